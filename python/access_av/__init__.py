@@ -1,1 +1,1 @@
-"""ACCESS-AV."""
+"""Localization of factory vehicles from 5G synchronization signal blocks (SSBs)."""

@@ -1,0 +1,51 @@
+# ACCESS-AV: what a person types. `make help` lists it.
+PYTHON ?= python3
+BIN := .venv/bin
+SOURCES := $(shell find crates scenarios platforms -type f 2>/dev/null) Cargo.toml Cargo.lock pyproject.toml
+
+.DEFAULT_GOAL := help
+.PHONY: help demo test lint lint-python bench clean
+
+help: ## List these commands
+	@sed -n 's/^\([a-z-]*\):.*## /  make \1\t/p' $(MAKEFILE_LIST) | expand -t 20
+
+demo: .venv/installed ## Install into .venv, run the paper's whole evaluation, write results/latest/report.html
+	$(BIN)/access-av evaluate
+
+test: .venv/installed-test ## Run every test: Rust, static checks of the Python side, pytest
+	cargo test --workspace --quiet
+	$(MAKE) --no-print-directory lint-python
+	$(BIN)/python -m pytest
+
+lint: lint-python ## Check formatting and lints of both languages
+	cargo fmt --all --check
+	cargo clippy --workspace --all-targets -- -D warnings
+
+lint-python: .venv/installed-test
+	$(BIN)/ruff check
+	$(BIN)/ruff format --check
+	$(BIN)/mypy
+	$(BIN)/stubtest access_av._core
+
+bench: .venv/installed-bench ## Compare the estimators with their peers; time the evaluation and how it scales
+	$(BIN)/python benches/aoa_peers.py
+	$(BIN)/python benches/evaluation.py
+
+clean: ## Remove what was built (results stay)
+	rm -rf .venv target python/access_av/*.so
+
+.venv/bin/python:
+	$(PYTHON) -m venv .venv
+	$(BIN)/python -m pip install --quiet --upgrade pip
+
+.venv/installed: .venv/bin/python $(SOURCES)
+	$(BIN)/python -m pip install --quiet --editable .
+	@touch $@
+
+.venv/installed-test: .venv/installed
+	$(BIN)/python -m pip install --quiet --editable '.[test]'
+	@touch $@
+
+.venv/installed-bench: .venv/installed
+	$(BIN)/python -m pip install --quiet --editable '.[bench]'
+	@touch $@
