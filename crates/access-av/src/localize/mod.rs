@@ -1,0 +1,85 @@
+//! From odometry and angles to a pose.
+
+use crate::geometry::Pose;
+
+/// What odometry says happened since the step before.
+#[derive(Debug, Clone, Copy, PartialEq)]
+pub struct OdometryStep {
+    /// End of the step in seconds.
+    pub time_s: f64,
+    /// Its duration in seconds.
+    pub duration_s: f64,
+    /// Distance driven in it, in metres.
+    pub distance_m: f64,
+    /// Turn in it by the gyroscope, in radians counter-clockwise, where there is one.
+    pub turn_rad: Option<f64>,
+}
+
+/// An angle of arrival as a localizer takes it.
+#[derive(Debug, Clone, Copy, PartialEq)]
+pub struct AngleMeasurement {
+    /// Time in seconds.
+    pub time_s: f64,
+    /// Electrical angle ω = 2π(d/λ)·cos θ between neighbouring antennas, in radians.
+    pub phase_rad: f64,
+    /// Its standard deviation from noise, in radians.
+    pub phase_sigma_rad: f64,
+    /// Angle of arrival θ from the array's axis, in radians, 0..=π.
+    pub angle_rad: f64,
+    /// SNR per antenna and snapshot, in dB.
+    pub snr_db: f64,
+}
+
+/// Where a localizer believes the vehicle to be.
+#[derive(Debug, Clone, Copy, PartialEq)]
+pub struct PoseEstimate {
+    /// Time in seconds.
+    pub time_s: f64,
+    /// Place and heading.
+    pub pose: Pose,
+    /// Covariance of (x, y, heading), row-major, in m² , m·rad and rad²; `None` where the
+    /// localizer does not know its own error.
+    pub covariance: Option<[[f64; 3]; 3]>,
+}
+
+/// What a localizer did with an angle.
+#[derive(Debug, Clone, Copy, PartialEq)]
+pub struct UpdateVerdict {
+    /// Whether the angle changed the pose.
+    pub accepted: bool,
+    /// Why, or why not.
+    pub reason: UpdateReason,
+    /// Squared Mahalanobis distance of the innovation, where the localizer has a covariance.
+    pub mahalanobis_squared: Option<f64>,
+    /// The largest it may be.
+    pub threshold: Option<f64>,
+}
+
+/// Why an angle was taken or left.
+#[derive(Debug, Clone, Copy, PartialEq, Eq)]
+#[non_exhaustive]
+pub enum UpdateReason {
+    /// It agrees with the prediction, or there is none to compare it with.
+    Consistent,
+    /// It lies too far from the prediction.
+    Outlier,
+    /// It carries no angle: no number, or no resolved source.
+    Unusable,
+    /// No radio head with this PCI and SSB index is on the map.
+    UnknownRadioHead,
+    /// Its time is before the last one's.
+    TimeReversed,
+}
+
+impl UpdateReason {
+    /// Short name for logs and tables.
+    pub const fn name(self) -> &'static str {
+        match self {
+            Self::Consistent => "consistent",
+            Self::Outlier => "outlier",
+            Self::Unusable => "unusable",
+            Self::UnknownRadioHead => "unknown radio head",
+            Self::TimeReversed => "time reversed",
+        }
+    }
+}

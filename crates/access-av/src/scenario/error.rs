@@ -1,0 +1,96 @@
+//! What can be wrong with a scenario or platform file, said so that it can be put right.
+
+use std::io;
+
+use thiserror::Error;
+
+/// An unusable scenario or platform. `file` is the path, or the origin the caller named.
+#[derive(Debug, Error)]
+pub enum ScenarioError {
+    /// The file cannot be read.
+    #[error("{file}: {source}")]
+    Read {
+        /// The file.
+        file: String,
+        /// Why not.
+        source: io::Error,
+    },
+    /// Neither a shipped name nor a file.
+    #[error("no {what} `{name}`: neither a file nor one of {}{}", quoted(known), suggestion(nearest.as_deref()))]
+    UnknownName {
+        /// "scenario" or "platform".
+        what: &'static str,
+        /// What was asked for.
+        name: String,
+        /// The shipped ones.
+        known: Vec<String>,
+        /// The shipped one that looks most like it.
+        nearest: Option<String>,
+    },
+    /// Not TOML.
+    #[error("{file}: not valid TOML: {message}")]
+    Syntax {
+        /// The file.
+        file: String,
+        /// The parser's message, with line and column.
+        message: String,
+    },
+    /// A key the schema does not have.
+    #[error("{file}: unknown key `{key}`; allowed here: {}{}", quoted(allowed), suggestion(nearest.as_deref()))]
+    UnknownKey {
+        /// The file.
+        file: String,
+        /// Path of the key.
+        key: String,
+        /// The keys allowed in its place.
+        allowed: Vec<String>,
+        /// The allowed key that looks most like it.
+        nearest: Option<String>,
+    },
+    /// A missing key, or a value of the wrong type.
+    #[error("{file}: `{key}`: {message}")]
+    Shape {
+        /// The file.
+        file: String,
+        /// Path of the key, or of the table it is missing from.
+        key: String,
+        /// What was found and what is expected.
+        message: String,
+    },
+    /// A value out of range, or one that contradicts another.
+    #[error("{file}: `{key}` is {value}; {allowed}")]
+    Value {
+        /// The file.
+        file: String,
+        /// Path of the key.
+        key: String,
+        /// Its value.
+        value: String,
+        /// What is allowed.
+        allowed: String,
+    },
+}
+
+fn quoted(names: &[String]) -> String {
+    names
+        .iter()
+        .map(|name| format!("`{name}`"))
+        .collect::<Vec<_>>()
+        .join(", ")
+}
+
+fn suggestion(nearest: Option<&str>) -> String {
+    nearest
+        .map(|name| format!(" (did you mean `{name}`?)"))
+        .unwrap_or_default()
+}
+
+/// The name that looks most like `name`, if any does.
+pub(crate) fn nearest<'a>(name: &str, known: impl IntoIterator<Item = &'a str>) -> Option<String> {
+    known
+        .into_iter()
+        .map(|candidate| (strsim::jaro_winkler(name, candidate), candidate))
+        .filter(|(likeness, _)| *likeness > 0.75)
+        .max_by(|a, b| a.0.total_cmp(&b.0))
+        .map(|(_, candidate)| candidate.to_owned())
+}

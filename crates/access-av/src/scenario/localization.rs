@@ -1,0 +1,119 @@
+//! Odometer, initial pose, angle estimator and localizer.
+
+use schemars::JsonSchema;
+use serde::{Deserialize, Serialize};
+
+/// `[odometer]`
+#[derive(Debug, Clone, Copy, PartialEq, Serialize, Deserialize, JsonSchema)]
+#[serde(default, deny_unknown_fields)]
+pub struct OdometerSettings {
+    /// Samples per second.
+    pub rate_hz: f64,
+    /// Standard deviation of the scale error, drawn once per run (0.003 is 0.3 %).
+    pub scale_error_std: f64,
+    /// Standard deviation of the distance after one metre, growing with the root of distance.
+    pub noise_m_per_sqrt_m: f64,
+    /// Probability that a sample is lost.
+    pub dropout_probability: f64,
+    /// A gyroscope, where the vehicle has one.
+    #[serde(skip_serializing_if = "Option::is_none")]
+    pub gyro: Option<GyroSettings>,
+}
+
+/// `[odometer.gyro]`
+#[derive(Debug, Clone, Copy, PartialEq, Default, Serialize, Deserialize, JsonSchema)]
+#[serde(default, deny_unknown_fields)]
+pub struct GyroSettings {
+    /// Angle random walk in rad/√s.
+    pub noise_rad_per_sqrt_s: f64,
+    /// Standard deviation of the constant bias in rad/s, drawn once per run.
+    pub bias_std_radps: f64,
+}
+
+impl Default for OdometerSettings {
+    fn default() -> Self {
+        Self {
+            rate_hz: 50.0,
+            scale_error_std: 0.0,
+            noise_m_per_sqrt_m: 0.0,
+            dropout_probability: 0.0,
+            gyro: None,
+        }
+    }
+}
+
+/// `[start]`: how well the initial pose is known; all zero in the paper.
+#[derive(Debug, Clone, Copy, PartialEq, Default, Serialize, Deserialize, JsonSchema)]
+#[serde(default, deny_unknown_fields)]
+pub struct StartSettings {
+    /// Standard deviation in each of x and y, in metres.
+    pub position_std_m: f64,
+    /// Standard deviation of the heading in radians.
+    pub heading_std_rad: f64,
+}
+
+/// `[estimator]`
+#[derive(Debug, Clone, Copy, PartialEq, Eq, Default, Serialize, Deserialize, JsonSchema)]
+#[serde(default, deny_unknown_fields)]
+pub struct EstimatorSettings {
+    /// The method.
+    pub method: EstimatorMethod,
+}
+
+/// How an angle of arrival is estimated from a covariance.
+#[derive(
+    Debug,
+    Clone,
+    Copy,
+    PartialEq,
+    Eq,
+    Hash,
+    PartialOrd,
+    Ord,
+    Default,
+    Serialize,
+    Deserialize,
+    JsonSchema,
+)]
+#[serde(rename_all = "kebab-case")]
+pub enum EstimatorMethod {
+    /// Multiple signal classification, refined off the grid.
+    #[default]
+    Music,
+    /// Its polynomial form.
+    RootMusic,
+    /// Estimation of signal parameters by rotational invariance.
+    Esprit,
+    /// One-source maximum likelihood.
+    MaximumLikelihood,
+}
+
+/// `[localizer]`
+#[derive(Debug, Clone, Copy, PartialEq, Serialize, Deserialize, JsonSchema)]
+#[serde(tag = "kind", rename_all = "kebab-case")]
+pub enum LocalizerSettings {
+    /// The paper's: each angle becomes a heading, distances are added up along it.
+    DeadReckoning,
+    /// The filter of `localize/tracker.rs`.
+    Tracker(TrackerSettings),
+}
+
+impl Default for LocalizerSettings {
+    fn default() -> Self {
+        Self::DeadReckoning
+    }
+}
+
+/// Settings of the tracker.
+#[derive(Debug, Clone, Copy, PartialEq, Serialize, Deserialize, JsonSchema)]
+#[serde(default, deny_unknown_fields)]
+pub struct TrackerSettings {
+    /// Whether the road's course is known to it.
+    pub map: bool,
+}
+
+impl Default for TrackerSettings {
+    fn default() -> Self {
+        Self { map: true }
+    }
+}

@@ -1,0 +1,127 @@
+//! When an angle is estimated.
+
+use schemars::JsonSchema;
+use serde::{Deserialize, Serialize};
+
+/// `[wake_up]`
+#[derive(Debug, Clone, Copy, PartialEq, Serialize, Deserialize, JsonSchema)]
+#[serde(tag = "policy", rename_all = "kebab-case")]
+pub enum WakeUpSettings {
+    /// At a fixed interval.
+    Fixed(FixedSettings),
+    /// The paper's Algorithm 1.
+    Pid(PidSettings),
+    /// As late as the error bound allows.
+    Uncertainty(UncertaintySettings),
+}
+
+impl Default for WakeUpSettings {
+    fn default() -> Self {
+        Self::Fixed(FixedSettings::default())
+    }
+}
+
+/// `policy = "fixed"`
+#[derive(Debug, Clone, Copy, PartialEq, Default, Serialize, Deserialize, JsonSchema)]
+#[serde(default, deny_unknown_fields)]
+pub struct FixedSettings {
+    /// Interval in ms; without it, the base wake-up time of the platform's mode.
+    #[serde(skip_serializing_if = "Option::is_none")]
+    pub interval_ms: Option<f64>,
+}
+
+/// `policy = "pid"`: Algorithm 1 and the choices it leaves open.
+#[derive(Debug, Clone, Copy, PartialEq, Serialize, Deserialize, JsonSchema)]
+#[serde(default, deny_unknown_fields)]
+pub struct PidSettings {
+    /// Shortest wake-up time in ms; without it, the base wake-up time of the platform's mode.
+    #[serde(skip_serializing_if = "Option::is_none")]
+    pub base_ms: Option<f64>,
+    /// Longest wake-up time in ms.
+    pub t_max_ms: f64,
+    /// Proportional gain.
+    pub kp: f64,
+    /// Integral gain.
+    pub ki: f64,
+    /// Derivative gain.
+    pub kd: f64,
+    /// Weight of the SNR error.
+    pub weight_snr: f64,
+    /// Weight of the velocity error.
+    pub weight_velocity: f64,
+    /// The SNR at which the SNR error is zero.
+    pub snr_set_point: SnrSetPoint,
+    /// SNR shortfall that counts as an error of 1, in dB.
+    pub snr_scale_db: f64,
+    /// When the controller's inputs are sensed.
+    pub sensing: SensingMode,
+    /// Whether an estimate that is due waits for an SSB that is not below the set point.
+    pub deferral: bool,
+    /// Bound on the magnitude of the integral term's sum; 0 removes it.
+    pub integral_clamp: f64,
+}
+
+impl Default for PidSettings {
+    fn default() -> Self {
+        Self {
+            base_ms: None,
+            t_max_ms: 240.0,
+            kp: 0.75,
+            ki: 0.08,
+            kd: 0.195,
+            weight_snr: 0.6,
+            weight_velocity: 0.4,
+            snr_set_point: SnrSetPoint::Expected { offset_db: 3.0 },
+            snr_scale_db: 10.0,
+            sensing: SensingMode::EverySsb,
+            deferral: true,
+            integral_clamp: 0.5,
+        }
+    }
+}
+
+/// The SNR at which the SNR error is zero.
+#[derive(Debug, Clone, Copy, PartialEq, Serialize, Deserialize, JsonSchema)]
+#[serde(tag = "kind", rename_all = "kebab-case", deny_unknown_fields)]
+pub enum SnrSetPoint {
+    /// What the link budget promises at the estimated place, and so much more.
+    Expected {
+        /// Offset in dB.
+        offset_db: f64,
+    },
+    /// One value for the whole route.
+    Absolute {
+        /// SNR in dB.
+        snr_db: f64,
+    },
+}
+
+/// When the controller's inputs are sensed.
+#[derive(Debug, Clone, Copy, PartialEq, Eq, Default, Serialize, Deserialize, JsonSchema)]
+#[serde(rename_all = "kebab-case")]
+pub enum SensingMode {
+    /// At each SSB: the receiver listens always and estimates sometimes.
+    #[default]
+    EverySsb,
+    /// At wake-ups only: the receiver sleeps in between.
+    WakeUp,
+}
+
+/// `policy = "uncertainty"`
+#[derive(Debug, Clone, Copy, PartialEq, Serialize, Deserialize, JsonSchema)]
+#[serde(default, deny_unknown_fields)]
+pub struct UncertaintySettings {
+    /// Horizontal error to be kept, in metres.
+    pub bound_m: f64,
+    /// Probability with which it is kept.
+    pub confidence: f64,
+}
+
+impl Default for UncertaintySettings {
+    fn default() -> Self {
+        Self {
+            bound_m: 0.5,
+            confidence: 0.95,
+        }
+    }
+}
