@@ -51,11 +51,13 @@ pub struct Pose {
 
 impl Pose {
     /// The place without the heading.
+    #[must_use]
     pub const fn point(self) -> Point {
         Point::new(self.x_m, self.y_m)
     }
 
     /// The pose after `length_m` along an arc of constant `curvature_per_m` (left is positive).
+    #[must_use]
     pub fn along_arc(self, length_m: f64, curvature_per_m: f64) -> Self {
         // The chord of an arc points along its mean heading and is sinc(turn/2) times as long.
         let half_turn = 0.5 * length_m * curvature_per_m;
@@ -73,6 +75,7 @@ impl Pose {
     }
 
     /// The pose moved `lateral_m` to the left of its heading.
+    #[must_use]
     pub fn offset_left(self, lateral_m: f64) -> Self {
         let (sin, cos) = self.heading_rad.sin_cos();
         Self {

@@ -91,18 +91,15 @@ pub enum EstimatorMethod {
 /// `[localizer]`
 #[derive(Debug, Clone, Copy, PartialEq, Serialize, Deserialize, JsonSchema)]
 #[serde(tag = "kind", rename_all = "kebab-case")]
+#[derive(Default)]
 pub enum LocalizerSettings {
     /// The paper's: each angle becomes a heading, distances are added up along it.
+    #[default]
     DeadReckoning,
     /// The filter of `localize/tracker.rs`.
     Tracker(TrackerSettings),
 }
 
-impl Default for LocalizerSettings {
-    fn default() -> Self {
-        Self::DeadReckoning
-    }
-}
 
 /// Settings of the tracker.
 #[derive(Debug, Clone, Copy, PartialEq, Serialize, Deserialize, JsonSchema)]
