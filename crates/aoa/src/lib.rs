@@ -1,1 +1,29 @@
-//! Placeholder crate page.
+//! Angle of arrival with uniform linear arrays.
+mod array;
+pub mod bound;
+mod calibration;
+mod covariance;
+mod eigen;
+mod error;
+mod esprit;
+mod estimate;
+mod linear;
+mod list;
+mod maximum_likelihood;
+mod music;
+mod pilots;
+mod root_music;
+mod source_count;
+mod spectrum;
+
+pub use array::Array;
+pub use calibration::Calibration;
+pub use covariance::{Covariance, Matrix};
+pub use error::Error;
+pub use estimate::{
+    AngleEstimate, AngleEstimates, Method, Reason, Verdict, estimate, estimate_several,
+};
+pub use list::List;
+pub use num_complex::Complex64;
+pub use pilots::maximum_likelihood_pilots;
+pub use source_count::{Criterion, source_count};

@@ -1,0 +1,187 @@
+//! Cramér–Rao bounds: the standard deviation that no unbiased estimator can beat.
+//!
+//! All bounds are for white noise; SNRs are linear, per antenna and snapshot. Electrical angles come
+//! first; [`angle_sigma_rad`] carries a bound over to the angle.
+
+use crate::array::{aperture, steering_vector};
+use crate::covariance::{Matrix, zeros};
+use crate::linear::{adjoint, inverse, product};
+use crate::list::List;
+use crate::{Array, Complex64, Error};
+
+/// One Gaussian source, unknown power: standard deviation of the electrical angle in rad,
+/// `sqrt((1 + 1 / (N snr)) / (2 L snr A))` with `A = N (N^2 - 1) / 12` (Stoica and Nehorai 1990,
+/// the stochastic bound). Maximum likelihood, MUSIC and Root-MUSIC attain it.
+pub fn stochastic<const N: usize>(snr: f64, snapshots: usize) -> f64 {
+    ((1.0 + 1.0 / (N as f64 * snr)) / (2.0 * snapshots as f64 * snr * aperture::<N>())).sqrt()
+}
+
+/// One source with an unknown, non-random waveform: `sqrt(1 / (2 L snr A))` (Stoica and Nehorai
+/// 1989, the deterministic bound). Below about 0 dB no estimator attains it with few snapshots.
+pub fn deterministic<const N: usize>(snr: f64, snapshots: usize) -> f64 {
+    (2.0 * snapshots as f64 * snr * aperture::<N>())
+        .sqrt()
+        .recip()
+}
+
+/// One source whose waveform is known up to a complex gain (pilots): `sqrt(1 / (2 SNR A))`,
+/// `SNR` being the sum over all known samples, i.e. the SNR per antenna after despreading.
+pub fn known_signal<const N: usize>(total_snr: f64) -> f64 {
+    (2.0 * total_snr * aperture::<N>()).sqrt().recip()
+}
+
+/// A bound on the angle from a bound on the electrical angle:
+/// `sigma_theta = sigma_omega / (2 pi (d / lambda) sin(theta))`. It diverges at end-fire.
+pub fn angle_sigma_rad<const N: usize>(
+    phase_sigma_rad: f64,
+    angle_rad: f64,
+    array: &Array<N>,
+) -> f64 {
+    phase_sigma_rad / (array.phase_at_end_fire_rad() * angle_rad.sin())
+}
+
+/// Estimates with a larger [`outlier_probability`] are called unresolved.
+pub(crate) const OUTLIERS: f64 = 0.01;
+
+/// Chernoff bound on the probability that noise in one of the N - 1 directions orthogonal to a
+/// source outweighs it: `(N - 1) (4 r / (1 + r)^2)^L`, `r = 1 + N snr` being the ratio of the two
+/// mean powers. Where it grows, estimators leave the Cramér–Rao bound (the threshold region).
+pub(crate) fn outlier_probability<const N: usize>(snr: f64, snapshots: usize) -> f64 {
+    let ratio = 1.0 + N as f64 * snr;
+    let overlap = 4.0 * ratio / ((1.0 + ratio) * (1.0 + ratio));
+    (N - 1) as f64 * overlap.powf(snapshots as f64)
+}
+
+/// Several uncorrelated Gaussian sources: standard deviation of each electrical angle in rad, from
+/// `C^-1 = 2 L Re[(D^H P D) * (S A^H R^-1 A S)^T]` (Stoica and Nehorai 1990), `P` projecting on the
+/// complement of the steering vectors `A`, `D` their derivatives, `S` the diagonal of the SNRs.
+///
+/// # Errors
+/// [`Error::TooManySources`] for none or more than N - 1, [`Error::NotPositive`] for an SNR or
+/// snapshot count that is not positive, [`Error::Singular`] for coinciding angles.
+pub fn stochastic_several<const N: usize>(
+    phases_rad: &[f64],
+    snrs: &[f64],
+    snapshots: usize,
+) -> Result<List<f64, N>, Error> {
+    let powers = checked_powers::<N>(phases_rad, snrs, snapshots)?;
+    stochastic_of(phases_rad, &powers, 1.0, snapshots)
+}
+
+/// Several uncorrelated sources with unknown, non-random waveforms: as [`stochastic_several`] with
+/// `S` in place of `S A^H R^-1 A S` (Stoica and Nehorai 1989).
+///
+/// # Errors
+/// As [`stochastic_several`].
+pub fn deterministic_several<const N: usize>(
+    phases_rad: &[f64],
+    snrs: &[f64],
+    snapshots: usize,
+) -> Result<List<f64, N>, Error> {
+    let powers = checked_powers::<N>(phases_rad, snrs, snapshots)?;
+    from_information(phases_rad, &powers, 1.0, snapshots)
+}
+
+fn checked_powers<const N: usize>(
+    phases_rad: &[f64],
+    snrs: &[f64],
+    snapshots: usize,
+) -> Result<Matrix<N>, Error> {
+    let sources = phases_rad.len();
+    if sources == 0 || sources >= N || snrs.len() != sources {
+        return Err(Error::TooManySources {
+            requested: sources.max(snrs.len()),
+            maximum: N - 1,
+        });
+    }
+    if snapshots == 0 {
+        return Err(Error::NoSnapshots);
+    }
+    if phases_rad.iter().any(|phase| !phase.is_finite()) {
+        return Err(Error::NotFinite);
+    }
+    let mut powers = zeros::<N>();
+    for (i, &snr) in snrs.iter().enumerate() {
+        if !(snr.is_finite() && snr > 0.0) {
+            return Err(Error::NotPositive {
+                name: "snr",
+                value: snr,
+            });
+        }
+        powers[i][i] = Complex64::from(snr);
+    }
+    Ok(powers)
+}
+
+/// Steering vectors as the columns of a matrix.
+pub(crate) fn steering_matrix<const N: usize>(phases_rad: &[f64]) -> Matrix<N> {
+    let mut columns = zeros::<N>();
+    for (k, &phase) in phases_rad.iter().enumerate() {
+        for (n, element) in steering_vector::<N>(phase).into_iter().enumerate() {
+            columns[n][k] = element;
+        }
+    }
+    columns
+}
+
+/// The stochastic bound for any source covariance.
+pub(crate) fn stochastic_of<const N: usize>(
+    phases_rad: &[f64],
+    source_covariance: &Matrix<N>,
+    noise_variance: f64,
+    snapshots: usize,
+) -> Result<List<f64, N>, Error> {
+    let sources = phases_rad.len();
+    let steering = steering_matrix::<N>(phases_rad);
+    // A S, N by K.
+    let mixed = product(&steering, source_covariance, [N, sources, sources]);
+    let mut covariance = product(&mixed, &adjoint(&steering), [N, sources, N]);
+    for (n, row) in covariance.iter_mut().enumerate() {
+        row[n] += noise_variance;
+    }
+    let inverse = inverse(covariance, N).ok_or(Error::Singular)?;
+    let right = product(&inverse, &mixed, [N, N, sources]);
+    let effective = product(&adjoint(&mixed), &right, [sources, N, sources]);
+    from_information(phases_rad, &effective, noise_variance, snapshots)
+}
+
+/// `C^-1 = (2 L / sigma^2) Re[(D^H P D) * G^T]`.
+fn from_information<const N: usize>(
+    phases_rad: &[f64],
+    effective: &Matrix<N>,
+    noise_variance: f64,
+    snapshots: usize,
+) -> Result<List<f64, N>, Error> {
+    let sources = phases_rad.len();
+    let steering = steering_matrix::<N>(phases_rad);
+    let mut derivative = steering;
+    for (n, row) in derivative.iter_mut().enumerate() {
+        for element in row {
+            *element *= Complex64::new(0.0, n as f64);
+        }
+    }
+    let [a_h, d_h] = [adjoint(&steering), adjoint(&derivative)];
+    let gram = product(&a_h, &steering, [sources, N, sources]);
+    let gram_inverse = inverse(gram, sources).ok_or(Error::Singular)?;
+    let overlap = product(&a_h, &derivative, [sources, N, sources]);
+    let projected = product(&gram_inverse, &overlap, [sources; 3]);
+    let removed = product(&adjoint(&overlap), &projected, [sources; 3]);
+    let total = product(&d_h, &derivative, [sources, N, sources]);
+    let scale = 2.0 * snapshots as f64 / noise_variance;
+    let mut information = zeros::<N>();
+    for i in 0..sources {
+        for j in 0..sources {
+            let value = ((total[i][j] - removed[i][j]) * effective[j][i]).re * scale;
+            information[i][j] = Complex64::from(value);
+        }
+    }
+    let variances = inverse(information, sources).ok_or(Error::Singular)?;
+    let determined = (0..sources).all(|k| variances[k][k].re > 0.0);
+    if !determined {
+        return Err(Error::Singular);
+    }
+    Ok(List::collect(
+        0.0,
+        (0..sources).map(|k| variances[k][k].re.sqrt()),
+    ))
+}

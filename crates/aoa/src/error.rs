@@ -1,0 +1,50 @@
+//! What can be wrong with the input of an estimator.
+
+/// Why no estimate could be formed. Every variant is a fault of the input; an estimate that was
+/// formed but should not be trusted carries [`Verdict::Unresolved`](crate::Verdict) instead.
+#[derive(Debug, Clone, Copy, PartialEq, thiserror::Error)]
+pub enum Error {
+    /// A sample, a weight or a matrix entry is NaN or infinite (or its power overflows).
+    #[error("samples must be finite: found NaN, infinity, or a power beyond the range of f64")]
+    NotFinite,
+    /// All samples are zero: there is no direction in silence.
+    #[error("samples must not all be zero")]
+    Zero,
+    /// No snapshots at all.
+    #[error("at least one snapshot is needed")]
+    NoSnapshots,
+    /// More sources than the method can resolve with this array.
+    #[error("{requested} sources asked for, allowed are 1 to {maximum} with this array and method")]
+    TooManySources {
+        /// The number of sources asked for.
+        requested: usize,
+        /// The largest number allowed: one less than the antennas, or 1 for maximum likelihood.
+        maximum: usize,
+    },
+    /// The element spacing is not a positive finite number of wavelengths.
+    #[error("spacing must be a positive number of wavelengths, not {0}")]
+    Spacing(f64),
+    /// The grid step of MUSIC is outside what makes sense.
+    #[error("grid_deg must be between 0.001 and 10 degrees, not {0}")]
+    Grid(f64),
+    /// An angle from the array's axis is outside 0 to pi, or not finite.
+    #[error("an angle from the array's axis lies between 0 and pi rad, not {0}")]
+    Angle(f64),
+    /// A calibration gain is zero, NaN or infinite.
+    #[error("calibration gain of channel {0} must be finite and not zero")]
+    CalibrationGain(usize),
+    /// A weight or a noise variance is negative, NaN or infinite.
+    #[error("{name} must be finite and positive, not {value}")]
+    NotPositive {
+        /// What is wrong.
+        name: &'static str,
+        /// Its value.
+        value: f64,
+    },
+    /// The matrix given as covariance is not Hermitian with a non-negative diagonal.
+    #[error("a covariance matrix must be Hermitian with a non-negative diagonal")]
+    NotHermitian,
+    /// The sources are so close or so coherent that the equations have no unique solution.
+    #[error("the sources cannot be told apart: the equations are singular")]
+    Singular,
+}

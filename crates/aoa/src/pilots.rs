@@ -1,0 +1,53 @@
+//! One source with known pilots: the entry for despread snapshots.
+
+use crate::estimate::{AngleEstimate, Reason, describe};
+use crate::maximum_likelihood;
+use crate::{Array, Complex64, Covariance, Error, bound};
+
+/// Maximum likelihood angle from despread pilots.
+///
+/// A block is one coherent piece of signal (an OFDM symbol): for each antenna the sum of its
+/// received samples times the conjugated pilots, divided by the root of the pilots' energy, so that
+/// the noise keeps the variance it has per sample. Blocks are summed non-coherently, hence neither
+/// carrier offset nor channel phase between blocks matters.
+///
+/// With `B` blocks and total SNR `g` after despreading (per antenna, all blocks), the standard
+/// deviation is the known-signal bound and what the unknown gain of each block costs at finite SNR:
+/// `sigma^2 = (1 + B / (N g)) / (2 g A)`, `A = N (N^2 - 1) / 12`.
+///
+/// `noise_variance` is per antenna and block; `None` estimates it from what does not fit the source.
+/// The estimate's `snr_db` is per antenna and block.
+///
+/// # Errors
+/// [`Error::NotPositive`] for a bad noise variance and those of [`Covariance::from_snapshots`].
+pub fn maximum_likelihood_pilots<const N: usize>(
+    blocks: &[[Complex64; N]],
+    noise_variance: Option<f64>,
+    array: &Array<N>,
+) -> Result<AngleEstimate, Error> {
+    let covariance = Covariance::from_snapshots(blocks)?
+        .calibrated(array)
+        .validated()?;
+    let phase_rad = maximum_likelihood::phase(&covariance);
+    let beam = maximum_likelihood::beam_power(&covariance, phase_rad);
+    let noise = match noise_variance {
+        Some(value) if value.is_finite() && value > 0.0 => value,
+        Some(value) => {
+            return Err(Error::NotPositive {
+                name: "noise_variance",
+                value,
+            });
+        }
+        None => maximum_likelihood::residual_power(&covariance, beam),
+    };
+    let snr = maximum_likelihood::snr::<N>(beam, noise);
+    let threshold = bound::outlier_probability::<N>(snr, blocks.len()) > bound::OUTLIERS;
+    let sigma = bound::stochastic::<N>(snr, blocks.len());
+    Ok(describe(
+        phase_rad,
+        sigma,
+        snr,
+        threshold.then_some(Reason::ThresholdSnr),
+        array,
+    ))
+}

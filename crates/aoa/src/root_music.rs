@@ -1,0 +1,93 @@
+//! Root-MUSIC (Barabell 1983; Rao and Hari 1989): the roots of the null spectrum instead of its
+//! minima.
+
+use crate::Complex64;
+use crate::list::List;
+use crate::spectrum::Spectrum;
+
+const ITERATIONS: usize = 60;
+
+/// Electrical angles of the `sources` roots nearest to the unit circle. `null` is the spectrum of the
+/// noise subspace.
+pub(crate) fn phases<const N: usize>(null: &Spectrum<N>, sources: usize) -> List<f64, N> {
+    let mut roots = inner_roots(null);
+    roots[..N - 1].sort_unstable_by(|a, b| b.norm_sqr().total_cmp(&a.norm_sqr()));
+    List::collect(
+        0.0,
+        roots[..sources].iter().map(|root| settled(null, *root)),
+    )
+}
+
+/// The phase of a root. A root on the circle is double, and rounding moves it along the circle by
+/// the square root of eps; but there the spectrum has a zero, and its minimum is well determined.
+fn settled<const N: usize>(null: &Spectrum<N>, root: Complex64) -> f64 {
+    let phase = root.arg();
+    if root.norm_sqr() > 1.0 - 1e-4 {
+        let minimum = null.negated().refined_maximum(phase, 1e-3);
+        if null.value(minimum) < null.lags[0].re * 1e-12 {
+            return minimum;
+        }
+    }
+    phase
+}
+
+/// The N - 1 roots inside (or on) the unit circle of
+/// `P(z) = z^(N-1) sum_k (c_k z^-k + conj(c_k) z^k)`; the others are their mirror images
+/// `1 / conj(z)`.
+///
+/// Ehrlich–Aberth iteration on the inner roots alone, the mirror images taking part in the
+/// repulsion.
+fn inner_roots<const N: usize>(null: &Spectrum<N>) -> [Complex64; N] {
+    let degree = N - 1;
+    let mut roots = [Complex64::ZERO; N];
+    // A start without symmetry, so that no two roots can stay together.
+    for (i, root) in roots[..degree].iter_mut().enumerate() {
+        *root = Complex64::from_polar(0.7, 0.4 + std::f64::consts::TAU * i as f64 / degree as f64);
+    }
+    for _ in 0..ITERATIONS {
+        let mut moved: f64 = 0.0;
+        for i in 0..degree {
+            let z = roots[i];
+            let (value, slope) = evaluate(null, z);
+            if value.norm_sqr() == 0.0 {
+                continue;
+            }
+            let mut repulsion = Complex64::ZERO;
+            for (j, other) in roots[..degree].iter().enumerate() {
+                if j != i && *other != z {
+                    repulsion += (z - other).inv();
+                }
+                let mirror = z * other.conj() - 1.0;
+                if mirror != Complex64::ZERO {
+                    repulsion += other.conj() / mirror;
+                }
+            }
+            // Newton's step is value / slope; written so that a zero slope does no harm.
+            let step = value / (slope - value * repulsion);
+            if step.is_finite() {
+                let mut next = z - step;
+                if next.norm_sqr() > 1.0 {
+                    next = next.conj().inv();
+                }
+                roots[i] = next;
+                moved = moved.max(step.norm_sqr());
+            }
+        }
+        if moved < 1e-28 {
+            break;
+        }
+    }
+    roots
+}
+
+/// P(z) and P'(z) by Horner's scheme, coefficients from the highest power down:
+/// `conj(c_(N-1)), ..., conj(c_1), c_0, c_1, ..., c_(N-1)`.
+fn evaluate<const N: usize>(null: &Spectrum<N>, z: Complex64) -> (Complex64, Complex64) {
+    let (mut value, mut slope) = (Complex64::ZERO, Complex64::ZERO);
+    let mirrored = null.lags.iter().rev().map(Complex64::conj);
+    for coefficient in mirrored.chain(null.lags.iter().skip(1).copied()) {
+        slope = slope * z + value;
+        value = value * z + coefficient;
+    }
+    (value, slope)
+}
