@@ -8,8 +8,19 @@
 //! right-handed, headings run counter-clockwise from +x. Angles of arrival are measured from the
 //! vehicle's forward axis.
 
+pub mod channel;
+pub mod energy;
+pub mod estimator;
 pub mod geometry;
 pub mod localize;
 pub mod observation;
+pub mod onboard;
+pub mod platform;
+pub mod random;
 pub mod scenario;
+pub mod simulate;
+pub mod wake_up;
 pub mod world;
+
+/// Whatever a user's own code fails with.
+pub type BoxError = Box<dyn std::error::Error + Send + Sync>;

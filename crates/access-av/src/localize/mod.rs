@@ -1,6 +1,41 @@
 //! From odometry and angles to a pose.
 
+mod dead_reckoning;
+
+pub use dead_reckoning::DeadReckoning;
+
 use crate::geometry::Pose;
+use crate::world::RadioHead;
+
+/// The localizer a scenario chooses.
+#[derive(Debug, Clone)]
+pub enum Localizer {
+    /// The paper's.
+    DeadReckoning(DeadReckoning),
+}
+
+impl Localizer {
+    /// Moves on by what odometry says.
+    pub fn predict(&mut self, step: &OdometryStep) {
+        match self {
+            Self::DeadReckoning(localizer) => localizer.predict(step),
+        }
+    }
+
+    /// Takes in an angle to a radio head.
+    pub fn update(&mut self, head: &RadioHead, measured: &AngleMeasurement) -> UpdateVerdict {
+        match self {
+            Self::DeadReckoning(localizer) => localizer.update(head, measured),
+        }
+    }
+
+    /// Where it believes the vehicle to be.
+    pub fn pose(&self) -> PoseEstimate {
+        match self {
+            Self::DeadReckoning(localizer) => localizer.pose(),
+        }
+    }
+}
 
 /// What odometry says happened since the step before.
 #[derive(Debug, Clone, Copy, PartialEq)]
@@ -28,6 +63,8 @@ pub struct AngleMeasurement {
     pub angle_rad: f64,
     /// SNR per antenna and snapshot, in dB.
     pub snr_db: f64,
+    /// Whether the estimator vouches for it: that it is Gaussian with this standard deviation.
+    pub resolved: bool,
 }
 
 /// Where a localizer believes the vehicle to be.

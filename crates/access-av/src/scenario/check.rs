@@ -2,7 +2,10 @@
 
 use std::fmt::Display;
 
-use super::{PidSettings, Scenario, ScenarioError, SnrSetPoint, TrackSettings, WakeUpSettings};
+use super::{
+    EstimatorMethod, PidSettings, Pilots, Scenario, ScenarioError, SnrSetPoint, TrackSettings,
+    WakeUpSettings,
+};
 use crate::geometry::Point;
 use crate::observation::{ANTENNAS, MAX_SNAPSHOTS};
 use crate::world::{Segment, Track, TrackError};
@@ -208,6 +211,15 @@ impl Scenario {
     }
 
     fn check_vehicle(&self, check: &Check<'_>) -> Result<(), ScenarioError> {
+        let estimator = &self.estimator;
+        check.between("estimator.grid_deg", estimator.grid_deg, 0.001, 10.0)?;
+        check.that(
+            self.receiver.pilots == Pilots::Blind
+                || estimator.method == EstimatorMethod::MaximumLikelihood,
+            "estimator.method",
+            estimator.method,
+            "with known pilots (receiver.pilots) it must be maximum-likelihood",
+        )?;
         let odometer = &self.odometer;
         check.between("odometer.rate_hz", odometer.rate_hz, 1.0, 1000.0)?;
         check.not_negative("odometer.scale_error_std", odometer.scale_error_std)?;
@@ -235,10 +247,6 @@ impl Scenario {
                 check.positive("wake_up.interval_ms", interval_ms)
             }),
             WakeUpSettings::Pid(pid) => pid.check(check),
-            WakeUpSettings::Uncertainty(settings) => {
-                check.positive("wake_up.bound_m", settings.bound_m)?;
-                check.between("wake_up.confidence", settings.confidence, 0.5, 0.999_999)
-            }
         }
     }
 }

@@ -71,6 +71,22 @@ pub enum ScenarioError {
     },
 }
 
+impl ScenarioError {
+    /// The error for a name that is neither a file nor one of the shipped.
+    pub(crate) fn unknown_name<'a>(
+        what: &'static str,
+        name: &str,
+        known: impl Iterator<Item = &'a str> + Clone,
+    ) -> Self {
+        Self::UnknownName {
+            what,
+            name: name.to_owned(),
+            nearest: nearest(name, known.clone()),
+            known: known.map(str::to_owned).collect(),
+        }
+    }
+}
+
 fn quoted(names: &[String]) -> String {
     names
         .iter()

@@ -1,5 +1,7 @@
 //! Odometer, initial pose, angle estimator and localizer.
 
+use std::fmt;
+
 use schemars::JsonSchema;
 use serde::{Deserialize, Serialize};
 
@@ -53,11 +55,33 @@ pub struct StartSettings {
 }
 
 /// `[estimator]`
-#[derive(Debug, Clone, Copy, PartialEq, Eq, Default, Serialize, Deserialize, JsonSchema)]
+#[derive(Debug, Clone, Copy, PartialEq, Serialize, Deserialize, JsonSchema)]
 #[serde(default, deny_unknown_fields)]
 pub struct EstimatorSettings {
     /// The method.
     pub method: EstimatorMethod,
+    /// Grid of MUSIC in degrees, from which it is refined.
+    pub grid_deg: f64,
+}
+
+impl Default for EstimatorSettings {
+    fn default() -> Self {
+        Self {
+            method: EstimatorMethod::Music,
+            grid_deg: 1.0,
+        }
+    }
+}
+
+impl fmt::Display for EstimatorMethod {
+    fn fmt(&self, f: &mut fmt::Formatter<'_>) -> fmt::Result {
+        f.write_str(match self {
+            Self::Music => "music",
+            Self::RootMusic => "root-music",
+            Self::Esprit => "esprit",
+            Self::MaximumLikelihood => "maximum-likelihood",
+        })
+    }
 }
 
 /// How an angle of arrival is estimated from a covariance.
@@ -96,21 +120,4 @@ pub enum LocalizerSettings {
     /// The paper's: each angle becomes a heading, distances are added up along it.
     #[default]
     DeadReckoning,
-    /// The filter of `localize/tracker.rs`.
-    Tracker(TrackerSettings),
-}
-
-
-/// Settings of the tracker.
-#[derive(Debug, Clone, Copy, PartialEq, Serialize, Deserialize, JsonSchema)]
-#[serde(default, deny_unknown_fields)]
-pub struct TrackerSettings {
-    /// Whether the road's course is known to it.
-    pub map: bool,
-}
-
-impl Default for TrackerSettings {
-    fn default() -> Self {
-        Self { map: true }
-    }
 }

@@ -9,7 +9,7 @@ mod check;
 mod error;
 mod localization;
 mod radio;
-mod read;
+pub(crate) mod read;
 mod road;
 mod shipped;
 mod track_file;
@@ -25,16 +25,15 @@ use toml::Value;
 use crate::world::Track;
 
 pub use channel::{ChannelSettings, ScatterModel};
+pub(crate) use check::Check;
 pub use error::ScenarioError;
 pub use localization::{
     EstimatorMethod, EstimatorSettings, GyroSettings, LocalizerSettings, OdometerSettings,
-    StartSettings, TrackerSettings,
+    StartSettings,
 };
 pub use radio::{ArraySettings, Pilots, RadioHeadSettings, ReceiverSettings, SsbSettings};
 pub use road::{MotionSettings, SegmentSettings, StopSettings, TrackSettings, WanderSettings};
-pub use wake_up::{
-    FixedSettings, PidSettings, SensingMode, SnrSetPoint, UncertaintySettings, WakeUpSettings,
-};
+pub use wake_up::{FixedSettings, PidSettings, SensingMode, SnrSetPoint, WakeUpSettings};
 
 /// Everything a simulated drive depends on, besides the seed.
 #[derive(Debug, Clone, PartialEq, Serialize, Deserialize, JsonSchema)]
@@ -117,7 +116,7 @@ impl Default for PlatformSettings {
 
 impl Scenario {
     /// Names of the shipped scenarios.
-    pub fn names() -> impl Iterator<Item = &'static str> {
+    pub fn names() -> impl Iterator<Item = &'static str> + Clone {
         shipped::SCENARIOS.iter().map(|(name, _)| *name)
     }
 
@@ -131,12 +130,11 @@ impl Scenario {
         }
         let path = Path::new(name_or_path);
         if !path.exists() {
-            return Err(ScenarioError::UnknownName {
-                what: "scenario",
-                name: name_or_path.to_owned(),
-                known: Self::names().map(str::to_owned).collect(),
-                nearest: error::nearest(name_or_path, Self::names()),
-            });
+            return Err(ScenarioError::unknown_name(
+                "scenario",
+                name_or_path,
+                Self::names(),
+            ));
         }
         let text = fs::read_to_string(path).map_err(|source| ScenarioError::Read {
             file: name_or_path.to_owned(),

@@ -11,8 +11,6 @@ pub enum WakeUpSettings {
     Fixed(FixedSettings),
     /// The paper's Algorithm 1.
     Pid(PidSettings),
-    /// As late as the error bound allows.
-    Uncertainty(UncertaintySettings),
 }
 
 impl Default for WakeUpSettings {
@@ -105,23 +103,4 @@ pub enum SensingMode {
     EverySsb,
     /// At wake-ups only: the receiver sleeps in between.
     WakeUp,
-}
-
-/// `policy = "uncertainty"`
-#[derive(Debug, Clone, Copy, PartialEq, Serialize, Deserialize, JsonSchema)]
-#[serde(default, deny_unknown_fields)]
-pub struct UncertaintySettings {
-    /// Horizontal error to be kept, in metres.
-    pub bound_m: f64,
-    /// Probability with which it is kept.
-    pub confidence: f64,
-}
-
-impl Default for UncertaintySettings {
-    fn default() -> Self {
-        Self {
-            bound_m: 0.5,
-            confidence: 0.95,
-        }
-    }
 }

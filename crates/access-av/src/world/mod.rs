@@ -1,7 +1,13 @@
 //! The truth: where the road runs, how the vehicle moves on it, what its odometer makes of that.
 
+mod motion;
+mod odometer;
 mod radio_head;
 mod track;
+mod vehicle;
 
+pub use motion::{Motion, MotionProfile};
+pub use odometer::Odometer;
 pub use radio_head::RadioHead;
 pub use track::{Projection, Segment, Track, TrackError};
+pub use vehicle::{Vehicle, VehicleState};

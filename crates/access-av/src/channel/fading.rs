@@ -1,0 +1,191 @@
+//! Rician fading across the array: a line of sight and scatter that stands still during an SSB.
+
+use std::f64::consts::TAU;
+
+use num_complex::Complex64;
+use rand::RngExt;
+
+use crate::observation::{ANTENNAS, Snapshot};
+use crate::random::{Purpose, Streams};
+use crate::scenario::{ScatterModel, Scenario};
+
+/// The fading of one radio head in one run.
+///
+/// The scatter is a sum of plane waves of fixed directions and random phases (Clarke's model), so
+/// that it is a function of the distance driven: its autocorrelation is J₀(2πΔ/λ), below 0.5 from
+/// a quarter of a wavelength on and first zero at 0.38 λ. Nothing is drawn while driving, and an
+/// SSB fades the same whether or not the ones before it were heard.
+#[derive(Debug, Clone)]
+pub struct RicianFading {
+    line_of_sight: f64,
+    scatter: f64,
+    wavenumber_per_m: f64,
+    rays: Vec<Ray>,
+    model: ScatterModel,
+}
+
+/// A plane wave, for one antenna or for all.
+#[derive(Debug, Clone, Copy)]
+struct Ray {
+    /// Cosine of its direction to the forward axis: its Doppler.
+    cosine: f64,
+    /// Its amplitude at the start.
+    start: Complex64,
+    /// Phase step from antenna to antenna.
+    step: Complex64,
+}
+
+impl RicianFading {
+    /// The fading of radio head number `head`.
+    pub fn new(scenario: &Scenario, streams: Streams, head: usize) -> Self {
+        let settings = &scenario.channel;
+        let mut rng = streams.generator(Purpose::Scatter, head);
+        let k = 10f64.powf(0.1 * settings.rician_k_db);
+        let per_antenna = usize::from(settings.rays);
+        let count = match settings.scatter {
+            ScatterModel::PerAntenna => per_antenna * ANTENNAS,
+            ScatterModel::Rays => per_antenna,
+        };
+        let element_rad = TAU * scenario.array.spacing_wavelengths;
+        let rays = (0..count)
+            .map(|_| {
+                let cosine = (rng.random::<f64>() * TAU).cos();
+                Ray {
+                    cosine,
+                    start: Complex64::cis(rng.random::<f64>() * TAU),
+                    step: Complex64::cis(element_rad * cosine),
+                }
+            })
+            .collect();
+        Self {
+            line_of_sight: (k / (k + 1.0)).sqrt(),
+            scatter: ((k + 1.0) * per_antenna as f64).recip().sqrt(),
+            wavenumber_per_m: TAU / scenario.ssb.wavelength_m(),
+            rays,
+            model: settings.scatter,
+        }
+    }
+
+    /// Gains of the antennas, of unit mean power, for a line of sight of electrical angle
+    /// `phase_rad` after `driven_m`.
+    pub fn gains(&self, phase_rad: f64, driven_m: f64) -> Snapshot {
+        let mut gains = steering_vector(phase_rad).map(|gain| gain * self.line_of_sight);
+        let arrival =
+            |ray: &Ray| ray.start * Complex64::cis(self.wavenumber_per_m * driven_m * ray.cosine);
+        match self.model {
+            ScatterModel::PerAntenna => {
+                let rays_each = self.rays.chunks_exact(self.rays.len() / ANTENNAS);
+                for (gain, rays) in gains.iter_mut().zip(rays_each) {
+                    *gain += rays.iter().map(arrival).sum::<Complex64>() * self.scatter;
+                }
+            }
+            ScatterModel::Rays => {
+                for ray in &self.rays {
+                    let mut wave = arrival(ray) * self.scatter;
+                    for gain in &mut gains {
+                        *gain += wave;
+                        wave *= ray.step;
+                    }
+                }
+            }
+        }
+        gains
+    }
+}
+
+fn steering_vector(phase_rad: f64) -> Snapshot {
+    let step = Complex64::cis(phase_rad);
+    let mut gain = Complex64::ONE;
+    [(); ANTENNAS].map(|()| {
+        let here = gain;
+        gain *= step;
+        here
+    })
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    fn scenario(k_db: f64, scatter: ScatterModel) -> Scenario {
+        let mut scenario = Scenario::load("paper").unwrap();
+        scenario.channel.rician_k_db = k_db;
+        scenario.channel.scatter = scatter;
+        scenario
+    }
+
+    /// Mean over runs of f(gains) at antenna 0 of an arriving line of sight at broadside.
+    fn mean_power_of_scatter(k_db: f64, model: ScatterModel) -> f64 {
+        let scenario = scenario(k_db, model);
+        let runs = 4000;
+        let scattered = |run| {
+            let fading = RicianFading::new(&scenario, Streams::new(1, run), 0);
+            let gains = fading.gains(0.3, 1.0);
+            let line_of_sight = steering_vector(0.3);
+            gains
+                .iter()
+                .zip(line_of_sight)
+                .map(|(gain, direct)| (gain - direct * fading.line_of_sight).norm_sqr())
+                .sum::<f64>()
+        };
+        (0..runs).map(scattered).sum::<f64>() / (runs as f64 * ANTENNAS as f64)
+    }
+
+    #[test]
+    fn k_divides_the_power() {
+        for model in [ScatterModel::PerAntenna, ScatterModel::Rays] {
+            for k_db in [0.0, 10.0, 20.0] {
+                let k = 10f64.powf(0.1 * k_db);
+                let scatter = mean_power_of_scatter(k_db, model);
+                // Scatter power is exponential: relative error 1/√runs, with 4 antennas alike.
+                assert!(
+                    (scatter * (k + 1.0) - 1.0).abs() < 4.0 / 4000f64.sqrt(),
+                    "{model:?} {k_db}"
+                );
+            }
+        }
+    }
+
+    #[test]
+    fn scatter_decorrelates_over_half_a_wavelength_as_j0() {
+        for model in [ScatterModel::PerAntenna, ScatterModel::Rays] {
+            let scenario = scenario(-30.0, model);
+            let wavelength_m = scenario.ssb.wavelength_m();
+            // J₀ at 0, π/4, 2.405 (its zero) and π.
+            for (wavelengths, j0) in [(0.0, 1.0), (0.125, 0.8516), (0.3827, 0.0), (0.5, -0.3042)] {
+                let runs = 4000;
+                let product = |run| {
+                    let fading = RicianFading::new(&scenario, Streams::new(2, run), 0);
+                    let here = fading.gains(0.0, 7.0);
+                    let there = fading.gains(0.0, 7.0 + wavelengths * wavelength_m);
+                    here.iter()
+                        .zip(there)
+                        .map(|(a, b)| (a.conj() * b).re)
+                        .sum::<f64>()
+                        / 4.0
+                };
+                let correlation = (0..runs).map(product).sum::<f64>() / runs as f64;
+                assert!(
+                    (correlation - j0).abs() < 0.07,
+                    "{model:?} {wavelengths}: {correlation}"
+                );
+            }
+        }
+    }
+
+    #[test]
+    fn antennas_fade_apart_or_together() {
+        let product = |model| {
+            let scenario = scenario(-30.0, model);
+            let runs = 4000;
+            let one = |run| {
+                let gains = RicianFading::new(&scenario, Streams::new(4, run), 0).gains(0.0, 0.0);
+                (gains[0].conj() * gains[1]).re
+            };
+            (0..runs).map(one).sum::<f64>() / runs as f64
+        };
+        assert!(product(ScatterModel::PerAntenna).abs() < 0.05);
+        // Neighbours at λ/2 in an isotropic field: J₀(π).
+        assert!((product(ScatterModel::Rays) + 0.3042).abs() < 0.06);
+    }
+}

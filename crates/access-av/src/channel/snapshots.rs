@@ -1,0 +1,135 @@
+//! From the vehicle's true place to what its array receives of one radio head.
+
+use num_complex::Complex64;
+use rand::RngExt;
+use rand_chacha::ChaCha8Rng;
+use rand_distr::StandardNormal;
+
+use super::{LinkBudget, RicianFading, Shadowing};
+use crate::observation::{SensedSsb, Snapshot, SsbObservation};
+use crate::random::{Purpose, Streams};
+use crate::scenario::{Pilots, Scenario};
+use crate::world::{RadioHead, VehicleState};
+use std::f64::consts::{FRAC_1_SQRT_2, TAU};
+
+/// The channel from one radio head to the vehicle in one run.
+#[derive(Debug, Clone)]
+pub struct HeadChannel {
+    head: RadioHead,
+    budget: LinkBudget,
+    shadowing: Shadowing,
+    fading: RicianFading,
+    snr_noise_db: f64,
+    snr_noise: ChaCha8Rng,
+    snapshot_noise: ChaCha8Rng,
+    element_rad: f64,
+    mounting_angle_rad: f64,
+    snapshots: u16,
+    pilots: Pilots,
+}
+
+/// One SSB at the array, before noise.
+#[derive(Debug, Clone, Copy, PartialEq)]
+pub struct Reception {
+    /// True electrical angle of the line of sight, in radians.
+    pub phase_rad: f64,
+    /// Gains of the antennas, relative to unit noise power.
+    pub gains: Snapshot,
+    /// What the receiver senses of it without estimating an angle.
+    pub ssb: SensedSsb,
+}
+
+impl HeadChannel {
+    /// The channel of radio head number `index`.
+    pub fn new(scenario: &Scenario, head: RadioHead, index: usize, streams: Streams) -> Self {
+        Self {
+            head,
+            budget: LinkBudget::new(scenario),
+            shadowing: Shadowing::new(&scenario.channel, streams, index),
+            fading: RicianFading::new(scenario, streams, index),
+            snr_noise_db: scenario.receiver.snr_noise_db,
+            snr_noise: streams.generator(Purpose::SensedSnr, index),
+            snapshot_noise: streams.generator(Purpose::Snapshots, index),
+            element_rad: TAU * scenario.array.spacing_wavelengths,
+            mounting_angle_rad: scenario.array.mounting_angle_rad,
+            snapshots: scenario.array.snapshots,
+            pilots: scenario.receiver.pilots,
+        }
+    }
+
+    /// Mean SNR in dB of the SSB that arrives now: link budget and shadowing. To be called once for
+    /// each SSB, in order.
+    pub fn next_snr_db(&mut self, vehicle: &VehicleState) -> f64 {
+        let distance_m = vehicle.pose.point().distance_m(self.head.position);
+        self.budget.snr_db(&self.head, distance_m) + self.shadowing.next_db(vehicle.along_m)
+    }
+
+    /// The SSB of mean SNR `snr_db` at the array, with fading.
+    pub fn receive(&mut self, vehicle: &VehicleState, snr_db: f64) -> Reception {
+        let bearing_rad = vehicle.pose.point().bearing_rad(self.head.position);
+        let to_axis_rad = bearing_rad - vehicle.pose.heading_rad - self.mounting_angle_rad;
+        let phase_rad = self.element_rad * to_axis_rad.cos();
+        let amplitude = 10f64.powf(0.05 * snr_db);
+        let gains = self
+            .fading
+            .gains(phase_rad, vehicle.along_m)
+            .map(|gain| gain * amplitude);
+        let power = gains.iter().map(Complex64::norm_sqr).sum::<f64>() / gains.len() as f64;
+        let mut sensed_db = 10.0 * power.log10();
+        if self.snr_noise_db > 0.0 {
+            let error: f64 = self.snr_noise.sample(StandardNormal);
+            sensed_db += self.snr_noise_db * error;
+        }
+        let ssb = SensedSsb {
+            pci: self.head.pci,
+            ssb_index: self.head.ssb_index,
+            time_s: vehicle.time_s,
+            snr_db: sensed_db,
+        };
+        Reception {
+            phase_rad,
+            gains,
+            ssb,
+        }
+    }
+
+    /// The array's output for SSB number `number`, noise of unit power included.
+    ///
+    /// Blind, each snapshot carries an independent Gaussian sample of the signal. With pilots there
+    /// is one despread block per OFDM symbol: N known resource elements add up to an N-fold SNR,
+    /// their common phase unknown from symbol to symbol.
+    pub fn observe(&mut self, number: u64, reception: &Reception, into: &mut SsbObservation) {
+        into.restart(reception.ssb);
+        // Each SSB has its own nonce: it sounds the same whether or not earlier ones were heard.
+        self.snapshot_noise.set_stream(number);
+        self.snapshot_noise.set_word_pos(0);
+        match self.pilots.per_symbol() {
+            None => {
+                for _ in 0..self.snapshots {
+                    let signal = self.complex_normal();
+                    self.push(reception.gains, signal, into);
+                }
+            }
+            Some(symbols) => {
+                into.noise_variance = Some(1.0);
+                for &resource_elements in symbols {
+                    let phase_rad = self.snapshot_noise.random::<f64>() * TAU;
+                    let signal =
+                        Complex64::from_polar(f64::from(resource_elements).sqrt(), phase_rad);
+                    self.push(reception.gains, signal, into);
+                }
+            }
+        }
+    }
+
+    fn push(&mut self, gains: Snapshot, signal: Complex64, into: &mut SsbObservation) {
+        into.push(gains.map(|gain| gain * signal + self.complex_normal()));
+    }
+
+    /// A circular Gaussian of unit power.
+    fn complex_normal(&mut self) -> Complex64 {
+        let re: f64 = self.snapshot_noise.sample(StandardNormal);
+        let im: f64 = self.snapshot_noise.sample(StandardNormal);
+        Complex64::new(re, im) * FRAC_1_SQRT_2
+    }
+}

@@ -1,0 +1,286 @@
+//! The pipeline on the vehicle: odometry and SSBs in; poses, verdicts and the next wake-up out.
+//!
+//! For each SSB burst: [`Onboard::listens`] says whether the receiver need be on at all,
+//! [`Onboard::consider`] whether what it sensed is worth estimating, [`Onboard::estimate`] turns an
+//! SSB into an angle and the angle into a better pose. Simulation and vehicle call the same three.
+//! Nothing is allocated after construction.
+
+use crate::BoxError;
+use crate::channel::LinkBudget;
+use crate::estimator::{AngleEstimator, CustomEstimator};
+use crate::geometry::Pose;
+use crate::localize::{
+    AngleMeasurement, DeadReckoning, Localizer, OdometryStep, PoseEstimate, UpdateReason,
+    UpdateVerdict,
+};
+use crate::observation::{OdometrySample, SensedSsb, SsbObservation};
+use crate::platform::Platform;
+use crate::scenario::{
+    Check, LocalizerSettings, PidSettings, Scenario, ScenarioError, WakeUpSettings,
+};
+use crate::wake_up::{
+    Adaptive, Controller, FixedInterval, Pid, Policy, WakeUpDecision, WakeUpInputs,
+};
+use crate::world::RadioHead;
+
+/// The pipeline on the vehicle.
+pub struct Onboard {
+    heads: Vec<RadioHead>,
+    budget: LinkBudget,
+    estimator: AngleEstimator,
+    localizer: Localizer,
+    policy: Policy,
+    wake_up_time_s: f64,
+    odometry: Option<OdometrySample>,
+    reached: Reached,
+}
+
+/// How far the localizer has been moved.
+#[derive(Debug, Clone, Copy, PartialEq)]
+struct Reached {
+    time_s: f64,
+    distance_m: f64,
+}
+
+/// The user's own code in place of parts of the pipeline.
+#[derive(Default)]
+pub struct Custom {
+    /// In place of the scenario's angle estimator.
+    pub estimator: Option<Box<dyn CustomEstimator>>,
+    /// In place of Algorithm 1. Where the scenario's policy is another one, the settings of
+    /// Algorithm 1 around it are their defaults.
+    pub controller: Option<Box<dyn Controller>>,
+}
+
+/// One estimated angle and what became of it.
+#[derive(Debug, Clone, Copy, PartialEq)]
+pub struct Execution {
+    /// The SSB.
+    pub ssb: SensedSsb,
+    /// Its angle; `None` when its snapshots carry none.
+    pub measured: Option<AngleMeasurement>,
+    /// What the localizer did with it.
+    pub verdict: UpdateVerdict,
+    /// The wake-up time that was in force, in seconds.
+    pub wake_up_time_s: f64,
+}
+
+/// Why an odometry sample was left out; the pipeline goes on from what it had.
+#[derive(Debug, Clone, Copy, PartialEq, Eq, thiserror::Error)]
+pub enum OdometryDefect {
+    /// Not later than the sample before.
+    #[error("its time is not after the last sample's")]
+    TimeReversed,
+    /// A value that is not a number.
+    #[error("a value is not a finite number")]
+    NotFinite,
+}
+
+impl Onboard {
+    /// The scenario's pipeline on `platform`, at 0 s and `start`.
+    ///
+    /// # Errors
+    /// [`ScenarioError`] when the platform lacks what the scenario asks of it.
+    pub fn new(
+        scenario: &Scenario,
+        platform: &Platform,
+        start: Pose,
+        custom: Custom,
+    ) -> Result<Self, ScenarioError> {
+        let check = Check {
+            file: &scenario.name,
+        };
+        let estimator = AngleEstimator::new(scenario, custom.estimator).map_err(|error| {
+            let spacing = scenario.array.spacing_wavelengths;
+            check.error("array.spacing_wavelengths", spacing, &error.to_string())
+        })?;
+        let localizer = match scenario.localizer {
+            LocalizerSettings::DeadReckoning => Localizer::DeadReckoning(DeadReckoning::new(
+                start,
+                scenario.array.mounting_angle_rad,
+            )),
+        };
+        Ok(Self {
+            heads: scenario.radio_heads.iter().map(RadioHead::from).collect(),
+            budget: LinkBudget::new(scenario),
+            estimator,
+            localizer,
+            policy: policy(scenario, platform, custom.controller)?,
+            wake_up_time_s: 0.0,
+            odometry: None,
+            reached: Reached {
+                time_s: 0.0,
+                distance_m: 0.0,
+            },
+        })
+    }
+
+    /// Takes in an odometry sample. The first one is where distances are counted from.
+    ///
+    /// # Errors
+    /// [`OdometryDefect`] when the sample is unusable; the state is kept.
+    pub fn odometry(&mut self, sample: &OdometrySample) -> Result<(), OdometryDefect> {
+        let yaw_rate_radps = sample.yaw_rate_radps.unwrap_or(0.0);
+        let values = [
+            sample.time_s,
+            sample.distance_m,
+            sample.speed_mps,
+            yaw_rate_radps,
+        ];
+        if values.iter().any(|value| !value.is_finite()) {
+            return Err(OdometryDefect::NotFinite);
+        }
+        match self.odometry {
+            None => self.reached.distance_m = sample.distance_m,
+            Some(last) if sample.time_s <= last.time_s => return Err(OdometryDefect::TimeReversed),
+            Some(_) => {}
+        }
+        self.odometry = Some(*sample);
+        self.advance_to(sample.time_s);
+        Ok(())
+    }
+
+    /// Moves the pose on to `time_s`, beyond the last odometry sample at that sample's speed.
+    pub fn advance_to(&mut self, time_s: f64) {
+        let (Some(sample), true) = (self.odometry, time_s > self.reached.time_s) else {
+            return;
+        };
+        let duration_s = time_s - self.reached.time_s;
+        let distance_m = sample.distance_m + sample.speed_mps * (time_s - sample.time_s);
+        self.localizer.predict(&OdometryStep {
+            time_s,
+            duration_s,
+            distance_m: distance_m - self.reached.distance_m,
+            turn_rad: sample
+                .yaw_rate_radps
+                .map(|rate_radps| rate_radps * duration_s),
+        });
+        self.reached = Reached { time_s, distance_m };
+    }
+
+    /// Whether the receiver need listen to the SSB burst at `time_s`.
+    pub fn listens(&self, time_s: f64) -> bool {
+        self.policy.listens(time_s)
+    }
+
+    /// Whether the burst of SSBs sensed at `time_s` is worth estimating; the policy judges by the
+    /// strongest of them that is on the map.
+    ///
+    /// # Errors
+    /// Whatever the user's own controller fails with.
+    pub fn consider(
+        &mut self,
+        time_s: f64,
+        sensed: &[SensedSsb],
+    ) -> Result<WakeUpDecision, BoxError> {
+        self.advance_to(time_s);
+        let strongest = sensed
+            .iter()
+            .filter_map(|ssb| Some((ssb, self.head(ssb)?)))
+            .max_by(|a, b| a.0.snr_db.total_cmp(&b.0.snr_db));
+        let Some((ssb, head)) = strongest else {
+            return Ok(WakeUpDecision {
+                estimate: false,
+                wake_up_time_s: self.wake_up_time_s,
+            });
+        };
+        let distance_m = self.localizer.pose().pose.point().distance_m(head.position);
+        let inputs = WakeUpInputs {
+            time_s,
+            sensed_snr_db: ssb.snr_db,
+            expected_snr_db: self.budget.snr_db(&head, distance_m),
+            speed_mps: self.odometry.map_or(0.0, |sample| sample.speed_mps),
+        };
+        let decision = self.policy.decide(&inputs)?;
+        self.wake_up_time_s = decision.wake_up_time_s;
+        Ok(decision)
+    }
+
+    /// Estimates the angle of an SSB and lets the localizer have it.
+    ///
+    /// # Errors
+    /// Whatever the user's own estimator fails with.
+    pub fn estimate(&mut self, observation: &SsbObservation) -> Result<Execution, BoxError> {
+        self.advance_to(observation.ssb.time_s);
+        let measured = self.estimator.estimate(observation)?;
+        let unused = |reason| UpdateVerdict {
+            accepted: false,
+            reason,
+            mahalanobis_squared: None,
+            threshold: None,
+        };
+        let verdict = match (self.head(&observation.ssb), &measured) {
+            (None, _) => unused(UpdateReason::UnknownRadioHead),
+            (_, None) => unused(UpdateReason::Unusable),
+            (Some(head), Some(measured)) => self.localizer.update(&head, measured),
+        };
+        let wake_up_time_s = self.wake_up_time_s;
+        Ok(Execution {
+            ssb: observation.ssb,
+            measured,
+            verdict,
+            wake_up_time_s,
+        })
+    }
+
+    /// Where the vehicle is believed to be.
+    pub fn pose(&self) -> PoseEstimate {
+        self.localizer.pose()
+    }
+
+    fn head(&self, ssb: &SensedSsb) -> Option<RadioHead> {
+        let is_it = |head: &&RadioHead| (head.pci, head.ssb_index) == (ssb.pci, ssb.ssb_index);
+        self.heads.iter().find(is_it).copied()
+    }
+}
+
+fn policy(
+    scenario: &Scenario,
+    platform: &Platform,
+    controller: Option<Box<dyn Controller>>,
+) -> Result<Policy, ScenarioError> {
+    let top_speed_mps = scenario.motion.top_speed_mps();
+    let interval_s = |explicit_ms: Option<f64>| match explicit_ms {
+        Some(explicit_ms) => Ok(explicit_ms * 1e-3),
+        None => platform.base_wake_up_s(scenario),
+    };
+    if let Some(controller) = controller {
+        let settings = if let WakeUpSettings::Pid(settings) = scenario.wake_up {
+            settings
+        } else {
+            PidSettings::default()
+        };
+        return Ok(Policy::Adaptive(Adaptive::new(
+            &settings,
+            controller,
+            top_speed_mps,
+        )));
+    }
+    match scenario.wake_up {
+        WakeUpSettings::Fixed(settings) => Ok(Policy::Fixed(FixedInterval::new(interval_s(
+            settings.interval_ms,
+        )?))),
+        WakeUpSettings::Pid(settings) => {
+            let base_s = interval_s(settings.base_ms)?;
+            let allowed = format!(
+                "it must not be below the base wake-up time, {} ms",
+                base_s * 1e3
+            );
+            Check {
+                file: &scenario.name,
+            }
+            .that(
+                settings.t_max_ms * 1e-3 >= base_s,
+                "wake_up.t_max_ms",
+                settings.t_max_ms,
+                &allowed,
+            )?;
+            let controller = Box::new(Pid::new(&settings, base_s));
+            Ok(Policy::Adaptive(Adaptive::new(
+                &settings,
+                controller,
+                top_speed_mps,
+            )))
+        }
+    }
+}

@@ -1,0 +1,188 @@
+//! Many simulated drives, and what they have in common.
+
+use rayon::prelude::*;
+
+use super::{ErrorHistogram, RunRecord, Simulation, SimulationError};
+use crate::energy::{Energy, EnergyModel};
+use crate::onboard::Custom;
+
+/// How a campaign is carried out; none of it but `seed`, `first_run` and `runs` touches its numbers.
+#[derive(Clone, Copy)]
+pub struct CampaignOptions<'a> {
+    /// Seed of all random streams.
+    pub seed: u64,
+    /// Number of the first run, for campaigns in parts.
+    pub first_run: u64,
+    /// Number of runs.
+    pub runs: usize,
+    /// Whether to keep every run's record.
+    pub keep_records: bool,
+    /// The user's own code, made anew for each run.
+    pub custom: &'a (dyn Fn() -> Custom + Sync),
+    /// Told how many runs are done; `false` stops the campaign.
+    pub progress: &'a dyn Fn(usize) -> bool,
+}
+
+/// Errors at one SSB, over all runs.
+#[derive(Debug, Clone, PartialEq, Default)]
+pub struct StepStatistics {
+    /// Mean of |x error| in metres.
+    pub mean_abs_error_x_m: f64,
+    /// Mean of |y error| in metres.
+    pub mean_abs_error_y_m: f64,
+    /// Root mean square of the horizontal error in metres.
+    pub rms_error_m: f64,
+    /// Root mean square of the heading error in radians.
+    pub rms_heading_error_rad: f64,
+    /// Mean SNR by link budget and shadowing, in dB.
+    pub mean_snr_db: f64,
+    /// Median of the horizontal error in metres.
+    pub p50_error_m: f64,
+    /// Its 90th percentile.
+    pub p90_error_m: f64,
+    /// Its 99th percentile.
+    pub p99_error_m: f64,
+}
+
+/// One run in a line.
+#[derive(Debug, Clone, Copy, PartialEq)]
+pub struct RunSummary {
+    /// Its number.
+    pub run: u64,
+    /// Estimated angles.
+    pub executions: usize,
+    /// SSB bursts listened to.
+    pub listened: usize,
+    /// Its energy, where the platform has figures for the method.
+    pub energy: Option<Energy>,
+    /// Root mean square of its horizontal error in metres.
+    pub rms_error_m: f64,
+    /// Its largest horizontal error in metres.
+    pub max_error_m: f64,
+    /// Its horizontal error at the end, in metres.
+    pub final_error_m: f64,
+}
+
+/// What a campaign found.
+#[derive(Debug, Clone, PartialEq)]
+pub struct Campaign {
+    /// Times of the steps in seconds.
+    pub time_s: Vec<f64>,
+    /// Statistics of each step.
+    pub steps: Vec<StepStatistics>,
+    /// The runs, by number.
+    pub runs: Vec<RunSummary>,
+    /// Horizontal errors of all steps of all runs.
+    pub errors: ErrorHistogram,
+    /// The runs' records, where asked for.
+    pub records: Vec<RunRecord>,
+}
+
+#[derive(Default, Clone)]
+struct StepSums {
+    abs_x_m: f64,
+    abs_y_m: f64,
+    square_m2: f64,
+    heading_rad2: f64,
+    snr_db: f64,
+    errors: ErrorHistogram,
+}
+
+impl Simulation {
+    /// Drives many times on the threads of the current rayon pool.
+    ///
+    /// Runs are computed in parallel and added up in order of their numbers: the result does not
+    /// depend on the number of threads, and memory not on the number of runs.
+    ///
+    /// # Errors
+    /// [`SimulationError`] of the first run that fails, or that the caller stopped it.
+    pub fn campaign(&self, options: &CampaignOptions<'_>) -> Result<Campaign, SimulationError> {
+        let energy = EnergyModel::new(self.scenario(), self.platform())?;
+        let mut sums = vec![StepSums::default(); self.steps()];
+        let mut errors = ErrorHistogram::default();
+        let mut runs = Vec::with_capacity(options.runs);
+        let mut records = Vec::new();
+        let wave = 8 * rayon::current_num_threads();
+        while runs.len() < options.runs {
+            let first = options.first_run + runs.len() as u64;
+            let count = wave.min(options.runs - runs.len()) as u64;
+            let (seed, custom) = (options.seed, options.custom);
+            let finished: Vec<Result<RunRecord, SimulationError>> = (first..first + count)
+                .into_par_iter()
+                .map(|run| self.run(seed, run, custom()))
+                .collect();
+            for record in finished {
+                let record = record?;
+                add_up(&record, &mut sums, &mut errors);
+                runs.push(summary(&record, energy.as_ref()));
+                if options.keep_records {
+                    records.push(record);
+                }
+            }
+            if !(options.progress)(runs.len()) {
+                return Err(SimulationError::Stopped);
+            }
+        }
+        let count = runs.len() as f64;
+        Ok(Campaign {
+            time_s: (0..self.steps())
+                .map(|number| self.time_s(number))
+                .collect(),
+            steps: sums.iter().map(|sums| sums.statistics(count)).collect(),
+            runs,
+            errors,
+            records,
+        })
+    }
+}
+
+fn summary(record: &RunRecord, energy: Option<&EnergyModel>) -> RunSummary {
+    let errors_m = || record.steps.iter().map(horizontal_error_m);
+    let duration_s = record.steps.last().map_or(0.0, |step| step.time_s);
+    let squares_m2: f64 = errors_m().map(|error_m| error_m * error_m).sum();
+    RunSummary {
+        run: record.run,
+        executions: record.executions.len(),
+        listened: record.listened,
+        energy: energy
+            .map(|model| model.of_run(record.executions.len(), record.listened, duration_s)),
+        rms_error_m: (squares_m2 / record.steps.len() as f64).sqrt(),
+        max_error_m: errors_m().fold(0.0, f64::max),
+        final_error_m: errors_m().next_back().unwrap_or(0.0),
+    }
+}
+
+fn horizontal_error_m(step: &super::Step) -> f64 {
+    step.truth.point().distance_m(step.estimate.point())
+}
+
+fn add_up(record: &RunRecord, sums: &mut [StepSums], errors: &mut ErrorHistogram) {
+    for (step, sums) in record.steps.iter().zip(sums) {
+        let error_m = horizontal_error_m(step);
+        let heading_rad =
+            crate::geometry::wrap_angle(step.estimate.heading_rad - step.truth.heading_rad);
+        sums.abs_x_m += (step.estimate.x_m - step.truth.x_m).abs();
+        sums.abs_y_m += (step.estimate.y_m - step.truth.y_m).abs();
+        sums.square_m2 += error_m * error_m;
+        sums.heading_rad2 += heading_rad * heading_rad;
+        sums.snr_db += step.snr_db;
+        sums.errors.add(error_m);
+        errors.add(error_m);
+    }
+}
+
+impl StepSums {
+    fn statistics(&self, count: f64) -> StepStatistics {
+        let quantile_m = |probability| self.errors.quantile_m(probability).unwrap_or(f64::NAN);
+        StepStatistics {
+            mean_abs_error_x_m: self.abs_x_m / count,
+            mean_abs_error_y_m: self.abs_y_m / count,
+            rms_error_m: (self.square_m2 / count).sqrt(),
+            rms_heading_error_rad: (self.heading_rad2 / count).sqrt(),
+            mean_snr_db: self.snr_db / count,
+            p50_error_m: quantile_m(0.5),
+            p90_error_m: quantile_m(0.9),
+            p99_error_m: quantile_m(0.99),
+        }
+    }
+}

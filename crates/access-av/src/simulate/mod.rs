@@ -1,0 +1,28 @@
+//! Simulated drives: one run, and campaigns of many.
+
+mod campaign;
+mod histogram;
+mod run;
+
+use thiserror::Error;
+
+pub use campaign::{Campaign, CampaignOptions, RunSummary, StepStatistics};
+pub use histogram::ErrorHistogram;
+pub use run::{RunRecord, Simulation, Step};
+
+use crate::BoxError;
+use crate::scenario::ScenarioError;
+
+/// Why a simulation ended early.
+#[derive(Debug, Error)]
+pub enum SimulationError {
+    /// The scenario and the platform do not go together.
+    #[error(transparent)]
+    Scenario(#[from] ScenarioError),
+    /// The user's own estimator or policy failed.
+    #[error("{0}")]
+    Custom(BoxError),
+    /// The caller asked to stop.
+    #[error("stopped")]
+    Stopped,
+}

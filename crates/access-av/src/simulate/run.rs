@@ -1,0 +1,187 @@
+//! One simulated drive.
+
+use rand::RngExt;
+use rand_distr::StandardNormal;
+
+use super::SimulationError;
+use crate::channel::{HeadChannel, Reception};
+use crate::geometry::Pose;
+use crate::observation::{SensedSsb, SsbObservation};
+use crate::onboard::{Custom, Execution, Onboard};
+use crate::platform::Platform;
+use crate::random::{Purpose, Streams};
+use crate::scenario::{Scenario, ScenarioError};
+use crate::world::{Odometer, RadioHead, Track, Vehicle};
+
+/// A scenario on a platform, ready to be run.
+#[derive(Debug, Clone)]
+pub struct Simulation {
+    scenario: Scenario,
+    platform: Platform,
+    track: Track,
+    steps: usize,
+}
+
+/// Truth and estimate at one SSB.
+#[derive(Debug, Clone, Copy, PartialEq)]
+pub struct Step {
+    /// Time in seconds.
+    pub time_s: f64,
+    /// Where the vehicle is.
+    pub truth: Pose,
+    /// Where it believes to be.
+    pub estimate: Pose,
+    /// Covariance of (x, y, heading), where the localizer has one.
+    pub covariance: Option<[[f64; 3]; 3]>,
+    /// SNR of the strongest radio head by link budget and shadowing, in dB.
+    pub snr_db: f64,
+}
+
+/// All that happened in one run.
+#[derive(Debug, Clone, PartialEq)]
+pub struct RunRecord {
+    /// Its number.
+    pub run: u64,
+    /// One step per SSB.
+    pub steps: Vec<Step>,
+    /// The estimated angles.
+    pub executions: Vec<Execution>,
+    /// SSB bursts that the receiver listened to.
+    pub listened: usize,
+}
+
+impl Simulation {
+    /// Prepares a scenario.
+    ///
+    /// # Errors
+    /// [`ScenarioError`] when the platform lacks what the scenario asks of it.
+    pub fn new(scenario: Scenario, platform: Platform) -> Result<Self, ScenarioError> {
+        let track = scenario.build_track()?;
+        let vehicle = Vehicle::new(track.clone(), &scenario.motion, Streams::new(0, 0));
+        // On to the first SSB that finds the vehicle at its destination.
+        let steps = (vehicle.duration_s() / scenario.ssb.period_s()).ceil() as usize + 1;
+        // Whatever the pipeline refuses, it refuses before the first run.
+        Onboard::new(&scenario, &platform, Pose::default(), Custom::default())?;
+        Ok(Self {
+            scenario,
+            platform,
+            track,
+            steps,
+        })
+    }
+
+    /// The scenario.
+    pub const fn scenario(&self) -> &Scenario {
+        &self.scenario
+    }
+
+    /// The platform.
+    pub const fn platform(&self) -> &Platform {
+        &self.platform
+    }
+
+    /// Steps of a run: one per SSB.
+    pub const fn steps(&self) -> usize {
+        self.steps
+    }
+
+    /// Time of step `number` in seconds.
+    pub fn time_s(&self, number: usize) -> f64 {
+        number as f64 * self.scenario.ssb.period_s()
+    }
+
+    /// Drives once. The same seed and run number give the same record to the last bit.
+    ///
+    /// # Errors
+    /// [`SimulationError`] from the user's own code, if any.
+    pub fn run(&self, seed: u64, run: u64, custom: Custom) -> Result<RunRecord, SimulationError> {
+        let scenario = &self.scenario;
+        let streams = Streams::new(seed, run);
+        let vehicle = Vehicle::new(self.track.clone(), &scenario.motion, streams);
+        let start = vehicle.at(0.0);
+        let mut odometer = Odometer::new(scenario.odometer, start, streams);
+        let mut channels: Vec<HeadChannel> = scenario
+            .radio_heads
+            .iter()
+            .enumerate()
+            .map(|(index, head)| HeadChannel::new(scenario, RadioHead::from(head), index, streams))
+            .collect();
+        let believed_start = self.believed_start(start.pose, streams);
+        let mut onboard = Onboard::new(scenario, &self.platform, believed_start, custom)?;
+
+        let mut record = RunRecord {
+            run,
+            steps: Vec::with_capacity(self.steps),
+            executions: Vec::with_capacity(self.steps),
+            listened: 0,
+        };
+        let mut snrs_db = vec![0.0; channels.len()];
+        let mut receptions: Vec<Reception> = Vec::with_capacity(channels.len());
+        let mut sensed: Vec<SensedSsb> = Vec::with_capacity(channels.len());
+        let mut observation = None;
+        let mut odometry_number = 0u32;
+        for number in 0..self.steps {
+            let time_s = self.time_s(number);
+            loop {
+                let sample_s = f64::from(odometry_number) * odometer.period_s();
+                if sample_s > time_s {
+                    break;
+                }
+                odometry_number += 1;
+                if let Some(sample) = odometer.sample(vehicle.at(sample_s)) {
+                    // A simulated odometer neither repeats itself nor returns NaN.
+                    let _ = onboard.odometry(&sample);
+                }
+            }
+            let truth = vehicle.at(time_s);
+            for (channel, snr_db) in channels.iter_mut().zip(&mut snrs_db) {
+                *snr_db = channel.next_snr_db(&truth);
+            }
+            if onboard.listens(time_s) {
+                record.listened += 1;
+                receptions.clear();
+                sensed.clear();
+                for (channel, snr_db) in channels.iter_mut().zip(&snrs_db) {
+                    let reception = channel.receive(&truth, *snr_db);
+                    sensed.push(reception.ssb);
+                    receptions.push(reception);
+                }
+                let decision = onboard
+                    .consider(time_s, &sensed)
+                    .map_err(SimulationError::Custom)?;
+                if decision.estimate {
+                    for (channel, reception) in channels.iter_mut().zip(&receptions) {
+                        let buffer =
+                            observation.get_or_insert_with(|| SsbObservation::new(reception.ssb));
+                        channel.observe(number as u64, reception, buffer);
+                        let execution =
+                            onboard.estimate(buffer).map_err(SimulationError::Custom)?;
+                        record.executions.push(execution);
+                    }
+                }
+            } else {
+                onboard.advance_to(time_s);
+            }
+            let believed = onboard.pose();
+            record.steps.push(Step {
+                time_s,
+                truth: truth.pose,
+                estimate: believed.pose,
+                covariance: believed.covariance,
+                snr_db: snrs_db.iter().copied().fold(f64::NEG_INFINITY, f64::max),
+            });
+        }
+        Ok(record)
+    }
+
+    fn believed_start(&self, truth: Pose, streams: Streams) -> Pose {
+        let settings = &self.scenario.start;
+        let mut rng = streams.generator(Purpose::Start, 0);
+        let mut normal = || rng.sample::<f64, _>(StandardNormal);
+        Pose {
+            x_m: truth.x_m + settings.position_std_m * normal(),
+            y_m: truth.y_m + settings.position_std_m * normal(),
+            heading_rad: truth.heading_rad + settings.heading_std_rad * normal(),
+        }
+    }
+}
