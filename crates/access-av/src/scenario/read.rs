@@ -23,8 +23,10 @@ pub(crate) fn settings<T: DeserializeOwned>(table: Table, file: &str) -> Result<
     refuse_not_finite(&value, "", file)?;
     serde_path_to_error::deserialize(value).map_err(|error| {
         let path = error.path().to_string();
-        let message = error.inner().to_string().trim_end().to_owned();
-        explain(file, if path == "." { "" } else { &path }, &message)
+        let message = error.inner().to_string();
+        // The TOML reader adds the path on a second line, less precisely.
+        let message = message.lines().next().unwrap_or_default();
+        explain(file, if path == "." { "" } else { &path }, message)
     })
 }
 

@@ -1,5 +1,6 @@
 //! Many simulated drives, and what they have in common.
 
+use rayon::ThreadPoolBuilder;
 use rayon::prelude::*;
 
 use super::{ErrorHistogram, RunRecord, Simulation, SimulationError};
@@ -15,6 +16,8 @@ pub struct CampaignOptions<'a> {
     pub first_run: u64,
     /// Number of runs.
     pub runs: usize,
+    /// Number of threads; `None` for one per core.
+    pub threads: Option<usize>,
     /// Whether to keep every run's record.
     pub keep_records: bool,
     /// The user's own code, made anew for each run.
@@ -89,7 +92,7 @@ struct StepSums {
 }
 
 impl Simulation {
-    /// Drives many times on the threads of the current rayon pool.
+    /// Drives many times.
     ///
     /// Runs are computed in parallel and added up in order of their numbers: the result does not
     /// depend on the number of threads, and memory not on the number of runs.
@@ -102,15 +105,18 @@ impl Simulation {
         let mut errors = ErrorHistogram::default();
         let mut runs = Vec::with_capacity(options.runs);
         let mut records = Vec::new();
-        let wave = 8 * rayon::current_num_threads();
+        let pool = ThreadPoolBuilder::new()
+            .num_threads(options.threads.unwrap_or(0))
+            .build()?;
+        let wave = 8 * pool.current_num_threads();
         while runs.len() < options.runs {
             let first = options.first_run + runs.len() as u64;
             let count = wave.min(options.runs - runs.len()) as u64;
             let (seed, custom) = (options.seed, options.custom);
-            let finished: Vec<Result<RunRecord, SimulationError>> = (first..first + count)
-                .into_par_iter()
-                .map(|run| self.run(seed, run, custom()))
-                .collect();
+            let finished: Vec<Result<RunRecord, SimulationError>> = pool.install(|| {
+                let numbers = (first..first + count).into_par_iter();
+                numbers.map(|run| self.run(seed, run, custom())).collect()
+            });
             for record in finished {
                 let record = record?;
                 add_up(&record, &mut sums, &mut errors);

@@ -22,6 +22,9 @@ pub enum SimulationError {
     /// The user's own estimator or policy failed.
     #[error("{0}")]
     Custom(BoxError),
+    /// The threads asked for cannot be had.
+    #[error("no threads to run on: {0}")]
+    Threads(#[from] rayon::ThreadPoolBuildError),
     /// The caller asked to stop.
     #[error("stopped")]
     Stopped,
