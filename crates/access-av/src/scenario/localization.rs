@@ -120,23 +120,4 @@ pub enum LocalizerSettings {
     /// The paper's: each angle becomes a heading, distances are added up along it.
     #[default]
     DeadReckoning,
-<<<<<<< HEAD
-=======
-    /// The filter of `localize/tracker.rs`.
-    Tracker(TrackerSettings),
-}
-
-/// Settings of the tracker.
-#[derive(Debug, Clone, Copy, PartialEq, Serialize, Deserialize, JsonSchema)]
-#[serde(default, deny_unknown_fields)]
-pub struct TrackerSettings {
-    /// Whether the road's course is known to it.
-    pub map: bool,
-}
-
-impl Default for TrackerSettings {
-    fn default() -> Self {
-        Self { map: true }
-    }
->>>>>>> fdcbc80 (Read and write SigMF recordings, so that IQ can come from and go to anywhere)
 }
