@@ -101,7 +101,7 @@ impl<const N: usize> Array<N> {
             assert!(
                 M <= N,
                 "a subarray has at most as many antennas as the array"
-            )
+            );
         };
         Array::new(self.spacing_wavelengths)
     }

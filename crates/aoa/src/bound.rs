@@ -82,6 +82,23 @@ pub fn deterministic_several<const N: usize>(
     from_information(phases_rad, &powers, 1.0, snapshots)
 }
 
+/// Several uncorrelated sources whose waveforms are known up to complex gains: each is bounded as if
+/// it were alone, [`known_signal`] with `snapshots` times its SNR (Li and Compton 1993).
+///
+/// # Errors
+/// As [`stochastic_several`], but for coinciding angles, which known waveforms tell apart.
+pub fn known_signal_several<const N: usize>(
+    phases_rad: &[f64],
+    snrs: &[f64],
+    snapshots: usize,
+) -> Result<List<f64, N>, Error> {
+    checked_powers::<N>(phases_rad, snrs, snapshots)?;
+    let total = snrs
+        .iter()
+        .map(|snr| known_signal::<N>(snr * snapshots as f64));
+    Ok(List::collect(0.0, total))
+}
+
 fn checked_powers<const N: usize>(
     phases_rad: &[f64],
     snrs: &[f64],

@@ -41,10 +41,22 @@ impl<const N: usize> Calibration<N> {
         array: &Array<N>,
         angle_rad: f64,
     ) -> Result<Self, Error> {
+        Self::from_reference_covariance(&Covariance::from_snapshots(snapshots)?, array, angle_rad)
+    }
+
+    /// As [`Calibration::from_reference`], from the covariance of the snapshots.
+    ///
+    /// # Errors
+    /// As [`Calibration::from_reference`].
+    pub fn from_reference_covariance(
+        covariance: &Covariance<N>,
+        array: &Array<N>,
+        angle_rad: f64,
+    ) -> Result<Self, Error> {
         if !(0.0..=std::f64::consts::PI).contains(&angle_rad) {
             return Err(Error::Angle(angle_rad));
         }
-        let covariance = Covariance::from_snapshots(snapshots)?;
+        let covariance = covariance.validated()?;
         let (_, response) = principal_eigenvector(covariance.matrix());
         let steering = steering_vector::<N>(array.phase_from_angle(angle_rad));
         let first = response[0] / steering[0];

@@ -1,5 +1,8 @@
 //! The sample covariance and its averages.
 
+use num_complex::Complex;
+
+use crate::kernel::{Real, correlation};
 use crate::{Array, Complex64, Error};
 
 /// A Hermitian matrix, row-major.
@@ -44,6 +47,32 @@ impl<const N: usize> Covariance<N> {
             covariance.accumulate(snapshot, 1.0);
         }
         covariance.validated()
+    }
+
+    /// The sample covariance of channels: `channels[n]` holds the samples of antenna `n`. Channels
+    /// longer than the shortest are cut.
+    ///
+    /// # Errors
+    /// [`Error::NoSnapshots`], [`Error::NotFinite`], [`Error::Zero`].
+    pub fn from_channels<T: Real>(channels: [&[Complex<T>]; N]) -> Result<Self, Error> {
+        let snapshots = channels
+            .iter()
+            .map(|channel| channel.len())
+            .min()
+            .unwrap_or(0);
+        let mut sum = zeros::<N>();
+        for i in 0..N {
+            for j in 0..=i {
+                sum[i][j] = correlation(channels[i], channels[j]);
+                sum[j][i] = sum[i][j].conj();
+            }
+        }
+        Self {
+            sum,
+            weight: snapshots as f64,
+            snapshots,
+        }
+        .validated()
     }
 
     /// A covariance known otherwise, standing for `snapshots` snapshots (which set the standard

@@ -30,6 +30,16 @@ pub enum Method {
     EspritTls,
 }
 
+impl Method {
+    /// How many sources the method can tell apart with `N` antennas.
+    pub const fn maximum_sources<const N: usize>(self) -> usize {
+        match self {
+            Self::MaximumLikelihood => 1,
+            _ => N - 1,
+        }
+    }
+}
+
 /// Whether an estimate may be used as a Gaussian measurement with its standard deviation.
 #[derive(Debug, Clone, Copy, PartialEq, Eq)]
 pub enum Verdict {
@@ -51,6 +61,28 @@ pub enum Reason {
     Ambiguous,
     /// Fewer peaks than sources, or two sources closer than their standard deviations.
     SourcesNotSeparated,
+}
+
+impl Verdict {
+    /// Every verdict there is.
+    pub const ALL: [Self; 5] = [
+        Self::Resolved,
+        Self::Unresolved(Reason::ThresholdSnr),
+        Self::Unresolved(Reason::NearEndFire),
+        Self::Unresolved(Reason::Ambiguous),
+        Self::Unresolved(Reason::SourcesNotSeparated),
+    ];
+
+    /// Its place in [`Verdict::ALL`].
+    pub const fn index(&self) -> usize {
+        match self {
+            Self::Resolved => 0,
+            Self::Unresolved(Reason::ThresholdSnr) => 1,
+            Self::Unresolved(Reason::NearEndFire) => 2,
+            Self::Unresolved(Reason::Ambiguous) => 3,
+            Self::Unresolved(Reason::SourcesNotSeparated) => 4,
+        }
+    }
 }
 
 impl fmt::Display for Reason {
@@ -96,6 +128,20 @@ impl AngleEstimate {
     /// Whether the verdict is [`Verdict::Resolved`].
     pub fn is_resolved(&self) -> bool {
         self.verdict == Verdict::Resolved
+    }
+}
+
+/// The estimate of who knows nothing: any direction, not resolved.
+impl Default for AngleEstimate {
+    fn default() -> Self {
+        Self {
+            phase_rad: 0.0,
+            phase_sigma_rad: PI / 3.0_f64.sqrt(),
+            angle_rad: FRAC_PI_2,
+            sigma_rad: FRAC_PI_2,
+            snr_db: f64::NEG_INFINITY,
+            verdict: Verdict::Unresolved(Reason::ThresholdSnr),
+        }
     }
 }
 
@@ -156,11 +202,7 @@ pub fn estimate_several<const N: usize>(
     array: &Array<N>,
     sources: usize,
 ) -> Result<AngleEstimates<N>, Error> {
-    let maximum = if method == Method::MaximumLikelihood {
-        1
-    } else {
-        N - 1
-    };
+    let maximum = method.maximum_sources::<N>();
     if sources == 0 || sources > maximum {
         return Err(Error::TooManySources {
             requested: sources,
@@ -209,8 +251,10 @@ pub fn estimate_several<const N: usize>(
         (Some(a), Some(b)) => a.angle_rad.total_cmp(&b.angle_rad),
         _ => std::cmp::Ordering::Equal,
     });
-    let fill = describe(0.0, PI, 1e-9, Some(Reason::ThresholdSnr), array);
-    Ok(List::collect(fill, estimates.into_iter().flatten()))
+    Ok(List::collect(
+        AngleEstimate::default(),
+        estimates.into_iter().flatten(),
+    ))
 }
 
 /// Electrical angles from the eigenvectors.

@@ -1,4 +1,5 @@
 //! `access_av._core`: the bindings, nothing else. One file per room of the core.
+mod aoa;
 mod scenario;
 mod simulate;
 
@@ -9,6 +10,22 @@ use pyo3::prelude::*;
 mod _core {
     use super::*;
 
+    #[pymodule]
+    mod aoa {
+        #[pymodule_export]
+        use crate::aoa::{
+            AngleEstimate, calibrate, covariance, crb_rad, esprit, estimate_sources,
+            forward_backward, maximum_likelihood, music, root_music,
+        };
+        use pyo3::prelude::*;
+
+        #[pymodule_init]
+        fn init(module: &Bound<'_, PyModule>) -> PyResult<()> {
+            // Makes `import access_av._core.aoa` find the submodule of a compiled module.
+            let modules = module.py().import("sys")?.getattr("modules")?;
+            modules.set_item("access_av._core.aoa", module)
+        }
+    }
     #[pymodule_export]
     use crate::scenario::{Platform, Scenario, ScenarioError};
     #[pymodule_export]

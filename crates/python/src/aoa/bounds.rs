@@ -1,0 +1,182 @@
+//! Cramér–Rao bounds for Python.
+
+use aoa::{Array, bound};
+use numpy::{AllowTypeChange, IxDyn, PyArray1, PyArrayLikeDyn, PyArrayMethods};
+use pyo3::IntoPyObjectExt;
+use pyo3::exceptions::PyValueError;
+use pyo3::prelude::*;
+
+use super::samples::{antennas_error, value_error};
+
+/// Cramér–Rao bound: the standard deviation in rad that no unbiased estimator can beat.
+///
+/// Parameters
+/// ----------
+/// angle_rad : array_like
+///     Angle from the array's axis.
+/// snr_db : array_like
+///     SNR per antenna and snapshot, broadcast against `angle_rad`.
+/// antennas, snapshots : int
+///     2 to 8 antennas, at least one snapshot.
+/// spacing_wavelengths : float
+///     Distance between neighbouring antennas in wavelengths.
+/// model : {'stochastic', 'deterministic', 'known'}
+///     What is known of the signal: that it is Gaussian; nothing; all but a complex gain.
+/// quantity : {'angle', 'phase'}
+///     Bound the angle, or the electrical angle ``2 pi (d / lambda) cos(angle)``.
+/// joint : bool
+///     Take the last axis as sources that are present at the same time, uncorrelated, instead of
+///     one alone for each element.
+///
+/// Returns
+/// -------
+/// float or ndarray
+///     Of the shape that `angle_rad` and `snr_db` broadcast to.
+///
+/// Raises
+/// ------
+/// ValueError
+///     Not finite values, coinciding sources, more sources than antennas - 1.
+///
+/// Examples
+/// --------
+/// >>> import numpy as np
+/// >>> from access_av import aoa
+/// >>> f"{np.degrees(aoa.crb_rad(np.radians(90), 10)):.3f}"
+/// '0.413'
+/// >>> aoa.crb_rad(np.radians([60, 90]), [[0], [10], [20]]).shape
+/// (3, 2)
+#[pyfunction]
+#[pyo3(signature = (angle_rad, snr_db, *, antennas=4, snapshots=20, spacing_wavelengths=0.5, model="stochastic", quantity="angle", joint=false))]
+#[allow(clippy::too_many_arguments)]
+pub fn crb_rad<'py>(
+    py: Python<'py>,
+    angle_rad: &Bound<'py, PyAny>,
+    snr_db: &Bound<'py, PyAny>,
+    antennas: usize,
+    snapshots: usize,
+    spacing_wavelengths: f64,
+    model: &str,
+    quantity: &str,
+    joint: bool,
+) -> PyResult<Bound<'py, PyAny>> {
+    let model = match model {
+        "stochastic" => Model::Stochastic,
+        "deterministic" => Model::Deterministic,
+        "known" => Model::Known,
+        other => {
+            return Err(PyValueError::new_err(format!(
+                "model must be 'stochastic', 'deterministic' or 'known', not '{other}'"
+            )));
+        }
+    };
+    let of_angle = match quantity {
+        "angle" => true,
+        "phase" => false,
+        other => {
+            return Err(PyValueError::new_err(format!(
+                "quantity must be 'angle' or 'phase', not '{other}'"
+            )));
+        }
+    };
+    let (angles, snrs): (Values<'_>, Values<'_>) = py
+        .import("numpy")?
+        .call_method1("broadcast_arrays", (angle_rad, snr_db))?
+        .extract()?;
+    let shape = angles.as_array().shape().to_vec();
+    let angles: Vec<f64> = angles.as_array().iter().copied().collect();
+    let snrs: Vec<f64> = snrs
+        .as_array()
+        .iter()
+        .map(|db| 10.0_f64.powf(db / 10.0))
+        .collect();
+    if snapshots == 0 || angles.iter().chain(&snrs).any(|value| !value.is_finite()) {
+        return Err(PyValueError::new_err(
+            "angles and SNRs must be finite, snapshots at least 1",
+        ));
+    }
+    let sources = if joint {
+        shape.last().copied().unwrap_or(1).max(1)
+    } else {
+        1
+    };
+    let setting = Setting {
+        spacing_wavelengths,
+        snapshots,
+        model,
+        of_angle,
+    };
+    let mut sigmas = Vec::with_capacity(angles.len());
+    for (angles, snrs) in angles.chunks(sources).zip(snrs.chunks(sources)) {
+        match antennas {
+            2 => setting.bound::<2>(angles, snrs, &mut sigmas)?,
+            3 => setting.bound::<3>(angles, snrs, &mut sigmas)?,
+            4 => setting.bound::<4>(angles, snrs, &mut sigmas)?,
+            5 => setting.bound::<5>(angles, snrs, &mut sigmas)?,
+            6 => setting.bound::<6>(angles, snrs, &mut sigmas)?,
+            7 => setting.bound::<7>(angles, snrs, &mut sigmas)?,
+            8 => setting.bound::<8>(angles, snrs, &mut sigmas)?,
+            other => return Err(antennas_error(other)),
+        }
+    }
+    match (shape.as_slice(), sigmas.as_slice()) {
+        ([], [only]) => only.into_bound_py_any(py),
+        _ => Ok(PyArray1::from_vec(py, sigmas)
+            .reshape(IxDyn(&shape))?
+            .into_any()),
+    }
+}
+
+type Values<'py> = PyArrayLikeDyn<'py, f64, AllowTypeChange>;
+
+#[derive(Clone, Copy)]
+enum Model {
+    Stochastic,
+    Deterministic,
+    Known,
+}
+
+struct Setting {
+    spacing_wavelengths: f64,
+    snapshots: usize,
+    model: Model,
+    of_angle: bool,
+}
+
+impl Setting {
+    /// Bounds of sources present together, appended to `sigmas`.
+    fn bound<const N: usize>(
+        &self,
+        angles_rad: &[f64],
+        snrs: &[f64],
+        sigmas: &mut Vec<f64>,
+    ) -> PyResult<()> {
+        let array = Array::<N>::new(self.spacing_wavelengths).map_err(value_error)?;
+        let first = sigmas.len();
+        if let (&[_], &[snr]) = (angles_rad, snrs) {
+            sigmas.push(match self.model {
+                Model::Stochastic => bound::stochastic::<N>(snr, self.snapshots),
+                Model::Deterministic => bound::deterministic::<N>(snr, self.snapshots),
+                Model::Known => bound::known_signal::<N>(snr * self.snapshots as f64),
+            });
+        } else {
+            let phases: Vec<f64> = angles_rad
+                .iter()
+                .map(|angle| array.phase_from_angle(*angle))
+                .collect();
+            let several = match self.model {
+                Model::Stochastic => bound::stochastic_several::<N>,
+                Model::Deterministic => bound::deterministic_several::<N>,
+                Model::Known => bound::known_signal_several::<N>,
+            };
+            let bounds = several(&phases, snrs, self.snapshots).map_err(value_error)?;
+            sigmas.extend_from_slice(&bounds);
+        }
+        if self.of_angle {
+            for (sigma, &angle) in sigmas[first..].iter_mut().zip(angles_rad) {
+                *sigma = bound::angle_sigma_rad(*sigma, angle, &array);
+            }
+        }
+        Ok(())
+    }
+}

@@ -1,0 +1,237 @@
+//! Covariances, the number of sources, calibration, bounds.
+
+use aoa::{Array, Batch, Calibration, Complex64, Covariance, Criterion, Real};
+use numpy::{
+    AllowTypeChange, IxDyn, PyArray1, PyArrayDyn, PyArrayLikeDyn, PyArrayMethods,
+    PyUntypedArrayMethods,
+};
+use pyo3::IntoPyObjectExt;
+use pyo3::exceptions::PyValueError;
+use pyo3::prelude::*;
+
+use super::samples::{Samples, Visitor, value_error};
+
+/// Sample covariance of the antennas, mean not removed.
+///
+/// Parameters
+/// ----------
+/// snapshots : ndarray
+///     Complex samples, `(antennas, snapshots)` or `(batch, antennas, snapshots)`.
+///
+/// Returns
+/// -------
+/// ndarray
+///     Complex128, `(antennas, antennas)` or `(batch, antennas, antennas)`.
+///
+/// Examples
+/// --------
+/// >>> import numpy as np
+/// >>> from access_av import aoa
+/// >>> aoa.covariance(np.ones((2, 5), complex)).real.tolist()
+/// [[1.0, 1.0], [1.0, 1.0]]
+#[pyfunction]
+pub fn covariance<'py>(
+    snapshots: &Bound<'py, PyAny>,
+) -> PyResult<Bound<'py, PyArrayDyn<Complex64>>> {
+    let samples = Samples::of(snapshots)?;
+    let shape = samples.shape([samples.antennas; 2]);
+    let entries = samples.visit(Entries)?;
+    PyArray1::from_vec(snapshots.py(), entries).reshape(IxDyn(&shape))
+}
+
+struct Entries;
+
+impl Visitor for Entries {
+    type Output = Vec<Complex64>;
+
+    fn visit<T: Real, const N: usize>(self, batch: Batch<'_, T, N>) -> PyResult<Vec<Complex64>> {
+        let mut entries = Vec::with_capacity(batch.len() * N * N);
+        for covariance in batch.covariances() {
+            entries.extend(
+                covariance
+                    .map_err(value_error)?
+                    .matrix()
+                    .into_iter()
+                    .flatten(),
+            );
+        }
+        Ok(entries)
+    }
+}
+
+/// Forward–backward average of a covariance: ``(R + J conj(R) J) / 2``, ``J`` reversing the antennas.
+///
+/// Parameters
+/// ----------
+/// covariance : array_like
+///     Complex, `(antennas, antennas)` or `(batch, antennas, antennas)`.
+///
+/// Returns
+/// -------
+/// ndarray
+///     Complex128, of the same shape.
+///
+/// Examples
+/// --------
+/// >>> import numpy as np
+/// >>> from access_av import aoa
+/// >>> aoa.forward_backward(np.diag([1, 3])).real.tolist()
+/// [[2.0, 0.0], [0.0, 2.0]]
+#[pyfunction]
+pub fn forward_backward<'py>(
+    covariance: &Bound<'py, PyAny>,
+) -> PyResult<Bound<'py, PyArrayDyn<Complex64>>> {
+    let py = covariance.py();
+    let covariance: PyArrayLikeDyn<'_, Complex64, AllowTypeChange> = covariance.extract()?;
+    let shape = covariance.shape().to_vec();
+    let (2 | 3, [.., rows, columns]) = (shape.len(), shape.as_slice()) else {
+        return Err(not_square(&shape));
+    };
+    if rows != columns {
+        return Err(not_square(&shape));
+    }
+    let entries: Vec<Complex64> = covariance.as_array().iter().copied().collect();
+    let average = entries.chunks((rows * columns).max(1)).flat_map(|matrix| {
+        // J conj(R) J is R read backwards, conjugated.
+        matrix
+            .iter()
+            .zip(matrix.iter().rev())
+            .map(|(a, b)| (a + b.conj()) * 0.5)
+    });
+    PyArray1::from_iter(py, average).reshape(IxDyn(&shape))
+}
+
+fn not_square(shape: &[usize]) -> PyErr {
+    PyValueError::new_err(format!(
+        "covariance must have the shape (antennas, antennas) or (batch, antennas, antennas), \
+         not {shape:?}"
+    ))
+}
+
+/// Number of sources, from the eigenvalues of the covariance (Wax and Kailath 1985).
+///
+/// Parameters
+/// ----------
+/// snapshots : ndarray
+///     Complex samples, `(antennas, snapshots)` or `(batch, antennas, snapshots)`.
+/// criterion : {'mdl', 'aic'}
+///     Minimum description length, or Akaike's criterion, which sees weaker sources and now and
+///     then one that is not there.
+///
+/// Returns
+/// -------
+/// int or ndarray
+///     0 to antennas - 1.
+///
+/// Examples
+/// --------
+/// >>> import numpy as np
+/// >>> from access_av import aoa
+/// >>> rng = np.random.default_rng(1)
+/// >>> noise = rng.normal(size=(4, 100, 2)) @ [1, 1j]
+/// >>> aoa.estimate_sources(noise)
+/// 0
+/// >>> aoa.estimate_sources(noise + 3 * rng.normal(size=100))
+/// 1
+#[pyfunction]
+#[pyo3(signature = (snapshots, *, criterion="mdl"))]
+pub fn estimate_sources<'py>(
+    snapshots: &Bound<'py, PyAny>,
+    criterion: &str,
+) -> PyResult<Bound<'py, PyAny>> {
+    let py = snapshots.py();
+    let samples = Samples::of(snapshots)?;
+    let criterion = match criterion {
+        "mdl" => Criterion::Mdl,
+        "aic" => Criterion::Aic,
+        other => {
+            return Err(PyValueError::new_err(format!(
+                "criterion must be 'mdl' or 'aic', not '{other}'"
+            )));
+        }
+    };
+    let counts = samples.visit(Counts(criterion))?;
+    match (samples.batch, counts.as_slice()) {
+        (None, [only]) => only.into_bound_py_any(py),
+        _ => PyArray1::from_vec(py, counts).into_bound_py_any(py),
+    }
+}
+
+struct Counts(Criterion);
+
+impl Visitor for Counts {
+    type Output = Vec<i64>;
+
+    fn visit<T: Real, const N: usize>(self, batch: Batch<'_, T, N>) -> PyResult<Vec<i64>> {
+        let count = |covariance: Result<Covariance<N>, aoa::Error>| {
+            let sources = aoa::source_count(self.0, &covariance.map_err(value_error)?);
+            sources.map(|sources| sources as i64).map_err(value_error)
+        };
+        batch.covariances().map(count).collect()
+    }
+}
+
+/// Channel gains from a burst of one source in a known direction.
+///
+/// Parameters
+/// ----------
+/// snapshots : ndarray
+///     Complex samples of the burst, `(antennas, snapshots)`.
+/// angle_rad : float
+///     Its angle from the array's axis, 0 to pi.
+/// spacing_wavelengths : float
+///     Distance between neighbouring antennas in wavelengths.
+///
+/// Returns
+/// -------
+/// ndarray
+///     Complex gains, one per channel; channel 0 has phase 0, the mean power gain is 1.
+///
+/// Examples
+/// --------
+/// >>> import numpy as np
+/// >>> from access_av import aoa
+/// >>> gains = np.array([1, 1j, -1, 1])
+/// >>> burst = np.outer(gains, np.ones(10))  # a source at broadside
+/// >>> bool(np.allclose(aoa.calibrate(burst, np.pi / 2), gains))
+/// True
+#[pyfunction]
+#[pyo3(signature = (snapshots, angle_rad, *, spacing_wavelengths=0.5))]
+pub fn calibrate<'py>(
+    snapshots: &Bound<'py, PyAny>,
+    angle_rad: f64,
+    spacing_wavelengths: f64,
+) -> PyResult<Bound<'py, PyArray1<Complex64>>> {
+    let samples = Samples::of(snapshots)?;
+    if samples.batch.is_some() {
+        return Err(PyValueError::new_err(
+            "a reference burst has the shape (antennas, snapshots)",
+        ));
+    }
+    let gains = samples.visit(Reference {
+        angle_rad,
+        spacing_wavelengths,
+    })?;
+    Ok(PyArray1::from_vec(snapshots.py(), gains))
+}
+
+struct Reference {
+    angle_rad: f64,
+    spacing_wavelengths: f64,
+}
+
+impl Visitor for Reference {
+    type Output = Vec<Complex64>;
+
+    fn visit<T: Real, const N: usize>(self, batch: Batch<'_, T, N>) -> PyResult<Vec<Complex64>> {
+        let array = Array::<N>::new(self.spacing_wavelengths).map_err(value_error)?;
+        let mut gains = Vec::with_capacity(N);
+        for covariance in batch.covariances() {
+            let covariance = covariance.map_err(value_error)?;
+            let calibration =
+                Calibration::from_reference_covariance(&covariance, &array, self.angle_rad);
+            gains.extend_from_slice(calibration.map_err(value_error)?.gains());
+        }
+        Ok(gains)
+    }
+}

@@ -1,0 +1,93 @@
+from typing import Any, Literal, final
+
+import numpy as np
+from numpy.typing import ArrayLike, NDArray
+
+__all__ = [
+    "AngleEstimate",
+    "calibrate",
+    "covariance",
+    "crb_rad",
+    "esprit",
+    "estimate_sources",
+    "forward_backward",
+    "maximum_likelihood",
+    "music",
+    "root_music",
+]
+
+_Samples = NDArray[np.complex64] | NDArray[np.complex128]
+
+@final
+class AngleEstimate:
+    # Numbers for a single estimate, arrays for a batch or several sources.
+    @property
+    def angle_rad(self) -> Any: ...
+    @property
+    def sigma_rad(self) -> Any: ...
+    @property
+    def phase_rad(self) -> Any: ...
+    @property
+    def phase_sigma_rad(self) -> Any: ...
+    @property
+    def snr_db(self) -> Any: ...
+    @property
+    def resolved(self) -> Any: ...
+    @property
+    def verdict(self) -> Any: ...
+
+def music(
+    snapshots: _Samples,
+    *,
+    spacing_wavelengths: float = 0.5,
+    sources: int = 1,
+    grid_deg: float = 0.1,
+    forward_backward: bool = False,
+    calibration: ArrayLike | None = None,
+    threads: int = 1,
+) -> AngleEstimate: ...
+def root_music(
+    snapshots: _Samples,
+    *,
+    spacing_wavelengths: float = 0.5,
+    sources: int = 1,
+    forward_backward: bool = False,
+    calibration: ArrayLike | None = None,
+    threads: int = 1,
+) -> AngleEstimate: ...
+def esprit(
+    snapshots: _Samples,
+    *,
+    spacing_wavelengths: float = 0.5,
+    sources: int = 1,
+    total_least_squares: bool = True,
+    forward_backward: bool = False,
+    calibration: ArrayLike | None = None,
+    threads: int = 1,
+) -> AngleEstimate: ...
+def maximum_likelihood(
+    snapshots: _Samples,
+    *,
+    spacing_wavelengths: float = 0.5,
+    sources: int = 1,
+    forward_backward: bool = False,
+    calibration: ArrayLike | None = None,
+    threads: int = 1,
+) -> AngleEstimate: ...
+def covariance(snapshots: _Samples) -> NDArray[np.complex128]: ...
+def forward_backward(covariance: ArrayLike) -> NDArray[np.complex128]: ...
+def estimate_sources(snapshots: _Samples, *, criterion: Literal["mdl", "aic"] = "mdl") -> Any: ...
+def calibrate(
+    snapshots: _Samples, angle_rad: float, *, spacing_wavelengths: float = 0.5
+) -> NDArray[np.complex128]: ...
+def crb_rad(
+    angle_rad: ArrayLike,
+    snr_db: ArrayLike,
+    *,
+    antennas: int = 4,
+    snapshots: int = 20,
+    spacing_wavelengths: float = 0.5,
+    model: Literal["stochastic", "deterministic", "known"] = "stochastic",
+    quantity: Literal["angle", "phase"] = "angle",
+    joint: bool = False,
+) -> Any: ...
