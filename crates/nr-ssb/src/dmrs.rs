@@ -27,7 +27,7 @@ pub fn ibar_ssb(lmax: Lmax, ssb_index: u8, half_frame: bool) -> u8 {
 pub fn dmrs(pci: Pci, ibar_ssb: u8) -> [Complex32; DMRS_LEN] {
     let i = u32::from(ibar_ssb) + 1;
     let cell = u32::from(pci.get());
-    let c_init = (i * (cell / 4 + 1) << 11) + (i << 6) + cell % 4;
+    let c_init = ((i * (cell / 4 + 1)) << 11) + (i << 6) + cell % 4;
     let mut symbols = [Complex32::ZERO; DMRS_LEN];
     qpsk(Gold::new(c_init, 0), &mut symbols);
     symbols

@@ -1,5 +1,12 @@
 //! Equality with reference vectors made by independent encoders: bits exact, samples within 1e-6.
 
+#![allow(
+    clippy::unwrap_used,
+    clippy::expect_used,
+    clippy::print_stdout,
+    reason = "a test"
+)]
+
 mod common;
 
 use common::{Vectors, cells, pack};
