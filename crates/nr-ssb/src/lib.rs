@@ -1,4 +1,86 @@
-//! Synchronization signal blocks (SSBs) of 5G NR.
+//! Synchronization signal blocks (SSBs) of 5G NR: what every cell broadcasts, sequences to samples
+//! and back.
+//!
+//! An SSB is 240 subcarriers × 4 OFDM symbols: the primary and secondary synchronization signals
+//! (PSS, SSS), which say the cell's identity, and the physical broadcast channel (PBCH) with its
+//! reference signal (DM-RS), which says the time and the master information block (MIB). This crate
+//! follows TS 38.211, 38.212, 38.213 and 38.331; each item names its clause.
+//!
+//! # Conventions
+//! Resource elements are flattened with the subcarrier fastest, index k + 240·l, and k = 120 is the
+//! SSB's centre. Samples are [`Complex32`] with the SSB's centre at 0 Hz. Log-likelihood ratios are
+//! positive for bit 0. Bit strings in integers have their first bit most significant.
+//!
+//! # Build a burst
+//! A cell sends its SSBs, one per beam, in a half frame of 5 ms; [`Burst`] writes them at any multiple
+//! of the 256-point rate (3.84 Msps at 15 kHz, 7.68 Msps at 30 kHz).
+//!
+//! ```
+//! use nr_ssb::{BchPayload, Beam, Burst, Case, Lmax, Mib, Numerology, Ofdm, Pci};
+//!
+//! let mib = Mib { ssb_subcarrier_offset: 6, pdcch_config_sib1: 0x60, ..Mib::default() };
+//! let burst = Burst {
+//!     pci: Pci::new(601)?,
+//!     case: Case::C,
+//!     lmax: Lmax::L8,
+//!     payload: BchPayload::new(mib, 784, false, 0)?,
+//!     beams: (0..8).map(Beam::new).collect(),
+//!     ssb_freq_hz: Some(3_700.8e6),
+//! };
+//! let numerology = Numerology::from_sample_rate(Case::C.spacing(), 7.68e6)?;
+//! let samples = burst.iq(&mut Ofdm::new(numerology))?;
+//! assert_eq!(samples.len(), numerology.half_frame_len());
+//! # Ok::<(), nr_ssb::Error>(())
+//! ```
+//!
+//! # Read an SSB
+//! Where an SSB begins is known here; a receiver finds it. Each symbol is demodulated, its phase of
+//! TS 38.211 §5.4 taken out, and the PBCH's elements become log-likelihood ratios.
+//!
+//! ```
+//! # use nr_ssb::{BchPayload, Beam, Burst, Case, Lmax, Mib, Numerology, Ofdm, Pci};
+//! use nr_ssb::{SsbGrid, grid::pbch_indices, ofdm::symbol_phase, pbch};
+//! # let (pci, lmax) = (Pci::new(601)?, Lmax::L8);
+//! # let payload = BchPayload::new(Mib::default(), 784, false, 3)?;
+//! # let numerology = Numerology::from_sample_rate(Case::C.spacing(), 7.68e6)?;
+//! # let mut ofdm = Ofdm::new(numerology);
+//! # let beams = vec![Beam::new(3)];
+//! # let burst = Burst { pci, case: Case::C, lmax, payload, beams, ssb_freq_hz: Some(3_700.8e6) };
+//! # let samples = burst.iq(&mut ofdm)?;
+//!
+//! let mut grid = SsbGrid::zeros();
+//! for (l, subcarriers) in grid.symbols_mut().enumerate() {
+//!     let symbol = Case::C.start_symbol(3)? + l;
+//!     // Begin in the middle of the cyclic prefix: the echoes may come early or late.
+//!     let early = numerology.ssb_cp_len() / 2;
+//!     let start = numerology.symbol_start(symbol) + numerology.cp_len(symbol) - early;
+//!     ofdm.demodulate(&samples[start..start + numerology.fft_size()], early, subcarriers)?;
+//!     let phase = symbol_phase(numerology, symbol, 3_700.8e6).conj();
+//!     subcarriers.iter_mut().for_each(|x| *x *= phase);
+//! }
+//!
+//! let received = pbch_indices(pci).map(|index| grid.elements()[index]);
+//! let mut llr = [0.0; 864];
+//! pbch::llr(&received, 0.1, &mut llr);
+//! let decoded = pbch::Decoder::default().decode(&llr, pci, lmax.index_lsb(3), lmax)?;
+//! assert_eq!(decoded.map(|d| d.payload.sfn()), Some(784));
+//! # Ok::<(), nr_ssb::Error>(())
+//! ```
+//!
+//! # The parts
+//! | to | see |
+//! |---|---|
+//! | name a cell | [`Pci`] |
+//! | lay SSBs out in time | [`Case`], [`Lmax`], [`Numerology`] |
+//! | lay them out in frequency | [`grid`] |
+//! | generate sequences | [`mod@pss`], [`mod@sss`], [`mod@dmrs`], [`gold`] |
+//! | read and write the MIB | [`Mib`], [`BchPayload`] |
+//! | code and decode the PBCH | [`pbch`]; its parts [`crc`], [`polar`], [`rate_matching`] |
+//! | combine the PBCHs of several periods | [`pbch::Decoder::combine`] |
+//! | go between subcarriers and samples | [`Ofdm`] |
+//!
+//! # Errors
+//! Everything that can be wrong with an input is an [`Error`]; nothing panics.
 
 pub mod burst;
 pub mod crc;
