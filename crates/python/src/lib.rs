@@ -1,5 +1,6 @@
 //! `access_av._core`: the bindings, nothing else. One file per room of the core.
 mod aoa;
+mod recording;
 mod scenario;
 mod simulate;
 
@@ -26,6 +27,8 @@ mod _core {
             modules.set_item("access_av._core.aoa", module)
         }
     }
+    #[pymodule_export]
+    use crate::recording::{Recording, RecordingError};
     #[pymodule_export]
     use crate::scenario::{Platform, Scenario, ScenarioError};
     #[pymodule_export]

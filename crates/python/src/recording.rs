@@ -1,0 +1,183 @@
+//! Recordings: `Recording` and its error.
+
+use std::path::PathBuf;
+
+use access_av::recording::{Recording as CoreRecording, RecordingError as CoreError};
+use num_complex::Complex32;
+use numpy::{PyArray2, PyArrayMethods};
+use pyo3::create_exception;
+use pyo3::exceptions::PyValueError;
+use pyo3::prelude::*;
+
+create_exception!(
+    access_av._core,
+    RecordingError,
+    PyValueError,
+    "An unusable recording; the message names file, key and what is allowed."
+);
+
+/// The Python error for a core error.
+#[allow(clippy::needless_pass_by_value)] // the shape that `map_err` wants
+pub fn recording_error(error: CoreError) -> PyErr {
+    RecordingError::new_err(error.to_string())
+}
+
+/// A recording of one or more antennas, read piece by piece.
+///
+/// Examples
+/// --------
+/// >>> import tempfile, numpy as np
+/// >>> from pathlib import Path
+/// >>> path = Path(tempfile.mkdtemp()) / "antenna0.cf32"
+/// >>> np.arange(4, dtype=np.complex64).tofile(path)
+/// >>> recording = Recording.open_raw([path], sample_rate_hz=7.68e6)
+/// >>> recording.read(1, 2)
+/// array([[1.+0.j, 2.+0.j]], dtype=complex64)
+#[pyclass(module = "access_av._core")]
+pub struct Recording {
+    core: CoreRecording,
+    buffer: Vec<Vec<Complex32>>,
+}
+
+impl From<CoreRecording> for Recording {
+    fn from(core: CoreRecording) -> Self {
+        Self {
+            core,
+            buffer: Vec::new(),
+        }
+    }
+}
+
+#[pymethods]
+impl Recording {
+    /// Open a SigMF recording by its name, its `.sigmf-meta` or its `.sigmf-data`.
+    ///
+    /// Parameters
+    /// ----------
+    /// path : path-like
+    ///     The recording; datatype `cf32_le` or `ci16_le`, any number of interleaved channels.
+    /// verify : bool
+    ///     Compare the data's SHA-512 with the metadata's, which reads all of it once.
+    ///
+    /// Raises
+    /// ------
+    /// RecordingError
+    ///     A half missing, unusable metadata, data that ends within a sample.
+    #[staticmethod]
+    #[pyo3(signature = (path, *, verify = true))]
+    fn open(py: Python<'_>, path: PathBuf, verify: bool) -> PyResult<Self> {
+        py.detach(|| {
+            if verify {
+                CoreRecording::open(path)
+            } else {
+                CoreRecording::open_unverified(path)
+            }
+        })
+        .map(Self::from)
+        .map_err(recording_error)
+    }
+
+    /// Open raw `cf32_le` files, one per antenna.
+    #[staticmethod]
+    #[pyo3(signature = (paths, *, sample_rate_hz, centre_frequency_hz = None))]
+    #[allow(clippy::needless_pass_by_value)] // what extraction yields
+    fn open_raw(
+        paths: Vec<PathBuf>,
+        sample_rate_hz: f64,
+        centre_frequency_hz: Option<f64>,
+    ) -> PyResult<Self> {
+        CoreRecording::open_raw(&paths, sample_rate_hz, centre_frequency_hz)
+            .map(Self::from)
+            .map_err(recording_error)
+    }
+
+    /// Samples per second and channel.
+    #[getter]
+    fn sample_rate_hz(&self) -> f64 {
+        self.core.sample_rate_hz()
+    }
+
+    /// Centre frequency of the first capture that states one, in Hz.
+    #[getter]
+    fn centre_frequency_hz(&self) -> Option<f64> {
+        self.core.centre_frequency_hz()
+    }
+
+    /// Number of channels.
+    #[getter]
+    fn channels(&self) -> usize {
+        self.core.channels()
+    }
+
+    /// Samples per channel.
+    #[getter]
+    fn length(&self) -> u64 {
+        self.core.length()
+    }
+
+    /// Format of the samples in the file.
+    #[getter]
+    fn datatype(&self) -> &'static str {
+        self.core.datatype().name()
+    }
+
+    /// What looks wrong but does not keep the recording from being read.
+    #[getter]
+    fn warnings(&self) -> Vec<String> {
+        self.core
+            .warnings()
+            .iter()
+            .map(ToString::to_string)
+            .collect()
+    }
+
+    /// The metadata as JSON, annotations and keys of extensions included.
+    fn metadata_json(&self) -> PyResult<String> {
+        serde_json::to_string(self.core.metadata())
+            .map_err(|error| RecordingError::new_err(error.to_string()))
+    }
+
+    /// Read `count` samples of every channel from sample `start` on.
+    ///
+    /// Returns
+    /// -------
+    /// ndarray
+    ///     complex64, shape (channels, count); full scale of integers is one.
+    ///
+    /// Raises
+    /// ------
+    /// RecordingError
+    ///     Samples beyond the end; a sample that is not finite.
+    fn read<'py>(
+        &mut self,
+        py: Python<'py>,
+        start: u64,
+        count: usize,
+    ) -> PyResult<Bound<'py, PyArray2<Complex32>>> {
+        py.detach(|| self.core.read(start, count, &mut self.buffer))
+            .map_err(recording_error)?;
+        let array = PyArray2::zeros(py, [self.buffer.len(), count], false);
+        let mut writable = array.readwrite();
+        for (mut row, samples) in writable.as_array_mut().outer_iter_mut().zip(&self.buffer) {
+            row.iter_mut()
+                .zip(samples)
+                .for_each(|(to, from)| *to = *from);
+        }
+        drop(writable);
+        Ok(array)
+    }
+
+    fn __len__(&self) -> usize {
+        self.core.length() as usize
+    }
+
+    fn __repr__(&self) -> String {
+        format!(
+            "Recording({:?}, {} channels, {} samples, {} Hz)",
+            self.core.data_file().display().to_string(),
+            self.core.channels(),
+            self.core.length(),
+            self.core.sample_rate_hz(),
+        )
+    }
+}
