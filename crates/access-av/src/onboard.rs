@@ -5,10 +5,13 @@
 //! SSB into an angle and the angle into a better pose. Simulation and vehicle call the same three.
 //! Nothing is allocated after construction.
 
+use std::sync::Arc;
+
 use crate::BoxError;
 use crate::channel::LinkBudget;
 use crate::estimator::{AngleEstimator, CustomEstimator};
 use crate::geometry::Pose;
+use crate::localize::tracker::{InitialPose, Tracker, TrackerConfig};
 use crate::localize::{
     AngleMeasurement, DeadReckoning, Localizer, OdometryStep, PoseEstimate, UpdateReason,
     UpdateVerdict,
@@ -94,14 +97,26 @@ impl Onboard {
             let spacing = scenario.array.spacing_wavelengths;
             check.error("array.spacing_wavelengths", spacing, &error.to_string())
         })?;
+        let heads: Vec<RadioHead> = scenario.radio_heads.iter().map(RadioHead::from).collect();
         let localizer = match scenario.localizer {
             LocalizerSettings::DeadReckoning => Localizer::DeadReckoning(DeadReckoning::new(
                 start,
                 scenario.array.mounting_angle_rad,
             )),
+            LocalizerSettings::Tracker(settings) => {
+                let map = settings.map.then(|| scenario.build_track()).transpose()?;
+                let start = InitialPose {
+                    pose: start,
+                    position_std_m: scenario.start.position_std_m,
+                    heading_std_rad: scenario.start.heading_std_rad,
+                };
+                let config = TrackerConfig::new(scenario, &settings);
+                let tracker = Tracker::new(config, map.map(Arc::new), &heads, &start);
+                Localizer::Tracker(Box::new(tracker))
+            }
         };
         Ok(Self {
-            heads: scenario.radio_heads.iter().map(RadioHead::from).collect(),
+            heads,
             budget: LinkBudget::new(scenario),
             estimator,
             localizer,
@@ -136,6 +151,7 @@ impl Onboard {
             Some(_) => {}
         }
         self.odometry = Some(*sample);
+        self.localizer.odometry(sample);
         self.advance_to(sample.time_s);
         Ok(())
     }
@@ -184,7 +200,7 @@ impl Onboard {
                 wake_up_time_s: self.wake_up_time_s,
             });
         };
-        let distance_m = self.localizer.pose().pose.point().distance_m(head.position);
+        let distance_m = self.pose().pose.point().distance_m(head.position);
         let inputs = WakeUpInputs {
             time_s,
             sensed_snr_db: ssb.snr_db,
@@ -225,7 +241,7 @@ impl Onboard {
 
     /// Where the vehicle is believed to be.
     pub fn pose(&self) -> PoseEstimate {
-        self.localizer.pose()
+        self.localizer.pose(self.reached.time_s)
     }
 
     fn head(&self, ssb: &SensedSsb) -> Option<RadioHead> {

@@ -66,13 +66,15 @@ impl HeadChannel {
 
     /// The SSB of mean SNR `snr_db` at the array, with fading.
     pub fn receive(&mut self, vehicle: &VehicleState, snr_db: f64) -> Reception {
-        let bearing_rad = vehicle.pose.point().bearing_rad(self.head.position);
+        let place = vehicle.pose.point();
+        let distance_m = place.distance_m(self.head.position);
+        let bearing_rad = place.bearing_rad(self.head.position);
         let to_axis_rad = bearing_rad - vehicle.pose.heading_rad - self.mounting_angle_rad;
         let phase_rad = self.element_rad * to_axis_rad.cos();
         let amplitude = 10f64.powf(0.05 * snr_db);
         let gains = self
             .fading
-            .gains(phase_rad, vehicle.along_m)
+            .gains(phase_rad, vehicle.along_m, distance_m)
             .map(|gain| gain * amplitude);
         let power = gains.iter().map(Complex64::norm_sqr).sum::<f64>() / gains.len() as f64;
         let mut sensed_db = 10.0 * power.log10();

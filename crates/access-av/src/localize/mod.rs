@@ -1,10 +1,15 @@
 //! From odometry and angles to a pose.
 
 mod dead_reckoning;
+pub mod gaussian;
+pub mod integrity;
+pub mod tracker;
 
 pub use dead_reckoning::DeadReckoning;
+pub use tracker::Tracker;
 
 use crate::geometry::Pose;
+use crate::observation::OdometrySample;
 use crate::world::RadioHead;
 
 /// The localizer a scenario chooses.
@@ -12,13 +17,28 @@ use crate::world::RadioHead;
 pub enum Localizer {
     /// The paper's.
     DeadReckoning(DeadReckoning),
+    /// The filter.
+    Tracker(Box<Tracker>),
 }
 
 impl Localizer {
+    /// Takes in a valid odometry sample.
+    pub fn odometry(&mut self, sample: &OdometrySample) {
+        match self {
+            // Dead reckoning knows steps only.
+            Self::DeadReckoning(_) => {}
+            Self::Tracker(tracker) => {
+                tracker.odometry(sample);
+            }
+        }
+    }
+
     /// Moves on by what odometry says.
     pub fn predict(&mut self, step: &OdometryStep) {
         match self {
             Self::DeadReckoning(localizer) => localizer.predict(step),
+            // The tracker stays at the newest sample and looks ahead from there.
+            Self::Tracker(_) => {}
         }
     }
 
@@ -26,13 +46,15 @@ impl Localizer {
     pub fn update(&mut self, head: &RadioHead, measured: &AngleMeasurement) -> UpdateVerdict {
         match self {
             Self::DeadReckoning(localizer) => localizer.update(head, measured),
+            Self::Tracker(tracker) => tracker.update(head, measured),
         }
     }
 
-    /// Where it believes the vehicle to be.
-    pub fn pose(&self) -> PoseEstimate {
+    /// Where it believes the vehicle to be at `time_s`, to which it has been moved.
+    pub fn pose(&self, time_s: f64) -> PoseEstimate {
         match self {
             Self::DeadReckoning(localizer) => localizer.pose(),
+            Self::Tracker(tracker) => tracker.pose(time_s),
         }
     }
 }
@@ -100,12 +122,15 @@ pub enum UpdateReason {
     Consistent,
     /// It lies too far from the prediction.
     Outlier,
-    /// It carries no angle: no number, or no resolved source.
+    /// It carries no angle: no number, no valid standard deviation, no resolved source, or a radio
+    /// head within a metre.
     Unusable,
     /// No radio head with this PCI and SSB index is on the map.
     UnknownRadioHead,
     /// Its time is before the last one's.
     TimeReversed,
+    /// Its radio head is excluded, by the user or as faulty.
+    Excluded,
 }
 
 impl UpdateReason {
@@ -117,6 +142,7 @@ impl UpdateReason {
             Self::Unusable => "unusable",
             Self::UnknownRadioHead => "unknown radio head",
             Self::TimeReversed => "time reversed",
+            Self::Excluded => "excluded",
         }
     }
 }

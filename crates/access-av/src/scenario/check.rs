@@ -3,8 +3,8 @@
 use std::fmt::Display;
 
 use super::{
-    EstimatorMethod, PidSettings, Pilots, Scenario, ScenarioError, SnrSetPoint, TrackSettings,
-    WakeUpSettings,
+    EstimatorMethod, LocalizerSettings, PidSettings, Pilots, Scenario, ScenarioError, SnrSetPoint,
+    TrackSettings, WakeUpSettings,
 };
 use crate::geometry::Point;
 use crate::observation::{ANTENNAS, MAX_SNAPSHOTS};
@@ -85,6 +85,12 @@ impl Scenario {
         check.positive(
             "motion.lateral_wander.wavelength_m",
             motion.lateral_wander.wavelength_m,
+        )?;
+        check.between(
+            "motion.lateral_wander.damping",
+            motion.lateral_wander.damping,
+            0.01,
+            0.99,
         )?;
         let mut before_m = 0.0;
         for (index, stop) in motion.stops.iter().enumerate() {
@@ -238,7 +244,11 @@ impl Scenario {
             check.not_negative("odometer.gyro.bias_std_radps", gyro.bias_std_radps)?;
         }
         check.not_negative("start.position_std_m", self.start.position_std_m)?;
-        check.not_negative("start.heading_std_rad", self.start.heading_std_rad)
+        check.not_negative("start.heading_std_rad", self.start.heading_std_rad)?;
+        match &self.localizer {
+            LocalizerSettings::DeadReckoning => Ok(()),
+            LocalizerSettings::Tracker(tracker) => tracker.check(check),
+        }
     }
 
     fn check_wake_up(&self, check: &Check<'_>) -> Result<(), ScenarioError> {

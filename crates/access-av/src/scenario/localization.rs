@@ -5,6 +5,8 @@ use std::fmt;
 use schemars::JsonSchema;
 use serde::{Deserialize, Serialize};
 
+use super::TrackerSettings;
+
 /// `[odometer]`
 #[derive(Debug, Clone, Copy, PartialEq, Serialize, Deserialize, JsonSchema)]
 #[serde(default, deny_unknown_fields)]
@@ -120,4 +122,6 @@ pub enum LocalizerSettings {
     /// The paper's: each angle becomes a heading, distances are added up along it.
     #[default]
     DeadReckoning,
+    /// A Kalman filter over pose, odometer scale and array calibration.
+    Tracker(TrackerSettings),
 }

@@ -13,6 +13,7 @@ pub(crate) mod read;
 mod road;
 mod shipped;
 mod track_file;
+mod tracker;
 mod wake_up;
 
 use std::fs;
@@ -33,6 +34,7 @@ pub use localization::{
 };
 pub use radio::{ArraySettings, Pilots, RadioHeadSettings, ReceiverSettings, SsbSettings};
 pub use road::{MotionSettings, SegmentSettings, StopSettings, TrackSettings, WanderSettings};
+pub use tracker::TrackerSettings;
 pub use wake_up::{FixedSettings, PidSettings, SensingMode, SnrSetPoint, WakeUpSettings};
 
 /// Everything a simulated drive depends on, besides the seed.

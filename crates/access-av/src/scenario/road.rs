@@ -4,6 +4,7 @@ use schemars::JsonSchema;
 use serde::{Deserialize, Serialize};
 
 use crate::geometry::Pose;
+use crate::world::LaneKeeping;
 
 /// `[track]`: exactly one of `segments`, `polyline_m` and `file` gives its shape.
 #[derive(Debug, Clone, PartialEq, Serialize, Deserialize, JsonSchema)]
@@ -71,6 +72,8 @@ pub struct WanderSettings {
     pub rms_m: f64,
     /// Typical wavelength along the road, in metres.
     pub wavelength_m: f64,
+    /// Damping ratio, above 0 and below 1: how soon one swing forgets the last.
+    pub damping: f64,
 }
 
 impl Default for TrackSettings {
@@ -109,6 +112,18 @@ impl Default for WanderSettings {
         Self {
             rms_m: 0.0,
             wavelength_m: 60.0,
+            damping: 0.1,
+        }
+    }
+}
+
+impl WanderSettings {
+    /// The process behind it.
+    pub fn lane_keeping(&self) -> LaneKeeping {
+        LaneKeeping {
+            wander_m: self.rms_m,
+            wavelength_m: self.wavelength_m,
+            damping: self.damping,
         }
     }
 }

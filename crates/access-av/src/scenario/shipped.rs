@@ -1,10 +1,22 @@
 //! The scenarios that come with the product.
 
 /// Names and texts of the shipped scenarios.
-pub(super) const SCENARIOS: [(&str, &str); 2] = [
+pub(super) const SCENARIOS: [(&str, &str); 5] = [
     ("paper", include_str!("../../../../scenarios/paper.toml")),
     (
         "paper-stop-and-go",
         include_str!("../../../../scenarios/paper-stop-and-go.toml"),
+    ),
+    (
+        "paper-real-odometry",
+        include_str!("../../../../scenarios/paper-real-odometry.toml"),
+    ),
+    (
+        "paper-real-odometry-2",
+        include_str!("../../../../scenarios/paper-real-odometry-2.toml"),
+    ),
+    (
+        "paper-real-odometry-4",
+        include_str!("../../../../scenarios/paper-real-odometry-4.toml"),
     ),
 ];

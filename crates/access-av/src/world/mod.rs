@@ -1,11 +1,13 @@
 //! The truth: where the road runs, how the vehicle moves on it, what its odometer makes of that.
 
+mod lane_keeping;
 mod motion;
 mod odometer;
 mod radio_head;
 mod track;
 mod vehicle;
 
+pub use lane_keeping::LaneKeeping;
 pub use motion::{Motion, MotionProfile};
 pub use odometer::Odometer;
 pub use radio_head::RadioHead;

@@ -1,8 +1,7 @@
 //! The vehicle's true pose: on the road, but for its lateral wander.
 
-use std::f64::consts::{SQRT_2, TAU};
-
 use rand::RngExt;
+use rand_distr::StandardNormal;
 
 use super::{MotionProfile, Track};
 use crate::geometry::Pose;
@@ -36,10 +35,11 @@ impl Vehicle {
     /// The vehicle of the run that `streams` belongs to.
     pub fn new(track: Track, settings: &MotionSettings, streams: Streams) -> Self {
         let motion = MotionProfile::new(settings, track.length_m());
+        let wander = Wander::new(settings.lateral_wander, track.length_m(), streams);
         Self {
             track,
             motion,
-            wander: Wander::new(settings.lateral_wander, streams),
+            wander,
         }
     }
 
@@ -52,7 +52,7 @@ impl Vehicle {
     pub fn at(&self, time_s: f64) -> VehicleState {
         let motion = self.motion.at(time_s);
         let middle = self.track.pose(motion.along_m);
-        if self.wander.amplitude_m == 0.0 {
+        let Some((lateral_m, slope)) = self.wander.at(motion.along_m) else {
             return VehicleState {
                 time_s,
                 along_m: motion.along_m,
@@ -60,8 +60,7 @@ impl Vehicle {
                 speed_mps: motion.speed_mps,
                 pose: middle,
             };
-        }
-        let (lateral_m, slope) = self.wander.at(motion.along_m);
+        };
         // Beside the middle of a bend, a metre of road is 1 − κd metres long.
         let stretch = 1.0 - self.track.curvature_per_m(motion.along_m) * lateral_m;
         let mut pose = middle.offset_left(lateral_m);
@@ -76,45 +75,70 @@ impl Vehicle {
     }
 }
 
-/// A sum of sinusoids around one wavelength.
-#[derive(Debug, Clone, Copy)]
-struct Wander {
-    amplitude_m: f64,
-    waves: [Wave; 4],
-}
+/// Distance between the points at which the wander is drawn, in metres.
+const KNOT_M: f64 = 0.5;
 
-#[derive(Debug, Clone, Copy, Default)]
-struct Wave {
-    per_m: f64,
-    phase_rad: f64,
+/// A drawn path beside the middle of the road: points of the Gauss–Markov process of
+/// [`LaneKeeping`], joined by cubics that share their offsets and slopes.
+#[derive(Debug, Clone)]
+struct Wander {
+    /// Offset in metres and slope, every [`KNOT_M`]; empty for a vehicle that does not wander.
+    knots: Vec<[f64; 2]>,
 }
 
 impl Wander {
-    fn new(settings: WanderSettings, streams: Streams) -> Self {
-        let mut rng = streams.generator(Purpose::Wander, 0);
-        let mut waves = [Wave::default(); 4];
-        for (wave, relative) in waves.iter_mut().zip([0.8, 0.93, 1.08, 1.25]) {
-            wave.per_m = TAU / (relative * settings.wavelength_m);
-            wave.phase_rad = rng.random::<f64>() * TAU;
+    fn new(settings: WanderSettings, length_m: f64, streams: Streams) -> Self {
+        if settings.rms_m == 0.0 {
+            return Self { knots: Vec::new() };
         }
-        // Four independent sinusoids of amplitude A have a mean square of 4·A²/2.
+        let keeping = settings.lane_keeping();
+        let transition = keeping.transition(KNOT_M);
+        let noise = keeping.noise(&transition);
+        // Cholesky factor of the noise of one step.
+        let slope_std = noise[1][1].sqrt();
+        let shared = noise[0][1] / slope_std;
+        let own = (noise[0][0] - shared * shared).max(0.0).sqrt();
+
+        let mut rng = streams.generator(Purpose::Wander, 0);
+        let mut normal = || rng.sample::<f64, _>(StandardNormal);
+        let [offset_variance, slope_variance] = keeping.stationary();
+        let first = [
+            offset_variance.sqrt() * normal(),
+            slope_variance.sqrt() * normal(),
+        ];
+        let count = (length_m / KNOT_M).ceil() as usize + 2;
+        let knots = std::iter::successors(Some(first), |&[offset_m, slope]| {
+            let (common, alone) = (normal(), normal());
+            Some([
+                transition[0][0] * offset_m
+                    + transition[0][1] * slope
+                    + shared * common
+                    + own * alone,
+                transition[1][0] * offset_m + transition[1][1] * slope + slope_std * common,
+            ])
+        });
         Self {
-            amplitude_m: settings.rms_m / SQRT_2,
-            waves,
+            knots: knots.take(count).collect(),
         }
     }
 
-    /// Offset in metres and its slope.
-    fn at(&self, along_m: f64) -> (f64, f64) {
-        self.waves
-            .iter()
-            .fold((0.0, 0.0), |(offset_m, slope), wave| {
-                let (sin, cos) = (wave.per_m * along_m + wave.phase_rad).sin_cos();
-                (
-                    offset_m + self.amplitude_m * sin,
-                    slope + self.amplitude_m * wave.per_m * cos,
-                )
-            })
+    /// Offset in metres and slope; `None` for a vehicle that does not wander.
+    fn at(&self, along_m: f64) -> Option<(f64, f64)> {
+        let place = (along_m / KNOT_M).max(0.0);
+        let index = (place as usize).min(self.knots.len().checked_sub(2)?);
+        let [[p0, m0], [p1, m1]] = *self.knots.get(index..)?.first_chunk()?;
+        let u = place - index as f64;
+        // Cubic Hermite polynomial and its derivative.
+        let (h00, h10) = (
+            (1.0 + 2.0 * u) * (1.0 - u) * (1.0 - u),
+            u * (1.0 - u) * (1.0 - u),
+        );
+        let (h01, h11) = (u * u * (3.0 - 2.0 * u), u * u * (u - 1.0));
+        let offset_m = h00 * p0 + h01 * p1 + KNOT_M * (h10 * m0 + h11 * m1);
+        let slope = 6.0 * u * (1.0 - u) * (p1 - p0) / KNOT_M
+            + (1.0 - u) * (1.0 - 3.0 * u) * m0
+            + u * (3.0 * u - 2.0) * m1;
+        Some((offset_m, slope))
     }
 }
 
@@ -131,7 +155,7 @@ mod tests {
         let track = Track::from_segments(Pose::default(), &bend, 5.0).unwrap();
         let lateral_wander = WanderSettings {
             rms_m: 0.1,
-            wavelength_m: 60.0,
+            ..Default::default()
         };
         let settings = MotionSettings {
             lateral_wander,

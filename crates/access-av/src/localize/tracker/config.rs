@@ -1,0 +1,97 @@
+//! What the tracker assumes of vehicle, road and radio.
+
+use super::motion::{MotionNoise, PathBend};
+use super::sighting::ArrayModel;
+use crate::localize::integrity::normal_quantile;
+use crate::scenario::{Scenario, TrackerSettings};
+use crate::world::LaneKeeping;
+
+/// Assumptions of the tracker, SI and radians. They are the tracker's, not the world's: the real
+/// odometer may be better or worse than assumed here.
+#[derive(Clone, Copy, Debug, PartialEq)]
+pub struct TrackerConfig {
+    /// The array.
+    pub array: ArrayModel,
+    /// Rician K of the channel as a power ratio: what scatter adds to each angle's variance.
+    pub rician_k: f64,
+    /// How the vehicle keeps to its lane; used with a map.
+    pub lane_keeping: LaneKeeping,
+    /// How the path bends; used without a map.
+    pub path_bend: PathBend,
+    /// Noise of the motion.
+    pub noise: MotionNoise,
+    /// Standard deviation of the odometer's scale error at the start.
+    pub odometer_scale_std: f64,
+    /// Surveyed direction of the array's axis from the vehicle's forward axis (rad).
+    pub mounting_rad: f64,
+    /// Angle random walk of the gyroscope (rad/√s).
+    pub yaw_noise_rad_per_sqrt_s: f64,
+    /// Standard deviation of its bias at the start (rad/s); 0 takes it as calibrated.
+    pub yaw_rate_bias_std_radps: f64,
+    /// Standard deviation of the array's mounting angle at the start (rad); 0 takes it as known.
+    pub mounting_std_rad: f64,
+    /// Standard deviation of the phase offset at the start (rad per element); 0 takes the array
+    /// as calibrated.
+    pub phase_std_rad: f64,
+    /// Largest squared Mahalanobis distance of an innovation that is used (χ², one degree).
+    pub gate: f64,
+    /// Acceleration to reckon with where odometry is missing (m/s²).
+    pub acceleration_mps2: f64,
+    /// Time between odometry samples above which they are reported as a gap (s).
+    pub gap_s: f64,
+    /// Speed that no odometry sample can exceed (m/s).
+    pub top_speed_mps: f64,
+}
+
+impl TrackerConfig {
+    /// What `settings` assume, for the scenario's array and carrier.
+    pub fn new(scenario: &Scenario, settings: &TrackerSettings) -> Self {
+        let rician_k_db = settings.rician_k_db.unwrap_or(scenario.channel.rician_k_db);
+        Self {
+            array: ArrayModel {
+                elements: scenario.array.elements,
+                spacing_wavelengths: scenario.array.spacing_wavelengths,
+                wavelength_m: scenario.ssb.wavelength_m(),
+            },
+            rician_k: 10f64.powf(0.1 * rician_k_db),
+            lane_keeping: LaneKeeping {
+                wander_m: settings.wander_rms_m,
+                wavelength_m: settings.wander_wavelength_m,
+                damping: settings.wander_damping,
+            },
+            path_bend: PathBend {
+                curvature_per_m: settings.curvature_rms_per_m,
+                correlation_m: settings.curvature_correlation_m,
+            },
+            noise: MotionNoise {
+                odometer_m_per_sqrt_m: settings.odometer_noise_m_per_sqrt_m,
+                ..MotionNoise::default()
+            },
+            odometer_scale_std: settings.odometer_scale_std,
+            mounting_rad: scenario.array.mounting_angle_rad,
+            yaw_noise_rad_per_sqrt_s: settings.gyro_noise_rad_per_sqrt_s,
+            yaw_rate_bias_std_radps: settings.gyro_bias_std_radps,
+            mounting_std_rad: settings.mounting_std_rad,
+            phase_std_rad: settings.phase_std_rad,
+            gate: normal_quantile(0.5 * settings.outlier_probability).powi(2),
+            acceleration_mps2: 2.0 * scenario.motion.acceleration_mps2,
+            gap_s: 5.0 / scenario.odometer.rate_hz,
+            top_speed_mps: 1.5 * scenario.motion.top_speed_mps(),
+        }
+    }
+
+    /// Variance (rad²) that scatter adds to an angle `travelled_m` after the radio head's last
+    /// one: a look is independent of the last after half a wavelength, and a share of a look
+    /// before.
+    pub fn look_variance(&self, travelled_m: f64) -> f64 {
+        // Standing still nothing new is learnt, but the variance must stay a number.
+        let share = (2.0 * travelled_m / self.array.wavelength_m).clamp(1e-9, 1.0);
+        self.array.scatter_variance(self.rician_k) / share
+    }
+
+    /// Variance of the distance (m²) driven during `duration_s` without odometry.
+    pub fn coasting_variance(&self, duration_s: f64) -> f64 {
+        let error_m = 0.5 * self.acceleration_mps2 * duration_s * duration_s;
+        error_m * error_m
+    }
+}

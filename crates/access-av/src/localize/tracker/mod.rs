@@ -1,0 +1,416 @@
+//! The tracker: an extended Kalman filter over pose, odometer scale and array calibration,
+//! predicted by odometry and updated by electrical angles.
+//!
+//! The electrical angle `ω = 2π (d/λ) cos θ` has Gaussian noise whose size does not depend on the
+//! direction; the angle θ has neither property near end-fire, and a filter that takes θ believes
+//! itself far too much there. Scatter is a second noise, the same for every look within half a
+//! wavelength of travel, and is counted once per half wavelength.
+
+mod config;
+mod interface;
+mod motion;
+mod sighting;
+pub mod state;
+
+use std::sync::Arc;
+
+use crate::geometry::{Pose, wrap_angle};
+use crate::localize::gaussian::Innovation;
+use crate::localize::{AngleMeasurement, PoseEstimate, UpdateReason, UpdateVerdict};
+use crate::observation::OdometrySample;
+use crate::world::{RadioHead, Track};
+
+pub use config::TrackerConfig;
+pub use interface::{InitialPose, OdometryVerdict};
+pub use motion::{MotionNoise, PathBend};
+pub use sighting::ArrayModel;
+
+use motion::{Step, Yaw};
+use sighting::{Footing, Sighting};
+use state::{
+    ACROSS, ALONG, Belief, CURVATURE, HEADING, MOUNTING, PHASE, SCALE, STATES, YAW_RATE_BIAS,
+};
+
+/// Longest step over which the road's curvature is taken as constant (m).
+const STEP_M: f64 = 1.0;
+
+#[derive(Clone, Copy, Debug, PartialEq)]
+struct Head {
+    known: RadioHead,
+    excluded: bool,
+    /// Distance driven when its last angle was used (m).
+    last_look_m: f64,
+}
+
+/// The tracker. With a map it works along and across the road, without in the plane.
+#[derive(Clone, Debug, PartialEq)]
+pub struct Tracker {
+    config: TrackerConfig,
+    map: Option<Arc<Track>>,
+    heads: Vec<Head>,
+    belief: Belief,
+    odometry: Option<OdometrySample>,
+    driven_m: f64,
+}
+
+impl Tracker {
+    /// A tracker that starts from a given pose. `map` is the course of the road, if known.
+    pub fn new(
+        config: TrackerConfig,
+        map: Option<Arc<Track>>,
+        heads: &[RadioHead],
+        start: &InitialPose,
+    ) -> Self {
+        let belief = initial_belief(&config, map.as_deref(), start);
+        let head = |&known| Head {
+            known,
+            excluded: false,
+            last_look_m: f64::NEG_INFINITY,
+        };
+        Self {
+            config,
+            map,
+            heads: heads.iter().map(head).collect(),
+            belief,
+            odometry: None,
+            driven_m: 0.0,
+        }
+    }
+
+    /// Moves the state by one odometry sample.
+    pub fn odometry(&mut self, sample: &OdometrySample) -> OdometryVerdict {
+        let yaw_is_finite = sample.yaw_rate_radps.is_none_or(f64::is_finite);
+        let finite = sample.time_s.is_finite()
+            && sample.distance_m.is_finite()
+            && sample.speed_mps.is_finite();
+        if !finite || !yaw_is_finite {
+            return OdometryVerdict::NotFinite;
+        }
+        let Some(previous) = self.odometry else {
+            self.odometry = Some(*sample);
+            return OdometryVerdict::First;
+        };
+        let duration_s = sample.time_s - previous.time_s;
+        if duration_s == 0.0 {
+            return OdometryVerdict::Duplicate;
+        }
+        if duration_s < 0.0 {
+            return OdometryVerdict::TimeBackwards;
+        }
+        self.odometry = Some(*sample);
+        let moved_m = sample.distance_m - previous.distance_m;
+        // A counter that was reset or overflowed says nothing of the distance: the speeds do.
+        let jumped = moved_m.abs() > self.config.top_speed_mps * duration_s + 0.1;
+        let reading_m = if jumped {
+            0.5 * (previous.speed_mps + sample.speed_mps) * duration_s
+        } else {
+            moved_m
+        };
+        let yaw = sample.yaw_rate_radps.map(|rate| Yaw {
+            turn_rad: 0.5 * (rate + previous.yaw_rate_radps.unwrap_or(rate)) * duration_s,
+            duration_s,
+            variance: self.config.yaw_noise_rad_per_sqrt_s.powi(2) * duration_s,
+        });
+        self.advance(reading_m, yaw);
+        if jumped {
+            self.add_along_variance(self.config.coasting_variance(duration_s));
+            OdometryVerdict::DistanceJump { jump_m: moved_m }
+        } else if duration_s > self.config.gap_s {
+            OdometryVerdict::AfterGap { gap_s: duration_s }
+        } else {
+            OdometryVerdict::Accepted
+        }
+    }
+
+    /// Corrects the state by one electrical angle to a radio head.
+    pub fn update(&mut self, head: &RadioHead, measured: &AngleMeasurement) -> UpdateVerdict {
+        let looked = match self.look(head, measured) {
+            Ok(looked) => looked,
+            Err(reason) => return self.verdict(reason, None),
+        };
+        let mahalanobis2 = looked.innovation.mahalanobis2();
+        if mahalanobis2 > self.config.gate {
+            return self.verdict(UpdateReason::Outlier, Some(mahalanobis2));
+        }
+        let residual = looked.innovation.residual;
+        self.belief
+            .update(residual, &looked.row, looked.measurement_variance);
+        if let Some(head) = self.heads.get_mut(looked.head) {
+            head.last_look_m = looked.place_m;
+        }
+        self.verdict(UpdateReason::Consistent, Some(mahalanobis2))
+    }
+
+    /// The innovation an angle would bring, without using it; `None` where there would be none.
+    pub fn innovation(&self, head: &RadioHead, measured: &AngleMeasurement) -> Option<Innovation> {
+        self.look(head, measured)
+            .ok()
+            .map(|looked| looked.innovation)
+    }
+
+    fn verdict(&self, reason: UpdateReason, mahalanobis2: Option<f64>) -> UpdateVerdict {
+        UpdateVerdict {
+            accepted: reason == UpdateReason::Consistent,
+            reason,
+            mahalanobis_squared: mahalanobis2,
+            threshold: Some(self.config.gate),
+        }
+    }
+
+    fn look(&self, head: &RadioHead, measured: &AngleMeasurement) -> Result<Look, UpdateReason> {
+        let sigma = measured.phase_sigma_rad;
+        let usable = measured.time_s.is_finite()
+            && measured.phase_rad.is_finite()
+            && sigma.is_finite()
+            && sigma > 0.0;
+        if !usable {
+            return Err(UpdateReason::Unusable);
+        }
+        if measured.time_s < self.time_s() {
+            return Err(UpdateReason::TimeReversed);
+        }
+        let is_it = |h: &Head| (h.known.pci, h.known.ssb_index) == (head.pci, head.ssb_index);
+        let (index, head) = (self.heads.iter().enumerate())
+            .find(|(_, head)| is_it(head))
+            .ok_or(UpdateReason::UnknownRadioHead)?;
+        if head.excluded {
+            return Err(UpdateReason::Excluded);
+        }
+        let (ahead_m, ahead_variance) = self.coasting(measured.time_s);
+        let (pose, footing) = locate(&self.belief.mean, ahead_m, self.map.as_deref());
+        let (mounting, offset) = (self.belief.mean[MOUNTING], self.belief.mean[PHASE]);
+        let array = &self.config.array;
+        let sighting = Sighting::new(head.known.position, pose, &footing, mounting, offset, array)
+            .ok_or(UpdateReason::Unusable)?;
+        let place_m = self.driven_m + ahead_m;
+        let measurement_variance = sigma * sigma
+            + self.config.look_variance(place_m - head.last_look_m)
+            + sighting.row[ALONG].powi(2) * ahead_variance;
+        let residual = wrap_angle(measured.phase_rad - sighting.phase_rad);
+        let innovation = self
+            .belief
+            .innovation(residual, &sighting.row, measurement_variance);
+        Ok(Look {
+            head: index,
+            place_m,
+            row: sighting.row,
+            measurement_variance,
+            innovation,
+        })
+    }
+
+    /// Time of the newest odometry (s).
+    pub fn time_s(&self) -> f64 {
+        self.odometry
+            .map_or(f64::NEG_INFINITY, |sample| sample.time_s)
+    }
+
+    /// The state and its covariance.
+    pub const fn belief(&self) -> &Belief {
+        &self.belief
+    }
+
+    /// What the tracker assumes.
+    pub const fn config(&self) -> &TrackerConfig {
+        &self.config
+    }
+
+    /// Distance driven since the start (m).
+    pub const fn driven_m(&self) -> f64 {
+        self.driven_m
+    }
+
+    /// Leaves the angles of a radio head unused, or uses them again.
+    pub fn set_excluded(&mut self, head: &RadioHead, excluded: bool) {
+        for mine in &mut self.heads {
+            if (mine.known.pci, mine.known.ssb_index) == (head.pci, head.ssb_index) {
+                mine.excluded = excluded;
+            }
+        }
+    }
+
+    /// The pose at `time_s`, carried on from the newest odometry at its speed.
+    pub fn pose(&self, time_s: f64) -> PoseEstimate {
+        let (lag_m, lag_variance) = self.coasting(time_s);
+        let map = self.map.as_deref();
+        let (pose, footing) = locate(&self.belief.mean, lag_m, map);
+        let (sin, cos) = footing.direction_rad.sin_cos();
+        // (x, y, heading) by (along, across, heading).
+        let jacobian = [
+            [cos * footing.stretch, -sin, 0.0],
+            [sin * footing.stretch, cos, 0.0],
+            [footing.curvature_per_m, 0.0, 1.0],
+        ];
+        let mut inner = [[0.0; 3]; 3];
+        for i in 0..3 {
+            for j in 0..3 {
+                inner[i][j] = self.belief.covariance[i][j];
+            }
+        }
+        inner[0][0] += lag_variance;
+        let mut covariance = [[0.0; 3]; 3];
+        for i in 0..3 {
+            for j in 0..3 {
+                for k in 0..3 {
+                    for l in 0..3 {
+                        covariance[i][j] += jacobian[i][k] * inner[k][l] * jacobian[j][l];
+                    }
+                }
+            }
+        }
+        PoseEstimate {
+            time_s,
+            pose,
+            covariance: Some(covariance),
+        }
+    }
+
+    fn speed_mps(&self) -> f64 {
+        let reading = self.odometry.map_or(0.0, |sample| sample.speed_mps);
+        reading / (1.0 + self.belief.mean[SCALE])
+    }
+
+    /// Distance driven since the newest odometry, and its variance.
+    fn coasting(&self, time_s: f64) -> (f64, f64) {
+        let Some(sample) = self.odometry else {
+            return (0.0, 0.0);
+        };
+        let lag_s = (time_s - sample.time_s).max(0.0);
+        (
+            self.speed_mps() * lag_s,
+            self.config.coasting_variance(lag_s),
+        )
+    }
+
+    fn advance(&mut self, reading_m: f64, yaw: Option<Yaw>) {
+        let steps = (reading_m.abs() / STEP_M).ceil().max(1.0);
+        let share = 1.0 / steps;
+        let yaw = yaw.map(|yaw| Yaw {
+            turn_rad: yaw.turn_rad * share,
+            duration_s: yaw.duration_s * share,
+            variance: yaw.variance * share,
+        });
+        for _ in 0..steps as usize {
+            let mut step = self.step(reading_m * share);
+            if let Some(yaw) = yaw {
+                step.correct(&mut self.belief, &yaw);
+                step = self
+                    .step(reading_m * share)
+                    .informed(&self.belief.mean, &yaw);
+            }
+            step.apply(&mut self.belief);
+        }
+        self.driven_m += reading_m.abs() / (1.0 + self.belief.mean[SCALE]);
+    }
+
+    fn step(&self, reading_m: f64) -> Step {
+        let (mean, config) = (&self.belief.mean, &self.config);
+        match &self.map {
+            Some(map) => {
+                let middle_m = mean[ALONG] + 0.5 * reading_m;
+                let curvature_per_m = map.curvature_per_m(middle_m);
+                Step::along_lane(
+                    mean,
+                    reading_m,
+                    curvature_per_m,
+                    &config.lane_keeping,
+                    &config.noise,
+                )
+            }
+            None => Step::in_plane(mean, reading_m, &config.path_bend, &config.noise),
+        }
+    }
+
+    fn add_along_variance(&mut self, variance: f64) {
+        if self.map.is_some() {
+            self.belief.covariance[ALONG][ALONG] += variance;
+            return;
+        }
+        let (sin, cos) = self.belief.mean[HEADING].sin_cos();
+        let direction = [cos, sin];
+        for i in 0..2 {
+            for j in 0..2 {
+                self.belief.covariance[i][j] += variance * direction[i] * direction[j];
+            }
+        }
+    }
+}
+
+/// An angle as the belief meets it.
+struct Look {
+    head: usize,
+    place_m: f64,
+    row: [f64; STATES],
+    measurement_variance: f64,
+    innovation: Innovation,
+}
+
+/// The pose `ahead_m` further on than the state says, and the road under it.
+fn locate(mean: &[f64; STATES], ahead_m: f64, map: Option<&Track>) -> (Pose, Footing) {
+    let Some(map) = map else {
+        let pose = Pose {
+            x_m: mean[ALONG],
+            y_m: mean[ACROSS],
+            heading_rad: mean[HEADING],
+        };
+        let footing = Footing {
+            direction_rad: 0.0,
+            stretch: 1.0,
+            curvature_per_m: 0.0,
+        };
+        return (pose.along_arc(ahead_m, mean[CURVATURE]), footing);
+    };
+    let along_m = mean[ALONG] + ahead_m;
+    let road = map.pose(along_m);
+    let curvature_per_m = map.curvature_per_m(along_m);
+    let footing = Footing {
+        direction_rad: road.heading_rad,
+        stretch: 1.0 - curvature_per_m * mean[ACROSS],
+        curvature_per_m,
+    };
+    let across_m = mean[ACROSS] + ahead_m * mean[HEADING];
+    let heading_rad = road.heading_rad + mean[HEADING];
+    let pose = Pose {
+        heading_rad,
+        ..road.offset_left(across_m)
+    };
+    (pose, footing)
+}
+
+fn initial_belief(config: &TrackerConfig, map: Option<&Track>, start: &InitialPose) -> Belief {
+    let mut sigma = [0.0; STATES];
+    sigma[SCALE] = config.odometer_scale_std;
+    sigma[YAW_RATE_BIAS] = config.yaw_rate_bias_std_radps;
+    sigma[MOUNTING] = config.mounting_std_rad;
+    sigma[PHASE] = config.phase_std_rad;
+    let mut mean = [0.0; STATES];
+    mean[MOUNTING] = config.mounting_rad;
+    let Some(map) = map else {
+        mean[ALONG] = start.pose.x_m;
+        mean[ACROSS] = start.pose.y_m;
+        mean[HEADING] = start.pose.heading_rad;
+        sigma[ALONG] = start.position_std_m;
+        sigma[ACROSS] = start.position_std_m;
+        sigma[HEADING] = start.heading_std_rad;
+        sigma[CURVATURE] = config.path_bend.curvature_per_m;
+        return Belief::independent(mean, sigma);
+    };
+    let place = map.project(start.pose.point());
+    let [offset_variance, heading_variance] = config.lane_keeping.stationary();
+    mean[ALONG] = place.along_m;
+    sigma[ALONG] = start.position_std_m;
+    sigma[ACROSS] = offset_variance.sqrt();
+    sigma[HEADING] = heading_variance.sqrt();
+    let mut belief = Belief::independent(mean, sigma);
+    // The given pose is a measurement beside what lane keeping already says.
+    let heading_rad = wrap_angle(start.pose.heading_rad - map.pose(place.along_m).heading_rad);
+    for (state, value, std) in [
+        (ACROSS, place.lateral_m, start.position_std_m),
+        (HEADING, heading_rad, start.heading_std_rad),
+    ] {
+        let mut row = [0.0; STATES];
+        row[state] = 1.0;
+        belief.update(value - belief.mean[state], &row, std * std);
+    }
+    belief
+}

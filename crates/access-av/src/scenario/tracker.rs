@@ -1,0 +1,104 @@
+//! What the tracker is told of vehicle, road and radio. It need not be the truth: that is in
+//! `[odometer]`, `[motion]` and `[channel]`.
+
+use schemars::JsonSchema;
+use serde::{Deserialize, Serialize};
+
+use super::{Check, ScenarioError};
+
+/// `[localizer]` with `kind = "tracker"`.
+#[derive(Debug, Clone, Copy, PartialEq, Serialize, Deserialize, JsonSchema)]
+#[serde(default, deny_unknown_fields)]
+pub struct TrackerSettings {
+    /// Whether the road's course is known to it.
+    pub map: bool,
+    /// Assumed standard deviation of the odometer's scale error.
+    pub odometer_scale_std: f64,
+    /// Assumed noise of the odometer, in metres per root of a metre.
+    pub odometer_noise_m_per_sqrt_m: f64,
+    /// Assumed lateral wander in metres (root mean square); with a map.
+    pub wander_rms_m: f64,
+    /// Its wavelength in metres.
+    pub wander_wavelength_m: f64,
+    /// Its damping ratio.
+    pub wander_damping: f64,
+    /// Assumed curvature of the path in 1/m (root mean square); without a map.
+    pub curvature_rms_per_m: f64,
+    /// Distance over which the curvature is forgotten, in metres.
+    pub curvature_correlation_m: f64,
+    /// Assumed Rician K in dB; without it, the channel's.
+    #[serde(skip_serializing_if = "Option::is_none")]
+    pub rician_k_db: Option<f64>,
+    /// Assumed angle random walk of the gyroscope in rad/√s, where there is one.
+    pub gyro_noise_rad_per_sqrt_s: f64,
+    /// Assumed standard deviation of its bias in rad/s.
+    pub gyro_bias_std_radps: f64,
+    /// How far the array's mounting angle may be off, in radians; 0 takes it as surveyed.
+    pub mounting_std_rad: f64,
+    /// How far its phase calibration may be off, in radians per element; 0 takes it as exact.
+    pub phase_std_rad: f64,
+    /// Probability with which a good angle is taken for an outlier.
+    pub outlier_probability: f64,
+}
+
+impl Default for TrackerSettings {
+    fn default() -> Self {
+        Self {
+            map: true,
+            odometer_scale_std: 0.003,
+            odometer_noise_m_per_sqrt_m: 0.01,
+            wander_rms_m: 0.1,
+            wander_wavelength_m: 60.0,
+            wander_damping: 0.1,
+            curvature_rms_per_m: 0.002,
+            curvature_correlation_m: 200.0,
+            rician_k_db: None,
+            gyro_noise_rad_per_sqrt_s: 1e-3,
+            gyro_bias_std_radps: 1e-3,
+            mounting_std_rad: 0.0,
+            phase_std_rad: 0.0,
+            outlier_probability: 1e-4,
+        }
+    }
+}
+
+impl TrackerSettings {
+    pub(super) fn check(&self, check: &Check<'_>) -> Result<(), ScenarioError> {
+        for (key, value) in [
+            ("localizer.odometer_scale_std", self.odometer_scale_std),
+            (
+                "localizer.odometer_noise_m_per_sqrt_m",
+                self.odometer_noise_m_per_sqrt_m,
+            ),
+            ("localizer.wander_rms_m", self.wander_rms_m),
+            ("localizer.curvature_rms_per_m", self.curvature_rms_per_m),
+            (
+                "localizer.gyro_noise_rad_per_sqrt_s",
+                self.gyro_noise_rad_per_sqrt_s,
+            ),
+            ("localizer.gyro_bias_std_radps", self.gyro_bias_std_radps),
+            ("localizer.mounting_std_rad", self.mounting_std_rad),
+            ("localizer.phase_std_rad", self.phase_std_rad),
+        ] {
+            check.not_negative(key, value)?;
+        }
+        check.positive("localizer.wander_wavelength_m", self.wander_wavelength_m)?;
+        check.between("localizer.wander_damping", self.wander_damping, 0.01, 0.99)?;
+        check.positive(
+            "localizer.curvature_correlation_m",
+            self.curvature_correlation_m,
+        )?;
+        check.between(
+            "localizer.rician_k_db",
+            self.rician_k_db.unwrap_or_default(),
+            -30.0,
+            200.0,
+        )?;
+        check.between(
+            "localizer.outlier_probability",
+            self.outlier_probability,
+            1e-12,
+            0.5,
+        )
+    }
+}
