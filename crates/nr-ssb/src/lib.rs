@@ -82,12 +82,25 @@
 //! # Errors
 //! Everything that can be wrong with an input is an [`Error`]; nothing panics.
 
+mod acquire;
+mod alignment;
+mod broadcast;
 pub mod burst;
+mod cancel;
+mod cfo;
+mod channel_estimate;
 pub mod crc;
+mod demodulate;
 pub mod dmrs;
 mod error;
+mod false_alarm;
+pub mod front_end;
 pub mod gold;
 pub mod grid;
+mod hermitian;
+mod identify;
+mod matched_filter;
+pub mod measure;
 pub mod mib;
 pub mod numerology;
 pub mod ofdm;
@@ -97,8 +110,12 @@ mod pci;
 pub mod polar;
 pub mod pss;
 mod qpsk;
+pub mod raster;
 pub mod rate_matching;
+pub mod search;
 pub mod sss;
+mod timing;
+pub mod track;
 
 pub use burst::{Beam, Burst};
 pub use error::Error;

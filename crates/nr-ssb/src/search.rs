@@ -1,0 +1,472 @@
+//! Cell search: every SSB of every cell on one raster point, from any number of antennas.
+//!
+//! The matched filter proposes, strongest first; SSS, DM-RS and the PBCH's checksum dispose. A
+//! found SSB is taken out of the samples, and what it hid is looked for again.
+
+use num_complex::Complex32;
+
+use crate::acquire::{Acquired, Acquirer};
+use crate::alignment::Alignment;
+use crate::broadcast::{Broadcast, BroadcastDecoder};
+use crate::cancel::Canceller;
+use crate::demodulate::{CYCLIC_PREFIX, SSB_SAMPLES};
+use crate::false_alarm::exponential_sum_threshold;
+use crate::matched_filter::{MatchedFilter, PssCandidate};
+use crate::measure::{Measurement, decibel, measure, sss_power};
+use crate::numerology::{Lmax, SubcarrierSpacing};
+use crate::payload::BchPayload;
+use crate::pci::Pci;
+
+/// Largest number of antennas.
+pub const MAX_ANTENNAS: usize = 16;
+/// Candidates examined per 20 ms at most; what noise and sidelobes offer beyond is not worth it.
+const CANDIDATES_PER_20_MS: usize = 200;
+/// PSS candidates that noise may offer in 20 ms. Each costs an examination, none a false cell.
+const NOISE_CANDIDATES_PER_20_MS: f64 = 4.0;
+/// Part of the threshold that a candidate must keep once the correlation of the antennas' noise is
+/// allowed for, its timing still off by up to half a sample.
+const PSS_FLOOR: f32 = 0.75;
+/// Part of the threshold for a cell from which on its PBCH is decoded.
+const DECODE_FLOOR: f32 = 0.7;
+/// SNR after combining above which a PBCH always decodes (its block error rate is 1 % at −8 dB):
+/// a stronger "cell" whose PBCH does not decode is none.
+const CERTAIN_DECODE_SNR_DB: f64 = -2.0;
+/// Two detections of one cell closer than this, in samples, are one SSB.
+const SAME_SSB_SAMPLES: f64 = CYCLIC_PREFIX as f64;
+
+/// What a search is told.
+#[derive(Debug, Clone, PartialEq)]
+pub struct SearchConfig {
+    /// Subcarrier spacing of the SSB.
+    pub spacing: SubcarrierSpacing,
+    /// Number of antennas, 1 to [`MAX_ANTENNAS`].
+    pub antennas: usize,
+    /// Absolute frequency of the SSB's centre, Hz. Without it the frequency offset comes from
+    /// inside the symbols only (TS 38.211 §5.4 hides the rest) and is an order less precise. Zero
+    /// for signals made without that phase.
+    pub ssb_freq_hz: Option<f64>,
+    /// SSBs per burst set, when known. Else the one usual for the frequency is tried first.
+    pub lmax: Option<Lmax>,
+    /// Largest carrier frequency offset, Hz.
+    pub cfo_range_hz: f64,
+    /// Probability that 20 ms of noise make a cell.
+    pub false_alarm: f64,
+}
+
+impl SearchConfig {
+    /// Offsets up to half a subcarrier, false alarm 1e-3.
+    pub fn new(spacing: SubcarrierSpacing, antennas: usize) -> Self {
+        Self {
+            spacing,
+            antennas,
+            ssb_freq_hz: None,
+            lmax: None,
+            cfo_range_hz: 0.5 * spacing.hz(),
+            false_alarm: 1e-3,
+        }
+    }
+}
+
+/// What makes a search impossible.
+#[derive(Debug, Clone, PartialEq, thiserror::Error)]
+#[non_exhaustive]
+pub enum SearchError {
+    /// No antenna, or more than [`MAX_ANTENNAS`].
+    #[error("{0} antennas: 1 to {MAX_ANTENNAS} are possible")]
+    Antennas(usize),
+    /// A setting outside its range.
+    #[error("{name} = {value}: {allowed}")]
+    Setting {
+        /// Which setting.
+        name: &'static str,
+        /// Its value.
+        value: f64,
+        /// What it may be.
+        allowed: &'static str,
+    },
+    /// The number of channels passed differs from that announced.
+    #[error("{given} channels given, {expected} expected")]
+    AntennaCount {
+        /// Channels passed.
+        given: usize,
+        /// Channels announced.
+        expected: usize,
+    },
+    /// Channels of different lengths.
+    #[error("channels hold different numbers of samples: {first} and {other}")]
+    UnequalLengths {
+        /// Length of channel 0.
+        first: usize,
+        /// A length that differs.
+        other: usize,
+    },
+    /// Less than one SSB.
+    #[error("{samples} samples are less than the {needed} of one SSB")]
+    TooShort {
+        /// Length of the recording at the base rate.
+        samples: usize,
+        /// Length of one SSB.
+        needed: usize,
+    },
+}
+
+/// One received SSB.
+#[derive(Debug, Clone, PartialEq)]
+pub struct DetectedSsb {
+    /// The cell.
+    pub pci: Pci,
+    /// ī_SSB of its DM-RS: with `lmax` the low bits of the SSB index.
+    pub ibar_ssb: u8,
+    /// SSB index; without a decoded PBCH as the DM-RS tells it for the likelier `lmax`.
+    pub ssb_index: u8,
+    /// Second half of the frame; unknown without a decoded PBCH at Lmax 8.
+    pub half_frame: Option<bool>,
+    /// Burst set size under which the PBCH decoded, else the likelier.
+    pub lmax: Lmax,
+    /// MIB, system frame number and half frame, if the checksum held.
+    pub payload: Option<BchPayload>,
+    /// First sample of the SSB, its cyclic prefix included, at the base rate, to a fraction of a
+    /// sample, from the first sample ever pushed.
+    pub sample_start: f64,
+    /// Carrier frequency offset, Hz.
+    pub cfo_hz: f64,
+    /// Phase from symbol to symbol beyond that of the offset (TS 38.211 §5.4), radians.
+    pub symbol_phase_step_rad: f64,
+    /// SNR of a resource element, mean over the antennas, dB.
+    pub snr_db: f64,
+    /// PSS, SSS and DM-RS detection statistics together.
+    pub statistic: f32,
+    measurements: [Measurement; MAX_ANTENNAS],
+    antennas: usize,
+}
+
+impl DetectedSsb {
+    /// SS-RSRP, SS-RSRQ and SS-SINR of every antenna.
+    pub fn measurements(&self) -> &[Measurement] {
+        &self.measurements[..self.antennas]
+    }
+}
+
+/// Searches blocks of samples at the base rate; owns all plans and buffers.
+pub struct Searcher {
+    config: SearchConfig,
+    base_rate_hz: f64,
+    filter: MatchedFilter,
+    acquirer: Acquirer,
+    decoder: BroadcastDecoder,
+    canceller: Canceller,
+    pss_threshold: f32,
+    cell_threshold: f32,
+    /// Samples of the end of the last block and of this one, per antenna.
+    buffer: Vec<Vec<Complex32>>,
+    /// Number of samples before the buffer's first.
+    buffer_start: u64,
+    candidates: Vec<PssCandidate>,
+    found: Vec<DetectedSsb>,
+    /// The last SSBs of the block before, to know them again.
+    recent: Vec<(Pci, f64)>,
+}
+
+impl Searcher {
+    /// Plans a search.
+    ///
+    /// # Errors
+    /// [`SearchError::Antennas`], [`SearchError::Setting`].
+    pub fn new(config: SearchConfig) -> Result<Self, SearchError> {
+        if config.antennas == 0 || config.antennas > MAX_ANTENNAS {
+            return Err(SearchError::Antennas(config.antennas));
+        }
+        let setting = |name, value, allowed| SearchError::Setting {
+            name,
+            value,
+            allowed,
+        };
+        if !(0.0..=5.0 * config.spacing.hz()).contains(&config.cfo_range_hz) {
+            let allowed = "from 0 to 5 subcarriers";
+            return Err(setting("cfo_range_hz", config.cfo_range_hz, allowed));
+        }
+        if !(config.false_alarm > 0.0 && config.false_alarm < 1.0) {
+            return Err(setting(
+                "false_alarm",
+                config.false_alarm,
+                "between 0 and 1",
+            ));
+        }
+        check_frequency(config.ssb_freq_hz)?;
+        let base_rate_hz = config.spacing.base_rate_hz();
+        let hypotheses = cfo_hypotheses(config.cfo_range_hz, config.spacing.hz());
+        let trials = 0.02 * base_rate_hz * 3.0 * hypotheses.len() as f64;
+        let pss_probability = NOISE_CANDIDATES_PER_20_MS / trials;
+        // Any of 336 SSS and 8 DM-RS may make the sum large.
+        let cell_probability = config.false_alarm / (trials * 336.0 * 8.0);
+        let antennas = config.antennas;
+        let pss_threshold = exponential_sum_threshold(antennas, pss_probability) as f32;
+        let pss_floor = PSS_FLOOR * pss_threshold;
+        Ok(Self {
+            base_rate_hz,
+            filter: MatchedFilter::new(config.spacing.hz(), &hypotheses, antennas),
+            acquirer: Acquirer::new(base_rate_hz, config.ssb_freq_hz, antennas, pss_floor),
+            decoder: BroadcastDecoder::new(&config),
+            canceller: Canceller::new(),
+            pss_threshold,
+            cell_threshold: exponential_sum_threshold(antennas + 4, cell_probability) as f32,
+            buffer: vec![Vec::new(); antennas],
+            buffer_start: 0,
+            candidates: Vec::new(),
+            found: Vec::new(),
+            recent: Vec::new(),
+            config,
+        })
+    }
+
+    /// All SSBs in one recording, in order of time.
+    ///
+    /// # Errors
+    /// [`SearchError::AntennaCount`], [`SearchError::UnequalLengths`], [`SearchError::TooShort`].
+    pub fn search(&mut self, antennas: &[&[Complex32]]) -> Result<&[DetectedSsb], SearchError> {
+        self.reset();
+        let samples = self.common_length(antennas)?;
+        if samples < SSB_SAMPLES {
+            return Err(SearchError::TooShort {
+                samples,
+                needed: SSB_SAMPLES,
+            });
+        }
+        self.push(antennas)
+    }
+
+    /// The SSBs that are complete with the next block of a stream, in order of time. Those that
+    /// reach over the block's end come with the next one.
+    ///
+    /// # Errors
+    /// [`SearchError::AntennaCount`], [`SearchError::UnequalLengths`].
+    pub fn push(&mut self, antennas: &[&[Complex32]]) -> Result<&[DetectedSsb], SearchError> {
+        let length = self.common_length(antennas)?;
+        let kept = self.buffer.first().map_or(0, Vec::len);
+        let tail = kept.min(SSB_SAMPLES + CYCLIC_PREFIX);
+        self.buffer_start += (kept - tail) as u64;
+        for (buffer, input) in self.buffer.iter_mut().zip(antennas) {
+            buffer.copy_within(kept - tail.., 0);
+            buffer.truncate(tail);
+            // A sample that is not a number would spoil a whole transform.
+            buffer.extend(
+                input
+                    .iter()
+                    .map(|x| if x.is_finite() { *x } else { Complex32::ZERO }),
+            );
+        }
+        self.remember();
+        self.examine_all(tail + length);
+        self.found
+            .sort_by(|a, b| a.sample_start.total_cmp(&b.sample_start));
+        Ok(&self.found)
+    }
+
+    /// Moves to an SSB at another frequency, and forgets the stream so far.
+    ///
+    /// # Errors
+    /// [`SearchError::Setting`] unless the frequency is finite.
+    pub fn tune(&mut self, ssb_freq_hz: Option<f64>) -> Result<(), SearchError> {
+        check_frequency(ssb_freq_hz)?;
+        self.config.ssb_freq_hz = ssb_freq_hz;
+        self.acquirer.tune(ssb_freq_hz);
+        self.decoder.tune(&self.config);
+        self.reset();
+        Ok(())
+    }
+
+    /// Forgets the stream so far.
+    pub fn reset(&mut self) {
+        self.buffer.iter_mut().for_each(Vec::clear);
+        self.buffer_start = 0;
+        self.found.clear();
+        self.recent.clear();
+    }
+
+    /// The settings.
+    pub fn config(&self) -> &SearchConfig {
+        &self.config
+    }
+
+    fn common_length(&self, antennas: &[&[Complex32]]) -> Result<usize, SearchError> {
+        let (given, expected) = (antennas.len(), self.config.antennas);
+        if given != expected {
+            return Err(SearchError::AntennaCount { given, expected });
+        }
+        let first = antennas.first().map_or(0, |samples| samples.len());
+        match antennas.iter().find(|samples| samples.len() != first) {
+            Some(samples) => Err(SearchError::UnequalLengths {
+                first,
+                other: samples.len(),
+            }),
+            None => Ok(first),
+        }
+    }
+
+    /// Keeps what was found near the end of the last block.
+    fn remember(&mut self) {
+        self.recent.clear();
+        let start = self.buffer_start as f64;
+        let near = self
+            .found
+            .iter()
+            .filter(|ssb| ssb.sample_start > start - SAME_SSB_SAMPLES);
+        self.recent
+            .extend(near.map(|ssb| (ssb.pci, ssb.sample_start)));
+        self.found.clear();
+    }
+
+    fn examine_all(&mut self, length: usize) {
+        // The PSS of an SSB that lies inside the buffer.
+        let Some(end) = (length + 1).checked_sub(SSB_SAMPLES - CYCLIC_PREFIX) else {
+            return;
+        };
+        let first = CYCLIC_PREFIX;
+        self.candidates.clear();
+        self.filter.run(
+            &self.buffer,
+            first,
+            end,
+            self.pss_threshold,
+            &mut self.candidates,
+        );
+        let blocks = (length as f64 / (0.02 * self.base_rate_hz)).ceil() as usize;
+        for _ in 0..CANDIDATES_PER_20_MS * blocks.max(1) {
+            let strongest = self
+                .candidates
+                .iter()
+                .enumerate()
+                .max_by(|a, b| a.1.statistic.total_cmp(&b.1.statistic))
+                .map(|(index, _)| index);
+            let Some(index) = strongest else { break };
+            let candidate = self.candidates.swap_remove(index);
+            let Some(alignment) = self.examine(&candidate) else {
+                continue;
+            };
+            // Around an SSB that is now gone the matched filter is run again.
+            let from = alignment.start.saturating_sub(SSB_SAMPLES / 4).max(first);
+            let to = (alignment.start + SSB_SAMPLES).min(end);
+            self.candidates
+                .retain(|other| !(from..to).contains(&other.sample));
+            self.filter.run(
+                &self.buffer,
+                from,
+                to,
+                self.pss_threshold,
+                &mut self.candidates,
+            );
+        }
+    }
+
+    /// Identifies, decodes, measures and removes the SSB of a candidate.
+    fn examine(&mut self, candidate: &PssCandidate) -> Option<Alignment> {
+        let mut acquired = self.acquirer.acquire(&self.buffer, candidate)?;
+        let tolerated_hz = self.config.cfo_range_hz + self.config.spacing.hz() / 6.0;
+        if (acquired.alignment.cfo_cycles * self.base_rate_hz).abs() > tolerated_hz {
+            return None;
+        }
+        let time = self.buffer_start as f64 + acquired.alignment.first_sample();
+        let known = self.found.iter().map(|ssb| (ssb.pci, ssb.sample_start));
+        if known
+            .chain(self.recent.iter().copied())
+            .any(|(pci, start)| pci == acquired.pci && (start - time).abs() < SAME_SSB_SAMPLES)
+        {
+            return None;
+        }
+        if acquired.statistic < DECODE_FLOOR * self.cell_threshold {
+            return None;
+        }
+        let broadcast = self.decoder.decode(&self.acquirer, &acquired);
+        if let Some(broadcast) = &broadcast {
+            self.acquirer
+                .know_pbch(acquired.pci, &broadcast.decoded.symbols());
+            self.acquirer.align(&self.buffer, &mut acquired.alignment)?;
+        } else {
+            let certain = 10.0_f64.powf(0.1 * CERTAIN_DECODE_SNR_DB);
+            if acquired.statistic < self.cell_threshold || self.acquirer.snr() > certain {
+                return None;
+            }
+        }
+        self.report(&acquired, broadcast.as_ref());
+        self.remove(&acquired.alignment);
+        Some(acquired.alignment)
+    }
+
+    fn report(&mut self, acquired: &Acquired, broadcast: Option<&Broadcast>) {
+        let alignment = &acquired.alignment;
+        let antennas = self.config.antennas;
+        let mut measurements = [Measurement::default(); MAX_ANTENNAS];
+        let estimate = &self.acquirer.estimate;
+        let inputs = self
+            .acquirer
+            .grids
+            .iter()
+            .zip(&estimate.channel)
+            .zip(&estimate.noise_variance);
+        for (slot, ((grid, channel), noise)) in measurements.iter_mut().zip(inputs) {
+            *slot = measure(grid, sss_power(channel), *noise);
+        }
+        let lmax = broadcast.map_or_else(|| self.decoder.likely_lmax(), |broadcast| broadcast.lmax);
+        let payload = broadcast.map(|broadcast| broadcast.decoded.payload);
+        let half_frame = match (payload, lmax) {
+            (Some(payload), _) => Some(payload.half_frame),
+            (None, Lmax::L4) => Some(acquired.ibar_ssb >= 4),
+            (None, _) => None,
+        };
+        self.found.push(DetectedSsb {
+            pci: acquired.pci,
+            ibar_ssb: acquired.ibar_ssb,
+            ssb_index: lmax.index_lsb(acquired.ibar_ssb),
+            half_frame,
+            lmax,
+            payload,
+            sample_start: self.buffer_start as f64 + alignment.first_sample(),
+            cfo_hz: alignment.cfo_cycles * self.base_rate_hz,
+            symbol_phase_step_rad: alignment.phase_step,
+            snr_db: decibel(self.acquirer.snr() / antennas as f64),
+            statistic: acquired.statistic,
+            measurements,
+            antennas,
+        });
+    }
+
+    /// Subtracts the SSB. Its channel is estimated without the PSS, which other cells share.
+    fn remove(&mut self, alignment: &Alignment) {
+        let phases = alignment.symbol_phases();
+        let pss = self.acquirer.forget_pss();
+        let Acquirer {
+            estimate,
+            grids,
+            reference,
+            ..
+        } = &mut self.acquirer;
+        estimate.fold(grids, reference, &phases);
+        estimate.fit();
+        reference.put(crate::grid::pss_indices(), pss);
+        for (samples, channel) in self.buffer.iter_mut().zip(&estimate.channel) {
+            self.canceller
+                .subtract(samples, alignment, reference, channel);
+        }
+    }
+}
+
+fn check_frequency(ssb_freq_hz: Option<f64>) -> Result<(), SearchError> {
+    match ssb_freq_hz {
+        Some(value) if !value.is_finite() => Err(SearchError::Setting {
+            name: "ssb_freq_hz",
+            value,
+            allowed: "a finite frequency",
+        }),
+        _ => Ok(()),
+    }
+}
+
+/// Offsets from −range to +range, no further apart than a third of a subcarrier, so placed that
+/// each answers for the same width.
+fn cfo_hypotheses(range_hz: f64, scs_hz: f64) -> Vec<f64> {
+    let count = (2.0 * range_hz / (scs_hz / 3.0)).ceil().max(1.0);
+    let width = 2.0 * range_hz / count;
+    (0..count as usize)
+        .map(|i| width * (i as f64 + 0.5) - range_hz)
+        .collect()
+}

@@ -1,0 +1,78 @@
+//! How often SSBs are found and decoded in noise, and how often noise is taken for one.
+#![allow(clippy::unwrap_used, clippy::print_stdout, reason = "this is a test")]
+
+mod air;
+
+use nr_ssb::SubcarrierSpacing;
+use nr_ssb::search::{SearchConfig, Searcher};
+
+/// Share of trials whose one SSB in 20 ms is found in the right place, and decoded.
+fn rates(antennas: usize, snr_db: f64, trials: u64) -> (f64, f64) {
+    let spacing = SubcarrierSpacing::Khz15;
+    let mut searcher = Searcher::new(SearchConfig::new(spacing, antennas)).unwrap();
+    let (mut found, mut decoded) = (0, 0);
+    for trial in 0..trials {
+        let mut rng = air::rng(1000 * antennas as u64 + trial);
+        let cell = air::Cell::random(&mut rng, spacing, antennas);
+        let mut samples = air::silence(antennas, 76_800);
+        cell.add_to(&mut samples);
+        air::add_noise(&mut samples, snr_db, &mut rng);
+        searcher.tune(Some(cell.ssb_freq_hz)).unwrap();
+        let start = cell.ssb_start(cell.ssb_indices[0]);
+        let cells = searcher.search(&air::slices(&samples)).unwrap();
+        let hit = cells
+            .iter()
+            .find(|ssb| ssb.pci.get() == cell.pci && (ssb.sample_start - start).abs() < 1.0);
+
+        found += u64::from(hit.is_some());
+        decoded += u64::from(hit.and_then(|ssb| ssb.payload).is_some_and(|payload| {
+            payload.sfn() == cell.sfn && payload.half_frame == cell.half_frame
+        }));
+    }
+    println!("{antennas} antennas, {snr_db} dB: {found} found, {decoded} decoded of {trials}");
+    (found as f64 / trials as f64, decoded as f64 / trials as f64)
+}
+
+/// Fewest hits of `TRIALS` at which a probability of 0.95 is not refuted at three sigma.
+const TRIALS: u64 = 80;
+const FEWEST: f64 = 0.95 - 3.0 * 0.0244;
+
+#[test]
+fn one_ssb_in_20_ms_is_found_by_four_antennas_at_minus_10_db() {
+    let (found, _) = rates(4, -10.0, TRIALS);
+    assert!(found >= FEWEST, "{found}");
+}
+
+#[test]
+fn one_ssb_in_20_ms_is_decoded_by_four_antennas_at_minus_8_db() {
+    let (_, decoded) = rates(4, -8.0, TRIALS);
+    assert!(decoded >= FEWEST, "{decoded}");
+}
+
+#[test]
+fn one_ssb_in_20_ms_is_found_by_one_antenna_at_minus_6_db() {
+    let (found, _) = rates(1, -6.0, TRIALS);
+    assert!(found >= FEWEST, "{found}");
+}
+
+#[test]
+fn one_ssb_in_20_ms_is_decoded_by_one_antenna_at_minus_3_db() {
+    let (_, decoded) = rates(1, -3.0, TRIALS);
+    assert!(decoded >= FEWEST, "{decoded}");
+}
+
+/// At the threshold for 1e-3, 100 searches make a cell with probability 0.1; none is seen, and with
+/// these seeds none ever will be.
+#[test]
+fn noise_makes_no_cell() {
+    for antennas in [1, 4] {
+        let config = SearchConfig::new(SubcarrierSpacing::Khz15, antennas);
+        let mut searcher = Searcher::new(config).unwrap();
+        for trial in 0..50 {
+            let mut rng = air::rng(trial);
+            let mut samples = air::silence(antennas, 76_800);
+            air::add_noise(&mut samples, 0.0, &mut rng);
+            assert!(searcher.search(&air::slices(&samples)).unwrap().is_empty());
+        }
+    }
+}
