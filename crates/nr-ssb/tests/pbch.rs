@@ -55,7 +55,7 @@ fn block_errors(decoder: &mut Decoder, snr_db: f32, trials: usize) -> usize {
 }
 
 /// The requirement is at most 0.01. A list of 8 alone has 0.013, the retry with 32 brings 0.003:
-/// 40 errors in 4000 would be eight standard deviations more.
+/// 40 errors in 4000 would be more than seven standard deviations above.
 #[test]
 fn few_block_errors_at_minus_8_db() {
     let errors = block_errors(&mut Decoder::default(), -8.0, 4000);
