@@ -1,5 +1,6 @@
 //! From odometry and angles to a pose.
 
+pub mod bound;
 mod dead_reckoning;
 pub mod gaussian;
 pub mod integrity;

@@ -1,5 +1,6 @@
 //! What the tracker is told of vehicle, road and radio. It need not be the truth: that is in
-//! `[odometer]`, `[motion]` and `[channel]`.
+//! `[odometer]`, `[motion]` and `[channel]`. What is not given here is taken from there as from a
+//! data sheet, but never as better than the best that wheels and lanes can be.
 
 use schemars::JsonSchema;
 use serde::{Deserialize, Serialize};
@@ -12,16 +13,18 @@ use super::{Check, ScenarioError};
 pub struct TrackerSettings {
     /// Whether the road's course is known to it.
     pub map: bool,
-    /// Assumed standard deviation of the odometer's scale error.
-    pub odometer_scale_std: f64,
-    /// Assumed noise of the odometer, in metres per root of a metre.
-    pub odometer_noise_m_per_sqrt_m: f64,
-    /// Assumed lateral wander in metres (root mean square); with a map.
-    pub wander_rms_m: f64,
-    /// Its wavelength in metres.
-    pub wander_wavelength_m: f64,
-    /// Its damping ratio.
-    pub wander_damping: f64,
+    /// Assumed standard deviation of the odometer's scale error; without it, the odometer's, but
+    /// at least 0.001.
+    #[serde(skip_serializing_if = "Option::is_none")]
+    pub odometer_scale_std: Option<f64>,
+    /// Assumed noise of the odometer, in metres per root of a metre; without it, the odometer's,
+    /// but at least 0.003.
+    #[serde(skip_serializing_if = "Option::is_none")]
+    pub odometer_noise_m_per_sqrt_m: Option<f64>,
+    /// Assumed lateral wander in metres (root mean square), used with a map; without it, the
+    /// motion's, but at least 0.02.
+    #[serde(skip_serializing_if = "Option::is_none")]
+    pub wander_rms_m: Option<f64>,
     /// Assumed curvature of the path in 1/m (root mean square); without a map.
     pub curvature_rms_per_m: f64,
     /// Distance over which the curvature is forgotten, in metres.
@@ -45,13 +48,11 @@ impl Default for TrackerSettings {
     fn default() -> Self {
         Self {
             map: true,
-            odometer_scale_std: 0.003,
-            odometer_noise_m_per_sqrt_m: 0.01,
-            wander_rms_m: 0.1,
-            wander_wavelength_m: 60.0,
-            wander_damping: 0.1,
-            curvature_rms_per_m: 0.002,
-            curvature_correlation_m: 200.0,
+            odometer_scale_std: None,
+            odometer_noise_m_per_sqrt_m: None,
+            wander_rms_m: None,
+            curvature_rms_per_m: 0.001,
+            curvature_correlation_m: 400.0,
             rician_k_db: None,
             gyro_noise_rad_per_sqrt_s: 1e-3,
             gyro_bias_std_radps: 1e-3,
@@ -65,12 +66,18 @@ impl Default for TrackerSettings {
 impl TrackerSettings {
     pub(super) fn check(&self, check: &Check<'_>) -> Result<(), ScenarioError> {
         for (key, value) in [
-            ("localizer.odometer_scale_std", self.odometer_scale_std),
+            (
+                "localizer.odometer_scale_std",
+                self.odometer_scale_std.unwrap_or_default(),
+            ),
             (
                 "localizer.odometer_noise_m_per_sqrt_m",
-                self.odometer_noise_m_per_sqrt_m,
+                self.odometer_noise_m_per_sqrt_m.unwrap_or_default(),
             ),
-            ("localizer.wander_rms_m", self.wander_rms_m),
+            (
+                "localizer.wander_rms_m",
+                self.wander_rms_m.unwrap_or_default(),
+            ),
             ("localizer.curvature_rms_per_m", self.curvature_rms_per_m),
             (
                 "localizer.gyro_noise_rad_per_sqrt_s",
@@ -82,8 +89,6 @@ impl TrackerSettings {
         ] {
             check.not_negative(key, value)?;
         }
-        check.positive("localizer.wander_wavelength_m", self.wander_wavelength_m)?;
-        check.between("localizer.wander_damping", self.wander_damping, 0.01, 0.99)?;
         check.positive(
             "localizer.curvature_correlation_m",
             self.curvature_correlation_m,

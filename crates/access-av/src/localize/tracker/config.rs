@@ -6,6 +6,11 @@ use crate::localize::integrity::normal_quantile;
 use crate::scenario::{Scenario, TrackerSettings};
 use crate::world::LaneKeeping;
 
+/// The best that the tracker takes for granted where nothing is said.
+const LEAST_ODOMETER_SCALE_STD: f64 = 0.001;
+const LEAST_ODOMETER_NOISE_M_PER_SQRT_M: f64 = 0.003;
+const LEAST_WANDER_M: f64 = 0.02;
+
 /// Assumptions of the tracker, SI and radians. They are the tracker's, not the world's: the real
 /// odometer may be better or worse than assumed here.
 #[derive(Clone, Copy, Debug, PartialEq)]
@@ -46,6 +51,10 @@ pub struct TrackerConfig {
 impl TrackerConfig {
     /// What `settings` assume, for the scenario's array and carrier.
     pub fn new(scenario: &Scenario, settings: &TrackerSettings) -> Self {
+        let (odometer, wander) = (
+            &scenario.odometer,
+            scenario.motion.lateral_wander.lane_keeping(),
+        );
         let rician_k_db = settings.rician_k_db.unwrap_or(scenario.channel.rician_k_db);
         Self {
             array: ArrayModel {
@@ -55,19 +64,26 @@ impl TrackerConfig {
             },
             rician_k: 10f64.powf(0.1 * rician_k_db),
             lane_keeping: LaneKeeping {
-                wander_m: settings.wander_rms_m,
-                wavelength_m: settings.wander_wavelength_m,
-                damping: settings.wander_damping,
+                wander_m: settings
+                    .wander_rms_m
+                    .unwrap_or(wander.wander_m.max(LEAST_WANDER_M)),
+                ..wander
             },
             path_bend: PathBend {
                 curvature_per_m: settings.curvature_rms_per_m,
                 correlation_m: settings.curvature_correlation_m,
             },
             noise: MotionNoise {
-                odometer_m_per_sqrt_m: settings.odometer_noise_m_per_sqrt_m,
+                odometer_m_per_sqrt_m: settings.odometer_noise_m_per_sqrt_m.unwrap_or(
+                    odometer
+                        .noise_m_per_sqrt_m
+                        .max(LEAST_ODOMETER_NOISE_M_PER_SQRT_M),
+                ),
                 ..MotionNoise::default()
             },
-            odometer_scale_std: settings.odometer_scale_std,
+            odometer_scale_std: settings
+                .odometer_scale_std
+                .unwrap_or(odometer.scale_error_std.max(LEAST_ODOMETER_SCALE_STD)),
             mounting_rad: scenario.array.mounting_angle_rad,
             yaw_noise_rad_per_sqrt_s: settings.gyro_noise_rad_per_sqrt_s,
             yaw_rate_bias_std_radps: settings.gyro_bias_std_radps,

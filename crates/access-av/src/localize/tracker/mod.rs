@@ -8,8 +8,8 @@
 
 mod config;
 mod interface;
-mod motion;
-mod sighting;
+pub(super) mod motion;
+pub(super) mod sighting;
 pub mod state;
 
 use std::sync::Arc;
@@ -61,7 +61,7 @@ impl Tracker {
         heads: &[RadioHead],
         start: &InitialPose,
     ) -> Self {
-        let belief = initial_belief(&config, map.as_deref(), start);
+        let belief = Self::prior(&config, map.as_deref(), start);
         let head = |&known| Head {
             known,
             excluded: false,
@@ -265,6 +265,49 @@ impl Tracker {
         }
     }
 
+    /// The belief before any measurement.
+    pub(super) fn prior(
+        config: &TrackerConfig,
+        map: Option<&Track>,
+        start: &InitialPose,
+    ) -> Belief {
+        let mut sigma = [0.0; STATES];
+        sigma[SCALE] = config.odometer_scale_std;
+        sigma[YAW_RATE_BIAS] = config.yaw_rate_bias_std_radps;
+        sigma[MOUNTING] = config.mounting_std_rad;
+        sigma[PHASE] = config.phase_std_rad;
+        let mut mean = [0.0; STATES];
+        mean[MOUNTING] = config.mounting_rad;
+        let Some(map) = map else {
+            mean[ALONG] = start.pose.x_m;
+            mean[ACROSS] = start.pose.y_m;
+            mean[HEADING] = start.pose.heading_rad;
+            sigma[ALONG] = start.position_std_m;
+            sigma[ACROSS] = start.position_std_m;
+            sigma[HEADING] = start.heading_std_rad;
+            sigma[CURVATURE] = config.path_bend.curvature_per_m;
+            return Belief::independent(mean, sigma);
+        };
+        let place = map.project(start.pose.point());
+        let [offset_variance, heading_variance] = config.lane_keeping.stationary();
+        mean[ALONG] = place.along_m;
+        sigma[ALONG] = start.position_std_m;
+        sigma[ACROSS] = offset_variance.sqrt();
+        sigma[HEADING] = heading_variance.sqrt();
+        let mut belief = Belief::independent(mean, sigma);
+        // The given pose is a measurement beside what lane keeping already says.
+        let heading_rad = wrap_angle(start.pose.heading_rad - map.pose(place.along_m).heading_rad);
+        for (state, value, std) in [
+            (ACROSS, place.lateral_m, start.position_std_m),
+            (HEADING, heading_rad, start.heading_std_rad),
+        ] {
+            let mut row = [0.0; STATES];
+            row[state] = 1.0;
+            belief.update(value - belief.mean[state], &row, std * std);
+        }
+        belief
+    }
+
     fn speed_mps(&self) -> f64 {
         let reading = self.odometry.map_or(0.0, |sample| sample.speed_mps);
         reading / (1.0 + self.belief.mean[SCALE])
@@ -353,12 +396,7 @@ fn locate(mean: &[f64; STATES], ahead_m: f64, map: Option<&Track>) -> (Pose, Foo
             y_m: mean[ACROSS],
             heading_rad: mean[HEADING],
         };
-        let footing = Footing {
-            direction_rad: 0.0,
-            stretch: 1.0,
-            curvature_per_m: 0.0,
-        };
-        return (pose.along_arc(ahead_m, mean[CURVATURE]), footing);
+        return (pose.along_arc(ahead_m, mean[CURVATURE]), Footing::PLANE);
     };
     let along_m = mean[ALONG] + ahead_m;
     let road = map.pose(along_m);
@@ -375,42 +413,4 @@ fn locate(mean: &[f64; STATES], ahead_m: f64, map: Option<&Track>) -> (Pose, Foo
         ..road.offset_left(across_m)
     };
     (pose, footing)
-}
-
-fn initial_belief(config: &TrackerConfig, map: Option<&Track>, start: &InitialPose) -> Belief {
-    let mut sigma = [0.0; STATES];
-    sigma[SCALE] = config.odometer_scale_std;
-    sigma[YAW_RATE_BIAS] = config.yaw_rate_bias_std_radps;
-    sigma[MOUNTING] = config.mounting_std_rad;
-    sigma[PHASE] = config.phase_std_rad;
-    let mut mean = [0.0; STATES];
-    mean[MOUNTING] = config.mounting_rad;
-    let Some(map) = map else {
-        mean[ALONG] = start.pose.x_m;
-        mean[ACROSS] = start.pose.y_m;
-        mean[HEADING] = start.pose.heading_rad;
-        sigma[ALONG] = start.position_std_m;
-        sigma[ACROSS] = start.position_std_m;
-        sigma[HEADING] = start.heading_std_rad;
-        sigma[CURVATURE] = config.path_bend.curvature_per_m;
-        return Belief::independent(mean, sigma);
-    };
-    let place = map.project(start.pose.point());
-    let [offset_variance, heading_variance] = config.lane_keeping.stationary();
-    mean[ALONG] = place.along_m;
-    sigma[ALONG] = start.position_std_m;
-    sigma[ACROSS] = offset_variance.sqrt();
-    sigma[HEADING] = heading_variance.sqrt();
-    let mut belief = Belief::independent(mean, sigma);
-    // The given pose is a measurement beside what lane keeping already says.
-    let heading_rad = wrap_angle(start.pose.heading_rad - map.pose(place.along_m).heading_rad);
-    for (state, value, std) in [
-        (ACROSS, place.lateral_m, start.position_std_m),
-        (HEADING, heading_rad, start.heading_std_rad),
-    ] {
-        let mut row = [0.0; STATES];
-        row[state] = 1.0;
-        belief.update(value - belief.mean[state], &row, std * std);
-    }
-    belief
 }

@@ -36,6 +36,15 @@ pub struct Footing {
     pub curvature_per_m: f64,
 }
 
+impl Footing {
+    /// No road: the first two states are x and y.
+    pub const PLANE: Self = Self {
+        direction_rad: 0.0,
+        stretch: 1.0,
+        curvature_per_m: 0.0,
+    };
+}
+
 /// Predicted electrical angle `ω = 2π (d/λ) cos(β − φ − μ) + ω₀` and its gradient, for bearing β
 /// of the radio head, heading φ, mounting angle μ and phase offset ω₀.
 #[derive(Clone, Copy, Debug, PartialEq)]

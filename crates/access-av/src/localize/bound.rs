@@ -1,0 +1,250 @@
+//! How well any localizer can do on a route: the posterior Cramér–Rao bound.
+//!
+//! Tichavský, Muravchik and Nehorai (1998): for states that move and are measured with additive
+//! Gaussian noise the posterior information obeys
+//! `J⁺ = (F J⁻¹ Fᵀ + Q)⁻¹ + Σ Hᵀ R⁻¹ H`,
+//! with the Jacobians taken at the true states. Its inverse bounds the mean squared error of every
+//! estimator from below. The truth taken here drives in the middle of its lane: the centimetres of
+//! its wander do not change the geometry.
+//!
+//! One angle has the variance of its thermal noise (the Cramér–Rao bound of the snapshots at the
+//! link budget's SNR) and that of the scatter, one independent look per half wavelength: scatter
+//! that arrives from all directions is band-limited to two spatial frequencies per wavelength, and
+//! has so many degrees of freedom (Landau and Pollak 1962).
+
+use aoa::bound;
+
+use super::gaussian::Gaussian;
+use super::tracker::motion::Step;
+use super::tracker::sighting::{Footing, Sighting};
+use super::tracker::state::{ACROSS, ALONG, Belief, CURVATURE, HEADING, MOUNTING, SCALE, STATES};
+use super::tracker::{InitialPose, Tracker, TrackerConfig};
+use crate::channel::LinkBudget;
+use crate::geometry::{Point, Pose};
+use crate::observation::ANTENNAS;
+use crate::scenario::{LocalizerSettings, Pilots, Scenario, ScenarioError};
+use crate::world::{MotionProfile, RadioHead, Track};
+
+/// The bound at one SSB.
+#[derive(Clone, Copy, Debug, PartialEq)]
+pub struct BoundPoint {
+    /// Time (s).
+    pub time_s: f64,
+    /// Distance along the road (m).
+    pub along_m: f64,
+    /// Place on the road.
+    pub pose: Pose,
+    /// Least root mean square of the horizontal error (m).
+    pub position_rms_m: f64,
+    /// Least standard deviation along the road (m) ...
+    pub along_std_m: f64,
+    /// ... and across it.
+    pub across_std_m: f64,
+    /// Least standard deviation of the heading (rad).
+    pub heading_std_rad: f64,
+    /// Least standard deviation of the odometer's scale.
+    pub scale_std: f64,
+}
+
+/// What the bound of a scenario is made of.
+#[derive(Clone, Debug)]
+pub struct Bound {
+    config: TrackerConfig,
+    map: bool,
+    track: Track,
+    motion: MotionProfile,
+    heads: Vec<RadioHead>,
+    thermal: Thermal,
+    start: InitialPose,
+    period_s: f64,
+}
+
+/// Thermal noise of one angle.
+#[derive(Clone, Debug)]
+struct Thermal {
+    budget: LinkBudget,
+    pilots: Pilots,
+    snapshots: usize,
+}
+
+impl Thermal {
+    fn variance(&self, head: &RadioHead, distance_m: f64) -> f64 {
+        let snr = 10f64.powf(0.1 * self.budget.snr_db(head, distance_m));
+        let sigma = match self.pilots.per_symbol() {
+            None => bound::stochastic::<ANTENNAS>(snr, self.snapshots),
+            Some(symbols) => {
+                let elements: u16 = symbols.iter().sum();
+                bound::known_signal::<ANTENNAS>(snr * f64::from(elements))
+            }
+        };
+        sigma * sigma
+    }
+}
+
+impl Bound {
+    /// The bound of a scenario: its road, radio heads and channel, and what its tracker assumes of
+    /// vehicle and road. A scenario without tracker is taken with the tracker's default settings.
+    ///
+    /// # Errors
+    /// [`ScenarioError`] when the road cannot be built.
+    pub fn new(scenario: &Scenario) -> Result<Self, ScenarioError> {
+        let settings = match scenario.localizer {
+            LocalizerSettings::Tracker(settings) => settings,
+            LocalizerSettings::DeadReckoning => Default::default(),
+        };
+        let track = scenario.build_track()?;
+        Ok(Self {
+            config: TrackerConfig::new(scenario, &settings),
+            map: settings.map,
+            motion: MotionProfile::new(&scenario.motion, track.length_m()),
+            heads: scenario.radio_heads.iter().map(RadioHead::from).collect(),
+            thermal: Thermal {
+                budget: LinkBudget::new(scenario),
+                pilots: scenario.receiver.pilots,
+                snapshots: usize::from(scenario.array.snapshots),
+            },
+            start: InitialPose {
+                pose: track.pose(0.0),
+                position_std_m: scenario.start.position_std_m,
+                heading_std_rad: scenario.start.heading_std_rad,
+            },
+            track,
+            period_s: scenario.ssb.period_s(),
+        })
+    }
+
+    /// The bound at each SSB of the drive, every SSB being used.
+    pub fn along_route(&self) -> Vec<BoundPoint> {
+        let map = self.map.then_some(&self.track);
+        let mut belief = Tracker::prior(&self.config, map, &self.start);
+        let mut last_look_m = f64::NEG_INFINITY;
+        let mut before_m = 0.0;
+        let steps = (self.motion.duration_s() / self.period_s).ceil() as usize + 1;
+        (0..steps)
+            .map(|number| {
+                let time_s = number as f64 * self.period_s;
+                let along_m = self.motion.at(time_s).along_m;
+                self.advance(&mut belief, along_m - before_m);
+                before_m = along_m;
+                self.listen(&mut belief, along_m, along_m - last_look_m);
+                last_look_m = along_m;
+                self.point(&belief, time_s, along_m)
+            })
+            .collect()
+    }
+
+    fn advance(&self, belief: &mut Belief, length_m: f64) {
+        let step = if self.map {
+            let curvature_per_m = self
+                .track
+                .curvature_per_m(belief.mean[ALONG] + 0.5 * length_m);
+            let config = &self.config;
+            Step::along_lane(
+                &belief.mean,
+                length_m,
+                curvature_per_m,
+                &config.lane_keeping,
+                &config.noise,
+            )
+        } else {
+            Step::in_plane(
+                &belief.mean,
+                length_m,
+                &self.config.path_bend,
+                &self.config.noise,
+            )
+        };
+        belief.spread(&step.jacobian, &step.noise);
+    }
+
+    /// Puts the state at its true place and takes in an angle to each radio head.
+    fn listen(&self, belief: &mut Belief, along_m: f64, travelled_m: f64) {
+        let pose = self.track.pose(along_m);
+        let curvature_per_m = self.track.curvature_per_m(along_m);
+        let footing = if self.map {
+            belief.mean[ALONG] = along_m;
+            Footing {
+                direction_rad: pose.heading_rad,
+                stretch: 1.0,
+                curvature_per_m,
+            }
+        } else {
+            belief.mean[ALONG] = pose.x_m;
+            belief.mean[ACROSS] = pose.y_m;
+            belief.mean[HEADING] = pose.heading_rad;
+            belief.mean[CURVATURE] = curvature_per_m;
+            Footing::PLANE
+        };
+        let scatter = self.config.look_variance(travelled_m);
+        let (mounting, array) = (belief.mean[MOUNTING], &self.config.array);
+        for head in &self.heads {
+            let sighting = Sighting::new(head.position, pose, &footing, mounting, 0.0, array);
+            if let Some(sighting) = sighting {
+                let variance = scatter + self.thermal.variance(head, sighting.range_m);
+                belief.update(0.0, &sighting.row, variance);
+            }
+        }
+    }
+
+    fn point(&self, belief: &Belief, time_s: f64, along_m: f64) -> BoundPoint {
+        let pose = self.track.pose(along_m);
+        let (sin, cos) = pose.heading_rad.sin_cos();
+        let (along, across) = if self.map {
+            ([1.0, 0.0], [0.0, 1.0])
+        } else {
+            ([cos, sin], [-sin, cos])
+        };
+        let variance = |[first, second]: [f64; 2]| {
+            let mut row = [0.0; STATES];
+            row[ALONG] = first;
+            row[ACROSS] = second;
+            belief.variance_along(&row)
+        };
+        let (along, across) = (variance(along), variance(across));
+        BoundPoint {
+            time_s,
+            along_m,
+            pose,
+            position_rms_m: (along + across).sqrt(),
+            along_std_m: along.sqrt(),
+            across_std_m: across.sqrt(),
+            heading_std_rad: belief.covariance[HEADING][HEADING].sqrt(),
+            scale_std: belief.covariance[SCALE][SCALE].sqrt(),
+        }
+    }
+
+    /// The bound of the position (m, root mean square) at any `place` of the site from `looks`
+    /// independent looks at every radio head, by a vehicle that knows its heading to
+    /// `heading_std_rad` and nothing of its place. Averaged over eight headings, in information.
+    /// `None` where the radio heads leave a direction open.
+    pub fn at(&self, place: Point, looks: f64, heading_std_rad: f64) -> Option<f64> {
+        const HEADINGS: u32 = 8;
+        const VAGUE_M: f64 = 1e4;
+        let mut information = 0.0;
+        for turn in 0..HEADINGS {
+            let heading_rad = std::f64::consts::TAU * f64::from(turn) / f64::from(HEADINGS);
+            let mut sigma = [0.0; STATES];
+            sigma[ALONG] = VAGUE_M;
+            sigma[ACROSS] = VAGUE_M;
+            sigma[HEADING] = heading_std_rad;
+            let mut belief = Gaussian::independent([0.0; STATES], sigma);
+            let pose = Pose {
+                x_m: place.x_m,
+                y_m: place.y_m,
+                heading_rad,
+            };
+            let scatter = self.config.look_variance(f64::INFINITY);
+            for head in &self.heads {
+                let array = &self.config.array;
+                let sighting =
+                    Sighting::new(head.position, pose, &Footing::PLANE, 0.0, 0.0, array)?;
+                let thermal = self.thermal.variance(head, sighting.range_m);
+                belief.update(0.0, &sighting.row, (scatter + thermal) / looks);
+            }
+            let [along, across] = [ALONG, ACROSS].map(|i| belief.covariance[i][i]);
+            information += 1.0 / (along + across);
+        }
+        let rms_m = (f64::from(HEADINGS) / information).sqrt();
+        (rms_m < 0.1 * VAGUE_M).then_some(rms_m)
+    }
+}
