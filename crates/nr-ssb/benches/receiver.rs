@@ -1,7 +1,6 @@
 //! Search of 20 ms and tracking of one SSB, four antennas, one thread.
 #![allow(clippy::unwrap_used, clippy::print_stdout, reason = "this is a test")]
 
-
 #[path = "../tests/air/mod.rs"]
 mod air;
 

@@ -2,11 +2,11 @@
 
 #![allow(dead_code, reason = "each test uses its part")]
 
+use std::fs::File;
 use std::io::Read;
 use std::path::PathBuf;
 
-use npyz::Deserialize;
-use npyz::npz::NpzArchive;
+use npyz::{Deserialize, NpyFile};
 use nr_ssb::{BchPayload, Lmax, Mib, Pci};
 
 /// The directory of reference data: `ACCESS_AV_DATA`, or `../shared/data` beside the project.
@@ -31,20 +31,32 @@ impl Vectors {
         None
     }
 
+    /// The bytes of one array: an `.npz` is a zip archive of `.npy` files.
+    fn npy(&self, key: &str) -> Vec<u8> {
+        let mut archive = zip::ZipArchive::new(File::open(&self.0).unwrap()).unwrap();
+        let mut bytes = Vec::new();
+        let mut entry = archive.by_name(&format!("{key}.npy")).expect(key);
+        entry.read_to_end(&mut bytes).unwrap();
+        bytes
+    }
+
     /// One array, flattened in C order.
     pub fn array<T: Deserialize>(&self, key: &str) -> Vec<T> {
-        let mut archive = NpzArchive::open(&self.0).unwrap();
-        let array = archive.by_name(key).unwrap().expect(key);
+        let npy = self.npy(key);
+        let array = NpyFile::new(&*npy).unwrap();
         assert_eq!(array.order(), npyz::Order::C, "{key}");
         array.into_vec().unwrap()
     }
 
     /// A zero-dimensional array of text (NumPy's UTF-32).
     pub fn text(&self, key: &str) -> String {
-        let mut archive = NpzArchive::open(&self.0).unwrap();
+        let npy = self.npy(key);
         let mut bytes = Vec::new();
-        let array = archive.by_name(key).unwrap().expect(key);
-        array.into_inner().read_to_end(&mut bytes).unwrap();
+        NpyFile::new(&*npy)
+            .unwrap()
+            .into_inner()
+            .read_to_end(&mut bytes)
+            .unwrap();
         let codes = bytes.as_chunks().0.iter().copied().map(u32::from_le_bytes);
         codes
             .take_while(|&code| code != 0)
