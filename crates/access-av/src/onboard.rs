@@ -99,10 +99,13 @@ impl Onboard {
         })?;
         let heads: Vec<RadioHead> = scenario.radio_heads.iter().map(RadioHead::from).collect();
         let localizer = match scenario.localizer {
-            LocalizerSettings::DeadReckoning => Localizer::DeadReckoning(DeadReckoning::new(
-                start,
-                scenario.array.mounting_angle_rad,
-            )),
+            LocalizerSettings::DeadReckoning(settings) => {
+                Localizer::DeadReckoning(DeadReckoning::new(
+                    start,
+                    settings.heading_between,
+                    scenario.array.mounting_angle_rad,
+                ))
+            }
             LocalizerSettings::Tracker(settings) => {
                 let map = settings.map.then(|| scenario.build_track()).transpose()?;
                 let start = InitialPose {

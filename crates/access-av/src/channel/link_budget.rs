@@ -50,7 +50,8 @@ mod tests {
 
     #[test]
     fn papers_numbers_by_hand() {
-        let scenario = Scenario::load("paper").unwrap();
+        let mut scenario = Scenario::load("paper").unwrap();
+        scenario.radio_heads[0].tx_power_dbm = -27.0;
         let budget = LinkBudget::new(&scenario);
         // −174 dBm/Hz at 290 K, 10·log10(3.6e6) = 65.56, noise figure 5 dB.
         assert!((budget.noise_dbm() - (-173.975 + 65.563 + 5.0)).abs() < 1e-3);

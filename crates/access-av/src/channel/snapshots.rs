@@ -1,7 +1,7 @@
 //! From the vehicle's true place to what its array receives of one radio head.
 
 use num_complex::Complex64;
-use rand::RngExt;
+use rand::{Rng, RngExt};
 use rand_chacha::ChaCha8Rng;
 use rand_distr::StandardNormal;
 
@@ -97,7 +97,8 @@ impl HeadChannel {
 
     /// The array's output for SSB number `number`, noise of unit power included.
     ///
-    /// Blind, each snapshot carries an independent Gaussian sample of the signal. With pilots there
+    /// Blind, each snapshot carries one unknown QPSK symbol, as a resource element of the broadcast
+    /// channel does (TS 38.211, 7.3.3.1). With pilots there
     /// is one despread block per OFDM symbol: N known resource elements add up to an N-fold SNR,
     /// their common phase unknown from symbol to symbol.
     pub fn observe(&mut self, number: u64, reception: &Reception, into: &mut SsbObservation) {
@@ -108,16 +109,14 @@ impl HeadChannel {
         match self.pilots.per_symbol() {
             None => {
                 for _ in 0..self.snapshots {
-                    let signal = self.complex_normal();
+                    let signal = self.qpsk();
                     self.push(reception.gains, signal, into);
                 }
             }
             Some(symbols) => {
                 into.noise_variance = Some(1.0);
                 for &resource_elements in symbols {
-                    let phase_rad = self.snapshot_noise.random::<f64>() * TAU;
-                    let signal =
-                        Complex64::from_polar(f64::from(resource_elements).sqrt(), phase_rad);
+                    let signal = self.qpsk() * f64::from(resource_elements).sqrt();
                     self.push(reception.gains, signal, into);
                 }
             }
@@ -126,6 +125,19 @@ impl HeadChannel {
 
     fn push(&mut self, gains: Snapshot, signal: Complex64, into: &mut SsbObservation) {
         into.push(gains.map(|gain| gain * signal + self.complex_normal()));
+    }
+
+    /// A random QPSK symbol.
+    fn qpsk(&mut self) -> Complex64 {
+        let bits = self.snapshot_noise.next_u32();
+        let level = |bit: u32| {
+            if bits >> bit & 1 == 0 {
+                FRAC_1_SQRT_2
+            } else {
+                -FRAC_1_SQRT_2
+            }
+        };
+        Complex64::new(level(0), level(1))
     }
 
     /// A circular Gaussian of unit power.

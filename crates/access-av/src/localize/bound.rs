@@ -90,7 +90,7 @@ impl Bound {
     pub fn new(scenario: &Scenario) -> Result<Self, ScenarioError> {
         let settings = match scenario.localizer {
             LocalizerSettings::Tracker(settings) => settings,
-            LocalizerSettings::DeadReckoning => Default::default(),
+            LocalizerSettings::DeadReckoning(_) => Default::default(),
         };
         let track = scenario.build_track()?;
         Ok(Self {

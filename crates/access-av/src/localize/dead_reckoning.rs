@@ -2,7 +2,8 @@
 //! Infrastructure, and Vehicle Trajectory Model").
 
 use super::{AngleMeasurement, OdometryStep, PoseEstimate, UpdateReason, UpdateVerdict};
-use crate::geometry::{Pose, wrap_angle};
+use crate::geometry::{Point, Pose, wrap_angle};
+use crate::scenario::HeadingBetween;
 use crate::world::RadioHead;
 
 /// Adds up odometer distances along the heading that the last angle of arrival gave.
@@ -12,15 +13,24 @@ use crate::world::RadioHead;
 pub struct DeadReckoning {
     time_s: f64,
     pose: Pose,
+    /// Where the last angle was taken.
+    anchor: Point,
+    heading_between: HeadingBetween,
     mounting_angle_rad: f64,
 }
 
 impl DeadReckoning {
     /// Begins at a known pose, with an array whose axis points `mounting_angle_rad` from forward.
-    pub const fn new(start: Pose, mounting_angle_rad: f64) -> Self {
+    pub const fn new(
+        start: Pose,
+        heading_between: HeadingBetween,
+        mounting_angle_rad: f64,
+    ) -> Self {
         Self {
             time_s: 0.0,
             pose: start,
+            anchor: start.point(),
+            heading_between,
             mounting_angle_rad,
         }
     }
@@ -50,7 +60,12 @@ impl DeadReckoning {
 
         let usable = aoh_rad.is_finite();
         if usable {
+            if self.heading_between == HeadingBetween::Mean {
+                let half_turn_rad = 0.5 * wrap_angle(aoh_rad - self.pose.heading_rad);
+                self.turn_about_anchor(half_turn_rad);
+            }
             self.pose.heading_rad = aoh_rad;
+            self.anchor = self.pose.point();
         }
         UpdateVerdict {
             accepted: usable,
@@ -62,6 +77,17 @@ impl DeadReckoning {
             mahalanobis_squared: None,
             threshold: None,
         }
+    }
+
+    /// Lays the stretch driven since the last angle along a heading turned by `turn_rad`.
+    fn turn_about_anchor(&mut self, turn_rad: f64) {
+        let (sin, cos) = turn_rad.sin_cos();
+        let (dx_m, dy_m) = (
+            self.pose.x_m - self.anchor.x_m,
+            self.pose.y_m - self.anchor.y_m,
+        );
+        self.pose.x_m = self.anchor.x_m + cos * dx_m - sin * dy_m;
+        self.pose.y_m = self.anchor.y_m + sin * dx_m + cos * dy_m;
     }
 
     /// Where it believes the vehicle to be; it does not know how well.
@@ -77,12 +103,17 @@ impl DeadReckoning {
 #[cfg(test)]
 mod tests {
     use super::*;
-    use crate::geometry::Point;
     use crate::scenario::MotionSettings;
     use crate::world::{MotionProfile, Segment, Track};
 
     /// Worst distance from the truth on the paper's trip with perfect angles every `period_s`.
-    fn worst_error_m(turn_rad: f64, head: Point, period_s: f64, mounting_angle_rad: f64) -> f64 {
+    fn worst_error_m(
+        between: HeadingBetween,
+        turn_rad: f64,
+        head: Point,
+        period_s: f64,
+        mounting_angle_rad: f64,
+    ) -> f64 {
         let bend = [Segment {
             length_m: 300.0,
             turn_rad,
@@ -95,7 +126,7 @@ mod tests {
             position: head,
             eirp_dbm: 0.0,
         };
-        let mut localizer = DeadReckoning::new(Pose::default(), mounting_angle_rad);
+        let mut localizer = DeadReckoning::new(Pose::default(), between, mounting_angle_rad);
         let (mut last_m, mut worst_m) = (0.0, 0f64);
         for step in 0..=(motion.duration_s() / period_s) as u32 {
             let time_s = f64::from(step) * period_s;
@@ -128,15 +159,23 @@ mod tests {
 
     #[test]
     fn perfect_angles_are_exact_on_a_straight_road() {
-        assert!(worst_error_m(0.0, Point::new(205.0, 100.0), 0.02, 0.0) < 1e-9);
+        assert!(
+            worst_error_m(
+                HeadingBetween::Held,
+                0.0,
+                Point::new(205.0, 100.0),
+                0.02,
+                0.0
+            ) < 1e-9
+        );
     }
 
     #[test]
     fn in_a_bend_only_the_held_heading_remains() {
         let head = Point::new(205.0, 100.0);
         // Held over a step, the heading lags by half of the step's turn: first order in the step.
-        let coarse_m = worst_error_m(0.25, head, 0.02, 0.0);
-        let fine_m = worst_error_m(0.25, head, 0.002, 0.0);
+        let coarse_m = worst_error_m(HeadingBetween::Held, 0.25, head, 0.02, 0.0);
+        let fine_m = worst_error_m(HeadingBetween::Held, 0.25, head, 0.002, 0.0);
         assert!(coarse_m < 0.011, "{coarse_m}");
         assert!(
             (coarse_m / fine_m - 10.0).abs() < 0.1,
@@ -145,14 +184,38 @@ mod tests {
     }
 
     #[test]
+    fn mean_heading_between_two_angles_follows_the_bend() {
+        let head = Point::new(205.0, 100.0);
+        let mean_m = worst_error_m(HeadingBetween::Mean, 0.25, head, 0.24, 0.0);
+        let held_m = worst_error_m(HeadingBetween::Held, 0.25, head, 0.24, 0.0);
+        assert!(held_m > 0.1 && mean_m < 0.01, "{held_m} {mean_m}");
+    }
+
+    #[test]
     fn radio_head_on_the_right_and_a_turned_array() {
-        assert!(worst_error_m(0.0, Point::new(60.0, -80.0), 0.02, 0.0) < 1e-9);
-        assert!(worst_error_m(0.0, Point::new(205.0, 100.0), 0.02, 0.3) < 1e-9);
+        assert!(
+            worst_error_m(
+                HeadingBetween::Held,
+                0.0,
+                Point::new(60.0, -80.0),
+                0.02,
+                0.0
+            ) < 1e-9
+        );
+        assert!(
+            worst_error_m(
+                HeadingBetween::Held,
+                0.0,
+                Point::new(205.0, 100.0),
+                0.02,
+                0.3
+            ) < 1e-9
+        );
     }
 
     #[test]
     fn angle_that_is_no_number_changes_nothing() {
-        let mut localizer = DeadReckoning::new(Pose::default(), 0.0);
+        let mut localizer = DeadReckoning::new(Pose::default(), HeadingBetween::Held, 0.0);
         let head = RadioHead {
             pci: 1,
             ssb_index: 0,

@@ -15,7 +15,7 @@ pub struct ChannelSettings {
     pub rician_k_db: f64,
     /// How the scatter reaches the antennas.
     pub scatter: ScatterModel,
-    /// Number of scattered rays.
+    /// Number of scattered rays, at each antenna or at all together.
     pub rays: u16,
 }
 
@@ -26,7 +26,7 @@ impl Default for ChannelSettings {
             shadowing_correlation_m: 0.0,
             rician_k_db: 20.0,
             scatter: ScatterModel::PerAntenna,
-            rays: 16,
+            rays: 8,
         }
     }
 }

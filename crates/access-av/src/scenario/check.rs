@@ -246,7 +246,7 @@ impl Scenario {
         check.not_negative("start.position_std_m", self.start.position_std_m)?;
         check.not_negative("start.heading_std_rad", self.start.heading_std_rad)?;
         match &self.localizer {
-            LocalizerSettings::DeadReckoning => Ok(()),
+            LocalizerSettings::DeadReckoning(_) => Ok(()),
             LocalizerSettings::Tracker(tracker) => tracker.check(check),
         }
     }

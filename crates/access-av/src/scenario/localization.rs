@@ -117,11 +117,34 @@ pub enum EstimatorMethod {
 /// `[localizer]`
 #[derive(Debug, Clone, Copy, PartialEq, Serialize, Deserialize, JsonSchema)]
 #[serde(tag = "kind", rename_all = "kebab-case")]
-#[derive(Default)]
 pub enum LocalizerSettings {
     /// The paper's: each angle becomes a heading, distances are added up along it.
-    #[default]
-    DeadReckoning,
+    DeadReckoning(DeadReckoningSettings),
     /// A Kalman filter over pose, odometer scale and array calibration.
     Tracker(TrackerSettings),
+}
+
+impl Default for LocalizerSettings {
+    fn default() -> Self {
+        Self::DeadReckoning(DeadReckoningSettings::default())
+    }
+}
+
+/// `kind = "dead-reckoning"`
+#[derive(Debug, Clone, Copy, PartialEq, Eq, Default, Serialize, Deserialize, JsonSchema)]
+#[serde(default, deny_unknown_fields)]
+pub struct DeadReckoningSettings {
+    /// Along which heading the distance between two angles is laid.
+    pub heading_between: HeadingBetween,
+}
+
+/// Along which heading the distance between two angles is laid.
+#[derive(Debug, Clone, Copy, PartialEq, Eq, Default, Serialize, Deserialize, JsonSchema)]
+#[serde(rename_all = "kebab-case")]
+pub enum HeadingBetween {
+    /// The one of the first angle: in a bend it lags behind.
+    #[default]
+    Held,
+    /// The mean of both, once the second is there.
+    Mean,
 }

@@ -29,8 +29,8 @@ pub use channel::{ChannelSettings, ScatterModel};
 pub(crate) use check::Check;
 pub use error::ScenarioError;
 pub use localization::{
-    EstimatorMethod, EstimatorSettings, GyroSettings, LocalizerSettings, OdometerSettings,
-    StartSettings,
+    DeadReckoningSettings, EstimatorMethod, EstimatorSettings, GyroSettings, HeadingBetween,
+    LocalizerSettings, OdometerSettings, StartSettings,
 };
 pub use radio::{ArraySettings, Pilots, RadioHeadSettings, ReceiverSettings, SsbSettings};
 pub use road::{MotionSettings, SegmentSettings, StopSettings, TrackSettings, WanderSettings};
