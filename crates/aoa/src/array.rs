@@ -57,6 +57,11 @@ impl<const N: usize> Array<N> {
         &self.calibration
     }
 
+    /// Whether no channel needs correction.
+    pub(crate) fn is_ideal(&self) -> bool {
+        self.calibration == Calibration::IDENTITY
+    }
+
     /// `2 pi d / lambda`: the electrical angle at end-fire, in rad.
     pub fn phase_at_end_fire_rad(&self) -> f64 {
         TAU * self.spacing_wavelengths

@@ -5,6 +5,7 @@ use num_complex::Complex;
 use crate::kernel::Real;
 use crate::{
     AngleEstimate, Array, Calibration, Covariance, Error, Method, estimate, estimate_several,
+    maximum_likelihood,
 };
 
 /// Samples of many estimates: items of `N` channels of `snapshots` samples each, row-major
@@ -96,6 +97,9 @@ impl<'a, T: Real, const N: usize> Batch<'a, T, N> {
         sources: usize,
         estimates: &mut [AngleEstimate],
     ) -> Result<(), BatchError> {
+        if method == Method::MaximumLikelihood && sources == 1 && array.is_ideal() {
+            return self.maximum_likelihood(array, estimates);
+        }
         let ideal = array.with_calibration(Calibration::IDENTITY);
         let places = estimates.chunks_exact_mut(sources.max(1));
         for (item, (covariance, places)) in self.covariances().zip(places).enumerate() {
@@ -114,6 +118,26 @@ impl<'a, T: Real, const N: usize> Batch<'a, T, N> {
                 }),
             });
             outcome.map_err(|error| BatchError { item, error })?;
+        }
+        Ok(())
+    }
+
+    /// Maximum likelihood for ideal channels, block by block. Forward–backward averaging would change
+    /// nothing: it leaves the sums along the diagonals as they are.
+    fn maximum_likelihood(
+        self,
+        array: &Array<N>,
+        estimates: &mut [AngleEstimate],
+    ) -> Result<(), BatchError> {
+        let places = estimates.chunks_mut(maximum_likelihood::BLOCK);
+        let blocks = self.split(maximum_likelihood::BLOCK).zip(places);
+        for (index, (block, places)) in blocks.enumerate() {
+            maximum_likelihood::block(block.samples, self.snapshots, array, places).map_err(
+                |(item, error)| BatchError {
+                    item: index * maximum_likelihood::BLOCK + item,
+                    error,
+                },
+            )?;
         }
         Ok(())
     }

@@ -40,16 +40,18 @@ pub fn angle_sigma_rad<const N: usize>(
     phase_sigma_rad / (array.phase_at_end_fire_rad() * angle_rad.sin())
 }
 
-/// Estimates with a larger [`outlier_probability`] are called unresolved.
-pub(crate) const OUTLIERS: f64 = 0.01;
-
-/// Chernoff bound on the probability that noise in one of the N - 1 directions orthogonal to a
-/// source outweighs it: `(N - 1) (4 r / (1 + r)^2)^L`, `r = 1 + N snr` being the ratio of the two
-/// mean powers. Where it grows, estimators leave the Cramér–Rao bound (the threshold region).
-pub(crate) fn outlier_probability<const N: usize>(snr: f64, snapshots: usize) -> f64 {
-    let ratio = 1.0 + N as f64 * snr;
-    let overlap = 4.0 * ratio / ((1.0 + ratio) * (1.0 + ratio));
-    (N - 1) as f64 * overlap.powf(snapshots as f64)
+/// The SNR per antenna and snapshot below which an estimate is called unresolved.
+///
+/// Below it, noise in one of the N - 1 directions orthogonal to the source outweighs it with a
+/// probability that may exceed 1 %; estimators then leave the Cramér–Rao bound (the threshold
+/// region). By the Chernoff bound this probability is at most `(N - 1) (4 r / (1 + r)^2)^L`,
+/// `r = 1 + N snr` being the ratio of the two mean powers.
+pub fn resolvable_snr<const N: usize>(snapshots: usize) -> f64 {
+    const OUTLIERS: f64 = 0.01;
+    // 4 r / (1 + r)^2 = q, solved for the root above 1.
+    let q = (OUTLIERS / (N - 1) as f64).powf(1.0 / snapshots as f64);
+    let ratio = (2.0 - q + 2.0 * (1.0 - q).sqrt()) / q;
+    (ratio - 1.0) / N as f64
 }
 
 /// Several uncorrelated Gaussian sources: standard deviation of each electrical angle in rad, from

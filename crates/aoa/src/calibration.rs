@@ -57,7 +57,7 @@ impl<const N: usize> Calibration<N> {
             return Err(Error::Angle(angle_rad));
         }
         let covariance = covariance.validated()?;
-        let (_, response) = principal_eigenvector(covariance.matrix());
+        let (_, response) = principal_eigenvector(covariance.unscaled());
         let steering = steering_vector::<N>(array.phase_from_angle(angle_rad));
         let first = response[0] / steering[0];
         let common = Complex64::from_polar((N as f64).sqrt(), -first.arg());

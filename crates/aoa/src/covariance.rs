@@ -2,7 +2,8 @@
 
 use num_complex::Complex;
 
-use crate::kernel::{Real, correlation};
+use crate::kernel::Real;
+use crate::spectrum::Spectrum;
 use crate::{Array, Complex64, Error};
 
 /// A Hermitian matrix, row-major.
@@ -63,7 +64,7 @@ impl<const N: usize> Covariance<N> {
         let mut sum = zeros::<N>();
         for i in 0..N {
             for j in 0..=i {
-                sum[i][j] = correlation(channels[i], channels[j]);
+                sum[i][j] = T::correlation(channels[i], channels[j]);
                 sum[j][i] = sum[i][j].conj();
             }
         }
@@ -81,6 +82,9 @@ impl<const N: usize> Covariance<N> {
     /// # Errors
     /// [`Error::NoSnapshots`], [`Error::NotFinite`], [`Error::Zero`], [`Error::NotHermitian`].
     pub fn from_matrix(matrix: Matrix<N>, snapshots: usize) -> Result<Self, Error> {
+        if !matrix.iter().flatten().all(|entry| entry.is_finite()) {
+            return Err(Error::NotFinite);
+        }
         let covariance = Self {
             sum: matrix,
             weight: 1.0,
@@ -130,6 +134,21 @@ impl<const N: usize> Covariance<N> {
         self.sum.map(|row| row.map(|entry| entry * scale))
     }
 
+    /// The matrix up to a factor.
+    pub(crate) const fn unscaled(&self) -> &Matrix<N> {
+        &self.sum
+    }
+
+    /// `a^H R a`, up to the same factor.
+    pub(crate) fn spectrum(&self) -> Spectrum<N> {
+        Spectrum::of_matrix(&self.sum)
+    }
+
+    /// The sum of the weights, which is that factor.
+    pub(crate) const fn weight(&self) -> f64 {
+        self.weight
+    }
+
     /// Mean power per antenna, `trace(R) / N`.
     pub fn power(&self) -> f64 {
         self.trace() / (self.weight * N as f64)
@@ -143,6 +162,9 @@ impl<const N: usize> Covariance<N> {
     /// `g_i conj(g_j)`. [`estimate`](crate::estimate) does this by itself.
     #[must_use]
     pub fn calibrated(&self, array: &Array<N>) -> Self {
+        if array.is_ideal() {
+            return *self;
+        }
         let inverse = array.calibration().gains().map(|gain| gain.inv());
         let mut result = *self;
         for (i, row) in result.sum.iter_mut().enumerate() {
@@ -193,8 +215,8 @@ impl<const N: usize> Covariance<N> {
         if self.snapshots == 0 {
             return Err(Error::NoSnapshots);
         }
-        let finite = self.weight.is_finite() && self.sum.iter().flatten().all(|x| x.is_finite());
-        if !finite || !self.trace().is_finite() {
+        // No entry is larger than the largest on the diagonal.
+        if !(self.weight.is_finite() && self.trace().is_finite()) {
             return Err(Error::NotFinite);
         }
         if self.weight <= 0.0 {

@@ -49,7 +49,7 @@ pub(crate) fn hermitian_eigen<const N: usize>(mut a: Matrix<N>, n: usize) -> Her
 /// One unitary rotation of rows and columns p and q that annihilates entry (p, q). The eigenvectors
 /// are kept as rows of `v`.
 fn rotate<const N: usize>(a: &mut Matrix<N>, v: &mut Matrix<N>, p: usize, q: usize, n: usize) {
-    let magnitude = a[p][q].norm();
+    let magnitude = a[p][q].norm_sqr().sqrt();
     let phase = a[p][q] / magnitude;
     let tau = (a[q][q].re - a[p][p].re) / (2.0 * magnitude);
     let t = 1.0_f64.copysign(tau) / (tau.abs() + (1.0 + tau * tau).sqrt());
@@ -73,10 +73,69 @@ fn rotate<const N: usize>(a: &mut Matrix<N>, v: &mut Matrix<N>, p: usize, q: usi
     }
 }
 
-/// Largest eigenvalue and its eigenvector (unit norm) of a Hermitian, positive semidefinite matrix.
-pub(crate) fn principal_eigenvector<const N: usize>(a: Matrix<N>) -> (f64, [Complex64; N]) {
-    let eigen = hermitian_eigen(a, N);
+/// Largest eigenvalue and its eigenvector (unit norm) of a Hermitian, positive semidefinite matrix
+/// that is not zero.
+///
+/// Squaring a matrix squares the ratios of its eigenvalues; after a few squarings only the largest is
+/// left. Where the two largest are nearly equal that takes too many, and Jacobi's method takes over.
+pub(crate) fn principal_eigenvector<const N: usize>(a: &Matrix<N>) -> (f64, [Complex64; N]) {
+    const SQUARINGS: usize = 9;
+    let mut power = *a;
+    let mut trace: f64 = (0..N).map(|n| power[n][n].re).sum();
+    for _ in 0..SQUARINGS {
+        let scale = 1.0 / trace;
+        for row in &mut power {
+            for entry in row {
+                *entry *= scale;
+            }
+        }
+        power = hermitian_square(&power);
+        trace = (0..N).map(|n| power[n][n].re).sum();
+        // The trace of the square of a matrix with unit trace is 1 if it has one eigenvalue.
+        if trace > 1.0 - 1e-14 {
+            let heaviest = (1..N).fold(0, |best, n| {
+                if power[n][n].re > power[best][best].re {
+                    n
+                } else {
+                    best
+                }
+            });
+            let mut vector: [Complex64; N] = std::array::from_fn(|n| power[n][heaviest]);
+            let norm = vector.iter().map(Complex64::norm_sqr).sum::<f64>().sqrt();
+            for element in &mut vector {
+                *element /= norm;
+            }
+            return (rayleigh(a, &vector), vector);
+        }
+    }
+    let eigen = hermitian_eigen(*a, N);
     (eigen.values[0], eigen.vectors[0])
+}
+
+fn hermitian_square<const N: usize>(a: &Matrix<N>) -> Matrix<N> {
+    let mut square = zeros::<N>();
+    for i in 0..N {
+        for j in 0..i {
+            let mut entry = Complex64::ZERO;
+            for k in 0..N {
+                entry += a[i][k] * a[k][j];
+            }
+            square[i][j] = entry;
+            square[j][i] = entry.conj();
+        }
+        square[i][i] = Complex64::from(a[i].iter().map(Complex64::norm_sqr).sum::<f64>());
+    }
+    square
+}
+
+fn rayleigh<const N: usize>(a: &Matrix<N>, u: &[Complex64; N]) -> f64 {
+    (0..N)
+        .map(|i| {
+            (0..N)
+                .map(|j| (u[i].conj() * a[i][j] * u[j]).re)
+                .sum::<f64>()
+        })
+        .sum()
 }
 
 /// Eigenvalues of the leading `n` by `n` block of any complex matrix: shifted QR iteration by

@@ -6,14 +6,20 @@ use crate::eigen::{HermitianEigen, general_eigenvalues, hermitian_eigen};
 use crate::linear::{inverse, product};
 use crate::list::List;
 
-/// Most antennas for which total least squares has room; two subarrays' bases side by side.
-const ROOM: usize = 32;
-
 /// Standard deviation over the Cramér–Rao bound, one source and high SNR:
 /// `sqrt(N (N + 1) / (6 (N - 1)))` (Rao and Hari 1989). Dropping an antenna at each end costs little.
 pub(crate) fn excess<const N: usize>() -> f64 {
     let n = N as f64;
     (n * (n + 1.0) / (6.0 * (n - 1.0))).sqrt()
+}
+
+/// One source: both kinds of least squares give the phase of `sum conj(u_n) u_(n+1)`.
+pub(crate) fn phase<const N: usize>(principal: &[Complex64; N]) -> f64 {
+    principal
+        .windows(2)
+        .map(|pair| pair[0].conj() * pair[1])
+        .sum::<Complex64>()
+        .arg()
 }
 
 /// Least squares: `Psi = (U1^H U1)^-1 U1^H U2`; its eigenvalues are `exp(j omega)`. `None` if
@@ -38,6 +44,18 @@ pub(crate) fn least_squares<const N: usize>(
 /// Total least squares: both subspaces may be wrong. With `E` the eigenvectors of
 /// `[U1 U2]^H [U1 U2]`, smallest eigenvalues last, `Psi = -E12 E22^-1`. `None` if singular.
 pub(crate) fn total_least_squares<const N: usize>(
+    eigen: &HermitianEigen<N>,
+    sources: usize,
+) -> Option<List<f64, N>> {
+    // Room for the bases of both subarrays side by side.
+    match 2 * sources {
+        ..=8 => total::<N, 8>(eigen, sources),
+        ..=16 => total::<N, 16>(eigen, sources),
+        _ => total::<N, 64>(eigen, sources),
+    }
+}
+
+fn total<const N: usize, const ROOM: usize>(
     eigen: &HermitianEigen<N>,
     sources: usize,
 ) -> Option<List<f64, N>> {

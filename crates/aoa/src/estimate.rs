@@ -3,9 +3,10 @@
 use std::f64::consts::{FRAC_PI_2, PI};
 use std::fmt;
 
-use crate::eigen::{HermitianEigen, hermitian_eigen};
+use crate::eigen::{HermitianEigen, hermitian_eigen, principal_eigenvector};
 use crate::linear::{adjoint, inverse, product};
 use crate::list::List;
+use crate::math::{acos, log10};
 use crate::{
     Array, Complex64, Covariance, Error, bound, esprit, maximum_likelihood, music, root_music,
 };
@@ -160,28 +161,34 @@ pub fn estimate<const N: usize>(
     array: &Array<N>,
 ) -> Result<AngleEstimate, Error> {
     let covariance = covariance.calibrated(array).validated()?;
+    let spectrum = covariance.spectrum();
     let (phase_rad, excess) = match method {
-        Method::MaximumLikelihood => (maximum_likelihood::phase(&covariance), 1.0),
-        Method::Music { .. } | Method::RootMusic => {
-            let eigen = hermitian_eigen(covariance.matrix(), N);
-            let phases = subspace_phases(method, &eigen, 1, array)?;
-            (phases.first().copied().ok_or(Error::Singular)?, 1.0)
-        }
-        Method::EspritLs | Method::EspritTls => {
-            let eigen = hermitian_eigen(covariance.matrix(), N);
-            let phases = subspace_phases(method, &eigen, 1, array)?;
+        Method::MaximumLikelihood => (maximum_likelihood::maximum(&spectrum).0, 1.0),
+        Method::Music { grid_deg, refine } => {
+            let signal = music::signal_spectrum_of_one(&covariance);
             (
-                phases.first().copied().ok_or(Error::Singular)?,
-                esprit::excess::<N>(),
+                music::phase(&signal, array, checked_grid(grid_deg)?, refine),
+                1.0,
             )
         }
+        Method::RootMusic => {
+            let signal = music::signal_spectrum_of_one(&covariance);
+            (
+                root_music::phase(&music::null_spectrum_of_one(&signal)),
+                1.0,
+            )
+        }
+        Method::EspritLs | Method::EspritTls => {
+            let (_, principal) = principal_eigenvector(covariance.unscaled());
+            (esprit::phase(&principal), esprit::excess::<N>())
+        }
     };
-    let beam = maximum_likelihood::beam_power(&covariance, phase_rad);
-    let noise = maximum_likelihood::residual_power(&covariance, beam);
+    let beam = spectrum.value(phase_rad) / N as f64;
+    let noise = maximum_likelihood::residual_power::<N>(spectrum.lags[0].re, beam);
     let snr = maximum_likelihood::snr::<N>(beam, noise);
     let snapshots = covariance.snapshots();
     let sigma = bound::stochastic::<N>(snr, snapshots) * excess;
-    let threshold = bound::outlier_probability::<N>(snr, snapshots) > bound::OUTLIERS;
+    let threshold = snr < bound::resolvable_snr::<N>(snapshots);
     Ok(describe(
         phase_rad,
         sigma,
@@ -230,7 +237,7 @@ pub fn estimate_several<const N: usize>(
         phase_sigma_rad: [PI; N],
     });
     let weakest = (eigen.values[sources - 1] / noise_variance - 1.0) / N as f64;
-    let outliers = bound::outlier_probability::<N>(weakest.max(0.0), covariance.snapshots());
+    let hidden = weakest < bound::resolvable_snr::<N>(covariance.snapshots());
     let mut estimates = [None; N];
     for (k, place) in estimates[..sources].iter_mut().enumerate() {
         let (phase, sigma) = (phases[k], strengths.phase_sigma_rad[k]);
@@ -238,7 +245,7 @@ pub fn estimate_several<const N: usize>(
             let gap = crate::spectrum::wrap(phases[other] - phase).abs();
             other != k && gap < 2.0 * sigma.hypot(strengths.phase_sigma_rad[other])
         });
-        let doubt = if outliers > bound::OUTLIERS {
+        let doubt = if hidden {
             Some(Reason::ThresholdSnr)
         } else if close || !separated {
             Some(Reason::SourcesNotSeparated)
@@ -266,11 +273,14 @@ fn subspace_phases<const N: usize>(
 ) -> Result<List<f64, N>, Error> {
     match method {
         Method::Music { grid_deg, refine } => {
-            if !(0.001..=10.0).contains(&grid_deg) {
-                return Err(Error::Grid(grid_deg));
-            }
             let spectrum = music::signal_spectrum(eigen, sources);
-            Ok(music::phases(&spectrum, sources, array, grid_deg, refine))
+            Ok(music::phases(
+                &spectrum,
+                sources,
+                array,
+                checked_grid(grid_deg)?,
+                refine,
+            ))
         }
         Method::MaximumLikelihood | Method::RootMusic => {
             let null = music::null_spectrum(eigen, sources);
@@ -278,6 +288,16 @@ fn subspace_phases<const N: usize>(
         }
         Method::EspritLs => esprit::least_squares(eigen, sources).ok_or(Error::Singular),
         Method::EspritTls => esprit::total_least_squares(eigen, sources).ok_or(Error::Singular),
+    }
+}
+
+/// The grid step in rad.
+fn checked_grid(grid_deg: f64) -> Result<f64, Error> {
+    let sensible = (0.001..=10.0).contains(&grid_deg);
+    if sensible {
+        Ok(grid_deg.to_radians())
+    } else {
+        Err(Error::Grid(grid_deg))
     }
 }
 
@@ -334,30 +354,59 @@ pub(crate) fn describe<const N: usize>(
     doubt: Option<Reason>,
     array: &Array<N>,
 ) -> AngleEstimate {
-    // No estimate is worse than a direction drawn at random.
-    let phase_sigma_rad = phase_sigma_rad.min(PI / 3.0_f64.sqrt());
     let end_fire = array.phase_at_end_fire_rad();
-    let cosine = phase_rad / end_fire;
-    let angle_rad = cosine.clamp(-1.0, 1.0).acos();
-    let spread = phase_sigma_rad / end_fire;
-    let sine = (1.0 - cosine * cosine).max(0.0).sqrt();
-    // acos(1 - x) is sqrt(2 x) near the axis: there the deviation is of that size, not infinite.
-    let sigma_rad = (spread / sine).min((2.0 * spread).sqrt()).min(FRAC_PI_2);
-    let reason = doubt.or_else(|| {
-        if end_fire > PI * (1.0 + 1e-9) {
-            Some(Reason::Ambiguous).filter(|_| phase_rad.abs() + end_fire > 2.0 * PI)
-        } else if phase_rad.abs() + 3.0 * phase_sigma_rad > end_fire {
-            Some(Reason::NearEndFire)
-        } else {
-            None
-        }
-    });
+    let (phase_sigma_rad, angle_rad, sigma_rad) =
+        direction::<false>(phase_rad, phase_sigma_rad, end_fire);
+    let reason = doubt.or_else(|| geometric_doubt(phase_rad, phase_sigma_rad, end_fire));
     AngleEstimate {
         phase_rad,
         phase_sigma_rad,
         angle_rad,
         sigma_rad,
-        snr_db: 10.0 * snr.log10(),
+        snr_db: 10.0 * log10::<false>(snr),
         verdict: reason.map_or(Verdict::Resolved, Verdict::Unresolved),
+    }
+}
+
+/// From an electrical angle and its standard deviation: that standard deviation limited to what it
+/// means to know nothing, the angle, and its standard deviation.
+#[inline(always)]
+pub(crate) fn direction<const FUSED: bool>(
+    phase_rad: f64,
+    phase_sigma_rad: f64,
+    end_fire_rad: f64,
+) -> (f64, f64, f64) {
+    // Standard deviation of a phase drawn at random, pi / sqrt(3).
+    const IGNORANCE: f64 = 1.813_799_364_234_217_8;
+    let lesser = |a: f64, b: f64| if a < b { a } else { b };
+    let phase_sigma_rad = lesser(phase_sigma_rad, IGNORANCE);
+    let cosine = phase_rad / end_fire_rad;
+    let cosine = if cosine > 1.0 { 1.0 } else { cosine };
+    let cosine = if cosine < -1.0 { -1.0 } else { cosine };
+    let sine = ((1.0 - cosine) * (1.0 + cosine)).sqrt();
+    let spread = phase_sigma_rad / end_fire_rad;
+    // acos(1 - x) is sqrt(2 x) near the axis: there the deviation is of that size, not infinite.
+    let sigma_rad = lesser(spread / sine, (2.0 * spread).sqrt());
+    (
+        phase_sigma_rad,
+        acos::<FUSED>(cosine),
+        lesser(sigma_rad, FRAC_PI_2),
+    )
+}
+
+/// What the direction itself gives reason to doubt.
+pub(crate) fn geometric_doubt(
+    phase_rad: f64,
+    phase_sigma_rad: f64,
+    end_fire_rad: f64,
+) -> Option<Reason> {
+    let reach = phase_rad.abs() + 3.0 * phase_sigma_rad;
+    // Another direction has the phase beyond the turn: nearest -(2 pi - |phase|).
+    if phase_rad.abs() + end_fire_rad >= 2.0 * PI * (1.0 + 1e-9) {
+        Some(Reason::Ambiguous)
+    } else if reach > end_fire_rad {
+        Some(Reason::NearEndFire)
+    } else {
+        None
     }
 }

@@ -28,20 +28,21 @@ pub fn maximum_likelihood_pilots<const N: usize>(
     let covariance = Covariance::from_snapshots(blocks)?
         .calibrated(array)
         .validated()?;
-    let phase_rad = maximum_likelihood::phase(&covariance);
-    let beam = maximum_likelihood::beam_power(&covariance, phase_rad);
+    let spectrum = covariance.spectrum();
+    let (phase_rad, value) = maximum_likelihood::maximum(&spectrum);
+    let beam = value / N as f64;
     let noise = match noise_variance {
-        Some(value) if value.is_finite() && value > 0.0 => value,
+        Some(value) if value.is_finite() && value > 0.0 => value * covariance.weight(),
         Some(value) => {
             return Err(Error::NotPositive {
                 name: "noise_variance",
                 value,
             });
         }
-        None => maximum_likelihood::residual_power(&covariance, beam),
+        None => maximum_likelihood::residual_power::<N>(spectrum.lags[0].re, beam),
     };
     let snr = maximum_likelihood::snr::<N>(beam, noise);
-    let threshold = bound::outlier_probability::<N>(snr, blocks.len()) > bound::OUTLIERS;
+    let threshold = snr < bound::resolvable_snr::<N>(blocks.len());
     let sigma = bound::stochastic::<N>(snr, blocks.len());
     Ok(describe(
         phase_rad,

@@ -18,6 +18,19 @@ pub(crate) fn phases<const N: usize>(null: &Spectrum<N>, sources: usize) -> List
     )
 }
 
+/// The electrical angle of the root nearest to the unit circle.
+pub(crate) fn phase<const N: usize>(null: &Spectrum<N>) -> f64 {
+    let roots = inner_roots(null);
+    let nearest = roots[..N - 1].iter().fold(Complex64::ZERO, |best, root| {
+        if root.norm_sqr() > best.norm_sqr() {
+            *root
+        } else {
+            best
+        }
+    });
+    settled(null, nearest)
+}
+
 /// The phase of a root. A root on the circle is double, and rounding moves it along the circle by
 /// the square root of eps; but there the spectrum has a zero, and its minimum is well determined.
 fn settled<const N: usize>(null: &Spectrum<N>, root: Complex64) -> f64 {

@@ -67,21 +67,6 @@ impl<const N: usize> Spectrum<N> {
         (2.0 * f, 2.0 * df, 2.0 * ddf)
     }
 
-    /// Where `f` is largest, in (-pi, pi].
-    pub(crate) fn maximum(&self) -> f64 {
-        let points = 8 * N;
-        let step = TAU / points as f64;
-        let mut best = (f64::NEG_INFINITY, 0.0);
-        for g in 0..points {
-            let phase = step * g as f64;
-            let value = self.value(phase);
-            if value > best.0 {
-                best = (value, phase);
-            }
-        }
-        self.refined_maximum(best.1, step)
-    }
-
     /// The local maximum within `reach` of `start`, by Newton's method, in (-pi, pi].
     pub(crate) fn refined_maximum(&self, start: f64, reach: f64) -> f64 {
         let mut offset: f64 = 0.0;

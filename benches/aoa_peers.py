@@ -1,0 +1,218 @@
+"""Angle of arrival against its peers: accuracy and time in one table.
+
+Four antennas half a wavelength apart, 20 snapshots, one Gaussian source between 20 and 160 degrees;
+everybody gets the same data, in the same run, on one thread. Times are the least of several
+repetitions and include the covariance. Run with the extra ``bench`` installed::
+
+    python benches/aoa_peers.py
+"""
+
+from __future__ import annotations
+
+import os
+
+for variable in ("OMP_NUM_THREADS", "OPENBLAS_NUM_THREADS", "MKL_NUM_THREADS"):
+    os.environ[variable] = "1"
+
+import time
+import warnings
+from typing import TYPE_CHECKING
+
+import numpy as np
+from rich.console import Console
+from rich.table import Table
+
+from access_av import aoa
+
+if TYPE_CHECKING:
+    from collections.abc import Callable
+
+    from numpy.typing import NDArray
+
+    Snapshots = NDArray[np.complex128]
+    Angles = NDArray[np.float64]
+
+ANTENNAS, SNAPSHOTS = 4, 20
+SNRS_DB = (0, 10, 20, 30)
+TRIALS = 1000
+CARRIER_HZ = 3.5e9
+LIGHT_M_S = 299_792_458.0
+
+
+def simulate(snr_db: float, trials: int, rng: np.random.Generator) -> tuple[Snapshots, Angles]:
+    """Snapshots ``(trials, antennas, snapshots)`` in unit noise, and the true angles in rad."""
+
+    def gaussian(*shape: int) -> Snapshots:
+        return (rng.normal(size=(*shape, 2)) @ [1, 1j]) / np.sqrt(2)
+
+    angles = np.radians(rng.uniform(20, 160, trials))
+    steering = np.exp(1j * np.pi * np.cos(angles)[:, None] * np.arange(ANTENNAS))
+    signal = 10 ** (snr_db / 20) * gaussian(trials, 1, SNAPSHOTS)
+    return steering[:, :, None] * signal + gaussian(trials, ANTENNAS, SNAPSHOTS), angles
+
+
+class BatchedNumpy:
+    """What a careful NumPy user would write: everything over the batch at once, no eigenvalues."""
+
+    def __init__(self, points: int = 32) -> None:
+        grid = 2 * np.pi * np.arange(points) / points
+        lags = np.arange(1, ANTENNAS)[:, None]
+        self.grid = grid
+        # Real and imaginary parts side by side, so that the search is one real product.
+        self.basis = np.concatenate([np.cos(lags * grid), np.sin(lags * grid)])
+
+    def maximum_likelihood(self, snapshots: Snapshots) -> Angles:
+        covariance = snapshots @ snapshots.conj().swapaxes(1, 2)
+        sums = [np.trace(covariance, offset=-k, axis1=1, axis2=2) for k in range(1, ANTENNAS)]
+        sums = np.stack(sums, axis=1)
+        phase = self.grid[np.argmax(np.hstack([sums.real, sums.imag]) @ self.basis, axis=1)]
+        lags = np.arange(1, ANTENNAS)
+        for _ in range(3):
+            terms = sums * np.exp(-1j * phase)[:, None] ** lags
+            phase = phase + (terms.imag @ lags) / (terms.real @ lags**2)
+        phase = np.angle(np.exp(1j * phase))
+        return np.arccos(np.clip(phase / np.pi, -1, 1))
+
+
+class DoaPy:
+    """doa_py, whose angles are from broadside."""
+
+    def __init__(self) -> None:
+        from doa_py import algorithm, arrays
+
+        # doa_py rounds the speed of light.
+        self.algorithm = algorithm
+        self.array = arrays.UniformLinearArray(m=ANTENNAS, dd=0.5 * arrays.C / CARRIER_HZ)
+        self.grid_rad = np.radians(np.arange(-90, 90.05, 0.1))
+
+    def music(self, snapshots: Snapshots) -> float:
+        spectrum = self.algorithm.music(
+            snapshots, 1, self.array, CARRIER_HZ, self.grid_rad, unit="rad"
+        )
+        return np.pi / 2 + float(self.grid_rad[np.argmax(spectrum)])
+
+    def root_music(self, snapshots: Snapshots) -> float:
+        found = self.algorithm.root_music(snapshots, 1, self.array, CARRIER_HZ, unit="rad")
+        return np.pi / 2 + float(np.ravel(found)[0])
+
+    def esprit(self, snapshots: Snapshots) -> float:
+        found = self.algorithm.esprit(snapshots, 1, self.array, CARRIER_HZ, unit="rad")
+        return np.pi / 2 + float(np.ravel(found)[0])
+
+
+class Pyroomacoustics:
+    """MUSIC of pyroomacoustics on a grid of 0.1 degrees over the half circle."""
+
+    def __init__(self) -> None:
+        import pyroomacoustics as pra
+
+        # Four points at four times the carrier: the carrier is bin 1 of bins 0, 1, 2.
+        fs, nfft = 4 * CARRIER_HZ, 4
+        spacing = 0.5 * LIGHT_M_S / CARRIER_HZ
+        place = np.zeros((2, ANTENNAS))
+        place[0] = spacing * np.arange(ANTENNAS)
+        grid = np.radians(np.arange(0, 180.05, 0.1))
+        self.carrier_bin = np.array([1])
+        self.music_of = pra.doa.MUSIC(place, fs, nfft, c=LIGHT_M_S, num_src=1, azimuth=grid)
+
+    def music(self, snapshots: Snapshots) -> float:
+        bins = np.zeros((ANTENNAS, 3, SNAPSHOTS), complex)
+        bins[:, 1] = snapshots
+        self.music_of.locate_sources(bins, num_src=1, freq_bins=self.carrier_bin)
+        return float(self.music_of.azimuth_recon[0])
+
+
+def least_time_us(call: Callable[[], object], estimates: int, budget_s: float = 0.4) -> float:
+    """Time per estimate: the least of repetitions that fill the budget."""
+    call()
+    started = time.perf_counter()
+    call()
+    once_s = max(time.perf_counter() - started, 1e-7)
+    inner = max(1, int(0.01 / once_s))
+    best = float("inf")
+    stop = time.perf_counter() + budget_s
+    while time.perf_counter() < stop:
+        started = time.perf_counter()
+        for _ in range(inner):
+            call()
+        best = min(best, (time.perf_counter() - started) / inner)
+    return 1e6 * best / estimates
+
+
+def main() -> None:
+    """Measure and print."""
+    warnings.simplefilter("ignore")
+    rng = np.random.default_rng(2026)
+    data = {snr_db: simulate(snr_db, TRIALS, rng) for snr_db in SNRS_DB}
+    batch = data[20][0]
+    batch_single = batch.astype(np.complex64)
+    one = np.ascontiguousarray(batch[0])
+    doa_py, pra, batched = DoaPy(), Pyroomacoustics(), BatchedNumpy()
+
+    def each(estimator: Callable[[Snapshots], float]) -> Callable[[Snapshots], Angles]:
+        return lambda snapshots: np.array([estimator(item) for item in snapshots])
+
+    # Name, angles of a batch, one timed call, estimates in that call.
+    rows: list[tuple[str, Callable[[Snapshots], Angles], Callable[[], object], int]] = [
+        ("doa_py MUSIC 0.1°", each(doa_py.music), lambda: doa_py.music(one), 1),
+        ("doa_py Root-MUSIC", each(doa_py.root_music), lambda: doa_py.root_music(one), 1),
+        ("doa_py ESPRIT", each(doa_py.esprit), lambda: doa_py.esprit(one), 1),
+        ("pyroomacoustics MUSIC 0.1°", each(pra.music), lambda: pra.music(one), 1),
+        (
+            "batched NumPy ML",
+            batched.maximum_likelihood,
+            lambda: batched.maximum_likelihood(batch),
+            TRIALS,
+        ),
+    ]
+    for name, function in (
+        ("MUSIC 0.1°", aoa.music),
+        ("Root-MUSIC", aoa.root_music),
+        ("ESPRIT", aoa.esprit),
+        ("ML", aoa.maximum_likelihood),
+    ):
+        angles = lambda snapshots, function=function: function(snapshots).angle_rad  # noqa: E731
+        rows.append((f"access_av {name}", angles, lambda function=function: function(one), 1))
+    ml = aoa.maximum_likelihood
+    rows += [
+        ("access_av ML, batch", lambda x: ml(x).angle_rad, lambda: ml(batch).angle_rad, TRIALS),
+        (
+            "access_av ML, batch complex64",
+            lambda x: ml(x.astype(np.complex64)).angle_rad,
+            lambda: ml(batch_single).angle_rad,
+            TRIALS,
+        ),
+    ]
+
+    table = Table(title=f"RMSE in degrees, {ANTENNAS} antennas, {SNAPSHOTS} snapshots")
+    for heading in ("", *(f"{snr_db} dB" for snr_db in SNRS_DB), "µs per estimate"):
+        table.add_column(heading, justify="left" if heading == "" else "right")
+    bounds = [
+        np.degrees(np.sqrt(np.mean(aoa.crb_rad(angles, snr_db) ** 2)))
+        for snr_db, (_, angles) in data.items()
+    ]
+    table.add_row("√CRB (stochastic)", *(f"{bound:.3f}" for bound in bounds), "–")
+    times: dict[str, float] = {}
+    for name, estimate, call, count in rows:
+        errors = [
+            np.degrees(np.sqrt(np.mean((estimate(snapshots) - angles) ** 2)))
+            for snapshots, angles in data.values()
+        ]
+        times[name] = least_time_us(call, count)
+        cells = (f"{error:.3f}" for error in errors)
+        table.add_row(name, *cells, f"{times[name]:.3f}")
+    console = Console(width=110)
+    console.print(table)
+
+    for ours, peer in (
+        ("access_av Root-MUSIC", "doa_py Root-MUSIC"),
+        ("access_av ESPRIT", "doa_py ESPRIT"),
+        ("access_av MUSIC 0.1°", "pyroomacoustics MUSIC 0.1°"),
+        ("access_av ML, batch", "batched NumPy ML"),
+        ("access_av ML, batch complex64", "batched NumPy ML"),
+    ):
+        console.print(f"{ours}: {times[peer] / times[ours]:.0f} × as fast as {peer}")
+
+
+if __name__ == "__main__":
+    main()
