@@ -97,7 +97,8 @@ impl<'a, T: Real, const N: usize> Batch<'a, T, N> {
         sources: usize,
         estimates: &mut [AngleEstimate],
     ) -> Result<(), BatchError> {
-        if method == Method::MaximumLikelihood && sources == 1 && array.is_ideal() {
+        let many = self.len() > maximum_likelihood::BLOCK / 8;
+        if method == Method::MaximumLikelihood && sources == 1 && array.is_ideal() && many {
             return self.maximum_likelihood(array, estimates);
         }
         let ideal = array.with_calibration(Calibration::IDENTITY);

@@ -61,13 +61,7 @@ impl<const N: usize> Covariance<N> {
             .map(|channel| channel.len())
             .min()
             .unwrap_or(0);
-        let mut sum = zeros::<N>();
-        for i in 0..N {
-            for j in 0..=i {
-                sum[i][j] = T::correlation(channels[i], channels[j]);
-                sum[j][i] = sum[i][j].conj();
-            }
-        }
+        let sum = T::products(&channels.map(|channel| &channel[..snapshots]));
         Self {
             sum,
             weight: snapshots as f64,

@@ -173,10 +173,7 @@ pub fn estimate<const N: usize>(
         }
         Method::RootMusic => {
             let signal = music::signal_spectrum_of_one(&covariance);
-            (
-                root_music::phase(&music::null_spectrum_of_one(&signal)),
-                1.0,
-            )
+            (root_music::phase(&signal), 1.0)
         }
         Method::EspritLs | Method::EspritTls => {
             let (_, principal) = principal_eigenvector(covariance.unscaled());

@@ -8,7 +8,7 @@ use num_complex::Complex;
 
 use crate::array::aperture;
 use crate::estimate::{AngleEstimate, Reason, direction, geometric_doubt};
-use crate::kernel::{Real, has_avx2_fma};
+use crate::kernel::{Real, dispatch};
 use crate::math::{log10, times_plus};
 use crate::peak::Spectra;
 use crate::spectrum::Spectrum;
@@ -58,18 +58,27 @@ pub(crate) fn block<T: Real, const N: usize>(
     array: &Array<N>,
     estimates: &mut [AngleEstimate],
 ) -> Result<(), (usize, Error)> {
-    #[cfg(target_arch = "x86_64")]
-    if has_avx2_fma() {
-        // SAFETY: the processor has the features that the function is compiled for.
-        #[allow(unsafe_code)]
-        return unsafe { block_avx2(samples, snapshots, array, estimates) };
-    }
-    block_generic::<false, T, N>(samples, snapshots, array, estimates)
+    dispatch!(
+        block_generic::<false, T, N>(samples, snapshots, array, estimates),
+        block_avx2(samples, snapshots, array, estimates),
+        block_avx512(samples, snapshots, array, estimates)
+    )
 }
 
 #[cfg(target_arch = "x86_64")]
 #[target_feature(enable = "avx2,fma")]
 fn block_avx2<T: Real, const N: usize>(
+    samples: &[Complex<T>],
+    snapshots: usize,
+    array: &Array<N>,
+    estimates: &mut [AngleEstimate],
+) -> Result<(), (usize, Error)> {
+    block_generic::<true, T, N>(samples, snapshots, array, estimates)
+}
+
+#[cfg(target_arch = "x86_64")]
+#[target_feature(enable = "avx2,fma,avx512f")]
+fn block_avx512<T: Real, const N: usize>(
     samples: &[Complex<T>],
     snapshots: usize,
     array: &Array<N>,

@@ -6,12 +6,14 @@
 use std::f64::consts::{PI, TAU};
 
 use crate::eigen::{HermitianEigen, principal_eigenvector};
+use crate::kernel::dispatch;
 use crate::list::List;
+use crate::math::times_plus;
 use crate::spectrum::Spectrum;
 use crate::{Array, Complex64, Covariance};
 
 /// Grid points that are computed side by side.
-const LANES: usize = 8;
+const LANES: usize = 64;
 
 /// The signal subspace's spectrum `a^H E_s E_s^H a`. It is N minus the null spectrum, so its largest
 /// local maxima are MUSIC's peaks.
@@ -36,13 +38,6 @@ pub(crate) fn signal_spectrum_of_one<const N: usize>(covariance: &Covariance<N>)
     Spectrum::of_subspace(&[principal_eigenvector(covariance.unscaled()).1])
 }
 
-/// N minus the signal spectrum.
-pub(crate) fn null_spectrum_of_one<const N: usize>(signal: &Spectrum<N>) -> Spectrum<N> {
-    let mut null = signal.negated();
-    null.lags[0] += N as f64;
-    null
-}
-
 /// The electrical angle of the highest point of the grid, refined if asked.
 pub(crate) fn phase<const N: usize>(
     spectrum: &Spectrum<N>,
@@ -51,21 +46,7 @@ pub(crate) fn phase<const N: usize>(
     refine: bool,
 ) -> f64 {
     let grid = Grid::new(array, grid_rad);
-    let mut highest = [(f64::NEG_INFINITY, 0_usize); LANES];
-    grid.for_each_block(spectrum, |first, values| {
-        for (best, value) in highest.iter_mut().zip(values) {
-            if *value > best.0 {
-                *best = (*value, first);
-            }
-        }
-    });
-    let (mut value, mut point) = (f64::NEG_INFINITY, 0);
-    for (lane, (lane_value, first)) in highest.into_iter().enumerate() {
-        if lane_value > value {
-            (value, point) = (lane_value, first + lane);
-        }
-    }
-    let phase = grid.phase(point);
+    let phase = grid.phase(grid.highest_point(spectrum));
     if refine {
         spectrum.refined_maximum(phase, grid.step)
     } else {
@@ -92,11 +73,13 @@ pub(crate) fn phases<const N: usize>(
         }
         (before, here) = (here, after);
     };
-    grid.for_each_block(spectrum, |first, values| {
+    let mut blocks = grid.blocks();
+    while let Some(first) = blocks.first {
+        let values = blocks.next_values::<false, N>(spectrum);
         for (lane, value) in values.iter().enumerate().take(grid.points - first) {
             consider((first + lane).wrapping_sub(1), *value);
         }
-    });
+    }
     consider(grid.points - 1, spectrum.value(grid.phase(0)));
     let found = peaks[..sources].iter().filter(|peak| peak.0.is_finite());
     let settle = |phase| {
@@ -131,41 +114,120 @@ impl Grid {
         self.step * point as f64 - PI
     }
 
-    /// Calls `visit` with the index of the first point and the values of each block of points.
-    fn for_each_block<const N: usize>(
+    fn blocks(&self) -> Blocks<'_> {
+        // z = exp(-j omega) of the first block, by doubling.
+        let (mut re, mut im) = ([0.0; LANES], [0.0; LANES]);
+        Complex64 {
+            re: re[0],
+            im: im[0],
+        } = Complex64::cis(-self.phase(0));
+        let mut turn = Complex64::cis(-self.step);
+        let mut known = 1;
+        while known < LANES {
+            for lane in 0..known {
+                let next = Complex64::new(re[lane], im[lane]) * turn;
+                Complex64 {
+                    re: re[lane + known],
+                    im: im[lane + known],
+                } = next;
+            }
+            turn *= turn;
+            known *= 2;
+        }
+        Blocks {
+            grid: self,
+            first: Some(0),
+            re,
+            im,
+            turn,
+        }
+    }
+
+    /// The point of the grid where the spectrum is largest.
+    fn highest_point<const N: usize>(&self, spectrum: &Spectrum<N>) -> usize {
+        dispatch!(
+            self.highest_point_generic::<false, N>(spectrum),
+            self.highest_point_avx2(spectrum),
+            self.highest_point_avx512(spectrum)
+        )
+    }
+
+    #[cfg(target_arch = "x86_64")]
+    #[target_feature(enable = "avx2,fma")]
+    fn highest_point_avx2<const N: usize>(&self, spectrum: &Spectrum<N>) -> usize {
+        self.highest_point_generic::<true, N>(spectrum)
+    }
+
+    #[cfg(target_arch = "x86_64")]
+    #[target_feature(enable = "avx2,fma,avx512f")]
+    fn highest_point_avx512<const N: usize>(&self, spectrum: &Spectrum<N>) -> usize {
+        self.highest_point_generic::<true, N>(spectrum)
+    }
+
+    #[inline(always)]
+    fn highest_point_generic<const FUSED: bool, const N: usize>(
         &self,
         spectrum: &Spectrum<N>,
-        mut visit: impl FnMut(usize, &[f64; LANES]),
-    ) {
-        // z = exp(-j omega), turned from block to block.
-        let (mut re, mut im) = ([0.0; LANES], [0.0; LANES]);
-        for lane in 0..LANES {
-            Complex64 {
-                re: re[lane],
-                im: im[lane],
-            } = Complex64::cis(-self.phase(lane));
-        }
-        let turn = Complex64::cis(-self.step * LANES as f64);
-        let mut first = 0;
-        while first < self.points {
-            let mut values = [0.0; LANES];
+    ) -> usize {
+        let (mut highest, mut place) = ([f64::NEG_INFINITY; LANES], [0.0; LANES]);
+        let mut blocks = self.blocks();
+        while let Some(first) = blocks.first {
+            let values = blocks.next_values::<FUSED, N>(spectrum);
+            let first = first as f64;
             for lane in 0..LANES {
-                // Horner's scheme for sum_k c_k z^k.
-                let (mut sum_re, mut sum_im) = (0.0, 0.0);
-                for lag in spectrum.lags[1..].iter().rev() {
-                    (sum_re, sum_im) = (
-                        (sum_re + lag.re) * re[lane] - (sum_im + lag.im) * im[lane],
-                        (sum_re + lag.re) * im[lane] + (sum_im + lag.im) * re[lane],
-                    );
-                }
-                values[lane] = 2.0 * sum_re + spectrum.lags[0].re;
-                (re[lane], im[lane]) = (
-                    re[lane] * turn.re - im[lane] * turn.im,
-                    re[lane] * turn.im + im[lane] * turn.re,
-                );
+                let better = values[lane] > highest[lane];
+                highest[lane] = if better { values[lane] } else { highest[lane] };
+                place[lane] = if better { first } else { place[lane] };
             }
-            visit(first, &values);
-            first += LANES;
         }
+        let mut best = 0;
+        for lane in 1..LANES {
+            if highest[lane] > highest[best] {
+                best = lane;
+            }
+        }
+        // The last block may reach beyond the circle, where the first points come again.
+        (place[best] as usize + best) % self.points
+    }
+}
+
+/// The grid, block by block.
+struct Blocks<'a> {
+    grid: &'a Grid,
+    /// First point of the next block; `None` after the last.
+    first: Option<usize>,
+    re: [f64; LANES],
+    im: [f64; LANES],
+    /// From block to block.
+    turn: Complex64,
+}
+
+impl Blocks<'_> {
+    /// The spectrum at the points of the next block.
+    #[inline(always)]
+    fn next_values<const FUSED: bool, const N: usize>(
+        &mut self,
+        spectrum: &Spectrum<N>,
+    ) -> [f64; LANES] {
+        let mut values = [0.0; LANES];
+        let turn = self.turn;
+        for lane in 0..LANES {
+            let (re, im) = (self.re[lane], self.im[lane]);
+            // Horner's scheme for sum_k c_k z^k.
+            let (mut sum_re, mut sum_im) = (0.0, 0.0);
+            for k in (1..N).rev() {
+                let (a, b) = (sum_re + spectrum.lags[k].re, sum_im + spectrum.lags[k].im);
+                sum_re = times_plus::<FUSED>(a, re, -(b * im));
+                sum_im = times_plus::<FUSED>(a, im, b * re);
+            }
+            values[lane] = times_plus::<FUSED>(2.0, sum_re, spectrum.lags[0].re);
+            self.re[lane] = times_plus::<FUSED>(re, turn.re, -(im * turn.im));
+            self.im[lane] = times_plus::<FUSED>(re, turn.im, im * turn.re);
+        }
+        self.first = self
+            .first
+            .map(|first| first + LANES)
+            .filter(|next| *next < self.grid.points);
+        values
     }
 }

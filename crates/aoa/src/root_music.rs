@@ -1,8 +1,12 @@
 //! Root-MUSIC (Barabell 1983; Rao and Hari 1989): the roots of the null spectrum instead of its
 //! minima.
 
+use std::f64::consts::TAU;
+
 use crate::Complex64;
+use crate::array::aperture;
 use crate::list::List;
+use crate::maximum_likelihood::maximum;
 use crate::spectrum::Spectrum;
 
 const ITERATIONS: usize = 60;
@@ -10,7 +14,12 @@ const ITERATIONS: usize = 60;
 /// Electrical angles of the `sources` roots nearest to the unit circle. `null` is the spectrum of the
 /// noise subspace.
 pub(crate) fn phases<const N: usize>(null: &Spectrum<N>, sources: usize) -> List<f64, N> {
-    let mut roots = inner_roots(null);
+    // A start without symmetry, so that no two roots can stay together.
+    let mut start = [Complex64::ZERO; N];
+    for (i, root) in start[..N - 1].iter_mut().enumerate() {
+        *root = Complex64::from_polar(0.7, 0.4 + TAU * i as f64 / (N - 1) as f64);
+    }
+    let mut roots = inner_roots(null, start);
     roots[..N - 1].sort_unstable_by(|a, b| b.norm_sqr().total_cmp(&a.norm_sqr()));
     List::collect(
         0.0,
@@ -18,9 +27,22 @@ pub(crate) fn phases<const N: usize>(null: &Spectrum<N>, sources: usize) -> List
     )
 }
 
-/// The electrical angle of the root nearest to the unit circle.
-pub(crate) fn phase<const N: usize>(null: &Spectrum<N>) -> f64 {
-    let roots = inner_roots(null);
+/// The electrical angle of the root nearest to the unit circle, for one source with the given signal
+/// spectrum.
+pub(crate) fn phase<const N: usize>(signal: &Spectrum<N>) -> f64 {
+    let mut null = signal.negated();
+    null.lags[0] += N as f64;
+    // Without noise one root is on the circle at the source, the others lie about half way in,
+    // between the zeros of the array's pattern; noise moves them little.
+    let (peak, height) = maximum(signal);
+    let depth = ((N as f64 - height).max(0.0) / aperture::<N>()).sqrt();
+    let mut start = [Complex64::ZERO; N];
+    start[0] = Complex64::from_polar(1.0 - depth.min(0.5), peak);
+    for (i, root) in start[..N - 1].iter_mut().enumerate().skip(1) {
+        let side = TAU * (i as f64 + 0.5 - 0.5 / N as f64) / (N as f64 - 1.0 / N as f64);
+        *root = Complex64::from_polar(0.45, peak + side);
+    }
+    let roots = inner_roots(&null, start);
     let nearest = roots[..N - 1].iter().fold(Complex64::ZERO, |best, root| {
         if root.norm_sqr() > best.norm_sqr() {
             *root
@@ -28,7 +50,7 @@ pub(crate) fn phase<const N: usize>(null: &Spectrum<N>) -> f64 {
             best
         }
     });
-    settled(null, nearest)
+    settled(&null, nearest)
 }
 
 /// The phase of a root. A root on the circle is double, and rounding moves it along the circle by
@@ -50,13 +72,8 @@ fn settled<const N: usize>(null: &Spectrum<N>, root: Complex64) -> f64 {
 ///
 /// Ehrlich–Aberth iteration on the inner roots alone, the mirror images taking part in the
 /// repulsion.
-fn inner_roots<const N: usize>(null: &Spectrum<N>) -> [Complex64; N] {
+fn inner_roots<const N: usize>(null: &Spectrum<N>, mut roots: [Complex64; N]) -> [Complex64; N] {
     let degree = N - 1;
-    let mut roots = [Complex64::ZERO; N];
-    // A start without symmetry, so that no two roots can stay together.
-    for (i, root) in roots[..degree].iter_mut().enumerate() {
-        *root = Complex64::from_polar(0.7, 0.4 + std::f64::consts::TAU * i as f64 / degree as f64);
-    }
     for _ in 0..ITERATIONS {
         let mut moved: f64 = 0.0;
         for i in 0..degree {
@@ -86,7 +103,8 @@ fn inner_roots<const N: usize>(null: &Spectrum<N>) -> [Complex64; N] {
                 moved = moved.max(step.norm_sqr());
             }
         }
-        if moved < 1e-28 {
+        // The error of a simple root cubes at each step.
+        if moved < 1e-12 {
             break;
         }
     }

@@ -1,0 +1,168 @@
+//! Kernels for AVX2 with FMA, and for AVX-512.
+//!
+//! Complex samples are left as they lie in memory, real and imaginary parts in turn. With `v` the
+//! samples of one antenna and `w` those of another, the lanes of `v w` sum to the real part of
+//! `v conj(w)`; of `v` times `w` with its parts exchanged, the odd lanes less the even ones sum to the
+//! imaginary part.
+
+macro_rules! kernels {
+    (
+        $module:ident, $features:literal, $real:ident, $vector:ident,
+        $complexes:literal, [$($lane:literal $part:ident),*], $steps:literal,
+        $set:ident, $zero:ident, $add:ident, $mul:ident, $fma:ident, $exchange:expr, $sums:expr
+    ) => {
+        pub(in crate::kernel) mod $module {
+            use std::arch::x86_64::*;
+
+            use num_complex::Complex;
+
+            use crate::Complex64;
+            use crate::covariance::{Matrix, zeros};
+
+            /// The samples from `start` on, zeros beyond the end.
+            #[target_feature(enable = $features)]
+            #[inline]
+            fn load(samples: &[Complex<$real>], start: usize) -> $vector {
+                if let Some(chunk) = samples.get(start..start + $complexes) {
+                    $set($(chunk[$lane].$part),*)
+                } else {
+                    let mut chunk = [Complex::<$real>::ZERO; $complexes];
+                    for (place, sample) in chunk.iter_mut().zip(samples.iter().skip(start)) {
+                        *place = *sample;
+                    }
+                    $set($(chunk[$lane].$part),*)
+                }
+            }
+
+            #[target_feature(enable = $features)]
+            #[inline]
+            fn total(direct: $vector, crossed: $vector) -> Complex64 {
+                let (even, odd) = $sums(direct);
+                let (crossed_even, crossed_odd) = $sums(crossed);
+                Complex64::new(f64::from(even + odd), f64::from(crossed_odd - crossed_even))
+            }
+
+            #[target_feature(enable = $features)]
+            #[inline]
+            fn correlation(x: &[Complex<$real>], y: &[Complex<$real>]) -> Complex64 {
+                let length = if x.len() < y.len() { x.len() } else { y.len() };
+                let (x, y) = (&x[..length], &y[..length]);
+                let (mut direct, mut crossed) = ($zero(), $zero());
+                let mut start = 0;
+                while start < length {
+                    let (v, w) = (load(x, start), load(y, start));
+                    direct = $fma(v, w, direct);
+                    crossed = $fma(v, $exchange(w), crossed);
+                    start += $complexes;
+                }
+                total(direct, crossed)
+            }
+
+            #[target_feature(enable = $features)]
+            pub(in crate::kernel) fn products<const N: usize>(
+                channels: &[&[Complex<$real>]; N],
+            ) -> Matrix<N> {
+                let mut matrix = zeros::<N>();
+                for i in 0..N {
+                    for j in 0..i {
+                        matrix[i][j] = correlation(channels[i], channels[j]);
+                        matrix[j][i] = matrix[i][j].conj();
+                    }
+                    matrix[i][i].re = correlation(channels[i], channels[i]).re;
+                }
+                matrix
+            }
+
+            /// Adds what the samples from `start` on contribute to each lag.
+            #[target_feature(enable = $features)]
+            #[inline]
+            fn add_products<const N: usize>(
+                (direct, crossed): &mut ([$vector; N], [$vector; N]),
+                rows: &[&[Complex<$real>]; N],
+                start: usize,
+            ) {
+                let (mut v, mut w) = ([$zero(); N], [$zero(); N]);
+                for n in 0..N {
+                    v[n] = load(rows[n], start);
+                    w[n] = $exchange(v[n]);
+                }
+                // The products of one k are added up first: fewer additions then wait for one
+                // another.
+                for k in 0..N {
+                    let mut straight = $mul(v[k], v[0]);
+                    for n in 1..N - k {
+                        straight = $fma(v[n + k], v[n], straight);
+                    }
+                    direct[k] = $add(direct[k], straight);
+                }
+                for k in 1..N {
+                    let mut across = $mul(v[k], w[0]);
+                    for n in 1..N - k {
+                        across = $fma(v[n + k], w[n], across);
+                    }
+                    crossed[k] = $add(crossed[k], across);
+                }
+            }
+
+            #[target_feature(enable = $features)]
+            pub(in crate::kernel) fn lag_sums<const N: usize>(
+                channels: &[&[Complex<$real>]; N],
+            ) -> [Complex64; N] {
+                let mut length = channels[0].len();
+                for channel in channels {
+                    length = if channel.len() < length { channel.len() } else { length };
+                }
+                let mut rows = *channels;
+                for row in &mut rows {
+                    *row = &row[..length];
+                }
+                let mut sums = ([$zero(); N], [$zero(); N]);
+                let mut start = 0;
+                while start < length {
+                    // Several steps a turn share the cost of turning.
+                    for step in 0..$steps {
+                        add_products(&mut sums, &rows, start + step * $complexes);
+                    }
+                    start += $steps * $complexes;
+                }
+                let (direct, crossed) = sums;
+                let mut lags = [Complex64::ZERO; N];
+                for k in 0..N {
+                    lags[k] = total(direct[k], crossed[k]);
+                }
+                lags
+            }
+        }
+    };
+}
+
+kernels!(
+    avx2_f64, "avx2,fma", f64, __m256d, 2, [1 im, 1 re, 0 im, 0 re], 2,
+    _mm256_set_pd, _mm256_setzero_pd, _mm256_add_pd, _mm256_mul_pd, _mm256_fmadd_pd,
+    _mm256_permute_pd::<0b0101>,
+    |v| {
+        let half = _mm_add_pd(_mm256_castpd256_pd128(v), _mm256_extractf128_pd::<1>(v));
+        (_mm_cvtsd_f64(half), _mm_cvtsd_f64(_mm_unpackhi_pd(half, half)))
+    }
+);
+kernels!(
+    avx2_f32, "avx2,fma", f32, __m256, 4, [3 im, 3 re, 2 im, 2 re, 1 im, 1 re, 0 im, 0 re], 1,
+    _mm256_set_ps, _mm256_setzero_ps, _mm256_add_ps, _mm256_mul_ps, _mm256_fmadd_ps,
+    _mm256_permute_ps::<0b10_11_00_01>,
+    |v| {
+        let half = _mm_add_ps(_mm256_castps256_ps128(v), _mm256_extractf128_ps::<1>(v));
+        let half = _mm_add_ps(half, _mm_movehl_ps(half, half));
+        (_mm_cvtss_f32(half), _mm_cvtss_f32(_mm_shuffle_ps::<1>(half, half)))
+    }
+);
+kernels!(
+    avx512_f64, "avx2,fma,avx512f", f64, __m512d,
+    4, [3 im, 3 re, 2 im, 2 re, 1 im, 1 re, 0 im, 0 re], 1,
+    _mm512_set_pd, _mm512_setzero_pd, _mm512_add_pd, _mm512_mul_pd, _mm512_fmadd_pd,
+    _mm512_permute_pd::<0b0101_0101>,
+    |v| {
+        let half = _mm256_add_pd(_mm512_castpd512_pd256(v), _mm512_extractf64x4_pd::<1>(v));
+        let half = _mm_add_pd(_mm256_castpd256_pd128(half), _mm256_extractf128_pd::<1>(half));
+        (_mm_cvtsd_f64(half), _mm_cvtsd_f64(_mm_unpackhi_pd(half, half)))
+    }
+);
