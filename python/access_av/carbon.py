@@ -1,0 +1,84 @@
+"""Greenhouse gas: embodied and use apart, low to high, per grid.
+
+Every number carries its source (``facts/carbon.toml``); nothing here is measured by this project.
+"""
+
+from __future__ import annotations
+
+from dataclasses import dataclass
+from typing import TYPE_CHECKING
+
+from access_av import facts
+
+if TYPE_CHECKING:
+    from collections.abc import Mapping
+
+KWH_IN_J = 3.6e6
+
+
+@dataclass(frozen=True)
+class Range:
+    """A quantity with its low, central and high value."""
+
+    low: float
+    central: float
+    high: float
+
+    @classmethod
+    def read(cls, entry: Mapping[str, float]) -> Range:
+        """Take the three values out of a fact."""
+        return cls(float(entry["low"]), float(entry["central"]), float(entry["high"]))
+
+    def scaled(self, factor: float) -> Range:
+        """All three values times a factor."""
+        return Range(self.low * factor, self.central * factor, self.high * factor)
+
+    def times(self, other: Range) -> Range:
+        """Low times low, central times central, high times high."""
+        return Range(self.low * other.low, self.central * other.central, self.high * other.high)
+
+
+@dataclass(frozen=True)
+class Footprint:
+    """Emissions of equipment over its lifetime, in kgCO2e."""
+
+    embodied_kg: Range
+    use_kg: Range
+    source: str
+
+
+def grids() -> dict[str, float]:
+    """Carbon intensity of electricity by region, in gCO2e per kWh, lowest first."""
+    table = {k: float(v) for k, v in facts.load("carbon")["grid"].items() if k != "source"}
+    return dict(sorted(table.items(), key=lambda item: item[1]))
+
+
+def footprint(thing: str, units: int, grid: str) -> Footprint:
+    """Lifetime footprint of a number of ``"roadside_unit"`` or ``"onboard_box"``.
+
+    Raises
+    ------
+    KeyError
+        When the thing is unknown, or the grid is not one of :func:`grids`.
+
+    Examples
+    --------
+    >>> round(footprint("onboard_box", 1, "germany").use_kg.central, 1)
+    133.5
+    """
+    entry = facts.load("carbon")["things"][thing]
+    use_wh = Range.read(entry["power_w"]).times(Range.read(entry["lifetime_h"]))
+    return Footprint(
+        embodied_kg=Range.read(entry["embodied_kg"]).scaled(units),
+        use_kg=use_wh.scaled(units * grids()[grid] / 1e6),
+        source=(
+            f"Embodied: {entry['embodied_source']}. Power: {entry['power_source']}. "
+            f"Lifetime: {entry['lifetime_source']}."
+        ),
+    )
+
+
+def use_kg_per_year(energy_j_per_trip: float, vehicles: int, grid: str) -> float:
+    """Emissions of an energy per trip, in a year of trips without a break, in kgCO2e."""
+    trips = facts.trips_per_day() * 365.0 * vehicles
+    return energy_j_per_trip * trips / KWH_IN_J * grids()[grid] / 1e3

@@ -1,0 +1,63 @@
+"""What the approach saves in money: roadside units, sensors, energy per day and per fleet."""
+
+from __future__ import annotations
+
+from dataclasses import dataclass
+
+from access_av import facts
+
+
+@dataclass(frozen=True)
+class RoadsideUnitCost:
+    """Cost of roadside units that the 5G radio heads make unnecessary, in US dollars."""
+
+    units: int
+    capital_low_usd: float
+    capital_high_usd: float
+    yearly_usd: float
+    source: str
+
+    def total_usd(self, years: float) -> tuple[float, float]:
+        """Low and high cost over a number of years, without discounting."""
+        running = self.yearly_usd * years
+        return self.capital_low_usd + running, self.capital_high_usd + running
+
+
+def roadside_units(units: int) -> RoadsideUnitCost:
+    """Cost of a number of roadside units.
+
+    Examples
+    --------
+    >>> roadside_units(4).capital_low_usd
+    52000.0
+    """
+    entry = facts.load("cost")["roadside_unit"]
+    return RoadsideUnitCost(
+        units=units,
+        capital_low_usd=float(units * entry["capital_usd"]["low"]),
+        capital_high_usd=float(units * entry["capital_usd"]["high"]),
+        yearly_usd=float(units * entry["yearly_usd"]),
+        source=entry["source"],
+    )
+
+
+def sensor_cost_ratio() -> float:
+    """How many 5G adapters one LiDAR costs."""
+    lidar, adapter = facts.load("cost")["sensor"]
+    return float(lidar["price_usd"] / adapter["price_usd"])
+
+
+@dataclass(frozen=True)
+class Saving:
+    """Energy that adaptive wake-up saves against a fixed baseline."""
+
+    per_trip_j: float
+
+    @property
+    def per_day_kj(self) -> float:
+        """One vehicle, 24 hours of trips without a break."""
+        return self.per_trip_j * facts.trips_per_day() / 1e3
+
+    def fleet_per_day_mj(self, vehicles: int) -> float:
+        """A fleet, 24 hours."""
+        return self.per_day_kj * vehicles / 1e3

@@ -1,0 +1,89 @@
+"""The design space: which operating points meet an energy budget and an accuracy bound."""
+
+from __future__ import annotations
+
+from dataclasses import dataclass
+from typing import TYPE_CHECKING
+
+import polars as pl
+
+if TYPE_CHECKING:
+    from collections.abc import Sequence
+
+
+@dataclass(frozen=True)
+class Query:
+    """Bounds an operating point has to keep; ``None`` leaves one open.
+
+    Attributes
+    ----------
+    max_energy_j
+        Energy of one trip.
+    max_rms_m
+        Root mean square of the horizontal error over the track and the runs.
+    max_worst_m
+        Worst error along the track, in X and in Y: mean over the runs of the absolute error.
+    max_executions
+        Angle estimates in one trip.
+    modes
+        Power modes to choose from.
+    """
+
+    max_energy_j: float | None = None
+    max_rms_m: float | None = None
+    max_worst_m: float | None = None
+    max_executions: float | None = None
+    modes: Sequence[int] | None = None
+
+    def __str__(self) -> str:
+        parts = [
+            f"{name} ≤ {bound:g} {unit}".rstrip()
+            for name, bound, unit in (
+                ("energy", self.max_energy_j, "J"),
+                ("RMS error", self.max_rms_m, "m"),
+                ("worst error", self.max_worst_m, "m"),
+                ("executions", self.max_executions, ""),
+            )
+            if bound is not None
+        ]
+        if self.modes is not None:
+            parts.append("mode " + ", ".join(map(str, self.modes)))
+        return " and ".join(parts) or "any operating point"
+
+
+def answer(points: pl.DataFrame, query: Query) -> pl.DataFrame:
+    """Operating points that meet a query, the one with the least energy first.
+
+    Parameters
+    ----------
+    points
+        Operating points as :func:`access_av.evaluate.evaluate` gives them.
+    query
+        The bounds.
+
+    Returns
+    -------
+    polars.DataFrame
+        The rows that qualify, by energy, then by error. May be empty.
+    """
+    bounds = {
+        "energy_j": query.max_energy_j,
+        "rms_error_m": query.max_rms_m,
+        "worst_error_x_m": query.max_worst_m,
+        "worst_error_y_m": query.max_worst_m,
+        "executions": query.max_executions,
+    }
+    kept = points.filter(pl.col("energy_j").is_not_null())
+    for column, bound in bounds.items():
+        if bound is not None:
+            kept = kept.filter(pl.col(column) <= bound)
+    if query.modes is not None:
+        kept = kept.filter(pl.col("mode").is_in(list(query.modes)))
+    return kept.sort("energy_j", "rms_error_m", "mode")
+
+
+def pareto_front(points: pl.DataFrame) -> pl.DataFrame:
+    """Operating points that no other beats in both energy and RMS error, by energy."""
+    ordered = points.filter(pl.col("energy_j").is_not_null()).sort("energy_j", "rms_error_m")
+    best_so_far = pl.col("rms_error_m").cum_min().shift(1)
+    return ordered.filter(best_so_far.is_null() | (pl.col("rms_error_m") < best_so_far))

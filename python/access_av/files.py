@@ -1,0 +1,111 @@
+"""Results on disk: a directory per command, a ``latest`` link, tables, trajectories."""
+
+from __future__ import annotations
+
+import json
+import os
+import sys
+from dataclasses import dataclass
+from datetime import datetime, timezone
+from importlib.metadata import version
+from pathlib import Path
+from typing import TYPE_CHECKING, Any
+
+import numpy as np
+
+if TYPE_CHECKING:
+    import polars as pl
+    from numpy.typing import ArrayLike
+
+RESULTS = Path("results")
+
+
+@dataclass(frozen=True)
+class ResultsDirectory:
+    """Where one command's results go. Files appear whole: written beside, then renamed."""
+
+    path: Path
+
+    @classmethod
+    def create(cls, command: str, out: Path | None = None) -> ResultsDirectory:
+        """Make the directory: ``out``, or a new one under ``results/``."""
+        if out is None:
+            now = datetime.now(timezone.utc).strftime("%Y-%m-%dT%H%M%S.%f")[:-3]
+            out = RESULTS / f"{now}-{command}"
+        if out.exists() and not out.is_dir():
+            raise NotADirectoryError(f"{out}: is a file; --out takes a directory")
+        out.mkdir(parents=True, exist_ok=True)
+        return cls(out)
+
+    def link_latest(self) -> None:
+        """Point ``results/latest`` here, when this directory is in ``results/``."""
+        if self.path.parent != RESULTS:
+            return
+        link = RESULTS / "latest"
+        fresh = RESULTS / f".latest-{os.getpid()}"
+        fresh.symlink_to(self.path.name, target_is_directory=True)
+        fresh.replace(link)
+
+    def write_text(self, name: str, text: str) -> Path:
+        """Write a text file."""
+        target = self.path / name
+        partial = self.path / f".{name}.partial"
+        partial.write_text(text, encoding="utf-8")
+        partial.replace(target)
+        return target
+
+    def write_json(self, name: str, value: object) -> Path:
+        """Write a JSON file."""
+        return self.write_text(name, json.dumps(value, indent=2, ensure_ascii=False) + "\n")
+
+    def write_table(self, name: str, table: pl.DataFrame) -> Path:
+        """Write a Parquet file."""
+        target = self.path / name
+        partial = self.path / f".{name}.partial"
+        table.write_parquet(partial, compression="zstd")
+        partial.replace(target)
+        return target
+
+    def write_manifest(self, **settings: Any) -> Path:
+        """Write ``manifest.json``: the version, the command line and the settings."""
+        return self.write_json(
+            "manifest.json",
+            {
+                "version": version("access-av"),
+                "command": ["access-av", *sys.argv[1:]],
+                "written": datetime.now(timezone.utc).isoformat(timespec="seconds"),
+                **settings,
+            },
+        )
+
+
+def tum_trajectory(
+    time_s: ArrayLike, x_m: ArrayLike, y_m: ArrayLike, heading_rad: ArrayLike
+) -> str:
+    r"""Trajectory in the TUM format: ``t x y z qx qy qz qw`` a line, time to the nanosecond.
+
+    Parameters
+    ----------
+    time_s, x_m, y_m, heading_rad
+        Arrays of shape (n,): seconds, metres, and the heading counter-clockwise from +x.
+
+    Returns
+    -------
+    str
+        n lines of exactly eight fields, single spaces, nothing trailing.
+
+    Examples
+    --------
+    >>> tum_trajectory([0.02], [1.0], [2.0], [0.0])
+    '0.020000000 1.000000 2.000000 0.000000 0.000000000 0.000000000 0.000000000 1.000000000\n'
+    """
+    half = np.asarray(heading_rad, dtype=float) / 2.0
+    columns = np.broadcast_arrays(
+        np.asarray(time_s, dtype=float),
+        np.asarray(x_m, dtype=float),
+        np.asarray(y_m, dtype=float),
+        np.sin(half),
+        np.cos(half),
+    )
+    line = "{:.9f} {:.6f} {:.6f} 0.000000 0.000000000 0.000000000 {:.9f} {:.9f}\n"
+    return "".join(line.format(*row) for row in zip(*(c.tolist() for c in columns), strict=True))

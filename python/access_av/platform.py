@@ -1,0 +1,139 @@
+"""The onboard computer: power modes, base wake-up times, energy per execution with its source."""
+
+from __future__ import annotations
+
+import json
+from dataclasses import dataclass
+from functools import cached_property
+from typing import TYPE_CHECKING, Any
+
+from access_av import _core
+
+if TYPE_CHECKING:
+    from collections.abc import Mapping
+
+BOUNDARIES = {
+    "marginal": "what is drawn above idle",
+    "soc-rails": "the rails of the system on chip",
+    "wall": "the wall socket",
+    "unstated": "unstated; the source does not say what it counts",
+}
+
+
+@dataclass(frozen=True)
+class Figure:
+    """A number with its provenance: ``measured``, ``fitted``, ``datasheet`` or ``assumed``."""
+
+    value: float
+    provenance: str
+    source: str
+    boundary: str
+
+
+@dataclass(frozen=True)
+class PowerMode:
+    """One power mode of a platform.
+
+    Attributes
+    ----------
+    base_wake_up_ms
+        Shortest interval between executions the computer manages, by method.
+    energy_per_execution_j
+        Energy of one execution, by method.
+    """
+
+    number: int
+    name: str
+    cpu_hz: float
+    base_wake_up_ms: Mapping[str, float]
+    energy_per_execution_j: Mapping[str, Figure]
+
+
+@dataclass(frozen=True)
+class Platform:
+    """A platform file, checked.
+
+    Examples
+    --------
+    >>> Platform.load("jetson-agx-xavier").modes[0].base_wake_up_ms["music"]
+    80.0
+    """
+
+    core: _core.Platform
+
+    @classmethod
+    def load(cls, name_or_path: str) -> Platform:
+        """Load a shipped platform by its name, or else a platform file by its path.
+
+        Raises
+        ------
+        ScenarioError
+            When there is neither, or the file cannot be used; names the key and what is allowed.
+        """
+        return cls(_core.Platform.load(name_or_path))
+
+    @staticmethod
+    def names() -> list[str]:
+        """Names of the shipped platforms."""
+        return _core.Platform.names()
+
+    @staticmethod
+    def schema_json() -> str:
+        """JSON Schema of a platform file."""
+        return _core.Platform.schema_json()
+
+    def to_toml(self) -> str:
+        """The platform as TOML, every default written out."""
+        return self.core.to_toml()
+
+    def with_energy(self, energies_j: Mapping[int, Mapping[str, Figure]]) -> Platform:
+        """Give this platform other energies per execution, by mode number and method."""
+        return Platform(
+            self.core.with_overrides(
+                {
+                    f"modes[{index}].energy_per_execution_j.{_as_written(method)}": vars(figure)
+                    for index, mode in enumerate(self.modes)
+                    for method, figure in energies_j[mode.number].items()
+                }
+            )
+        )
+
+    @cached_property
+    def name(self) -> str:
+        """Short name."""
+        return str(json.loads(self.core.to_json())["name"])
+
+    @cached_property
+    def modes(self) -> tuple[PowerMode, ...]:
+        """Power modes, in the file's order."""
+        return tuple(
+            PowerMode(
+                number=mode["mode"],
+                name=mode["name"],
+                cpu_hz=mode["cpu_mhz"] * 1e6,
+                base_wake_up_ms=_by_method(mode["base_wake_up_ms"]),
+                energy_per_execution_j={
+                    method: Figure(**figure)
+                    for method, figure in _by_method(mode["energy_per_execution_j"]).items()
+                },
+            )
+            for mode in json.loads(self.core.to_json())["modes"]
+        )
+
+    @cached_property
+    def energy_boundary(self) -> str:
+        """What the energies per execution count, in words."""
+        found = {
+            figure.boundary
+            for mode in self.modes
+            for figure in mode.energy_per_execution_j.values()
+        }
+        return "; ".join(BOUNDARIES[boundary] for boundary in sorted(found))
+
+
+def _as_written(method: str) -> str:
+    return method.replace("_", "-")
+
+
+def _by_method(table: Mapping[str, Any]) -> dict[str, Any]:
+    return {method.replace("-", "_"): value for method, value in table.items()}

@@ -1,0 +1,58 @@
+from __future__ import annotations
+
+import os
+import sys
+from pathlib import Path
+from typing import TYPE_CHECKING, NamedTuple
+
+import pytest
+
+if TYPE_CHECKING:
+    from collections.abc import Callable
+
+ROOT = Path(__file__).parent.parent
+
+
+class Finished(NamedTuple):
+    code: int
+    out: str
+    err: str
+
+
+@pytest.fixture
+def access_av(
+    monkeypatch: pytest.MonkeyPatch, capsys: pytest.CaptureFixture[str]
+) -> Callable[..., Finished]:
+    """Run the command line in this process."""
+    from access_av.cli import main
+
+    def run(*arguments: str, columns: int = 100) -> Finished:
+        monkeypatch.setattr(sys, "argv", ["access-av", *map(str, arguments)])
+        monkeypatch.setenv("COLUMNS", str(columns))
+        capsys.readouterr()
+        with pytest.raises(SystemExit) as stopped:
+            main()
+        return Finished(int(stopped.value.code or 0), *capsys.readouterr())
+
+    return run
+
+
+@pytest.fixture(scope="session")
+def quick_study(tmp_path_factory: pytest.TempPathFactory) -> Path:
+    """Results of a small evaluation, in a directory that stands for ``results/``."""
+    from access_av import study
+
+    results = tmp_path_factory.mktemp("results")
+    directory = results / "2000-01-01T000000.000-evaluate"
+    study.run("paper", "jetson-agx-xavier", runs=3, seed=5, out=directory)
+    (results / "latest").symlink_to(directory.name)
+    return results
+
+
+@pytest.fixture
+def data() -> Path:
+    """Directory of the reference recordings; skips where there is none."""
+    place = Path(os.environ.get("ACCESS_AV_DATA", ROOT.parent / "shared" / "data"))
+    if not place.is_dir():
+        pytest.skip(f"no reference data: neither {place} nor ACCESS_AV_DATA")
+    return place
