@@ -1,0 +1,77 @@
+"""Fragments of the report's HTML."""
+
+from __future__ import annotations
+
+from html import escape
+from typing import TYPE_CHECKING, Any
+
+if TYPE_CHECKING:
+    from collections.abc import Iterable, Sequence
+
+
+def number(value: float | None, digits: int = 3) -> str:
+    """A number as a reader wants it; a dash for none."""
+    return "–" if value is None else f"{value:,.{digits}f}"
+
+
+def value_text(value: Any) -> str:
+    """A claim's stated or obtained value, whatever its shape."""
+    if value is None:
+        return "none"
+    if isinstance(value, dict):
+        return ", ".join(
+            f"{key.replace('_', ' ')} {value_text(item)}" for key, item in value.items()
+        )
+    if isinstance(value, list):
+        return ", ".join(map(value_text, value)) or "none"
+    if isinstance(value, (int, float)):
+        return f"{value:,.0f}" if abs(value) >= 1000 else f"{value:.4g}"
+    return str(value)
+
+
+def badge(text: str, kind: str) -> str:
+    """A small label: ``kind`` is ``yes``, ``no`` or ``fit``."""
+    return f'<span class="badge {kind}">{escape(text)}</span>'
+
+
+def tile(value: str, text: str) -> str:
+    """One number of the summary."""
+    return f'<div class="tile"><b>{escape(value)}</b><span>{escape(text)}</span></div>'
+
+
+def figure(chart_id: str, caption: str = "", title: str = "") -> str:
+    """A place for a chart."""
+    heading = f"<h3>{escape(title)}</h3>" if title else ""
+    below = f"<figcaption>{escape(caption)}</figcaption>" if caption else ""
+    return f'<figure>{heading}<div class="chart" id="{chart_id}"></div>{below}</figure>'
+
+
+def table(
+    head: Sequence[str], rows: Iterable[Sequence[str]], *, numbers: Sequence[int] = ()
+) -> str:
+    """A table; ``numbers`` are the columns set to the right. Cells are HTML already.
+
+    On a narrow screen each row becomes a card whose lines are named after the head.
+    """
+
+    def cell(tag: str, column: int, content: str) -> str:
+        kind = ' class="number"' if column in numbers else ""
+        name = f' data-label="{escape(head[column])}"' if tag == "td" and column else ""
+        return f"<{tag}{kind}{name}>{content}</{tag}>"
+
+    top = "".join(cell("th", column, escape(name)) for column, name in enumerate(head))
+    body = "".join(
+        "<tr>"
+        + "".join(cell("td", column, content) for column, content in enumerate(row))
+        + "</tr>"
+        for row in rows
+    )
+    return (
+        f'<div class="table"><table class="cards"><thead><tr>{top}</tr></thead>'
+        f"<tbody>{body}</tbody></table></div>"
+    )
+
+
+def source(title: str, text: str) -> str:
+    """A file to unfold."""
+    return f"<details><summary>{escape(title)}</summary><pre>{escape(text)}</pre></details>"
