@@ -1,0 +1,157 @@
+"""What the command line shows: tables that fit the terminal, progress, errors."""
+
+from __future__ import annotations
+
+from contextlib import contextmanager
+from typing import TYPE_CHECKING
+
+from rich import box
+from rich.console import Console
+from rich.progress import (
+    BarColumn,
+    MofNCompleteColumn,
+    Progress,
+    TextColumn,
+    TimeRemainingColumn,
+)
+from rich.table import Table
+
+from access_av.methods import METHODS, label
+from access_av.recorded_angles import mean_absolute_error_deg
+from access_av.report.parts import value_text
+
+if TYPE_CHECKING:
+    from collections.abc import Callable, Iterator, Sequence
+
+    import polars as pl
+
+    from access_av.claims import Claim
+    from access_av.evaluate import Evaluation
+    from access_av.recorded_angles import BurstAngle
+    from access_av.simulation import Simulation
+
+console = Console(highlight=False)
+errors = Console(stderr=True, highlight=False)
+
+NARROW = 80
+
+
+def is_narrow() -> bool:
+    """Whether tables should leave out what can be found in the files."""
+    return console.width < NARROW
+
+
+@contextmanager
+def progress(title: str) -> Iterator[Callable[[int, int], None]]:
+    """Show a bar on the error stream; gives the function that moves it."""
+    bar = Progress(
+        TextColumn("{task.description}"),
+        BarColumn(bar_width=None if not is_narrow() else 12),
+        MofNCompleteColumn(),
+        TimeRemainingColumn(compact=True),
+        console=errors,
+        transient=True,
+    )
+    with bar:
+        task = bar.add_task(title, total=None)
+        yield lambda done, total: bar.update(task, completed=done, total=total)
+
+
+def table(head: Sequence[str], *, title: str = "", text: int = 1) -> Table:
+    """An empty table; the first ``text`` columns hold words, the others numbers."""
+    made = Table(title=title or None, box=box.SIMPLE_HEAD, title_justify="left", pad_edge=False)
+    for index, name in enumerate(head):
+        made.add_column(name, justify="left" if index < text else "right", overflow="fold")
+    return made
+
+
+def show_points(points: pl.DataFrame, title: str = "") -> None:
+    """Operating points as a table."""
+    head = ["mode", "method", "energy J", "RMS m", "worst X m", "worst Y m", "executions"]
+    if is_narrow():
+        head = ["mode", "method", "J", "RMS m", "X m", "Y m"]
+    made = table(head, title=title, text=2)
+    for point in points.iter_rows(named=True):
+        cells = [
+            str(point["mode"]) if is_narrow() else f"{point['mode']} {point['mode_name']}",
+            label(point["method"], adaptive=point["adaptive"]),
+            f"{point['energy_j']:.1f}",
+            f"{point['rms_error_m']:.3f}",
+            f"{point['worst_error_x_m']:.3f}",
+            f"{point['worst_error_y_m']:.3f}",
+            f"{point['executions']:.0f}",
+        ]
+        made.add_row(*cells[: len(head)])
+    console.print(made)
+
+
+def show_simulation(result: Simulation, title: str) -> None:
+    """Errors and executions of many drives, in one table."""
+    steps, runs = result.steps, result.runs
+    made = table(["", "value"], title=title)
+    rows = {
+        "worst mean error along the track, X / m": steps["mean_abs_error_x_m"].max(),
+        "worst mean error along the track, Y / m": steps["mean_abs_error_y_m"].max(),
+        "RMS error / m": result.rms_error_m,
+        "duration / s": steps["time_s"].max(),
+        "executions": runs["executions"].mean(),
+        "energy / J": runs["energy_j"].mean(),
+    }
+    for name, value in rows.items():
+        made.add_row(name, value_text(value))
+    console.print(made)
+
+
+def show_bursts(bursts: Sequence[BurstAngle]) -> None:
+    """Angles of a recording's bursts, with their errors where the truth is known."""
+    made = table(["sample", "azimuth °", "σ °", "SNR dB", "truth °", "error °"], text=0)
+    for burst in bursts:
+        azimuth_deg, truth_deg = burst.azimuth_from_broadside_deg, burst.truth_deg
+        made.add_row(
+            str(burst.sample_start),
+            f"{azimuth_deg:.2f}",
+            f"{burst.sigma_deg:.3f}",
+            f"{burst.snr_db:.1f}",
+            "" if truth_deg is None else f"{truth_deg:.2f}",
+            "" if truth_deg is None else f"{azimuth_deg - truth_deg:+.2f}",
+        )
+    console.print(made)
+    error_deg = mean_absolute_error_deg(bursts)
+    if error_deg is not None:
+        console.print(f"Mean absolute error {error_deg:.2f}° over {len(bursts)} bursts.")
+
+
+def show_evaluation(evaluation: Evaluation) -> None:
+    """Accuracy and energy per mode, fixed methods beside the adaptive one."""
+    energy = table(["mode", *map(label, METHODS), "adaptive"], title="Energy of a trip in J")
+    error = table(["mode", *map(label, METHODS), "adaptive"], title="Worst error in Y in m")
+    for mode in evaluation.platform.modes:
+        rows = [
+            *evaluation.campaign("Q").filter(mode=mode.number).iter_rows(named=True),
+            *evaluation.campaign("R").filter(mode=mode.number).iter_rows(named=True),
+        ]
+        name = str(mode.number) if is_narrow() else f"{mode.number} {mode.name}"
+        energy.add_row(name, *(f"{row['energy_j']:.1f}" for row in rows))
+        error.add_row(name, *(f"{row['worst_error_y_m']:.3f}" for row in rows))
+    console.print(error)
+    console.print(energy)
+
+
+def show_claims(claims: Sequence[Claim]) -> None:
+    """The paper's claims with their verdicts."""
+    made = table(["claim", "paper", "obtained", ""], title="Claims of the paper", text=4)
+    for claim in claims:
+        name = claim.id.split("_")[0] if is_narrow() else claim.id
+        fitted = " (fitted)" if claim.fitted and not is_narrow() else ""
+        made.add_row(
+            name,
+            value_text(claim.stated),
+            value_text(claim.obtained),
+            f"[green]✓[/]{fitted}" if claim.reproduced else "[red]✗ not reproduced[/]",
+        )
+    console.print(made)
+    reproduced = sum(claim.reproduced for claim in claims)
+    console.print(f"[bold]{reproduced} of {len(claims)} claims reproduced.[/]")
+    for claim in claims:
+        if not claim.reproduced:
+            console.print(f"  {claim.id}: {claim.note}")

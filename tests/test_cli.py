@@ -1,0 +1,185 @@
+from __future__ import annotations
+
+import json
+import re
+from typing import TYPE_CHECKING
+
+import polars as pl
+import pytest
+
+if TYPE_CHECKING:
+    from collections.abc import Callable
+    from pathlib import Path
+
+    from conftest import Finished
+
+    Cli = Callable[..., Finished]
+
+TRAJECTORY_COLUMNS = {
+    "run", "time_s", "x_m", "y_m", "heading_rad", "true_x_m", "true_y_m", "error_x_m", "error_y_m",
+}  # fmt: skip
+COMMANDS = ["evaluate", "run", "explore", "aoa", "fit", "scenario", "platform"]
+
+
+def test_help_lists_every_command(access_av: Cli) -> None:
+    done = access_av("--help")
+    assert done.code == 0
+    for command in COMMANDS:
+        assert command in done.out
+
+
+@pytest.mark.parametrize("command", ["evaluate", "run", "explore", "aoa", "fit"])
+def test_help_of_each_command_has_an_example(access_av: Cli, command: str) -> None:
+    done = access_av(command, "--help", columns=60)
+    assert done.code == 0
+    assert f"access-av {command}" in done.out
+    assert "Example:" in done.out
+    assert max(map(len, done.out.splitlines())) <= 60
+
+
+def test_run_writes_what_it_promises(access_av: Cli, tmp_path: Path) -> None:
+    done = access_av("run", "paper", "--runs", "2", "--seed", "3", "--out", tmp_path / "r")
+    assert done.code == 0, done.err
+    table = pl.read_parquet(tmp_path / "r/trajectories.parquet")
+    assert set(table.columns) >= TRAJECTORY_COLUMNS
+    assert table["run"].unique().sort().to_list() == [0, 1]
+    error = table["x_m"] - table["true_x_m"] - table["error_x_m"]
+    assert error.abs().max() < 1e-9
+    executions = pl.read_parquet(tmp_path / "r/executions.parquet")
+    assert set(executions.columns) >= {"run", "time_s"}
+    manifest = json.loads((tmp_path / "r/manifest.json").read_text())
+    assert manifest["seed"] == 3
+    assert access_av("scenario", "check", tmp_path / "r/scenario.toml").code == 0
+    for name in ("trajectory.tum", "truth.tum"):
+        lines = (tmp_path / "r" / name).read_text().splitlines()
+        assert all(re.fullmatch(r"\d+\.\d{9}( -?\d+\.\d+){7}", line) for line in lines)
+        assert len(lines) == table.filter(run=0).height
+
+
+def test_run_is_the_same_for_one_and_two_threads(access_av: Cli, tmp_path: Path) -> None:
+    for threads in ("1", "2"):
+        access_av("run", "paper", "--runs", "3", "--threads", threads, "--out", tmp_path / threads)
+    for name in ("trajectories.parquet", "executions.parquet", "trajectory.tum"):
+        assert (tmp_path / "1" / name).read_bytes() == (tmp_path / "2" / name).read_bytes()
+
+
+def test_set_changes_one_key(access_av: Cli, tmp_path: Path) -> None:
+    done = access_av(
+        "run", "paper", "--set", "channel.rician_k_db=7.5", "--set", "estimator.method=esprit",
+        "--out", tmp_path / "r",
+    )  # fmt: skip
+    assert done.code == 0, done.err
+    written = (tmp_path / "r/scenario.toml").read_text()
+    assert "rician_k_db = 7.5" in written
+    assert 'method = "esprit"' in written
+
+
+def test_evaluation_leaves_its_files(quick_study: Path) -> None:
+    names = {path.name for path in (quick_study / "latest").iterdir()}
+    assert names == {
+        "claims.json", "errors.parquet", "manifest.json", "operating_points.parquet",
+        "platform.toml", "report.html", "scenario.toml", "snr.parquet",
+    }  # fmt: skip
+    claims = json.loads((quick_study / "latest/claims.json").read_text())
+    assert len(claims) == 17
+
+
+def test_explore_answers_from_the_last_evaluation(
+    access_av: Cli, quick_study: Path, tmp_path: Path, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    (tmp_path / "results").symlink_to(quick_study)
+    monkeypatch.chdir(tmp_path)
+    done = access_av("explore", "--max-energy-j", "1000", "--json")
+    assert len(json.loads(done.out)) == 8
+    assert access_av("explore", "--max-energy-j", "1000", "--fixed", columns=60).code == 0
+    none = access_av("explore", "--max-energy-j", "1")
+    assert none.code == 0
+    assert "No operating point has energy ≤ 1 J" in none.out
+
+
+def test_evaluate_shows_tables_in_a_narrow_terminal(access_av: Cli, tmp_path: Path) -> None:
+    done = access_av("evaluate", "--runs", "1", "--out", str(tmp_path / "e"), columns=60)
+    assert done.code == 0, done.err
+    assert "claims reproduced" in done.out
+    tables = done.out.split("Claims of the paper")[0]
+    assert max(map(len, tables.splitlines())) <= 60
+
+
+def test_shipped_files_are_listed_shown_and_fine(access_av: Cli, tmp_path: Path) -> None:
+    for what in ("scenario", "platform"):
+        names = access_av(what, "list").out.split()
+        assert names
+        for name in names:
+            shown = access_av(what, "show", name)
+            file = tmp_path / f"{name}.toml"
+            file.write_text(shown.out)
+            assert access_av(what, "check", str(file), name).code == 0
+        assert json.loads(access_av(what, "schema").out)["$schema"]
+
+
+SCENARIO = 'name = "mine"\n[track]\nsegments = [{ length_m = 300.0, turn_rad = 0.25 }]\n'
+HEAD = "[[radio_heads]]\nposition_m = [205.0, 100.0]\ntx_power_dbm = -27.0\n"
+
+
+@pytest.mark.parametrize(
+    ("text", "named"),
+    [
+        (SCENARIO + HEAD + "[chanel]\n", ["chanel", "channel"]),
+        (SCENARIO + HEAD + "[channel]\nrician_k = 3.0\n", ["channel.rician_k", "rician_k_db"]),
+        (SCENARIO + HEAD + '[channel]\nrician_k_db = "ten"\n', ["channel.rician_k_db"]),
+        (SCENARIO + HEAD + "[channel]\nrician_k_db = nan\n", ["channel.rician_k_db", "finite"]),
+        (SCENARIO.replace("300.0", "-300.0") + HEAD, ["length_m", "-300"]),
+        (SCENARIO + HEAD.replace("[205.0, 100.0]", "[0.0, 0.0]"), ["radio_heads[0]"]),
+        (SCENARIO + HEAD + '[wake_up]\npolicy = "pid"\nbase_ms = 300.0\n', ["t_max_ms", "300"]),
+        (SCENARIO, ["radio_heads"]),
+        ("name = \n", ["TOML"]),
+    ],
+    ids=[
+        "table", "key", "type", "nan", "negative", "head-on-track", "t-max", "missing", "syntax",
+    ],
+)  # fmt: skip
+def test_bad_scenarios_end_with_2_and_name_file_and_key(
+    access_av: Cli, tmp_path: Path, text: str, named: list[str]
+) -> None:
+    file = tmp_path / "mine.toml"
+    file.write_text(text)
+    for arguments in (("run", file), ("scenario", "check", file)):
+        done = access_av(*map(str, arguments))
+        assert done.code == 2
+        for part in ("mine.toml", *named):
+            assert part in done.err
+        assert "Traceback" not in done.err
+
+
+@pytest.mark.parametrize(
+    ("arguments", "named"),
+    [
+        (["run", "papier"], ["papier", "paper"]),
+        (["run", "paper", "--set", "channel.rician_k=3"], ["rician_k", "rician_k_db"]),
+        (["run", "paper", "--set", "nonsense"], ["KEY=VALUE"]),
+        (["run", "paper", "--runs", "0"], ["--runs"]),
+        (["run", "paper", "--seed", "-1"], ["--seed"]),
+        (["evaluate", "--platform", "jetson"], ["jetson", "jetson-agx-xavier"]),
+        (["evaluate", "--scenario", "nowhere.toml"], ["nowhere.toml"]),
+        (["explore", "--max-energy-j", "nan"], ["--max-energy-j"]),
+        (["explore", "--max-energy-j", "inf"], ["finite"]),
+        (["explore", "--max-rms-m", "-1"], ["--max-rms-m"]),
+        (["explore", "--results", "."], ["operating_points.parquet"]),
+        (["aoa", "nowhere"], ["nowhere", ".sigmf-meta"]),
+        (["frobnicate"], ["frobnicate"]),
+    ],
+    ids=" ".join,
+)
+def test_bad_arguments_end_with_2(access_av: Cli, arguments: list[str], named: list[str]) -> None:
+    done = access_av(*arguments)
+    assert done.code == 2
+    for part in named:
+        assert part in done.err
+    assert "Traceback" not in done.err
+
+
+def test_out_that_is_a_file(access_av: Cli, tmp_path: Path) -> None:
+    (tmp_path / "taken").write_text("")
+    done = access_av("run", "paper", "--out", str(tmp_path / "taken"))
+    assert done.code == 2
+    assert "--out takes a directory" in done.err

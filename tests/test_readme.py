@@ -1,0 +1,57 @@
+"""The README's examples run as they are written."""
+
+from __future__ import annotations
+
+import re
+import shlex
+import subprocess
+import sys
+from typing import TYPE_CHECKING
+
+import pytest
+from conftest import ROOT
+
+if TYPE_CHECKING:
+    from pathlib import Path
+
+README = (ROOT / "README.md").read_text(encoding="utf-8")
+
+
+def blocks(language: str) -> list[str]:
+    return re.findall(rf"```{language}\n(.*?)```", README, flags=re.DOTALL)
+
+
+def test_python_example(tmp_path: Path) -> None:
+    (example,) = blocks("python")
+    done = subprocess.run(
+        [sys.executable, "-c", example], cwd=tmp_path, capture_output=True, text=True, check=True
+    )
+    assert "worst error in Y" in done.stdout
+
+
+def test_command_line_examples(tmp_path: Path, quick_study: Path) -> None:
+    lines = [line for block in blocks("sh") for line in block.splitlines()]
+    commands = [shlex.split(line)[1:] for line in lines if ".venv/bin/access-av" in line]
+    assert [command[0] for command in commands] == ["run", "explore"]
+    (tmp_path / "results").symlink_to(quick_study, target_is_directory=True)
+    for command in commands:
+        done = subprocess.run(
+            [sys.executable, "-m", "access_av", *command],
+            cwd=tmp_path,
+            capture_output=True,
+            text=True,
+            check=False,
+        )
+        assert done.returncode == 0, done.stderr
+    assert (tmp_path / "results/first/trajectories.parquet").is_file()
+
+
+def test_make_commands_exist() -> None:
+    makefile = (ROOT / "Makefile").read_text(encoding="utf-8")
+    for target in re.findall(r"^make ([a-z]+)", "\n".join(blocks("sh")), flags=re.MULTILINE):
+        assert re.search(rf"^{target}:", makefile, flags=re.MULTILINE)
+
+
+@pytest.mark.parametrize("path", ["docs/report.png", "LICENSE-MIT", "LICENSE-APACHE"])
+def test_files_it_shows_exist(path: str) -> None:
+    assert (ROOT / path).stat().st_size < 300_000
