@@ -6,10 +6,11 @@ import os
 import resource
 import time
 
-from access_av import simulate
-from access_av.evaluate import evaluate
 from rich.console import Console
 from rich.table import Table
+
+from access_av import simulate
+from access_av.evaluate import evaluate
 
 
 def main() -> None:

@@ -5,6 +5,7 @@ from dataclasses import replace
 
 import polars as pl
 import pytest
+
 import synthetic
 from access_av import facts
 from access_av.claims import FINDINGS, as_records, check_claims, judge

@@ -2,6 +2,7 @@ from __future__ import annotations
 
 import polars as pl
 import pytest
+
 import synthetic
 from access_av.explore import Query, answer, pareto_front
 

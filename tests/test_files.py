@@ -7,6 +7,7 @@ from typing import TYPE_CHECKING
 import numpy as np
 import polars as pl
 import pytest
+
 from access_av.files import ResultsDirectory, tum_trajectory
 
 if TYPE_CHECKING:

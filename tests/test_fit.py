@@ -1,6 +1,7 @@
 from __future__ import annotations
 
 import pytest
+
 import synthetic
 from access_av import facts
 from access_av.fit import ModeDemand, fit_energy

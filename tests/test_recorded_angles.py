@@ -5,6 +5,7 @@ from typing import TYPE_CHECKING, Any
 
 import numpy as np
 import pytest
+
 from access_av.errors import InputError
 from access_av.recorded_angles import estimate_bursts, mean_absolute_error_deg
 

@@ -3,6 +3,7 @@ from __future__ import annotations
 import re
 
 import pytest
+
 import synthetic
 from access_av.claims import check_claims
 from access_av.report import render

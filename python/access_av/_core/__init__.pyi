@@ -3,8 +3,9 @@ from os import PathLike
 from typing import Any, final
 
 import numpy as np
-from access_av._core import aoa as aoa
 from numpy.typing import NDArray
+
+from access_av._core import aoa as aoa
 
 __all__ = [
     "Platform",
