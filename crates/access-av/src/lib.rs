@@ -17,6 +17,7 @@ pub mod observation;
 pub mod onboard;
 pub mod platform;
 pub mod random;
+pub mod receive;
 pub mod recording;
 pub mod scenario;
 pub mod simulate;

@@ -1,0 +1,319 @@
+//! Every SSB of a recording that nobody has said anything about.
+
+use nr_ssb::front_end::{FrontEnd, FrontEndError};
+use nr_ssb::raster::{self, RasterPoint};
+use nr_ssb::search::{DetectedSsb, SearchConfig, SearchError, Searcher};
+use nr_ssb::{Complex32, SubcarrierSpacing};
+use thiserror::Error;
+
+use super::array_view::{ArraySetup, ArrayView, array_view};
+use super::diagnosis::{ChannelFault, ChannelWatch};
+use super::iq_source::IqSource;
+use crate::recording::RecordingError;
+
+/// Samples of an SSB at the base rate: four symbols of 256 with a cyclic prefix of 18.
+const SSB_SAMPLES: usize = 4 * 274;
+/// Read and searched at once.
+const BLOCK_S: f64 = 0.02;
+/// Looked through for raster points, in two steps: the usual period, and the longest (TS 38.331).
+const RASTER_WINDOWS_S: [f64; 2] = [0.02, 0.16];
+/// Probability that 20 ms of noise make a cell, shared among the places looked at.
+const FALSE_ALARM: f64 = 1e-3;
+
+/// What a scan is told; by default nothing.
+#[derive(Debug, Clone, PartialEq, Default)]
+pub struct ScanSettings {
+    /// Absolute frequency of the SSB's centre in Hz; else the synchronization raster is searched.
+    pub ssb_freq_hz: Option<f64>,
+    /// Subcarrier spacing; else both are tried.
+    pub spacing: Option<SubcarrierSpacing>,
+    /// Centre frequency of the recording in Hz, in place of its own.
+    pub centre_frequency_hz: Option<f64>,
+    /// The receiving array, for angles.
+    pub array: ArraySetup,
+}
+
+/// One SSB of a recording.
+#[derive(Debug, Clone, PartialEq)]
+pub struct FoundSsb {
+    /// Cell, index, payload, offset and strength.
+    pub ssb: DetectedSsb,
+    /// First sample of the SSB, its cyclic prefix included, at the recording's rate.
+    pub sample_start: f64,
+    /// Its length at the recording's rate.
+    pub sample_count: f64,
+    /// Frequency of its centre in Hz.
+    pub ssb_freq_hz: f64,
+    /// Its subcarrier spacing.
+    pub spacing: SubcarrierSpacing,
+    /// Angle of arrival, with two antennas and more.
+    pub angle: Option<aoa::AngleEstimate>,
+}
+
+/// All that a scan found.
+#[derive(Debug, Clone, PartialEq, Default)]
+pub struct Scan {
+    /// The SSBs in order of time.
+    pub ssbs: Vec<FoundSsb>,
+    /// What is wrong with single channels.
+    pub faults: Vec<ChannelFault>,
+}
+
+/// What makes a scan impossible.
+#[derive(Debug, Error)]
+#[non_exhaustive]
+pub enum ScanError {
+    /// The samples cannot be read.
+    #[error(transparent)]
+    Recording(#[from] RecordingError),
+    /// The recording's rate or band does not suit.
+    #[error("{file}: {source}")]
+    FrontEnd {
+        /// The recording.
+        file: String,
+        /// What does not suit.
+        source: FrontEndError,
+    },
+    /// The search refused its input.
+    #[error("{file}: {source}")]
+    Search {
+        /// The recording.
+        file: String,
+        /// What does not suit.
+        source: SearchError,
+    },
+    /// No centre frequency, in the recording or in the settings.
+    #[error("{file}: no centre frequency; the recording must state it, or it must be given")]
+    NoCentreFrequency {
+        /// The recording.
+        file: String,
+    },
+    /// An impossible array.
+    #[error("array: {0}")]
+    Array(#[from] aoa::Error),
+}
+
+/// Finds every SSB of a recording, in order of time.
+///
+/// # Errors
+/// [`ScanError`] when the recording cannot be read or searched as it is; a recording without any
+/// SSB is not an error.
+pub fn scan(source: &mut dyn IqSource, settings: &ScanSettings) -> Result<Scan, ScanError> {
+    let file = source.name();
+    let front_end_failed = |source| ScanError::FrontEnd {
+        file: file.clone(),
+        source,
+    };
+    // A rate that no numerology can use is better said before anything else.
+    FrontEnd::new(
+        source.sample_rate_hz(),
+        0.0,
+        SubcarrierSpacing::Khz15.hz(),
+        1,
+    )
+    .map_err(front_end_failed)?;
+    let centre_hz = settings
+        .centre_frequency_hz
+        .or(source.centre_frequency_hz())
+        .ok_or_else(|| ScanError::NoCentreFrequency { file: file.clone() })?;
+    let places = match settings.ssb_freq_hz {
+        Some(hz) => given_places(source.sample_rate_hz(), hz, settings.spacing),
+        None => raster_places(source, settings.spacing, centre_hz)?,
+    };
+    let mut found = Scan::default();
+    let mut watch = ChannelWatch::new(source.channels());
+    for (index, place) in places.iter().enumerate() {
+        let config = SearchConfig {
+            ssb_freq_hz: Some(place.ssb_freq_hz),
+            false_alarm: FALSE_ALARM / places.len() as f64,
+            ..SearchConfig::new(place.spacing, source.channels())
+        };
+        let watched = (index == 0).then_some(&mut watch);
+        place.search(
+            source,
+            centre_hz,
+            &config,
+            &settings.array,
+            watched,
+            &mut found,
+        )?;
+    }
+    if places.is_empty() {
+        watch_all(source, &mut watch)?;
+    }
+    found
+        .ssbs
+        .sort_by(|a, b| a.sample_start.total_cmp(&b.sample_start));
+    found.faults = watch.faults();
+    Ok(found)
+}
+
+/// Where to search, and how.
+#[derive(Debug, Clone, Copy, PartialEq)]
+struct Place {
+    ssb_freq_hz: f64,
+    spacing: SubcarrierSpacing,
+}
+
+fn given_places(rate_hz: f64, ssb_freq_hz: f64, spacing: Option<SubcarrierSpacing>) -> Vec<Place> {
+    let both = [SubcarrierSpacing::Khz15, SubcarrierSpacing::Khz30];
+    // A spacing that was asked for may fail; one that was only guessed is left out.
+    both.into_iter()
+        .filter(|one| spacing.map_or(one.base_rate_hz() <= rate_hz, |wanted| wanted == *one))
+        .map(|spacing| Place {
+            ssb_freq_hz,
+            spacing,
+        })
+        .collect()
+}
+
+fn raster_places(
+    source: &mut dyn IqSource,
+    spacing: Option<SubcarrierSpacing>,
+    centre_hz: f64,
+) -> Result<Vec<Place>, ScanError> {
+    let rate_hz = source.sample_rate_hz();
+    let mut antennas = Vec::new();
+    let mut looked_at = 0;
+    for window_s in RASTER_WINDOWS_S {
+        let count = source.length().min((window_s * rate_hz) as u64) as usize;
+        if count == looked_at {
+            break;
+        }
+        looked_at = count;
+        source.read(0, count, &mut antennas)?;
+        let slices: Vec<&[Complex32]> = antennas.iter().map(Vec::as_slice).collect();
+        let finds = raster::scan(&slices, rate_hz, centre_hz).map_err(|error| {
+            let file = source.name();
+            match error {
+                raster::ScanError::FrontEnd(source) => ScanError::FrontEnd { file, source },
+                raster::ScanError::Search(source) => ScanError::Search { file, source },
+                _ => ScanError::NoCentreFrequency { file },
+            }
+        })?;
+        let suits = |find: &&raster::RasterFind| spacing.is_none_or(|it| it == find.spacing);
+        let place = |find: &raster::RasterFind| {
+            let RasterPoint { ssb_freq_hz, .. } = find.point;
+            Place {
+                ssb_freq_hz,
+                spacing: find.spacing,
+            }
+        };
+        let places: Vec<Place> = finds.iter().filter(suits).map(place).collect();
+        if !places.is_empty() {
+            return Ok(places);
+        }
+    }
+    Ok(Vec::new())
+}
+
+fn watch_all(source: &mut dyn IqSource, watch: &mut ChannelWatch) -> Result<(), ScanError> {
+    let mut antennas = Vec::new();
+    for_each_block(source, &mut antennas, |antennas, _| {
+        watch.samples(antennas);
+        Ok(())
+    })
+}
+
+/// Calls `act` with block after block, and whether it is the last.
+fn for_each_block(
+    source: &mut dyn IqSource,
+    antennas: &mut Vec<Vec<Complex32>>,
+    mut act: impl FnMut(&[Vec<Complex32>], bool) -> Result<(), ScanError>,
+) -> Result<(), ScanError> {
+    let block = ((BLOCK_S * source.sample_rate_hz()) as u64).max(1);
+    let mut start = 0;
+    while start < source.length() {
+        let count = block.min(source.length() - start);
+        source.read(start, count as usize, antennas)?;
+        start += count;
+        act(antennas, start == source.length())?;
+    }
+    Ok(())
+}
+
+impl Place {
+    fn search(
+        &self,
+        source: &mut dyn IqSource,
+        centre_hz: f64,
+        config: &SearchConfig,
+        array: &ArraySetup,
+        mut watch: Option<&mut ChannelWatch>,
+        found: &mut Scan,
+    ) -> Result<(), ScanError> {
+        let file = source.name();
+        let front_end_failed = |source| ScanError::FrontEnd {
+            file: file.clone(),
+            source,
+        };
+        let search_failed = |source| ScanError::Search {
+            file: file.clone(),
+            source,
+        };
+        let rate_hz = source.sample_rate_hz();
+        let offset_hz = self.ssb_freq_hz - centre_hz;
+        let mut front_end = FrontEnd::new(rate_hz, offset_hz, self.spacing.hz(), source.channels())
+            .map_err(front_end_failed)?;
+        let ratio = front_end.input_per_output();
+        let samples = (source.length() as f64 / ratio) as usize;
+        if samples < SSB_SAMPLES {
+            return Err(search_failed(SearchError::TooShort {
+                samples,
+                needed: SSB_SAMPLES,
+            }));
+        }
+        let mut searcher = Searcher::new(config.clone()).map_err(search_failed)?;
+        let mut view = array_view(config, array)?;
+        let mut base = vec![Vec::new(); source.channels()];
+        let mut base_start = 0u64;
+        let mut raw = Vec::new();
+        for_each_block(source, &mut raw, |raw, last| {
+            if let Some(watch) = &mut watch {
+                watch.samples(raw);
+            }
+            let known = base.first().map_or(0, Vec::len);
+            front_end.push(raw, &mut base).map_err(front_end_failed)?;
+            if last {
+                front_end.finish(&mut base);
+            }
+            let window: Vec<&[Complex32]> = base.iter().map(Vec::as_slice).collect();
+            let new: Vec<&[Complex32]> = window
+                .iter()
+                .map(|samples| samples.get(known..).unwrap_or_default())
+                .collect();
+            for ssb in searcher.push(&new).map_err(search_failed)? {
+                let seen = see(view.as_deref_mut(), ssb, &window, base_start as f64);
+                if let (Some(watch), Some(seen)) = (&mut watch, &seen) {
+                    watch.response(seen);
+                }
+                found.ssbs.push(FoundSsb {
+                    ssb: ssb.clone(),
+                    sample_start: ssb.sample_start * ratio,
+                    sample_count: SSB_SAMPLES as f64 * ratio,
+                    ssb_freq_hz: self.ssb_freq_hz,
+                    spacing: self.spacing,
+                    angle: seen.map(|seen| seen.estimate),
+                });
+            }
+            // An SSB that is complete only with the next block begins at most this long ago.
+            let gone = window
+                .first()
+                .map_or(0, |it| it.len().saturating_sub(2 * SSB_SAMPLES));
+            for samples in &mut base {
+                samples.drain(..gone);
+            }
+            base_start += gone as u64;
+            Ok(())
+        })
+    }
+}
+
+fn see(
+    view: Option<&mut (dyn ArrayView + 'static)>,
+    ssb: &DetectedSsb,
+    window: &[&[Complex32]],
+    window_start: f64,
+) -> Option<super::array_view::View> {
+    view?.view(ssb, window, window_start)
+}

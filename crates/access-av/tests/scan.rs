@@ -1,0 +1,302 @@
+//! Scanning recordings: the real ones, and every kind of unsuitable one.
+
+mod common;
+
+use access_av::receive::{
+    ArraySetup, ChannelFault, FoundSsb, SampleBlock, ScanError, ScanSettings, diagnose_channels,
+    scan,
+};
+use access_av::recording::Recording;
+use nr_ssb::{BchPayload, Beam, Burst, Case, Lmax, Mib, Numerology, Ofdm, Pci};
+use num_complex::{Complex32, Complex64};
+use rand::{RngExt, SeedableRng};
+use rand_chacha::ChaCha8Rng;
+use rand_distr::StandardNormal;
+use serde_json::Value;
+
+const SSB_HZ: f64 = 3_700.8e6;
+const RATE_HZ: f64 = 7.68e6;
+
+/// Four antennas, 5 ms, an SSB from the given electrical angle at 20 dB per resource element.
+fn half_frame(phase_rad: f64, seed: u64) -> Vec<Vec<Complex32>> {
+    let burst = Burst {
+        pci: Pci::new(7).unwrap(),
+        case: Case::C,
+        lmax: Lmax::L8,
+        payload: BchPayload::new(Mib::default(), 12, false, 0).unwrap(),
+        beams: vec![Beam::new(2)],
+        ssb_freq_hz: Some(SSB_HZ),
+    };
+    let numerology = Numerology::from_sample_rate(Case::C.spacing(), RATE_HZ).unwrap();
+    let clean = burst.iq(&mut Ofdm::new(numerology)).unwrap();
+    let mut rng = ChaCha8Rng::seed_from_u64(seed);
+    // A resource element collects the noise of 256 samples.
+    let sigma = (0.5 * 0.01 / 256.0_f64).sqrt();
+    (0..4)
+        .map(|antenna| {
+            let turn = Complex64::cis(phase_rad * f64::from(antenna));
+            let turn = Complex32::new(turn.re as f32, turn.im as f32);
+            clean
+                .iter()
+                .map(|sample| {
+                    let mut part = || (sigma * rng.sample::<f64, _>(StandardNormal)) as f32;
+                    sample * turn + Complex32::new(part(), part())
+                })
+                .collect()
+        })
+        .collect()
+}
+
+fn block(antennas: &[Vec<Complex32>]) -> SampleBlock<'_> {
+    SampleBlock {
+        antennas: antennas.iter().map(Vec::as_slice).collect(),
+        sample_rate_hz: RATE_HZ,
+        centre_frequency_hz: Some(SSB_HZ),
+    }
+}
+
+fn known() -> ScanSettings {
+    ScanSettings {
+        ssb_freq_hz: Some(SSB_HZ),
+        ..ScanSettings::default()
+    }
+}
+
+#[test]
+fn a_built_burst_is_found_with_its_angle() {
+    let antennas = half_frame(0.7, 1);
+    let found = scan(&mut block(&antennas), &known()).unwrap();
+    assert_eq!((found.ssbs.len(), found.faults.len()), (1, 0));
+    let FoundSsb {
+        ssb,
+        sample_start,
+        angle,
+        ..
+    } = &found.ssbs[0];
+    assert_eq!(
+        (ssb.pci.get(), ssb.ssb_index, ssb.payload.unwrap().sfn()),
+        (7, 2, 12)
+    );
+    let numerology = Numerology::from_sample_rate(Case::C.spacing(), RATE_HZ).unwrap();
+    let symbol = Case::C.start_symbol(2).unwrap();
+    assert!((sample_start - numerology.symbol_start(symbol) as f64).abs() < 0.2);
+    let angle = angle.unwrap();
+    assert!((angle.phase_rad - 0.7).abs() < 5.0 * angle.phase_sigma_rad);
+    // 20 dB and 830 elements: sigma = 1 / sqrt(2 * 830 * 100 * 5).
+    assert!((angle.phase_sigma_rad * (2.0 * 830.0 * 100.0 * 5.0_f64).sqrt() - 1.0).abs() < 0.15);
+}
+
+#[test]
+fn faults_are_laid_at_the_right_channel() {
+    let mut antennas = half_frame(1.4, 2);
+    antennas.swap(1, 2);
+    let found = scan(&mut block(&antennas), &known()).unwrap();
+    assert_eq!(
+        found.faults,
+        [ChannelFault::Swapped {
+            first: 1,
+            second: 2
+        }]
+    );
+
+    let mut antennas = half_frame(0.7, 3);
+    antennas[3].fill(Complex32::ZERO);
+    let found = scan(&mut block(&antennas), &known()).unwrap();
+    assert!(found.faults.contains(&ChannelFault::Silent { channel: 3 }));
+    assert_eq!(found.ssbs.len(), 1);
+
+    let mut antennas = half_frame(0.7, 4);
+    let limit = 0.01;
+    for sample in &mut antennas[0] {
+        *sample = Complex32::new(
+            sample.re.clamp(-limit, limit),
+            sample.im.clamp(-limit, limit),
+        );
+    }
+    let faults = diagnose_channels(&antennas);
+    assert!(
+        matches!(faults[..], [ChannelFault::Clipped { channel: 0, .. }]),
+        "{faults:?}"
+    );
+}
+
+#[test]
+fn what_cannot_be_scanned_says_why() {
+    let antennas = half_frame(0.0, 5);
+    let mut source = block(&antennas);
+    source.centre_frequency_hz = None;
+    let error = scan(&mut source, &known()).unwrap_err();
+    assert!(matches!(error, ScanError::NoCentreFrequency { .. }));
+
+    let mut source = block(&antennas);
+    source.sample_rate_hz = 10e6;
+    let error = scan(&mut source, &known()).unwrap_err();
+    assert!(
+        error.to_string().contains("multiple of 3.84 MHz"),
+        "{error}"
+    );
+
+    let far = ScanSettings {
+        ssb_freq_hz: Some(SSB_HZ + 3e6),
+        ..known()
+    };
+    assert!(matches!(
+        scan(&mut block(&antennas), &far),
+        Err(ScanError::FrontEnd { .. })
+    ));
+
+    let short: Vec<_> = antennas
+        .iter()
+        .map(|samples| samples[..500].to_vec())
+        .collect();
+    for settings in [known(), ScanSettings::default()] {
+        let error = scan(&mut block(&short), &settings).unwrap_err();
+        assert!(matches!(error, ScanError::Search { .. }), "{error}");
+    }
+
+    let array = ArraySetup {
+        spacing_wavelengths: 0.5,
+        calibration: Some(vec![Complex64::ONE; 3]),
+    };
+    let error = scan(&mut block(&antennas), &ScanSettings { array, ..known() }).unwrap_err();
+    assert!(matches!(error, ScanError::Array(_)));
+
+    let mut spoilt = antennas.clone();
+    spoilt[2][77].im = f32::NAN;
+    let error = scan(&mut block(&spoilt), &known()).unwrap_err();
+    assert!(
+        error.to_string().contains("sample 77 of channel 2"),
+        "{error}"
+    );
+}
+
+#[test]
+fn every_annotated_recording_is_scanned_without_being_told_anything() {
+    let Some(dir) = common::data_dir() else {
+        return;
+    };
+    for entry in std::fs::read_dir(dir.join("captures")).unwrap() {
+        let path = entry.unwrap().path();
+        if path
+            .extension()
+            .is_none_or(|extension| extension != "sigmf-meta")
+        {
+            continue;
+        }
+        let name = path.file_stem().unwrap().to_string_lossy().into_owned();
+        let mut recording = Recording::open(&path).unwrap();
+        let annotations = recording.annotations().to_vec();
+        if !annotations
+            .iter()
+            .any(|annotation| annotation.other.contains_key("nr:ssb"))
+        {
+            continue;
+        }
+        let found = scan(&mut recording, &ScanSettings::default()).unwrap();
+        for annotation in &annotations {
+            let truth = &annotation.other["nr:ssb"];
+            let near = |found: &&FoundSsb| {
+                // The annotation of 46.08 Msps has a resolution of the base rate.
+                (found.sample_start - annotation.sample_start as f64).abs() < 6.0
+            };
+            let found = found
+                .ssbs
+                .iter()
+                .find(near)
+                .unwrap_or_else(|| panic!("{name}"));
+            let payload = found
+                .ssb
+                .payload
+                .unwrap_or_else(|| panic!("{name}: no payload"));
+            assert_eq!(truth["pci"], found.ssb.pci.get(), "{name}");
+            assert_eq!(truth["ssb_index"], found.ssb.ssb_index, "{name}");
+            assert_eq!(truth["sfn"], payload.sfn(), "{name}");
+            assert_eq!(truth["mib_bits_24"], payload.mib.bit_string(), "{name}");
+            assert_eq!(
+                truth["ssb_freq_hz"].as_f64(),
+                Some(found.ssb_freq_hz),
+                "{name}"
+            );
+            assert!((found.sample_count - annotation.sample_count.unwrap() as f64).abs() < 1.0);
+        }
+    }
+}
+
+/// Gains of the channels as the annotation has them; only their phases count.
+fn calibration(truth: &Value) -> Vec<Complex64> {
+    let part = |key: &str| -> Vec<f64> {
+        truth[key]
+            .as_array()
+            .unwrap()
+            .iter()
+            .map(|value| value.as_f64().unwrap())
+            .collect()
+    };
+    part("channel_calibration_re")
+        .into_iter()
+        .zip(part("channel_calibration_im"))
+        .map(|(re, im)| Complex64::cis(im.atan2(re)))
+        .collect()
+}
+
+#[test]
+fn semi_real_angles_are_as_good_as_bartlett_with_perfect_timing() {
+    let Some(dir) = common::data_dir() else {
+        return;
+    };
+    let path = dir.join("captures/semireal4_singtel-n1_day1_array1");
+    let mut recording = Recording::open(path).unwrap();
+    let annotations = recording.annotations().to_vec();
+    let (mut ours, mut bartletts) = (0.0, 0.0);
+    for annotation in &annotations {
+        let truth = &annotation.other["aoa:truth"];
+        let spacing_wavelengths = truth["element_spacing_wavelengths"].as_f64().unwrap();
+        let gains = calibration(truth);
+        let settings = ScanSettings {
+            array: ArraySetup {
+                spacing_wavelengths,
+                calibration: Some(gains.clone()),
+            },
+            ..ScanSettings::default()
+        };
+        let found = scan(&mut recording, &settings).unwrap();
+        let near =
+            |found: &&FoundSsb| (found.sample_start - annotation.sample_start as f64).abs() < 6.0;
+        let angle = found.ssbs.iter().find(near).unwrap().angle.unwrap();
+        let azimuth_deg = 90.0 - angle.angle_rad.to_degrees();
+
+        // Bartlett on the samples of the annotated SSB.
+        let mut samples = Vec::new();
+        let count = annotation.sample_count.unwrap() as usize;
+        recording
+            .read(annotation.sample_start, count, &mut samples)
+            .unwrap();
+        let power = |azimuth_deg: f64| -> f64 {
+            let step = std::f64::consts::TAU * spacing_wavelengths * azimuth_deg.to_radians().sin();
+            let weights: Vec<Complex64> = gains
+                .iter()
+                .enumerate()
+                .map(|(k, g)| (g * Complex64::cis(step * k as f64)).conj())
+                .collect();
+            (0..count)
+                .map(|n| {
+                    let sum: Complex64 = weights
+                        .iter()
+                        .zip(&samples)
+                        .map(|(w, x)| w * Complex64::new(f64::from(x[n].re), f64::from(x[n].im)))
+                        .sum();
+                    sum.norm_sqr()
+                })
+                .sum()
+        };
+        let bartlett_deg = (-900..=900)
+            .map(|tenth| f64::from(tenth) * 0.1)
+            .max_by(|a, b| power(*a).total_cmp(&power(*b)))
+            .unwrap();
+        let true_deg = truth["azimuth_from_broadside_deg"].as_f64().unwrap();
+        println!("truth {true_deg:.1}, ours {azimuth_deg:.2}, Bartlett {bartlett_deg:.1}");
+        ours += (azimuth_deg - true_deg).abs();
+        bartletts += (bartlett_deg - true_deg).abs();
+    }
+    assert!(ours <= 1.3 * bartletts, "{ours} {bartletts}");
+}
