@@ -1,4 +1,5 @@
 //! Scanning recordings: the real ones, and every kind of unsuitable one.
+#![allow(clippy::unwrap_used, clippy::print_stdout, reason = "this is a test")]
 
 mod common;
 

@@ -1,4 +1,5 @@
 //! SigMF: what is written is read again; every kind of damage has its own error; nothing panics.
+#![allow(clippy::unwrap_used, clippy::print_stdout, reason = "this is a test")]
 
 mod common;
 
@@ -143,13 +144,13 @@ fn metadata_that_cannot_be_used_names_the_key() {
     type Edit = fn(&mut Value);
     let cases: [(&str, Edit); 12] = [
         ("global.core:sample_rate", |json| {
-            json["global"]["core:sample_rate"] = json!(0)
+            json["global"]["core:sample_rate"] = json!(0);
         }),
         ("global.core:sample_rate", |json| {
-            json["global"]["core:sample_rate"] = json!(-1.5)
+            json["global"]["core:sample_rate"] = json!(-1.5);
         }),
         ("global.core:sample_rate", |json| {
-            json["global"]["core:sample_rate"] = json!("fast")
+            json["global"]["core:sample_rate"] = json!("fast");
         }),
         ("global.core:sample_rate", |json| {
             json["global"]
@@ -158,7 +159,7 @@ fn metadata_that_cannot_be_used_names_the_key() {
                 .remove("core:sample_rate");
         }),
         ("global.core:datatype", |json| {
-            json["global"]["core:datatype"] = json!("cf64_be")
+            json["global"]["core:datatype"] = json!("cf64_be");
         }),
         ("global.core:datatype", |json| {
             json["global"]
@@ -167,13 +168,13 @@ fn metadata_that_cannot_be_used_names_the_key() {
                 .remove("core:datatype");
         }),
         ("global.core:num_channels", |json| {
-            json["global"]["core:num_channels"] = json!(0)
+            json["global"]["core:num_channels"] = json!(0);
         }),
         ("global.core:num_channels", |json| {
-            json["global"]["core:num_channels"] = json!(u64::MAX)
+            json["global"]["core:num_channels"] = json!(u64::MAX);
         }),
         ("captures[0].core:frequency", |json| {
-            json["captures"][0]["core:frequency"] = json!([1])
+            json["captures"][0]["core:frequency"] = json!([1]);
         }),
         ("captures[0].core:sample_start", |json| {
             json["captures"][0]["core:sample_start"] = json!(LENGTH);

@@ -106,13 +106,20 @@ impl ChannelWatch {
             return;
         }
         let antennas = self.channels.len();
-        let pairs = (0..antennas).flat_map(|i| (i + 1..antennas).map(move |j| (i, j)));
+        // Neighbours first: of four antennas, exchanging the inner two looks like exchanging the
+        // outer two in a mirror, and only a clearly better pair replaces a nearer one.
+        let pairs = (1..antennas).flat_map(|apart| (apart..antennas).map(move |j| (j - apart, j)));
         let as_it_is = share_in_one_direction(&view.blocks, None);
-        let best = pairs
-            .map(|pair| (share_in_one_direction(&view.blocks, Some(pair)), pair))
-            .max_by(|a, b| a.0.total_cmp(&b.0));
+        let best = pairs.fold((0.0, (0, 0)), |best, pair| {
+            let share = share_in_one_direction(&view.blocks, Some(pair));
+            if share > best.0 + 0.01 {
+                (share, pair)
+            } else {
+                best
+            }
+        });
         match best {
-            Some((share, pair)) if share > RIGHT_SHARE && share > as_it_is + SWAP_GAIN => {
+            (share, pair) if share > RIGHT_SHARE && share > as_it_is + SWAP_GAIN => {
                 match self.swapped.iter_mut().find(|(other, _)| *other == pair) {
                     Some((_, votes)) => *votes += 1,
                     None => self.swapped.push((pair, 1)),

@@ -6,7 +6,7 @@ use nr_ssb::search::{DetectedSsb, SearchConfig, SearchError, Searcher};
 use nr_ssb::{Complex32, SubcarrierSpacing};
 use thiserror::Error;
 
-use super::array_view::{ArraySetup, ArrayView, array_view};
+use super::array_view::{ArraySetup, ArrayView, View, array_view};
 use super::diagnosis::{ChannelFault, ChannelWatch};
 use super::iq_source::IqSource;
 use crate::recording::RecordingError;
@@ -120,26 +120,41 @@ pub fn scan(source: &mut dyn IqSource, settings: &ScanSettings) -> Result<Scan, 
         Some(hz) => given_places(source.sample_rate_hz(), hz, settings.spacing),
         None => raster_places(source, settings.spacing, centre_hz)?,
     };
-    let mut found = Scan::default();
     let mut watch = ChannelWatch::new(source.channels());
-    for (index, place) in places.iter().enumerate() {
+    let mut antennas = Vec::new();
+    for_each_block(source, &mut antennas, |antennas, _| {
+        watch.samples(antennas);
+        Ok(())
+    })?;
+    let mut found = Scan::default();
+    for place in &places {
         let config = SearchConfig {
             ssb_freq_hz: Some(place.ssb_freq_hz),
             false_alarm: FALSE_ALARM / places.len() as f64,
             ..SearchConfig::new(place.spacing, source.channels())
         };
-        let watched = (index == 0).then_some(&mut watch);
-        place.search(
-            source,
-            centre_hz,
-            &config,
-            &settings.array,
-            watched,
-            &mut found,
-        )?;
-    }
-    if places.is_empty() {
-        watch_all(source, &mut watch)?;
+        let mut front_end = FrontEnd::new(
+            source.sample_rate_hz(),
+            place.ssb_freq_hz - centre_hz,
+            place.spacing.hz(),
+            source.channels(),
+        )
+        .map_err(front_end_failed)?;
+        let mut view = array_view(&config, &settings.array)?;
+        for (ssb, seen) in search(source, &config, &mut front_end, view.as_deref_mut())? {
+            if let Some(seen) = &seen {
+                watch.response(seen);
+            }
+            let ratio = front_end.input_per_output();
+            found.ssbs.push(FoundSsb {
+                sample_start: ssb.sample_start * ratio,
+                sample_count: SSB_SAMPLES as f64 * ratio,
+                ssb_freq_hz: place.ssb_freq_hz,
+                spacing: place.spacing,
+                angle: seen.map(|seen| seen.estimate),
+                ssb,
+            });
+        }
     }
     found
         .ssbs
@@ -207,14 +222,6 @@ fn raster_places(
     Ok(Vec::new())
 }
 
-fn watch_all(source: &mut dyn IqSource, watch: &mut ChannelWatch) -> Result<(), ScanError> {
-    let mut antennas = Vec::new();
-    for_each_block(source, &mut antennas, |antennas, _| {
-        watch.samples(antennas);
-        Ok(())
-    })
-}
-
 /// Calls `act` with block after block, and whether it is the last.
 fn for_each_block(
     source: &mut dyn IqSource,
@@ -232,88 +239,60 @@ fn for_each_block(
     Ok(())
 }
 
-impl Place {
-    fn search(
-        &self,
-        source: &mut dyn IqSource,
-        centre_hz: f64,
-        config: &SearchConfig,
-        array: &ArraySetup,
-        mut watch: Option<&mut ChannelWatch>,
-        found: &mut Scan,
-    ) -> Result<(), ScanError> {
-        let file = source.name();
-        let front_end_failed = |source| ScanError::FrontEnd {
-            file: file.clone(),
-            source,
-        };
-        let search_failed = |source| ScanError::Search {
-            file: file.clone(),
-            source,
-        };
-        let rate_hz = source.sample_rate_hz();
-        let offset_hz = self.ssb_freq_hz - centre_hz;
-        let mut front_end = FrontEnd::new(rate_hz, offset_hz, self.spacing.hz(), source.channels())
-            .map_err(front_end_failed)?;
-        let ratio = front_end.input_per_output();
-        let samples = (source.length() as f64 / ratio) as usize;
-        if samples < SSB_SAMPLES {
-            return Err(search_failed(SearchError::TooShort {
-                samples,
-                needed: SSB_SAMPLES,
-            }));
-        }
-        let mut searcher = Searcher::new(config.clone()).map_err(search_failed)?;
-        let mut view = array_view(config, array)?;
-        let mut base = vec![Vec::new(); source.channels()];
-        let mut base_start = 0u64;
-        let mut raw = Vec::new();
-        for_each_block(source, &mut raw, |raw, last| {
-            if let Some(watch) = &mut watch {
-                watch.samples(raw);
-            }
-            let known = base.first().map_or(0, Vec::len);
-            front_end.push(raw, &mut base).map_err(front_end_failed)?;
-            if last {
-                front_end.finish(&mut base);
-            }
-            let window: Vec<&[Complex32]> = base.iter().map(Vec::as_slice).collect();
-            let new: Vec<&[Complex32]> = window
-                .iter()
-                .map(|samples| samples.get(known..).unwrap_or_default())
-                .collect();
-            for ssb in searcher.push(&new).map_err(search_failed)? {
-                let seen = see(view.as_deref_mut(), ssb, &window, base_start as f64);
-                if let (Some(watch), Some(seen)) = (&mut watch, &seen) {
-                    watch.response(seen);
-                }
-                found.ssbs.push(FoundSsb {
-                    ssb: ssb.clone(),
-                    sample_start: ssb.sample_start * ratio,
-                    sample_count: SSB_SAMPLES as f64 * ratio,
-                    ssb_freq_hz: self.ssb_freq_hz,
-                    spacing: self.spacing,
-                    angle: seen.map(|seen| seen.estimate),
-                });
-            }
-            // An SSB that is complete only with the next block begins at most this long ago.
-            let gone = window
-                .first()
-                .map_or(0, |it| it.len().saturating_sub(2 * SSB_SAMPLES));
-            for samples in &mut base {
-                samples.drain(..gone);
-            }
-            base_start += gone as u64;
-            Ok(())
-        })
+/// The SSBs at one place, and how the array sees each.
+fn search(
+    source: &mut dyn IqSource,
+    config: &SearchConfig,
+    front_end: &mut FrontEnd,
+    mut view: Option<&mut (dyn ArrayView + 'static)>,
+) -> Result<Vec<(DetectedSsb, Option<View>)>, ScanError> {
+    let file = source.name();
+    let front_end_failed = |source| ScanError::FrontEnd {
+        file: file.clone(),
+        source,
+    };
+    let search_failed = |source| ScanError::Search {
+        file: file.clone(),
+        source,
+    };
+    let samples = (source.length() as f64 / front_end.input_per_output()) as usize;
+    if samples < SSB_SAMPLES {
+        return Err(search_failed(SearchError::TooShort {
+            samples,
+            needed: SSB_SAMPLES,
+        }));
     }
-}
-
-fn see(
-    view: Option<&mut (dyn ArrayView + 'static)>,
-    ssb: &DetectedSsb,
-    window: &[&[Complex32]],
-    window_start: f64,
-) -> Option<super::array_view::View> {
-    view?.view(ssb, window, window_start)
+    let mut searcher = Searcher::new(config.clone()).map_err(search_failed)?;
+    let mut found = Vec::new();
+    let mut base = vec![Vec::new(); source.channels()];
+    let mut base_start = 0u64;
+    let mut raw = Vec::new();
+    for_each_block(source, &mut raw, |raw, last| {
+        let known = base.first().map_or(0, Vec::len);
+        front_end.push(raw, &mut base).map_err(front_end_failed)?;
+        if last {
+            front_end.finish(&mut base);
+        }
+        let window: Vec<&[Complex32]> = base.iter().map(Vec::as_slice).collect();
+        let new: Vec<&[Complex32]> = window
+            .iter()
+            .map(|samples| samples.get(known..).unwrap_or_default())
+            .collect();
+        for ssb in searcher.push(&new).map_err(search_failed)? {
+            let seen = view
+                .as_mut()
+                .and_then(|view| view.view(ssb, &window, base_start as f64));
+            found.push((ssb.clone(), seen));
+        }
+        // An SSB that is complete only with the next block begins at most this long ago.
+        let gone = window
+            .first()
+            .map_or(0, |it| it.len().saturating_sub(2 * SSB_SAMPLES));
+        for samples in &mut base {
+            samples.drain(..gone);
+        }
+        base_start += gone as u64;
+        Ok(())
+    })?;
+    Ok(found)
 }

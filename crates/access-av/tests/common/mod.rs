@@ -1,5 +1,10 @@
 //! What several tests share.
-#![allow(dead_code)]
+#![allow(
+    dead_code,
+    clippy::unwrap_used,
+    clippy::print_stdout,
+    reason = "shared by tests"
+)]
 
 use std::path::{Path, PathBuf};
 
