@@ -50,3 +50,16 @@ fn track_one_ssb_of_4_antennas(bencher: divan::Bencher, decode_pbch: bool) {
             .is_some()
     });
 }
+
+/// What the four symbols of four antennas cost in bare transforms: the machine's yardstick.
+#[divan::bench]
+fn yardstick_16_transforms_of_256(bencher: divan::Bencher) {
+    let fft = rustfft::FftPlanner::new().plan_fft_forward(256);
+    let mut scratch = vec![nr_ssb::Complex32::ZERO; fft.get_inplace_scratch_len()];
+    let mut buffer = vec![nr_ssb::Complex32::ZERO; 256];
+    bencher.bench_local(|| {
+        for _ in 0..16 {
+            fft.process_with_scratch(divan::black_box(&mut buffer), &mut scratch);
+        }
+    });
+}

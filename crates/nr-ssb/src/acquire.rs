@@ -101,7 +101,7 @@ impl Acquirer {
         self.demodulator
             .run(antennas, &alignment, &mut self.grids)?;
         self.estimate.fold(&self.grids, &self.reference, &flat);
-        self.estimate.fit();
+        self.estimate.fit(&self.grids, &self.reference);
         let cell = self
             .sss
             .identify(candidate.n_id_2, &self.grids, &self.estimate)?;
@@ -118,7 +118,7 @@ impl Acquirer {
             Complex32::ONE,
         ];
         self.estimate.fold(&self.grids, &self.reference, &phases);
-        self.estimate.fit();
+        self.estimate.fit(&self.grids, &self.reference);
         let beam = dmrs_hypothesis(pci, &self.grids, &self.estimate);
         let ibar_ssb = beam.hypothesis;
         self.know_dmrs(pci, ibar_ssb);
@@ -149,7 +149,7 @@ impl Acquirer {
             .symbol_phases();
             self.estimate.fold(&self.grids, &self.reference, &phases);
             let delay = timing::refine(&self.estimate.rows, 0.0, 3);
-            self.estimate.fit();
+            self.estimate.fit(&self.grids, &self.reference);
             step = self.phase_step();
             alignment.phase_step = step;
             if let Some(carrier_step) = self.carrier_step {
@@ -163,7 +163,7 @@ impl Acquirer {
         }
         self.estimate
             .fold(&self.grids, &self.reference, &alignment.symbol_phases());
-        self.estimate.fit();
+        self.estimate.fit(&self.grids, &self.reference);
         Some(())
     }
 

@@ -15,6 +15,7 @@ use crate::cfo::SymbolPairs;
 use crate::demodulate::{ReceivedGrid, SYMBOL_FFT};
 use crate::grid::{SUBCARRIERS, SYMBOLS, SsbGrid};
 use crate::hermitian;
+use crate::sums::{complex_product, energy};
 
 /// Taps of the channel model, one per sample at the base rate.
 const TAPS: usize = 16;
@@ -31,8 +32,6 @@ pub(crate) struct ChannelEstimator {
     pub(crate) rows: Vec<[Complex32; SUBCARRIERS]>,
     /// Known elements per subcarrier.
     counts: [f32; SUBCARRIERS],
-    /// Per antenna: energy of the known elements' least-squares estimates.
-    energies: Vec<f64>,
     /// Per antenna: the estimate.
     pub(crate) channel: Vec<[Complex32; SUBCARRIERS]>,
     /// Per antenna: variance of the noise on a resource element.
@@ -56,7 +55,6 @@ impl ChannelEstimator {
             steering,
             rows: vec![[Complex32::ZERO; SUBCARRIERS]; antennas],
             counts: [0.0; SUBCARRIERS],
-            energies: vec![0.0; antennas],
             channel: vec![[Complex32::ZERO; SUBCARRIERS]; antennas],
             noise_variance: vec![0.0; antennas],
             matched: vec![[Complex64::ZERO; TAPS]; antennas],
@@ -73,36 +71,62 @@ impl ChannelEstimator {
         phases: &[Complex32; SYMBOLS],
     ) {
         self.counts.fill(0.0);
-        for known in reference.symbols() {
-            for (count, s) in self.counts.iter_mut().zip(known) {
-                *count += if s.norm_sqr() > 0.5 { 1.0 } else { 0.0 };
-            }
-        }
-        for ((grid, row), energy) in grids.iter().zip(&mut self.rows).zip(&mut self.energies) {
+        for row in &mut self.rows {
             row.fill(Complex32::ZERO);
-            let mut sum = 0.0_f64;
-            for ((received, known), phase) in grid.iter().zip(reference.symbols()).zip(phases) {
-                let mut symbol_energy = 0.0_f32;
-                for ((slot, y), s) in row.iter_mut().zip(received).zip(known) {
-                    let ls = y * s.conj();
-                    symbol_energy += ls.norm_sqr();
-                    *slot += ls * phase;
-                }
-                sum += f64::from(symbol_energy);
+        }
+        for (l, (known, phase)) in reference.symbols().zip(phases).enumerate() {
+            let mut weights = [Complex32::ZERO; SUBCARRIERS];
+            for k in 0..SUBCARRIERS {
+                weights[k] = known[k].conj() * phase;
+                self.counts[k] += if known[k].norm_sqr() > 0.5 { 1.0 } else { 0.0 };
             }
-            *energy = sum;
+            for (grid, row) in grids.iter().zip(&mut self.rows) {
+                let received = &grid[l];
+                for k in 0..SUBCARRIERS {
+                    let (y, w) = (received[k], weights[k]);
+                    row[k].re += y.re * w.re - y.im * w.im;
+                    row[k].im += y.re * w.im + y.im * w.re;
+                }
+            }
         }
     }
 
-    /// Noise of each antenna from the folded rows alone, into `noise_variance`.
+    /// Noise of each antenna from the folded rows alone, into `noise_variance`: from the second
+    /// difference over the subcarriers, which a smooth channel hardly has (a path 10 samples late
+    /// adds −32 dB of its power).
     pub(crate) fn estimate_noise(&mut self) {
+        let inverse = self
+            .counts
+            .map(|count| if count > 0.0 { 1.0 / count } else { 0.0 });
+        // Where one of three neighbours is unknown, the difference is left out.
+        let mut used = [0.0_f32; SUBCARRIERS];
+        let mut weight = 0.0_f64;
+        for k in 1..SUBCARRIERS - 1 {
+            if self.counts[k - 1] * self.counts[k] * self.counts[k + 1] > 0.0 {
+                used[k] = 1.0;
+                weight += f64::from(inverse[k - 1] + 4.0 * inverse[k] + inverse[k + 1]);
+            }
+        }
         for (row, noise) in self.rows.iter().zip(&mut self.noise_variance) {
-            *noise = curvature_noise(row, &self.counts);
+            let mut means = [Complex32::ZERO; SUBCARRIERS];
+            for k in 0..SUBCARRIERS {
+                means[k] = row[k] * inverse[k];
+            }
+            let mut differences = [Complex32::ZERO; SUBCARRIERS];
+            for k in 1..SUBCARRIERS - 1 {
+                differences[k] = (means[k - 1] + means[k + 1] - means[k] * 2.0) * used[k];
+            }
+            *noise = if weight > 0.0 {
+                f64::from(energy(&differences)) / weight
+            } else {
+                0.0
+            };
         }
     }
 
-    /// Fits the channel to the folded rows; results in `channel` and `noise_variance`.
-    pub(crate) fn fit(&mut self) {
+    /// Fits the channel to the rows folded from these grids; results in `channel` and
+    /// `noise_variance`.
+    pub(crate) fn fit(&mut self, grids: &[ReceivedGrid], reference: &SsbGrid) {
         let known: f64 = self.counts.iter().map(|count| f64::from(*count)).sum();
         if known < 2.0 {
             return;
@@ -111,7 +135,7 @@ impl ChannelEstimator {
         self.estimate_noise();
         for (row, matched) in self.rows.iter().zip(&mut self.matched) {
             for (slot, steering) in matched.iter_mut().zip(&self.steering) {
-                let sum: Complex32 = row.iter().zip(steering).map(|(z, e)| z * e).sum();
+                let sum = complex_product(row, steering);
                 *slot = Complex64::new(f64::from(sum.re), f64::from(sum.im));
             }
         }
@@ -142,7 +166,7 @@ impl ChannelEstimator {
         let freedom: f64 = powers.iter().map(|p| p / (p + mean_noise / known)).sum();
         for antenna in 0..self.rows.len() {
             let residual = residual_energy(
-                self.energies[antenna],
+                known_energy(&grids[antenna], reference),
                 &gram,
                 &self.taps[antenna],
                 &self.matched[antenna],
@@ -236,21 +260,16 @@ impl ChannelEstimator {
 
 type Matrix = hermitian::Matrix<TAPS>;
 
-/// Noise variance from the second difference over the subcarriers, which a smooth channel hardly
-/// has (a path 10 samples late adds −32 dB of its power).
-fn curvature_noise(row: &[Complex32; SUBCARRIERS], counts: &[f32; SUBCARRIERS]) -> f64 {
-    let (mut sum, mut weight) = (0.0_f64, 0.0_f64);
-    for (z, n) in row.windows(3).zip(counts.windows(3)) {
-        if let ([a, b, c], [na, nb, nc]) = (z, n)
-            && *na > 0.0
-            && *nb > 0.0
-            && *nc > 0.0
-        {
-            sum += f64::from((a / *na - b * (2.0 / *nb) + c / *nc).norm_sqr());
-            weight += f64::from(1.0 / na + 4.0 / nb + 1.0 / nc);
-        }
-    }
-    if weight > 0.0 { sum / weight } else { 0.0 }
+/// Received energy on the known elements.
+fn known_energy(grid: &ReceivedGrid, reference: &SsbGrid) -> f64 {
+    let symbols = grid.iter().zip(reference.symbols());
+    symbols
+        .map(|(received, known)| {
+            let pairs = received.iter().zip(known);
+            let energy: f32 = pairs.map(|(y, s)| y.norm_sqr() * s.norm_sqr()).sum();
+            f64::from(energy)
+        })
+        .sum()
 }
 
 /// Σ|z − Σ_τ g e|² over the known elements.

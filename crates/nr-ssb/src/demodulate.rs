@@ -124,7 +124,10 @@ pub(crate) fn fill_phasors(phasors: &mut [Complex32], first: f64, step: f64) {
     for chunk in phasors.chunks_mut(STRANDS) {
         for (slot, phasor) in chunk.iter_mut().zip(&mut strands) {
             *slot = Complex32::new(phasor.re as f32, phasor.im as f32);
-            *phasor *= stride;
+            *phasor = Complex64::new(
+                phasor.re * stride.re - phasor.im * stride.im,
+                phasor.re * stride.im + phasor.im * stride.re,
+            );
         }
     }
 }

@@ -15,6 +15,7 @@ use crate::pci::Pci;
 use crate::pss::{SYNC_LEN, pss};
 use crate::search::MAX_ANTENNAS;
 use crate::sss::sss;
+use crate::sums::inner_product;
 
 /// Most likely hypothesis and how it stands out.
 #[derive(Debug, Clone, Copy)]
@@ -58,7 +59,7 @@ impl SssTable {
             let Some(sequence) = self.0.get(usize::from(pci.get())) else {
                 continue;
             };
-            let match_ = Complex32::new(dot(&re, sequence), dot(&im, sequence));
+            let match_ = Complex32::new(inner_product(&re, sequence), inner_product(&im, sequence));
             if best.is_none() || match_.norm_sqr() > sum.norm_sqr() {
                 best = Some(pci);
                 sum = match_;
@@ -168,18 +169,4 @@ fn widen(value: Complex32) -> Complex64 {
 
 fn noise_weight(estimate: &ChannelEstimator, antenna: usize) -> f32 {
     (1.0 / estimate.noise_variance[antenna].max(1e-30)) as f32
-}
-
-/// Inner product in eight strands, which the compiler turns into vector instructions.
-fn dot(a: &[f32; SYNC_LEN], b: &[f32; SYNC_LEN]) -> f32 {
-    let (a_chunks, a_rest) = a.as_chunks::<8>();
-    let (b_chunks, b_rest) = b.as_chunks::<8>();
-    let mut strands = [0.0_f32; 8];
-    for (x, y) in a_chunks.iter().zip(b_chunks) {
-        for ((strand, x), y) in strands.iter_mut().zip(x).zip(y) {
-            *strand += x * y;
-        }
-    }
-    let rest: f32 = a_rest.iter().zip(b_rest).map(|(x, y)| x * y).sum();
-    strands.iter().sum::<f32>() + rest
 }

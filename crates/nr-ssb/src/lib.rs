@@ -91,6 +91,7 @@ mod cfo;
 mod channel_estimate;
 pub mod crc;
 mod demodulate;
+pub mod diagnose;
 pub mod dmrs;
 mod error;
 mod false_alarm;
@@ -114,6 +115,7 @@ pub mod raster;
 pub mod rate_matching;
 pub mod search;
 pub mod sss;
+mod sums;
 mod timing;
 pub mod track;
 

@@ -6,6 +6,10 @@
 //! subcarriers exponentially distributed with mean one whatever the level (a beta distribution, to
 //! be exact, whose tail is the thinner), and about 127 × SNR where the PSS is. Antennas are summed
 //! non-coherently, so in noise the sum of `A` of them follows a gamma distribution of shape `A`.
+//!
+//! The PSS fills 127 of 256 bins, so its correlation is computed at half the base rate; the lags
+//! between are the sums of their neighbours, `(c(n−1) + c(n+1))/√2`, which carry noise of the same
+//! variance and lose no more of a peak (0.9 dB at worst) than sampling at the base rate does.
 
 use std::sync::Arc;
 
@@ -16,7 +20,9 @@ use crate::demodulate::SYMBOL_FFT;
 use crate::pss::pss;
 
 /// Length of a transform of the overlap-save scheme.
-const BLOCK: usize = 2048;
+const BLOCK: usize = 4096;
+/// Length of the transform back: the PSS's half of the spectrum.
+const HALF_BLOCK: usize = BLOCK / 2;
 /// Correlation lags that one block yields.
 const HOP: usize = BLOCK - SYMBOL_FFT;
 /// Two maxima of one PSS closer than this are one candidate.
@@ -44,12 +50,14 @@ pub struct MatchedFilter {
     cfo_hypotheses_hz: Vec<f64>,
     /// Conjugated spectra of the replicas, `[n_id_2][hypothesis]`.
     replicas: [Vec<Vec<Complex32>>; 3],
-    /// Spectrum of the block, per antenna.
+    block: Vec<Complex32>,
+    /// Spectrum of the block around 0 Hz, per antenna.
     spectra: Vec<Vec<Complex32>>,
-    /// 240 / energy under the window, per antenna and lag.
+    /// 240 / energy under the window, per antenna and pair of lags.
     inverse_energy: Vec<Vec<f32>>,
     product: Vec<Complex32>,
     scratch: Vec<Complex32>,
+    /// Statistics of one hypothesis, then the best and whose it is: even lags, then odd ones.
     sum: Vec<f32>,
     best: Vec<f32>,
     best_hypothesis: Vec<u8>,
@@ -61,7 +69,7 @@ impl MatchedFilter {
     pub fn new(scs_hz: f64, cfo_hypotheses_hz: &[f64], antennas: usize) -> Self {
         let mut planner = FftPlanner::new();
         let forward = planner.plan_fft_forward(BLOCK);
-        let inverse = planner.plan_fft_inverse(BLOCK);
+        let inverse = planner.plan_fft_inverse(HALF_BLOCK);
         let replicas = [0, 1, 2].map(|n_id_2| {
             let symbol = pss_symbol(n_id_2);
             cfo_hypotheses_hz
@@ -75,11 +83,10 @@ impl MatchedFilter {
                             sample * Complex32::new(rotation.re as f32, rotation.im as f32);
                     }
                     forward.process(&mut replica);
-                    // The pair of unnormalised transforms multiplies by BLOCK.
-                    for bin in &mut replica {
-                        *bin = bin.conj() / BLOCK as f32;
-                    }
-                    replica
+                    // The forward transform multiplies by BLOCK in the end.
+                    let mut half = vec![Complex32::ZERO; HALF_BLOCK];
+                    keep_centre(&replica, &mut half);
+                    half.iter().map(|bin| bin.conj() / BLOCK as f32).collect()
                 })
                 .collect()
         });
@@ -91,9 +98,10 @@ impl MatchedFilter {
             inverse,
             cfo_hypotheses_hz: cfo_hypotheses_hz.to_vec(),
             replicas,
-            spectra: vec![vec![Complex32::ZERO; BLOCK]; antennas],
-            inverse_energy: vec![vec![0.0; HOP]; antennas],
-            product: vec![Complex32::ZERO; BLOCK],
+            block: vec![Complex32::ZERO; BLOCK],
+            spectra: vec![vec![Complex32::ZERO; HALF_BLOCK]; antennas],
+            inverse_energy: vec![vec![0.0; HOP / 2]; antennas],
+            product: vec![Complex32::ZERO; HALF_BLOCK],
             scratch: vec![Complex32::ZERO; scratch],
             sum: vec![0.0; HOP],
             best: vec![0.0; HOP],
@@ -132,27 +140,24 @@ impl MatchedFilter {
         }
     }
 
-    /// Spectrum of a block and the energy under the window at each lag.
+    /// Spectrum of a block and the energy under the window at each pair of lags.
     fn load_antenna(&mut self, antenna: usize, window: &[Complex32]) {
-        let spectrum = &mut self.spectra[antenna];
-        spectrum[..window.len()].copy_from_slice(window);
-        spectrum[window.len()..].fill(Complex32::ZERO);
+        self.block[..window.len()].copy_from_slice(window);
+        self.block[window.len()..].fill(Complex32::ZERO);
 
-        let mut energy: f64 = spectrum[..SYMBOL_FFT]
-            .iter()
-            .map(|x| f64::from(x.norm_sqr()))
-            .sum();
-        let (old, new) = (spectrum.iter(), spectrum[SYMBOL_FFT..].iter());
-        for (slot, (old, new)) in self.inverse_energy[antenna].iter_mut().zip(old.zip(new)) {
-            *slot = if energy > f64::from(f32::MIN_POSITIVE) {
-                OCCUPIED / energy as f32
-            } else {
-                0.0
-            };
-            energy += f64::from(new.norm_sqr()) - f64::from(old.norm_sqr());
+        let pair_energy =
+            |pair: &[Complex32; 2]| f64::from(pair[0].norm_sqr() + pair[1].norm_sqr());
+        let (pairs, _) = self.block.as_chunks::<2>();
+        let mut energy: f64 = pairs[..SYMBOL_FFT / 2].iter().map(pair_energy).sum();
+        let moves = pairs.iter().zip(&pairs[SYMBOL_FFT / 2..]);
+        for (slot, (old, new)) in self.inverse_energy[antenna].iter_mut().zip(moves) {
+            let known = energy > f64::from(f32::MIN_POSITIVE);
+            *slot = if known { OCCUPIED / energy as f32 } else { 0.0 };
+            energy += pair_energy(new) - pair_energy(old);
         }
         self.forward
-            .process_with_scratch(spectrum, &mut self.scratch);
+            .process_with_scratch(&mut self.block, &mut self.scratch);
+        keep_centre(&self.block, &mut self.spectra[antenna]);
     }
 
     /// Leaves the largest statistic over the frequency hypotheses in `best`.
@@ -160,16 +165,11 @@ impl MatchedFilter {
         for (hypothesis, replica) in self.replicas[n_id_2].iter().enumerate() {
             self.sum.fill(0.0);
             for (spectrum, inverse_energy) in self.spectra.iter().zip(&self.inverse_energy) {
-                for ((product, bin), weight) in self.product.iter_mut().zip(spectrum).zip(replica) {
-                    *product = bin * weight;
-                }
+                multiply(&mut self.product, spectrum, replica);
                 self.inverse
                     .process_with_scratch(&mut self.product, &mut self.scratch);
-                for ((sum, value), scale) in
-                    self.sum.iter_mut().zip(&self.product).zip(inverse_energy)
-                {
-                    *sum += value.norm_sqr() * scale;
-                }
+                let (even, odd) = self.sum.split_at_mut(HOP / 2);
+                add_power(even, odd, &self.product, inverse_energy);
             }
             if hypothesis == 0 {
                 self.best.copy_from_slice(&self.sum);
@@ -178,10 +178,9 @@ impl MatchedFilter {
             }
             let kept = self.best.iter_mut().zip(&mut self.best_hypothesis);
             for ((best, index), sum) in kept.zip(&self.sum) {
-                if *sum > *best {
-                    *best = *sum;
-                    *index = hypothesis as u8;
-                }
+                let better = *sum > *best;
+                *best = if better { *sum } else { *best };
+                *index = if better { hypothesis as u8 } else { *index };
             }
         }
     }
@@ -194,13 +193,10 @@ impl MatchedFilter {
         threshold: f32,
         candidates: &mut Vec<PssCandidate>,
     ) {
-        for (lag, (&statistic, &hypothesis)) in self
-            .best
-            .iter()
-            .zip(&self.best_hypothesis)
-            .take(lags)
-            .enumerate()
-        {
+        for lag in 0..lags {
+            // Even lags come first, then odd ones.
+            let slot = lag / 2 + (lag % 2) * (HOP / 2);
+            let (statistic, hypothesis) = (self.best[slot], self.best_hypothesis[slot]);
             if statistic < threshold {
                 continue;
             }
@@ -220,6 +216,40 @@ impl MatchedFilter {
                 None => candidates.push(candidate),
             }
         }
+    }
+}
+
+/// The bins around 0 Hz, for a transform of half the length.
+fn keep_centre(spectrum: &[Complex32], half: &mut [Complex32]) {
+    let (positive, negative) = half.split_at_mut(HALF_BLOCK / 2);
+    positive.copy_from_slice(&spectrum[..HALF_BLOCK / 2]);
+    negative.copy_from_slice(&spectrum[BLOCK - HALF_BLOCK / 2..]);
+}
+
+/// Elementwise product.
+fn multiply(product: &mut [Complex32], a: &[Complex32], b: &[Complex32]) {
+    let n = product.len();
+    let (a, b) = (&a[..n], &b[..n]);
+    for i in 0..n {
+        product[i] = Complex32::new(
+            a[i].re * b[i].re - a[i].im * b[i].im,
+            a[i].re * b[i].im + a[i].im * b[i].re,
+        );
+    }
+}
+
+/// Adds the statistic of one antenna at the even and the odd lags, from the correlation at the
+/// even ones.
+fn add_power(even: &mut [f32], odd: &mut [f32], correlation: &[Complex32], inverse_energy: &[f32]) {
+    // Lengths made equal, so that the loop needs no checks.
+    let lags = inverse_energy.len();
+    let (even, odd) = (&mut even[..lags], &mut odd[..lags]);
+    let (here, next) = (&correlation[..lags], &correlation[1..=lags]);
+    for i in 0..lags {
+        let (a, b, scale) = (here[i], next[i], inverse_energy[i]);
+        let (re, im) = (a.re + b.re, a.im + b.im);
+        even[i] += (a.re * a.re + a.im * a.im) * scale;
+        odd[i] += (re * re + im * im) * (0.5 * scale);
     }
 }
 

@@ -4,6 +4,7 @@ use num_complex::Complex32;
 
 use crate::demodulate::{ReceivedGrid, SYMBOL_FFT};
 use crate::grid::{SUBCARRIERS, SYMBOLS, pss_indices};
+use crate::sums::energy;
 
 /// Resource blocks of an SSB.
 const RESOURCE_BLOCKS: f64 = 20.0;
@@ -22,8 +23,8 @@ pub struct Measurement {
 /// Measures one antenna from what was received, the power of a resource element of the SSS and the
 /// variance of the noise on it, in the scale of an unnormalised transform.
 pub(crate) fn measure(grid: &ReceivedGrid, rsrp: f64, noise_variance: f64) -> Measurement {
-    let received: f64 = grid.iter().map(|symbol| mean_power(symbol)).sum::<f64>() / SYMBOLS as f64;
-    let rssi = received * SUBCARRIERS as f64;
+    let received: f32 = grid.iter().map(energy).sum();
+    let rssi = f64::from(received) / SYMBOLS as f64;
     let full_scale = (SYMBOL_FFT * SYMBOL_FFT) as f64;
     Measurement {
         ss_rsrp_dbfs: decibel(rsrp / full_scale),

@@ -281,6 +281,7 @@ impl Searcher {
         self.buffer_start = 0;
         self.found.clear();
         self.recent.clear();
+        self.decoder.forget();
     }
 
     /// The settings.
@@ -376,16 +377,18 @@ impl Searcher {
         if acquired.statistic < DECODE_FLOOR * self.cell_threshold {
             return None;
         }
-        let broadcast = self.decoder.decode(&self.acquirer, &acquired);
-        if let Some(broadcast) = &broadcast {
-            self.acquirer
-                .know_pbch(acquired.pci, &broadcast.decoded.symbols());
-            self.acquirer.align(&self.buffer, &mut acquired.alignment)?;
-        } else {
+        let mut broadcast = self.decoder.decode(&self.acquirer, &acquired);
+        if broadcast.is_none() {
             let certain = 10.0_f64.powf(0.1 * CERTAIN_DECODE_SNR_DB);
             if acquired.statistic < self.cell_threshold || self.acquirer.snr() > certain {
                 return None;
             }
+            broadcast = self.decoder.combine(&acquired, time);
+        }
+        if let Some(broadcast) = &broadcast {
+            self.acquirer.know_pbch(acquired.pci, &broadcast.symbols);
+            self.acquirer.align(&self.buffer, &mut acquired.alignment)?;
+            self.complete_earlier(&acquired, broadcast, time);
         }
         self.report(&acquired, broadcast.as_ref());
         self.remove(&acquired.alignment);
@@ -407,7 +410,7 @@ impl Searcher {
             *slot = measure(grid, sss_power(channel), *noise);
         }
         let lmax = broadcast.map_or_else(|| self.decoder.likely_lmax(), |broadcast| broadcast.lmax);
-        let payload = broadcast.map(|broadcast| broadcast.decoded.payload);
+        let payload = broadcast.map(|broadcast| broadcast.payload);
         let half_frame = match (payload, lmax) {
             (Some(payload), _) => Some(payload.half_frame),
             (None, Lmax::L4) => Some(acquired.ibar_ssb >= 4),
@@ -430,6 +433,22 @@ impl Searcher {
         });
     }
 
+    /// Gives earlier SSBs of the same beam, not decoded by themselves, what they must have said.
+    fn complete_earlier(&mut self, acquired: &Acquired, broadcast: &Broadcast, time: f64) {
+        let same = |ssb: &&mut DetectedSsb| {
+            ssb.payload.is_none() && ssb.pci == acquired.pci && ssb.ibar_ssb == acquired.ibar_ssb
+        };
+        for ssb in self.found.iter_mut().filter(same) {
+            let before = ssb.sample_start - time;
+            ssb.payload = self.decoder.repeated(broadcast.payload, before);
+            if let Some(payload) = ssb.payload {
+                ssb.lmax = broadcast.lmax;
+                ssb.ssb_index = payload.ssb_index;
+                ssb.half_frame = Some(payload.half_frame);
+            }
+        }
+    }
+
     /// Subtracts the SSB. Its channel is estimated without the PSS, which other cells share.
     fn remove(&mut self, alignment: &Alignment) {
         let phases = alignment.symbol_phases();
@@ -441,7 +460,7 @@ impl Searcher {
             ..
         } = &mut self.acquirer;
         estimate.fold(grids, reference, &phases);
-        estimate.fit();
+        estimate.fit(grids, reference);
         reference.put(crate::grid::pss_indices(), pss);
         for (samples, channel) in self.buffer.iter_mut().zip(&estimate.channel) {
             self.canceller

@@ -36,6 +36,20 @@ pub(crate) fn refine(rows: &[[Complex32; SUBCARRIERS]], start: f64, iterations: 
     delay
 }
 
+/// The same for a delay already near zero, with the antennas first combined by their sums over the
+/// subcarriers: one row instead of one per antenna.
+pub(crate) fn refine_combined(rows: &[[Complex32; SUBCARRIERS]]) -> f64 {
+    let mut combined = [[Complex32::ZERO; SUBCARRIERS]];
+    for row in rows {
+        let gain = row.iter().fold(Complex32::ZERO, |sum, z| sum + z).conj();
+        for (slot, z) in combined[0].iter_mut().zip(row) {
+            slot.re += z.re * gain.re - z.im * gain.im;
+            slot.im += z.re * gain.im + z.im * gain.re;
+        }
+    }
+    refine(&combined, 0.0, 3)
+}
+
 /// `exp(j2πk'τ/256)`: takes a delay of τ samples out of the subcarriers.
 pub(crate) fn ramp(delay: f64) -> [Complex32; SUBCARRIERS] {
     let mut ramp = [Complex32::ZERO; SUBCARRIERS];

@@ -24,6 +24,7 @@ use crate::pci::Pci;
 use crate::pss::{SYNC_LEN, pss};
 use crate::search::{DetectedSsb, SearchConfig, SearchError, Searcher};
 use crate::sss::sss;
+use crate::sums::{complex_product, inner_product};
 use crate::timing;
 
 /// Probability that noise at the expected place passes for the cell.
@@ -97,7 +98,8 @@ pub struct Tracker<const A: usize> {
     searcher: Searcher,
     /// All that is known beforehand, per ī_SSB.
     references: Vec<SsbGrid>,
-    dmrs: Vec<[Complex32; DMRS_LEN]>,
+    /// DM-RS per ī_SSB, real and imaginary parts.
+    dmrs: Vec<[[f32; DMRS_LEN]; 2]>,
     threshold: f64,
     phase_step: f64,
     cfo_cycles: f64,
@@ -133,7 +135,10 @@ impl<const A: usize> Tracker<A> {
             decoder: BroadcastDecoder::new(&config),
             searcher,
             references: (0..8).map(|ibar_ssb| pilots(pci, ibar_ssb)).collect(),
-            dmrs: (0..8).map(|ibar_ssb| dmrs(pci, ibar_ssb)).collect(),
+            dmrs: (0..8)
+                .map(|ibar_ssb| dmrs(pci, ibar_ssb))
+                .map(|r| [r.map(|r| r.re), r.map(|r| r.im)])
+                .collect(),
             threshold: exponential_sum_threshold(A, FALSE_ALARM),
             phase_step: cell.symbol_phase_step_rad,
             cfo_cycles: cell.cfo_hz / base_rate_hz,
@@ -242,7 +247,7 @@ impl<const A: usize> Tracker<A> {
         } = &mut self.acquirer;
         estimate.fold(grids, reference, &phases);
         estimate.estimate_noise();
-        let delay = timing::refine(&estimate.rows, 0.0, 2);
+        let delay = timing::refine_combined(&estimate.rows);
         let (blocks, pilots) = despread(grids, reference, delay);
         let noise_variance = std::array::from_fn(|antenna| estimate.noise_variance[antenna]);
         alignment.shift(delay)?;
@@ -310,12 +315,9 @@ impl<const A: usize> Tracker<A> {
         if statistic.is_nan() || statistic <= self.threshold {
             return None;
         }
-        let fit = |sequence: &[Complex32; DMRS_LEN]| -> f32 {
-            combined
-                .iter()
-                .zip(sequence)
-                .map(|(w, r)| w.re * r.re + w.im * r.im)
-                .sum()
+        let (re, im) = (combined.map(|w| w.re), combined.map(|w| w.im));
+        let fit = |[real, imaginary]: &[[f32; DMRS_LEN]; 2]| {
+            inner_product(&re, real) + inner_product(&im, imaginary)
         };
         let fits = self.dmrs.iter().map(fit).zip(0..);
         fits.max_by(|a, b| a.0.total_cmp(&b.0))
@@ -331,7 +333,7 @@ impl<const A: usize> Tracker<A> {
             ..
         } = &mut self.acquirer;
         estimate.fold(grids, reference, &alignment.symbol_phases());
-        estimate.fit();
+        estimate.fit(grids, reference);
         let acquired = Acquired {
             pci: self.pci,
             ibar_ssb,
@@ -339,9 +341,8 @@ impl<const A: usize> Tracker<A> {
             statistic: 0.0,
         };
         let broadcast = self.decoder.decode(&self.acquirer, &acquired)?;
-        self.acquirer
-            .know_pbch(self.pci, &broadcast.decoded.symbols());
-        Some(broadcast.decoded.payload)
+        self.acquirer.know_pbch(self.pci, &broadcast.symbols);
+        Some(broadcast.payload)
     }
 
     /// Moves the frequency offset by the PSS–SSS phase, weighted by what noise leaves of it.
@@ -434,7 +435,7 @@ fn despread<const A: usize>(
         pilots[l] = energy.round() as u16;
         let scale = 1.0 / f64::from(energy.max(1.0)).sqrt();
         for (slot, grid) in blocks[l].iter_mut().zip(grids) {
-            let sum: Complex32 = grid[l].iter().zip(&weights).map(|(y, w)| y * w).sum();
+            let sum = complex_product(&grid[l], &weights);
             *slot = Complex64::new(f64::from(sum.re), f64::from(sum.im)) * scale;
         }
     }
