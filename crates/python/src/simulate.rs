@@ -128,10 +128,7 @@ impl CustomEstimator for PythonEstimator {
                 .map(|antenna| snapshots.iter().map(|snapshot| snapshot[antenna]).collect())
                 .collect();
             let array = PyArray2::from_vec2(py, &rows).map_err(PyErr::from)?;
-            self.0
-                .call1(py, (array,))?
-                .extract::<f64>(py)
-                .map_err(PyErr::from)
+            self.0.call1(py, (array,))?.extract::<f64>(py)
         });
         Ok(angle?)
     }
@@ -150,10 +147,7 @@ impl Controller for PythonController {
     ) -> Result<f64, BoxError> {
         let wake_up_time_s = Python::attach(|py| {
             let arguments = (snr_error, velocity_error, interval_s);
-            self.0
-                .call1(py, arguments)?
-                .extract::<f64>(py)
-                .map_err(PyErr::from)
+            self.0.call1(py, arguments)?.extract::<f64>(py)
         });
         Ok(wake_up_time_s?)
     }
@@ -166,19 +160,22 @@ fn custom(estimator: Option<&Py<PyAny>>, policy: Option<&Py<PyAny>>) -> Custom {
     })
 }
 
+/// A column's name, and its value in a row.
+type Column<R> = (&'static str, fn(&R) -> f64);
+
 /// A column from the rows of a table.
-fn column<'py, R, T: Element>(
-    py: Python<'py>,
+fn column<R, T: Element>(
+    py: Python<'_>,
     rows: impl IntoIterator<Item = R>,
     value: impl Fn(R) -> T,
-) -> Bound<'py, PyArray1<T>> {
+) -> Bound<'_, PyArray1<T>> {
     PyArray1::from_vec(py, rows.into_iter().map(value).collect())
 }
 
 fn steps(py: Python<'_>, campaign: &Campaign) -> PyResult<Py<PyDict>> {
     let table = PyDict::new(py);
     table.set_item("time_s", column(py, &campaign.time_s, |time_s| *time_s))?;
-    let columns: [(&str, fn(&StepStatistics) -> f64); 8] = [
+    let columns: [Column<StepStatistics>; 8] = [
         ("mean_abs_error_x_m", |step| step.mean_abs_error_x_m),
         ("mean_abs_error_y_m", |step| step.mean_abs_error_y_m),
         ("rms_error_m", |step| step.rms_error_m),
@@ -201,7 +198,7 @@ fn run_table(py: Python<'_>, campaign: &Campaign) -> PyResult<Py<PyDict>> {
     table.set_item("run", column(py, runs, |run| run.run))?;
     table.set_item("executions", column(py, runs, |run| run.executions as u64))?;
     table.set_item("listened", column(py, runs, |run| run.listened as u64))?;
-    let columns: [(&str, fn(&RunSummary) -> f64); 7] = [
+    let columns: [Column<RunSummary>; 7] = [
         ("energy_j", |run| {
             run.energy.map_or(f64::NAN, |energy| energy.total_j())
         }),
@@ -232,7 +229,7 @@ fn trajectories(py: Python<'_>, records: &[RunRecord]) -> PyResult<Py<PyDict>> {
         .iter()
         .flat_map(|record| record.steps.iter().map(|_| record.run));
     table.set_item("run", column(py, runs, |run| run))?;
-    let columns: [(&str, fn(&Step) -> f64); 16] = [
+    let columns: [Column<Step>; 16] = [
         ("time_s", |step| step.time_s),
         ("x_m", |step| step.estimate.x_m),
         ("y_m", |step| step.estimate.y_m),
@@ -280,7 +277,7 @@ fn executions(py: Python<'_>, records: &[RunRecord]) -> PyResult<Py<PyDict>> {
         "ssb_index",
         column(py, rows(), |execution| execution.ssb.ssb_index),
     )?;
-    let columns: [(&str, fn(&Execution) -> f64); 8] = [
+    let columns: [Column<Execution>; 8] = [
         ("sensed_snr_db", |execution| execution.ssb.snr_db),
         ("phase_rad", |execution| {
             measured(execution, |angle| angle.phase_rad)

@@ -21,13 +21,76 @@ pub(crate) fn parse(text: &str, file: &str) -> Result<Table, ScenarioError> {
 pub(crate) fn settings<T: DeserializeOwned>(table: Table, file: &str) -> Result<T, ScenarioError> {
     let value = Value::Table(table);
     refuse_not_finite(&value, "", file)?;
-    serde_path_to_error::deserialize(value).map_err(|error| {
+    read::<T>(&value).map_err(|defect| {
+        let path = precise_path::<T>(&value, &defect);
+        explain(file, &path, &defect.message)
+    })
+}
+
+/// What serde says is wrong, and where as far as it knows.
+struct Defect {
+    path: String,
+    message: String,
+}
+
+fn read<T: DeserializeOwned>(value: &Value) -> Result<T, Defect> {
+    serde_path_to_error::deserialize(value.clone()).map_err(|error| {
         let path = error.path().to_string();
         let message = error.inner().to_string();
-        // The TOML reader adds the path on a second line, less precisely.
-        let message = message.lines().next().unwrap_or_default();
-        explain(file, if path == "." { "" } else { &path }, message)
+        Defect {
+            path: if path == "." { String::new() } else { path },
+            // The TOML reader adds the path on a second line, less precisely.
+            message: message.lines().next().unwrap_or_default().to_owned(),
+        }
     })
+}
+
+/// The path of the offending key. serde's own path ends at tables with a tag, which it reads ahead
+/// as a whole; inside them the offender is the key without which this defect is gone.
+fn precise_path<T: DeserializeOwned>(value: &Value, defect: &Defect) -> String {
+    let mut path = defect.path.clone();
+    let gone = |key: &str| match read::<T>(&without(value, key)) {
+        Ok(_) => true,
+        Err(other) => {
+            other.message != defect.message && !other.message.starts_with("missing field")
+        }
+    };
+    while let Some(Value::Table(table)) = at(value, &path) {
+        let candidates = table.keys().map(|key| join(&path, key));
+        let Some(offender) = candidates.into_iter().find(|candidate| gone(candidate)) else {
+            break;
+        };
+        path = offender;
+    }
+    path
+}
+
+fn at<'a>(value: &'a Value, path: &str) -> Option<&'a Value> {
+    steps(path).try_fold(value, |here, step| match step.parse::<usize>() {
+        Ok(index) => here.get(index),
+        Err(_) => here.get(step),
+    })
+}
+
+fn without(value: &Value, path: &str) -> Value {
+    let mut copy = value.clone();
+    if let Some((key, parents)) = steps(path).collect::<Vec<_>>().split_last() {
+        let table = parents
+            .iter()
+            .try_fold(&mut copy, |here, step| match step.parse::<usize>() {
+                Ok(index) => here.get_mut(index),
+                Err(_) => here.get_mut(step),
+            });
+        if let Some(table) = table.and_then(Value::as_table_mut) {
+            table.remove(*key);
+        }
+    }
+    copy
+}
+
+/// `radio_heads[0].pci` as `radio_heads`, `0`, `pci`.
+fn steps(path: &str) -> impl Iterator<Item = &str> {
+    path.split(['.', '[', ']']).filter(|step| !step.is_empty())
 }
 
 /// serde says what it expected in words; put them into the error's fields.
