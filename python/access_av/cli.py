@@ -11,6 +11,7 @@ from typing import Annotated, Any
 import typer
 
 from access_av import RecordingError, ScenarioError, __version__
+from access_av.cli_nr import app as nr_commands
 from access_av.errors import InputError
 from access_av.terminal import console, errors, progress
 
@@ -298,6 +299,8 @@ def _files_app(what: str) -> typer.Typer:
 
     return files
 
+
+app.add_typer(nr_commands)
 
 for _what in ("scenario", "platform"):
     app.add_typer(_files_app(_what), name=_what)

@@ -95,7 +95,7 @@ def estimate_bursts(
     if not annotations:
         raise InputError(f"{path}: no `annotations`, so it is not known where the bursts are")
     if spacing_wavelengths is None:
-        spacing_wavelengths = _stated_spacing(metadata, recording.centre_frequency_hz)
+        spacing_wavelengths = stated_spacing(metadata, recording.centre_frequency_hz)
     if spacing_wavelengths is None:
         raise InputError(f"{path}: the metadata states no antenna spacing; give --spacing")
 
@@ -113,7 +113,7 @@ def estimate_bursts(
         found = aoa.maximum_likelihood(
             _equalised(snapshots),
             spacing_wavelengths=spacing_wavelengths,
-            calibration=_stated_calibration(truth, calibration),
+            calibration=stated_calibration(truth, calibration),
         )
         bursts.append(
             BurstAngle(
@@ -138,7 +138,7 @@ def mean_absolute_error_deg(bursts: Sequence[BurstAngle]) -> float | None:
     return sum(errors) / len(errors) if errors else None
 
 
-def _stated_spacing(metadata: dict[str, Any], frequency_hz: float | None) -> float | None:
+def stated_spacing(metadata: dict[str, Any], frequency_hz: float | None) -> float | None:
     """Spacing in wavelengths from an annotation's truth, or from the description's metres."""
     for annotation in metadata["annotations"]:
         spacing = annotation.get("aoa:truth", {}).get("element_spacing_wavelengths")
@@ -157,9 +157,10 @@ def _equalised(snapshots: NDArray[np.complex64]) -> NDArray[np.complex64]:
     return (snapshots / np.sqrt(np.where(power > 0.0, power, 1.0))).astype(np.complex64)
 
 
-def _stated_calibration(
+def stated_calibration(
     truth: dict[str, Any], reference: NDArray[np.complex128] | None
 ) -> NDArray[np.complex128] | None:
+    """Phases of the channels that an annotation states, else those of the ``reference``."""
     if "channel_calibration_re" not in truth:
         return reference
     gains = np.array(truth["channel_calibration_re"]) + 1j * np.array(

@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 from contextlib import contextmanager
-from typing import TYPE_CHECKING
+from typing import TYPE_CHECKING, Any
 
 from rich import box
 from rich.console import Console
@@ -119,6 +119,32 @@ def show_bursts(bursts: Sequence[BurstAngle]) -> None:
     error_deg = mean_absolute_error_deg(bursts)
     if error_deg is not None:
         console.print(f"Mean absolute error {error_deg:.2f}° over {len(bursts)} bursts.")
+
+
+def show_cells(title: str, cells: Sequence[dict[str, Any]]) -> None:
+    """SSBs of one recording, one a row."""
+    with_angles = any("angle_deg" in cell for cell in cells)
+    head = ["PCI", "SSB", "SFN", "SNR dB", "CFO Hz", "sample", "MHz", "kHz"]
+    made = table([*head, *(["azimuth °", "σ °"] if with_angles else [])], title=title, text=0)
+    for cell in cells:
+        row = [
+            str(cell["pci"]),
+            str(cell["ssb_index"]),
+            "–" if cell["sfn"] is None else str(cell["sfn"]),
+            f"{cell['snr_db']:.1f}",
+            f"{cell['cfo_hz']:.1f}",
+            str(cell["sample_start"]),
+            f"{cell['ssb_freq_hz'] / 1e6:.3f}",
+            str(cell["scs_khz"]),
+        ]
+        if with_angles:
+            angle = "azimuth_deg" in cell
+            row += [
+                f"{cell['azimuth_deg']:.2f}" if angle else "–",
+                f"{cell['sigma_deg']:.3f}" if angle else "–",
+            ]
+        made.add_row(*row)
+    console.print(made)
 
 
 def show_evaluation(evaluation: Evaluation) -> None:

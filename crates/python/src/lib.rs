@@ -1,5 +1,6 @@
 //! `access_av._core`: the bindings, nothing else. One file per room of the core.
 mod aoa;
+mod nr;
 mod recording;
 mod scenario;
 mod simulate;
@@ -27,6 +28,20 @@ mod _core {
             modules.set_item("access_av._core.aoa", module)
         }
     }
+
+    #[pymodule]
+    mod nr {
+        #[pymodule_export]
+        use crate::nr::{Cell, Scan, build_burst, scan, search};
+        use pyo3::prelude::*;
+
+        #[pymodule_init]
+        fn init(module: &Bound<'_, PyModule>) -> PyResult<()> {
+            let modules = module.py().import("sys")?.getattr("modules")?;
+            modules.set_item("access_av._core.nr", module)
+        }
+    }
+
     #[pymodule_export]
     use crate::recording::{Recording, RecordingError};
     #[pymodule_export]

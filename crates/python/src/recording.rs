@@ -48,6 +48,13 @@ impl From<CoreRecording> for Recording {
     }
 }
 
+impl Recording {
+    /// The core's recording.
+    pub fn core_mut(&mut self) -> &mut CoreRecording {
+        &mut self.core
+    }
+}
+
 #[pymethods]
 impl Recording {
     /// Open a SigMF recording by its name, its `.sigmf-meta` or its `.sigmf-data`.

@@ -6,6 +6,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from access_av._core import aoa as aoa
+from access_av._core import nr as nr
 
 __all__ = [
     "Platform",
@@ -16,6 +17,7 @@ __all__ = [
     "SimulationResult",
     "__version__",
     "aoa",
+    "nr",
     "simulate",
 ]
 

@@ -1,0 +1,407 @@
+//! SSBs: finding them in samples and recordings, building them. `access_av._core.nr`.
+
+use access_av::receive::{
+    ArraySetup, FoundSsb, IqSource, SampleBlock, Scan as CoreScan, ScanError, ScanSettings,
+};
+use aoa::AngleEstimate;
+use nr_ssb::{BchPayload, Beam, Burst, Case, Lmax, Mib, Numerology, Ofdm, Pci, SubcarrierSpacing};
+use num_complex::{Complex32, Complex64};
+use numpy::{PyArray1, PyArrayDyn, PyArrayMethods, PyReadonlyArrayDyn, PyUntypedArrayMethods};
+use pyo3::exceptions::PyValueError;
+use pyo3::prelude::*;
+use pyo3::types::PyDict;
+
+use crate::recording::{Recording, RecordingError};
+
+/// One SSB of a cell, as it was received.
+///
+/// Attributes
+/// ----------
+/// pci : int
+///     Physical cell identity, 0 to 1007.
+/// ssb_index : int
+///     Index of the SSB in its burst, that is its beam.
+/// lmax : int
+///     SSB indices that the cell has, 4 or 8.
+/// half_frame : int or None
+///     1 in the second half of a frame; unknown without a decoded PBCH.
+/// sfn : int or None
+///     System frame number, if the PBCH's checksum held.
+/// mib_bits : str or None
+///     The 24 bits of the master information block, `0` and `1`, the first sent first.
+/// cfo_hz : float
+///     Carrier frequency offset.
+/// snr_db : float
+///     Per resource element, mean over the antennas.
+/// sample_start : float
+///     First sample of the SSB, its cyclic prefix included, at the recording's own rate.
+/// sample_count : float
+///     Its length at that rate.
+/// ssb_freq_hz, scs_khz : float, int
+///     Frequency of its centre, and its subcarrier spacing.
+/// rsrp_dbfs, rsrq_db, sinr_db : list of float
+///     SS-RSRP, SS-RSRQ and SS-SINR of each antenna (TS 38.215).
+/// angle_rad, sigma_rad : float or None
+///     Angle of arrival from the array's axis and its standard deviation; with 2 to 8 antennas.
+/// phase_rad, phase_sigma_rad : float or None
+///     The electrical angle behind it.
+/// azimuth_rad : float or None
+///     Counter-clockwise from broadside, for an array numbered from right to left:
+///     a quarter turn less `angle_rad`.
+/// verdict : str or None
+///     `resolved`, or why the angle may not be relied on.
+#[pyclass(frozen, get_all, module = "access_av._core.nr")]
+pub struct Cell {
+    pci: u16,
+    ssb_index: u8,
+    lmax: u8,
+    half_frame: Option<u8>,
+    sfn: Option<u16>,
+    mib_bits: Option<String>,
+    cfo_hz: f64,
+    snr_db: f64,
+    sample_start: f64,
+    sample_count: f64,
+    ssb_freq_hz: f64,
+    scs_khz: u32,
+    rsrp_dbfs: Vec<f64>,
+    rsrq_db: Vec<f64>,
+    sinr_db: Vec<f64>,
+    angle_rad: Option<f64>,
+    sigma_rad: Option<f64>,
+    phase_rad: Option<f64>,
+    phase_sigma_rad: Option<f64>,
+    azimuth_rad: Option<f64>,
+    verdict: Option<String>,
+}
+
+impl From<&FoundSsb> for Cell {
+    fn from(found: &FoundSsb) -> Self {
+        let ssb = &found.ssb;
+        let measured = ssb.measurements();
+        let of_angle = |part: fn(&AngleEstimate) -> f64| found.angle.as_ref().map(part);
+        Self {
+            pci: ssb.pci.get(),
+            ssb_index: ssb.ssb_index,
+            lmax: ssb.lmax.count(),
+            half_frame: ssb.half_frame.map(u8::from),
+            sfn: ssb.payload.map(|payload| payload.sfn()),
+            mib_bits: ssb.payload.map(|payload| payload.mib.bit_string()),
+            cfo_hz: ssb.cfo_hz,
+            snr_db: ssb.snr_db,
+            sample_start: found.sample_start,
+            sample_count: found.sample_count,
+            ssb_freq_hz: found.ssb_freq_hz,
+            scs_khz: found.spacing.khz(),
+            rsrp_dbfs: measured.iter().map(|it| it.ss_rsrp_dbfs).collect(),
+            rsrq_db: measured.iter().map(|it| it.ss_rsrq_db).collect(),
+            sinr_db: measured.iter().map(|it| it.ss_sinr_db).collect(),
+            angle_rad: of_angle(|angle| angle.angle_rad),
+            sigma_rad: of_angle(|angle| angle.sigma_rad),
+            phase_rad: of_angle(|angle| angle.phase_rad),
+            phase_sigma_rad: of_angle(|angle| angle.phase_sigma_rad),
+            azimuth_rad: of_angle(|angle| std::f64::consts::FRAC_PI_2 - angle.angle_rad),
+            verdict: found.angle.map(|angle| angle.verdict.to_string()),
+        }
+    }
+}
+
+#[pymethods]
+impl Cell {
+    fn __repr__(&self) -> String {
+        format!(
+            "Cell(pci={}, ssb_index={}, sfn={}, snr_db={:.1}, sample_start={:.2})",
+            self.pci,
+            self.ssb_index,
+            self.sfn
+                .map_or_else(|| "None".to_owned(), |sfn| sfn.to_string()),
+            self.snr_db,
+            self.sample_start,
+        )
+    }
+}
+
+/// What a scan of a recording found.
+///
+/// Attributes
+/// ----------
+/// cells : list of Cell
+///     The SSBs in order of time.
+/// faults : list of str
+///     What is wrong with single channels: clipped, silent, exchanged.
+#[pyclass(frozen, get_all, module = "access_av._core.nr")]
+pub struct Scan {
+    cells: Vec<Py<Cell>>,
+    faults: Vec<String>,
+}
+
+#[pymethods]
+impl Scan {
+    #[new]
+    fn new(cells: Vec<Py<Cell>>, faults: Vec<String>) -> Self {
+        Self { cells, faults }
+    }
+}
+
+impl Scan {
+    fn of(py: Python<'_>, scan: &CoreScan) -> PyResult<Self> {
+        Ok(Self {
+            cells: scan
+                .ssbs
+                .iter()
+                .map(|ssb| Py::new(py, Cell::from(ssb)))
+                .collect::<Result<_, _>>()?,
+            faults: scan.faults.iter().map(ToString::to_string).collect(),
+        })
+    }
+}
+
+/// Find every SSB of a recording.
+///
+/// Parameters
+/// ----------
+/// recording : Recording
+///     The recording; its rate must be an integer multiple of 3.84 MHz.
+/// centre_frequency_hz : float, optional
+///     In place of what the recording states.
+/// ssb_freq_hz : float, optional
+///     Absolute frequency of the SSB's centre; the synchronization raster is searched without.
+/// scs_khz : int, optional
+///     Subcarrier spacing, 15 or 30; both are tried without.
+/// spacing_wavelengths : float
+///     Distance between neighbouring antennas.
+/// calibration : array_like, optional
+///     Complex gain of each channel, by which it is divided.
+///
+/// Raises
+/// ------
+/// RecordingError
+///     A rate, band or length that cannot be searched; samples that are not finite.
+#[pyfunction]
+#[pyo3(signature = (recording, *, centre_frequency_hz = None, ssb_freq_hz = None, scs_khz = None, spacing_wavelengths = 0.5, calibration = None))]
+pub fn scan(
+    py: Python<'_>,
+    recording: &mut Recording,
+    centre_frequency_hz: Option<f64>,
+    ssb_freq_hz: Option<f64>,
+    scs_khz: Option<u32>,
+    spacing_wavelengths: f64,
+    calibration: Option<Vec<Complex64>>,
+) -> PyResult<Scan> {
+    let settings = ScanSettings {
+        ssb_freq_hz,
+        spacing: scs_khz.map(subcarrier_spacing).transpose()?,
+        centre_frequency_hz,
+        array: ArraySetup {
+            spacing_wavelengths,
+            calibration,
+        },
+    };
+    let core = recording.core_mut();
+    let found = py
+        .detach(|| access_av::receive::scan(core, &settings))
+        .map_err(scan_error)?;
+    Scan::of(py, &found)
+}
+
+/// Find every SSB in samples.
+///
+/// Parameters
+/// ----------
+/// samples : ndarray
+///     Complex samples, `(samples,)` or `(antennas, samples)`.
+/// sample_rate_hz : float
+///     An integer multiple of 3.84 MHz.
+/// centre_frequency_hz : float
+///     Frequency that stands at 0 Hz in the samples.
+/// ssb_freq_hz, scs_khz, spacing_wavelengths, calibration
+///     As for `scan`.
+///
+/// Returns
+/// -------
+/// list of Cell
+///     The SSBs in order of time.
+///
+/// Examples
+/// --------
+/// >>> from access_av import nr
+/// >>> burst = nr.build_burst(42, ssb_indices=[1], sfn=7, ssb_freq_hz=3.7008e9)
+/// >>> [cell] = nr.search(burst, 7.68e6, centre_frequency_hz=3.7008e9, ssb_freq_hz=3.7008e9)
+/// >>> cell.pci, cell.ssb_index, cell.sfn
+/// (42, 1, 7)
+#[pyfunction]
+#[pyo3(signature = (samples, sample_rate_hz, *, centre_frequency_hz, ssb_freq_hz = None, scs_khz = None, spacing_wavelengths = 0.5, calibration = None))]
+#[allow(clippy::too_many_arguments)]
+pub fn search(
+    py: Python<'_>,
+    samples: &Bound<'_, PyAny>,
+    sample_rate_hz: f64,
+    centre_frequency_hz: f64,
+    ssb_freq_hz: Option<f64>,
+    scs_khz: Option<u32>,
+    spacing_wavelengths: f64,
+    calibration: Option<Vec<Complex64>>,
+) -> PyResult<Vec<Py<Cell>>> {
+    let samples = complex_samples(samples)?;
+    let length = samples.shape().last().copied().unwrap_or(0);
+    let flat = samples.as_slice()?;
+    let settings = ScanSettings {
+        ssb_freq_hz,
+        spacing: scs_khz.map(subcarrier_spacing).transpose()?,
+        centre_frequency_hz: None,
+        array: ArraySetup {
+            spacing_wavelengths,
+            calibration,
+        },
+    };
+    let mut block = SampleBlock {
+        antennas: flat.chunks_exact(length.max(1)).collect(),
+        sample_rate_hz,
+        centre_frequency_hz: Some(centre_frequency_hz),
+    };
+    let source: &mut (dyn IqSource + Send) = &mut block;
+    let found = py
+        .detach(|| access_av::receive::scan(source, &settings))
+        .map_err(scan_error)?;
+    Scan::of(py, &found).map(|scan| scan.cells)
+}
+
+/// Build one burst set: what a cell sends in a half frame of 5 ms, SSB centred at 0 Hz.
+///
+/// Parameters
+/// ----------
+/// pci : int
+///     Physical cell identity, 0 to 1007.
+/// ssb_indices : sequence of int
+///     The SSBs that are sent.
+/// gains : sequence of complex, optional
+///     Amplitude of each of them; 1 without.
+/// case : str
+///     Where they lie in time (TS 38.213, 4.1): `A` (15 kHz), `B` or `C` (30 kHz).
+/// lmax : int
+///     SSB indices that the cell has, 4 or 8.
+/// sfn : int
+///     System frame number, 0 to 1023.
+/// half_frame : bool
+///     Second half of the frame.
+/// mib_bits : str, optional
+///     24 bits of the master information block; the frame number in them is `sfn`'s.
+/// ssb_freq_hz : float, optional
+///     Absolute frequency of the SSB's centre, for the phase of each symbol (TS 38.211, 5.4);
+///     without it there is no such phase.
+/// sample_rate_hz : float
+///     256, 512, 1024, ... times the subcarrier spacing.
+///
+/// Returns
+/// -------
+/// ndarray
+///     complex64, 5 ms. A resource element of amplitude one has power 1 / FFT size squared.
+///
+/// Raises
+/// ------
+/// ValueError
+///     A value out of its range; the message says which is allowed.
+#[pyfunction]
+#[pyo3(signature = (pci, *, ssb_indices = vec![0], gains = None, case = "C", lmax = 8, sfn = 0, half_frame = false, mib_bits = None, ssb_freq_hz = None, sample_rate_hz = 7.68e6))]
+#[allow(clippy::too_many_arguments, clippy::needless_pass_by_value)] // Python's keywords
+pub fn build_burst<'py>(
+    py: Python<'py>,
+    pci: u16,
+    ssb_indices: Vec<u8>,
+    gains: Option<Vec<Complex32>>,
+    case: &str,
+    lmax: u8,
+    sfn: u16,
+    half_frame: bool,
+    mib_bits: Option<&str>,
+    ssb_freq_hz: Option<f64>,
+    sample_rate_hz: f64,
+) -> PyResult<Bound<'py, PyArray1<Complex32>>> {
+    let wrong = |error: nr_ssb::Error| PyValueError::new_err(error.to_string());
+    let case = match case {
+        "A" => Case::A,
+        "B" => Case::B,
+        "C" => Case::C,
+        other => {
+            return Err(PyValueError::new_err(format!(
+                "case is {other:?}; allowed: A, B, C"
+            )));
+        }
+    };
+    let lmax = match lmax {
+        4 => Lmax::L4,
+        8 => Lmax::L8,
+        other => {
+            return Err(PyValueError::new_err(format!(
+                "lmax is {other}; allowed: 4, 8"
+            )));
+        }
+    };
+    let gains = gains.unwrap_or_else(|| vec![Complex32::ONE; ssb_indices.len()]);
+    if gains.len() != ssb_indices.len() {
+        return Err(PyValueError::new_err(format!(
+            "{} gains for {} SSBs; each needs one",
+            gains.len(),
+            ssb_indices.len()
+        )));
+    }
+    let mib = mib_bits.map_or_else(|| Ok(Mib::default()), master_information_block)?;
+    let beam = |(ssb_index, gain)| Beam { ssb_index, gain };
+    let burst = Burst {
+        pci: Pci::new(pci).map_err(wrong)?,
+        case,
+        lmax,
+        payload: BchPayload::new(mib, sfn, half_frame, 0).map_err(wrong)?,
+        beams: ssb_indices.into_iter().zip(gains).map(beam).collect(),
+        ssb_freq_hz,
+    };
+    let numerology = Numerology::from_sample_rate(case.spacing(), sample_rate_hz).map_err(wrong)?;
+    let samples = burst.iq(&mut Ofdm::new(numerology)).map_err(wrong)?;
+    Ok(PyArray1::from_vec(py, samples))
+}
+
+fn master_information_block(bits: &str) -> PyResult<Mib> {
+    let number = u32::from_str_radix(bits, 2)
+        .ok()
+        .filter(|_| bits.len() == 24);
+    let number = number.ok_or_else(|| {
+        PyValueError::new_err(format!(
+            "mib_bits is {bits:?}; it must be 24 characters 0 or 1"
+        ))
+    })?;
+    Mib::from_bits(number).map_err(|error| PyValueError::new_err(error.to_string()))
+}
+
+fn subcarrier_spacing(khz: u32) -> PyResult<SubcarrierSpacing> {
+    match khz {
+        15 => Ok(SubcarrierSpacing::Khz15),
+        30 => Ok(SubcarrierSpacing::Khz30),
+        other => Err(PyValueError::new_err(format!(
+            "scs_khz is {other}; allowed: 15, 30"
+        ))),
+    }
+}
+
+#[allow(clippy::needless_pass_by_value)] // the shape that `map_err` wants
+fn scan_error(error: ScanError) -> PyErr {
+    RecordingError::new_err(error.to_string())
+}
+
+/// One or two axes of complex64, row by row; what is already so is not copied.
+fn complex_samples<'py>(
+    samples: &Bound<'py, PyAny>,
+) -> PyResult<PyReadonlyArrayDyn<'py, Complex32>> {
+    let py = samples.py();
+    let keywords = PyDict::new(py);
+    keywords.set_item("dtype", "complex64")?;
+    let numpy = py.import("numpy")?;
+    let array = numpy.call_method("ascontiguousarray", (samples,), Some(&keywords))?;
+    let array = array.cast_into::<PyArrayDyn<Complex32>>()?.try_readonly()?;
+    if !(1..=2).contains(&array.ndim()) {
+        return Err(PyValueError::new_err(format!(
+            "samples must have the shape (samples,) or (antennas, samples), not {:?}",
+            array.shape()
+        )));
+    }
+    Ok(array)
+}
