@@ -1,4 +1,6 @@
-//! Times of single estimates from four antennas and twenty snapshots, covariance included.
+//! Times of estimates from four antennas and twenty snapshots, covariance included.
+
+#![allow(clippy::unwrap_used)]
 
 use aoa::{Array, Batch, Complex64, Covariance, Method};
 use divan::{Bencher, black_box, counter::ItemsCount};

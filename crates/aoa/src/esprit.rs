@@ -49,8 +49,8 @@ pub(crate) fn total_least_squares<const N: usize>(
 ) -> Option<List<f64, N>> {
     // Room for the bases of both subarrays side by side.
     match 2 * sources {
-        ..=8 => total::<N, 8>(eigen, sources),
-        ..=16 => total::<N, 16>(eigen, sources),
+        0..=8 => total::<N, 8>(eigen, sources),
+        9..=16 => total::<N, 16>(eigen, sources),
         _ => total::<N, 64>(eigen, sources),
     }
 }

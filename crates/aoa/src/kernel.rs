@@ -1,29 +1,35 @@
 //! The inner loops over samples: portable, and for the vector instructions that a processor may have.
 
+mod portable;
 #[cfg(target_arch = "x86_64")]
 mod x86;
 
 use num_complex::Complex;
 
-use crate::Complex64;
-use crate::covariance::{Matrix, zeros};
+use crate::covariance::Matrix;
+use crate::peak::Spectra;
 
 /// A real sample type: `f32` or `f64`.
 pub trait Real: sealed::Kernel + Into<f64> + Send + Sync + 'static {}
 impl Real for f32 {}
 impl Real for f64 {}
 
-pub(crate) mod sealed {
-    use super::{Complex, Complex64, Matrix};
+mod sealed {
+    use super::{Complex, Matrix, Spectra};
 
-    /// What is compiled for each type.
+    /// What is compiled for each type. Reachable by name for nobody else.
     pub trait Kernel: Copy {
         /// `sum_t x_t x_t^H`.
         fn products<const N: usize>(channels: &[&[Complex<Self>]; N]) -> Matrix<N>;
 
-        /// Sums along the diagonals of `sum_t x_t x_t^H`:
-        /// `lag[k] = sum_t sum_n x_(n+k) conj(x_n)`.
-        fn lag_sums<const N: usize>(channels: &[&[Complex<Self>]; N]) -> [Complex64; N];
+        /// The spectrum `a^H (sum_t x_t x_t^H) a` of each item of row-major samples
+        /// `(items, N, snapshots)`, up to `W` of them: its coefficients are
+        /// `c_k = sum_t sum_n x_(n+k) conj(x_n)`.
+        fn spectra<const N: usize, const W: usize>(
+            samples: &[Complex<Self>],
+            snapshots: usize,
+            spectra: &mut Spectra<N, W>,
+        );
     }
 }
 
@@ -85,19 +91,23 @@ macro_rules! kernel {
             #[inline]
             fn products<const N: usize>(channels: &[&[Complex<$real>]; N]) -> Matrix<N> {
                 dispatch!(
-                    products(channels),
+                    portable::products(channels),
                     x86::$avx2::products(channels),
                     x86::$avx512::products(channels)
                 )
             }
 
             #[inline]
-            fn lag_sums<const N: usize>(channels: &[&[Complex<$real>]; N]) -> [Complex64; N] {
+            fn spectra<const N: usize, const W: usize>(
+                samples: &[Complex<$real>],
+                snapshots: usize,
+                spectra: &mut Spectra<N, W>,
+            ) {
                 dispatch!(
-                    lag_sums(channels),
-                    x86::$avx2::lag_sums(channels),
-                    x86::$avx512::lag_sums(channels)
-                )
+                    portable::spectra(samples, snapshots, spectra),
+                    x86::$avx2::spectra(samples, snapshots, spectra),
+                    x86::$avx512::spectra(samples, snapshots, spectra)
+                );
             }
         }
     };
@@ -106,53 +116,24 @@ kernel!(f64, avx2_f64, avx512_f64);
 // Twenty samples of f32 fill five registers of AVX2, and two and a half of AVX-512.
 kernel!(f32, avx2_f32, avx2_f32);
 
-fn correlation<T: Real>(x: &[Complex<T>], y: &[Complex<T>]) -> Complex64 {
-    let wide = |z: &Complex<T>| Complex64::new(z.re.into(), z.im.into());
-    let (mut even, mut odd) = (Complex64::ZERO, Complex64::ZERO);
-    for (x, y) in x.chunks(2).zip(y.chunks(2)) {
-        even += wide(&x[0]) * wide(&y[0]).conj();
-        if let ([_, x], [_, y]) = (x, y) {
-            odd += wide(x) * wide(y).conj();
-        }
-    }
-    even + odd
-}
-
-fn products<T: Real, const N: usize>(channels: &[&[Complex<T>]; N]) -> Matrix<N> {
-    let mut matrix = zeros::<N>();
-    for i in 0..N {
-        for j in 0..=i {
-            matrix[i][j] = correlation(channels[i], channels[j]);
-            matrix[j][i] = matrix[i][j].conj();
-        }
-    }
-    matrix
-}
-
-fn lag_sums<T: Real, const N: usize>(channels: &[&[Complex<T>]; N]) -> [Complex64; N] {
-    let mut lags = [Complex64::ZERO; N];
-    for i in 0..N {
-        for j in 0..=i {
-            lags[i - j] += correlation(channels[i], channels[j]);
-        }
-    }
-    lags
-}
-
 #[cfg(test)]
 mod tests {
     use super::*;
 
     /// Whatever this processor has is compared with the portable code, for all remainders.
-    fn check<T: Real>(make: impl Fn(usize, usize) -> Complex<T>) {
-        for length in 0..23 {
-            let rows: [Vec<Complex<T>>; 4] =
-                std::array::from_fn(|n| (0..length).map(|t| make(n, t)).collect());
-            let channels = std::array::from_fn(|n| rows[n].as_slice());
-            for (fast, plain) in T::lag_sums::<4>(&channels).iter().zip(lag_sums(&channels)) {
-                assert!((fast - plain).norm() < 1e-4, "{fast} {plain}");
+    fn check<T: Real>(make: impl Fn(usize) -> Complex<T>) {
+        for length in 1..23 {
+            let samples: Vec<Complex<T>> = (0..8 * length).map(&make).collect();
+            let (mut fast, mut plain) = (Spectra::<4, 3>::ZERO, Spectra::<4, 3>::ZERO);
+            T::spectra(&samples, length, &mut fast);
+            portable::spectra(&samples, length, &mut plain);
+            for (fast, plain) in [(fast.re, plain.re), (fast.im, plain.im)] {
+                for (fast, plain) in fast.iter().flatten().zip(plain.iter().flatten()) {
+                    assert!((fast - plain).abs() < 1e-4, "{fast} {plain}");
+                }
             }
-            let (fast, plain) = (T::products::<4>(&channels), products(&channels));
+            let channels = std::array::from_fn(|n| &samples[n * length..(n + 1) * length]);
+            let (fast, plain) = (T::products::<4>(&channels), portable::products(&channels));
             for (fast, plain) in fast.iter().flatten().zip(plain.iter().flatten()) {
                 assert!((fast - plain).norm() < 1e-4, "{fast} {plain}");
             }
@@ -161,8 +142,8 @@ mod tests {
 
     #[test]
     fn kernels_agree() {
-        let part = |n: usize, t: usize| ((n * 7 + t * 13) % 11) as f32 * 0.1 - 0.4;
-        check::<f32>(|n, t| Complex::new(part(n, t), part(t, n)));
-        check::<f64>(|n, t| Complex::new(part(n, t).into(), part(t, n).into()));
+        let part = |i: usize| (i * 7 % 31) as f32 * 0.1 - 1.4;
+        check::<f32>(|i| Complex::new(part(i), part(i * i + 3)));
+        check::<f64>(|i| Complex::new(part(i).into(), part(i * i + 3).into()));
     }
 }

@@ -1,4 +1,65 @@
 //! Angle of arrival with uniform linear arrays.
+//!
+//! From the complex samples ("snapshots") of a few antennas in a row to the direction of a source: by
+//! maximum likelihood, MUSIC, Root-MUSIC or ESPRIT, with a standard deviation, an SNR and a verdict
+//! for every estimate. The number of antennas is a const generic; nothing is allocated.
+//!
+//! # One source
+//!
+//! ```
+//! use aoa::{Array, Complex64, Covariance, Method, estimate};
+//!
+//! let array = Array::<4>::half_wavelength();
+//! // Twenty snapshots of a source at 60 degrees from the array's axis, and a little disturbance.
+//! let steering = array.steering_vector(array.phase_from_angle(60_f64.to_radians()));
+//! let snapshots: Vec<[Complex64; 4]> = (0..20)
+//!     .map(|t| {
+//!         let waveform = Complex64::cis(0.7 * f64::from(t * t));
+//!         std::array::from_fn(|n| {
+//!             let disturbance = Complex64::cis(f64::from(t * (3 * n as i32 + 2))) * 0.1;
+//!             steering[n] * waveform + disturbance
+//!         })
+//!     })
+//!     .collect();
+//!
+//! let covariance = Covariance::from_snapshots(&snapshots)?;
+//! let found = estimate(Method::MaximumLikelihood, &covariance, &array)?;
+//! assert!((found.angle_rad.to_degrees() - 60.0).abs() < 1.0);
+//! assert!(found.is_resolved());
+//! # Ok::<(), aoa::Error>(())
+//! ```
+//!
+//! # Conventions
+//!
+//! The angle is measured from the array's axis, 0 to pi. What is estimated is the electrical angle
+//! `omega = 2 pi (d / lambda) cos(theta)`, the phase step between neighbours: its noise is Gaussian
+//! with the same standard deviation in every direction. A filter should take
+//! [`phase_rad`](AngleEstimate::phase_rad) and [`phase_sigma_rad`](AngleEstimate::phase_sigma_rad);
+//! `angle_rad` and `sigma_rad` are for people. The SNR is per antenna and snapshot. The mean of the
+//! snapshots is signal and is never removed.
+//!
+//! # Which method
+//!
+//! | | sources | attains the Cramér–Rao bound |
+//! |---|---|---|
+//! | [`Method::MaximumLikelihood`] | 1 | yes, and is the fastest |
+//! | [`Method::Music`] | N - 1 | yes |
+//! | [`Method::RootMusic`] | N - 1 | yes; separates close sources best |
+//! | [`Method::EspritLs`], [`Method::EspritTls`] | N - 1 | 5 % above it with four antennas |
+//!
+//! Several sources: [`estimate_several`], and [`source_count`] for how many. Coherent ones
+//! (reflections) need [`Covariance::forward_backward`] or [`Covariance::spatially_smoothed`] first.
+//! Known pilots: [`maximum_likelihood_pilots`]. Many estimates in one call: [`Batch`]. Real
+//! receivers: [`Calibration`].
+//!
+//! # What an estimate does not know
+//!
+//! The standard deviation is that of noise. Reflections that stand still while the snapshots are taken
+//! displace the estimate by more than that, whatever the method.
+
+// Loops over vector registers must be compiled into the function that was chosen for the processor.
+#![allow(clippy::inline_always)]
+
 mod array;
 mod batch;
 pub mod bound;

@@ -12,7 +12,7 @@ use crate::kernel::{Real, dispatch};
 use crate::math::{log10, times_plus};
 use crate::peak::Spectra;
 use crate::spectrum::Spectrum;
-use crate::{Array, Complex64, Error, Verdict, bound};
+use crate::{Array, Error, Verdict, bound};
 
 /// Items of a batch that are searched side by side.
 pub(crate) const BLOCK: usize = 64;
@@ -95,23 +95,14 @@ fn block_generic<const FUSED: bool, T: Real, const N: usize>(
     estimates: &mut [AngleEstimate],
 ) -> Result<(), (usize, Error)> {
     let mut spectra = Spectra::<N, BLOCK>::ZERO;
-    let items = samples.chunks_exact(N * snapshots);
-    for (w, (item, _)) in items.zip(estimates.iter()).take(BLOCK).enumerate() {
-        let mut channels: [&[Complex<T>]; N] = [&[]; N];
-        for (n, channel) in channels.iter_mut().enumerate() {
-            *channel = &item[n * snapshots..(n + 1) * snapshots];
-        }
-        let lags: [Complex64; N] = T::lag_sums(&channels);
-        let trace = lags[0].re;
+    T::spectra(samples, snapshots, &mut spectra);
+    let items = samples.len() / (N * snapshots);
+    for (w, trace) in spectra.re[0].iter().take(items).enumerate() {
         if !trace.is_finite() {
             return Err((w, Error::NotFinite));
         }
-        if trace <= 0.0 {
+        if *trace <= 0.0 {
             return Err((w, Error::Zero));
-        }
-        for k in 0..N {
-            spectra.re[k][w] = lags[k].re;
-            spectra.im[k][w] = lags[k].im;
         }
     }
     let peaks = spectra.maxima::<FUSED>();
@@ -135,7 +126,7 @@ fn block_generic<const FUSED: bool, T: Real, const N: usize>(
         (phase_sigma[w], angle[w], sigma[w]) =
             direction::<FUSED>(peaks.phase_rad[w], phase_sigma[w], end_fire);
     }
-    for (w, estimate) in estimates.iter_mut().take(BLOCK).enumerate() {
+    for (w, estimate) in estimates.iter_mut().take(items.min(BLOCK)).enumerate() {
         let doubt = (snrs[w] < threshold).then_some(Reason::ThresholdSnr);
         let doubt = doubt.or_else(|| geometric_doubt(peaks.phase_rad[w], phase_sigma[w], end_fire));
         *estimate = AngleEstimate {

@@ -17,9 +17,9 @@ const NEWTON_STEPS: usize = 6;
 
 /// `W` spectra `f(omega) = c_0 + 2 Re sum_k c_k exp(-j k omega)` of degree N - 1.
 #[derive(Debug, Clone, Copy)]
-pub(crate) struct Spectra<const N: usize, const W: usize> {
-    pub(crate) re: [[f64; W]; N],
-    pub(crate) im: [[f64; W]; N],
+pub struct Spectra<const N: usize, const W: usize> {
+    pub re: [[f64; W]; N],
+    pub im: [[f64; W]; N],
 }
 
 /// Where each spectrum is largest, and how large it is there.
@@ -31,6 +31,7 @@ pub(crate) struct Peaks<const W: usize> {
 }
 
 /// The best grid point so far.
+#[derive(Clone, Copy)]
 struct Best<const W: usize> {
     value: [f64; W],
     phase: [f64; W],
@@ -57,7 +58,7 @@ impl<const N: usize, const W: usize> Spectra<N, W> {
     #[inline(always)]
     pub(crate) fn maxima<const FUSED: bool>(&self) -> Peaks<W> {
         let best = self.best_grid_points::<FUSED>();
-        self.refined::<FUSED>(best)
+        self.refined::<FUSED>(&best)
     }
 
     #[inline(always)]
@@ -114,14 +115,14 @@ impl<const N: usize, const W: usize> Spectra<N, W> {
     }
 
     #[inline(always)]
-    fn refined<const FUSED: bool>(&self, best: Best<W>) -> Peaks<W> {
+    fn refined<const FUSED: bool>(&self, best: &Best<W>) -> Peaks<W> {
         let reach = 0.75 * TAU * Self::STRIDE as f64 / CIRCLE as f64;
         let Best {
             mut value,
             phase,
             mut cos,
             mut sin,
-        } = best;
+        } = *best;
         let mut offset = [0.0; W];
         for _ in 0..NEWTON_STEPS {
             let mut moving = false;
@@ -182,14 +183,26 @@ impl<const N: usize, const W: usize> Spectra<N, W> {
 #[inline(always)]
 fn small_sin_cos<const FUSED: bool>(x: f64) -> (f64, f64) {
     let squared = x * x;
-    let (mut sin, mut cos) = (1.0, 1.0);
-    for pair in (1..7).rev() {
-        let n = 2.0 * f64::from(pair);
-        sin = times_plus::<FUSED>(-squared * (1.0 / (n * (n + 1.0))), sin, 1.0);
-        cos = times_plus::<FUSED>(-squared * (1.0 / (n * (n - 1.0))), cos, 1.0);
+    let (mut sin, mut cos) = (0.0, 0.0);
+    for term in SINE_COSINE.iter().rev() {
+        sin = times_plus::<FUSED>(sin, squared, term.0);
+        cos = times_plus::<FUSED>(cos, squared, term.1);
     }
     (x * sin, cos)
 }
+
+/// Coefficients of `sin(x) / x` and of `cos(x)` in powers of `x^2`.
+const SINE_COSINE: [(f64, f64); 7] = {
+    let mut series = [(1.0, 1.0); 7];
+    let mut n = 1;
+    while n < series.len() {
+        let order = 2.0 * n as f64;
+        series[n].0 = -series[n - 1].0 / (order * (order + 1.0));
+        series[n].1 = -series[n - 1].1 / (order * (order - 1.0));
+        n += 1;
+    }
+    series
+};
 
 /// The cosines of the grid, by the Taylor series about the nearest multiple of pi / 2.
 const fn cosines() -> [f64; CIRCLE] {

@@ -8,7 +8,7 @@
 macro_rules! kernels {
     (
         $module:ident, $features:literal, $real:ident, $vector:ident,
-        $complexes:literal, [$($lane:literal $part:ident),*], $steps:literal,
+        $complexes:literal, [$($lane:literal $part:ident),*],
         $set:ident, $zero:ident, $add:ident, $mul:ident, $fma:ident, $exchange:expr, $sums:expr
     ) => {
         pub(in crate::kernel) mod $module {
@@ -18,27 +18,23 @@ macro_rules! kernels {
 
             use crate::Complex64;
             use crate::covariance::{Matrix, zeros};
+            use crate::kernel::portable;
+            use crate::peak::Spectra;
 
-            /// The samples from `start` on, zeros beyond the end.
+            /// The samples from `start` on.
             #[target_feature(enable = $features)]
             #[inline]
             fn load(samples: &[Complex<$real>], start: usize) -> $vector {
-                if let Some(chunk) = samples.get(start..start + $complexes) {
-                    $set($(chunk[$lane].$part),*)
-                } else {
-                    let mut chunk = [Complex::<$real>::ZERO; $complexes];
-                    for (place, sample) in chunk.iter_mut().zip(samples.iter().skip(start)) {
-                        *place = *sample;
-                    }
-                    $set($(chunk[$lane].$part),*)
-                }
+                let chunk = &samples[start..start + $complexes];
+                $set($(chunk[$lane].$part),*)
             }
 
+            /// The complex number whose real part is the sum of the lanes of `direct`, and whose
+            /// imaginary part that of the odd less that of the even lanes of `crossed`.
             #[target_feature(enable = $features)]
             #[inline]
             fn total(direct: $vector, crossed: $vector) -> Complex64 {
-                let (even, odd) = $sums(direct);
-                let (crossed_even, crossed_odd) = $sums(crossed);
+                let ((even, odd), (crossed_even, crossed_odd)) = ($sums(direct), $sums(crossed));
                 Complex64::new(f64::from(even + odd), f64::from(crossed_odd - crossed_even))
             }
 
@@ -49,13 +45,13 @@ macro_rules! kernels {
                 let (x, y) = (&x[..length], &y[..length]);
                 let (mut direct, mut crossed) = ($zero(), $zero());
                 let mut start = 0;
-                while start < length {
+                while start + $complexes <= length {
                     let (v, w) = (load(x, start), load(y, start));
                     direct = $fma(v, w, direct);
                     crossed = $fma(v, $exchange(w), crossed);
                     start += $complexes;
                 }
-                total(direct, crossed)
+                total(direct, crossed) + portable::correlation(&x[start..], &y[start..])
             }
 
             #[target_feature(enable = $features)]
@@ -105,39 +101,46 @@ macro_rules! kernels {
             }
 
             #[target_feature(enable = $features)]
-            pub(in crate::kernel) fn lag_sums<const N: usize>(
-                channels: &[&[Complex<$real>]; N],
-            ) -> [Complex64; N] {
-                let mut length = channels[0].len();
-                for channel in channels {
-                    length = if channel.len() < length { channel.len() } else { length };
-                }
-                let mut rows = *channels;
-                for row in &mut rows {
-                    *row = &row[..length];
-                }
-                let mut sums = ([$zero(); N], [$zero(); N]);
-                let mut start = 0;
-                while start < length {
-                    // Several steps a turn share the cost of turning.
-                    for step in 0..$steps {
-                        add_products(&mut sums, &rows, start + step * $complexes);
+            pub(in crate::kernel) fn spectra<const N: usize, const W: usize>(
+                samples: &[Complex<$real>],
+                snapshots: usize,
+                spectra: &mut Spectra<N, W>,
+            ) {
+                let mut rest = samples;
+                for w in 0..W {
+                    let mut rows: [&[Complex<$real>]; N] = [&[]; N];
+                    for row in &mut rows {
+                        let Some((first, others)) = rest.split_at_checked(snapshots) else {
+                            return;
+                        };
+                        (*row, rest) = (first, others);
                     }
-                    start += $steps * $complexes;
+                    let mut sums = ([$zero(); N], [$zero(); N]);
+                    let mut start = 0;
+                    while start + $complexes <= snapshots {
+                        add_products(&mut sums, &rows, start);
+                        start += $complexes;
+                    }
+                    let (direct, crossed) = sums;
+                    let mut lags = [Complex64::ZERO; N];
+                    for k in 0..N {
+                        lags[k] = total(direct[k], crossed[k]);
+                    }
+                    if start < snapshots {
+                        portable::add_lags(&rows, start, &mut lags);
+                    }
+                    for (k, lag) in lags.iter().enumerate() {
+                        spectra.re[k][w] = lag.re;
+                        spectra.im[k][w] = lag.im;
+                    }
                 }
-                let (direct, crossed) = sums;
-                let mut lags = [Complex64::ZERO; N];
-                for k in 0..N {
-                    lags[k] = total(direct[k], crossed[k]);
-                }
-                lags
             }
         }
     };
 }
 
 kernels!(
-    avx2_f64, "avx2,fma", f64, __m256d, 2, [1 im, 1 re, 0 im, 0 re], 2,
+    avx2_f64, "avx2,fma", f64, __m256d, 2, [1 im, 1 re, 0 im, 0 re],
     _mm256_set_pd, _mm256_setzero_pd, _mm256_add_pd, _mm256_mul_pd, _mm256_fmadd_pd,
     _mm256_permute_pd::<0b0101>,
     |v| {
@@ -146,7 +149,7 @@ kernels!(
     }
 );
 kernels!(
-    avx2_f32, "avx2,fma", f32, __m256, 4, [3 im, 3 re, 2 im, 2 re, 1 im, 1 re, 0 im, 0 re], 1,
+    avx2_f32, "avx2,fma", f32, __m256, 4, [3 im, 3 re, 2 im, 2 re, 1 im, 1 re, 0 im, 0 re],
     _mm256_set_ps, _mm256_setzero_ps, _mm256_add_ps, _mm256_mul_ps, _mm256_fmadd_ps,
     _mm256_permute_ps::<0b10_11_00_01>,
     |v| {
@@ -157,7 +160,7 @@ kernels!(
 );
 kernels!(
     avx512_f64, "avx2,fma,avx512f", f64, __m512d,
-    4, [3 im, 3 re, 2 im, 2 re, 1 im, 1 re, 0 im, 0 re], 1,
+    4, [3 im, 3 re, 2 im, 2 re, 1 im, 1 re, 0 im, 0 re],
     _mm512_set_pd, _mm512_setzero_pd, _mm512_add_pd, _mm512_mul_pd, _mm512_fmadd_pd,
     _mm512_permute_pd::<0b0101_0101>,
     |v| {
