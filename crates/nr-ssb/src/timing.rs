@@ -28,10 +28,12 @@ pub(crate) fn refine(rows: &[[Complex32; SUBCARRIERS]], start: f64, iterations: 
     let mut delay = start;
     for _ in 0..iterations {
         let moments = moments(rows, delay);
-        if moments.curvature >= 0.0 {
-            break;
-        }
-        delay -= (moments.slope / moments.curvature).clamp(-0.3, 0.3);
+        // Beyond the inflection, half a sample away, uphill is all that is known.
+        delay += if moments.curvature < 0.0 {
+            (-moments.slope / moments.curvature).clamp(-0.3, 0.3)
+        } else {
+            0.3 * moments.slope.signum()
+        };
     }
     delay
 }
@@ -47,7 +49,7 @@ pub(crate) fn refine_combined(rows: &[[Complex32; SUBCARRIERS]]) -> f64 {
             slot.im += z.re * gain.im + z.im * gain.re;
         }
     }
-    refine(&combined, 0.0, 3)
+    refine(&combined, 0.0, 4)
 }
 
 /// `exp(j2πk'τ/256)`: takes a delay of τ samples out of the subcarriers.

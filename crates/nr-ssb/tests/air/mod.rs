@@ -128,6 +128,23 @@ pub fn delayed(samples: &[Complex32], fraction: f64) -> Vec<Complex32> {
     spectrum
 }
 
+/// Interpolates to `factor` times the rate and mixes up by `cycles` per output sample.
+pub fn raised(samples: &[Complex32], factor: usize, cycles: f64) -> Vec<Complex32> {
+    let n = samples.len();
+    let mut planner = FftPlanner::new();
+    let mut spectrum = samples.to_vec();
+    planner.plan_fft_forward(n).process(&mut spectrum);
+    let mut wide = vec![Complex32::ZERO; n * factor];
+    let end = wide.len() - n / 2;
+    wide[..n / 2].copy_from_slice(&spectrum[..n / 2]);
+    wide[end..].copy_from_slice(&spectrum[n / 2..]);
+    planner.plan_fft_inverse(n * factor).process(&mut wide);
+    let mixed = wide.iter().enumerate();
+    mixed
+        .map(|(i, x)| x * phasor(TAU * cycles * i as f64) / n as f32)
+        .collect()
+}
+
 /// Noise such that a resource element of unit gain has this SNR.
 pub fn add_noise(antennas: &mut [Vec<Complex32>], snr_db: f64, rng: &mut ChaCha8Rng) {
     let scale = (0.5 / 256.0 / 10f64.powf(0.1 * snr_db)).sqrt() as f32;
