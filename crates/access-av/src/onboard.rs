@@ -22,7 +22,8 @@ use crate::scenario::{
     Check, LocalizerSettings, PidSettings, Scenario, ScenarioError, WakeUpSettings,
 };
 use crate::wake_up::{
-    Adaptive, Controller, FixedInterval, Pid, Policy, WakeUpDecision, WakeUpInputs,
+    Adaptive, Controller, FixedInterval, Pid, Policy, UncertaintyDriven, WakeUpDecision,
+    WakeUpInputs,
 };
 use crate::world::RadioHead;
 
@@ -32,10 +33,19 @@ pub struct Onboard {
     budget: LinkBudget,
     estimator: AngleEstimator,
     localizer: Localizer,
-    policy: Policy,
+    trigger: Trigger,
     wake_up_time_s: f64,
     odometry: Option<OdometrySample>,
     reached: Reached,
+}
+
+/// What decides when to wake up.
+#[derive(Debug)]
+enum Trigger {
+    /// A policy that looks at the clock, the SNR and the speed.
+    Policy(Policy),
+    /// The tracker's own error.
+    Uncertainty(Box<UncertaintyDriven>),
 }
 
 /// How far the localizer has been moved.
@@ -123,7 +133,7 @@ impl Onboard {
             budget: LinkBudget::new(scenario),
             estimator,
             localizer,
-            policy: policy(scenario, platform, custom.controller)?,
+            trigger: trigger(scenario, platform, custom.controller)?,
             wake_up_time_s: 0.0,
             odometry: None,
             reached: Reached {
@@ -179,7 +189,29 @@ impl Onboard {
 
     /// Whether the receiver need listen to the SSB burst at `time_s`.
     pub fn listens(&self, time_s: f64) -> bool {
-        self.policy.listens(time_s)
+        match (&self.trigger, &self.localizer) {
+            (Trigger::Policy(policy), _) => policy.listens(time_s),
+            (Trigger::Uncertainty(policy), Localizer::Tracker(tracker)) => {
+                policy.is_due(tracker, time_s)
+            }
+            // Scenarios with this pair are refused.
+            (Trigger::Uncertainty(_), Localizer::DeadReckoning(_)) => true,
+        }
+    }
+
+    /// Whether the angle of this SSB, of a burst worth estimating, is itself worth it.
+    pub fn selects(&self, ssb: &SensedSsb) -> bool {
+        match &self.trigger {
+            Trigger::Policy(_) => true,
+            Trigger::Uncertainty(policy) => {
+                let is_it =
+                    |head: &RadioHead| (head.pci, head.ssb_index) == (ssb.pci, ssb.ssb_index);
+                self.heads
+                    .iter()
+                    .position(is_it)
+                    .is_some_and(|index| policy.chooses(index))
+            }
+        }
     }
 
     /// Whether the burst of SSBs sensed at `time_s` is worth estimating; the policy judges by the
@@ -210,7 +242,16 @@ impl Onboard {
             expected_snr_db: self.budget.snr_db(&head, distance_m),
             speed_mps: self.odometry.map_or(0.0, |sample| sample.speed_mps),
         };
-        let decision = self.policy.decide(&inputs)?;
+        let decision = match (&mut self.trigger, &self.localizer) {
+            (Trigger::Policy(policy), _) => policy.decide(&inputs)?,
+            (Trigger::Uncertainty(policy), Localizer::Tracker(tracker)) => {
+                policy.decide(tracker, time_s, &self.heads)
+            }
+            (Trigger::Uncertainty(_), Localizer::DeadReckoning(_)) => WakeUpDecision {
+                estimate: true,
+                wake_up_time_s: self.wake_up_time_s,
+            },
+        };
         self.wake_up_time_s = decision.wake_up_time_s;
         Ok(decision)
     }
@@ -253,11 +294,11 @@ impl Onboard {
     }
 }
 
-fn policy(
+fn trigger(
     scenario: &Scenario,
     platform: &Platform,
     controller: Option<Box<dyn Controller>>,
-) -> Result<Policy, ScenarioError> {
+) -> Result<Trigger, ScenarioError> {
     let top_speed_mps = scenario.motion.top_speed_mps();
     let interval_s = |explicit_ms: Option<f64>| match explicit_ms {
         Some(explicit_ms) => Ok(explicit_ms * 1e-3),
@@ -269,16 +310,16 @@ fn policy(
         } else {
             PidSettings::default()
         };
-        return Ok(Policy::Adaptive(Adaptive::new(
-            &settings,
-            controller,
-            top_speed_mps,
-        )));
+        let adaptive = Adaptive::new(&settings, controller, top_speed_mps);
+        return Ok(Trigger::Policy(Policy::Adaptive(adaptive)));
     }
     match scenario.wake_up {
-        WakeUpSettings::Fixed(settings) => Ok(Policy::Fixed(FixedInterval::new(interval_s(
-            settings.interval_ms,
-        )?))),
+        WakeUpSettings::Fixed(settings) => {
+            let interval_s = interval_s(settings.interval_ms)?;
+            Ok(Trigger::Policy(Policy::Fixed(FixedInterval::new(
+                interval_s,
+            ))))
+        }
         WakeUpSettings::Pid(settings) => {
             let base_s = interval_s(settings.base_ms)?;
             let allowed = format!(
@@ -295,11 +336,11 @@ fn policy(
                 &allowed,
             )?;
             let controller = Box::new(Pid::new(&settings, base_s));
-            Ok(Policy::Adaptive(Adaptive::new(
-                &settings,
-                controller,
-                top_speed_mps,
-            )))
+            let adaptive = Adaptive::new(&settings, controller, top_speed_mps);
+            Ok(Trigger::Policy(Policy::Adaptive(adaptive)))
         }
+        WakeUpSettings::Uncertainty(settings) => Ok(Trigger::Uncertainty(Box::new(
+            UncertaintyDriven::new(&settings, scenario),
+        ))),
     }
 }

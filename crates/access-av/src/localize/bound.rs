@@ -12,17 +12,14 @@
 //! that arrives from all directions is band-limited to two spatial frequencies per wavelength, and
 //! has so many degrees of freedom (Landau and Pollak 1962).
 
-use aoa::bound;
-
 use super::gaussian::Gaussian;
+use super::thermal::ThermalNoise;
 use super::tracker::motion::Step;
 use super::tracker::sighting::{Footing, Sighting};
 use super::tracker::state::{ACROSS, ALONG, Belief, CURVATURE, HEADING, MOUNTING, SCALE, STATES};
 use super::tracker::{InitialPose, Tracker, TrackerConfig};
-use crate::channel::LinkBudget;
 use crate::geometry::{Point, Pose};
-use crate::observation::ANTENNAS;
-use crate::scenario::{LocalizerSettings, Pilots, Scenario, ScenarioError};
+use crate::scenario::{LocalizerSettings, Scenario, ScenarioError};
 use crate::world::{MotionProfile, RadioHead, Track};
 
 /// The bound at one SSB.
@@ -54,31 +51,9 @@ pub struct Bound {
     track: Track,
     motion: MotionProfile,
     heads: Vec<RadioHead>,
-    thermal: Thermal,
+    thermal: ThermalNoise,
     start: InitialPose,
     period_s: f64,
-}
-
-/// Thermal noise of one angle.
-#[derive(Clone, Debug)]
-struct Thermal {
-    budget: LinkBudget,
-    pilots: Pilots,
-    snapshots: usize,
-}
-
-impl Thermal {
-    fn variance(&self, head: &RadioHead, distance_m: f64) -> f64 {
-        let snr = 10f64.powf(0.1 * self.budget.snr_db(head, distance_m));
-        let sigma = match self.pilots.per_symbol() {
-            None => bound::stochastic::<ANTENNAS>(snr, self.snapshots),
-            Some(symbols) => {
-                let elements: u16 = symbols.iter().sum();
-                bound::known_signal::<ANTENNAS>(snr * f64::from(elements))
-            }
-        };
-        sigma * sigma
-    }
 }
 
 impl Bound {
@@ -98,11 +73,7 @@ impl Bound {
             map: settings.map,
             motion: MotionProfile::new(&scenario.motion, track.length_m()),
             heads: scenario.radio_heads.iter().map(RadioHead::from).collect(),
-            thermal: Thermal {
-                budget: LinkBudget::new(scenario),
-                pilots: scenario.receiver.pilots,
-                snapshots: usize::from(scenario.array.snapshots),
-            },
+            thermal: ThermalNoise::new(scenario),
             start: InitialPose {
                 pose: track.pose(0.0),
                 position_std_m: scenario.start.position_std_m,

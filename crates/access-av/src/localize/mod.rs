@@ -4,6 +4,7 @@ pub mod bound;
 mod dead_reckoning;
 pub mod gaussian;
 pub mod integrity;
+pub mod thermal;
 pub mod tracker;
 
 pub use dead_reckoning::DeadReckoning;

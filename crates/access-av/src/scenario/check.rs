@@ -257,6 +257,22 @@ impl Scenario {
                 check.positive("wake_up.interval_ms", interval_ms)
             }),
             WakeUpSettings::Pid(pid) => pid.check(check),
+            WakeUpSettings::Uncertainty(uncertainty) => {
+                check.positive("wake_up.bound_m", uncertainty.bound_m)?;
+                check.between(
+                    "wake_up.confidence",
+                    uncertainty.confidence,
+                    0.01,
+                    0.999_999,
+                )?;
+                check.not_negative("wake_up.wake_up_cost", uncertainty.wake_up_cost)?;
+                check.that(
+                    matches!(self.localizer, LocalizerSettings::Tracker(_)),
+                    "wake_up.policy",
+                    "uncertainty",
+                    "it needs localizer.kind = \"tracker\", which knows its own error",
+                )
+            }
         }
     }
 }

@@ -35,7 +35,9 @@ pub use localization::{
 pub use radio::{ArraySettings, Pilots, RadioHeadSettings, ReceiverSettings, SsbSettings};
 pub use road::{MotionSettings, SegmentSettings, StopSettings, TrackSettings, WanderSettings};
 pub use tracker::TrackerSettings;
-pub use wake_up::{FixedSettings, PidSettings, SensingMode, SnrSetPoint, WakeUpSettings};
+pub use wake_up::{
+    FixedSettings, PidSettings, SensingMode, SnrSetPoint, UncertaintySettings, WakeUpSettings,
+};
 
 /// Everything a simulated drive depends on, besides the seed.
 #[derive(Debug, Clone, PartialEq, Serialize, Deserialize, JsonSchema)]

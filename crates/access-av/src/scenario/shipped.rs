@@ -1,7 +1,7 @@
 //! The scenarios that come with the product.
 
 /// Names and texts of the shipped scenarios.
-pub(super) const SCENARIOS: [(&str, &str); 5] = [
+pub(super) const SCENARIOS: [(&str, &str); 6] = [
     ("paper", include_str!("../../../../scenarios/paper.toml")),
     (
         "paper-stop-and-go",
@@ -19,4 +19,5 @@ pub(super) const SCENARIOS: [(&str, &str); 5] = [
         "paper-real-odometry-4",
         include_str!("../../../../scenarios/paper-real-odometry-4.toml"),
     ),
+    ("yard", include_str!("../../../../scenarios/yard.toml")),
 ];

@@ -11,6 +11,8 @@ pub enum WakeUpSettings {
     Fixed(FixedSettings),
     /// The paper's Algorithm 1.
     Pid(PidSettings),
+    /// As late as a bound on the error allows; needs the tracker.
+    Uncertainty(UncertaintySettings),
 }
 
 impl Default for WakeUpSettings {
@@ -103,4 +105,26 @@ pub enum SensingMode {
     EverySsb,
     /// At wake-ups only: the receiver sleeps in between.
     WakeUp,
+}
+
+/// `policy = "uncertainty"`
+#[derive(Debug, Clone, Copy, PartialEq, Serialize, Deserialize, JsonSchema)]
+#[serde(default, deny_unknown_fields)]
+pub struct UncertaintySettings {
+    /// Horizontal error to be kept, in metres: the paper's x̃_max.
+    pub bound_m: f64,
+    /// Probability with which it is kept.
+    pub confidence: f64,
+    /// Energy of waking the receiver up, in executions.
+    pub wake_up_cost: f64,
+}
+
+impl Default for UncertaintySettings {
+    fn default() -> Self {
+        Self {
+            bound_m: 0.3,
+            confidence: 0.9,
+            wake_up_cost: 0.5,
+        }
+    }
 }

@@ -151,6 +151,9 @@ impl Simulation {
                     .map_err(SimulationError::Custom)?;
                 if decision.estimate {
                     for (channel, reception) in channels.iter_mut().zip(&receptions) {
+                        if !onboard.selects(&reception.ssb) {
+                            continue;
+                        }
                         let buffer =
                             observation.get_or_insert_with(|| SsbObservation::new(reception.ssb));
                         channel.observe(number as u64, reception, buffer);

@@ -2,9 +2,11 @@
 
 mod fixed;
 mod pid;
+mod uncertainty;
 
 pub use fixed::FixedInterval;
 pub use pid::{Adaptive, Controller, Pid};
+pub use uncertainty::UncertaintyDriven;
 
 use crate::BoxError;
 

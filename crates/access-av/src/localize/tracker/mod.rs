@@ -31,6 +31,9 @@ use state::{
     ACROSS, ALONG, Belief, CURVATURE, HEADING, MOUNTING, PHASE, SCALE, STATES, YAW_RATE_BIAS,
 };
 
+/// Longest step of a forecast (m), where millimetres do not matter.
+const FORECAST_STEP_M: f64 = 5.0;
+
 /// Longest step over which the road's curvature is taken as constant (m).
 const STEP_M: f64 = 1.0;
 
@@ -40,6 +43,12 @@ struct Head {
     excluded: bool,
     /// Distance driven when its last angle was used (m).
     last_look_m: f64,
+}
+
+impl Head {
+    fn is(&self, other: &RadioHead) -> bool {
+        (self.known.pci, self.known.ssb_index) == (other.pci, other.ssb_index)
+    }
 }
 
 /// The tracker. With a map it works along and across the road, without in the plane.
@@ -169,9 +178,8 @@ impl Tracker {
         if measured.time_s < self.time_s() {
             return Err(UpdateReason::TimeReversed);
         }
-        let is_it = |h: &Head| (h.known.pci, h.known.ssb_index) == (head.pci, head.ssb_index);
         let (index, head) = (self.heads.iter().enumerate())
-            .find(|(_, head)| is_it(head))
+            .find(|(_, mine)| mine.is(head))
             .ok_or(UpdateReason::UnknownRadioHead)?;
         if head.excluded {
             return Err(UpdateReason::Excluded);
@@ -222,10 +230,8 @@ impl Tracker {
 
     /// Leaves the angles of a radio head unused, or uses them again.
     pub fn set_excluded(&mut self, head: &RadioHead, excluded: bool) {
-        for mine in &mut self.heads {
-            if (mine.known.pci, mine.known.ssb_index) == (head.pci, head.ssb_index) {
-                mine.excluded = excluded;
-            }
+        for mine in self.heads.iter_mut().filter(|mine| mine.is(head)) {
+            mine.excluded = excluded;
         }
     }
 
@@ -263,6 +269,53 @@ impl Tracker {
             pose,
             covariance: Some(covariance),
         }
+    }
+
+    /// The belief at `time_s`, had the vehicle driven on at its speed and heard nothing.
+    pub fn forecast(&self, time_s: f64) -> Belief {
+        let mut belief = self.belief;
+        let Some(sample) = self.odometry else {
+            return belief;
+        };
+        let reading_m = sample.speed_mps * (time_s - sample.time_s).max(0.0);
+        let steps = (reading_m / FORECAST_STEP_M).ceil();
+        for _ in 0..steps as usize {
+            self.step(&belief, reading_m / steps).apply(&mut belief);
+        }
+        belief
+    }
+
+    /// Variances of a belief's horizontal error along its principal axes, larger first (m²).
+    pub fn principal_variances(belief: &Belief) -> [f64; 2] {
+        let [[aa, ab, ..], [_, bb, ..], ..] = belief.covariance;
+        let half = (0.25 * (aa - bb) * (aa - bb) + ab * ab).sqrt();
+        let mean = 0.5 * (aa + bb);
+        [mean + half, (mean - half).max(0.0)]
+    }
+
+    /// What an angle of thermal variance `thermal(distance)` to `head` would make of a belief
+    /// `ahead_m` further on than the newest odometry.
+    pub fn rehearse(
+        &self,
+        belief: &Belief,
+        ahead_m: f64,
+        head: &RadioHead,
+        thermal: impl Fn(f64) -> f64,
+    ) -> Option<Belief> {
+        let known = self.heads.iter().find(|mine| mine.is(head))?;
+        if known.excluded {
+            return None;
+        }
+        let (pose, footing) = locate(&belief.mean, 0.0, self.map.as_deref());
+        let (mounting, offset) = (belief.mean[MOUNTING], belief.mean[PHASE]);
+        let array = &self.config.array;
+        let place = known.known.position;
+        let sighting = Sighting::new(place, pose, &footing, mounting, offset, array)?;
+        let travelled_m = self.driven_m + ahead_m - known.last_look_m;
+        let variance = thermal(sighting.range_m) + self.config.look_variance(travelled_m);
+        let mut rehearsed = *belief;
+        rehearsed.update(0.0, &sighting.row, variance);
+        Some(rehearsed)
     }
 
     /// The belief before any measurement.
@@ -308,7 +361,8 @@ impl Tracker {
         belief
     }
 
-    fn speed_mps(&self) -> f64 {
+    /// Speed along the heading (m/s).
+    pub fn speed_mps(&self) -> f64 {
         let reading = self.odometry.map_or(0.0, |sample| sample.speed_mps);
         reading / (1.0 + self.belief.mean[SCALE])
     }
@@ -334,11 +388,11 @@ impl Tracker {
             variance: yaw.variance * share,
         });
         for _ in 0..steps as usize {
-            let mut step = self.step(reading_m * share);
+            let mut step = self.step(&self.belief, reading_m * share);
             if let Some(yaw) = yaw {
                 step.correct(&mut self.belief, &yaw);
                 step = self
-                    .step(reading_m * share)
+                    .step(&self.belief, reading_m * share)
                     .informed(&self.belief.mean, &yaw);
             }
             step.apply(&mut self.belief);
@@ -346,8 +400,8 @@ impl Tracker {
         self.driven_m += reading_m.abs() / (1.0 + self.belief.mean[SCALE]);
     }
 
-    fn step(&self, reading_m: f64) -> Step {
-        let (mean, config) = (&self.belief.mean, &self.config);
+    fn step(&self, belief: &Belief, reading_m: f64) -> Step {
+        let (mean, config) = (&belief.mean, &self.config);
         match &self.map {
             Some(map) => {
                 let middle_m = mean[ALONG] + 0.5 * reading_m;

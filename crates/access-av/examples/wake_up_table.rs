@@ -1,0 +1,100 @@
+//! Executions that each wake-up policy needs for the same error, on the yard:
+//! `cargo run --release --example wake_up_table -- [runs] [seed]`.
+
+use std::error::Error;
+
+use access_av::onboard::Custom;
+use access_av::platform::Platform;
+use access_av::scenario::Scenario;
+use access_av::simulate::{CampaignOptions, Simulation};
+
+struct Outcome {
+    p90_m: f64,
+    executions: f64,
+    listened: f64,
+}
+
+fn main() -> Result<(), Box<dyn Error>> {
+    let mut arguments = std::env::args().skip(1);
+    let runs: usize = arguments.next().map_or(Ok(30), |text| text.parse())?;
+    let seed: u64 = arguments.next().map_or(Ok(1), |text| text.parse())?;
+    let yard = Scenario::load("yard")?;
+
+    println!("yard, {runs} runs, seed {seed}");
+    println!("policy                  p90 m  executions  SSB bursts listened to");
+    let mut references = Vec::new();
+    for base_ms in [80.0, 150.0] {
+        let scenario = yard.with_overrides([
+            ("wake_up.policy", "pid".into()),
+            ("wake_up.base_ms", base_ms.into()),
+        ])?;
+        references.push((
+            format!("PID, base {base_ms} ms"),
+            drive(scenario, runs, seed)?,
+        ));
+    }
+    for interval_ms in [20.0, 240.0] {
+        let scenario = yard.with_overrides([
+            ("wake_up.policy", "fixed".into()),
+            ("wake_up.interval_ms", interval_ms.into()),
+        ])?;
+        references.push((
+            format!("fixed {interval_ms} ms"),
+            drive(scenario, runs, seed)?,
+        ));
+    }
+    for (name, reference) in &references {
+        print(name, reference);
+        // The bound at which the 90th percentile comes out the same, by bisection.
+        let (mut low_m, mut high_m) = (0.5 * reference.p90_m, 2.0 * reference.p90_m);
+        let mut same = None;
+        for _ in 0..6 {
+            let bound_m = 0.5 * (low_m + high_m);
+            let scenario = yard.with_overrides([("wake_up.bound_m", bound_m.into())])?;
+            let outcome = drive(scenario, runs, seed)?;
+            if outcome.p90_m > reference.p90_m {
+                high_m = bound_m;
+            } else {
+                low_m = bound_m;
+                same = Some((bound_m, outcome));
+            }
+        }
+        if let Some((bound_m, outcome)) = same {
+            print(&format!("  uncertainty {bound_m:.3} m"), &outcome);
+            println!(
+                "  share of executions: {:.2}",
+                outcome.executions / reference.executions
+            );
+        }
+    }
+    Ok(())
+}
+
+fn print(name: &str, outcome: &Outcome) {
+    println!(
+        "{name:22} {:6.3} {:11.0} {:11.0}",
+        outcome.p90_m, outcome.executions, outcome.listened
+    );
+}
+
+fn drive(scenario: Scenario, runs: usize, seed: u64) -> Result<Outcome, Box<dyn Error>> {
+    let platform = Platform::load(&scenario.platform.name)?;
+    let simulation = Simulation::new(scenario, platform)?;
+    let campaign = simulation.campaign(&CampaignOptions {
+        seed,
+        first_run: 0,
+        runs,
+        threads: None,
+        keep_records: false,
+        custom: &Custom::default,
+        progress: &|_| true,
+    })?;
+    let mean = |of: &dyn Fn(&access_av::simulate::RunSummary) -> usize| {
+        campaign.runs.iter().map(|run| of(run) as f64).sum::<f64>() / runs as f64
+    };
+    Ok(Outcome {
+        p90_m: campaign.errors.quantile_m(0.9).unwrap_or(f64::NAN),
+        executions: mean(&|run| run.executions),
+        listened: mean(&|run| run.listened),
+    })
+}

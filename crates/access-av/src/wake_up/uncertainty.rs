@@ -1,0 +1,131 @@
+//! Wake-up as late as a bound on the error allows.
+//!
+//! The paper's t_max keeps a position uncertainty x̃_max by a worst case: the distance driven at
+//! top speed. The tracker knows its error and how it grows, so the rule can be exact: wake up at
+//! the last SSB before the error would, with the stated confidence, exceed the bound; and then take
+//! the angles that are worth their energy.
+
+use super::WakeUpDecision;
+use crate::localize::Tracker;
+use crate::localize::integrity::RadialQuantile;
+use crate::localize::thermal::ThermalNoise;
+use crate::scenario::{Scenario, UncertaintySettings};
+use crate::world::RadioHead;
+
+/// Longest wake-up time it looks ahead for, in seconds.
+const HORIZON_S: f64 = 20.0;
+
+/// Most radio heads among which it chooses.
+const MOST_HEADS: usize = 64;
+
+/// Error this many times the bound: no angle is spared.
+const ALARMING: f64 = 1.25;
+
+/// The uncertainty-driven policy.
+#[derive(Clone, Debug)]
+pub struct UncertaintyDriven {
+    bound_m: f64,
+    quantile: RadialQuantile,
+    wake_up_cost: f64,
+    period_s: f64,
+    thermal: ThermalNoise,
+    /// One bit for each radio head: whose angle is to be estimated.
+    chosen: u64,
+}
+
+impl UncertaintyDriven {
+    /// The policy for a scenario's SSBs.
+    pub fn new(settings: &UncertaintySettings, scenario: &Scenario) -> Self {
+        Self {
+            bound_m: settings.bound_m,
+            quantile: RadialQuantile::new(1.0 - settings.confidence),
+            wake_up_cost: settings.wake_up_cost,
+            period_s: scenario.ssb.period_s(),
+            thermal: ThermalNoise::new(scenario),
+            chosen: 0,
+        }
+    }
+
+    /// Whether to listen at `time_s`: whether the error would exceed the bound at the SSB after.
+    pub fn is_due(&self, tracker: &Tracker, time_s: f64) -> bool {
+        self.error_m(tracker, time_s + self.period_s) > self.bound_m
+    }
+
+    /// Chooses the angles to estimate at `time_s`, by the variance they take away for their cost:
+    /// that of waking up, once, and of one execution each.
+    pub fn decide(
+        &mut self,
+        tracker: &Tracker,
+        time_s: f64,
+        heads: &[RadioHead],
+    ) -> WakeUpDecision {
+        self.chosen = 0;
+        if self.error_m(tracker, time_s) > ALARMING * self.bound_m {
+            self.chosen = u64::MAX;
+        } else {
+            self.choose(tracker, time_s, heads);
+        }
+        WakeUpDecision {
+            estimate: self.chosen != 0,
+            wake_up_time_s: self.wake_up_time_s(tracker, time_s),
+        }
+    }
+
+    /// Whether the angle to radio head number `index` is among the chosen ones.
+    pub fn chooses(&self, index: usize) -> bool {
+        index < MOST_HEADS && self.chosen >> index & 1 == 1
+    }
+
+    fn choose(&mut self, tracker: &Tracker, time_s: f64, heads: &[RadioHead]) {
+        let mut belief = tracker.forecast(time_s);
+        let ahead_m = tracker.speed_mps() * (time_s - tracker.time_s()).max(0.0);
+        let spread = |belief: &_| Tracker::principal_variances(belief).iter().sum::<f64>();
+        let before = spread(&belief);
+        let (mut taken, mut best_rate) = (0u64, 0.0);
+        for count in 1..=heads.len().min(MOST_HEADS) {
+            let next = (heads.iter().enumerate().take(MOST_HEADS))
+                .filter(|(index, _)| taken >> index & 1 == 0)
+                .filter_map(|(index, head)| {
+                    let thermal = |distance_m| self.thermal.variance(head, distance_m);
+                    let after = tracker.rehearse(&belief, ahead_m, head, thermal)?;
+                    Some((index, after, spread(&after)))
+                })
+                .min_by(|a, b| a.2.total_cmp(&b.2));
+            let Some((index, after, left)) = next else {
+                break;
+            };
+            taken |= 1 << index;
+            belief = after;
+            let rate = (before - left) / (self.wake_up_cost + count as f64);
+            if rate <= best_rate {
+                break;
+            }
+            best_rate = rate;
+            self.chosen = taken;
+        }
+    }
+
+    /// Time from `time_s` on for which the bound holds without another angle, in seconds.
+    fn wake_up_time_s(&self, tracker: &Tracker, time_s: f64) -> f64 {
+        let holds =
+            |periods: f64| self.error_m(tracker, time_s + periods * self.period_s) <= self.bound_m;
+        let (mut low, mut high) = (0.0, (HORIZON_S / self.period_s).ceil());
+        if holds(high) {
+            return high * self.period_s;
+        }
+        while high - low > 1.0 {
+            let middle = (0.5 * (low + high)).floor();
+            if holds(middle) {
+                low = middle;
+            } else {
+                high = middle;
+            }
+        }
+        (low * self.period_s).max(self.period_s)
+    }
+
+    fn error_m(&self, tracker: &Tracker, time_s: f64) -> f64 {
+        let belief = tracker.forecast(time_s);
+        self.quantile.radius(Tracker::principal_variances(&belief))
+    }
+}
