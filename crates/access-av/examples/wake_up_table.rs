@@ -45,22 +45,25 @@ fn main() -> Result<(), Box<dyn Error>> {
     }
     for (name, reference) in &references {
         print(name, reference);
-        // The bound at which the 90th percentile comes out the same, by bisection.
-        let (mut low_m, mut high_m) = (0.5 * reference.p90_m, 2.0 * reference.p90_m);
+        // The least gain at which the 90th percentile comes out the same, by bisection.
+        let (mut low, mut high) = (1e-6_f64, 1e-3_f64);
         let mut same = None;
-        for _ in 0..6 {
-            let bound_m = 0.5 * (low_m + high_m);
-            let scenario = yard.with_overrides([("wake_up.bound_m", bound_m.into())])?;
+        for _ in 0..7 {
+            let least_gain_m2 = (low * high).sqrt();
+            let scenario = yard.with_overrides([
+                ("wake_up.bound_m", (0.5 * reference.p90_m).into()),
+                ("wake_up.least_gain_m2", least_gain_m2.into()),
+            ])?;
             let outcome = drive(scenario, runs, seed)?;
             if outcome.p90_m > reference.p90_m {
-                high_m = bound_m;
+                high = least_gain_m2;
             } else {
-                low_m = bound_m;
-                same = Some((bound_m, outcome));
+                low = least_gain_m2;
+                same = Some((least_gain_m2, outcome));
             }
         }
-        if let Some((bound_m, outcome)) = same {
-            print(&format!("  uncertainty {bound_m:.3} m"), &outcome);
+        if let Some((least_gain_m2, outcome)) = same {
+            print(&format!("  uncertainty {least_gain_m2:.1e}"), &outcome);
             println!(
                 "  share of executions: {:.2}",
                 outcome.executions / reference.executions

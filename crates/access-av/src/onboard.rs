@@ -192,7 +192,7 @@ impl Onboard {
         match (&self.trigger, &self.localizer) {
             (Trigger::Policy(policy), _) => policy.listens(time_s),
             (Trigger::Uncertainty(policy), Localizer::Tracker(tracker)) => {
-                policy.is_due(tracker, time_s)
+                policy.is_due(tracker, time_s, &self.heads)
             }
             // Scenarios with this pair are refused.
             (Trigger::Uncertainty(_), Localizer::DeadReckoning(_)) => true,

@@ -117,6 +117,9 @@ pub struct UncertaintySettings {
     pub confidence: f64,
     /// Energy of waking the receiver up, in executions.
     pub wake_up_cost: f64,
+    /// Variance in m² that an execution has to take away to be worth its energy. Above 0 it lets
+    /// the error pass the bound where radio heads stand badly, instead of paying any price.
+    pub least_gain_m2: f64,
 }
 
 impl Default for UncertaintySettings {
@@ -125,6 +128,7 @@ impl Default for UncertaintySettings {
             bound_m: 0.3,
             confidence: 0.9,
             wake_up_cost: 0.5,
+            least_gain_m2: 0.0,
         }
     }
 }

@@ -4,22 +4,27 @@
 //! top speed. The tracker knows its error and how it grows, so the rule can be exact: wake up at
 //! the last SSB before the error would, with the stated confidence, exceed the bound; and then take
 //! the angles that are worth their energy.
+//!
+//! An angle is worth what it takes off the variance of the position a little further on, where
+//! what it says of heading and odometer has become position too. Of a constant energy the most is
+//! made where the last angle bought everywhere takes away the same: that is `least_gain_m2`.
 
 use super::WakeUpDecision;
 use crate::localize::Tracker;
 use crate::localize::integrity::RadialQuantile;
 use crate::localize::thermal::ThermalNoise;
+use crate::localize::tracker::state::Belief;
 use crate::scenario::{Scenario, UncertaintySettings};
 use crate::world::RadioHead;
 
 /// Longest wake-up time it looks ahead for, in seconds.
 const HORIZON_S: f64 = 20.0;
 
+/// How much further on an angle's worth is judged, in metres.
+const LOOK_AHEAD_M: f64 = 10.0;
+
 /// Most radio heads among which it chooses.
 const MOST_HEADS: usize = 64;
-
-/// Error this many times the bound: no angle is spared.
-const ALARMING: f64 = 1.25;
 
 /// The uncertainty-driven policy.
 #[derive(Clone, Debug)]
@@ -27,6 +32,7 @@ pub struct UncertaintyDriven {
     bound_m: f64,
     quantile: RadialQuantile,
     wake_up_cost: f64,
+    least_gain_m2: f64,
     period_s: f64,
     thermal: ThermalNoise,
     /// One bit for each radio head: whose angle is to be estimated.
@@ -40,31 +46,28 @@ impl UncertaintyDriven {
             bound_m: settings.bound_m,
             quantile: RadialQuantile::new(1.0 - settings.confidence),
             wake_up_cost: settings.wake_up_cost,
+            least_gain_m2: settings.least_gain_m2,
             period_s: scenario.ssb.period_s(),
             thermal: ThermalNoise::new(scenario),
             chosen: 0,
         }
     }
 
-    /// Whether to listen at `time_s`: whether the error would exceed the bound at the SSB after.
-    pub fn is_due(&self, tracker: &Tracker, time_s: f64) -> bool {
+    /// Whether to listen at `time_s`: the error would exceed the bound at the SSB after, and there
+    /// is an angle worth its energy.
+    pub fn is_due(&self, tracker: &Tracker, time_s: f64, heads: &[RadioHead]) -> bool {
         self.error_m(tracker, time_s + self.period_s) > self.bound_m
+            && self.choice(tracker, time_s, heads) != 0
     }
 
-    /// Chooses the angles to estimate at `time_s`, by the variance they take away for their cost:
-    /// that of waking up, once, and of one execution each.
+    /// Chooses the angles to estimate at `time_s`.
     pub fn decide(
         &mut self,
         tracker: &Tracker,
         time_s: f64,
         heads: &[RadioHead],
     ) -> WakeUpDecision {
-        self.chosen = 0;
-        if self.error_m(tracker, time_s) > ALARMING * self.bound_m {
-            self.chosen = u64::MAX;
-        } else {
-            self.choose(tracker, time_s, heads);
-        }
+        self.chosen = self.choice(tracker, time_s, heads);
         WakeUpDecision {
             estimate: self.chosen != 0,
             wake_up_time_s: self.wake_up_time_s(tracker, time_s),
@@ -76,12 +79,17 @@ impl UncertaintyDriven {
         index < MOST_HEADS && self.chosen >> index & 1 == 1
     }
 
-    fn choose(&mut self, tracker: &Tracker, time_s: f64, heads: &[RadioHead]) {
+    /// The angles that take away most variance for their cost, that of waking up once and of one
+    /// execution each; none where the least gain is not met. One bit for each radio head.
+    fn choice(&self, tracker: &Tracker, time_s: f64, heads: &[RadioHead]) -> u64 {
         let mut belief = tracker.forecast(time_s);
         let ahead_m = tracker.speed_mps() * (time_s - tracker.time_s()).max(0.0);
-        let spread = |belief: &_| Tracker::principal_variances(belief).iter().sum::<f64>();
+        let spread = |belief: &Belief| {
+            let later = tracker.carry(*belief, LOOK_AHEAD_M);
+            Tracker::principal_variances(&later).iter().sum::<f64>()
+        };
         let before = spread(&belief);
-        let (mut taken, mut best_rate) = (0u64, 0.0);
+        let (mut taken, mut best, mut best_rate) = (0u64, 0u64, self.least_gain_m2);
         for count in 1..=heads.len().min(MOST_HEADS) {
             let next = (heads.iter().enumerate().take(MOST_HEADS))
                 .filter(|(index, _)| taken >> index & 1 == 0)
@@ -100,9 +108,9 @@ impl UncertaintyDriven {
             if rate <= best_rate {
                 break;
             }
-            best_rate = rate;
-            self.chosen = taken;
+            (best, best_rate) = (taken, rate);
         }
+        best
     }
 
     /// Time from `time_s` on for which the bound holds without another angle, in seconds.

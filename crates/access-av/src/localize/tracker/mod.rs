@@ -273,12 +273,17 @@ impl Tracker {
 
     /// The belief at `time_s`, had the vehicle driven on at its speed and heard nothing.
     pub fn forecast(&self, time_s: f64) -> Belief {
-        let mut belief = self.belief;
-        let Some(sample) = self.odometry else {
-            return belief;
-        };
-        let reading_m = sample.speed_mps * (time_s - sample.time_s).max(0.0);
-        let steps = (reading_m / FORECAST_STEP_M).ceil();
+        let lag_s = (time_s - self.time_s()).max(0.0);
+        let speed_mps = self.odometry.map_or(0.0, |sample| sample.speed_mps);
+        if speed_mps == 0.0 {
+            return self.belief;
+        }
+        self.carry(self.belief, speed_mps * lag_s)
+    }
+
+    /// A belief carried on by what the odometer would read, nothing being heard.
+    pub fn carry(&self, mut belief: Belief, reading_m: f64) -> Belief {
+        let steps = (reading_m.abs() / FORECAST_STEP_M).ceil();
         for _ in 0..steps as usize {
             self.step(&belief, reading_m / steps).apply(&mut belief);
         }
