@@ -11,6 +11,7 @@ use crate::BoxError;
 use crate::channel::LinkBudget;
 use crate::estimator::{AngleEstimator, CustomEstimator};
 use crate::geometry::Pose;
+use crate::localize::integrity::{Guard, IntegrityConfig};
 use crate::localize::tracker::{InitialPose, Tracker, TrackerConfig};
 use crate::localize::{
     AngleMeasurement, DeadReckoning, Localizer, OdometryStep, PoseEstimate, UpdateReason,
@@ -125,7 +126,16 @@ impl Onboard {
                 };
                 let config = TrackerConfig::new(scenario, &settings);
                 let tracker = Tracker::new(config, map.map(Arc::new), &heads, &start);
-                Localizer::Tracker(Box::new(tracker))
+                if settings.integrity {
+                    let config = IntegrityConfig {
+                        alert_limit_m: settings.alert_limit_m,
+                        risk: settings.integrity_risk,
+                        ..IntegrityConfig::default()
+                    };
+                    Localizer::Guarded(Box::new(Guard::new(tracker, &heads, config)))
+                } else {
+                    Localizer::Tracker(Box::new(tracker))
+                }
             }
         };
         Ok(Self {
@@ -189,13 +199,13 @@ impl Onboard {
 
     /// Whether the receiver need listen to the SSB burst at `time_s`.
     pub fn listens(&self, time_s: f64) -> bool {
-        match (&self.trigger, &self.localizer) {
+        match (&self.trigger, self.localizer.tracker()) {
             (Trigger::Policy(policy), _) => policy.listens(time_s),
-            (Trigger::Uncertainty(policy), Localizer::Tracker(tracker)) => {
+            (Trigger::Uncertainty(policy), Some(tracker)) => {
                 policy.is_due(tracker, time_s, &self.heads)
             }
             // Scenarios with this pair are refused.
-            (Trigger::Uncertainty(_), Localizer::DeadReckoning(_)) => true,
+            (Trigger::Uncertainty(_), None) => true,
         }
     }
 
@@ -242,12 +252,12 @@ impl Onboard {
             expected_snr_db: self.budget.snr_db(&head, distance_m),
             speed_mps: self.odometry.map_or(0.0, |sample| sample.speed_mps),
         };
-        let decision = match (&mut self.trigger, &self.localizer) {
+        let decision = match (&mut self.trigger, self.localizer.tracker()) {
             (Trigger::Policy(policy), _) => policy.decide(&inputs)?,
-            (Trigger::Uncertainty(policy), Localizer::Tracker(tracker)) => {
+            (Trigger::Uncertainty(policy), Some(tracker)) => {
                 policy.decide(tracker, time_s, &self.heads)
             }
-            (Trigger::Uncertainty(_), Localizer::DeadReckoning(_)) => WakeUpDecision {
+            (Trigger::Uncertainty(_), None) => WakeUpDecision {
                 estimate: true,
                 wake_up_time_s: self.wake_up_time_s,
             },

@@ -96,6 +96,7 @@ impl DeadReckoning {
             time_s: self.time_s,
             pose: self.pose,
             covariance: None,
+            integrity: None,
         }
     }
 }

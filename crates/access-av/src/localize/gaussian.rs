@@ -21,6 +21,8 @@ pub struct Innovation {
     pub residual: f64,
     /// Variance of the residual under the belief, `H P Hᵀ + R`.
     pub variance: f64,
+    /// The measurement's part of it, `R`.
+    pub measurement_variance: f64,
 }
 
 impl Innovation {
@@ -89,6 +91,7 @@ impl<const N: usize> Gaussian<N> {
         Innovation {
             residual,
             variance: self.variance_along(row) + variance,
+            measurement_variance: variance,
         }
     }
 

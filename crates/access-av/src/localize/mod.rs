@@ -8,6 +8,7 @@ pub mod thermal;
 pub mod tracker;
 
 pub use dead_reckoning::DeadReckoning;
+pub use integrity::{Guard, Integrity, IntegrityState};
 pub use tracker::Tracker;
 
 use crate::geometry::Pose;
@@ -21,6 +22,8 @@ pub enum Localizer {
     DeadReckoning(DeadReckoning),
     /// The filter.
     Tracker(Box<Tracker>),
+    /// The filter, mistrusting its sources.
+    Guarded(Box<Guard>),
 }
 
 impl Localizer {
@@ -32,6 +35,9 @@ impl Localizer {
             Self::Tracker(tracker) => {
                 tracker.odometry(sample);
             }
+            Self::Guarded(guard) => {
+                guard.odometry(sample);
+            }
         }
     }
 
@@ -40,7 +46,7 @@ impl Localizer {
         match self {
             Self::DeadReckoning(localizer) => localizer.predict(step),
             // The tracker stays at the newest sample and looks ahead from there.
-            Self::Tracker(_) => {}
+            Self::Tracker(_) | Self::Guarded(_) => {}
         }
     }
 
@@ -49,6 +55,7 @@ impl Localizer {
         match self {
             Self::DeadReckoning(localizer) => localizer.update(head, measured),
             Self::Tracker(tracker) => tracker.update(head, measured),
+            Self::Guarded(guard) => guard.update(head, measured),
         }
     }
 
@@ -57,6 +64,16 @@ impl Localizer {
         match self {
             Self::DeadReckoning(localizer) => localizer.pose(),
             Self::Tracker(tracker) => tracker.pose(time_s),
+            Self::Guarded(guard) => guard.pose(time_s),
+        }
+    }
+
+    /// The tracker in it, if it is one.
+    pub fn tracker(&self) -> Option<&Tracker> {
+        match self {
+            Self::DeadReckoning(_) => None,
+            Self::Tracker(tracker) => Some(tracker),
+            Self::Guarded(guard) => Some(guard.tracker()),
         }
     }
 }
@@ -101,6 +118,21 @@ pub struct PoseEstimate {
     /// Covariance of (x, y, heading), row-major, in m² , m·rad and rad²; `None` where the
     /// localizer does not know its own error.
     pub covariance: Option<[[f64; 3]; 3]>,
+    /// Protection level and state, where the localizer is guarded.
+    pub integrity: Option<Integrity>,
+}
+
+impl PoseEstimate {
+    /// Variances of the horizontal error along its principal axes, larger first, in m²; infinite
+    /// where the localizer does not know them.
+    pub fn principal_variances(&self) -> [f64; 2] {
+        let Some([[xx, xy, _], [_, yy, _], _]) = self.covariance else {
+            return [f64::INFINITY; 2];
+        };
+        let half = (0.25 * (xx - yy) * (xx - yy) + xy * xy).sqrt();
+        let mean = 0.5 * (xx + yy);
+        [mean + half, (mean - half).max(0.0)]
+    }
 }
 
 /// What a localizer did with an angle.

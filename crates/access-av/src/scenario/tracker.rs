@@ -42,6 +42,12 @@ pub struct TrackerSettings {
     pub phase_std_rad: f64,
     /// Probability with which a good angle is taken for an outlier.
     pub outlier_probability: f64,
+    /// Whether it mistrusts its sources and states a protection level.
+    pub integrity: bool,
+    /// Protection level in metres above which the position is not to be relied on.
+    pub alert_limit_m: f64,
+    /// Probability with which the error may exceed the protection level.
+    pub integrity_risk: f64,
 }
 
 impl Default for TrackerSettings {
@@ -59,6 +65,9 @@ impl Default for TrackerSettings {
             mounting_std_rad: 0.0,
             phase_std_rad: 0.0,
             outlier_probability: 1e-4,
+            integrity: false,
+            alert_limit_m: 1.5,
+            integrity_risk: 5e-4,
         }
     }
 }
@@ -99,6 +108,8 @@ impl TrackerSettings {
             -30.0,
             200.0,
         )?;
+        check.positive("localizer.alert_limit_m", self.alert_limit_m)?;
+        check.between("localizer.integrity_risk", self.integrity_risk, 1e-12, 0.5)?;
         check.between(
             "localizer.outlier_probability",
             self.outlier_probability,

@@ -6,6 +6,7 @@ use rand_distr::StandardNormal;
 use super::SimulationError;
 use crate::channel::{HeadChannel, Reception};
 use crate::geometry::Pose;
+use crate::localize::Integrity;
 use crate::observation::{SensedSsb, SsbObservation};
 use crate::onboard::{Custom, Execution, Onboard};
 use crate::platform::Platform;
@@ -33,6 +34,8 @@ pub struct Step {
     pub estimate: Pose,
     /// Covariance of (x, y, heading), where the localizer has one.
     pub covariance: Option<[[f64; 3]; 3]>,
+    /// Protection level and state, where the localizer is guarded.
+    pub integrity: Option<Integrity>,
     /// SNR of the strongest radio head by link budget and shadowing, in dB.
     pub snr_db: f64,
 }
@@ -171,6 +174,7 @@ impl Simulation {
                 truth: truth.pose,
                 estimate: believed.pose,
                 covariance: believed.covariance,
+                integrity: believed.integrity,
                 snr_db: snrs_db.iter().copied().fold(f64::NEG_INFINITY, f64::max),
             });
         }

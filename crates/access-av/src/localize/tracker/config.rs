@@ -42,6 +42,8 @@ pub struct TrackerConfig {
     pub gate: f64,
     /// Acceleration to reckon with where odometry is missing (m/s²).
     pub acceleration_mps2: f64,
+    /// Acceleration that the vehicle cannot do: the odometer slipped (m/s²).
+    pub leap_mps2: f64,
     /// Time between odometry samples above which they are reported as a gap (s).
     pub gap_s: f64,
     /// Speed that no odometry sample can exceed (m/s).
@@ -91,6 +93,7 @@ impl TrackerConfig {
             phase_std_rad: settings.phase_std_rad,
             gate: normal_quantile(0.5 * settings.outlier_probability).powi(2),
             acceleration_mps2: 2.0 * scenario.motion.acceleration_mps2,
+            leap_mps2: 10.0 * scenario.motion.acceleration_mps2,
             gap_s: 5.0 / scenario.odometer.rate_hz,
             top_speed_mps: 1.5 * scenario.motion.top_speed_mps(),
         }

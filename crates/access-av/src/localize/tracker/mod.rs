@@ -107,6 +107,12 @@ impl Tracker {
             return OdometryVerdict::TimeBackwards;
         }
         self.odometry = Some(*sample);
+        // A jump of the speed that no vehicle can do is a jump of the odometer's scale: slip.
+        let leap_mps = (sample.speed_mps - previous.speed_mps).abs();
+        if leap_mps > self.config.leap_mps2 * duration_s.max(0.02) {
+            let leap = leap_mps / previous.speed_mps.abs().max(sample.speed_mps.abs());
+            self.belief.covariance[SCALE][SCALE] += leap * leap;
+        }
         let moved_m = sample.distance_m - previous.distance_m;
         // A counter that was reset or overflowed says nothing of the distance: the speeds do.
         let jumped = moved_m.abs() > self.config.top_speed_mps * duration_s + 0.1;
@@ -134,6 +140,9 @@ impl Tracker {
     /// Corrects the state by one electrical angle to a radio head.
     pub fn update(&mut self, head: &RadioHead, measured: &AngleMeasurement) -> UpdateVerdict {
         let looked = match self.look(head, measured) {
+            Ok(looked) if looked.excluded => {
+                return self.verdict(UpdateReason::Excluded, None);
+            }
             Ok(looked) => looked,
             Err(reason) => return self.verdict(reason, None),
         };
@@ -150,11 +159,15 @@ impl Tracker {
         self.verdict(UpdateReason::Consistent, Some(mahalanobis2))
     }
 
-    /// The innovation an angle would bring, without using it; `None` where there would be none.
-    pub fn innovation(&self, head: &RadioHead, measured: &AngleMeasurement) -> Option<Innovation> {
-        self.look(head, measured)
-            .ok()
-            .map(|looked| looked.innovation)
+    /// The innovation that an angle to an excluded radio head would bring; it counts as a look.
+    pub(in crate::localize) fn rehearse_excluded(
+        &mut self,
+        head: &RadioHead,
+        measured: &AngleMeasurement,
+    ) -> Option<Innovation> {
+        let looked = self.look(head, measured).ok()?;
+        self.heads.get_mut(looked.head)?.last_look_m = looked.place_m;
+        Some(looked.innovation)
     }
 
     fn verdict(&self, reason: UpdateReason, mahalanobis2: Option<f64>) -> UpdateVerdict {
@@ -181,9 +194,6 @@ impl Tracker {
         let (index, head) = (self.heads.iter().enumerate())
             .find(|(_, mine)| mine.is(head))
             .ok_or(UpdateReason::UnknownRadioHead)?;
-        if head.excluded {
-            return Err(UpdateReason::Excluded);
-        }
         let (ahead_m, ahead_variance) = self.coasting(measured.time_s);
         let (pose, footing) = locate(&self.belief.mean, ahead_m, self.map.as_deref());
         let (mounting, offset) = (self.belief.mean[MOUNTING], self.belief.mean[PHASE]);
@@ -200,6 +210,7 @@ impl Tracker {
             .innovation(residual, &sighting.row, measurement_variance);
         Ok(Look {
             head: index,
+            excluded: head.excluded,
             place_m,
             row: sighting.row,
             measurement_variance,
@@ -268,6 +279,7 @@ impl Tracker {
             time_s,
             pose,
             covariance: Some(covariance),
+            integrity: None,
         }
     }
 
@@ -441,6 +453,7 @@ impl Tracker {
 /// An angle as the belief meets it.
 struct Look {
     head: usize,
+    excluded: bool,
     place_m: f64,
     row: [f64; STATES],
     measurement_variance: f64,
