@@ -102,6 +102,7 @@ fn estimate(time_s: f64) -> PoseEstimate {
         time_s,
         pose,
         covariance,
+        integrity: None,
     }
 }
 
