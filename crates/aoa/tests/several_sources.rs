@@ -2,8 +2,8 @@
 
 mod common;
 
-use aoa::{Array, Covariance, estimate_several};
-use common::{METHODS, exact};
+use aoa::{Array, Complex64, Covariance, Criterion, bound, estimate_several, source_count};
+use common::{METHODS, Random, exact};
 
 #[test]
 fn every_method_is_exact_on_the_exact_covariance_of_two_sources() {
@@ -30,4 +30,121 @@ fn every_method_is_exact_on_the_exact_covariance_of_two_sources() {
     check::<4>(0.5);
     check::<4>(0.4);
     check::<8>(0.5);
+}
+
+#[test]
+fn as_many_sources_as_antennas_less_one() {
+    let array = Array::<4>::half_wavelength();
+    let truth: [f64; 3] = [40.0, 75.0, 120.0];
+    let sources = truth.map(|degrees| (degrees.to_radians(), 10.0));
+    let covariance = Covariance::from_matrix(exact(&array, &sources), 1000).unwrap();
+    for method in &METHODS[1..] {
+        let found = estimate_several(*method, &covariance, &array, 3).unwrap();
+        for (estimate, degrees) in found.iter().zip(truth) {
+            assert!(
+                (estimate.angle_rad.to_degrees() - degrees).abs() < 1e-6,
+                "{method:?}"
+            );
+            assert!(
+                (estimate.snr_db - 10.0).abs() < 1e-5,
+                "{method:?} {estimate:?}"
+            );
+        }
+    }
+}
+
+#[test]
+fn two_sources_stay_near_their_bound_and_know_it() {
+    let array = Array::<4>::half_wavelength();
+    let truth = [1.1, 1.8];
+    let phases = truth.map(|angle| array.phase_from_angle(angle));
+    let bounds = bound::stochastic_several::<4>(&phases, &[100.0, 10.0], 50).unwrap();
+    let mut random = Random::new(11);
+    let trials = 2000;
+    for (method, limit) in METHODS[1..].iter().zip([1.15, 1.15, 1.4, 1.4]) {
+        let (mut squares, mut normalised) = ([0.0; 2], [0.0; 2]);
+        for _ in 0..trials {
+            let snapshots = random.snapshots(&array, &[(truth[0], 20.0), (truth[1], 10.0)], 50);
+            let covariance = Covariance::from_snapshots(&snapshots).unwrap();
+            let found = estimate_several(*method, &covariance, &array, 2).unwrap();
+            for k in 0..2 {
+                let error = found[k].phase_rad - phases[k];
+                squares[k] += error * error;
+                normalised[k] += (error / found[k].phase_sigma_rad).powi(2);
+                assert!(found[k].is_resolved());
+            }
+        }
+        for k in 0..2 {
+            let ratio = (squares[k] / f64::from(trials)).sqrt() / bounds[k];
+            let consistency = normalised[k] / f64::from(trials);
+            println!("{method:?} source {k}: RMSE / bound {ratio:.3}, NEES {consistency:.3}");
+            assert!(ratio < limit, "{method:?} source {k}: {ratio}");
+            assert!(
+                (0.8..limit * limit * 1.1).contains(&consistency),
+                "{method:?}: {consistency}"
+            );
+        }
+    }
+}
+
+#[test]
+fn coherent_sources_need_averaging() {
+    // A reflection carries the waveform of the direct path: R has rank one.
+    let array = Array::<4>::half_wavelength();
+    let truth: [f64; 2] = [60.0, 105.0];
+    let [direct, reflected] =
+        truth.map(|degrees| array.steering_vector(array.phase_from_angle(degrees.to_radians())));
+    let coherent: [Complex64; 4] =
+        std::array::from_fn(|n| direct[n] + reflected[n] * Complex64::from_polar(0.8, 1.0));
+    let covariance = Covariance::from_snapshots(&[coherent; 10]).unwrap();
+    let averaged = covariance.forward_backward();
+    let smoothed = covariance.spatially_smoothed::<3>();
+    let ideal = array.subarray::<3>().unwrap();
+    for method in &METHODS[1..] {
+        let found = estimate_several(*method, &averaged, &array, 2).unwrap();
+        let small = estimate_several(*method, &smoothed, &ideal, 2).unwrap();
+        for k in 0..2 {
+            assert!(
+                (found[k].angle_rad.to_degrees() - truth[k]).abs() < 1e-4,
+                "{method:?}"
+            );
+            assert!(
+                (small[k].angle_rad.to_degrees() - truth[k]).abs() < 1e-4,
+                "{method:?}"
+            );
+        }
+    }
+}
+
+#[test]
+fn sources_closer_than_the_noise_allows_are_not_separated() {
+    let array = Array::<4>::half_wavelength();
+    let mut random = Random::new(12);
+    let resolved = (0..200)
+        .filter(|_| {
+            let snapshots = random.snapshots(&array, &[(1.50, 3.0), (1.53, 3.0)], 20);
+            let covariance = Covariance::from_snapshots(&snapshots).unwrap();
+            let found = estimate_several(METHODS[1], &covariance, &array, 2).unwrap();
+            found.iter().any(aoa::AngleEstimate::is_resolved)
+        })
+        .count();
+    assert!(resolved <= 10, "{resolved} of 200 claimed to be resolved");
+}
+
+#[test]
+fn the_number_of_sources_is_found() {
+    let array = Array::<5>::half_wavelength();
+    let mut random = Random::new(13);
+    let sources = [(0.9, 10.0), (1.5, 10.0), (2.2, 10.0)];
+    for count in 0..=3 {
+        let (mut mdl, mut aic) = (0, 0);
+        for _ in 0..200 {
+            let snapshots = random.snapshots(&array, &sources[..count], 100);
+            let covariance = Covariance::from_snapshots(&snapshots).unwrap();
+            mdl += usize::from(source_count(Criterion::Mdl, &covariance) == Ok(count));
+            aic += usize::from(source_count(Criterion::Aic, &covariance) == Ok(count));
+        }
+        assert!(mdl >= 196, "MDL {count}: {mdl} of 200");
+        assert!(aic >= 160, "AIC {count}: {aic} of 200");
+    }
 }

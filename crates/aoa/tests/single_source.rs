@@ -2,7 +2,9 @@
 
 mod common;
 
-use aoa::{Array, Covariance, Method, bound, estimate};
+use aoa::{
+    AngleEstimate, Array, Batch, Complex64, Covariance, Method, Reason, Verdict, bound, estimate,
+};
 use common::{METHODS, Random, exact, oracle};
 
 #[test]
@@ -83,6 +85,180 @@ fn efficient_methods_reach_the_stochastic_bound() {
                 "{:?}: NEES {consistency}",
                 METHODS[m]
             );
+        }
+    }
+}
+
+#[test]
+fn constant_snapshots_are_as_good_as_random_ones() {
+    // Despread pilots: the same vector in every snapshot. Who removes the mean removes the signal.
+    let array = Array::<4>::half_wavelength();
+    let mut random = Random::new(3);
+    let amplitude = 10.0;
+    for method in METHODS {
+        let (mut squares, mut bounds) = (0.0, 0.0);
+        for _ in 0..2000 {
+            let angle = random.uniform(20.0, 160.0).to_radians();
+            let a = array.steering_vector(array.phase_from_angle(angle));
+            let snapshots: Vec<_> = (0..20)
+                .map(|_| a.map(|element| element * amplitude + random.gaussian()))
+                .collect();
+            let covariance = Covariance::from_snapshots(&snapshots).unwrap();
+            squares += (estimate(method, &covariance, &array).unwrap().angle_rad - angle).powi(2);
+            let sigma = bound::deterministic::<4>(amplitude * amplitude, 20);
+            bounds += bound::angle_sigma_rad(sigma, angle, &array).powi(2);
+        }
+        let ratio = (squares / bounds).sqrt();
+        assert!(ratio < 1.12, "{method:?}: RMSE / bound {ratio}");
+    }
+}
+
+#[test]
+fn a_coarse_grid_costs_no_accuracy() {
+    let array = Array::<4>::half_wavelength();
+    let mut random = Random::new(4);
+    for _ in 0..500 {
+        let angle = random.uniform(0.3, 2.8);
+        let snapshots = random.snapshots(&array, &[(angle, 20.0)], 20);
+        let covariance = Covariance::from_snapshots(&snapshots).unwrap();
+        let of = |grid_deg, refine| {
+            let method = Method::Music { grid_deg, refine };
+            estimate(method, &covariance, &array).unwrap().phase_rad
+        };
+        let exact = of(0.1, true);
+        assert!((of(1.0, true) - exact).abs() < 1e-9);
+        assert!((of(10.0, true) - exact).abs() < 1e-9);
+        // Without refinement: the nearest point of the grid.
+        let step = std::f64::consts::PI * 1_f64.to_radians();
+        assert!((of(1.0, false) - exact).abs() <= 0.51 * step);
+    }
+}
+
+#[test]
+fn a_batch_gives_what_single_calls_give() {
+    fn check<const N: usize>() {
+        let array = Array::<N>::new(0.45).unwrap();
+        let mut random = Random::new(5);
+        let (items, count) = (150, 7);
+        let mut samples = Vec::new();
+        let mut singles = Vec::new();
+        for item in 0..items {
+            let truth = [(random.uniform(0.1, 3.0), f64::from(item % 5) * 8.0 - 8.0)];
+            let snapshots = random.snapshots(&array, &truth, count);
+            for n in 0..N {
+                samples.extend(snapshots.iter().map(|snapshot| snapshot[n]));
+            }
+            let covariance = Covariance::from_snapshots(&snapshots).unwrap();
+            singles.push(METHODS.map(|method| estimate(method, &covariance, &array).unwrap()));
+        }
+        let narrow: Vec<_> = samples
+            .iter()
+            .map(|z| num_complex::Complex::new(z.re as f32, z.im as f32))
+            .collect();
+        for (m, method) in METHODS.into_iter().enumerate() {
+            let mut batch = vec![AngleEstimate::default(); items as usize];
+            let view = Batch::<f64, N>::new(&samples, count).unwrap();
+            view.estimate(method, &array, false, 1, &mut batch).unwrap();
+            let mut batch_narrow = batch.clone();
+            let view = Batch::<f32, N>::new(&narrow, count).unwrap();
+            view.estimate(method, &array, false, 1, &mut batch_narrow)
+                .unwrap();
+            for (item, single) in singles.iter().enumerate() {
+                let single = single[m];
+                for (other, tolerance) in [(batch[item], 1e-8), (batch_narrow[item], 2e-4)] {
+                    let differs = |a: f64, b: f64| (a - b).abs() > tolerance * (1.0 + b.abs());
+                    assert_eq!(other.verdict, single.verdict, "{method:?} {item}");
+                    assert!(
+                        !differs(other.phase_rad, single.phase_rad),
+                        "{other:?} {single:?}"
+                    );
+                    assert!(
+                        !differs(other.snr_db, single.snr_db),
+                        "{other:?} {single:?}"
+                    );
+                    if tolerance < 1e-6 {
+                        assert!(!differs(other.angle_rad, single.angle_rad));
+                        assert!(!differs(other.sigma_rad, single.sigma_rad));
+                        assert!(!differs(other.phase_sigma_rad, single.phase_sigma_rad));
+                    }
+                }
+            }
+        }
+    }
+    check::<2>();
+    check::<3>();
+    check::<4>();
+    check::<8>();
+}
+
+#[test]
+fn verdicts_say_when_not_to_believe() {
+    let array = Array::<4>::half_wavelength();
+    let mut random = Random::new(6);
+    let of = |snapshots: &[[Complex64; 4]]| {
+        let covariance = Covariance::from_snapshots(snapshots).unwrap();
+        estimate(Method::MaximumLikelihood, &covariance, &array).unwrap()
+    };
+    let trials = 2000;
+    // Noise alone has the look of a source now and then.
+    let believed = (0..trials)
+        .filter(|_| of(&random.snapshots(&array, &[], 20)).is_resolved())
+        .count();
+    assert!(believed < trials / 10, "{believed} of {trials}");
+    // In the threshold region, what is believed is right.
+    for snr_db in [-8.0, -5.0, -2.0, 0.0] {
+        let (mut wrong, mut resolved) = (0, 0);
+        for _ in 0..trials {
+            let angle = random.uniform(20.0, 160.0).to_radians();
+            let found = of(&random.snapshots(&array, &[(angle, snr_db)], 20));
+            if found.is_resolved() {
+                resolved += 1;
+                let error = found.phase_rad - array.phase_from_angle(angle);
+                wrong += usize::from(error.abs() > 5.0 * found.phase_sigma_rad);
+            }
+        }
+        assert!(
+            wrong * 50 <= resolved,
+            "{snr_db} dB: {wrong} of {resolved} wrong"
+        );
+    }
+    let good = (0..trials)
+        .filter(|_| of(&random.snapshots(&array, &[(1.2, 5.0)], 20)).is_resolved())
+        .count();
+    assert!(good * 100 > trials * 99, "{good} of {trials}");
+    // Along the axis the other end fits as well.
+    let found = of(&random.snapshots(&array, &[(0.02, 20.0)], 20));
+    assert_eq!(found.verdict, Verdict::Unresolved(Reason::NearEndFire));
+    assert!(found.sigma_rad.is_finite());
+    assert_eq!(
+        found.verdict.to_string(),
+        "unresolved: too near to the array's axis"
+    );
+    // A wavelength of spacing makes every direction ambiguous.
+    let wide = Array::<4>::new(1.0).unwrap();
+    let covariance = Covariance::from_matrix(exact(&wide, &[(1.2, 20.0)]), 20).unwrap();
+    let found = estimate(Method::RootMusic, &covariance, &wide).unwrap();
+    assert_eq!(found.verdict, Verdict::Unresolved(Reason::Ambiguous));
+}
+
+#[test]
+fn streaming_and_batch_covariances_agree() {
+    let array = Array::<3>::half_wavelength();
+    let snapshots = Random::new(8).snapshots(&array, &[(1.0, 3.0)], 11);
+    let mut streaming = Covariance::<3>::new();
+    streaming.accumulate(&snapshots[0], 1.0);
+    streaming.reset();
+    for snapshot in &snapshots {
+        streaming.accumulate(snapshot, 2.5);
+    }
+    let whole = Covariance::from_snapshots(&snapshots).unwrap();
+    assert_eq!(streaming.snapshots(), 11);
+    let rows: [Vec<_>; 3] = std::array::from_fn(|n| snapshots.iter().map(|x| x[n]).collect());
+    let channels = Covariance::from_channels([&rows[0][..], &rows[1], &rows[2]]).unwrap();
+    for (i, row) in whole.matrix().iter().enumerate() {
+        for (j, entry) in row.iter().enumerate() {
+            assert!((streaming.matrix()[i][j] - entry).norm() < 1e-12);
+            assert!((channels.matrix()[i][j] - entry).norm() < 1e-12);
         }
     }
 }
