@@ -64,7 +64,8 @@ pub enum FrontEndError {
     },
 }
 
-/// Mixer, low-pass and rate conversion by L/M for all antennas of one receiver.
+/// Mixer, low-pass and rate conversion by L/M for all antennas of one receiver. Any multiple of
+/// 3.84 Msps is an input rate, also 11.52 Msps at 30 kHz (L/M = 2/3).
 pub struct FrontEnd {
     input_rate_hz: f64,
     scs_hz: f64,

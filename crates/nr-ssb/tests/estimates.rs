@@ -92,6 +92,34 @@ proptest! {
     }
 }
 
+/// 11.52 Msps is three halves of the base rate at 30 kHz.
+#[test]
+fn a_rate_of_three_halves_is_converted() {
+    let spacing = SubcarrierSpacing::Khz30;
+    let mut rng = air::rng(5);
+    let mut cell = air::Cell::random(&mut rng, spacing, 1);
+    cell.delay = 333.25;
+    let mut samples = air::silence(1, 30_000);
+    cell.add_to(&mut samples);
+    air::add_noise(&mut samples, 15.0, &mut rng);
+    let recorded: Vec<_> = air::raised(&samples[0], 3, 0.0)
+        .into_iter()
+        .step_by(2)
+        .collect();
+    let mut front_end = FrontEnd::new(11.52e6, 0.0, 30e3, 1).unwrap();
+    let base = front_end.process(&[&recorded]).unwrap();
+    assert_eq!(base[0].len(), 30_000);
+    let mut searcher = Searcher::new(SearchConfig {
+        ssb_freq_hz: Some(cell.ssb_freq_hz),
+        ..SearchConfig::new(spacing, 1)
+    })
+    .unwrap();
+    let found = searcher.search(&air::slices(&base)).unwrap();
+    assert_eq!(found.len(), 1);
+    assert_eq!(found[0].payload.unwrap().sfn(), cell.sfn);
+    assert!((found[0].sample_start - cell.ssb_start(cell.ssb_indices[0])).abs() < 0.05);
+}
+
 #[test]
 fn bad_input_is_named() {
     let spacing = SubcarrierSpacing::Khz15;

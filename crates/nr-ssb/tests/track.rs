@@ -105,7 +105,11 @@ fn noise_variance_and_blocks_keep_the_scale_of_a_resource_element() {
             .track(&windows(&samples), 0.0, start, false)
             .unwrap()
             .unwrap();
-        signal += tracked.blocks[0].iter().map(num_complex::Complex64::norm_sqr).sum::<f64>() / 4.0;
+        signal += tracked.blocks[0]
+            .iter()
+            .map(num_complex::Complex64::norm_sqr)
+            .sum::<f64>()
+            / 4.0;
         noise += tracked.noise_variance.iter().sum::<f64>() / 4.0;
         count += 1.0;
     }
