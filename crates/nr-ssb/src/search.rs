@@ -258,7 +258,7 @@ impl Searcher {
         self.remember();
         self.examine_all(tail + length);
         self.found
-            .sort_by(|a, b| a.sample_start.total_cmp(&b.sample_start));
+            .sort_unstable_by(|a, b| a.sample_start.total_cmp(&b.sample_start));
         Ok(&self.found)
     }
 
