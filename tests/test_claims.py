@@ -65,4 +65,4 @@ def test_a_worse_adaptive_drive_turns_its_claims() -> None:
     verdicts = {claim.id: claim for claim in check_claims(worse)}
     assert not verdicts["a1_adaptive_worst_m"].reproduced
     assert not verdicts["a6_modes_1_2_3_adaptive_worst_m"].reproduced
-    assert "e5 cannot hold" in verdicts["a6_modes_1_2_3_adaptive_worst_m"].note
+    assert "wake up least often" in verdicts["a6_modes_1_2_3_adaptive_worst_m"].note
