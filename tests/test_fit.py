@@ -3,9 +3,10 @@ from __future__ import annotations
 import pytest
 
 import synthetic
-from access_av import facts
+from access_av import facts, study
 from access_av.fit import ModeDemand, fit_energy
 from access_av.methods import METHODS
+from access_av.platform import Platform
 
 Energies = dict[int, dict[str, float]]
 
@@ -67,3 +68,15 @@ def test_savings_are_those_stated(demands: dict[int, ModeDemand], energies: Ener
     assert sum(pairs) / len(pairs) == pytest.approx(0.4309, abs=1e-9)
     for mode in (6, 7):
         assert sum(savings[mode]) / len(METHODS) > 0.52
+
+
+def test_the_shipped_platform_holds_what_the_fit_gives() -> None:
+    shipped = Platform.load("jetson-agx-xavier")
+    fitted = study.fit_platform("paper", "jetson-agx-xavier", runs=10, seed=2)
+    for held, found in zip(shipped.modes, fitted.modes, strict=True):
+        for method in METHODS:
+            energy = held.energy_per_execution_j[method]
+            assert energy.provenance == "fitted"
+            assert energy.value == pytest.approx(
+                found.energy_per_execution_j[method].value, rel=0.02
+            )

@@ -25,8 +25,8 @@ NOT_REPRODUCED = "not reproduced"
 
 # The parameters that were chosen with the paper's claims in view.
 RADIO = (
-    "what the paper leaves open of radio and controller (SNR level, Rician K, SNR set point and its "
-    "scale, heading between two estimates)"
+    "what the paper leaves open of radio and controller (SNR level, Rician K, SNR set point and "
+    "its scale, heading between two estimates)"
 )
 ENERGY = "energy per execution, per mode and method"
 
