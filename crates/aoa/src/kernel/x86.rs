@@ -5,11 +5,30 @@
 //! `v conj(w)`; of `v` times `w` with its parts exchanged, the odd lanes less the even ones sum to the
 //! imaginary part.
 
+use std::arch::x86_64::{__m128d, _mm_addsub_pd, _mm_cvtsd_f64, _mm_unpackhi_pd, _mm_unpacklo_pd};
+
+use crate::Complex64;
+
+/// The real part `direct_0 + direct_1` and the imaginary part `crossed_1 - crossed_0`.
+#[target_feature(enable = "avx2,fma")]
+#[inline]
+fn parts_pd(direct: __m128d, crossed: __m128d) -> Complex64 {
+    let (low, high) = (
+        _mm_unpacklo_pd(crossed, direct),
+        _mm_unpackhi_pd(crossed, direct),
+    );
+    let parts = _mm_addsub_pd(high, low);
+    Complex64::new(
+        _mm_cvtsd_f64(_mm_unpackhi_pd(parts, parts)),
+        _mm_cvtsd_f64(parts),
+    )
+}
+
 macro_rules! kernels {
     (
         $module:ident, $features:literal, $real:ident, $vector:ident,
         $complexes:literal, [$($lane:literal $part:ident),*],
-        $set:ident, $zero:ident, $add:ident, $mul:ident, $fma:ident, $exchange:expr, $sums:expr
+        $set:ident, $zero:ident, $add:ident, $mul:ident, $fma:ident, $exchange:expr, $total:expr
     ) => {
         pub(in crate::kernel) mod $module {
             use std::arch::x86_64::*;
@@ -18,6 +37,7 @@ macro_rules! kernels {
 
             use crate::Complex64;
             use crate::covariance::{Matrix, zeros};
+            use super::parts_pd;
             use crate::kernel::portable;
             use crate::peak::Spectra;
 
@@ -34,8 +54,7 @@ macro_rules! kernels {
             #[target_feature(enable = $features)]
             #[inline]
             fn total(direct: $vector, crossed: $vector) -> Complex64 {
-                let ((even, odd), (crossed_even, crossed_odd)) = ($sums(direct), $sums(crossed));
-                Complex64::new(f64::from(even + odd), f64::from(crossed_odd - crossed_even))
+                $total(direct, crossed)
             }
 
             #[target_feature(enable = $features)]
@@ -143,19 +162,21 @@ kernels!(
     avx2_f64, "avx2,fma", f64, __m256d, 2, [1 im, 1 re, 0 im, 0 re],
     _mm256_set_pd, _mm256_setzero_pd, _mm256_add_pd, _mm256_mul_pd, _mm256_fmadd_pd,
     _mm256_permute_pd::<0b0101>,
-    |v| {
-        let half = _mm_add_pd(_mm256_castpd256_pd128(v), _mm256_extractf128_pd::<1>(v));
-        (_mm_cvtsd_f64(half), _mm_cvtsd_f64(_mm_unpackhi_pd(half, half)))
+    |direct, crossed| {
+        let halve = |v| _mm_add_pd(_mm256_castpd256_pd128(v), _mm256_extractf128_pd::<1>(v));
+        parts_pd(halve(direct), halve(crossed))
     }
 );
 kernels!(
     avx2_f32, "avx2,fma", f32, __m256, 4, [3 im, 3 re, 2 im, 2 re, 1 im, 1 re, 0 im, 0 re],
     _mm256_set_ps, _mm256_setzero_ps, _mm256_add_ps, _mm256_mul_ps, _mm256_fmadd_ps,
     _mm256_permute_ps::<0b10_11_00_01>,
-    |v| {
-        let half = _mm_add_ps(_mm256_castps256_ps128(v), _mm256_extractf128_ps::<1>(v));
-        let half = _mm_add_ps(half, _mm_movehl_ps(half, half));
-        (_mm_cvtss_f32(half), _mm_cvtss_f32(_mm_shuffle_ps::<1>(half, half)))
+    |direct, crossed| {
+        let halve = |v| {
+            let half = _mm_add_ps(_mm256_castps256_ps128(v), _mm256_extractf128_ps::<1>(v));
+            _mm_cvtps_pd(_mm_add_ps(half, _mm_movehl_ps(half, half)))
+        };
+        parts_pd(halve(direct), halve(crossed))
     }
 );
 kernels!(
@@ -163,9 +184,11 @@ kernels!(
     4, [3 im, 3 re, 2 im, 2 re, 1 im, 1 re, 0 im, 0 re],
     _mm512_set_pd, _mm512_setzero_pd, _mm512_add_pd, _mm512_mul_pd, _mm512_fmadd_pd,
     _mm512_permute_pd::<0b0101_0101>,
-    |v| {
-        let half = _mm256_add_pd(_mm512_castpd512_pd256(v), _mm512_extractf64x4_pd::<1>(v));
-        let half = _mm_add_pd(_mm256_castpd256_pd128(half), _mm256_extractf128_pd::<1>(half));
-        (_mm_cvtsd_f64(half), _mm_cvtsd_f64(_mm_unpackhi_pd(half, half)))
+    |direct, crossed| {
+        let halve = |v| {
+            let half = _mm256_add_pd(_mm512_castpd512_pd256(v), _mm512_extractf64x4_pd::<1>(v));
+            _mm_add_pd(_mm256_castpd256_pd128(half), _mm256_extractf128_pd::<1>(half))
+        };
+        parts_pd(halve(direct), halve(crossed))
     }
 );
