@@ -20,9 +20,10 @@ import warnings
 from typing import TYPE_CHECKING
 
 import numpy as np
-from access_av import aoa
 from rich.console import Console
 from rich.table import Table
+
+from access_av import aoa
 
 if TYPE_CHECKING:
     from collections.abc import Callable
