@@ -22,6 +22,12 @@ pub enum Purpose {
     Wander = 6,
     /// Error of the initial pose.
     Start = 7,
+    /// Oscillators and channel gains of the simulated receiver.
+    ReceiverHardware = 8,
+    /// Noise of the simulated samples.
+    SampleNoise = 9,
+    /// Oscillator of a radio head.
+    HeadOscillator = 10,
 }
 
 /// The random streams of one run.

@@ -57,6 +57,11 @@ impl HeadChannel {
         }
     }
 
+    /// The radio head.
+    pub const fn head(&self) -> &RadioHead {
+        &self.head
+    }
+
     /// Mean SNR in dB of the SSB that arrives now: link budget and shadowing. To be called once for
     /// each SSB, in order.
     pub fn next_snr_db(&mut self, vehicle: &VehicleState) -> f64 {
@@ -64,18 +69,21 @@ impl HeadChannel {
         self.budget.snr_db(&self.head, distance_m) + self.shadowing.next_db(vehicle.along_m)
     }
 
-    /// The SSB of mean SNR `snr_db` at the array, with fading.
-    pub fn receive(&mut self, vehicle: &VehicleState, snr_db: f64) -> Reception {
+    /// Electrical angle of the line of sight, and gains of the antennas for a mean SNR of `snr_db`.
+    pub fn gains(&self, vehicle: &VehicleState, snr_db: f64) -> (f64, Snapshot) {
         let place = vehicle.pose.point();
         let distance_m = place.distance_m(self.head.position);
         let bearing_rad = place.bearing_rad(self.head.position);
         let to_axis_rad = bearing_rad - vehicle.pose.heading_rad - self.mounting_angle_rad;
         let phase_rad = self.element_rad * to_axis_rad.cos();
         let amplitude = 10f64.powf(0.05 * snr_db);
-        let gains = self
-            .fading
-            .gains(phase_rad, vehicle.along_m, distance_m)
-            .map(|gain| gain * amplitude);
+        let fading = self.fading.gains(phase_rad, vehicle.along_m, distance_m);
+        (phase_rad, fading.map(|gain| gain * amplitude))
+    }
+
+    /// The SSB of mean SNR `snr_db` at the array, with fading.
+    pub fn receive(&mut self, vehicle: &VehicleState, snr_db: f64) -> Reception {
+        let (phase_rad, gains) = self.gains(vehicle, snr_db);
         let power = gains.iter().map(Complex64::norm_sqr).sum::<f64>() / gains.len() as f64;
         let mut sensed_db = 10.0 * power.log10();
         if self.snr_noise_db > 0.0 {

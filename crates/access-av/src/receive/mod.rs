@@ -1,13 +1,19 @@
 //! From IQ samples to SSBs and the angles they arrive at.
 //!
-//! [`scan`] looks through a recording for whatever cells are in it.
+//! [`scan`] looks through a recording for whatever cells are in it; a [`Receiver`] keeps to the cells
+//! of a site while the vehicle drives, and makes an observation of each of their SSBs.
 
 mod array_view;
 mod diagnosis;
 mod iq_source;
+mod receiver;
 mod scan;
 
 pub use array_view::ArraySetup;
 pub use diagnosis::{ChannelFault, diagnose_channels};
 pub use iq_source::{IqSource, SampleBlock};
+pub use receiver::{ReceiveError, Receiver, ReceiverConfig, Window};
 pub use scan::{FoundSsb, Scan, ScanError, ScanSettings, scan};
+
+/// Samples of an SSB at the base rate: four symbols of 256 with a cyclic prefix of 18.
+const SSB_SAMPLES: usize = 4 * 274;

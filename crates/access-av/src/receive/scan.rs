@@ -6,13 +6,12 @@ use nr_ssb::search::{DetectedSsb, SearchConfig, SearchError, Searcher};
 use nr_ssb::{Complex32, SubcarrierSpacing};
 use thiserror::Error;
 
+use super::SSB_SAMPLES;
 use super::array_view::{ArraySetup, ArrayView, View, array_view};
 use super::diagnosis::{ChannelFault, ChannelWatch};
 use super::iq_source::IqSource;
 use crate::recording::RecordingError;
 
-/// Samples of an SSB at the base rate: four symbols of 256 with a cyclic prefix of 18.
-const SSB_SAMPLES: usize = 4 * 274;
 /// Read and searched at once.
 const BLOCK_S: f64 = 0.02;
 /// Looked through for raster points, in two steps: the usual period, and the longest (TS 38.331).

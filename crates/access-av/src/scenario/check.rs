@@ -73,6 +73,7 @@ impl Scenario {
         self.check_motion(&check, &track)?;
         self.check_radio_heads(&check, &track)?;
         self.check_radio(&check)?;
+        self.check_iq(&check)?;
         self.check_vehicle(&check)?;
         self.check_wake_up(&check)
     }

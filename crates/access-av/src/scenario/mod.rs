@@ -7,6 +7,7 @@
 mod channel;
 mod check;
 mod error;
+mod iq;
 mod localization;
 mod radio;
 pub(crate) mod read;
@@ -28,6 +29,7 @@ use crate::world::Track;
 pub use channel::{ChannelSettings, ScatterModel};
 pub(crate) use check::Check;
 pub use error::ScenarioError;
+pub use iq::IqSettings;
 pub use localization::{
     DeadReckoningSettings, EstimatorMethod, EstimatorSettings, GyroSettings, HeadingBetween,
     LocalizerSettings, OdometerSettings, StartSettings,
@@ -70,6 +72,9 @@ pub struct Scenario {
     /// What happens to the signal in between.
     #[serde(default)]
     pub channel: ChannelSettings,
+    /// What the receiver's hardware does to the samples, where they are simulated.
+    #[serde(default)]
+    pub iq: IqSettings,
     /// The vehicle's odometer.
     #[serde(default)]
     pub odometer: OdometerSettings,
@@ -97,6 +102,8 @@ pub enum Fidelity {
     /// Array snapshots drawn from the channel, as in the paper.
     #[default]
     Snapshots,
+    /// Samples of every SSB at every antenna, received as a recording is (`[iq]`).
+    Iq,
 }
 
 /// The onboard computer and its power mode.

@@ -2,6 +2,7 @@
 
 mod campaign;
 mod histogram;
+mod iq_reception;
 mod run;
 
 use thiserror::Error;
@@ -11,6 +12,7 @@ pub use histogram::ErrorHistogram;
 pub use run::{RunRecord, Simulation, Step};
 
 use crate::BoxError;
+use crate::receive::ReceiveError;
 use crate::scenario::ScenarioError;
 
 /// Why a simulation ended early.
@@ -22,6 +24,12 @@ pub enum SimulationError {
     /// The user's own estimator or policy failed.
     #[error("{0}")]
     Custom(BoxError),
+    /// An SSB of the scenario cannot be sent as samples.
+    #[error("samples: {0}")]
+    Samples(#[from] nr_ssb::Error),
+    /// The receiver refuses its samples.
+    #[error("receiver: {0}")]
+    Receive(#[from] ReceiveError),
     /// The threads asked for cannot be had.
     #[error("no threads to run on: {0}")]
     Threads(#[from] rayon::ThreadPoolBuildError),

@@ -4,6 +4,7 @@ use rand::RngExt;
 use rand_distr::StandardNormal;
 
 use super::SimulationError;
+use super::iq_reception::IqReception;
 use crate::channel::{HeadChannel, Reception};
 use crate::geometry::Pose;
 use crate::localize::Integrity;
@@ -11,7 +12,7 @@ use crate::observation::{SensedSsb, SsbObservation};
 use crate::onboard::{Custom, Execution, Onboard};
 use crate::platform::Platform;
 use crate::random::{Purpose, Streams};
-use crate::scenario::{Scenario, ScenarioError};
+use crate::scenario::{Fidelity, Scenario, ScenarioError};
 use crate::world::{Odometer, RadioHead, Track, Vehicle};
 
 /// A scenario on a platform, ready to be run.
@@ -118,6 +119,10 @@ impl Simulation {
             executions: Vec::with_capacity(self.steps),
             listened: 0,
         };
+        let mut iq = match scenario.fidelity {
+            Fidelity::Snapshots => None,
+            Fidelity::Iq => Some(IqReception::new(scenario, streams)?),
+        };
         let mut snrs_db = vec![0.0; channels.len()];
         let mut receptions: Vec<Reception> = Vec::with_capacity(channels.len());
         let mut sensed: Vec<SensedSsb> = Vec::with_capacity(channels.len());
@@ -144,15 +149,28 @@ impl Simulation {
                 record.listened += 1;
                 receptions.clear();
                 sensed.clear();
-                for (channel, snr_db) in channels.iter_mut().zip(&snrs_db) {
-                    let reception = channel.receive(&truth, *snr_db);
-                    sensed.push(reception.ssb);
-                    receptions.push(reception);
+                if let Some(iq) = &mut iq {
+                    iq.receive(number as u64, &vehicle, &channels, &snrs_db)?;
+                    sensed.extend(iq.observations().iter().map(|it| it.ssb));
+                } else {
+                    for (channel, snr_db) in channels.iter_mut().zip(&snrs_db) {
+                        let reception = channel.receive(&truth, *snr_db);
+                        sensed.push(reception.ssb);
+                        receptions.push(reception);
+                    }
                 }
                 let decision = onboard
                     .consider(time_s, &sensed)
                     .map_err(SimulationError::Custom)?;
                 if decision.estimate {
+                    // One of the two is empty: samples were received, or snapshots are drawn.
+                    for heard in iq.iter().flat_map(IqReception::observations) {
+                        if onboard.selects(&heard.ssb) {
+                            let execution =
+                                onboard.estimate(heard).map_err(SimulationError::Custom)?;
+                            record.executions.push(execution);
+                        }
+                    }
                     for (channel, reception) in channels.iter_mut().zip(&receptions) {
                         if !onboard.selects(&reception.ssb) {
                             continue;

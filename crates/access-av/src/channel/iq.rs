@@ -1,0 +1,265 @@
+//! From the vehicle's true place to the samples that its receiver gets of an SSB burst: every radio
+//! head's SSB, multipath, Doppler, frequency offset, clock drift, noise, channel errors, converter.
+
+use std::f64::consts::{FRAC_1_SQRT_2, TAU};
+
+use nr_ssb::burst::ssb_grid;
+use nr_ssb::ofdm::symbol_phase;
+use nr_ssb::{
+    BchPayload, Case, Complex32, Error, Lmax, Mib, Numerology, Ofdm, Pci, SubcarrierSpacing,
+};
+use num_complex::Complex64;
+use rand::RngExt;
+use rand_chacha::ChaCha8Rng;
+use rand_distr::StandardNormal;
+
+use super::HeadChannel;
+use crate::observation::ANTENNAS;
+use crate::random::{Purpose, Streams};
+use crate::scenario::{IqSettings, Scenario};
+use crate::world::VehicleState;
+
+const SPEED_OF_LIGHT_MPS: f64 = 299_792_458.0;
+/// Size of the transforms: samples are made at the base rate.
+const FFT_SIZE: usize = 256;
+/// Samples before the first SSB of a burst and after the last.
+const MARGIN: usize = 64;
+/// Subcarrier that stands at the SSB's centre.
+const CENTRE: f64 = 120.0;
+
+/// What is on the air, and the hardware that receives it, in one run.
+pub struct IqAir {
+    numerology: Numerology,
+    case: Case,
+    lmax: Lmax,
+    ofdm: Ofdm,
+    ssb_freq_hz: f64,
+    settings: IqSettings,
+    period_s: f64,
+    /// Error of the receiver's oscillator: positive is too fast.
+    oscillator: f64,
+    head_oscillators: Vec<f64>,
+    channel_gains: [Complex64; ANTENNAS],
+    noise: ChaCha8Rng,
+    /// Sum of all SSBs at each antenna, before the converter.
+    sum: [Vec<Complex64>; ANTENNAS],
+    burst: IqBurst,
+}
+
+/// Samples of one burst, at the base rate.
+#[derive(Debug, Clone, PartialEq, Default)]
+pub struct IqBurst {
+    /// Number of the first sample by the receiver's clock.
+    pub start: u64,
+    /// The vehicle's time at it, in seconds.
+    pub time_s: f64,
+    /// The samples of each antenna; full scale of the converter is one.
+    pub antennas: [Vec<Complex32>; ANTENNAS],
+    /// Where each radio head's SSB begins, by the receiver's clock; in the order of the heads.
+    pub ssb_starts: Vec<f64>,
+}
+
+impl IqAir {
+    /// The air of the run that `streams` belongs to.
+    ///
+    /// # Errors
+    /// [`Error`] for a numerology of frequency range 2.
+    pub fn new(scenario: &Scenario, streams: Streams) -> Result<Self, Error> {
+        let (case, spacing) = case_of(scenario);
+        let ssb_freq_hz = scenario.ssb.carrier_mhz * 1e6;
+        let settings = scenario.iq;
+        let mut hardware = streams.generator(Purpose::ReceiverHardware, 0);
+        let mut normal = || hardware.sample::<f64, _>(StandardNormal);
+        let oscillator = 1e-6 * settings.oscillator_ppm * normal();
+        let channel_gains = [(); ANTENNAS].map(|()| {
+            let gain = 10f64.powf(0.05 * settings.channel_gain_db * normal());
+            Complex64::from_polar(gain, settings.channel_phase_rad * normal())
+        });
+        let head_oscillators = (0..scenario.radio_heads.len())
+            .map(|index| {
+                let mut rng = streams.generator(Purpose::HeadOscillator, index);
+                1e-6 * settings.head_oscillator_ppm * rng.sample::<f64, _>(StandardNormal)
+            })
+            .collect();
+        let numerology = Numerology::new(spacing, FFT_SIZE)?;
+        Ok(Self {
+            numerology,
+            case,
+            lmax: if ssb_freq_hz <= 3e9 {
+                Lmax::L4
+            } else {
+                Lmax::L8
+            },
+            ofdm: Ofdm::new(numerology),
+            ssb_freq_hz,
+            settings,
+            period_s: scenario.ssb.period_s(),
+            oscillator,
+            head_oscillators,
+            channel_gains,
+            noise: streams.generator(Purpose::SampleNoise, 0),
+            sum: Default::default(),
+            burst: IqBurst::default(),
+        })
+    }
+
+    /// Samples per second.
+    pub fn sample_rate_hz(&self) -> f64 {
+        self.numerology.sample_rate_hz()
+    }
+
+    /// Gains of the receive channels, as a calibration would find them.
+    pub const fn channel_gains(&self) -> &[Complex64; ANTENNAS] {
+        &self.channel_gains
+    }
+
+    /// What the receiver gets of burst number `number`, received at the vehicle's `time_s`, of radio
+    /// heads with these mean SNRs. `state` gives the truth at any time.
+    ///
+    /// # Errors
+    /// [`Error`] for an SSB index that a cell cannot have.
+    pub fn receive(
+        &mut self,
+        number: u64,
+        state: impl Fn(f64) -> VehicleState,
+        heads: &[HeadChannel],
+        snrs_db: &[f64],
+    ) -> Result<&IqBurst, Error> {
+        let rate_hz = self.sample_rate_hz();
+        let time_s = number as f64 * self.period_s;
+        // A clock that runs too fast has counted more samples by then.
+        let half_frame_start = time_s * rate_hz * (1.0 + self.oscillator);
+        let (first, last) = self.span(heads)?;
+        let offset = self.numerology.symbol_start(first) as f64 - MARGIN as f64;
+        self.burst.start = (half_frame_start + offset).max(0.0).floor() as u64;
+        self.burst.time_s = time_s + (self.burst.start as f64 - half_frame_start) / rate_hz;
+        let length = self.numerology.symbol_start(last + 4) - self.numerology.symbol_start(first);
+        for antenna in &mut self.sum {
+            antenna.clear();
+            antenna.resize(length + 2 * MARGIN, Complex64::ZERO);
+        }
+        self.burst.ssb_starts.clear();
+        for (index, (head, snr_db)) in heads.iter().zip(snrs_db).enumerate() {
+            let start = self.add_ssb(index, number, half_frame_start, &state, head, *snr_db)?;
+            self.burst.ssb_starts.push(start);
+        }
+        self.add_noise(number);
+        self.convert();
+        Ok(&self.burst)
+    }
+
+    /// First symbols of the earliest and the latest SSB.
+    fn span(&self, heads: &[HeadChannel]) -> Result<(usize, usize), Error> {
+        let mut span: Option<(usize, usize)> = None;
+        for head in heads {
+            let symbol = self.case.start_symbol(head.head().ssb_index)?;
+            let (first, last) = span.unwrap_or((symbol, symbol));
+            span = Some((first.min(symbol), last.max(symbol)));
+        }
+        Ok(span.unwrap_or_default())
+    }
+
+    /// Adds one radio head's SSB; returns where it begins.
+    fn add_ssb(
+        &mut self,
+        index: usize,
+        number: u64,
+        half_frame_start: f64,
+        state: &impl Fn(f64) -> VehicleState,
+        channel: &HeadChannel,
+        snr_db: f64,
+    ) -> Result<f64, Error> {
+        let head = channel.head();
+        let rate_hz = self.sample_rate_hz();
+        let grid = ssb_grid(
+            Pci::new(head.pci)?,
+            self.lmax,
+            &self.payload(number, head.ssb_index)?,
+        )?;
+        let first_symbol = self.case.start_symbol(head.ssb_index)?;
+        let time_s = number as f64 * self.period_s;
+        let range_m = state(time_s).pose.point().distance_m(head.position);
+        let delay = range_m / SPEED_OF_LIGHT_MPS * rate_hz;
+        let start = half_frame_start + self.numerology.symbol_start(first_symbol) as f64 + delay;
+        let place = (start - self.burst.start as f64).floor();
+        // What is left of the delay becomes a phase ramp over the subcarriers.
+        let fraction = start - self.burst.start as f64 - place;
+        let oscillator = self.head_oscillators.get(index).copied().unwrap_or(0.0);
+        let cfo = (oscillator - self.oscillator) * self.ssb_freq_hz / rate_hz;
+        let symbol_len = self.numerology.ssb_symbol_len();
+        let mut samples = vec![Complex32::ZERO; symbol_len];
+        for (l, subcarriers) in grid.symbols().enumerate() {
+            let phase = symbol_phase(self.numerology, first_symbol + l, self.ssb_freq_hz);
+            let mut shifted = *subcarriers;
+            for (k, element) in shifted.iter_mut().enumerate() {
+                let cycles = -(k as f64 - CENTRE) * fraction / FFT_SIZE as f64;
+                let turn = Complex64::cis(TAU * cycles);
+                *element *= phase * Complex32::new(turn.re as f32, turn.im as f32);
+            }
+            self.ofdm.modulate(&shifted, &mut samples)?;
+            let middle_s =
+                time_s + (self.numerology.symbol_start(first_symbol + l) as f64) / rate_hz;
+            let (_, gains) = channel.gains(&state(middle_s), snr_db);
+            let begin = place as usize + l * symbol_len;
+            for (sum, gain) in self.sum.iter_mut().zip(gains) {
+                for (n, (to, sample)) in sum.iter_mut().skip(begin).zip(&samples).enumerate() {
+                    let at = self.burst.start as f64 + (begin + n) as f64;
+                    let turn = Complex64::cis(TAU * (cfo * at).fract());
+                    *to += gain * turn * Complex64::new(sample.re.into(), sample.im.into());
+                }
+            }
+        }
+        Ok(start)
+    }
+
+    /// What a cell broadcasts in burst number `number`.
+    fn payload(&self, number: u64, ssb_index: u8) -> Result<BchPayload, Error> {
+        let half_frames = (number as f64 * self.period_s / 5e-3).round() as u64;
+        let sfn = (half_frames / 2 % 1024) as u16;
+        BchPayload::new(Mib::default(), sfn, half_frames % 2 == 1, ssb_index)
+    }
+
+    /// Noise that has unit power on a resource element: a transform of 256 adds up 256 samples.
+    fn add_noise(&mut self, number: u64) {
+        // Each burst has its own nonce: it sounds the same whether or not earlier ones were heard.
+        self.noise.set_stream(number);
+        self.noise.set_word_pos(0);
+        let sigma = FRAC_1_SQRT_2 / (FFT_SIZE as f64).sqrt();
+        for (sum, gain) in self.sum.iter_mut().zip(self.channel_gains) {
+            for sample in sum {
+                let re: f64 = self.noise.sample(StandardNormal);
+                let im: f64 = self.noise.sample(StandardNormal);
+                *sample = (*sample + Complex64::new(re, im) * sigma) * gain;
+            }
+        }
+    }
+
+    /// Gain control, rounding and clipping.
+    fn convert(&mut self) {
+        let count: usize = self.sum.iter().map(Vec::len).sum();
+        let energy: f64 = self.sum.iter().flatten().map(Complex64::norm_sqr).sum();
+        // I and Q share the power.
+        let rms = (0.5 * energy / count.max(1) as f64)
+            .sqrt()
+            .max(f64::MIN_POSITIVE);
+        let scale = 10f64.powf(-0.05 * self.settings.adc_headroom_db) / rms;
+        let steps = f64::from(1u32 << (self.settings.adc_bits - 1));
+        let convert =
+            |part: f64| ((part * scale * steps).round().clamp(-steps, steps - 1.0) / steps) as f32;
+        for (samples, sum) in self.burst.antennas.iter_mut().zip(&self.sum) {
+            samples.clear();
+            samples.extend(
+                sum.iter()
+                    .map(|x| Complex32::new(convert(x.re), convert(x.im))),
+            );
+        }
+    }
+}
+
+fn case_of(scenario: &Scenario) -> (Case, SubcarrierSpacing) {
+    if scenario.ssb.subcarrier_spacing_khz == 30.0 {
+        (Case::C, SubcarrierSpacing::Khz30)
+    } else {
+        (Case::A, SubcarrierSpacing::Khz15)
+    }
+}
