@@ -38,7 +38,10 @@ PlatformOption = Annotated[str, typer.Option(help="Shipped name, or path of a TO
 Runs = Annotated[int, typer.Option(min=1, help="Drives per setting.")]
 Seed = Annotated[int, typer.Option(min=0, help="Same seed, same results.")]
 Threads = Annotated[int | None, typer.Option(min=1, help="Worker threads; all cores if not given.")]
-Bound = Annotated[float | None, typer.Option(min=0.0, callback=_finite)]
+
+
+def _bound(text: str) -> Any:
+    return typer.Option(min=0.0, callback=_finite, help=text)
 
 
 def _show_version(wanted: bool) -> None:
@@ -156,10 +159,10 @@ def _override(text: str) -> tuple[str, Any]:
     epilog="Example: [bold]access-av explore --max-energy-j 260 --max-rms-m 0.15[/]",
 )
 def explore(
-    max_energy_j: Bound = None,
-    max_rms_m: Bound = None,
-    max_worst_m: Bound = None,
-    max_executions: Bound = None,
+    max_energy_j: Annotated[float | None, _bound("Energy of a trip.")] = None,
+    max_rms_m: Annotated[float | None, _bound("RMS error over track and runs.")] = None,
+    max_worst_m: Annotated[float | None, _bound("Worst mean error, X and Y.")] = None,
+    max_executions: Annotated[float | None, _bound("Angle estimates in a trip.")] = None,
     mode: Annotated[list[int] | None, typer.Option(help="Only these power modes.")] = None,
     fixed: Annotated[bool, typer.Option("--fixed", help="Also the fixed wake-up times.")] = False,
     results: Annotated[
