@@ -7,7 +7,6 @@ repetitions and include the covariance. Run with the extra ``bench`` installed::
     python benches/aoa_peers.py
 """
 
-# ruff: noqa: E402  (the number of threads must be set before NumPy is imported)
 from __future__ import annotations
 
 import os
@@ -36,6 +35,7 @@ if TYPE_CHECKING:
 ANTENNAS, SNAPSHOTS = 4, 20
 SNRS_DB = (0, 10, 20, 30)
 TRIALS = 1000
+ROUNDS = 12
 CARRIER_HZ = 3.5e9
 LIGHT_M_S = 299_792_458.0
 
@@ -127,21 +127,20 @@ class Pyroomacoustics:
         return float(self.music_of.azimuth_recon[0])
 
 
-def least_time_us(call: Callable[[], object], estimates: int, budget_s: float = 0.4) -> float:
-    """Time per estimate: the least of repetitions that fill the budget."""
-    call()
-    started = time.perf_counter()
-    call()
-    once_s = max(time.perf_counter() - started, 1e-7)
-    inner = max(1, int(0.01 / once_s))
-    best = float("inf")
-    stop = time.perf_counter() + budget_s
-    while time.perf_counter() < stop:
-        started = time.perf_counter()
-        for _ in range(inner):
-            call()
-        best = min(best, (time.perf_counter() - started) / inner)
-    return 1e6 * best / estimates
+def least_times_us(calls: dict[str, tuple[Callable[[], object], int]]) -> dict[str, float]:
+    """Time per estimate: the least of many, taken in turns so that all meet the same machine."""
+    best = dict.fromkeys(calls, float("inf"))
+    for _ in range(ROUNDS):
+        for name, (call, estimates) in calls.items():
+            stop = time.perf_counter() + 0.05
+            while time.perf_counter() < stop:
+                repetitions = max(1, 100 // estimates)
+                started = time.perf_counter()
+                for _ in range(repetitions):
+                    call()
+                elapsed_s = time.perf_counter() - started
+                best[name] = min(best[name], 1e6 * elapsed_s / (repetitions * estimates))
+    return best
 
 
 def main() -> None:
@@ -197,13 +196,12 @@ def main() -> None:
         for snr_db, (_, angles) in data.items()
     ]
     table.add_row("√CRB (stochastic)", *(f"{bound:.3f}" for bound in bounds), "–")
-    times: dict[str, float] = {}
-    for name, estimate, call, count in rows:
+    times = least_times_us({name: (call, count) for name, _, call, count in rows})
+    for name, estimate, _, _ in rows:
         errors = [
             np.degrees(np.sqrt(np.mean((estimate(snapshots) - angles) ** 2)))
             for snapshots, angles in data.values()
         ]
-        times[name] = least_time_us(call, count)
         cells = (f"{error:.3f}" for error in errors)
         table.add_row(name, *cells, f"{times[name]:.3f}")
     console = Console(width=110)
