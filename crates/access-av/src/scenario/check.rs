@@ -75,6 +75,9 @@ impl Scenario {
         self.check_radio(&check)?;
         self.check_iq(&check)?;
         self.check_vehicle(&check)?;
+        for (index, fault) in self.faults.iter().enumerate() {
+            fault.check(&check, index, self.radio_heads.len())?;
+        }
         self.check_wake_up(&check)
     }
 

@@ -7,6 +7,7 @@
 mod channel;
 mod check;
 mod error;
+mod faults;
 mod iq;
 mod localization;
 mod radio;
@@ -29,6 +30,7 @@ use crate::world::Track;
 pub use channel::{ChannelSettings, ScatterModel};
 pub(crate) use check::Check;
 pub use error::ScenarioError;
+pub use faults::{FaultKind, FaultSettings};
 pub use iq::IqSettings;
 pub use localization::{
     DeadReckoningSettings, EstimatorMethod, EstimatorSettings, GyroSettings, HeadingBetween,
@@ -90,6 +92,9 @@ pub struct Scenario {
     /// When an angle is estimated.
     #[serde(default)]
     pub wake_up: WakeUpSettings,
+    /// What goes wrong on the way.
+    #[serde(default, skip_serializing_if = "Vec::is_empty")]
+    pub faults: Vec<FaultSettings>,
     /// On which computer.
     #[serde(default)]
     pub platform: PlatformSettings,

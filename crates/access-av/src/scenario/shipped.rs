@@ -1,7 +1,7 @@
 //! The scenarios that come with the product.
 
 /// Names and texts of the shipped scenarios.
-pub(super) const SCENARIOS: [(&str, &str); 6] = [
+pub(super) const SCENARIOS: [(&str, &str); 8] = [
     ("paper", include_str!("../../../../scenarios/paper.toml")),
     (
         "paper-stop-and-go",
@@ -20,4 +20,12 @@ pub(super) const SCENARIOS: [(&str, &str); 6] = [
         include_str!("../../../../scenarios/paper-real-odometry-4.toml"),
     ),
     ("yard", include_str!("../../../../scenarios/yard.toml")),
+    (
+        "nlos-and-faults",
+        include_str!("../../../../scenarios/nlos-and-faults.toml"),
+    ),
+    (
+        "campus-handover",
+        include_str!("../../../../scenarios/campus-handover.toml"),
+    ),
 ];

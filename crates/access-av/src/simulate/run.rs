@@ -13,7 +13,7 @@ use crate::onboard::{Custom, Execution, Onboard};
 use crate::platform::Platform;
 use crate::random::{Purpose, Streams};
 use crate::scenario::{Fidelity, Scenario, ScenarioError};
-use crate::world::{Odometer, RadioHead, Track, Vehicle};
+use crate::world::{Faults, Odometer, RadioHead, Track, Vehicle};
 
 /// A scenario on a platform, ready to be run.
 #[derive(Debug, Clone)]
@@ -123,6 +123,8 @@ impl Simulation {
             Fidelity::Snapshots => None,
             Fidelity::Iq => Some(IqReception::new(scenario, streams)?),
         };
+        let mut faults = Faults::new(scenario);
+        let heads: Vec<RadioHead> = scenario.radio_heads.iter().map(RadioHead::from).collect();
         let mut snrs_db = vec![0.0; channels.len()];
         let mut receptions: Vec<Reception> = Vec::with_capacity(channels.len());
         let mut sensed: Vec<SensedSsb> = Vec::with_capacity(channels.len());
@@ -138,7 +140,7 @@ impl Simulation {
                 odometry_number += 1;
                 if let Some(sample) = odometer.sample(vehicle.at(sample_s)) {
                     // A simulated odometer neither repeats itself nor returns NaN.
-                    let _ = onboard.odometry(&sample);
+                    let _ = onboard.odometry(&faults.slip(sample));
                 }
             }
             let truth = vehicle.at(time_s);
@@ -153,8 +155,10 @@ impl Simulation {
                     iq.receive(number as u64, &vehicle, &channels, &snrs_db)?;
                     sensed.extend(iq.observations().iter().map(|it| it.ssb));
                 } else {
-                    for (channel, snr_db) in channels.iter_mut().zip(&snrs_db) {
-                        let reception = channel.receive(&truth, *snr_db);
+                    let of_heads = channels.iter_mut().zip(&snrs_db).zip(&heads);
+                    for (index, ((channel, snr_db), head)) in of_heads.enumerate() {
+                        let mut reception = channel.receive(&truth, *snr_db);
+                        faults.distort(index, head, &truth, &mut reception.gains);
                         sensed.push(reception.ssb);
                         receptions.push(reception);
                     }

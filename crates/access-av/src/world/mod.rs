@@ -1,5 +1,6 @@
 //! The truth: where the road runs, how the vehicle moves on it, what its odometer makes of that.
 
+mod faults;
 mod lane_keeping;
 mod motion;
 mod odometer;
@@ -7,6 +8,7 @@ mod radio_head;
 mod track;
 mod vehicle;
 
+pub use faults::Faults;
 pub use lane_keeping::LaneKeeping;
 pub use motion::{Motion, MotionProfile};
 pub use odometer::Odometer;
