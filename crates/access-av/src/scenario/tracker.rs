@@ -67,7 +67,7 @@ impl Default for TrackerSettings {
             outlier_probability: 1e-4,
             integrity: false,
             alert_limit_m: 1.5,
-            integrity_risk: 5e-4,
+            integrity_risk: 8e-4,
         }
     }
 }

@@ -44,6 +44,14 @@ impl LaneKeeping {
         [variance, natural * natural * variance]
     }
 
+    /// Random walk of the heading over a length short against the wavelength (rad per √m): the root
+    /// of the density of `w`, `4ζΩ³σ_d²`.
+    #[must_use]
+    pub fn steering_rad_per_sqrt_m(&self) -> f64 {
+        let natural = TAU / self.wavelength_m;
+        (4.0 * self.damping * natural.powi(3)).sqrt() * self.wander_m
+    }
+
     /// `Q` of a step with the given `Φ`.
     #[must_use]
     pub fn noise(&self, transition: &[[f64; 2]; 2]) -> [[f64; 2]; 2] {

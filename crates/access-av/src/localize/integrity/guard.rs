@@ -33,8 +33,8 @@ pub struct IntegrityConfig {
 impl Default for IntegrityConfig {
     fn default() -> Self {
         Self {
-            risk: 5e-4,
-            risk_under_fault: 5e-3,
+            risk: 8e-4,
+            risk_under_fault: 1e-2,
             alert_limit_m: 1.5,
             detection_threshold: 5.5,
             recovery_threshold: 3.0,

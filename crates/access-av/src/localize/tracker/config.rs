@@ -58,6 +58,12 @@ impl TrackerConfig {
             scenario.motion.lateral_wander.lane_keeping(),
         );
         let rician_k_db = settings.rician_k_db.unwrap_or(scenario.channel.rician_k_db);
+        let lane_keeping = LaneKeeping {
+            wander_m: settings
+                .wander_rms_m
+                .unwrap_or(wander.wander_m.max(LEAST_WANDER_M)),
+            ..wander
+        };
         Self {
             array: ArrayModel {
                 elements: scenario.array.elements,
@@ -65,15 +71,11 @@ impl TrackerConfig {
                 wavelength_m: scenario.ssb.wavelength_m(),
             },
             rician_k: 10f64.powf(0.1 * rician_k_db),
-            lane_keeping: LaneKeeping {
-                wander_m: settings
-                    .wander_rms_m
-                    .unwrap_or(wander.wander_m.max(LEAST_WANDER_M)),
-                ..wander
-            },
+            lane_keeping,
             path_bend: PathBend {
                 curvature_per_m: settings.curvature_rms_per_m,
                 correlation_m: settings.curvature_correlation_m,
+                steering_rad_per_sqrt_m: lane_keeping.steering_rad_per_sqrt_m(),
             },
             noise: MotionNoise {
                 odometer_m_per_sqrt_m: settings.odometer_noise_m_per_sqrt_m.unwrap_or(

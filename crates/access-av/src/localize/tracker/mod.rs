@@ -122,7 +122,7 @@ impl Tracker {
             moved_m
         };
         let yaw = sample.yaw_rate_radps.map(|rate| Yaw {
-            turn_rad: 0.5 * (rate + previous.yaw_rate_radps.unwrap_or(rate)) * duration_s,
+            turn_rad: rate * duration_s,
             duration_s,
             variance: self.config.yaw_noise_rad_per_sqrt_s.powi(2) * duration_s,
         });

@@ -20,6 +20,8 @@ pub struct PathBend {
     pub curvature_per_m: f64,
     /// Distance over which the curvature is forgotten (m).
     pub correlation_m: f64,
+    /// Random walk of the heading by steering (rad per √m), quicker than any bend of the road.
+    pub steering_rad_per_sqrt_m: f64,
 }
 
 /// Noise of the motion that the odometer does not see or gets wrong.
@@ -159,7 +161,8 @@ impl Step {
         q[CURVATURE][CURVATURE] = bending;
         q[HEADING][CURVATURE] = bending * length / 2.0;
         q[CURVATURE][HEADING] = bending * length / 2.0;
-        q[HEADING][HEADING] = bending * length * length / 3.0;
+        q[HEADING][HEADING] =
+            bending * length * length / 3.0 + bend.steering_rad_per_sqrt_m.powi(2) * distance;
         slow_states(&mut q, walk, distance);
 
         let mut mean = *start;

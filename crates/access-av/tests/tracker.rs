@@ -1,0 +1,309 @@
+//! The tracker on simulated drives, and on input that no drive should bring.
+
+use std::sync::Arc;
+
+use access_av::geometry::Pose;
+use access_av::localize::bound::Bound;
+use access_av::localize::tracker::{InitialPose, OdometryVerdict, TrackerConfig};
+use access_av::localize::{AngleMeasurement, IntegrityState, Tracker, UpdateReason};
+use access_av::observation::OdometrySample;
+use access_av::onboard::Custom;
+use access_av::platform::Platform;
+use access_av::scenario::{LocalizerSettings, Scenario, TrackerSettings};
+use access_av::simulate::{RunRecord, Simulation};
+use access_av::world::RadioHead;
+
+fn drives(scenario: Scenario, runs: u64) -> Vec<RunRecord> {
+    let platform = Platform::load(&scenario.platform.name).unwrap();
+    let simulation = Simulation::new(scenario, platform).unwrap();
+    (0..runs)
+        .map(|run| simulation.run(11, run, Custom::default()).unwrap())
+        .collect()
+}
+
+/// Mean normalised squared error of the position, and root mean square error.
+fn consistency(records: &[RunRecord]) -> (f64, f64) {
+    let (mut nees, mut square_m2, mut count) = (0.0, 0.0, 0.0);
+    for step in records
+        .iter()
+        .flat_map(|record| record.steps.iter().skip(100))
+    {
+        let (dx, dy) = (
+            step.estimate.x_m - step.truth.x_m,
+            step.estimate.y_m - step.truth.y_m,
+        );
+        let [[xx, xy, _], [_, yy, _], _] = step.covariance.unwrap();
+        nees += (yy * dx * dx - 2.0 * xy * dx * dy + xx * dy * dy) / (xx * yy - xy * xy);
+        square_m2 += dx * dx + dy * dy;
+        count += 1.0;
+    }
+    (nees / count, (square_m2 / count).sqrt())
+}
+
+#[test]
+fn as_wrong_as_it_says_and_as_right_as_can_be() {
+    // The errors of a run hang together: a run counts as about one draw of χ² with 2 degrees of
+    // freedom, whose mean over n runs has the relative deviation 1/√n; four of those are allowed.
+    let runs = 24;
+    let tolerance = 4.0 / (runs as f64).sqrt();
+    let scenario = Scenario::load("paper-real-odometry-2").unwrap();
+    let bound = Bound::new(&scenario).unwrap().along_route();
+    let records = drives(scenario, runs);
+    let (nees, rms_m) = consistency(&records);
+    assert!((nees / 2.0 - 1.0).abs() < tolerance, "{nees}");
+    let bound_m = (bound
+        .iter()
+        .skip(100)
+        .map(|p| p.position_rms_m.powi(2))
+        .sum::<f64>()
+        / (bound.len() - 100) as f64)
+        .sqrt();
+    let ratio = rms_m / bound_m;
+    assert!(
+        ratio > 1.0 - tolerance / 2.0 && ratio < 1.0 + tolerance / 2.0,
+        "{ratio}"
+    );
+}
+
+#[test]
+fn more_radio_heads_lower_the_bound() {
+    let rms_m = [
+        "paper-real-odometry",
+        "paper-real-odometry-2",
+        "paper-real-odometry-4",
+    ]
+    .map(|name| {
+        let bound = Bound::new(&Scenario::load(name).unwrap())
+            .unwrap()
+            .along_route();
+        bound.iter().map(|p| p.position_rms_m).sum::<f64>() / bound.len() as f64
+    });
+    assert!(
+        rms_m[0] > 1.3 * rms_m[1] && rms_m[1] > 1.2 * rms_m[2],
+        "{rms_m:?}"
+    );
+}
+
+#[test]
+fn the_site_bound_is_blind_along_the_line_through_two_heads() {
+    let scenario = Scenario::load("paper-real-odometry-2").unwrap();
+    let bound = Bound::new(&scenario).unwrap();
+    let between = bound.at([150.0, 10.0].into(), 50.0, 0.01).unwrap();
+    // Far out on the line through both heads their angles say the same.
+    let beyond = bound.at([785.0, 820.0].into(), 50.0, 0.01);
+    assert!(
+        beyond.is_none_or(|rms_m| rms_m > 20.0 * between),
+        "{between} {beyond:?}"
+    );
+}
+
+#[test]
+fn without_a_map_it_stays_within_its_covariance() {
+    let scenario = Scenario::load("paper-real-odometry-4")
+        .unwrap()
+        .with_overrides([("localizer.map", false.into())])
+        .unwrap();
+    let runs = 12;
+    let (nees, _) = consistency(&drives(scenario, runs));
+    assert!(
+        (nees / 2.0 - 1.0).abs() < 4.0 / (runs as f64).sqrt(),
+        "{nees}"
+    );
+}
+
+#[test]
+fn uncertainty_needs_half_the_executions_of_the_pid() {
+    let yard = Scenario::load("yard").unwrap();
+    let executions = |records: &[RunRecord]| {
+        records
+            .iter()
+            .map(|record| record.executions.len())
+            .sum::<usize>()
+    };
+    let pid = yard
+        .with_overrides([
+            ("wake_up.policy", "pid".into()),
+            ("wake_up.base_ms", 80.0.into()),
+        ])
+        .unwrap();
+    let pid = drives(pid, 2);
+    let uncertainty = drives(yard, 2);
+    assert!(2 * executions(&uncertainty) < executions(&pid));
+    let listened = |records: &[RunRecord]| records.iter().map(|r| r.listened).sum::<usize>();
+    assert!(listened(&uncertainty) < listened(&pid));
+}
+
+#[test]
+fn faults_are_bounded_or_told() {
+    let records = drives(Scenario::load("nlos-and-faults").unwrap(), 4);
+    let (mut ok, mut beyond, mut told) = (0, 0, 0);
+    for step in records.iter().flat_map(|record| &record.steps) {
+        let integrity = step.integrity.unwrap();
+        let error_m = step.truth.point().distance_m(step.estimate.point());
+        if integrity.state == IntegrityState::Ok {
+            ok += 1;
+            beyond += usize::from(error_m > integrity.protection_level_m);
+        } else {
+            told += 1;
+        }
+    }
+    assert!(100 * beyond <= ok, "{beyond} of {ok}");
+    assert!(told > 0);
+}
+
+#[test]
+fn a_campus_is_driven_from_cell_to_cell() {
+    let records = drives(Scenario::load("campus-handover").unwrap(), 1);
+    let mut cells: Vec<u16> = records[0]
+        .executions
+        .iter()
+        .filter(|execution| execution.verdict.accepted)
+        .map(|execution| execution.ssb.pci)
+        .collect();
+    cells.sort_unstable();
+    cells.dedup();
+    assert!(cells.len() >= 6, "{cells:?}");
+    let last = records[0].steps.last().unwrap();
+    assert!(last.truth.point().distance_m(last.estimate.point()) < 2.0);
+}
+
+fn tracker() -> (Tracker, RadioHead) {
+    let scenario = Scenario::load("paper-real-odometry").unwrap();
+    let LocalizerSettings::Tracker(settings) = scenario.localizer else {
+        unreachable!("the scenario uses the tracker");
+    };
+    let heads: Vec<RadioHead> = scenario.radio_heads.iter().map(RadioHead::from).collect();
+    let start = InitialPose {
+        pose: Pose::default(),
+        position_std_m: 0.5,
+        heading_std_rad: 0.01,
+    };
+    let config = TrackerConfig::new(&scenario, &settings);
+    let map = Arc::new(scenario.build_track().unwrap());
+    let mut tracker = Tracker::new(config, Some(map), &heads, &start);
+    assert_eq!(tracker.odometry(&sample(0.0, 0.0)), OdometryVerdict::First);
+    assert_eq!(
+        tracker.odometry(&sample(0.1, 0.4)),
+        OdometryVerdict::Accepted
+    );
+    (tracker, heads[0])
+}
+
+fn sample(time_s: f64, distance_m: f64) -> OdometrySample {
+    OdometrySample {
+        time_s,
+        distance_m,
+        speed_mps: 4.0,
+        yaw_rate_radps: None,
+    }
+}
+
+fn angle(time_s: f64, phase_rad: f64, phase_sigma_rad: f64) -> AngleMeasurement {
+    AngleMeasurement {
+        time_s,
+        phase_rad,
+        phase_sigma_rad,
+        angle_rad: 0.0,
+        snr_db: 20.0,
+        resolved: true,
+    }
+}
+
+#[test]
+fn bad_angles_are_named_and_leave_the_state() {
+    let (mut tracker, head) = tracker();
+    let before = tracker.clone();
+    let stranger = RadioHead { pci: 999, ..head };
+    let here = RadioHead {
+        position: tracker.pose(0.1).pose.point(),
+        ..head
+    };
+    let good = angle(0.12, 2.8, 0.01);
+    for (head, measured, reason) in [
+        (head, angle(0.12, f64::NAN, 0.01), UpdateReason::Unusable),
+        (head, angle(f64::NAN, 2.8, 0.01), UpdateReason::Unusable),
+        (head, angle(0.12, 2.8, f64::NAN), UpdateReason::Unusable),
+        (head, angle(0.12, 2.8, -0.01), UpdateReason::Unusable),
+        (head, angle(0.12, 2.8, 0.0), UpdateReason::Unusable),
+        (head, angle(0.05, 2.8, 0.01), UpdateReason::TimeReversed),
+        (head, angle(0.12, -1.0, 0.01), UpdateReason::Outlier),
+        (stranger, good, UpdateReason::UnknownRadioHead),
+    ] {
+        let verdict = tracker.update(&head, &measured);
+        assert_eq!(verdict.reason, reason);
+        assert!(!verdict.accepted && verdict.threshold.is_some());
+        assert_eq!(tracker, before);
+    }
+    tracker.set_excluded(&head, true);
+    assert_eq!(tracker.update(&head, &good).reason, UpdateReason::Excluded);
+    tracker.set_excluded(&head, false);
+    assert!(
+        tracker.update(&here, &good).accepted,
+        "the survey counts, not the caller's place"
+    );
+    assert_ne!(tracker, before);
+}
+
+#[test]
+fn bad_odometry_is_named_and_leaves_the_state() {
+    let (mut tracker, _) = tracker();
+    let before = tracker.clone();
+    for (sample, verdict) in [
+        (sample(0.1, 0.4), OdometryVerdict::Duplicate),
+        (sample(0.05, 0.3), OdometryVerdict::TimeBackwards),
+        (sample(f64::NAN, 0.5), OdometryVerdict::NotFinite),
+        (sample(0.2, f64::INFINITY), OdometryVerdict::NotFinite),
+    ] {
+        assert_eq!(tracker.odometry(&sample), verdict);
+        assert_eq!(tracker, before);
+    }
+}
+
+#[test]
+fn a_gap_loses_time_and_a_jump_loses_certainty() {
+    let (mut gap, _) = tracker();
+    assert!(matches!(
+        gap.odometry(&sample(2.1, 8.4)),
+        OdometryVerdict::AfterGap { .. }
+    ));
+    let at_m = gap.pose(2.1).pose.x_m;
+    assert!((at_m - 8.4).abs() < 0.05, "{at_m}");
+
+    let (mut jump, _) = tracker();
+    assert!(matches!(
+        jump.odometry(&sample(2.1, 5000.0)),
+        OdometryVerdict::DistanceJump { .. }
+    ));
+    // The counter is worthless, the speed is not: 2 s at 4 m/s.
+    assert!((jump.pose(2.1).pose.x_m - 8.4).abs() < 0.05);
+    let variance = |tracker: &Tracker| tracker.pose(2.1).principal_variances()[0];
+    assert!(variance(&jump) > variance(&gap) + 1.0);
+}
+
+#[test]
+fn a_gyroscope_helps_without_a_map() {
+    let run = |gyro: bool| {
+        let mut scenario = Scenario::load("paper-real-odometry").unwrap();
+        scenario.localizer = LocalizerSettings::Tracker(TrackerSettings {
+            map: false,
+            ..TrackerSettings::default()
+        });
+        if gyro {
+            scenario.odometer.gyro = Some(access_av::scenario::GyroSettings {
+                noise_rad_per_sqrt_s: 1e-3,
+                bias_std_radps: 1e-3,
+            });
+        }
+        let records = drives(scenario, 8);
+        let predicted_m2: f64 = (records.iter().flat_map(|record| &record.steps))
+            .map(|step| {
+                step.covariance
+                    .map_or(0.0, |[[xx, ..], [_, yy, _], _]| xx + yy)
+            })
+            .sum();
+        (predicted_m2, consistency(&records).0)
+    };
+    let ((without_m2, _), (with_m2, nees)) = (run(false), run(true));
+    assert!(with_m2 < without_m2, "{with_m2} {without_m2}");
+    assert!(nees < 2.0 * (1.0 + 4.0 / 8f64.sqrt()), "{nees}");
+}
