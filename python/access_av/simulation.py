@@ -21,6 +21,55 @@ Scenario = _core.Scenario
 
 
 @dataclass(frozen=True)
+class Integrity:
+    """How protection levels and errors went together.
+
+    Attributes
+    ----------
+    epochs
+        Number of steps with a protection level.
+    state_shares
+        Share of them in each state.
+    median_level_over_error
+        Median of protection level by horizontal error.
+    exceedances
+        Steps in state ``ok`` whose error lay beyond the protection level.
+    """
+
+    epochs: int
+    state_shares: Mapping[str, float]
+    median_level_over_error: float
+    exceedances: int
+
+    @classmethod
+    def of(cls, trajectories: pl.DataFrame) -> Integrity | None:
+        """Count in a table of trajectories; ``None`` where no step has a protection level."""
+        stated = trajectories.filter(pl.col("protection_level_m").is_not_null()).select(
+            "protection_level_m",
+            "integrity",
+            error_m=horizontal_error_m(),
+        )
+        if stated.is_empty():
+            return None
+        ratio = (pl.col("protection_level_m") / pl.col("error_m")).median()
+        beyond = (pl.col("integrity") == "ok") & (pl.col("error_m") > pl.col("protection_level_m"))
+        return cls(
+            epochs=stated.height,
+            state_shares={
+                state: stated.filter(integrity=state).height / stated.height
+                for state in ("ok", "degraded", "unavailable")
+            },
+            median_level_over_error=float(stated.select(ratio).item()),
+            exceedances=stated.filter(beyond).height,
+        )
+
+
+def horizontal_error_m() -> pl.Expr:
+    """Distance between truth and estimate, in a table of trajectories."""
+    return (pl.col("error_x_m") ** 2 + pl.col("error_y_m") ** 2).sqrt()
+
+
+@dataclass(frozen=True)
 class Simulation:
     """What many drives found.
 
@@ -34,7 +83,8 @@ class Simulation:
     trajectories
         Truth and estimate, one row per run and SSB: ``run``, ``time_s``, ``x_m``, ``y_m``,
         ``heading_rad``, ``true_x_m``, ``true_y_m``, ``error_x_m``, ``error_y_m`` and more.
-        ``None`` unless kept.
+        Variances, ``protection_level_m`` and ``integrity`` (``ok``, ``degraded``,
+        ``unavailable``) are null where the localizer does not state them. ``None`` unless kept.
     executions
         The angle estimates, one row each. ``None`` unless trajectories were kept.
     error_quantiles_m
@@ -46,6 +96,11 @@ class Simulation:
     trajectories: pl.DataFrame | None
     executions: pl.DataFrame | None
     error_quantiles_m: Mapping[float, float]
+
+    @property
+    def integrity(self) -> Integrity | None:
+        """How protection levels and errors went together; ``None`` where none were stated."""
+        return None if self.trajectories is None else Integrity.of(self.trajectories)
 
     @property
     def rms_error_m(self) -> float:
@@ -120,7 +175,15 @@ def simulate(
     return Simulation(
         steps=pl.DataFrame(found.steps),
         runs=pl.DataFrame(found.runs),
-        trajectories=None if found.trajectories is None else pl.DataFrame(found.trajectories),
+        trajectories=None if found.trajectories is None else _stated(found.trajectories),
         executions=None if found.executions is None else pl.DataFrame(found.executions),
         error_quantiles_m=found.error_quantiles_m,
+    )
+
+
+def _stated(columns: Mapping[str, NDArray[np.generic]]) -> pl.DataFrame:
+    """Trajectories, with null for what the localizer does not state."""
+    table = pl.DataFrame(columns, schema_overrides={"integrity": pl.String})
+    return table.with_columns(
+        pl.col("^(variance|covariance)_.*$", "protection_level_m").fill_nan(None)
     )

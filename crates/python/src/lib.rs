@@ -1,5 +1,6 @@
 //! `access_av._core`: the bindings, nothing else. One file per room of the core.
 mod aoa;
+mod bound;
 mod nr;
 mod recording;
 mod scenario;
@@ -42,6 +43,8 @@ mod _core {
         }
     }
 
+    #[pymodule_export]
+    use crate::bound::ErrorBound;
     #[pymodule_export]
     use crate::recording::{Recording, RecordingError};
     #[pymodule_export]

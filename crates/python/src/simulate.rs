@@ -221,7 +221,8 @@ fn run_table(py: Python<'_>, campaign: &Campaign) -> PyResult<Py<PyDict>> {
     Ok(table.unbind())
 }
 
-/// Variances are NaN where the localizer does not know its own error.
+/// Variances and protection levels are NaN where the localizer does not know its own error, states
+/// of integrity `None`.
 fn trajectories(py: Python<'_>, records: &[RunRecord]) -> PyResult<Py<PyDict>> {
     let table = PyDict::new(py);
     let rows = || records.iter().flat_map(|record| record.steps.iter());
@@ -229,7 +230,7 @@ fn trajectories(py: Python<'_>, records: &[RunRecord]) -> PyResult<Py<PyDict>> {
         .iter()
         .flat_map(|record| record.steps.iter().map(|_| record.run));
     table.set_item("run", column(py, runs, |run| run))?;
-    let columns: [Column<Step>; 16] = [
+    let columns: [Column<Step>; 17] = [
         ("time_s", |step| step.time_s),
         ("x_m", |step| step.estimate.x_m),
         ("y_m", |step| step.estimate.y_m),
@@ -246,10 +247,16 @@ fn trajectories(py: Python<'_>, records: &[RunRecord]) -> PyResult<Py<PyDict>> {
         ("covariance_xy_m2", |step| covariance(step, 0, 1)),
         ("covariance_x_heading_m_rad", |step| covariance(step, 0, 2)),
         ("covariance_y_heading_m_rad", |step| covariance(step, 1, 2)),
+        ("protection_level_m", |step| {
+            step.integrity
+                .map_or(f64::NAN, |integrity| integrity.protection_level_m)
+        }),
     ];
     for (name, value) in columns {
         table.set_item(name, column(py, rows(), value))?;
     }
+    let states = rows().map(|step| step.integrity.map(|integrity| integrity.state.name()));
+    table.set_item("integrity", PyList::new(py, states.collect::<Vec<_>>())?)?;
     Ok(table.unbind())
 }
 

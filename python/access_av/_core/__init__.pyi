@@ -9,6 +9,7 @@ from access_av._core import aoa as aoa
 from access_av._core import nr as nr
 
 __all__ = [
+    "Bound",
     "Platform",
     "Recording",
     "RecordingError",
@@ -76,6 +77,19 @@ class SimulationResult:
     def executions(self) -> dict[str, Any] | None: ...
     @property
     def error_quantiles_m(self) -> dict[float, float]: ...
+
+@final
+class Bound:
+    def __new__(cls, scenario: Scenario) -> Bound: ...
+    def along_route(self) -> dict[str, NDArray[np.float64]]: ...
+    def at(
+        self,
+        x_m: NDArray[np.float64],
+        y_m: NDArray[np.float64],
+        looks: float,
+        heading_std_rad: float,
+    ) -> NDArray[np.float64]: ...
+    def snr_db(self, x_m: NDArray[np.float64], y_m: NDArray[np.float64]) -> NDArray[np.float64]: ...
 
 def simulate(
     scenario: Scenario,

@@ -1,0 +1,125 @@
+//! The posterior Cramér–Rao bound along a route and over its site, as columns.
+
+use access_av::channel::LinkBudget;
+use access_av::geometry::Point;
+use access_av::localize::bound::{Bound as CoreBound, BoundPoint};
+use access_av::world::RadioHead;
+use numpy::{PyArray1, PyArray2, PyReadonlyArray1};
+use pyo3::exceptions::PyValueError;
+use pyo3::prelude::*;
+use pyo3::types::PyDict;
+
+use crate::scenario::{Scenario, scenario_error};
+
+/// How well any localizer can do in a scenario: the posterior Cramér–Rao bound.
+#[pyclass(frozen, name = "Bound", module = "access_av._core")]
+pub struct ErrorBound {
+    bound: CoreBound,
+    budget: LinkBudget,
+    heads: Vec<RadioHead>,
+}
+
+#[pymethods]
+impl ErrorBound {
+    #[new]
+    fn new(scenario: &Scenario) -> PyResult<Self> {
+        Ok(Self {
+            bound: CoreBound::new(&scenario.0).map_err(scenario_error)?,
+            budget: LinkBudget::new(&scenario.0),
+            heads: scenario.0.radio_heads.iter().map(RadioHead::from).collect(),
+        })
+    }
+
+    /// The bound at each SSB of the drive, every SSB being used: columns of equal length.
+    fn along_route(&self, py: Python<'_>) -> PyResult<Py<PyDict>> {
+        let points = py.detach(|| self.bound.along_route());
+        let table = PyDict::new(py);
+        let columns: [(&str, fn(&BoundPoint) -> f64); 9] = [
+            ("time_s", |point| point.time_s),
+            ("along_m", |point| point.along_m),
+            ("x_m", |point| point.pose.x_m),
+            ("y_m", |point| point.pose.y_m),
+            ("bound_m", |point| point.position_rms_m),
+            ("along_std_m", |point| point.along_std_m),
+            ("across_std_m", |point| point.across_std_m),
+            ("heading_std_rad", |point| point.heading_std_rad),
+            ("odometer_scale_std", |point| point.scale_std),
+        ];
+        for (name, value) in columns {
+            let values = points.iter().map(value).collect();
+            table.set_item(name, PyArray1::from_vec(py, values))?;
+        }
+        Ok(table.unbind())
+    }
+
+    /// The bound in metres at each place from `looks` independent looks at every radio head, by a
+    /// vehicle that knows its heading to `heading_std_rad` and nothing of its place. NaN where
+    /// the radio heads leave a direction open.
+    #[allow(clippy::needless_pass_by_value)] // as Python passes them
+    fn at<'py>(
+        &self,
+        py: Python<'py>,
+        x_m: PyReadonlyArray1<'py, f64>,
+        y_m: PyReadonlyArray1<'py, f64>,
+        looks: f64,
+        heading_std_rad: f64,
+    ) -> PyResult<Bound<'py, PyArray1<f64>>> {
+        let places = places(&x_m, &y_m)?;
+        if !(looks > 0.0 && looks.is_finite()) {
+            return Err(PyValueError::new_err(format!(
+                "`looks` is {looks}; it must be above 0"
+            )));
+        }
+        if !(heading_std_rad >= 0.0 && heading_std_rad.is_finite()) {
+            return Err(PyValueError::new_err(format!(
+                "`heading_std_rad` is {heading_std_rad}; it must be at least 0"
+            )));
+        }
+        let bound_m: Vec<f64> = py.detach(|| {
+            let at = |place| self.bound.at(place, looks, heading_std_rad);
+            places
+                .into_iter()
+                .map(|place| at(place).unwrap_or(f64::NAN))
+                .collect()
+        });
+        Ok(PyArray1::from_vec(py, bound_m))
+    }
+
+    /// SNR per antenna and sample in dB by the link budget, of each radio head at each place:
+    /// shape (radio heads, places).
+    #[allow(clippy::needless_pass_by_value)] // as Python passes them
+    fn snr_db<'py>(
+        &self,
+        py: Python<'py>,
+        x_m: PyReadonlyArray1<'py, f64>,
+        y_m: PyReadonlyArray1<'py, f64>,
+    ) -> PyResult<Bound<'py, PyArray2<f64>>> {
+        let places = places(&x_m, &y_m)?;
+        let rows: Vec<Vec<f64>> = self
+            .heads
+            .iter()
+            .map(|head| {
+                let snr_db =
+                    |place: &Point| self.budget.snr_db(head, head.position.distance_m(*place));
+                places.iter().map(snr_db).collect()
+            })
+            .collect();
+        Ok(PyArray2::from_vec2(py, &rows)?)
+    }
+}
+
+fn places(
+    x_m: &PyReadonlyArray1<'_, f64>,
+    y_m: &PyReadonlyArray1<'_, f64>,
+) -> PyResult<Vec<Point>> {
+    let (x_m, y_m) = (x_m.as_slice()?, y_m.as_slice()?);
+    if x_m.len() != y_m.len() {
+        return Err(PyValueError::new_err(format!(
+            "`x_m` has {} values and `y_m` {}; they must be as many",
+            x_m.len(),
+            y_m.len()
+        )));
+    }
+    let places = x_m.iter().zip(y_m);
+    Ok(places.map(|(&x_m, &y_m)| Point { x_m, y_m }).collect())
+}
