@@ -2,21 +2,18 @@
 
 from __future__ import annotations
 
-import json
 from html import escape
-from importlib import resources
 from importlib.metadata import version
-from string import Template
 from typing import TYPE_CHECKING
 
 import polars as pl
-import vl_convert
 
 from access_av import carbon, cost, facts
 from access_av.claims import saving, savings_percent
 from access_av.explore import Query, answer
 from access_av.methods import METHODS, label
 from access_av.report import charts
+from access_av.report.page import fill
 from access_av.report.parts import badge, figure, number, source, table, tile, value_text
 
 if TYPE_CHECKING:
@@ -49,10 +46,10 @@ def render(evaluation: Evaluation, claims: list[Claim]) -> str:
     """
     specs: dict[str, Spec] = {}
     reproduced = sum(claim.reproduced for claim in claims)
-    page = Template(_read("page.html"))
-    return page.substitute(
+    return fill(
+        "page.html",
+        specs,
         scenario_name=escape(evaluation.scenario.name),
-        style=_read("style.css"),
         headline=f"{reproduced} of {len(claims)} claims of the paper reproduced",
         lead=_lead(evaluation),
         tiles=_tiles(evaluation),
@@ -71,16 +68,7 @@ def render(evaluation: Evaluation, claims: list[Claim]) -> str:
         cost=_cost(specs),
         carbon=_carbon(evaluation, specs),
         provenance=_provenance(evaluation),
-        footer=f"ACCESS-AV {version('access-av')}. This localizer is not a safety function "
-        "in the sense of ISO 3691-4.",
-        bundle=vl_convert.javascript_bundle("window.vegaEmbed = vegaEmbed;"),
-        specs=json.dumps(specs, separators=(",", ":")).replace("</", "<\\/"),
-        script=_read("page.js"),
     )
-
-
-def _read(name: str) -> str:
-    return resources.files(__package__).joinpath(name).read_text(encoding="utf-8")
 
 
 def _lead(evaluation: Evaluation) -> str:

@@ -32,13 +32,14 @@ def _scale(names: list[str]) -> alt.Scale:
     return alt.Scale(domain=names, range=[COLOURS[name] for name in names])
 
 
-def _thinned(series: pl.DataFrame) -> pl.DataFrame:
+def thinned(series: pl.DataFrame) -> pl.DataFrame:
     """Enough points for a line on a screen, rounded to what can be seen."""
     step = max(1, series.height // POINTS_PER_LINE)
     return series.gather_every(step).with_columns(pl.col(pl.Float64).round(4))
 
 
-def _spec(chart: alt.Chart | alt.LayerChart, *, height: int, description: str) -> Spec:
+def finish(chart: alt.Chart | alt.LayerChart, *, height: int, description: str) -> Spec:
+    """The chart as Vega-Lite, as wide as its place."""
     spec: Spec = chart.properties(width="container", height=height).to_dict()
     spec["description"] = description
     spec["autosize"] = {"type": "fit-x", "contains": "padding"}
@@ -48,7 +49,7 @@ def _spec(chart: alt.Chart | alt.LayerChart, *, height: int, description: str) -
 def snr(evaluation: Evaluation) -> Spec:
     """SNR along the track (the paper's SNR figure)."""
     line = (
-        alt.Chart(_thinned(evaluation.snr))
+        alt.Chart(thinned(evaluation.snr))
         .mark_line(color=COLOURS[ADAPTIVE_LABEL], strokeWidth=2)
         .encode(
             x=alt.X("time_s:Q", title="time / s"),
@@ -59,7 +60,9 @@ def snr(evaluation: Evaluation) -> Spec:
             ],
         )
     )
-    return _spec(line, height=220, description="Signal-to-noise ratio against time along the track")
+    return finish(
+        line, height=220, description="Signal-to-noise ratio against time along the track"
+    )
 
 
 def errors(evaluation: Evaluation, points: pl.DataFrame, axis: str) -> Spec:
@@ -69,7 +72,7 @@ def errors(evaluation: Evaluation, points: pl.DataFrame, axis: str) -> Spec:
     """
     names = _line_names(points)
     lines = pl.concat(
-        _thinned(evaluation.series(point)).select(
+        thinned(evaluation.series(point)).select(
             pl.col("time_s"),
             pl.col(f"error_{axis}_m").alias("error_m"),
             pl.lit(name).alias("line"),
@@ -100,7 +103,7 @@ def errors(evaluation: Evaluation, points: pl.DataFrame, axis: str) -> Spec:
         )
         .add_params(picked)
     )
-    return _spec(
+    return finish(
         chart,
         height=190,
         description=f"Mean absolute error in {axis.upper()} against time for {', '.join(names)}",
@@ -181,7 +184,7 @@ def energy(evaluation: Evaluation) -> Spec:
         )
     )
     bars = _grouped_bars(evaluation, "energy_j", "energy of a trip / J", ".1f")
-    return _spec(
+    return finish(
         bars + marks, height=260, description="Energy of one trip per power mode and method"
     )
 
@@ -189,7 +192,7 @@ def energy(evaluation: Evaluation) -> Spec:
 def executions(evaluation: Evaluation) -> Spec:
     """Angle estimates in a trip, per mode."""
     bars = _grouped_bars(evaluation, "executions", "executions in a trip", ".0f")
-    return _spec(
+    return finish(
         bars, height=230, description="Angle estimates in one trip per power mode and method"
     )
 
@@ -244,7 +247,7 @@ def design_space(evaluation: Evaluation) -> Spec:
     limits = alt.Chart(pl.DataFrame({"any": [0]})).mark_rule(strokeDash=[4, 3])
     vertical = limits.transform_calculate(limit=budget.name).encode(x="limit:Q")
     horizontal = limits.transform_calculate(limit=bound.name).encode(y="limit:Q")
-    return _spec(
+    return finish(
         vertical + horizontal + dots + numbers,
         height=320,
         description="RMS error against energy of each operating point; the number is the mode",
@@ -268,7 +271,9 @@ def roadside_unit_cost(units: int, years: int) -> Spec:
             tooltip=["year:Q", "low:Q", "high:Q"],
         )
     )
-    return _spec(band, height=200, description=f"Cost of {units} roadside units over {years} years")
+    return finish(
+        band, height=200, description=f"Cost of {units} roadside units over {years} years"
+    )
 
 
 def sensor_cost() -> Spec:
@@ -281,7 +286,7 @@ def sensor_cost() -> Spec:
     )
     bars = base.mark_bar(color=COLOURS[ADAPTIVE_LABEL], cornerRadiusEnd=3, height=26)
     prices = base.mark_text(align="left", dx=6).encode(text=alt.Text("price_usd:Q", format=",.2f"))
-    return _spec(bars + prices, height=120, description="Price of a LiDAR and of a 5G adapter")
+    return finish(bars + prices, height=120, description="Price of a LiDAR and of a 5G adapter")
 
 
 def grid_name(grid: str) -> str:
@@ -332,6 +337,6 @@ def carbon(footprints: dict[str, Footprint]) -> Spec:
     )
     spans = base.mark_rule(strokeWidth=4, opacity=0.4).encode(x=axis, x2="high:Q")
     dots = base.mark_point(filled=True, size=80).encode(x="central:Q")
-    return _spec(
+    return finish(
         spans + dots, height=230, description="Emissions of roadside units, embodied and in use"
     )

@@ -1,0 +1,234 @@
+"""Charts of one scenario's drives and of its bound."""
+
+from __future__ import annotations
+
+import math
+from typing import TYPE_CHECKING
+
+import altair as alt
+import polars as pl
+
+from access_av.report.charts import finish, thinned
+from access_av.simulation import horizontal_error_m
+
+if TYPE_CHECKING:
+    from access_av.bound import ErrorBound
+    from access_av.report.charts import Spec
+
+# Okabe and Ito's colours, as in the report.
+BLUE, ORANGE, GREEN = "#2f7ed8", "#d55e00", "#009e73"
+# Bins of the Stanford diagram per factor of ten: 12 % wide.
+BINS_PER_DECADE = 20
+# Errors below a millimetre are drawn as one.
+LEAST_M = 1e-3
+MAP_WIDTH_PX = 1000
+ROAD_STEP_M = 2.0
+
+
+def error_against_time(steps: pl.DataFrame) -> Spec:
+    """Quantiles of the horizontal error over the runs, against time."""
+    names = {"p50_error_m": "median", "p90_error_m": "90th percentile", "rms_error_m": "RMS"}
+    lines = (
+        thinned(steps.select("time_s", *names))
+        .rename(names)
+        .unpivot(index="time_s", variable_name="line", value_name="error_m")
+    )
+    chart = (
+        alt.Chart(lines)
+        .mark_line(strokeWidth=1.8)
+        .encode(
+            x=alt.X("time_s:Q", title="time / s"),
+            y=alt.Y("error_m:Q", title="horizontal error / m"),
+            color=_colours(list(names.values()), [BLUE, ORANGE, GREEN]),
+            tooltip=[
+                alt.Tooltip("line:N", title="over the runs"),
+                alt.Tooltip("time_s:Q", title="time / s", format=".1f"),
+                alt.Tooltip("error_m:Q", title="error / m", format=".3f"),
+            ],
+        )
+    )
+    return finish(chart, height=240, description="Horizontal error against time, over the runs")
+
+
+def executions_against_time(executions: pl.DataFrame, runs: int, duration_s: float) -> Spec:
+    """Angle estimates per second, mean over the runs, one bar a time, stacked by radio head."""
+    bar_s = max(1.0, math.ceil(duration_s / 80.0))
+    rates = (
+        executions.group_by(
+            start_s=(pl.col("time_s") / bar_s).floor() * bar_s,
+            head=pl.format("PCI {}, SSB {}", "pci", "ssb_index"),
+        )
+        .agg((pl.len() / (runs * bar_s)).round(3).alias("per_second"))
+        .sort("start_s", "head")
+        .with_columns(end_s=pl.col("start_s") + bar_s)
+    )
+    chart = (
+        alt.Chart(rates)
+        .mark_bar()
+        .encode(
+            x=alt.X("start_s:Q", title="time / s"),
+            x2="end_s:Q",
+            y=alt.Y("per_second:Q", title="executions per second"),
+            color=alt.Color("head:N", legend=alt.Legend(title=None)),
+            tooltip=[
+                alt.Tooltip("head:N", title="radio head"),
+                alt.Tooltip("start_s:Q", title="from / s"),
+                alt.Tooltip("per_second:Q", title="per second"),
+            ],
+        )
+    )
+    return finish(chart, height=200, description="Executions per second against time")
+
+
+def stanford(trajectories: pl.DataFrame, alert_limit_m: float) -> Spec:
+    """Error against protection level, counted; beyond the diagonal the level did not hold."""
+    bins = (
+        trajectories.filter(pl.col("protection_level_m").is_not_null())
+        .select(error=_bin(horizontal_error_m()), level=_bin(pl.col("protection_level_m")))
+        .group_by("error", "level")
+        .agg(pl.len().alias("epochs"))
+        .sort("error", "level")
+    )
+    edges = {
+        f"{name}_{end}_m": (10.0 ** ((pl.col(name) + shift) / BINS_PER_DECADE)).round(6)
+        for name in ("error", "level")
+        for end, shift in (("from", 0), ("to", 1))
+    }
+    counted = bins.select("epochs", **edges)
+    low = counted.select(pl.min_horizontal("error_from_m", "level_from_m").min()).item()
+    high = counted.select(pl.max_horizontal("error_to_m", "level_to_m").max()).item()
+    low, high = min(low, alert_limit_m), max(high, alert_limit_m * 1.25)
+    scale = alt.Scale(type="log", domain=[low, high], nice=False)
+    cells = (
+        alt.Chart(counted)
+        .mark_rect()
+        .encode(
+            x=alt.X("error_from_m:Q", title="horizontal error / m", scale=scale),
+            x2="error_to_m:Q",
+            y=alt.Y("level_from_m:Q", title="protection level / m", scale=scale),
+            y2="level_to_m:Q",
+            color=alt.Color(
+                "epochs:Q",
+                scale=alt.Scale(type="log", scheme="viridis"),
+                legend=alt.Legend(title="epochs"),
+            ),
+            tooltip=[
+                alt.Tooltip("error_from_m:Q", title="error from / m", format=".3f"),
+                alt.Tooltip("level_from_m:Q", title="level from / m", format=".3f"),
+                "epochs:Q",
+            ],
+        )
+    )
+    diagonal = (
+        alt.Chart(pl.DataFrame({"at_m": [low, high]}))
+        .mark_line(color=ORANGE, strokeWidth=2)
+        .encode(x=alt.X("at_m:Q", scale=scale), y=alt.Y("at_m:Q", scale=scale))
+    )
+    limit = alt.Chart(pl.DataFrame({"at_m": [alert_limit_m]}))
+    rule = limit.mark_rule(strokeDash=[5, 4], strokeWidth=1.5)
+    limits = rule.encode(x=alt.X("at_m:Q", scale=scale)) + rule.encode(
+        y=alt.Y("at_m:Q", scale=scale)
+    )
+    return finish(
+        cells + diagonal + limits,
+        height=420,
+        description="Stanford diagram: protection level against horizontal error",
+    )
+
+
+def _bin(length_m: pl.Expr) -> pl.Expr:
+    return (length_m.clip(LEAST_M).log10() * BINS_PER_DECADE).floor().cast(pl.Int32)
+
+
+def bound_along_route(route: pl.DataFrame) -> Spec:
+    """The bound against the distance driven, and its parts along and across the road."""
+    names = {"bound_m": "horizontal", "along_std_m": "along the road", "across_std_m": "across it"}
+    lines = (
+        thinned(route.select("along_m", *names))
+        .rename(names)
+        .unpivot(index="along_m", variable_name="line", value_name="bound_m")
+    )
+    chart = (
+        alt.Chart(lines)
+        .mark_line(strokeWidth=1.8)
+        .encode(
+            x=alt.X("along_m:Q", title="along the road / m"),
+            y=alt.Y("bound_m:Q", title="least RMS error / m"),
+            color=_colours(list(names.values()), [BLUE, ORANGE, GREEN]),
+            tooltip=[
+                alt.Tooltip("line:N", title="error"),
+                alt.Tooltip("along_m:Q", title="along / m", format=".1f"),
+                alt.Tooltip("bound_m:Q", title="bound / m", format=".3f"),
+            ],
+        )
+    )
+    return finish(chart, height=260, description="Least RMS error of any localizer on the route")
+
+
+def bound_over_site(bound: ErrorBound) -> Spec:
+    """The bound over the site, with road and radio heads."""
+    step_m = bound.map_step_m
+    squares = bound.site.drop_nulls("bound_m").select(
+        left_m=(pl.col("x_m") - 0.5 * step_m).round(2),
+        right_m=(pl.col("x_m") + 0.5 * step_m).round(2),
+        low_m=(pl.col("y_m") - 0.5 * step_m).round(2),
+        high_m=(pl.col("y_m") + 0.5 * step_m).round(2),
+        bound_m=pl.col("bound_m").round(4),
+    )
+    places, half = bound.site.select("x_m", "y_m").to_numpy(), 0.5 * step_m
+    left_m, low_m = (places.min(axis=0) - half).tolist()
+    right_m, high_m = (places.max(axis=0) + half).tolist()
+    across = alt.Scale(domain=[left_m, right_m], nice=False)
+    upward = alt.Scale(domain=[low_m, high_m], nice=False)
+    heat = (
+        alt.Chart(squares)
+        .mark_rect()
+        .encode(
+            x=alt.X("left_m:Q", title="x / m", scale=across),
+            x2="right_m:Q",
+            y=alt.Y("low_m:Q", title="y / m", scale=upward),
+            y2="high_m:Q",
+            color=alt.Color(
+                "bound_m:Q",
+                scale=alt.Scale(type="log", scheme="viridis", reverse=True),
+                legend=alt.Legend(title="least RMS error / m", gradientLength=240),
+            ),
+            tooltip=[alt.Tooltip("bound_m:Q", title="bound / m", format=".3f")],
+        )
+    )
+    road = (
+        alt.Chart(_road(bound.route))
+        .mark_line(color="#ffffff", stroke="#11161d", strokeWidth=2.5)
+        .encode(
+            x=alt.X("x_m:Q", scale=across),
+            y=alt.Y("y_m:Q", scale=upward),
+            order="along_m:Q",
+        )
+    )
+    heads = alt.Chart(bound.heads.select("name", "pci", "x_m", "y_m")).encode(
+        x=alt.X("x_m:Q", scale=across), y=alt.Y("y_m:Q", scale=upward)
+    )
+    marks = heads.mark_point(
+        shape="triangle-up", filled=True, size=170, color=ORANGE, stroke="#ffffff", opacity=1.0
+    ).encode(tooltip=["name:N", "pci:Q"])
+    names = heads.mark_text(dy=-14, fontSize=12, fontWeight="bold").encode(text="name:N")
+    height = MAP_WIDTH_PX * (high_m - low_m) / (right_m - left_m)
+    drawn = road + marks + names
+    return finish(
+        drawn if squares.is_empty() else heat + drawn,
+        height=round(min(900.0, max(220.0, height))),
+        description="Map of the least RMS error over the site, with the road and the radio heads",
+    )
+
+
+def _road(route: pl.DataFrame) -> pl.DataFrame:
+    """The road's course, a point every ``ROAD_STEP_M``: bends have to look like bends."""
+    moved = (pl.col("along_m") / ROAD_STEP_M).floor()
+    return route.filter(moved.diff().fill_null(1.0) > 0.0).select(
+        pl.col("x_m", "y_m", "along_m").round(2)
+    )
+
+
+def _colours(names: list[str], colours: list[str]) -> alt.Color:
+    scale = alt.Scale(domain=names, range=colours)
+    return alt.Color("line:N", scale=scale, legend=alt.Legend(title=None))

@@ -1,0 +1,43 @@
+"""A page that loads nothing: style, charts and the code that draws them are inside."""
+
+from __future__ import annotations
+
+import json
+from importlib import resources
+from importlib.metadata import version
+from string import Template
+from typing import TYPE_CHECKING
+
+import vl_convert
+
+if TYPE_CHECKING:
+    from collections.abc import Mapping
+
+    from access_av.report.charts import Spec
+
+
+def fill(template: str, specs: Mapping[str, Spec], **fields: object) -> str:
+    """A template of this package with its fields, its charts, style and code filled in.
+
+    Parameters
+    ----------
+    template
+        Name of the template.
+    specs
+        Charts by the ``id`` of their place.
+    fields
+        What goes into the template's other fields, as HTML.
+    """
+    return Template(_read(template)).substitute(
+        fields,
+        style=_read("style.css"),
+        footer=f"ACCESS-AV {version('access-av')}. This localizer is not a safety function "
+        "in the sense of ISO 3691-4.",
+        bundle=vl_convert.javascript_bundle("window.vegaEmbed = vegaEmbed;"),
+        specs=json.dumps(specs, separators=(",", ":")).replace("</", "<\\/"),
+        script=_read("page.js"),
+    )
+
+
+def _read(name: str) -> str:
+    return resources.files(__package__).joinpath(name).read_text(encoding="utf-8")

@@ -1,0 +1,83 @@
+"""The page of ``access-av bound``: the bound along the route and over the site."""
+
+from __future__ import annotations
+
+from html import escape
+from importlib.metadata import version
+from typing import TYPE_CHECKING
+
+from access_av.bound import MAP_TRAVEL_M, VISIBLE_SNR_DB
+from access_av.report import drive_charts as charts
+from access_av.report.page import fill
+from access_av.report.parts import figure, number, source, table, tile
+
+if TYPE_CHECKING:
+    from access_av.bound import ErrorBound
+
+
+def render_bound(bound: ErrorBound) -> str:
+    """The bound of one scenario as an HTML page that loads nothing."""
+    summary = bound.summary()
+    scenario = bound.scenario
+    specs = {
+        "route": charts.bound_along_route(bound.route),
+        "site": charts.bound_over_site(bound),
+    }
+    head = ("Radio head", "PCI", "SSB", "x / m", "y / m", "Distance / m", "SNR / dB", "Visible")
+    rows = [
+        (
+            escape(one["name"]),
+            str(one["pci"]),
+            str(one["ssb_index"]),
+            number(one["x_m"], 1),
+            number(one["y_m"], 1),
+            f"{one['nearest_m']:.0f} to {one['farthest_m']:.0f}",
+            f"{one['least_snr_db']:.1f} to {one['most_snr_db']:.1f}",
+            f"{one['visible_share']:.1%}",
+        )
+        for one in summary["heads"]
+    ]
+    sections = (
+        "<section><h2>Along the route</h2><p>Posterior Cramér–Rao bound, an angle to every radio "
+        "head being used at every SSB: no localizer that knows what the scenario says has a "
+        f"smaller root mean square error.</p>{figure('route')}</section>"
+        f"<section><h2>Over the site</h2><p>{_map_text(bound)}</p>{figure('site')}</section>"
+        "<section><h2>Radio heads</h2><p>By the link budget, before shadowing and fading. Visible: "
+        f"share of the route’s SSBs with an SNR of {VISIBLE_SNR_DB:g} dB or more, down to which "
+        f"3GPP wants SSBs detected (TS 38.133).</p>{table(head, rows, numbers=range(1, 8))}"
+        "</section><section><h2>Provenance</h2>"
+        f"{source('Scenario, all defaults written out', scenario.to_toml())}</section>"
+    )
+    return fill(
+        "sheet.html",
+        specs,
+        title=f"ACCESS-AV bound: {escape(scenario.name)}",
+        kicker="ACCESS-AV bound",
+        headline=f"{summary['p90_m']:.2f} m or less on nine tenths of the route, at best",
+        lead=escape(scenario.description),
+        tiles="".join(
+            tile(f"{summary[key]:.3f} m", f"least RMS error, {text}")
+            for key, text in (
+                ("median_m", "median of the route"),
+                ("p90_m", "90th percentile"),
+                ("max_m", "worst place"),
+            )
+        ),
+        meta=escape(f"Scenario “{scenario.name}”, version {version('access-av')}."),
+        sections=sections,
+    )
+
+
+def _map_text(bound: ErrorBound) -> str:
+    if bound.site["bound_m"].is_null().all():
+        return (
+            "One radio head alone leaves a direction open: without a past no place of the site has "
+            "a position. The road and the radio head are shown."
+        )
+    return (
+        f"Of a vehicle that has listened on {MAP_TRAVEL_M:g} m of way "
+        f"({bound.map_looks:.0f} independent looks at each radio head), knows its heading to "
+        f"{bound.map_heading_std_rad * 1e3:.1f} mrad and nothing of its place. Squares of "
+        f"{bound.map_step_m:g} m; none where the radio heads leave a direction open. "
+        "Drawn to scale on a wide screen."
+    )
