@@ -18,7 +18,7 @@ if TYPE_CHECKING:
 TRAJECTORY_COLUMNS = {
     "run", "time_s", "x_m", "y_m", "heading_rad", "true_x_m", "true_y_m", "error_x_m", "error_y_m",
 }  # fmt: skip
-COMMANDS = ["evaluate", "run", "explore", "aoa", "fit", "scenario", "platform"]
+COMMANDS = ["evaluate", "run", "explore", "bound", "aoa", "fit", "scenario", "platform"]
 
 
 def test_help_lists_every_command(access_av: Cli) -> None:
@@ -28,7 +28,7 @@ def test_help_lists_every_command(access_av: Cli) -> None:
         assert command in done.out
 
 
-@pytest.mark.parametrize("command", ["evaluate", "run", "explore", "aoa", "fit"])
+@pytest.mark.parametrize("command", ["evaluate", "run", "explore", "bound", "aoa", "fit"])
 def test_help_of_each_command_has_an_example(access_av: Cli, command: str) -> None:
     done = access_av(command, "--help", columns=60)
     assert done.code == 0
@@ -165,6 +165,11 @@ def test_bad_scenarios_end_with_2_and_name_file_and_key(
         (["explore", "--max-energy-j", "inf"], ["finite"]),
         (["explore", "--max-rms-m", "-1"], ["--max-rms-m"]),
         (["explore", "--results", "."], ["operating_points.parquet"]),
+        (["bound", "papier"], ["papier", "paper"]),
+        (["bound", "yard", "--map-step-m", "0"], ["--map-step-m", "above 0"]),
+        (["bound", "yard", "--map-step-m", "nan"], ["--map-step-m", "above 0"]),
+        (["bound", "yard", "--map-step-m", "0.01"], ["--map-step-m", "at most"]),
+        (["bound", "paper", "--out", "pyproject.toml"], ["--out takes a directory"]),
         (["aoa", "nowhere"], ["nowhere", ".sigmf-meta"]),
         (["frobnicate"], ["frobnicate"]),
     ],

@@ -33,7 +33,7 @@ def test_python_example(tmp_path: Path) -> None:
 def test_command_line_examples(tmp_path: Path, quick_study: Path) -> None:
     lines = [line for block in blocks("sh") for line in block.splitlines()]
     commands = [shlex.split(line)[1:] for line in lines if ".venv/bin/access-av" in line]
-    assert [command[0] for command in commands] == ["run", "explore"]
+    assert [command[0] for command in commands] == ["run", "explore", "bound"]
     (tmp_path / "results").symlink_to(quick_study, target_is_directory=True)
     for command in commands:
         done = subprocess.run(
@@ -45,6 +45,7 @@ def test_command_line_examples(tmp_path: Path, quick_study: Path) -> None:
         )
         assert done.returncode == 0, done.stderr
     assert (tmp_path / "results/first/trajectories.parquet").is_file()
+    assert (tmp_path / "results/yard-bound/report.html").is_file()
 
 
 def test_make_commands_exist() -> None:

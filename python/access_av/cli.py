@@ -11,6 +11,7 @@ from typing import Annotated, Any
 import typer
 
 from access_av import RecordingError, ScenarioError, __version__
+from access_av.cli_bound import app as bound_commands
 from access_av.cli_nr import app as nr_commands
 from access_av.errors import InputError
 from access_av.terminal import console, errors, progress
@@ -112,10 +113,11 @@ def run(
     """Drive one scenario and write its trajectories.
 
     Writes trajectories.parquet, executions.parquet, trajectory.tum and truth.tum (the first run),
-    scenario.toml with every default, and manifest.json.
+    report.html, scenario.toml with every default, and manifest.json.
     """
     from access_av import Scenario, simulate
     from access_av.files import ResultsDirectory, tum_trajectory
+    from access_av.report.drive import render_drive
     from access_av.terminal import show_simulation
 
     chosen = Scenario.load(scenario)
@@ -134,12 +136,13 @@ def run(
     for name, prefix in (("trajectory.tum", ""), ("truth.tum", "true_")):
         columns = ("time_s", f"{prefix}x_m", f"{prefix}y_m", f"{prefix}heading_rad")
         directory.write_text(name, tum_trajectory(*(first[column] for column in columns)))
+    directory.write_text("report.html", render_drive(chosen, result, seed))
     directory.write_text("scenario.toml", chosen.to_toml())
     directory.write_manifest(scenario=chosen.name, runs=runs, seed=seed)
     directory.link_latest()
 
     show_simulation(result, title=f"{chosen.name}: {runs} runs, seed {seed}")
-    console.print(f"Files: {directory.path}", soft_wrap=True)
+    console.print(f"Report: {directory.path / 'report.html'}", soft_wrap=True)
 
 
 def _override(text: str) -> tuple[str, Any]:
@@ -303,6 +306,7 @@ def _files_app(what: str) -> typer.Typer:
     return files
 
 
+app.add_typer(bound_commands)
 app.add_typer(nr_commands)
 
 for _what in ("scenario", "platform"):

@@ -93,12 +93,43 @@ def show_simulation(result: Simulation, title: str) -> None:
         "worst mean error along the track, X / m": steps["mean_abs_error_x_m"].max(),
         "worst mean error along the track, Y / m": steps["mean_abs_error_y_m"].max(),
         "RMS error / m": result.rms_error_m,
+        **{
+            f"horizontal error, {share:.0%} below / m": result.error_quantiles_m[share]
+            for share in (0.5, 0.9, 0.99)
+        },
         "duration / s": steps["time_s"].max(),
         "executions": runs["executions"].mean(),
-        "energy / J": runs["energy_j"].mean(),
+        "energy / J": runs["energy_j"].fill_nan(None).mean(),
     }
+    integrity = result.integrity
+    if integrity is not None:
+        rows["protection level / error, median"] = integrity.median_level_over_error
+        rows |= {
+            f"epochs {state} / %": 100.0 * share for state, share in integrity.state_shares.items()
+        }
+        rows["errors beyond the level while ok"] = integrity.exceedances
     for name, value in rows.items():
         made.add_row(name, value_text(value))
+    console.print(made)
+
+
+def show_bound(summary: dict[str, Any]) -> None:
+    """The bound along the route, and how each radio head is received there."""
+    made = table(["least RMS error of any localizer", "m"], title=summary["scenario"])
+    for name, key in (("median of the route", "median_m"), ("90 % of it below", "p90_m")):
+        made.add_row(name, f"{summary[key]:.3f}")
+    made.add_row("worst place", f"{summary['max_m']:.3f}")
+    console.print(made)
+    made = table(["radio head", "PCI", "SSB", "distance m", "SNR dB", "visible"])
+    for head in summary["heads"]:
+        made.add_row(
+            head["name"],
+            str(head["pci"]),
+            str(head["ssb_index"]),
+            f"{head['nearest_m']:.0f}–{head['farthest_m']:.0f}",
+            f"{head['least_snr_db']:.1f} to {head['most_snr_db']:.1f}",
+            f"{head['visible_share']:.1%}",
+        )
     console.print(made)
 
 

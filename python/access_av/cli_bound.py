@@ -1,0 +1,50 @@
+"""The command ``bound``: what accuracy a placement of radio heads can give."""
+
+from __future__ import annotations
+
+import json
+from pathlib import Path  # noqa: TC003 (Typer reads annotations at run time)
+from typing import Annotated
+
+import typer
+
+from access_av.terminal import console, show_bound
+
+app = typer.Typer()
+
+
+@app.command(
+    epilog="Example: [bold]access-av bound yard --map-step-m 10 --out results/yard-bound[/]",
+)
+def bound(
+    scenario: Annotated[str, typer.Argument(help="Shipped name, or path of a TOML file.")],
+    out: Annotated[
+        Path | None, typer.Option(help="Directory for the files; else a new one in results/.")
+    ] = None,
+    map_step_m: Annotated[
+        float | None, typer.Option(help="Side of the map's squares; else a round length that fits.")
+    ] = None,
+    as_json: Annotated[bool, typer.Option("--json", help="Print JSON.")] = False,
+) -> None:
+    """Tell how well any localizer can do, before anything is built.
+
+    The posterior Cramér-Rao bound of the horizontal error: along the route and over the site.
+    Writes bound.parquet, map.parquet, report.html, scenario.toml and manifest.json.
+    """
+    from access_av.bound import bound as error_bound
+    from access_av.files import ResultsDirectory
+    from access_av.report.placement import render_bound
+
+    found = error_bound(scenario, map_step_m=map_step_m)
+    directory = ResultsDirectory.create(f"bound-{found.scenario.name}", out)
+    directory.write_table("bound.parquet", found.route)
+    directory.write_table("map.parquet", found.site)
+    directory.write_text("report.html", render_bound(found))
+    directory.write_text("scenario.toml", found.scenario.to_toml())
+    directory.write_manifest(scenario=found.scenario.name, map_step_m=found.map_step_m)
+    summary = found.summary()
+    if as_json:
+        print(json.dumps({**summary, "directory": str(directory.path)}, indent=2))
+        return
+    show_bound(summary)
+    console.print(f"Report: {directory.path / 'report.html'}", soft_wrap=True)

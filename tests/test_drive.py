@@ -1,0 +1,104 @@
+"""What ``run`` tells of covariances, protection levels and percentiles."""
+
+from __future__ import annotations
+
+import json
+import re
+from typing import TYPE_CHECKING
+
+import numpy as np
+import polars as pl
+import pytest
+
+from access_av import Scenario, simulate
+from access_av.errors import InputError
+from access_av.report.drive import render_drive
+from access_av.simulation import Integrity
+
+if TYPE_CHECKING:
+    from collections.abc import Callable
+    from pathlib import Path
+
+    from access_av import Simulation
+    from conftest import Finished
+
+GUARDED = Scenario.load("paper-real-odometry-2").with_overrides({"localizer.integrity": True})
+
+
+@pytest.fixture(scope="module")
+def guarded() -> Simulation:
+    return simulate(GUARDED, runs=2, seed=4, keep_trajectories=True)
+
+
+def test_guarded_tracker_states_levels(guarded: Simulation) -> None:
+    table, integrity = guarded.trajectories, guarded.integrity
+    assert table is not None
+    assert integrity is not None
+    for name in ("protection_level_m", "variance_x_m2", "variance_y_m2", "variance_heading_rad2"):
+        assert table[name].null_count() == 0
+        assert (table[name] >= 0.0).all()
+    assert integrity.epochs == table.height
+    assert abs(sum(integrity.state_shares.values()) - 1.0) < 1e-12
+    assert integrity.median_level_over_error > 1.0
+    # Two runs are correlated epochs: the stated 1e-3 is of many. Here, not grossly violated.
+    assert integrity.exceedances < 0.05 * integrity.epochs
+
+
+def test_dead_reckoning_states_none() -> None:
+    result = simulate("paper", runs=1, keep_trajectories=True)
+    assert result.trajectories is not None
+    for name in ("protection_level_m", "integrity", "variance_x_m2", "covariance_xy_m2"):
+        assert result.trajectories[name].null_count() == result.trajectories.height
+    assert result.trajectories.schema["integrity"] == pl.String
+    assert result.integrity is None
+    assert '"stanford"' not in render_drive(Scenario.load("paper"), result, seed=1)
+
+
+def test_integrity_is_counted_by_hand() -> None:
+    table = pl.DataFrame(
+        {
+            "error_x_m": [0.3, 0.0, 0.6, 3.0, 1.0],
+            "error_y_m": [0.4, 0.2, 0.8, 4.0, 0.0],
+            "protection_level_m": [1.0, 0.1, 4.0, 1.0, None],
+            "integrity": ["ok", "ok", "degraded", "unavailable", None],
+        }
+    )
+    # Errors 0.5, 0.2, 1 and 5 m: ratios 2, 0.5, 4 and 0.2.
+    found = Integrity.of(table)
+    assert found is not None
+    assert found.epochs == 4
+    assert found.state_shares == {"ok": 0.5, "degraded": 0.25, "unavailable": 0.25}
+    assert np.isclose(found.median_level_over_error, 1.25)
+    assert found.exceedances == 1
+    assert Integrity.of(table.tail(1)) is None
+
+
+def test_page_has_every_chart_and_loads_nothing(guarded: Simulation) -> None:
+    page = render_drive(GUARDED, guarded, seed=4)
+    specs = json.loads(page.split("const charts = ")[1].split(";\n")[0])
+    places = set(re.findall(r'class="chart" id="([^"]+)"', page))
+    assert set(specs) == places == {"error", "executions", "stanford"}
+    markup = re.sub(r"(<script>).*?(</script>)", r"\1\2", page, flags=re.DOTALL)
+    assert not re.search(r"<(link|img|iframe|script)[^>]*\b(src|href)=", markup)
+    assert not re.search(r"@import|url\(|https?:", markup)
+    counted = specs["stanford"]["datasets"].values()
+    assert guarded.trajectories is not None
+    epochs = sum(row.get("epochs", 0) for rows in counted for row in rows)
+    assert epochs == guarded.trajectories.height
+
+
+def test_page_needs_trajectories() -> None:
+    with pytest.raises(InputError, match="keep_trajectories"):
+        render_drive(Scenario.load("paper"), simulate("paper", runs=1), seed=1)
+
+
+def test_run_tells_percentiles_and_integrity(
+    access_av: Callable[..., Finished], tmp_path: Path
+) -> None:
+    done = access_av(
+        "run", "paper-real-odometry-2", "--set", "localizer.integrity=true", "--out", tmp_path,
+    )  # fmt: skip
+    assert done.code == 0, done.err
+    for text in ("50% below", "90% below", "99% below", "protection level / error", "epochs ok"):
+        assert text in done.out
+    assert "stanford" in (tmp_path / "report.html").read_text()
