@@ -239,6 +239,19 @@ impl Tracker {
         self.driven_m
     }
 
+    /// The innovation that an angle would bring; `None` where it would bring none.
+    pub fn innovation(&self, head: &RadioHead, measured: &AngleMeasurement) -> Option<Innovation> {
+        self.look(head, measured)
+            .ok()
+            .filter(|looked| !looked.excluded)
+            .map(|looked| looked.innovation)
+    }
+
+    /// Sets the largest squared Mahalanobis distance of an angle that is used.
+    pub fn set_gate(&mut self, gate: f64) {
+        self.config.gate = gate;
+    }
+
     /// Leaves the angles of a radio head unused, or uses them again.
     pub fn set_excluded(&mut self, head: &RadioHead, excluded: bool) {
         for mine in self.heads.iter_mut().filter(|mine| mine.is(head)) {
