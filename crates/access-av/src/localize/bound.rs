@@ -19,7 +19,7 @@ use super::tracker::sighting::{Footing, Sighting};
 use super::tracker::state::{ACROSS, ALONG, Belief, CURVATURE, HEADING, MOUNTING, SCALE, STATES};
 use super::tracker::{InitialPose, Tracker, TrackerConfig};
 use crate::geometry::{Point, Pose};
-use crate::scenario::{LocalizerSettings, Scenario, ScenarioError};
+use crate::scenario::{LocalizerSettings, Scenario, ScenarioError, TrackerSettings};
 use crate::world::{MotionProfile, RadioHead, Track};
 
 /// The bound at one SSB.
@@ -65,7 +65,7 @@ impl Bound {
     pub fn new(scenario: &Scenario) -> Result<Self, ScenarioError> {
         let settings = match scenario.localizer {
             LocalizerSettings::Tracker(settings) => settings,
-            LocalizerSettings::DeadReckoning(_) => Default::default(),
+            LocalizerSettings::DeadReckoning(_) => TrackerSettings::default(),
         };
         let track = scenario.build_track()?;
         Ok(Self {

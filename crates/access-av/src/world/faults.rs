@@ -11,7 +11,7 @@ use crate::scenario::{FaultKind, FaultSettings, Scenario};
 /// The faults of a scenario.
 #[derive(Debug, Clone)]
 pub struct Faults {
-    faults: Vec<FaultSettings>,
+    all: Vec<FaultSettings>,
     element_rad: f64,
     mounting_angle_rad: f64,
     /// The odometer's own last distance, and what slip has added to it, in metres.
@@ -23,7 +23,7 @@ impl Faults {
     /// The scenario's.
     pub fn new(scenario: &Scenario) -> Self {
         Self {
-            faults: scenario.faults.clone(),
+            all: scenario.faults.clone(),
             element_rad: TAU * scenario.array.spacing_wavelengths,
             mounting_angle_rad: scenario.array.mounting_angle_rad,
             distance_m: 0.0,
@@ -32,7 +32,7 @@ impl Faults {
     }
 
     fn at(&self, time_s: f64) -> impl Iterator<Item = FaultKind> {
-        self.faults
+        self.all
             .iter()
             .filter(move |fault| (fault.from_s..fault.until_s).contains(&time_s))
             .map(|fault| fault.what)
