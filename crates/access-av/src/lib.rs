@@ -19,6 +19,7 @@ pub mod platform;
 pub mod random;
 pub mod receive;
 pub mod recording;
+pub mod replay;
 pub mod scenario;
 pub mod simulate;
 pub mod wake_up;

@@ -271,26 +271,30 @@ impl Onboard {
     /// # Errors
     /// Whatever the user's own estimator fails with.
     pub fn estimate(&mut self, observation: &SsbObservation) -> Result<Execution, BoxError> {
-        self.advance_to(observation.ssb.time_s);
         let measured = self.estimator.estimate(observation)?;
+        Ok(self.take_in(observation.ssb, measured))
+    }
+
+    /// Lets the localizer have an angle that was estimated elsewhere; `None` is an SSB that had none.
+    pub fn take_in(&mut self, ssb: SensedSsb, measured: Option<AngleMeasurement>) -> Execution {
+        self.advance_to(ssb.time_s);
         let unused = |reason| UpdateVerdict {
             accepted: false,
             reason,
             mahalanobis_squared: None,
             threshold: None,
         };
-        let verdict = match (self.head(&observation.ssb), &measured) {
+        let verdict = match (self.head(&ssb), &measured) {
             (None, _) => unused(UpdateReason::UnknownRadioHead),
             (_, None) => unused(UpdateReason::Unusable),
             (Some(head), Some(measured)) => self.localizer.update(&head, measured),
         };
-        let wake_up_time_s = self.wake_up_time_s;
-        Ok(Execution {
-            ssb: observation.ssb,
+        Execution {
+            ssb,
             measured,
             verdict,
-            wake_up_time_s,
-        })
+            wake_up_time_s: self.wake_up_time_s,
+        }
     }
 
     /// Where the vehicle is believed to be.

@@ -41,6 +41,8 @@ pub struct IqAir {
     head_oscillators: Vec<f64>,
     channel_gains: [Complex64; ANTENNAS],
     noise: ChaCha8Rng,
+    /// Whether samples are made from one burst to the next, without a gap.
+    continuous: bool,
     /// Sum of all SSBs at each antenna, before the converter.
     sum: [Vec<Complex64>; ANTENNAS],
     burst: IqBurst,
@@ -98,9 +100,17 @@ impl IqAir {
             head_oscillators,
             channel_gains,
             noise: streams.generator(Purpose::SampleNoise, 0),
+            continuous: false,
             sum: Default::default(),
             burst: IqBurst::default(),
         })
+    }
+
+    /// Makes samples from one burst to the next too, not around the bursts only.
+    #[must_use]
+    pub const fn continuous(mut self) -> Self {
+        self.continuous = true;
+        self
     }
 
     /// Samples per second.
@@ -127,16 +137,27 @@ impl IqAir {
     ) -> Result<&IqBurst, Error> {
         let rate_hz = self.sample_rate_hz();
         let time_s = number as f64 * self.period_s;
-        // A clock that runs too fast has counted more samples by then.
-        let half_frame_start = time_s * rate_hz * (1.0 + self.oscillator);
+        let half_frame_start = self.half_frame_start(number);
         let (first, last) = self.span(heads)?;
-        let offset = self.numerology.symbol_start(first) as f64 - MARGIN as f64;
-        self.burst.start = (half_frame_start + offset).max(0.0).floor() as u64;
-        self.burst.time_s = time_s + (self.burst.start as f64 - half_frame_start) / rate_hz;
-        let length = self.numerology.symbol_start(last + 4) - self.numerology.symbol_start(first);
+        let symbol = |symbol| self.numerology.symbol_start(symbol);
+        let (start, end) = if self.continuous {
+            (
+                half_frame_start.floor(),
+                self.half_frame_start(number + 1).floor(),
+            )
+        } else {
+            let start = half_frame_start.floor();
+            let margin = MARGIN as f64;
+            (
+                start + symbol(first) as f64 - margin,
+                start + symbol(last + 4) as f64 + margin,
+            )
+        };
+        self.burst.start = start as u64;
+        self.burst.time_s = time_s + (start - half_frame_start) / rate_hz;
         for antenna in &mut self.sum {
             antenna.clear();
-            antenna.resize(length + 2 * MARGIN, Complex64::ZERO);
+            antenna.resize((end - start) as usize, Complex64::ZERO);
         }
         self.burst.ssb_starts.clear();
         for (index, (head, snr_db)) in heads.iter().zip(snrs_db).enumerate() {
@@ -146,6 +167,12 @@ impl IqAir {
         self.add_noise(number);
         self.convert();
         Ok(&self.burst)
+    }
+
+    /// Where burst number `number`'s half frame begins: a clock that runs too fast has counted more
+    /// samples by then.
+    fn half_frame_start(&self, number: u64) -> f64 {
+        number as f64 * self.period_s * self.sample_rate_hz() * (1.0 + self.oscillator)
     }
 
     /// First symbols of the earliest and the latest SSB.
@@ -236,12 +263,18 @@ impl IqAir {
 
     /// Gain control, rounding and clipping.
     fn convert(&mut self) {
-        let count: usize = self.sum.iter().map(Vec::len).sum();
-        let energy: f64 = self.sum.iter().flatten().map(Complex64::norm_sqr).sum();
+        // The strongest symbol sets the gain: a mean over the pauses would drive an SSB into the limit.
+        let symbol_len = self.numerology.ssb_symbol_len();
+        let power = |symbol: &[Complex64]| {
+            symbol.iter().map(Complex64::norm_sqr).sum::<f64>() / symbol.len() as f64
+        };
+        let strongest = self
+            .sum
+            .iter()
+            .flat_map(|samples| samples.chunks_exact(symbol_len).map(power))
+            .fold(f64::MIN_POSITIVE, f64::max);
         // I and Q share the power.
-        let rms = (0.5 * energy / count.max(1) as f64)
-            .sqrt()
-            .max(f64::MIN_POSITIVE);
+        let rms = (0.5 * strongest).sqrt();
         let scale = 10f64.powf(-0.05 * self.settings.adc_headroom_db) / rms;
         let steps = f64::from(1u32 << (self.settings.adc_bits - 1));
         let convert =

@@ -8,6 +8,7 @@ mod diagnosis;
 mod iq_source;
 mod receiver;
 mod scan;
+mod stream;
 
 pub use array_view::ArraySetup;
 pub use diagnosis::{ChannelFault, diagnose_channels};

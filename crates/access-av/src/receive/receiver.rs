@@ -11,7 +11,7 @@ use thiserror::Error;
 
 use super::SSB_SAMPLES;
 use crate::observation::{ANTENNAS, SensedSsb, SsbObservation};
-use crate::scenario::Pilots;
+use crate::scenario::{Pilots, Scenario};
 
 /// SSBs in a row that must be missing before a cell is given up: one second at the usual period.
 const MISSES: u32 = 50;
@@ -37,6 +37,26 @@ pub struct ReceiverConfig {
     pub calibration: [Complex64; ANTENNAS],
     /// Cells to listen to; all without.
     pub cells: Option<Vec<u16>>,
+}
+
+impl ReceiverConfig {
+    /// The scenario's receiver, its channels ideal, for the cells of its radio heads.
+    pub fn new(scenario: &Scenario) -> Self {
+        let spacing = if scenario.ssb.subcarrier_spacing_khz == 30.0 {
+            SubcarrierSpacing::Khz30
+        } else {
+            SubcarrierSpacing::Khz15
+        };
+        Self {
+            ssb_freq_hz: scenario.ssb.carrier_mhz * 1e6,
+            spacing,
+            period_s: scenario.ssb.period_s(),
+            pilots: scenario.receiver.pilots,
+            snapshots: scenario.array.snapshots.into(),
+            calibration: [Complex64::ONE; ANTENNAS],
+            cells: Some(scenario.radio_heads.iter().map(|head| head.pci).collect()),
+        }
+    }
 }
 
 /// Samples at the base rate.
@@ -109,6 +129,11 @@ impl Receiver {
             observation: SsbObservation::new(nothing),
             config,
         })
+    }
+
+    /// What it was told.
+    pub const fn config(&self) -> &ReceiverConfig {
+        &self.config
     }
 
     /// Number of SSBs that are tracked.

@@ -7,6 +7,7 @@
 //! | odometry | [CSV](read_odometry_csv); [MCAP](mcap) | read, written |
 //! | trajectories | [TUM](write_tum) | read, written |
 //! | poses, verdicts, diagnoses | [MCAP](mcap) | written |
+//! | surveyed radio heads | [TOML](Site) | read, written |
 //!
 //! A file that cannot be used at all is a [`RecordingError`]; single bad items in it are left out
 //! and reported beside what was read.
@@ -17,6 +18,7 @@ mod error;
 pub mod mcap;
 mod odometry;
 pub mod sigmf;
+mod site;
 mod tum;
 
 pub use angle_log::{AngleLog, AngleRemark, LoggedAngle, read_angle_log, write_angle_log};
@@ -28,4 +30,5 @@ pub use odometry::{
 pub use sigmf::{
     Annotation, Capture, Datatype, Recording, RecordingWarning, RecordingWriter, WriterSettings,
 };
+pub use site::Site;
 pub use tum::{TimedPose, read_tum, tum_text, write_tum};

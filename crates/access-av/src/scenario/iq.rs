@@ -16,7 +16,7 @@ pub struct IqSettings {
     pub head_oscillator_ppm: f64,
     /// Bits of the converter, for each of I and Q.
     pub adc_bits: u8,
-    /// Full scale of the converter over the root mean square of the signal, in dB.
+    /// Full scale of the converter over the root mean square of the strongest symbol, in dB.
     pub adc_headroom_db: f64,
     /// Standard deviation of the phase error of each channel in radians, drawn once per run.
     pub channel_phase_rad: f64,

@@ -168,7 +168,7 @@ impl Scenario {
         Self::from_table(read::parse(text, origin)?, origin)
     }
 
-    fn from_table(table: toml::Table, origin: &str) -> Result<Self, ScenarioError> {
+    pub(crate) fn from_table(table: toml::Table, origin: &str) -> Result<Self, ScenarioError> {
         let mut scenario: Self = read::settings(table, origin)?;
         scenario.track.take_over_file(origin)?;
         scenario.check(origin)?;

@@ -2,13 +2,11 @@
 
 use super::SimulationError;
 use crate::channel::{HeadChannel, IqAir};
-use crate::observation::{ANTENNAS, SsbObservation};
+use crate::observation::SsbObservation;
 use crate::random::Streams;
 use crate::receive::{Receiver, ReceiverConfig, Window};
 use crate::scenario::Scenario;
 use crate::world::Vehicle;
-use nr_ssb::SubcarrierSpacing;
-use num_complex::Complex64;
 
 /// Air and receiver of one run.
 pub(super) struct IqReception {
@@ -21,7 +19,7 @@ impl IqReception {
     pub fn new(scenario: &Scenario, streams: Streams) -> Result<Self, SimulationError> {
         Ok(Self {
             air: IqAir::new(scenario, streams)?,
-            receiver: Receiver::new(receiver_config(scenario))?,
+            receiver: Receiver::new(ReceiverConfig::new(scenario))?,
             observations: Vec::new(),
         })
     }
@@ -53,23 +51,5 @@ impl IqReception {
     /// The SSBs of the last burst that the receiver made out, in order of time.
     pub fn observations(&self) -> &[SsbObservation] {
         &self.observations
-    }
-}
-
-/// The scenario's receiver.
-fn receiver_config(scenario: &Scenario) -> ReceiverConfig {
-    let thirty = scenario.ssb.subcarrier_spacing_khz == 30.0;
-    ReceiverConfig {
-        ssb_freq_hz: scenario.ssb.carrier_mhz * 1e6,
-        spacing: if thirty {
-            SubcarrierSpacing::Khz30
-        } else {
-            SubcarrierSpacing::Khz15
-        },
-        period_s: scenario.ssb.period_s(),
-        pilots: scenario.receiver.pilots,
-        snapshots: scenario.array.snapshots.into(),
-        calibration: [Complex64::ONE; ANTENNAS],
-        cells: Some(scenario.radio_heads.iter().map(|head| head.pci).collect()),
     }
 }

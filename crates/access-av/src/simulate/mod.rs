@@ -4,12 +4,14 @@ mod campaign;
 mod histogram;
 mod iq_reception;
 mod run;
+mod synth;
 
 use thiserror::Error;
 
 pub use campaign::{Campaign, CampaignOptions, RunSummary, StepStatistics};
 pub use histogram::ErrorHistogram;
 pub use run::{RunRecord, Simulation, Step};
+pub use synth::{SynthError, SynthSettings, Synthesized, synthesize};
 
 use crate::BoxError;
 use crate::receive::ReceiveError;

@@ -41,6 +41,7 @@ pub struct RecordingWriter {
     data_file: PathBuf,
     data: BufWriter<File>,
     hash: Sha512,
+    captures: Vec<Capture>,
     annotations: Vec<Annotation>,
     length: u64,
     block: Vec<u8>,
@@ -60,7 +61,7 @@ impl RecordingWriter {
         };
         let (meta_file, data_file) = (file(".sigmf-meta"), file(".sigmf-data"));
         settings
-            .metadata(String::new(), Vec::new())
+            .metadata(String::new(), Vec::new(), Vec::new())
             .check(&meta_file)?;
         let data =
             File::create(&data_file).map_err(|source| RecordingError::io(&data_file, source))?;
@@ -70,6 +71,7 @@ impl RecordingWriter {
             data_file,
             data: BufWriter::new(data),
             hash: Sha512::new(),
+            captures: Vec::new(),
             annotations: Vec::new(),
             length: 0,
             block: Vec::new(),
@@ -110,6 +112,17 @@ impl RecordingWriter {
             .map_err(|source| RecordingError::io(data_file, source))
     }
 
+    /// Begins a stretch whose first sample is number `global_index` since the receiver began to
+    /// count: what comes now does not join what came before.
+    pub fn begin_capture(&mut self, global_index: u64) {
+        let index = ("core:global_index".to_owned(), json!(global_index));
+        self.captures.push(Capture {
+            sample_start: self.length,
+            frequency_hz: Some(self.settings.frequency_hz),
+            other: Map::from_iter([index]),
+        });
+    }
+
     /// Says something of a stretch of samples.
     pub fn annotate(&mut self, annotation: Annotation) {
         self.annotations.push(annotation);
@@ -132,9 +145,9 @@ impl RecordingWriter {
         // SigMF asks for annotations in order of their first sample.
         self.annotations
             .sort_by_key(|annotation| annotation.sample_start);
-        let metadata = self
-            .settings
-            .metadata(hexadecimal(self.hash), self.annotations);
+        let metadata =
+            self.settings
+                .metadata(hexadecimal(self.hash), self.captures, self.annotations);
         let failed = |source| RecordingError::io(&self.meta_file, source);
         let text = serde_json::to_string_pretty(&metadata).map_err(|error| failed(error.into()))?;
         fs::write(&self.meta_file, text + "\n").map_err(failed)?;
@@ -143,7 +156,18 @@ impl RecordingWriter {
 }
 
 impl WriterSettings {
-    fn metadata(&self, sha512: String, annotations: Vec<Annotation>) -> Metadata {
+    fn metadata(
+        &self,
+        sha512: String,
+        mut captures: Vec<Capture>,
+        annotations: Vec<Annotation>,
+    ) -> Metadata {
+        if captures.is_empty() {
+            captures.push(Capture {
+                frequency_hz: Some(self.frequency_hz),
+                ..Capture::default()
+            });
+        }
         let mut other = self.global.clone();
         other.insert(
             "core:recorder".to_owned(),
@@ -175,11 +199,7 @@ impl WriterSettings {
                 description: Some(self.description.clone()),
                 other,
             },
-            captures: vec![Capture {
-                sample_start: 0,
-                frequency_hz: Some(self.frequency_hz),
-                other: Map::new(),
-            }],
+            captures,
             annotations,
         }
     }
