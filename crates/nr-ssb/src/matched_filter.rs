@@ -10,10 +10,13 @@
 //! The PSS fills 127 of 256 bins, so its correlation is computed at half the base rate; the lags
 //! between are the sums of their neighbours, `(c(n−1) + c(n+1))/√2`, which carry noise of the same
 //! variance and lose no more of a peak (0.9 dB at worst) than sampling at the base rate does.
+//!
+//! A frequency offset shifts the spectrum, so that a hypothesis is but another choice of bins, a
+//! sixteenth of a subcarrier apart, before the transform back.
 
 use std::sync::Arc;
 
-use num_complex::{Complex32, Complex64};
+use num_complex::Complex32;
 use rustfft::{Fft, FftPlanner};
 
 use crate::demodulate::SYMBOL_FFT;
@@ -23,6 +26,10 @@ use crate::pss::pss;
 const BLOCK: usize = 4096;
 /// Length of the transform back: the PSS's half of the spectrum.
 const HALF_BLOCK: usize = BLOCK / 2;
+/// Bins on each side of a hypothesis.
+const QUARTER: usize = HALF_BLOCK / 2;
+/// Bins of a block's spectrum per subcarrier.
+const BINS_PER_SUBCARRIER: usize = BLOCK / SYMBOL_FFT;
 /// Correlation lags that one block yields.
 const HOP: usize = BLOCK - SYMBOL_FFT;
 /// Two maxima of one PSS closer than this are one candidate.
@@ -47,11 +54,13 @@ pub struct PssCandidate {
 pub struct MatchedFilter {
     forward: Arc<dyn Fft<f32>>,
     inverse: Arc<dyn Fft<f32>>,
-    cfo_hypotheses_hz: Vec<f64>,
-    /// Conjugated spectra of the replicas, `[n_id_2][hypothesis]`.
-    replicas: [Vec<Vec<Complex32>>; 3],
+    bin_hz: f64,
+    /// Frequency offsets looked at, bins.
+    hypotheses: Vec<isize>,
+    /// Conjugated spectrum of each PSS.
+    replicas: [Vec<Complex32>; 3],
     block: Vec<Complex32>,
-    /// Spectrum of the block around 0 Hz, per antenna.
+    /// Spectrum of the block per antenna, lowest frequency first.
     spectra: Vec<Vec<Complex32>>,
     /// 240 / energy under the window, per antenna and pair of lags.
     inverse_energy: Vec<Vec<f32>>,
@@ -60,46 +69,39 @@ pub struct MatchedFilter {
     /// Statistics of one hypothesis, then the best and whose it is: even lags, then odd ones.
     sum: Vec<f32>,
     best: Vec<f32>,
-    best_hypothesis: Vec<u8>,
+    best_hypothesis: Vec<u16>,
 }
 
 impl MatchedFilter {
     /// Correlator for `antennas` channels at 256 samples a symbol; offsets in Hz at subcarrier
-    /// spacing `scs_hz`.
+    /// spacing `scs_hz`, at most 64 subcarriers, each moved to the nearest bin.
     pub fn new(scs_hz: f64, cfo_hypotheses_hz: &[f64], antennas: usize) -> Self {
         let mut planner = FftPlanner::new();
         let forward = planner.plan_fft_forward(BLOCK);
         let inverse = planner.plan_fft_inverse(HALF_BLOCK);
         let replicas = [0, 1, 2].map(|n_id_2| {
-            let symbol = pss_symbol(n_id_2);
-            cfo_hypotheses_hz
-                .iter()
-                .map(|cfo_hz| {
-                    let cycles = cfo_hz / (scs_hz * SYMBOL_FFT as f64);
-                    let mut replica = vec![Complex32::ZERO; BLOCK];
-                    for (i, sample) in symbol.iter().enumerate() {
-                        let rotation = Complex64::cis(std::f64::consts::TAU * cycles * i as f64);
-                        replica[i] =
-                            sample * Complex32::new(rotation.re as f32, rotation.im as f32);
-                    }
-                    forward.process(&mut replica);
-                    // The forward transform multiplies by BLOCK in the end.
-                    let mut half = vec![Complex32::ZERO; HALF_BLOCK];
-                    keep_centre(&replica, &mut half);
-                    half.iter().map(|bin| bin.conj() / BLOCK as f32).collect()
-                })
-                .collect()
+            let mut replica = pss_symbol(n_id_2);
+            replica.resize(BLOCK, Complex32::ZERO);
+            forward.process(&mut replica);
+            let (positive, negative) = (&replica[..QUARTER], &replica[BLOCK - QUARTER..]);
+            let bins = positive.iter().chain(negative);
+            // The forward transform multiplies by BLOCK in the end.
+            bins.map(|bin| bin.conj() / BLOCK as f32).collect()
         });
+        let bin_hz = scs_hz / BINS_PER_SUBCARRIER as f64;
+        let reach = QUARTER as isize;
+        let nearest_bin = |hz: &f64| ((hz / bin_hz).round() as isize).clamp(-reach, reach);
         let scratch = forward
             .get_inplace_scratch_len()
             .max(inverse.get_inplace_scratch_len());
         Self {
             forward,
             inverse,
-            cfo_hypotheses_hz: cfo_hypotheses_hz.to_vec(),
+            bin_hz,
+            hypotheses: cfo_hypotheses_hz.iter().map(nearest_bin).collect(),
             replicas,
             block: vec![Complex32::ZERO; BLOCK],
-            spectra: vec![vec![Complex32::ZERO; HALF_BLOCK]; antennas],
+            spectra: vec![vec![Complex32::ZERO; BLOCK]; antennas],
             inverse_energy: vec![vec![0.0; HOP / 2]; antennas],
             product: vec![Complex32::ZERO; HALF_BLOCK],
             scratch: vec![Complex32::ZERO; scratch],
@@ -157,15 +159,21 @@ impl MatchedFilter {
         }
         self.forward
             .process_with_scratch(&mut self.block, &mut self.scratch);
-        keep_centre(&self.block, &mut self.spectra[antenna]);
+        let (negative, positive) = self.spectra[antenna].split_at_mut(BLOCK / 2);
+        positive.copy_from_slice(&self.block[..BLOCK / 2]);
+        negative.copy_from_slice(&self.block[BLOCK / 2..]);
     }
 
     /// Leaves the largest statistic over the frequency hypotheses in `best`.
     fn correlate(&mut self, n_id_2: usize) {
-        for (hypothesis, replica) in self.replicas[n_id_2].iter().enumerate() {
+        let (above, below) = self.replicas[n_id_2].split_at(QUARTER);
+        for (hypothesis, shift) in self.hypotheses.iter().enumerate() {
+            let centre = (BLOCK / 2).saturating_add_signed(*shift);
             self.sum.fill(0.0);
             for (spectrum, inverse_energy) in self.spectra.iter().zip(&self.inverse_energy) {
-                multiply(&mut self.product, spectrum, replica);
+                let (positive, negative) = self.product.split_at_mut(QUARTER);
+                multiply(positive, &spectrum[centre..], above);
+                multiply(negative, &spectrum[centre - QUARTER..], below);
                 self.inverse
                     .process_with_scratch(&mut self.product, &mut self.scratch);
                 let (even, odd) = self.sum.split_at_mut(HOP / 2);
@@ -180,7 +188,7 @@ impl MatchedFilter {
             for ((best, index), sum) in kept.zip(&self.sum) {
                 let better = *sum > *best;
                 *best = if better { *sum } else { *best };
-                *index = if better { hypothesis as u8 } else { *index };
+                *index = if better { hypothesis as u16 } else { *index };
             }
         }
     }
@@ -203,7 +211,7 @@ impl MatchedFilter {
             let candidate = PssCandidate {
                 n_id_2,
                 sample: start + lag,
-                cfo_hz: self.cfo_hypotheses_hz[usize::from(hypothesis)],
+                cfo_hz: self.hypotheses[usize::from(hypothesis)] as f64 * self.bin_hz,
                 statistic,
             };
             let near = candidates.iter_mut().rev().take(64).find(|other| {
@@ -219,14 +227,7 @@ impl MatchedFilter {
     }
 }
 
-/// The bins around 0 Hz, for a transform of half the length.
-fn keep_centre(spectrum: &[Complex32], half: &mut [Complex32]) {
-    let (positive, negative) = half.split_at_mut(HALF_BLOCK / 2);
-    positive.copy_from_slice(&spectrum[..HALF_BLOCK / 2]);
-    negative.copy_from_slice(&spectrum[BLOCK - HALF_BLOCK / 2..]);
-}
-
-/// Elementwise product.
+/// Elementwise product; what `a` and `b` hold beyond the product's length is left.
 fn multiply(product: &mut [Complex32], a: &[Complex32], b: &[Complex32]) {
     let n = product.len();
     let (a, b) = (&a[..n], &b[..n]);

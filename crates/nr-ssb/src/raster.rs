@@ -1,18 +1,33 @@
 //! Finding the SSB's frequency and subcarrier spacing: the synchronization raster of TS 38.104
-//! §5.4.3, point by point through the recorded band, at 15 and 30 kHz.
+//! §5.4.3, point by point through the recorded band, at 15 and 30 kHz. Test networks place SSBs
+//! elsewhere; for them, and for recordings that do not state their centre, see [`scan_off_raster`].
 
 use num_complex::Complex32;
 
+use crate::false_alarm::exponential_sum_threshold;
 use crate::front_end::{FrontEnd, FrontEndError};
+use crate::grid::SUBCARRIERS;
+use crate::matched_filter::MatchedFilter;
 use crate::numerology::SubcarrierSpacing;
-use crate::search::{DetectedSsb, SearchConfig, SearchError, Searcher};
+use crate::search::{DetectedSsb, SearchConfig, SearchError, Searcher, cfo_hypotheses};
+
+/// Off the raster, the SSB's centre is a multiple of this off the recording's.
+const OFFSET_UNIT_HZ: f64 = 15e3;
+/// Half of what one tuning of the front end shows of the band: the PSS's 127 subcarriers may lie
+/// anywhere among 240.
+const TILE_SUBCARRIERS: f64 = 55.0;
+/// Maxima that noise may offer in a scan off the raster.
+const NOISE_CANDIDATES: f64 = 4.0;
+/// Points off the raster that are searched at most, per spacing.
+const MOST_POINTS: usize = 16;
 
 /// A frequency where a cell may place an SSB.
 #[derive(Debug, Clone, Copy, PartialEq)]
 pub struct RasterPoint {
     /// Global synchronization channel number; `None` off the raster.
     pub gscn: Option<u16>,
-    /// Frequency of the SSB's centre (subcarrier 120), Hz.
+    /// Frequency of the SSB's centre (subcarrier 120), Hz; relative to the recording's centre where
+    /// that is unknown.
     pub ssb_freq_hz: f64,
 }
 
@@ -60,62 +75,238 @@ pub enum ScanError {
     Search(#[from] SearchError),
 }
 
-/// All SSBs of a recording, `antennas` channels at `rate_hz` around `centre_hz`, on whatever raster
-/// point and at whatever subcarrier spacing; the point with the strongest SSB first.
+/// Share of the probability of a false cell, 1e-3 for 20 ms, that each of two scans at each of two
+/// spacings may use up.
+const FALSE_ALARM: f64 = 0.25e-3;
+const SPACINGS: [SubcarrierSpacing; 2] = [SubcarrierSpacing::Khz15, SubcarrierSpacing::Khz30];
+
+/// All SSBs of a recording, `antennas` channels at `rate_hz` around `centre_hz` (`None`: unknown),
+/// at whatever frequency and subcarrier spacing; the frequency with the strongest SSB first. First
+/// [`scan_raster`]; where it finds nothing, [`scan_off_raster`].
 ///
-/// The probability of a false cell, 1e-3 for 20 ms, is shared among the points.
+/// # Errors
+/// Those of [`scan_raster`].
+pub fn scan(
+    antennas: &[&[Complex32]],
+    rate_hz: f64,
+    centre_hz: Option<f64>,
+) -> Result<Vec<RasterFind>, ScanError> {
+    if let Some(centre_hz) = centre_hz {
+        let finds = scan_raster(antennas, rate_hz, centre_hz)?;
+        if !finds.is_empty() {
+            return Ok(finds);
+        }
+    }
+    scan_off_raster(antennas, rate_hz, centre_hz)
+}
+
+/// The SSBs on the points of the synchronization raster, the point with the strongest first.
+///
+/// The probability of a false cell, half of 1e-3 for 20 ms, is shared among the points.
 ///
 /// # Errors
 /// [`ScanError::FrontEnd`] for a rate that is no multiple of 3.84 MHz, [`ScanError::Search`] for
 /// channels of unequal lengths or less than one SSB.
-pub fn scan(
+pub fn scan_raster(
     antennas: &[&[Complex32]],
     rate_hz: f64,
     centre_hz: f64,
 ) -> Result<Vec<RasterFind>, ScanError> {
     let mut finds = Vec::new();
-    let half_band = 0.5 * rate_hz;
-    for spacing in [SubcarrierSpacing::Khz15, SubcarrierSpacing::Khz30] {
-        let reach = half_band - 120.0 * spacing.hz();
+    for spacing in SPACINGS {
+        let reach = reach_hz(rate_hz, spacing);
         let points: Vec<_> = synchronization_raster(centre_hz - reach, centre_hz + reach).collect();
         if points.is_empty() {
             continue;
         }
-        let mut front_end = FrontEnd::new(rate_hz, 0.0, spacing.hz(), antennas.len())?;
-        let mut searcher = Searcher::new(SearchConfig {
-            false_alarm: 1e-3 / points.len() as f64,
-            ..SearchConfig::new(spacing, antennas.len())
-        })?;
-        let mut base = vec![Vec::new(); antennas.len()];
+        let mut at_point = PointSearch::new(spacing, rate_hz, antennas.len(), points.len())?;
         for point in points {
-            front_end.tune(point.ssb_freq_hz - centre_hz)?;
-            base.iter_mut().for_each(Vec::clear);
-            front_end.push(antennas, &mut base)?;
-            front_end.finish(&mut base);
-            searcher.tune(Some(point.ssb_freq_hz))?;
-            let slices: Vec<_> = base.iter().map(Vec::as_slice).collect();
-            let ssbs = searcher.search(&slices)?;
-            if !ssbs.is_empty() {
-                finds.push(RasterFind {
-                    point,
-                    spacing,
-                    input_per_output: front_end.input_per_output(),
-                    ssbs: ssbs.to_vec(),
-                });
-            }
+            let offset_hz = point.ssb_freq_hz - centre_hz;
+            finds.extend(at_point.search(antennas, point.gscn, offset_hz, Some(centre_hz))?);
         }
     }
-    finds.sort_by(|a, b| b.strongest().total_cmp(&a.strongest()));
+    sort(&mut finds);
     Ok(finds)
+}
+
+/// The SSBs anywhere in the band, their centre a multiple of 15 kHz (the unit of k_SSB, TS 38.211
+/// §7.4.3.1) off that of the recording.
+///
+/// The PSS is looked for at steps of a third of a subcarrier through the whole band; the points
+/// near the strongest maxima are then searched. Without the absolute centre frequency the carrier
+/// frequency offset comes from inside the symbols only and is less precise, see
+/// [`SearchConfig::ssb_freq_hz`]. The probability of a false cell, half of 1e-3 for 20 ms, is
+/// shared among all points of the band.
+///
+/// Takes time in proportion to bandwidth squared, duration and antennas: for one antenna and 1 ms
+/// at 23.04 Msps under a second.
+///
+/// # Errors
+/// Those of [`scan_raster`].
+pub fn scan_off_raster(
+    antennas: &[&[Complex32]],
+    rate_hz: f64,
+    centre_hz: Option<f64>,
+) -> Result<Vec<RasterFind>, ScanError> {
+    let mut finds: Vec<RasterFind> = Vec::new();
+    for spacing in SPACINGS {
+        let reach = reach_hz(rate_hz, spacing);
+        if reach.is_nan() || reach < 0.0 {
+            continue;
+        }
+        let all = 2 * (reach / OFFSET_UNIT_HZ) as usize + 1;
+        let mut at_point = PointSearch::new(spacing, rate_hz, antennas.len(), all)?;
+        let mut found_hz: Vec<f64> = Vec::new();
+        for offset_hz in at_point.likely_offsets(antennas, reach)? {
+            // An SSB also shows, weaker, where its PSS overlaps with a shifted one.
+            let width_hz = SUBCARRIERS as f64 * spacing.hz();
+            if found_hz.iter().any(|hz| (hz - offset_hz).abs() < width_hz) {
+                continue;
+            }
+            let Some(first) = at_point.search(antennas, None, offset_hz, None)? else {
+                continue;
+            };
+            // A maximum may lie on the wrong side between two points, and a wrong centre would be
+            // taken for a frequency offset (TS 38.211 §5.4): the offset found tells the right one.
+            let offset_hz = nearest_offset(offset_hz + first.cfo_hz(), reach);
+            found_hz.push(offset_hz);
+            finds.extend(at_point.search(antennas, None, offset_hz, centre_hz)?);
+        }
+    }
+    sort(&mut finds);
+    Ok(finds)
+}
+
+/// How far from the recording's centre that of an SSB can lie.
+fn reach_hz(rate_hz: f64, spacing: SubcarrierSpacing) -> f64 {
+    0.5 * rate_hz - 0.5 * SUBCARRIERS as f64 * spacing.hz()
+}
+
+/// The multiple of 15 kHz nearest to `hz` inside the reach.
+fn nearest_offset(hz: f64, reach_hz: f64) -> f64 {
+    let last = (reach_hz / OFFSET_UNIT_HZ).floor();
+    (hz / OFFSET_UNIT_HZ).round().clamp(-last, last) * OFFSET_UNIT_HZ
+}
+
+fn sort(finds: &mut [RasterFind]) {
+    finds.sort_by(|a, b| b.strongest().total_cmp(&a.strongest()));
+}
+
+/// Front end and search at one spacing, moved from point to point.
+struct PointSearch {
+    spacing: SubcarrierSpacing,
+    front_end: FrontEnd,
+    searcher: Searcher,
+    base: Vec<Vec<Complex32>>,
+}
+
+impl PointSearch {
+    /// The probability of a false cell is shared among `points`.
+    fn new(
+        spacing: SubcarrierSpacing,
+        rate_hz: f64,
+        antennas: usize,
+        points: usize,
+    ) -> Result<Self, ScanError> {
+        Ok(Self {
+            spacing,
+            front_end: FrontEnd::new(rate_hz, 0.0, spacing.hz(), antennas)?,
+            searcher: Searcher::new(SearchConfig {
+                false_alarm: FALSE_ALARM / points as f64,
+                ..SearchConfig::new(spacing, antennas)
+            })?,
+            base: vec![Vec::new(); antennas],
+        })
+    }
+
+    /// Brings `offset_hz` to 0 Hz and all channels to the base rate.
+    fn tune(&mut self, antennas: &[&[Complex32]], offset_hz: f64) -> Result<(), FrontEndError> {
+        self.front_end.tune(offset_hz)?;
+        self.base.iter_mut().for_each(Vec::clear);
+        self.front_end.push(antennas, &mut self.base)?;
+        self.front_end.finish(&mut self.base);
+        Ok(())
+    }
+
+    /// The SSBs `offset_hz` from the centre of the recording, itself at `centre_hz` if known.
+    fn search(
+        &mut self,
+        antennas: &[&[Complex32]],
+        gscn: Option<u16>,
+        offset_hz: f64,
+        centre_hz: Option<f64>,
+    ) -> Result<Option<RasterFind>, ScanError> {
+        self.tune(antennas, offset_hz)?;
+        self.searcher
+            .tune(centre_hz.map(|centre_hz| centre_hz + offset_hz))?;
+        let slices: Vec<_> = self.base.iter().map(Vec::as_slice).collect();
+        let ssbs = self.searcher.search(&slices)?;
+        Ok((!ssbs.is_empty()).then(|| RasterFind {
+            point: RasterPoint {
+                gscn,
+                ssb_freq_hz: centre_hz.unwrap_or(0.0) + offset_hz,
+            },
+            spacing: self.spacing,
+            input_per_output: self.front_end.input_per_output(),
+            ssbs: ssbs.to_vec(),
+        }))
+    }
+
+    /// Offsets from the recording's centre, multiples of 15 kHz up to `reach_hz`, where the PSS
+    /// stands out, the likeliest first.
+    ///
+    /// The band is cut into tiles as wide as the PSS can wander inside the front end's pass band.
+    fn likely_offsets(
+        &mut self,
+        antennas: &[&[Complex32]],
+        reach_hz: f64,
+    ) -> Result<Vec<f64>, ScanError> {
+        let scs_hz = self.spacing.hz();
+        let tiles = (reach_hz / (TILE_SUBCARRIERS * scs_hz)).ceil().max(1.0);
+        let half_tile_hz = reach_hz / tiles;
+        let hypotheses = cfo_hypotheses(half_tile_hz + 0.5 * scs_hz, scs_hz);
+        let mut filter = MatchedFilter::new(scs_hz, &hypotheses, antennas.len());
+        let mut seen: Vec<(f32, f64)> = Vec::new();
+        let mut candidates = Vec::new();
+        for tile in 0..tiles as usize {
+            let tile_hz = (2.0 * tile as f64 + 1.0) * half_tile_hz - reach_hz;
+            self.tune(antennas, tile_hz)?;
+            let samples = self.base.first().map_or(0, Vec::len);
+            let trials = samples as f64 * 3.0 * hypotheses.len() as f64 * tiles;
+            let probability = NOISE_CANDIDATES / trials.max(NOISE_CANDIDATES);
+            let threshold = exponential_sum_threshold(antennas.len(), probability);
+            candidates.clear();
+            filter.run(&self.base, 0, samples, threshold as f32, &mut candidates);
+            seen.extend(candidates.iter().map(|candidate| {
+                let offset_hz = nearest_offset(tile_hz + candidate.cfo_hz, reach_hz);
+                (candidate.statistic, offset_hz)
+            }));
+        }
+        seen.sort_by(|a, b| b.0.total_cmp(&a.0));
+        let mut offsets = Vec::new();
+        for (_, offset_hz) in seen {
+            if offsets.len() < MOST_POINTS && !offsets.contains(&offset_hz) {
+                offsets.push(offset_hz);
+            }
+        }
+        Ok(offsets)
+    }
 }
 
 impl RasterFind {
     /// SNR of the strongest SSB, dB.
     fn strongest(&self) -> f64 {
-        self.ssbs
+        let snrs = self.ssbs.iter().map(|ssb| ssb.snr_db);
+        snrs.fold(f64::NEG_INFINITY, f64::max)
+    }
+
+    /// Carrier frequency offset of the strongest SSB, Hz.
+    fn cfo_hz(&self) -> f64 {
+        let strongest = self
+            .ssbs
             .iter()
-            .map(|ssb| ssb.snr_db)
-            .fold(f64::NEG_INFINITY, f64::max)
+            .max_by(|a, b| a.snr_db.total_cmp(&b.snr_db));
+        strongest.map_or(0.0, |ssb| ssb.cfo_hz)
     }
 }
 

@@ -20,7 +20,7 @@ fn every_annotated_ssb_is_found_without_being_told_where() {
         let finds = scan(
             &recording.antennas(),
             recording.rate_hz,
-            recording.centre_hz,
+            Some(recording.centre_hz),
         )
         .unwrap();
         assert_eq!(finds.len(), 1, "{name}: one raster point holds cells");

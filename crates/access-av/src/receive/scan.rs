@@ -128,7 +128,9 @@ pub fn scan(source: &mut dyn IqSource, settings: &ScanSettings) -> Result<Scan, 
     let mut found = Scan::default();
     for place in &places {
         let config = SearchConfig {
-            ssb_freq_hz: Some(place.ssb_freq_hz),
+            // A centre of 0 Hz is none; a given frequency is meant as it is.
+            ssb_freq_hz: (centre_hz > 0.0 || settings.ssb_freq_hz.is_some())
+                .then_some(place.ssb_freq_hz),
             false_alarm: FALSE_ALARM / places.len() as f64,
             ..SearchConfig::new(place.spacing, source.channels())
         };
@@ -187,24 +189,19 @@ fn raster_places(
     centre_hz: f64,
 ) -> Result<Vec<Place>, ScanError> {
     let rate_hz = source.sample_rate_hz();
-    let mut antennas = Vec::new();
-    let mut looked_at = 0;
-    for window_s in RASTER_WINDOWS_S {
-        let count = source.length().min((window_s * rate_hz) as u64) as usize;
-        if count == looked_at {
-            break;
-        }
-        looked_at = count;
-        source.read(0, count, &mut antennas)?;
-        let slices: Vec<&[Complex32]> = antennas.iter().map(Vec::as_slice).collect();
-        let finds = raster::scan(&slices, rate_hz, centre_hz).map_err(|error| {
-            let file = source.name();
-            match error {
-                raster::ScanError::FrontEnd(source) => ScanError::FrontEnd { file, source },
-                raster::ScanError::Search(source) => ScanError::Search { file, source },
-                _ => ScanError::NoCentreFrequency { file },
-            }
-        })?;
+    let file = source.name();
+    let failed = |error| match error {
+        raster::ScanError::FrontEnd(source) => ScanError::FrontEnd {
+            file: file.clone(),
+            source,
+        },
+        raster::ScanError::Search(source) => ScanError::Search {
+            file: file.clone(),
+            source,
+        },
+        _ => ScanError::NoCentreFrequency { file: file.clone() },
+    };
+    let suiting = |finds: Vec<raster::RasterFind>| -> Vec<Place> {
         let suits = |find: &&raster::RasterFind| spacing.is_none_or(|it| it == find.spacing);
         let place = |find: &raster::RasterFind| {
             let RasterPoint { ssb_freq_hz, .. } = find.point;
@@ -213,12 +210,33 @@ fn raster_places(
                 spacing: find.spacing,
             }
         };
-        let places: Vec<Place> = finds.iter().filter(suits).map(place).collect();
+        finds.iter().filter(suits).map(place).collect()
+    };
+    let centre_hz = Some(centre_hz).filter(|hz| *hz > 0.0);
+    let mut antennas = Vec::new();
+    let mut looked_at = 0;
+    for window_s in RASTER_WINDOWS_S {
+        let Some(centre_hz) = centre_hz else { break };
+        let count = source.length().min((window_s * rate_hz) as u64) as usize;
+        if count == looked_at {
+            break;
+        }
+        looked_at = count;
+        source.read(0, count, &mut antennas)?;
+        let slices: Vec<&[Complex32]> = antennas.iter().map(Vec::as_slice).collect();
+        let finds = raster::scan_raster(&slices, rate_hz, centre_hz).map_err(failed)?;
+        let places = suiting(finds);
         if !places.is_empty() {
             return Ok(places);
         }
     }
-    Ok(Vec::new())
+    // Off the raster, or without a centre to count from, the whole band is looked through, for
+    // one period on one antenna.
+    let count = source.length().min((RASTER_WINDOWS_S[0] * rate_hz) as u64) as usize;
+    source.read(0, count, &mut antennas)?;
+    let first: Vec<&[Complex32]> = antennas.iter().take(1).map(Vec::as_slice).collect();
+    let finds = raster::scan_off_raster(&first, rate_hz, centre_hz).map_err(failed)?;
+    Ok(suiting(finds))
 }
 
 /// Calls `act` with block after block, and whether it is the last.

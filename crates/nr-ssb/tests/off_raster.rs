@@ -1,0 +1,124 @@
+//! SSBs off the synchronization raster, and recordings that do not state their centre.
+#![allow(clippy::unwrap_used, clippy::print_stdout, reason = "this is a test")]
+
+mod air;
+mod recordings;
+
+use nr_ssb::SubcarrierSpacing;
+use nr_ssb::raster::{scan, scan_off_raster, scan_raster};
+
+const RATE_HZ: f64 = 15.36e6;
+
+/// A recording of 3 ms with one SSB `offset_hz` off its centre at 0 dB, and its cell.
+fn off_raster(
+    spacing: SubcarrierSpacing,
+    offset_hz: f64,
+    seed: u64,
+) -> (air::Cell, Vec<Vec<nr_ssb::Complex32>>) {
+    let mut rng = air::rng(seed);
+    let mut cell = air::Cell::random(&mut rng, spacing, 1);
+    cell.ssb_freq_hz += 135e3;
+    cell.ssb_indices = vec![1];
+    cell.delay = 200.3;
+    cell.cfo_hz *= 0.5;
+    let mut samples = air::silence(1, (3e-3 * spacing.base_rate_hz()) as usize);
+    cell.add_to(&mut samples);
+    let factor = (RATE_HZ / spacing.base_rate_hz()) as usize;
+    let mut raised = vec![air::raised(&samples[0], factor, offset_hz / RATE_HZ)];
+    // `raised` keeps amplitudes, so that noise of the same density is stronger.
+    air::add_noise(&mut raised, -10.0 * (factor as f64).log10(), &mut rng);
+    (cell, raised)
+}
+
+#[test]
+fn an_ssb_between_the_raster_points_is_found() {
+    for (spacing, offset_hz, seed) in [
+        (SubcarrierSpacing::Khz15, 15e3 * 373.0, 1),
+        (SubcarrierSpacing::Khz15, -15e3 * 391.0, 2),
+        (SubcarrierSpacing::Khz30, 15e3 * 55.0, 3),
+        (SubcarrierSpacing::Khz30, -15e3 * 262.0, 4),
+    ] {
+        let (cell, samples) = off_raster(spacing, offset_hz, seed);
+        let slices = air::slices(&samples);
+        let centre_hz = cell.ssb_freq_hz - offset_hz;
+        assert!(scan_raster(&slices, RATE_HZ, centre_hz).unwrap().is_empty());
+        for centre_hz in [Some(centre_hz), None] {
+            let finds = scan(&slices, RATE_HZ, centre_hz).unwrap();
+            assert_eq!(finds.len(), 1);
+            let find = &finds[0];
+            assert_eq!((find.spacing, find.point.gscn), (spacing, None));
+            assert_eq!(find.ssbs.len(), 1);
+            let ssb = &find.ssbs[0];
+            assert_eq!((ssb.pci.get(), ssb.ssb_index), (cell.pci, 1));
+            assert_eq!(ssb.payload.unwrap().sfn(), cell.sfn);
+            let found_hz = find.point.ssb_freq_hz - centre_hz.unwrap_or(0.0);
+            assert!((found_hz - offset_hz).abs() < 1.0, "{found_hz}");
+            // At 0 dB the PSS-SSS phase has σ = 0.09 rad over two symbols, 0.7 % of a subcarrier;
+            // the halves of the PSS, all that is left without the centre, 4 %.
+            let tolerance = if centre_hz.is_some() { 0.035 } else { 0.2 };
+            let error_hz = ssb.cfo_hz - cell.cfo_hz;
+            assert!(error_hz.abs() < tolerance * spacing.hz(), "{error_hz}");
+        }
+    }
+}
+
+#[test]
+fn noise_holds_no_cell_anywhere() {
+    let mut samples = air::silence(2, 46_080);
+    air::add_noise(&mut samples, 0.0, &mut air::rng(9));
+    let finds = scan(&air::slices(&samples), RATE_HZ, Some(3.5e9)).unwrap();
+    assert!(finds.is_empty());
+}
+
+#[test]
+fn a_band_narrower_than_an_ssb_holds_none() {
+    let samples = air::silence(1, 10_000);
+    let finds = scan_off_raster(&air::slices(&samples), 1.92e6, None).unwrap();
+    assert!(finds.is_empty());
+}
+
+#[test]
+fn recordings_that_hide_their_centre_give_the_same_cells() {
+    let Some(dir) = recordings::data_dir() else {
+        return;
+    };
+    for recording in recordings::annotated(&dir) {
+        let name = &recording.name;
+        let first = &recording.annotations[0];
+        // 2 ms around the first SSB: what a scan takes grows with the recording.
+        let start = first["core:sample_start"].as_u64().unwrap() as usize;
+        let margin = (1e-3 * recording.rate_hz) as usize;
+        let antennas = recording.antennas();
+        let part: Vec<_> = antennas
+            .iter()
+            .map(|x| &x[start.saturating_sub(margin)..(start + margin).min(x.len())])
+            .take(1)
+            .collect();
+        let finds = scan(&part, recording.rate_hz, None).unwrap();
+        let truth = &first["nr:ssb"];
+        let number = |key: &str| truth[key].as_f64().unwrap();
+        let find = &finds[0];
+        assert_eq!(finds.len(), 1, "{name}");
+        assert_eq!(find.spacing.hz(), number("scs_hz"), "{name}");
+        let ssb = find
+            .ssbs
+            .iter()
+            .max_by(|a, b| a.snr_db.total_cmp(&b.snr_db))
+            .unwrap();
+        let offset_hz = number("ssb_freq_hz") - recording.centre_hz;
+        let found_hz = find.point.ssb_freq_hz + ssb.cfo_hz;
+        assert!(
+            (found_hz - offset_hz).abs() < 0.02 * find.spacing.hz(),
+            "{name}: {found_hz}"
+        );
+        assert_eq!(f64::from(ssb.pci.get()), number("pci"), "{name}");
+        assert_eq!(f64::from(ssb.ssb_index), number("ssb_index"), "{name}");
+        let payload = ssb.payload.unwrap();
+        assert_eq!(f64::from(payload.sfn()), number("sfn"), "{name}");
+        assert_eq!(
+            payload.mib.bit_string(),
+            truth["mib_bits_24"].as_str().unwrap(),
+            "{name}"
+        );
+    }
+}
