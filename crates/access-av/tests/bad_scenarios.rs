@@ -63,7 +63,7 @@ fn wrong_types_say_what_is_expected() {
     assert_says(outcome, "estimator.method", "did you mean `music`?");
     let outcome = with_line("policy = \"pid\"", "policy = \"pdi\"");
     assert_says(outcome, "wake_up.policy", "did you mean `pid`?");
-    let outcome = with_line("offset_db = 3.1", "offset = 3.1");
+    let outcome = with_line("offset_db = 3.0", "offset = 3.1");
     assert_says(
         outcome,
         "wake_up.snr_set_point.offset",
