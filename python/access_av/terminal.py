@@ -127,7 +127,7 @@ def show_bound(summary: dict[str, Any]) -> None:
             str(head["pci"]),
             str(head["ssb_index"]),
             f"{head['nearest_m']:.0f}–{head['farthest_m']:.0f}",
-            f"{head['least_snr_db']:.1f} to {head['most_snr_db']:.1f}",
+            f"{head['least_snr_db']:.0f} to {head['most_snr_db']:.0f}",
             f"{head['visible_share']:.1%}",
         )
     console.print(made)

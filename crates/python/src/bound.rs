@@ -11,6 +11,9 @@ use pyo3::types::PyDict;
 
 use crate::scenario::{Scenario, scenario_error};
 
+/// A column's name, and its value in a row.
+type Column = (&'static str, fn(&BoundPoint) -> f64);
+
 /// How well any localizer can do in a scenario: the posterior Cramér–Rao bound.
 #[pyclass(frozen, name = "Bound", module = "access_av._core")]
 pub struct ErrorBound {
@@ -34,7 +37,7 @@ impl ErrorBound {
     fn along_route(&self, py: Python<'_>) -> PyResult<Py<PyDict>> {
         let points = py.detach(|| self.bound.along_route());
         let table = PyDict::new(py);
-        let columns: [(&str, fn(&BoundPoint) -> f64); 9] = [
+        let columns: [Column; 9] = [
             ("time_s", |point| point.time_s),
             ("along_m", |point| point.along_m),
             ("x_m", |point| point.pose.x_m),
