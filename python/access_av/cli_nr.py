@@ -1,4 +1,4 @@
-"""Commands that take or make IQ: ``scan``."""
+"""Commands that take or make recordings: ``scan``, ``synth``, ``locate``."""
 
 from __future__ import annotations
 
@@ -12,6 +12,8 @@ from access_av.errors import InputError
 from access_av.terminal import console, errors, show_cells
 
 app = typer.Typer()
+
+MOST_REMARKS = 10
 
 
 @app.command(
@@ -84,6 +86,102 @@ def scan(
             console.print(f"{path}: no SSB found.", soft_wrap=True)
     if as_json:
         print(json.dumps(found, indent=2))
+
+
+@app.command(
+    epilog="Example: [bold]access-av synth paper-real-odometry-2 --out drive --duration-s 20[/]",
+)
+def synth(
+    scenario: Annotated[str, typer.Argument(help="Shipped name, or path of a TOML file.")],
+    out: Annotated[Path, typer.Option(help="Directory for the files.")],
+    duration_s: Annotated[
+        float | None, typer.Option(min=0.02, help="From the start on; else the whole drive.")
+    ] = None,
+    seed: Annotated[int, typer.Option(min=0, help="Same seed, same samples.")] = 1,
+    run: Annotated[int, typer.Option(min=0, help="Number of the run.")] = 0,
+    continuous: Annotated[
+        bool, typer.Option("--continuous", help="Also the time between the bursts (large).")
+    ] = False,
+    datatype: Annotated[str, typer.Option(help="ci16_le or cf32_le.")] = "ci16_le",
+) -> None:
+    """Record a scenario's drive: samples of all antennas, odometry, site, truth.
+
+    The samples are SigMF, so that any other receiver can be fed with them; the truth is in their
+    annotations and in truth.tum. Without --continuous the receiver sleeps between the bursts, and
+    each capture says where in time it belongs (core:global_index).
+    """
+    from access_av import drives
+
+    made = drives.synthesize(
+        scenario,
+        out,
+        seed=seed,
+        run=run,
+        duration_s=duration_s,
+        continuous=continuous,
+        datatype=datatype,
+    )
+    console.print(
+        f"{made.bursts} bursts, {made.samples} samples per antenna: {made.recording}",
+        soft_wrap=True,
+    )
+
+
+@app.command(
+    epilog="Example: [bold]access-av locate --recording drive/iq.sigmf-meta "
+    "--odometry drive/odometry.csv --site drive/site.toml --truth drive/truth.tum[/]",
+)
+def locate(
+    recording: Annotated[Path, typer.Option(help="SigMF recording, or CSV log of angles.")],
+    odometry: Annotated[Path, typer.Option(help="CSV, or MCAP with nav_msgs/Odometry.")],
+    site: Annotated[Path, typer.Option(help="TOML: radio heads, road, array.")],
+    out: Annotated[
+        Path | None, typer.Option(help="Directory for the files; else a new one in results/.")
+    ] = None,
+    truth: Annotated[
+        Path | None, typer.Option(help="TUM trajectory to compare with, where there is one.")
+    ] = None,
+    topic: Annotated[str | None, typer.Option(help="Topic of the odometry in the MCAP.")] = None,
+    start_time_s: Annotated[
+        float, typer.Option(help="Time of the first sample by the odometry's clock.")
+    ] = 0.0,
+) -> None:
+    """Locate a recorded drive.
+
+    Writes drive.mcap (poses with covariance and twist, verdicts, diagnostics), trajectory.tum,
+    poses.parquet, angles.parquet and report.html. Items of the input that cannot be used are
+    named, and the rest is used.
+    """
+    from access_av import drives
+    from access_av.files import ResultsDirectory
+    from access_av.report.located import render_located
+
+    drive = drives.locate(site, odometry, recording, topic=topic, start_time_s=start_time_s)
+    numbers = drives.summary(drive, truth)
+    directory = ResultsDirectory.create("locate", out)
+    drive.write_mcap(directory.path / "drive.mcap")
+    drive.write_tum(directory.path / "trajectory.tum")
+    directory.write_table("poses.parquet", drive.poses)
+    directory.write_table("angles.parquet", drive.angles)
+    site_text = site.read_text(encoding="utf-8")
+    directory.write_text("report.html", render_located(drive, site_text, numbers))
+    directory.write_text("site.toml", site_text)
+    directory.write_manifest(recording=str(recording), odometry=str(odometry), **numbers)
+    directory.link_latest()
+    for remark in drive.remarks[:MOST_REMARKS]:
+        errors.print(f"[yellow]warning:[/] {remark}", soft_wrap=True)
+    if len(drive.remarks) > MOST_REMARKS:
+        errors.print(f"[yellow]warning:[/] {len(drive.remarks) - MOST_REMARKS} more like these")
+    console.print(
+        f"{numbers['angles']:.0f} angles, {numbers['accepted']:.0f} accepted, "
+        f"in {numbers['duration_s']:.1f} s."
+    )
+    if "rms_error_m" in numbers:
+        console.print(
+            f"Horizontal error: RMS {numbers['rms_error_m']:.3f} m, "
+            f"90th percentile {numbers['p90_error_m']:.3f} m."
+        )
+    console.print(f"Files: {directory.path}", soft_wrap=True)
 
 
 def _gains(text: str) -> list[complex]:

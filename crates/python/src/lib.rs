@@ -1,6 +1,7 @@
 //! `access_av._core`: the bindings, nothing else. One file per room of the core.
 mod aoa;
 mod bound;
+mod drive;
 mod nr;
 mod recording;
 mod scenario;
@@ -45,6 +46,8 @@ mod _core {
 
     #[pymodule_export]
     use crate::bound::ErrorBound;
+    #[pymodule_export]
+    use crate::drive::{LocatedDrive, locate, synthesize};
     #[pymodule_export]
     use crate::recording::{Recording, RecordingError};
     #[pymodule_export]

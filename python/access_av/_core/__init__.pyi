@@ -1,5 +1,6 @@
 from collections.abc import Callable, Sequence
 from os import PathLike
+from pathlib import Path
 from typing import Any, final
 
 import numpy as np
@@ -10,6 +11,7 @@ from access_av._core import nr as nr
 
 __all__ = [
     "Bound",
+    "LocatedDrive",
     "Platform",
     "Recording",
     "RecordingError",
@@ -18,8 +20,10 @@ __all__ = [
     "SimulationResult",
     "__version__",
     "aoa",
+    "locate",
     "nr",
     "simulate",
+    "synthesize",
 ]
 
 __version__: str
@@ -131,3 +135,33 @@ class Recording:
     def metadata_json(self) -> str: ...
     def read(self, start: int, count: int) -> NDArray[np.complex64]: ...
     def __len__(self) -> int: ...
+
+def synthesize(
+    scenario: Scenario,
+    directory: str | PathLike[str],
+    *,
+    seed: int = 1,
+    run: int = 0,
+    duration_s: float | None = None,
+    continuous: bool = False,
+    datatype: str = "ci16_le",
+) -> tuple[Path, int, int]: ...
+def locate(
+    site: str | PathLike[str],
+    odometry: str | PathLike[str],
+    recording: str | PathLike[str],
+    *,
+    topic: str | None = None,
+    start_time_s: float = 0.0,
+) -> LocatedDrive: ...
+
+@final
+class LocatedDrive:
+    @property
+    def remarks(self) -> list[str]: ...
+    @property
+    def poses(self) -> dict[str, NDArray[Any]]: ...
+    @property
+    def angles(self) -> dict[str, Any]: ...
+    def write_mcap(self, path: str | PathLike[str]) -> None: ...
+    def write_tum(self, path: str | PathLike[str]) -> None: ...

@@ -23,7 +23,7 @@ mod tum;
 
 pub use angle_log::{AngleLog, AngleRemark, LoggedAngle, read_angle_log, write_angle_log};
 pub use error::RecordingError;
-pub use mcap::{McapWriter, read_odometry_mcap};
+pub use mcap::{McapWriter, read_odometry_mcap, write_drive_mcap};
 pub use odometry::{
     OdometryIssue, OdometryLog, OdometryRemark, read_odometry_csv, write_odometry_csv,
 };

@@ -4,9 +4,11 @@
 //! DiagnosticArray` and [`access_av_msgs/msg/AngleVerdict`](McapWriter::verdict); read is odometry.
 
 mod cdr;
+mod drive;
 mod reader;
 mod writer;
 
+pub use drive::write_drive_mcap;
 pub use reader::read_odometry_mcap;
 pub use writer::{DiagnosticLevel, DiagnosticStatus, Frames, McapWriter, Twist};
 

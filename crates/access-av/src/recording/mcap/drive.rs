@@ -1,0 +1,101 @@
+//! A located drive as one MCAP file.
+
+use std::fs::File;
+use std::io::BufWriter;
+use std::path::Path;
+
+use mcap::McapError;
+
+use super::{DiagnosticLevel, DiagnosticStatus, Frames, McapWriter, Twist};
+use crate::onboard::Execution;
+use crate::recording::RecordingError;
+use crate::replay::{LocatedDrive, LocatedPose};
+
+/// Topic of the poses.
+const POSE_TOPIC: &str = "/access_av/odometry";
+/// Topic of the verdicts.
+const VERDICT_TOPIC: &str = "/access_av/verdicts";
+/// Variance of a wheel speed in (m/s)² and of a gyroscope's rate in (rad/s)².
+const SPEED_VARIANCE: f64 = 1e-4;
+const YAW_RATE_VARIANCE: f64 = 1e-4;
+/// Diagnostics come once a second (REP-107).
+const DIAGNOSTIC_PERIOD_S: f64 = 1.0;
+
+/// Writes poses, verdicts and a diagnosis a second, in order of time.
+///
+/// # Errors
+/// [`RecordingError`] when the file cannot be written.
+pub fn write_drive_mcap(file: &Path, drive: &LocatedDrive) -> Result<(), RecordingError> {
+    let made = File::create(file).map_err(|source| RecordingError::io(file, source))?;
+    write(BufWriter::new(made), drive).map_err(|error| RecordingError::Write {
+        file: file.display().to_string(),
+        message: error.to_string(),
+    })
+}
+
+fn write(file: BufWriter<File>, drive: &LocatedDrive) -> Result<(), McapError> {
+    let mut writer = McapWriter::new(file)?;
+    let mut executions = drive.executions.iter().peekable();
+    let mut lately: Vec<&Execution> = Vec::new();
+    let mut diagnosed_s = f64::NEG_INFINITY;
+    for pose in &drive.poses {
+        let time_s = pose.estimate.time_s;
+        while let Some(execution) = executions.next_if(|it| it.ssb.time_s <= time_s) {
+            writer.verdict(VERDICT_TOPIC, execution)?;
+            lately.push(execution);
+        }
+        let twist = Twist {
+            speed_mps: pose.speed_mps,
+            speed_variance: SPEED_VARIANCE,
+            yaw_rate: pose
+                .yaw_rate_radps
+                .map(|rate_radps| (rate_radps, YAW_RATE_VARIANCE)),
+        };
+        writer.odometry(POSE_TOPIC, Frames::MAP, &pose.estimate, &twist)?;
+        if time_s - diagnosed_s >= DIAGNOSTIC_PERIOD_S {
+            writer.diagnostics(time_s, &[diagnosis(pose, &lately)])?;
+            diagnosed_s = time_s;
+            lately.clear();
+        }
+    }
+    for execution in executions {
+        writer.verdict(VERDICT_TOPIC, execution)?;
+    }
+    writer.finish()
+}
+
+fn diagnosis(pose: &LocatedPose, lately: &[&Execution]) -> DiagnosticStatus {
+    let accepted = lately
+        .iter()
+        .filter(|execution| execution.verdict.accepted)
+        .count();
+    let (level, message) = match (accepted, lately.len()) {
+        (_, 0) => (DiagnosticLevel::Stale, "no SSB in the last second"),
+        (0, _) => (
+            DiagnosticLevel::Error,
+            "no angle accepted in the last second",
+        ),
+        (few, all) if 2 * few < all => (DiagnosticLevel::Warn, "most angles refused"),
+        _ => (DiagnosticLevel::Ok, "angles accepted"),
+    };
+    let mut cells: Vec<u16> = lately.iter().map(|execution| execution.ssb.pci).collect();
+    cells.sort_unstable();
+    cells.dedup();
+    let mut values = vec![
+        ("angles".to_owned(), lately.len().to_string()),
+        ("accepted".to_owned(), accepted.to_string()),
+        ("cells".to_owned(), format!("{cells:?}")),
+    ];
+    if let Some([[x, ..], [_, y, _], _]) = pose.estimate.covariance {
+        values.push((
+            "position_sigma_m".to_owned(),
+            format!("{:.4}", (x + y).sqrt()),
+        ));
+    }
+    DiagnosticStatus {
+        level,
+        name: "access_av: localizer".to_owned(),
+        message: message.to_owned(),
+        values,
+    }
+}

@@ -1,0 +1,259 @@
+//! Recorded drives: writing them from a scenario, locating them.
+
+use std::path::{Path, PathBuf};
+
+use access_av::localize::AngleMeasurement;
+use access_av::recording::{
+    Datatype, OdometryLog, Recording, Site, TimedPose, read_angle_log, read_odometry_csv,
+    read_odometry_mcap, write_drive_mcap, write_tum,
+};
+use access_av::replay::{self, ReplayError};
+use access_av::simulate::{SynthError, SynthSettings};
+use numpy::PyArray1;
+use pyo3::exceptions::PyValueError;
+use pyo3::prelude::*;
+use pyo3::types::PyDict;
+
+use crate::recording::{RecordingError, recording_error};
+use crate::scenario::{Scenario, scenario_error};
+
+/// Record a scenario's drive as somebody on the vehicle would have.
+///
+/// Writes `iq.sigmf-meta`, `iq.sigmf-data`, `odometry.csv`, `site.toml`, `scenario.toml` and
+/// `truth.tum`.
+///
+/// Parameters
+/// ----------
+/// scenario : Scenario
+///     What is driven.
+/// directory : path-like
+///     Where the files go; made if it is not there.
+/// seed, run : int
+///     The random streams.
+/// duration_s : float, optional
+///     Seconds from the start on; the whole drive without.
+/// continuous : bool
+///     Also the time between the SSB bursts, which makes the files many times larger.
+/// datatype : str
+///     `ci16_le` or `cf32_le`.
+///
+/// Returns
+/// -------
+/// tuple of (path of the metadata, number of bursts, samples per antenna)
+#[pyfunction]
+#[pyo3(signature = (scenario, directory, *, seed = 1, run = 0, duration_s = None, continuous = false, datatype = "ci16_le"))]
+#[allow(clippy::too_many_arguments, clippy::needless_pass_by_value)] // Python's keywords
+pub fn synthesize(
+    py: Python<'_>,
+    scenario: &Scenario,
+    directory: PathBuf,
+    seed: u64,
+    run: u64,
+    duration_s: Option<f64>,
+    continuous: bool,
+    datatype: &str,
+) -> PyResult<(PathBuf, usize, u64)> {
+    let datatype = match datatype {
+        "ci16_le" => Datatype::Ci16Le,
+        "cf32_le" => Datatype::Cf32Le,
+        other => {
+            return Err(PyValueError::new_err(format!(
+                "datatype is {other:?}; allowed: ci16_le, cf32_le"
+            )));
+        }
+    };
+    let settings = SynthSettings {
+        seed,
+        run,
+        duration_s,
+        continuous,
+        datatype,
+    };
+    let made = py
+        .detach(|| access_av::simulate::synthesize(&scenario.0, &settings, &directory))
+        .map_err(|error| match error {
+            SynthError::Scenario(error) => scenario_error(error),
+            SynthError::Recording(error) => recording_error(error),
+            other => PyValueError::new_err(other.to_string()),
+        })?;
+    Ok((made.recording, made.bursts, made.samples))
+}
+
+/// Locate a recorded drive.
+///
+/// Parameters
+/// ----------
+/// site : path-like
+///     Site file: radio heads, road, array.
+/// odometry : path-like
+///     CSV with the columns `time_s`, `distance_m`, `speed_mps` and, with a gyroscope,
+///     `yaw_rate_radps`; or an MCAP file with `nav_msgs/msg/Odometry`.
+/// recording : path-like
+///     SigMF recording of the array's samples, or a CSV log of angles.
+/// topic : str, optional
+///     Topic of the odometry in an MCAP file with several.
+/// start_time_s : float
+///     Time of the recording's first sample by the odometry's clock.
+///
+/// Raises
+/// ------
+/// RecordingError, ScenarioError
+///     An unusable recording or odometry; an unusable site file.
+#[pyfunction]
+#[pyo3(signature = (site, odometry, recording, *, topic = None, start_time_s = 0.0))]
+#[allow(clippy::needless_pass_by_value)] // what extraction yields
+pub fn locate(
+    py: Python<'_>,
+    site: PathBuf,
+    odometry: PathBuf,
+    recording: PathBuf,
+    topic: Option<&str>,
+    start_time_s: f64,
+) -> PyResult<LocatedDrive> {
+    py.detach(|| run(&site, &odometry, &recording, topic, start_time_s))
+        .map_err(replay_error)
+}
+
+fn run(
+    site: &Path,
+    odometry: &Path,
+    recording: &Path,
+    topic: Option<&str>,
+    start_time_s: f64,
+) -> Result<LocatedDrive, ReplayError> {
+    let is = |path: &Path, extension: &str| {
+        path.extension()
+            .is_some_and(|it| it.eq_ignore_ascii_case(extension))
+    };
+    let site = Site::read(site)?;
+    let OdometryLog { samples, remarks } = if is(odometry, "mcap") {
+        read_odometry_mcap(odometry, topic)?
+    } else {
+        read_odometry_csv(odometry)?
+    };
+    let mut remarks: Vec<String> = remarks.iter().map(ToString::to_string).collect();
+    let core = if is(recording, "csv") {
+        let log = read_angle_log(recording)?;
+        remarks.extend(log.remarks.iter().map(ToString::to_string));
+        replay::locate_angles(&site, &samples, &log.angles)?
+    } else {
+        let mut recording = Recording::open(recording)?;
+        remarks.extend(recording.warnings().iter().map(ToString::to_string));
+        replay::locate_recording(&site, &samples, &mut recording, start_time_s)?
+    };
+    Ok(LocatedDrive { core, remarks })
+}
+
+#[allow(clippy::needless_pass_by_value)] // the shape that `map_err` wants
+fn replay_error(error: ReplayError) -> PyErr {
+    match error {
+        ReplayError::Site(error) => scenario_error(error),
+        ReplayError::Recording(error) => recording_error(error),
+        other => RecordingError::new_err(other.to_string()),
+    }
+}
+
+/// A located drive.
+#[pyclass(frozen, module = "access_av._core")]
+pub struct LocatedDrive {
+    core: replay::LocatedDrive,
+    remarks: Vec<String>,
+}
+
+#[pymethods]
+impl LocatedDrive {
+    /// What was wrong with single items of the input.
+    #[getter]
+    fn remarks(&self) -> Vec<String> {
+        self.remarks.clone()
+    }
+
+    /// One pose per odometry sample: columns `time_s`, `x_m`, `y_m`, `heading_rad`, `speed_mps`,
+    /// and the covariance `xx_m2`, `xy_m2`, `yy_m2`, `heading_rad2`, NaN where it is not known.
+    #[getter]
+    fn poses<'py>(&self, py: Python<'py>) -> PyResult<Bound<'py, PyDict>> {
+        let poses = &self.core.poses;
+        let columns = PyDict::new(py);
+        let column = |value: fn(&replay::LocatedPose) -> f64| {
+            PyArray1::from_iter(py, poses.iter().map(value))
+        };
+        columns.set_item("time_s", column(|it| it.estimate.time_s))?;
+        columns.set_item("x_m", column(|it| it.estimate.pose.x_m))?;
+        columns.set_item("y_m", column(|it| it.estimate.pose.y_m))?;
+        columns.set_item("heading_rad", column(|it| it.estimate.pose.heading_rad))?;
+        columns.set_item("speed_mps", column(|it| it.speed_mps))?;
+        columns.set_item("xx_m2", column(|it| covariance(it, 0, 0)))?;
+        columns.set_item("xy_m2", column(|it| covariance(it, 0, 1)))?;
+        columns.set_item("yy_m2", column(|it| covariance(it, 1, 1)))?;
+        columns.set_item("heading_rad2", column(|it| covariance(it, 2, 2)))?;
+        Ok(columns)
+    }
+
+    /// One row per angle: columns `time_s`, `pci`, `ssb_index`, `snr_db`, `phase_rad`,
+    /// `phase_sigma_rad`, `angle_rad`, `accepted`, `reason`, `mahalanobis_squared`, `threshold`.
+    #[getter]
+    fn angles<'py>(&self, py: Python<'py>) -> PyResult<Bound<'py, PyDict>> {
+        let angles = &self.core.executions;
+        let columns = PyDict::new(py);
+        let measured = |value: fn(&AngleMeasurement) -> f64| {
+            let of = move |it: &access_av::onboard::Execution| {
+                it.measured.as_ref().map_or(f64::NAN, value)
+            };
+            PyArray1::from_iter(py, angles.iter().map(of))
+        };
+        let each = || angles.iter();
+        columns.set_item(
+            "time_s",
+            PyArray1::from_iter(py, each().map(|it| it.ssb.time_s)),
+        )?;
+        columns.set_item("pci", PyArray1::from_iter(py, each().map(|it| it.ssb.pci)))?;
+        columns.set_item(
+            "ssb_index",
+            PyArray1::from_iter(py, each().map(|it| it.ssb.ssb_index)),
+        )?;
+        columns.set_item(
+            "snr_db",
+            PyArray1::from_iter(py, each().map(|it| it.ssb.snr_db)),
+        )?;
+        columns.set_item("phase_rad", measured(|it| it.phase_rad))?;
+        columns.set_item("phase_sigma_rad", measured(|it| it.phase_sigma_rad))?;
+        columns.set_item("angle_rad", measured(|it| it.angle_rad))?;
+        columns.set_item(
+            "accepted",
+            PyArray1::from_iter(py, each().map(|it| it.verdict.accepted)),
+        )?;
+        let reasons: Vec<&str> = each().map(|it| it.verdict.reason.name()).collect();
+        columns.set_item("reason", reasons)?;
+        let or_nan = |value: Option<f64>| value.unwrap_or(f64::NAN);
+        let distance = each().map(|it| or_nan(it.verdict.mahalanobis_squared));
+        columns.set_item("mahalanobis_squared", PyArray1::from_iter(py, distance))?;
+        let threshold = each().map(|it| or_nan(it.verdict.threshold));
+        columns.set_item("threshold", PyArray1::from_iter(py, threshold))?;
+        Ok(columns)
+    }
+
+    /// Write poses, verdicts and diagnostics as MCAP (ROS 2).
+    #[allow(clippy::needless_pass_by_value)] // what extraction yields
+    fn write_mcap(&self, path: PathBuf) -> PyResult<()> {
+        write_drive_mcap(&path, &self.core).map_err(recording_error)
+    }
+
+    /// Write the poses as a TUM trajectory.
+    #[allow(clippy::needless_pass_by_value)] // what extraction yields
+    fn write_tum(&self, path: PathBuf) -> PyResult<()> {
+        let timed = |it: &replay::LocatedPose| TimedPose {
+            time_s: it.estimate.time_s,
+            pose: it.estimate.pose,
+        };
+        let poses: Vec<TimedPose> = self.core.poses.iter().map(timed).collect();
+        write_tum(&path, &poses).map_err(recording_error)
+    }
+}
+
+fn covariance(pose: &replay::LocatedPose, row: usize, column: usize) -> f64 {
+    let known = pose.estimate.covariance.as_ref();
+    known
+        .and_then(|it| it.get(row)?.get(column))
+        .copied()
+        .unwrap_or(f64::NAN)
+}

@@ -1,0 +1,213 @@
+"""Recorded drives: write them from a scenario, find out where the vehicle was."""
+
+from __future__ import annotations
+
+from dataclasses import dataclass
+from pathlib import Path
+from typing import TYPE_CHECKING
+
+import polars as pl
+
+from access_av import _core
+from access_av.errors import InputError
+
+if TYPE_CHECKING:
+    from access_av._core import Scenario
+
+
+DATATYPES = ("ci16_le", "cf32_le")
+
+
+@dataclass(frozen=True)
+class SynthesizedDrive:
+    """A drive that was written.
+
+    Attributes
+    ----------
+    recording
+        The SigMF metadata.
+    bursts
+        SSB bursts in it.
+    samples
+        Samples per antenna.
+    """
+
+    recording: Path
+    bursts: int
+    samples: int
+
+
+def synthesize(
+    scenario: Scenario | str,
+    directory: str | Path,
+    *,
+    seed: int = 1,
+    run: int = 0,
+    duration_s: float | None = None,
+    continuous: bool = False,
+    datatype: str = "ci16_le",
+) -> SynthesizedDrive:
+    """Record a scenario's drive as somebody on the vehicle would have.
+
+    Writes ``iq.sigmf-meta`` and ``iq.sigmf-data`` (all antennas, the truth in the annotations),
+    ``odometry.csv``, ``site.toml``, ``scenario.toml`` and ``truth.tum``.
+
+    Parameters
+    ----------
+    scenario
+        What is driven, or its name or path.
+    directory
+        Where the files go; made if it is not there.
+    seed, run
+        The random streams.
+    duration_s
+        Seconds from the start on; the whole drive without.
+    continuous
+        Also the time between the SSB bursts, which makes the files many times larger.
+    datatype
+        ``ci16_le`` or ``cf32_le``.
+
+    Raises
+    ------
+    ScenarioError
+        When the scenario cannot be sent as samples.
+    InputError
+        When the datatype is another one.
+
+    Examples
+    --------
+    >>> import tempfile
+    >>> from access_av import drives
+    >>> here = tempfile.mkdtemp()
+    >>> drives.synthesize("paper-real-odometry-2", here, duration_s=2.0).bursts
+    101
+    >>> located = drives.locate(here + "/site.toml", here + "/odometry.csv", here + "/iq")
+    >>> located.poses.height
+    101
+    """
+    if datatype not in DATATYPES:
+        raise InputError(f"datatype is {datatype!r}; allowed: {', '.join(DATATYPES)}")
+    chosen = _core.Scenario.load(scenario) if isinstance(scenario, str) else scenario
+    made = _core.synthesize(
+        chosen,
+        directory,
+        seed=seed,
+        run=run,
+        duration_s=duration_s,
+        continuous=continuous,
+        datatype=datatype,
+    )
+    return SynthesizedDrive(*made)
+
+
+@dataclass(frozen=True)
+class Drive:
+    """A located drive.
+
+    Attributes
+    ----------
+    poses
+        One row per odometry sample: time, pose, speed and covariance (null where unknown).
+    angles
+        One row per angle: SSB, angle, and what the localizer did with it.
+    remarks
+        What was wrong with single items of the input.
+    """
+
+    poses: pl.DataFrame
+    angles: pl.DataFrame
+    remarks: list[str]
+    _core: _core.LocatedDrive
+
+    def write_mcap(self, path: str | Path) -> None:
+        """Write poses, verdicts and diagnostics as MCAP (ROS 2)."""
+        self._core.write_mcap(path)
+
+    def write_tum(self, path: str | Path) -> None:
+        """Write the poses as a TUM trajectory."""
+        self._core.write_tum(path)
+
+
+def locate(
+    site: str | Path,
+    odometry: str | Path,
+    recording: str | Path,
+    *,
+    topic: str | None = None,
+    start_time_s: float = 0.0,
+) -> Drive:
+    """Locate a recorded drive.
+
+    Parameters
+    ----------
+    site
+        Site file: radio heads, road, array.
+    odometry
+        CSV with the columns ``time_s``, ``distance_m``, ``speed_mps`` and, with a gyroscope,
+        ``yaw_rate_radps``; or an MCAP file with ``nav_msgs/msg/Odometry``.
+    recording
+        SigMF recording of the array's samples, or a CSV log of angles with the columns ``time_s``,
+        ``pci``, ``ssb_index``, ``phase_rad``, ``phase_sigma_rad``, ``angle_rad``, ``snr_db``.
+    topic
+        Topic of the odometry in an MCAP file with several.
+    start_time_s
+        Time of the recording's first sample by the odometry's clock.
+
+    Raises
+    ------
+    RecordingError
+        When the recording or the odometry cannot be used.
+    ScenarioError
+        When the site file cannot be used.
+    """
+    located = _core.locate(site, odometry, recording, topic=topic, start_time_s=start_time_s)
+    poses = pl.DataFrame(located.poses).with_columns(pl.col("^.*2$").fill_nan(None))
+    angles = pl.DataFrame(located.angles).with_columns(pl.col(pl.Float64).fill_nan(None))
+    return Drive(poses, angles, located.remarks, located)
+
+
+def error_m(poses: pl.DataFrame, truth: str | Path) -> pl.DataFrame:
+    """Horizontal error at the times that a TUM trajectory of the truth has too.
+
+    Parameters
+    ----------
+    poses
+        Poses of a located drive.
+    truth
+        TUM trajectory; times within a microsecond belong together.
+
+    Raises
+    ------
+    InputError
+        When the file is no TUM trajectory, or shares no time with the drive.
+    """
+    rows = [line.split() for line in Path(truth).read_text(encoding="utf-8").splitlines()]
+    if not rows or any(len(row) != 8 for row in rows):
+        raise InputError(f"{truth}: not a TUM trajectory (8 numbers a line)")
+    true = pl.DataFrame(
+        {
+            "time_us": [round(float(row[0]) * 1e6) for row in rows],
+            "true_x_m": [float(row[1]) for row in rows],
+            "true_y_m": [float(row[2]) for row in rows],
+        }
+    )
+    timed = poses.with_columns(time_us=(pl.col("time_s") * 1e6).round().cast(pl.Int64))
+    both = timed.join(true, on="time_us")
+    if both.is_empty():
+        raise InputError(f"{truth}: no time in common with the drive")
+    dx, dy = pl.col("x_m") - pl.col("true_x_m"), pl.col("y_m") - pl.col("true_y_m")
+    return both.select("time_s", error_m=(dx**2 + dy**2).sqrt())
+
+
+def summary(drive: Drive, truth: str | Path | None = None) -> dict[str, float]:
+    """The drive in a few numbers; errors only where the truth is known."""
+    numbers = {
+        "duration_s": float(drive.poses["time_s"][-1] - drive.poses["time_s"][0]),
+        "angles": float(drive.angles.height),
+        "accepted": float(drive.angles["accepted"].sum()),
+    }
+    if truth is not None:
+        errors = error_m(drive.poses, truth)["error_m"]
+        numbers["rms_error_m"] = float((errors**2).mean() ** 0.5)  # type: ignore[operator]
+        numbers["p90_error_m"] = float(errors.quantile(0.9, "linear") or 0.0)
+    return numbers

@@ -1,0 +1,146 @@
+from __future__ import annotations
+
+import json
+import re
+import subprocess
+import sys
+from typing import TYPE_CHECKING
+
+import polars as pl
+import pytest
+from mcap.reader import make_reader
+
+from access_av import drives
+
+if TYPE_CHECKING:
+    from collections.abc import Callable
+    from pathlib import Path
+
+    from conftest import Finished
+
+    Cli = Callable[..., Finished]
+
+SCENARIO = "paper-real-odometry-2"
+
+
+@pytest.fixture(scope="module")
+def drive(tmp_path_factory: pytest.TempPathFactory) -> Path:
+    """Twelve seconds of a drive past two radio heads, as recorded."""
+    directory = tmp_path_factory.mktemp("drive")
+    drives.synthesize(SCENARIO, directory, duration_s=12.0)
+    return directory
+
+
+def arguments(drive: Path, out: Path) -> list[object]:
+    return [
+        "locate", "--recording", drive / "iq.sigmf-meta", "--odometry", drive / "odometry.csv",
+        "--site", drive / "site.toml", "--out", out,
+    ]  # fmt: skip
+
+
+def test_a_synthesized_drive_is_located(access_av: Cli, drive: Path, tmp_path: Path) -> None:
+    done = access_av(*arguments(drive, tmp_path), "--truth", drive / "truth.tum")
+    assert done.code == 0, done.err
+    poses = pl.read_parquet(tmp_path / "poses.parquet")
+    angles = pl.read_parquet(tmp_path / "angles.parquet")
+    assert poses.height == 601
+    assert set(angles["pci"].unique()) <= {1, 2}
+    assert angles["accepted"].mean() > 0.95  # type: ignore[operator]
+    error = float(re.findall(r"RMS ([0-9.]+) m", done.out)[0])
+    # An initial pose with a standard deviation of half a metre, and what two radio heads add.
+    assert error < 0.6
+    page = (tmp_path / "report.html").read_text()
+    assert "http" not in re.sub(
+        r"https?://(www\.w3\.org|vega\.github\.io)[^\"']*", "", page[:20_000]
+    )
+    assert json.loads((tmp_path / "manifest.json").read_text())["angles"] == angles.height
+
+
+def test_mcap_is_what_ros_tools_expect(access_av: Cli, drive: Path, tmp_path: Path) -> None:
+    assert access_av(*arguments(drive, tmp_path)).code == 0
+    with (tmp_path / "drive.mcap").open("rb") as file:
+        reader = make_reader(file)
+        assert reader.get_header().profile == "ros2"
+        summary = reader.get_summary()
+        assert summary is not None
+        assert summary.statistics is not None
+        counts = {
+            channel.topic: (
+                summary.schemas[channel.schema_id].name,
+                channel.message_encoding,
+                summary.statistics.channel_message_counts[number],
+            )
+            for number, channel in summary.channels.items()
+        }
+    angles = pl.read_parquet(tmp_path / "angles.parquet").height
+    assert counts == {
+        "/access_av/odometry": ("nav_msgs/msg/Odometry", "cdr", 601),
+        "/access_av/verdicts": ("access_av_msgs/msg/AngleVerdict", "cdr", angles),
+        "/diagnostics": ("diagnostic_msgs/msg/DiagnosticArray", "cdr", 13),
+    }
+
+
+def test_evo_finds_the_same_error_in_tum_and_mcap(
+    access_av: Cli, drive: Path, tmp_path: Path
+) -> None:
+    access_av(*arguments(drive, tmp_path), "--truth", drive / "truth.tum")
+    ours = json.loads((tmp_path / "manifest.json").read_text())["rms_error_m"]
+    code = f"""
+from evo.core import metrics, sync
+from evo.tools import file_interface
+from rosbags.rosbag2 import Reader
+from pathlib import Path
+truth = file_interface.read_tum_trajectory_file({str(drive / "truth.tum")!r})
+tum = file_interface.read_tum_trajectory_file({str(tmp_path / "trajectory.tum")!r})
+with Reader(Path({str(tmp_path / "drive.mcap")!r})) as bag:
+    mcap = file_interface.read_bag_trajectory(bag, "/access_av/odometry")
+for found in (tum, mcap):
+    pair = sync.associate_trajectories(truth, found, max_diff=1e-4)
+    ape = metrics.APE(metrics.PoseRelation.translation_part)
+    ape.process_data(pair)
+    print(ape.get_statistic(metrics.StatisticsType.rmse))
+"""
+    environment = {"HOME": str(tmp_path), "PATH": "/usr/bin:/bin", "MPLBACKEND": "Agg"}
+    done = subprocess.run(
+        [sys.executable, "-W", "ignore", "-c", code],
+        capture_output=True, text=True, env=environment, check=True,
+    )  # fmt: skip
+    found = [float(line) for line in done.stdout.split()[-2:]]
+    assert found == pytest.approx([ours, ours], abs=1e-6)
+
+
+def test_mcap_odometry_and_bad_items_are_taken_in(
+    access_av: Cli, drive: Path, tmp_path: Path
+) -> None:
+    # Our own poses as odometry, by way of MCAP.
+    access_av(*arguments(drive, tmp_path))
+    located = drives.locate(drive / "site.toml", tmp_path / "drive.mcap", drive / "iq")
+    assert located.poses.height == 601
+    rows = (drive / "odometry.csv").read_text().splitlines()
+    spoilt = tmp_path / "odometry.csv"
+    spoilt.write_text("\n".join([*rows[:100], "nan,1,2", rows[50], "a,b", *rows[100:]]))
+    done = access_av(*arguments(drive, tmp_path / "again")[:4], spoilt, "--site",
+                     drive / "site.toml", "--out", tmp_path / "again")  # fmt: skip
+    assert done.code == 0, done.err
+    assert done.err.count("left out") == 3
+
+
+def test_what_cannot_be_located_says_why(access_av: Cli, drive: Path, tmp_path: Path) -> None:
+    site = tmp_path / "site.toml"
+    text = (drive / "site.toml").read_text()
+    positions = re.findall(r"position_m = \[[^]]*\]", text)
+    site.write_text(text.replace(positions[1], positions[0]))
+    given = arguments(drive, tmp_path)
+    given[6] = site
+    done = access_av(*given)
+    assert done.code == 2
+    assert "radio_heads[1].position_m" in done.err
+    given[6], given[4] = drive / "site.toml", tmp_path / "none.csv"
+    assert access_av(*given).code == 2
+
+
+def test_synth_refuses_what_it_cannot_send(access_av: Cli, tmp_path: Path) -> None:
+    assert access_av("synth", "paper", "--out", tmp_path, "--datatype", "cf64_le").code == 2
+    done = access_av("synth", "no-such", "--out", tmp_path)
+    assert done.code == 2
+    assert "no-such" in done.err
