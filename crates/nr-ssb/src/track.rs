@@ -24,7 +24,7 @@ use crate::pci::Pci;
 use crate::pss::{SYNC_LEN, pss};
 use crate::search::{DetectedSsb, SearchConfig, SearchError, Searcher};
 use crate::sss::sss;
-use crate::sums::{complex_product, inner_product};
+use crate::sums::{complex_product, energy, inner_product, real_product};
 use crate::timing;
 
 /// Probability that noise at the expected place passes for the cell.
@@ -98,6 +98,8 @@ pub struct Tracker<const A: usize> {
     searcher: Searcher,
     /// All that is known beforehand, per ī_SSB.
     references: Vec<SsbGrid>,
+    /// PSS and SSS.
+    chips: [[f32; SYNC_LEN]; 2],
     /// DM-RS per ī_SSB, real and imaginary parts.
     dmrs: Vec<[[f32; DMRS_LEN]; 2]>,
     threshold: f64,
@@ -135,6 +137,7 @@ impl<const A: usize> Tracker<A> {
             decoder: BroadcastDecoder::new(&config),
             searcher,
             references: (0..8).map(|ibar_ssb| pilots(pci, ibar_ssb)).collect(),
+            chips: [pss(pci.n_id_2()), sss(pci)],
             dmrs: (0..8)
                 .map(|ibar_ssb| dmrs(pci, ibar_ssb))
                 .map(|r| [r.map(|r| r.re), r.map(|r| r.im)])
@@ -284,27 +287,21 @@ impl<const A: usize> Tracker<A> {
 
     /// ī_SSB, if PSS and SSS say that the cell is there.
     fn identify(&self, phases: &[Complex32; SYMBOLS]) -> Option<u8> {
-        let known = &self.references.first()?;
         let grids = &self.acquirer.grids;
         let mut statistic = 0.0;
         let mut combined = [Complex32::ZERO; DMRS_LEN];
         for grid in grids {
-            let mut sums = [Complex32::ZERO; 2];
-            let mut energy = 0.0_f32;
-            for (sum, (l, indices)) in sums
-                .iter_mut()
-                .zip([(0, pss_indices()), (2, pss_indices())])
-            {
-                let chips = &known.elements()[l * SUBCARRIERS..][indices.clone()];
-                for (y, chip) in grid[l][indices].iter().zip(chips) {
-                    *sum += y * chip.re;
-                    energy += y.norm_sqr();
-                }
+            // PSS and SSS lie on the same subcarriers of their symbols.
+            let mut gain = Complex32::ZERO;
+            let mut power = 0.0_f32;
+            for (l, chips) in [0, 2].into_iter().zip(&self.chips) {
+                let received = grid[l].get(pss_indices())?.first_chunk::<SYNC_LEN>()?;
+                gain += real_product(received, chips) * phases[l];
+                power += energy(received);
             }
             // |Σ|²/N against the energy that it leaves over: noise whatever the channel's level.
-            let gain = sums[0] * phases[0] + sums[1] * phases[2];
             let explained = gain.norm_sqr() / (2 * SYNC_LEN) as f32;
-            let noise = ((energy - explained) / (2 * SYNC_LEN - 1) as f32).max(f32::MIN_POSITIVE);
+            let noise = ((power - explained) / (2 * SYNC_LEN - 1) as f32).max(f32::MIN_POSITIVE);
             statistic += f64::from(explained / noise);
             let weight = gain.conj() / noise;
             for (slot, index) in combined.iter_mut().zip(dmrs_indices(self.pci)) {
