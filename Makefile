@@ -27,8 +27,9 @@ lint-python: .venv/installed-test
 	$(BIN)/mypy
 	$(BIN)/stubtest access_av._core
 
-bench: .venv/installed-bench ## Compare the estimators with their peers; time the evaluation and how it scales
+bench: .venv/installed-bench ## Compare angle estimators and cell search with their peers; time the evaluation
 	$(BIN)/python benches/aoa_peers.py
+	$(BIN)/python benches/nr_peers.py
 	$(BIN)/python benches/evaluation.py
 
 clean: ## Remove what was built (results stay)
