@@ -18,7 +18,10 @@ if TYPE_CHECKING:
 TRAJECTORY_COLUMNS = {
     "run", "time_s", "x_m", "y_m", "heading_rad", "true_x_m", "true_y_m", "error_x_m", "error_y_m",
 }  # fmt: skip
-COMMANDS = ["evaluate", "run", "explore", "bound", "aoa", "fit", "scenario", "platform"]
+COMMANDS = [
+    "evaluate", "run", "explore", "bound", "aoa", "scan", "synth", "locate", "fit", "scenario",
+    "platform",
+]  # fmt: skip
 
 
 def test_help_lists_every_command(access_av: Cli) -> None:
@@ -28,7 +31,9 @@ def test_help_lists_every_command(access_av: Cli) -> None:
         assert command in done.out
 
 
-@pytest.mark.parametrize("command", ["evaluate", "run", "explore", "bound", "aoa", "fit"])
+@pytest.mark.parametrize(
+    "command", ["evaluate", "run", "explore", "bound", "aoa", "scan", "synth", "locate", "fit"]
+)
 def test_help_of_each_command_has_an_example(access_av: Cli, command: str) -> None:
     done = access_av(command, "--help", columns=60)
     assert done.code == 0

@@ -82,10 +82,13 @@ def scan_as_recorded(
     if not stretches:
         return found
     cells = list(found.cells)
+    places = {(cell.ssb_freq_hz, cell.scs_khz) for cell in cells}
     for start, gains in stretches:
-        for cell in scan(recording, calibration=gains.tolist(), **where).cells:
-            if abs(cell.sample_start - start) < 0.5 * cell.sample_count:
-                cells = [cell if _same(cell, other) else other for other in cells]
+        for ssb_freq_hz, scs_khz in places:
+            where |= {"ssb_freq_hz": ssb_freq_hz, "scs_khz": scs_khz}
+            for cell in scan(recording, calibration=gains.tolist(), **where).cells:
+                if abs(cell.sample_start - start) < 0.5 * cell.sample_count:
+                    cells = [cell if _same(cell, other) else other for other in cells]
     return Scan(cells, found.faults)
 
 

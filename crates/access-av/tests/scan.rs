@@ -4,10 +4,10 @@
 mod common;
 
 use access_av::receive::{
-    ArraySetup, ChannelFault, FoundSsb, SampleBlock, ScanError, ScanSettings, diagnose_channels,
-    scan,
+    ArraySetup, ChannelFault, FoundSsb, SampleBlock, ScanError, ScanSettings, scan,
 };
 use access_av::recording::Recording;
+use nr_ssb::diagnose::Fault;
 use nr_ssb::{BchPayload, Beam, Burst, Case, Lmax, Mib, Numerology, Ofdm, Pci};
 use num_complex::{Complex32, Complex64};
 use rand::{RngExt, SeedableRng};
@@ -94,7 +94,7 @@ fn faults_are_laid_at_the_right_channel() {
     let found = scan(&mut block(&antennas), &known()).unwrap();
     assert_eq!(
         found.faults,
-        [ChannelFault::Swapped {
+        [ChannelFault::Exchanged {
             first: 1,
             second: 2
         }]
@@ -103,7 +103,10 @@ fn faults_are_laid_at_the_right_channel() {
     let mut antennas = half_frame(0.7, 3);
     antennas[3].fill(Complex32::ZERO);
     let found = scan(&mut block(&antennas), &known()).unwrap();
-    assert!(found.faults.contains(&ChannelFault::Silent { channel: 3 }));
+    assert!(found.faults.contains(&ChannelFault::Samples {
+        channel: 3,
+        fault: Fault::Silent
+    }));
     assert_eq!(found.ssbs.len(), 1);
 
     let mut antennas = half_frame(0.7, 4);
@@ -114,11 +117,27 @@ fn faults_are_laid_at_the_right_channel() {
             sample.im.clamp(-limit, limit),
         );
     }
-    let faults = diagnose_channels(&antennas);
-    assert!(
-        matches!(faults[..], [ChannelFault::Clipped { channel: 0, .. }]),
-        "{faults:?}"
-    );
+    let faults = scan(&mut block(&antennas), &known()).unwrap().faults;
+    let clipped = |it: &ChannelFault| {
+        matches!(
+            it,
+            ChannelFault::Samples {
+                channel: 0,
+                fault: Fault::Clipped { .. }
+            }
+        )
+    };
+    assert!(faults.iter().any(clipped), "{faults:?}");
+}
+
+#[test]
+fn a_cell_off_the_raster_is_found_where_the_recording_was_tuned_to() {
+    let antennas = half_frame(0.3, 8);
+    let mut source = block(&antennas);
+    // 3700.8 MHz is not 3 GHz + N · 1.44 MHz.
+    source.centre_frequency_hz = Some(SSB_HZ);
+    let found = scan(&mut source, &ScanSettings::default()).unwrap();
+    assert_eq!((found.ssbs.len(), found.ssbs[0].ssb.pci.get()), (1, 7));
 }
 
 #[test]

@@ -1,17 +1,15 @@
-//! What is wrong with single receive channels: clipped, silent, swapped.
+//! What is wrong with single receive channels: clipped, silent, weak, doubled, exchanged.
 
 use std::f64::consts::TAU;
 use std::fmt;
 
-use num_complex::{Complex32, Complex64};
+use nr_ssb::Complex32;
+use nr_ssb::diagnose::{Fault, diagnose};
+use num_complex::Complex64;
 
 use super::array_view::View;
 
-/// A channel this far below the strongest is silent, in dB.
-const SILENT_DB: f64 = 60.0;
-/// Share of samples at the largest magnitude from which a channel is clipped.
-const CLIPPED_SHARE: f64 = 1e-3;
-/// Channels are judged swapped only on SSBs of at least this SNR per symbol, in dB.
+/// Channels are judged exchanged only on SSBs of at least this SNR per symbol, in dB.
 const SWAP_SNR_DB: f64 = 10.0;
 /// Power that must be gained by changing two channels back, as a share of all power.
 const SWAP_GAIN: f64 = 0.1;
@@ -21,20 +19,15 @@ const RIGHT_SHARE: f64 = 0.9;
 /// What is wrong with the channels.
 #[derive(Debug, Clone, PartialEq)]
 pub enum ChannelFault {
-    /// Samples stand at the converter's limit.
-    Clipped {
+    /// Its samples themselves show it.
+    Samples {
         /// The channel.
         channel: usize,
-        /// Share of its samples at the limit.
-        share: f64,
-    },
-    /// Nothing, or next to nothing, comes from it.
-    Silent {
-        /// The channel.
-        channel: usize,
+        /// What they show.
+        fault: Fault,
     },
     /// The array's response makes sense with these two exchanged, and not as they are.
-    Swapped {
+    Exchanged {
         /// One channel.
         first: usize,
         /// The other.
@@ -44,73 +37,69 @@ pub enum ChannelFault {
 
 impl fmt::Display for ChannelFault {
     fn fmt(&self, f: &mut fmt::Formatter<'_>) -> fmt::Result {
-        match self {
-            Self::Clipped { channel, share } => {
+        let (channel, fault) = match self {
+            Self::Exchanged { first, second } => {
+                return write!(f, "channels {first} and {second} look exchanged");
+            }
+            Self::Samples { channel, fault } => (channel, fault),
+        };
+        match fault {
+            Fault::Silent => write!(f, "channel {channel} is silent"),
+            Fault::Weak { below_strongest_db } => {
+                write!(
+                    f,
+                    "channel {channel} is {below_strongest_db:.0} dB below the strongest"
+                )
+            }
+            Fault::Clipped { share } => {
                 write!(
                     f,
                     "channel {channel} is clipped: {:.2} % of its samples",
                     share * 100.0
                 )
             }
-            Self::Silent { channel } => write!(f, "channel {channel} is silent"),
-            Self::Swapped { first, second } => {
-                write!(f, "channels {first} and {second} look exchanged")
+            Fault::Duplicate { of } => {
+                write!(
+                    f,
+                    "channel {channel} holds the same samples as channel {of}"
+                )
             }
+            other => write!(f, "channel {channel}: {other:?}"),
         }
     }
 }
 
-/// Faults that the samples alone show: clipped and silent channels.
-pub fn diagnose_channels(antennas: &[Vec<Complex32>]) -> Vec<ChannelFault> {
-    let mut watch = ChannelWatch::new(antennas.len());
-    watch.samples(antennas);
-    watch.faults()
+/// Faults that the samples alone show.
+pub(super) fn faults_of_samples(antennas: &[&[Complex32]]) -> Vec<ChannelFault> {
+    let diagnoses = diagnose(antennas).into_iter().enumerate();
+    diagnoses
+        .flat_map(|(channel, it)| {
+            it.faults
+                .into_iter()
+                .map(move |fault| ChannelFault::Samples { channel, fault })
+        })
+        .collect()
 }
 
-/// Watches channels over a whole recording.
+/// Votes of the SSBs on whether two channels are exchanged.
 #[derive(Debug, Clone, Default)]
-pub(super) struct ChannelWatch {
-    channels: Vec<Level>,
-    /// Votes of SSBs: as they are, or with a pair exchanged.
+pub(super) struct ExchangeVotes {
     right: usize,
-    swapped: Vec<((usize, usize), usize)>,
+    exchanged: Vec<((usize, usize), usize)>,
 }
 
-#[derive(Debug, Clone, Copy, Default)]
-struct Level {
-    samples: u64,
-    energy: f64,
-    largest: f32,
-    at_largest: u64,
-}
-
-impl ChannelWatch {
-    pub fn new(channels: usize) -> Self {
-        Self {
-            channels: vec![Level::default(); channels],
-            ..Self::default()
-        }
-    }
-
-    pub fn samples(&mut self, antennas: &[Vec<Complex32>]) {
-        for (level, samples) in self.channels.iter_mut().zip(antennas) {
-            for sample in samples {
-                level.add(*sample);
-            }
-        }
-    }
-
-    /// An SSB as the array saw it.
-    pub fn response(&mut self, view: &View) {
+impl ExchangeVotes {
+    /// Takes the vote of an SSB as the array saw it.
+    pub fn vote(&mut self, view: &View) {
         if view.estimate.snr_db < SWAP_SNR_DB {
             return;
         }
-        let antennas = self.channels.len();
+        let antennas = view.blocks.first().map_or(0, Vec::len);
         // Neighbours first: of four antennas, exchanging the inner two looks like exchanging the
         // outer two in a mirror, and only a clearly better pair replaces a nearer one.
         let pairs = (1..antennas).flat_map(|apart| (apart..antennas).map(move |j| (j - apart, j)));
         let as_it_is = share_in_one_direction(&view.blocks, None);
-        let best = pairs.fold((0.0, (0, 0)), |best, pair| {
+        let (share, pair) = pairs.fold((0.0, (0, 0)), |best, pair| {
             let share = share_in_one_direction(&view.blocks, Some(pair));
             if share > best.0 + 0.01 {
                 (share, pair)
@@ -118,58 +107,20 @@ impl ChannelWatch {
                 best
             }
         });
-        match best {
-            (share, pair) if share > RIGHT_SHARE && share > as_it_is + SWAP_GAIN => {
-                match self.swapped.iter_mut().find(|(other, _)| *other == pair) {
-                    Some((_, votes)) => *votes += 1,
-                    None => self.swapped.push((pair, 1)),
-                }
-            }
-            _ => self.right += 1,
+        if share <= RIGHT_SHARE || share <= as_it_is + SWAP_GAIN {
+            self.right += 1;
+        } else if let Some((_, votes)) = self.exchanged.iter_mut().find(|(it, _)| *it == pair) {
+            *votes += 1;
+        } else {
+            self.exchanged.push((pair, 1));
         }
     }
 
-    pub fn faults(&self) -> Vec<ChannelFault> {
-        let powers = self.channels.iter().map(Level::power);
-        let strongest = powers.fold(0.0, f64::max);
-        let floor = strongest * 10f64.powf(-0.1 * SILENT_DB);
-        let mut faults = Vec::new();
-        for (channel, level) in self.channels.iter().enumerate() {
-            let share = level.at_largest as f64 / level.samples.max(1) as f64;
-            if level.power() <= floor {
-                faults.push(ChannelFault::Silent { channel });
-            } else if share > CLIPPED_SHARE && level.at_largest > 8 {
-                faults.push(ChannelFault::Clipped { channel, share });
-            }
-        }
-        let votes: usize = self.right + self.swapped.iter().map(|(_, votes)| votes).sum::<usize>();
-        if let Some(((first, second), most)) = self.swapped.iter().max_by_key(|(_, votes)| votes)
-            && 2 * most > votes
-        {
-            faults.push(ChannelFault::Swapped {
-                first: *first,
-                second: *second,
-            });
-        }
-        faults
-    }
-}
-
-impl Level {
-    fn add(&mut self, sample: Complex32) {
-        self.samples += 1;
-        self.energy += f64::from(sample.norm_sqr());
-        let largest = sample.re.abs().max(sample.im.abs());
-        if largest > self.largest {
-            self.largest = largest;
-            self.at_largest = 1;
-        } else if largest == self.largest && largest > 0.0 {
-            self.at_largest += 1;
-        }
-    }
-
-    fn power(&self) -> f64 {
-        self.energy / self.samples.max(1) as f64
+    /// What the majority says.
+    pub fn fault(&self) -> Option<ChannelFault> {
+        let all = self.right + self.exchanged.iter().map(|(_, votes)| votes).sum::<usize>();
+        let ((first, second), votes) = *self.exchanged.iter().max_by_key(|(_, votes)| votes)?;
+        (2 * votes > all).then_some(ChannelFault::Exchanged { first, second })
     }
 }
 

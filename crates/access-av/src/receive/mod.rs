@@ -11,7 +11,7 @@ mod scan;
 mod stream;
 
 pub use array_view::ArraySetup;
-pub use diagnosis::{ChannelFault, diagnose_channels};
+pub use diagnosis::ChannelFault;
 pub use iq_source::{IqSource, SampleBlock};
 pub use receiver::{ReceiveError, Receiver, ReceiverConfig, Window};
 pub use scan::{FoundSsb, Scan, ScanError, ScanSettings, scan};

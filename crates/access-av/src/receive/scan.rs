@@ -8,7 +8,7 @@ use thiserror::Error;
 
 use super::SSB_SAMPLES;
 use super::array_view::{ArraySetup, ArrayView, View, array_view};
-use super::diagnosis::{ChannelFault, ChannelWatch};
+use super::diagnosis::{ChannelFault, ExchangeVotes, faults_of_samples};
 use super::iq_source::IqSource;
 use crate::recording::RecordingError;
 
@@ -18,6 +18,8 @@ const BLOCK_S: f64 = 0.02;
 const RASTER_WINDOWS_S: [f64; 2] = [0.02, 0.16];
 /// Probability that 20 ms of noise make a cell, shared among the places looked at.
 const FALSE_ALARM: f64 = 1e-3;
+/// The same where the raster had nothing: the raster has used up most of it.
+const FALSE_ALARM_OFF_RASTER: f64 = 1e-4;
 
 /// What a scan is told; by default nothing.
 #[derive(Debug, Clone, PartialEq, Default)]
@@ -115,23 +117,35 @@ pub fn scan(source: &mut dyn IqSource, settings: &ScanSettings) -> Result<Scan, 
         .centre_frequency_hz
         .or(source.centre_frequency_hz())
         .ok_or_else(|| ScanError::NoCentreFrequency { file: file.clone() })?;
-    let places = match settings.ssb_freq_hz {
-        Some(hz) => given_places(source.sample_rate_hz(), hz, settings.spacing),
-        None => raster_places(source, settings.spacing, centre_hz)?,
-    };
-    let mut watch = ChannelWatch::new(source.channels());
     let mut antennas = Vec::new();
-    for_each_block(source, &mut antennas, |antennas, _| {
-        watch.samples(antennas);
-        Ok(())
-    })?;
-    let mut found = Scan::default();
+    let first_block = source
+        .length()
+        .min((BLOCK_S * source.sample_rate_hz()) as u64) as usize;
+    source.read(0, first_block, &mut antennas)?;
+    let slices: Vec<&[Complex32]> = antennas.iter().map(Vec::as_slice).collect();
+    let mut found = Scan {
+        faults: faults_of_samples(&slices),
+        ..Scan::default()
+    };
+    let mut votes = ExchangeVotes::default();
+    let rate_hz = source.sample_rate_hz();
+    let (places, false_alarm) = match settings.ssb_freq_hz {
+        Some(hz) => (given_places(rate_hz, hz, settings.spacing), FALSE_ALARM),
+        None => match raster_places(source, settings.spacing, centre_hz)? {
+            places if !places.is_empty() => (places, FALSE_ALARM),
+            // A private cell may stand off the raster; whoever recorded it probably tuned to it.
+            _ => (
+                given_places(rate_hz, centre_hz, settings.spacing),
+                FALSE_ALARM_OFF_RASTER,
+            ),
+        },
+    };
     for place in &places {
         let config = SearchConfig {
             // A centre of 0 Hz is none; a given frequency is meant as it is.
             ssb_freq_hz: (centre_hz > 0.0 || settings.ssb_freq_hz.is_some())
                 .then_some(place.ssb_freq_hz),
-            false_alarm: FALSE_ALARM / places.len() as f64,
+            false_alarm: false_alarm / places.len() as f64,
             ..SearchConfig::new(place.spacing, source.channels())
         };
         let mut front_end = FrontEnd::new(
@@ -144,7 +158,7 @@ pub fn scan(source: &mut dyn IqSource, settings: &ScanSettings) -> Result<Scan, 
         let mut view = array_view(&config, &settings.array)?;
         for (ssb, seen) in search(source, &config, &mut front_end, view.as_deref_mut())? {
             if let Some(seen) = &seen {
-                watch.response(seen);
+                votes.vote(seen);
             }
             let ratio = front_end.input_per_output();
             found.ssbs.push(FoundSsb {
@@ -160,7 +174,7 @@ pub fn scan(source: &mut dyn IqSource, settings: &ScanSettings) -> Result<Scan, 
     found
         .ssbs
         .sort_by(|a, b| a.sample_start.total_cmp(&b.sample_start));
-    found.faults = watch.faults();
+    found.faults.extend(votes.fault());
     Ok(found)
 }
 
