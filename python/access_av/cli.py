@@ -61,7 +61,7 @@ def _options(
 
 
 @app.command(
-    epilog="Example: [bold]access-av evaluate --runs 20 --out /tmp/quick[/]",
+    epilog="Example: [bold]access-av evaluate --runs 20 --out results/quick[/]",
 )
 def evaluate(
     scenario: ScenarioOption = "paper",

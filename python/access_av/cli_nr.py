@@ -47,12 +47,16 @@ def scan(
             metavar="GAINS", help="Gain of each channel, as 1,0.9+0.2j,1j,-1; else as recorded."
         ),
     ] = None,
+    unconfirmed: Annotated[
+        bool, typer.Option(help="Also SSBs too weak for their message to be decoded.")
+    ] = False,
     as_json: Annotated[bool, typer.Option("--json", help="Print JSON.")] = False,
 ) -> None:
     """Find every SSB in recordings of cells that nobody has described.
 
-    Prints cell, beam, time, frequency offset, strength and message of each SSB, and with several
-    channels the angle it arrives from. Channels that are clipped, silent or exchanged are named.
+    Prints cell, beam, time, frequency offset, strength and message of each SSB whose message passes
+    its checksum, and with several channels the angle it arrives from. Channels that are clipped,
+    silent or exchanged are named.
     """
     from access_av import nr
     from access_av._core import Recording
@@ -77,6 +81,8 @@ def scan(
         for fault in result.faults:
             errors.print(f"[yellow]warning:[/] {path}: {fault}", soft_wrap=True)
         cells = [nr.record(cell) for cell in result.cells]
+        weak = [] if unconfirmed else [cell for cell in cells if cell["mib_bits"] is None]
+        cells = [cell for cell in cells if cell not in weak]
         found += [{"recording": str(path), **cell} for cell in cells]
         if as_json:
             continue
@@ -84,6 +90,8 @@ def scan(
             show_cells(path.name, cells)
         else:
             console.print(f"{path}: no SSB found.", soft_wrap=True)
+        if weak:
+            console.print(f"{len(weak)} more without a message: --unconfirmed lists them.")
     if as_json:
         print(json.dumps(found, indent=2))
 

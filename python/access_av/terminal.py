@@ -153,28 +153,28 @@ def show_bursts(bursts: Sequence[BurstAngle]) -> None:
 
 
 def show_cells(title: str, cells: Sequence[dict[str, Any]]) -> None:
-    """SSBs of one recording, one a row."""
+    """SSBs of one recording, one a row; a narrow terminal leaves out where on the air they were."""
     with_angles = any("angle_deg" in cell for cell in cells)
-    head = ["PCI", "SSB", "SFN", "SNR dB", "CFO Hz", "sample", "MHz", "kHz"]
-    made = table([*head, *(["azimuth °", "σ °"] if with_angles else [])], title=title, text=0)
+    columns = ["PCI", "SSB", "SFN", "SNR dB", "CFO Hz"]
+    if with_angles:
+        columns += ["azimuth °", "σ °"]
+    if not is_narrow():
+        columns += ["sample", "MHz", "kHz"]
+    made = table(columns, title=title, text=0)
     for cell in cells:
-        row = [
-            str(cell["pci"]),
-            str(cell["ssb_index"]),
-            "–" if cell["sfn"] is None else str(cell["sfn"]),
-            f"{cell['snr_db']:.1f}",
-            f"{cell['cfo_hz']:.1f}",
-            str(cell["sample_start"]),
-            f"{cell['ssb_freq_hz'] / 1e6:.3f}",
-            str(cell["scs_khz"]),
-        ]
-        if with_angles:
-            angle = "azimuth_deg" in cell
-            row += [
-                f"{cell['azimuth_deg']:.2f}" if angle else "–",
-                f"{cell['sigma_deg']:.3f}" if angle else "–",
-            ]
-        made.add_row(*row)
+        texts = {
+            "PCI": str(cell["pci"]),
+            "SSB": str(cell["ssb_index"]),
+            "SFN": "–" if cell["sfn"] is None else str(cell["sfn"]),
+            "SNR dB": f"{cell['snr_db']:.1f}",
+            "CFO Hz": f"{cell['cfo_hz']:.1f}",
+            "azimuth °": f"{cell['azimuth_deg']:.2f}" if "azimuth_deg" in cell else "–",
+            "σ °": f"{cell['sigma_deg']:.3f}" if "sigma_deg" in cell else "–",
+            "sample": str(cell["sample_start"]),
+            "MHz": f"{cell['ssb_freq_hz'] / 1e6:.3f}",
+            "kHz": str(cell["scs_khz"]),
+        }
+        made.add_row(*(texts[column] for column in columns))
     console.print(made)
 
 
