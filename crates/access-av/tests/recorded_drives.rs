@@ -7,6 +7,8 @@ mod common;
 use std::fs::{self, File};
 use std::path::Path;
 
+use proptest::prelude::*;
+
 use access_av::geometry::Pose;
 use access_av::localize::{AngleMeasurement, PoseEstimate};
 use access_av::observation::{OdometrySample, SensedSsb};
@@ -239,5 +241,38 @@ fn tum_has_eight_fields_and_comes_back() {
         fs::write(&file, format!("# comment\n{line}\n")).unwrap();
         let error = read_tum(&file).unwrap_err();
         assert!(matches!(error, RecordingError::Value { ref key, .. } if key == "line 2"));
+    }
+}
+
+proptest! {
+    #![proptest_config(ProptestConfig::with_cases(400))]
+
+    /// Any damage to a file gives an error or what is left of it, never a panic.
+    #[test]
+    fn damage_never_panics(
+        changes in prop::collection::vec((any::<prop::sample::Index>(), any::<u8>()), 1..8),
+        cut in prop::option::of(any::<prop::sample::Index>()),
+        kind in 0..3usize,
+    ) {
+        let dir = common::scratch("damage");
+        let file = dir.join("file");
+        match kind {
+            0 => write_mcap(&file, &["/odom"], 0.1),
+            1 => write_odometry_csv(&file, &[sample(0.0), sample(0.1)]).unwrap(),
+            _ => write_tum(&file, &[TimedPose { time_s: 0.5, pose: Pose::default() }]).unwrap(),
+        }
+        let mut bytes = fs::read(&file).unwrap();
+        for (place, value) in changes {
+            let place = place.index(bytes.len());
+            bytes[place] = value;
+        }
+        if let Some(cut) = cut {
+            bytes.truncate(cut.index(bytes.len()));
+        }
+        fs::write(&file, bytes).unwrap();
+        let _ = read_odometry_mcap(&file, None);
+        let _ = read_odometry_csv(&file);
+        let _ = read_angle_log(&file);
+        let _ = read_tum(&file);
     }
 }

@@ -5,12 +5,16 @@ use std::io::BufReader;
 use std::path::Path;
 
 use mcap::io::MessageReader;
+use mcap::sans_io::LinearReaderOptions;
 
 use super::ODOMETRY;
 use super::cdr::Decoder;
 use crate::observation::OdometrySample;
 use crate::recording::RecordingError;
 use crate::recording::odometry::{OdometryCollector, OdometryLog};
+
+/// Bytes of the longest record that is read; chunks are customarily below 10 MB.
+const LONGEST_RECORD: usize = 1 << 28;
 
 /// What is used of one `nav_msgs/msg/Odometry`.
 struct Reading {
@@ -34,7 +38,9 @@ pub fn read_odometry_mcap(file: &Path, topic: Option<&str>) -> Result<OdometryLo
     let mut collector = OdometryCollector::default();
     let mut last_place: Option<(f64, f64)> = None;
     let mut item = 0;
-    for message in MessageReader::new(BufReader::new(opened)) {
+    // A damaged length must not be taken for the memory to set aside.
+    let options = LinearReaderOptions::default().with_record_length_limit(LONGEST_RECORD);
+    for message in MessageReader::new_with_options(BufReader::new(opened), options) {
         let message = message.map_err(|error| RecordingError::Syntax {
             file: file.display().to_string(),
             format: "MCAP",
