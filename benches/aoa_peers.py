@@ -7,6 +7,7 @@ repetitions and include the covariance. Run with the extra ``bench`` installed::
     python benches/aoa_peers.py
 """
 
+# ruff: noqa: E402  (the number of threads must be set before NumPy is imported)
 from __future__ import annotations
 
 import os
