@@ -125,6 +125,23 @@ def test_mcap_odometry_and_bad_items_are_taken_in(
     assert done.err.count("left out") == 3
 
 
+def test_integrity_comes_with_the_poses_where_the_site_asks_for_it(
+    drive: Path, tmp_path: Path
+) -> None:
+    text = (drive / "site.toml").read_text()
+    site = tmp_path / "site.toml"
+    site.write_text(text.replace("integrity = false", "integrity = true"))
+    poses = drives.locate(site, drive / "odometry.csv", drive / "iq").poses
+    assert set(poses["integrity"].unique()) <= {"ok", "degraded", "unavailable"}
+    assert poses["protection_level_m"].max() > 0.1  # type: ignore[operator]
+    assert (
+        drives.locate(drive / "site.toml", drive / "odometry.csv", drive / "iq")
+        .poses["integrity"]
+        .is_null()
+        .all()
+    )
+
+
 def test_what_cannot_be_located_says_why(access_av: Cli, drive: Path, tmp_path: Path) -> None:
     site = tmp_path / "site.toml"
     text = (drive / "site.toml").read_text()

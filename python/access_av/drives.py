@@ -107,7 +107,8 @@ class Drive:
     Attributes
     ----------
     poses
-        One row per odometry sample: time, pose, speed and covariance (null where unknown).
+        One row per odometry sample: time, pose, speed, covariance, and protection level and
+        integrity where the site asks for them (null where unknown).
     angles
         One row per angle: SSB, angle, and what the localizer did with it.
     remarks
@@ -161,7 +162,8 @@ def locate(
         When the site file cannot be used.
     """
     located = _core.locate(site, odometry, recording, topic=topic, start_time_s=start_time_s)
-    poses = pl.DataFrame(located.poses).with_columns(pl.col("^.*2$").fill_nan(None))
+    columns = pl.DataFrame(located.poses, schema_overrides={"integrity": pl.String})
+    poses = columns.with_columns(pl.col(pl.Float64).fill_nan(None))
     angles = pl.DataFrame(located.angles).with_columns(pl.col(pl.Float64).fill_nan(None))
     return Drive(poses, angles, located.remarks, located)
 

@@ -103,6 +103,8 @@ fn a_recorded_drive_is_located() {
     let mut stranger = angles[20];
     stranger.ssb.pci = 999;
     angles.insert(20, stranger);
+    // And one that comes a second late.
+    angles.insert(100, angles[4]);
     let file = dir.join("angles.csv");
     write_angle_log(&file, &angles).unwrap();
     let angles = read_angle_log(&file).unwrap().angles;
@@ -112,6 +114,7 @@ fn a_recorded_drive_is_located() {
         again.executions[20].verdict.reason.name(),
         "unknown radio head"
     );
+    assert_eq!(again.executions[100].verdict.reason.name(), "time reversed");
     println!("RMS error {from_samples_m:.3} m from samples, {from_angles_m:.3} m from angles");
     assert!(from_samples_m < 0.5, "{from_samples_m}");
     assert!((from_samples_m - from_angles_m).abs() < 1e-6);

@@ -169,7 +169,8 @@ impl LocatedDrive {
     }
 
     /// One pose per odometry sample: columns `time_s`, `x_m`, `y_m`, `heading_rad`, `speed_mps`,
-    /// and the covariance `xx_m2`, `xy_m2`, `yy_m2`, `heading_rad2`, NaN where it is not known.
+    /// the covariance `xx_m2`, `xy_m2`, `yy_m2`, `heading_rad2` and the `protection_level_m`, NaN where
+    /// they are not known, and `integrity`: `ok`, `degraded`, `unavailable` or None.
     #[getter]
     fn poses<'py>(&self, py: Python<'py>) -> PyResult<Bound<'py, PyDict>> {
         let poses = &self.core.poses;
@@ -186,6 +187,16 @@ impl LocatedDrive {
         columns.set_item("xy_m2", column(|it| covariance(it, 0, 1)))?;
         columns.set_item("yy_m2", column(|it| covariance(it, 1, 1)))?;
         columns.set_item("heading_rad2", column(|it| covariance(it, 2, 2)))?;
+        columns.set_item(
+            "protection_level_m",
+            column(|it| {
+                it.estimate
+                    .integrity
+                    .map_or(f64::NAN, |integrity| integrity.protection_level_m)
+            }),
+        )?;
+        let state = |it: &replay::LocatedPose| Some(it.estimate.integrity?.state.name());
+        columns.set_item("integrity", poses.iter().map(state).collect::<Vec<_>>())?;
         Ok(columns)
     }
 

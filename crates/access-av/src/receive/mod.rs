@@ -17,4 +17,4 @@ pub use receiver::{ReceiveError, Receiver, ReceiverConfig, Window};
 pub use scan::{FoundSsb, Scan, ScanError, ScanSettings, scan};
 
 /// Samples of an SSB at the base rate: four symbols of 256 with a cyclic prefix of 18.
-const SSB_SAMPLES: usize = 4 * 274;
+pub(crate) const SSB_SAMPLES: usize = 4 * 274;

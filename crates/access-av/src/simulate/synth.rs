@@ -10,15 +10,13 @@ use thiserror::Error;
 use crate::channel::{HeadChannel, IqAir};
 use crate::observation::ANTENNAS;
 use crate::random::Streams;
+use crate::receive::SSB_SAMPLES;
 use crate::recording::{
     Annotation, Datatype, RecordingError, RecordingWriter, Site, TimedPose, WriterSettings,
     write_odometry_csv, write_tum,
 };
 use crate::scenario::{Check, Scenario, ScenarioError};
 use crate::world::{Odometer, RadioHead, Vehicle, VehicleState};
-
-/// Samples of an SSB at the base rate.
-const SSB_SAMPLES: u64 = 4 * 274;
 
 /// How a scenario is recorded.
 #[derive(Debug, Clone, Copy, PartialEq)]
@@ -218,7 +216,7 @@ fn annotation(
     });
     Annotation {
         sample_start: sample_start.round() as u64,
-        sample_count: Some(SSB_SAMPLES),
+        sample_count: Some(SSB_SAMPLES as u64),
         freq_lower_edge_hz: Some(ssb_freq_hz - 120.0 * scs_hz),
         freq_upper_edge_hz: Some(ssb_freq_hz + 120.0 * scs_hz),
         label: Some(format!("SSB pci={} idx={}", head.pci, head.ssb_index)),

@@ -7,6 +7,7 @@ use std::path::Path;
 use mcap::McapError;
 
 use super::{DiagnosticLevel, DiagnosticStatus, Frames, McapWriter, Twist};
+use crate::localize::IntegrityState;
 use crate::onboard::Execution;
 use crate::recording::RecordingError;
 use crate::replay::{LocatedDrive, LocatedPose};
@@ -69,7 +70,15 @@ fn diagnosis(pose: &LocatedPose, lately: &[&Execution]) -> DiagnosticStatus {
         .iter()
         .filter(|execution| execution.verdict.accepted)
         .count();
+    let state = pose.estimate.integrity.map(|integrity| integrity.state);
     let (level, message) = match (accepted, lately.len()) {
+        _ if state == Some(IntegrityState::Unavailable) => {
+            (DiagnosticLevel::Error, "position not to be relied on")
+        }
+        _ if state == Some(IntegrityState::Degraded) => (
+            DiagnosticLevel::Warn,
+            "protection level above the alert limit",
+        ),
         (_, 0) => (DiagnosticLevel::Stale, "no SSB in the last second"),
         (0, _) => (
             DiagnosticLevel::Error,
@@ -91,6 +100,11 @@ fn diagnosis(pose: &LocatedPose, lately: &[&Execution]) -> DiagnosticStatus {
             "position_sigma_m".to_owned(),
             format!("{:.4}", (x + y).sqrt()),
         ));
+    }
+    if let Some(integrity) = &pose.estimate.integrity {
+        let level_m = format!("{:.3}", integrity.protection_level_m);
+        values.push(("protection_level_m".to_owned(), level_m));
+        values.push(("integrity".to_owned(), integrity.state.name().to_owned()));
     }
     DiagnosticStatus {
         level,
