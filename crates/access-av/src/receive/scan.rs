@@ -18,8 +18,6 @@ const BLOCK_S: f64 = 0.02;
 const RASTER_WINDOWS_S: [f64; 2] = [0.02, 0.16];
 /// Probability that 20 ms of noise make a cell, shared among the places looked at.
 const FALSE_ALARM: f64 = 1e-3;
-/// The same where the raster had nothing: the raster has used up most of it.
-const FALSE_ALARM_OFF_RASTER: f64 = 1e-4;
 
 /// What a scan is told; by default nothing.
 #[derive(Debug, Clone, PartialEq, Default)]
@@ -105,22 +103,15 @@ pub fn scan(source: &mut dyn IqSource, settings: &ScanSettings) -> Result<Scan, 
         file: file.clone(),
         source,
     };
+    let rate_hz = source.sample_rate_hz();
     // A rate that no numerology can use is better said before anything else.
-    FrontEnd::new(
-        source.sample_rate_hz(),
-        0.0,
-        SubcarrierSpacing::Khz15.hz(),
-        1,
-    )
-    .map_err(front_end_failed)?;
+    FrontEnd::new(rate_hz, 0.0, SubcarrierSpacing::Khz15.hz(), 1).map_err(front_end_failed)?;
     let centre_hz = settings
         .centre_frequency_hz
         .or(source.centre_frequency_hz())
         .ok_or_else(|| ScanError::NoCentreFrequency { file: file.clone() })?;
     let mut antennas = Vec::new();
-    let first_block = source
-        .length()
-        .min((BLOCK_S * source.sample_rate_hz()) as u64) as usize;
+    let first_block = source.length().min((BLOCK_S * rate_hz) as u64) as usize;
     source.read(0, first_block, &mut antennas)?;
     let slices: Vec<&[Complex32]> = antennas.iter().map(Vec::as_slice).collect();
     let mut found = Scan {
@@ -128,28 +119,20 @@ pub fn scan(source: &mut dyn IqSource, settings: &ScanSettings) -> Result<Scan, 
         ..Scan::default()
     };
     let mut votes = ExchangeVotes::default();
-    let rate_hz = source.sample_rate_hz();
-    let (places, false_alarm) = match settings.ssb_freq_hz {
-        Some(hz) => (given_places(rate_hz, hz, settings.spacing), FALSE_ALARM),
-        None => match raster_places(source, settings.spacing, centre_hz)? {
-            places if !places.is_empty() => (places, FALSE_ALARM),
-            // A private cell may stand off the raster; whoever recorded it probably tuned to it.
-            _ => (
-                given_places(rate_hz, centre_hz, settings.spacing),
-                FALSE_ALARM_OFF_RASTER,
-            ),
-        },
+    let places = match settings.ssb_freq_hz {
+        Some(hz) => given_places(rate_hz, hz, settings.spacing),
+        None => raster_places(source, settings.spacing, centre_hz)?,
     };
     for place in &places {
         let config = SearchConfig {
             // A centre of 0 Hz is none; a given frequency is meant as it is.
             ssb_freq_hz: (centre_hz > 0.0 || settings.ssb_freq_hz.is_some())
                 .then_some(place.ssb_freq_hz),
-            false_alarm: false_alarm / places.len() as f64,
+            false_alarm: FALSE_ALARM / places.len() as f64,
             ..SearchConfig::new(place.spacing, source.channels())
         };
         let mut front_end = FrontEnd::new(
-            source.sample_rate_hz(),
+            rate_hz,
             place.ssb_freq_hz - centre_hz,
             place.spacing.hz(),
             source.channels(),
