@@ -1,10 +1,9 @@
 //! Executions that each wake-up policy needs for the same error, on the yard:
 //! `cargo run --release --example wake_up_table -- [runs] [seed]`.
+#![allow(clippy::print_stdout, reason = "prints a table")]
 
 use std::error::Error;
 
-use access_av::onboard::Custom;
-use access_av::platform::Platform;
 use access_av::scenario::Scenario;
 use access_av::simulate::{CampaignOptions, Simulation};
 
@@ -81,23 +80,15 @@ fn print(name: &str, outcome: &Outcome) {
 }
 
 fn drive(scenario: Scenario, runs: usize, seed: u64) -> Result<Outcome, Box<dyn Error>> {
-    let platform = Platform::load(&scenario.platform.name)?;
-    let simulation = Simulation::new(scenario, platform)?;
-    let campaign = simulation.campaign(&CampaignOptions {
+    let campaign = Simulation::on_its_platform(scenario)?.campaign(&CampaignOptions {
         seed,
-        first_run: 0,
         runs,
-        threads: None,
-        keep_records: false,
-        custom: &Custom::default,
-        progress: &|_| true,
+        ..CampaignOptions::default()
     })?;
-    let mean = |of: &dyn Fn(&access_av::simulate::RunSummary) -> usize| {
-        campaign.runs.iter().map(|run| of(run) as f64).sum::<f64>() / runs as f64
-    };
+    let listened: usize = campaign.runs.iter().map(|run| run.listened).sum();
     Ok(Outcome {
         p90_m: campaign.errors.quantile_m(0.9).unwrap_or(f64::NAN),
-        executions: mean(&|run| run.executions),
-        listened: mean(&|run| run.listened),
+        executions: campaign.mean_executions(),
+        listened: listened as f64 / runs as f64,
     })
 }

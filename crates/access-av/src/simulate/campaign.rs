@@ -3,9 +3,10 @@
 use rayon::ThreadPoolBuilder;
 use rayon::prelude::*;
 
-use super::{ErrorHistogram, RunRecord, Simulation, SimulationError};
+use super::{ErrorHistogram, IntegritySummary, RunRecord, Simulation, SimulationError};
 use crate::energy::{Energy, EnergyModel};
 use crate::onboard::Custom;
+use crate::scenario::LocalizerSettings;
 
 /// How a campaign is carried out; none of it but `seed`, `first_run` and `runs` touches its numbers.
 #[derive(Clone, Copy)]
@@ -26,6 +27,21 @@ pub struct CampaignOptions<'a> {
     pub progress: &'a dyn Fn(usize) -> bool,
 }
 
+impl Default for CampaignOptions<'_> {
+    /// One run of seed 0 on every core, with nothing kept and nobody told.
+    fn default() -> Self {
+        Self {
+            seed: 0,
+            first_run: 0,
+            runs: 1,
+            threads: None,
+            keep_records: false,
+            custom: &Custom::default,
+            progress: &|_| true,
+        }
+    }
+}
+
 /// Errors at one SSB, over all runs.
 #[derive(Debug, Clone, PartialEq, Default)]
 pub struct StepStatistics {
@@ -35,6 +51,11 @@ pub struct StepStatistics {
     pub mean_abs_error_y_m: f64,
     /// Root mean square of the horizontal error in metres.
     pub rms_error_m: f64,
+    /// What the localizer's covariances make of it; `None` where it has none.
+    pub predicted_rms_m: Option<f64>,
+    /// Mean of the squared position error normalised by its covariance (NEES), 2 for a localizer
+    /// that is as wrong as it says; `None` where it has no covariance, or one without area.
+    pub mean_nees: Option<f64>,
     /// Root mean square of the heading error in radians.
     pub rms_heading_error_rad: f64,
     /// Mean SNR by link budget and shadowing, in dB.
@@ -77,6 +98,8 @@ pub struct Campaign {
     pub runs: Vec<RunSummary>,
     /// Horizontal errors of all steps of all runs.
     pub errors: ErrorHistogram,
+    /// How the runs kept to their protection levels, by number; empty where none are stated.
+    pub integrity: Vec<IntegritySummary>,
     /// The runs' records, where asked for.
     pub records: Vec<RunRecord>,
 }
@@ -86,6 +109,8 @@ struct StepSums {
     abs_x_m: f64,
     abs_y_m: f64,
     square_m2: f64,
+    predicted_m2: f64,
+    nees: f64,
     heading_rad2: f64,
     snr_db: f64,
     errors: ErrorHistogram,
@@ -104,7 +129,12 @@ impl Simulation {
         let mut sums = vec![StepSums::default(); self.steps()];
         let mut errors = ErrorHistogram::default();
         let mut runs = Vec::with_capacity(options.runs);
+        let mut integrity = Vec::new();
         let mut records = Vec::new();
+        let alert_limit_m = match self.scenario().localizer {
+            LocalizerSettings::Tracker(settings) => settings.alert_limit_m,
+            LocalizerSettings::DeadReckoning(_) => f64::INFINITY,
+        };
         let pool = ThreadPoolBuilder::new()
             .num_threads(options.threads.unwrap_or(0))
             .build()?;
@@ -121,6 +151,7 @@ impl Simulation {
                 let record = record?;
                 add_up(&record, &mut sums, &mut errors);
                 runs.push(summary(&record, energy.as_ref()));
+                integrity.extend(IntegritySummary::new(&record, alert_limit_m));
                 if options.keep_records {
                     records.push(record);
                 }
@@ -137,13 +168,14 @@ impl Simulation {
             steps: sums.iter().map(|sums| sums.statistics(count)).collect(),
             runs,
             errors,
+            integrity,
             records,
         })
     }
 }
 
 fn summary(record: &RunRecord, energy: Option<&EnergyModel>) -> RunSummary {
-    let errors_m = || record.steps.iter().map(horizontal_error_m);
+    let errors_m = || record.steps.iter().map(super::Step::error_m);
     let duration_s = record.steps.last().map_or(0.0, |step| step.time_s);
     let squares_m2: f64 = errors_m().map(|error_m| error_m * error_m).sum();
     RunSummary {
@@ -158,18 +190,17 @@ fn summary(record: &RunRecord, energy: Option<&EnergyModel>) -> RunSummary {
     }
 }
 
-fn horizontal_error_m(step: &super::Step) -> f64 {
-    step.truth.point().distance_m(step.estimate.point())
-}
-
 fn add_up(record: &RunRecord, sums: &mut [StepSums], errors: &mut ErrorHistogram) {
     for (step, sums) in record.steps.iter().zip(sums) {
-        let error_m = horizontal_error_m(step);
+        let error_m = step.error_m();
         let heading_rad =
             crate::geometry::wrap_angle(step.estimate.heading_rad - step.truth.heading_rad);
         sums.abs_x_m += (step.estimate.x_m - step.truth.x_m).abs();
         sums.abs_y_m += (step.estimate.y_m - step.truth.y_m).abs();
         sums.square_m2 += error_m * error_m;
+        // A single run without makes the sum NaN, and the mean none.
+        sums.predicted_m2 += step.predicted_m2().unwrap_or(f64::NAN);
+        sums.nees += step.nees().unwrap_or(f64::NAN);
         sums.heading_rad2 += heading_rad * heading_rad;
         sums.snr_db += step.snr_db;
         sums.errors.add(error_m);
@@ -179,11 +210,14 @@ fn add_up(record: &RunRecord, sums: &mut [StepSums], errors: &mut ErrorHistogram
 
 impl StepSums {
     fn statistics(&self, count: f64) -> StepStatistics {
+        let number = |value: f64| (!value.is_nan()).then_some(value);
         let quantile_m = |probability| self.errors.quantile_m(probability).unwrap_or(f64::NAN);
         StepStatistics {
             mean_abs_error_x_m: self.abs_x_m / count,
             mean_abs_error_y_m: self.abs_y_m / count,
             rms_error_m: (self.square_m2 / count).sqrt(),
+            predicted_rms_m: number((self.predicted_m2 / count).sqrt()),
+            mean_nees: number(self.nees / count),
             rms_heading_error_rad: (self.heading_rad2 / count).sqrt(),
             mean_snr_db: self.snr_db / count,
             p50_error_m: quantile_m(0.5),

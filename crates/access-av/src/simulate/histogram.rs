@@ -33,6 +33,14 @@ impl ErrorHistogram {
         }
     }
 
+    /// Counts everything another histogram has counted.
+    pub fn merge(&mut self, other: &Self) {
+        for (count, more) in self.counts.iter_mut().zip(other.counts.iter()) {
+            *count += more;
+        }
+        self.total += other.total;
+    }
+
     /// The error in metres that the share `probability` of all stays below; `None` when empty.
     pub fn quantile_m(&self, probability: f64) -> Option<f64> {
         let wanted = probability * f64::from(self.total);

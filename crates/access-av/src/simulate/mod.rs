@@ -1,15 +1,21 @@
 //! Simulated drives: one run, and campaigns of many.
 
+mod bootstrap;
 mod campaign;
+mod consistency;
 mod histogram;
+mod integrity_summary;
 mod iq_reception;
 mod run;
 mod synth;
 
 use thiserror::Error;
 
+pub use bootstrap::bootstrap_interval;
 pub use campaign::{Campaign, CampaignOptions, RunSummary, StepStatistics};
+pub use consistency::Consistency;
 pub use histogram::ErrorHistogram;
+pub use integrity_summary::IntegritySummary;
 pub use run::{RunRecord, Simulation, Step};
 pub use synth::{SynthError, SynthSettings, Synthesized, synthesize};
 

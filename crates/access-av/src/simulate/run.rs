@@ -41,6 +41,32 @@ pub struct Step {
     pub snr_db: f64,
 }
 
+impl Step {
+    /// Horizontal error in metres.
+    pub fn error_m(&self) -> f64 {
+        self.truth.point().distance_m(self.estimate.point())
+    }
+
+    /// Sum of the variances of the horizontal error in m²; `None` where the localizer has none.
+    pub fn predicted_m2(&self) -> Option<f64> {
+        let [[xx, ..], [_, yy, _], _] = self.covariance?;
+        Some(xx + yy)
+    }
+
+    /// Squared horizontal error normalised by its covariance (NEES); `None` where the localizer
+    /// has none, or one without area.
+    pub fn nees(&self) -> Option<f64> {
+        let [[xx, xy, _], [_, yy, _], _] = self.covariance?;
+        let (dx, dy) = (
+            self.estimate.x_m - self.truth.x_m,
+            self.estimate.y_m - self.truth.y_m,
+        );
+        let determinant = xx * yy - xy * xy;
+        let nees = (yy * dx * dx - 2.0 * xy * dx * dy + xx * dy * dy) / determinant;
+        (determinant > 0.0).then_some(nees)
+    }
+}
+
 /// All that happened in one run.
 #[derive(Debug, Clone, PartialEq)]
 pub struct RunRecord {
@@ -72,6 +98,15 @@ impl Simulation {
             track,
             steps,
         })
+    }
+
+    /// A scenario on the platform it names.
+    ///
+    /// # Errors
+    /// [`ScenarioError`] when there is no such platform, or it lacks what the scenario asks of it.
+    pub fn on_its_platform(scenario: Scenario) -> Result<Self, ScenarioError> {
+        let platform = Platform::load(&scenario.platform.name)?;
+        Self::new(scenario, platform)
     }
 
     /// The scenario.

@@ -1,0 +1,88 @@
+//! Whether a localizer is as wrong as it says.
+
+use super::Campaign;
+
+/// Standard normal quantile of a two-sided 95 % band.
+const BAND: f64 = 1.959_964;
+
+/// A campaign's errors beside their own prediction.
+#[derive(Debug, Clone, Copy, PartialEq)]
+pub struct Consistency {
+    /// Root mean square of the horizontal error in metres ...
+    pub rms_m: f64,
+    /// ... and what the localizer's covariances made of it; NaN where it has none.
+    pub predicted_rms_m: f64,
+    /// 90th percentile of the horizontal error in metres.
+    pub p90_m: f64,
+    /// Mean of the normalised squared position error (NEES), 2 for a consistent localizer.
+    pub mean_nees: f64,
+    /// Share of the steps whose mean NEES over the runs lies within its 95 % band.
+    pub in_band: f64,
+}
+
+impl Campaign {
+    /// Errors against covariances. The NEES of the first `skip` steps is left out: a start that is
+    /// known exactly has an error ellipse without area.
+    pub fn consistency(&self, skip: usize) -> Consistency {
+        let [low, high] = nees_band(self.runs.len());
+        let nees = || {
+            self.steps
+                .iter()
+                .skip(skip)
+                .filter_map(|step| step.mean_nees)
+        };
+        let within = nees().filter(|nees| (low..high).contains(nees));
+        let squares_m2 = || self.steps.iter().map(|step| step.rms_error_m.powi(2));
+        let predicted_m = || self.steps.iter().filter_map(|step| step.predicted_rms_m);
+        Consistency {
+            rms_m: mean(squares_m2()).sqrt(),
+            predicted_rms_m: mean(predicted_m().map(|rms_m| rms_m * rms_m)).sqrt(),
+            p90_m: self.errors.quantile_m(0.9).unwrap_or(f64::NAN),
+            mean_nees: mean(nees()),
+            in_band: within.count() as f64 / nees().count() as f64,
+        }
+    }
+
+    /// Largest mean of |x error| and of |y error| over the steps, in metres: the paper's figures.
+    pub fn worst_mean_abs_error_m(&self) -> [f64; 2] {
+        self.steps
+            .iter()
+            .fold([0.0; 2], |[x_m, y_m]: [f64; 2], step| {
+                [
+                    x_m.max(step.mean_abs_error_x_m),
+                    y_m.max(step.mean_abs_error_y_m),
+                ]
+            })
+    }
+
+    /// Mean number of estimated angles in a run.
+    pub fn mean_executions(&self) -> f64 {
+        mean(self.runs.iter().map(|run| run.executions as f64))
+    }
+}
+
+fn mean(values: impl Iterator<Item = f64>) -> f64 {
+    let (sum, count) = values.fold((0.0, 0.0), |(sum, count), value| (sum + value, count + 1.0));
+    sum / count
+}
+
+/// 95 % band of the mean NEES over `runs` runs: χ² with two degrees of freedom each, by the cube
+/// root transformation of Wilson and Hilferty.
+fn nees_band(runs: usize) -> [f64; 2] {
+    let freedom = 2.0 * runs as f64;
+    let spread = 2.0 / (9.0 * freedom);
+    [-BAND, BAND].map(|z| 2.0 * (1.0 - spread + z * spread.sqrt()).powi(3))
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    #[test]
+    fn band_is_that_of_chi_squared() {
+        // χ²(200): 162.73 and 241.06.
+        let [low, high] = nees_band(100);
+        assert!((low - 1.6273).abs() < 1e-3, "{low}");
+        assert!((high - 2.4106).abs() < 1e-3, "{high}");
+    }
+}

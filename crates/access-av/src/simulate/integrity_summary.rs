@@ -1,0 +1,170 @@
+//! How a guarded localizer kept its promises in one run.
+
+use super::{ErrorHistogram, RunRecord};
+use crate::localize::IntegrityState;
+
+/// Least error in metres that a protection level is divided by: below it the error is no error.
+const LEAST_ERROR_M: f64 = 1e-3;
+
+/// What became of protection levels and alarms in one run. Its epochs hang together: what counts as
+/// independent is the run.
+#[derive(Debug, Clone, PartialEq, Default)]
+pub struct IntegritySummary {
+    /// Steps with a protection level.
+    pub epochs: usize,
+    /// Those whose state was `ok`.
+    pub ok: usize,
+    /// Those whose state was `ok` although the error was beyond the protection level.
+    pub beyond: usize,
+    /// Times at which the state left `ok` ...
+    pub alarms: usize,
+    /// ... and those of them at which the error was within the alert limit.
+    pub early_alarms: usize,
+    /// Times at which the error passed the alert limit.
+    pub excursions: usize,
+    /// Longest time in seconds that the error had been beyond the alert limit while the state was
+    /// `ok`.
+    pub longest_silence_s: f64,
+    /// Largest horizontal error in metres.
+    pub worst_m: f64,
+    /// Time driven in seconds.
+    pub duration_s: f64,
+    /// Protection level over error.
+    pub ratios: ErrorHistogram,
+}
+
+impl IntegritySummary {
+    /// The summary of a run; `None` where its localizer stated no protection level.
+    pub fn new(record: &RunRecord, alert_limit_m: f64) -> Option<Self> {
+        let mut summary = Self::default();
+        let mut was_ok = true;
+        let mut exceeded_since_s = None;
+        for step in &record.steps {
+            let integrity = step.integrity?;
+            let error_m = step.error_m();
+            let ok = integrity.state == IntegrityState::Ok;
+            let exceeds = error_m > alert_limit_m;
+            summary.epochs += 1;
+            summary.ok += usize::from(ok);
+            summary.beyond += usize::from(ok && error_m > integrity.protection_level_m);
+            summary.alarms += usize::from(was_ok && !ok);
+            summary.early_alarms += usize::from(was_ok && !ok && !exceeds);
+            summary.worst_m = summary.worst_m.max(error_m);
+            if exceeds {
+                summary.excursions += usize::from(exceeded_since_s.is_none());
+                let since_s = *exceeded_since_s.get_or_insert(step.time_s);
+                if ok {
+                    summary.longest_silence_s =
+                        summary.longest_silence_s.max(step.time_s - since_s);
+                }
+            } else {
+                exceeded_since_s = None;
+            }
+            let ratio = integrity.protection_level_m / error_m.max(LEAST_ERROR_M);
+            summary.ratios.add(ratio);
+            was_ok = ok;
+        }
+        summary.duration_s = record.steps.last()?.time_s;
+        Some(summary)
+    }
+
+    /// Several runs as one.
+    pub fn sum<'a>(runs: impl IntoIterator<Item = &'a Self>) -> Self {
+        let mut total = Self::default();
+        for run in runs {
+            total.epochs += run.epochs;
+            total.ok += run.ok;
+            total.beyond += run.beyond;
+            total.alarms += run.alarms;
+            total.early_alarms += run.early_alarms;
+            total.excursions += run.excursions;
+            total.longest_silence_s = total.longest_silence_s.max(run.longest_silence_s);
+            total.worst_m = total.worst_m.max(run.worst_m);
+            total.duration_s += run.duration_s;
+            total.ratios.merge(&run.ratios);
+        }
+        total
+    }
+
+    /// Share of the epochs in state `ok` whose error was beyond the protection level.
+    pub fn risk(&self) -> f64 {
+        self.beyond as f64 / self.ok.max(1) as f64
+    }
+
+    /// Alarms without need per hour.
+    pub fn early_alarms_per_h(&self) -> f64 {
+        self.early_alarms as f64 / (self.duration_s / 3600.0)
+    }
+
+    /// Median of protection level over error.
+    pub fn median_ratio(&self) -> f64 {
+        self.ratios.quantile_m(0.5).unwrap_or(f64::NAN)
+    }
+}
+
+#[cfg(test)]
+mod tests {
+    use super::super::Step;
+    use super::*;
+    use crate::geometry::Pose;
+    use crate::localize::Integrity;
+
+    fn record(steps: &[(f64, f64, IntegrityState)]) -> RunRecord {
+        let step = |(number, &(error_m, protection_level_m, state)): (usize, &_)| Step {
+            time_s: number as f64,
+            truth: Pose::default(),
+            estimate: Pose {
+                x_m: error_m,
+                ..Pose::default()
+            },
+            covariance: None,
+            integrity: Some(Integrity {
+                protection_level_m,
+                state,
+                faulty: 0,
+            }),
+            snr_db: 0.0,
+        };
+        RunRecord {
+            run: 0,
+            steps: steps.iter().enumerate().map(step).collect(),
+            executions: Vec::new(),
+            listened: 0,
+        }
+    }
+
+    #[test]
+    fn counts_what_it_says() {
+        use IntegrityState::{Degraded, Ok};
+        let record = record(&[
+            (0.1, 0.8, Ok),
+            (0.1, 0.8, Degraded), // an alarm without need
+            (0.5, 0.4, Ok),       // beyond its level
+            (2.0, 9.0, Ok),       // beyond the alert limit, silent for 0 s ...
+            (2.0, 9.0, Ok),       // ... 1 s ...
+            (2.0, 9.0, Degraded),
+            (2.0, 9.0, Ok), // ... and again 3 s after it began
+            (0.5, 9.0, Ok),
+            (2.0, 9.0, Degraded), // an alarm in time
+        ]);
+        let summary = IntegritySummary::new(&record, 1.5).unwrap();
+        assert_eq!((summary.epochs, summary.ok, summary.beyond), (9, 6, 1));
+        assert_eq!((summary.alarms, summary.early_alarms), (3, 1));
+        assert_eq!(summary.excursions, 2);
+        assert_eq!((summary.longest_silence_s, summary.worst_m), (3.0, 2.0));
+        let median = summary.median_ratio();
+        // A bin of the histogram is 6 % wide.
+        assert!((median / 4.5 - 1.0).abs() < 0.06, "{median}");
+        let twice = IntegritySummary::sum([&summary, &summary]);
+        assert_eq!((twice.beyond, twice.excursions), (2, 4));
+        assert!((twice.risk() - summary.risk()).abs() < 1e-15);
+        assert!((twice.early_alarms_per_h() - 450.0).abs() < 1e-9);
+    }
+
+    #[test]
+    fn without_protection_levels_there_is_no_summary() {
+        let mut record = record(&[(0.1, 0.8, IntegrityState::Ok)]);
+        record.steps[0].integrity = None;
+        assert_eq!(IntegritySummary::new(&record, 1.5), None);
+    }
+}
