@@ -8,11 +8,12 @@
 //! its wander do not change the geometry.
 //!
 //! One angle has the variance of its thermal noise (the Cramér–Rao bound of the snapshots at the
-//! link budget's SNR) and that of the scatter, one independent look per half wavelength: scatter
-//! that arrives from all directions is band-limited to two spatial frequencies per wavelength, and
-//! has so many degrees of freedom (Landau and Pollak 1962).
+//! link budget's SNR) and that of the scatter, which successive looks share as
+//! [`ArrayModel::correlation`](super::tracker::ArrayModel::correlation) says: its spectrum at the
+//! line of sight stands for white noise, as it may where the state changes little in a wavelength.
 
-use super::gaussian::Gaussian;
+use super::gaussian::{Gaussian, Matrix, identity, product};
+use super::ideal::IdealFilter;
 use super::thermal::ThermalNoise;
 use super::tracker::motion::Step;
 use super::tracker::sighting::{Footing, Sighting};
@@ -86,25 +87,60 @@ impl Bound {
 
     /// The bound at each SSB of the drive, every SSB being used.
     pub fn along_route(&self) -> Vec<BoundPoint> {
+        let look = self.config.array.scatter_bound(self.config.rician_k);
+        let array = &self.config.array;
+        let scatter = |travelled_m, toward| look * array.correlation(travelled_m, toward);
+        let mut points = Vec::new();
+        self.walk(scatter, |_, belief, time_s, along_m| {
+            points.push(self.point(belief, time_s, along_m));
+        });
+        points
+    }
+
+    /// A filter that makes the errors the tracker says it makes, at every `stride`-th SSB.
+    pub fn ideal_filter(&self, stride: usize) -> IdealFilter {
+        let scatter = |travelled_m, toward| self.config.look_variance(travelled_m, toward);
+        let mut filter = IdealFilter::default();
+        let (mut since, mut before) = (identity(), [[0.0; STATES]; STATES]);
+        let mut number = 0;
+        self.walk(scatter, |transition, belief, _, _| {
+            since = product(transition, &since);
+            if number % stride.max(1) == 0 {
+                filter.push(&since, &before, &belief.covariance);
+                (since, before) = (identity(), belief.covariance);
+            }
+            number += 1;
+        });
+        filter
+    }
+
+    /// Drives the route with looks whose scatter has the variance `scatter(travelled, toward)`,
+    /// and calls `visit(Ψ, belief, time, distance along the road)` at each SSB, Ψ being what
+    /// became of an error since the one before.
+    fn walk(
+        &self,
+        scatter: impl Fn(f64, f64) -> f64,
+        mut visit: impl FnMut(&Matrix<STATES>, &Belief, f64, f64),
+    ) {
         let map = self.map.then_some(&self.track);
         let mut belief = Tracker::prior(&self.config, map, &self.start);
         let mut last_look_m = f64::NEG_INFINITY;
         let mut before_m = 0.0;
         let steps = (self.motion.duration_s() / self.period_s).ceil() as usize + 1;
-        (0..steps)
-            .map(|number| {
-                let time_s = number as f64 * self.period_s;
-                let along_m = self.motion.at(time_s).along_m;
-                self.advance(&mut belief, along_m - before_m);
-                before_m = along_m;
-                self.listen(&mut belief, along_m, along_m - last_look_m);
-                last_look_m = along_m;
-                self.point(&belief, time_s, along_m)
-            })
-            .collect()
+        for number in 0..steps {
+            let time_s = number as f64 * self.period_s;
+            let along_m = self.motion.at(time_s).along_m;
+            let mut transition = self.advance(&mut belief, along_m - before_m);
+            before_m = along_m;
+            let travelled_m = along_m - last_look_m;
+            let scatter = |toward| scatter(travelled_m, toward);
+            self.listen(&mut belief, along_m, scatter, &mut transition);
+            last_look_m = along_m;
+            visit(&transition, &belief, time_s, along_m);
+        }
     }
 
-    fn advance(&self, belief: &mut Belief, length_m: f64) {
+    fn advance(&self, belief: &mut Belief, length_m: f64) -> Matrix<STATES> {
         let step = if self.map {
             let curvature_per_m = self
                 .track
@@ -126,10 +162,18 @@ impl Bound {
             )
         };
         belief.spread(&step.jacobian, &step.noise);
+        step.jacobian
     }
 
-    /// Puts the state at its true place and takes in an angle to each radio head.
-    fn listen(&self, belief: &mut Belief, along_m: f64, travelled_m: f64) {
+    /// Puts the state at its true place and takes in an angle to each radio head; `transition`
+    /// follows what becomes of an error.
+    fn listen(
+        &self,
+        belief: &mut Belief,
+        along_m: f64,
+        scatter: impl Fn(f64) -> f64,
+        transition: &mut Matrix<STATES>,
+    ) {
         let pose = self.track.pose(along_m);
         let curvature_per_m = self.track.curvature_per_m(along_m);
         let footing = if self.map {
@@ -146,13 +190,30 @@ impl Bound {
             belief.mean[CURVATURE] = curvature_per_m;
             Footing::PLANE
         };
-        let scatter = self.config.look_variance(travelled_m);
         let (mounting, array) = (belief.mean[MOUNTING], &self.config.array);
         for head in &self.heads {
             let sighting = Sighting::new(head.position, pose, &footing, mounting, 0.0, array);
-            if let Some(sighting) = sighting {
-                let variance = scatter + self.thermal.variance(head, sighting.range_m);
-                belief.update(0.0, &sighting.row, variance);
+            if let Some(Sighting {
+                row,
+                range_m,
+                toward,
+                ..
+            }) = sighting
+            {
+                let variance = scatter(toward) + self.thermal.variance(head, range_m);
+                let gain = belief.update(0.0, &row, variance);
+                // (I − K H) times the transition so far.
+                let mut seen = [0.0; STATES];
+                for j in 0..STATES {
+                    for k in 0..STATES {
+                        seen[j] += row[k] * transition[k][j];
+                    }
+                }
+                for i in 0..STATES {
+                    for j in 0..STATES {
+                        transition[i][j] -= gain[i] * seen[j];
+                    }
+                }
             }
         }
     }
@@ -204,9 +265,9 @@ impl Bound {
                 y_m: place.y_m,
                 heading_rad,
             };
-            let scatter = self.config.look_variance(f64::INFINITY);
+            let array = &self.config.array;
+            let scatter = array.scatter_bound(self.config.rician_k);
             for head in &self.heads {
-                let array = &self.config.array;
                 let sighting =
                     Sighting::new(head.position, pose, &Footing::PLANE, 0.0, 0.0, array)?;
                 let thermal = self.thermal.variance(head, sighting.range_m);

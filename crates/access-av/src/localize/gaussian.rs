@@ -4,6 +4,28 @@
 /// Square matrix, row major.
 pub type Matrix<const N: usize> = [[f64; N]; N];
 
+/// The identity.
+pub(super) fn identity<const N: usize>() -> Matrix<N> {
+    let mut matrix = [[0.0; N]; N];
+    for (i, row) in matrix.iter_mut().enumerate() {
+        row[i] = 1.0;
+    }
+    matrix
+}
+
+/// Matrix product.
+pub(super) fn product<const N: usize>(left: &Matrix<N>, right: &Matrix<N>) -> Matrix<N> {
+    let mut product = [[0.0; N]; N];
+    for i in 0..N {
+        for k in 0..N {
+            for j in 0..N {
+                product[i][j] += left[i][k] * right[k][j];
+            }
+        }
+    }
+    product
+}
+
 /// Mean and covariance of `N` states.
 #[derive(Clone, Copy, Debug, PartialEq)]
 pub struct Gaussian<const N: usize> {
@@ -97,11 +119,12 @@ impl<const N: usize> Gaussian<N> {
 
     /// Kalman update by one scalar measurement, covariance in Joseph form
     /// `(I − K H) P (I − K H)ᵀ + K R Kᵀ`, written out for one row so that it costs one pass.
-    pub fn update(&mut self, residual: f64, row: &[f64; N], variance: f64) {
+    /// Returns the gain K.
+    pub fn update(&mut self, residual: f64, row: &[f64; N], variance: f64) -> [f64; N] {
         let cross = self.cross(row);
         let total = (0..N).map(|i| row[i] * cross[i]).sum::<f64>().max(0.0) + variance;
         if total <= 0.0 {
-            return; // both the belief and the measurement are exact: nothing to learn
+            return [0.0; N]; // both the belief and the measurement are exact: nothing to learn
         }
         let mut gain = cross;
         for g in &mut gain {
@@ -118,6 +141,7 @@ impl<const N: usize> Gaussian<N> {
                 self.covariance[j][i] = p;
             }
         }
+        gain
     }
 }
 

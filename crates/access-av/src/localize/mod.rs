@@ -3,6 +3,7 @@
 pub mod bound;
 mod dead_reckoning;
 pub mod gaussian;
+pub mod ideal;
 pub mod initialise;
 pub mod integrity;
 pub mod thermal;

@@ -174,6 +174,32 @@ impl Simulation {
     }
 }
 
+impl Campaign {
+    /// The campaign of these runs, of equally many steps each.
+    pub(super) fn of(records: impl IntoIterator<Item = RunRecord>) -> Self {
+        let mut sums = Vec::new();
+        let mut campaign = Self {
+            time_s: Vec::new(),
+            steps: Vec::new(),
+            runs: Vec::new(),
+            errors: ErrorHistogram::default(),
+            integrity: Vec::new(),
+            records: Vec::new(),
+        };
+        for record in records {
+            if sums.is_empty() {
+                sums = vec![StepSums::default(); record.steps.len()];
+                campaign.time_s = record.steps.iter().map(|step| step.time_s).collect();
+            }
+            add_up(&record, &mut sums, &mut campaign.errors);
+            campaign.runs.push(summary(&record, None));
+        }
+        let count = campaign.runs.len() as f64;
+        campaign.steps = sums.iter().map(|sums| sums.statistics(count)).collect();
+        campaign
+    }
+}
+
 fn summary(record: &RunRecord, energy: Option<&EnergyModel>) -> RunSummary {
     let errors_m = || record.steps.iter().map(super::Step::error_m);
     let duration_s = record.steps.last().map_or(0.0, |step| step.time_s);

@@ -4,6 +4,7 @@ mod bootstrap;
 mod campaign;
 mod consistency;
 mod histogram;
+mod ideal;
 mod integrity_summary;
 mod iq_reception;
 mod run;

@@ -102,12 +102,11 @@ impl TrackerConfig {
     }
 
     /// Variance (rad²) that scatter adds to an angle `travelled_m` after the radio head's last
-    /// one: a look is independent of the last after half a wavelength, and a share of a look
-    /// before.
-    pub fn look_variance(&self, travelled_m: f64) -> f64 {
-        // Standing still nothing new is learnt, but the variance must stay a number.
-        let share = (2.0 * travelled_m / self.array.wavelength_m).clamp(1e-9, 1.0);
-        self.array.scatter_variance(self.rician_k) / share
+    /// one, see [`ArrayModel::correlation`]. A look never counts for more than one, although at
+    /// some regular spacings their errors cancel: a vehicle's looks need not stay regular.
+    pub fn look_variance(&self, travelled_m: f64, toward: f64) -> f64 {
+        let correlation = self.array.correlation(travelled_m, toward).max(1.0);
+        self.array.scatter_variance(self.rician_k) * correlation
     }
 
     /// Variance of the distance (m²) driven during `duration_s` without odometry.

@@ -202,7 +202,9 @@ impl Tracker {
             .ok_or(UpdateReason::Unusable)?;
         let place_m = self.driven_m + ahead_m;
         let measurement_variance = sigma * sigma
-            + self.config.look_variance(place_m - head.last_look_m)
+            + self
+                .config
+                .look_variance(place_m - head.last_look_m, sighting.toward)
             + sighting.row[ALONG].powi(2) * ahead_variance;
         let residual = wrap_angle(measured.phase_rad - sighting.phase_rad);
         let innovation = self
@@ -342,7 +344,8 @@ impl Tracker {
         let place = known.known.position;
         let sighting = Sighting::new(place, pose, &footing, mounting, offset, array)?;
         let travelled_m = self.driven_m + ahead_m - known.last_look_m;
-        let variance = thermal(sighting.range_m) + self.config.look_variance(travelled_m);
+        let variance =
+            thermal(sighting.range_m) + self.config.look_variance(travelled_m, sighting.toward);
         let mut rehearsed = *belief;
         rehearsed.update(0.0, &sighting.row, variance);
         Some(rehearsed)

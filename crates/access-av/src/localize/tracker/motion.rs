@@ -10,7 +10,7 @@
 use super::state::{
     ACROSS, ALONG, Belief, CURVATURE, HEADING, MOUNTING, PHASE, SCALE, STATES, YAW_RATE_BIAS,
 };
-use crate::localize::gaussian::Matrix;
+use crate::localize::gaussian::{Matrix, identity};
 use crate::world::LaneKeeping;
 
 /// How the path bends where no map tells.
@@ -35,14 +35,6 @@ pub struct MotionNoise {
     pub mounting_rad_per_sqrt_m: f64,
     /// Random walk of the phase offset (rad per √m).
     pub phase_rad_per_sqrt_m: f64,
-}
-
-fn identity() -> Matrix<STATES> {
-    let mut matrix = [[0.0; STATES]; STATES];
-    for (i, row) in matrix.iter_mut().enumerate() {
-        row[i] = 1.0;
-    }
-    matrix
 }
 
 /// One step of the motion, linearised at the mean it starts from.

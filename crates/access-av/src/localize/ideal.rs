@@ -1,0 +1,136 @@
+//! The errors of a filter that is exactly as good as it says: what a campaign of a given size may
+//! show by chance, and against which its figures are to be judged.
+//!
+//! Such a filter's error is the Gauss–Markov process of its own covariance: over a stretch of the
+//! route `e⁺ = Ψ e + ξ`, with the closed-loop transition `Ψ = Π (I − K H) F` and
+//! `Cov ξ = P⁺ − Ψ P Ψᵀ`. An odometer's scale and the start stay with a vehicle for the whole run,
+//! so that the steps of a run are far from independent and even a perfect filter's figures scatter
+//! from campaign to campaign.
+
+use rand::RngExt;
+use rand_distr::StandardNormal;
+
+use super::gaussian::{Matrix, product};
+use super::tracker::state::{ACROSS, ALONG, STATES};
+use crate::random::{Purpose, Streams};
+
+/// A perfectly consistent filter along a route.
+#[derive(Clone, Debug, Default)]
+pub struct IdealFilter {
+    points: Vec<Point>,
+}
+
+/// One of the places where its error is drawn.
+#[derive(Clone, Copy, Debug)]
+struct Point {
+    transition: Matrix<STATES>,
+    /// Cholesky factor of what is new in the error.
+    fresh: Matrix<STATES>,
+    covariance_m2: [[f64; 2]; 2],
+}
+
+/// Its error at one of these places, along the filter's first two states.
+#[derive(Clone, Copy, Debug, PartialEq)]
+pub struct IdealError {
+    /// The error (m).
+    pub error_m: [f64; 2],
+    /// Its covariance (m²).
+    pub covariance_m2: [[f64; 2]; 2],
+}
+
+impl IdealFilter {
+    /// Adds the next place: the closed-loop transition to it and the covariances before and after.
+    pub(super) fn push(
+        &mut self,
+        transition: &Matrix<STATES>,
+        before: &Matrix<STATES>,
+        after: &Matrix<STATES>,
+    ) {
+        let carried = product(transition, before);
+        let mut fresh = *after;
+        for i in 0..STATES {
+            for j in 0..STATES {
+                for k in 0..STATES {
+                    fresh[i][j] -= carried[i][k] * transition[j][k];
+                }
+            }
+        }
+        self.points.push(Point {
+            transition: *transition,
+            fresh: cholesky(&fresh, after),
+            covariance_m2: [
+                [after[ALONG][ALONG], after[ALONG][ACROSS]],
+                [after[ACROSS][ALONG], after[ACROSS][ACROSS]],
+            ],
+        });
+    }
+
+    /// The errors of one run. The first place's transition starts from nothing.
+    pub fn run(&self, seed: u64, run: u64) -> impl Iterator<Item = IdealError> {
+        let mut rng = Streams::new(seed, run).generator(Purpose::Start, 1);
+        let mut error = [0.0; STATES];
+        self.points.iter().map(move |point| {
+            let draws = [(); STATES].map(|()| rng.sample::<f64, _>(StandardNormal));
+            let mut next = [0.0; STATES];
+            for i in 0..STATES {
+                for j in 0..STATES {
+                    next[i] += point.transition[i][j] * error[j] + point.fresh[i][j] * draws[j];
+                }
+            }
+            error = next;
+            IdealError {
+                error_m: [error[ALONG], error[ACROSS]],
+                covariance_m2: point.covariance_m2,
+            }
+        })
+    }
+}
+
+/// Lower factor `L Lᵀ` of a positive semidefinite matrix; directions that have less than a
+/// rounding error of the variance `scale` get none.
+fn cholesky(matrix: &Matrix<STATES>, scale: &Matrix<STATES>) -> Matrix<STATES> {
+    let mut factor = [[0.0; STATES]; STATES];
+    for j in 0..STATES {
+        let own = matrix[j][j] - (0..j).map(|k| factor[j][k] * factor[j][k]).sum::<f64>();
+        if own <= 1e-12 * scale[j][j] {
+            continue;
+        }
+        factor[j][j] = own.sqrt();
+        for i in j + 1..STATES {
+            let shared = (0..j).map(|k| factor[i][k] * factor[j][k]).sum::<f64>();
+            factor[i][j] = (matrix[i][j] - shared) / factor[j][j];
+        }
+    }
+    factor
+}
+
+#[cfg(test)]
+mod tests {
+    use crate::localize::bound::Bound;
+    use crate::scenario::Scenario;
+
+    #[test]
+    fn its_errors_have_the_covariance_it_states() {
+        let scenario = Scenario::load("paper-real-odometry-2").unwrap();
+        let filter = Bound::new(&scenario).unwrap().ideal_filter(200);
+        let runs = 4000;
+        let mut sums = vec![[0.0; 3]; filter.points.len()];
+        for run in 0..runs {
+            for (sums, drawn) in sums.iter_mut().zip(filter.run(3, run)) {
+                let [a, b] = drawn.error_m;
+                for (sum, product) in sums.iter_mut().zip([a * a, a * b, b * b]) {
+                    *sum += product / runs as f64;
+                }
+            }
+        }
+        // The first place is an exact start.
+        for (point, [aa, ab, bb]) in filter.points.iter().zip(sums).skip(1) {
+            let [[paa, pab], [_, pbb]] = point.covariance_m2;
+            // Deviation of a sample covariance of Gaussians; four of them.
+            let tolerance = |variance: f64| 4.0 * (variance / runs as f64).sqrt();
+            assert!((aa - paa).abs() < tolerance(2.0 * paa * paa));
+            assert!((bb - pbb).abs() < tolerance(2.0 * pbb * pbb));
+            assert!((ab - pab).abs() < tolerance(paa * pbb + pab * pab));
+        }
+    }
+}

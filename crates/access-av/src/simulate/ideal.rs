@@ -1,0 +1,38 @@
+//! Campaigns of a filter that is exactly as good as it says.
+
+use super::{Campaign, RunRecord, Step};
+use crate::geometry::Pose;
+use crate::localize::ideal::{IdealError, IdealFilter};
+
+impl IdealFilter {
+    /// A campaign of `runs` runs of its errors, along the filter's first two states instead of x
+    /// and y.
+    pub fn campaign(&self, seed: u64, runs: u64) -> Campaign {
+        Campaign::of((0..runs).map(|run| self.record(seed, run)))
+    }
+
+    fn record(&self, seed: u64, run: u64) -> RunRecord {
+        let step = |(number, drawn): (usize, IdealError)| {
+            let [[aa, ab], [ba, bb]] = drawn.covariance_m2;
+            let [x_m, y_m] = drawn.error_m;
+            Step {
+                time_s: number as f64,
+                truth: Pose::default(),
+                estimate: Pose {
+                    x_m,
+                    y_m,
+                    ..Pose::default()
+                },
+                covariance: Some([[aa, ab, 0.0], [ba, bb, 0.0], [0.0; 3]]),
+                integrity: None,
+                snr_db: 0.0,
+            }
+        };
+        RunRecord {
+            run,
+            steps: self.run(seed, run).enumerate().map(step).collect(),
+            executions: Vec::new(),
+            listened: 0,
+        }
+    }
+}
