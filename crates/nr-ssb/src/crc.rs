@@ -24,11 +24,16 @@ const TABLE: [u32; 256] = {
 ///
 /// The first bit of the payload is the most significant one, and so is the first parity bit.
 /// Since the register starts at zero the map is linear: crc(a ⊕ b) = crc(a) ⊕ crc(b).
-pub fn crc24c(payload: u32) -> u32 {
-    payload.to_be_bytes().iter().fold(0, |crc, &byte| {
-        let index = (crc >> 16) as u8 ^ byte;
-        ((crc << 8) & 0xFF_FFFF) ^ TABLE[usize::from(index)]
-    })
+pub const fn crc24c(payload: u32) -> u32 {
+    let bytes = payload.to_be_bytes();
+    let mut crc = 0;
+    let mut i = 0;
+    while i < bytes.len() {
+        let index = (crc >> 16) as u8 ^ bytes[i];
+        crc = ((crc << 8) & 0xFF_FFFF) ^ TABLE[index as usize];
+        i += 1;
+    }
+    crc
 }
 
 #[cfg(test)]

@@ -7,66 +7,40 @@
     reason = "a test"
 )]
 
+mod noisy;
+
+use noisy::{block_errors, noisy_llr, random_payload};
 use nr_ssb::pbch::{self, Decoder, Period};
-use nr_ssb::{BchPayload, Complex32, Lmax, Mib, Pci};
-use rand::{Rng, RngExt, SeedableRng};
+use nr_ssb::{Lmax, Pci};
+use rand::{RngExt, SeedableRng};
 use rand_chacha::ChaCha8Rng;
-use rand_distr::{Distribution, StandardNormal};
 
-/// Ratios of `symbols` in white noise at an SNR per resource element.
-fn noisy_llr(symbols: &[Complex32; 432], snr_db: f32, rng: &mut impl Rng) -> [f32; 864] {
-    let noise_variance = 10f32.powf(-snr_db / 10.0);
-    let mut gauss = || -> f32 { StandardNormal.sample(rng) };
-    let received = symbols.map(|s| {
-        let noise = Complex32::new(gauss(), gauss());
-        s + noise * (noise_variance / 2.0).sqrt()
-    });
-    let mut llr = [0.0; 864];
-    pbch::llr(&received, noise_variance, &mut llr);
-    llr
-}
-
-fn random_payload(rng: &mut impl Rng, lmax: Lmax) -> BchPayload {
-    let mib = Mib::from_bits(rng.random_range(0..1 << 23)).unwrap();
-    let index = rng.random_range(0..lmax.count());
-    let payload = BchPayload::new(mib, rng.random_range(0..1024), rng.random(), index).unwrap();
-    BchPayload {
-        k_ssb_msb: lmax != Lmax::L64 && rng.random(),
-        ..payload
-    }
-}
-
-/// Block errors in `trials` PBCHs; a wrong payload with a right CRC must not occur.
-fn block_errors(decoder: &mut Decoder, snr_db: f32, trials: usize) -> usize {
-    let mut rng = ChaCha8Rng::seed_from_u64(1);
-    let lmax = Lmax::L8;
-    let mut errors = 0;
-    for _ in 0..trials {
-        let pci = Pci::new(rng.random_range(0..1008)).unwrap();
-        let payload = random_payload(&mut rng, lmax);
-        let llr = noisy_llr(&pbch::encode(&payload, pci, lmax), snr_db, &mut rng);
-        let v = lmax.index_lsb(payload.ssb_index);
-        match decoder.decode(&llr, pci, v, lmax).unwrap() {
-            Some(decoded) => assert_eq!(decoded.payload, payload),
-            None => errors += 1,
-        }
-    }
-    errors
-}
-
-/// The requirement is at most 0.01. A list of 8 alone has 0.013, the retry with 32 brings 0.003:
-/// 40 errors in 4000 would be more than seven standard deviations above.
+/// The requirement is at most 0.01. So few errors that 0.01 or more is refuted with 95 %.
 #[test]
 fn few_block_errors_at_minus_8_db() {
-    let errors = block_errors(&mut Decoder::default(), -8.0, 4000);
-    println!("list of 8, then 32, at -8 dB: {errors} errors in 4000");
-    assert!(errors <= 40, "{errors} errors in 4000");
+    let blocks = 20_000;
+    let errors = block_errors(&mut Decoder::new(8).unwrap(), -8.0, blocks, 1);
+    println!("list of 8 at -8 dB: {errors} errors in {blocks}");
+    let expected = 0.01 * blocks as f64;
+    let most = expected - 1.645 * (0.99 * expected).sqrt();
+    assert!((errors as f64) < most, "{errors} errors in {blocks}");
 }
 
-/// Independent implementations: successive cancellation 0.25 at −8 dB and 0.85 at −10 dB, a list of 8
-/// 0.00 and 0.40. Bounds at four standard deviations of 2000 trials, and 0.03 for theirs.
+/// Where a list of 8 fails, one of 32 finds most of the rest, and invents nothing.
 #[test]
-fn block_error_rates_are_those_of_other_implementations() {
+fn the_retry_finds_most_of_what_a_list_of_8_misses() {
+    let blocks = 4000;
+    let alone = block_errors(&mut Decoder::new(8).unwrap(), -8.0, blocks, 2);
+    let retried = block_errors(&mut Decoder::default(), -8.0, blocks, 2);
+    println!("at -8 dB of {blocks}: list of 8 misses {alone}, with a retry {retried}");
+    assert!(2 * retried < alone, "{retried} of {alone}");
+}
+
+/// Independent implementations, which use neither the early checks nor joint decisions: successive
+/// cancellation 0.25 at −8 dB and 0.85 at −10 dB, a list of 8 0.00 (of some hundred) and 0.40. This
+/// one has no more, but for four standard deviations of 2000 trials, and 0.01 for their 0.00.
+#[test]
+fn no_more_block_errors_than_other_implementations() {
     for (list_size, snr_db, expected) in [
         (1, -8.0, 0.25_f64),
         (1, -10.0, 0.85),
@@ -74,13 +48,10 @@ fn block_error_rates_are_those_of_other_implementations() {
         (8, -10.0, 0.40),
     ] {
         let mut decoder = Decoder::new(list_size).unwrap();
-        let rate = block_errors(&mut decoder, snr_db, 2000) as f64 / 2000.0;
+        let rate = block_errors(&mut decoder, snr_db, 2000, 1) as f64 / 2000.0;
         println!("list of {list_size} at {snr_db} dB: {rate}, elsewhere {expected}");
-        let tolerance = 4.0 * (expected * (1.0 - expected) / 2000.0).sqrt() + 0.03;
-        assert!(
-            (rate - expected).abs() < tolerance,
-            "{rate} instead of {expected}"
-        );
+        let tolerance = (4.0 * (expected * (1.0 - expected) / 2000.0).sqrt()).max(0.01);
+        assert!(rate < expected + tolerance, "{rate}, elsewhere {expected}");
     }
 }
 
@@ -120,7 +91,7 @@ fn combining_four_periods_gains_about_6_db() {
         }
     }
     println!("at {snr_db} dB of {trials}: {alone} alone, {together} of four together");
-    assert!(alone <= trials as usize / 20, "{alone} alone");
+    assert!(alone <= trials as usize / 10, "{alone} alone");
     // 5 of 8 places keep all four on one side of a change of the SFN's high bits, 2 of 8 keep three.
     assert!(together >= trials as usize * 3 / 4, "{together} together");
 }

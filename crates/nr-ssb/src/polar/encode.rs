@@ -11,19 +11,23 @@ pub type Codeword = [u64; WORDS];
 ///
 /// The code is linear: encode(a ⊕ b) = encode(a) ⊕ encode(b).
 pub fn encode(message: u64) -> Codeword {
+    let mut u = place(message);
+    transform(&mut u);
+    u
+}
+
+/// u, the message on the information channels.
+pub(super) fn place(message: u64) -> Codeword {
     let mut u = [0; WORDS];
     for (&channel, &from) in INFORMATION_SET.iter().zip(&INTERLEAVER) {
         let bit = message >> (K - 1 - usize::from(from)) & 1;
         u[usize::from(channel) / 64] |= bit << (channel % 64);
     }
-    transform(&mut u);
     u
 }
 
-/// The message whose codeword this is.
-pub(crate) fn message_of(codeword: &Codeword) -> u64 {
-    let mut u = *codeword;
-    transform(&mut u);
+/// The message, from u.
+pub(super) fn message_of(u: &Codeword) -> u64 {
     let pairs = INFORMATION_SET.iter().zip(&INTERLEAVER);
     pairs.fold(0, |message, (&channel, &from)| {
         let bit = u[usize::from(channel) / 64] >> (channel % 64) & 1;
@@ -31,9 +35,9 @@ pub(crate) fn message_of(codeword: &Codeword) -> u64 {
     })
 }
 
-/// u ← u·G_N, its own inverse: butterflies first inside the words, then between them.
-fn transform(u: &mut Codeword) {
-    const INSIDE: [(u32, u64); 6] = [
+/// u ← u·G_64, its own inverse; with leading zeros u·G_n for every smaller power of two.
+pub(super) const fn transform_word(mut word: u64) -> u64 {
+    const BUTTERFLIES: [(u32, u64); 6] = [
         (1, 0x5555_5555_5555_5555),
         (2, 0x3333_3333_3333_3333),
         (4, 0x0F0F_0F0F_0F0F_0F0F),
@@ -41,10 +45,19 @@ fn transform(u: &mut Codeword) {
         (16, 0x0000_FFFF_0000_FFFF),
         (32, 0x0000_0000_FFFF_FFFF),
     ];
+    let mut i = 0;
+    while i < BUTTERFLIES.len() {
+        let (shift, mask) = BUTTERFLIES[i];
+        word ^= (word >> shift) & mask;
+        i += 1;
+    }
+    word
+}
+
+/// u ← u·G_N, its own inverse: butterflies first inside the words, then between them.
+fn transform(u: &mut Codeword) {
     for word in u.iter_mut() {
-        for (shift, mask) in INSIDE {
-            *word ^= (*word >> shift) & mask;
-        }
+        *word = transform_word(*word);
     }
     for step in [1, 2, 4] {
         for pair in u.chunks_exact_mut(2 * step) {

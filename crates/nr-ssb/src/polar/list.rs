@@ -1,22 +1,27 @@
 //! Successive cancellation list decoding.
 //!
 //! I. Tal, A. Vardy, "List decoding of polar codes", IEEE Trans. Inf. Theory 61 (2015), with log-likelihood
-//! ratios and path metrics as in A. Balatsoukas-Stimming et al., IEEE Trans. Signal Process. 63 (2015), and
-//! whole constituent codes decoded at once as in S. A. Hashemi et al., "Fast and flexible successive-
-//! cancellation list decoders for polar codes", IEEE Trans. Signal Process. 65 (2017).
+//! ratios and path metrics as in A. Balatsoukas-Stimming et al., IEEE Trans. Signal Process. 63 (2015).
+//! The list is cut down only after whole [leaves](super::leaf), where a path is judged by more than
+//! its latest bit, and never holds a path that fails one of the [checks](super::checks): at −8 dB
+//! per resource element the two together take the errors of a list of 8 from 1.4 % to 0.8 %.
 //!
 //! All paths visit a node together. A path that splits copies nothing but its indices into the
 //! buffers of each tree level: what a node wrote is never changed until all paths write it anew.
 
-use super::encode::Codeword;
-use super::tree::{MAX_LEAF, Node};
-use super::{N, message_of};
+use super::N;
+use super::checks::Check;
+use super::encode::{Codeword, message_of, transform_word};
+use super::leaf::Leaf;
+use super::tree::Node;
 use crate::Error;
 
 /// Largest list size.
 const MAX_LIST: usize = 32;
 /// log2 N: levels above the single channels.
 const DEPTH: usize = N.ilog2() as usize;
+/// Ratios beyond this say no more, and their sums stay finite.
+const CERTAIN: f32 = 1e30;
 
 /// For each path, which buffer of a level is its own.
 type Slots = [u8; MAX_LIST];
@@ -75,20 +80,54 @@ enum Side {
     Right,
 }
 
-/// How a surviving path came about.
+/// A path that goes on with a word of a leaf.
 #[derive(Debug, Clone, Copy, Default)]
 struct Branch {
     metric: f32,
     parent: u8,
-    /// Which of the two continuations of the parent.
-    second: bool,
+    word: u64,
 }
 
-/// Surviving paths after a split.
-type Survivors = [Branch; MAX_LIST];
+/// The best branches so far, best first.
+struct Survivors {
+    branches: [Branch; MAX_LIST],
+    count: usize,
+    list_size: usize,
+}
 
-/// Per path, the bits of a node by rising reliability.
-type Ranking = [[u8; MAX_LEAF]; MAX_LIST];
+impl Survivors {
+    fn new(list_size: usize) -> Self {
+        Self {
+            branches: [Branch::default(); MAX_LIST],
+            count: 0,
+            list_size,
+        }
+    }
+
+    /// A branch must have a lower metric than this.
+    fn bound(&self) -> f32 {
+        if self.count < self.list_size {
+            f32::INFINITY
+        } else {
+            self.branches[self.count - 1].metric
+        }
+    }
+
+    /// Takes in a branch below the bound.
+    fn insert(&mut self, branch: Branch) {
+        self.count = self.list_size.min(self.count + 1);
+        let mut place = self.count - 1;
+        while place > 0 && self.branches[place - 1].metric > branch.metric {
+            self.branches[place] = self.branches[place - 1];
+            place -= 1;
+        }
+        self.branches[place] = branch;
+    }
+
+    fn as_slice(&self) -> &[Branch] {
+        &self.branches[..self.count]
+    }
+}
 
 /// Decoder of the PBCH's polar code that keeps up to 32 paths; owns its buffers.
 ///
@@ -99,6 +138,8 @@ pub struct ListDecoder {
     levels: [Level; DEPTH + 1],
     /// Path metrics: the sum of |LLR| over all decisions against the LLR's sign.
     metrics: [f32; MAX_LIST],
+    /// u of each path as far as it is decided, zeros beyond.
+    inputs: [Codeword; MAX_LIST],
     paths: usize,
 }
 
@@ -131,6 +172,7 @@ impl ListDecoder {
             list_size,
             levels,
             metrics: [0.0; MAX_LIST],
+            inputs: [Codeword::default(); MAX_LIST],
             paths: 1,
         }
     }
@@ -142,21 +184,22 @@ impl ListDecoder {
 
     /// Decode the log-likelihood ratios (positive for bit 0, any scale) of N coded bits: the messages
     /// of the surviving paths, each of 56 bits with the first in bit 55, most likely first.
+    ///
+    /// Of the 24 bits of the checksum the first three are right in every one of them, the decoder
+    /// having used them; the others are left to tell a right message from a wrong one. Where a
+    /// ratio is not a number no path survives.
     pub fn decode(&mut self, llr: &[f32; N]) -> Candidates<'_> {
         self.paths = 1;
         self.metrics[0] = 0.0;
+        self.inputs[0] = Codeword::default();
         if let Some(root) = self.levels[DEPTH].alpha.rewrite().next() {
-            root.copy_from_slice(llr);
+            for (root, x) in root.iter_mut().zip(llr) {
+                *root = x.clamp(-CERTAIN, CERTAIN);
+            }
         }
         self.visit(DEPTH, 0, Side::Left);
-
-        let mut order = IDENTITY;
-        order[..self.paths].sort_unstable_by(|&a, &b| {
-            self.metrics[usize::from(a)].total_cmp(&self.metrics[usize::from(b)])
-        });
         Candidates {
             decoder: self,
-            order,
             next: 0,
         }
     }
@@ -167,15 +210,15 @@ impl ListDecoder {
         let len = 1 << level;
         match Node::at(first, len) {
             Node::Rate0 => self.rate_0(level, side),
-            Node::Repetition => self.repetition(level, side),
-            Node::SingleParity => self.single_parity(level, side),
-            Node::Rate1 => self.rate_1(level, side),
+            Node::Leaf(leaf) => self.leaf(level, first, leaf, side),
             Node::Split => {
                 self.descend_left(level);
                 self.visit(level - 1, first, Side::Left);
                 self.descend_right(level);
                 self.visit(level - 1, first + len / 2, Side::Right);
-                self.combine(level, side);
+                if level < DEPTH {
+                    self.combine(level, side);
+                }
             }
         }
     }
@@ -233,139 +276,51 @@ impl ListDecoder {
         let Level { alpha, beta } = &mut self.levels[level];
         let metrics = self.metrics.iter_mut().take(self.paths);
         for ((path, metric), out) in metrics.enumerate().zip(beta[side as usize].rewrite()) {
-            *metric += against(alpha.of(path))[0];
+            *metric += sum_of(alpha.of(path), |x| if x < 0.0 { -x } else { 0.0 });
             out.fill(1.0);
         }
     }
 
-    fn repetition(&mut self, level: usize, side: Side) {
-        let alpha = &self.levels[level].alpha;
-        let mut costs = [[0.0; 2]; MAX_LIST];
-        for (path, cost) in costs.iter_mut().enumerate().take(self.paths) {
-            *cost = against(alpha.of(path));
-        }
-        let survivors = self.split(level, &costs);
-        let outs = self.levels[level].beta[side as usize].rewrite();
-        for (out, survivor) in outs.zip(&survivors[..self.paths]) {
-            out.fill(if survivor.second { -1.0 } else { 1.0 });
-        }
-    }
-
-    /// Hard decisions, and every path split at its least reliable bits; beyond L − 1 of them no
-    /// change could survive.
-    fn rate_1(&mut self, level: usize, side: Side) {
-        let ranking = self.rank(level);
-        let mut flips = [0u16; MAX_LIST];
-        for turn in 0..(1 << level).min(self.list_size - 1) {
-            let alpha = &self.levels[level].alpha;
-            let mut costs = [[0.0; 2]; MAX_LIST];
-            for (path, cost) in costs.iter_mut().enumerate().take(self.paths) {
-                let bit = ranking[usize::from(alpha.slots[path])][turn];
-                cost[1] = alpha.of(path)[usize::from(bit)].abs();
-            }
-            let survivors = self.split(level, &costs);
-            self.inherit(&mut flips, &survivors);
-            let alpha = &self.levels[level].alpha;
-            for (path, survivor) in survivors.iter().enumerate().take(self.paths) {
-                let bit = ranking[usize::from(alpha.slots[path])][turn];
-                flips[path] ^= u16::from(survivor.second) << bit;
-            }
-        }
-        self.decide(level, side, &flips);
-    }
-
-    /// Hard decisions, the least reliable bit making the parity even; then every path split at its
-    /// next least reliable bits, each change taking the least reliable bit along.
-    fn single_parity(&mut self, level: usize, side: Side) {
-        let ranking = self.rank(level);
-        let mut flips = [0u16; MAX_LIST];
-        let alpha = &self.levels[level].alpha;
+    /// Lets every path go on with every word of the leaf, and keeps the best that hold the check.
+    fn leaf(&mut self, level: usize, first: usize, leaf: Leaf, side: Side) {
+        let check = Check::inside(first, 1 << level);
+        let mut survivors = Survivors::new(self.list_size);
         for path in 0..self.paths {
-            let values = alpha.of(path);
-            let least = ranking[usize::from(alpha.slots[path])][0];
-            let odd = values
-                .iter()
-                .fold(0, |parity, x| parity ^ x.to_bits() >> 31);
-            flips[path] = (odd as u16) << least;
-            self.metrics[path] += odd as f32 * values[usize::from(least)].abs();
-        }
-        for turn in 1..(1 << level).min(self.list_size) {
-            let alpha = &self.levels[level].alpha;
-            let mut costs = [[0.0; 2]; MAX_LIST];
-            for (path, cost) in costs.iter_mut().enumerate().take(self.paths) {
-                let ranked = &ranking[usize::from(alpha.slots[path])];
-                let magnitude = |rank: usize| alpha.of(path)[usize::from(ranked[rank])].abs();
-                let flipped = flips[path] >> ranked[0] & 1 == 1;
-                cost[1] = magnitude(turn) + if flipped { -magnitude(0) } else { magnitude(0) };
-            }
-            let survivors = self.split(level, &costs);
-            self.inherit(&mut flips, &survivors);
-            let alpha = &self.levels[level].alpha;
-            for (path, survivor) in survivors.iter().enumerate().take(self.paths) {
-                let ranked = &ranking[usize::from(alpha.slots[path])];
-                if survivor.second {
-                    flips[path] ^= 1 << ranked[turn] | 1 << ranked[0];
+            let alpha = self.levels[level].alpha.of(path);
+            let input = &self.inputs[path];
+            // A word costs (Σ|α| − Σ ±α)/2.
+            let uncorrelated = self.metrics[path] + 0.5 * sum_of(alpha, f32::abs);
+            let threshold = |survivors: &Survivors| 2.0 * (uncorrelated - survivors.bound());
+            leaf.correlate(alpha, threshold(&survivors), |correlation, word| {
+                let u = transform_word(word) << (first % 64);
+                if check.is_none_or(|check| check.holds(input, u, first)) {
+                    survivors.insert(Branch {
+                        metric: uncorrelated - 0.5 * correlation,
+                        parent: path as u8,
+                        word,
+                    });
                 }
-            }
-        }
-        self.decide(level, side, &flips);
-    }
-
-    /// The bits of each LLR buffer of this level by rising |LLR|.
-    fn rank(&self, level: usize) -> Ranking {
-        let mut ranking = [[0; MAX_LEAF]; MAX_LIST];
-        let Buffers { values, len, .. } = &self.levels[level].alpha;
-        for (order, values) in ranking
-            .iter_mut()
-            .zip(values.chunks_exact(*len))
-            .take(self.paths)
-        {
-            for (rank, bit) in order.iter_mut().zip(0..) {
-                *rank = bit;
-            }
-            order[..*len].sort_unstable_by(|&a, &b| {
-                values[usize::from(a)]
-                    .abs()
-                    .total_cmp(&values[usize::from(b)].abs())
+                threshold(&survivors)
             });
         }
-        ranking
-    }
-
-    /// Write the signs of this level's LLRs, those in `flips` reversed, as decided bits.
-    fn decide(&mut self, level: usize, side: Side, flips: &[u16; MAX_LIST]) {
-        let Level { alpha, beta } = &mut self.levels[level];
-        for (path, out) in beta[side as usize].rewrite().take(self.paths).enumerate() {
-            for (bit, (out, &x)) in out.iter_mut().zip(alpha.of(path)).enumerate() {
-                let flip = f32::from(flips[path] >> bit & 1);
-                *out = 1f32.copysign(x) * (1.0 - 2.0 * flip);
+        self.follow(level, first, survivors.as_slice());
+        let outs = self.levels[level].beta[side as usize].rewrite();
+        for (out, branch) in outs.zip(survivors.as_slice()) {
+            for (i, out) in out.iter_mut().enumerate() {
+                *out = if branch.word >> i & 1 == 1 { -1.0 } else { 1.0 };
             }
         }
     }
 
-    /// Let every path go on in two ways at the given costs in a node of this level, keep the best,
-    /// and hand each survivor its parent's buffers.
-    fn split(&mut self, level: usize, costs: &[[f32; 2]; MAX_LIST]) -> Survivors {
-        let mut branches = [Branch::default(); 2 * MAX_LIST];
-        let count = 2 * self.paths;
-        for (path, cost) in costs.iter().enumerate().take(self.paths) {
-            for (second, cost) in [false, true].into_iter().zip(cost) {
-                branches[2 * path + usize::from(second)] = Branch {
-                    metric: self.metrics[path] + cost,
-                    parent: path as u8,
-                    second,
-                };
-            }
-        }
-        let kept = count.min(self.list_size);
-        if kept < count {
-            branches[..count].select_nth_unstable_by(kept, |a, b| a.metric.total_cmp(&b.metric));
-        }
-        let mut survivors = [Branch::default(); MAX_LIST];
-        survivors[..kept].copy_from_slice(&branches[..kept]);
-        self.paths = kept;
-        for (metric, survivor) in self.metrics.iter_mut().zip(&survivors[..kept]) {
-            *metric = survivor.metric;
+    /// Makes the branches of a leaf the paths, each with its parent's buffers.
+    fn follow(&mut self, level: usize, first: usize, branches: &[Branch]) {
+        self.paths = branches.len();
+        let before = self.inputs;
+        for ((input, metric), branch) in self.inputs.iter_mut().zip(&mut self.metrics).zip(branches)
+        {
+            *metric = branch.metric;
+            *input = before[usize::from(branch.parent)];
+            input[first / 64] |= transform_word(branch.word) << (first % 64);
         }
         // Below this node nothing is read before it is written anew, and neither are right siblings.
         for Level {
@@ -375,33 +330,11 @@ impl ListDecoder {
         {
             for slots in [&mut alpha.slots, &mut left.slots] {
                 let before = *slots;
-                for (slot, survivor) in slots.iter_mut().zip(&survivors[..kept]) {
-                    *slot = before[usize::from(survivor.parent)];
+                for (slot, branch) in slots.iter_mut().zip(branches) {
+                    *slot = before[usize::from(branch.parent)];
                 }
             }
         }
-        survivors
-    }
-
-    /// Hand each survivor its parent's flips.
-    fn inherit(&self, flips: &mut [u16; MAX_LIST], survivors: &Survivors) {
-        let before = *flips;
-        for (flips, survivor) in flips.iter_mut().zip(survivors).take(self.paths) {
-            *flips = before[usize::from(survivor.parent)];
-        }
-    }
-
-    /// The message of a path, once the root is decided.
-    fn message(&self, path: usize) -> u64 {
-        let beta = self.levels[DEPTH].beta[Side::Left as usize].of(path);
-        let mut codeword = Codeword::default();
-        for (word, signs) in codeword.iter_mut().zip(beta.chunks_exact(64)) {
-            *word = signs
-                .iter()
-                .rev()
-                .fold(0, |word, s| word << 1 | u64::from(s.to_bits() >> 31));
-        }
-        message_of(&codeword)
     }
 }
 
@@ -409,7 +342,6 @@ impl ListDecoder {
 #[derive(Debug)]
 pub struct Candidates<'a> {
     decoder: &'a ListDecoder,
-    order: Slots,
     next: usize,
 }
 
@@ -417,23 +349,21 @@ impl Iterator for Candidates<'_> {
     type Item = u64;
 
     fn next(&mut self) -> Option<u64> {
-        let path = *self.order[..self.decoder.paths].get(self.next)?;
+        // The last leaf left the paths in order.
+        let input = self.decoder.inputs[..self.decoder.paths].get(self.next)?;
         self.next += 1;
-        Some(self.decoder.message(usize::from(path)))
+        Some(message_of(input))
     }
 }
 
-/// The cost of deciding all bits 0 and of deciding all bits 1: the sum of |LLR| of the contrary.
-fn against(alpha: &[f32]) -> [f32; 2] {
+/// Sum of a function of the values.
+fn sum_of(values: &[f32], f: impl Fn(f32) -> f32) -> f32 {
     // Independent partial sums, so that the additions need not wait for one another.
-    const LANES: usize = 8;
-    let mut zeros = [0.0; LANES];
-    let mut ones = [0.0; LANES];
-    for chunk in alpha.chunks(LANES) {
-        for ((zero, one), &x) in zeros.iter_mut().zip(&mut ones).zip(chunk) {
-            *zero += if x < 0.0 { -x } else { 0.0 };
-            *one += if x > 0.0 { x } else { 0.0 };
+    let mut sums = [0.0; 8];
+    for chunk in values.chunks(sums.len()) {
+        for (sum, &x) in sums.iter_mut().zip(chunk) {
+            *sum += f(x);
         }
     }
-    [zeros.iter().sum(), ones.iter().sum()]
+    sums.iter().sum()
 }

@@ -4,52 +4,77 @@ use rand::{RngExt, SeedableRng};
 use rand_chacha::ChaCha8Rng;
 use rand_distr::{Distribution, StandardNormal};
 
-use super::{INFORMATION_SET, K, ListDecoder, N, encode};
+use super::checks::Check;
+use super::encode::Codeword;
+use super::tree::Node;
+use super::{INFORMATION_SET, ListDecoder, N, encode};
+use crate::crc::crc24c;
 
-/// One path at a node: its metric, its place among the paths that entered, its bits.
-type Path = (f64, usize, Vec<u8>);
+/// A path that enters a node: its metric, its LLRs, its u so far.
+type Entered = (f64, Vec<f64>, Codeword);
+/// A path at a node's end: its metric, its place among the paths that entered, its bits, its u.
+type Path = (f64, usize, Vec<u8>, Codeword);
 
-/// Decode a node that begins at channel `first`, entered by paths with these metrics and LLRs.
-fn visit(entered: &[(f64, Vec<f64>)], first: u16, list_size: usize) -> Vec<Path> {
+/// Decode the node that begins at channel `first`. The list is cut down at the ends of the leaves
+/// of the decoding tree, of which this node is a part if `in_leaf`.
+fn visit(entered: &[Entered], first: usize, list_size: usize, in_leaf: bool) -> Vec<Path> {
     let len = entered[0].1.len();
-    if len == 1 {
-        let mut paths = Vec::new();
-        for (parent, (metric, llr)) in entered.iter().enumerate() {
-            paths.push((metric + (-llr[0]).max(0.0), parent, vec![0]));
-            if INFORMATION_SET.contains(&first) {
-                paths.push((metric + llr[0].max(0.0), parent, vec![1]));
-            }
-        }
+    let is_leaf = !in_leaf && matches!(Node::at(first, len), Node::Leaf(_));
+    let inside = in_leaf || is_leaf;
+    let mut paths = if len == 1 {
+        channel(entered, first)
+    } else {
+        let half = len / 2;
+        let f = |(metric, llr, u): &Entered| {
+            let child = (0..half).map(|i| {
+                let (a, b) = (llr[i], llr[i + half]);
+                a.signum() * b.signum() * a.abs().min(b.abs())
+            });
+            (*metric, child.collect(), *u)
+        };
+        let left: Vec<_> = entered.iter().map(f).collect();
+        let left = visit(&left, first, list_size, inside);
+        let g = |(metric, parent, bits, u): &Path| {
+            let llr = &entered[*parent].1;
+            let child =
+                (0..half).map(|i| llr[i + half] + (1.0 - 2.0 * f64::from(bits[i])) * llr[i]);
+            (*metric, child.collect(), *u)
+        };
+        let right: Vec<_> = left.iter().map(g).collect();
+        let right = visit(&right, first + half, list_size, inside);
+        let join = |(metric, parent, right, u): Path| {
+            let (_, grandparent, left, _) = &left[parent];
+            let sum = left.iter().zip(&right).map(|(l, r)| l ^ r);
+            let bits = sum.chain(right.iter().copied()).collect();
+            (metric, *grandparent, bits, u)
+        };
+        right.into_iter().map(join).collect()
+    };
+    if is_leaf {
         paths.sort_by(|a, b| a.0.total_cmp(&b.0));
         paths.truncate(list_size);
-        return paths;
     }
-    let half = len / 2;
-    let f = |(metric, llr): &(f64, Vec<f64>)| {
-        let child = (0..half).map(|i| {
-            let (a, b) = (llr[i], llr[i + half]);
-            a.signum() * b.signum() * a.abs().min(b.abs())
-        });
-        (*metric, child.collect())
-    };
-    let left = visit(&entered.iter().map(f).collect::<Vec<_>>(), first, list_size);
-    let g = |(metric, parent, bits): &Path| {
-        let llr = &entered[*parent].1;
-        let child = (0..half).map(|i| llr[i + half] + (1.0 - 2.0 * f64::from(bits[i])) * llr[i]);
-        (*metric, child.collect())
-    };
-    let middle = first + half as u16;
-    let right = visit(&left.iter().map(g).collect::<Vec<_>>(), middle, list_size);
-    let join = |(metric, parent, right): Path| {
-        let (_, grandparent, left) = &left[parent];
-        let sum = left.iter().zip(&right).map(|(l, r)| l ^ r);
-        (
-            metric,
-            *grandparent,
-            sum.chain(right.iter().copied()).collect(),
-        )
-    };
-    right.into_iter().map(join).collect()
+    paths
+}
+
+/// Both ways to go on at a channel, or the one that is allowed.
+fn channel(entered: &[Entered], channel: usize) -> Vec<Path> {
+    let mut paths = Vec::new();
+    for (parent, (metric, llr, u)) in entered.iter().enumerate() {
+        for bit in [0, 1] {
+            let mut u = *u;
+            u[channel / 64] |= u64::from(bit) << (channel % 64);
+            let allowed = match Check::inside(channel, 1) {
+                Some(check) => check.holds(&u, 0, 0),
+                None => bit == 0 || INFORMATION_SET.contains(&(channel as u16)),
+            };
+            if allowed {
+                let against = if bit == 0 { -llr[0] } else { llr[0] };
+                paths.push((metric + against.max(0.0), parent, vec![bit], u));
+            }
+        }
+    }
+    paths
 }
 
 #[test]
@@ -58,16 +83,17 @@ fn survivors_are_those_of_the_book() {
     for list_size in [1, 2, 3, 8, 32] {
         let mut decoder = ListDecoder::new(list_size).unwrap();
         for _ in 0..20 {
-            let sent = encode(rng.random::<u64>() >> (64 - K));
+            let payload = rng.random();
+            let sent = encode(u64::from(payload) << 24 | u64::from(crc24c(payload)));
             let llr: [f32; N] = std::array::from_fn(|n| {
                 let noise: f32 = StandardNormal.sample(&mut rng);
                 1.0 - 2.0 * (sent[n / 64] >> (n % 64) & 1) as f32 + 2.0 * noise
             });
-            let root = (0.0, llr.iter().map(|&x| f64::from(x)).collect());
-            let expected = visit(&[root], 0, list_size);
+            let root = llr.iter().map(|&x| f64::from(x)).collect();
+            let expected = visit(&[(0.0, root, Codeword::default())], 0, list_size, false);
             let got: Vec<_> = decoder.decode(&llr).map(encode).collect();
             assert_eq!(got.len(), expected.len());
-            for (codeword, (_, _, bits)) in got.iter().zip(&expected) {
+            for (codeword, (_, _, bits, _)) in got.iter().zip(&expected) {
                 let bits = bits.iter().enumerate();
                 let equal = bits
                     .clone()

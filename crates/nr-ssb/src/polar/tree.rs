@@ -1,57 +1,43 @@
-//! The decoding tree: which of its nodes need no descent.
+//! The decoding tree: where to stop descending.
 
-use super::{INFORMATION_SET, N};
+use super::INFORMATION_SET;
+use super::encode::Codeword;
+use super::leaf::Leaf;
 
-/// Longest single-parity or rate-1 node that is decoded at once; every one of this code fits.
-pub const MAX_LEAF: usize = 16;
+/// The information channels as bits.
+const INFORMATION: Codeword = {
+    let mut channels = [0; 8];
+    let mut k = 0;
+    while k < INFORMATION_SET.len() {
+        let channel = INFORMATION_SET[k] as usize;
+        channels[channel / 64] |= 1 << (channel % 64);
+        k += 1;
+    }
+    channels
+};
 
-/// The code that a node of the decoding tree is by itself.
+/// What a node of the decoding tree asks for.
 #[derive(Debug, Clone, Copy, PartialEq, Eq)]
 pub enum Node {
     /// All channels frozen: the all-zero word.
     Rate0,
-    /// Only the last channel carries information: all bits equal.
-    Repetition,
-    /// Only the first channel is frozen: an even number of ones.
-    SingleParity,
-    /// No channel frozen: any word.
-    Rate1,
-    /// None of these.
+    /// A code whose words can all be compared.
+    Leaf(Leaf),
+    /// To be descended into.
     Split,
 }
 
-/// Information channels before each channel.
-const BEFORE: [usize; N + 1] = {
-    let mut before = [0; N + 1];
-    let mut found = 0;
-    let mut channel = 0;
-    while channel < N {
-        before[channel] = found;
-        if found < INFORMATION_SET.len() && INFORMATION_SET[found] as usize == channel {
-            found += 1;
-        }
-        channel += 1;
-    }
-    before[N] = found;
-    before
-};
-
 impl Node {
-    /// The node over `len` channels from `first` on.
-    pub const fn at(first: usize, len: usize) -> Self {
-        let information = BEFORE[first + len] - BEFORE[first];
-        let last = BEFORE[first + len] - BEFORE[first + len - 1];
-        let after_first = BEFORE[first + len] - BEFORE[first + 1];
-        if information == 0 {
-            Self::Rate0
-        } else if information == 1 && last == 1 {
-            Self::Repetition
-        } else if len <= MAX_LEAF && information == len {
-            Self::Rate1
-        } else if len <= MAX_LEAF && information == len - 1 && after_first == len - 1 {
-            Self::SingleParity
-        } else {
-            Self::Split
+    /// The node over `len` channels, a power of two, from its multiple `first` on.
+    pub fn at(first: usize, len: usize) -> Self {
+        let words = &INFORMATION[first / 64..(first + len).div_ceil(64)];
+        if len > 64 {
+            let frozen = words.iter().all(|word| *word == 0);
+            return if frozen { Self::Rate0 } else { Self::Split };
+        }
+        match words[0] >> (first % 64) & u64::MAX >> (64 - len) {
+            0 => Self::Rate0,
+            rows => Leaf::new(rows, len).map_or(Self::Split, Self::Leaf),
         }
     }
 }
@@ -62,11 +48,15 @@ mod tests {
 
     #[test]
     fn nodes_are_what_their_channels_say() {
-        assert_eq!(Node::at(0, 128), Node::Rate0);
-        assert_eq!(Node::at(384, 32), Node::Repetition);
-        assert_eq!(Node::at(496, 16), Node::SingleParity);
-        assert_eq!(Node::at(444, 4), Node::Rate1);
-        assert_eq!(Node::at(440, 4), Node::Split);
+        let leaf = |rows, len| Node::Leaf(Leaf::new(rows, len).unwrap());
         assert_eq!(Node::at(0, 512), Node::Split);
+        assert_eq!(Node::at(0, 128), Node::Rate0);
+        assert_eq!(Node::at(384, 32), leaf(1 << 31, 32));
+        assert_eq!(
+            Node::at(192, 64),
+            leaf(1 << 55 | 1 << 61 | 1 << 62 | 1 << 63, 64)
+        );
+        assert_eq!(Node::at(504, 8), Node::Split);
+        assert_eq!(Node::at(504, 4), leaf(0xF, 4));
     }
 }
