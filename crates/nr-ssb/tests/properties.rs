@@ -150,7 +150,8 @@ fn degenerate_ratios_decode_to_nothing_or_to_an_error() {
     }
 }
 
-/// 20 000 lists of 8 on noise: 0.005 false alarms expected from 24 CRC bits and the choice bit.
+/// 20 000 lists of 8 on noise: 0.04 false alarms expected from the 21 CRC bits that the decoder leaves
+/// and the choice bit.
 #[test]
 fn noise_holds_no_mib() {
     let mut rng = ChaCha8Rng::seed_from_u64(4);
