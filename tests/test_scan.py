@@ -1,6 +1,7 @@
 from __future__ import annotations
 
 import json
+from concurrent.futures import ThreadPoolExecutor
 from typing import TYPE_CHECKING
 
 import numpy as np
@@ -43,6 +44,63 @@ def test_raw_files_of_each_antenna_are_scanned(access_av: Cli, tmp_path: Path) -
     assert abs(cell["angle_deg"] - 50) < 5 * cell["sigma_deg"]
     assert cell["azimuth_deg"] == pytest.approx(90 - cell["angle_deg"], abs=1e-3)
     assert access_av("scan", *files, *options).out.count("99") >= 1
+
+
+def searcher(**changes: object) -> nr.Searcher:
+    settings: dict[str, object] = {
+        "centre_frequency_hz": SSB_HZ, "ssb_freq_hz": SSB_HZ, "scs_khz": 30, "antennas": 4,
+    }  # fmt: skip
+    return nr.Searcher(RATE_HZ, **settings | changes)  # type: ignore[arg-type]
+
+
+def values(cells: list[nr.Cell]) -> list[dict[str, object]]:
+    return [nr.record(cell) for cell in cells]
+
+
+def test_a_kept_searcher_finds_what_a_new_search_does() -> None:
+    kept = searcher()
+    for sfn in (5, 6):
+        samples = array_burst(ssb_indices=[0, 3], sfn=sfn)
+        there = {"centre_frequency_hz": SSB_HZ, "ssb_freq_hz": SSB_HZ, "scs_khz": 30}
+        expected = values(nr.search(samples, RATE_HZ, **there))
+        assert [value["sfn"] for value in expected] == [sfn, sfn]
+        assert values(kept.search(samples)) == expected
+    # What does not lie row by row, or is not complex64, is brought there.
+    assert values(kept.search(np.asfortranarray(samples))) == expected
+    assert values(kept.search(samples.astype(np.complex128))) == expected
+    # Searched where it lies, and left as it was.
+    before = samples.copy()
+    before.flags.writeable = False
+    assert values(kept.search(before)) == expected
+    assert np.array_equal(before, samples)
+
+
+def test_searchers_of_several_threads_do_not_disturb_each_other() -> None:
+    bursts = [array_burst(ssb_indices=[0], sfn=sfn) for sfn in range(4)]
+    with ThreadPoolExecutor(4) as pool:
+        found = list(pool.map(lambda samples: searcher().search(samples), bursts))
+    assert [cell.sfn for [cell] in found] == [0, 1, 2, 3]
+
+
+def test_a_searcher_says_what_it_cannot_use() -> None:
+    with pytest.raises(RecordingError, match=r"multiple of 3\.84 MHz"):
+        nr.Searcher(1e6, centre_frequency_hz=0, ssb_freq_hz=0, scs_khz=15, antennas=1)
+    for wrong, message in (
+        ({"scs_khz": 60}, "allowed: 15, 30"),
+        ({"antennas": 17}, "1 to 16"),
+        ({"ssb_freq_hz": SSB_HZ + 3e6}, "does not fit"),
+        ({"calibration": [1, 1]}, "channel"),
+    ):
+        with pytest.raises(ValueError, match=message):
+            searcher(**wrong)
+    kept, samples = searcher(), array_burst()
+    with pytest.raises(RecordingError, match="3 channels given, 4 expected"):
+        kept.search(samples[:3])
+    with pytest.raises(RecordingError, match="less than the"):
+        kept.search(samples[:, :300])
+    samples[2, 9] = np.nan
+    with pytest.raises(RecordingError, match="sample 9 of channel 2"):
+        kept.search(samples)
 
 
 def test_search_says_what_it_cannot_use() -> None:

@@ -23,7 +23,7 @@ import json
 from typing import TYPE_CHECKING, Any
 
 from access_av._core import Recording
-from access_av._core.nr import Cell, Scan, build_burst, scan, search
+from access_av._core.nr import Cell, Scan, Searcher, build_burst, scan, search
 from access_av.recorded_angles import stated_calibration, stated_spacing
 
 if TYPE_CHECKING:
@@ -33,6 +33,7 @@ __all__ = [
     "Cell",
     "Recording",
     "Scan",
+    "Searcher",
     "build_burst",
     "record",
     "scan",

@@ -24,6 +24,9 @@ const FIRST_TAP: i32 = -4;
 /// Times the tap powers are learned anew.
 const ITERATIONS: usize = 3;
 
+/// Noise that is assumed at the least, over the strongest path: −60 dB.
+const NOISE_FLOOR: f64 = 1e-6;
+
 /// Channel estimator with its buffers; results are read from the fields.
 pub(crate) struct ChannelEstimator {
     /// exp(j2πk'τ/256), `[tap][k]`.
@@ -140,13 +143,17 @@ impl ChannelEstimator {
             }
         }
         let gram = self.gram();
-        let mean_noise = (self.noise_variance.iter().sum::<f64>() / antennas).max(1e-30);
+        let received: [f64; TAPS] = std::array::from_fn(|tap| {
+            let power = self.matched.iter().map(|m| m[tap].norm_sqr()).sum::<f64>() / antennas;
+            power / (known * known)
+        });
+        // Without noise the taps, closer than the band can tell apart, would be undetermined.
+        let least = NOISE_FLOOR * received.iter().copied().fold(0.0, f64::max);
+        let mean_noise = self.noise_variance.iter().sum::<f64>() / antennas;
+        let mean_noise = mean_noise.max(least).max(1e-30);
         // A tap that explains less than this is noise.
         let floor = 1e-3 * mean_noise / known;
-        let mut powers: [f64; TAPS] = std::array::from_fn(|tap| {
-            let power = self.matched.iter().map(|m| m[tap].norm_sqr()).sum::<f64>() / antennas;
-            (power / (known * known) - mean_noise / known).max(floor)
-        });
+        let mut powers = received.map(|power| (power - mean_noise / known).max(floor));
         for _ in 0..ITERATIONS {
             let mut system = gram;
             for (tap, power) in powers.iter().enumerate() {

@@ -34,6 +34,9 @@ const BINS_PER_SUBCARRIER: usize = BLOCK / SYMBOL_FFT;
 const HOP: usize = BLOCK - SYMBOL_FFT;
 /// Two maxima of one PSS closer than this are one candidate.
 const CANDIDATE_SPACING: usize = 12;
+/// Part of a block's energy that rings under other windows, with a margin that keeps its statistic
+/// below that of noise: 5e-8 of the energy, times 240.
+const RINGING: f64 = 1.2e-5;
 /// Resource elements that share a window's energy when the whole SSB band is occupied.
 const OCCUPIED: f32 = 240.0;
 
@@ -150,10 +153,12 @@ impl MatchedFilter {
         let pair_energy =
             |pair: &[Complex32; 2]| f64::from(pair[0].norm_sqr() + pair[1].norm_sqr());
         let (pairs, _) = self.block.as_chunks::<2>();
+        // Silence beside a signal holds the signal's ringing: the spectrum is cut at half the band.
+        let silence = RINGING * pairs.iter().map(pair_energy).sum::<f64>();
         let mut energy: f64 = pairs[..SYMBOL_FFT / 2].iter().map(pair_energy).sum();
         let moves = pairs.iter().zip(&pairs[SYMBOL_FFT / 2..]);
         for (slot, (old, new)) in self.inverse_energy[antenna].iter_mut().zip(moves) {
-            let known = energy > f64::from(f32::MIN_POSITIVE);
+            let known = energy > silence.max(f64::from(f32::MIN_POSITIVE));
             *slot = if known { OCCUPIED / energy as f32 } else { 0.0 };
             energy += pair_energy(new) - pair_energy(old);
         }

@@ -9,8 +9,9 @@ use crate::acquire::{Acquired, Acquirer};
 use crate::alignment::Alignment;
 use crate::broadcast::{Broadcast, BroadcastDecoder};
 use crate::cancel::Canceller;
-use crate::demodulate::{CYCLIC_PREFIX, SSB_SAMPLES};
+use crate::demodulate::{CYCLIC_PREFIX, ReceivedGrid, SSB_SAMPLES};
 use crate::false_alarm::exponential_sum_threshold;
+use crate::grid::SsbGrid;
 use crate::matched_filter::{MatchedFilter, PssCandidate};
 use crate::measure::{Measurement, decibel, measure, sss_power};
 use crate::numerology::{Lmax, SubcarrierSpacing};
@@ -147,6 +148,17 @@ impl DetectedSsb {
     }
 }
 
+/// What was received of one SSB, stronger cells' taken out, delay and frequency offset too.
+#[derive(Debug, Clone, Copy)]
+pub struct ReceivedSsb<'a> {
+    /// The resource elements of every antenna, `[symbol][subcarrier]`.
+    pub elements: &'a [ReceivedGrid],
+    /// The elements that are known, zero elsewhere: pilots, and the PBCH if it decoded.
+    pub known: &'a SsbGrid,
+    /// Variance of the noise on a resource element, per antenna.
+    pub noise_variance: &'a [f64],
+}
+
 /// Searches blocks of samples at the base rate; owns all plans and buffers.
 pub struct Searcher {
     config: SearchConfig,
@@ -241,6 +253,19 @@ impl Searcher {
     /// # Errors
     /// [`SearchError::AntennaCount`], [`SearchError::UnequalLengths`].
     pub fn push(&mut self, antennas: &[&[Complex32]]) -> Result<&[DetectedSsb], SearchError> {
+        self.push_with(antennas, &mut |_, _| {})
+    }
+
+    /// As [`push`](Self::push), and shows `look` every SSB as it is found, stronger ones first. Its
+    /// payload may become known later, from another SSB.
+    ///
+    /// # Errors
+    /// As [`push`](Self::push).
+    pub fn push_with(
+        &mut self,
+        antennas: &[&[Complex32]],
+        look: &mut dyn FnMut(&DetectedSsb, &ReceivedSsb<'_>),
+    ) -> Result<&[DetectedSsb], SearchError> {
         let length = self.common_length(antennas)?;
         let kept = self.buffer.first().map_or(0, Vec::len);
         let tail = kept.min(SSB_SAMPLES + CYCLIC_PREFIX);
@@ -256,7 +281,7 @@ impl Searcher {
             );
         }
         self.remember();
-        self.examine_all(tail + length);
+        self.examine_all(tail + length, look);
         self.found
             .sort_unstable_by(|a, b| a.sample_start.total_cmp(&b.sample_start));
         Ok(&self.found)
@@ -317,7 +342,7 @@ impl Searcher {
         self.found.clear();
     }
 
-    fn examine_all(&mut self, length: usize) {
+    fn examine_all(&mut self, length: usize, look: &mut dyn FnMut(&DetectedSsb, &ReceivedSsb<'_>)) {
         // The PSS of an SSB that lies inside the buffer.
         let Some(end) = (length + 1).checked_sub(SSB_SAMPLES - CYCLIC_PREFIX) else {
             return;
@@ -341,7 +366,7 @@ impl Searcher {
                 .map(|(index, _)| index);
             let Some(index) = strongest else { break };
             let candidate = self.candidates.swap_remove(index);
-            let Some(alignment) = self.examine(&candidate) else {
+            let Some(alignment) = self.examine(&candidate, look) else {
                 continue;
             };
             // Around an SSB that is now gone the matched filter is run again.
@@ -360,7 +385,11 @@ impl Searcher {
     }
 
     /// Identifies, decodes, measures and removes the SSB of a candidate.
-    fn examine(&mut self, candidate: &PssCandidate) -> Option<Alignment> {
+    fn examine(
+        &mut self,
+        candidate: &PssCandidate,
+        look: &mut dyn FnMut(&DetectedSsb, &ReceivedSsb<'_>),
+    ) -> Option<Alignment> {
         let mut acquired = self.acquirer.acquire(&self.buffer, candidate)?;
         let tolerated_hz = self.config.cfo_range_hz + self.config.spacing.hz() / 6.0;
         if (acquired.alignment.cfo_cycles * self.base_rate_hz).abs() > tolerated_hz {
@@ -391,6 +420,14 @@ impl Searcher {
             self.complete_earlier(&acquired, broadcast, time);
         }
         self.report(&acquired, broadcast.as_ref());
+        if let Some(ssb) = self.found.last() {
+            let received = ReceivedSsb {
+                elements: &self.acquirer.grids,
+                known: &self.acquirer.reference,
+                noise_variance: &self.acquirer.estimate.noise_variance,
+            };
+            look(ssb, &received);
+        }
         self.remove(&acquired.alignment);
         Some(acquired.alignment)
     }

@@ -76,3 +76,36 @@ fn noise_makes_no_cell() {
         }
     }
 }
+
+#[test]
+fn bursts_in_silence_or_next_to_none_are_found() {
+    for trial in 0..24 {
+        let mut rng = air::rng(trial);
+        let spacing = [SubcarrierSpacing::Khz15, SubcarrierSpacing::Khz30][trial as usize % 2];
+        let cell = air::Cell::random(&mut rng, spacing, 2);
+        let half_frame = cell.half_frame_samples();
+        let mut samples = air::silence(2, 76_800);
+        for antenna in &mut samples {
+            antenna[1_000..1_000 + half_frame.len()].copy_from_slice(&half_frame);
+        }
+        // As a program made it, and with less noise than any receiver has.
+        if let Some(snr_db) = [None, Some(90.0), Some(60.0), Some(45.0)][trial as usize / 2 % 4] {
+            air::add_noise(&mut samples, snr_db, &mut rng);
+        }
+        let config = SearchConfig {
+            ssb_freq_hz: Some(cell.ssb_freq_hz),
+            ..SearchConfig::new(spacing, 2)
+        };
+        let mut searcher = Searcher::new(config).unwrap();
+        let found = searcher.search(&air::slices(&samples)).unwrap();
+        let [ssb] = found else {
+            panic!("trial {trial}: {} SSBs", found.len())
+        };
+        let decoded = ssb.payload.map(|payload| payload.sfn());
+        assert_eq!(
+            (ssb.pci.get(), decoded),
+            (cell.pci, Some(cell.sfn)),
+            "trial {trial}"
+        );
+    }
+}

@@ -6,7 +6,7 @@ from numpy.typing import ArrayLike, NDArray
 
 from access_av._core import Recording
 
-__all__ = ["Cell", "Scan", "build_burst", "scan", "search"]
+__all__ = ["Cell", "Scan", "Searcher", "build_burst", "scan", "search"]
 
 @final
 class Cell:
@@ -60,6 +60,21 @@ class Scan:
     def cells(self) -> list[Cell]: ...
     @property
     def faults(self) -> list[str]: ...
+
+@final
+class Searcher:
+    def __new__(
+        cls,
+        sample_rate_hz: float,
+        *,
+        centre_frequency_hz: float,
+        ssb_freq_hz: float,
+        scs_khz: int,
+        antennas: int,
+        spacing_wavelengths: float = 0.5,
+        calibration: Sequence[complex] | None = None,
+    ) -> Searcher: ...
+    def search(self, samples: ArrayLike) -> list[Cell]: ...
 
 def scan(
     recording: Recording,

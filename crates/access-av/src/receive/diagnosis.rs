@@ -109,10 +109,24 @@ impl ExchangeVotes {
         });
         if share <= RIGHT_SHARE || share <= as_it_is + SWAP_GAIN {
             self.right += 1;
-        } else if let Some((_, votes)) = self.exchanged.iter_mut().find(|(it, _)| *it == pair) {
-            *votes += 1;
         } else {
-            self.exchanged.push((pair, 1));
+            self.count(pair, 1);
+        }
+    }
+
+    /// Adds the votes of others.
+    pub fn add(&mut self, others: &Self) {
+        self.right += others.right;
+        for (pair, votes) in &others.exchanged {
+            self.count(*pair, *votes);
+        }
+    }
+
+    fn count(&mut self, pair: (usize, usize), votes: usize) {
+        if let Some((_, sum)) = self.exchanged.iter_mut().find(|(it, _)| *it == pair) {
+            *sum += votes;
+        } else {
+            self.exchanged.push((pair, votes));
         }
     }
 

@@ -59,6 +59,14 @@ impl IqSource for Recording {
     }
 }
 
+/// Channel and number of the first sample that is not finite.
+pub(super) fn first_not_finite(antennas: &[&[Complex32]]) -> Option<(usize, usize)> {
+    antennas.iter().enumerate().find_map(|(channel, samples)| {
+        let place = samples.iter().position(|sample| !sample.is_finite())?;
+        Some((channel, place))
+    })
+}
+
 /// Samples in memory, one slice per antenna, all of one length.
 #[derive(Debug, Clone)]
 pub struct SampleBlock<'a> {

@@ -2,22 +2,18 @@
 
 use nr_ssb::front_end::{FrontEnd, FrontEndError};
 use nr_ssb::raster::{self, RasterPoint};
-use nr_ssb::search::{DetectedSsb, SearchConfig, SearchError, Searcher};
+use nr_ssb::search::SearchError;
 use nr_ssb::{Complex32, SubcarrierSpacing};
 use thiserror::Error;
 
-use super::SSB_SAMPLES;
-use super::array_view::{ArraySetup, ArrayView, View, array_view};
+use super::array_view::ArraySetup;
 use super::diagnosis::{ChannelFault, ExchangeVotes, faults_of_samples};
 use super::iq_source::IqSource;
+use super::ssb_search::{BLOCK_S, FALSE_ALARM, FoundSsb, SsbSearch, SsbSearchConfig};
 use crate::recording::RecordingError;
 
-/// Read and searched at once.
-const BLOCK_S: f64 = 0.02;
 /// Looked through for raster points, in two steps: the usual period, and the longest (TS 38.331).
 const RASTER_WINDOWS_S: [f64; 2] = [0.02, 0.16];
-/// Probability that 20 ms of noise make a cell, shared among the places looked at.
-const FALSE_ALARM: f64 = 1e-3;
 
 /// What a scan is told; by default nothing.
 #[derive(Debug, Clone, PartialEq, Default)]
@@ -30,23 +26,6 @@ pub struct ScanSettings {
     pub centre_frequency_hz: Option<f64>,
     /// The receiving array, for angles.
     pub array: ArraySetup,
-}
-
-/// One SSB of a recording.
-#[derive(Debug, Clone, PartialEq)]
-pub struct FoundSsb {
-    /// Cell, index, payload, offset and strength.
-    pub ssb: DetectedSsb,
-    /// First sample of the SSB, its cyclic prefix included, at the recording's rate.
-    pub sample_start: f64,
-    /// Its length at the recording's rate.
-    pub sample_count: f64,
-    /// Frequency of its centre in Hz.
-    pub ssb_freq_hz: f64,
-    /// Its subcarrier spacing.
-    pub spacing: SubcarrierSpacing,
-    /// Angle of arrival, with two antennas and more.
-    pub angle: Option<aoa::AngleEstimate>,
 }
 
 /// All that a scan found.
@@ -123,36 +102,35 @@ pub fn scan(source: &mut dyn IqSource, settings: &ScanSettings) -> Result<Scan, 
         Some(hz) => given_places(rate_hz, hz, settings.spacing),
         None => raster_places(source, settings.spacing, centre_hz)?,
     };
-    for place in &places {
-        let config = SearchConfig {
+    // Shared among the places looked at.
+    let false_alarm = FALSE_ALARM / places.len() as f64;
+    for place in places {
+        let mut search = SsbSearch::new(SsbSearchConfig {
+            name: file.clone(),
             // A centre of 0 Hz is none; a given frequency is meant as it is.
-            ssb_freq_hz: (centre_hz > 0.0 || settings.ssb_freq_hz.is_some())
-                .then_some(place.ssb_freq_hz),
-            false_alarm: FALSE_ALARM / places.len() as f64,
-            ..SearchConfig::new(place.spacing, source.channels())
-        };
-        let mut front_end = FrontEnd::new(
-            rate_hz,
-            place.ssb_freq_hz - centre_hz,
-            place.spacing.hz(),
-            source.channels(),
-        )
-        .map_err(front_end_failed)?;
-        let mut view = array_view(&config, &settings.array)?;
-        for (ssb, seen) in search(source, &config, &mut front_end, view.as_deref_mut())? {
-            if let Some(seen) = &seen {
-                votes.vote(seen);
-            }
-            let ratio = front_end.input_per_output();
-            found.ssbs.push(FoundSsb {
-                sample_start: ssb.sample_start * ratio,
-                sample_count: SSB_SAMPLES as f64 * ratio,
-                ssb_freq_hz: place.ssb_freq_hz,
-                spacing: place.spacing,
-                angle: seen.map(|seen| seen.estimate),
-                ssb,
-            });
+            absolute: centre_hz > 0.0 || settings.ssb_freq_hz.is_some(),
+            array: settings.array.clone(),
+            false_alarm,
+            ..SsbSearchConfig::new(
+                rate_hz,
+                centre_hz,
+                place.ssb_freq_hz,
+                place.spacing,
+                source.channels(),
+            )
+        })?;
+        let (block, length) = (search.block() as u64, source.length());
+        search.begin(length)?;
+        let mut start = 0;
+        while start < length {
+            let count = block.min(length - start);
+            source.read(start, count as usize, &mut antennas)?;
+            start += count;
+            let slices: Vec<&[Complex32]> = antennas.iter().map(Vec::as_slice).collect();
+            search.push(&slices, start == length)?;
         }
+        found.ssbs.extend_from_slice(search.found());
+        votes.add(search.votes());
     }
     found
         .ssbs
@@ -234,79 +212,4 @@ fn raster_places(
     let first: Vec<&[Complex32]> = antennas.iter().take(1).map(Vec::as_slice).collect();
     let finds = raster::scan_off_raster(&first, rate_hz, centre_hz).map_err(failed)?;
     Ok(suiting(finds))
-}
-
-/// Calls `act` with block after block, and whether it is the last.
-fn for_each_block(
-    source: &mut dyn IqSource,
-    antennas: &mut Vec<Vec<Complex32>>,
-    mut act: impl FnMut(&[Vec<Complex32>], bool) -> Result<(), ScanError>,
-) -> Result<(), ScanError> {
-    let block = ((BLOCK_S * source.sample_rate_hz()) as u64).max(1);
-    let mut start = 0;
-    while start < source.length() {
-        let count = block.min(source.length() - start);
-        source.read(start, count as usize, antennas)?;
-        start += count;
-        act(antennas, start == source.length())?;
-    }
-    Ok(())
-}
-
-/// The SSBs at one place, and how the array sees each.
-fn search(
-    source: &mut dyn IqSource,
-    config: &SearchConfig,
-    front_end: &mut FrontEnd,
-    mut view: Option<&mut (dyn ArrayView + 'static)>,
-) -> Result<Vec<(DetectedSsb, Option<View>)>, ScanError> {
-    let file = source.name();
-    let front_end_failed = |source| ScanError::FrontEnd {
-        file: file.clone(),
-        source,
-    };
-    let search_failed = |source| ScanError::Search {
-        file: file.clone(),
-        source,
-    };
-    let samples = (source.length() as f64 / front_end.input_per_output()) as usize;
-    if samples < SSB_SAMPLES {
-        return Err(search_failed(SearchError::TooShort {
-            samples,
-            needed: SSB_SAMPLES,
-        }));
-    }
-    let mut searcher = Searcher::new(config.clone()).map_err(search_failed)?;
-    let mut found = Vec::new();
-    let mut base = vec![Vec::new(); source.channels()];
-    let mut base_start = 0u64;
-    let mut raw = Vec::new();
-    for_each_block(source, &mut raw, |raw, last| {
-        let known = base.first().map_or(0, Vec::len);
-        front_end.push(raw, &mut base).map_err(front_end_failed)?;
-        if last {
-            front_end.finish(&mut base);
-        }
-        let window: Vec<&[Complex32]> = base.iter().map(Vec::as_slice).collect();
-        let new: Vec<&[Complex32]> = window
-            .iter()
-            .map(|samples| samples.get(known..).unwrap_or_default())
-            .collect();
-        for ssb in searcher.push(&new).map_err(search_failed)? {
-            let seen = view
-                .as_mut()
-                .and_then(|view| view.view(ssb, &window, base_start as f64));
-            found.push((ssb.clone(), seen));
-        }
-        // An SSB that is complete only with the next block begins at most this long ago.
-        let gone = window
-            .first()
-            .map_or(0, |it| it.len().saturating_sub(2 * SSB_SAMPLES));
-        for samples in &mut base {
-            samples.drain(..gone);
-        }
-        base_start += gone as u64;
-        Ok(())
-    })?;
-    Ok(found)
 }

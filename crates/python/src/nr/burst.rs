@@ -1,0 +1,113 @@
+//! SSB bursts as a cell sends them.
+
+use nr_ssb::{BchPayload, Beam, Burst, Case, Lmax, Mib, Numerology, Ofdm, Pci};
+use num_complex::Complex32;
+use numpy::PyArray1;
+use pyo3::exceptions::PyValueError;
+use pyo3::prelude::*;
+
+/// Build one burst set: what a cell sends in a half frame of 5 ms, SSB centred at 0 Hz.
+///
+/// Parameters
+/// ----------
+/// pci : int
+///     Physical cell identity, 0 to 1007.
+/// ssb_indices : sequence of int
+///     The SSBs that are sent.
+/// gains : sequence of complex, optional
+///     Amplitude of each of them; 1 without.
+/// case : str
+///     Where they lie in time (TS 38.213, 4.1): `A` (15 kHz), `B` or `C` (30 kHz).
+/// lmax : int
+///     SSB indices that the cell has, 4 or 8.
+/// sfn : int
+///     System frame number, 0 to 1023.
+/// half_frame : bool
+///     Second half of the frame.
+/// mib_bits : str, optional
+///     24 bits of the master information block; the frame number in them is `sfn`'s.
+/// ssb_freq_hz : float, optional
+///     Absolute frequency of the SSB's centre, for the phase of each symbol (TS 38.211, 5.4);
+///     without it there is no such phase.
+/// sample_rate_hz : float
+///     256, 512, 1024, ... times the subcarrier spacing.
+///
+/// Returns
+/// -------
+/// ndarray
+///     complex64, 5 ms. A resource element of amplitude one has power 1 / FFT size squared.
+///
+/// Raises
+/// ------
+/// ValueError
+///     A value out of its range; the message says which is allowed.
+#[pyfunction]
+#[pyo3(signature = (pci, *, ssb_indices = vec![0], gains = None, case = "C", lmax = 8, sfn = 0, half_frame = false, mib_bits = None, ssb_freq_hz = None, sample_rate_hz = 7.68e6))]
+#[allow(clippy::too_many_arguments, clippy::needless_pass_by_value)] // Python's keywords
+pub fn build_burst<'py>(
+    py: Python<'py>,
+    pci: u16,
+    ssb_indices: Vec<u8>,
+    gains: Option<Vec<Complex32>>,
+    case: &str,
+    lmax: u8,
+    sfn: u16,
+    half_frame: bool,
+    mib_bits: Option<&str>,
+    ssb_freq_hz: Option<f64>,
+    sample_rate_hz: f64,
+) -> PyResult<Bound<'py, PyArray1<Complex32>>> {
+    let wrong = |error: nr_ssb::Error| PyValueError::new_err(error.to_string());
+    let case = match case {
+        "A" => Case::A,
+        "B" => Case::B,
+        "C" => Case::C,
+        other => {
+            return Err(PyValueError::new_err(format!(
+                "case is {other:?}; allowed: A, B, C"
+            )));
+        }
+    };
+    let lmax = match lmax {
+        4 => Lmax::L4,
+        8 => Lmax::L8,
+        other => {
+            return Err(PyValueError::new_err(format!(
+                "lmax is {other}; allowed: 4, 8"
+            )));
+        }
+    };
+    let gains = gains.unwrap_or_else(|| vec![Complex32::ONE; ssb_indices.len()]);
+    if gains.len() != ssb_indices.len() {
+        return Err(PyValueError::new_err(format!(
+            "{} gains for {} SSBs; each needs one",
+            gains.len(),
+            ssb_indices.len()
+        )));
+    }
+    let mib = mib_bits.map_or_else(|| Ok(Mib::default()), master_information_block)?;
+    let beam = |(ssb_index, gain)| Beam { ssb_index, gain };
+    let burst = Burst {
+        pci: Pci::new(pci).map_err(wrong)?,
+        case,
+        lmax,
+        payload: BchPayload::new(mib, sfn, half_frame, 0).map_err(wrong)?,
+        beams: ssb_indices.into_iter().zip(gains).map(beam).collect(),
+        ssb_freq_hz,
+    };
+    let numerology = Numerology::from_sample_rate(case.spacing(), sample_rate_hz).map_err(wrong)?;
+    let samples = burst.iq(&mut Ofdm::new(numerology)).map_err(wrong)?;
+    Ok(PyArray1::from_vec(py, samples))
+}
+
+fn master_information_block(bits: &str) -> PyResult<Mib> {
+    let number = u32::from_str_radix(bits, 2)
+        .ok()
+        .filter(|_| bits.len() == 24);
+    let number = number.ok_or_else(|| {
+        PyValueError::new_err(format!(
+            "mib_bits is {bits:?}; it must be 24 characters 0 or 1"
+        ))
+    })?;
+    Mib::from_bits(number).map_err(|error| PyValueError::new_err(error.to_string()))
+}

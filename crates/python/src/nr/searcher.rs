@@ -1,0 +1,116 @@
+//! A search whose plans and buffers are kept.
+
+use access_av::receive::{ArraySetup, FoundSsb, SsbSearch, SsbSearchConfig};
+use num_complex::Complex64;
+use pyo3::prelude::*;
+
+use super::{Cell, complex_samples, rows, scan_error, subcarrier_spacing};
+
+/// Search for the SSBs of one frequency, prepared once and used for one recording after another.
+///
+/// Transforms and buffers are kept between calls, and complex64 samples that lie in memory row by row
+/// are searched where they are. Other threads run meanwhile; one searcher serves one of them at a
+/// time.
+///
+/// Parameters
+/// ----------
+/// sample_rate_hz : float
+///     An integer multiple of 3.84 MHz.
+/// centre_frequency_hz : float
+///     Frequency that stands at 0 Hz in the samples.
+/// ssb_freq_hz : float
+///     Absolute frequency of the SSB's centre.
+/// scs_khz : int
+///     Subcarrier spacing, 15 or 30.
+/// antennas : int
+///     Number of antennas, 1 to 16; angles come with 2 to 8.
+/// spacing_wavelengths : float
+///     Distance between neighbouring antennas.
+/// calibration : array_like, optional
+///     Complex gain of each channel, by which it is divided.
+///
+/// Raises
+/// ------
+/// RecordingError
+///     A rate, band or array that is not possible.
+///
+/// Examples
+/// --------
+/// >>> from access_av import nr
+/// >>> searcher = nr.Searcher(
+/// ...     7.68e6, centre_frequency_hz=3.7008e9, ssb_freq_hz=3.7008e9, scs_khz=30, antennas=1
+/// ... )
+/// >>> for sfn in (7, 8):
+/// ...     burst = nr.build_burst(42, ssb_indices=[1], sfn=sfn, ssb_freq_hz=3.7008e9)
+/// ...     [cell] = searcher.search(burst)
+/// ...     print(cell.pci, cell.ssb_index, cell.sfn)
+/// 42 1 7
+/// 42 1 8
+#[pyclass(module = "access_av._core.nr")]
+pub struct Searcher(SsbSearch);
+
+#[pymethods]
+impl Searcher {
+    #[new]
+    #[pyo3(signature = (sample_rate_hz, *, centre_frequency_hz, ssb_freq_hz, scs_khz, antennas, spacing_wavelengths = 0.5, calibration = None))]
+    fn new(
+        sample_rate_hz: f64,
+        centre_frequency_hz: f64,
+        ssb_freq_hz: f64,
+        scs_khz: u32,
+        antennas: usize,
+        spacing_wavelengths: f64,
+        calibration: Option<Vec<Complex64>>,
+    ) -> PyResult<Self> {
+        let config = SsbSearchConfig {
+            array: ArraySetup {
+                spacing_wavelengths,
+                calibration,
+            },
+            ..SsbSearchConfig::new(
+                sample_rate_hz,
+                centre_frequency_hz,
+                ssb_freq_hz,
+                subcarrier_spacing(scs_khz)?,
+                antennas,
+            )
+        };
+        SsbSearch::new(config).map(Self).map_err(scan_error)
+    }
+
+    /// Find every SSB in samples.
+    ///
+    /// Parameters
+    /// ----------
+    /// samples : ndarray
+    ///     Complex samples, `(samples,)` or `(antennas, samples)`.
+    ///
+    /// Returns
+    /// -------
+    /// list of Cell
+    ///     The SSBs in order of time.
+    ///
+    /// Raises
+    /// ------
+    /// RecordingError
+    ///     Another number of antennas, less than one SSB, samples that are not finite.
+    fn search(&mut self, py: Python<'_>, samples: &Bound<'_, PyAny>) -> PyResult<Vec<Py<Cell>>> {
+        let samples = complex_samples(samples)?;
+        let antennas = rows(&samples)?;
+        let found: &[FoundSsb] = py.detach(|| self.0.search(&antennas)).map_err(scan_error)?;
+        found
+            .iter()
+            .map(|ssb| Py::new(py, Cell::from(ssb)))
+            .collect()
+    }
+
+    fn __repr__(&self) -> String {
+        let config = self.0.config();
+        format!(
+            "Searcher(ssb_freq_hz={:.0}, scs_khz={}, antennas={})",
+            config.ssb_freq_hz,
+            config.spacing.khz(),
+            config.antennas,
+        )
+    }
+}
