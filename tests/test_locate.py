@@ -11,6 +11,7 @@ import pytest
 from mcap.reader import make_reader
 
 from access_av import drives
+from access_av.facts import tomllib
 
 if TYPE_CHECKING:
     from collections.abc import Callable
@@ -161,3 +162,63 @@ def test_synth_refuses_what_it_cannot_send(access_av: Cli, tmp_path: Path) -> No
     done = access_av("synth", "no-such", "--out", tmp_path)
     assert done.code == 2
     assert "no-such" in done.err
+
+
+def without_start(site: str) -> str:
+    return re.sub(r"\[initial_pose\]\n(\w+ = .*\n)+", "", site)
+
+
+def test_without_an_initial_pose_the_vehicle_is_found(
+    access_av: Cli, drive: Path, tmp_path: Path
+) -> None:
+    site = tmp_path / "site.toml"
+    site.write_text(without_start((drive / "site.toml").read_text()))
+    given = arguments(drive, tmp_path / "out")
+    given[6] = site
+    done = access_av(*given, "--truth", drive / "truth.tum")
+    assert done.code == 0, done.err
+    driven_m = float(re.findall(r"Found after ([0-9.]+) m", done.out)[0])
+    poses = pl.read_parquet(tmp_path / "out" / "poses.parquet")
+    known = poses.filter(~pl.col("searching"))
+    assert 0.0 < driven_m < 32.0
+    assert 0 < known.height < poses.height
+    trajectory = (tmp_path / "out" / "trajectory.tum").read_text().splitlines()
+    assert len(trajectory) == known.height
+    # It is found once its standard deviation is below 0.4 m; it only gets better.
+    errors = drives.error_m(poses, drive / "truth.tum")
+    assert errors.height == known.height
+    assert errors["error_m"].max() < 4 * 0.4  # type: ignore[operator]
+
+
+def test_the_start_may_be_given_with_the_command(
+    access_av: Cli, drive: Path, tmp_path: Path
+) -> None:
+    pose = tomllib.loads((drive / "site.toml").read_text())["initial_pose"]
+    site = tmp_path / "site.toml"
+    site.write_text(without_start((drive / "site.toml").read_text()))
+    given = drives.locate(drive / "site.toml", drive / "odometry.csv", drive / "iq").poses
+    told = drives.locate(
+        site,
+        drive / "odometry.csv",
+        drive / "iq",
+        start=(pose["x_m"], pose["y_m"], pose["heading_rad"]),
+    ).poses
+    assert told.equals(given)
+    searched = arguments(drive, tmp_path / "out")
+    assert "Found after" in access_av(*searched, "--start", "scratch").out
+    for bad in ("1,2", "1,2,x", "1,2,inf"):
+        done = access_av(*searched, "--start", bad)
+        assert done.code == 2
+        assert "--start" in done.err
+
+
+def test_one_radio_head_cannot_find_it(access_av: Cli, drive: Path, tmp_path: Path) -> None:
+    site = tmp_path / "site.toml"
+    text = without_start((drive / "site.toml").read_text())
+    site.write_text("pci_allow_list = [1]\n" + text)
+    given = arguments(drive, tmp_path / "out")
+    given[6] = site
+    done = access_av(*given)
+    assert done.code == 2
+    assert "initial_pose" in done.err
+    assert "two radio heads" in done.err

@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import json
+import math
 from pathlib import Path  # noqa: TC003 (Typer reads annotations at run time)
 from typing import Annotated
 
@@ -153,18 +154,35 @@ def locate(
     start_time_s: Annotated[
         float, typer.Option(help="Time of the first sample by the odometry's clock.")
     ] = 0.0,
+    start: Annotated[
+        str | None,
+        typer.Option(
+            metavar="X,Y,HEADING",
+            help="Initial pose in m, m, rad, in place of the site's; or the word scratch.",
+        ),
+    ] = None,
 ) -> None:
     """Locate a recorded drive.
 
     Writes drive.mcap (poses with covariance and twist, verdicts, diagnostics), trajectory.tum,
     poses.parquet, angles.parquet and report.html. Items of the input that cannot be used are
-    named, and the rest is used.
+    named, and the rest is used. Without an initial pose, in the site file or by --start, the
+    vehicle is found along the road; that takes two radio heads or more.
     """
     from access_av import drives
     from access_av.files import ResultsDirectory
     from access_av.report.located import render_located
 
-    drive = drives.locate(site, odometry, recording, topic=topic, start_time_s=start_time_s)
+    from_scratch = start is not None and start.strip() == "scratch"
+    drive = drives.locate(
+        site,
+        odometry,
+        recording,
+        topic=topic,
+        start_time_s=start_time_s,
+        start=None if start is None or from_scratch else _pose(start),
+        from_scratch=from_scratch,
+    )
     numbers = drives.summary(drive, truth)
     directory = ResultsDirectory.create("locate", out)
     drive.write_mcap(directory.path / "drive.mcap")
@@ -184,12 +202,31 @@ def locate(
         f"{numbers['angles']:.0f} angles, {numbers['accepted']:.0f} accepted, "
         f"in {numbers['duration_s']:.1f} s."
     )
+    if "found_s" in numbers:
+        console.print(
+            f"Found after {numbers['found_m']:.1f} m and {numbers['found_s']:.1f} s from scratch."
+        )
+    elif drive.poses["searching"].all():
+        console.print("Not found: several places on the road fit the angles.")
     if "rms_error_m" in numbers:
         console.print(
             f"Horizontal error: RMS {numbers['rms_error_m']:.3f} m, "
             f"90th percentile {numbers['p90_error_m']:.3f} m."
         )
     console.print(f"Files: {directory.path}", soft_wrap=True)
+
+
+def _pose(text: str) -> tuple[float, float, float]:
+    try:
+        x_m, y_m, heading_rad = (float(part) for part in text.split(","))
+    except ValueError as error:
+        raise InputError(
+            f"--start {text}: write x and y in metres and the heading in radians, as 12.5,-3,0.1, "
+            "or the word scratch"
+        ) from error
+    if not all(map(math.isfinite, (x_m, y_m, heading_rad))):
+        raise InputError(f"--start {text}: the numbers must be finite")
+    return x_m, y_m, heading_rad
 
 
 def _gains(text: str) -> list[complex]:

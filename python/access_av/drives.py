@@ -108,7 +108,8 @@ class Drive:
     ----------
     poses
         One row per odometry sample: time, pose, speed, covariance, and protection level and
-        integrity where the site asks for them (null where unknown).
+        integrity where the site asks for them (null where unknown). ``searching`` as long as the
+        first pose is not known; the pose is then the mean of where the vehicle may be.
     angles
         One row per angle: SSB, angle, and what the localizer did with it.
     remarks
@@ -121,11 +122,11 @@ class Drive:
     _core: _core.LocatedDrive
 
     def write_mcap(self, path: str | Path) -> None:
-        """Write poses, verdicts and diagnostics as MCAP (ROS 2)."""
+        """Write poses, verdicts and diagnostics as MCAP (ROS 2); no poses while searching."""
         self._core.write_mcap(path)
 
     def write_tum(self, path: str | Path) -> None:
-        """Write the poses as a TUM trajectory."""
+        """Write the poses, from the first that is known on, as a TUM trajectory."""
         self._core.write_tum(path)
 
 
@@ -136,6 +137,8 @@ def locate(
     *,
     topic: str | None = None,
     start_time_s: float = 0.0,
+    start: tuple[float, float, float] | None = None,
+    from_scratch: bool = False,
 ) -> Drive:
     """Locate a recorded drive.
 
@@ -153,6 +156,11 @@ def locate(
         Topic of the odometry in an MCAP file with several.
     start_time_s
         Time of the recording's first sample by the odometry's clock.
+    start
+        Initial pose (x in metres, y in metres, heading in radians) in place of the site's. A site
+        without one leaves it to be found along the road, by two radio heads or more.
+    from_scratch
+        Find the vehicle along the road even if the site has an initial pose.
 
     Raises
     ------
@@ -161,7 +169,15 @@ def locate(
     ScenarioError
         When the site file cannot be used.
     """
-    located = _core.locate(site, odometry, recording, topic=topic, start_time_s=start_time_s)
+    located = _core.locate(
+        site,
+        odometry,
+        recording,
+        topic=topic,
+        start_time_s=start_time_s,
+        start=start,
+        from_scratch=from_scratch,
+    )
     columns = pl.DataFrame(located.poses, schema_overrides={"integrity": pl.String})
     poses = columns.with_columns(pl.col(pl.Float64).fill_nan(None))
     angles = pl.DataFrame(located.angles).with_columns(pl.col(pl.Float64).fill_nan(None))
@@ -174,7 +190,7 @@ def error_m(poses: pl.DataFrame, truth: str | Path) -> pl.DataFrame:
     Parameters
     ----------
     poses
-        Poses of a located drive.
+        Poses of a located drive; those before the first known one are passed over.
     truth
         TUM trajectory; times within a microsecond belong together.
 
@@ -194,7 +210,7 @@ def error_m(poses: pl.DataFrame, truth: str | Path) -> pl.DataFrame:
         }
     )
     timed = poses.with_columns(time_us=(pl.col("time_s") * 1e6).round().cast(pl.Int64))
-    both = timed.join(true, on="time_us")
+    both = timed.filter(~pl.col("searching")).join(true, on="time_us")
     if both.is_empty():
         raise InputError(f"{truth}: no time in common with the drive")
     dx, dy = pl.col("x_m") - pl.col("true_x_m"), pl.col("y_m") - pl.col("true_y_m")
@@ -207,8 +223,16 @@ def summary(drive: Drive, truth: str | Path | None = None) -> dict[str, float]:
         "duration_s": float(drive.poses["time_s"][-1] - drive.poses["time_s"][0]),
         "angles": float(drive.angles.height),
         "accepted": float(drive.angles["accepted"].sum()),
+        "remarks": float(len(drive.remarks)),
     }
-    if truth is not None:
+    known = drive.poses.filter(~pl.col("searching"))
+    if known.height < drive.poses.height and not known.is_empty():
+        numbers["found_s"] = float(known["time_s"][0] - drive.poses["time_s"][0])
+        steps = drive.poses.select("time_s", "speed_mps").with_columns(
+            driven_m=(pl.col("time_s").diff().fill_null(0.0) * pl.col("speed_mps").abs()).cum_sum()
+        )
+        numbers["found_m"] = float(steps.filter(time_s=known["time_s"][0])["driven_m"][0])
+    if truth is not None and not known.is_empty():
         errors = error_m(drive.poses, truth)["error_m"]
         numbers["rms_error_m"] = float((errors**2).mean() ** 0.5)  # type: ignore[operator]
         numbers["p90_error_m"] = float(errors.quantile(0.9, "linear") or 0.0)

@@ -11,11 +11,11 @@ use crate::BoxError;
 use crate::channel::LinkBudget;
 use crate::estimator::{AngleEstimator, CustomEstimator};
 use crate::geometry::Pose;
-use crate::localize::integrity::{Guard, IntegrityConfig};
-use crate::localize::tracker::{InitialPose, Tracker, TrackerConfig};
+use crate::localize::integrity::IntegrityConfig;
+use crate::localize::tracker::{InitialPose, OdometryVerdict, Tracker, TrackerConfig};
 use crate::localize::{
-    AngleMeasurement, DeadReckoning, Localizer, OdometryStep, PoseEstimate, UpdateReason,
-    UpdateVerdict,
+    AngleMeasurement, DeadReckoning, Initialiser, Localizer, OdometryStep, PoseEstimate,
+    UpdateReason, UpdateVerdict,
 };
 use crate::observation::{OdometrySample, SensedSsb, SsbObservation};
 use crate::platform::Platform;
@@ -91,7 +91,8 @@ pub enum OdometryDefect {
 }
 
 impl Onboard {
-    /// The scenario's pipeline on `platform`, at 0 s and `start`.
+    /// The scenario's pipeline on `platform`, at 0 s and `start`, or in search of its start where
+    /// the scenario says that it is not known.
     ///
     /// # Errors
     /// [`ScenarioError`] when the platform lacks what the scenario asks of it.
@@ -118,23 +119,27 @@ impl Onboard {
                 ))
             }
             LocalizerSettings::Tracker(settings) => {
-                let map = settings.map.then(|| scenario.build_track()).transpose()?;
-                let start = InitialPose {
-                    pose: start,
-                    position_std_m: scenario.start.position_std_m,
-                    heading_std_rad: scenario.start.heading_std_rad,
-                };
                 let config = TrackerConfig::new(scenario, &settings);
-                let tracker = Tracker::new(config, map.map(Arc::new), &heads, &start);
-                if settings.integrity {
-                    let config = IntegrityConfig {
-                        alert_limit_m: settings.alert_limit_m,
-                        risk: settings.integrity_risk,
-                        ..IntegrityConfig::default()
+                let integrity = settings.integrity.then(|| IntegrityConfig {
+                    alert_limit_m: settings.alert_limit_m,
+                    risk: settings.integrity_risk,
+                    ..IntegrityConfig::default()
+                });
+                let settled = &scenario.start;
+                if settled.known {
+                    let map = settings.map.then(|| scenario.build_track()).transpose()?;
+                    let start = InitialPose {
+                        pose: start,
+                        position_std_m: settled.position_std_m,
+                        heading_std_rad: settled.heading_std_rad,
                     };
-                    Localizer::Guarded(Box::new(Guard::new(tracker, &heads, config)))
+                    let tracker = Tracker::new(config, map.map(Arc::new), &heads, &start);
+                    Localizer::tracking(tracker, &heads, integrity)
                 } else {
-                    Localizer::Tracker(Box::new(tracker))
+                    let road = scenario.build_track()?;
+                    let either = settled.either_direction;
+                    let search = Initialiser::new(config, road, either, &heads);
+                    Localizer::Searching(Box::new(search), integrity)
                 }
             }
         };
@@ -153,11 +158,12 @@ impl Onboard {
         })
     }
 
-    /// Takes in an odometry sample. The first one is where distances are counted from.
+    /// Takes in an odometry sample, and says what the localizer made of it. The first one is where
+    /// distances are counted from.
     ///
     /// # Errors
     /// [`OdometryDefect`] when the sample is unusable; the state is kept.
-    pub fn odometry(&mut self, sample: &OdometrySample) -> Result<(), OdometryDefect> {
+    pub fn odometry(&mut self, sample: &OdometrySample) -> Result<OdometryVerdict, OdometryDefect> {
         let yaw_rate_radps = sample.yaw_rate_radps.unwrap_or(0.0);
         let values = [
             sample.time_s,
@@ -174,9 +180,9 @@ impl Onboard {
             Some(_) => {}
         }
         self.odometry = Some(*sample);
-        self.localizer.odometry(sample);
+        let verdict = self.localizer.odometry(sample);
         self.advance_to(sample.time_s);
-        Ok(())
+        Ok(verdict)
     }
 
     /// Moves the pose on to `time_s`, beyond the last odometry sample at that sample's speed.
@@ -197,8 +203,18 @@ impl Onboard {
         self.reached = Reached { time_s, distance_m };
     }
 
-    /// Whether the receiver need listen to the SSB burst at `time_s`.
+    /// Number of places the vehicle may be at while it searches for its first pose; `None` once
+    /// that is known. Until then [`pose`](Self::pose) is the mean of these places.
+    pub fn searching(&self) -> Option<usize> {
+        self.localizer.hypotheses()
+    }
+
+    /// Whether the receiver need listen to the SSB burst at `time_s`: always, while it searches
+    /// for its first pose.
     pub fn listens(&self, time_s: f64) -> bool {
+        if self.searching().is_some() {
+            return true;
+        }
         match (&self.trigger, self.localizer.tracker()) {
             (Trigger::Policy(policy), _) => policy.listens(time_s),
             (Trigger::Uncertainty(policy), Some(tracker)) => {
@@ -211,6 +227,9 @@ impl Onboard {
 
     /// Whether the angle of this SSB, of a burst worth estimating, is itself worth it.
     pub fn selects(&self, ssb: &SensedSsb) -> bool {
+        if self.searching().is_some() {
+            return true;
+        }
         match &self.trigger {
             Trigger::Policy(_) => true,
             Trigger::Uncertainty(policy) => {
@@ -235,6 +254,12 @@ impl Onboard {
         sensed: &[SensedSsb],
     ) -> Result<WakeUpDecision, BoxError> {
         self.advance_to(time_s);
+        if self.searching().is_some() {
+            return Ok(WakeUpDecision {
+                estimate: true,
+                wake_up_time_s: self.wake_up_time_s,
+            });
+        }
         let strongest = sensed
             .iter()
             .filter_map(|ssb| Some((ssb, self.head(ssb)?)))

@@ -2,11 +2,12 @@
 
 use crate::BoxError;
 use crate::localize::PoseEstimate;
+use crate::localize::tracker::OdometryVerdict;
 use crate::observation::{OdometrySample, SsbObservation};
 use crate::onboard::{Custom, Execution, Onboard};
 use crate::platform::Platform;
 use crate::receive::{ReceiveError, Receiver};
-use crate::recording::{LoggedAngle, Recording, RecordingError, Site};
+use crate::recording::{AngleLog, LoggedAngle, OdometryLog, Recording, RecordingError, Site};
 use crate::scenario::ScenarioError;
 use thiserror::Error;
 
@@ -63,6 +64,18 @@ pub struct LocatedPose {
     pub speed_mps: f64,
     /// Yaw rate in rad/s, where there is a gyroscope.
     pub yaw_rate_radps: Option<f64>,
+    /// Number of places the vehicle may be at, while the first pose is searched for; the estimate
+    /// is their mean.
+    pub searching: Option<usize>,
+}
+
+/// What is remarkable about one item of the input.
+#[derive(Debug, Clone, PartialEq)]
+pub struct Remark {
+    /// When in the drive it came, in seconds.
+    pub time_s: f64,
+    /// Which item, what is wrong with it, and whether it was left out.
+    pub text: String,
 }
 
 /// A located drive.
@@ -72,6 +85,8 @@ pub struct LocatedDrive {
     pub poses: Vec<LocatedPose>,
     /// The angles and what became of them.
     pub executions: Vec<Execution>,
+    /// What was remarkable about single items of the input, in order of time.
+    pub remarks: Vec<Remark>,
 }
 
 /// A drive being located.
@@ -82,25 +97,35 @@ pub struct Replay<'a> {
 }
 
 impl<'a> Replay<'a> {
-    /// A drive that starts at the site's initial pose; `odometry` is in order of time.
+    /// A drive that starts at the site's initial pose, or anywhere on its road if it has none.
     ///
     /// # Errors
     /// [`ReplayError::Site`], [`ReplayError::NoOdometry`].
-    pub fn new(site: &Site, odometry: &'a [OdometrySample]) -> Result<Self, ReplayError> {
-        if odometry.is_empty() {
+    pub fn new(site: &Site, odometry: &'a OdometryLog) -> Result<Self, ReplayError> {
+        if odometry.samples.is_empty() {
             return Err(ReplayError::NoOdometry);
         }
         let platform = Platform::load(&site.scenario.platform.name)?;
         let onboard = Onboard::new(
             &site.scenario,
             &platform,
-            site.initial_pose,
+            site.initial_pose.unwrap_or_default(),
             Custom::default(),
         )?;
         Ok(Self {
             onboard,
-            odometry: odometry.iter().peekable(),
-            drive: LocatedDrive::default(),
+            odometry: odometry.samples.iter().peekable(),
+            drive: LocatedDrive {
+                remarks: odometry
+                    .remarks
+                    .iter()
+                    .map(|remark| Remark {
+                        time_s: remark.time_s,
+                        text: remark.to_string(),
+                    })
+                    .collect(),
+                ..LocatedDrive::default()
+            },
         })
     }
 
@@ -130,21 +155,42 @@ impl<'a> Replay<'a> {
     pub fn finish(mut self) -> LocatedDrive {
         self.odometry_until(f64::INFINITY);
         self.drive
+            .remarks
+            .sort_by(|a, b| a.time_s.total_cmp(&b.time_s));
+        self.drive
+    }
+
+    fn remark(&mut self, time_s: f64, text: String) {
+        self.drive.remarks.push(Remark { time_s, text });
     }
 
     fn odometry_until(&mut self, time_s: f64) {
         while let Some(sample) = self.odometry.next_if(|sample| sample.time_s <= time_s) {
-            // Nothing is known of the vehicle's place by a sample that is left out.
-            if self.onboard.odometry(sample).is_ok() {
-                self.drive.poses.push(LocatedPose {
-                    estimate: PoseEstimate {
-                        time_s: sample.time_s,
-                        ..self.onboard.pose()
-                    },
-                    speed_mps: sample.speed_mps,
-                    yaw_rate_radps: sample.yaw_rate_radps,
-                });
+            let at_s = sample.time_s;
+            match self.onboard.odometry(sample) {
+                Ok(OdometryVerdict::DistanceJump { jump_m }) => self.remark(
+                    at_s,
+                    format!(
+                        "odometry at {at_s} s: the distance jumps by {jump_m:.3} m, the speed was \
+                         used instead"
+                    ),
+                ),
+                Ok(_) => {}
+                // Nothing is known of the vehicle's place by a sample that is left out.
+                Err(defect) => {
+                    self.remark(at_s, format!("odometry at {at_s} s: left out, {defect}"));
+                    continue;
+                }
             }
+            self.drive.poses.push(LocatedPose {
+                estimate: PoseEstimate {
+                    time_s: at_s,
+                    ..self.onboard.pose()
+                },
+                speed_mps: sample.speed_mps,
+                yaw_rate_radps: sample.yaw_rate_radps,
+                searching: self.onboard.searching(),
+            });
         }
     }
 }
@@ -155,11 +201,14 @@ impl<'a> Replay<'a> {
 /// [`ReplayError::Site`], [`ReplayError::NoOdometry`].
 pub fn locate_angles(
     site: &Site,
-    odometry: &[OdometrySample],
-    angles: &[LoggedAngle],
+    odometry: &OdometryLog,
+    angles: &AngleLog,
 ) -> Result<LocatedDrive, ReplayError> {
     let mut replay = Replay::new(site, odometry)?;
-    for angle in angles {
+    for remark in &angles.remarks {
+        replay.remark(remark.time_s, remark.to_string());
+    }
+    for angle in &angles.angles {
         replay.angle(angle);
     }
     Ok(replay.finish())
@@ -171,11 +220,14 @@ pub fn locate_angles(
 /// [`ReplayError`].
 pub fn locate_recording(
     site: &Site,
-    odometry: &[OdometrySample],
+    odometry: &OdometryLog,
     recording: &mut Recording,
     start_time_s: f64,
 ) -> Result<LocatedDrive, ReplayError> {
     let mut replay = Replay::new(site, odometry)?;
+    for warning in recording.warnings() {
+        replay.remark(f64::NEG_INFINITY, warning.to_string());
+    }
     let file = recording.data_file().display().to_string();
     let mut receiver = Receiver::new(site.receiver_config())
         .map_err(|source| ReplayError::Receive { file, source })?;

@@ -9,8 +9,8 @@ use std::path::Path;
 use access_av::geometry::Point;
 use access_av::receive::{ScanSettings, scan};
 use access_av::recording::{
-    Datatype, LoggedAngle, Recording, Site, read_angle_log, read_odometry_csv, read_tum,
-    write_angle_log,
+    Datatype, LoggedAngle, OdometryLog, Recording, Site, read_angle_log, read_odometry_csv,
+    read_tum, write_angle_log,
 };
 use access_av::replay::{LocatedDrive, ReplayError, locate_angles, locate_recording};
 use access_av::scenario::{Scenario, ScenarioError};
@@ -68,15 +68,13 @@ fn a_recorded_drive_is_located() {
     let dir = common::scratch("drive");
     let made = synthesize(&scenario(), &SETTINGS, &dir).unwrap();
     let site = Site::read(&dir.join("site.toml")).unwrap();
-    let odometry = read_odometry_csv(&dir.join("odometry.csv"))
-        .unwrap()
-        .samples;
+    let odometry = read_odometry_csv(&dir.join("odometry.csv")).unwrap();
     let mut recording = Recording::open(&made.recording).unwrap();
     assert_eq!(recording.warnings(), []);
     assert_eq!(recording.length(), made.samples);
 
     let drive = locate_recording(&site, &odometry, &mut recording, 0.0).unwrap();
-    assert_eq!(drive.poses.len(), odometry.len());
+    assert_eq!(drive.poses.len(), odometry.samples.len());
     // Two heads; what the acquisition of the second costs is a burst or two.
     assert!(
         drive.executions.len() + 5 > 2 * made.bursts,
@@ -107,7 +105,7 @@ fn a_recorded_drive_is_located() {
     angles.insert(100, angles[4]);
     let file = dir.join("angles.csv");
     write_angle_log(&file, &angles).unwrap();
-    let angles = read_angle_log(&file).unwrap().angles;
+    let angles = read_angle_log(&file).unwrap();
     let again = locate_angles(&site, &odometry, &angles).unwrap();
     let from_angles_m = rms_error_m(&again, &dir.join("truth.tum"));
     assert_eq!(
@@ -149,9 +147,7 @@ fn a_recording_without_gaps_is_scanned_and_located_alike() {
     assert_eq!(found.ssbs.len(), annotations.len());
 
     let site = Site::read(&dir.join("site.toml")).unwrap();
-    let odometry = read_odometry_csv(&dir.join("odometry.csv"))
-        .unwrap()
-        .samples;
+    let odometry = read_odometry_csv(&dir.join("odometry.csv")).unwrap();
     let drive = locate_recording(&site, &odometry, &mut recording, 0.0).unwrap();
     assert_eq!(drive.executions.len(), 2 * made.bursts);
 }
@@ -167,12 +163,10 @@ fn what_does_not_fit_together_is_refused() {
     let text = fs::read_to_string(dir.join("site.toml")).unwrap();
     let site = Site::from_toml(&text, "site.toml").unwrap();
     let mut recording = Recording::open(&made.recording).unwrap();
-    let error = locate_recording(&site, &[], &mut recording, 0.0).unwrap_err();
+    let error = locate_recording(&site, &OdometryLog::default(), &mut recording, 0.0).unwrap_err();
     assert!(matches!(error, ReplayError::NoOdometry));
 
-    let odometry = read_odometry_csv(&dir.join("odometry.csv"))
-        .unwrap()
-        .samples;
+    let odometry = read_odometry_csv(&dir.join("odometry.csv")).unwrap();
     let mut elsewhere = site.clone();
     elsewhere.scenario.ssb.carrier_mhz = 3600.0;
     let error = locate_recording(&elsewhere, &odometry, &mut recording, 0.0).unwrap_err();
@@ -196,7 +190,7 @@ fn site_files_are_checked() {
     let start = "[initial_pose]\nx_m = 1.0\ny_m = 2.0\nheading_rad = 0.3\n";
     let good = format!("{start}{}{}", head(1, 0.0), head(2, 50.0));
     let site = Site::from_toml(&good, "site.toml").unwrap();
-    assert_eq!(site.initial_pose.point(), Point::new(1.0, 2.0));
+    assert_eq!(site.initial_pose.unwrap().point(), Point::new(1.0, 2.0));
     assert_eq!(site.scenario.radio_heads.len(), 2);
     let listed = Site::from_toml(&format!("pci_allow_list = [2]\n{good}"), "site.toml").unwrap();
     assert_eq!(listed.scenario.radio_heads.len(), 1);

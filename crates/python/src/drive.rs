@@ -2,10 +2,11 @@
 
 use std::path::{Path, PathBuf};
 
+use access_av::geometry::Pose;
 use access_av::localize::AngleMeasurement;
 use access_av::recording::{
-    Datatype, OdometryLog, Recording, Site, TimedPose, read_angle_log, read_odometry_csv,
-    read_odometry_mcap, write_drive_mcap, write_tum,
+    Datatype, Recording, Site, TimedPose, read_angle_log, read_odometry_csv, read_odometry_mcap,
+    write_drive_mcap, write_tum,
 };
 use access_av::replay::{self, ReplayError};
 use access_av::simulate::{SynthError, SynthSettings};
@@ -94,14 +95,21 @@ pub fn synthesize(
 ///     Topic of the odometry in an MCAP file with several.
 /// start_time_s : float
 ///     Time of the recording's first sample by the odometry's clock.
+/// start : tuple of float, optional
+///     Initial pose (x in metres, y in metres, heading in radians) in place of the site's.
+/// from_scratch : bool
+///     Whether to find the vehicle along the road, even if the site has an initial pose.
 ///
 /// Raises
 /// ------
 /// RecordingError, ScenarioError
 ///     An unusable recording or odometry; an unusable site file.
 #[pyfunction]
-#[pyo3(signature = (site, odometry, recording, *, topic = None, start_time_s = 0.0))]
-#[allow(clippy::needless_pass_by_value)] // what extraction yields
+#[pyo3(signature = (
+    site, odometry, recording, *, topic = None, start_time_s = 0.0, start = None,
+    from_scratch = false
+))]
+#[allow(clippy::too_many_arguments, clippy::needless_pass_by_value)] // Python's keywords
 pub fn locate(
     py: Python<'_>,
     site: PathBuf,
@@ -109,39 +117,62 @@ pub fn locate(
     recording: PathBuf,
     topic: Option<&str>,
     start_time_s: f64,
+    start: Option<[f64; 3]>,
+    from_scratch: bool,
 ) -> PyResult<LocatedDrive> {
-    py.detach(|| run(&site, &odometry, &recording, topic, start_time_s))
-        .map_err(replay_error)
+    let pose = start.map(|[x_m, y_m, heading_rad]| Pose {
+        x_m,
+        y_m,
+        heading_rad,
+    });
+    if start.is_some_and(|values| values.iter().any(|value| !value.is_finite())) {
+        return Err(PyValueError::new_err(
+            "`start` must be three finite numbers",
+        ));
+    }
+    if start.is_some() && from_scratch {
+        return Err(PyValueError::new_err(
+            "give either `start` or `from_scratch`",
+        ));
+    }
+    py.detach(|| {
+        let origin = site.display().to_string();
+        let mut site = Site::read(&site)?;
+        if pose.is_some() || from_scratch {
+            site = site.starting_at(pose, &origin)?;
+        }
+        run(&site, &odometry, &recording, topic, start_time_s)
+    })
+    .map(|core| LocatedDrive { core })
+    .map_err(replay_error)
 }
 
 fn run(
-    site: &Path,
+    site: &Site,
     odometry: &Path,
     recording: &Path,
     topic: Option<&str>,
     start_time_s: f64,
-) -> Result<LocatedDrive, ReplayError> {
+) -> Result<replay::LocatedDrive, ReplayError> {
     let is = |path: &Path, extension: &str| {
         path.extension()
             .is_some_and(|it| it.eq_ignore_ascii_case(extension))
     };
-    let site = Site::read(site)?;
-    let OdometryLog { samples, remarks } = if is(odometry, "mcap") {
+    let odometry = if is(odometry, "mcap") {
         read_odometry_mcap(odometry, topic)?
     } else {
         read_odometry_csv(odometry)?
     };
-    let mut remarks: Vec<String> = remarks.iter().map(ToString::to_string).collect();
-    let core = if is(recording, "csv") {
-        let log = read_angle_log(recording)?;
-        remarks.extend(log.remarks.iter().map(ToString::to_string));
-        replay::locate_angles(&site, &samples, &log.angles)?
+    if is(recording, "csv") {
+        replay::locate_angles(site, &odometry, &read_angle_log(recording)?)
     } else {
-        let mut recording = Recording::open(recording)?;
-        remarks.extend(recording.warnings().iter().map(ToString::to_string));
-        replay::locate_recording(&site, &samples, &mut recording, start_time_s)?
-    };
-    Ok(LocatedDrive { core, remarks })
+        replay::locate_recording(
+            site,
+            &odometry,
+            &mut Recording::open(recording)?,
+            start_time_s,
+        )
+    }
 }
 
 #[allow(clippy::needless_pass_by_value)] // the shape that `map_err` wants
@@ -157,7 +188,6 @@ fn replay_error(error: ReplayError) -> PyErr {
 #[pyclass(frozen, module = "access_av._core")]
 pub struct LocatedDrive {
     core: replay::LocatedDrive,
-    remarks: Vec<String>,
 }
 
 #[pymethods]
@@ -165,12 +195,14 @@ impl LocatedDrive {
     /// What was wrong with single items of the input.
     #[getter]
     fn remarks(&self) -> Vec<String> {
-        self.remarks.clone()
+        let remarks = self.core.remarks.iter();
+        remarks.map(|remark| remark.text.clone()).collect()
     }
 
     /// One pose per odometry sample: columns `time_s`, `x_m`, `y_m`, `heading_rad`, `speed_mps`,
     /// the covariance `xx_m2`, `xy_m2`, `yy_m2`, `heading_rad2` and the `protection_level_m`, NaN where
-    /// they are not known, and `integrity`: `ok`, `degraded`, `unavailable` or None.
+    /// they are not known, `integrity`: `ok`, `degraded`, `unavailable` or None, and `searching`:
+    /// whether the first pose is not yet known, and this one the mean of where the vehicle may be.
     #[getter]
     fn poses<'py>(&self, py: Python<'py>) -> PyResult<Bound<'py, PyDict>> {
         let poses = &self.core.poses;
@@ -197,6 +229,8 @@ impl LocatedDrive {
         )?;
         let state = |it: &replay::LocatedPose| Some(it.estimate.integrity?.state.name());
         columns.set_item("integrity", poses.iter().map(state).collect::<Vec<_>>())?;
+        let searching = poses.iter().map(|it| it.searching.is_some());
+        columns.set_item("searching", PyArray1::from_iter(py, searching))?;
         Ok(columns)
     }
 
@@ -249,14 +283,15 @@ impl LocatedDrive {
         write_drive_mcap(&path, &self.core).map_err(recording_error)
     }
 
-    /// Write the poses as a TUM trajectory.
+    /// Write the poses, from the first that is known on, as a TUM trajectory.
     #[allow(clippy::needless_pass_by_value)] // what extraction yields
     fn write_tum(&self, path: PathBuf) -> PyResult<()> {
         let timed = |it: &replay::LocatedPose| TimedPose {
             time_s: it.estimate.time_s,
             pose: it.estimate.pose,
         };
-        let poses: Vec<TimedPose> = self.core.poses.iter().map(timed).collect();
+        let known = self.core.poses.iter().filter(|it| it.searching.is_none());
+        let poses: Vec<TimedPose> = known.map(timed).collect();
         write_tum(&path, &poses).map_err(recording_error)
     }
 }

@@ -198,7 +198,7 @@ fn run_table(py: Python<'_>, campaign: &Campaign) -> PyResult<Py<PyDict>> {
     table.set_item("run", column(py, runs, |run| run.run))?;
     table.set_item("executions", column(py, runs, |run| run.executions as u64))?;
     table.set_item("listened", column(py, runs, |run| run.listened as u64))?;
-    let columns: [Column<RunSummary>; 7] = [
+    let columns: [Column<RunSummary>; 9] = [
         ("energy_j", |run| {
             run.energy.map_or(f64::NAN, |energy| energy.total_j())
         }),
@@ -214,6 +214,12 @@ fn run_table(py: Python<'_>, campaign: &Campaign) -> PyResult<Py<PyDict>> {
         ("rms_error_m", |run| run.rms_error_m),
         ("max_error_m", |run| run.max_error_m),
         ("final_error_m", |run| run.final_error_m),
+        ("found_s", |run| {
+            run.found.map_or(f64::NAN, |found| found.step.time_s)
+        }),
+        ("found_m", |run| {
+            run.found.map_or(f64::NAN, |found| found.driven_m)
+        }),
     ];
     for (name, value) in columns {
         table.set_item(name, column(py, runs, value))?;
@@ -255,6 +261,7 @@ fn trajectories(py: Python<'_>, records: &[RunRecord]) -> PyResult<Py<PyDict>> {
     for (name, value) in columns {
         table.set_item(name, column(py, rows(), value))?;
     }
+    table.set_item("searching", column(py, rows(), |step| step.searching))?;
     let states = rows().map(|step| step.integrity.map(|integrity| integrity.state.name()));
     table.set_item("integrity", PyList::new(py, states.collect::<Vec<_>>())?)?;
     Ok(table.unbind())

@@ -153,6 +153,8 @@ def locate(
     *,
     topic: str | None = None,
     start_time_s: float = 0.0,
+    start: tuple[float, float, float] | None = None,
+    from_scratch: bool = False,
 ) -> LocatedDrive: ...
 
 @final

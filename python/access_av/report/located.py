@@ -34,7 +34,8 @@ def render_located(drive: Drive, site: str, numbers: dict[str, float]) -> str:
     numbers
         What :func:`access_av.drives.summary` returned.
     """
-    specs = {"track": _track(drive.poses), "sigma": _sigma(drive.poses)}
+    known = drive.poses.filter(~pl.col("searching"))
+    specs = {"track": _track(known), "sigma": _sigma(known)}
     sections = [
         _section("Track", "Where the vehicle was, in the map's frame.", figure("track")),
         _section(

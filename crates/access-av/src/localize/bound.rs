@@ -76,9 +76,18 @@ impl Bound {
             heads: scenario.radio_heads.iter().map(RadioHead::from).collect(),
             thermal: ThermalNoise::new(scenario),
             start: InitialPose {
-                pose: track.pose(0.0),
-                position_std_m: scenario.start.position_std_m,
-                heading_std_rad: scenario.start.heading_std_rad,
+                pose: track.pose(scenario.motion.start_at_m),
+                // A start that is not known is anywhere on the road.
+                position_std_m: if scenario.start.known {
+                    scenario.start.position_std_m
+                } else {
+                    track.length_m()
+                },
+                heading_std_rad: if scenario.start.known {
+                    scenario.start.heading_std_rad
+                } else {
+                    std::f64::consts::PI
+                },
             },
             track,
             period_s: scenario.ssb.period_s(),
@@ -125,7 +134,7 @@ impl Bound {
         let map = self.map.then_some(&self.track);
         let mut belief = Tracker::prior(&self.config, map, &self.start);
         let mut last_look_m = f64::NEG_INFINITY;
-        let mut before_m = 0.0;
+        let mut before_m = self.motion.at(0.0).along_m;
         let steps = (self.motion.duration_s() / self.period_s).ceil() as usize + 1;
         for number in 0..steps {
             let time_s = number as f64 * self.period_s;

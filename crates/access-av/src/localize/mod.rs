@@ -10,12 +10,15 @@ pub mod thermal;
 pub mod tracker;
 
 pub use dead_reckoning::DeadReckoning;
+pub use initialise::Initialiser;
 pub use integrity::{Guard, Integrity, IntegrityState};
 pub use tracker::Tracker;
 
 use crate::geometry::Pose;
 use crate::observation::OdometrySample;
 use crate::world::RadioHead;
+use integrity::{IntegrityConfig, RadialQuantile};
+use tracker::OdometryVerdict;
 
 /// The localizer a scenario chooses.
 #[derive(Debug, Clone)]
@@ -26,20 +29,39 @@ pub enum Localizer {
     Tracker(Box<Tracker>),
     /// The filter, mistrusting its sources.
     Guarded(Box<Guard>),
+    /// The search for the first pose, and how the filter that comes out of it is to be guarded.
+    Searching(Box<Initialiser>, Option<IntegrityConfig>),
 }
 
 impl Localizer {
+    /// A tracker, guarded or not.
+    pub fn tracking(
+        tracker: Tracker,
+        heads: &[RadioHead],
+        integrity: Option<IntegrityConfig>,
+    ) -> Self {
+        match integrity {
+            Some(config) => Self::Guarded(Box::new(Guard::new(tracker, heads, config))),
+            None => Self::Tracker(Box::new(tracker)),
+        }
+    }
+
+    /// Number of hypotheses left of a search for the first pose; `None` once it is known.
+    pub fn hypotheses(&self) -> Option<usize> {
+        match self {
+            Self::Searching(initialiser, _) => Some(initialiser.left()),
+            _ => None,
+        }
+    }
+
     /// Takes in a valid odometry sample.
-    pub fn odometry(&mut self, sample: &OdometrySample) {
+    pub fn odometry(&mut self, sample: &OdometrySample) -> OdometryVerdict {
         match self {
             // Dead reckoning knows steps only.
-            Self::DeadReckoning(_) => {}
-            Self::Tracker(tracker) => {
-                tracker.odometry(sample);
-            }
-            Self::Guarded(guard) => {
-                guard.odometry(sample);
-            }
+            Self::DeadReckoning(_) => OdometryVerdict::Accepted,
+            Self::Tracker(tracker) => tracker.odometry(sample),
+            Self::Guarded(guard) => guard.odometry(sample),
+            Self::Searching(initialiser, _) => initialiser.odometry(sample),
         }
     }
 
@@ -48,7 +70,7 @@ impl Localizer {
         match self {
             Self::DeadReckoning(localizer) => localizer.predict(step),
             // The tracker stays at the newest sample and looks ahead from there.
-            Self::Tracker(_) | Self::Guarded(_) => {}
+            Self::Tracker(_) | Self::Guarded(_) | Self::Searching(..) => {}
         }
     }
 
@@ -58,6 +80,13 @@ impl Localizer {
             Self::DeadReckoning(localizer) => localizer.update(head, measured),
             Self::Tracker(tracker) => tracker.update(head, measured),
             Self::Guarded(guard) => guard.update(head, measured),
+            Self::Searching(initialiser, integrity) => {
+                let verdict = initialiser.update(head, measured);
+                if let Some(tracker) = initialiser.found() {
+                    *self = Self::tracking(tracker, initialiser.heads(), *integrity);
+                }
+                verdict
+            }
         }
     }
 
@@ -67,13 +96,23 @@ impl Localizer {
             Self::DeadReckoning(localizer) => localizer.pose(),
             Self::Tracker(tracker) => tracker.pose(time_s),
             Self::Guarded(guard) => guard.pose(time_s),
+            Self::Searching(initialiser, integrity) => {
+                let mut estimate = initialiser.pose(time_s);
+                estimate.integrity = integrity.map(|config| Integrity {
+                    protection_level_m: RadialQuantile::new(config.risk)
+                        .radius(estimate.principal_variances()),
+                    state: IntegrityState::Unavailable,
+                    faulty: 0,
+                });
+                estimate
+            }
         }
     }
 
     /// The tracker in it, if it is one.
     pub fn tracker(&self) -> Option<&Tracker> {
         match self {
-            Self::DeadReckoning(_) => None,
+            Self::DeadReckoning(_) | Self::Searching(..) => None,
             Self::Tracker(tracker) => Some(tracker),
             Self::Guarded(guard) => Some(guard.tracker()),
         }

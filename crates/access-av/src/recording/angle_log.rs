@@ -43,10 +43,12 @@ pub struct AngleLog {
 }
 
 /// A line of an angle log that was left out.
-#[derive(Debug, Clone, PartialEq, Eq)]
+#[derive(Debug, Clone, PartialEq)]
 pub struct AngleRemark {
     /// Line in the file, from 1.
     pub line: usize,
+    /// Time of the last usable angle before it, in seconds.
+    pub time_s: f64,
     /// Why.
     pub message: String,
 }
@@ -73,6 +75,10 @@ pub fn read_angle_log(file: &Path) -> Result<AngleLog, RecordingError> {
             Ok(angle) => log.angles.push(angle),
             Err(message) => log.remarks.push(AngleRemark {
                 line: row.line,
+                time_s: log
+                    .angles
+                    .last()
+                    .map_or(f64::NEG_INFINITY, |last| last.measured.time_s),
                 message,
             }),
         }

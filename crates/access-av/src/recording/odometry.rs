@@ -26,6 +26,8 @@ pub struct OdometryLog {
 pub struct OdometryRemark {
     /// Line of the CSV file or number of the MCAP message, from 1.
     pub item: usize,
+    /// Time of the last usable sample before it, or its own if it is used, in seconds.
+    pub time_s: f64,
     /// What it is.
     pub issue: OdometryIssue,
 }
@@ -109,7 +111,13 @@ impl OdometryCollector {
                 }
             },
         };
-        self.log.remarks.push(OdometryRemark { item, issue });
+        let time_s = self.last().map_or(f64::NEG_INFINITY, |last| last.time_s);
+        let remark = OdometryRemark {
+            item,
+            time_s,
+            issue,
+        };
+        self.log.remarks.push(remark);
     }
 
     /// Last distance, for sources that tell places instead.
@@ -134,12 +142,18 @@ impl OdometryCollector {
             .get(sorted.len() / 2)
             .copied()
             .unwrap_or(f64::INFINITY);
-        for (&gap_s, &item) in steps_s.iter().zip(self.items.iter().skip(1)) {
-            if gap_s > GAP_STEPS * usual_s {
-                let issue = OdometryIssue::Gap { gap_s };
-                self.log.remarks.push(OdometryRemark { item, issue });
-            }
-        }
+        let ends = self.log.samples.iter().zip(&self.items).skip(1);
+        let gaps: Vec<_> = steps_s
+            .iter()
+            .zip(ends)
+            .filter(|(gap_s, _)| **gap_s > GAP_STEPS * usual_s)
+            .map(|(&gap_s, (sample, &item))| OdometryRemark {
+                item,
+                time_s: sample.time_s,
+                issue: OdometryIssue::Gap { gap_s },
+            })
+            .collect();
+        self.log.remarks.extend(gaps);
         self.log.remarks.sort_by_key(|remark| remark.item);
         self.log
     }

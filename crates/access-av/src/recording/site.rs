@@ -7,7 +7,7 @@
 //! pci_allow_list = [1, 7]              # cells to listen to; all of the radio heads' without
 //! channel_gains = [[1.0, 0.0], [0.9, 0.1], [1.0, -0.2], [1.1, 0.0]] # re, im of each antenna
 //!
-//! [initial_pose]                       # without it the road's beginning
+//! [initial_pose]                       # without it the vehicle is found along the road
 //! x_m = 0.0
 //! y_m = 0.0
 //! heading_rad = 0.0
@@ -33,8 +33,8 @@ const OWN_KEYS: [&str; 3] = ["pci_allow_list", "channel_gains", "initial_pose"];
 pub struct Site {
     /// Radio heads, road, array and localizer.
     pub scenario: Scenario,
-    /// Where the vehicle starts.
-    pub initial_pose: Pose,
+    /// Where the vehicle starts; `None` to find it along the road.
+    pub initial_pose: Option<Pose>,
     /// Complex gain of each channel, by which it is divided.
     pub channel_gains: [Complex64; ANTENNAS],
 }
@@ -55,7 +55,7 @@ impl Site {
     ///
     /// # Errors
     /// [`ScenarioError`] naming the key and what is allowed: two radio heads in one place or with
-    /// one identity, a cell on the list that no radio head has, neither road nor initial pose.
+    /// one identity, a cell on the list that no radio head has, no initial pose where it takes one.
     pub fn read(file: &Path) -> Result<Self, ScenarioError> {
         let origin = file.display().to_string();
         let text = fs::read_to_string(file).map_err(|source| ScenarioError::Read {
@@ -78,11 +78,17 @@ impl Site {
             .collect();
         let own: OwnKeys = read::settings(own, origin)?;
         let has_road = table.contains_key("track");
-        if !has_road && own.initial_pose.is_none() {
-            let allowed = "without `track` the vehicle must be told where it starts";
-            return Err(check.error("initial_pose", "missing", allowed));
-        }
         fill_in(&mut table, has_road);
+        let known = own.initial_pose.is_some();
+        let stated = table.get_mut("start").and_then(|start| {
+            start
+                .as_table_mut()?
+                .insert("known".to_owned(), true.into())
+        });
+        if let Some(stated) = stated.filter(|stated| *stated != Value::Boolean(known)) {
+            let allowed = "in a site file this is for the presence of `initial_pose` to say";
+            return Err(check.error("start.known", stated, allowed));
+        }
         let mut scenario = Scenario::from_table(table, origin)?;
         if let Some(list) = &own.pci_allow_list {
             for (index, pci) in list.iter().enumerate() {
@@ -108,15 +114,31 @@ impl Site {
             let key = format!("channel_gains[{index}]");
             check.that(usable, &key, format!("[{re}, {im}]"), "it must not be zero")?;
         }
-        let initial_pose = match own.initial_pose {
-            Some(pose) => pose,
-            None => scenario.build_track()?.pose(0.0),
-        };
-        Ok(Self {
+        Self {
             scenario,
-            initial_pose,
+            initial_pose: None,
             channel_gains: gains.map(|[re, im]| Complex64::new(re, im)),
-        })
+        }
+        .starting_at(own.initial_pose, origin)
+    }
+
+    /// The site with another start, or with none, to find the vehicle along the road. Errors name
+    /// `origin` as the file.
+    ///
+    /// # Errors
+    /// [`ScenarioError`] when there is no start, and not what finding the vehicle takes.
+    pub fn starting_at(mut self, start: Option<Pose>, origin: &str) -> Result<Self, ScenarioError> {
+        let with_map = matches!(&self.scenario.localizer, LocalizerSettings::Tracker(it) if it.map);
+        Check { file: origin }.that(
+            start.is_some() || (with_map && self.scenario.radio_heads.len() > 1),
+            "initial_pose",
+            "missing",
+            "to find the vehicle without it takes a `track`, which localizer.map must not be \
+             switched off for, and two radio heads or more",
+        )?;
+        self.scenario.start.known = start.is_some();
+        self.initial_pose = start;
+        Ok(self)
     }
 
     /// The site of a scenario, as a surveyor and a calibration would find it.
@@ -128,7 +150,7 @@ impl Site {
         let own = OwnKeys {
             pci_allow_list: None,
             channel_gains: Some(channel_gains.map(|gain| [gain.re, gain.im])),
-            initial_pose: Some(initial_pose),
+            initial_pose: scenario.start.known.then_some(initial_pose),
         };
         // Settings read from TOML can be written as TOML.
         let mut table = Table::try_from(scenario).unwrap_or_default();
@@ -143,6 +165,9 @@ impl Site {
         table.retain(|key, _| !simulated.contains(&key));
         if !matches!(scenario.localizer, LocalizerSettings::Tracker(_)) {
             table.remove("localizer");
+        }
+        if let Some(Value::Table(start)) = table.get_mut("start") {
+            start.remove("known");
         }
         table.extend(Table::try_from(own).unwrap_or_default());
         if let Some(Value::Table(receiver)) = table.get_mut("receiver") {

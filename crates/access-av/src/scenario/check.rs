@@ -85,6 +85,17 @@ impl Scenario {
         let motion = &self.motion;
         check.positive("motion.acceleration_mps2", motion.acceleration_mps2)?;
         check.positive("motion.top_speed_kmh", motion.top_speed_kmh)?;
+        let on_the_road = (0.0..track.length_m()).contains(&motion.start_at_m);
+        let allowed = format!(
+            "it must be on the road, from 0 to {:.1} m",
+            track.length_m()
+        );
+        check.that(
+            on_the_road,
+            "motion.start_at_m",
+            motion.start_at_m,
+            &allowed,
+        )?;
         check.not_negative("motion.lateral_wander.rms_m", motion.lateral_wander.rms_m)?;
         check.positive(
             "motion.lateral_wander.wavelength_m",
@@ -247,12 +258,33 @@ impl Scenario {
             )?;
             check.not_negative("odometer.gyro.bias_std_radps", gyro.bias_std_radps)?;
         }
-        check.not_negative("start.position_std_m", self.start.position_std_m)?;
-        check.not_negative("start.heading_std_rad", self.start.heading_std_rad)?;
+        self.check_start(check)?;
         match &self.localizer {
             LocalizerSettings::DeadReckoning(_) => Ok(()),
             LocalizerSettings::Tracker(tracker) => tracker.check(check),
         }
+    }
+
+    fn check_start(&self, check: &Check<'_>) -> Result<(), ScenarioError> {
+        let start = &self.start;
+        check.not_negative("start.position_std_m", start.position_std_m)?;
+        check.not_negative("start.heading_std_rad", start.heading_std_rad)?;
+        if start.known {
+            return Ok(());
+        }
+        let map = matches!(&self.localizer, LocalizerSettings::Tracker(tracker) if tracker.map);
+        check.that(
+            map,
+            "start.known",
+            false,
+            "to find the vehicle along the road takes localizer.kind = \"tracker\" with map = true",
+        )?;
+        check.that(
+            self.radio_heads.len() > 1,
+            "start.known",
+            false,
+            "to find the vehicle takes two radio heads or more; one leaves several places open",
+        )
     }
 
     fn check_wake_up(&self, check: &Check<'_>) -> Result<(), ScenarioError> {

@@ -46,14 +46,30 @@ impl Default for OdometerSettings {
     }
 }
 
-/// `[start]`: how well the initial pose is known; all zero in the paper.
-#[derive(Debug, Clone, Copy, PartialEq, Default, Serialize, Deserialize, JsonSchema)]
+/// `[start]`: how well the initial pose is known; exactly in the paper.
+#[derive(Debug, Clone, Copy, PartialEq, Serialize, Deserialize, JsonSchema)]
 #[serde(default, deny_unknown_fields)]
 pub struct StartSettings {
+    /// Whether it is known at all. If not, the vehicle is found along the road, by two radio heads
+    /// or more.
+    pub known: bool,
+    /// Whether a vehicle that is to be found may also drive against the road's direction.
+    pub either_direction: bool,
     /// Standard deviation in each of x and y, in metres.
     pub position_std_m: f64,
     /// Standard deviation of the heading in radians.
     pub heading_std_rad: f64,
+}
+
+impl Default for StartSettings {
+    fn default() -> Self {
+        Self {
+            known: true,
+            either_direction: false,
+            position_std_m: 0.0,
+            heading_std_rad: 0.0,
+        }
+    }
 }
 
 /// `[estimator]`

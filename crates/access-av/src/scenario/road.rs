@@ -44,6 +44,8 @@ pub struct SegmentSettings {
 #[derive(Debug, Clone, PartialEq, Serialize, Deserialize, JsonSchema)]
 #[serde(default, deny_unknown_fields)]
 pub struct MotionSettings {
+    /// Where along the road the drive begins, in metres; stops before it are passed over.
+    pub start_at_m: f64,
     /// Acceleration and deceleration in m/s².
     pub acceleration_mps2: f64,
     /// Top speed in km/h.
@@ -92,6 +94,7 @@ impl Default for TrackSettings {
 impl Default for MotionSettings {
     fn default() -> Self {
         Self {
+            start_at_m: 0.0,
             acceleration_mps2: 0.5,
             top_speed_kmh: 15.0,
             stops: Vec::new(),

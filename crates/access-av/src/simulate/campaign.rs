@@ -3,7 +3,7 @@
 use rayon::ThreadPoolBuilder;
 use rayon::prelude::*;
 
-use super::{ErrorHistogram, IntegritySummary, RunRecord, Simulation, SimulationError};
+use super::{ErrorHistogram, Found, IntegritySummary, RunRecord, Simulation, SimulationError};
 use crate::energy::{Energy, EnergyModel};
 use crate::onboard::Custom;
 use crate::scenario::LocalizerSettings;
@@ -42,7 +42,7 @@ impl Default for CampaignOptions<'_> {
     }
 }
 
-/// Errors at one SSB, over all runs.
+/// Errors at one SSB, over all runs that know their pose by then; NaN where none does.
 #[derive(Debug, Clone, PartialEq, Default)]
 pub struct StepStatistics {
     /// Mean of |x error| in metres.
@@ -85,6 +85,8 @@ pub struct RunSummary {
     pub max_error_m: f64,
     /// Its horizontal error at the end, in metres.
     pub final_error_m: f64,
+    /// How its first pose came about; `None` if it was not found.
+    pub found: Option<Found>,
 }
 
 /// What a campaign found.
@@ -96,7 +98,7 @@ pub struct Campaign {
     pub steps: Vec<StepStatistics>,
     /// The runs, by number.
     pub runs: Vec<RunSummary>,
-    /// Horizontal errors of all steps of all runs.
+    /// Horizontal errors of all steps of all runs that know their pose.
     pub errors: ErrorHistogram,
     /// How the runs kept to their protection levels, by number; empty where none are stated.
     pub integrity: Vec<IntegritySummary>,
@@ -106,6 +108,8 @@ pub struct Campaign {
 
 #[derive(Default, Clone)]
 struct StepSums {
+    runs: f64,
+    located: f64,
     abs_x_m: f64,
     abs_y_m: f64,
     square_m2: f64,
@@ -160,12 +164,11 @@ impl Simulation {
                 return Err(SimulationError::Stopped);
             }
         }
-        let count = runs.len() as f64;
         Ok(Campaign {
             time_s: (0..self.steps())
                 .map(|number| self.time_s(number))
                 .collect(),
-            steps: sums.iter().map(|sums| sums.statistics(count)).collect(),
+            steps: sums.iter().map(StepSums::statistics).collect(),
             runs,
             errors,
             integrity,
@@ -194,14 +197,14 @@ impl Campaign {
             add_up(&record, &mut sums, &mut campaign.errors);
             campaign.runs.push(summary(&record, None));
         }
-        let count = campaign.runs.len() as f64;
-        campaign.steps = sums.iter().map(|sums| sums.statistics(count)).collect();
+        campaign.steps = sums.iter().map(StepSums::statistics).collect();
         campaign
     }
 }
 
 fn summary(record: &RunRecord, energy: Option<&EnergyModel>) -> RunSummary {
-    let errors_m = || record.steps.iter().map(super::Step::error_m);
+    let located = || record.steps.iter().filter(|step| !step.searching);
+    let errors_m = || located().map(super::Step::error_m);
     let duration_s = record.steps.last().map_or(0.0, |step| step.time_s);
     let squares_m2: f64 = errors_m().map(|error_m| error_m * error_m).sum();
     RunSummary {
@@ -210,14 +213,21 @@ fn summary(record: &RunRecord, energy: Option<&EnergyModel>) -> RunSummary {
         listened: record.listened,
         energy: energy
             .map(|model| model.of_run(record.executions.len(), record.listened, duration_s)),
-        rms_error_m: (squares_m2 / record.steps.len() as f64).sqrt(),
+        rms_error_m: (squares_m2 / located().count() as f64).sqrt(),
         max_error_m: errors_m().fold(0.0, f64::max),
-        final_error_m: errors_m().next_back().unwrap_or(0.0),
+        final_error_m: errors_m().next_back().unwrap_or(f64::NAN),
+        found: record.found(),
     }
 }
 
 fn add_up(record: &RunRecord, sums: &mut [StepSums], errors: &mut ErrorHistogram) {
     for (step, sums) in record.steps.iter().zip(sums) {
+        sums.runs += 1.0;
+        sums.snr_db += step.snr_db;
+        if step.searching {
+            continue;
+        }
+        sums.located += 1.0;
         let error_m = step.error_m();
         let heading_rad =
             crate::geometry::wrap_angle(step.estimate.heading_rad - step.truth.heading_rad);
@@ -228,14 +238,14 @@ fn add_up(record: &RunRecord, sums: &mut [StepSums], errors: &mut ErrorHistogram
         sums.predicted_m2 += step.predicted_m2().unwrap_or(f64::NAN);
         sums.nees += step.nees().unwrap_or(f64::NAN);
         sums.heading_rad2 += heading_rad * heading_rad;
-        sums.snr_db += step.snr_db;
         sums.errors.add(error_m);
         errors.add(error_m);
     }
 }
 
 impl StepSums {
-    fn statistics(&self, count: f64) -> StepStatistics {
+    fn statistics(&self) -> StepStatistics {
+        let count = self.located;
         let number = |value: f64| (!value.is_nan()).then_some(value);
         let quantile_m = |probability| self.errors.quantile_m(probability).unwrap_or(f64::NAN);
         StepStatistics {
@@ -245,7 +255,7 @@ impl StepSums {
             predicted_rms_m: number((self.predicted_m2 / count).sqrt()),
             mean_nees: number(self.nees / count),
             rms_heading_error_rad: (self.heading_rad2 / count).sqrt(),
-            mean_snr_db: self.snr_db / count,
+            mean_snr_db: self.snr_db / self.runs,
             p50_error_m: quantile_m(0.5),
             p90_error_m: quantile_m(0.9),
             p99_error_m: quantile_m(0.99),

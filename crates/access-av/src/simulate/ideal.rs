@@ -25,6 +25,7 @@ impl IdealFilter {
                 },
                 covariance: Some([[aa, ab, 0.0], [ba, bb, 0.0], [0.0; 3]]),
                 integrity: None,
+                searching: false,
                 snr_db: 0.0,
             }
         };

@@ -123,6 +123,7 @@ mod tests {
                 state,
                 faulty: 0,
             }),
+            searching: false,
             snr_db: 0.0,
         };
         RunRecord {

@@ -17,7 +17,7 @@ pub use campaign::{Campaign, CampaignOptions, RunSummary, StepStatistics};
 pub use consistency::Consistency;
 pub use histogram::ErrorHistogram;
 pub use integrity_summary::IntegritySummary;
-pub use run::{RunRecord, Simulation, Step};
+pub use run::{Found, RunRecord, Simulation, Step};
 pub use synth::{SynthError, SynthSettings, Synthesized, synthesize};
 
 use crate::BoxError;

@@ -37,6 +37,8 @@ pub struct Step {
     pub covariance: Option<[[f64; 3]; 3]>,
     /// Protection level and state, where the localizer is guarded.
     pub integrity: Option<Integrity>,
+    /// Whether it is still in search of its first pose.
+    pub searching: bool,
     /// SNR of the strongest radio head by link budget and shadowing, in dB.
     pub snr_db: f64,
 }
@@ -78,6 +80,32 @@ pub struct RunRecord {
     pub executions: Vec<Execution>,
     /// SSB bursts that the receiver listened to.
     pub listened: usize,
+}
+
+/// How the first pose came about.
+#[derive(Debug, Clone, Copy, PartialEq)]
+pub struct Found {
+    /// The first step at which the pose was known.
+    pub step: Step,
+    /// Distance driven by then, in metres.
+    pub driven_m: f64,
+}
+
+impl RunRecord {
+    /// How the first pose came about: at once, unless it had to be searched for; `None` if it was
+    /// not found.
+    pub fn found(&self) -> Option<Found> {
+        let first = self.steps.iter().position(|step| !step.searching)?;
+        let until = self.steps.get(..=first)?;
+        let driven_m = |pair: &[Step]| match pair {
+            [from, to] => from.truth.point().distance_m(to.truth.point()),
+            _ => 0.0,
+        };
+        Some(Found {
+            step: *until.last()?,
+            driven_m: until.windows(2).map(driven_m).sum(),
+        })
+    }
 }
 
 impl Simulation {
@@ -232,6 +260,7 @@ impl Simulation {
                 estimate: believed.pose,
                 covariance: believed.covariance,
                 integrity: believed.integrity,
+                searching: onboard.searching().is_some(),
                 snr_db: snrs_db.iter().copied().fold(f64::NEG_INFINITY, f64::max),
             });
         }

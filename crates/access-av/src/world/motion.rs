@@ -87,12 +87,13 @@ impl Leg {
 }
 
 impl MotionProfile {
-    /// The drive along a road of `length_m`. Stops are in driving order and on the road.
+    /// The drive to the end of a road of `length_m`. Stops are in driving order and on the road.
     pub fn new(settings: &MotionSettings, length_m: f64) -> Self {
-        let ends = settings.stops.iter().map(|stop| (stop.at_m, stop.dwell_s));
-        let (mut time_s, mut along_m) = (0.0, 0.0);
+        let (mut time_s, mut along_m) = (0.0, settings.start_at_m);
+        let ahead = settings.stops.iter().filter(|stop| stop.at_m > along_m);
+        let ends: Vec<_> = ahead.map(|stop| (stop.at_m, stop.dwell_s)).collect();
         let mut legs = Vec::with_capacity(settings.stops.len() + 1);
-        for (end_m, dwell_s) in ends.chain([(length_m, 0.0)]) {
+        for (end_m, dwell_s) in ends.into_iter().chain([(length_m, 0.0)]) {
             let leg = Leg::new(
                 time_s,
                 along_m,
@@ -166,6 +167,23 @@ mod tests {
         assert!((profile.duration_s() - (241.0 / 3.0 + ramp_s + 7.0)).abs() < 1e-9);
         let standing = profile.at(100.0 / (15.0 / 3.6) + ramp_s + 3.0);
         assert!((standing.along_m - 100.0).abs() < 1e-9 && standing.speed_mps == 0.0);
+    }
+
+    #[test]
+    fn a_drive_that_begins_on_the_way_passes_over_the_stops_before() {
+        let stop = |at_m| StopSettings { at_m, dwell_s: 5.0 };
+        let begin = |start_at_m, stops| {
+            let settings = MotionSettings {
+                start_at_m,
+                stops,
+                ..Default::default()
+            };
+            MotionProfile::new(&settings, 300.0)
+        };
+        let profile = begin(120.0, vec![stop(80.0), stop(120.0), stop(200.0)]);
+        assert_eq!(profile, begin(120.0, vec![stop(200.0)]));
+        assert_eq!(profile.at(0.0).along_m, 120.0);
+        assert_eq!(profile.at(profile.duration_s()).along_m, 300.0);
     }
 
     #[test]

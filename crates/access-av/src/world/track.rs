@@ -170,6 +170,31 @@ impl Track {
         Self::from_segments(start, &segments, width_m)
     }
 
+    /// The same road driven the other way.
+    #[must_use]
+    pub fn reversed(&self) -> Self {
+        let mut start_m = 0.0;
+        let turned = |pose: Pose| Pose {
+            heading_rad: wrap_angle(pose.heading_rad + std::f64::consts::PI),
+            ..pose
+        };
+        let pieces = self.pieces.iter().rev().map(|piece| {
+            let reversed = Piece {
+                start_m,
+                length_m: piece.length_m,
+                curvature_per_m: -piece.curvature_per_m,
+                start: turned(piece.pose(piece.length_m)),
+            };
+            start_m += piece.length_m;
+            reversed
+        });
+        Self {
+            pieces: pieces.collect(),
+            length_m: self.length_m,
+            width_m: self.width_m,
+        }
+    }
+
     /// Length of the road in metres.
     pub const fn length_m(&self) -> f64 {
         self.length_m
@@ -337,6 +362,22 @@ mod tests {
         assert!((end.y_m - 1200.0 * (1.0 - 0.25_f64.cos())).abs() < 1e-9);
         assert!((end.heading_rad.to_degrees() - 14.32).abs() < 0.01);
         assert!((paper().curvature_per_m(10.0) - 1.0 / 1200.0).abs() < 1e-15);
+    }
+
+    #[test]
+    fn the_other_way_round_it_is_the_same_road() {
+        let (track, back) = (winding(), winding().reversed());
+        for step in 0..=40 {
+            let along_m = f64::from(step) * track.length_m() / 40.0;
+            let (there, here) = (track.pose(along_m), back.pose(track.length_m() - along_m));
+            assert!(there.point().distance_m(here.point()) < 1e-9);
+            let turn_rad = wrap_angle(there.heading_rad - here.heading_rad).abs();
+            assert!((turn_rad - std::f64::consts::PI).abs() < 1e-9);
+        }
+        assert_eq!(
+            back.curvature_per_m(1.0),
+            -track.curvature_per_m(track.length_m() - 1.0)
+        );
     }
 
     #[test]

@@ -231,6 +231,11 @@ impl Tracker {
         &self.belief
     }
 
+    /// Replaces the state and its covariance, where several trackers become one.
+    pub(in crate::localize) const fn set_belief(&mut self, belief: &Belief) {
+        self.belief = *belief;
+    }
+
     /// What the tracker assumes.
     pub const fn config(&self) -> &TrackerConfig {
         &self.config

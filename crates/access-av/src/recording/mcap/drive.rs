@@ -1,5 +1,6 @@
 //! A located drive as one MCAP file.
 
+use std::collections::BTreeMap;
 use std::fs::File;
 use std::io::BufWriter;
 use std::path::Path;
@@ -10,7 +11,7 @@ use super::{DiagnosticLevel, DiagnosticStatus, Frames, McapWriter, Twist};
 use crate::localize::IntegrityState;
 use crate::onboard::Execution;
 use crate::recording::RecordingError;
-use crate::replay::{LocatedDrive, LocatedPose};
+use crate::replay::{LocatedDrive, LocatedPose, Remark};
 
 /// Topic of the poses.
 const POSE_TOPIC: &str = "/access_av/odometry";
@@ -22,7 +23,8 @@ const YAW_RATE_VARIANCE: f64 = 1e-4;
 /// Diagnostics come once a second (REP-107).
 const DIAGNOSTIC_PERIOD_S: f64 = 1.0;
 
-/// Writes poses, verdicts and a diagnosis a second, in order of time.
+/// Writes poses, verdicts and a diagnosis a second, in order of time. As long as the first pose is
+/// searched for there are no poses. The diagnoses name every item of the input that was remarkable.
 ///
 /// # Errors
 /// [`RecordingError`] when the file cannot be written.
@@ -38,6 +40,7 @@ fn write(file: BufWriter<File>, drive: &LocatedDrive) -> Result<(), McapError> {
     let mut writer = McapWriter::new(file)?;
     let mut executions = drive.executions.iter().peekable();
     let mut lately: Vec<&Execution> = Vec::new();
+    let mut remarks = drive.remarks.as_slice();
     let mut diagnosed_s = f64::NEG_INFINITY;
     for pose in &drive.poses {
         let time_s = pose.estimate.time_s;
@@ -52,17 +55,44 @@ fn write(file: BufWriter<File>, drive: &LocatedDrive) -> Result<(), McapError> {
                 .yaw_rate_radps
                 .map(|rate_radps| (rate_radps, YAW_RATE_VARIANCE)),
         };
-        writer.odometry(POSE_TOPIC, Frames::MAP, &pose.estimate, &twist)?;
+        if pose.searching.is_none() {
+            writer.odometry(POSE_TOPIC, Frames::MAP, &pose.estimate, &twist)?;
+        }
         if time_s - diagnosed_s >= DIAGNOSTIC_PERIOD_S {
-            writer.diagnostics(time_s, &[diagnosis(pose, &lately)])?;
+            let known = remarks.partition_point(|remark| remark.time_s <= time_s);
+            let (told, later) = remarks.split_at(known);
+            writer.diagnostics(time_s, &[diagnosis(pose, &lately), input(told)])?;
             diagnosed_s = time_s;
+            remarks = later;
             lately.clear();
         }
     }
     for execution in executions {
         writer.verdict(VERDICT_TOPIC, execution)?;
     }
+    if let (Some(last), [_, ..]) = (drive.poses.last(), remarks) {
+        writer.diagnostics(last.estimate.time_s, &[input(remarks)])?;
+    }
     writer.finish()
+}
+
+/// What was remarkable about the input lately, item by item.
+fn input(remarks: &[Remark]) -> DiagnosticStatus {
+    let (level, message) = match remarks.len() {
+        0 => (DiagnosticLevel::Ok, "nothing to remark".to_owned()),
+        1 => (DiagnosticLevel::Warn, "1 remarkable item".to_owned()),
+        count => (DiagnosticLevel::Warn, format!("{count} remarkable items")),
+    };
+    let texts = remarks.iter().map(|remark| remark.text.clone());
+    DiagnosticStatus {
+        level,
+        name: "access_av: input".to_owned(),
+        message,
+        values: (1..)
+            .map(|number: usize| number.to_string())
+            .zip(texts)
+            .collect(),
+    }
 }
 
 fn diagnosis(pose: &LocatedPose, lately: &[&Execution]) -> DiagnosticStatus {
@@ -72,6 +102,7 @@ fn diagnosis(pose: &LocatedPose, lately: &[&Execution]) -> DiagnosticStatus {
         .count();
     let state = pose.estimate.integrity.map(|integrity| integrity.state);
     let (level, message) = match (accepted, lately.len()) {
+        _ if pose.searching.is_some() => (DiagnosticLevel::Warn, "searching for the first pose"),
         _ if state == Some(IntegrityState::Unavailable) => {
             (DiagnosticLevel::Error, "position not to be relied on")
         }
@@ -95,6 +126,20 @@ fn diagnosis(pose: &LocatedPose, lately: &[&Execution]) -> DiagnosticStatus {
         ("accepted".to_owned(), accepted.to_string()),
         ("cells".to_owned(), format!("{cells:?}")),
     ];
+    if let Some(hypotheses) = pose.searching {
+        values.push(("hypotheses".to_owned(), hypotheses.to_string()));
+    }
+    let mut refused = BTreeMap::new();
+    for execution in lately.iter().filter(|it| !it.verdict.accepted) {
+        *refused
+            .entry(execution.verdict.reason.name())
+            .or_insert(0u32) += 1;
+    }
+    values.extend(
+        refused
+            .into_iter()
+            .map(|(reason, count)| (format!("refused: {reason}"), count.to_string())),
+    );
     if let Some([[x, ..], [_, y, _], _]) = pose.estimate.covariance {
         values.push((
             "position_sigma_m".to_owned(),

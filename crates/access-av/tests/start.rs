@@ -1,0 +1,196 @@
+//! Starts from scratch: the vehicle is somewhere on its road and finds out where.
+#![allow(clippy::unwrap_used, clippy::print_stdout, reason = "this is a test")]
+
+mod common;
+
+use access_av::localize::IntegrityState;
+use access_av::onboard::Custom;
+use access_av::platform::Platform;
+use access_av::random::{Purpose, Streams};
+use access_av::recording::{AngleLog, LoggedAngle, OdometryLog, Site, write_drive_mcap};
+use access_av::replay::{LocatedDrive, locate_angles};
+use access_av::scenario::{Scenario, ScenarioError};
+use access_av::simulate::{RunRecord, Simulation};
+use access_av::world::{Odometer, Vehicle};
+use rand::Rng as _;
+use toml::Value;
+
+fn unknown(name: &str) -> Scenario {
+    Scenario::load(name)
+        .unwrap()
+        .with_overrides([("start.known", false.into())])
+        .unwrap()
+}
+
+fn run(scenario: &Scenario, seed: u64, number: u64) -> RunRecord {
+    let platform = Platform::load(&scenario.platform.name).unwrap();
+    let simulation = Simulation::new(scenario.clone(), platform).unwrap();
+    simulation.run(seed, number, Custom::default()).unwrap()
+}
+
+/// A run that begins anywhere on the road but its last 60 m.
+fn run_from_anywhere(scenario: &Scenario, seed: u64, number: u64) -> RunRecord {
+    let mut random = Streams::new(seed, number).generator(Purpose::Start, 1);
+    let share = f64::from(random.next_u32()) / f64::from(u32::MAX);
+    let start_m = share * (scenario.build_track().unwrap().length_m() - 60.0);
+    let there = [("motion.start_at_m", Value::Float(start_m))];
+    run(&scenario.with_overrides(there).unwrap(), seed, number)
+}
+
+/// Within 2 m of the truth, and within four standard deviations.
+fn is_right(record: &RunRecord) -> bool {
+    record.found().is_some_and(|found| {
+        let (truth, estimate) = (found.step.truth.point(), found.step.estimate.point());
+        let [[xx, xy, _], [_, yy, _], _] = found.step.covariance.unwrap();
+        let larger = 0.5 * (xx + yy) + (0.25 * (xx - yy).powi(2) + xy * xy).sqrt();
+        let error_m = truth.distance_m(estimate);
+        error_m < 2.0 && error_m < 4.0 * larger.sqrt()
+    })
+}
+
+#[test]
+fn a_vehicle_anywhere_on_its_road_is_found() {
+    let starts = 20;
+    let mut right = 0;
+    for name in ["paper-real-odometry-2", "yard"] {
+        let scenario = unknown(name);
+        let records = (0..starts).map(|number| run_from_anywhere(&scenario, 11, number));
+        right += records.filter(is_right).count();
+    }
+    // If 99 of 100 are right, 37 or fewer of 40 are with a probability of 0.7 %.
+    assert!(right > 37, "{right} of {}", 2 * starts);
+}
+
+#[test]
+fn while_it_searches_it_listens_always_and_vouches_for_nothing() {
+    let scenario = unknown("yard")
+        .with_overrides([("localizer.integrity", true.into())])
+        .unwrap();
+    let record = run(&scenario, 3, 0);
+    let found = record.found().unwrap();
+    let until = record
+        .steps
+        .iter()
+        .position(|step| !step.searching)
+        .unwrap();
+    assert!(found.step.time_s > 0.0 && until > 10, "{found:?}");
+    // Four radio heads at each SSB, whatever the policy.
+    let looked = |step: &&access_av::onboard::Execution| step.ssb.time_s < found.step.time_s;
+    assert_eq!(record.executions.iter().filter(looked).count(), 4 * until);
+    for step in &record.steps[..until] {
+        let integrity = step.integrity.unwrap();
+        assert_eq!(integrity.state, IntegrityState::Unavailable);
+        let error_m = step.truth.point().distance_m(step.estimate.point());
+        assert!(error_m < integrity.protection_level_m, "{step:?}");
+    }
+    assert!(record.steps[until..].iter().all(|step| !step.searching));
+    // Afterwards the policy decides.
+    assert!(record.listened < record.steps.len() / 2);
+}
+
+#[test]
+fn what_cannot_be_found_is_refused() {
+    let paper = Scenario::load("paper").unwrap();
+    let refused = |scenario: &Scenario, changes: &[(&str, Value)], why: &str| {
+        let changes = changes.iter().cloned();
+        match scenario.with_overrides(changes.chain([("start.known", false.into())])) {
+            Err(ScenarioError::Value { key, allowed, .. }) => {
+                assert_eq!(key, "start.known");
+                assert!(allowed.contains(why), "{allowed}");
+            }
+            other => panic!("{other:?}"),
+        }
+    };
+    refused(&paper, &[], "tracker");
+    let tracker = [("localizer.kind", Value::from("tracker"))];
+    refused(&paper, &tracker, "two radio heads");
+    let two = Scenario::load("paper-real-odometry-2").unwrap();
+    refused(&two, &[("localizer.map", false.into())], "map = true");
+}
+
+/// Odometry and angles of a run, as a vehicle would have logged them.
+fn logs(scenario: &Scenario, seed: u64) -> (OdometryLog, AngleLog, RunRecord) {
+    let record = run(scenario, seed, 0);
+    let streams = Streams::new(seed, 0);
+    let vehicle = Vehicle::new(scenario.build_track().unwrap(), &scenario.motion, streams);
+    let mut odometer = Odometer::new(scenario.odometer, vehicle.at(0.0), streams);
+    let times = record.steps.iter().map(|step| step.time_s);
+    let odometry = OdometryLog {
+        samples: times
+            .filter_map(|time_s| odometer.sample(vehicle.at(time_s)))
+            .collect(),
+        remarks: Vec::new(),
+    };
+    let logged = record.executions.iter().map(|execution| LoggedAngle {
+        ssb: execution.ssb,
+        measured: execution.measured.unwrap(),
+    });
+    let angles = AngleLog {
+        angles: logged.collect(),
+        remarks: Vec::new(),
+    };
+    (odometry, angles, record)
+}
+
+/// Errors of the published poses in metres and in their own standard deviations.
+fn errors(drive: &LocatedDrive, record: &RunRecord) -> Vec<(f64, f64)> {
+    let both = drive.poses.iter().zip(&record.steps);
+    both.filter(|(pose, _)| pose.searching.is_none())
+        .map(|(pose, step)| {
+            let error_m = pose.estimate.pose.point().distance_m(step.truth.point());
+            let [larger, _] = pose.estimate.principal_variances();
+            (error_m, error_m / larger.sqrt())
+        })
+        .collect()
+}
+
+#[test]
+fn a_recorded_drive_either_way_needs_no_initial_pose() {
+    // The paper's road driven from its end to its beginning, which the site does not know.
+    let along = Scenario::load("paper-real-odometry-2").unwrap();
+    let end = along.build_track().unwrap().reversed().pose(0.0);
+    let start: Value = toml::Value::try_from(end).unwrap();
+    let segment: Value =
+        toml::from_str::<toml::Table>("s = [{ length_m = 300.0, turn_rad = -0.25 }]").unwrap()["s"]
+            .clone();
+    let against = along
+        .with_overrides([("track.start", start), ("track.segments", segment)])
+        .unwrap();
+    let (odometry, angles, record) = logs(&against, 5);
+
+    let text = Site::of_scenario(&unknown("paper-real-odometry-2"), end, [1.0.into(); 4]);
+    let either = text.replace("either_direction = false", "either_direction = true");
+    let site = Site::from_toml(&either, "site.toml").unwrap();
+    assert_eq!(site.initial_pose, None);
+    let drive = locate_angles(&site, &odometry, &angles).unwrap();
+    let errors = errors(&drive, &record);
+    // Found within a few metres of 300, and from then on as good as the tracker says.
+    assert!(
+        errors.len() * 10 > drive.poses.len() * 8,
+        "{}",
+        errors.len()
+    );
+    let worst = errors
+        .iter()
+        .fold(0.0, |most: f64, error| most.max(error.1));
+    assert!(worst < 4.5, "{worst}");
+    let rms_m =
+        (errors.iter().map(|error| error.0.powi(2)).sum::<f64>() / errors.len() as f64).sqrt();
+    println!(
+        "found after {} epochs, RMS {rms_m:.3} m from there",
+        drive.poses.len() - errors.len()
+    );
+
+    // Who takes the road for one-way does not find the vehicle there.
+    let site = Site::from_toml(&text, "site.toml").unwrap();
+    let misled = locate_angles(&site, &odometry, &angles).unwrap();
+    let refused = misled.executions.iter().filter(|it| !it.verdict.accepted);
+    assert!(refused.count() * 2 > misled.executions.len());
+
+    // No pose is published before there is one.
+    let dir = common::scratch("start-mcap");
+    write_drive_mcap(&dir.join("drive.mcap"), &drive).unwrap();
+    let published =
+        access_av::recording::read_odometry_mcap(&dir.join("drive.mcap"), None).unwrap();
+    assert_eq!(published.samples.len(), errors.len());
+}
