@@ -108,6 +108,62 @@ fn as_wrong_as_it_says_and_as_right_as_can_be() {
 }
 
 #[test]
+fn a_start_unknown_by_five_metres_is_found_as_well_as_can_be() {
+    let (runs, campaigns, stride) = (48, 100, 50);
+    for (map, heading_std_rad) in [(true, 0.0), (false, 0.02)] {
+        let scenario = Scenario::load("paper-real-odometry-2")
+            .unwrap()
+            .with_overrides([
+                ("start.position_std_m", toml::Value::from(5.0)),
+                ("start.heading_std_rad", heading_std_rad.into()),
+                ("localizer.map", map.into()),
+            ])
+            .unwrap();
+        let bound = Bound::new(&scenario).unwrap();
+        let points = bound.along_route();
+        // Every 50th step from 20 m of travel on.
+        let ratios = |campaign: &Campaign, stride: usize| -> Vec<f64> {
+            (campaign.steps.iter().step_by(stride))
+                .zip(points.iter().step_by(50))
+                .filter(|(_, point)| point.along_m >= 20.0)
+                .map(|(step, point)| step.rms_error_m / point.position_rms_m)
+                .collect()
+        };
+        let mean = |ratios: &[f64]| ratios.iter().sum::<f64>() / ratios.len() as f64;
+        let largest = |ratios: &[f64]| ratios.iter().copied().fold(0.0, f64::max);
+
+        // A filter with the tracker's covariances is within 1.2 of the bound at every step ...
+        let filter = bound.ideal_filter(stride);
+        let ideal: Vec<Vec<f64>> = (0..campaigns)
+            .map(|seed| ratios(&filter.campaign(seed, runs), 1))
+            .collect();
+        for step in 0..ideal[0].len() {
+            let squares = ideal.iter().map(|ratios| ratios[step].powi(2));
+            let ratio = (squares.sum::<f64>() / campaigns as f64).sqrt();
+            assert!(ratio < 1.2, "step {step}: {ratio}");
+        }
+
+        // ... and the tracker, on average and at its worst step, no further than such a filter by
+        // four standard deviations of a campaign of this size.
+        let found = ratios(&campaign(scenario, runs as usize), stride);
+        for (what, of) in [
+            ("mean", &mean as &dyn Fn(&[f64]) -> f64),
+            ("largest", &largest),
+        ] {
+            let values: Vec<f64> = ideal.iter().map(|ratios| of(ratios)).collect();
+            let centre = mean(&values);
+            let squares = values.iter().map(|value| (value - centre).powi(2));
+            let spread = (squares.sum::<f64>() / (campaigns as f64 - 1.0)).sqrt();
+            assert!(
+                of(&found) < centre + 4.0 * spread,
+                "map {map}: {what} {}, expected {centre} ± {spread}",
+                of(&found)
+            );
+        }
+    }
+}
+
+#[test]
 fn more_radio_heads_lower_the_bound() {
     let rms_m = [
         "paper-real-odometry",

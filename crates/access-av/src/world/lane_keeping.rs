@@ -52,6 +52,14 @@ impl LaneKeeping {
         (4.0 * self.damping * natural.powi(3)).sqrt() * self.wander_m
     }
 
+    /// Stationary deviation of the curvature with which the vehicle steers back (1/m), that of
+    /// `2ζΩ ψ + Ω² d`.
+    #[must_use]
+    pub fn pull_per_m(&self) -> f64 {
+        let natural = TAU / self.wavelength_m;
+        natural * natural * self.wander_m * (2.0 * self.damping).hypot(1.0)
+    }
+
     /// `Q` of a step with the given `Φ`.
     #[must_use]
     pub fn noise(&self, transition: &[[f64; 2]; 2]) -> [[f64; 2]; 2] {

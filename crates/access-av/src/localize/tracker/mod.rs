@@ -200,16 +200,15 @@ impl Tracker {
         let array = &self.config.array;
         let sighting = Sighting::new(head.known.position, pose, &footing, mounting, offset, array)
             .ok_or(UpdateReason::Unusable)?;
+        let bend = sighting.bend(&self.belief.covariance);
         let place_m = self.driven_m + ahead_m;
-        let measurement_variance = sigma * sigma
-            + self
-                .config
-                .look_variance(place_m - head.last_look_m, sighting.toward)
-            + sighting.row[ALONG].powi(2) * ahead_variance;
-        let residual = wrap_angle(measured.phase_rad - sighting.phase_rad);
-        let innovation = self
-            .belief
-            .innovation(residual, &sighting.row, measurement_variance);
+        let scatter = (self.config).look_variance(place_m - head.last_look_m, sighting.toward);
+        let measurement_variance =
+            sigma * sigma + scatter + sighting.row[ALONG].powi(2) * ahead_variance + bend.variance;
+        let residual = wrap_angle(measured.phase_rad - sighting.phase_rad - bend.shift_rad);
+        // Errors of successive looks may cancel; a look by itself is as wrong as it is.
+        let alone = measurement_variance + (self.config.scatter_variance() - scatter).max(0.0);
+        let innovation = self.belief.innovation(residual, &sighting.row, alone);
         Ok(Look {
             head: index,
             excluded: head.excluded,
@@ -376,7 +375,9 @@ impl Tracker {
             sigma[ALONG] = start.position_std_m;
             sigma[ACROSS] = start.position_std_m;
             sigma[HEADING] = start.heading_std_rad;
-            sigma[CURVATURE] = config.path_bend.curvature_per_m;
+            // The path bends with the road, and back to the middle of the lane.
+            let pull_per_m = config.lane_keeping.pull_per_m();
+            sigma[CURVATURE] = config.path_bend.curvature_per_m.hypot(pull_per_m);
             return Belief::independent(mean, sigma);
         };
         let place = map.project(start.pose.point());
@@ -388,13 +389,17 @@ impl Tracker {
         let mut belief = Belief::independent(mean, sigma);
         // The given pose is a measurement beside what lane keeping already says.
         let heading_rad = wrap_angle(start.pose.heading_rad - map.pose(place.along_m).heading_rad);
-        for (state, value, std) in [
-            (ACROSS, place.lateral_m, start.position_std_m),
-            (HEADING, heading_rad, start.heading_std_rad),
+        // Where the road bends, the heading tells of the place along it.
+        let curvature_per_m = map.curvature_per_m(place.along_m);
+        for (state, value, std, by_along) in [
+            (ACROSS, place.lateral_m, start.position_std_m, 0.0),
+            (HEADING, heading_rad, start.heading_std_rad, curvature_per_m),
         ] {
             let mut row = [0.0; STATES];
             row[state] = 1.0;
-            belief.update(value - belief.mean[state], &row, std * std);
+            row[ALONG] = by_along;
+            let expected = belief.mean[state] + by_along * (belief.mean[ALONG] - place.along_m);
+            belief.update(value - expected, &row, std * std);
         }
         belief
     }

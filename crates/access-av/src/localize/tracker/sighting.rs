@@ -3,6 +3,7 @@
 
 use super::state::{ACROSS, ALONG, HEADING, MOUNTING, PHASE, STATES};
 use crate::geometry::{Point, Pose};
+use crate::localize::gaussian::Matrix;
 
 /// What the array turns an angle into.
 #[derive(Clone, Copy, Debug, PartialEq)]
@@ -78,8 +79,8 @@ impl Footing {
     };
 }
 
-/// Predicted electrical angle `ω = 2π (d/λ) cos(β − φ − μ) + ω₀` and its gradient, for bearing β
-/// of the radio head, heading φ, mounting angle μ and phase offset ω₀.
+/// Predicted electrical angle `ω = 2π (d/λ) cos α + ω₀`, `α = β − φ − μ`, and how it changes with
+/// the state, for bearing β of the radio head, heading φ, mounting angle μ and phase offset ω₀.
 #[derive(Clone, Copy, Debug, PartialEq)]
 pub struct Sighting {
     /// Electrical angle (rad), not wrapped.
@@ -90,11 +91,26 @@ pub struct Sighting {
     pub range_m: f64,
     /// Cosine of the angle between the line of sight and the direction of travel.
     pub toward: f64,
+    /// Derivative of α by each state.
+    turn: [f64; STATES],
+    /// Steps of the place by each state towards the radio head and to the left of it.
+    sight: [[f64; STATES]; 2],
+    /// `2π (d/λ)` times cosine and sine of α.
+    slopes: [f64; 2],
+}
+
+/// What the bend of the electrical angle over the breadth of a belief does to its prediction.
+#[derive(Clone, Copy, Debug, PartialEq)]
+pub struct Bend {
+    /// Shift of the expected electrical angle (rad).
+    pub shift_rad: f64,
+    /// Variance (rad²) that it adds.
+    pub variance: f64,
 }
 
 impl Sighting {
     /// The radio head at `head` seen from `pose`; `None` when it is closer than a metre, where an
-    /// angle says nothing that a linear update could use.
+    /// angle says nothing that an update could use.
     pub fn new(
         head: Point,
         pose: Pose,
@@ -110,22 +126,56 @@ impl Sighting {
         let bearing = pose.point().bearing_rad(head);
         let slope = std::f64::consts::TAU * array.spacing_wavelengths;
         let (sin, cos) = (bearing - pose.heading_rad - mounting_rad).sin_cos();
-        // A step of length dl in direction δ turns the bearing by sin(β − δ) dl / R.
-        let (across_sight, along_sight) = (bearing - footing.direction_rad).sin_cos();
-        let turn_by_along = across_sight * footing.stretch / range_m - footing.curvature_per_m;
-        let turn_by_across = -along_sight / range_m;
-        let mut row = [0.0; STATES];
-        row[ALONG] = -slope * sin * turn_by_along;
-        row[ACROSS] = -slope * sin * turn_by_across;
-        row[HEADING] = slope * sin;
-        row[MOUNTING] = slope * sin;
+        let (left, ahead) = (bearing - footing.direction_rad).sin_cos();
+        let mut sight = [[0.0; STATES]; 2];
+        sight[0][ALONG] = ahead * footing.stretch;
+        sight[0][ACROSS] = left;
+        sight[1][ALONG] = -left * footing.stretch;
+        sight[1][ACROSS] = ahead;
+        // A step to the left of the line of sight turns the bearing to the right.
+        let mut turn = sight[1].map(|step| -step / range_m);
+        turn[ALONG] -= footing.curvature_per_m;
+        turn[HEADING] = -1.0;
+        turn[MOUNTING] = -1.0;
+        let mut row = turn.map(|turn| -slope * sin * turn);
         row[PHASE] = 1.0;
         Some(Self {
             phase_rad: slope * cos + offset_rad,
             row,
             range_m,
             toward: (bearing - pose.heading_rad).cos(),
+            turn,
+            sight,
+            slopes: [slope * cos, slope * sin],
         })
+    }
+
+    /// What the second derivative `D` of ω means for a Gaussian belief of covariance P: ω is
+    /// `½ tr(D P)` from its value at the mean on average, and has `½ tr(D P D P)` more variance
+    /// (Jazwinski, Stochastic Processes and Filtering Theory, 9.3). With g the derivative of α, r
+    /// and t the steps along and across the line of sight and R its length,
+    /// `D = −2π (d/λ) (cos α · g gᵀ − sin α / R² · (r tᵀ + t rᵀ))`.
+    pub fn bend(&self, covariance: &Matrix<STATES>) -> Bend {
+        let form = |left: &[f64; STATES], right: &[f64; STATES]| {
+            let mut sum = 0.0;
+            for i in [ALONG, ACROSS, HEADING, MOUNTING] {
+                for j in [ALONG, ACROSS, HEADING, MOUNTING] {
+                    sum += left[i] * covariance[i][j] * right[j];
+                }
+            }
+            sum
+        };
+        let (turn, [ahead, left]) = (&self.turn, &self.sight);
+        let (gg, gr, gt) = (form(turn, turn), form(turn, ahead), form(turn, left));
+        let (rr, rt, tt) = (form(ahead, ahead), form(ahead, left), form(left, left));
+        let (a, b) = (
+            -self.slopes[0],
+            self.slopes[1] / (self.range_m * self.range_m),
+        );
+        Bend {
+            shift_rad: 0.5 * a * gg + b * rt,
+            variance: 0.5 * a * a * gg * gg + 2.0 * a * b * gr * gt + b * b * (rt * rt + rr * tt),
+        }
     }
 }
 
@@ -182,6 +232,64 @@ mod tests {
                 sighting.row[state]
             );
         }
+    }
+
+    #[test]
+    fn bend_equals_finite_differences() {
+        let head = Point::new(40.0, 30.0);
+        let states = [ALONG, ACROSS, HEADING, MOUNTING];
+        let see = |x: [f64; 4]| {
+            let (pose, footing) = on_circle(x[0], x[1], x[2], 0.0);
+            Sighting::new(head, pose, &footing, x[3], 0.0, &ARRAY).unwrap()
+        };
+        // A covariance without symmetry but its own.
+        let factor = [
+            [2.0, 0.0, 0.0, 0.0],
+            [0.7, 1.5, 0.0, 0.0],
+            [0.02, -0.03, 0.04, 0.0],
+            [0.01, 0.02, 0.01, 0.02],
+        ];
+        let mut covariance = [[0.0; STATES]; STATES];
+        for (i, &row) in states.iter().enumerate() {
+            for (j, &column) in states.iter().enumerate() {
+                covariance[row][column] = (0..4).map(|k| factor[i][k] * factor[j][k]).sum();
+            }
+        }
+        let x = [3.0, 0.8, 0.05, 0.02];
+        let mut second = [[0.0; 4]; 4];
+        for (i, row) in second.iter_mut().enumerate() {
+            for (j, value) in row.iter_mut().enumerate() {
+                let at = |a: f64, b: f64| {
+                    let mut x = x;
+                    x[i] += a;
+                    x[j] += b;
+                    see(x).phase_rad
+                };
+                let h = 1e-3;
+                *value = (at(h, h) - at(h, -h) - at(-h, h) + at(-h, -h)) / (4.0 * h * h);
+            }
+        }
+        let mut product = [[0.0; 4]; 4];
+        for (i, row) in product.iter_mut().enumerate() {
+            for (j, value) in row.iter_mut().enumerate() {
+                *value = (0..4)
+                    .map(|k| second[i][k] * covariance[states[k]][states[j]])
+                    .sum();
+            }
+        }
+        let trace: f64 = (0..4).map(|i| product[i][i]).sum();
+        let square: f64 = (0..4)
+            .map(|i| (0..4).map(|j| product[i][j] * product[j][i]).sum::<f64>())
+            .sum();
+        let bend = see(x).bend(&covariance);
+        assert!(
+            (bend.shift_rad - 0.5 * trace).abs() < 1e-6,
+            "{bend:?} {trace}"
+        );
+        assert!(
+            (bend.variance - 0.5 * square).abs() < 1e-6,
+            "{bend:?} {square}"
+        );
     }
 
     #[test]
