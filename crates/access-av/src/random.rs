@@ -28,6 +28,8 @@ pub enum Purpose {
     SampleNoise = 9,
     /// Oscillator of a radio head.
     HeadOscillator = 10,
+    /// Delays of a radio head's scatter.
+    ScatterDelay = 11,
 }
 
 /// The random streams of one run.

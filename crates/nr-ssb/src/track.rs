@@ -55,6 +55,9 @@ pub struct Tracked<const A: usize> {
     /// the delay taken out, over the root of the pilots' number: the noise keeps the variance it
     /// has on a resource element. In the scale of an unnormalised transform.
     pub blocks: [[Complex64; A]; SYMBOLS],
+    /// Samples by which the SSB came later than `received` has it: the delay that is taken out of
+    /// the blocks.
+    pub residual_delay: f64,
     /// Pilots behind each block: 127, 60, 151, 60; with the PBCH 127, 240, 223, 240.
     pub pilots: [u16; SYMBOLS],
     /// Variance of the noise on a resource element, per antenna.
@@ -220,7 +223,7 @@ impl<const A: usize> Tracker<A> {
     }
 
     /// Received resource elements of one antenna, `[symbol][subcarrier]`, of the last SSB, delay
-    /// and frequency offset as predicted taken out.
+    /// and frequency offset as predicted taken out; [`Tracked::residual_delay`] is left.
     pub fn received(&self, antenna: usize) -> Option<&[[Complex32; SUBCARRIERS]; SYMBOLS]> {
         self.acquirer.grids.get(antenna)
     }
@@ -277,6 +280,7 @@ impl<const A: usize> Tracker<A> {
             cfo_hz: self.cfo_cycles * self.base_rate_hz,
             snr_db: decibel(snr),
             blocks,
+            residual_delay: delay,
             pilots,
             noise_variance,
             measurements,

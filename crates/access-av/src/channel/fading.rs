@@ -14,7 +14,8 @@ use crate::scenario::{ScatterModel, Scenario};
 /// The scatter is a sum of plane waves of fixed directions, uniform over the sphere, and random
 /// phases (Aulin's model), so that it is a function of the distance driven: its autocorrelation is
 /// sin(2πΔ/λ)/(2πΔ/λ), first zero at half a wavelength, and its Doppler spectrum is flat. Like any
-/// wave, the line of sight turns its phase with its own Doppler. Nothing is drawn while driving,
+/// wave, the line of sight turns its phase with its own Doppler. Where scatter has a delay spread,
+/// each ray's delay is exponentially distributed, and the channel varies over the band. Nothing is drawn while driving,
 /// and an SSB fades the same whether or not the ones before it were heard.
 #[derive(Debug, Clone)]
 pub struct RicianFading {
@@ -23,6 +24,8 @@ pub struct RicianFading {
     wavenumber_per_m: f64,
     rays: Vec<Ray>,
     model: ScatterModel,
+    /// Whether the scatter is delayed against the line of sight.
+    dispersive: bool,
 }
 
 /// A plane wave, for one antenna or for all.
@@ -34,6 +37,8 @@ struct Ray {
     start: Complex64,
     /// Phase step from antenna to antenna.
     step: Complex64,
+    /// Delay after the line of sight, in seconds.
+    delay_s: f64,
 }
 
 impl RicianFading {
@@ -48,6 +53,8 @@ impl RicianFading {
             ScatterModel::Rays => per_antenna,
         };
         let element_rad = TAU * scenario.array.spacing_wavelengths;
+        let spread_s = 1e-9 * settings.delay_spread_ns;
+        let mut delays = streams.generator(Purpose::ScatterDelay, head);
         let rays = (0..count)
             .map(|_| {
                 // Uniform over the sphere is uniform in the cosine to any axis (Archimedes).
@@ -56,6 +63,8 @@ impl RicianFading {
                     cosine,
                     start: Complex64::cis(rng.random::<f64>() * TAU),
                     step: Complex64::cis(element_rad * cosine),
+                    // Exponential: mean and standard deviation are the spread.
+                    delay_s: -spread_s * (1.0 - delays.random::<f64>()).ln(),
                 }
             })
             .collect();
@@ -65,34 +74,61 @@ impl RicianFading {
             wavenumber_per_m: TAU / scenario.ssb.wavelength_m(),
             rays,
             model: settings.scatter,
+            dispersive: spread_s > 0.0,
         }
     }
 
-    /// Gains of the antennas, of unit mean power, for a line of sight of electrical angle
-    /// `phase_rad` after `driven_m`, at `range_m` from the radio head.
+    /// Gains of the antennas at the carrier, of unit mean power, for a line of sight of electrical
+    /// angle `phase_rad` after `driven_m`, at `range_m` from the radio head.
     pub fn gains(&self, phase_rad: f64, driven_m: f64, range_m: f64) -> Snapshot {
+        let mut gains = [[Complex64::ZERO; ANTENNAS]];
+        self.response(phase_rad, driven_m, range_m, 0.0, &mut gains);
+        let [gains] = gains;
+        gains
+    }
+
+    /// The same at frequencies `step_hz` apart, the carrier in their middle (of an even number, just
+    /// above it). The line of sight has no delay.
+    pub fn response(
+        &self,
+        phase_rad: f64,
+        driven_m: f64,
+        range_m: f64,
+        step_hz: f64,
+        into: &mut [Snapshot],
+    ) {
         let direct = Complex64::from_polar(self.line_of_sight, -self.wavenumber_per_m * range_m);
-        let mut gains = steering_vector(phase_rad).map(|gain| gain * direct);
-        let arrival =
-            |ray: &Ray| ray.start * Complex64::cis(self.wavenumber_per_m * driven_m * ray.cosine);
-        match self.model {
-            ScatterModel::PerAntenna => {
-                let rays_each = self.rays.chunks_exact(self.rays.len() / ANTENNAS);
-                for (gain, rays) in gains.iter_mut().zip(rays_each) {
-                    *gain += rays.iter().map(arrival).sum::<Complex64>() * self.scatter;
-                }
-            }
-            ScatterModel::Rays => {
-                for ray in &self.rays {
-                    let mut wave = arrival(ray) * self.scatter;
-                    for gain in &mut gains {
-                        *gain += wave;
-                        wave *= ray.step;
+        into.fill(steering_vector(phase_rad).map(|gain| gain * direct));
+        let first_hz = -((into.len() / 2) as f64) * step_hz;
+        let per_antenna = self.rays.len() / ANTENNAS;
+        // Without delays one frequency is like another.
+        let count = if self.dispersive { into.len() } else { 1 };
+        for (number, ray) in self.rays.iter().enumerate() {
+            let doppler = Complex64::cis(self.wavenumber_per_m * driven_m * ray.cosine);
+            let mut wave = ray.start * doppler * self.scatter;
+            wave *= Complex64::cis(-TAU * first_hz * ray.delay_s);
+            let turn = Complex64::cis(-TAU * step_hz * ray.delay_s);
+            for gains in into.iter_mut().take(count) {
+                match self.model {
+                    ScatterModel::PerAntenna => {
+                        if let Some(gain) = gains.get_mut(number / per_antenna) {
+                            *gain += wave;
+                        }
+                    }
+                    ScatterModel::Rays => {
+                        let mut here = wave;
+                        for gain in gains {
+                            *gain += here;
+                            here *= ray.step;
+                        }
                     }
                 }
+                wave *= turn;
             }
         }
-        gains
+        if let (false, Some(&gains)) = (self.dispersive, into.first()) {
+            into.fill(gains);
+        }
     }
 }
 
@@ -191,5 +227,33 @@ mod tests {
         assert!(product(ScatterModel::PerAntenna).abs() < 0.05);
         // Neighbours at λ/2 in an isotropic field: sin(π)/π.
         assert!(product(ScatterModel::Rays).abs() < 0.05);
+    }
+
+    #[test]
+    fn scatter_decorrelates_over_frequency_as_its_delays_have_it() {
+        for model in [ScatterModel::PerAntenna, ScatterModel::Rays] {
+            let mut scenario = scenario(-30.0, model);
+            scenario.channel.delay_spread_ns = 300.0;
+            let (runs, step_hz) = (4000, 250e3);
+            let mut sums = [Complex64::ZERO; 4];
+            for run in 0..runs {
+                let mut gains = [[Complex64::ZERO; ANTENNAS]; 4];
+                RicianFading::new(&scenario, Streams::new(5, run), 0)
+                    .response(0.0, 3.0, 0.0, step_hz, &mut gains);
+                for (sum, there) in sums.iter_mut().zip(&gains) {
+                    let pairs = gains[0].iter().zip(there);
+                    *sum += pairs.map(|(a, b)| a.conj() * b).sum::<Complex64>() / 4.0;
+                }
+            }
+            for (step, sum) in sums.iter().enumerate() {
+                // The characteristic function of an exponential distribution.
+                let turns = step as f64 * step_hz * 300e-9;
+                let expected = Complex64::new(1.0, TAU * turns).inv();
+                // Fourth moments of a sum of eight rays: below two.
+                let bound = 4.0 * (2.0 / runs as f64).sqrt();
+                let deviation = sum / runs as f64 - expected;
+                assert!(deviation.norm() < bound, "{model:?} {step}: {deviation}");
+            }
+        }
     }
 }

@@ -1,9 +1,11 @@
 //! From the vehicle's true place to the samples that its receiver gets of an SSB burst: every radio
-//! head's SSB, multipath, Doppler, frequency offset, clock drift, noise, channel errors, converter.
+//! head's SSB, multipath, Doppler, faults, frequency offset, clock drift, noise, channel errors,
+//! converter.
 
 use std::f64::consts::{FRAC_1_SQRT_2, TAU};
 
 use nr_ssb::burst::ssb_grid;
+use nr_ssb::grid::SUBCARRIERS;
 use nr_ssb::ofdm::symbol_phase;
 use nr_ssb::{
     BchPayload, Case, Complex32, Error, Lmax, Mib, Numerology, Ofdm, Pci, SubcarrierSpacing,
@@ -14,10 +16,10 @@ use rand_chacha::ChaCha8Rng;
 use rand_distr::StandardNormal;
 
 use super::HeadChannel;
-use crate::observation::ANTENNAS;
+use crate::observation::{ANTENNAS, Snapshot};
 use crate::random::{Purpose, Streams};
 use crate::scenario::{IqSettings, Scenario};
-use crate::world::VehicleState;
+use crate::world::{Faults, VehicleState};
 
 const SPEED_OF_LIGHT_MPS: f64 = 299_792_458.0;
 /// Size of the transforms: samples are made at the base rate.
@@ -43,6 +45,10 @@ pub struct IqAir {
     noise: ChaCha8Rng,
     /// Whether samples are made from one burst to the next, without a gap.
     continuous: bool,
+    faults: Faults,
+    /// Gains of the antennas at each subcarrier, and a symbol's samples.
+    response: Vec<Snapshot>,
+    symbol: Vec<Complex32>,
     /// Sum of all SSBs at each antenna, before the converter.
     sum: [Vec<Complex64>; ANTENNAS],
     burst: IqBurst,
@@ -101,6 +107,9 @@ impl IqAir {
             channel_gains,
             noise: streams.generator(Purpose::SampleNoise, 0),
             continuous: false,
+            faults: Faults::new(scenario),
+            response: vec![[Complex64::ZERO; ANTENNAS]; SUBCARRIERS],
+            symbol: vec![Complex32::ZERO; numerology.ssb_symbol_len()],
             sum: Default::default(),
             burst: IqBurst::default(),
         })
@@ -214,7 +223,6 @@ impl IqAir {
         let oscillator = self.head_oscillators.get(index).copied().unwrap_or(0.0);
         let cfo = (oscillator - self.oscillator) * self.ssb_freq_hz / rate_hz;
         let symbol_len = self.numerology.ssb_symbol_len();
-        let mut samples = vec![Complex32::ZERO; symbol_len];
         for (l, subcarriers) in grid.symbols().enumerate() {
             let phase = symbol_phase(self.numerology, first_symbol + l, self.ssb_freq_hz);
             let mut shifted = *subcarriers;
@@ -223,16 +231,28 @@ impl IqAir {
                 let turn = Complex64::cis(TAU * cycles);
                 *element *= phase * Complex32::new(turn.re as f32, turn.im as f32);
             }
-            self.ofdm.modulate(&shifted, &mut samples)?;
             let middle_s =
                 time_s + (self.numerology.symbol_start(first_symbol + l) as f64) / rate_hz;
-            let (_, gains) = channel.gains(&state(middle_s), snr_db);
+            let here = state(middle_s);
+            let step_hz = self.numerology.spacing().hz();
+            channel.response(&here, snr_db, step_hz, &mut self.response);
+            if self.faults.any_at(middle_s) {
+                for gains in &mut self.response {
+                    self.faults.distort(index, head, &here, gains);
+                }
+            }
             let begin = place as usize + l * symbol_len;
-            for (sum, gain) in self.sum.iter_mut().zip(gains) {
-                for (n, (to, sample)) in sum.iter_mut().skip(begin).zip(&samples).enumerate() {
+            for (antenna, sum) in self.sum.iter_mut().enumerate() {
+                let mut faded = shifted;
+                for (element, gains) in faded.iter_mut().zip(&self.response) {
+                    let gain = gains.get(antenna).copied().unwrap_or_default();
+                    *element *= Complex32::new(gain.re as f32, gain.im as f32);
+                }
+                self.ofdm.modulate(&faded, &mut self.symbol)?;
+                for (n, (to, sample)) in sum.iter_mut().skip(begin).zip(&self.symbol).enumerate() {
                     let at = self.burst.start as f64 + (begin + n) as f64;
                     let turn = Complex64::cis(TAU * (cfo * at).fract());
-                    *to += gain * turn * Complex64::new(sample.re.into(), sample.im.into());
+                    *to += turn * Complex64::new(sample.re.into(), sample.im.into());
                 }
             }
         }

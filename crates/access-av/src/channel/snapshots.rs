@@ -69,13 +69,36 @@ impl HeadChannel {
         self.budget.snr_db(&self.head, distance_m) + self.shadowing.next_db(vehicle.along_m)
     }
 
-    /// Electrical angle of the line of sight, and gains of the antennas for a mean SNR of `snr_db`.
-    pub fn gains(&self, vehicle: &VehicleState, snr_db: f64) -> (f64, Snapshot) {
+    /// Gains of the antennas at frequencies `step_hz` apart around the carrier, for a mean SNR of
+    /// `snr_db`; see [`RicianFading::response`].
+    pub fn response(
+        &self,
+        vehicle: &VehicleState,
+        snr_db: f64,
+        step_hz: f64,
+        into: &mut [Snapshot],
+    ) {
+        let (phase_rad, distance_m) = self.line_of_sight(vehicle);
+        self.fading
+            .response(phase_rad, vehicle.along_m, distance_m, step_hz, into);
+        let amplitude = 10f64.powf(0.05 * snr_db);
+        for gain in into.iter_mut().flatten() {
+            *gain *= amplitude;
+        }
+    }
+
+    /// Electrical angle of the line of sight, and its length in metres.
+    fn line_of_sight(&self, vehicle: &VehicleState) -> (f64, f64) {
         let place = vehicle.pose.point();
-        let distance_m = place.distance_m(self.head.position);
         let bearing_rad = place.bearing_rad(self.head.position);
         let to_axis_rad = bearing_rad - vehicle.pose.heading_rad - self.mounting_angle_rad;
         let phase_rad = self.element_rad * to_axis_rad.cos();
+        (phase_rad, place.distance_m(self.head.position))
+    }
+
+    /// Electrical angle of the line of sight, and gains of the antennas for a mean SNR of `snr_db`.
+    pub fn gains(&self, vehicle: &VehicleState, snr_db: f64) -> (f64, Snapshot) {
+        let (phase_rad, distance_m) = self.line_of_sight(vehicle);
         let amplitude = 10f64.powf(0.05 * snr_db);
         let fading = self.fading.gains(phase_rad, vehicle.along_m, distance_m);
         (phase_rad, fading.map(|gain| gain * amplitude))

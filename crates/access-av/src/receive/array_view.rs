@@ -5,6 +5,7 @@ use nr_ssb::search::ReceivedSsb;
 use num_complex::Complex64;
 
 use super::despread::Despread;
+use super::wideband::line_of_sight;
 use crate::scenario::Pilots;
 
 /// The receiving array.
@@ -62,36 +63,38 @@ pub(super) fn array_view(
 
 struct Looker<const A: usize> {
     array: Array<A>,
+    calibration: Calibration<A>,
 }
 
 impl<const A: usize> Looker<A> {
     fn new(setup: &ArraySetup) -> Result<Self, aoa::Error> {
-        let mut array = Array::new(setup.spacing_wavelengths)?;
+        let mut calibration = Calibration::IDENTITY;
         if let Some(gains) = &setup.calibration {
             let gains = <[Complex64; A]>::try_from(gains.as_slice())
                 .map_err(|_| aoa::Error::CalibrationGain(gains.len().min(A)))?;
-            array = array.with_calibration(Calibration::new(gains)?);
+            calibration = Calibration::new(gains)?;
         }
-        Ok(Self { array })
+        Ok(Self {
+            array: Array::new(setup.spacing_wavelengths)?,
+            calibration,
+        })
     }
 }
 
 impl<const A: usize> ArrayView for Looker<A> {
     fn view(&self, ssb: &ReceivedSsb<'_>) -> Option<View> {
         let elements = ssb.elements.first_chunk::<A>()?.each_ref();
-        let despread = Despread::new(elements, ssb.known, Pilots::Ssb, 0.0);
         let noise = ssb.noise_variance.iter().sum::<f64>() / A as f64;
         let scale = noise.max(f64::MIN_POSITIVE).sqrt().recip();
-        let blocks: Vec<[Complex64; A]> = despread
-            .blocks()
-            .map(|block| block.map(|gain| gain * scale))
-            .collect();
-        let estimate = maximum_likelihood_pilots(&blocks, Some(1.0), &self.array).ok()?;
-        let calibration = self.array.calibration();
-        let blocks = blocks
-            .iter()
-            .map(|block| calibration.apply(block).to_vec())
-            .collect();
+        let gains = self.calibration.gains().map(|gain| scale / gain);
+        let despread = Despread::new(elements, ssb.known, Pilots::Ssb, 0.0).scaled(&gains);
+        let blocks: Vec<[Complex64; A]> = despread.blocks().collect();
+        let told = line_of_sight(&despread);
+        let looked_at = told
+            .as_ref()
+            .map_or(&blocks[..], |told| std::slice::from_ref(&told.block));
+        let estimate = maximum_likelihood_pilots(looked_at, Some(1.0), &self.array).ok()?;
+        let blocks = blocks.iter().map(|block| block.to_vec()).collect();
         Some(View { estimate, blocks })
     }
 }

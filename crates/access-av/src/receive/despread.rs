@@ -14,7 +14,7 @@ pub(super) const GROUPS: usize = 24;
 /// Subcarriers of a group.
 pub(super) const GROUP: usize = SUBCARRIERS / GROUPS;
 /// Size of the transform that a delay in samples refers to.
-const FFT_SIZE: f64 = 256.0;
+pub(super) const FFT_SIZE: f64 = 256.0;
 /// Subcarriers of PSS and SSS (TS 38.211, 7.4.3.1), in symbols 0 and 2.
 const SYNC: Range<usize> = 56..183;
 
@@ -60,6 +60,16 @@ impl<const A: usize> Despread<A> {
             }
         }
         result
+    }
+
+    /// The same with each antenna multiplied by a gain.
+    pub fn scaled(mut self, gains: &[Complex64; A]) -> Self {
+        for sum in self.sums.iter_mut().flatten() {
+            for (value, gain) in sum.iter_mut().zip(gains) {
+                *value *= gain;
+            }
+        }
+        self
     }
 
     /// One block per symbol that has pilots, over the whole band: the sum over the root of the

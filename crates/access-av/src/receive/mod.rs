@@ -11,6 +11,7 @@ mod receiver;
 mod scan;
 mod ssb_search;
 mod stream;
+mod wideband;
 
 pub use array_view::ArraySetup;
 pub use diagnosis::ChannelFault;

@@ -3,6 +3,7 @@
 //! It is given windows of samples at the base rate (256 to a symbol), however they came about: cut
 //! from a recording, or made by the simulator around each burst.
 
+use nr_ssb::grid::{SUBCARRIERS, SYMBOLS};
 use nr_ssb::search::{SearchConfig, SearchError, Searcher};
 use nr_ssb::track::{TrackError, Tracked, Tracker};
 use nr_ssb::{Complex32, SubcarrierSpacing};
@@ -10,6 +11,8 @@ use num_complex::Complex64;
 use thiserror::Error;
 
 use super::SSB_SAMPLES;
+use super::despread::Despread;
+use super::wideband::line_of_sight;
 use crate::observation::{ANTENNAS, SensedSsb, SsbObservation};
 use crate::scenario::{Pilots, Scenario};
 
@@ -250,27 +253,34 @@ fn fill(
     into.cfo_hz = seen.cfo_hz;
     let noise = seen.noise_variance.iter().sum::<f64>() / ANTENNAS as f64;
     let scale = noise.max(f64::MIN_POSITIVE).sqrt().recip();
-    let calibrated = |antenna: usize, value: Complex64| {
-        value * scale
-            / config
-                .calibration
-                .get(antenna)
-                .copied()
-                .unwrap_or(Complex64::ONE)
-    };
-    let symbols: &[usize] = match config.pilots {
-        Pilots::Blind => return fill_blind(into, config, tracker, calibrated),
-        Pilots::Pss => &[0],
-        Pilots::PssSss => &[0, 2],
-        Pilots::Ssb => &[0, 1, 2, 3],
+    let gains: [Complex64; ANTENNAS] = config.calibration.map(|gain| scale / gain);
+    if config.pilots == Pilots::Blind {
+        return fill_blind(into, config, tracker, gains);
+    }
+    let Some(elements) = received(tracker) else {
+        return;
     };
     into.noise_variance = Some(1.0);
-    for symbol in symbols {
-        if let Some(block) = seen.blocks.get(*symbol) {
-            let mut antenna = 0..ANTENNAS;
-            into.push(block.map(|gain| calibrated(antenna.next().unwrap_or(0), gain)));
-        }
+    let delay = seen.residual_delay;
+    let despread = Despread::new(elements, tracker.known(), config.pilots, delay).scaled(&gains);
+    if let Some(told) = line_of_sight(&despread) {
+        into.push(told.block);
+        return;
     }
+    for block in despread.blocks() {
+        into.push(block);
+    }
+}
+
+/// What every antenna received of the last SSB.
+fn received(
+    tracker: &Tracker<ANTENNAS>,
+) -> Option<[&[[Complex32; SUBCARRIERS]; SYMBOLS]; ANTENNAS]> {
+    let mut elements = [tracker.received(0)?; ANTENNAS];
+    for (antenna, grid) in elements.iter_mut().enumerate() {
+        *grid = tracker.received(antenna)?;
+    }
+    Some(elements)
 }
 
 /// Resource elements of the broadcast channel as snapshots of a signal that is not known.
@@ -278,23 +288,23 @@ fn fill_blind(
     into: &mut SsbObservation,
     config: &ReceiverConfig,
     tracker: &Tracker<ANTENNAS>,
-    calibrated: impl Fn(usize, Complex64) -> Complex64,
+    gains: [Complex64; ANTENNAS],
 ) {
-    /// Symbol of the SSB that holds nothing but the broadcast channel, and its subcarriers.
+    /// Symbol of the SSB that holds nothing but the broadcast channel.
     const PBCH_SYMBOL: usize = 1;
-    const SUBCARRIERS: usize = 240;
+    let Some(elements) = received(tracker) else {
+        return;
+    };
     for number in 0..config.snapshots {
         let subcarrier = number * SUBCARRIERS / config.snapshots.max(1);
-        let element = |antenna: usize| {
-            let grid = tracker.received(antenna)?;
-            let value = grid.get(PBCH_SYMBOL)?.get(subcarrier)?;
-            Some(calibrated(
-                antenna,
-                Complex64::new(value.re.into(), value.im.into()),
-            ))
-        };
-        into.push(std::array::from_fn(|antenna| {
-            element(antenna).unwrap_or(Complex64::ZERO)
-        }));
+        let mut snapshot = gains;
+        for (value, grid) in snapshot.iter_mut().zip(elements) {
+            let element = grid[PBCH_SYMBOL]
+                .get(subcarrier)
+                .copied()
+                .unwrap_or_default();
+            *value *= Complex64::new(element.re.into(), element.im.into());
+        }
+        into.push(snapshot);
     }
 }

@@ -228,7 +228,8 @@ impl Scenario {
             -30.0,
             200.0,
         )?;
-        check.between("channel.rays", f64::from(self.channel.rays), 1.0, 64.0)
+        check.between("channel.rays", f64::from(self.channel.rays), 1.0, 64.0)?;
+        self.check_delay_spread(check)
     }
 
     fn check_vehicle(&self, check: &Check<'_>) -> Result<(), ScenarioError> {

@@ -52,6 +52,20 @@ impl Scenario {
         Ok(())
     }
 
+    /// Refuses delays that snapshots cannot show, or that symbols would run into each other by.
+    pub(super) fn check_delay_spread(&self, check: &Check<'_>) -> Result<(), ScenarioError> {
+        let (key, spread_ns) = ("channel.delay_spread_ns", self.channel.delay_spread_ns);
+        // A quarter of the prefix, 18 samples of a symbol's 256: e⁻⁴ of the scatter comes later.
+        let prefix_ns = 18.0 / 256.0 * 1e6 / self.ssb.subcarrier_spacing_khz;
+        check.between(key, spread_ns, 0.0, 0.25 * prefix_ns)?;
+        check.that(
+            spread_ns == 0.0 || self.fidelity == Fidelity::Iq,
+            key,
+            spread_ns,
+            "it acts on samples only, with fidelity = \"iq\"; else it must be 0",
+        )
+    }
+
     /// Refuses what cannot be sent as samples.
     ///
     /// # Errors

@@ -16,7 +16,7 @@ use crate::recording::{
     write_odometry_csv, write_tum,
 };
 use crate::scenario::{Check, Scenario, ScenarioError};
-use crate::world::{Odometer, RadioHead, Vehicle, VehicleState};
+use crate::world::{Faults, Odometer, RadioHead, Vehicle, VehicleState};
 
 /// How a scenario is recorded.
 #[derive(Debug, Clone, Copy, PartialEq)]
@@ -173,11 +173,13 @@ fn write_odometry(
     file: &Path,
 ) -> Result<(), RecordingError> {
     let mut odometer = Odometer::new(scenario.odometer, vehicle.at(0.0), streams);
+    let mut faults = Faults::new(scenario);
     let count = (end_s / odometer.period_s()).floor() as usize + 1;
     let samples: Vec<_> = (0..count)
         .filter_map(|number| {
             let time_s = number as f64 * odometer.period_s();
-            odometer.sample(vehicle.at(time_s))
+            let sample = odometer.sample(vehicle.at(time_s))?;
+            Some(faults.slip(sample))
         })
         .collect();
     write_odometry_csv(file, &samples)

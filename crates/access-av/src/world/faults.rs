@@ -38,6 +38,11 @@ impl Faults {
             .map(|fault| fault.what)
     }
 
+    /// Whether anything is wrong at this time.
+    pub fn any_at(&self, time_s: f64) -> bool {
+        self.at(time_s).next().is_some()
+    }
+
     /// What becomes of the antennas' gains for radio head number `index`.
     pub fn distort(
         &self,
