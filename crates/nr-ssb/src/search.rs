@@ -159,6 +159,15 @@ pub struct ReceivedSsb<'a> {
     pub noise_variance: &'a [f64],
 }
 
+/// How far candidates came in the last block.
+#[derive(Debug, Clone, Copy, PartialEq, Eq, Default)]
+pub struct SearchCounts {
+    /// Maxima of the matched filter that were examined.
+    pub pss_candidates: usize,
+    /// Of these, SSBs likely enough for their PBCH to be decoded.
+    pub pbch_tried: usize,
+}
+
 /// Searches blocks of samples at the base rate; owns all plans and buffers.
 pub struct Searcher {
     config: SearchConfig,
@@ -175,6 +184,7 @@ pub struct Searcher {
     buffer_start: u64,
     candidates: Vec<PssCandidate>,
     found: Vec<DetectedSsb>,
+    counts: SearchCounts,
     /// The last SSBs of the block before, to know them again.
     recent: Vec<(Pci, f64)>,
 }
@@ -226,6 +236,7 @@ impl Searcher {
             buffer_start: 0,
             candidates: Vec::new(),
             found: Vec::new(),
+            counts: SearchCounts::default(),
             recent: Vec::new(),
             config,
         })
@@ -314,6 +325,11 @@ impl Searcher {
         &self.config
     }
 
+    /// What became of the candidates in the block searched last.
+    pub fn counts(&self) -> SearchCounts {
+        self.counts
+    }
+
     fn common_length(&self, antennas: &[&[Complex32]]) -> Result<usize, SearchError> {
         let (given, expected) = (antennas.len(), self.config.antennas);
         if given != expected {
@@ -343,6 +359,7 @@ impl Searcher {
     }
 
     fn examine_all(&mut self, length: usize, look: &mut dyn FnMut(&DetectedSsb, &ReceivedSsb<'_>)) {
+        self.counts = SearchCounts::default();
         // The PSS of an SSB that lies inside the buffer.
         let Some(end) = (length + 1).checked_sub(SSB_SAMPLES - CYCLIC_PREFIX) else {
             return;
@@ -366,6 +383,7 @@ impl Searcher {
                 .map(|(index, _)| index);
             let Some(index) = strongest else { break };
             let candidate = self.candidates.swap_remove(index);
+            self.counts.pss_candidates += 1;
             let Some(alignment) = self.examine(&candidate, look) else {
                 continue;
             };
@@ -406,6 +424,7 @@ impl Searcher {
         if acquired.statistic < DECODE_FLOOR * self.cell_threshold {
             return None;
         }
+        self.counts.pbch_tried += 1;
         let mut broadcast = self.decoder.decode(&self.acquirer, &acquired);
         if broadcast.is_none() {
             let certain = 10.0_f64.powf(0.1 * CERTAIN_DECODE_SNR_DB);

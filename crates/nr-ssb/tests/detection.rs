@@ -2,6 +2,7 @@
 #![allow(clippy::unwrap_used, clippy::print_stdout, reason = "this is a test")]
 
 mod air;
+mod noise_only;
 
 use nr_ssb::SubcarrierSpacing;
 use nr_ssb::search::{SearchConfig, Searcher};
@@ -61,20 +62,27 @@ fn one_ssb_in_20_ms_is_decoded_by_one_antenna_at_minus_3_db() {
     assert!(decoded >= FEWEST, "{decoded}");
 }
 
-/// At the threshold for 1e-3, 100 searches make a cell with probability 0.1; none is seen, and with
-/// these seeds none ever will be.
+/// At 1e-3 a search, 400 searches make a cell with a probability of 0.33. `false_cells` of the
+/// examples makes enough of them to refute 1e-3; here a rate tenfold too high would show with a
+/// probability of 0.98.
 #[test]
 fn noise_makes_no_cell() {
-    for antennas in [1, 4] {
-        let config = SearchConfig::new(SubcarrierSpacing::Khz15, antennas);
-        let mut searcher = Searcher::new(config).unwrap();
-        for trial in 0..50 {
-            let mut rng = air::rng(trial);
-            let mut samples = air::silence(antennas, 76_800);
-            air::add_noise(&mut samples, 0.0, &mut rng);
-            assert!(searcher.search(&air::slices(&samples)).unwrap().is_empty());
-        }
+    let mut all = noise_only::Tally::default();
+    for (antennas, searches) in [(1, 300), (4, 100)] {
+        all.add(noise_only::search_noise(antennas, 0..searches));
     }
+    println!("{all:?}");
+    assert_eq!(all.false_cells, 0);
+    // Else nothing was examined at all.
+    assert!(all.pss_candidates > 0 && all.pbch_tried > 0);
+}
+
+#[test]
+fn the_upper_limit_is_that_of_clopper_and_pearson() {
+    // No event: 1 − 0.05^(1/n). One in ten: so few have the probability (1 − p)^9 (1 + 9p).
+    assert!((noise_only::upper_limit(0, 1000) - (1.0 - 0.05_f64.powf(1e-3))).abs() < 1e-12);
+    let p: f64 = noise_only::upper_limit(1, 10);
+    assert!(((1.0 - p).powi(9) * (1.0 + 9.0 * p) - 0.05).abs() < 1e-9);
 }
 
 #[test]

@@ -153,6 +153,14 @@ pub fn add_noise(antennas: &mut [Vec<Complex32>], snr_db: f64, rng: &mut ChaCha8
     }
 }
 
+/// The same noise and nothing else.
+pub fn fill_with_noise(antennas: &mut [Vec<Complex32>], snr_db: f64, rng: &mut ChaCha8Rng) {
+    for samples in antennas.iter_mut() {
+        samples.fill(Complex32::ZERO);
+    }
+    add_noise(antennas, snr_db, rng);
+}
+
 fn gaussian(rng: &mut impl Rng) -> Complex32 {
     Complex32::new(StandardNormal.sample(rng), StandardNormal.sample(rng))
 }
