@@ -68,10 +68,8 @@ impl Demodulator {
             ..
         } = *alignment;
         let first = start.checked_sub(CYCLIC_PREFIX)?;
-        if antennas
-            .iter()
-            .any(|samples| samples.as_ref().len() < first + SSB_SAMPLES)
-        {
+        let end = first.checked_add(SSB_SAMPLES)?;
+        if antennas.iter().any(|samples| samples.as_ref().len() < end) {
             return None;
         }
         fill_phasors(

@@ -32,6 +32,8 @@ const DECODE_FLOOR: f32 = 0.7;
 /// SNR after combining above which a PBCH always decodes (its block error rate is 1 % at −8 dB):
 /// a stronger "cell" whose PBCH does not decode is none.
 const CERTAIN_DECODE_SNR_DB: f64 = -2.0;
+/// Sums of a million samples' energies stay finite below this.
+const MAX_ENERGY: f32 = 1e30;
 /// Two detections of one cell closer than this, in samples, are one SSB.
 const SAME_SSB_SAMPLES: f64 = CYCLIC_PREFIX as f64;
 
@@ -284,11 +286,12 @@ impl Searcher {
         for (buffer, input) in self.buffer.iter_mut().zip(antennas) {
             buffer.copy_within(kept - tail.., 0);
             buffer.truncate(tail);
-            // A sample that is not a number would spoil a whole transform.
+            // One sample that is not a number, or whose energy is none, would spoil a whole transform.
+            let usable = |x: &Complex32| x.norm_sqr() < MAX_ENERGY;
             buffer.extend(
                 input
                     .iter()
-                    .map(|x| if x.is_finite() { *x } else { Complex32::ZERO }),
+                    .map(|x| if usable(x) { *x } else { Complex32::ZERO }),
             );
         }
         self.remember();

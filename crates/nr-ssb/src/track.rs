@@ -256,6 +256,12 @@ impl<const A: usize> Tracker<A> {
         let delay = timing::refine_combined(&estimate.rows);
         let (blocks, pilots) = despread(grids, reference, delay);
         let noise_variance = std::array::from_fn(|antenna| estimate.noise_variance[antenna]);
+        // Samples that are no numbers, or beyond all bounds, must not reach what is kept.
+        if !(blocks.iter().flatten().all(|block| block.is_finite())
+            && noise_variance.iter().all(|noise| noise.is_finite()))
+        {
+            return None;
+        }
         alignment.shift(delay)?;
         let known: f64 = pilots.iter().map(|count| f64::from(*count)).sum();
         let mut snr = 0.0;
