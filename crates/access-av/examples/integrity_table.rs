@@ -1,5 +1,5 @@
 //! Protection levels, alarms and false alarms, nominal and under each fault:
-//! `cargo run --release --example integrity_table -- [runs] [seed]`.
+//! `cargo run --release -p access-av --example integrity_table -- [runs] [seed ...]`.
 //!
 //! The epochs of a run hang together: beside each share stand the end of its 95 % interval by the
 //! bootstrap over runs, and in how many runs anything happened at all.
@@ -13,8 +13,13 @@ use access_av::simulate::{CampaignOptions, IntegritySummary, Simulation, bootstr
 fn main() -> Result<(), Box<dyn Error>> {
     let mut arguments = std::env::args().skip(1);
     let runs: usize = arguments.next().map_or(Ok(40), |text| text.parse())?;
-    let seed: u64 = arguments.next().map_or(Ok(1), |text| text.parse())?;
-    println!("{runs} runs of each, seed {seed}");
+    let mut seeds: Vec<u64> = arguments
+        .map(|text| text.parse())
+        .collect::<Result<_, _>>()?;
+    if seeds.is_empty() {
+        seeds.push(1);
+    }
+    println!("{runs} runs of each, seeds {seeds:?}");
     println!(
         "                      beyond PL while ok    runs         PL/error      worst  silent  needless"
     );
@@ -22,12 +27,17 @@ fn main() -> Result<(), Box<dyn Error>> {
         "case                     share    limit   with    epochs   median  not ok      m       s  alarms/h"
     );
     for (name, scenario) in cases()? {
-        let campaign = Simulation::on_its_platform(scenario)?.campaign(&CampaignOptions {
-            seed,
-            runs,
-            ..CampaignOptions::default()
-        })?;
-        print(name, &campaign.integrity);
+        let simulation = Simulation::on_its_platform(scenario)?;
+        let mut driven = Vec::new();
+        for &seed in &seeds {
+            let campaign = simulation.campaign(&CampaignOptions {
+                seed,
+                runs,
+                ..CampaignOptions::default()
+            })?;
+            driven.extend(campaign.integrity);
+        }
+        print(name, &driven);
     }
     Ok(())
 }

@@ -1,5 +1,5 @@
 //! Executions that each wake-up policy needs for the same error, on the yard:
-//! `cargo run --release --example wake_up_table -- [runs] [seed]`.
+//! `cargo run --release -p access-av --example wake_up_table -- [runs] [seed]`.
 #![allow(clippy::print_stdout, reason = "prints a table")]
 
 use std::error::Error;

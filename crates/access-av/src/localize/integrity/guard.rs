@@ -1,13 +1,18 @@
 //! A tracker that mistrusts its sources.
 //!
-//! Beside the tracker that uses every radio head there runs one without each of them. If one radio
-//! head is at fault — seen round a corner, moved, spoofed — the tracker without it is not, so the
-//! error of the full solution is at most the distance between the two plus the error of the clean
-//! one (solution separation, Brown and McBurney 1988, with the separation as it is and not its
-//! threshold). The angles of each radio head are tested against the tracker that does not use them.
+//! Beside the tracker that uses every radio head there run trackers that do without some of them
+//! ([`Bank`]). If one radio head is at fault, the tracker without it is right within its own
+//! covariance, wherever the full solution may be: the protection level is the radius about the full
+//! solution that holds for each of them (solution separation, Brown and McBurney 1988, with the
+//! separation as it is and not its threshold).
+//!
+//! A single radio head has no witness but odometry and road: the protection level then is what
+//! those two can vouch for, grows with the distance driven, and passes the alert limit unless they
+//! are good.
 
+use super::bank::Bank;
 use super::quantile::RadialQuantile;
-use super::sequence_test::SequenceTest;
+use super::separation::SeparatedRadius;
 use crate::localize::tracker::OdometryVerdict;
 use crate::localize::{AngleMeasurement, PoseEstimate, Tracker, UpdateVerdict};
 use crate::observation::OdometrySample;
@@ -37,7 +42,7 @@ impl Default for IntegrityConfig {
             risk_under_fault: 1e-2,
             alert_limit_m: 1.5,
             detection_threshold: 5.5,
-            recovery_threshold: 3.0,
+            recovery_threshold: 3.5,
             recovery_s: 5.0,
         }
     }
@@ -76,46 +81,35 @@ pub struct Integrity {
     pub faulty: usize,
 }
 
-/// One radio head and the tracker that does without it.
-#[derive(Clone, Debug)]
-struct Witness {
-    head: RadioHead,
-    without: Tracker,
-    test: SequenceTest,
-    faulty: bool,
-    sound_since_s: f64,
-}
-
 /// A tracker with its witnesses.
 #[derive(Clone, Debug)]
 pub struct Guard {
     config: IntegrityConfig,
     nominal: RadialQuantile,
-    under_fault: RadialQuantile,
-    main: Tracker,
-    witnesses: Vec<Witness>,
+    under_fault: SeparatedRadius,
+    bank: Bank,
+    restarted: Option<Restarted>,
+    /// Distance driven (m) when the sources could be told apart last.
+    trusted_m: f64,
     now_s: f64,
+}
+
+/// Trackers begun anew from a vague pose.
+#[derive(Clone, Debug)]
+struct Restarted {
+    bank: Bank,
+    since_s: f64,
 }
 
 impl Guard {
     /// Guards a tracker of these radio heads.
     pub fn new(tracker: Tracker, heads: &[RadioHead], config: IntegrityConfig) -> Self {
-        let witness = |&head: &RadioHead| {
-            let mut without = tracker.clone();
-            without.set_excluded(&head, true);
-            Witness {
-                head,
-                without,
-                test: SequenceTest::default(),
-                faulty: false,
-                sound_since_s: f64::NEG_INFINITY,
-            }
-        };
         Self {
             nominal: RadialQuantile::new(config.risk),
-            under_fault: RadialQuantile::new(config.risk_under_fault),
-            witnesses: heads.iter().map(witness).collect(),
-            main: tracker,
+            under_fault: SeparatedRadius::new(config.risk_under_fault),
+            trusted_m: tracker.driven_m(),
+            bank: Bank::new(tracker, heads, f64::NEG_INFINITY),
+            restarted: None,
             now_s: f64::NEG_INFINITY,
             config,
         }
@@ -123,121 +117,84 @@ impl Guard {
 
     /// The tracker that uses every sound source.
     pub const fn tracker(&self) -> &Tracker {
-        &self.main
+        self.bank.main()
     }
 
     /// Moves every tracker.
     pub fn odometry(&mut self, sample: &OdometrySample) -> OdometryVerdict {
-        for witness in &mut self.witnesses {
-            witness.without.odometry(sample);
+        if let Some(restarted) = &mut self.restarted {
+            restarted.bank.odometry(sample);
         }
-        self.main.odometry(sample)
+        self.bank.odometry(sample)
     }
 
     /// Takes in an angle: a test of its radio head, and information for whoever trusts that.
     pub fn update(&mut self, head: &RadioHead, measured: &AngleMeasurement) -> UpdateVerdict {
         self.now_s = self.now_s.max(measured.time_s);
-        let mut fired = false;
-        for witness in &mut self.witnesses {
-            if (witness.head.pci, witness.head.ssb_index) != (head.pci, head.ssb_index) {
-                witness.without.update(head, measured);
-                continue;
-            }
-            let Some(innovation) = witness.without.rehearse_excluded(head, measured) else {
-                continue;
-            };
-            // While the vehicle stands, scatter is one look however often it is seen.
-            if innovation.measurement_variance < 1.0 {
-                witness.test.push(&innovation);
-                fired |=
-                    !witness.faulty && witness.test.statistic() > self.config.detection_threshold;
-            }
-            if witness.test.statistic() > self.config.recovery_threshold {
-                witness.sound_since_s = self.now_s;
-            }
+        let verdict = self.bank.update(head, measured);
+        self.bank.judge(self.now_s, &self.config);
+        if let Some(restarted) = &mut self.restarted {
+            restarted.bank.update(head, measured);
+            restarted.bank.judge(self.now_s, &self.config);
         }
-        let verdict = self.main.update(head, measured);
-        if fired {
-            self.exclude_worst();
-        }
-        self.readmit();
+        self.recover();
         verdict
     }
 
-    /// Excludes the radio head that disagrees most, where two others remain to agree without it.
-    fn exclude_worst(&mut self) {
-        let sound = self
-            .witnesses
-            .iter()
-            .filter(|witness| !witness.faulty)
-            .count();
-        if sound < 3 {
-            return;
-        }
-        let worst = (self.witnesses.iter_mut())
-            .filter(|witness| !witness.faulty)
-            .max_by(|a, b| a.test.statistic().total_cmp(&b.test.statistic()));
-        let Some(worst) = worst else {
+    /// Where the sources cannot be told apart, the trackers may have been led astray, so far that
+    /// they refuse the good angles as outliers. Others then start from a pose as vague as what may
+    /// have happened meanwhile, and take over once nothing contradicts them. Until then, or until
+    /// the old ones are at peace again, nothing is `ok`.
+    fn recover(&mut self) {
+        let (now_s, patience_s) = (self.now_s, self.config.recovery_s);
+        let lost = self.bank.is_lost(&self.config);
+        let Some(restarted) = &self.restarted else {
+            if lost {
+                self.restart();
+            } else {
+                self.trusted_m = self.bank.main().driven_m();
+            }
             return;
         };
-        worst.faulty = true;
-        worst.sound_since_s = self.now_s;
-        // What the fault did to the full solution goes with it.
-        self.main = worst.without.clone();
-        for witness in self.witnesses.iter_mut().filter(|witness| !witness.faulty) {
-            witness.without = self.main.clone();
-            witness.without.set_excluded(&witness.head, true);
-            witness.test = SequenceTest::default();
+        let aged = now_s - restarted.since_s > patience_s;
+        if !lost && self.bank.quiet_s(now_s) > patience_s {
+            self.restarted = None;
+        } else if aged && restarted.bank.is_lost(&self.config) {
+            self.restart();
+        } else if restarted.bank.quiet_s(now_s) > patience_s
+            && self.protection_level_m(&restarted.bank, now_s) <= self.config.alert_limit_m
+            && let Some(restarted) = self.restarted.take()
+        {
+            self.bank = restarted.bank;
         }
     }
 
-    fn readmit(&mut self) {
-        let since_s = self.now_s - self.config.recovery_s;
-        for index in 0..self.witnesses.len() {
-            let Some(witness) = self.witnesses.get_mut(index) else {
-                return;
-            };
-            if !witness.faulty || witness.sound_since_s > since_s {
-                continue;
-            }
-            witness.faulty = false;
-            let head = witness.head;
-            self.main.set_excluded(&head, false);
-            for (other, witness) in self.witnesses.iter_mut().enumerate() {
-                witness.without.set_excluded(&head, other == index);
-            }
-        }
+    fn restart(&mut self) {
+        let main = self.bank.main();
+        let position_std_m = self.config.alert_limit_m + main.driven_m() - self.trusted_m;
+        self.restarted = Some(Restarted {
+            bank: Bank::new(
+                main.restarted(position_std_m),
+                self.bank.heads(),
+                self.now_s,
+            ),
+            since_s: self.now_s,
+        });
     }
 
     /// The pose at `time_s`.
     pub fn pose(&self, time_s: f64) -> PoseEstimate {
-        let mut pose = self.main.pose(time_s);
+        let mut pose = self.bank.main().pose(time_s);
         pose.integrity = Some(self.integrity(time_s));
         pose
     }
 
     /// Protection level and state at `time_s`.
     pub fn integrity(&self, time_s: f64) -> Integrity {
-        let main = self.main.pose(time_s);
-        let mut protection_level_m = self.nominal.radius(main.principal_variances());
-        for witness in self.witnesses.iter().filter(|witness| !witness.faulty) {
-            let clean = witness.without.pose(time_s);
-            let separation_m = main.pose.point().distance_m(clean.pose.point());
-            let radius_m = self.under_fault.radius(clean.principal_variances());
-            protection_level_m = protection_level_m.max(separation_m + radius_m);
-        }
-        let threshold = self.config.detection_threshold;
-        let doubtful = (self.witnesses.iter())
-            .filter(|witness| !witness.faulty && witness.test.statistic() > threshold)
-            .count();
-        let faulty = self
-            .witnesses
-            .iter()
-            .filter(|witness| witness.faulty)
-            .count();
-        let state = if doubtful + faulty > 1 && 2 * (doubtful + faulty) >= self.witnesses.len() {
+        let protection_level_m = self.protection_level_m(&self.bank, time_s);
+        let state = if self.bank.is_outvoted(&self.config) {
             IntegrityState::Unavailable
-        } else if doubtful > 0 || protection_level_m > self.config.alert_limit_m {
+        } else if self.restarted.is_some() || protection_level_m > self.config.alert_limit_m {
             IntegrityState::Degraded
         } else {
             IntegrityState::Ok
@@ -245,7 +202,27 @@ impl Guard {
         Integrity {
             protection_level_m,
             state,
-            faulty,
+            faulty: self.bank.faulty(),
         }
+    }
+
+    /// The radius that the error leaves with the stated risk, whether no source is at fault or any
+    /// one of those in use.
+    fn protection_level_m(&self, bank: &Bank, time_s: f64) -> f64 {
+        let main = bank.main().pose(time_s);
+        let mut level_m = self.nominal.radius(main.principal_variances());
+        for without in bank.without_one() {
+            let clean = without.pose(time_s);
+            let Some([[xx, xy, _], [_, yy, _], _]) = clean.covariance else {
+                continue;
+            };
+            let separation_m = [
+                clean.pose.x_m - main.pose.x_m,
+                clean.pose.y_m - main.pose.y_m,
+            ];
+            let covariance = [[xx, xy], [xy, yy]];
+            level_m = (self.under_fault).radius(separation_m, covariance, level_m);
+        }
+        level_m
     }
 }

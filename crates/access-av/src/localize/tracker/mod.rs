@@ -265,6 +265,32 @@ impl Tracker {
         }
     }
 
+    /// The same tracker begun anew where it is, every source in use, its place known to
+    /// `position_std_m` and its heading by the road alone, or without a map by a quarter turn.
+    pub(in crate::localize) fn restarted(&self, position_std_m: f64) -> Self {
+        let along_m = self.belief.mean[ALONG];
+        let pose = match &self.map {
+            Some(map) => map.pose(along_m),
+            None => locate(&self.belief.mean, 0.0, None).0,
+        };
+        let start = InitialPose {
+            pose,
+            position_std_m,
+            heading_std_rad: if self.map.is_some() { 1.0 } else { 0.3 },
+        };
+        let heads: Vec<RadioHead> = self.heads.iter().map(|head| head.known).collect();
+        let mut restarted = Self::new(self.config, self.map.clone(), &heads, &start);
+        // Where the road crosses itself its nearest place may be another one.
+        if self.map.is_some() {
+            restarted.belief.mean[ALONG] = along_m;
+        }
+        Self {
+            odometry: self.odometry,
+            driven_m: self.driven_m,
+            ..restarted
+        }
+    }
+
     /// The pose at `time_s`, carried on from the newest odometry at its speed.
     pub fn pose(&self, time_s: f64) -> PoseEstimate {
         let (lag_m, lag_variance) = self.coasting(time_s);
