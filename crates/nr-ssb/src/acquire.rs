@@ -29,6 +29,8 @@ pub(crate) struct Acquired {
     pub(crate) pci: Pci,
     pub(crate) ibar_ssb: u8,
     pub(crate) alignment: Alignment,
+    /// Carrier frequency offset by the insides of the symbols alone, cycles per sample.
+    pub(crate) coarse_cfo_cycles: f64,
     /// PSS, SSS and DM-RS statistics together: in noise a sum of `antennas + 4` exponentials.
     pub(crate) statistic: f32,
 }
@@ -82,10 +84,12 @@ impl Acquirer {
     ) -> Option<Acquired> {
         let pss_symbol = self.pss_symbols.get(usize::from(candidate.n_id_2))?;
         let hypothesis_cycles = candidate.cfo_hz / self.base_rate_hz;
+        let coarse_cfo_cycles =
+            cfo::coarse(antennas, candidate.sample, pss_symbol, hypothesis_cycles);
         let mut alignment = Alignment {
             start: candidate.sample,
             delay: 0.0,
-            cfo_cycles: cfo::coarse(antennas, candidate.sample, pss_symbol, hypothesis_cycles),
+            cfo_cycles: coarse_cfo_cycles,
             phase_step: 0.0,
         };
         // The PSS gives the channel that the SSS is judged with.
@@ -128,6 +132,7 @@ impl Acquirer {
             pci,
             ibar_ssb,
             alignment,
+            coarse_cfo_cycles,
             statistic: statistic + cell.statistic + beam.statistic,
         })
     }

@@ -96,6 +96,7 @@ pub mod dmrs;
 mod error;
 mod false_alarm;
 pub mod front_end;
+mod global_raster;
 pub mod gold;
 pub mod grid;
 mod hermitian;

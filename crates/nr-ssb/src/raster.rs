@@ -2,16 +2,19 @@
 //! §5.4.3, point by point through the recorded band, at 15 and 30 kHz. Test networks place SSBs
 //! elsewhere; for them, and for recordings that do not state their centre, see [`scan_off_raster`].
 
+use std::ops::RangeInclusive;
+
 use num_complex::Complex32;
 
 use crate::false_alarm::exponential_sum_threshold;
 use crate::front_end::{FrontEnd, FrontEndError};
+use crate::global_raster::placed_at;
 use crate::grid::SUBCARRIERS;
 use crate::matched_filter::MatchedFilter;
 use crate::numerology::SubcarrierSpacing;
 use crate::search::{DetectedSsb, SearchConfig, SearchError, Searcher, cfo_hypotheses};
 
-/// Off the raster, the SSB's centre is a multiple of this off the recording's.
+/// Off the raster, the PSS is looked for at multiples of this off the recording's centre.
 const OFFSET_UNIT_HZ: f64 = 15e3;
 /// Half of what one tuning of the front end shows of the band: the PSS's 127 subcarriers may lie
 /// anywhere among 240.
@@ -102,6 +105,11 @@ pub fn scan(
 
 /// The SSBs on the points of the synchronization raster, the point with the strongest first.
 ///
+/// A point also shows what lies up to half a subcarrier beside it, on the global frequency raster;
+/// such an SSB is placed there, without a GSCN, if the phase between its symbols clearly says so.
+/// In doubt it is taken to be on the point, and the rest for its carrier frequency offset: a cell
+/// that is to be searched for must be on this raster.
+///
 /// The probability of a false cell, half of 1e-3 for 20 ms, is shared among the points.
 ///
 /// # Errors
@@ -122,20 +130,45 @@ pub fn scan_raster(
         let mut at_point = PointSearch::new(spacing, rate_hz, antennas.len(), points.len())?;
         for point in points {
             let offset_hz = point.ssb_freq_hz - centre_hz;
-            finds.extend(at_point.search(antennas, point.gscn, offset_hz, Some(centre_hz))?);
+            let Some(find) = at_point.search(antennas, point.gscn, offset_hz, Some(centre_hz))?
+            else {
+                continue;
+            };
+            // What the point's neighbours on the global frequency raster hold shows here too.
+            let placed_hz = find.strongest().map_or(point.ssb_freq_hz, |ssb| {
+                placed_at(
+                    point.ssb_freq_hz,
+                    true,
+                    ssb,
+                    spacing,
+                    band(centre_hz, reach),
+                )
+            });
+            finds.push(if placed_hz == point.ssb_freq_hz {
+                find
+            } else {
+                at_point
+                    .search(antennas, None, placed_hz - centre_hz, Some(centre_hz))?
+                    .unwrap_or(find)
+            });
         }
     }
     sort(&mut finds);
     Ok(finds)
 }
 
-/// The SSBs anywhere in the band, their centre a multiple of 15 kHz (the unit of k_SSB, TS 38.211
-/// §7.4.3.1) off that of the recording.
+/// The SSBs anywhere in the band.
 ///
-/// The PSS is looked for at steps of a third of a subcarrier through the whole band; the points
-/// near the strongest maxima are then searched. Without the absolute centre frequency the carrier
-/// frequency offset comes from inside the symbols only and is less precise, see
-/// [`SearchConfig::ssb_freq_hz`]. The probability of a false cell, half of 1e-3 for 20 ms, is
+/// The PSS is looked for at steps of a third of a subcarrier through the whole band; the places
+/// of the strongest maxima are then searched. An SSB belongs to a point of the global frequency
+/// raster (TS 38.104 §5.4.2.1: multiples of 5 kHz below 3 GHz, of 15 kHz above), which may be nearer
+/// than its carrier frequency offset. It is the phase between symbols that tells them apart (TS
+/// 38.211 §5.4), and where that leaves a doubt the smaller offset is preferred.
+///
+/// Without the absolute centre frequency there is no raster to count from: an SSB is placed at
+/// the nearest multiple of 15 kHz (the unit of k_SSB, TS 38.211 §7.4.3.1) from the recording's
+/// centre, the rest is frequency offset, and that comes from inside the symbols only and is less
+/// precise, see [`SearchConfig::ssb_freq_hz`]. The probability of a false cell, half of 1e-3 for 20 ms, is
 /// shared among all points of the band.
 ///
 /// Takes time in proportion to bandwidth squared, duration and antennas: for one antenna and 1 ms
@@ -166,9 +199,18 @@ pub fn scan_off_raster(
             let Some(first) = at_point.search(antennas, None, offset_hz, None)? else {
                 continue;
             };
-            // A maximum may lie on the wrong side between two points, and a wrong centre would be
-            // taken for a frequency offset (TS 38.211 §5.4): the offset found tells the right one.
-            let offset_hz = nearest_offset(offset_hz + first.cfo_hz(), reach);
+            let Some(strongest) = first.strongest() else {
+                continue;
+            };
+            // A wrong frequency would be taken for an offset (TS 38.211 §5.4).
+            let offset_hz = match centre_hz {
+                Some(centre_hz) => {
+                    let tuned_hz = centre_hz + offset_hz;
+                    let band_hz = band(centre_hz, reach);
+                    placed_at(tuned_hz, false, strongest, spacing, band_hz) - centre_hz
+                }
+                None => nearest_offset(offset_hz + strongest.cfo_hz, reach),
+            };
             found_hz.push(offset_hz);
             finds.extend(at_point.search(antennas, None, offset_hz, centre_hz)?);
         }
@@ -182,6 +224,10 @@ fn reach_hz(rate_hz: f64, spacing: SubcarrierSpacing) -> f64 {
     0.5 * rate_hz - 0.5 * SUBCARRIERS as f64 * spacing.hz()
 }
 
+fn band(centre_hz: f64, reach_hz: f64) -> RangeInclusive<f64> {
+    centre_hz - reach_hz..=centre_hz + reach_hz
+}
+
 /// The multiple of 15 kHz nearest to `hz` inside the reach.
 fn nearest_offset(hz: f64, reach_hz: f64) -> f64 {
     let last = (reach_hz / OFFSET_UNIT_HZ).floor();
@@ -189,7 +235,8 @@ fn nearest_offset(hz: f64, reach_hz: f64) -> f64 {
 }
 
 fn sort(finds: &mut [RasterFind]) {
-    finds.sort_by(|a, b| b.strongest().total_cmp(&a.strongest()));
+    let snr_db = |find: &RasterFind| find.strongest().map_or(f64::NEG_INFINITY, |it| it.snr_db);
+    finds.sort_by(|a, b| snr_db(b).total_cmp(&snr_db(a)));
 }
 
 /// Front end and search at one spacing, moved from point to point.
@@ -294,19 +341,11 @@ impl PointSearch {
 }
 
 impl RasterFind {
-    /// SNR of the strongest SSB, dB.
-    fn strongest(&self) -> f64 {
-        let snrs = self.ssbs.iter().map(|ssb| ssb.snr_db);
-        snrs.fold(f64::NEG_INFINITY, f64::max)
-    }
-
-    /// Carrier frequency offset of the strongest SSB, Hz.
-    fn cfo_hz(&self) -> f64 {
-        let strongest = self
-            .ssbs
+    /// The SSB of highest SNR.
+    fn strongest(&self) -> Option<&DetectedSsb> {
+        self.ssbs
             .iter()
-            .max_by(|a, b| a.snr_db.total_cmp(&b.snr_db));
-        strongest.map_or(0.0, |ssb| ssb.cfo_hz)
+            .max_by(|a, b| a.snr_db.total_cmp(&b.snr_db))
     }
 }
 

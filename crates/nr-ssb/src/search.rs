@@ -139,6 +139,8 @@ pub struct DetectedSsb {
     pub snr_db: f64,
     /// PSS, SSS and DM-RS detection statistics together.
     pub statistic: f32,
+    /// Carrier frequency offset by the insides of the symbols alone, Hz.
+    pub(crate) coarse_cfo_hz: f64,
     measurements: [Measurement; MAX_ANTENNAS],
     antennas: usize,
 }
@@ -487,6 +489,7 @@ impl Searcher {
             symbol_phase_step_rad: alignment.phase_step,
             snr_db: decibel(self.acquirer.snr() / antennas as f64),
             statistic: acquired.statistic,
+            coarse_cfo_hz: acquired.coarse_cfo_cycles * self.base_rate_hz,
             measurements,
             antennas,
         });

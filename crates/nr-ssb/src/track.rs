@@ -345,6 +345,7 @@ impl<const A: usize> Tracker<A> {
             pci: self.pci,
             ibar_ssb,
             alignment,
+            coarse_cfo_cycles: alignment.cfo_cycles,
             statistic: 0.0,
         };
         let broadcast = self.decoder.decode(&self.acquirer, &acquired)?;

@@ -6,6 +6,7 @@ mod recordings;
 
 use nr_ssb::SubcarrierSpacing;
 use nr_ssb::raster::{scan, scan_off_raster, scan_raster};
+use rand_chacha::ChaCha8Rng;
 
 const RATE_HZ: f64 = 15.36e6;
 
@@ -21,13 +22,24 @@ fn off_raster(
     cell.ssb_indices = vec![1];
     cell.delay = 200.3;
     cell.cfo_hz *= 0.5;
+    (cell.clone(), on_the_air(&cell, offset_hz, 0.0, &mut rng))
+}
+
+/// 3 ms of the cell on one antenna, its SSBs `offset_hz` off the recording's centre.
+fn on_the_air(
+    cell: &air::Cell,
+    offset_hz: f64,
+    snr_db: f64,
+    rng: &mut ChaCha8Rng,
+) -> Vec<Vec<nr_ssb::Complex32>> {
+    let spacing = cell.spacing;
     let mut samples = air::silence(1, (3e-3 * spacing.base_rate_hz()) as usize);
     cell.add_to(&mut samples);
     let factor = (RATE_HZ / spacing.base_rate_hz()) as usize;
     let mut raised = vec![air::raised(&samples[0], factor, offset_hz / RATE_HZ)];
     // `raised` keeps amplitudes, so that noise of the same density is stronger.
-    air::add_noise(&mut raised, -10.0 * (factor as f64).log10(), &mut rng);
-    (cell, raised)
+    air::add_noise(&mut raised, snr_db - 10.0 * (factor as f64).log10(), rng);
+    raised
 }
 
 #[test]
@@ -59,6 +71,44 @@ fn an_ssb_between_the_raster_points_is_found() {
             let error_hz = ssb.cfo_hz - cell.cfo_hz;
             assert!(error_hz.abs() < tolerance * spacing.hz(), "{error_hz}");
         }
+    }
+}
+
+/// A recording's centre may be any frequency. 50 dB: the noise moves the frequency offset by less
+/// than 1 Hz, so that what remains is the method's.
+#[test]
+fn a_centre_between_all_rasters_gives_the_right_frequency_and_offset() {
+    use SubcarrierSpacing::{Khz15, Khz30};
+    let mut rng = air::rng(5);
+    // On the synchronization raster (the first of each band), and 5, 10 kHz or 15 kHz next to it.
+    for (spacing, ssb_freq_hz, centre_off_hz, cfo_ppm) in [
+        (Khz15, 2_100.05e6, 4.3e3, 0.9),
+        (Khz15, 2_100.05e6, 7.0e3, -1.8),
+        (Khz15, 2_100.235e6, 4.3e3, -1.1),
+        (Khz15, 2_100.240e6, 7.0e3, 1.9),
+        (Khz30, 2_100.245e6, -4.3e3, 1.5),
+        (Khz15, 3_600.96e6, 7.0e3, 1.0),
+        (Khz30, 3_600.0e6, 4.3e3, 2.0),
+        (Khz30, 3_600.135e6, 7.0e3, -2.0),
+        (Khz30, 3_600.150e6, 4.3e3, 1.0),
+        (Khz15, 3_600.165e6, 7.0e3, 1.7),
+    ] {
+        let mut cell = air::Cell::random(&mut rng, spacing, 1);
+        cell.ssb_freq_hz = ssb_freq_hz;
+        cell.ssb_indices = vec![1];
+        cell.delay = 200.3;
+        cell.cfo_hz = 1e-6 * cfo_ppm * ssb_freq_hz;
+        let offset_hz = 1.5e6 + centre_off_hz;
+        let centre_hz = ssb_freq_hz - offset_hz;
+        let samples = on_the_air(&cell, offset_hz, 50.0, &mut rng);
+        let finds = scan(&air::slices(&samples), RATE_HZ, Some(centre_hz)).unwrap();
+        let find = &finds[0];
+        let found_hz = find.point.ssb_freq_hz;
+        let cfo_hz = find.ssbs[0].cfo_hz;
+        println!("{ssb_freq_hz} {}: {found_hz} {cfo_hz}", cell.cfo_hz);
+        assert_eq!((finds.len(), find.spacing), (1, spacing));
+        assert!((found_hz - ssb_freq_hz).abs() < 0.1, "{found_hz}");
+        assert!((cfo_hz - cell.cfo_hz).abs() < 20.0, "{cfo_hz}");
     }
 }
 
@@ -119,6 +169,13 @@ fn recordings_that_hide_their_centre_give_the_same_cells() {
             payload.mib.bit_string(),
             truth["mib_bits_24"].as_str().unwrap(),
             "{name}"
+        );
+        // With the centre, the place is known to the hertz.
+        let finds = scan_off_raster(&part, recording.rate_hz, Some(recording.centre_hz)).unwrap();
+        let found_hz = finds[0].point.ssb_freq_hz;
+        assert!(
+            (found_hz - number("ssb_freq_hz")).abs() < 1.0,
+            "{name}: {found_hz}"
         );
     }
 }
