@@ -10,8 +10,8 @@ use access_av::localize::{AngleMeasurement, Tracker, UpdateReason};
 use access_av::observation::OdometrySample;
 use access_av::onboard::Custom;
 use access_av::platform::Platform;
-use access_av::scenario::{LocalizerSettings, Scenario, TrackerSettings};
-use access_av::simulate::{Campaign, CampaignOptions, Consistency, RunRecord, Simulation};
+use access_av::scenario::{LocalizerSettings, Scenario};
+use access_av::simulate::{Campaign, CampaignOptions, Consistency, RunRecord, Simulation, Step};
 use access_av::world::RadioHead;
 
 fn drives(scenario: Scenario, runs: u64) -> Vec<RunRecord> {
@@ -360,30 +360,46 @@ fn a_gap_loses_time_and_a_jump_loses_certainty() {
     assert!(variance(&jump) > variance(&gap) + 1.0);
 }
 
-#[test]
-fn a_gyroscope_helps_without_a_map() {
-    let run = |gyro: bool| {
-        let mut scenario = Scenario::load("paper-real-odometry").unwrap();
-        scenario.localizer = LocalizerSettings::Tracker(TrackerSettings {
-            map: false,
-            ..TrackerSettings::default()
-        });
-        if gyro {
-            scenario.odometer.gyro = Some(access_av::scenario::GyroSettings {
-                noise_rad_per_sqrt_s: 1e-3,
-                bias_std_radps: 1e-3,
-            });
-        }
-        let records = drives(scenario, 8);
-        let predicted_m2: f64 = (records.iter().flat_map(|record| &record.steps))
-            .map(|step| {
-                step.covariance
-                    .map_or(0.0, |[[xx, ..], [_, yy, _], _]| xx + yy)
-            })
-            .sum();
-        (predicted_m2, consistency(&records).0)
+/// Mean squared error of each run, beside what its covariances predict (m²).
+fn squares(records: &[RunRecord]) -> Vec<[f64; 2]> {
+    let of_run = |record: &RunRecord| {
+        let count = record.steps.len() as f64;
+        let found: f64 = record.steps.iter().map(|step| step.error_m().powi(2)).sum();
+        let predicted: f64 = record.steps.iter().filter_map(Step::predicted_m2).sum();
+        [found / count, predicted / count]
     };
-    let ((without_m2, _), (with_m2, nees)) = (run(false), run(true));
-    assert!(with_m2 < without_m2, "{with_m2} {without_m2}");
-    assert!(nees < 2.0 * (1.0 + 4.0 / 8f64.sqrt()), "{nees}");
+    records.iter().map(of_run).collect()
+}
+
+#[test]
+fn a_gyroscope_helps_as_much_as_it_says() {
+    for map in [true, false] {
+        let without = Scenario::load("paper-real-odometry")
+            .unwrap()
+            .with_overrides([("localizer.map", map.into())])
+            .unwrap();
+        let mut with = without.clone();
+        with.odometer.gyro = Some(access_av::scenario::GyroSettings {
+            noise_rad_per_sqrt_s: 1e-3,
+            bias_std_radps: 1e-3,
+        });
+        // The same drives, but for the gyroscope: what it takes from the squared error of a run.
+        let [without, with] = [without, with].map(|scenario| squares(&drives(scenario, 32)));
+        let gains = || {
+            without
+                .iter()
+                .zip(&with)
+                .map(|(a, b)| [a[0] - b[0], a[1] - b[1]])
+        };
+        let count = with.len() as f64;
+        let found = gains().map(|gain| gain[0]).sum::<f64>() / count;
+        let predicted = gains().map(|gain| gain[1]).sum::<f64>() / count;
+        assert!(predicted > 0.0, "map {map}: {predicted}");
+        let scatter = gains().map(|gain| (gain[0] - found).powi(2)).sum::<f64>();
+        let deviation = (scatter / (count - 1.0) / count).sqrt();
+        assert!(
+            (found - predicted).abs() < 4.0 * deviation,
+            "map {map}: {found} of {predicted} ± {deviation}"
+        );
+    }
 }
