@@ -12,7 +12,7 @@ use crate::channel::LinkBudget;
 use crate::estimator::{AngleEstimator, CustomEstimator};
 use crate::geometry::Pose;
 use crate::localize::integrity::IntegrityConfig;
-use crate::localize::tracker::{InitialPose, OdometryVerdict, Tracker, TrackerConfig};
+use crate::localize::tracker::{Calibration, InitialPose, OdometryVerdict, Tracker, TrackerConfig};
 use crate::localize::{
     AngleMeasurement, DeadReckoning, Initialiser, Localizer, OdometryStep, PoseEstimate,
     UpdateReason, UpdateVerdict,
@@ -320,6 +320,11 @@ impl Onboard {
             verdict,
             wake_up_time_s: self.wake_up_time_s,
         }
+    }
+
+    /// How far the array has come from its survey, where the localizer looks for it.
+    pub fn calibration(&self) -> Option<Calibration> {
+        self.localizer.tracker().map(Tracker::calibration)
     }
 
     /// Where the vehicle is believed to be.

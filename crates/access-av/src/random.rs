@@ -30,6 +30,8 @@ pub enum Purpose {
     HeadOscillator = 10,
     /// Delays of a radio head's scatter.
     ScatterDelay = 11,
+    /// Mounting and calibration of the array.
+    Array = 12,
 }
 
 /// The random streams of one run.

@@ -2,7 +2,7 @@
 
 use crate::BoxError;
 use crate::localize::PoseEstimate;
-use crate::localize::tracker::OdometryVerdict;
+use crate::localize::tracker::{Calibration, OdometryVerdict};
 use crate::observation::{OdometrySample, SsbObservation};
 use crate::onboard::{Custom, Execution, Onboard};
 use crate::platform::Platform;
@@ -67,6 +67,8 @@ pub struct LocatedPose {
     /// Number of places the vehicle may be at, while the first pose is searched for; the estimate
     /// is their mean.
     pub searching: Option<usize>,
+    /// How far the array has come from its survey.
+    pub calibration: Option<Calibration>,
 }
 
 /// What is remarkable about one item of the input.
@@ -190,6 +192,7 @@ impl<'a> Replay<'a> {
                 speed_mps: sample.speed_mps,
                 yaw_rate_radps: sample.yaw_rate_radps,
                 searching: self.onboard.searching(),
+                calibration: self.onboard.calibration(),
             });
         }
     }

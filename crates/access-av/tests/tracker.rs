@@ -5,14 +5,15 @@ use std::sync::Arc;
 
 use access_av::geometry::Pose;
 use access_av::localize::bound::Bound;
-use access_av::localize::tracker::{InitialPose, OdometryVerdict, TrackerConfig};
+use access_av::localize::tracker::{Calibration, InitialPose, OdometryVerdict, TrackerConfig};
 use access_av::localize::{AngleMeasurement, Tracker, UpdateReason};
 use access_av::observation::OdometrySample;
 use access_av::onboard::Custom;
 use access_av::platform::Platform;
+use access_av::random::Streams;
 use access_av::scenario::{LocalizerSettings, Scenario};
 use access_av::simulate::{Campaign, CampaignOptions, Consistency, RunRecord, Simulation, Step};
-use access_av::world::RadioHead;
+use access_av::world::{ArrayDrift, RadioHead, Vehicle};
 
 fn drives(scenario: Scenario, runs: u64) -> Vec<RunRecord> {
     let platform = Platform::load(&scenario.platform.name).unwrap();
@@ -358,6 +359,91 @@ fn a_gap_loses_time_and_a_jump_loses_certainty() {
     assert!((jump.pose(2.1).pose.x_m - 8.4).abs() < 0.05);
     let variance = |tracker: &Tracker| tracker.pose(2.1).principal_variances()[0];
     assert!(variance(&jump) > variance(&gap) + 1.0);
+}
+
+/// The array of a run at its end, by the same draws.
+fn array_at_the_end(simulation: &Simulation, run: u64) -> ArrayDrift {
+    let scenario = simulation.scenario();
+    let streams = Streams::new(11, run);
+    let track = scenario.build_track().unwrap();
+    let vehicle = Vehicle::new(track, &scenario.motion, streams);
+    let mut array = ArrayDrift::new(scenario.array, streams);
+    for number in 0..simulation.steps() {
+        array.advance(vehicle.at(simulation.time_s(number)).along_m);
+    }
+    array
+}
+
+#[test]
+fn mounting_and_calibration_are_found_while_driving() {
+    let runs = 16;
+    for drifting in [0.0, 1.0] {
+        let scenario = Scenario::load("paper-real-odometry-2")
+            .unwrap()
+            .with_overrides([
+                ("array.mounting_error_std_rad", toml::Value::from(0.02)),
+                ("array.phase_error_std_rad", 0.1.into()),
+                (
+                    "array.mounting_drift_rad_per_sqrt_m",
+                    (5e-4 * drifting).into(),
+                ),
+                ("array.phase_drift_rad_per_sqrt_m", (2e-3 * drifting).into()),
+            ])
+            .unwrap();
+        let simulation = Simulation::on_its_platform(scenario).unwrap();
+        let mut normalised = [0.0; 2];
+        for run in 0..runs {
+            let record = simulation.run(11, run, Custom::default()).unwrap();
+            let truth = array_at_the_end(&simulation, run);
+            let Calibration { mounting, phase } = record.calibration.unwrap();
+            for (sum, (found, truth)) in normalised.iter_mut().zip([
+                (mounting, truth.mounting_rad()),
+                (phase, truth.phase_error_rad()),
+            ]) {
+                let error = (found.by_rad - truth) / found.std_rad;
+                // 64 draws are beyond four standard deviations with a probability of 0.4 %.
+                assert!(error.abs() < 4.0, "{found:?} {truth}");
+                assert!(found.std_rad < 0.5 * found.surveyed_std_rad, "{found:?}");
+                *sum += error * error / runs as f64;
+            }
+            let holds = !record.calibration.unwrap().alarms();
+            assert!(holds || drifting > 0.0, "{:?}", record.calibration);
+        }
+        // The mean of squared standard normals deviates by √(2/n).
+        for mean in normalised {
+            assert!(
+                (mean - 1.0).abs() < 4.0 * (2.0 / runs as f64).sqrt(),
+                "{mean}"
+            );
+        }
+    }
+}
+
+#[test]
+fn an_array_that_has_left_its_survey_is_noticed() {
+    // Nobody is told: the survey is said to be good to 0.01 rad, and the array is far off it.
+    let scenario = Scenario::load("paper-real-odometry-2")
+        .unwrap()
+        .with_overrides([
+            ("array.phase_error_std_rad", toml::Value::from(0.3)),
+            ("localizer.phase_std_rad", 0.01.into()),
+            ("localizer.phase_walk_rad_per_sqrt_m", 0.01.into()),
+        ])
+        .unwrap();
+    let simulation = Simulation::on_its_platform(scenario).unwrap();
+    let mut noticed = 0;
+    for run in 0..8 {
+        let found = simulation.run(11, run, Custom::default()).unwrap();
+        let off_rad = array_at_the_end(&simulation, run).phase_error_rad();
+        let found = found.calibration.unwrap();
+        // The alarm is for departures beyond 3 · (0.01 + σ); σ may err by four of itself.
+        let limit_rad = 3.0 * (0.01 + found.phase.std_rad);
+        if off_rad.abs() > limit_rad + 4.0 * found.phase.std_rad {
+            assert!(found.alarms(), "{off_rad} {found:?}");
+            noticed += 1;
+        }
+    }
+    assert!(noticed >= 4, "{noticed}");
 }
 
 /// Mean squared error of each run, beside what its covariances predict (m²).

@@ -9,7 +9,7 @@ use super::{LinkBudget, RicianFading, Shadowing};
 use crate::observation::{SensedSsb, Snapshot, SsbObservation};
 use crate::random::{Purpose, Streams};
 use crate::scenario::{Pilots, Scenario};
-use crate::world::{RadioHead, VehicleState};
+use crate::world::{ArrayDrift, RadioHead, VehicleState};
 use std::f64::consts::{FRAC_1_SQRT_2, TAU};
 
 /// The channel from one radio head to the vehicle in one run.
@@ -23,7 +23,7 @@ pub struct HeadChannel {
     snr_noise: ChaCha8Rng,
     snapshot_noise: ChaCha8Rng,
     element_rad: f64,
-    mounting_angle_rad: f64,
+    array: ArrayDrift,
     snapshots: u16,
     pilots: Pilots,
 }
@@ -51,7 +51,7 @@ impl HeadChannel {
             snr_noise: streams.generator(Purpose::SensedSnr, index),
             snapshot_noise: streams.generator(Purpose::Snapshots, index),
             element_rad: TAU * scenario.array.spacing_wavelengths,
-            mounting_angle_rad: scenario.array.mounting_angle_rad,
+            array: ArrayDrift::new(scenario.array, streams),
             snapshots: scenario.array.snapshots,
             pilots: scenario.receiver.pilots,
         }
@@ -65,6 +65,7 @@ impl HeadChannel {
     /// Mean SNR in dB of the SSB that arrives now: link budget and shadowing. To be called once for
     /// each SSB, in order.
     pub fn next_snr_db(&mut self, vehicle: &VehicleState) -> f64 {
+        self.array.advance(vehicle.along_m);
         let distance_m = vehicle.pose.point().distance_m(self.head.position);
         self.budget.snr_db(&self.head, distance_m) + self.shadowing.next_db(vehicle.along_m)
     }
@@ -82,8 +83,9 @@ impl HeadChannel {
         self.fading
             .response(phase_rad, vehicle.along_m, distance_m, step_hz, into);
         let amplitude = 10f64.powf(0.05 * snr_db);
-        for gain in into.iter_mut().flatten() {
-            *gain *= amplitude;
+        for gains in into {
+            *gains = gains.map(|gain| gain * amplitude);
+            self.array.turn(gains);
         }
     }
 
@@ -91,7 +93,7 @@ impl HeadChannel {
     fn line_of_sight(&self, vehicle: &VehicleState) -> (f64, f64) {
         let place = vehicle.pose.point();
         let bearing_rad = place.bearing_rad(self.head.position);
-        let to_axis_rad = bearing_rad - vehicle.pose.heading_rad - self.mounting_angle_rad;
+        let to_axis_rad = bearing_rad - vehicle.pose.heading_rad - self.array.mounting_rad();
         let phase_rad = self.element_rad * to_axis_rad.cos();
         (phase_rad, place.distance_m(self.head.position))
     }
@@ -101,7 +103,9 @@ impl HeadChannel {
         let (phase_rad, distance_m) = self.line_of_sight(vehicle);
         let amplitude = 10f64.powf(0.05 * snr_db);
         let fading = self.fading.gains(phase_rad, vehicle.along_m, distance_m);
-        (phase_rad, fading.map(|gain| gain * amplitude))
+        let mut gains = fading.map(|gain| gain * amplitude);
+        self.array.turn(&mut gains);
+        (phase_rad, gains)
     }
 
     /// The SSB of mean SNR `snr_db` at the array, with fading.

@@ -213,6 +213,20 @@ impl Scenario {
             -3.2,
             3.2,
         )?;
+        for (key, value) in [
+            ("array.mounting_error_std_rad", array.mounting_error_std_rad),
+            (
+                "array.mounting_drift_rad_per_sqrt_m",
+                array.mounting_drift_rad_per_sqrt_m,
+            ),
+            ("array.phase_error_std_rad", array.phase_error_std_rad),
+            (
+                "array.phase_drift_rad_per_sqrt_m",
+                array.phase_drift_rad_per_sqrt_m,
+            ),
+        ] {
+            check.not_negative(key, value)?;
+        }
         check.not_negative("receiver.noise_figure_db", self.receiver.noise_figure_db)?;
         check.positive("receiver.temperature_k", self.receiver.temperature_k)?;
         check.positive("receiver.bandwidth_mhz", self.receiver.bandwidth_mhz)?;

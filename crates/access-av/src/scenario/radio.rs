@@ -78,6 +78,15 @@ pub struct ArraySettings {
     pub rx_gain_dbi: f64,
     /// Direction of the array's axis from the vehicle's forward axis, in radians.
     pub mounting_angle_rad: f64,
+    /// Standard deviation of the error of that direction, in radians, drawn once per run.
+    pub mounting_error_std_rad: f64,
+    /// Random walk of that direction, in radians per root of a metre driven.
+    pub mounting_drift_rad_per_sqrt_m: f64,
+    /// Standard deviation of the phase that calibration leaves from antenna to antenna, in radians,
+    /// drawn once per run.
+    pub phase_error_std_rad: f64,
+    /// Random walk of that phase, in radians per root of a metre driven.
+    pub phase_drift_rad_per_sqrt_m: f64,
 }
 
 impl Default for ArraySettings {
@@ -88,6 +97,10 @@ impl Default for ArraySettings {
             snapshots: 20,
             rx_gain_dbi: 5.0,
             mounting_angle_rad: 0.0,
+            mounting_error_std_rad: 0.0,
+            mounting_drift_rad_per_sqrt_m: 0.0,
+            phase_error_std_rad: 0.0,
+            phase_drift_rad_per_sqrt_m: 0.0,
         }
     }
 }

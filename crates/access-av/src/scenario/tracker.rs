@@ -36,10 +36,22 @@ pub struct TrackerSettings {
     pub gyro_noise_rad_per_sqrt_s: f64,
     /// Assumed standard deviation of its bias in rad/s.
     pub gyro_bias_std_radps: f64,
-    /// How far the array's mounting angle may be off, in radians; 0 takes it as surveyed.
-    pub mounting_std_rad: f64,
-    /// How far its phase calibration may be off, in radians per element; 0 takes it as exact.
-    pub phase_std_rad: f64,
+    /// How far the array's mounting angle may be off, in radians; without it, what the array's
+    /// errors say. 0 takes it as surveyed.
+    #[serde(skip_serializing_if = "Option::is_none")]
+    pub mounting_std_rad: Option<f64>,
+    /// How it walks, in radians per root of a metre driven; without it, what the array's drift says.
+    #[serde(skip_serializing_if = "Option::is_none")]
+    pub mounting_walk_rad_per_sqrt_m: Option<f64>,
+    /// How far its phase calibration may be off, in radians per element; without it, what the
+    /// array's errors say. 0 takes it as exact.
+    #[serde(skip_serializing_if = "Option::is_none")]
+    pub phase_std_rad: Option<f64>,
+    /// How it walks, in radians per root of a metre driven; without it, what the array's drift says.
+    #[serde(skip_serializing_if = "Option::is_none")]
+    pub phase_walk_rad_per_sqrt_m: Option<f64>,
+    /// How the odometer's scale walks, per root of a metre driven.
+    pub odometer_scale_walk_per_sqrt_m: f64,
     /// Probability with which a good angle is taken for an outlier.
     pub outlier_probability: f64,
     /// Whether it mistrusts its sources and states a protection level.
@@ -62,8 +74,11 @@ impl Default for TrackerSettings {
             rician_k_db: None,
             gyro_noise_rad_per_sqrt_s: 1e-3,
             gyro_bias_std_radps: 1e-3,
-            mounting_std_rad: 0.0,
-            phase_std_rad: 0.0,
+            mounting_std_rad: None,
+            mounting_walk_rad_per_sqrt_m: None,
+            phase_std_rad: None,
+            phase_walk_rad_per_sqrt_m: None,
+            odometer_scale_walk_per_sqrt_m: 0.0,
             outlier_probability: 1e-4,
             integrity: false,
             alert_limit_m: 1.5,
@@ -93,8 +108,26 @@ impl TrackerSettings {
                 self.gyro_noise_rad_per_sqrt_s,
             ),
             ("localizer.gyro_bias_std_radps", self.gyro_bias_std_radps),
-            ("localizer.mounting_std_rad", self.mounting_std_rad),
-            ("localizer.phase_std_rad", self.phase_std_rad),
+            (
+                "localizer.mounting_std_rad",
+                self.mounting_std_rad.unwrap_or_default(),
+            ),
+            (
+                "localizer.mounting_walk_rad_per_sqrt_m",
+                self.mounting_walk_rad_per_sqrt_m.unwrap_or_default(),
+            ),
+            (
+                "localizer.phase_std_rad",
+                self.phase_std_rad.unwrap_or_default(),
+            ),
+            (
+                "localizer.phase_walk_rad_per_sqrt_m",
+                self.phase_walk_rad_per_sqrt_m.unwrap_or_default(),
+            ),
+            (
+                "localizer.odometer_scale_walk_per_sqrt_m",
+                self.odometer_scale_walk_per_sqrt_m,
+            ),
         ] {
             check.not_negative(key, value)?;
         }

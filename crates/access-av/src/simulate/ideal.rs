@@ -34,6 +34,7 @@ impl IdealFilter {
             steps: self.run(seed, run).enumerate().map(step).collect(),
             executions: Vec::new(),
             listened: 0,
+            calibration: None,
         }
     }
 }

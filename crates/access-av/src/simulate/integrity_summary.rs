@@ -131,6 +131,7 @@ mod tests {
             steps: steps.iter().enumerate().map(step).collect(),
             executions: Vec::new(),
             listened: 0,
+            calibration: None,
         }
     }
 

@@ -8,6 +8,7 @@ use super::iq_reception::IqReception;
 use crate::channel::{HeadChannel, Reception};
 use crate::geometry::Pose;
 use crate::localize::Integrity;
+use crate::localize::tracker::Calibration;
 use crate::observation::{SensedSsb, SsbObservation};
 use crate::onboard::{Custom, Execution, Onboard};
 use crate::platform::Platform;
@@ -80,6 +81,8 @@ pub struct RunRecord {
     pub executions: Vec<Execution>,
     /// SSB bursts that the receiver listened to.
     pub listened: usize,
+    /// The array as found by the end of the drive, where the localizer looks for it.
+    pub calibration: Option<Calibration>,
 }
 
 /// How the first pose came about.
@@ -181,6 +184,7 @@ impl Simulation {
             steps: Vec::with_capacity(self.steps),
             executions: Vec::with_capacity(self.steps),
             listened: 0,
+            calibration: None,
         };
         let mut iq = match scenario.fidelity {
             Fidelity::Snapshots => None,
@@ -264,6 +268,7 @@ impl Simulation {
                 snr_db: snrs_db.iter().copied().fold(f64::NEG_INFINITY, f64::max),
             });
         }
+        record.calibration = onboard.calibration();
         Ok(record)
     }
 

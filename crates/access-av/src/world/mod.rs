@@ -1,5 +1,6 @@
 //! The truth: where the road runs, how the vehicle moves on it, what its odometer makes of that.
 
+mod array_drift;
 mod faults;
 mod lane_keeping;
 mod motion;
@@ -8,6 +9,7 @@ mod radio_head;
 mod track;
 mod vehicle;
 
+pub use array_drift::ArrayDrift;
 pub use faults::Faults;
 pub use lane_keeping::LaneKeeping;
 pub use motion::{Motion, MotionProfile};

@@ -57,6 +57,7 @@ impl TrackerConfig {
             &scenario.odometer,
             scenario.motion.lateral_wander.lane_keeping(),
         );
+        let array = &scenario.array;
         let rician_k_db = settings.rician_k_db.unwrap_or(scenario.channel.rician_k_db);
         let lane_keeping = LaneKeeping {
             wander_m: settings
@@ -66,8 +67,8 @@ impl TrackerConfig {
         };
         Self {
             array: ArrayModel {
-                elements: scenario.array.elements,
-                spacing_wavelengths: scenario.array.spacing_wavelengths,
+                elements: array.elements,
+                spacing_wavelengths: array.spacing_wavelengths,
                 wavelength_m: scenario.ssb.wavelength_m(),
             },
             rician_k: 10f64.powf(0.1 * rician_k_db),
@@ -83,16 +84,24 @@ impl TrackerConfig {
                         .noise_m_per_sqrt_m
                         .max(LEAST_ODOMETER_NOISE_M_PER_SQRT_M),
                 ),
-                ..MotionNoise::default()
+                scale_per_sqrt_m: settings.odometer_scale_walk_per_sqrt_m,
+                mounting_rad_per_sqrt_m: settings
+                    .mounting_walk_rad_per_sqrt_m
+                    .unwrap_or(array.mounting_drift_rad_per_sqrt_m),
+                phase_rad_per_sqrt_m: settings
+                    .phase_walk_rad_per_sqrt_m
+                    .unwrap_or(array.phase_drift_rad_per_sqrt_m),
             },
             odometer_scale_std: settings
                 .odometer_scale_std
                 .unwrap_or(odometer.scale_error_std.max(LEAST_ODOMETER_SCALE_STD)),
-            mounting_rad: scenario.array.mounting_angle_rad,
+            mounting_rad: array.mounting_angle_rad,
             yaw_noise_rad_per_sqrt_s: settings.gyro_noise_rad_per_sqrt_s,
             yaw_rate_bias_std_radps: settings.gyro_bias_std_radps,
-            mounting_std_rad: settings.mounting_std_rad,
-            phase_std_rad: settings.phase_std_rad,
+            mounting_std_rad: settings
+                .mounting_std_rad
+                .unwrap_or(array.mounting_error_std_rad),
+            phase_std_rad: settings.phase_std_rad.unwrap_or(array.phase_error_std_rad),
             gate: normal_quantile(0.5 * settings.outlier_probability).powi(2),
             acceleration_mps2: 2.0 * scenario.motion.acceleration_mps2,
             leap_mps2: 10.0 * scenario.motion.acceleration_mps2,

@@ -6,6 +6,7 @@
 //! itself far too much there. Scatter is a second noise, the same for every look within half a
 //! wavelength of travel, and is counted once per half wavelength.
 
+mod calibration;
 mod config;
 mod interface;
 pub(super) mod motion;
@@ -20,6 +21,7 @@ use crate::localize::{AngleMeasurement, PoseEstimate, UpdateReason, UpdateVerdic
 use crate::observation::OdometrySample;
 use crate::world::{RadioHead, Track};
 
+pub use calibration::{Calibration, Departure};
 pub use config::TrackerConfig;
 pub use interface::{InitialPose, OdometryVerdict};
 pub use motion::{MotionNoise, PathBend};
@@ -238,6 +240,11 @@ impl Tracker {
     /// What the tracker assumes.
     pub const fn config(&self) -> &TrackerConfig {
         &self.config
+    }
+
+    /// How far the array has come from its survey.
+    pub fn calibration(&self) -> Calibration {
+        Calibration::new(&self.config, &self.belief)
     }
 
     /// Distance driven since the start (m).

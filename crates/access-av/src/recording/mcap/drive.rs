@@ -9,6 +9,7 @@ use mcap::McapError;
 
 use super::{DiagnosticLevel, DiagnosticStatus, Frames, McapWriter, Twist};
 use crate::localize::IntegrityState;
+use crate::localize::tracker::Calibration;
 use crate::onboard::Execution;
 use crate::recording::RecordingError;
 use crate::replay::{LocatedDrive, LocatedPose, Remark};
@@ -115,6 +116,10 @@ fn diagnosis(pose: &LocatedPose, lately: &[&Execution]) -> DiagnosticStatus {
             DiagnosticLevel::Error,
             "no angle accepted in the last second",
         ),
+        _ if pose.calibration.is_some_and(|found| found.alarms()) => (
+            DiagnosticLevel::Warn,
+            "the array's mounting or calibration does not hold",
+        ),
         (few, all) if 2 * few < all => (DiagnosticLevel::Warn, "most angles refused"),
         _ => (DiagnosticLevel::Ok, "angles accepted"),
     };
@@ -126,6 +131,15 @@ fn diagnosis(pose: &LocatedPose, lately: &[&Execution]) -> DiagnosticStatus {
         ("accepted".to_owned(), accepted.to_string()),
         ("cells".to_owned(), format!("{cells:?}")),
     ];
+    if let Some(Calibration { mounting, phase }) = pose.calibration {
+        for (name, departure) in [("mounting_rad", mounting), ("phase_rad", phase)] {
+            // What is taken as surveyed has nothing to tell.
+            if departure.std_rad > 0.0 {
+                let value = format!("{:.4} ± {:.4}", departure.by_rad, departure.std_rad);
+                values.push((name.to_owned(), value));
+            }
+        }
+    }
     if let Some(hypotheses) = pose.searching {
         values.push(("hypotheses".to_owned(), hypotheses.to_string()));
     }
