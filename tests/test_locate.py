@@ -222,3 +222,24 @@ def test_one_radio_head_cannot_find_it(access_av: Cli, drive: Path, tmp_path: Pa
     assert done.code == 2
     assert "initial_pose" in done.err
     assert "two radio heads" in done.err
+
+
+def test_smoothing_writes_a_second_trajectory(access_av: Cli, drive: Path, tmp_path: Path) -> None:
+    done = access_av(*arguments(drive, tmp_path), "--smooth", "--truth", drive / "truth.tum")
+    assert done.code == 0, done.err
+    numbers = json.loads((tmp_path / "manifest.json").read_text())
+    assert f"Smoothed: RMS {numbers['smoothed_rms_error_m']:.3f} m" in done.out
+    poses, smoothed = (
+        pl.read_parquet(tmp_path / f"{name}.parquet") for name in ("poses", "smoothed")
+    )
+    assert smoothed["time_s"].equals(poses["time_s"])
+    # What comes later can only add information.
+    variance_m2 = pl.col("xx_m2") + pl.col("yy_m2")
+    before, after = (table.select(variance_m2).to_series() for table in (poses, smoothed))
+    assert (after <= before * (1 + 1e-9)).all()
+    assert after.sum() < before.sum()
+    assert len((tmp_path / "smoothed.tum").read_text().splitlines()) == smoothed.height
+    assert '"smoothed"' in (tmp_path / "report.html").read_text()
+    with (tmp_path / "drive.mcap").open("rb") as file:
+        topics = [channel.topic for _, channel, _ in make_reader(file).iter_messages()]
+    assert topics.count("/access_av/smoothed") == smoothed.height

@@ -5,12 +5,15 @@ from __future__ import annotations
 import json
 import math
 from pathlib import Path  # noqa: TC003 (Typer reads annotations at run time)
-from typing import Annotated
+from typing import TYPE_CHECKING, Annotated
 
 import typer
 
 from access_av.errors import InputError
 from access_av.terminal import console, errors, show_cells
+
+if TYPE_CHECKING:
+    from access_av.drives import Drive
 
 app = typer.Typer()
 
@@ -161,13 +164,17 @@ def locate(
             help="Initial pose in m, m, rad, in place of the site's; or the word scratch.",
         ),
     ] = None,
+    smooth: Annotated[
+        bool, typer.Option("--smooth", help="Also each pose by the angles that came after it.")
+    ] = False,
 ) -> None:
     """Locate a recorded drive.
 
     Writes drive.mcap (poses with covariance and twist, verdicts, diagnostics), trajectory.tum,
     poses.parquet, angles.parquet and report.html. Items of the input that cannot be used are
     named, and the rest is used. Without an initial pose, in the site file or by --start, the
-    vehicle is found along the road; that takes two radio heads or more.
+    vehicle is found along the road; that takes two radio heads or more. --smooth adds
+    smoothed.tum, smoothed.parquet and the topic /access_av/smoothed.
     """
     from access_av import drives
     from access_av.files import ResultsDirectory
@@ -182,13 +189,19 @@ def locate(
         start_time_s=start_time_s,
         start=None if start is None or from_scratch else _pose(start),
         from_scratch=from_scratch,
+        smooth=smooth,
     )
+    if drive.smoothed is not None and drive.smoothed.is_empty() and not _lost(drive):
+        raise InputError(f"{site}: --smooth needs localizer.kind = tracker")
     numbers = drives.summary(drive, truth)
     directory = ResultsDirectory.create("locate", out)
     drive.write_mcap(directory.path / "drive.mcap")
     drive.write_tum(directory.path / "trajectory.tum")
     directory.write_table("poses.parquet", drive.poses)
     directory.write_table("angles.parquet", drive.angles)
+    if drive.smoothed is not None:
+        directory.write_table("smoothed.parquet", drive.smoothed)
+        drive.write_smoothed_tum(directory.path / "smoothed.tum")
     site_text = site.read_text(encoding="utf-8")
     directory.write_text("report.html", render_located(drive, site_text, numbers))
     directory.write_text("site.toml", site_text)
@@ -206,14 +219,20 @@ def locate(
         console.print(
             f"Found after {numbers['found_m']:.1f} m and {numbers['found_s']:.1f} s from scratch."
         )
-    elif drive.poses["searching"].all():
+    elif _lost(drive):
         console.print("Not found: several places on the road fit the angles.")
     if "rms_error_m" in numbers:
         console.print(
             f"Horizontal error: RMS {numbers['rms_error_m']:.3f} m, "
             f"90th percentile {numbers['p90_error_m']:.3f} m."
         )
+    if "smoothed_rms_error_m" in numbers:
+        console.print(f"Smoothed: RMS {numbers['smoothed_rms_error_m']:.3f} m.")
     console.print(f"Files: {directory.path}", soft_wrap=True)
+
+
+def _lost(drive: Drive) -> bool:
+    return bool(drive.poses["searching"].all())
 
 
 def _pose(text: str) -> tuple[float, float, float]:

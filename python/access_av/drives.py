@@ -4,7 +4,7 @@ from __future__ import annotations
 
 from dataclasses import dataclass
 from pathlib import Path
-from typing import TYPE_CHECKING
+from typing import TYPE_CHECKING, Any
 
 import polars as pl
 
@@ -12,6 +12,8 @@ from access_av import _core
 from access_av.errors import InputError
 
 if TYPE_CHECKING:
+    from collections.abc import Mapping
+
     from access_av._core import Scenario
 
 
@@ -114,12 +116,16 @@ class Drive:
         One row per angle: SSB, angle, and what the localizer did with it.
     remarks
         What was wrong with single items of the input.
+    smoothed
+        ``poses`` as seen from the end of the drive, from the first known one on; ``None`` unless
+        asked for. Protection levels are not smoothed.
     """
 
     poses: pl.DataFrame
     angles: pl.DataFrame
     remarks: list[str]
     _core: _core.LocatedDrive
+    smoothed: pl.DataFrame | None = None
 
     def write_mcap(self, path: str | Path) -> None:
         """Write poses, verdicts and diagnostics as MCAP (ROS 2); no poses while searching."""
@@ -128,6 +134,10 @@ class Drive:
     def write_tum(self, path: str | Path) -> None:
         """Write the poses, from the first that is known on, as a TUM trajectory."""
         self._core.write_tum(path)
+
+    def write_smoothed_tum(self, path: str | Path) -> None:
+        """Write the smoothed poses as a TUM trajectory."""
+        self._core.write_smoothed_tum(path)
 
 
 def locate(
@@ -139,6 +149,7 @@ def locate(
     start_time_s: float = 0.0,
     start: tuple[float, float, float] | None = None,
     from_scratch: bool = False,
+    smooth: bool = False,
 ) -> Drive:
     """Locate a recorded drive.
 
@@ -161,6 +172,8 @@ def locate(
         without one leaves it to be found along the road, by two radio heads or more.
     from_scratch
         Find the vehicle along the road even if the site has an initial pose.
+    smooth
+        Also look back from the end of the drive: every pose by all angles, before it and after.
 
     Raises
     ------
@@ -177,11 +190,16 @@ def locate(
         start_time_s=start_time_s,
         start=start,
         from_scratch=from_scratch,
+        smooth=smooth,
     )
-    columns = pl.DataFrame(located.poses, schema_overrides={"integrity": pl.String})
-    poses = columns.with_columns(pl.col(pl.Float64).fill_nan(None))
     angles = pl.DataFrame(located.angles).with_columns(pl.col(pl.Float64).fill_nan(None))
-    return Drive(poses, angles, located.remarks, located)
+    smoothed = _poses(located.smoothed) if smooth else None
+    return Drive(_poses(located.poses), angles, located.remarks, located, smoothed)
+
+
+def _poses(columns: Mapping[str, Any]) -> pl.DataFrame:
+    table = pl.DataFrame(columns, schema_overrides={"integrity": pl.String})
+    return table.with_columns(pl.col(pl.Float64).fill_nan(None))
 
 
 def error_m(poses: pl.DataFrame, truth: str | Path) -> pl.DataFrame:
@@ -236,4 +254,7 @@ def summary(drive: Drive, truth: str | Path | None = None) -> dict[str, float]:
         errors = error_m(drive.poses, truth)["error_m"]
         numbers["rms_error_m"] = float((errors**2).mean() ** 0.5)  # type: ignore[operator]
         numbers["p90_error_m"] = float(errors.quantile(0.9, "linear") or 0.0)
+        if drive.smoothed is not None and not drive.smoothed.is_empty():
+            errors = error_m(drive.smoothed, truth)["error_m"]
+            numbers["smoothed_rms_error_m"] = float((errors**2).mean() ** 0.5)  # type: ignore[operator]
     return numbers

@@ -327,6 +327,21 @@ impl Onboard {
         self.localizer.tracker().map(Tracker::calibration)
     }
 
+    /// Keeps from now on what smoothing takes; in vain as long as the first pose is searched for,
+    /// and with a guard, whose trackers take each other's place.
+    pub fn keep_journal(&mut self) {
+        self.localizer.keep_journal();
+    }
+
+    /// Where the vehicle was at each odometry sample since the journal was begun, by everything
+    /// that is known now; nowhere without journal, or without tracker.
+    pub fn smoothed(&self) -> Vec<PoseEstimate> {
+        self.localizer
+            .tracker()
+            .map(Tracker::smoothed)
+            .unwrap_or_default()
+    }
+
     /// Where the vehicle is believed to be.
     pub fn pose(&self) -> PoseEstimate {
         self.localizer.pose(self.reached.time_s)

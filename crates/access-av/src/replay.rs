@@ -1,14 +1,16 @@
 //! A recorded drive through the pipeline: odometry and SSBs, or angles, in order of time.
 
+use std::collections::BTreeMap;
+
 use crate::BoxError;
-use crate::localize::PoseEstimate;
 use crate::localize::tracker::{Calibration, OdometryVerdict};
+use crate::localize::{PoseEstimate, UpdateReason};
 use crate::observation::{OdometrySample, SsbObservation};
 use crate::onboard::{Custom, Execution, Onboard};
 use crate::platform::Platform;
 use crate::receive::{ReceiveError, Receiver};
 use crate::recording::{AngleLog, LoggedAngle, OdometryLog, Recording, RecordingError, Site};
-use crate::scenario::ScenarioError;
+use crate::scenario::{LocalizerSettings, ScenarioError};
 use thiserror::Error;
 
 /// Why a drive cannot be located.
@@ -87,6 +89,8 @@ pub struct LocatedDrive {
     pub poses: Vec<LocatedPose>,
     /// The angles and what became of them.
     pub executions: Vec<Execution>,
+    /// The poses as seen from the end of the drive, from the first known one on, where asked for.
+    pub smoothed: Vec<LocatedPose>,
     /// What was remarkable about single items of the input, in order of time.
     pub remarks: Vec<Remark>,
 }
@@ -96,6 +100,8 @@ pub struct Replay<'a> {
     onboard: Onboard,
     odometry: std::iter::Peekable<std::slice::Iter<'a, OdometrySample>>,
     drive: LocatedDrive,
+    /// Whether it is driven to be smoothed.
+    looks_back: bool,
 }
 
 impl<'a> Replay<'a> {
@@ -128,6 +134,7 @@ impl<'a> Replay<'a> {
                     .collect(),
                 ..LocatedDrive::default()
             },
+            looks_back: false,
         })
     }
 
@@ -169,6 +176,9 @@ impl<'a> Replay<'a> {
     fn odometry_until(&mut self, time_s: f64) {
         while let Some(sample) = self.odometry.next_if(|sample| sample.time_s <= time_s) {
             let at_s = sample.time_s;
+            if self.looks_back {
+                self.onboard.keep_journal();
+            }
             match self.onboard.odometry(sample) {
                 Ok(OdometryVerdict::DistanceJump { jump_m }) => self.remark(
                     at_s,
@@ -198,7 +208,7 @@ impl<'a> Replay<'a> {
     }
 }
 
-/// Locates a drive by angles that were estimated before.
+/// Locates a drive by angles that were estimated before, and smooths it if asked to.
 ///
 /// # Errors
 /// [`ReplayError::Site`], [`ReplayError::NoOdometry`].
@@ -206,6 +216,7 @@ pub fn locate_angles(
     site: &Site,
     odometry: &OdometryLog,
     angles: &AngleLog,
+    smooth: bool,
 ) -> Result<LocatedDrive, ReplayError> {
     let mut replay = Replay::new(site, odometry)?;
     for remark in &angles.remarks {
@@ -214,10 +225,14 @@ pub fn locate_angles(
     for angle in &angles.angles {
         replay.angle(angle);
     }
-    Ok(replay.finish())
+    let mut drive = replay.finish();
+    if smooth {
+        drive.smoothed = look_back(site, odometry, &drive.executions)?;
+    }
+    Ok(drive)
 }
 
-/// Locates a drive by recorded samples. Sample 0 was received at `start_time_s` of the odometry.
+/// Locates a drive by recorded samples, and smooths it if asked to. Sample 0 was received at `start_time_s` of the odometry.
 ///
 /// # Errors
 /// [`ReplayError`].
@@ -226,6 +241,7 @@ pub fn locate_recording(
     odometry: &OdometryLog,
     recording: &mut Recording,
     start_time_s: f64,
+    smooth: bool,
 ) -> Result<LocatedDrive, ReplayError> {
     let mut replay = Replay::new(site, odometry)?;
     for warning in recording.warnings() {
@@ -237,5 +253,50 @@ pub fn locate_recording(
     receiver.run(recording, start_time_s, |observation| {
         replay.ssb(observation)
     })?;
-    Ok(replay.finish())
+    let mut drive = replay.finish();
+    if smooth {
+        drive.smoothed = look_back(site, odometry, &drive.executions)?;
+    }
+    Ok(drive)
+}
+
+/// Drives once more, to see each pose from the end. A radio head that was found faulty is not
+/// heard before it was trusted again; so nothing needs a guard.
+fn look_back(
+    site: &Site,
+    odometry: &OdometryLog,
+    executions: &[Execution],
+) -> Result<Vec<LocatedPose>, ReplayError> {
+    let mut site = site.clone();
+    if let LocalizerSettings::Tracker(settings) = &mut site.scenario.localizer {
+        settings.integrity = false;
+    }
+    let mut replay = Replay::new(&site, odometry)?;
+    replay.looks_back = true;
+    let mut mistrusted_until_s = BTreeMap::new();
+    for execution in executions {
+        if execution.verdict.reason == UpdateReason::Excluded {
+            let ssb = &execution.ssb;
+            mistrusted_until_s.insert((ssb.pci, ssb.ssb_index), ssb.time_s);
+        }
+    }
+    for execution in executions {
+        let ssb = execution.ssb;
+        let until_s = mistrusted_until_s.get(&(ssb.pci, ssb.ssb_index));
+        if until_s.is_none_or(|until_s| ssb.time_s > *until_s)
+            && let Some(measured) = execution.measured
+        {
+            replay.angle(&LoggedAngle { ssb, measured });
+        }
+    }
+    replay.odometry_until(f64::INFINITY);
+    let smoothed = replay.onboard.smoothed();
+    let poses = &replay.drive.poses;
+    let known = poses
+        .iter()
+        .skip(poses.len() - smoothed.len().min(poses.len()));
+    Ok(known
+        .zip(smoothed)
+        .map(|(pose, estimate)| LocatedPose { estimate, ..*pose })
+        .collect())
 }

@@ -73,7 +73,7 @@ fn a_recorded_drive_is_located() {
     assert_eq!(recording.warnings(), []);
     assert_eq!(recording.length(), made.samples);
 
-    let drive = locate_recording(&site, &odometry, &mut recording, 0.0).unwrap();
+    let drive = locate_recording(&site, &odometry, &mut recording, 0.0, false).unwrap();
     assert_eq!(drive.poses.len(), odometry.samples.len());
     // Two heads; what the acquisition of the second costs is a burst or two.
     assert!(
@@ -106,7 +106,7 @@ fn a_recorded_drive_is_located() {
     let file = dir.join("angles.csv");
     write_angle_log(&file, &angles).unwrap();
     let angles = read_angle_log(&file).unwrap();
-    let again = locate_angles(&site, &odometry, &angles).unwrap();
+    let again = locate_angles(&site, &odometry, &angles, false).unwrap();
     let from_angles_m = rms_error_m(&again, &dir.join("truth.tum"));
     assert_eq!(
         again.executions[20].verdict.reason.name(),
@@ -148,7 +148,7 @@ fn a_recording_without_gaps_is_scanned_and_located_alike() {
 
     let site = Site::read(&dir.join("site.toml")).unwrap();
     let odometry = read_odometry_csv(&dir.join("odometry.csv")).unwrap();
-    let drive = locate_recording(&site, &odometry, &mut recording, 0.0).unwrap();
+    let drive = locate_recording(&site, &odometry, &mut recording, 0.0, false).unwrap();
     assert_eq!(drive.executions.len(), 2 * made.bursts);
 }
 
@@ -163,18 +163,19 @@ fn what_does_not_fit_together_is_refused() {
     let text = fs::read_to_string(dir.join("site.toml")).unwrap();
     let site = Site::from_toml(&text, "site.toml").unwrap();
     let mut recording = Recording::open(&made.recording).unwrap();
-    let error = locate_recording(&site, &OdometryLog::default(), &mut recording, 0.0).unwrap_err();
+    let error =
+        locate_recording(&site, &OdometryLog::default(), &mut recording, 0.0, false).unwrap_err();
     assert!(matches!(error, ReplayError::NoOdometry));
 
     let odometry = read_odometry_csv(&dir.join("odometry.csv")).unwrap();
     let mut elsewhere = site.clone();
     elsewhere.scenario.ssb.carrier_mhz = 3600.0;
-    let error = locate_recording(&elsewhere, &odometry, &mut recording, 0.0).unwrap_err();
+    let error = locate_recording(&elsewhere, &odometry, &mut recording, 0.0, false).unwrap_err();
     assert!(matches!(error, ReplayError::FrontEnd { .. }), "{error}");
 
     let data = dir.join("iq.sigmf-data");
     let mut mono = Recording::open_raw(&[&data], 3.84e6, Some(3.5e9)).unwrap();
-    let error = locate_recording(&site, &odometry, &mut mono, 0.0).unwrap_err();
+    let error = locate_recording(&site, &odometry, &mut mono, 0.0, false).unwrap_err();
     assert!(matches!(error, ReplayError::Channels { channels: 1, .. }));
 
     let scenario = Scenario::load("paper").unwrap();

@@ -7,6 +7,7 @@ mod common;
 use std::fs::{self, File};
 use std::path::Path;
 
+use mcap::{Compression, MessageStream, WriteOptions};
 use proptest::prelude::*;
 
 use access_av::geometry::Pose;
@@ -147,6 +148,41 @@ fn odometry_is_read_from_mcap() {
     );
 }
 
+/// The same messages in compressed chunks, as most recorders write them.
+fn compress(file: &Path, compression: Compression) {
+    let whole = fs::read(file).unwrap();
+    let options = WriteOptions::new()
+        .compression(Some(compression))
+        .chunk_size(Some(4096));
+    let mut writer = options.create(File::create(file).unwrap()).unwrap();
+    for message in MessageStream::new(&whole).unwrap() {
+        writer.write(&message.unwrap()).unwrap();
+    }
+    writer.finish().unwrap();
+}
+
+#[test]
+fn compressed_mcap_is_read_alike() {
+    let dir = common::scratch("odometry-mcap-compressed");
+    let plain = dir.join("plain.mcap");
+    write_mcap(&plain, &["/odom"], 0.02);
+    let expected = read_odometry_mcap(&plain, None).unwrap();
+    for compression in [Compression::Lz4, Compression::Zstd] {
+        let file = dir.join("odo.mcap");
+        fs::copy(&plain, &file).unwrap();
+        compress(&file, compression);
+        assert!(fs::metadata(&file).unwrap().len() < fs::metadata(&plain).unwrap().len());
+        assert_eq!(read_odometry_mcap(&file, None).unwrap(), expected);
+        let whole = fs::read(&file).unwrap();
+        fs::write(&file, &whole[..whole.len() / 3]).unwrap();
+        let error = read_odometry_mcap(&file, None).unwrap_err();
+        assert!(matches!(
+            error,
+            RecordingError::Syntax { format: "MCAP", .. }
+        ));
+    }
+}
+
 #[test]
 fn mcap_files_without_the_one_topic_are_refused() {
     let file = common::scratch("odometry-mcap-bad").join("odo.mcap");
@@ -252,13 +288,18 @@ proptest! {
     fn damage_never_panics(
         changes in prop::collection::vec((any::<prop::sample::Index>(), any::<u8>()), 1..8),
         cut in prop::option::of(any::<prop::sample::Index>()),
-        kind in 0..3usize,
+        kind in 0..5usize,
     ) {
         let dir = common::scratch("damage");
         let file = dir.join("file");
         match kind {
             0 => write_mcap(&file, &["/odom"], 0.1),
-            1 => write_odometry_csv(&file, &[sample(0.0), sample(0.1)]).unwrap(),
+            1 | 2 => {
+                write_mcap(&file, &["/odom"], 0.1);
+                let compressions = [Compression::Lz4, Compression::Zstd];
+                compress(&file, compressions[kind - 1]);
+            }
+            3 => write_odometry_csv(&file, &[sample(0.0), sample(0.1)]).unwrap(),
             _ => write_tum(&file, &[TimedPose { time_s: 0.5, pose: Pose::default() }]).unwrap(),
         }
         let mut bytes = fs::read(&file).unwrap();

@@ -99,6 +99,8 @@ pub fn synthesize(
 ///     Initial pose (x in metres, y in metres, heading in radians) in place of the site's.
 /// from_scratch : bool
 ///     Whether to find the vehicle along the road, even if the site has an initial pose.
+/// smooth : bool
+///     Whether to look back from the end of the drive too, which fills `smoothed`.
 ///
 /// Raises
 /// ------
@@ -107,7 +109,7 @@ pub fn synthesize(
 #[pyfunction]
 #[pyo3(signature = (
     site, odometry, recording, *, topic = None, start_time_s = 0.0, start = None,
-    from_scratch = false
+    from_scratch = false, smooth = false
 ))]
 #[allow(clippy::too_many_arguments, clippy::needless_pass_by_value)] // Python's keywords
 pub fn locate(
@@ -119,6 +121,7 @@ pub fn locate(
     start_time_s: f64,
     start: Option<[f64; 3]>,
     from_scratch: bool,
+    smooth: bool,
 ) -> PyResult<LocatedDrive> {
     let pose = start.map(|[x_m, y_m, heading_rad]| Pose {
         x_m,
@@ -141,7 +144,7 @@ pub fn locate(
         if pose.is_some() || from_scratch {
             site = site.starting_at(pose, &origin)?;
         }
-        run(&site, &odometry, &recording, topic, start_time_s)
+        run(&site, &odometry, &recording, topic, start_time_s, smooth)
     })
     .map(|core| LocatedDrive { core })
     .map_err(replay_error)
@@ -153,6 +156,7 @@ fn run(
     recording: &Path,
     topic: Option<&str>,
     start_time_s: f64,
+    smooth: bool,
 ) -> Result<replay::LocatedDrive, ReplayError> {
     let is = |path: &Path, extension: &str| {
         path.extension()
@@ -164,13 +168,14 @@ fn run(
         read_odometry_csv(odometry)?
     };
     if is(recording, "csv") {
-        replay::locate_angles(site, &odometry, &read_angle_log(recording)?)
+        replay::locate_angles(site, &odometry, &read_angle_log(recording)?, smooth)
     } else {
         replay::locate_recording(
             site,
             &odometry,
             &mut Recording::open(recording)?,
             start_time_s,
+            smooth,
         )
     }
 }
@@ -205,33 +210,13 @@ impl LocatedDrive {
     /// whether the first pose is not yet known, and this one the mean of where the vehicle may be.
     #[getter]
     fn poses<'py>(&self, py: Python<'py>) -> PyResult<Bound<'py, PyDict>> {
-        let poses = &self.core.poses;
-        let columns = PyDict::new(py);
-        let column = |value: fn(&replay::LocatedPose) -> f64| {
-            PyArray1::from_iter(py, poses.iter().map(value))
-        };
-        columns.set_item("time_s", column(|it| it.estimate.time_s))?;
-        columns.set_item("x_m", column(|it| it.estimate.pose.x_m))?;
-        columns.set_item("y_m", column(|it| it.estimate.pose.y_m))?;
-        columns.set_item("heading_rad", column(|it| it.estimate.pose.heading_rad))?;
-        columns.set_item("speed_mps", column(|it| it.speed_mps))?;
-        columns.set_item("xx_m2", column(|it| covariance(it, 0, 0)))?;
-        columns.set_item("xy_m2", column(|it| covariance(it, 0, 1)))?;
-        columns.set_item("yy_m2", column(|it| covariance(it, 1, 1)))?;
-        columns.set_item("heading_rad2", column(|it| covariance(it, 2, 2)))?;
-        columns.set_item(
-            "protection_level_m",
-            column(|it| {
-                it.estimate
-                    .integrity
-                    .map_or(f64::NAN, |integrity| integrity.protection_level_m)
-            }),
-        )?;
-        let state = |it: &replay::LocatedPose| Some(it.estimate.integrity?.state.name());
-        columns.set_item("integrity", poses.iter().map(state).collect::<Vec<_>>())?;
-        let searching = poses.iter().map(|it| it.searching.is_some());
-        columns.set_item("searching", PyArray1::from_iter(py, searching))?;
-        Ok(columns)
+        pose_columns(py, &self.core.poses)
+    }
+
+    /// The same as seen from the end of the drive; empty unless asked for.
+    #[getter]
+    fn smoothed<'py>(&self, py: Python<'py>) -> PyResult<Bound<'py, PyDict>> {
+        pose_columns(py, &self.core.smoothed)
     }
 
     /// One row per angle: columns `time_s`, `pci`, `ssb_index`, `snr_db`, `phase_rad`,
@@ -286,14 +271,54 @@ impl LocatedDrive {
     /// Write the poses, from the first that is known on, as a TUM trajectory.
     #[allow(clippy::needless_pass_by_value)] // what extraction yields
     fn write_tum(&self, path: PathBuf) -> PyResult<()> {
-        let timed = |it: &replay::LocatedPose| TimedPose {
-            time_s: it.estimate.time_s,
-            pose: it.estimate.pose,
-        };
-        let known = self.core.poses.iter().filter(|it| it.searching.is_none());
-        let poses: Vec<TimedPose> = known.map(timed).collect();
-        write_tum(&path, &poses).map_err(recording_error)
+        write_poses(&path, &self.core.poses)
     }
+
+    /// Write the smoothed poses as a TUM trajectory.
+    #[allow(clippy::needless_pass_by_value)] // what extraction yields
+    fn write_smoothed_tum(&self, path: PathBuf) -> PyResult<()> {
+        write_poses(&path, &self.core.smoothed)
+    }
+}
+
+fn write_poses(path: &Path, poses: &[replay::LocatedPose]) -> PyResult<()> {
+    let known = poses.iter().filter(|it| it.searching.is_none());
+    let timed = known.map(|it| TimedPose {
+        time_s: it.estimate.time_s,
+        pose: it.estimate.pose,
+    });
+    write_tum(path, &timed.collect::<Vec<_>>()).map_err(recording_error)
+}
+
+fn pose_columns<'py>(
+    py: Python<'py>,
+    poses: &[replay::LocatedPose],
+) -> PyResult<Bound<'py, PyDict>> {
+    let columns = PyDict::new(py);
+    let column =
+        |value: fn(&replay::LocatedPose) -> f64| PyArray1::from_iter(py, poses.iter().map(value));
+    columns.set_item("time_s", column(|it| it.estimate.time_s))?;
+    columns.set_item("x_m", column(|it| it.estimate.pose.x_m))?;
+    columns.set_item("y_m", column(|it| it.estimate.pose.y_m))?;
+    columns.set_item("heading_rad", column(|it| it.estimate.pose.heading_rad))?;
+    columns.set_item("speed_mps", column(|it| it.speed_mps))?;
+    columns.set_item("xx_m2", column(|it| covariance(it, 0, 0)))?;
+    columns.set_item("xy_m2", column(|it| covariance(it, 0, 1)))?;
+    columns.set_item("yy_m2", column(|it| covariance(it, 1, 1)))?;
+    columns.set_item("heading_rad2", column(|it| covariance(it, 2, 2)))?;
+    columns.set_item(
+        "protection_level_m",
+        column(|it| {
+            it.estimate
+                .integrity
+                .map_or(f64::NAN, |integrity| integrity.protection_level_m)
+        }),
+    )?;
+    let state = |it: &replay::LocatedPose| Some(it.estimate.integrity?.state.name());
+    columns.set_item("integrity", poses.iter().map(state).collect::<Vec<_>>())?;
+    let searching = poses.iter().map(|it| it.searching.is_some());
+    columns.set_item("searching", PyArray1::from_iter(py, searching))?;
+    Ok(columns)
 }
 
 fn covariance(pose: &replay::LocatedPose, row: usize, column: usize) -> f64 {

@@ -35,7 +35,10 @@ def render_located(drive: Drive, site: str, numbers: dict[str, float]) -> str:
         What :func:`access_av.drives.summary` returned.
     """
     known = drive.poses.filter(~pl.col("searching"))
-    specs = {"track": _track(known), "sigma": _sigma(known)}
+    lines = {"as driven": known}
+    if drive.smoothed is not None and not drive.smoothed.is_empty():
+        lines["smoothed"] = drive.smoothed
+    specs = {"track": _track(lines), "sigma": _sigma(lines)}
     sections = [
         _section("Track", "Where the vehicle was, in the map's frame.", figure("track")),
         _section(
@@ -91,30 +94,45 @@ def _section(title: str, text: str, body: str) -> str:
     return f"<section><h2>{escape(title)}</h2><p>{escape(text)}</p>{body}</section>"
 
 
-def _track(poses: pl.DataFrame) -> Spec:
-    line = (
-        alt.Chart(thinned(poses.select("time_s", "x_m", "y_m")))
-        .mark_line(color=BLUE, strokeWidth=2)
+def _track(lines: dict[str, pl.DataFrame]) -> Spec:
+    chart = (
+        alt.Chart(_together(lines, pl.col("x_m"), pl.col("y_m")))
+        .mark_line(strokeWidth=2)
         .encode(
             x=alt.X("x_m:Q", title="x / m", scale=alt.Scale(zero=False)),
             y=alt.Y("y_m:Q", title="y / m", scale=alt.Scale(zero=False)),
             order="time_s:Q",
+            color=_line_colour(lines),
         )
     )
-    return finish(line, height=300, description="Track of the vehicle")
+    return finish(chart, height=300, description="Track of the vehicle")
 
 
-def _sigma(poses: pl.DataFrame) -> Spec:
-    sigma = poses.select("time_s", sigma_m=(pl.col("xx_m2") + pl.col("yy_m2")).sqrt())
-    line = (
-        alt.Chart(thinned(sigma))
-        .mark_line(color=BLUE, strokeWidth=2)
+def _sigma(lines: dict[str, pl.DataFrame]) -> Spec:
+    sigma_m = (pl.col("xx_m2") + pl.col("yy_m2")).sqrt().alias("sigma_m")
+    chart = (
+        alt.Chart(_together(lines, sigma_m))
+        .mark_line(strokeWidth=2)
         .encode(
             x=alt.X("time_s:Q", title="time / s"),
             y=alt.Y("sigma_m:Q", title="standard deviation / m"),
+            color=_line_colour(lines),
         )
     )
-    return finish(line, height=220, description="Standard deviation of the position against time")
+    return finish(chart, height=220, description="Standard deviation of the position against time")
+
+
+def _together(lines: dict[str, pl.DataFrame], *columns: pl.Expr) -> pl.DataFrame:
+    return pl.concat(
+        thinned(poses.select("time_s", *columns)).with_columns(line=pl.lit(name))
+        for name, poses in lines.items()
+    )
+
+
+def _line_colour(lines: dict[str, pl.DataFrame]) -> alt.Color:
+    scale = alt.Scale(domain=list(lines), range=[BLUE, ORANGE][: len(lines)])
+    legend = alt.Legend(title=None) if len(lines) > 1 else None
+    return alt.Color("line:N", scale=scale, legend=legend)
 
 
 def _angles(angles: pl.DataFrame) -> Spec:

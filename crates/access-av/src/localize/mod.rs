@@ -6,6 +6,7 @@ pub mod gaussian;
 pub mod ideal;
 pub mod initialise;
 pub mod integrity;
+pub mod smoother;
 pub mod thermal;
 pub mod tracker;
 
@@ -106,6 +107,14 @@ impl Localizer {
                 });
                 estimate
             }
+        }
+    }
+
+    /// Lets the tracker, if it is one by now and without guard, keep the journal that smoothing
+    /// takes.
+    pub fn keep_journal(&mut self) {
+        if let Self::Tracker(tracker) = self {
+            tracker.keep_journal();
         }
     }
 

@@ -17,6 +17,7 @@ use std::sync::Arc;
 
 use crate::geometry::{Pose, wrap_angle};
 use crate::localize::gaussian::Innovation;
+use crate::localize::smoother::Journal;
 use crate::localize::{AngleMeasurement, PoseEstimate, UpdateReason, UpdateVerdict};
 use crate::observation::OdometrySample;
 use crate::world::{RadioHead, Track};
@@ -62,6 +63,7 @@ pub struct Tracker {
     belief: Belief,
     odometry: Option<OdometrySample>,
     driven_m: f64,
+    journal: Option<Journal<STATES>>,
 }
 
 impl Tracker {
@@ -85,6 +87,7 @@ impl Tracker {
             belief,
             odometry: None,
             driven_m: 0.0,
+            journal: None,
         }
     }
 
@@ -99,6 +102,7 @@ impl Tracker {
         }
         let Some(previous) = self.odometry else {
             self.odometry = Some(*sample);
+            self.ask(sample.time_s);
             return OdometryVerdict::First;
         };
         let duration_s = sample.time_s - previous.time_s;
@@ -131,6 +135,9 @@ impl Tracker {
         self.advance(reading_m, yaw);
         if jumped {
             self.add_along_variance(self.config.coasting_variance(duration_s));
+        }
+        self.ask(sample.time_s);
+        if jumped {
             OdometryVerdict::DistanceJump { jump_m: moved_m }
         } else if duration_s > self.config.gap_s {
             OdometryVerdict::AfterGap { gap_s: duration_s }
@@ -153,8 +160,7 @@ impl Tracker {
             return self.verdict(UpdateReason::Outlier, Some(mahalanobis2));
         }
         let residual = looked.innovation.residual;
-        self.belief
-            .update(residual, &looked.row, looked.measurement_variance);
+        self.measure(residual, &looked.row, looked.measurement_variance);
         if let Some(head) = self.heads.get_mut(looked.head) {
             head.last_look_m = looked.place_m;
         }
@@ -298,11 +304,32 @@ impl Tracker {
         }
     }
 
+    /// Keeps a journal from now on, from which the drive can be smoothed; it grows by about 2 kB
+    /// with each odometry sample.
+    pub fn keep_journal(&mut self) {
+        self.journal.get_or_insert_default();
+    }
+
+    /// The poses at the odometry samples since the journal was begun, by everything that is known
+    /// now; none without a journal.
+    pub fn smoothed(&self) -> Vec<PoseEstimate> {
+        let journal = self.journal.iter();
+        let beliefs = journal.flat_map(Journal::smoothed);
+        beliefs
+            .map(|(time_s, belief)| self.pose_of(&belief, time_s, 0.0, 0.0))
+            .collect()
+    }
+
     /// The pose at `time_s`, carried on from the newest odometry at its speed.
     pub fn pose(&self, time_s: f64) -> PoseEstimate {
         let (lag_m, lag_variance) = self.coasting(time_s);
+        self.pose_of(&self.belief, time_s, lag_m, lag_variance)
+    }
+
+    /// The pose of a belief, `lag_m` further on than it says.
+    fn pose_of(&self, belief: &Belief, time_s: f64, lag_m: f64, lag_variance: f64) -> PoseEstimate {
         let map = self.map.as_deref();
-        let (pose, footing) = locate(&self.belief.mean, lag_m, map);
+        let (pose, footing) = locate(&belief.mean, lag_m, map);
         let (sin, cos) = footing.direction_rad.sin_cos();
         // (x, y, heading) by (along, across, heading).
         let jacobian = [
@@ -313,7 +340,7 @@ impl Tracker {
         let mut inner = [[0.0; 3]; 3];
         for i in 0..3 {
             for j in 0..3 {
-                inner[i][j] = self.belief.covariance[i][j];
+                inner[i][j] = belief.covariance[i][j];
             }
         }
         inner[0][0] += lag_variance;
@@ -466,14 +493,31 @@ impl Tracker {
         for _ in 0..steps as usize {
             let mut step = self.step(&self.belief, reading_m * share);
             if let Some(yaw) = yaw {
-                step.correct(&mut self.belief, &yaw);
+                let (residual, row, variance) = step.turn_seen(&self.belief.mean, &yaw);
+                self.measure(residual, &row, variance);
                 step = self
                     .step(&self.belief, reading_m * share)
                     .informed(&self.belief.mean, &yaw);
             }
+            if let Some(journal) = &mut self.journal {
+                journal.moved(&step.jacobian);
+            }
             step.apply(&mut self.belief);
         }
         self.driven_m += reading_m.abs() / (1.0 + self.belief.mean[SCALE]);
+    }
+
+    fn measure(&mut self, residual: f64, row: &[f64; STATES], variance: f64) {
+        if let Some(journal) = &mut self.journal {
+            journal.measured(&self.belief, residual, row, variance);
+        }
+        self.belief.update(residual, row, variance);
+    }
+
+    fn ask(&mut self, time_s: f64) {
+        if let Some(journal) = &mut self.journal {
+            journal.asked(time_s, &self.belief);
+        }
     }
 
     fn step(&self, belief: &Belief, reading_m: f64) -> Step {

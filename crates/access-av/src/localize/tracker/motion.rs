@@ -179,13 +179,13 @@ impl Step {
         belief.spread(&self.jacobian, &self.noise);
     }
 
-    /// What a gyroscope says of the state before this step.
-    pub fn correct(&self, belief: &mut Belief, yaw: &Yaw) {
+    /// What a gyroscope says of the state `start` before this step: residual, row and variance.
+    pub fn turn_seen(&self, start: &[f64; STATES], yaw: &Yaw) -> (f64, [f64; STATES], f64) {
         let mut row = self.turn_row;
         row[YAW_RATE_BIAS] = yaw.duration_s;
-        let bias = belief.mean[YAW_RATE_BIAS] * yaw.duration_s;
+        let bias = start[YAW_RATE_BIAS] * yaw.duration_s;
         let variance = self.noise[HEADING][HEADING] + yaw.variance;
-        belief.update(yaw.turn_rad - self.turn_rad - bias, &row, variance);
+        (yaw.turn_rad - self.turn_rad - bias, row, variance)
     }
 
     /// This step, its noise known in part from a gyroscope: measurement and motion share the

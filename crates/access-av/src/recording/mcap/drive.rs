@@ -16,6 +16,8 @@ use crate::replay::{LocatedDrive, LocatedPose, Remark};
 
 /// Topic of the poses.
 const POSE_TOPIC: &str = "/access_av/odometry";
+/// Topic of the smoothed poses.
+const SMOOTHED_TOPIC: &str = "/access_av/smoothed";
 /// Topic of the verdicts.
 const VERDICT_TOPIC: &str = "/access_av/verdicts";
 /// Variance of a wheel speed in (m/s)² and of a gyroscope's rate in (rad/s)².
@@ -43,21 +45,18 @@ fn write(file: BufWriter<File>, drive: &LocatedDrive) -> Result<(), McapError> {
     let mut lately: Vec<&Execution> = Vec::new();
     let mut remarks = drive.remarks.as_slice();
     let mut diagnosed_s = f64::NEG_INFINITY;
+    let mut smoothed = drive.smoothed.iter().peekable();
     for pose in &drive.poses {
         let time_s = pose.estimate.time_s;
         while let Some(execution) = executions.next_if(|it| it.ssb.time_s <= time_s) {
             writer.verdict(VERDICT_TOPIC, execution)?;
             lately.push(execution);
         }
-        let twist = Twist {
-            speed_mps: pose.speed_mps,
-            speed_variance: SPEED_VARIANCE,
-            yaw_rate: pose
-                .yaw_rate_radps
-                .map(|rate_radps| (rate_radps, YAW_RATE_VARIANCE)),
-        };
         if pose.searching.is_none() {
-            writer.odometry(POSE_TOPIC, Frames::MAP, &pose.estimate, &twist)?;
+            writer.odometry(POSE_TOPIC, Frames::MAP, &pose.estimate, &twist(pose))?;
+        }
+        if let Some(pose) = smoothed.next_if(|it| it.estimate.time_s <= time_s) {
+            writer.odometry(SMOOTHED_TOPIC, Frames::MAP, &pose.estimate, &twist(pose))?;
         }
         if time_s - diagnosed_s >= DIAGNOSTIC_PERIOD_S {
             let known = remarks.partition_point(|remark| remark.time_s <= time_s);
@@ -75,6 +74,16 @@ fn write(file: BufWriter<File>, drive: &LocatedDrive) -> Result<(), McapError> {
         writer.diagnostics(last.estimate.time_s, &[input(remarks)])?;
     }
     writer.finish()
+}
+
+fn twist(pose: &LocatedPose) -> Twist {
+    Twist {
+        speed_mps: pose.speed_mps,
+        speed_variance: SPEED_VARIANCE,
+        yaw_rate: pose
+            .yaw_rate_radps
+            .map(|rate_radps| (rate_radps, YAW_RATE_VARIANCE)),
+    }
 }
 
 /// What was remarkable about the input lately, item by item.
