@@ -4,7 +4,8 @@
 mod common;
 
 use access_av::receive::{
-    ArraySetup, ChannelFault, FoundSsb, SampleBlock, ScanError, ScanSettings, scan,
+    ArraySetup, ChannelFault, FoundSsb, SampleBlock, ScanError, ScanSettings, SsbSearch,
+    SsbSearchConfig, scan,
 };
 use access_av::recording::Recording;
 use nr_ssb::diagnose::Fault;
@@ -18,34 +19,57 @@ use serde_json::Value;
 const SSB_HZ: f64 = 3_700.8e6;
 const RATE_HZ: f64 = 7.68e6;
 
-/// Four antennas, 5 ms, an SSB from the given electrical angle at 20 dB per resource element.
-fn half_frame(phase_rad: f64, seed: u64) -> Vec<Vec<Complex32>> {
+/// What a cell sends in 5 ms.
+fn burst(pci: u16, ssb_index: u8) -> Vec<Complex32> {
     let burst = Burst {
-        pci: Pci::new(7).unwrap(),
+        pci: Pci::new(pci).unwrap(),
         case: Case::C,
         lmax: Lmax::L8,
         payload: BchPayload::new(Mib::default(), 12, false, 0).unwrap(),
-        beams: vec![Beam::new(2)],
+        beams: vec![Beam::new(ssb_index)],
         ssb_freq_hz: Some(SSB_HZ),
     };
     let numerology = Numerology::from_sample_rate(Case::C.spacing(), RATE_HZ).unwrap();
-    let clean = burst.iq(&mut Ofdm::new(numerology)).unwrap();
-    let mut rng = ChaCha8Rng::seed_from_u64(seed);
+    burst.iq(&mut Ofdm::new(numerology)).unwrap()
+}
+
+/// Noise of four antennas; a resource element of amplitude one is so far above it.
+fn noise(samples: usize, snr_db: f64, rng: &mut ChaCha8Rng) -> Vec<Vec<Complex32>> {
     // A resource element collects the noise of 256 samples.
-    let sigma = (0.5 * 0.01 / 256.0_f64).sqrt();
+    let sigma = (0.5 * 10f64.powf(-0.1 * snr_db) / 256.0).sqrt();
+    let mut part = || (sigma * rng.sample::<f64, _>(StandardNormal)) as f32;
     (0..4)
-        .map(|antenna| {
-            let turn = Complex64::cis(phase_rad * f64::from(antenna));
-            let turn = Complex32::new(turn.re as f32, turn.im as f32);
-            clean
-                .iter()
-                .map(|sample| {
-                    let mut part = || (sigma * rng.sample::<f64, _>(StandardNormal)) as f32;
-                    sample * turn + Complex32::new(part(), part())
-                })
+        .map(|_| {
+            (0..samples)
+                .map(|_| Complex32::new(part(), part()))
                 .collect()
         })
         .collect()
+}
+
+/// Adds a plane wave of the given electrical angle, its first sample at `start`.
+fn add(
+    antennas: &mut [Vec<Complex32>],
+    wave: &[Complex32],
+    gain: Complex64,
+    phase_rad: f64,
+    start: usize,
+) {
+    for (number, antenna) in antennas.iter_mut().enumerate() {
+        let turn = gain * Complex64::cis(phase_rad * number as f64);
+        let turn = Complex32::new(turn.re as f32, turn.im as f32);
+        for (to, sample) in antenna.iter_mut().skip(start).zip(wave) {
+            *to += sample * turn;
+        }
+    }
+}
+
+/// Four antennas, 5 ms, an SSB from the given electrical angle at 20 dB per resource element.
+fn half_frame(phase_rad: f64, seed: u64) -> Vec<Vec<Complex32>> {
+    let sent = burst(7, 2);
+    let mut antennas = noise(sent.len(), 20.0, &mut ChaCha8Rng::seed_from_u64(seed));
+    add(&mut antennas, &sent, Complex64::ONE, phase_rad, 0);
+    antennas
 }
 
 fn block(antennas: &[Vec<Complex32>]) -> SampleBlock<'_> {
@@ -88,46 +112,142 @@ fn a_built_burst_is_found_with_its_angle() {
 }
 
 #[test]
-fn faults_are_laid_at_the_right_channel() {
+fn cells_under_a_stronger_one_have_angles_and_know_how_good_they_are() {
+    let config = SsbSearchConfig::new(RATE_HZ, SSB_HZ, SSB_HZ, Case::C.spacing(), 4);
+    let mut search = SsbSearch::new(config).unwrap();
+    let mut rng = ChaCha8Rng::seed_from_u64(11);
+    let trials = 60;
+    // Two more cells under the first, on the same symbols: one with another PSS, one with its own.
+    let cells = [(7, 0.7, 1.0), (302, -1.9, 0.1), (610, 2.4, 0.15)];
+    let sent = cells.map(|(pci, ..)| burst(pci, 2));
+    let mut squares = [0.0; 3];
+    for trial in 0..trials {
+        // The weak ones have 5 and 8.5 dB.
+        let mut antennas = noise(sent[0].len() + 200, 25.0, &mut rng);
+        for ((_, phase_rad, amplitude), wave) in cells.iter().zip(&sent) {
+            let gain = Complex64::from_polar(*amplitude, 6.2 * rng.random::<f64>());
+            // Other cells of a network come within a cyclic prefix or so.
+            let start = 100 + rng.random_range(0..40);
+            add(&mut antennas, wave, gain, *phase_rad, start);
+        }
+        let slices: Vec<&[Complex32]> = antennas.iter().map(Vec::as_slice).collect();
+        let found = search.search(&slices).unwrap();
+        assert_eq!(found.len(), cells.len(), "trial {trial}");
+        for ((pci, phase_rad, _), square) in cells.iter().zip(&mut squares) {
+            let cell = found.iter().find(|it| it.ssb.pci.get() == *pci).unwrap();
+            let angle = cell.angle.unwrap();
+            assert!(angle.is_resolved(), "trial {trial}: {pci}");
+            *square += ((angle.phase_rad - phase_rad) / angle.phase_sigma_rad).powi(2);
+        }
+    }
+    // The mean square of n Gaussian errors has a relative deviation of √(2/n); four of them.
+    let bound = 4.0 * (2.0 / f64::from(trials)).sqrt();
+    for ((pci, ..), square) in cells.iter().zip(squares) {
+        let mean = square / f64::from(trials);
+        println!("cell {pci}: normalised error variance {mean:.2}");
+        assert!((mean - 1.0).abs() < bound, "{pci}: {mean}");
+    }
+}
+
+/// The faults of a scan of four channels, spoilt so.
+fn faults_of(spoil: impl FnOnce(&mut Vec<Vec<Complex32>>)) -> Vec<ChannelFault> {
     let mut antennas = half_frame(1.4, 2);
-    antennas.swap(1, 2);
+    spoil(&mut antennas);
     let found = scan(&mut block(&antennas), &known()).unwrap();
     assert_eq!(
-        found.faults,
-        [ChannelFault::Exchanged {
-            first: 1,
-            second: 2
-        }]
+        found.ssbs.len(),
+        1,
+        "whatever a channel lacks, the others hear the cell"
     );
+    found.faults
+}
 
-    let mut antennas = half_frame(0.7, 3);
-    antennas[3].fill(Complex32::ZERO);
-    let found = scan(&mut block(&antennas), &known()).unwrap();
-    assert!(found.faults.contains(&ChannelFault::Samples {
-        channel: 3,
-        fault: Fault::Silent
-    }));
-    assert_eq!(found.ssbs.len(), 1);
-
-    let mut antennas = half_frame(0.7, 4);
-    let limit = 0.01;
-    for sample in &mut antennas[0] {
-        *sample = Complex32::new(
-            sample.re.clamp(-limit, limit),
-            sample.im.clamp(-limit, limit),
-        );
+/// What is wrong with a channel by its samples; `None` unless that is all there is.
+fn only(faults: &[ChannelFault]) -> Option<(usize, Fault)> {
+    match faults {
+        [ChannelFault::Samples { channel, fault }] => Some((*channel, *fault)),
+        _ => None,
     }
-    let faults = scan(&mut block(&antennas), &known()).unwrap().faults;
-    let clipped = |it: &ChannelFault| {
-        matches!(
-            it,
-            ChannelFault::Samples {
-                channel: 0,
-                fault: Fault::Clipped { .. }
-            }
-        )
+}
+
+#[test]
+fn healthy_channels_have_no_faults() {
+    assert_eq!(faults_of(|_| ()), []);
+}
+
+#[test]
+fn exchanged_channels_are_told_by_their_phases() {
+    for (first, second) in [(0, 1), (1, 2), (2, 3)] {
+        let faults = faults_of(|antennas| antennas.swap(first, second));
+        assert_eq!(faults, [ChannelFault::Exchanged { first, second }]);
+    }
+}
+
+#[test]
+fn a_silent_channel_is_named() {
+    let faults = faults_of(|antennas| antennas[3].fill(Complex32::ZERO));
+    assert_eq!(only(&faults), Some((3, Fault::Silent)));
+}
+
+#[test]
+fn a_weak_channel_is_named_with_its_level() {
+    // 46 dB down: a cable that is off leaves no more.
+    let weaken = |antenna: &mut Vec<Complex32>| antenna.iter_mut().for_each(|x| *x *= 0.005);
+    let faults = faults_of(|antennas| weaken(&mut antennas[1]));
+    let Some((1, Fault::Weak { below_strongest_db })) = only(&faults) else {
+        panic!("{faults:?}")
     };
-    assert!(faults.iter().any(clipped), "{faults:?}");
+    assert!(
+        (below_strongest_db - 46.02).abs() < 0.5,
+        "{below_strongest_db}"
+    );
+    assert!(
+        faults[0].to_string().contains("channel 1 is 46 dB below"),
+        "{}",
+        faults[0]
+    );
+    // 20 dB are an antenna that looks the other way.
+    let faults = faults_of(|antennas| antennas[1].iter_mut().for_each(|x| *x *= 0.1));
+    assert_eq!(faults, []);
+}
+
+#[test]
+fn a_clipped_channel_is_named_with_its_share() {
+    let limit = 0.05;
+    let mut share_beyond = 0.0;
+    let faults = faults_of(|antennas| {
+        let beyond = |x: &Complex32| x.re.abs() >= limit || x.im.abs() >= limit;
+        let count = antennas[0].iter().filter(|x| beyond(x)).count();
+        share_beyond = count as f64 / antennas[0].len() as f64;
+        for x in &mut antennas[0] {
+            *x = Complex32::new(x.re.clamp(-limit, limit), x.im.clamp(-limit, limit));
+        }
+    });
+    let Some((0, Fault::Clipped { share })) = only(&faults) else {
+        panic!("{faults:?}")
+    };
+    // All that were beyond, but for the few that any recording has.
+    assert!(
+        (share / share_beyond - 1.0).abs() < 0.05,
+        "{share} {share_beyond}"
+    );
+}
+
+#[test]
+fn a_doubled_channel_is_named_with_its_original() {
+    let faults = faults_of(|antennas| antennas[2] = antennas[0].clone());
+    assert!(
+        faults.contains(&ChannelFault::Samples {
+            channel: 2,
+            fault: Fault::Duplicate { of: 0 }
+        }),
+        "{faults:?}"
+    );
+    assert!(
+        faults[0].to_string().contains("same samples as channel 0"),
+        "{}",
+        faults[0]
+    );
 }
 
 #[test]

@@ -34,6 +34,10 @@ const DECODE_FLOOR: f32 = 0.7;
 const CERTAIN_DECODE_SNR_DB: f64 = -2.0;
 /// Sums of a million samples' energies stay finite below this.
 const MAX_ENERGY: f32 = 1e30;
+/// A cell whose PBCH does not decode, with the PSS of a cell so much stronger and so near to it in
+/// time, is taken for what was left of that one.
+const RESIDUE_DB: f64 = 25.0;
+const RESIDUE_SAMPLES: f64 = 1.0;
 /// Two detections of one cell closer than this, in samples, are one SSB.
 const SAME_SSB_SAMPLES: f64 = CYCLIC_PREFIX as f64;
 
@@ -437,6 +441,9 @@ impl Searcher {
                 return None;
             }
             broadcast = self.decoder.combine(&acquired, time);
+            if broadcast.is_none() && self.is_residue(acquired.pci, time) {
+                return None;
+            }
         }
         if let Some(broadcast) = &broadcast {
             self.acquirer.know_pbch(acquired.pci, &broadcast.symbols);
@@ -454,6 +461,17 @@ impl Searcher {
         }
         self.remove(&acquired.alignment);
         Some(acquired.alignment)
+    }
+
+    /// Whether an SSB may be what a clipped or otherwise distorted stronger one has left: with its
+    /// PSS, in its place, and far below it.
+    fn is_residue(&self, pci: Pci, time: f64) -> bool {
+        let snr_db = decibel(self.acquirer.snr() / self.config.antennas as f64);
+        self.found.iter().any(|ssb| {
+            ssb.pci.n_id_2() == pci.n_id_2()
+                && (ssb.sample_start - time).abs() < RESIDUE_SAMPLES
+                && ssb.snr_db > snr_db + RESIDUE_DB
+        })
     }
 
     fn report(&mut self, acquired: &Acquired, broadcast: Option<&Broadcast>) {

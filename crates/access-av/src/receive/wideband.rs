@@ -54,8 +54,15 @@ pub(super) struct LineOfSight<const A: usize> {
 /// The line of sight, where the channel varies over the band. The noise on an element has variance
 /// one and the channels are calibrated.
 pub(super) fn line_of_sight<const A: usize>(despread: &Despread<A>) -> Option<LineOfSight<A>> {
-    let channel = Channel::new(despread);
-    let excess = channel.variation()?;
+    let channel = Channel::new(despread, 0);
+    // Another cell's PSS may be the same: late, it looks like a path. It is not believed alone.
+    let others = Channel::new(despread, 1);
+    let others = if others.known() > 0.0 {
+        others
+    } else {
+        channel.clone()
+    };
+    let excess = others.variation()?;
     let fit = |decay: f64, power: f64, delays: &mut dyn Iterator<Item = f64>| {
         let scatter = Scatter::new(&channel, decay, power)?;
         let likelihood = |delay| (channel.likelihood(&scatter, delay), delay, decay, power);
@@ -68,7 +75,7 @@ pub(super) fn line_of_sight<const A: usize>(despread: &Despread<A>) -> Option<Li
     };
     let mut best = None;
     for decay in DECAYS {
-        let power = excess / channel.variable_share(decay);
+        let power = excess / others.variable_share(decay);
         let mut delays = (0..DELAYS).map(|step| EARLIEST + spacing * step as f64);
         best = better(best, fit(decay, power, &mut delays));
     }
@@ -108,6 +115,7 @@ pub(super) fn line_of_sight<const A: usize>(despread: &Despread<A>) -> Option<Li
 type Fit = (f64, f64, f64, f64);
 
 /// The channel as the symbols together show it.
+#[derive(Clone)]
 struct Channel<const A: usize> {
     /// Mean over the known elements of each group, per antenna.
     antennas: [Band; A],
@@ -116,11 +124,11 @@ struct Channel<const A: usize> {
 }
 
 impl<const A: usize> Channel<A> {
-    /// Brings the symbols to one phase and adds them up.
-    fn new(despread: &Despread<A>) -> Self {
+    /// Brings the symbols from number `from` on to one phase and adds them up.
+    fn new(despread: &Despread<A>, from: usize) -> Self {
         // The symbol that knows most is the one whose phase the others take.
         let known = |counts: &[f64; GROUPS]| counts.iter().sum::<f64>();
-        let symbols = despread.sums.iter().zip(&despread.counts);
+        let symbols = despread.sums.iter().zip(&despread.counts).skip(from);
         let first = symbols
             .clone()
             .max_by(|a, b| known(a.1).total_cmp(&known(b.1)));
