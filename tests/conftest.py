@@ -21,10 +21,12 @@ class Finished(NamedTuple):
 
 @pytest.fixture
 def access_av(
-    monkeypatch: pytest.MonkeyPatch, capsys: pytest.CaptureFixture[str]
+    monkeypatch: pytest.MonkeyPatch, capsys: pytest.CaptureFixture[str], tmp_path: Path
 ) -> Callable[..., Finished]:
-    """Run the command line in this process."""
+    """Run the command line in this process; its latest results are the test's own."""
     from access_av.cli import main
+
+    monkeypatch.setattr("access_av.files.RESULTS", tmp_path / "results")
 
     def run(*arguments: str, columns: int = 100) -> Finished:
         monkeypatch.setattr(sys, "argv", ["access-av", *map(str, arguments)])
@@ -44,8 +46,9 @@ def quick_study(tmp_path_factory: pytest.TempPathFactory) -> Path:
 
     results = tmp_path_factory.mktemp("results")
     directory = results / "2000-01-01T000000.000-evaluate"
-    study.run("paper", "jetson-agx-xavier", runs=3, seed=5, out=directory)
-    (results / "latest").symlink_to(directory.name)
+    with pytest.MonkeyPatch.context() as patch:
+        patch.setattr("access_av.files.RESULTS", results)
+        study.run("paper", "jetson-agx-xavier", runs=3, seed=5, out=directory)
     return results
 
 

@@ -55,6 +55,9 @@ def test_run_writes_what_it_promises(access_av: Cli, tmp_path: Path) -> None:
     manifest = json.loads((tmp_path / "r/manifest.json").read_text())
     assert manifest["seed"] == 3
     assert access_av("scenario", "check", tmp_path / "r/scenario.toml").code == 0
+    # What the scenario leaves to the platform is written out.
+    assert "base_ms = 80.0" in (tmp_path / "r/scenario.toml").read_text()
+    assert (tmp_path / "results/latest").samefile(tmp_path / "r")
     for name in ("trajectory.tum", "truth.tum"):
         lines = (tmp_path / "r" / name).read_text().splitlines()
         assert all(re.fullmatch(r"\d+\.\d{9}( -?\d+\.\d+){7}", line) for line in lines)
@@ -77,6 +80,7 @@ def test_set_changes_one_key(access_av: Cli, tmp_path: Path) -> None:
     written = (tmp_path / "r/scenario.toml").read_text()
     assert "rician_k_db = 7.5" in written
     assert 'method = "esprit"' in written
+    assert "base_ms = " in written
 
 
 def test_evaluation_leaves_its_files(quick_study: Path) -> None:

@@ -46,12 +46,15 @@ def test_latest_points_to_the_newest(tmp_path: Path, monkeypatch: pytest.MonkeyP
     assert json.loads((tmp_path / "results/latest/claims.json").read_text()) == []
 
 
-def test_a_named_directory_is_used_as_it_is(tmp_path: Path) -> None:
-    directory = ResultsDirectory.create("run", tmp_path / "here")
+def test_a_named_directory_is_used_as_it_is_and_is_the_latest_too(
+    tmp_path: Path, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    monkeypatch.chdir(tmp_path)
+    directory = ResultsDirectory.create("run", tmp_path / "else" / "here")
     directory.write_table("table.parquet", pl.DataFrame({"run": [0]}))
     directory.link_latest()
-    assert sorted(path.name for path in (tmp_path / "here").iterdir()) == ["table.parquet"]
-    assert [path.name for path in tmp_path.iterdir()] == ["here"]
+    assert [path.name for path in directory.path.iterdir()] == ["table.parquet"]
+    assert (tmp_path / "results/latest/table.parquet").samefile(directory.path / "table.parquet")
 
 
 def test_a_file_in_the_way_is_named(tmp_path: Path) -> None:

@@ -243,3 +243,18 @@ def test_smoothing_writes_a_second_trajectory(access_av: Cli, drive: Path, tmp_p
     with (tmp_path / "drive.mcap").open("rb") as file:
         topics = [channel.topic for _, channel, _ in make_reader(file).iter_messages()]
     assert topics.count("/access_av/smoothed") == smoothed.height
+
+
+def test_a_recording_of_two_antennas_is_refused(
+    access_av: Cli, drive: Path, tmp_path: Path
+) -> None:
+    meta = json.loads((drive / "iq.sigmf-meta").read_text())
+    meta["global"]["core:num_channels"] = 2
+    meta["global"].pop("core:sha512", None)
+    (tmp_path / "two.sigmf-meta").write_text(json.dumps(meta))
+    (tmp_path / "two.sigmf-data").symlink_to(drive / "iq.sigmf-data")
+    given = arguments(drive, tmp_path / "out")
+    given[2] = tmp_path / "two.sigmf-meta"
+    done = access_av(*given)
+    assert done.code == 2
+    assert "2 channels; the vehicle's array has 4" in done.err

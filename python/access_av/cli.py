@@ -137,7 +137,7 @@ def run(
         columns = ("time_s", f"{prefix}x_m", f"{prefix}y_m", f"{prefix}heading_rad")
         directory.write_text(name, tum_trajectory(*(first[column] for column in columns)))
     directory.write_text("report.html", render_drive(chosen, result, seed))
-    directory.write_text("scenario.toml", chosen.to_toml())
+    directory.write_text("scenario.toml", chosen.resolved().to_toml())
     directory.write_manifest(scenario=chosen.name, runs=runs, seed=seed)
     directory.link_latest()
 

@@ -38,13 +38,12 @@ class ResultsDirectory:
         return cls(out)
 
     def link_latest(self) -> None:
-        """Point ``results/latest`` here, when this directory is in ``results/``."""
-        if self.path.parent != RESULTS:
-            return
-        link = RESULTS / "latest"
+        """Point ``results/latest`` here, wherever this directory is."""
+        RESULTS.mkdir(parents=True, exist_ok=True)
         fresh = RESULTS / f".latest-{os.getpid()}"
-        fresh.symlink_to(self.path.name, target_is_directory=True)
-        fresh.replace(link)
+        here = os.path.relpath(self.path.resolve(), RESULTS.resolve())
+        fresh.symlink_to(here, target_is_directory=True)
+        fresh.replace(RESULTS / "latest")
 
     def write_text(self, name: str, text: str) -> Path:
         """Write a text file."""

@@ -53,7 +53,7 @@ def run(
     directory.write_table("snr.parquet", evaluation.snr)
     directory.write_json("claims.json", as_records(claims))
     directory.write_text("report.html", render(evaluation, claims))
-    directory.write_text("scenario.toml", evaluation.scenario.to_toml())
+    directory.write_text("scenario.toml", evaluation.scenario.resolved(board.core).to_toml())
     directory.write_text("platform.toml", evaluation.platform.to_toml())
     directory.write_manifest(
         scenario=evaluation.scenario.name,
@@ -108,8 +108,8 @@ def operating_points(
     Parameters
     ----------
     results
-        Directory of an evaluation. ``None`` takes the newest one in ``results/`` and, where there
-        is none, runs the paper's.
+        Directory of an evaluation. ``None`` takes ``results/latest`` if that is one, else the
+        newest one in ``results/`` and, where there is none, runs the paper's.
     progress
         Called as ``progress(done, total)`` while a new one runs.
 
@@ -124,6 +124,7 @@ def operating_points(
             raise InputError(f"{results}: no evaluation here ({POINTS_FILE} is missing)")
     else:
         earlier = sorted(RESULTS.glob(f"*-evaluate/{POINTS_FILE}"))
+        earlier += RESULTS.glob(f"latest/{POINTS_FILE}")
         if not earlier:
             new = run("paper", "jetson-agx-xavier", runs=100, seed=1, progress=progress)
             return _with_energy(new.evaluation.points)

@@ -1,14 +1,14 @@
 //! The onboard computer: its power modes, how fast they estimate and what that costs.
 
 use std::collections::BTreeMap;
-use std::fs;
-use std::path::Path;
 
 use schemars::JsonSchema;
 use serde::{Deserialize, Serialize};
 use toml::Value;
 
-use crate::scenario::{Check, EstimatorMethod, PlatformSettings, Scenario, ScenarioError, read};
+use crate::scenario::{
+    Check, EstimatorMethod, PlatformSettings, Scenario, ScenarioError, WakeUpSettings, read,
+};
 
 /// Names and texts of the shipped platforms.
 const SHIPPED: [(&str, &str); 1] = [(
@@ -151,21 +151,7 @@ impl Platform {
     /// # Errors
     /// [`ScenarioError`] when there is neither, or when what there is cannot be used.
     pub fn load(name_or_path: &str) -> Result<Self, ScenarioError> {
-        if let Some((name, text)) = SHIPPED.iter().find(|shipped| shipped.0 == name_or_path) {
-            return Self::from_toml(text, name);
-        }
-        if !Path::new(name_or_path).exists() {
-            return Err(ScenarioError::unknown_name(
-                "platform",
-                name_or_path,
-                Self::names(),
-            ));
-        }
-        let text = fs::read_to_string(name_or_path).map_err(|source| ScenarioError::Read {
-            file: name_or_path.to_owned(),
-            source,
-        })?;
-        Self::from_toml(&text, name_or_path)
+        read::load("platform", &SHIPPED, name_or_path, Self::from_toml)
     }
 
     /// Reads a platform from TOML; `origin` is the file that errors name.
@@ -191,10 +177,7 @@ impl Platform {
         overrides: impl IntoIterator<Item = (&'a str, Value)>,
     ) -> Result<Self, ScenarioError> {
         let origin = format!("{} with overrides", self.name);
-        let mut table = read::parse(&self.to_toml(), &origin)?;
-        for (path, value) in overrides {
-            read::set(&mut table, path, value, &origin)?;
-        }
+        let table = read::overridden(&self.to_toml(), overrides, &origin)?;
         Self::from_table(table, &origin)
     }
 
@@ -265,6 +248,23 @@ impl Platform {
                 }
                 .error("estimator.method", method, &allowed)
             })
+    }
+
+    /// The scenario with the wake-up times written out that it leaves to the platform.
+    ///
+    /// # Errors
+    /// As [`base_wake_up_s`](Self::base_wake_up_s).
+    pub fn resolve(&self, scenario: &Scenario) -> Result<Scenario, ScenarioError> {
+        let mut resolved = scenario.clone();
+        let time_ms = match &mut resolved.wake_up {
+            WakeUpSettings::Fixed(fixed) => &mut fixed.interval_ms,
+            WakeUpSettings::Pid(pid) => &mut pid.base_ms,
+            WakeUpSettings::Uncertainty(_) => return Ok(resolved),
+        };
+        if time_ms.is_none() {
+            *time_ms = Some(self.base_wake_up_s(scenario)? * 1e3);
+        }
+        Ok(resolved)
     }
 
     fn check(&self, check: &Check<'_>) -> Result<(), ScenarioError> {
@@ -345,6 +345,23 @@ mod tests {
         scenario.estimator.method = EstimatorMethod::MaximumLikelihood;
         let message = xavier.base_wake_up_s(&scenario).unwrap_err().to_string();
         assert!(message.contains("root-music"), "{message}");
+    }
+
+    #[test]
+    fn resolved_scenarios_state_the_platforms_wake_up_time() {
+        let xavier = Platform::load("jetson-agx-xavier").unwrap();
+        let mut scenario = Scenario::load("paper").unwrap();
+        scenario.platform.mode = 1;
+        let resolved = xavier.resolve(&scenario).unwrap();
+        assert!(resolved.to_toml().contains("base_ms = 150.0"));
+        assert_eq!(xavier.resolve(&resolved).unwrap(), resolved);
+        let fixed = scenario
+            .with_overrides([("wake_up.policy", "fixed".into())])
+            .unwrap();
+        let resolved = xavier.resolve(&fixed).unwrap().to_toml();
+        assert!(resolved.contains("interval_ms = 150.0"));
+        let yard = Scenario::load("yard").unwrap();
+        assert_eq!(xavier.resolve(&yard).unwrap(), yard);
     }
 
     #[test]

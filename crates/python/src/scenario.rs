@@ -21,69 +21,77 @@ pub fn scenario_error(error: CoreError) -> PyErr {
     ScenarioError::new_err(error.to_string())
 }
 
-/// A scenario, checked.
-#[pyclass(frozen, eq, module = "access_av._core")]
-#[derive(PartialEq)]
-pub struct Scenario(pub CoreScenario);
+/// A Python class for a checked TOML file of which some are shipped by name, with what is its own.
+macro_rules! toml_file {
+    ($(#[$doc:meta])* $class:ident($core:ty), $what:literal, $($own:tt)*) => {
+        $(#[$doc])*
+        #[pyclass(frozen, eq, module = "access_av._core")]
+        #[derive(PartialEq)]
+        pub struct $class(pub $core);
 
-#[pymethods]
-impl Scenario {
-    /// Load a shipped scenario by its name, or else a scenario file by its path.
-    #[staticmethod]
-    fn load(name_or_path: &str) -> PyResult<Self> {
-        CoreScenario::load(name_or_path)
-            .map(Self)
-            .map_err(scenario_error)
-    }
+        #[pymethods]
+        impl $class {
+            #[doc = concat!("Load a shipped ", $what, " by its name, or else a ", $what,
+                " file by its path.")]
+            #[staticmethod]
+            fn load(name_or_path: &str) -> PyResult<Self> {
+                <$core>::load(name_or_path).map(Self).map_err(scenario_error)
+            }
 
-    /// Read a scenario from TOML; `origin` is the file that errors name.
-    #[staticmethod]
-    #[pyo3(signature = (text, origin = "<string>"))]
-    fn from_toml(text: &str, origin: &str) -> PyResult<Self> {
-        CoreScenario::from_toml(text, origin)
-            .map(Self)
-            .map_err(scenario_error)
-    }
+            #[doc = concat!("Read a ", $what, " from TOML; `origin` is the file that errors name.")]
+            #[staticmethod]
+            #[pyo3(signature = (text, origin = "<string>"))]
+            fn from_toml(text: &str, origin: &str) -> PyResult<Self> {
+                <$core>::from_toml(text, origin).map(Self).map_err(scenario_error)
+            }
 
-    /// Names of the shipped scenarios.
-    #[staticmethod]
-    fn names() -> Vec<&'static str> {
-        CoreScenario::names().collect()
-    }
+            #[doc = concat!("Names of the shipped ", $what, "s.")]
+            #[staticmethod]
+            fn names() -> Vec<&'static str> {
+                <$core>::names().collect()
+            }
 
-    /// JSON Schema of a scenario file.
-    #[staticmethod]
-    fn schema_json() -> String {
-        CoreScenario::schema_json()
-    }
+            #[doc = concat!("JSON Schema of a ", $what, " file.")]
+            #[staticmethod]
+            fn schema_json() -> String {
+                <$core>::schema_json()
+            }
 
-    /// This scenario with single keys set, such as `{"channel.rician_k_db": 10.0}`.
-    fn with_overrides(&self, overrides: &Bound<'_, PyDict>) -> PyResult<Self> {
-        let pairs = pairs(overrides)?;
-        let borrowed = pairs
-            .iter()
-            .map(|(path, value)| (path.as_str(), value.clone()));
-        self.0
-            .with_overrides(borrowed)
-            .map(Self)
-            .map_err(scenario_error)
-    }
+            #[doc = concat!("This ", $what, " with single keys set, by their dotted paths.")]
+            fn with_overrides(&self, overrides: &Bound<'_, PyDict>) -> PyResult<Self> {
+                let pairs = pairs(overrides)?;
+                let borrowed = pairs.iter().map(|(path, value)| (path.as_str(), value.clone()));
+                self.0.with_overrides(borrowed).map(Self).map_err(scenario_error)
+            }
 
-    /// The scenario as TOML, every default written out.
-    fn to_toml(&self) -> String {
-        self.0.to_toml()
-    }
+            #[doc = concat!("The ", $what, " as TOML, every default written out.")]
+            fn to_toml(&self) -> String {
+                self.0.to_toml()
+            }
 
-    /// The scenario as JSON, every default written out.
-    fn to_json(&self) -> String {
-        self.0.to_json()
-    }
+            #[doc = concat!("The ", $what, " as JSON, every default written out.")]
+            fn to_json(&self) -> String {
+                self.0.to_json()
+            }
 
-    /// Short name.
-    #[getter]
-    fn name(&self) -> &str {
-        &self.0.name
-    }
+            /// Short name.
+            #[getter]
+            fn name(&self) -> &str {
+                &self.0.name
+            }
+
+            fn __repr__(&self) -> String {
+                format!("{}({:?})", stringify!($class), self.0.name)
+            }
+
+            $($own)*
+        }
+    };
+}
+
+toml_file! {
+    /// A scenario, checked.
+    Scenario(CoreScenario), "scenario",
 
     /// What the scenario is for.
     #[getter]
@@ -91,78 +99,22 @@ impl Scenario {
         &self.0.description
     }
 
-    fn __repr__(&self) -> String {
-        format!("Scenario({:?})", self.0.name)
+    /// The scenario with the wake-up times written out that it leaves to the platform, which is
+    /// the one it names unless another is given.
+    #[pyo3(signature = (platform = None))]
+    fn resolved(&self, platform: Option<&Platform>) -> PyResult<Self> {
+        let resolved = match platform {
+            Some(platform) => platform.0.resolve(&self.0),
+            None => CorePlatform::load(&self.0.platform.name)
+                .and_then(|platform| platform.resolve(&self.0)),
+        };
+        resolved.map(Self).map_err(scenario_error)
     }
 }
 
-/// A platform, checked.
-#[pyclass(frozen, eq, module = "access_av._core")]
-#[derive(PartialEq)]
-pub struct Platform(pub CorePlatform);
-
-#[pymethods]
-impl Platform {
-    /// Load a shipped platform by its name, or else a platform file by its path.
-    #[staticmethod]
-    fn load(name_or_path: &str) -> PyResult<Self> {
-        CorePlatform::load(name_or_path)
-            .map(Self)
-            .map_err(scenario_error)
-    }
-
-    /// Read a platform from TOML; `origin` is the file that errors name.
-    #[staticmethod]
-    #[pyo3(signature = (text, origin = "<string>"))]
-    fn from_toml(text: &str, origin: &str) -> PyResult<Self> {
-        CorePlatform::from_toml(text, origin)
-            .map(Self)
-            .map_err(scenario_error)
-    }
-
-    /// Names of the shipped platforms.
-    #[staticmethod]
-    fn names() -> Vec<&'static str> {
-        CorePlatform::names().collect()
-    }
-
-    /// JSON Schema of a platform file.
-    #[staticmethod]
-    fn schema_json() -> String {
-        CorePlatform::schema_json()
-    }
-
-    /// This platform with single keys set, such as `{"modes[0].cores": 4}`.
-    fn with_overrides(&self, overrides: &Bound<'_, PyDict>) -> PyResult<Self> {
-        let pairs = pairs(overrides)?;
-        let borrowed = pairs
-            .iter()
-            .map(|(path, value)| (path.as_str(), value.clone()));
-        self.0
-            .with_overrides(borrowed)
-            .map(Self)
-            .map_err(scenario_error)
-    }
-
-    /// The platform as TOML, every default written out.
-    fn to_toml(&self) -> String {
-        self.0.to_toml()
-    }
-
-    /// The platform as JSON, every default written out.
-    fn to_json(&self) -> String {
-        self.0.to_json()
-    }
-
-    /// Short name.
-    #[getter]
-    fn name(&self) -> &str {
-        &self.0.name
-    }
-
-    fn __repr__(&self) -> String {
-        format!("Platform({:?})", self.0.name)
-    }
+toml_file! {
+    /// A platform, checked.
+    Platform(CorePlatform), "platform",
 }
 
 fn pairs(overrides: &Bound<'_, PyDict>) -> PyResult<Vec<(String, Value)>> {

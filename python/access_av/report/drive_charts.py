@@ -28,24 +28,12 @@ ROAD_STEP_M = 2.0
 def error_against_time(steps: pl.DataFrame) -> Spec:
     """Quantiles of the horizontal error over the runs, against time."""
     names = {"p50_error_m": "median", "p90_error_m": "90th percentile", "rms_error_m": "RMS"}
-    lines = (
-        thinned(steps.select("time_s", *names))
-        .rename(names)
-        .unpivot(index="time_s", variable_name="line", value_name="error_m")
-    )
-    chart = (
-        alt.Chart(lines)
-        .mark_line(strokeWidth=1.8)
-        .encode(
-            x=alt.X("time_s:Q", title="time / s"),
-            y=alt.Y("error_m:Q", title="horizontal error / m"),
-            color=_colours(list(names.values()), [BLUE, ORANGE, GREEN]),
-            tooltip=[
-                alt.Tooltip("line:N", title="over the runs"),
-                alt.Tooltip("time_s:Q", title="time / s", format=".1f"),
-                alt.Tooltip("error_m:Q", title="error / m", format=".3f"),
-            ],
-        )
+    chart = _lines(
+        steps,
+        names,
+        line="over the runs",
+        x=("time_s", "time / s"),
+        y=("error_m", "horizontal error / m"),
     )
     return finish(chart, height=240, description="Horizontal error against time, over the runs")
 
@@ -143,24 +131,12 @@ def _bin(length_m: pl.Expr) -> pl.Expr:
 def bound_along_route(route: pl.DataFrame) -> Spec:
     """The bound against the distance driven, and its parts along and across the road."""
     names = {"bound_m": "horizontal", "along_std_m": "along the road", "across_std_m": "across it"}
-    lines = (
-        thinned(route.select("along_m", *names))
-        .rename(names)
-        .unpivot(index="along_m", variable_name="line", value_name="bound_m")
-    )
-    chart = (
-        alt.Chart(lines)
-        .mark_line(strokeWidth=1.8)
-        .encode(
-            x=alt.X("along_m:Q", title="along the road / m"),
-            y=alt.Y("bound_m:Q", title="least RMS error / m"),
-            color=_colours(list(names.values()), [BLUE, ORANGE, GREEN]),
-            tooltip=[
-                alt.Tooltip("line:N", title="error"),
-                alt.Tooltip("along_m:Q", title="along / m", format=".1f"),
-                alt.Tooltip("bound_m:Q", title="bound / m", format=".3f"),
-            ],
-        )
+    chart = _lines(
+        route,
+        names,
+        line="error",
+        x=("along_m", "along the road / m"),
+        y=("bound_m", "least RMS error / m"),
     )
     return finish(chart, height=260, description="Least RMS error of any localizer on the route")
 
@@ -229,6 +205,34 @@ def _road(route: pl.DataFrame) -> pl.DataFrame:
     )
 
 
-def _colours(names: list[str], colours: list[str]) -> alt.Color:
-    scale = alt.Scale(domain=names, range=colours)
-    return alt.Color("line:N", scale=scale, legend=alt.Legend(title=None))
+def _lines(
+    table: pl.DataFrame,
+    names: dict[str, str],
+    *,
+    line: str,
+    x: tuple[str, str],
+    y: tuple[str, str],
+) -> alt.Chart:
+    """A line for each column of ``names``; ``x`` and ``y`` are columns and their titles."""
+    (across, x_title), (upward, y_title) = x, y
+    rows = (
+        thinned(table.select(across, *names))
+        .rename(names)
+        .unpivot(index=across, variable_name="line", value_name=upward)
+    )
+    scale = alt.Scale(domain=list(names.values()), range=[BLUE, ORANGE, GREEN])
+    chart: alt.Chart = (
+        alt.Chart(rows)
+        .mark_line(strokeWidth=1.8)
+        .encode(
+            x=alt.X(f"{across}:Q", title=x_title),
+            y=alt.Y(f"{upward}:Q", title=y_title),
+            color=alt.Color("line:N", scale=scale, legend=alt.Legend(title=None)),
+            tooltip=[
+                alt.Tooltip("line:N", title=line),
+                alt.Tooltip(f"{across}:Q", title=x_title, format=".1f"),
+                alt.Tooltip(f"{upward}:Q", title=y_title, format=".3f"),
+            ],
+        )
+    )
+    return chart

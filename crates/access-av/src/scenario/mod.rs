@@ -18,9 +18,6 @@ mod track_file;
 mod tracker;
 mod wake_up;
 
-use std::fs;
-use std::path::Path;
-
 use schemars::JsonSchema;
 use serde::{Deserialize, Serialize};
 use toml::Value;
@@ -141,22 +138,12 @@ impl Scenario {
     /// # Errors
     /// [`ScenarioError`] when there is neither, or when what there is cannot be used.
     pub fn load(name_or_path: &str) -> Result<Self, ScenarioError> {
-        if let Some((name, text)) = shipped::SCENARIOS.iter().find(|s| s.0 == name_or_path) {
-            return Self::from_toml(text, name);
-        }
-        let path = Path::new(name_or_path);
-        if !path.exists() {
-            return Err(ScenarioError::unknown_name(
-                "scenario",
-                name_or_path,
-                Self::names(),
-            ));
-        }
-        let text = fs::read_to_string(path).map_err(|source| ScenarioError::Read {
-            file: name_or_path.to_owned(),
-            source,
-        })?;
-        Self::from_toml(&text, name_or_path)
+        read::load(
+            "scenario",
+            &shipped::SCENARIOS,
+            name_or_path,
+            Self::from_toml,
+        )
     }
 
     /// Reads a scenario from TOML. `origin` is the file that errors name, and against whose place
@@ -187,12 +174,7 @@ impl Scenario {
         overrides: impl IntoIterator<Item = (&'a str, Value)>,
     ) -> Result<Self, ScenarioError> {
         let origin = format!("{} with overrides", self.name);
-        let mut table = read::parse(&self.to_toml(), &origin)?;
-        let mut overrides: Vec<_> = overrides.into_iter().collect();
-        overrides.sort_by_key(|(path, _)| !read::ends_in_tag(path));
-        for (path, value) in overrides {
-            read::set(&mut table, path, value, &origin)?;
-        }
+        let table = read::overridden(&self.to_toml(), overrides, &origin)?;
         Self::from_table(table, &origin)
     }
 

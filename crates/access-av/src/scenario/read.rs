@@ -1,5 +1,8 @@
 //! From TOML text to checked settings, and overriding single keys.
 
+use std::fs;
+use std::path::Path;
+
 use serde::de::DeserializeOwned;
 use toml::{Table, Value};
 
@@ -7,6 +10,42 @@ use super::error::{ScenarioError, nearest};
 
 /// Tags that decide which other keys their table may have.
 const TAGS: [&str; 2] = ["policy", "kind"];
+
+/// Loads a shipped file of the kind `what` by its name, or else a file by its path.
+pub(crate) fn load<T>(
+    what: &'static str,
+    shipped: &[(&'static str, &str)],
+    name_or_path: &str,
+    from_toml: fn(&str, &str) -> Result<T, ScenarioError>,
+) -> Result<T, ScenarioError> {
+    if let Some((name, text)) = shipped.iter().find(|it| it.0 == name_or_path) {
+        return from_toml(text, name);
+    }
+    if !Path::new(name_or_path).exists() {
+        let names = shipped.iter().map(|(name, _)| *name);
+        return Err(ScenarioError::unknown_name(what, name_or_path, names));
+    }
+    let text = fs::read_to_string(name_or_path).map_err(|source| ScenarioError::Read {
+        file: name_or_path.to_owned(),
+        source,
+    })?;
+    from_toml(&text, name_or_path)
+}
+
+/// A file's text as a table with single keys set; tags first, which decide about the others.
+pub(crate) fn overridden<'a>(
+    text: &str,
+    overrides: impl IntoIterator<Item = (&'a str, Value)>,
+    file: &str,
+) -> Result<Table, ScenarioError> {
+    let mut table = parse(text, file)?;
+    let mut overrides: Vec<_> = overrides.into_iter().collect();
+    overrides.sort_by_key(|(path, _)| !ends_in_tag(path));
+    for (path, value) in overrides {
+        set(&mut table, path, value, file)?;
+    }
+    Ok(table)
+}
 
 /// Parses TOML into a table.
 pub(crate) fn parse(text: &str, file: &str) -> Result<Table, ScenarioError> {
@@ -170,7 +209,7 @@ fn join(path: &str, key: &str) -> String {
 }
 
 /// Whether a path names a tag.
-pub(crate) fn ends_in_tag(path: &str) -> bool {
+fn ends_in_tag(path: &str) -> bool {
     TAGS.contains(&path.rsplit_once('.').map_or(path, |(_, key)| key))
 }
 
@@ -178,12 +217,7 @@ pub(crate) fn ends_in_tag(path: &str) -> bool {
 ///
 /// Where the path ends in a tag (`wake_up.policy`) whose value changes, the table's other keys
 /// belonged to the old variant and are dropped.
-pub(crate) fn set(
-    table: &mut Table,
-    path: &str,
-    value: Value,
-    file: &str,
-) -> Result<(), ScenarioError> {
+fn set(table: &mut Table, path: &str, value: Value, file: &str) -> Result<(), ScenarioError> {
     let no_such = || ScenarioError::Shape {
         file: file.to_owned(),
         key: path.to_owned(),
