@@ -40,23 +40,27 @@ impl<const A: usize> Despread<A> {
             sums: [[[Complex64::ZERO; A]; GROUPS]; SYMBOLS],
             counts: [[0.0; GROUPS]; SYMBOLS],
         };
-        let step = Complex64::cis(TAU * delay / FFT_SIZE);
-        let first = Complex64::cis(-TAU * delay / FFT_SIZE * 0.5 * SUBCARRIERS as f64);
+        let cycles = delay / FFT_SIZE;
+        let step = Complex64::cis(TAU * cycles);
+        let mut turn = Complex64::cis(-TAU * cycles * 0.5 * SUBCARRIERS as f64);
+        let ramp: [Complex64; SUBCARRIERS] = std::array::from_fn(|_| {
+            let here = turn;
+            turn *= step;
+            here
+        });
         let groups = result.sums.iter_mut().zip(&mut result.counts);
         for (l, ((sums, counts), known)) in groups.zip(known.symbols()).enumerate() {
-            let used = subcarriers(pilots, l);
-            let mut turn = first;
-            for (k, s) in known.iter().enumerate() {
-                let known = s.norm_sqr();
-                if known > 0.5 && used.contains(&k) {
-                    let weight = Complex64::new(s.re.into(), s.im.into()).conj() * turn;
+            for k in subcarriers(pilots, l) {
+                let s = known[k];
+                let energy = s.norm_sqr();
+                if energy > 0.5 {
+                    let weight = Complex64::new(s.re.into(), s.im.into()).conj() * ramp[k];
                     for (sum, grid) in sums[k / GROUP].iter_mut().zip(&elements) {
                         let y = grid[l][k];
                         *sum += Complex64::new(y.re.into(), y.im.into()) * weight;
                     }
-                    counts[k / GROUP] += f64::from(known);
+                    counts[k / GROUP] += f64::from(energy);
                 }
-                turn *= step;
             }
         }
         result
