@@ -124,7 +124,6 @@ impl Burst {
     pub fn add_to(&self, ofdm: &mut Ofdm, half_frame: &mut [Complex32]) -> Result<(), Error> {
         let numerology = ofdm.numerology();
         self.check_layout(numerology, half_frame.len())?;
-        let mut symbol_samples = vec![Complex32::ZERO; numerology.ssb_symbol_len()];
         for beam in &self.beams {
             let (first, grid) = self.placed(beam.ssb_index)?;
             for (l, subcarriers) in grid.symbols().enumerate() {
@@ -132,11 +131,14 @@ impl Burst {
                 let phase = self.ssb_freq_hz.map_or(Complex32::ONE, |freq_hz| {
                     symbol_phase(numerology, symbol, freq_hz)
                 });
-                ofdm.modulate(subcarriers, &mut symbol_samples)?;
-                let place = half_frame.iter_mut().skip(numerology.symbol_start(symbol));
-                for (sum, sample) in place.zip(&symbol_samples) {
-                    *sum += sample * beam.gain * phase;
-                }
+                let place = half_frame.get_mut(numerology.symbol_start(symbol)..);
+                let cp_len = numerology.ssb_cp_len();
+                ofdm.add(
+                    subcarriers,
+                    beam.gain * phase,
+                    cp_len,
+                    place.unwrap_or_default(),
+                );
             }
         }
         Ok(())

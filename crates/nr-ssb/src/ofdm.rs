@@ -87,19 +87,32 @@ impl Ofdm {
                 expected: self.numerology.ssb_symbol_len(),
             });
         }
+        samples.fill(Complex32::ZERO);
+        self.add(subcarriers, Complex32::ONE, cp_len, samples);
+        Ok(())
+    }
+
+    /// Add one symbol, times `gain`, behind a cyclic prefix of `cp_len` up to N, to the first of the
+    /// samples.
+    pub(crate) fn add(
+        &mut self,
+        subcarriers: &[Complex32; SUBCARRIERS],
+        gain: Complex32,
+        cp_len: usize,
+        samples: &mut [Complex32],
+    ) {
+        let size = self.numerology.fft_size();
         self.spectrum.fill(Complex32::ZERO);
         let (negative, positive) = subcarriers.split_at(SUBCARRIERS / 2);
         self.spectrum[..SUBCARRIERS / 2].copy_from_slice(positive);
         self.spectrum[size - SUBCARRIERS / 2..].copy_from_slice(negative);
         self.inverse
             .process_with_scratch(&mut self.spectrum, &mut self.scratch);
-        let scale = 1.0 / size as f32;
-        let (prefix, symbol) = samples.split_at_mut(cp_len);
-        for (sample, value) in symbol.iter_mut().zip(&self.spectrum) {
-            *sample = value * scale;
+        let scale = gain / size as f32;
+        let values = self.spectrum[size - cp_len..].iter().chain(&self.spectrum);
+        for (sample, value) in samples.iter_mut().zip(values) {
+            *sample += value * scale;
         }
-        prefix.copy_from_slice(&symbol[size - cp_len..]);
-        Ok(())
     }
 
     /// The subcarriers of one symbol, from N samples that begin `early` samples before the end of the

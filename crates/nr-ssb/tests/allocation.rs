@@ -6,9 +6,9 @@ mod air;
 use std::alloc::{GlobalAlloc, Layout, System};
 use std::cell::Cell;
 
-use nr_ssb::SubcarrierSpacing;
 use nr_ssb::search::{SearchConfig, Searcher};
 use nr_ssb::track::Tracker;
+use nr_ssb::{BchPayload, Beam, Burst, Case, Lmax, Mib, Numerology, Ofdm, Pci, SubcarrierSpacing};
 
 thread_local! {
     static ALLOCATIONS: Cell<usize> = const { Cell::new(0) };
@@ -119,4 +119,23 @@ fn warm_tracking_allocates_nothing() {
     };
     visit();
     assert_eq!(allocations(visit), 0);
+}
+
+#[test]
+fn adding_a_burst_allocates_nothing() {
+    let burst = Burst {
+        pci: Pci::new(601).unwrap(),
+        case: Case::C,
+        lmax: Lmax::L8,
+        payload: BchPayload::new(Mib::default(), 341, false, 0).unwrap(),
+        beams: (0..8).map(Beam::new).collect(),
+        ssb_freq_hz: Some(3.7008e9),
+    };
+    let numerology = Numerology::new(Case::C.spacing(), 512).unwrap();
+    let mut ofdm = Ofdm::new(numerology);
+    let mut half_frame = vec![nr_ssb::Complex32::ZERO; numerology.half_frame_len()];
+    let mut add = || burst.add_to(&mut ofdm, &mut half_frame).unwrap();
+    add();
+    assert_eq!(allocations(add), 0);
+    assert!(half_frame.iter().any(|x| x.norm_sqr() > 0.0));
 }
