@@ -76,10 +76,7 @@ pub struct FrontEnd {
     /// Output samples per input block: L/M.
     interpolation: usize,
     decimation: usize,
-    /// Bin of the input spectrum that becomes 0 Hz.
-    centre_bin: i64,
-    /// What the choice of bins leaves, in cycles per output sample.
-    residual_cycles: f64,
+    tuning: Tuning,
     low_pass: Vec<f32>,
     spectrum: Vec<Complex32>,
     block: Vec<Complex32>,
@@ -90,6 +87,15 @@ pub struct FrontEnd {
     consumed_input: u64,
     /// Samples given out so far, per antenna.
     produced: u64,
+}
+
+/// Which frequency becomes 0 Hz.
+#[derive(Debug, Clone, Copy, Default)]
+struct Tuning {
+    /// Bin of the input spectrum.
+    centre_bin: i64,
+    /// What the choice of bins leaves, in cycles per output sample.
+    residual_cycles: f64,
 }
 
 impl FrontEnd {
@@ -131,8 +137,7 @@ impl FrontEnd {
             input_block,
             interpolation,
             decimation,
-            centre_bin: 0,
-            residual_cycles: 0.0,
+            tuning: Tuning::default(),
             low_pass: low_pass(input_block),
             spectrum: vec![Complex32::ZERO; input_block],
             block: vec![Complex32::ZERO; BLOCK],
@@ -151,6 +156,11 @@ impl FrontEnd {
     /// # Errors
     /// [`FrontEndError::OutOfBand`].
     pub fn tune(&mut self, offset_hz: f64) -> Result<(), FrontEndError> {
+        self.tuning = self.tuning_to(offset_hz)?;
+        Ok(())
+    }
+
+    fn tuning_to(&self, offset_hz: f64) -> Result<Tuning, FrontEndError> {
         let edge_hz = offset_hz.abs() + 120.0 * self.scs_hz;
         if edge_hz.is_nan() || edge_hz > 0.5 * self.input_rate_hz {
             return Err(FrontEndError::OutOfBand {
@@ -161,9 +171,10 @@ impl FrontEnd {
         let base_rate_hz = SYMBOL_FFT as f64 * self.scs_hz;
         let bin_hz = base_rate_hz / BLOCK as f64;
         let centre_bin = (offset_hz / bin_hz).round();
-        self.centre_bin = centre_bin as i64;
-        self.residual_cycles = (offset_hz - centre_bin * bin_hz) / base_rate_hz;
-        Ok(())
+        Ok(Tuning {
+            centre_bin: centre_bin as i64,
+            residual_cycles: (offset_hz - centre_bin * bin_hz) / base_rate_hz,
+        })
     }
 
     /// Input samples per output sample, M/L.
@@ -181,27 +192,43 @@ impl FrontEnd {
         antennas: &[S],
         output: &mut [Vec<Complex32>],
     ) -> Result<(), FrontEndError> {
-        let length = self.common_length(antennas, output)?;
+        self.push_at(antennas, &[self.tuning], &mut [output])
+    }
+
+    fn push_at<S: AsRef<[Complex32]>>(
+        &mut self,
+        antennas: &[S],
+        tunings: &[Tuning],
+        outputs: &mut [&mut [Vec<Complex32>]],
+    ) -> Result<(), FrontEndError> {
+        let mut length = 0;
+        for output in outputs.iter() {
+            length = self.common_length(antennas, output)?;
+        }
         for (pending, input) in self.pending.iter_mut().zip(antennas) {
             pending.extend_from_slice(input.as_ref());
         }
         self.consumed_input += length as u64;
-        self.run_blocks(output);
+        self.run_blocks(tunings, outputs);
         Ok(())
     }
 
     /// Ends the stream: appends the samples held back. The front end is then ready for another.
     pub fn finish(&mut self, output: &mut [Vec<Complex32>]) {
+        self.finish_at(&[self.tuning], &mut [output]);
+    }
+
+    fn finish_at(&mut self, tunings: &[Tuning], outputs: &mut [&mut [Vec<Complex32>]]) {
         let (up, down) = (self.interpolation as u64, self.decimation as u64);
         let total = (self.consumed_input * up).div_ceil(down);
         while self.produced < total {
             for pending in &mut self.pending {
                 pending.resize(self.input_block, Complex32::ZERO);
             }
-            self.run_blocks(output);
+            self.run_blocks(tunings, outputs);
         }
         let excess = self.produced.saturating_sub(total) as usize;
-        for samples in output.iter_mut() {
+        for samples in outputs.iter_mut().flat_map(|output| output.iter_mut()) {
             samples.truncate(samples.len() - excess.min(samples.len()));
         }
         let lead_in = MARGIN / self.interpolation * self.decimation;
@@ -225,6 +252,30 @@ impl FrontEnd {
         self.push(antennas, &mut output)?;
         self.finish(&mut output);
         Ok(output)
+    }
+
+    /// A whole recording brought to several offsets at once, each with its own output for every
+    /// antenna: the transform of the input, most of the work at high rates, is done only once.
+    ///
+    /// # Errors
+    /// As [`tune`](Self::tune) and [`push`](Self::push).
+    pub(crate) fn process_at<S: AsRef<[Complex32]>>(
+        &mut self,
+        antennas: &[S],
+        offsets_hz: &[f64],
+        outputs: &mut [Vec<Vec<Complex32>>],
+    ) -> Result<(), FrontEndError> {
+        let tunings = offsets_hz
+            .iter()
+            .map(|offset_hz| self.tuning_to(*offset_hz));
+        let tunings: Vec<_> = tunings.collect::<Result<_, _>>()?;
+        let mut outputs: Vec<_> = outputs.iter_mut().map(Vec::as_mut_slice).collect();
+        for samples in outputs.iter_mut().flat_map(|output| output.iter_mut()) {
+            samples.clear();
+        }
+        self.push_at(antennas, &tunings, &mut outputs)?;
+        self.finish_at(&tunings, &mut outputs);
+        Ok(())
     }
 
     fn common_length<S: AsRef<[Complex32]>>(
@@ -251,36 +302,40 @@ impl FrontEnd {
         }
     }
 
-    fn run_blocks(&mut self, output: &mut [Vec<Complex32>]) {
+    fn run_blocks(&mut self, tunings: &[Tuning], outputs: &mut [&mut [Vec<Complex32>]]) {
         let hop_output = BLOCK - 2 * MARGIN;
         let hop_input = hop_output / self.interpolation * self.decimation;
-        while self
-            .pending
-            .first()
-            .is_some_and(|pending| pending.len() >= self.input_block)
-        {
-            let (phase, step) = self.block_phase();
+        let available = self.pending.first().map_or(0, Vec::len);
+        let mut start = 0;
+        while start + self.input_block <= available {
             for antenna in 0..self.pending.len() {
-                self.spectrum
-                    .copy_from_slice(&self.pending[antenna][..self.input_block]);
-                self.pending[antenna].drain(..hop_input);
-                self.filter_block();
-                let mut rotation = phase;
-                output[antenna].extend(self.block[MARGIN..BLOCK - MARGIN].iter().map(|sample| {
-                    let rotated = sample * Complex32::new(rotation.re as f32, rotation.im as f32);
-                    rotation *= step;
-                    rotated
-                }));
+                let input = &self.pending[antenna][start..start + self.input_block];
+                self.spectrum.copy_from_slice(input);
+                self.forward
+                    .process_with_scratch(&mut self.spectrum, &mut self.scratch);
+                for (tuning, output) in tunings.iter().zip(outputs.iter_mut()) {
+                    self.filter_block(tuning);
+                    let (mut rotation, step) = self.block_phase(tuning);
+                    let kept = self.block[MARGIN..BLOCK - MARGIN].iter();
+                    output[antenna].extend(kept.map(|sample| {
+                        let rotated =
+                            sample * Complex32::new(rotation.re as f32, rotation.im as f32);
+                        rotation *= step;
+                        rotated
+                    }));
+                }
             }
+            start += hop_input;
             self.produced += hop_output as u64;
+        }
+        for pending in &mut self.pending {
+            pending.drain(..start);
         }
     }
 
-    /// Transforms `spectrum` and leaves the filtered block at the base rate in `block`.
-    fn filter_block(&mut self) {
-        self.forward
-            .process_with_scratch(&mut self.spectrum, &mut self.scratch);
-        let first = (self.centre_bin - (BLOCK / 2) as i64).rem_euclid(self.input_block as i64);
+    /// Leaves the part of `spectrum` around the tuning, filtered and at the base rate, in `block`.
+    fn filter_block(&mut self, tuning: &Tuning) {
+        let first = (tuning.centre_bin - (BLOCK / 2) as i64).rem_euclid(self.input_block as i64);
         let mut source = first as usize;
         for (index, weight) in self.low_pass.iter().enumerate() {
             self.block[(index + BLOCK / 2) % BLOCK] = self.spectrum[source] * *weight;
@@ -294,15 +349,16 @@ impl FrontEnd {
     }
 
     /// Phase of the mixer at the first sample of the next output hop, and its step per sample.
-    fn block_phase(&self) -> (Complex64, Complex64) {
+    fn block_phase(&self, tuning: &Tuning) -> (Complex64, Complex64) {
         let hop_start = i128::from(self.produced) - MARGIN as i128;
         let start_input = hop_start / self.interpolation as i128 * self.decimation as i128;
-        let bins = (i128::from(self.centre_bin) * start_input).rem_euclid(self.input_block as i128);
+        let bins =
+            (i128::from(tuning.centre_bin) * start_input).rem_euclid(self.input_block as i128);
         let cycles = bins as f64 / self.input_block as f64
-            + (self.residual_cycles * self.produced as f64).fract();
+            + (tuning.residual_cycles * self.produced as f64).fract();
         (
             Complex64::cis(-TAU * cycles),
-            Complex64::cis(-TAU * self.residual_cycles),
+            Complex64::cis(-TAU * tuning.residual_cycles),
         )
     }
 }

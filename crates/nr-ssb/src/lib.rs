@@ -109,6 +109,7 @@ pub mod ofdm;
 pub mod payload;
 pub mod pbch;
 mod pci;
+mod point_search;
 pub mod polar;
 pub mod pss;
 mod qpsk;

@@ -72,7 +72,7 @@ pub struct MatchedFilter {
     /// Statistics of one hypothesis, then the best and whose it is: even lags, then odd ones.
     sum: Vec<f32>,
     best: Vec<f32>,
-    best_hypothesis: Vec<u16>,
+    best_hypothesis: Vec<u32>,
 }
 
 impl MatchedFilter {
@@ -189,12 +189,12 @@ impl MatchedFilter {
                 self.best_hypothesis.fill(0);
                 continue;
             }
-            let kept = self.best.iter_mut().zip(&mut self.best_hypothesis);
-            for ((best, index), sum) in kept.zip(&self.sum) {
-                let better = *sum > *best;
-                *best = if better { *sum } else { *best };
-                *index = if better { hypothesis as u16 } else { *index };
-            }
+            keep_best(
+                &mut self.best,
+                &mut self.best_hypothesis,
+                &self.sum,
+                hypothesis as u32,
+            );
         }
     }
 
@@ -216,7 +216,7 @@ impl MatchedFilter {
             let candidate = PssCandidate {
                 n_id_2,
                 sample: start + lag,
-                cfo_hz: self.hypotheses[usize::from(hypothesis)] as f64 * self.bin_hz,
+                cfo_hz: self.hypotheses[hypothesis as usize] as f64 * self.bin_hz,
                 statistic,
             };
             let near = candidates.iter_mut().rev().take(64).find(|other| {
@@ -256,6 +256,18 @@ fn add_power(even: &mut [f32], odd: &mut [f32], correlation: &[Complex32], inver
         let (re, im) = (a.re + b.re, a.im + b.im);
         even[i] += (a.re * a.re + a.im * a.im) * scale;
         odd[i] += (re * re + im * im) * (0.5 * scale);
+    }
+}
+
+/// Keeps the larger statistic and whose it is, without a branch: lanes as wide as the statistics'.
+fn keep_best(best: &mut [f32], index: &mut [u32], sum: &[f32], hypothesis: u32) {
+    let n = sum.len();
+    let (best, index) = (&mut best[..n], &mut index[..n]);
+    for i in 0..n {
+        let better = u32::from(sum[i] > best[i]).wrapping_neg();
+        let bits = best[i].to_bits() & !better | sum[i].to_bits() & better;
+        best[i] = f32::from_bits(bits);
+        index[i] = index[i] & !better | hypothesis & better;
     }
 }
 

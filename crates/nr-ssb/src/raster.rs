@@ -6,23 +6,12 @@ use std::ops::RangeInclusive;
 
 use num_complex::Complex32;
 
-use crate::false_alarm::exponential_sum_threshold;
-use crate::front_end::{FrontEnd, FrontEndError};
+use crate::front_end::FrontEndError;
 use crate::global_raster::placed_at;
 use crate::grid::SUBCARRIERS;
-use crate::matched_filter::MatchedFilter;
 use crate::numerology::SubcarrierSpacing;
-use crate::search::{DetectedSsb, SearchConfig, SearchError, Searcher, cfo_hypotheses};
-
-/// Off the raster, the PSS is looked for at multiples of this off the recording's centre.
-const OFFSET_UNIT_HZ: f64 = 15e3;
-/// Half of what one tuning of the front end shows of the band: the PSS's 127 subcarriers may lie
-/// anywhere among 240.
-const TILE_SUBCARRIERS: f64 = 55.0;
-/// Maxima that noise may offer in a scan off the raster.
-const NOISE_CANDIDATES: f64 = 4.0;
-/// Points off the raster that are searched at most, per spacing.
-const MOST_POINTS: usize = 16;
+use crate::point_search::{OFFSET_UNIT_HZ, PointSearch, nearest_offset};
+use crate::search::{DetectedSsb, SearchError};
 
 /// A frequency where a cell may place an SSB.
 #[derive(Debug, Clone, Copy, PartialEq)]
@@ -127,28 +116,24 @@ pub fn scan_raster(
         if points.is_empty() {
             continue;
         }
-        let mut at_point = PointSearch::new(spacing, rate_hz, antennas.len(), points.len())?;
-        for point in points {
-            let offset_hz = point.ssb_freq_hz - centre_hz;
-            let Some(find) = at_point.search(antennas, point.gscn, offset_hz, Some(centre_hz))?
-            else {
-                continue;
-            };
+        let mut at_point = PointSearch::new(
+            spacing,
+            rate_hz,
+            antennas.len(),
+            FALSE_ALARM / points.len() as f64,
+        )?;
+        for find in at_point.search_all(antennas, &points, centre_hz)? {
             // What the point's neighbours on the global frequency raster hold shows here too.
-            let placed_hz = find.strongest().map_or(point.ssb_freq_hz, |ssb| {
-                placed_at(
-                    point.ssb_freq_hz,
-                    true,
-                    ssb,
-                    spacing,
-                    band(centre_hz, reach),
-                )
+            let at = find.point;
+            let band_hz = band(centre_hz, reach);
+            let placed_hz = find.strongest().map_or(at.ssb_freq_hz, |ssb| {
+                placed_at(at.ssb_freq_hz, true, ssb, spacing, band_hz)
             });
-            finds.push(if placed_hz == point.ssb_freq_hz {
+            finds.push(if placed_hz == at.ssb_freq_hz {
                 find
             } else {
                 at_point
-                    .search(antennas, None, placed_hz - centre_hz, Some(centre_hz))?
+                    .search(antennas, RasterPoint::off(placed_hz), Some(centre_hz))?
                     .unwrap_or(find)
             });
         }
@@ -188,7 +173,8 @@ pub fn scan_off_raster(
             continue;
         }
         let all = 2 * (reach / OFFSET_UNIT_HZ) as usize + 1;
-        let mut at_point = PointSearch::new(spacing, rate_hz, antennas.len(), all)?;
+        let mut at_point =
+            PointSearch::new(spacing, rate_hz, antennas.len(), FALSE_ALARM / all as f64)?;
         let mut found_hz: Vec<f64> = Vec::new();
         for offset_hz in at_point.likely_offsets(antennas, reach)? {
             // An SSB also shows, weaker, where its PSS overlaps with a shifted one.
@@ -196,10 +182,8 @@ pub fn scan_off_raster(
             if found_hz.iter().any(|hz| (hz - offset_hz).abs() < width_hz) {
                 continue;
             }
-            let Some(first) = at_point.search(antennas, None, offset_hz, None)? else {
-                continue;
-            };
-            let Some(strongest) = first.strongest() else {
+            let first = at_point.search(antennas, RasterPoint::off(offset_hz), None)?;
+            let Some(strongest) = first.as_ref().and_then(RasterFind::strongest) else {
                 continue;
             };
             // A wrong frequency would be taken for an offset (TS 38.211 §5.4).
@@ -212,7 +196,8 @@ pub fn scan_off_raster(
                 None => nearest_offset(offset_hz + strongest.cfo_hz, reach),
             };
             found_hz.push(offset_hz);
-            finds.extend(at_point.search(antennas, None, offset_hz, centre_hz)?);
+            let point = RasterPoint::off(centre_hz.unwrap_or(0.0) + offset_hz);
+            finds.extend(at_point.search(antennas, point, centre_hz)?);
         }
     }
     sort(&mut finds);
@@ -228,115 +213,17 @@ fn band(centre_hz: f64, reach_hz: f64) -> RangeInclusive<f64> {
     centre_hz - reach_hz..=centre_hz + reach_hz
 }
 
-/// The multiple of 15 kHz nearest to `hz` inside the reach.
-fn nearest_offset(hz: f64, reach_hz: f64) -> f64 {
-    let last = (reach_hz / OFFSET_UNIT_HZ).floor();
-    (hz / OFFSET_UNIT_HZ).round().clamp(-last, last) * OFFSET_UNIT_HZ
-}
-
 fn sort(finds: &mut [RasterFind]) {
     let snr_db = |find: &RasterFind| find.strongest().map_or(f64::NEG_INFINITY, |it| it.snr_db);
     finds.sort_by(|a, b| snr_db(b).total_cmp(&snr_db(a)));
 }
 
-/// Front end and search at one spacing, moved from point to point.
-struct PointSearch {
-    spacing: SubcarrierSpacing,
-    front_end: FrontEnd,
-    searcher: Searcher,
-    base: Vec<Vec<Complex32>>,
-}
-
-impl PointSearch {
-    /// The probability of a false cell is shared among `points`.
-    fn new(
-        spacing: SubcarrierSpacing,
-        rate_hz: f64,
-        antennas: usize,
-        points: usize,
-    ) -> Result<Self, ScanError> {
-        Ok(Self {
-            spacing,
-            front_end: FrontEnd::new(rate_hz, 0.0, spacing.hz(), antennas)?,
-            searcher: Searcher::new(SearchConfig {
-                false_alarm: FALSE_ALARM / points as f64,
-                ..SearchConfig::new(spacing, antennas)
-            })?,
-            base: vec![Vec::new(); antennas],
-        })
-    }
-
-    /// Brings `offset_hz` to 0 Hz and all channels to the base rate.
-    fn tune(&mut self, antennas: &[&[Complex32]], offset_hz: f64) -> Result<(), FrontEndError> {
-        self.front_end.tune(offset_hz)?;
-        self.base.iter_mut().for_each(Vec::clear);
-        self.front_end.push(antennas, &mut self.base)?;
-        self.front_end.finish(&mut self.base);
-        Ok(())
-    }
-
-    /// The SSBs `offset_hz` from the centre of the recording, itself at `centre_hz` if known.
-    fn search(
-        &mut self,
-        antennas: &[&[Complex32]],
-        gscn: Option<u16>,
-        offset_hz: f64,
-        centre_hz: Option<f64>,
-    ) -> Result<Option<RasterFind>, ScanError> {
-        self.tune(antennas, offset_hz)?;
-        self.searcher
-            .tune(centre_hz.map(|centre_hz| centre_hz + offset_hz))?;
-        let slices: Vec<_> = self.base.iter().map(Vec::as_slice).collect();
-        let ssbs = self.searcher.search(&slices)?;
-        Ok((!ssbs.is_empty()).then(|| RasterFind {
-            point: RasterPoint {
-                gscn,
-                ssb_freq_hz: centre_hz.unwrap_or(0.0) + offset_hz,
-            },
-            spacing: self.spacing,
-            input_per_output: self.front_end.input_per_output(),
-            ssbs: ssbs.to_vec(),
-        }))
-    }
-
-    /// Offsets from the recording's centre, multiples of 15 kHz up to `reach_hz`, where the PSS
-    /// stands out, the likeliest first.
-    ///
-    /// The band is cut into tiles as wide as the PSS can wander inside the front end's pass band.
-    fn likely_offsets(
-        &mut self,
-        antennas: &[&[Complex32]],
-        reach_hz: f64,
-    ) -> Result<Vec<f64>, ScanError> {
-        let scs_hz = self.spacing.hz();
-        let tiles = (reach_hz / (TILE_SUBCARRIERS * scs_hz)).ceil().max(1.0);
-        let half_tile_hz = reach_hz / tiles;
-        let hypotheses = cfo_hypotheses(half_tile_hz + 0.5 * scs_hz, scs_hz);
-        let mut filter = MatchedFilter::new(scs_hz, &hypotheses, antennas.len());
-        let mut seen: Vec<(f32, f64)> = Vec::new();
-        let mut candidates = Vec::new();
-        for tile in 0..tiles as usize {
-            let tile_hz = (2.0 * tile as f64 + 1.0) * half_tile_hz - reach_hz;
-            self.tune(antennas, tile_hz)?;
-            let samples = self.base.first().map_or(0, Vec::len);
-            let trials = samples as f64 * 3.0 * hypotheses.len() as f64 * tiles;
-            let probability = NOISE_CANDIDATES / trials.max(NOISE_CANDIDATES);
-            let threshold = exponential_sum_threshold(antennas.len(), probability);
-            candidates.clear();
-            filter.run(&self.base, 0, samples, threshold as f32, &mut candidates);
-            seen.extend(candidates.iter().map(|candidate| {
-                let offset_hz = nearest_offset(tile_hz + candidate.cfo_hz, reach_hz);
-                (candidate.statistic, offset_hz)
-            }));
+impl RasterPoint {
+    const fn off(ssb_freq_hz: f64) -> Self {
+        Self {
+            gscn: None,
+            ssb_freq_hz,
         }
-        seen.sort_by(|a, b| b.0.total_cmp(&a.0));
-        let mut offsets = Vec::new();
-        for (_, offset_hz) in seen {
-            if offsets.len() < MOST_POINTS && !offsets.contains(&offset_hz) {
-                offsets.push(offset_hz);
-            }
-        }
-        Ok(offsets)
     }
 }
 
