@@ -1,94 +1,135 @@
-//! Executions that each wake-up policy needs for the same error, on the yard:
-//! `cargo run --release -p access-av --example wake_up_table -- [runs] [seed]`.
+//! What each wake-up policy costs and what error it leaves, on the yard, with the settings shipped:
+//! `cargo run --release -p access-av --example wake_up_table -- [runs] [seed ...]`.
+//!
+//! Every policy drives the same runs over the same radio channel. Beside the uncertainty-driven
+//! policy stands the strict one, which listens to the bound alone.
 #![allow(clippy::print_stdout, reason = "prints a table")]
 
 use std::error::Error;
 
-use access_av::scenario::Scenario;
+use access_av::scenario::{Scenario, WakeUpSettings};
 use access_av::simulate::{CampaignOptions, Simulation};
+
+/// One policy, one outcome for each seed.
+struct Policy {
+    name: String,
+    scenario: Scenario,
+    outcomes: Vec<Outcome>,
+}
 
 struct Outcome {
     p90_m: f64,
     executions: f64,
     listened: f64,
+    out_of_reach: f64,
 }
 
 fn main() -> Result<(), Box<dyn Error>> {
     let mut arguments = std::env::args().skip(1);
     let runs: usize = arguments.next().map_or(Ok(30), |text| text.parse())?;
-    let seed: u64 = arguments.next().map_or(Ok(1), |text| text.parse())?;
-    let yard = Scenario::load("yard")?;
-
-    println!("yard, {runs} runs, seed {seed}");
-    println!("policy                  p90 m  executions  SSB bursts listened to");
-    let mut references = Vec::new();
-    for base_ms in [80.0, 150.0] {
-        let scenario = yard.with_overrides([
-            ("wake_up.policy", "pid".into()),
-            ("wake_up.base_ms", base_ms.into()),
-        ])?;
-        references.push((
-            format!("PID, base {base_ms} ms"),
-            drive(scenario, runs, seed)?,
-        ));
+    let mut seeds: Vec<u64> = arguments
+        .map(|text| text.parse())
+        .collect::<Result<_, _>>()?;
+    if seeds.is_empty() {
+        seeds.push(11);
     }
-    for interval_ms in [20.0, 240.0] {
-        let scenario = yard.with_overrides([
-            ("wake_up.policy", "fixed".into()),
-            ("wake_up.interval_ms", interval_ms.into()),
-        ])?;
-        references.push((
-            format!("fixed {interval_ms} ms"),
-            drive(scenario, runs, seed)?,
-        ));
-    }
-    for (name, reference) in &references {
-        print(name, reference);
-        // The least gain at which the 90th percentile comes out the same, by bisection.
-        let (mut low, mut high) = (1e-6_f64, 1e-3_f64);
-        let mut same = None;
-        for _ in 0..7 {
-            let least_gain_m2 = (low * high).sqrt();
-            let scenario = yard.with_overrides([
-                ("wake_up.bound_m", (0.5 * reference.p90_m).into()),
-                ("wake_up.least_gain_m2", least_gain_m2.into()),
-            ])?;
-            let outcome = drive(scenario, runs, seed)?;
-            if outcome.p90_m > reference.p90_m {
-                high = least_gain_m2;
-            } else {
-                low = least_gain_m2;
-                same = Some((least_gain_m2, outcome));
-            }
+    let mut policies = policies()?;
+    for policy in &mut policies {
+        for &seed in &seeds {
+            policy.outcomes.push(drive(&policy.scenario, runs, seed)?);
         }
-        if let Some((least_gain_m2, outcome)) = same {
-            print(&format!("  uncertainty {least_gain_m2:.1e}"), &outcome);
-            println!(
-                "  share of executions: {:.2}",
-                outcome.executions / reference.executions
-            );
+    }
+
+    println!("yard, {runs} runs of each, seeds {seeds:?}");
+    println!("policy                 p90 m  executions  bursts heard  bound out of reach");
+    for policy in &policies {
+        println!(
+            "{:20} {:7.3} {:11.0} {:13.0} {:17.1} %",
+            policy.name,
+            policy.mean(|it| it.p90_m),
+            policy.mean(|it| it.executions),
+            policy.mean(|it| it.listened),
+            100.0 * policy.mean(|it| it.out_of_reach),
+        );
+    }
+    println!("\nagainst each other: mean over the seeds, least and most");
+    println!("policy               against             share of executions      p90 over p90");
+    let (driven, references): (Vec<_>, Vec<_>) = policies
+        .iter()
+        .partition(|policy| matches!(policy.scenario.wake_up, WakeUpSettings::Uncertainty(_)));
+    for policy in driven {
+        for reference in &references {
+            let share = policy.against(reference, |it| it.executions);
+            let error = policy.against(reference, |it| it.p90_m);
+            println!("{:20} {:18} {share}   {error}", policy.name, reference.name);
         }
     }
     Ok(())
 }
 
-fn print(name: &str, outcome: &Outcome) {
-    println!(
-        "{name:22} {:6.3} {:11.0} {:11.0}",
-        outcome.p90_m, outcome.executions, outcome.listened
-    );
+fn policies() -> Result<Vec<Policy>, Box<dyn Error>> {
+    let yard = Scenario::load("yard")?;
+    let policy = |name: &str, scenario: Scenario| Policy {
+        name: name.to_owned(),
+        scenario,
+        outcomes: Vec::new(),
+    };
+    let mut policies = Vec::new();
+    for base_ms in [80.0, 150.0] {
+        let settings = [
+            ("wake_up.policy", "pid".into()),
+            ("wake_up.base_ms", base_ms.into()),
+        ];
+        let name = format!("PID, base {base_ms} ms");
+        policies.push(policy(&name, yard.with_overrides(settings)?));
+    }
+    for interval_ms in [20.0, 240.0] {
+        let settings = [
+            ("wake_up.policy", "fixed".into()),
+            ("wake_up.interval_ms", interval_ms.into()),
+        ];
+        let name = format!("fixed {interval_ms} ms");
+        policies.push(policy(&name, yard.with_overrides(settings)?));
+    }
+    let mut strict = yard.clone();
+    if let WakeUpSettings::Uncertainty(settings) = &mut strict.wake_up {
+        settings.least_gain_m2 = None;
+    }
+    policies.push(policy("uncertainty", yard));
+    policies.push(policy("  on demand alone", strict));
+    Ok(policies)
 }
 
-fn drive(scenario: Scenario, runs: usize, seed: u64) -> Result<Outcome, Box<dyn Error>> {
-    let campaign = Simulation::on_its_platform(scenario)?.campaign(&CampaignOptions {
+fn drive(scenario: &Scenario, runs: usize, seed: u64) -> Result<Outcome, Box<dyn Error>> {
+    let simulation = Simulation::on_its_platform(scenario.clone())?;
+    let campaign = simulation.campaign(&CampaignOptions {
         seed,
         runs,
         ..CampaignOptions::default()
     })?;
     let listened: usize = campaign.runs.iter().map(|run| run.listened).sum();
+    let out_of_reach: usize = campaign.runs.iter().map(|run| run.out_of_reach).sum();
     Ok(Outcome {
         p90_m: campaign.errors.quantile_m(0.9).unwrap_or(f64::NAN),
         executions: campaign.mean_executions(),
         listened: listened as f64 / runs as f64,
+        out_of_reach: out_of_reach as f64 / (runs * simulation.steps()) as f64,
     })
+}
+
+impl Policy {
+    fn mean(&self, of: impl Fn(&Outcome) -> f64) -> f64 {
+        self.outcomes.iter().map(of).sum::<f64>() / self.outcomes.len() as f64
+    }
+
+    /// A figure over that of another policy on the same seeds: mean, least and most.
+    fn against(&self, other: &Self, of: impl Fn(&Outcome) -> f64) -> String {
+        let ratios: Vec<f64> = (self.outcomes.iter().zip(&other.outcomes))
+            .map(|(mine, theirs)| of(mine) / of(theirs))
+            .collect();
+        let mean = ratios.iter().sum::<f64>() / ratios.len() as f64;
+        let least = ratios.iter().copied().fold(f64::INFINITY, f64::min);
+        let most = ratios.iter().copied().fold(0.0, f64::max);
+        format!("{mean:.3} ({least:.3} … {most:.3})")
+    }
 }

@@ -225,6 +225,16 @@ impl Onboard {
         }
     }
 
+    /// Whether the error keeps the bound of an uncertainty-driven wake-up until the next SSB; `None`
+    /// for the other policies. `false` after an SSB whose angles were free to be taken says that the
+    /// bound is out of reach there, or not worth its price.
+    pub fn keeps_bound(&self, time_s: f64) -> Option<bool> {
+        match (&self.trigger, self.localizer.tracker()) {
+            (Trigger::Uncertainty(policy), Some(tracker)) => Some(policy.keeps(tracker, time_s)),
+            _ => None,
+        }
+    }
+
     /// Whether the angle of this SSB, of a burst worth estimating, is itself worth it.
     pub fn selects(&self, ssb: &SensedSsb) -> bool {
         if self.searching().is_some() {

@@ -211,28 +211,6 @@ fn without_a_map_it_stays_within_its_covariance() {
 }
 
 #[test]
-fn uncertainty_needs_half_the_executions_of_the_pid() {
-    let yard = Scenario::load("yard").unwrap();
-    let executions = |records: &[RunRecord]| {
-        records
-            .iter()
-            .map(|record| record.executions.len())
-            .sum::<usize>()
-    };
-    let pid = yard
-        .with_overrides([
-            ("wake_up.policy", "pid".into()),
-            ("wake_up.base_ms", 80.0.into()),
-        ])
-        .unwrap();
-    let pid = drives(pid, 2);
-    let uncertainty = drives(yard, 2);
-    assert!(2 * executions(&uncertainty) < executions(&pid));
-    let listened = |records: &[RunRecord]| records.iter().map(|r| r.listened).sum::<usize>();
-    assert!(listened(&uncertainty) < listened(&pid));
-}
-
-#[test]
 fn a_campus_is_driven_from_cell_to_cell() {
     let records = drives(Scenario::load("campus-handover").unwrap(), 1);
     let mut cells: Vec<u16> = records[0]

@@ -317,7 +317,8 @@ impl Scenario {
                     0.999_999,
                 )?;
                 check.not_negative("wake_up.wake_up_cost", uncertainty.wake_up_cost)?;
-                check.not_negative("wake_up.least_gain_m2", uncertainty.least_gain_m2)?;
+                let least_gain_m2 = uncertainty.least_gain_m2.unwrap_or_default();
+                check.not_negative("wake_up.least_gain_m2", least_gain_m2)?;
                 check.that(
                     matches!(self.localizer, LocalizerSettings::Tracker(_)),
                     "wake_up.policy",

@@ -111,15 +111,18 @@ pub enum SensingMode {
 #[derive(Debug, Clone, Copy, PartialEq, Serialize, Deserialize, JsonSchema)]
 #[serde(default, deny_unknown_fields)]
 pub struct UncertaintySettings {
-    /// Horizontal error to be kept, in metres: the paper's x̃_max.
+    /// Horizontal error to be kept, in metres: the paper's x̃_max. As few angles are estimated as
+    /// late as keeps it.
     pub bound_m: f64,
     /// Probability with which it is kept.
     pub confidence: f64,
     /// Energy of waking the receiver up, in executions.
     pub wake_up_cost: f64,
-    /// Variance in m² that an execution has to take away to be worth its energy. Above 0 it lets
-    /// the error pass the bound where radio heads stand badly, instead of paying any price.
-    pub least_gain_m2: f64,
+    /// Variance in m² that makes an execution worth its energy before the bound demands it, and
+    /// that it must take away where the bound is out of reach. Without it angles are estimated on
+    /// the bound's demand alone, and all there are where it is out of reach.
+    #[serde(skip_serializing_if = "Option::is_none")]
+    pub least_gain_m2: Option<f64>,
 }
 
 impl Default for UncertaintySettings {
@@ -128,7 +131,7 @@ impl Default for UncertaintySettings {
             bound_m: 0.3,
             confidence: 0.9,
             wake_up_cost: 0.5,
-            least_gain_m2: 0.0,
+            least_gain_m2: None,
         }
     }
 }

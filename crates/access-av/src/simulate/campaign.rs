@@ -77,6 +77,8 @@ pub struct RunSummary {
     pub executions: usize,
     /// SSB bursts listened to.
     pub listened: usize,
+    /// SSBs at which no choice of angles could keep the bound of an uncertainty-driven wake-up.
+    pub out_of_reach: usize,
     /// Its energy, where the platform has figures for the method.
     pub energy: Option<Energy>,
     /// Root mean square of its horizontal error in metres.
@@ -211,6 +213,7 @@ fn summary(record: &RunRecord, energy: Option<&EnergyModel>) -> RunSummary {
         run: record.run,
         executions: record.executions.len(),
         listened: record.listened,
+        out_of_reach: record.out_of_reach,
         energy: energy
             .map(|model| model.of_run(record.executions.len(), record.listened, duration_s)),
         rms_error_m: (squares_m2 / located().count() as f64).sqrt(),

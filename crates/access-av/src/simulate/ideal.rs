@@ -35,6 +35,7 @@ impl IdealFilter {
             executions: Vec::new(),
             listened: 0,
             calibration: None,
+            out_of_reach: 0,
         }
     }
 }

@@ -132,6 +132,7 @@ mod tests {
             executions: Vec::new(),
             listened: 0,
             calibration: None,
+            out_of_reach: 0,
         }
     }
 

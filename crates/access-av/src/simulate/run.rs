@@ -83,6 +83,8 @@ pub struct RunRecord {
     pub listened: usize,
     /// The array as found by the end of the drive, where the localizer looks for it.
     pub calibration: Option<Calibration>,
+    /// SSBs at which no choice of angles could keep the bound of an uncertainty-driven wake-up.
+    pub out_of_reach: usize,
 }
 
 /// How the first pose came about.
@@ -185,6 +187,7 @@ impl Simulation {
             executions: Vec::with_capacity(self.steps),
             listened: 0,
             calibration: None,
+            out_of_reach: 0,
         };
         let mut iq = match scenario.fidelity {
             Fidelity::Snapshots => None,
@@ -257,6 +260,7 @@ impl Simulation {
             } else {
                 onboard.advance_to(time_s);
             }
+            record.out_of_reach += usize::from(onboard.keeps_bound(time_s) == Some(false));
             let believed = onboard.pose();
             record.steps.push(Step {
                 time_s,

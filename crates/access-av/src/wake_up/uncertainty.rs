@@ -1,13 +1,17 @@
-//! Wake-up as late as a bound on the error allows.
+//! Wake-up as late as a bound on the error allows, and earlier where information is cheap.
 //!
 //! The paper's t_max keeps a position uncertainty x̃_max by a worst case: the distance driven at
 //! top speed. The tracker knows its error and how it grows, so the rule can be exact: wake up at
-//! the last SSB before the error would, with the stated confidence, exceed the bound; and then take
-//! the angles that are worth their energy.
+//! the last SSB before the error would, with the stated confidence, exceed the bound, and take the
+//! fewest angles that keep it. Where not even all of them do, the bound is out of reach there, and
+//! [`UncertaintyDriven::keeps`] says so.
 //!
 //! An angle is worth what it takes off the variance of the position a little further on, where
-//! what it says of heading and odometer has become position too. Of a constant energy the most is
-//! made where the last angle bought everywhere takes away the same: that is `least_gain_m2`.
+//! what it says of heading and odometer has become position too. That depends on where the vehicle
+//! is: beside a radio head an angle is worth many of those from afar. Of a constant energy the most
+//! is made where the last angle bought everywhere takes away the same (equal marginal gains), so
+//! an angle of at least that worth, `least_gain_m2`, is taken before the bound demands it: the
+//! stretch ahead, where none is worth as much, then begins with a small error.
 
 use super::WakeUpDecision;
 use crate::localize::Tracker;
@@ -32,7 +36,7 @@ pub struct UncertaintyDriven {
     bound_m: f64,
     quantile: RadialQuantile,
     wake_up_cost: f64,
-    least_gain_m2: f64,
+    least_gain_m2: Option<f64>,
     period_s: f64,
     thermal: ThermalNoise,
     /// One bit for each radio head: whose angle is to be estimated.
@@ -53,11 +57,15 @@ impl UncertaintyDriven {
         }
     }
 
-    /// Whether to listen at `time_s`: the error would exceed the bound at the SSB after, and there
-    /// is an angle worth its energy.
+    /// Whether to listen at `time_s`: the error would exceed the bound at the SSB after, or an angle
+    /// is worth its energy anyway.
     pub fn is_due(&self, tracker: &Tracker, time_s: f64, heads: &[RadioHead]) -> bool {
-        self.error_m(tracker, time_s + self.period_s) > self.bound_m
-            && self.choice(tracker, time_s, heads) != 0
+        self.choice(tracker, time_s, heads) != 0
+    }
+
+    /// Whether the error keeps the bound until the SSB after `time_s` without another angle.
+    pub fn keeps(&self, tracker: &Tracker, time_s: f64) -> bool {
+        self.error_m(tracker, time_s + self.period_s) <= self.bound_m
     }
 
     /// Chooses the angles to estimate at `time_s`.
@@ -79,17 +87,27 @@ impl UncertaintyDriven {
         index < MOST_HEADS && self.chosen >> index & 1 == 1
     }
 
-    /// The angles that take away most variance for their cost, that of waking up once and of one
-    /// execution each; none where the least gain is not met. One bit for each radio head.
+    /// The angles to take, one bit for each radio head: those worth their energy, and of the others
+    /// as few as keep the bound until the next SSB. Where nothing keeps it, those worth their
+    /// energy, or all, if any price is to be paid.
     fn choice(&self, tracker: &Tracker, time_s: f64, heads: &[RadioHead]) -> u64 {
+        let mut demanded = !self.keeps(tracker, time_s);
+        if !demanded && self.least_gain_m2.is_none() {
+            return 0;
+        }
         let mut belief = tracker.forecast(time_s);
         let ahead_m = tracker.speed_mps() * (time_s - tracker.time_s()).max(0.0);
         let spread = |belief: &Belief| {
             let later = tracker.carry(*belief, LOOK_AHEAD_M);
             Tracker::principal_variances(&later).iter().sum::<f64>()
         };
+        let keeps = |belief: &Belief| {
+            let next = tracker.carry(*belief, tracker.speed_mps() * self.period_s);
+            self.quantile.radius(Tracker::principal_variances(&next)) <= self.bound_m
+        };
         let before = spread(&belief);
-        let (mut taken, mut best, mut best_rate) = (0u64, 0u64, self.least_gain_m2);
+        let mut best_rate = self.least_gain_m2.unwrap_or(f64::INFINITY);
+        let (mut taken, mut worthwhile, mut improving) = (0u64, 0u64, true);
         for count in 1..=heads.len().min(MOST_HEADS) {
             let next = (heads.iter().enumerate().take(MOST_HEADS))
                 .filter(|(index, _)| taken >> index & 1 == 0)
@@ -105,15 +123,27 @@ impl UncertaintyDriven {
             taken |= 1 << index;
             belief = after;
             let rate = (before - left) / (self.wake_up_cost + count as f64);
-            if rate <= best_rate {
+            improving &= rate > best_rate;
+            if improving {
+                (worthwhile, best_rate) = (taken, rate);
+            }
+            if demanded && keeps(&belief) {
+                // The angles are taken in the same order for either purpose.
+                worthwhile |= taken;
+                demanded = false;
+            }
+            if !improving && !demanded {
                 break;
             }
-            (best, best_rate) = (taken, rate);
         }
-        best
+        match self.least_gain_m2 {
+            None if demanded => taken,
+            _ => worthwhile,
+        }
     }
 
-    /// Time from `time_s` on for which the bound holds without another angle, in seconds.
+    /// Time from `time_s` on for which the bound holds without another angle, in seconds: the
+    /// latest wake-up.
     fn wake_up_time_s(&self, tracker: &Tracker, time_s: f64) -> f64 {
         let holds =
             |periods: f64| self.error_m(tracker, time_s + periods * self.period_s) <= self.bound_m;
