@@ -102,3 +102,34 @@ def test_run_tells_percentiles_and_integrity(
     for text in ("50% below", "90% below", "99% below", "protection level / error", "epochs ok"):
         assert text in done.out
     assert "stanford" in (tmp_path / "report.html").read_text()
+
+
+def test_a_start_from_scratch_says_when_it_was_found(
+    access_av: Callable[..., Finished], tmp_path: Path
+) -> None:
+    changes = {"start.known": False, "motion.start_at_m": 200.0}
+    done = access_av(
+        "run", "paper-real-odometry-2", "--runs", "2", "--out", tmp_path,
+        *(f"--set={key}={str(value).lower()}" for key, value in changes.items()),
+    )  # fmt: skip
+    assert done.code == 0, done.err
+    assert "runs in which the vehicle was found" in done.out
+    assert "nan" not in done.out
+    table = pl.read_parquet(tmp_path / "trajectories.parquet")
+    known = table.filter(~pl.col("searching"), run=0)
+    assert 0 < known.height < table.filter(run=0).height
+    trajectory = (tmp_path / "trajectory.tum").read_text().splitlines()
+    assert len(trajectory) == known.height
+    assert "NaN" not in (tmp_path / "report.html").read_text().split("const charts = ")[1][:200_000]
+
+
+def test_a_vehicle_that_cannot_be_found_has_no_error() -> None:
+    # Nothing is heard.
+    silent = {f"radio_heads[{index}].tx_power_dbm": -150.0 for index in (0, 1)}
+    scenario = Scenario.load("paper-real-odometry-2").with_overrides(
+        {"start.known": False, "motion.start_at_m": 290.0, **silent}
+    )
+    result = simulate(scenario, keep_trajectories=True)
+    assert result.runs["found_s"].null_count() == 1
+    assert np.isnan(result.rms_error_m)
+    assert "nan" in render_drive(scenario, result, seed=1)

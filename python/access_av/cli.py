@@ -115,6 +115,8 @@ def run(
     Writes trajectories.parquet, executions.parquet, trajectory.tum and truth.tum (the first run),
     report.html, scenario.toml with every default, and manifest.json.
     """
+    import polars as pl
+
     from access_av import Scenario, simulate
     from access_av.files import ResultsDirectory, tum_trajectory
     from access_av.report.drive import render_drive
@@ -133,9 +135,10 @@ def run(
     directory.write_table("trajectories.parquet", result.trajectories)
     directory.write_table("executions.parquet", result.executions)
     first = result.trajectories.filter(run=0)
-    for name, prefix in (("trajectory.tum", ""), ("truth.tum", "true_")):
+    known = first.filter(~pl.col("searching"))
+    for name, poses, prefix in (("trajectory.tum", known, ""), ("truth.tum", first, "true_")):
         columns = ("time_s", f"{prefix}x_m", f"{prefix}y_m", f"{prefix}heading_rad")
-        directory.write_text(name, tum_trajectory(*(first[column] for column in columns)))
+        directory.write_text(name, tum_trajectory(*(poses[column] for column in columns)))
     directory.write_text("report.html", render_drive(chosen, result, seed))
     directory.write_text("scenario.toml", chosen.resolved().to_toml())
     directory.write_manifest(scenario=chosen.name, runs=runs, seed=seed)

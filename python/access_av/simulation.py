@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import math
 from dataclasses import dataclass
 from pathlib import Path
 from typing import TYPE_CHECKING
@@ -77,14 +78,17 @@ class Simulation:
     ----------
     steps
         Statistics over all runs, one row per SSB: ``time_s``, ``mean_abs_error_x_m``,
-        ``mean_abs_error_y_m``, ``rms_error_m``, ``mean_snr_db`` and more.
+        ``mean_abs_error_y_m``, ``rms_error_m``, ``mean_snr_db`` and more. Errors are of the runs
+        that know their pose by then, null where none does.
     runs
         One row per run: ``run``, ``executions``, ``energy_j``, ``rms_error_m`` and more.
+        ``found_s`` and ``found_m`` are time and distance driven until the first pose was known.
     trajectories
         Truth and estimate, one row per run and SSB: ``run``, ``time_s``, ``x_m``, ``y_m``,
         ``heading_rad``, ``true_x_m``, ``true_y_m``, ``error_x_m``, ``error_y_m`` and more.
-        Variances, ``protection_level_m`` and ``integrity`` (``ok``, ``degraded``,
-        ``unavailable``) are null where the localizer does not state them. ``None`` unless kept.
+        ``searching`` as long as the first pose is not known. Variances, ``protection_level_m`` and
+        ``integrity`` (``ok``, ``degraded``, ``unavailable``) are null where the localizer does not
+        state them. ``None`` unless kept.
     executions
         The angle estimates, one row each. ``None`` unless trajectories were kept.
     error_quantiles_m
@@ -105,7 +109,8 @@ class Simulation:
     @property
     def rms_error_m(self) -> float:
         """Root mean square of the horizontal error over track and runs."""
-        return float(self.steps.select((pl.col("rms_error_m") ** 2).mean().sqrt()).item())
+        rms_m = self.steps.select((pl.col("rms_error_m") ** 2).mean().sqrt()).item()
+        return math.nan if rms_m is None else float(rms_m)
 
 
 def simulate(
@@ -173,8 +178,10 @@ def simulate(
         progress=progress,
     )
     return Simulation(
-        steps=pl.DataFrame(found.steps),
-        runs=pl.DataFrame(found.runs),
+        steps=pl.DataFrame(found.steps).fill_nan(None),
+        runs=pl.DataFrame(found.runs).with_columns(
+            pl.col("found_s", "found_m", "rms_error_m", "final_error_m").fill_nan(None)
+        ),
         trajectories=None if found.trajectories is None else _stated(found.trajectories),
         executions=None if found.executions is None else pl.DataFrame(found.executions),
         error_quantiles_m=found.error_quantiles_m,

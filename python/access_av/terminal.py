@@ -101,6 +101,10 @@ def show_simulation(result: Simulation, title: str) -> None:
         "executions": runs["executions"].mean(),
         "energy / J": runs["energy_j"].fill_nan(None).mean(),
     }
+    if runs["found_s"].fill_null(1.0).max() != 0.0:
+        rows["runs in which the vehicle was found"] = runs.height - runs["found_s"].null_count()
+        rows["driven until found, median / m"] = runs["found_m"].median()
+        rows["driven until found, most / m"] = runs["found_m"].max()
     integrity = result.integrity
     if integrity is not None:
         rows["protection level / error, median"] = integrity.median_level_over_error

@@ -334,7 +334,10 @@ fn measured(execution: &Execution, value: fn(&AngleMeasurement) -> f64) -> f64 {
 fn error_quantiles(py: Python<'_>, campaign: &Campaign) -> PyResult<Py<PyDict>> {
     let table = PyDict::new(py);
     for probability in [0.5, 0.68, 0.9, 0.95, 0.99, 0.999] {
-        table.set_item(probability, campaign.errors.quantile_m(probability))?;
+        table.set_item(
+            probability,
+            campaign.errors.quantile_m(probability).unwrap_or(f64::NAN),
+        )?;
     }
     Ok(table.unbind())
 }
