@@ -304,6 +304,41 @@ fn bad_angles_are_named_and_leave_the_state() {
 }
 
 #[test]
+fn an_angle_nobody_vouches_for_counts_as_far_as_it_is_likely() {
+    let sure = angle(0.12, 0.0, 0.01);
+    let after = |off_rad: f64, resolved: bool| {
+        let (mut tracker, head) = tracker();
+        // Where the tracker sees the head, and a little off.
+        let residual_rad = tracker.innovation(&head, &sure).unwrap().residual;
+        let measured = AngleMeasurement {
+            phase_rad: off_rad - residual_rad,
+            resolved,
+            ..sure
+        };
+        let before = tracker.pose(0.12);
+        let verdict = tracker.update(&head, &measured);
+        assert_eq!(verdict.accepted, resolved || off_rad < 0.2);
+        let moved_m = tracker
+            .pose(0.12)
+            .pose
+            .point()
+            .distance_m(before.pose.point());
+        (moved_m, tracker.pose(0.12).principal_variances()[0])
+    };
+    // Close to where it is expected it is most likely right ...
+    let ((sure_m, sure_m2), (unsure_m, unsure_m2)) = (after(0.1, true), after(0.1, false));
+    assert!(
+        unsure_m < sure_m && unsure_m > 0.8 * sure_m,
+        "{unsure_m} {sure_m}"
+    );
+    assert!(unsure_m2 > sure_m2);
+    // ... and far off, if within the gate, it says nothing.
+    let ((sure_m, _), (unsure_m, _)) = (after(0.33, true), after(0.33, false));
+    assert!(sure_m > 0.0);
+    assert_eq!(unsure_m, 0.0);
+}
+
+#[test]
 fn bad_odometry_is_named_and_leaves_the_state() {
     let (mut tracker, _) = tracker();
     let before = tracker.clone();

@@ -8,6 +8,7 @@
 
 mod calibration;
 mod config;
+mod doubt;
 mod interface;
 pub(super) mod motion;
 pub(super) mod sighting;
@@ -159,8 +160,16 @@ impl Tracker {
         if mahalanobis2 > self.config.gate {
             return self.verdict(UpdateReason::Outlier, Some(mahalanobis2));
         }
-        let residual = looked.innovation.residual;
-        self.measure(residual, &looked.row, looked.measurement_variance);
+        let (mut residual, mut variance) =
+            (looked.innovation.residual, looked.measurement_variance);
+        if !measured.resolved {
+            let innovation = self.belief.innovation(residual, &looked.row, variance);
+            let Some(likely) = doubt::equivalent(&innovation) else {
+                return self.verdict(UpdateReason::Outlier, Some(mahalanobis2));
+            };
+            (residual, variance) = likely;
+        }
+        self.measure(residual, &looked.row, variance);
         if let Some(head) = self.heads.get_mut(looked.head) {
             head.last_look_m = looked.place_m;
         }
