@@ -110,15 +110,12 @@ impl TrackerConfig {
         }
     }
 
-    /// Variance (rad²) of the electrical angle by the scatter of one look, ...
-    pub fn scatter_variance(&self) -> f64 {
-        self.array.scatter_variance(self.rician_k)
-    }
-
-    /// ... and what it counts for beside the others when the radio head's last look is
-    /// `travelled_m` back, see [`ArrayModel::correlation`].
+    /// Variance (rad²) that scatter adds to an angle `travelled_m` after the radio head's last
+    /// one, see [`ArrayModel::correlation`]. A look never counts for more than one: where
+    /// successive errors cancel, they do so at one spacing and for a moment.
     pub fn look_variance(&self, travelled_m: f64, toward: f64) -> f64 {
-        self.scatter_variance() * self.array.correlation(travelled_m, toward)
+        let correlation = self.array.correlation(travelled_m, toward).max(1.0);
+        self.array.scatter_variance(self.rician_k) * correlation
     }
 
     /// Variance of the distance (m²) driven during `duration_s` without odometry.

@@ -160,10 +160,9 @@ impl Tracker {
         if mahalanobis2 > self.config.gate {
             return self.verdict(UpdateReason::Outlier, Some(mahalanobis2));
         }
-        let (mut residual, mut variance) =
-            (looked.innovation.residual, looked.measurement_variance);
+        let innovation = looked.innovation;
+        let (mut residual, mut variance) = (innovation.residual, innovation.measurement_variance);
         if !measured.resolved {
-            let innovation = self.belief.innovation(residual, &looked.row, variance);
             let Some(likely) = doubt::equivalent(&innovation) else {
                 return self.verdict(UpdateReason::Outlier, Some(mahalanobis2));
             };
@@ -223,15 +222,12 @@ impl Tracker {
         let measurement_variance =
             sigma * sigma + scatter + sighting.row[ALONG].powi(2) * ahead_variance + bend.variance;
         let residual = wrap_angle(measured.phase_rad - sighting.phase_rad - bend.shift_rad);
-        // Errors of successive looks may cancel; a look by itself is as wrong as it is.
-        let alone = measurement_variance + (self.config.scatter_variance() - scatter).max(0.0);
-        let innovation = self.belief.innovation(residual, &sighting.row, alone);
+        let innovation = (self.belief).innovation(residual, &sighting.row, measurement_variance);
         Ok(Look {
             head: index,
             excluded: head.excluded,
             place_m,
             row: sighting.row,
-            measurement_variance,
             innovation,
         })
     }
@@ -568,7 +564,6 @@ struct Look {
     excluded: bool,
     place_m: f64,
     row: [f64; STATES],
-    measurement_variance: f64,
     innovation: Innovation,
 }
 
