@@ -139,7 +139,7 @@ impl Onboard {
                     let road = scenario.build_track()?;
                     let either = settled.either_direction;
                     let search = Initialiser::new(config, road, either, &heads);
-                    Localizer::Searching(Box::new(search), integrity)
+                    Localizer::searching(search, integrity)
                 }
             }
         };

@@ -30,8 +30,15 @@ pub enum Localizer {
     Tracker(Box<Tracker>),
     /// The filter, mistrusting its sources.
     Guarded(Box<Guard>),
-    /// The search for the first pose, and how the filter that comes out of it is to be guarded.
-    Searching(Box<Initialiser>, Option<IntegrityConfig>),
+    /// The search for the first pose.
+    Searching(Box<Search>),
+}
+
+/// The search for the first pose, and how the filter that comes out of it is to be guarded.
+#[derive(Debug, Clone)]
+pub struct Search {
+    initialiser: Initialiser,
+    integrity: Option<(IntegrityConfig, RadialQuantile)>,
 }
 
 impl Localizer {
@@ -47,10 +54,18 @@ impl Localizer {
         }
     }
 
+    /// A search for the first pose, from which a tracker comes, guarded or not.
+    pub fn searching(initialiser: Initialiser, integrity: Option<IntegrityConfig>) -> Self {
+        Self::Searching(Box::new(Search {
+            initialiser,
+            integrity: integrity.map(|config| (config, RadialQuantile::new(config.risk))),
+        }))
+    }
+
     /// Number of hypotheses left of a search for the first pose; `None` once it is known.
     pub fn hypotheses(&self) -> Option<usize> {
         match self {
-            Self::Searching(initialiser, _) => Some(initialiser.left()),
+            Self::Searching(search) => Some(search.initialiser.left()),
             _ => None,
         }
     }
@@ -62,7 +77,7 @@ impl Localizer {
             Self::DeadReckoning(_) => OdometryVerdict::Accepted,
             Self::Tracker(tracker) => tracker.odometry(sample),
             Self::Guarded(guard) => guard.odometry(sample),
-            Self::Searching(initialiser, _) => initialiser.odometry(sample),
+            Self::Searching(search) => search.initialiser.odometry(sample),
         }
     }
 
@@ -81,10 +96,11 @@ impl Localizer {
             Self::DeadReckoning(localizer) => localizer.update(head, measured),
             Self::Tracker(tracker) => tracker.update(head, measured),
             Self::Guarded(guard) => guard.update(head, measured),
-            Self::Searching(initialiser, integrity) => {
-                let verdict = initialiser.update(head, measured);
-                if let Some(tracker) = initialiser.found() {
-                    *self = Self::tracking(tracker, initialiser.heads(), *integrity);
+            Self::Searching(search) => {
+                let verdict = search.initialiser.update(head, measured);
+                if let Some(tracker) = search.initialiser.found() {
+                    let integrity = search.integrity.as_ref().map(|(config, _)| *config);
+                    *self = Self::tracking(tracker, search.initialiser.heads(), integrity);
                 }
                 verdict
             }
@@ -97,11 +113,11 @@ impl Localizer {
             Self::DeadReckoning(localizer) => localizer.pose(),
             Self::Tracker(tracker) => tracker.pose(time_s),
             Self::Guarded(guard) => guard.pose(time_s),
-            Self::Searching(initialiser, integrity) => {
-                let mut estimate = initialiser.pose(time_s);
-                estimate.integrity = integrity.map(|config| Integrity {
-                    protection_level_m: RadialQuantile::new(config.risk)
-                        .radius(estimate.principal_variances()),
+            Self::Searching(search) => {
+                let mut estimate = search.initialiser.pose(time_s);
+                let variances = estimate.principal_variances();
+                estimate.integrity = search.integrity.as_ref().map(|(_, quantile)| Integrity {
+                    protection_level_m: quantile.radius(variances),
                     state: IntegrityState::Unavailable,
                     faulty: 0,
                 });
