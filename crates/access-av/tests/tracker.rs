@@ -354,6 +354,46 @@ fn bad_odometry_is_named_and_leaves_the_state() {
 }
 
 #[test]
+fn beyond_the_end_of_the_map_it_drives_on_and_comes_back() {
+    let scenario = Scenario::load("paper-real-odometry").unwrap();
+    let length_m = scenario.build_track().unwrap().length_m();
+    let (mut tracker, _) = tracker();
+    let (mut beyond, mut before) = (0, [0.0; 2]);
+    let across = |tracker: &Tracker, time_s: f64| tracker.pose(time_s).principal_variances();
+    // Out to 60 m beyond the end and back again, backwards.
+    let turn_s = (length_m + 60.0) / 4.0;
+    for number in 6..(2.0 * turn_s / 0.02) as u32 {
+        let time_s = 0.02 * f64::from(number);
+        let place_m = 4.0 * (turn_s - (time_s - turn_s).abs());
+        let verdict = tracker.odometry(&sample(time_s, place_m));
+        assert!(verdict.accepted(), "{verdict:?}");
+        if let OdometryVerdict::BeyondMap { by_m } = verdict {
+            beyond += 1;
+            assert!(
+                (by_m - (place_m - length_m)).abs() < 1.0,
+                "{by_m} {place_m}"
+            );
+            if beyond > 1 && time_s < turn_s {
+                let now = across(&tracker, time_s);
+                assert!(
+                    now[0] >= before[0] && now[1] >= before[1],
+                    "{now:?} {before:?}"
+                );
+            }
+            before = across(&tracker, time_s);
+        }
+    }
+    // Beyond the end from three deviations of the place (0.9 m of scale, 0.5 m of start) on.
+    assert!(beyond > 2 * 50 * 13 && beyond < 2 * 50 * 15, "{beyond}");
+    // Sixty metres without a lane, and the lane is kept again.
+    let lane_m2 = across(&tracker, 2.0 * turn_s)[1];
+    assert!(
+        before[1] > 2.0 * lane_m2 && lane_m2 < 0.1_f64.powi(2),
+        "{before:?} {lane_m2}"
+    );
+}
+
+#[test]
 fn a_gap_loses_time_and_a_jump_loses_certainty() {
     let (mut gap, _) = tracker();
     assert!(matches!(

@@ -18,19 +18,21 @@ pub struct LaneKeeping {
 }
 
 impl LaneKeeping {
-    /// `Φ` of (d, ψ) over the signed length.
+    /// `Φ` of (d, ψ) over the length; backwards, a negative one, that of the reversed process,
+    /// `P∞ Φᵀ P∞⁻¹`, which forgets as well.
     #[must_use]
     pub fn transition(&self, length_m: f64) -> [[f64; 2]; 2] {
         let natural = TAU / self.wavelength_m;
         let decay = self.damping * natural;
         let damped = natural * (1.0 - self.damping * self.damping).sqrt();
-        let envelope = (-decay * length_m).exp();
-        let (sin, cos) = (damped * length_m).sin_cos();
+        let envelope = (-decay * length_m.abs()).exp();
+        let (sin, cos) = (damped * length_m.abs()).sin_cos();
         let slope = sin / damped;
+        let ahead = slope.copysign(slope * length_m);
         [
-            [envelope * (cos + decay * slope), envelope * slope],
+            [envelope * (cos + decay * slope), envelope * ahead],
             [
-                -envelope * natural * natural * slope,
+                -envelope * natural * natural * ahead,
                 envelope * (cos - decay * slope),
             ],
         ]
@@ -92,6 +94,20 @@ mod tests {
                 assert!((product - two[i][j]).abs() < 1e-14);
             }
         }
+    }
+
+    #[test]
+    fn backwards_it_is_the_reversed_process() {
+        let variances = KEEPING.stationary();
+        let (ahead, back) = (KEEPING.transition(11.0), KEEPING.transition(-11.0));
+        for i in 0..2 {
+            for j in 0..2 {
+                let reversed = variances[i] * ahead[j][i] / variances[j];
+                assert!((back[i][j] - reversed).abs() < 1e-14);
+            }
+        }
+        let noise = KEEPING.noise(&KEEPING.transition(-500.0));
+        assert!((noise[0][0] / variances[0] - 1.0).abs() < 1e-6);
     }
 
     #[test]

@@ -25,6 +25,11 @@ pub enum OdometryVerdict {
         /// Length of the gap in seconds.
         gap_s: f64,
     },
+    /// Used, as in the plane: the vehicle has certainly driven off the end of the map.
+    BeyondMap {
+        /// How far from its end, in metres.
+        by_m: f64,
+    },
     /// The distance jumped; the speed was used instead, with its uncertainty.
     DistanceJump {
         /// By how much, in metres.
@@ -43,7 +48,11 @@ impl OdometryVerdict {
     pub const fn accepted(&self) -> bool {
         matches!(
             self,
-            Self::Accepted | Self::First | Self::AfterGap { .. } | Self::DistanceJump { .. }
+            Self::Accepted
+                | Self::First
+                | Self::AfterGap { .. }
+                | Self::BeyondMap { .. }
+                | Self::DistanceJump { .. }
         )
     }
 }

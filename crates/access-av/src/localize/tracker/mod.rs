@@ -17,7 +17,7 @@ pub mod state;
 use std::sync::Arc;
 
 use crate::geometry::{Pose, wrap_angle};
-use crate::localize::gaussian::Innovation;
+use crate::localize::gaussian::{Innovation, identity};
 use crate::localize::smoother::Journal;
 use crate::localize::{AngleMeasurement, PoseEstimate, UpdateReason, UpdateVerdict};
 use crate::observation::OdometrySample;
@@ -64,6 +64,8 @@ pub struct Tracker {
     belief: Belief,
     odometry: Option<OdometrySample>,
     driven_m: f64,
+    /// Whether the vehicle has driven off the end of the map.
+    beyond_map: bool,
     journal: Option<Journal<STATES>>,
 }
 
@@ -88,6 +90,7 @@ impl Tracker {
             belief,
             odometry: None,
             driven_m: 0.0,
+            beyond_map: false,
             journal: None,
         }
     }
@@ -142,6 +145,10 @@ impl Tracker {
             OdometryVerdict::DistanceJump { jump_m: moved_m }
         } else if duration_s > self.config.gap_s {
             OdometryVerdict::AfterGap { gap_s: duration_s }
+        } else if self.beyond_map {
+            OdometryVerdict::BeyondMap {
+                by_m: self.from_map_m(),
+            }
         } else {
             OdometryVerdict::Accepted
         }
@@ -510,6 +517,42 @@ impl Tracker {
             step.apply(&mut self.belief);
         }
         self.driven_m += reading_m.abs() / (1.0 + self.belief.mean[SCALE]);
+        self.watch_the_ends();
+    }
+
+    /// How far beyond the nearer end of the map the vehicle is believed to be (m); 0 on it.
+    fn from_map_m(&self) -> f64 {
+        let along_m = self.belief.mean[ALONG];
+        (self.map.as_ref()).map_or(0.0, |map| (along_m - map.length_m()).max(-along_m).max(0.0))
+    }
+
+    /// Beyond its ends the map goes on straight, but nothing says that the road does. Where the
+    /// vehicle is certainly there, the path bends as it does without a map; along and across stay
+    /// what they are. Back on the map it keeps to its lane again.
+    fn watch_the_ends(&mut self) {
+        let beyond = self.from_map_m() > 3.0 * self.belief.covariance[ALONG][ALONG].sqrt();
+        if beyond == self.beyond_map {
+            return;
+        }
+        self.beyond_map = beyond;
+        if beyond {
+            let curvature_per_m = self.config.path_bend.curvature_per_m;
+            self.belief.covariance[CURVATURE][CURVATURE] = curvature_per_m * curvature_per_m;
+            return;
+        }
+        let mut forget = identity();
+        forget[CURVATURE][CURVATURE] = 0.0;
+        if let Some(journal) = &mut self.journal {
+            journal.moved(&forget);
+        }
+        self.belief.mean[CURVATURE] = 0.0;
+        self.belief.spread(&forget, &[[0.0; STATES]; STATES]);
+        let variances = self.config.lane_keeping.stationary();
+        for (state, variance) in [ACROSS, HEADING].into_iter().zip(variances) {
+            let mut row = [0.0; STATES];
+            row[state] = 1.0;
+            self.measure(-self.belief.mean[state], &row, variance);
+        }
     }
 
     fn measure(&mut self, residual: f64, row: &[f64; STATES], variance: f64) {
@@ -528,7 +571,7 @@ impl Tracker {
     fn step(&self, belief: &Belief, reading_m: f64) -> Step {
         let (mean, config) = (&belief.mean, &self.config);
         match &self.map {
-            Some(map) => {
+            Some(map) if !self.beyond_map => {
                 let middle_m = mean[ALONG] + 0.5 * reading_m;
                 let curvature_per_m = map.curvature_per_m(middle_m);
                 Step::along_lane(
@@ -539,7 +582,7 @@ impl Tracker {
                     &config.noise,
                 )
             }
-            None => Step::in_plane(mean, reading_m, &config.path_bend, &config.noise),
+            _ => Step::in_plane(mean, reading_m, &config.path_bend, &config.noise),
         }
     }
 
