@@ -102,6 +102,8 @@ pub struct Replay<'a> {
     drive: LocatedDrive,
     /// Whether it is driven to be smoothed.
     looks_back: bool,
+    /// Whether the odometry before told of the end of the road.
+    beyond_map: bool,
 }
 
 impl<'a> Replay<'a> {
@@ -122,6 +124,7 @@ impl<'a> Replay<'a> {
         )?;
         Ok(Self {
             onboard,
+            beyond_map: false,
             odometry: odometry.samples.iter().peekable(),
             drive: LocatedDrive {
                 remarks: odometry
@@ -187,7 +190,17 @@ impl<'a> Replay<'a> {
                          used instead"
                     ),
                 ),
-                Ok(_) => {}
+                Ok(OdometryVerdict::BeyondMap { by_m }) => {
+                    if !self.beyond_map {
+                        let text = format!(
+                            "odometry at {at_s} s: {by_m:.1} m beyond the end of the road, \
+                             driving on without it"
+                        );
+                        self.remark(at_s, text);
+                    }
+                    self.beyond_map = true;
+                }
+                Ok(_) => self.beyond_map = false,
                 // Nothing is known of the vehicle's place by a sample that is left out.
                 Err(defect) => {
                     self.remark(at_s, format!("odometry at {at_s} s: left out, {defect}"));

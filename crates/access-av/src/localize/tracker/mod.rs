@@ -147,7 +147,7 @@ impl Tracker {
             OdometryVerdict::AfterGap { gap_s: duration_s }
         } else if self.beyond_map {
             OdometryVerdict::BeyondMap {
-                by_m: self.from_map_m(),
+                by_m: self.off_map_m(),
             }
         } else {
             OdometryVerdict::Accepted
@@ -521,7 +521,7 @@ impl Tracker {
     }
 
     /// How far beyond the nearer end of the map the vehicle is believed to be (m); 0 on it.
-    fn from_map_m(&self) -> f64 {
+    fn off_map_m(&self) -> f64 {
         let along_m = self.belief.mean[ALONG];
         (self.map.as_ref()).map_or(0.0, |map| (along_m - map.length_m()).max(-along_m).max(0.0))
     }
@@ -530,7 +530,7 @@ impl Tracker {
     /// vehicle is certainly there, the path bends as it does without a map; along and across stay
     /// what they are. Back on the map it keeps to its lane again.
     fn watch_the_ends(&mut self) {
-        let beyond = self.from_map_m() > 3.0 * self.belief.covariance[ALONG][ALONG].sqrt();
+        let beyond = self.off_map_m() > 3.0 * self.belief.covariance[ALONG][ALONG].sqrt();
         if beyond == self.beyond_map {
             return;
         }
