@@ -2,7 +2,9 @@
 //! `cargo run --release -p access-av --example integrity_table -- [runs] [seed ...]`.
 //!
 //! The epochs of a run hang together: beside each share stand the end of its 95 % interval by the
-//! bootstrap over runs, and in how many runs anything happened at all.
+//! bootstrap over runs, and in how many runs anything happened at all. Silent is the longest time
+//! without an alarm while the error was beyond the alert limit; early are alarms while it was within,
+//! be it that the protection level passed the limit or that a source was suspected.
 #![allow(clippy::print_stdout, reason = "prints a table")]
 
 use std::error::Error;
@@ -21,10 +23,10 @@ fn main() -> Result<(), Box<dyn Error>> {
     }
     println!("{runs} runs of each, seeds {seeds:?}");
     println!(
-        "                      beyond PL while ok    runs         PL/error      worst  silent  needless"
+        "                      beyond PL while ok    runs         PL/error      worst  silent  early alarms/h"
     );
     println!(
-        "case                     share    limit   with    epochs   median  not ok      m       s  alarms/h"
+        "case                     share    limit   with    epochs   median  not ok      m       s     all  suspected"
     );
     for (name, scenario) in cases()? {
         let simulation = Simulation::on_its_platform(scenario)?;
@@ -97,13 +99,14 @@ fn print(name: &str, runs: &[IntegritySummary]) {
         beyond / ok.max(1.0)
     });
     println!(
-        "{name:22} {:8.1e} {limit:8.1e} {affected:6} {:9} {:8.2} {:5.1} % {:6.2} {:7.2} {:9.1}",
+        "{name:22} {:8.1e} {limit:8.1e} {affected:6} {:9} {:8.2} {:5.1} % {:6.2} {:7.2} {:7.1} {:10.1}",
         total.risk(),
         total.epochs,
         total.median_ratio(),
         100.0 * (1.0 - total.ok as f64 / total.epochs.max(1) as f64),
         total.worst_m,
         total.longest_silence_s,
-        total.early_alarms_per_h(),
+        total.per_h(total.early_alarms),
+        total.per_h(total.suspicions),
     );
 }

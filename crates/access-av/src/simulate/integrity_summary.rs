@@ -18,8 +18,11 @@ pub struct IntegritySummary {
     pub beyond: usize,
     /// Times at which the state left `ok` ...
     pub alarms: usize,
-    /// ... and those of them at which the error was within the alert limit.
+    /// ... those of them at which the error was within the alert limit ...
     pub early_alarms: usize,
+    /// ... and those of these at which the protection level was within it too: a source was
+    /// suspected, nominally a false alarm.
+    pub suspicions: usize,
     /// Times at which the error passed the alert limit.
     pub excursions: usize,
     /// Longest time in seconds that the error had been beyond the alert limit while the state was
@@ -48,7 +51,10 @@ impl IntegritySummary {
             summary.ok += usize::from(ok);
             summary.beyond += usize::from(ok && error_m > integrity.protection_level_m);
             summary.alarms += usize::from(was_ok && !ok);
-            summary.early_alarms += usize::from(was_ok && !ok && !exceeds);
+            let early = was_ok && !ok && !exceeds;
+            summary.early_alarms += usize::from(early);
+            let vouched = integrity.protection_level_m <= alert_limit_m;
+            summary.suspicions += usize::from(early && vouched);
             summary.worst_m = summary.worst_m.max(error_m);
             if exceeds {
                 summary.excursions += usize::from(exceeded_since_s.is_none());
@@ -77,6 +83,7 @@ impl IntegritySummary {
             total.beyond += run.beyond;
             total.alarms += run.alarms;
             total.early_alarms += run.early_alarms;
+            total.suspicions += run.suspicions;
             total.excursions += run.excursions;
             total.longest_silence_s = total.longest_silence_s.max(run.longest_silence_s);
             total.worst_m = total.worst_m.max(run.worst_m);
@@ -91,9 +98,9 @@ impl IntegritySummary {
         self.beyond as f64 / self.ok.max(1) as f64
     }
 
-    /// Alarms without need per hour.
-    pub fn early_alarms_per_h(&self) -> f64 {
-        self.early_alarms as f64 / (self.duration_s / 3600.0)
+    /// So many of them per hour.
+    pub fn per_h(&self, count: usize) -> f64 {
+        count as f64 / (self.duration_s / 3600.0)
     }
 
     /// Median of protection level over error.
@@ -153,6 +160,7 @@ mod tests {
         let summary = IntegritySummary::new(&record, 1.5).unwrap();
         assert_eq!((summary.epochs, summary.ok, summary.beyond), (9, 6, 1));
         assert_eq!((summary.alarms, summary.early_alarms), (3, 1));
+        assert_eq!(summary.suspicions, 1);
         assert_eq!(summary.excursions, 2);
         assert_eq!((summary.longest_silence_s, summary.worst_m), (3.0, 2.0));
         let median = summary.median_ratio();
@@ -161,7 +169,7 @@ mod tests {
         let twice = IntegritySummary::sum([&summary, &summary]);
         assert_eq!((twice.beyond, twice.excursions), (2, 4));
         assert!((twice.risk() - summary.risk()).abs() < 1e-15);
-        assert!((twice.early_alarms_per_h() - 450.0).abs() < 1e-9);
+        assert!((twice.per_h(twice.early_alarms) - 450.0).abs() < 1e-9);
     }
 
     #[test]
