@@ -1,0 +1,86 @@
+//! What the tracker believes before any measurement.
+
+use super::place::locate;
+use super::state::{
+    ACROSS, ALONG, Belief, CURVATURE, HEADING, MOUNTING, PHASE, SCALE, STATES, YAW_RATE_BIAS,
+};
+use super::{InitialPose, Tracker, TrackerConfig};
+use crate::geometry::wrap_angle;
+use crate::world::{RadioHead, Track};
+
+impl Tracker {
+    /// The belief before any measurement.
+    pub(in crate::localize) fn prior(
+        config: &TrackerConfig,
+        map: Option<&Track>,
+        start: &InitialPose,
+    ) -> Belief {
+        let mut sigma = [0.0; STATES];
+        sigma[SCALE] = config.odometer_scale_std;
+        sigma[YAW_RATE_BIAS] = config.yaw_rate_bias_std_radps;
+        sigma[MOUNTING] = config.mounting_std_rad;
+        sigma[PHASE] = config.phase_std_rad;
+        let mut mean = [0.0; STATES];
+        mean[MOUNTING] = config.mounting_rad;
+        let Some(map) = map else {
+            mean[ALONG] = start.pose.x_m;
+            mean[ACROSS] = start.pose.y_m;
+            mean[HEADING] = start.pose.heading_rad;
+            sigma[ALONG] = start.position_std_m;
+            sigma[ACROSS] = start.position_std_m;
+            sigma[HEADING] = start.heading_std_rad;
+            // The path bends with the road, and back to the middle of the lane.
+            let pull_per_m = config.lane_keeping.pull_per_m();
+            sigma[CURVATURE] = config.path_bend.curvature_per_m.hypot(pull_per_m);
+            return Belief::independent(mean, sigma);
+        };
+        let place = map.project(start.pose.point());
+        let [offset_variance, heading_variance] = config.lane_keeping.stationary();
+        mean[ALONG] = place.along_m;
+        sigma[ALONG] = start.position_std_m;
+        sigma[ACROSS] = offset_variance.sqrt();
+        sigma[HEADING] = heading_variance.sqrt();
+        let mut belief = Belief::independent(mean, sigma);
+        // The given pose is a measurement beside what lane keeping already says.
+        let heading_rad = wrap_angle(start.pose.heading_rad - map.pose(place.along_m).heading_rad);
+        // Where the road bends, the heading tells of the place along it.
+        let curvature_per_m = map.curvature_per_m(place.along_m);
+        for (state, value, std, by_along) in [
+            (ACROSS, place.lateral_m, start.position_std_m, 0.0),
+            (HEADING, heading_rad, start.heading_std_rad, curvature_per_m),
+        ] {
+            let mut row = [0.0; STATES];
+            row[state] = 1.0;
+            row[ALONG] = by_along;
+            let expected = belief.mean[state] + by_along * (belief.mean[ALONG] - place.along_m);
+            belief.update(value - expected, &row, std * std);
+        }
+        belief
+    }
+
+    /// The same tracker begun anew where it is, every source in use, its place known to
+    /// `position_std_m` and its heading by the road alone, or without a map by a quarter turn.
+    pub(in crate::localize) fn restarted(&self, position_std_m: f64) -> Self {
+        let along_m = self.belief.mean[ALONG];
+        let pose = match &self.map {
+            Some(map) => map.pose(along_m),
+            None => locate(&self.belief.mean, 0.0, None).0,
+        };
+        let start = InitialPose {
+            pose,
+            position_std_m,
+            heading_std_rad: if self.map.is_some() { 1.0 } else { 0.3 },
+        };
+        let heads: Vec<RadioHead> = self.heads.iter().map(|head| head.known).collect();
+        let mut restarted = Self::new(self.config, self.map.clone(), &heads, &start);
+        // Where the road crosses itself its nearest place may be another one.
+        if self.map.is_some() {
+            restarted.belief.mean[ALONG] = along_m;
+        }
+        Self {
+            odometry: self.odometry,
+            driven_m: self.driven_m,
+            ..restarted
+        }
+    }
+}
