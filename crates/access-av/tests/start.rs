@@ -155,11 +155,14 @@ fn a_recorded_drive_either_way_needs_no_initial_pose() {
         drive.poses.len() - errors.len()
     );
 
-    // Who takes the road for one-way does not find the vehicle there.
+    // Who takes the road for one-way does not find the vehicle there, and the angles say so: a
+    // tracker that is right refuses one in ten thousand.
     let site = Site::from_toml(&text, "site.toml").unwrap();
     let misled = locate_angles(&site, &odometry, &angles, false).unwrap();
+    let (last, truth) = (misled.poses.last().unwrap(), record.steps.last().unwrap());
+    assert!(last.estimate.pose.point().distance_m(truth.truth.point()) > 50.0);
     let refused = misled.executions.iter().filter(|it| !it.verdict.accepted);
-    assert!(refused.count() * 2 > misled.executions.len());
+    assert!(refused.count() * 10 > misled.executions.len());
 
     // No pose is published before there is one.
     let dir = common::scratch("start-mcap");
