@@ -1,0 +1,124 @@
+//! What an SSB costs on the vehicle, one thread: from samples to angle, and from angle to pose.
+//! `cargo bench -p access-av`.
+#![allow(clippy::unwrap_used, reason = "this is a benchmark")]
+
+use std::f64::consts::TAU;
+
+use access_av::estimator::AngleEstimator;
+use access_av::localize::tracker::{InitialPose, TrackerConfig};
+use access_av::localize::{AngleMeasurement, Tracker};
+use access_av::observation::OdometrySample;
+use access_av::random::{Purpose, Streams};
+use access_av::receive::{Receiver, ReceiverConfig, Window};
+use access_av::scenario::{LocalizerSettings, Scenario};
+use access_av::world::RadioHead;
+use nr_ssb::{BchPayload, Beam, Burst, Case, Complex32, Lmax, Mib, Numerology, Ofdm, Pci};
+use rand_distr::{Distribution, StandardNormal};
+
+const ANTENNAS: usize = 4;
+/// 20 ms at 3.84 Msps.
+const PERIOD: usize = 76_800;
+
+fn main() {
+    divan::main();
+}
+
+/// 20 ms of the scenario's cell on four antennas at 20 dB per resource element.
+fn samples(scenario: &Scenario) -> Vec<Vec<Complex32>> {
+    let burst = Burst {
+        pci: Pci::new(scenario.radio_heads[0].pci).unwrap(),
+        case: Case::A,
+        lmax: Lmax::L8,
+        payload: BchPayload::new(Mib::default(), 7, false, 0).unwrap(),
+        beams: vec![Beam::new(0)],
+        ssb_freq_hz: Some(scenario.ssb.carrier_mhz * 1e6),
+    };
+    let numerology = Numerology::new(burst.case.spacing(), 256).unwrap();
+    let sent = burst.iq(&mut Ofdm::new(numerology)).unwrap();
+    let mut random = Streams::new(1, 0).generator(Purpose::SampleNoise, 0);
+    // A resource element of power one has 1/256 of it in a sample.
+    let noise = (0.5 * 0.01 / 256.0_f32).sqrt();
+    let mut draw = || -> f32 { StandardNormal.sample(&mut random) };
+    (0..ANTENNAS)
+        .map(|antenna| {
+            let gain = Complex32::cis(0.2 * TAU as f32 * antenna as f32);
+            let quiet = vec![Complex32::ZERO; PERIOD - sent.len()];
+            let received = quiet.iter().chain(&sent);
+            received
+                .map(|sample| sample * gain + Complex32::new(draw(), draw()) * noise)
+                .collect()
+        })
+        .collect()
+}
+
+#[divan::bench(args = ["pss", "pss+sss", "ssb"])]
+fn samples_to_angle(bencher: divan::Bencher, pilots: &str) {
+    let scenario = Scenario::load("paper-real-odometry")
+        .and_then(|it| it.with_overrides([("receiver.pilots", pilots.into())]))
+        .unwrap();
+    let samples = samples(&scenario);
+    let antennas: [&[Complex32]; ANTENNAS] = std::array::from_fn(|n| samples[n].as_slice());
+    let mut receiver = Receiver::new(ReceiverConfig::new(&scenario)).unwrap();
+    let mut estimator = AngleEstimator::new(&scenario, None).unwrap();
+    let mut number = 0;
+    let mut next = || {
+        // The clock stands still, so that no other cells are looked for.
+        let window = Window {
+            start: (number * PERIOD) as u64,
+            time_s: 0.0,
+            antennas,
+        };
+        number += 1;
+        let mut phase_rad = None;
+        let take = |observation: &_| {
+            let angle = estimator.estimate(observation).unwrap();
+            phase_rad = angle.map(|angle| angle.phase_rad);
+        };
+        receiver.receive(&window, take).unwrap();
+        phase_rad.unwrap()
+    };
+    next();
+    bencher.bench_local(next);
+}
+
+#[divan::bench(args = [true, false])]
+fn angle_to_pose(bencher: divan::Bencher, map: bool) {
+    let scenario = Scenario::load("paper-real-odometry-2").unwrap();
+    let LocalizerSettings::Tracker(settings) = scenario.localizer else {
+        return;
+    };
+    let track = scenario.build_track().unwrap();
+    let heads: Vec<RadioHead> = scenario.radio_heads.iter().map(RadioHead::from).collect();
+    let config = TrackerConfig::new(&scenario, &settings);
+    let start = InitialPose {
+        pose: track.pose(0.0),
+        position_std_m: 1.0,
+        heading_std_rad: 0.05,
+    };
+    let known = map.then(|| std::sync::Arc::new(track));
+    let mut tracker = Tracker::new(config, known, &heads, &start);
+    let mut at = |metres: f64| {
+        tracker.odometry(&OdometrySample {
+            time_s: 0.25 * metres,
+            distance_m: metres,
+            speed_mps: 4.0,
+            yaw_rate_radps: None,
+        });
+    };
+    at(0.0);
+    at(1.0);
+    let bearing = start.pose.point().bearing_rad(heads[0].position) - start.pose.heading_rad;
+    let measured = AngleMeasurement {
+        time_s: 0.25,
+        phase_rad: 0.5 * TAU * bearing.cos(),
+        phase_sigma_rad: 0.05,
+        angle_rad: bearing,
+        snr_db: 20.0,
+        resolved: true,
+    };
+    // The same tracker each time: a second angle would find nothing new.
+    bencher.bench_local(|| {
+        let mut tracker = divan::black_box(&tracker).clone();
+        tracker.update(&heads[0], divan::black_box(&measured))
+    });
+}
