@@ -104,6 +104,8 @@ pub struct Replay<'a> {
     looks_back: bool,
     /// Whether the odometry before told of the end of the road.
     beyond_map: bool,
+    /// Where the gaps of the road begin that were remarked on (m).
+    gaps_m: Vec<f64>,
 }
 
 impl<'a> Replay<'a> {
@@ -125,6 +127,7 @@ impl<'a> Replay<'a> {
         Ok(Self {
             onboard,
             beyond_map: false,
+            gaps_m: Vec::new(),
             odometry: odometry.samples.iter().peekable(),
             drive: LocatedDrive {
                 remarks: odometry
@@ -199,6 +202,17 @@ impl<'a> Replay<'a> {
                         self.remark(at_s, text);
                     }
                     self.beyond_map = true;
+                }
+                Ok(OdometryVerdict::InMapGap { from_m, to_m }) => {
+                    self.beyond_map = false;
+                    if !self.gaps_m.contains(&from_m) {
+                        let text = format!(
+                            "odometry at {at_s} s: the road was not surveyed from {from_m:.1} to \
+                             {to_m:.1} m, driving on without it"
+                        );
+                        self.remark(at_s, text);
+                        self.gaps_m.push(from_m);
+                    }
                 }
                 Ok(_) => self.beyond_map = false,
                 // Nothing is known of the vehicle's place by a sample that is left out.

@@ -104,6 +104,26 @@ fn numbers_must_be_finite_and_in_range() {
         ),
         ("period_ms = 20.0", "period_ms = 21", "ssb.period_ms"),
         ("elements = 4", "elements = 3", "array.elements"),
+        (
+            "mounting_error_std_rad = 0.0",
+            "mounting_error_std_rad = -0.01",
+            "array.mounting_error_std_rad",
+        ),
+        (
+            "mounting_drift_rad_per_sqrt_m = 0.0",
+            "mounting_drift_rad_per_sqrt_m = -1e-4",
+            "array.mounting_drift_rad_per_sqrt_m",
+        ),
+        (
+            "phase_error_std_rad = 0.0",
+            "phase_error_std_rad = -0.1",
+            "array.phase_error_std_rad",
+        ),
+        (
+            "phase_drift_rad_per_sqrt_m = 0.0",
+            "phase_drift_rad_per_sqrt_m = -1e-3",
+            "array.phase_drift_rad_per_sqrt_m",
+        ),
         ("snapshots = 20", "snapshots = 65", "array.snapshots"),
         ("pci = 1", "pci = 1008", "radio_heads[0].pci"),
         (
@@ -131,6 +151,33 @@ fn numbers_must_be_finite_and_in_range() {
     ] {
         assert_says(with_line(line, bad), key, "must");
     }
+}
+
+#[test]
+fn a_guess_of_the_road_is_straight() {
+    assert_says(
+        with_line("surveyed = true", "surveyed = false"),
+        "track.segments[0].turn_rad",
+        "a guess must be straight",
+    );
+    assert_says(
+        with_line("surveyed = true", "surveyed = \"no\""),
+        "track.segments[0].surveyed",
+        "expected a boolean",
+    );
+    assert_says(
+        with_line("surveyed = true", "surveyd = false"),
+        "track.segments[0].surveyd",
+        "did you mean `surveyed`?",
+    );
+    assert!(
+        Scenario::from_toml(
+            "name = 'plant'\nradio_heads = [{ position_m = [50, 20] }]\n\
+         track.segments = [{ length_m = 60 }, { length_m = 40, surveyed = false }]",
+            "plant.toml"
+        )
+        .is_ok()
+    );
 }
 
 #[test]

@@ -5,7 +5,7 @@
 //! `J⁺ = (F J⁻¹ Fᵀ + Q)⁻¹ + Σ Hᵀ R⁻¹ H`,
 //! with the Jacobians taken at the true states. Its inverse bounds the mean squared error of every
 //! estimator from below. The truth taken here drives in the middle of its lane: the centimetres of
-//! its wander do not change the geometry.
+//! its wander do not change the geometry. The whole road is taken as surveyed.
 //!
 //! One angle has the variance of its thermal noise (the Cramér–Rao bound of the snapshots at the
 //! link budget's SNR) and that of the scatter, which successive looks share as
@@ -166,6 +166,7 @@ impl Bound {
             Step::in_plane(
                 &belief.mean,
                 length_m,
+                0.0,
                 &self.config.path_bend,
                 &self.config.noise,
             )

@@ -118,6 +118,7 @@ mod tests {
         let bend = [Segment {
             length_m: 300.0,
             turn_rad,
+            surveyed: true,
         }];
         let track = Track::from_segments(Pose::default(), &bend, 5.0).unwrap();
         let motion = MotionProfile::new(&MotionSettings::default(), 300.0);

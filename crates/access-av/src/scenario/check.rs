@@ -380,6 +380,7 @@ impl TrackSettings {
                     .map(|s| Segment {
                         length_m: s.length_m,
                         turn_rad: s.turn_rad,
+                        surveyed: s.surveyed,
                     })
                     .collect();
                 (
@@ -415,6 +416,10 @@ impl TrackSettings {
                 TrackError::Length { index, length_m } => (
                     format!("track.{key}[{index}].length_m"),
                     length_m.to_string(),
+                ),
+                TrackError::BentGuess { index, turn_rad } => (
+                    format!("track.{key}[{index}].turn_rad"),
+                    turn_rad.to_string(),
                 ),
                 TrackError::RepeatedPoint { index } | TrackError::Reversal { index } => {
                     (format!("track.{key}[{index}]"), "not passable".to_owned())

@@ -38,6 +38,15 @@ pub struct SegmentSettings {
     /// Turn over this length in radians; left is positive.
     #[serde(default)]
     pub turn_rad: f64,
+    /// Whether the road is known to lie there. What is given of a stretch that was not surveyed
+    /// is a guess, such as the chord between the ends of the survey, and must be straight. A
+    /// tracker does not keep to it; a simulated vehicle does.
+    #[serde(default = "surveyed")]
+    pub surveyed: bool,
+}
+
+const fn surveyed() -> bool {
+    true
 }
 
 /// `[motion]`

@@ -15,5 +15,5 @@ pub use lane_keeping::LaneKeeping;
 pub use motion::{Motion, MotionProfile};
 pub use odometer::Odometer;
 pub use radio_head::RadioHead;
-pub use track::{Projection, Segment, Track, TrackError};
+pub use track::{Gap, Projection, Segment, Track, TrackError};
 pub use vehicle::{Vehicle, VehicleState};

@@ -8,6 +8,7 @@ use crate::geometry::{Point, Pose, wrap_angle};
 #[derive(Debug, Clone, PartialEq)]
 pub struct Track {
     pieces: Vec<Piece>,
+    gaps: Vec<Gap>,
     length_m: f64,
     width_m: f64,
 }
@@ -19,6 +20,18 @@ pub struct Segment {
     pub length_m: f64,
     /// Turn over that length in radians; left is positive, a line has none.
     pub turn_rad: f64,
+    /// Whether the road is known to lie there; else this is a guess, which must be straight.
+    pub surveyed: bool,
+}
+
+/// A stretch of the road that was not surveyed: the road leaves at one end and comes back at the
+/// other, and what lies between is a guess.
+#[derive(Debug, Clone, Copy, PartialEq)]
+pub struct Gap {
+    /// Where it begins, along the road in metres.
+    pub from_m: f64,
+    /// Where it ends.
+    pub to_m: f64,
 }
 
 /// A line or arc where it lies.
@@ -53,6 +66,17 @@ pub enum TrackError {
         /// Its length in metres.
         length_m: f64,
     },
+    /// A guess that bends: beside a bend the road's coordinates end at its centre, and nothing
+    /// says how far from a guess the vehicle is.
+    #[error(
+        "segment {index} is not surveyed and turns by {turn_rad} rad; a guess must be straight"
+    )]
+    BentGuess {
+        /// Index of the segment.
+        index: usize,
+        /// Its turn in radians.
+        turn_rad: f64,
+    },
     /// Two successive points in one place.
     #[error("points {index} and {} of the polyline are in one place", index + 1)]
     RepeatedPoint {
@@ -78,12 +102,19 @@ impl Track {
         width_m: f64,
     ) -> Result<Self, TrackError> {
         let mut pieces = Vec::with_capacity(segments.len());
+        let mut gaps: Vec<Gap> = Vec::new();
         let (mut pose, mut length_m) = (start, 0.0);
         for (index, segment) in segments.iter().enumerate() {
             if !(segment.length_m > 0.0 && segment.length_m.is_finite()) {
                 return Err(TrackError::Length {
                     index,
                     length_m: segment.length_m,
+                });
+            }
+            if !segment.surveyed && segment.turn_rad != 0.0 {
+                return Err(TrackError::BentGuess {
+                    index,
+                    turn_rad: segment.turn_rad,
                 });
             }
             let piece = Piece {
@@ -95,12 +126,21 @@ impl Track {
             pose = piece.pose(piece.length_m);
             length_m += piece.length_m;
             pieces.push(piece);
+            if !segment.surveyed {
+                let from_m = piece.start_m;
+                let before = gaps.pop_if(|gap| gap.to_m == from_m);
+                gaps.push(Gap {
+                    from_m: before.map_or(from_m, |gap| gap.from_m),
+                    to_m: length_m,
+                });
+            }
         }
         if pieces.is_empty() {
             return Err(TrackError::Empty);
         }
         Ok(Self {
             pieces,
+            gaps,
             length_m,
             width_m,
         })
@@ -152,12 +192,14 @@ impl Track {
                 segments.push(Segment {
                     length_m: straight_m,
                     turn_rad: 0.0,
+                    surveyed: true,
                 });
             }
             if let Some((_, arc_m, turn_rad)) = corner {
                 segments.push(Segment {
                     length_m: arc_m,
                     turn_rad,
+                    surveyed: true,
                 });
             }
             cut_before_m = cut_after_m;
@@ -188,8 +230,13 @@ impl Track {
             start_m += piece.length_m;
             reversed
         });
+        let gaps = self.gaps.iter().rev().map(|gap| Gap {
+            from_m: self.length_m - gap.to_m,
+            to_m: self.length_m - gap.from_m,
+        });
         Self {
             pieces: pieces.collect(),
+            gaps: gaps.collect(),
             length_m: self.length_m,
             width_m: self.width_m,
         }
@@ -219,6 +266,12 @@ impl Track {
             return 0.0;
         }
         self.piece(along_m).curvature_per_m
+    }
+
+    /// The first stretch between `from_m` and `to_m` along the road that was not surveyed.
+    pub fn gap_between(&self, from_m: f64, to_m: f64) -> Option<Gap> {
+        let mut gaps = self.gaps.iter().copied();
+        gaps.find(|gap| gap.from_m <= to_m && gap.to_m >= from_m)
     }
 
     /// The nearest point of the road.
@@ -330,6 +383,7 @@ mod tests {
         let bend = [Segment {
             length_m: 300.0,
             turn_rad: 0.25,
+            surveyed: true,
         }];
         Track::from_segments(Pose::default(), &bend, 5.0).unwrap()
     }
@@ -342,7 +396,11 @@ mod tests {
             (25.0, 0.0),
             (60.0, 1.0),
         ]
-        .map(|(length_m, turn_rad)| Segment { length_m, turn_rad });
+        .map(|(length_m, turn_rad)| Segment {
+            length_m,
+            turn_rad,
+            surveyed: true,
+        });
         Track::from_segments(
             Pose {
                 x_m: 3.0,
@@ -418,10 +476,42 @@ mod tests {
     }
 
     #[test]
+    fn guesses_that_join_are_one_gap_from_either_side() {
+        let segments = [(40.0, true), (10.0, false), (20.0, false), (30.0, true)];
+        let segments = segments.map(|(length_m, surveyed)| Segment {
+            length_m,
+            turn_rad: if surveyed { 0.3 } else { 0.0 },
+            surveyed,
+        });
+        let track = Track::from_segments(Pose::default(), &segments, 5.0).unwrap();
+        let gap = |from_m, to_m| Some(Gap { from_m, to_m });
+        assert_eq!(track.gap_between(65.0, 65.0), gap(40.0, 70.0));
+        assert_eq!(track.gap_between(38.0, 41.0), gap(40.0, 70.0));
+        assert_eq!(track.gap_between(f64::NEG_INFINITY, 39.0), None);
+        assert_eq!(track.gap_between(71.0, f64::INFINITY), None);
+        assert_eq!(track.reversed().gap_between(0.0, 99.0), gap(30.0, 60.0));
+        assert_eq!(
+            Track::from_segments(
+                Pose::default(),
+                &segments.map(|segment| Segment {
+                    turn_rad: 0.1,
+                    ..segment
+                }),
+                5.0
+            ),
+            Err(TrackError::BentGuess {
+                index: 1,
+                turn_rad: 0.1
+            })
+        );
+    }
+
+    #[test]
     fn impossible_roads_are_refused() {
         let bad = [Segment {
             length_m: -3.0,
             turn_rad: 0.0,
+            surveyed: true,
         }];
         assert_eq!(
             Track::from_segments(Pose::default(), &bad, 5.0),

@@ -151,6 +151,7 @@ mod tests {
         let bend = [Segment {
             length_m: 300.0,
             turn_rad: 0.25,
+            surveyed: true,
         }];
         let track = Track::from_segments(Pose::default(), &bend, 5.0).unwrap();
         let lateral_wander = WanderSettings {

@@ -118,6 +118,12 @@ impl TrackerConfig {
         self.array.scatter_variance(self.rician_k) * correlation
     }
 
+    /// Variance of the curvature of the path (1/m²) where no map tells: it bends with the road, and
+    /// back to the middle of the lane.
+    pub fn curvature_variance(&self) -> f64 {
+        self.path_bend.curvature_per_m.powi(2) + self.lane_keeping.pull_per_m().powi(2)
+    }
+
     /// Variance of the distance (m²) driven during `duration_s` without odometry.
     pub fn coasting_variance(&self, duration_s: f64) -> f64 {
         let error_m = 0.5 * self.acceleration_mps2 * duration_s * duration_s;

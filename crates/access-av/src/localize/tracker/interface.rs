@@ -30,6 +30,13 @@ pub enum OdometryVerdict {
         /// How far from its end, in metres.
         by_m: f64,
     },
+    /// Used, as in the plane: the vehicle may be where the road was not surveyed.
+    InMapGap {
+        /// Where that stretch begins, along the road in metres.
+        from_m: f64,
+        /// Where it ends.
+        to_m: f64,
+    },
     /// The distance jumped; the speed was used instead, with its uncertainty.
     DistanceJump {
         /// By how much, in metres.
@@ -52,6 +59,7 @@ impl OdometryVerdict {
                 | Self::First
                 | Self::AfterGap { .. }
                 | Self::BeyondMap { .. }
+                | Self::InMapGap { .. }
                 | Self::DistanceJump { .. }
         )
     }

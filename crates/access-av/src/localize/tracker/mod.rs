@@ -26,7 +26,7 @@ use crate::localize::gaussian::Innovation;
 use crate::localize::smoother::Journal;
 use crate::localize::{AngleMeasurement, UpdateReason, UpdateVerdict};
 use crate::observation::OdometrySample;
-use crate::world::{RadioHead, Track};
+use crate::world::{Gap, RadioHead, Track};
 
 pub use calibration::{Calibration, Departure};
 pub use config::TrackerConfig;
@@ -35,6 +35,7 @@ pub use motion::{MotionNoise, PathBend};
 pub use sighting::ArrayModel;
 
 use motion::{Step, Yaw};
+use off_map::OffMap;
 use place::locate;
 use sighting::Sighting;
 use state::{ALONG, Belief, HEADING, MOUNTING, PHASE, SCALE, STATES};
@@ -65,8 +66,8 @@ pub struct Tracker {
     belief: Belief,
     odometry: Option<OdometrySample>,
     driven_m: f64,
-    /// Whether the vehicle has driven off the end of the map.
-    beyond_map: bool,
+    /// Where the vehicle is that the map does not tell how the road goes on.
+    off_map: Option<OffMap>,
     journal: Option<Journal<STATES>>,
 }
 
@@ -84,16 +85,18 @@ impl Tracker {
             excluded: false,
             last_look_m: f64::NEG_INFINITY,
         };
-        Self {
+        let mut tracker = Self {
             config,
             map,
             heads: heads.iter().map(head).collect(),
             belief,
             odometry: None,
             driven_m: 0.0,
-            beyond_map: false,
+            off_map: None,
             journal: None,
-        }
+        };
+        tracker.watch_the_map();
+        tracker
     }
 
     /// Moves the state by one odometry sample.
@@ -146,12 +149,14 @@ impl Tracker {
             OdometryVerdict::DistanceJump { jump_m: moved_m }
         } else if duration_s > self.config.gap_s {
             OdometryVerdict::AfterGap { gap_s: duration_s }
-        } else if self.beyond_map {
-            OdometryVerdict::BeyondMap {
-                by_m: self.off_map_m(),
-            }
         } else {
-            OdometryVerdict::Accepted
+            match self.off_map {
+                Some(OffMap::Beyond { by_m }) => OdometryVerdict::BeyondMap { by_m },
+                Some(OffMap::Gap(Gap { from_m, to_m })) => {
+                    OdometryVerdict::InMapGap { from_m, to_m }
+                }
+                None => OdometryVerdict::Accepted,
+            }
         }
     }
 
@@ -178,24 +183,19 @@ impl Tracker {
             step.apply(&mut self.belief);
         }
         self.driven_m += reading_m.abs() / (1.0 + self.belief.mean[SCALE]);
-        self.watch_the_ends();
+        self.watch_the_map();
     }
 
     fn step(&self, belief: &Belief, reading_m: f64) -> Step {
         let (mean, config) = (&belief.mean, &self.config);
-        match &self.map {
-            Some(map) if !self.beyond_map => {
-                let middle_m = mean[ALONG] + 0.5 * reading_m;
-                let curvature_per_m = map.curvature_per_m(middle_m);
-                Step::along_lane(
-                    mean,
-                    reading_m,
-                    curvature_per_m,
-                    &config.lane_keeping,
-                    &config.noise,
-                )
-            }
-            _ => Step::in_plane(mean, reading_m, &config.path_bend, &config.noise),
+        let middle_m = mean[ALONG] + 0.5 * reading_m;
+        let curvature_per_m = (self.map.as_ref()).map_or(0.0, |map| map.curvature_per_m(middle_m));
+        let noise = &config.noise;
+        if self.map.is_some() && self.off_map.is_none() {
+            let keeping = &config.lane_keeping;
+            Step::along_lane(mean, reading_m, curvature_per_m, keeping, noise)
+        } else {
+            Step::in_plane(mean, reading_m, curvature_per_m, &config.path_bend, noise)
         }
     }
 

@@ -118,52 +118,76 @@ impl Step {
         }
     }
 
-    /// The step in the plane, for what the odometer read.
+    /// The step in the plane, for what the odometer read: in Cartesian coordinates, or in those of
+    /// a road of curvature κ that the vehicle does not keep to. There
+    /// `ds = dl cos ψ / (1 − κ d)`, `dd = dl sin ψ` and `dψ = c dl − κ ds`, for the curvature c of
+    /// the path driven; κ = 0 is the Cartesian case.
     pub fn in_plane(
         start: &[f64; STATES],
         reading_m: f64,
+        road_curvature_per_m: f64,
         bend: &PathBend,
         walk: &MotionNoise,
     ) -> Self {
         let scale = 1.0 + start[SCALE];
         let length = reading_m / scale;
-        let (sin, cos) = (start[HEADING] + 0.5 * start[CURVATURE] * length).sin_cos();
+        let kappa = road_curvature_per_m;
+        let (sin_at_start, cos_at_start) = start[HEADING].sin_cos();
+        // Offset, stretch of the road beside it and heading halfway, and how they depend on the
+        // state: the midpoint rule.
+        let half_m = 0.5 * length;
+        let mut offset_row = [0.0; STATES];
+        offset_row[ACROSS] = 1.0;
+        offset_row[HEADING] = half_m * cos_at_start;
+        offset_row[SCALE] = -half_m * sin_at_start / scale;
+        let stretch = 1.0 / (1.0 - kappa * (start[ACROSS] + half_m * sin_at_start));
+        let stretch_row = offset_row.map(|by| kappa * stretch * stretch * by);
+        let bending = start[CURVATURE] - kappa * stretch * cos_at_start;
+        let (sin, cos) = (start[HEADING] + half_m * bending).sin_cos();
+        let mut heading_row = stretch_row.map(|by| -half_m * kappa * cos_at_start * by);
+        heading_row[HEADING] += 1.0 + half_m * kappa * stretch * sin_at_start;
+        heading_row[CURVATURE] += half_m;
+        heading_row[SCALE] -= half_m * bending / scale;
         let distance = length.abs();
         let kept = (-distance / bend.correlation_m).exp();
 
+        let mut turn_row = [0.0; STATES];
+        turn_row[CURVATURE] = length;
+        turn_row[SCALE] = -start[CURVATURE] * length / scale;
         let mut f = identity();
-        f[ALONG][HEADING] = -length * sin;
-        f[ALONG][CURVATURE] = -0.5 * length * length * sin;
-        f[ALONG][SCALE] = -length * cos / scale;
-        f[ACROSS][HEADING] = length * cos;
-        f[ACROSS][CURVATURE] = 0.5 * length * length * cos;
-        f[ACROSS][SCALE] = -length * sin / scale;
-        f[HEADING][CURVATURE] = length;
-        f[HEADING][SCALE] = -start[CURVATURE] * length / scale;
+        for i in 0..STATES {
+            f[ALONG][i] += length * (cos * stretch_row[i] - stretch * sin * heading_row[i]);
+            f[ACROSS][i] += length * cos * heading_row[i];
+        }
+        f[ALONG][SCALE] -= length * stretch * cos / scale;
+        f[ACROSS][SCALE] -= length * sin / scale;
+        for i in 0..STATES {
+            f[HEADING][i] += turn_row[i] - kappa * f[ALONG][i];
+        }
+        f[HEADING][ALONG] = 0.0;
         f[CURVATURE][CURVATURE] = kept;
 
         let mut q = [[0.0; STATES]; STATES];
         let spread = walk.odometer_m_per_sqrt_m.powi(2) * distance;
-        q[ALONG][ALONG] = spread * cos * cos;
-        q[ALONG][ACROSS] = spread * cos * sin;
-        q[ACROSS][ALONG] = spread * cos * sin;
+        q[ALONG][ALONG] = spread * (cos * stretch).powi(2);
+        q[ALONG][ACROSS] = spread * cos * stretch * sin;
+        q[ACROSS][ALONG] = spread * cos * stretch * sin;
         q[ACROSS][ACROSS] = spread * sin * sin;
         // Curvature noise and its integral, the heading (a step is short against both).
-        let bending = bend.curvature_per_m.powi(2) * (1.0 - kept * kept);
-        q[CURVATURE][CURVATURE] = bending;
-        q[HEADING][CURVATURE] = bending * length / 2.0;
-        q[CURVATURE][HEADING] = bending * length / 2.0;
+        let fresh = bend.curvature_per_m.powi(2) * (1.0 - kept * kept);
+        q[CURVATURE][CURVATURE] = fresh;
+        q[HEADING][CURVATURE] = fresh * length / 2.0;
+        q[CURVATURE][HEADING] = fresh * length / 2.0;
         q[HEADING][HEADING] =
-            bending * length * length / 3.0 + bend.steering_rad_per_sqrt_m.powi(2) * distance;
+            fresh * length * length / 3.0 + bend.steering_rad_per_sqrt_m.powi(2) * distance;
         slow_states(&mut q, walk, distance);
 
         let mut mean = *start;
-        mean[ALONG] += length * cos;
+        let ahead_m = length * cos * stretch;
+        mean[ALONG] += ahead_m;
         mean[ACROSS] += length * sin;
-        mean[HEADING] += start[CURVATURE] * length;
+        mean[HEADING] += start[CURVATURE] * length - kappa * ahead_m;
         mean[CURVATURE] *= kept;
-        let mut turn_row = f[HEADING];
-        turn_row[HEADING] -= 1.0;
         Self {
             turn_rad: start[CURVATURE] * length,
             mean,
@@ -215,4 +239,76 @@ fn slow_states(q: &mut Matrix<STATES>, noise: &MotionNoise, distance_m: f64) {
     q[SCALE][SCALE] = noise.scale_per_sqrt_m.powi(2) * distance_m;
     q[MOUNTING][MOUNTING] = noise.mounting_rad_per_sqrt_m.powi(2) * distance_m;
     q[PHASE][PHASE] = noise.phase_rad_per_sqrt_m.powi(2) * distance_m;
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+    use crate::geometry::Pose;
+
+    const BEND: PathBend = PathBend {
+        curvature_per_m: 0.01,
+        correlation_m: f64::INFINITY,
+        steering_rad_per_sqrt_m: 0.0,
+    };
+
+    /// Along, across, heading against the road, curvature of the path, odometer scale.
+    fn state(values: [f64; 5]) -> [f64; STATES] {
+        let mut state = [0.0; STATES];
+        for (index, value) in [ALONG, ACROSS, HEADING, CURVATURE, SCALE]
+            .into_iter()
+            .zip(values)
+        {
+            state[index] = value;
+        }
+        state
+    }
+
+    fn step(start: &[f64; STATES], reading_m: f64, kappa: f64) -> Step {
+        Step::in_plane(start, reading_m, kappa, &BEND, &MotionNoise::default())
+    }
+
+    #[test]
+    fn a_path_is_the_same_whatever_road_it_is_told_beside() {
+        let driven = Pose::default().offset_left(2.0);
+        let end = driven.along_arc(30.0, 0.02);
+        for kappa in [0.0, 0.05, -0.03] {
+            let mut at = state([0.0, 2.0, 0.0, 0.02, 0.0]);
+            for _ in 0..300 {
+                at = step(&at, 0.1, kappa).mean;
+            }
+            let road = Pose::default().along_arc(at[ALONG], kappa);
+            let found = road.offset_left(at[ACROSS]);
+            let off_m = found.point().distance_m(end.point());
+            assert!(off_m < 1e-3, "{kappa}: {off_m}");
+            let heading_rad = road.heading_rad + at[HEADING];
+            assert!((heading_rad - end.heading_rad).abs() < 1e-4, "{kappa}");
+        }
+    }
+
+    #[test]
+    fn the_jacobian_in_the_plane_is_the_derivative() {
+        let start = state([5.0, 1.5, 0.2, 0.03, 0.01]);
+        for kappa in [0.0, 0.04, -0.1] {
+            let made = step(&start, 0.9, kappa);
+            for state in [ALONG, ACROSS, HEADING, CURVATURE, SCALE] {
+                let beside = |by: f64| {
+                    let mut start = start;
+                    start[state] += by;
+                    step(&start, 0.9, kappa)
+                };
+                let (less, more) = (beside(-1e-6), beside(1e-6));
+                let slope = |less: f64, more: f64| (more - less) / 2e-6;
+                for row in 0..STATES {
+                    let expected = slope(less.mean[row], more.mean[row]);
+                    assert!(
+                        (made.jacobian[row][state] - expected).abs() < 1e-8,
+                        "{kappa}: {row} by {state}"
+                    );
+                }
+                let expected = slope(less.turn_rad, more.turn_rad);
+                assert!((made.turn_row[state] - expected).abs() < 1e-8);
+            }
+        }
+    }
 }

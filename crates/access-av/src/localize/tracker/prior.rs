@@ -1,5 +1,7 @@
 //! What the tracker believes before any measurement.
 
+use std::sync::Arc;
+
 use super::place::locate;
 use super::state::{
     ACROSS, ALONG, Belief, CURVATURE, HEADING, MOUNTING, PHASE, SCALE, STATES, YAW_RATE_BIAS,
@@ -29,21 +31,29 @@ impl Tracker {
             sigma[ALONG] = start.position_std_m;
             sigma[ACROSS] = start.position_std_m;
             sigma[HEADING] = start.heading_std_rad;
-            // The path bends with the road, and back to the middle of the lane.
-            let pull_per_m = config.lane_keeping.pull_per_m();
-            sigma[CURVATURE] = config.path_bend.curvature_per_m.hypot(pull_per_m);
+            sigma[CURVATURE] = config.curvature_variance().sqrt();
             return Belief::independent(mean, sigma);
         };
         let place = map.project(start.pose.point());
+        let heading_rad = wrap_angle(start.pose.heading_rad - map.pose(place.along_m).heading_rad);
+        if map.gap_between(place.along_m, place.along_m).is_some() {
+            // No lane to keep to: what is given is all there is.
+            mean[ALONG] = place.along_m;
+            mean[ACROSS] = place.lateral_m;
+            mean[HEADING] = heading_rad;
+            sigma[ALONG] = start.position_std_m;
+            sigma[ACROSS] = start.position_std_m;
+            sigma[HEADING] = start.heading_std_rad;
+            return Belief::independent(mean, sigma);
+        }
         let [offset_variance, heading_variance] = config.lane_keeping.stationary();
         mean[ALONG] = place.along_m;
         sigma[ALONG] = start.position_std_m;
         sigma[ACROSS] = offset_variance.sqrt();
         sigma[HEADING] = heading_variance.sqrt();
         let mut belief = Belief::independent(mean, sigma);
-        // The given pose is a measurement beside what lane keeping already says.
-        let heading_rad = wrap_angle(start.pose.heading_rad - map.pose(place.along_m).heading_rad);
-        // Where the road bends, the heading tells of the place along it.
+        // The given pose is a measurement beside what lane keeping already says. Where the road
+        // bends, the heading tells of the place along it.
         let curvature_per_m = map.curvature_per_m(place.along_m);
         for (state, value, std, by_along) in [
             (ACROSS, place.lateral_m, start.position_std_m, 0.0),
@@ -59,17 +69,20 @@ impl Tracker {
     }
 
     /// The same tracker begun anew where it is, every source in use, its place known to
-    /// `position_std_m` and its heading by the road alone, or without a map by a quarter turn.
+    /// `position_std_m` and its heading by the road alone, or by a quarter turn where no map tells
+    /// how the road lies.
     pub(in crate::localize) fn restarted(&self, position_std_m: f64) -> Self {
         let along_m = self.belief.mean[ALONG];
-        let pose = match &self.map {
+        let surveyed = |map: &&Arc<Track>| map.gap_between(along_m, along_m).is_none();
+        let road = self.map.as_ref().filter(surveyed);
+        let pose = match road {
             Some(map) => map.pose(along_m),
-            None => locate(&self.belief.mean, 0.0, None).0,
+            None => locate(&self.belief.mean, 0.0, self.map.as_deref()).0,
         };
         let start = InitialPose {
             pose,
             position_std_m,
-            heading_std_rad: if self.map.is_some() { 1.0 } else { 0.3 },
+            heading_std_rad: if road.is_some() { 1.0 } else { 0.3 },
         };
         let heads: Vec<RadioHead> = self.heads.iter().map(|head| head.known).collect();
         let mut restarted = Self::new(self.config, self.map.clone(), &heads, &start);

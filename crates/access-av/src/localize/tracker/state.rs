@@ -15,7 +15,7 @@ pub const ALONG: usize = 0;
 pub const ACROSS: usize = 1;
 /// Heading against the track's direction with a map, in the map frame without (rad).
 pub const HEADING: usize = 2;
-/// Curvature of the path driven (1/m); only without a map, which knows it.
+/// Curvature of the path driven (1/m); only where no map knows it.
 pub const CURVATURE: usize = 3;
 /// Odometer scale error ε: the odometer reads `(1 + ε)` times the distance travelled.
 pub const SCALE: usize = 4;
