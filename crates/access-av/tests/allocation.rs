@@ -1,8 +1,9 @@
 //! A vehicle that drives for years allocates nothing once under way.
 #![allow(clippy::unwrap_used, reason = "this is a test")]
 
-use std::alloc::{GlobalAlloc, Layout, System};
-use std::cell::Cell;
+#[path = "../../nr-ssb/tests/counting/mod.rs"]
+mod counting;
+
 use std::f64::consts::PI;
 
 use access_av::localize::AngleMeasurement;
@@ -12,38 +13,7 @@ use access_av::platform::Platform;
 use access_av::scenario::Scenario;
 use access_av::world::{MotionProfile, RadioHead};
 
-thread_local! {
-    static ALLOCATIONS: Cell<usize> = const { Cell::new(0) };
-}
-
-/// The system's allocator, counting what this thread asks of it.
-struct Counting;
-
-// SAFETY: all calls are handed on to the system's allocator as they are; the count is a
-// thread-local constant without destructor, so that counting does not allocate.
-#[allow(unsafe_code, reason = "an allocator is unsafe by its trait")]
-unsafe impl GlobalAlloc for Counting {
-    unsafe fn alloc(&self, layout: Layout) -> *mut u8 {
-        ALLOCATIONS.set(ALLOCATIONS.get() + 1);
-        // SAFETY: the caller promises what the system's allocator needs.
-        unsafe { System.alloc(layout) }
-    }
-
-    unsafe fn dealloc(&self, place: *mut u8, layout: Layout) {
-        // SAFETY: as above.
-        unsafe { System.dealloc(place, layout) }
-    }
-}
-
-#[global_allocator]
-static COUNTING: Counting = Counting;
-
-/// Allocations of this thread while `act` runs.
-fn allocations(act: impl FnOnce()) -> usize {
-    let before = ALLOCATIONS.get();
-    act();
-    ALLOCATIONS.get() - before
-}
+use counting::allocations;
 
 #[test]
 fn the_counter_counts() {
