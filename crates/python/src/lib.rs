@@ -7,12 +7,12 @@ mod recording;
 mod scenario;
 mod simulate;
 
-use pyo3::prelude::*;
+use pyo3::pymodule;
 
 /// The compiled core of `access_av`.
 #[pymodule]
 mod _core {
-    use super::*;
+    use pyo3::prelude::*;
 
     #[pymodule]
     mod aoa {
