@@ -3,23 +3,26 @@
 //! The matched filter proposes, strongest first; SSS, DM-RS and the PBCH's checksum dispose. A
 //! found SSB is taken out of the samples, and what it hid is looked for again.
 
+mod detected;
+mod settings;
+
 use num_complex::Complex32;
 
 use crate::acquire::{Acquired, Acquirer};
 use crate::alignment::Alignment;
 use crate::broadcast::{Broadcast, BroadcastDecoder};
 use crate::cancel::Canceller;
-use crate::demodulate::{CYCLIC_PREFIX, ReceivedGrid, SSB_SAMPLES};
+use crate::demodulate::{CYCLIC_PREFIX, SSB_SAMPLES};
 use crate::false_alarm::exponential_sum_threshold;
-use crate::grid::SsbGrid;
 use crate::matched_filter::{MatchedFilter, PssCandidate};
 use crate::measure::{Measurement, decibel, measure, sss_power};
-use crate::numerology::{Lmax, SubcarrierSpacing};
-use crate::payload::BchPayload;
+use crate::numerology::Lmax;
 use crate::pci::Pci;
+use settings::check_frequency;
 
-/// Largest number of antennas.
-pub const MAX_ANTENNAS: usize = 16;
+pub use detected::{DetectedSsb, ReceivedSsb, SearchCounts};
+pub use settings::{MAX_ANTENNAS, SearchConfig, SearchError};
+
 /// Candidates examined per 20 ms at most; what noise and sidelobes offer beyond is not worth it.
 const CANDIDATES_PER_20_MS: usize = 200;
 /// PSS candidates that noise may offer in 20 ms. Each costs an examination, none a false cell.
@@ -40,141 +43,6 @@ const RESIDUE_DB: f64 = 25.0;
 const RESIDUE_SAMPLES: f64 = 1.0;
 /// Two detections of one cell closer than this, in samples, are one SSB.
 const SAME_SSB_SAMPLES: f64 = CYCLIC_PREFIX as f64;
-
-/// What a search is told.
-#[derive(Debug, Clone, PartialEq)]
-pub struct SearchConfig {
-    /// Subcarrier spacing of the SSB.
-    pub spacing: SubcarrierSpacing,
-    /// Number of antennas, 1 to [`MAX_ANTENNAS`].
-    pub antennas: usize,
-    /// Absolute frequency of the SSB's centre, Hz. Without it the frequency offset comes from
-    /// inside the symbols only (TS 38.211 §5.4 hides the rest) and is an order less precise. Zero
-    /// for signals made without that phase.
-    pub ssb_freq_hz: Option<f64>,
-    /// SSBs per burst set, when known. Else the one usual for the frequency is tried first.
-    pub lmax: Option<Lmax>,
-    /// Largest carrier frequency offset, Hz.
-    pub cfo_range_hz: f64,
-    /// Probability that 20 ms of noise make a cell.
-    pub false_alarm: f64,
-}
-
-impl SearchConfig {
-    /// Offsets up to half a subcarrier, false alarm 1e-3.
-    pub fn new(spacing: SubcarrierSpacing, antennas: usize) -> Self {
-        Self {
-            spacing,
-            antennas,
-            ssb_freq_hz: None,
-            lmax: None,
-            cfo_range_hz: 0.5 * spacing.hz(),
-            false_alarm: 1e-3,
-        }
-    }
-}
-
-/// What makes a search impossible.
-#[derive(Debug, Clone, PartialEq, thiserror::Error)]
-#[non_exhaustive]
-pub enum SearchError {
-    /// No antenna, or more than [`MAX_ANTENNAS`].
-    #[error("{0} antennas: 1 to {MAX_ANTENNAS} are possible")]
-    Antennas(usize),
-    /// A setting outside its range.
-    #[error("{name} = {value}: {allowed}")]
-    Setting {
-        /// Which setting.
-        name: &'static str,
-        /// Its value.
-        value: f64,
-        /// What it may be.
-        allowed: &'static str,
-    },
-    /// The number of channels passed differs from that announced.
-    #[error("{given} channels given, {expected} expected")]
-    AntennaCount {
-        /// Channels passed.
-        given: usize,
-        /// Channels announced.
-        expected: usize,
-    },
-    /// Channels of different lengths.
-    #[error("channels hold different numbers of samples: {first} and {other}")]
-    UnequalLengths {
-        /// Length of channel 0.
-        first: usize,
-        /// A length that differs.
-        other: usize,
-    },
-    /// Less than one SSB.
-    #[error("{samples} samples are less than the {needed} of one SSB")]
-    TooShort {
-        /// Length of the recording at the base rate.
-        samples: usize,
-        /// Length of one SSB.
-        needed: usize,
-    },
-}
-
-/// One received SSB.
-#[derive(Debug, Clone, PartialEq)]
-pub struct DetectedSsb {
-    /// The cell.
-    pub pci: Pci,
-    /// ī_SSB of its DM-RS: with `lmax` the low bits of the SSB index.
-    pub ibar_ssb: u8,
-    /// SSB index; without a decoded PBCH as the DM-RS tells it for the likelier `lmax`.
-    pub ssb_index: u8,
-    /// Second half of the frame; unknown without a decoded PBCH at Lmax 8.
-    pub half_frame: Option<bool>,
-    /// Burst set size under which the PBCH decoded, else the likelier.
-    pub lmax: Lmax,
-    /// MIB, system frame number and half frame, if the checksum held.
-    pub payload: Option<BchPayload>,
-    /// First sample of the SSB, its cyclic prefix included, at the base rate, to a fraction of a
-    /// sample, from the first sample ever pushed.
-    pub sample_start: f64,
-    /// Carrier frequency offset, Hz.
-    pub cfo_hz: f64,
-    /// Phase from symbol to symbol beyond that of the offset (TS 38.211 §5.4), radians.
-    pub symbol_phase_step_rad: f64,
-    /// SNR of a resource element, mean over the antennas, dB.
-    pub snr_db: f64,
-    /// PSS, SSS and DM-RS detection statistics together.
-    pub statistic: f32,
-    /// Carrier frequency offset by the insides of the symbols alone, Hz.
-    pub(crate) coarse_cfo_hz: f64,
-    measurements: [Measurement; MAX_ANTENNAS],
-    antennas: usize,
-}
-
-impl DetectedSsb {
-    /// SS-RSRP, SS-RSRQ and SS-SINR of every antenna.
-    pub fn measurements(&self) -> &[Measurement] {
-        &self.measurements[..self.antennas]
-    }
-}
-
-/// What was received of one SSB, stronger cells' taken out, delay and frequency offset too.
-#[derive(Debug, Clone, Copy)]
-pub struct ReceivedSsb<'a> {
-    /// The resource elements of every antenna, `[symbol][subcarrier]`.
-    pub elements: &'a [ReceivedGrid],
-    /// The elements that are known, zero elsewhere: pilots, and the PBCH if it decoded.
-    pub known: &'a SsbGrid,
-    /// Variance of the noise on a resource element, per antenna.
-    pub noise_variance: &'a [f64],
-}
-
-/// How far candidates came in the last block.
-#[derive(Debug, Clone, Copy, PartialEq, Eq, Default)]
-pub struct SearchCounts {
-    /// Maxima of the matched filter that were examined.
-    pub pss_candidates: usize,
-    /// Of these, SSBs likely enough for their PBCH to be decoded.
-    pub pbch_tried: usize,
-}
 
 /// Searches blocks of samples at the base rate; owns all plans and buffers.
 pub struct Searcher {
@@ -546,17 +414,6 @@ impl Searcher {
             self.canceller
                 .subtract(samples, alignment, reference, channel);
         }
-    }
-}
-
-fn check_frequency(ssb_freq_hz: Option<f64>) -> Result<(), SearchError> {
-    match ssb_freq_hz {
-        Some(value) if !value.is_finite() => Err(SearchError::Setting {
-            name: "ssb_freq_hz",
-            value,
-            allowed: "a finite frequency",
-        }),
-        _ => Ok(()),
     }
 }
 

@@ -1,0 +1,68 @@
+//! What a search finds.
+
+use super::MAX_ANTENNAS;
+use crate::demodulate::ReceivedGrid;
+use crate::grid::SsbGrid;
+use crate::measure::Measurement;
+use crate::numerology::Lmax;
+use crate::payload::BchPayload;
+use crate::pci::Pci;
+
+/// One received SSB.
+#[derive(Debug, Clone, PartialEq)]
+pub struct DetectedSsb {
+    /// The cell.
+    pub pci: Pci,
+    /// ī_SSB of its DM-RS: with `lmax` the low bits of the SSB index.
+    pub ibar_ssb: u8,
+    /// SSB index; without a decoded PBCH as the DM-RS tells it for the likelier `lmax`.
+    pub ssb_index: u8,
+    /// Second half of the frame; unknown without a decoded PBCH at Lmax 8.
+    pub half_frame: Option<bool>,
+    /// Burst set size under which the PBCH decoded, else the likelier.
+    pub lmax: Lmax,
+    /// MIB, system frame number and half frame, if the checksum held.
+    pub payload: Option<BchPayload>,
+    /// First sample of the SSB, its cyclic prefix included, at the base rate, to a fraction of a
+    /// sample, from the first sample ever pushed.
+    pub sample_start: f64,
+    /// Carrier frequency offset, Hz.
+    pub cfo_hz: f64,
+    /// Phase from symbol to symbol beyond that of the offset (TS 38.211 §5.4), radians.
+    pub symbol_phase_step_rad: f64,
+    /// SNR of a resource element, mean over the antennas, dB.
+    pub snr_db: f64,
+    /// PSS, SSS and DM-RS detection statistics together.
+    pub statistic: f32,
+    /// Carrier frequency offset by the insides of the symbols alone, Hz.
+    pub(crate) coarse_cfo_hz: f64,
+    pub(super) measurements: [Measurement; MAX_ANTENNAS],
+    pub(super) antennas: usize,
+}
+
+impl DetectedSsb {
+    /// SS-RSRP, SS-RSRQ and SS-SINR of every antenna.
+    pub fn measurements(&self) -> &[Measurement] {
+        &self.measurements[..self.antennas]
+    }
+}
+
+/// What was received of one SSB, stronger cells' taken out, delay and frequency offset too.
+#[derive(Debug, Clone, Copy)]
+pub struct ReceivedSsb<'a> {
+    /// The resource elements of every antenna, `[symbol][subcarrier]`.
+    pub elements: &'a [ReceivedGrid],
+    /// The elements that are known, zero elsewhere: pilots, and the PBCH if it decoded.
+    pub known: &'a SsbGrid,
+    /// Variance of the noise on a resource element, per antenna.
+    pub noise_variance: &'a [f64],
+}
+
+/// How far candidates came in the last block.
+#[derive(Debug, Clone, Copy, PartialEq, Eq, Default)]
+pub struct SearchCounts {
+    /// Maxima of the matched filter that were examined.
+    pub pss_candidates: usize,
+    /// Of these, SSBs likely enough for their PBCH to be decoded.
+    pub pbch_tried: usize,
+}
