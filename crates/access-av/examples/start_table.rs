@@ -5,6 +5,7 @@
 
 use std::error::Error;
 
+use access_av::localize::gaussian::principal_variances;
 use access_av::onboard::Custom;
 use access_av::platform::Platform;
 use access_av::random::{Purpose, Streams};
@@ -80,6 +81,6 @@ fn is_right(found: &Found) -> bool {
         .point()
         .distance_m(found.step.estimate.point());
     let [[xx, xy, _], [_, yy, _], _] = found.step.covariance.unwrap_or_default();
-    let half = (0.25 * (xx - yy) * (xx - yy) + xy * xy).sqrt();
-    error_m < 2.0 && error_m < 4.0 * (0.5 * (xx + yy) + half).sqrt()
+    let [larger_m2, _] = principal_variances(xx, xy, yy);
+    error_m < 2.0 && error_m < 4.0 * larger_m2.sqrt()
 }

@@ -242,14 +242,11 @@ impl Onboard {
         }
         match &self.trigger {
             Trigger::Policy(_) => true,
-            Trigger::Uncertainty(policy) => {
-                let is_it =
-                    |head: &RadioHead| (head.pci, head.ssb_index) == (ssb.pci, ssb.ssb_index);
-                self.heads
-                    .iter()
-                    .position(is_it)
-                    .is_some_and(|index| policy.chooses(index))
-            }
+            Trigger::Uncertainty(policy) => self
+                .heads
+                .iter()
+                .position(|head| head.sends(ssb.pci, ssb.ssb_index))
+                .is_some_and(|index| policy.chooses(index)),
         }
     }
 
@@ -313,15 +310,9 @@ impl Onboard {
     /// Lets the localizer have an angle that was estimated elsewhere; `None` is an SSB that had none.
     pub fn take_in(&mut self, ssb: SensedSsb, measured: Option<AngleMeasurement>) -> Execution {
         self.advance_to(ssb.time_s);
-        let unused = |reason| UpdateVerdict {
-            accepted: false,
-            reason,
-            mahalanobis_squared: None,
-            threshold: None,
-        };
         let verdict = match (self.head(&ssb), &measured) {
-            (None, _) => unused(UpdateReason::UnknownRadioHead),
-            (_, None) => unused(UpdateReason::Unusable),
+            (None, _) => UpdateVerdict::unused(UpdateReason::UnknownRadioHead),
+            (_, None) => UpdateVerdict::unused(UpdateReason::Unusable),
             (Some(head), Some(measured)) => self.localizer.update(&head, measured),
         };
         Execution {
@@ -358,8 +349,10 @@ impl Onboard {
     }
 
     fn head(&self, ssb: &SensedSsb) -> Option<RadioHead> {
-        let is_it = |head: &&RadioHead| (head.pci, head.ssb_index) == (ssb.pci, ssb.ssb_index);
-        self.heads.iter().find(is_it).copied()
+        let mut heads = self.heads.iter();
+        heads
+            .find(|head| head.sends(ssb.pci, ssb.ssb_index))
+            .copied()
     }
 }
 

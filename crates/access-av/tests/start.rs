@@ -4,6 +4,7 @@
 mod common;
 
 use access_av::localize::IntegrityState;
+use access_av::localize::gaussian::principal_variances;
 use access_av::random::{Purpose, Streams};
 use access_av::recording::{Site, write_drive_mcap};
 use access_av::replay::{LocatedDrive, locate_angles};
@@ -35,7 +36,7 @@ fn is_right(record: &RunRecord) -> bool {
     record.found().is_some_and(|found| {
         let (truth, estimate) = (found.step.truth.point(), found.step.estimate.point());
         let [[xx, xy, _], [_, yy, _], _] = found.step.covariance.unwrap();
-        let larger = 0.5 * (xx + yy) + (0.25 * (xx - yy).powi(2) + xy * xy).sqrt();
+        let [larger, _] = principal_variances(xx, xy, yy);
         let error_m = truth.distance_m(estimate);
         error_m < 2.0 && error_m < 4.0 * larger.sqrt()
     })

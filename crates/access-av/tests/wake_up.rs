@@ -1,6 +1,7 @@
 //! The uncertainty-driven wake-up on simulated drives: what it saves, and that it keeps its bound.
 #![allow(clippy::unwrap_used)] // helpers of tests
 
+use access_av::localize::gaussian::principal_variances;
 use access_av::localize::integrity::RadialQuantile;
 use access_av::onboard::Custom;
 use access_av::scenario::{Scenario, UncertaintySettings, WakeUpSettings};
@@ -70,18 +71,16 @@ fn on_demand(bound_m: f64, runs: u64) -> Vec<RunRecord> {
 }
 
 /// Variances of the horizontal error along its principal axes, larger first.
-fn principal_variances(step: &Step) -> [f64; 2] {
+fn variances(step: &Step) -> [f64; 2] {
     let [[xx, xy, _], [_, yy, _], _] = step.covariance.unwrap();
-    let half = (0.25 * (xx - yy) * (xx - yy) + xy * xy).sqrt();
-    let mean = 0.5 * (xx + yy);
-    [mean + half, (mean - half).max(0.0)]
+    principal_variances(xx, xy, yy)
 }
 
 #[test]
 fn the_bound_is_kept_with_its_confidence_and_as_late_as_can_be() {
     let bound_m = 0.3;
     let quantile = RadialQuantile::new(0.1);
-    let predicted_m = |step: &Step| quantile.radius(principal_variances(step));
+    let predicted_m = |step: &Step| quantile.radius(variances(step));
     let records = on_demand(bound_m, 12);
     for record in &records {
         // An angle may turn out an outlier, one in 10⁴ by the gate, and leave its SSB without.

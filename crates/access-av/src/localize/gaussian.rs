@@ -4,6 +4,13 @@
 /// Square matrix, row major.
 pub type Matrix<const N: usize> = [[f64; N]; N];
 
+/// Variances of a covariance `[[xx, xy], [xy, yy]]` along its principal axes, larger first.
+pub fn principal_variances(xx: f64, xy: f64, yy: f64) -> [f64; 2] {
+    let half = (0.25 * (xx - yy) * (xx - yy) + xy * xy).sqrt();
+    let mean = 0.5 * (xx + yy);
+    [mean + half, (mean - half).max(0.0)]
+}
+
 /// The identity.
 pub(super) fn identity<const N: usize>() -> Matrix<N> {
     let mut matrix = [[0.0; N]; N];

@@ -135,12 +135,7 @@ impl Initialiser {
 
     /// Judges every hypothesis by an angle. The verdict is that of the likeliest.
     pub fn update(&mut self, head: &RadioHead, measured: &AngleMeasurement) -> UpdateVerdict {
-        let mut first = UpdateVerdict {
-            accepted: false,
-            reason: UpdateReason::Unusable,
-            mahalanobis_squared: None,
-            threshold: None,
-        };
+        let mut first = UpdateVerdict::unused(UpdateReason::Unusable);
         for (rank, hypothesis) in self.hypotheses.iter_mut().enumerate() {
             let innovation = hypothesis.tracker.innovation(head, measured);
             let verdict = hypothesis.tracker.update(head, measured);

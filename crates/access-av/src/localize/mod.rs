@@ -195,9 +195,7 @@ impl PoseEstimate {
         let Some([[xx, xy, _], [_, yy, _], _]) = self.covariance else {
             return [f64::INFINITY; 2];
         };
-        let half = (0.25 * (xx - yy) * (xx - yy) + xy * xy).sqrt();
-        let mean = 0.5 * (xx + yy);
-        [mean + half, (mean - half).max(0.0)]
+        gaussian::principal_variances(xx, xy, yy)
     }
 }
 
@@ -212,6 +210,18 @@ pub struct UpdateVerdict {
     pub mahalanobis_squared: Option<f64>,
     /// The largest it may be.
     pub threshold: Option<f64>,
+}
+
+impl UpdateVerdict {
+    /// An angle that never met the localizer's covariance.
+    pub(crate) const fn unused(reason: UpdateReason) -> Self {
+        Self {
+            accepted: false,
+            reason,
+            mahalanobis_squared: None,
+            threshold: None,
+        }
+    }
 }
 
 /// Why an angle was taken or left.

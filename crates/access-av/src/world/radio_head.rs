@@ -16,6 +16,13 @@ pub struct RadioHead {
     pub eirp_dbm: f64,
 }
 
+impl RadioHead {
+    /// Whether this SSB of this cell is the one it sends.
+    pub const fn sends(&self, pci: u16, ssb_index: u8) -> bool {
+        self.pci == pci && self.ssb_index == ssb_index
+    }
+}
+
 impl From<&RadioHeadSettings> for RadioHead {
     fn from(settings: &RadioHeadSettings) -> Self {
         Self {

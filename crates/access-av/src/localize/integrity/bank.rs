@@ -137,7 +137,7 @@ impl Bank {
 
     /// Takes in an angle: a test of its radio head, and information for whoever uses that.
     pub fn update(&mut self, head: &RadioHead, measured: &AngleMeasurement) -> UpdateVerdict {
-        let is_it = |mine: &RadioHead| (mine.pci, mine.ssb_index) == (head.pci, head.ssb_index);
+        let is_it = |mine: &RadioHead| mine.sends(head.pci, head.ssb_index);
         if let Some(number) = self.heads.iter().position(is_it) {
             for member in &mut self.members {
                 if !member.lacks(number) {

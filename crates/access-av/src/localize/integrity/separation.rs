@@ -3,6 +3,7 @@
 use std::f64::consts::TAU;
 
 use super::quantile::RadialQuantile;
+use crate::localize::gaussian::principal_variances;
 
 /// Directions over which the probability is summed.
 const DIRECTIONS: usize = 48;
@@ -46,9 +47,7 @@ impl SeparatedRadius {
         least_m: f64,
     ) -> f64 {
         let distance_m = separation_m[0].hypot(separation_m[1]);
-        let half = (0.25 * (xx - yy) * (xx - yy) + xy * xy).sqrt();
-        let mean = 0.5 * (xx + yy);
-        let about_itself_m = (self.about_itself).radius([mean + half, (mean - half).max(0.0)]);
+        let about_itself_m = (self.about_itself).radius(principal_variances(xx, xy, yy));
         // A circle holds less of a Gaussian the further its centre is off (Anderson 1955).
         let mut low = distance_m.max(about_itself_m).max(least_m);
         let mut high = distance_m + about_itself_m;

@@ -5,7 +5,7 @@ use super::place::locate;
 use super::sighting::Sighting;
 use super::state::{Belief, MOUNTING, PHASE};
 use crate::localize::AngleMeasurement;
-use crate::localize::gaussian::Innovation;
+use crate::localize::gaussian::{Innovation, principal_variances};
 use crate::world::RadioHead;
 
 /// Longest step of a forecast (m), where millimetres do not matter.
@@ -79,8 +79,6 @@ impl Tracker {
     /// Variances of a belief's horizontal error along its principal axes, larger first (m²).
     pub fn principal_variances(belief: &Belief) -> [f64; 2] {
         let [[aa, ab, ..], [_, bb, ..], ..] = belief.covariance;
-        let half = (0.25 * (aa - bb) * (aa - bb) + ab * ab).sqrt();
-        let mean = 0.5 * (aa + bb);
-        [mean + half, (mean - half).max(0.0)]
+        principal_variances(aa, ab, bb)
     }
 }

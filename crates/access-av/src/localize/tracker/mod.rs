@@ -53,7 +53,7 @@ struct Head {
 
 impl Head {
     fn is(&self, other: &RadioHead) -> bool {
-        (self.known.pci, self.known.ssb_index) == (other.pci, other.ssb_index)
+        self.known.sends(other.pci, other.ssb_index)
     }
 }
 
