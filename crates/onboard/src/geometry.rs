@@ -1,0 +1,139 @@
+//! Points, poses and angles in the plane.
+
+use std::f64::consts::{PI, TAU};
+
+use schemars::JsonSchema;
+use serde::{Deserialize, Serialize};
+
+/// A place in the `map` frame.
+#[derive(Debug, Clone, Copy, PartialEq, Default)]
+pub struct Point {
+    /// East in metres.
+    pub x_m: f64,
+    /// North in metres.
+    pub y_m: f64,
+}
+
+impl Point {
+    /// The point at (`x_m`, `y_m`).
+    pub const fn new(x_m: f64, y_m: f64) -> Self {
+        Self { x_m, y_m }
+    }
+
+    /// Distance to another point in metres.
+    pub fn distance_m(self, other: Self) -> f64 {
+        (other.x_m - self.x_m).hypot(other.y_m - self.y_m)
+    }
+
+    /// Direction to another point in radians from +x: the paper's angle of incoming signal, eq. 3.
+    pub fn bearing_rad(self, other: Self) -> f64 {
+        (other.y_m - self.y_m).atan2(other.x_m - self.x_m)
+    }
+}
+
+impl From<[f64; 2]> for Point {
+    fn from([x_m, y_m]: [f64; 2]) -> Self {
+        Self { x_m, y_m }
+    }
+}
+
+/// Place and heading in the `map` frame.
+#[derive(Debug, Clone, Copy, PartialEq, Default, Serialize, Deserialize, JsonSchema)]
+#[serde(default, deny_unknown_fields)]
+pub struct Pose {
+    /// East in metres.
+    pub x_m: f64,
+    /// North in metres.
+    pub y_m: f64,
+    /// Counter-clockwise from +x in radians.
+    pub heading_rad: f64,
+}
+
+impl Pose {
+    /// The place without the heading.
+    #[must_use]
+    pub const fn point(self) -> Point {
+        Point::new(self.x_m, self.y_m)
+    }
+
+    /// The pose after `length_m` along an arc of constant `curvature_per_m` (left is positive).
+    #[must_use]
+    pub fn along_arc(self, length_m: f64, curvature_per_m: f64) -> Self {
+        // The chord of an arc points along its mean heading and is sinc(turn/2) times as long.
+        let half_turn = 0.5 * length_m * curvature_per_m;
+        let sinc = if half_turn.abs() < 1e-4 {
+            1.0 - half_turn * half_turn / 6.0
+        } else {
+            half_turn.sin() / half_turn
+        };
+        let (sin, cos) = (self.heading_rad + half_turn).sin_cos();
+        Self {
+            x_m: self.x_m + length_m * sinc * cos,
+            y_m: self.y_m + length_m * sinc * sin,
+            heading_rad: self.heading_rad + 2.0 * half_turn,
+        }
+    }
+
+    /// The point that lies so far forward and to the left of the pose.
+    #[must_use]
+    pub fn beside(self, forward_m: f64, left_m: f64) -> Point {
+        let (sin, cos) = self.heading_rad.sin_cos();
+        Point::new(
+            self.x_m + forward_m * cos - left_m * sin,
+            self.y_m + forward_m * sin + left_m * cos,
+        )
+    }
+
+    /// The pose moved `lateral_m` to the left of its heading.
+    #[must_use]
+    pub fn offset_left(self, lateral_m: f64) -> Self {
+        let (sin, cos) = self.heading_rad.sin_cos();
+        Self {
+            x_m: self.x_m - lateral_m * sin,
+            y_m: self.y_m + lateral_m * cos,
+            ..self
+        }
+    }
+}
+
+/// The angle in (−π, π] that differs from `angle_rad` by whole turns.
+pub fn wrap_angle(angle_rad: f64) -> f64 {
+    if angle_rad > -PI && angle_rad <= PI {
+        return angle_rad;
+    }
+    let turned = angle_rad.rem_euclid(TAU);
+    if turned > PI { turned - TAU } else { turned }
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    #[test]
+    fn angles_wrap_to_the_half_open_turn() {
+        for (angle, wrapped) in [
+            (0.0, 0.0),
+            (PI, PI),
+            (-PI, PI),
+            (3.0 * PI, PI),
+            (-0.1, -0.1),
+        ] {
+            assert!((wrap_angle(angle) - wrapped).abs() < 1e-12, "{angle}");
+        }
+        assert!((wrap_angle(7.0) - (7.0 - TAU)).abs() < 1e-12);
+    }
+
+    #[test]
+    fn quarter_circle() {
+        let end = Pose::default().along_arc(5.0 * PI, 0.1);
+        assert!((end.x_m - 10.0).abs() < 1e-12 && (end.y_m - 10.0).abs() < 1e-12);
+        assert!((end.heading_rad - PI / 2.0).abs() < 1e-12);
+    }
+
+    #[test]
+    fn arcs_are_continuous_into_straight_lines() {
+        let bent = Pose::default().along_arc(100.0, 2.1e-6);
+        let barely = Pose::default().along_arc(100.0, 1.9e-6);
+        assert!((bent.y_m - barely.y_m - 0.5 * 0.2e-6 * 1e4).abs() < 1e-9);
+    }
+}

@@ -1,0 +1,51 @@
+//! The localizer that a vehicle's settings choose.
+
+use std::sync::Arc;
+
+use super::dead_reckoning::DeadReckoning;
+use super::initialise::Initialiser;
+use super::localizer::Localizer;
+use super::search::Search;
+use super::tracker::{InitialPose, Tracker, TrackerConfig};
+use super::tracking::tracking;
+use crate::geometry::Pose;
+use crate::radio_head::RadioHead;
+use crate::settings::{LocalizerSettings, SettingsError, Site, Vehicle};
+
+/// The localizer of a vehicle at a site: at `start`, or in search of it along the road where the
+/// vehicle's settings say that it is not known.
+///
+/// # Errors
+/// [`SettingsError`] when the site's road cannot be built.
+pub fn built_in(
+    site: &Site,
+    vehicle: &Vehicle,
+    start: Pose,
+) -> Result<Box<dyn Localizer>, SettingsError> {
+    if let LocalizerSettings::DeadReckoning(settings) = vehicle.localizer {
+        let mounting_rad = vehicle.array.mounting_rad;
+        let between = settings.heading_between;
+        return Ok(Box::new(DeadReckoning::new(start, between, mounting_rad)));
+    }
+    let config = TrackerConfig::new(site, vehicle);
+    let heads = RadioHead::heard(site, vehicle);
+    let integrity = vehicle.integrity.as_ref().map(Into::into);
+    let road = site.build_road()?;
+    match road {
+        Some(road) if !vehicle.start.known => {
+            let either = vehicle.start.either_direction;
+            let search = Initialiser::new(config, road, either, &heads);
+            Ok(Box::new(Search::new(search, integrity)))
+        }
+        road => {
+            let start = InitialPose {
+                pose: start,
+                position_std_m: vehicle.start.position_std_m,
+                heading_std_rad: vehicle.start.heading_std_rad,
+            };
+            let map = road.filter(|_| vehicle.follows_road()).map(Arc::new);
+            let tracker = Tracker::new(config, map, &heads, &start);
+            Ok(tracking(tracker, &heads, integrity))
+        }
+    }
+}

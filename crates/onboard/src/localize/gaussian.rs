@@ -1,0 +1,213 @@
+//! A Gaussian belief of fixed size: mean and covariance, moved by a linearised motion and
+//! corrected by scalar measurements. No allocation, no general linear algebra.
+
+/// Square matrix, row major.
+pub type Matrix<const N: usize> = [[f64; N]; N];
+
+/// Variances of a covariance `[[xx, xy], [xy, yy]]` along its principal axes, larger first.
+pub fn principal_variances(xx: f64, xy: f64, yy: f64) -> [f64; 2] {
+    let half = (0.25 * (xx - yy) * (xx - yy) + xy * xy).sqrt();
+    let mean = 0.5 * (xx + yy);
+    [mean + half, (mean - half).max(0.0)]
+}
+
+/// The identity.
+pub fn identity<const N: usize>() -> Matrix<N> {
+    let mut matrix = [[0.0; N]; N];
+    for (i, row) in matrix.iter_mut().enumerate() {
+        row[i] = 1.0;
+    }
+    matrix
+}
+
+/// Matrix product.
+pub fn product<const N: usize>(left: &Matrix<N>, right: &Matrix<N>) -> Matrix<N> {
+    let mut product = [[0.0; N]; N];
+    for i in 0..N {
+        for k in 0..N {
+            for j in 0..N {
+                product[i][j] += left[i][k] * right[k][j];
+            }
+        }
+    }
+    product
+}
+
+/// Mean and covariance of `N` states.
+#[derive(Clone, Copy, Debug, PartialEq)]
+pub struct Gaussian<const N: usize> {
+    /// Expected state.
+    pub mean: [f64; N],
+    /// Covariance, symmetric and positive semidefinite; a state that is switched off has a row
+    /// and column of zeros and is never moved by an update.
+    pub covariance: Matrix<N>,
+}
+
+/// What one scalar measurement said about the belief it met.
+#[derive(Clone, Copy, Debug, PartialEq)]
+pub struct Innovation {
+    /// Measured minus predicted.
+    pub residual: f64,
+    /// Variance of the residual under the belief, `H P Hᵀ + R`.
+    pub variance: f64,
+    /// The measurement's part of it, `R`.
+    pub measurement_variance: f64,
+}
+
+impl Innovation {
+    /// Squared Mahalanobis distance, χ² with one degree of freedom when the model holds.
+    pub fn mahalanobis2(&self) -> f64 {
+        self.residual * self.residual / self.variance
+    }
+}
+
+impl<const N: usize> Gaussian<N> {
+    /// Belief with independent states.
+    pub fn independent(mean: [f64; N], sigma: [f64; N]) -> Self {
+        let mut covariance = [[0.0; N]; N];
+        for i in 0..N {
+            covariance[i][i] = sigma[i] * sigma[i];
+        }
+        Self { mean, covariance }
+    }
+
+    /// Covariance through a linearised motion, `P ← F P Fᵀ + Q`. The mean is the caller's, who
+    /// knows the motion itself and not only its Jacobian.
+    pub fn spread(&mut self, jacobian: &Matrix<N>, noise: &Matrix<N>) {
+        let mut left = [[0.0; N]; N];
+        for i in 0..N {
+            for k in 0..N {
+                let f = jacobian[i][k];
+                // Jacobians of motion are nearly identity: most products are skipped.
+                if f != 0.0 {
+                    for j in 0..N {
+                        left[i][j] += f * self.covariance[k][j];
+                    }
+                }
+            }
+        }
+        for i in 0..N {
+            for j in i..N {
+                let mut sum = noise[i][j];
+                for k in 0..N {
+                    sum += left[i][k] * jacobian[j][k];
+                }
+                self.covariance[i][j] = sum;
+                self.covariance[j][i] = sum;
+            }
+        }
+    }
+
+    /// `P Hᵀ` for one measurement row.
+    fn cross(&self, row: &[f64; N]) -> [f64; N] {
+        let mut cross = [0.0; N];
+        for i in 0..N {
+            for j in 0..N {
+                cross[i] += self.covariance[i][j] * row[j];
+            }
+        }
+        cross
+    }
+
+    /// Variance of `H x` under the belief.
+    pub fn variance_along(&self, row: &[f64; N]) -> f64 {
+        let cross = self.cross(row);
+        (0..N).map(|i| row[i] * cross[i]).sum::<f64>().max(0.0)
+    }
+
+    /// The innovation a measurement would bring, without applying it.
+    pub fn innovation(&self, residual: f64, row: &[f64; N], variance: f64) -> Innovation {
+        Innovation {
+            residual,
+            variance: self.variance_along(row) + variance,
+            measurement_variance: variance,
+        }
+    }
+
+    /// Kalman update by one scalar measurement, covariance in Joseph form
+    /// `(I − K H) P (I − K H)ᵀ + K R Kᵀ`, written out for one row so that it costs one pass.
+    /// Returns the gain K.
+    pub fn update(&mut self, residual: f64, row: &[f64; N], variance: f64) -> [f64; N] {
+        let cross = self.cross(row);
+        let total = (0..N).map(|i| row[i] * cross[i]).sum::<f64>().max(0.0) + variance;
+        if total <= 0.0 {
+            return [0.0; N]; // both the belief and the measurement are exact: nothing to learn
+        }
+        let mut gain = cross;
+        for g in &mut gain {
+            *g /= total;
+        }
+        for i in 0..N {
+            self.mean[i] += gain[i] * residual;
+        }
+        for i in 0..N {
+            for j in i..N {
+                let p = self.covariance[i][j] - gain[i] * cross[j] - cross[i] * gain[j]
+                    + gain[i] * gain[j] * total;
+                self.covariance[i][j] = p;
+                self.covariance[j][i] = p;
+            }
+        }
+        gain
+    }
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    fn correlated() -> Gaussian<3> {
+        Gaussian {
+            mean: [1.0, -2.0, 0.5],
+            covariance: [[2.0, 0.3, -0.1], [0.3, 1.0, 0.2], [-0.1, 0.2, 0.5]],
+        }
+    }
+
+    #[test]
+    fn update_equals_the_information_form() {
+        let mut belief = correlated();
+        let row = [1.0, 2.0, -1.0];
+        let (residual, variance) = (0.7, 0.4);
+        let prior = belief;
+        belief.update(residual, &row, variance);
+        // P⁺ (P⁻¹ + Hᵀ R⁻¹ H) = I, checked as P⁺ + P⁺ Hᵀ R⁻¹ H P⁻ = P⁻.
+        let after = belief.cross(&row);
+        let before = prior.cross(&row);
+        for i in 0..3 {
+            for j in 0..3 {
+                let sum = belief.covariance[i][j] + after[i] * before[j] / variance;
+                assert!((sum - prior.covariance[i][j]).abs() < 1e-12);
+            }
+            let step = after[i] / variance * residual;
+            assert!((belief.mean[i] - prior.mean[i] - step).abs() < 1e-12);
+        }
+    }
+
+    #[test]
+    fn a_state_switched_off_stays_off() {
+        let mut belief = Gaussian::independent([0.0, 3.0], [1.0, 0.0]);
+        belief.update(5.0, &[1.0, 1.0], 0.1);
+        assert_eq!(belief.mean[1], 3.0);
+        assert_eq!(belief.covariance[1], [0.0, 0.0]);
+    }
+
+    #[test]
+    fn spread_equals_the_matrix_product() {
+        let mut belief = correlated();
+        let f = [[1.0, 0.5, 0.0], [0.0, 1.0, -0.3], [0.0, 0.0, 0.9]];
+        let q = [[0.1, 0.0, 0.0], [0.0, 0.2, 0.05], [0.0, 0.05, 0.3]];
+        let p = belief.covariance;
+        belief.spread(&f, &q);
+        for i in 0..3 {
+            for j in 0..3 {
+                let mut sum = q[i][j];
+                for k in 0..3 {
+                    for l in 0..3 {
+                        sum += f[i][k] * p[k][l] * f[j][l];
+                    }
+                }
+                assert!((belief.covariance[i][j] - sum).abs() < 1e-12);
+            }
+        }
+    }
+}

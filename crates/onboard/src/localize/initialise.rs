@@ -1,0 +1,340 @@
+//! A start from scratch: the vehicle knows the road and hears radio heads, but not where it is.
+//!
+//! One tracker for each metre of the road, and for each direction in which it may be driven: a sum of
+//! Gaussians (Sorenson and Alspach 1971), each weighed by how well it foretells the angles. Those
+//! that fall far behind or leave the road are given up, those that meet become one. The vehicle is
+//! found when all that are left, taken as one Gaussian, know its place.
+
+use std::f64::consts::TAU;
+use std::sync::Arc;
+
+use super::measurement::{AngleMeasurement, UpdateReason, UpdateVerdict};
+use super::pose_estimate::PoseEstimate;
+use super::tracker::state::{ALONG, STATES};
+use super::tracker::{InitialPose, OdometryVerdict, Tracker, TrackerConfig};
+use crate::geometry::{Pose, wrap_angle};
+use crate::observation::OdometrySample;
+use crate::radio_head::RadioHead;
+use crate::road::Road;
+
+/// Distance between the first hypotheses (m): within it an angle is linear enough to be followed,
+/// also into a narrow bend and out of it.
+const SPACING_M: f64 = 1.0;
+
+/// Log-likelihood by which a hypothesis may fall behind the best; e^−25 is one in 10¹¹.
+const BEHIND: f64 = 25.0;
+
+/// What an angle costs a hypothesis that takes it for an outlier, `ln(2π/ε)` for outliers from all
+/// directions and a share ε of about 2 in 1000: the right one must survive a few.
+const OUTLIER: f64 = 8.0;
+
+/// Standard deviation of the position, along its ellipse's longer axis, at which it is found (m).
+/// Another place 100 m away then has a probability of less than 2 in 100 000.
+const FOUND_STD_M: f64 = 0.4;
+
+/// Probability of the other direction of travel at which it is ruled out.
+const OTHER_WAY: f64 = 1e-5;
+
+/// A hypothesis of where the vehicle is.
+#[derive(Clone, Debug)]
+struct Hypothesis {
+    /// Number of the road it drives on.
+    road: usize,
+    tracker: Tracker,
+    log_likelihood: f64,
+}
+
+impl Hypothesis {
+    /// Distance along its road, and the standard deviation of that (m).
+    fn along_m(&self) -> (f64, f64) {
+        let belief = self.tracker.belief();
+        (
+            belief.mean[ALONG],
+            belief.covariance[ALONG][ALONG].max(0.0).sqrt(),
+        )
+    }
+
+    /// Takes in another hypothesis on the same road: the Gaussian of the same mean and covariance
+    /// as both together.
+    fn absorb(&mut self, other: &Self) {
+        let ratio = (other.log_likelihood - self.log_likelihood).exp();
+        let weight = ratio / (1.0 + ratio);
+        let (mut one, two) = (*self.tracker.belief(), other.tracker.belief());
+        let mut apart = two.mean;
+        for (apart, mean) in apart.iter_mut().zip(one.mean) {
+            *apart -= mean;
+        }
+        for i in 0..STATES {
+            one.mean[i] += weight * apart[i];
+            for j in 0..STATES {
+                one.covariance[i][j] += weight
+                    * (two.covariance[i][j] - one.covariance[i][j]
+                        + (1.0 - weight) * apart[i] * apart[j]);
+            }
+        }
+        self.tracker.set_belief(&one);
+        self.log_likelihood += ratio.ln_1p();
+    }
+}
+
+/// The search for the first pose.
+#[derive(Clone, Debug)]
+pub struct Initialiser {
+    config: TrackerConfig,
+    roads: Vec<Arc<Road>>,
+    heads: Vec<RadioHead>,
+    hypotheses: Vec<Hypothesis>,
+}
+
+impl Initialiser {
+    /// The vehicle may be anywhere on `road`, driving along it or, where `either_direction`, also
+    /// against it.
+    pub fn new(
+        config: TrackerConfig,
+        road: Road,
+        either_direction: bool,
+        heads: &[RadioHead],
+    ) -> Self {
+        let against = either_direction.then(|| Arc::new(road.reversed()));
+        let mut made = Self {
+            config,
+            roads: [Arc::new(road)].into_iter().chain(against).collect(),
+            heads: heads.to_vec(),
+            hypotheses: Vec::new(),
+        };
+        made.restart();
+        made
+    }
+
+    fn restart(&mut self) {
+        for (number, road) in self.roads.iter().enumerate() {
+            let count = (road.length_m() / SPACING_M).ceil().max(1.0);
+            let spacing_m = road.length_m() / count;
+            let heads = &self.heads;
+            let hypothesis = |index: usize| {
+                let start = InitialPose {
+                    pose: road.pose((index as f64 + 0.5) * spacing_m),
+                    position_std_m: 0.5 * spacing_m,
+                    heading_std_rad: 1.0,
+                };
+                Hypothesis {
+                    road: number,
+                    tracker: Tracker::new(self.config, Some(road.clone()), heads, &start),
+                    log_likelihood: 0.0,
+                }
+            };
+            self.hypotheses.extend((0..count as usize).map(hypothesis));
+        }
+    }
+
+    /// Moves every hypothesis.
+    pub fn odometry(&mut self, sample: &OdometrySample) -> OdometryVerdict {
+        let trackers = self.hypotheses.iter_mut();
+        trackers.fold(OdometryVerdict::NotFinite, |_, hypothesis| {
+            hypothesis.tracker.odometry(sample)
+        })
+    }
+
+    /// Judges every hypothesis by an angle. The verdict is that of the likeliest.
+    pub fn update(&mut self, head: &RadioHead, measured: &AngleMeasurement) -> UpdateVerdict {
+        let mut first = UpdateVerdict::unused(UpdateReason::Unusable);
+        for (rank, hypothesis) in self.hypotheses.iter_mut().enumerate() {
+            let innovation = hypothesis.tracker.innovation(head, measured);
+            let verdict = hypothesis.tracker.update(head, measured);
+            // Looks that are not independent have a variance that says so, and cost alike.
+            hypothesis.log_likelihood -= match (innovation, verdict.reason) {
+                (Some(seen), UpdateReason::Consistent) => {
+                    0.5 * (seen.mahalanobis2() + (TAU * seen.variance).ln())
+                }
+                (Some(_), _) => OUTLIER,
+                (None, _) => 0.0,
+            };
+            if rank == 0 {
+                first = verdict;
+            }
+        }
+        self.prune();
+        first
+    }
+
+    fn prune(&mut self) {
+        let by_likelihood =
+            |a: &Hypothesis, b: &Hypothesis| b.log_likelihood.total_cmp(&a.log_likelihood);
+        self.hypotheses.sort_unstable_by(by_likelihood);
+        let best = self
+            .hypotheses
+            .first()
+            .map_or(0.0, |best| best.log_likelihood);
+        let roads = &self.roads;
+        self.hypotheses.retain(|hypothesis| {
+            let (along_m, std_m) = hypothesis.along_m();
+            let length_m = roads
+                .get(hypothesis.road)
+                .map_or(0.0, |road| road.length_m());
+            let on_the_road = (-3.0 * std_m..=length_m + 3.0 * std_m).contains(&along_m);
+            on_the_road && hypothesis.log_likelihood > best - BEHIND
+        });
+        let mut kept = 0;
+        for index in 0..self.hypotheses.len() {
+            let (better, rest) = self.hypotheses.split_at_mut(index);
+            let Some(hypothesis) = rest.first() else {
+                break;
+            };
+            let (along_m, std_m) = hypothesis.along_m();
+            let met = better.iter_mut().take(kept).find(|other| {
+                other.road == hypothesis.road && (other.along_m().0 - along_m).abs() < std_m
+            });
+            if let Some(other) = met {
+                other.absorb(hypothesis);
+            } else {
+                self.hypotheses.swap(kept, index);
+                kept += 1;
+            }
+        }
+        self.hypotheses.truncate(kept);
+        if self.hypotheses.is_empty() {
+            // What seemed right has driven off the road.
+            self.restart();
+        }
+    }
+
+    /// The radio heads it listens to.
+    pub fn heads(&self) -> &[RadioHead] {
+        &self.heads
+    }
+
+    /// Number of hypotheses left.
+    pub fn left(&self) -> usize {
+        self.hypotheses.len()
+    }
+
+    /// One tracker for all hypotheses that are left, once they know the position.
+    pub fn found(&self) -> Option<Tracker> {
+        let spread = self.pose(f64::NEG_INFINITY).principal_variances();
+        let mut one = self.hypotheses.first()?.clone();
+        let best = one.log_likelihood;
+        let mut other_way = 0.0;
+        for hypothesis in self.hypotheses.iter().skip(1) {
+            if hypothesis.road == one.road {
+                one.absorb(hypothesis);
+            } else {
+                other_way += (hypothesis.log_likelihood - best).exp();
+            }
+        }
+        (spread[0] < FOUND_STD_M * FOUND_STD_M && other_way < OTHER_WAY).then_some(one.tracker)
+    }
+
+    /// Mean and covariance over all hypotheses, each weighed by its likelihood: where the vehicle
+    /// may be, which is far from Gaussian as long as several are left.
+    pub fn pose(&self, time_s: f64) -> PoseEstimate {
+        let best = self
+            .hypotheses
+            .iter()
+            .map(|hypothesis| hypothesis.log_likelihood)
+            .fold(f64::NEG_INFINITY, f64::max);
+        let weighed = || {
+            self.hypotheses.iter().map(|hypothesis| {
+                let weight = (hypothesis.log_likelihood - best).exp();
+                (weight, hypothesis.tracker.pose(time_s))
+            })
+        };
+        let (mut total, mut x_m, mut y_m) = (0.0, 0.0, 0.0);
+        let (mut sin, mut cos) = (0.0, 0.0);
+        for (weight, PoseEstimate { pose, .. }) in weighed() {
+            total += weight;
+            x_m += weight * pose.x_m;
+            y_m += weight * pose.y_m;
+            sin += weight * pose.heading_rad.sin();
+            cos += weight * pose.heading_rad.cos();
+        }
+        let mean = Pose {
+            x_m: x_m / total,
+            y_m: y_m / total,
+            heading_rad: sin.atan2(cos),
+        };
+        let mut covariance = [[0.0; 3]; 3];
+        for (weight, estimate) in weighed() {
+            let pose = estimate.pose;
+            let off = [
+                pose.x_m - mean.x_m,
+                pose.y_m - mean.y_m,
+                wrap_angle(pose.heading_rad - mean.heading_rad),
+            ];
+            let own = estimate.covariance.unwrap_or_default();
+            for (row, (own, a)) in covariance.iter_mut().zip(own.iter().zip(off)) {
+                for (value, (own, b)) in row.iter_mut().zip(own.iter().zip(off)) {
+                    *value += weight / total * (own + a * b);
+                }
+            }
+        }
+        PoseEstimate {
+            time_s,
+            pose: mean,
+            covariance: Some(covariance),
+            integrity: None,
+        }
+    }
+}
+
+#[cfg(test)]
+mod tests {
+    use rand::{RngExt, SeedableRng};
+    use rand_chacha::ChaCha8Rng;
+    use rand_distr::StandardNormal;
+
+    use super::*;
+    use crate::settings::{Shipped, Site, TomlFile, Vehicle};
+
+    /// Drives from `start_m` until found; the error then, in metres and in standard deviations.
+    fn search(seed: u64) -> Option<(f64, f64)> {
+        let mut rng = ChaCha8Rng::seed_from_u64(seed);
+        let site = Site::from_library("trip-2", &Shipped).unwrap();
+        let vehicle = Vehicle::from_library("carrier", &Shipped).unwrap();
+        let config = TrackerConfig::new(&site, &vehicle);
+        let heads = RadioHead::heard(&site, &vehicle);
+        let map = site.build_road().unwrap().unwrap();
+        let start_m = rng.random::<f64>() * 200.0;
+        let mut initialiser = Initialiser::new(config, map.clone(), false, &heads);
+        for step in 0..1000 {
+            let time_s = f64::from(step) * 0.02;
+            let distance_m = 4.0 * time_s;
+            initialiser.odometry(&OdometrySample {
+                time_s,
+                distance_m,
+                speed_mps: 4.0,
+                yaw_rate_radps: None,
+            });
+            let truth = map.pose(start_m + distance_m);
+            for head in &heads {
+                let bearing_rad = truth.point().bearing_rad(head.position);
+                let noise: f64 = rng.sample(StandardNormal);
+                let phase_rad =
+                    std::f64::consts::PI * (bearing_rad - truth.heading_rad).cos() + 0.1 * noise;
+                let measured = AngleMeasurement {
+                    time_s,
+                    phase_rad: wrap_angle(phase_rad),
+                    phase_sigma_rad: 0.001,
+                    angle_rad: f64::NAN,
+                    snr_db: 20.0,
+                    resolved: true,
+                };
+                initialiser.update(head, &measured);
+            }
+            if let Some(tracker) = initialiser.found() {
+                let estimate = tracker.pose(time_s);
+                let error_m = estimate.pose.point().distance_m(truth.point());
+                return Some((error_m, error_m / estimate.principal_variances()[0].sqrt()));
+            }
+        }
+        None
+    }
+
+    #[test]
+    fn two_heads_and_the_road_are_enough() {
+        let right = (0..100)
+            .filter_map(search)
+            .filter(|(error_m, sigmas)| *error_m < 2.0 && *sigmas < 4.5)
+            .count();
+        assert!(right >= 99, "{right} of 100");
+    }
+}

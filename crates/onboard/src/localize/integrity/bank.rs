@@ -1,0 +1,415 @@
+//! Trackers that do without some of the radio heads.
+//!
+//! Beside the tracker of every sound radio head run one without each of them and one without each
+//! two. If one radio head is at fault — seen round a corner, moved, spoofed — the trackers without
+//! it are not. Those without two tell which one it is: leave out the right one, and the others
+//! agree with each other; leave out a wrong one, and the fault is still among them. And when a
+//! radio head is excluded, trackers that have never heard it are ready to take over, together with
+//! those that have heard neither it nor one of the others.
+
+use super::config::IntegrityConfig;
+use super::sequence_test::SequenceTest;
+use crate::clone_in_place::clone_in_place;
+use crate::localize::measurement::{AngleMeasurement, UpdateVerdict};
+use crate::localize::tracker::{OdometryVerdict, Tracker};
+use crate::observation::OdometrySample;
+use crate::radio_head::RadioHead;
+
+/// A tracker without one or two radio heads, and the test of each against it.
+#[derive(Debug)]
+struct Member {
+    /// Numbers of the radio heads left out; the same twice where it is one.
+    without: [usize; 2],
+    tests: [SequenceTest; 2],
+    tracker: Tracker,
+}
+
+clone_in_place!(Member {
+    without,
+    tests,
+    tracker
+});
+
+impl Member {
+    fn lacks(&self, head: usize) -> bool {
+        self.without.contains(&head)
+    }
+
+    fn test(&self, head: usize) -> SequenceTest {
+        let [first, second] = self.tests;
+        if self.without[0] == head {
+            first
+        } else {
+            second
+        }
+    }
+}
+
+/// The trackers.
+#[derive(Debug)]
+pub(super) struct Bank {
+    heads: Vec<RadioHead>,
+    faulty: Vec<bool>,
+    /// When each of them last disagreed with the tracker without it (s).
+    disagreed_s: Vec<f64>,
+    /// When it was lost last (s).
+    lost_s: f64,
+    main: Tracker,
+    /// First those without one radio head, in order; then those without two.
+    members: Vec<Member>,
+}
+
+clone_in_place!(Bank {
+    heads,
+    faulty,
+    disagreed_s,
+    lost_s,
+    main,
+    members
+});
+
+impl Bank {
+    /// The trackers beside this one; nothing is known of them at `now_s`.
+    pub fn new(tracker: Tracker, heads: &[RadioHead], now_s: f64) -> Self {
+        let count = heads.len();
+        let one = (0..count).map(|head| [head; 2]);
+        // Which of two disagrees nobody can tell.
+        let pairs = if count < 3 { 0 } else { count };
+        let two =
+            (0..pairs).flat_map(|first| (first + 1..pairs).map(move |second| [first, second]));
+        let member = |without: [usize; 2]| {
+            let mut tracker = tracker.clone();
+            for head in without {
+                exclude(&mut tracker, heads.get(head), true);
+            }
+            Member {
+                without,
+                tests: [SequenceTest::default(); 2],
+                tracker,
+            }
+        };
+        Self {
+            members: one.chain(two).map(member).collect(),
+            faulty: vec![false; count],
+            disagreed_s: vec![f64::NEG_INFINITY; count],
+            lost_s: now_s,
+            heads: heads.to_vec(),
+            main: tracker,
+        }
+    }
+
+    /// The tracker of every sound radio head.
+    pub const fn main(&self) -> &Tracker {
+        &self.main
+    }
+
+    /// The trackers that do without one of the sound radio heads.
+    pub fn without_one(&self) -> impl Iterator<Item = &Tracker> {
+        self.sound()
+            .filter_map(|head| Some(&self.members.get(head)?.tracker))
+    }
+
+    fn sound(&self) -> impl Iterator<Item = usize> {
+        let faulty = self.faulty.iter().enumerate();
+        faulty.filter_map(|(head, faulty)| (!faulty).then_some(head))
+    }
+
+    /// The radio heads.
+    pub fn heads(&self) -> &[RadioHead] {
+        &self.heads
+    }
+
+    /// Number of radio heads found faulty.
+    pub fn faulty(&self) -> usize {
+        self.faulty.iter().filter(|faulty| **faulty).count()
+    }
+
+    fn is_faulty(&self, head: usize) -> bool {
+        self.faulty.get(head).is_some_and(|faulty| *faulty)
+    }
+
+    /// How far the angles of a radio head are off from the tracker without it, in standard
+    /// deviations.
+    fn statistic(&self, head: usize) -> f64 {
+        self.members
+            .get(head)
+            .map_or(0.0, |member| member.test(head).statistic())
+    }
+
+    /// Number of sound radio heads whose statistic is above a threshold.
+    fn doubtful(&self, threshold: f64) -> usize {
+        self.sound()
+            .filter(|&head| self.statistic(head) > threshold)
+            .count()
+    }
+
+    /// Moves every tracker.
+    pub fn odometry(&mut self, sample: &OdometrySample) -> OdometryVerdict {
+        for member in &mut self.members {
+            member.tracker.odometry(sample);
+        }
+        self.main.odometry(sample)
+    }
+
+    /// Takes in an angle: a test of its radio head, and information for whoever uses that.
+    pub fn update(&mut self, head: &RadioHead, measured: &AngleMeasurement) -> UpdateVerdict {
+        let is_it = |mine: &RadioHead| mine.sends(head.pci, head.ssb_index);
+        if let Some(number) = self.heads.iter().position(is_it) {
+            for member in &mut self.members {
+                if !member.lacks(number) {
+                    member.tracker.update(head, measured);
+                    continue;
+                }
+                let Some(innovation) = member.tracker.rehearse_excluded(head, measured) else {
+                    continue;
+                };
+                // While the vehicle stands, scatter is one look however often it is seen.
+                if innovation.measurement_variance < 1.0 {
+                    for (mine, test) in member.without.iter().zip(&mut member.tests) {
+                        if *mine == number {
+                            test.push(&innovation);
+                        }
+                    }
+                }
+            }
+        }
+        self.main.update(head, measured)
+    }
+
+    /// Whether a source is at fault and nobody knows which, or too many are.
+    pub fn is_lost(&self, config: &IntegrityConfig) -> bool {
+        self.doubtful(config.detection_threshold) > 0 || self.is_outvoted(config)
+    }
+
+    /// Whether half of several radio heads or more are at fault or in doubt.
+    pub fn is_outvoted(&self, config: &IntegrityConfig) -> bool {
+        let against = self.doubtful(config.detection_threshold) + self.faulty();
+        against > 1 && 2 * against >= self.heads.len()
+    }
+
+    /// For how long it has not been lost (s).
+    pub fn quiet_s(&self, now_s: f64) -> f64 {
+        now_s - self.lost_s
+    }
+
+    /// Excludes the radio head that is at fault, where two others remain to agree without it, and
+    /// readmits those that have come to agree again.
+    pub fn judge(&mut self, now_s: f64, config: &IntegrityConfig) {
+        for head in 0..self.heads.len() {
+            let disagrees = self.statistic(head) > config.recovery_threshold;
+            let Some(disagreed_s) = self.disagreed_s.get_mut(head) else {
+                return;
+            };
+            if disagrees {
+                *disagreed_s = now_s;
+            } else if now_s - *disagreed_s > config.recovery_s && self.is_faulty(head) {
+                self.readmit(head);
+            }
+        }
+        // A wrong choice is itself a fault, and must be as rare as the risk under one.
+        let odds = -2.0 * config.risk_under_fault.ln();
+        if let Some(culprit) = self.culprit(config.detection_threshold, odds) {
+            self.exclude(culprit);
+        }
+        if self.is_lost(config) {
+            self.lost_s = now_s;
+        }
+    }
+
+    /// The radio head that is at fault, if one is that much likelier to be it than any other:
+    /// without it the largest statistic among the others falls below what it is without another by
+    /// `odds`, in twice the logarithm of a likelihood ratio.
+    fn culprit(&self, threshold: f64, odds: f64) -> Option<usize> {
+        if self.sound().count() < 3 || self.doubtful(threshold) == 0 {
+            return None;
+        }
+        let (mut best, mut second) = ((usize::MAX, f64::INFINITY), f64::INFINITY);
+        for head in self.sound() {
+            let disagreement = self.disagreement_without(head);
+            if disagreement < best.1 {
+                second = best.1;
+                best = (head, disagreement);
+            } else {
+                second = second.min(disagreement);
+            }
+        }
+        let (head, least) = best;
+        let sure = second * second - least * least > odds;
+        (sure && least < threshold && self.statistic(head) > threshold).then_some(head)
+    }
+
+    /// The largest statistic of a sound radio head when `left_out` is left out.
+    fn disagreement_without(&self, left_out: usize) -> f64 {
+        (self.members.iter())
+            .filter(|member| member.without[0] != member.without[1] && member.lacks(left_out))
+            .flat_map(|member| member.without.iter().zip(&member.tests))
+            .filter(|(head, _)| **head != left_out && !self.is_faulty(**head))
+            .map(|(_, test)| test.statistic())
+            .fold(0.0, f64::max)
+    }
+
+    fn number_without(&self, first: usize, second: usize) -> Option<usize> {
+        let (first, second) = (first.min(second), first.max(second));
+        (self.members.iter()).position(|member| member.without == [first, second])
+    }
+
+    /// Leaves a radio head out everywhere, and with it what it has done.
+    fn exclude(&mut self, culprit: usize) {
+        let Some(faulty) = self.faulty.get_mut(culprit) else {
+            return;
+        };
+        *faulty = true;
+        if let Some(without) = self.members.get(culprit) {
+            self.main = without.tracker.clone();
+        }
+        for number in 0..self.members.len() {
+            let Some([first, second]) = self.members.get(number).map(|member| member.without)
+            else {
+                return;
+            };
+            if first == culprit || second == culprit {
+                continue;
+            }
+            // Without (first, culprit) it has not heard the culprit; of the second it is told now.
+            let clean = [first, second].map(|head| {
+                self.number_without(head, culprit)
+                    .and_then(|i| self.members.get(i))
+            });
+            let [Some(of_first), Some(of_second)] = clean else {
+                continue;
+            };
+            let tests = [of_first.test(first), of_second.test(second)];
+            let mut tracker = of_first.tracker.clone();
+            exclude(&mut tracker, self.heads.get(second), true);
+            if let Some(member) = self.members.get_mut(number) {
+                member.tests = tests;
+                member.tracker = tracker;
+            }
+        }
+    }
+
+    /// Uses a radio head again.
+    fn readmit(&mut self, head: usize) {
+        if let Some(faulty) = self.faulty.get_mut(head) {
+            *faulty = false;
+        }
+        let known = self.heads.get(head);
+        exclude(&mut self.main, known, false);
+        for member in self.members.iter_mut().filter(|member| !member.lacks(head)) {
+            exclude(&mut member.tracker, known, false);
+        }
+    }
+}
+
+fn exclude(tracker: &mut Tracker, head: Option<&RadioHead>, excluded: bool) {
+    if let Some(head) = head {
+        tracker.set_excluded(head, excluded);
+    }
+}
+
+#[cfg(test)]
+mod tests {
+    use std::sync::Arc;
+
+    use super::*;
+    use crate::geometry::Pose;
+    use crate::localize::tracker::{InitialPose, TrackerConfig};
+    use crate::settings::{Shipped, Site, TomlFile, Vehicle};
+
+    /// A minute of driving past four radio heads, of which number 2 is off by `bias_rad`; what was
+    /// measured goes to `sinks`.
+    fn drive(
+        bias_rad: f64,
+        mut sink: impl FnMut(Option<&OdometrySample>, usize, &AngleMeasurement),
+    ) {
+        let (site, _) = trip();
+        let road = site.build_road().unwrap().unwrap();
+        for step in 1..600 {
+            let time_s = f64::from(step) * 0.1;
+            let odometry = OdometrySample {
+                time_s,
+                distance_m: 4.0 * time_s,
+                speed_mps: 4.0,
+                yaw_rate_radps: None,
+            };
+            let pose = road.pose(4.0 * time_s);
+            for (number, head) in site.radio_heads.iter().enumerate() {
+                let bearing_rad = pose.point().bearing_rad(RadioHead::from(head).position);
+                let bias_rad = if number == 2 { bias_rad } else { 0.0 };
+                let phase_rad = std::f64::consts::PI * (bearing_rad - pose.heading_rad).cos();
+                let measured = AngleMeasurement {
+                    time_s,
+                    phase_rad: phase_rad + bias_rad,
+                    phase_sigma_rad: 0.05,
+                    angle_rad: f64::NAN,
+                    snr_db: 20.0,
+                    resolved: true,
+                };
+                sink((number == 0).then_some(&odometry), number, &measured);
+            }
+        }
+    }
+
+    fn trip() -> (Site, Vehicle) {
+        let site = Site::from_library("trip-4", &Shipped).unwrap();
+        let vehicle = Vehicle::from_library("carrier", &Shipped).unwrap();
+        (site, vehicle)
+    }
+
+    fn tracker() -> (Tracker, Vec<RadioHead>) {
+        let (site, vehicle) = trip();
+        let config = TrackerConfig::new(&site, &vehicle);
+        let heads = RadioHead::heard(&site, &vehicle);
+        let start = InitialPose {
+            pose: Pose::default(),
+            position_std_m: 0.1,
+            heading_std_rad: 0.01,
+        };
+        let map = Arc::new(site.build_road().unwrap().unwrap());
+        (Tracker::new(config, Some(map), &heads, &start), heads)
+    }
+
+    /// The bank after the drive, and the same tracker having done without some radio heads.
+    fn after(bias_rad: f64, without: &[usize]) -> (Bank, Tracker) {
+        let (mut alone, heads) = tracker();
+        for &head in without {
+            alone.set_excluded(&heads[head], true);
+        }
+        let mut bank = Bank::new(tracker().0, &heads, 0.0);
+        drive(bias_rad, |odometry, head, measured| {
+            if let Some(sample) = odometry {
+                bank.odometry(sample);
+                alone.odometry(sample);
+            }
+            bank.update(&heads[head], measured);
+            alone.update(&heads[head], measured);
+        });
+        (bank, alone)
+    }
+
+    #[test]
+    fn the_culprit_is_named_and_nobody_else() {
+        let (config, odds) = (IntegrityConfig::default(), 9.2);
+        let (sound, _) = after(0.0, &[]);
+        assert_eq!(sound.culprit(config.detection_threshold, odds), None);
+        let (biased, _) = after(0.3, &[]);
+        assert!(biased.is_lost(&config));
+        assert_eq!(biased.culprit(config.detection_threshold, odds), Some(2));
+    }
+
+    #[test]
+    fn what_takes_over_has_never_heard_the_excluded() {
+        let (mut bank, without) = after(0.3, &[2]);
+        bank.exclude(2);
+        assert_eq!(bank.main().belief(), without.belief());
+        assert_eq!(bank.faulty(), 1);
+        let (_, without_both) = after(0.3, &[1, 2]);
+        let witness = bank.members[1].tracker.belief();
+        assert_eq!(witness, without_both.belief());
+        // The test of the excluded goes on, for the day it agrees again.
+        assert!(bank.statistic(2) > 5.5 && !bank.is_lost(&IntegrityConfig::default()));
+        bank.readmit(2);
+        assert_eq!(bank.faulty(), 0);
+        assert!(bank.main().belief() == without.belief());
+    }
+}

@@ -1,0 +1,181 @@
+//! A tracker that mistrusts its sources.
+//!
+//! Beside the tracker that uses every radio head there run trackers that do without some of them
+//! ([`Bank`]). If one radio head is at fault, the tracker without it is right within its own
+//! covariance, wherever the full solution may be: the protection level is the radius about the full
+//! solution that holds for each of them (solution separation, Brown and McBurney 1988, with the
+//! separation as it is and not its threshold).
+//!
+//! A single radio head has no witness but odometry and road: the protection level then is what
+//! those two can vouch for, grows with the distance driven, and passes the alert limit unless they
+//! are good.
+
+use super::bank::Bank;
+use super::config::IntegrityConfig;
+use crate::localize::quantile::RadialQuantile;
+use super::separation::SeparatedRadius;
+use crate::clone_in_place::clone_in_place;
+use crate::localize::integrity_state::{Integrity, IntegrityState};
+use crate::localize::measurement::{AngleMeasurement, UpdateVerdict};
+use crate::localize::pose_estimate::PoseEstimate;
+use crate::localize::tracker::{OdometryVerdict, Tracker};
+use crate::observation::OdometrySample;
+use crate::radio_head::RadioHead;
+
+/// A tracker with its witnesses.
+#[derive(Debug)]
+pub struct Guard {
+    config: IntegrityConfig,
+    nominal: RadialQuantile,
+    under_fault: SeparatedRadius,
+    bank: Bank,
+    restarted: Option<Restarted>,
+    /// Distance driven (m) when the sources could be told apart last.
+    trusted_m: f64,
+    now_s: f64,
+}
+
+/// Trackers begun anew from a vague pose.
+#[derive(Debug)]
+struct Restarted {
+    bank: Bank,
+    since_s: f64,
+}
+
+clone_in_place!(Guard {
+    config,
+    nominal,
+    under_fault,
+    bank,
+    restarted,
+    trusted_m,
+    now_s
+});
+
+clone_in_place!(Restarted { bank, since_s });
+
+impl Guard {
+    /// Guards a tracker of these radio heads.
+    pub fn new(tracker: Tracker, heads: &[RadioHead], config: IntegrityConfig) -> Self {
+        Self {
+            nominal: RadialQuantile::new(config.risk),
+            under_fault: SeparatedRadius::new(config.risk_under_fault),
+            trusted_m: tracker.driven_m(),
+            bank: Bank::new(tracker, heads, f64::NEG_INFINITY),
+            restarted: None,
+            now_s: f64::NEG_INFINITY,
+            config,
+        }
+    }
+
+    /// The tracker that uses every sound source.
+    pub const fn tracker(&self) -> &Tracker {
+        self.bank.main()
+    }
+
+    /// Moves every tracker.
+    pub fn odometry(&mut self, sample: &OdometrySample) -> OdometryVerdict {
+        if let Some(restarted) = &mut self.restarted {
+            restarted.bank.odometry(sample);
+        }
+        self.bank.odometry(sample)
+    }
+
+    /// Takes in an angle: a test of its radio head, and information for whoever trusts that.
+    pub fn update(&mut self, head: &RadioHead, measured: &AngleMeasurement) -> UpdateVerdict {
+        self.now_s = self.now_s.max(measured.time_s);
+        let verdict = self.bank.update(head, measured);
+        self.bank.judge(self.now_s, &self.config);
+        if let Some(restarted) = &mut self.restarted {
+            restarted.bank.update(head, measured);
+            restarted.bank.judge(self.now_s, &self.config);
+        }
+        self.recover();
+        verdict
+    }
+
+    /// Where the sources cannot be told apart, the trackers may have been led astray, so far that
+    /// they refuse the good angles as outliers. Others then start from a pose as vague as what may
+    /// have happened meanwhile, and take over once nothing contradicts them. Until then, or until
+    /// the old ones are at peace again, nothing is `ok`.
+    fn recover(&mut self) {
+        let (now_s, patience_s) = (self.now_s, self.config.recovery_s);
+        let lost = self.bank.is_lost(&self.config);
+        let Some(restarted) = &self.restarted else {
+            if lost {
+                self.restart();
+            } else {
+                self.trusted_m = self.bank.main().driven_m();
+            }
+            return;
+        };
+        let aged = now_s - restarted.since_s > patience_s;
+        if !lost && self.bank.quiet_s(now_s) > patience_s {
+            self.restarted = None;
+        } else if aged && restarted.bank.is_lost(&self.config) {
+            self.restart();
+        } else if restarted.bank.quiet_s(now_s) > patience_s
+            && self.protection_level_m(&restarted.bank, now_s) <= self.config.alert_limit_m
+            && let Some(restarted) = self.restarted.take()
+        {
+            self.bank = restarted.bank;
+        }
+    }
+
+    fn restart(&mut self) {
+        let main = self.bank.main();
+        let position_std_m = self.config.alert_limit_m + main.driven_m() - self.trusted_m;
+        self.restarted = Some(Restarted {
+            bank: Bank::new(
+                main.restarted(position_std_m),
+                self.bank.heads(),
+                self.now_s,
+            ),
+            since_s: self.now_s,
+        });
+    }
+
+    /// The pose at `time_s`.
+    pub fn pose(&self, time_s: f64) -> PoseEstimate {
+        let mut pose = self.bank.main().pose(time_s);
+        pose.integrity = Some(self.integrity(time_s));
+        pose
+    }
+
+    /// Protection level and state at `time_s`.
+    pub fn integrity(&self, time_s: f64) -> Integrity {
+        let protection_level_m = self.protection_level_m(&self.bank, time_s);
+        let state = if self.bank.is_outvoted(&self.config) {
+            IntegrityState::Unavailable
+        } else if self.restarted.is_some() || protection_level_m > self.config.alert_limit_m {
+            IntegrityState::Degraded
+        } else {
+            IntegrityState::Ok
+        };
+        Integrity {
+            protection_level_m,
+            state,
+            faulty: self.bank.faulty(),
+        }
+    }
+
+    /// The radius that the error leaves with the stated risk, whether no source is at fault or any
+    /// one of those in use.
+    fn protection_level_m(&self, bank: &Bank, time_s: f64) -> f64 {
+        let main = bank.main().pose(time_s);
+        let mut level_m = self.nominal.radius(main.principal_variances());
+        for without in bank.without_one() {
+            let clean = without.pose(time_s);
+            let Some([[xx, xy, _], [_, yy, _], _]) = clean.covariance else {
+                continue;
+            };
+            let separation_m = [
+                clean.pose.x_m - main.pose.x_m,
+                clean.pose.y_m - main.pose.y_m,
+            ];
+            let covariance = [[xx, xy], [xy, yy]];
+            level_m = (self.under_fault).radius(separation_m, covariance, level_m);
+        }
+        level_m
+    }
+}

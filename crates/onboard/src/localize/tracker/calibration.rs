@@ -1,0 +1,55 @@
+//! How far the array has come from its survey.
+
+use super::config::TrackerConfig;
+use super::state::{Belief, MOUNTING, PHASE};
+
+/// Departures count from this many standard deviations on.
+const SIGMAS: f64 = 3.0;
+
+/// A constant of the array, as found while driving.
+#[derive(Clone, Copy, Debug, PartialEq)]
+pub struct Departure {
+    /// How far it is from the survey (rad) ...
+    pub by_rad: f64,
+    /// ... the standard deviation of that ...
+    pub std_rad: f64,
+    /// ... and the standard deviation that the survey was said to have.
+    pub surveyed_std_rad: f64,
+}
+
+impl Departure {
+    /// Whether it is certain that the survey does not hold: the departure is beyond three standard
+    /// deviations of the survey by three of its own. Under a survey that holds, fewer than 0.27 %
+    /// of the drives see this.
+    pub fn alarms(&self) -> bool {
+        self.by_rad.abs() > SIGMAS * (self.surveyed_std_rad + self.std_rad)
+    }
+}
+
+/// The array's mounting and phase calibration, as found while driving.
+#[derive(Clone, Copy, Debug, PartialEq)]
+pub struct Calibration {
+    /// Direction of its axis from the surveyed one, counter-clockwise.
+    pub mounting: Departure,
+    /// Phase per element from the calibrated one.
+    pub phase: Departure,
+}
+
+impl Calibration {
+    pub(super) fn new(config: &TrackerConfig, belief: &Belief) -> Self {
+        let departure = |state: usize, surveyed_rad: f64, surveyed_std_rad: f64| Departure {
+            by_rad: belief.mean[state] - surveyed_rad,
+            std_rad: belief.covariance[state][state].sqrt(),
+            surveyed_std_rad,
+        };
+        Self {
+            mounting: departure(MOUNTING, config.mounting_rad, config.mounting_std_rad),
+            phase: departure(PHASE, config.phase_rad, config.phase_std_rad),
+        }
+    }
+
+    /// Whether mounting or phase calibration no longer hold.
+    pub fn alarms(&self) -> bool {
+        self.mounting.alarms() || self.phase.alarms()
+    }
+}

@@ -1,0 +1,146 @@
+//! What the tracker assumes of vehicle, road and radio.
+
+use super::motion::{MotionNoise, PathBend};
+use super::sighting::{ArrayModel, Sighting};
+use crate::localize::quantile::normal_quantile;
+use crate::road::LaneKeeping;
+use crate::settings::{LocalizerSettings, Site, TrackerSettings, Vehicle};
+
+/// The best that the tracker takes for granted where nothing is said.
+const LEAST_ODOMETER_SCALE_STD: f64 = 0.001;
+const LEAST_ODOMETER_NOISE_M_PER_SQRT_M: f64 = 0.003;
+const LEAST_LANE_RMS_M: f64 = 0.02;
+
+/// Assumptions of the tracker, SI and radians: what site and vehicle state.
+#[derive(Clone, Copy, Debug, PartialEq)]
+pub struct TrackerConfig {
+    /// The array.
+    pub array: ArrayModel,
+    /// Rician K of the channel as a power ratio: what scatter adds to each angle's variance.
+    pub rician_k: f64,
+    /// How the vehicle keeps to its lane; used with a map.
+    pub lane_keeping: LaneKeeping,
+    /// How the path bends; used without a map.
+    pub path_bend: PathBend,
+    /// Noise of the motion.
+    pub noise: MotionNoise,
+    /// Metres that the odometer reads per metre driven, by its data sheet.
+    pub odometer_scale: f64,
+    /// Standard deviation of that at the start.
+    pub odometer_scale_std: f64,
+    /// Surveyed direction of the array's axis from the vehicle's forward axis (rad).
+    pub mounting_rad: f64,
+    /// Angle random walk of the gyroscope (rad/√s).
+    pub yaw_noise_rad_per_sqrt_s: f64,
+    /// Its bias by the data sheet (rad/s).
+    pub yaw_rate_bias_radps: f64,
+    /// Standard deviation of that at the start (rad/s); 0 takes it as calibrated.
+    pub yaw_rate_bias_std_radps: f64,
+    /// Standard deviation of the array's mounting angle at the start (rad); 0 takes it as known.
+    pub mounting_std_rad: f64,
+    /// Phase offset that calibration is known to have left (rad per element).
+    pub phase_rad: f64,
+    /// Standard deviation of that at the start (rad per element); 0 takes the array
+    /// as calibrated.
+    pub phase_std_rad: f64,
+    /// Largest squared Mahalanobis distance of an innovation that is used (χ², one degree).
+    pub gate: f64,
+    /// Acceleration to reckon with where odometry is missing (m/s²).
+    pub acceleration_mps2: f64,
+    /// Acceleration that the vehicle cannot do: the odometer slipped (m/s²).
+    pub leap_mps2: f64,
+    /// Time between odometry samples above which they are reported as a gap (s).
+    pub gap_s: f64,
+    /// Speed that no odometry sample can exceed (m/s).
+    pub top_speed_mps: f64,
+}
+
+/// A gyroscope that nothing is stated of: angle random walk (rad/√s) and bias (rad/s).
+const USUAL_GYROSCOPE: [f64; 2] = [1e-3, 1e-3];
+
+impl TrackerConfig {
+    /// What a tracker on a vehicle assumes at a site.
+    pub fn new(site: &Site, vehicle: &Vehicle) -> Self {
+        let settings = match vehicle.localizer {
+            LocalizerSettings::Tracker(settings) => settings,
+            LocalizerSettings::DeadReckoning(_) => TrackerSettings::default(),
+        };
+        let (odometer, array) = (&vehicle.odometer, &vehicle.array);
+        let keeping = vehicle.lane_keeping.process();
+        let lane_keeping = LaneKeeping {
+            rms_m: keeping.rms_m.max(LEAST_LANE_RMS_M),
+            ..keeping
+        };
+        let gyroscope = vehicle.gyroscope.as_ref();
+        let [yaw_noise, yaw_bias_std] = gyroscope.map_or(USUAL_GYROSCOPE, |gyroscope| {
+            [gyroscope.noise_rad_per_sqrt_s, gyroscope.bias_std_radps]
+        });
+        Self {
+            array: ArrayModel {
+                elements: array.elements,
+                spacing_wavelengths: array.spacing_wavelengths,
+                wavelength_m: site.wavelength_m(),
+                position_m: array.position_m,
+                position_std_m: array.position_std_m,
+            },
+            rician_k: 10f64.powf(0.1 * site.rician_k_db),
+            lane_keeping,
+            path_bend: PathBend {
+                curvature_per_m: settings.curvature_rms_per_m,
+                correlation_m: settings.curvature_correlation_m,
+                steering_rad_per_sqrt_m: lane_keeping.steering_rad_per_sqrt_m(),
+            },
+            noise: MotionNoise {
+                odometer_m_per_sqrt_m: odometer
+                    .noise_m_per_sqrt_m
+                    .max(LEAST_ODOMETER_NOISE_M_PER_SQRT_M),
+                scale_per_sqrt_m: settings.odometer_scale_walk_per_sqrt_m,
+                mounting_rad_per_sqrt_m: array.mounting_drift_rad_per_sqrt_m,
+                phase_rad_per_sqrt_m: array.phase_drift_rad_per_sqrt_m,
+            },
+            odometer_scale: odometer.scale,
+            odometer_scale_std: odometer.scale_std.max(LEAST_ODOMETER_SCALE_STD),
+            mounting_rad: array.mounting_rad,
+            yaw_noise_rad_per_sqrt_s: yaw_noise,
+            yaw_rate_bias_radps: gyroscope.map_or(0.0, |gyroscope| gyroscope.bias_radps),
+            yaw_rate_bias_std_radps: yaw_bias_std,
+            mounting_std_rad: array.mounting_std_rad,
+            phase_rad: array.phase_rad,
+            phase_std_rad: array.phase_std_rad,
+            gate: normal_quantile(0.5 * settings.outlier_probability).powi(2),
+            acceleration_mps2: 2.0 * vehicle.acceleration_mps2,
+            leap_mps2: 10.0 * vehicle.acceleration_mps2,
+            gap_s: 5.0 / odometer.rate_hz,
+            top_speed_mps: 1.5 * vehicle.top_speed_mps(),
+        }
+    }
+
+    /// Variance (rad²) of an angle `travelled_m` after the radio head's last one by what several
+    /// looks share: scatter, see [`ArrayModel::correlation`], and the surveys, whose errors stay
+    /// until the radio head is seen from another side, after about its distance. A look never
+    /// counts for more than one: where successive errors cancel, they do so at one spacing and for
+    /// a moment.
+    pub fn look_variance(&self, travelled_m: f64, sighting: &Sighting) -> f64 {
+        let scatter = self.array.scatter_variance(self.rician_k);
+        let correlation = self.array.correlation(travelled_m, sighting.toward).max(1.0);
+        let mut variance = scatter * correlation;
+        if sighting.survey_variance > 0.0 {
+            // Standing still nothing new is learnt, but the variance must stay a number.
+            let same_side = sighting.range_m / travelled_m.abs().max(1e-9);
+            variance += sighting.survey_variance * same_side.max(1.0);
+        }
+        variance
+    }
+
+    /// Variance of the curvature of the path (1/m²) where no map tells: it bends with the road, and
+    /// back to the middle of the lane.
+    pub fn curvature_variance(&self) -> f64 {
+        self.path_bend.curvature_per_m.powi(2) + self.lane_keeping.pull_per_m().powi(2)
+    }
+
+    /// Variance of the distance (m²) driven during `duration_s` without odometry.
+    pub fn coasting_variance(&self, duration_s: f64) -> f64 {
+        let error_m = 0.5 * self.acceleration_mps2 * duration_s * duration_s;
+        error_m * error_m
+    }
+}

@@ -1,0 +1,339 @@
+//! The filter itself: what it holds, how odometry moves it and angles correct it.
+
+use std::sync::Arc;
+
+use super::calibration::Calibration;
+use super::config::TrackerConfig;
+use super::doubt;
+use super::interface::{InitialPose, OdometryVerdict};
+use super::locate::locate;
+use super::motion::{Step, Yaw};
+use super::off_map::OffMap;
+use super::sighting::Sighting;
+use super::state::{ALONG, Belief, HEADING, SCALE, STATES};
+use crate::clone_in_place::clone_in_place;
+use crate::geometry::wrap_angle;
+use crate::localize::gaussian::Innovation;
+use crate::localize::measurement::{AngleMeasurement, UpdateReason, UpdateVerdict};
+use crate::localize::smoother::Journal;
+use crate::observation::OdometrySample;
+use crate::radio_head::RadioHead;
+use crate::road::{Gap, Road};
+
+/// Longest step over which the road's curvature is taken as constant (m).
+const STEP_M: f64 = 1.0;
+
+#[derive(Clone, Copy, Debug, PartialEq)]
+pub(super) struct Head {
+    pub known: RadioHead,
+    pub excluded: bool,
+    /// Distance driven when its last angle was used (m).
+    pub last_look_m: f64,
+}
+
+impl Head {
+    pub fn is(&self, other: &RadioHead) -> bool {
+        self.known.sends(other.pci, other.ssb_index)
+    }
+}
+
+/// The tracker. With a map it works along and across the road, without in the plane.
+#[derive(Debug, PartialEq)]
+pub struct Tracker {
+    pub(super) config: TrackerConfig,
+    pub(super) map: Option<Arc<Road>>,
+    pub(super) heads: Vec<Head>,
+    pub(super) belief: Belief,
+    pub(super) odometry: Option<OdometrySample>,
+    pub(super) driven_m: f64,
+    /// Where the vehicle is that the map does not tell how the road goes on.
+    pub(super) off_map: Option<OffMap>,
+    pub(super) journal: Option<Journal<STATES>>,
+}
+
+clone_in_place!(Tracker {
+    config,
+    map,
+    heads,
+    belief,
+    odometry,
+    driven_m,
+    off_map,
+    journal
+});
+
+impl Tracker {
+    /// A tracker that starts from a given pose. `map` is the course of the road, if known.
+    pub fn new(
+        config: TrackerConfig,
+        map: Option<Arc<Road>>,
+        heads: &[RadioHead],
+        start: &InitialPose,
+    ) -> Self {
+        let belief = Self::prior(&config, map.as_deref(), start);
+        let head = |&known| Head {
+            known,
+            excluded: false,
+            last_look_m: f64::NEG_INFINITY,
+        };
+        let mut tracker = Self {
+            config,
+            map,
+            heads: heads.iter().map(head).collect(),
+            belief,
+            odometry: None,
+            driven_m: 0.0,
+            off_map: None,
+            journal: None,
+        };
+        tracker.watch_the_map();
+        tracker
+    }
+
+    /// Moves the state by one odometry sample.
+    pub fn odometry(&mut self, sample: &OdometrySample) -> OdometryVerdict {
+        if !sample.is_finite() {
+            return OdometryVerdict::NotFinite;
+        }
+        let Some(previous) = self.odometry else {
+            self.odometry = Some(*sample);
+            self.ask(sample.time_s);
+            return OdometryVerdict::First;
+        };
+        let duration_s = sample.time_s - previous.time_s;
+        if duration_s == 0.0 {
+            return OdometryVerdict::Duplicate;
+        }
+        if duration_s < 0.0 {
+            return OdometryVerdict::TimeBackwards;
+        }
+        self.odometry = Some(*sample);
+        // A jump of the speed that no vehicle can do is a jump of the odometer's scale: slip.
+        let leap_mps = (sample.speed_mps - previous.speed_mps).abs();
+        if leap_mps > self.config.leap_mps2 * duration_s.max(0.02) {
+            let leap = leap_mps / previous.speed_mps.abs().max(sample.speed_mps.abs());
+            self.belief.covariance[SCALE][SCALE] += leap * leap;
+        }
+        let moved_m = sample.distance_m - previous.distance_m;
+        // A counter that was reset or overflowed says nothing of the distance: the speeds do.
+        let jumped = moved_m.abs() > self.config.top_speed_mps * duration_s + 0.1;
+        let reading_m = if jumped {
+            0.5 * (previous.speed_mps + sample.speed_mps) * duration_s
+        } else {
+            moved_m
+        };
+        let yaw = sample.yaw_rate_radps.map(|rate| Yaw {
+            turn_rad: rate * duration_s,
+            duration_s,
+            variance: self.config.yaw_noise_rad_per_sqrt_s.powi(2) * duration_s,
+        });
+        self.advance(reading_m, yaw);
+        if jumped {
+            self.add_along_variance(self.config.coasting_variance(duration_s));
+        }
+        self.ask(sample.time_s);
+        if jumped {
+            OdometryVerdict::DistanceJump { jump_m: moved_m }
+        } else if duration_s > self.config.gap_s {
+            OdometryVerdict::AfterGap { gap_s: duration_s }
+        } else {
+            match self.off_map {
+                Some(OffMap::Beyond { by_m }) => OdometryVerdict::BeyondMap { by_m },
+                Some(OffMap::Gap(Gap { from_m, to_m })) => {
+                    OdometryVerdict::InMapGap { from_m, to_m }
+                }
+                None => OdometryVerdict::Accepted,
+            }
+        }
+    }
+
+    fn advance(&mut self, reading_m: f64, yaw: Option<Yaw>) {
+        let steps = (reading_m.abs() / STEP_M).ceil().max(1.0);
+        let share = 1.0 / steps;
+        let yaw = yaw.map(|yaw| Yaw {
+            turn_rad: yaw.turn_rad * share,
+            duration_s: yaw.duration_s * share,
+            variance: yaw.variance * share,
+        });
+        for _ in 0..steps as usize {
+            let mut step = self.step(&self.belief, reading_m * share);
+            if let Some(yaw) = yaw {
+                let (residual, row, variance) = step.turn_seen(&self.belief.mean, &yaw);
+                self.measure(residual, &row, variance);
+                step = self
+                    .step(&self.belief, reading_m * share)
+                    .informed(&self.belief.mean, &yaw);
+            }
+            if let Some(journal) = &mut self.journal {
+                journal.moved(&step.jacobian);
+            }
+            step.apply(&mut self.belief);
+        }
+        self.driven_m += reading_m.abs() / (1.0 + self.belief.mean[SCALE]);
+        self.watch_the_map();
+    }
+
+    pub(super) fn step(&self, belief: &Belief, reading_m: f64) -> Step {
+        let (mean, config) = (&belief.mean, &self.config);
+        let middle_m = mean[ALONG] + 0.5 * reading_m;
+        let curvature_per_m = (self.map.as_ref()).map_or(0.0, |map| map.curvature_per_m(middle_m));
+        let noise = &config.noise;
+        if self.map.is_some() && self.off_map.is_none() {
+            let keeping = &config.lane_keeping;
+            Step::along_lane(mean, reading_m, curvature_per_m, keeping, noise)
+        } else {
+            Step::in_plane(mean, reading_m, curvature_per_m, &config.path_bend, noise)
+        }
+    }
+
+    fn add_along_variance(&mut self, variance: f64) {
+        if self.map.is_some() {
+            self.belief.covariance[ALONG][ALONG] += variance;
+            return;
+        }
+        let (sin, cos) = self.belief.mean[HEADING].sin_cos();
+        let direction = [cos, sin];
+        for i in 0..2 {
+            for j in 0..2 {
+                self.belief.covariance[i][j] += variance * direction[i] * direction[j];
+            }
+        }
+    }
+
+    /// Corrects the state by one electrical angle to a radio head.
+    pub fn update(&mut self, head: &RadioHead, measured: &AngleMeasurement) -> UpdateVerdict {
+        let looked = match self.look(head, measured) {
+            Ok(looked) if looked.excluded => {
+                return self.verdict(UpdateReason::Excluded, None);
+            }
+            Ok(looked) => looked,
+            Err(reason) => return self.verdict(reason, None),
+        };
+        let mahalanobis2 = looked.innovation.mahalanobis2();
+        if mahalanobis2 > self.config.gate {
+            return self.verdict(UpdateReason::Outlier, Some(mahalanobis2));
+        }
+        let innovation = looked.innovation;
+        let (mut residual, mut variance) = (innovation.residual, innovation.measurement_variance);
+        if !measured.resolved {
+            let Some(likely) = doubt::equivalent(&innovation) else {
+                return self.verdict(UpdateReason::Outlier, Some(mahalanobis2));
+            };
+            (residual, variance) = likely;
+        }
+        self.measure(residual, &looked.row, variance);
+        if let Some(head) = self.heads.get_mut(looked.head) {
+            head.last_look_m = looked.place_m;
+        }
+        self.verdict(UpdateReason::Consistent, Some(mahalanobis2))
+    }
+
+    fn verdict(&self, reason: UpdateReason, mahalanobis2: Option<f64>) -> UpdateVerdict {
+        UpdateVerdict {
+            accepted: reason == UpdateReason::Consistent,
+            reason,
+            mahalanobis_squared: mahalanobis2,
+            threshold: Some(self.config.gate),
+        }
+    }
+
+    pub(super) fn look(&self, head: &RadioHead, measured: &AngleMeasurement) -> Result<Look, UpdateReason> {
+        let sigma = measured.phase_sigma_rad;
+        let usable = measured.time_s.is_finite()
+            && measured.phase_rad.is_finite()
+            && sigma.is_finite()
+            && sigma > 0.0;
+        if !usable {
+            return Err(UpdateReason::Unusable);
+        }
+        if measured.time_s < self.time_s() {
+            return Err(UpdateReason::TooLate);
+        }
+        let (index, head) = (self.heads.iter().enumerate())
+            .find(|(_, mine)| mine.is(head))
+            .ok_or(UpdateReason::UnknownRadioHead)?;
+        let (ahead_m, ahead_variance) = self.coasting(measured.time_s);
+        let (pose, footing) = locate(&self.belief.mean, ahead_m, self.map.as_deref());
+        let sighting = Sighting::new(
+            &head.known,
+            pose,
+            &footing,
+            &self.belief.mean,
+            &self.config.array,
+        )
+        .ok_or(UpdateReason::Unusable)?;
+        let bend = sighting.bend(&self.belief.covariance);
+        let place_m = self.driven_m + ahead_m;
+        let shared = (self.config).look_variance(place_m - head.last_look_m, &sighting);
+        let measurement_variance =
+            sigma * sigma + shared + sighting.row[ALONG].powi(2) * ahead_variance + bend.variance;
+        let residual = wrap_angle(measured.phase_rad - sighting.phase_rad - bend.shift_rad);
+        let innovation = (self.belief).innovation(residual, &sighting.row, measurement_variance);
+        Ok(Look {
+            head: index,
+            excluded: head.excluded,
+            place_m,
+            row: sighting.row,
+            innovation,
+        })
+    }
+
+    pub(super) fn measure(&mut self, residual: f64, row: &[f64; STATES], variance: f64) {
+        if let Some(journal) = &mut self.journal {
+            journal.measured(&self.belief, residual, row, variance);
+        }
+        self.belief.update(residual, row, variance);
+    }
+
+    /// Time of the newest odometry (s).
+    pub fn time_s(&self) -> f64 {
+        self.odometry
+            .map_or(f64::NEG_INFINITY, |sample| sample.time_s)
+    }
+
+    /// The state and its covariance.
+    pub const fn belief(&self) -> &Belief {
+        &self.belief
+    }
+
+    /// Replaces the state and its covariance, where several trackers become one.
+    pub(in crate::localize) const fn set_belief(&mut self, belief: &Belief) {
+        self.belief = *belief;
+    }
+
+    /// What the tracker assumes.
+    pub const fn config(&self) -> &TrackerConfig {
+        &self.config
+    }
+
+    /// How far the array has come from its survey.
+    pub fn calibration(&self) -> Calibration {
+        Calibration::new(&self.config, &self.belief)
+    }
+
+    /// Distance driven since the start (m).
+    pub const fn driven_m(&self) -> f64 {
+        self.driven_m
+    }
+
+    /// Sets the largest squared Mahalanobis distance of an angle that is used.
+    pub fn set_gate(&mut self, gate: f64) {
+        self.config.gate = gate;
+    }
+
+    /// Leaves the angles of a radio head unused, or uses them again.
+    pub fn set_excluded(&mut self, head: &RadioHead, excluded: bool) {
+        for mine in self.heads.iter_mut().filter(|mine| mine.is(head)) {
+            mine.excluded = excluded;
+        }
+    }
+}
+
+/// An angle as the belief meets it.
+pub(super) struct Look {
+    pub head: usize,
+    pub excluded: bool,
+    pub place_m: f64,
+    pub row: [f64; STATES],
+    pub innovation: Innovation,
+}

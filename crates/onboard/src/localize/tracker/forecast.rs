@@ -1,0 +1,82 @@
+//! What the belief would become: driven on, and with angles not yet heard.
+
+use super::filter::Tracker;
+use super::locate::locate;
+use super::sighting::Sighting;
+use super::state::Belief;
+use crate::localize::gaussian::{Innovation, principal_variances};
+use crate::localize::measurement::AngleMeasurement;
+use crate::radio_head::RadioHead;
+
+/// Longest step of a forecast (m), where millimetres do not matter.
+const FORECAST_STEP_M: f64 = 5.0;
+
+impl Tracker {
+    /// The innovation that an angle would bring; `None` where it would bring none.
+    pub fn innovation(&self, head: &RadioHead, measured: &AngleMeasurement) -> Option<Innovation> {
+        self.look(head, measured)
+            .ok()
+            .filter(|looked| !looked.excluded)
+            .map(|looked| looked.innovation)
+    }
+
+    /// The innovation that an angle to an excluded radio head would bring; it counts as a look.
+    pub(in crate::localize) fn rehearse_excluded(
+        &mut self,
+        head: &RadioHead,
+        measured: &AngleMeasurement,
+    ) -> Option<Innovation> {
+        let looked = self.look(head, measured).ok()?;
+        self.heads.get_mut(looked.head)?.last_look_m = looked.place_m;
+        Some(looked.innovation)
+    }
+
+    /// The belief at `time_s`, had the vehicle driven on at its speed and heard nothing.
+    pub fn forecast(&self, time_s: f64) -> Belief {
+        let lag_s = (time_s - self.time_s()).max(0.0);
+        let speed_mps = self.odometry.map_or(0.0, |sample| sample.speed_mps);
+        if speed_mps == 0.0 {
+            return self.belief;
+        }
+        self.carry(self.belief, speed_mps * lag_s)
+    }
+
+    /// A belief carried on by what the odometer would read, nothing being heard.
+    pub fn carry(&self, mut belief: Belief, reading_m: f64) -> Belief {
+        let steps = (reading_m.abs() / FORECAST_STEP_M).ceil();
+        for _ in 0..steps as usize {
+            self.step(&belief, reading_m / steps).apply(&mut belief);
+        }
+        belief
+    }
+
+    /// What an angle of thermal variance `thermal(distance)` to `head` would make of a belief
+    /// `ahead_m` further on than the newest odometry.
+    pub fn rehearse(
+        &self,
+        belief: &Belief,
+        ahead_m: f64,
+        head: &RadioHead,
+        thermal: impl Fn(f64) -> f64,
+    ) -> Option<Belief> {
+        let known = self.heads.iter().find(|mine| mine.is(head))?;
+        if known.excluded {
+            return None;
+        }
+        let (pose, footing) = locate(&belief.mean, 0.0, self.map.as_deref());
+        let array = &self.config.array;
+        let sighting = Sighting::new(&known.known, pose, &footing, &belief.mean, array)?;
+        let travelled_m = self.driven_m + ahead_m - known.last_look_m;
+        let variance =
+            thermal(sighting.range_m) + self.config.look_variance(travelled_m, &sighting);
+        let mut rehearsed = *belief;
+        rehearsed.update(0.0, &sighting.row, variance);
+        Some(rehearsed)
+    }
+
+    /// Variances of a belief's horizontal error along its principal axes, larger first (m²).
+    pub fn principal_variances(belief: &Belief) -> [f64; 2] {
+        let [[aa, ab, ..], [_, bb, ..], ..] = belief.covariance;
+        principal_variances(aa, ab, bb)
+    }
+}

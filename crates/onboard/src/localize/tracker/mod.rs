@@ -1,0 +1,29 @@
+//! The tracker: an extended Kalman filter over pose, odometer scale and array calibration,
+//! predicted by odometry and updated by electrical angles.
+//!
+//! The electrical angle `ω = 2π (d/λ) cos θ` has Gaussian noise whose size does not depend on the
+//! direction; the angle θ has neither property near end-fire, and a filter that takes θ believes
+//! itself far too much there. Scatter is a second noise, the same for every look within half a
+//! wavelength of travel, and is counted once per half wavelength.
+
+mod calibration;
+mod config;
+mod doubt;
+mod filter;
+mod forecast;
+mod interface;
+mod journal;
+mod locate;
+pub mod motion;
+mod off_map;
+mod place;
+mod prior;
+pub mod sighting;
+pub mod state;
+
+pub use calibration::{Calibration, Departure};
+pub use config::TrackerConfig;
+pub use filter::Tracker;
+pub use interface::{InitialPose, OdometryVerdict};
+pub use motion::{MotionNoise, PathBend};
+pub use sighting::ArrayModel;

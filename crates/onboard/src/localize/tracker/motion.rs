@@ -1,0 +1,314 @@
+//! How the state moves with the distance the odometer reads.
+//!
+//! **With a map** (curvilinear coordinates). The vehicle follows its lane as [`LaneKeeping`] says.
+//!
+//! **Without a map** (Cartesian). The curvature of the path is a first-order Gauss–Markov process
+//! over the distance travelled; heading and position are its integrals.
+//!
+//! Noise in the odometer is a random walk over distance in both.
+
+use super::state::{
+    ACROSS, ALONG, Belief, CURVATURE, HEADING, MOUNTING, PHASE, SCALE, STATES, YAW_RATE_BIAS,
+};
+use crate::localize::gaussian::{Matrix, identity};
+use crate::road::LaneKeeping;
+
+/// How the path bends where no map tells.
+#[derive(Clone, Copy, Debug, PartialEq)]
+pub struct PathBend {
+    /// Stationary deviation of the curvature (1/m).
+    pub curvature_per_m: f64,
+    /// Distance over which the curvature is forgotten (m).
+    pub correlation_m: f64,
+    /// Random walk of the heading by steering (rad per √m), quicker than any bend of the road.
+    pub steering_rad_per_sqrt_m: f64,
+}
+
+/// Noise of the motion that the odometer does not see or gets wrong.
+#[derive(Clone, Copy, Debug, Default, PartialEq)]
+pub struct MotionNoise {
+    /// Random walk of the odometer (m per √m).
+    pub odometer_m_per_sqrt_m: f64,
+    /// Random walk of the odometer's scale (1 per √m).
+    pub scale_per_sqrt_m: f64,
+    /// Random walk of the mounting angle (rad per √m).
+    pub mounting_rad_per_sqrt_m: f64,
+    /// Random walk of the phase offset (rad per √m).
+    pub phase_rad_per_sqrt_m: f64,
+}
+
+/// One step of the motion, linearised at the mean it starts from.
+#[derive(Clone, Copy, Debug)]
+pub struct Step {
+    /// Mean after the step.
+    pub mean: [f64; STATES],
+    /// Jacobian of the step.
+    pub jacobian: Matrix<STATES>,
+    /// Covariance of what the step adds.
+    pub noise: Matrix<STATES>,
+    /// By how much the vehicle turns (rad) ...
+    pub turn_rad: f64,
+    /// ... and how that depends on the state before the step.
+    pub turn_row: [f64; STATES],
+}
+
+/// What a gyroscope read during a step.
+#[derive(Clone, Copy, Debug, PartialEq)]
+pub struct Yaw {
+    /// Yaw rate times duration (rad).
+    pub turn_rad: f64,
+    /// Duration (s).
+    pub duration_s: f64,
+    /// Variance of the reading (rad²).
+    pub variance: f64,
+}
+
+impl Step {
+    /// The step along a lane of the given curvature, for what the odometer read.
+    pub fn along_lane(
+        start: &[f64; STATES],
+        reading_m: f64,
+        curvature_per_m: f64,
+        keeping: &LaneKeeping,
+        walk: &MotionNoise,
+    ) -> Self {
+        let scale = 1.0 + start[SCALE];
+        let length = reading_m / scale;
+        let (sin, cos) = start[HEADING].sin_cos();
+        let stretch = 1.0 / (1.0 - curvature_per_m * start[ACROSS]);
+        let phi = keeping.transition(length);
+
+        let mut f = identity();
+        f[ALONG][ACROSS] = length * cos * curvature_per_m * stretch * stretch;
+        f[ALONG][HEADING] = -length * sin * stretch;
+        f[ALONG][SCALE] = -length * cos * stretch / scale;
+        f[ACROSS][ACROSS] = phi[0][0];
+        f[ACROSS][HEADING] = phi[0][1];
+        f[HEADING][ACROSS] = phi[1][0];
+        f[HEADING][HEADING] = phi[1][1];
+
+        let distance = length.abs();
+        let mut q = [[0.0; STATES]; STATES];
+        q[ALONG][ALONG] = walk.odometer_m_per_sqrt_m.powi(2) * distance;
+        let wander = keeping.noise(&phi);
+        for i in 0..2 {
+            for j in 0..2 {
+                q[ACROSS + i][ACROSS + j] = wander[i][j];
+            }
+        }
+        slow_states(&mut q, walk, distance);
+
+        let mut mean = *start;
+        mean[ALONG] += length * cos * stretch;
+        mean[ACROSS] = phi[0][0] * start[ACROSS] + phi[0][1] * start[HEADING];
+        mean[HEADING] = phi[1][0] * start[ACROSS] + phi[1][1] * start[HEADING];
+        let mut turn_row = [0.0; STATES];
+        for i in 0..STATES {
+            turn_row[i] = f[HEADING][i] + curvature_per_m * f[ALONG][i];
+        }
+        turn_row[HEADING] -= 1.0;
+        turn_row[ALONG] = 0.0;
+        Self {
+            turn_rad: curvature_per_m * (mean[ALONG] - start[ALONG]) + mean[HEADING]
+                - start[HEADING],
+            mean,
+            jacobian: f,
+            noise: q,
+            turn_row,
+        }
+    }
+
+    /// The step in the plane, for what the odometer read: in Cartesian coordinates, or in those of
+    /// a road of curvature κ that the vehicle does not keep to. There
+    /// `ds = dl cos ψ / (1 − κ d)`, `dd = dl sin ψ` and `dψ = c dl − κ ds`, for the curvature c of
+    /// the path driven; κ = 0 is the Cartesian case.
+    pub fn in_plane(
+        start: &[f64; STATES],
+        reading_m: f64,
+        road_curvature_per_m: f64,
+        bend: &PathBend,
+        walk: &MotionNoise,
+    ) -> Self {
+        let scale = 1.0 + start[SCALE];
+        let length = reading_m / scale;
+        let kappa = road_curvature_per_m;
+        let (sin_at_start, cos_at_start) = start[HEADING].sin_cos();
+        // Offset, stretch of the road beside it and heading halfway, and how they depend on the
+        // state: the midpoint rule.
+        let half_m = 0.5 * length;
+        let mut offset_row = [0.0; STATES];
+        offset_row[ACROSS] = 1.0;
+        offset_row[HEADING] = half_m * cos_at_start;
+        offset_row[SCALE] = -half_m * sin_at_start / scale;
+        let stretch = 1.0 / (1.0 - kappa * (start[ACROSS] + half_m * sin_at_start));
+        let stretch_row = offset_row.map(|by| kappa * stretch * stretch * by);
+        let bending = start[CURVATURE] - kappa * stretch * cos_at_start;
+        let (sin, cos) = (start[HEADING] + half_m * bending).sin_cos();
+        let mut heading_row = stretch_row.map(|by| -half_m * kappa * cos_at_start * by);
+        heading_row[HEADING] += 1.0 + half_m * kappa * stretch * sin_at_start;
+        heading_row[CURVATURE] += half_m;
+        heading_row[SCALE] -= half_m * bending / scale;
+        let distance = length.abs();
+        let kept = (-distance / bend.correlation_m).exp();
+
+        let mut turn_row = [0.0; STATES];
+        turn_row[CURVATURE] = length;
+        turn_row[SCALE] = -start[CURVATURE] * length / scale;
+        let mut f = identity();
+        for i in 0..STATES {
+            f[ALONG][i] += length * (cos * stretch_row[i] - stretch * sin * heading_row[i]);
+            f[ACROSS][i] += length * cos * heading_row[i];
+        }
+        f[ALONG][SCALE] -= length * stretch * cos / scale;
+        f[ACROSS][SCALE] -= length * sin / scale;
+        for i in 0..STATES {
+            f[HEADING][i] += turn_row[i] - kappa * f[ALONG][i];
+        }
+        f[HEADING][ALONG] = 0.0;
+        f[CURVATURE][CURVATURE] = kept;
+
+        let mut q = [[0.0; STATES]; STATES];
+        let spread = walk.odometer_m_per_sqrt_m.powi(2) * distance;
+        q[ALONG][ALONG] = spread * (cos * stretch).powi(2);
+        q[ALONG][ACROSS] = spread * cos * stretch * sin;
+        q[ACROSS][ALONG] = spread * cos * stretch * sin;
+        q[ACROSS][ACROSS] = spread * sin * sin;
+        // Curvature noise and its integral, the heading (a step is short against both).
+        let fresh = bend.curvature_per_m.powi(2) * (1.0 - kept * kept);
+        q[CURVATURE][CURVATURE] = fresh;
+        q[HEADING][CURVATURE] = fresh * length / 2.0;
+        q[CURVATURE][HEADING] = fresh * length / 2.0;
+        q[HEADING][HEADING] =
+            fresh * length * length / 3.0 + bend.steering_rad_per_sqrt_m.powi(2) * distance;
+        slow_states(&mut q, walk, distance);
+
+        let mut mean = *start;
+        let ahead_m = length * cos * stretch;
+        mean[ALONG] += ahead_m;
+        mean[ACROSS] += length * sin;
+        mean[HEADING] += start[CURVATURE] * length - kappa * ahead_m;
+        mean[CURVATURE] *= kept;
+        Self {
+            turn_rad: start[CURVATURE] * length,
+            mean,
+            jacobian: f,
+            noise: q,
+            turn_row,
+        }
+    }
+
+    /// Moves a belief by this step.
+    pub fn apply(&self, belief: &mut Belief) {
+        belief.mean = self.mean;
+        belief.spread(&self.jacobian, &self.noise);
+    }
+
+    /// What a gyroscope says of the state `start` before this step: residual, row and variance.
+    pub fn turn_seen(&self, start: &[f64; STATES], yaw: &Yaw) -> (f64, [f64; STATES], f64) {
+        let mut row = self.turn_row;
+        row[YAW_RATE_BIAS] = yaw.duration_s;
+        let bias = start[YAW_RATE_BIAS] * yaw.duration_s;
+        let variance = self.noise[HEADING][HEADING] + yaw.variance;
+        (yaw.turn_rad - self.turn_rad - bias, row, variance)
+    }
+
+    /// This step, its noise known in part from a gyroscope: measurement and motion share the
+    /// noise of the heading, so it is decorrelated (Anderson & Moore, Optimal Filtering, 5.5).
+    pub fn informed(mut self, start: &[f64; STATES], yaw: &Yaw) -> Self {
+        let total = self.noise[HEADING][HEADING] + yaw.variance;
+        if total <= 0.0 {
+            return self;
+        }
+        let shared = self.noise[HEADING];
+        let mut row = self.turn_row;
+        row[YAW_RATE_BIAS] = yaw.duration_s;
+        let surprise = yaw.turn_rad - self.turn_rad - start[YAW_RATE_BIAS] * yaw.duration_s;
+        for i in 0..STATES {
+            let gain = shared[i] / total;
+            self.mean[i] += gain * surprise;
+            for j in 0..STATES {
+                self.jacobian[i][j] -= gain * row[j];
+                self.noise[i][j] -= gain * shared[j];
+            }
+        }
+        self
+    }
+}
+
+fn slow_states(q: &mut Matrix<STATES>, noise: &MotionNoise, distance_m: f64) {
+    q[SCALE][SCALE] = noise.scale_per_sqrt_m.powi(2) * distance_m;
+    q[MOUNTING][MOUNTING] = noise.mounting_rad_per_sqrt_m.powi(2) * distance_m;
+    q[PHASE][PHASE] = noise.phase_rad_per_sqrt_m.powi(2) * distance_m;
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+    use crate::geometry::Pose;
+
+    const BEND: PathBend = PathBend {
+        curvature_per_m: 0.01,
+        correlation_m: f64::INFINITY,
+        steering_rad_per_sqrt_m: 0.0,
+    };
+
+    /// Along, across, heading against the road, curvature of the path, odometer scale.
+    fn state(values: [f64; 5]) -> [f64; STATES] {
+        let mut state = [0.0; STATES];
+        for (index, value) in [ALONG, ACROSS, HEADING, CURVATURE, SCALE]
+            .into_iter()
+            .zip(values)
+        {
+            state[index] = value;
+        }
+        state
+    }
+
+    fn step(start: &[f64; STATES], reading_m: f64, kappa: f64) -> Step {
+        Step::in_plane(start, reading_m, kappa, &BEND, &MotionNoise::default())
+    }
+
+    #[test]
+    fn a_path_is_the_same_whatever_road_it_is_told_beside() {
+        let driven = Pose::default().offset_left(2.0);
+        let end = driven.along_arc(30.0, 0.02);
+        for kappa in [0.0, 0.05, -0.03] {
+            let mut at = state([0.0, 2.0, 0.0, 0.02, 0.0]);
+            for _ in 0..300 {
+                at = step(&at, 0.1, kappa).mean;
+            }
+            let road = Pose::default().along_arc(at[ALONG], kappa);
+            let found = road.offset_left(at[ACROSS]);
+            let off_m = found.point().distance_m(end.point());
+            assert!(off_m < 1e-3, "{kappa}: {off_m}");
+            let heading_rad = road.heading_rad + at[HEADING];
+            assert!((heading_rad - end.heading_rad).abs() < 1e-4, "{kappa}");
+        }
+    }
+
+    #[test]
+    fn the_jacobian_in_the_plane_is_the_derivative() {
+        let start = state([5.0, 1.5, 0.2, 0.03, 0.01]);
+        for kappa in [0.0, 0.04, -0.1] {
+            let made = step(&start, 0.9, kappa);
+            for state in [ALONG, ACROSS, HEADING, CURVATURE, SCALE] {
+                let beside = |by: f64| {
+                    let mut start = start;
+                    start[state] += by;
+                    step(&start, 0.9, kappa)
+                };
+                let (less, more) = (beside(-1e-6), beside(1e-6));
+                let slope = |less: f64, more: f64| (more - less) / 2e-6;
+                for row in 0..STATES {
+                    let expected = slope(less.mean[row], more.mean[row]);
+                    assert!(
+                        (made.jacobian[row][state] - expected).abs() < 1e-8,
+                        "{kappa}: {row} by {state}"
+                    );
+                }
+                let expected = slope(less.turn_rad, more.turn_rad);
+                assert!((made.turn_row[state] - expected).abs() < 1e-8);
+            }
+        }
+    }
+}

@@ -1,0 +1,74 @@
+//! From the belief to the pose in the map frame.
+
+use super::filter::Tracker;
+use super::locate::locate;
+use super::state::{Belief, SCALE};
+use crate::localize::pose_estimate::PoseEstimate;
+
+impl Tracker {
+    /// The pose at `time_s`, carried on from the newest odometry at its speed.
+    pub fn pose(&self, time_s: f64) -> PoseEstimate {
+        let (lag_m, lag_variance) = self.coasting(time_s);
+        self.pose_of(&self.belief, time_s, lag_m, lag_variance)
+    }
+
+    /// Distance driven since the newest odometry, and its variance.
+    pub(super) fn coasting(&self, time_s: f64) -> (f64, f64) {
+        let Some(sample) = self.odometry else {
+            return (0.0, 0.0);
+        };
+        let lag_s = (time_s - sample.time_s).max(0.0);
+        (
+            self.speed_mps() * lag_s,
+            self.config.coasting_variance(lag_s),
+        )
+    }
+
+    /// Speed along the heading (m/s).
+    pub fn speed_mps(&self) -> f64 {
+        let reading = self.odometry.map_or(0.0, |sample| sample.speed_mps);
+        reading / (1.0 + self.belief.mean[SCALE])
+    }
+
+    /// The pose of a belief, `lag_m` further on than it says.
+    pub(super) fn pose_of(
+        &self,
+        belief: &Belief,
+        time_s: f64,
+        lag_m: f64,
+        lag_variance: f64,
+    ) -> PoseEstimate {
+        let map = self.map.as_deref();
+        let (pose, footing) = locate(&belief.mean, lag_m, map);
+        let (sin, cos) = footing.direction_rad.sin_cos();
+        // (x, y, heading) by (along, across, heading).
+        let jacobian = [
+            [cos * footing.stretch, -sin, 0.0],
+            [sin * footing.stretch, cos, 0.0],
+            [footing.curvature_per_m, 0.0, 1.0],
+        ];
+        let mut inner = [[0.0; 3]; 3];
+        for i in 0..3 {
+            for j in 0..3 {
+                inner[i][j] = belief.covariance[i][j];
+            }
+        }
+        inner[0][0] += lag_variance;
+        let mut covariance = [[0.0; 3]; 3];
+        for i in 0..3 {
+            for j in 0..3 {
+                for k in 0..3 {
+                    for l in 0..3 {
+                        covariance[i][j] += jacobian[i][k] * inner[k][l] * jacobian[j][l];
+                    }
+                }
+            }
+        }
+        PoseEstimate {
+            time_s,
+            pose,
+            covariance: Some(covariance),
+            integrity: None,
+        }
+    }
+}

@@ -1,0 +1,105 @@
+//! What the tracker believes before any measurement.
+
+use std::sync::Arc;
+
+use super::config::TrackerConfig;
+use super::filter::Tracker;
+use super::interface::InitialPose;
+use super::locate::locate;
+use super::state::{
+    ACROSS, ALONG, Belief, CURVATURE, HEADING, MOUNTING, PHASE, SCALE, STATES, YAW_RATE_BIAS,
+};
+use crate::geometry::wrap_angle;
+use crate::radio_head::RadioHead;
+use crate::road::Road;
+
+impl Tracker {
+    /// The belief before any measurement.
+    pub fn prior(
+        config: &TrackerConfig,
+        map: Option<&Road>,
+        start: &InitialPose,
+    ) -> Belief {
+        let mut sigma = [0.0; STATES];
+        sigma[SCALE] = config.odometer_scale_std;
+        sigma[YAW_RATE_BIAS] = config.yaw_rate_bias_std_radps;
+        sigma[MOUNTING] = config.mounting_std_rad;
+        sigma[PHASE] = config.phase_std_rad;
+        let mut mean = [0.0; STATES];
+        mean[SCALE] = config.odometer_scale - 1.0;
+        mean[YAW_RATE_BIAS] = config.yaw_rate_bias_radps;
+        mean[MOUNTING] = config.mounting_rad;
+        mean[PHASE] = config.phase_rad;
+        let Some(map) = map else {
+            mean[ALONG] = start.pose.x_m;
+            mean[ACROSS] = start.pose.y_m;
+            mean[HEADING] = start.pose.heading_rad;
+            sigma[ALONG] = start.position_std_m;
+            sigma[ACROSS] = start.position_std_m;
+            sigma[HEADING] = start.heading_std_rad;
+            sigma[CURVATURE] = config.curvature_variance().sqrt();
+            return Belief::independent(mean, sigma);
+        };
+        let place = map.project(start.pose.point());
+        let heading_rad = wrap_angle(start.pose.heading_rad - map.pose(place.along_m).heading_rad);
+        if map.gap_between(place.along_m, place.along_m).is_some() {
+            // No lane to keep to: what is given is all there is.
+            mean[ALONG] = place.along_m;
+            mean[ACROSS] = place.lateral_m;
+            mean[HEADING] = heading_rad;
+            sigma[ALONG] = start.position_std_m;
+            sigma[ACROSS] = start.position_std_m;
+            sigma[HEADING] = start.heading_std_rad;
+            return Belief::independent(mean, sigma);
+        }
+        let [offset_variance, heading_variance] = config.lane_keeping.stationary();
+        mean[ALONG] = place.along_m;
+        sigma[ALONG] = start.position_std_m;
+        sigma[ACROSS] = offset_variance.sqrt();
+        sigma[HEADING] = heading_variance.sqrt();
+        let mut belief = Belief::independent(mean, sigma);
+        // The given pose is a measurement beside what lane keeping already says. Where the road
+        // bends, the heading tells of the place along it.
+        let curvature_per_m = map.curvature_per_m(place.along_m);
+        for (state, value, std, by_along) in [
+            (ACROSS, place.lateral_m, start.position_std_m, 0.0),
+            (HEADING, heading_rad, start.heading_std_rad, curvature_per_m),
+        ] {
+            let mut row = [0.0; STATES];
+            row[state] = 1.0;
+            row[ALONG] = by_along;
+            let expected = belief.mean[state] + by_along * (belief.mean[ALONG] - place.along_m);
+            belief.update(value - expected, &row, std * std);
+        }
+        belief
+    }
+
+    /// The same tracker begun anew where it is, every source in use, its place known to
+    /// `position_std_m` and its heading by the road alone, or by a quarter turn where no map tells
+    /// how the road lies.
+    pub(in crate::localize) fn restarted(&self, position_std_m: f64) -> Self {
+        let along_m = self.belief.mean[ALONG];
+        let surveyed = |map: &&Arc<Road>| map.gap_between(along_m, along_m).is_none();
+        let road = self.map.as_ref().filter(surveyed);
+        let pose = match road {
+            Some(map) => map.pose(along_m),
+            None => locate(&self.belief.mean, 0.0, self.map.as_deref()).0,
+        };
+        let start = InitialPose {
+            pose,
+            position_std_m,
+            heading_std_rad: if road.is_some() { 1.0 } else { 0.3 },
+        };
+        let heads: Vec<RadioHead> = self.heads.iter().map(|head| head.known).collect();
+        let mut restarted = Self::new(self.config, self.map.clone(), &heads, &start);
+        // Where the road crosses itself its nearest place may be another one.
+        if self.map.is_some() {
+            restarted.belief.mean[ALONG] = along_m;
+        }
+        Self {
+            odometry: self.odometry,
+            driven_m: self.driven_m,
+            ..restarted
+        }
+    }
+}

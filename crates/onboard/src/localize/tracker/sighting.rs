@@ -1,0 +1,402 @@
+//! Seen from the vehicle: the electrical angle at which a radio head appears, and how it changes
+//! with the state.
+
+use super::state::{ACROSS, ALONG, HEADING, MOUNTING, PHASE, STATES};
+use crate::geometry::Pose;
+use crate::localize::gaussian::Matrix;
+use crate::radio_head::RadioHead;
+
+/// What the array turns an angle into.
+#[derive(Clone, Copy, Debug, PartialEq)]
+pub struct ArrayModel {
+    /// Number of antennas N.
+    pub elements: u8,
+    /// Distance between neighbours in wavelengths, `d/λ`.
+    pub spacing_wavelengths: f64,
+    /// Wavelength λ in metres.
+    pub wavelength_m: f64,
+    /// Place of its middle from the odometer's point `[forward, left, up]`, in metres.
+    pub position_m: [f64; 3],
+    /// Standard deviation of that in each of forward and left, in metres.
+    pub position_std_m: f64,
+}
+
+impl ArrayModel {
+    /// Least variance (rad²) of the electrical angle that scatter of the given Rician K (power
+    /// ratio) leaves in one look, however strong the signal: the Cramér–Rao bound of one snapshot
+    /// at an SNR of K, `6 / (K N (N² − 1))`, which is `1/(10 K)` for four antennas.
+    pub fn scatter_bound(&self, rician_k: f64) -> f64 {
+        let n = f64::from(self.elements);
+        6.0 / (rician_k * n * (n * n - 1.0))
+    }
+
+    /// Variance (rad²) that the best estimate has, to the second order in 1/K.
+    ///
+    /// The maximum of `|Σ (1 + ε_n) e^{−jωm}|²` over ω, for scatter `ε_n` of variance 1/K and the
+    /// antennas' places `m` from their middle, expanded to the third order in ε, has the variance
+    /// `(1 + (1 + κ) / (2 N K))` times the bound, with `κ = N Σm⁴/(Σm²)²`, which is
+    /// `(9 N² − 21) / (5 (N² − 1))`: 1.64 for four antennas.
+    pub fn scatter_variance(&self, rician_k: f64) -> f64 {
+        let n = f64::from(self.elements);
+        let kurtosis = (9.0 * n * n - 21.0) / (5.0 * (n * n - 1.0));
+        self.scatter_bound(rician_k) * (1.0 + (1.0 + kurtosis) / (2.0 * n * rician_k))
+    }
+
+    /// How much of a look's scatter stays when looks are averaged that lie `travelled_m` apart, as
+    /// a multiple of what independent looks would leave.
+    ///
+    /// Scatter that arrives from all directions of space has a flat spectrum over the distance
+    /// travelled, one wave per wavelength to either side; the line of sight is a line in it, at
+    /// the cosine `toward` of the angle between it and the direction of travel. Looks fold the
+    /// spectrum at multiples of 1/Δ, and what falls on the line is what an average cannot remove:
+    /// `λ/(2Δ)` times the number of whole m with `|m λ/Δ − toward| < 1`. Up to half a wavelength
+    /// this is one look per half wavelength; far apart it tends to 1.
+    pub fn correlation(&self, travelled_m: f64, toward: f64) -> f64 {
+        if !travelled_m.is_finite() {
+            return 1.0;
+        }
+        // Standing still nothing new is learnt, but the variance must stay a number.
+        let spacing = (travelled_m.abs() / self.wavelength_m).max(5e-10);
+        let (first, last) = (spacing * (toward - 1.0), spacing * (toward + 1.0));
+        // The line itself, m = 0, is in the band, if only at its edge.
+        let copies = (last.ceil() - first.floor() - 1.0).max(1.0);
+        copies / (2.0 * spacing)
+    }
+}
+
+/// The road under the vehicle, as the Jacobian needs it.
+#[derive(Clone, Copy, Debug, PartialEq)]
+pub struct Footing {
+    /// Direction in which the first state grows (rad); the second grows to its left.
+    pub direction_rad: f64,
+    /// Metres travelled in the plane per metre of the first state, `1 − κ d`.
+    pub stretch: f64,
+    /// Turn of the vehicle per metre of the first state with the others kept, κ.
+    pub curvature_per_m: f64,
+}
+
+impl Footing {
+    /// No road: the first two states are x and y.
+    pub const PLANE: Self = Self {
+        direction_rad: 0.0,
+        stretch: 1.0,
+        curvature_per_m: 0.0,
+    };
+}
+
+/// Predicted electrical angle `ω = 2π (d/λ) cos ε cos α + ω₀`, `α = β − φ − μ`, and how it changes
+/// with the state, for bearing β and elevation ε of the radio head as the array sees it, heading φ,
+/// mounting angle μ and phase offset ω₀.
+#[derive(Clone, Copy, Debug, PartialEq)]
+pub struct Sighting {
+    /// Electrical angle (rad), not wrapped.
+    pub phase_rad: f64,
+    /// Its derivative by each state.
+    pub row: [f64; STATES],
+    /// Distance of the radio head from the array (m).
+    pub range_m: f64,
+    /// Cosine of the angle between the line of sight and the direction of travel.
+    pub toward: f64,
+    /// Variance (rad²) of the electrical angle by the surveys of radio head and array; it stays
+    /// for as long as the radio head is seen from the same side.
+    pub survey_variance: f64,
+    /// Derivative of α by each state.
+    turn: [f64; STATES],
+    /// Steps of the place by each state towards the radio head and to the left of it.
+    sight: [[f64; STATES]; 2],
+    /// Horizontal distance of the radio head (m).
+    ground_m: f64,
+    /// `2π (d/λ) cos ε` times cosine and sine of α.
+    slopes: [f64; 2],
+}
+
+/// What the bend of the electrical angle over the breadth of a belief does to its prediction.
+#[derive(Clone, Copy, Debug, PartialEq)]
+pub struct Bend {
+    /// Shift of the expected electrical angle (rad).
+    pub shift_rad: f64,
+    /// Variance (rad²) that it adds.
+    pub variance: f64,
+}
+
+impl Sighting {
+    /// A radio head seen from `pose` by an array whose mounting and phase are those of the state
+    /// `mean`; `None` when it is closer than a metre, where an angle says nothing that an update
+    /// could use.
+    pub fn new(
+        head: &RadioHead,
+        pose: Pose,
+        footing: &Footing,
+        mean: &[f64; STATES],
+        array: &ArrayModel,
+    ) -> Option<Self> {
+        let [forward_m, left_m, up_m] = array.position_m;
+        let eye = pose.beside(forward_m, left_m);
+        let ground_m = eye.distance_m(head.position);
+        let range_m = ground_m.hypot(head.height_m - up_m);
+        if range_m < 1.0 || ground_m == 0.0 {
+            return None;
+        }
+        let bearing = eye.bearing_rad(head.position);
+        let level = ground_m / range_m; // cos ε
+        let slope = std::f64::consts::TAU * array.spacing_wavelengths;
+        let (sin, cos) = (bearing - pose.heading_rad - mean[MOUNTING]).sin_cos();
+        let (left, ahead) = (bearing - footing.direction_rad).sin_cos();
+        // Turning on the spot moves the array.
+        let (aside, along) = (bearing - pose.heading_rad).sin_cos();
+        let mut sight = [[0.0; STATES]; 2];
+        sight[0][ALONG] = ahead * footing.stretch;
+        sight[0][ACROSS] = left;
+        sight[0][HEADING] = aside * forward_m - along * left_m;
+        sight[1][ALONG] = -left * footing.stretch;
+        sight[1][ACROSS] = ahead;
+        sight[1][HEADING] = along * forward_m + aside * left_m;
+        for step in &mut sight {
+            // Along a bend the vehicle turns as it goes.
+            step[ALONG] += footing.curvature_per_m * step[HEADING];
+        }
+        // A step to the left of the line of sight turns the bearing to the right.
+        let mut turn = sight[1].map(|step| -step / ground_m);
+        turn[ALONG] -= footing.curvature_per_m;
+        turn[HEADING] -= 1.0;
+        turn[MOUNTING] = -1.0;
+        // A step towards the radio head raises it: d cos ε = −sin² ε dρ/R.
+        let climb = slope * cos * (1.0 - level * level) / range_m;
+        let mut row = turn.map(|turn| -slope * level * sin * turn);
+        for (value, step) in row.iter_mut().zip(sight[0]) {
+            *value -= climb * step;
+        }
+        row[PHASE] = 1.0;
+        let survey_variance = head.position_std_m.powi(2) + array.position_std_m.powi(2);
+        Some(Self {
+            phase_rad: slope * level * cos + mean[PHASE],
+            row,
+            range_m,
+            toward: along * level,
+            survey_variance: (slope * sin / range_m).powi(2) * survey_variance,
+            turn,
+            sight,
+            ground_m,
+            slopes: [slope * level * cos, slope * level * sin],
+        })
+    }
+
+    /// What the second derivative `D` of ω means for a Gaussian belief of covariance P: ω is
+    /// `½ tr(D P)` from its value at the mean on average, and has `½ tr(D P D P)` more variance
+    /// (Jazwinski, Stochastic Processes and Filtering Theory, 9.3). With g the derivative of α, r
+    /// and t the steps along and across the line of sight and R its length,
+    /// `D = −2π (d/λ) (cos α · g gᵀ − sin α / R² · (r tᵀ + t rᵀ))`. That is the plane's; of the
+    /// elevation only its cosine is taken.
+    pub fn bend(&self, covariance: &Matrix<STATES>) -> Bend {
+        let form = |left: &[f64; STATES], right: &[f64; STATES]| {
+            let mut sum = 0.0;
+            for i in [ALONG, ACROSS, HEADING, MOUNTING] {
+                for j in [ALONG, ACROSS, HEADING, MOUNTING] {
+                    sum += left[i] * covariance[i][j] * right[j];
+                }
+            }
+            sum
+        };
+        let (turn, [ahead, left]) = (&self.turn, &self.sight);
+        let (gg, gr, gt) = (form(turn, turn), form(turn, ahead), form(turn, left));
+        let (rr, rt, tt) = (form(ahead, ahead), form(ahead, left), form(left, left));
+        let (a, b) = (
+            -self.slopes[0],
+            self.slopes[1] / (self.ground_m * self.ground_m),
+        );
+        Bend {
+            shift_rad: 0.5 * a * gg + b * rt,
+            variance: 0.5 * a * a * gg * gg + 2.0 * a * b * gr * gt + b * b * (rt * rt + rr * tt),
+        }
+    }
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+    use crate::geometry::Point;
+
+    fn head(x_m: f64, y_m: f64, height_m: f64) -> RadioHead {
+        RadioHead {
+            pci: 1,
+            ssb_index: 0,
+            position: Point::new(x_m, y_m),
+            height_m,
+            position_std_m: 0.0,
+            eirp_dbm: 0.0,
+        }
+    }
+
+    fn mean(mounting: f64, phase: f64) -> [f64; STATES] {
+        let mut mean = [0.0; STATES];
+        mean[MOUNTING] = mounting;
+        mean[PHASE] = phase;
+        mean
+    }
+
+    const ARRAY: ArrayModel = ArrayModel {
+        elements: 4,
+        spacing_wavelengths: 0.5,
+        wavelength_m: 0.0857,
+        position_m: [0.0; 3],
+        position_std_m: 0.0,
+    };
+
+    /// State (s, d, ψ) on a circle of radius 1/κ through the origin, heading +x.
+    fn on_circle(s: f64, d: f64, psi: f64, kappa: f64) -> (Pose, Footing) {
+        let lane = Pose::default().along_arc(s, kappa);
+        let pose = lane.offset_left(d);
+        let footing = Footing {
+            direction_rad: lane.heading_rad,
+            stretch: 1.0 - kappa * d,
+            curvature_per_m: kappa,
+        };
+        let heading_rad = lane.heading_rad + psi;
+        (
+            Pose {
+                heading_rad,
+                ..pose
+            },
+            footing,
+        )
+    }
+
+    #[test]
+    fn gradient_equals_finite_differences() {
+        let kappa = 0.01;
+        for (height_m, position_m) in [(0.0, [0.0; 3]), (9.0, [0.8, -0.3, 1.2])] {
+            let array = ArrayModel {
+                position_m,
+                ..ARRAY
+            };
+            let see = |x: [f64; 5]| {
+                let (pose, footing) = on_circle(x[0], x[1], x[2], kappa);
+                let head = head(70.0, 40.0, height_m);
+                Sighting::new(&head, pose, &footing, &mean(x[3], x[4]), &array).unwrap()
+            };
+            let x = [30.0, 0.8, 0.05, 0.02, 0.1];
+            let sighting = see(x);
+            for (i, state) in [ALONG, ACROSS, HEADING, MOUNTING, PHASE]
+                .into_iter()
+                .enumerate()
+            {
+                let (mut up, mut down) = (x, x);
+                up[i] += 1e-5;
+                down[i] -= 1e-5;
+                let slope = (see(up).phase_rad - see(down).phase_rad) / 2e-5;
+                assert!(
+                    (slope - sighting.row[state]).abs() < 1e-8,
+                    "state {state}: {slope} {}",
+                    sighting.row[state]
+                );
+            }
+        }
+    }
+
+    #[test]
+    fn bend_equals_finite_differences() {
+        let states = [ALONG, ACROSS, HEADING, MOUNTING];
+        let see = |x: [f64; 4]| {
+            let (pose, footing) = on_circle(x[0], x[1], x[2], 0.0);
+            Sighting::new(&head(40.0, 30.0, 0.0), pose, &footing, &mean(x[3], 0.0), &ARRAY).unwrap()
+        };
+        // A covariance without symmetry but its own.
+        let factor = [
+            [2.0, 0.0, 0.0, 0.0],
+            [0.7, 1.5, 0.0, 0.0],
+            [0.02, -0.03, 0.04, 0.0],
+            [0.01, 0.02, 0.01, 0.02],
+        ];
+        let mut covariance = [[0.0; STATES]; STATES];
+        for (i, &row) in states.iter().enumerate() {
+            for (j, &column) in states.iter().enumerate() {
+                covariance[row][column] = (0..4).map(|k| factor[i][k] * factor[j][k]).sum();
+            }
+        }
+        let x = [3.0, 0.8, 0.05, 0.02];
+        let mut second = [[0.0; 4]; 4];
+        for (i, row) in second.iter_mut().enumerate() {
+            for (j, value) in row.iter_mut().enumerate() {
+                let at = |a: f64, b: f64| {
+                    let mut x = x;
+                    x[i] += a;
+                    x[j] += b;
+                    see(x).phase_rad
+                };
+                let h = 1e-3;
+                *value = (at(h, h) - at(h, -h) - at(-h, h) + at(-h, -h)) / (4.0 * h * h);
+            }
+        }
+        let mut product = [[0.0; 4]; 4];
+        for (i, row) in product.iter_mut().enumerate() {
+            for (j, value) in row.iter_mut().enumerate() {
+                *value = (0..4)
+                    .map(|k| second[i][k] * covariance[states[k]][states[j]])
+                    .sum();
+            }
+        }
+        let trace: f64 = (0..4).map(|i| product[i][i]).sum();
+        let square: f64 = (0..4)
+            .map(|i| (0..4).map(|j| product[i][j] * product[j][i]).sum::<f64>())
+            .sum();
+        let bend = see(x).bend(&covariance);
+        assert!(
+            (bend.shift_rad - 0.5 * trace).abs() < 1e-6,
+            "{bend:?} {trace}"
+        );
+        assert!(
+            (bend.variance - 0.5 * square).abs() < 1e-6,
+            "{bend:?} {square}"
+        );
+    }
+
+    #[test]
+    fn a_head_ahead_is_at_pi_and_one_abeam_at_zero() {
+        let footing = on_circle(0.0, 0.0, 0.0, 0.0).1;
+        let see = |head: RadioHead| {
+            Sighting::new(&head, Pose::default(), &footing, &mean(0.0, 0.0), &ARRAY).unwrap()
+        };
+        let ahead = see(head(50.0, 0.0, 0.0)).phase_rad;
+        assert!((ahead - std::f64::consts::PI).abs() < 1e-12);
+        assert!(see(head(0.0, 9.0, 0.0)).phase_rad.abs() < 1e-12);
+        // Half as high as far: cos 45°.
+        let above = see(head(50.0, 0.0, 50.0)).phase_rad;
+        assert!((above - std::f64::consts::PI / 2f64.sqrt()).abs() < 1e-12);
+    }
+
+    #[test]
+    fn scatter_leaves_a_tenth_over_k_and_a_little() {
+        assert!((ARRAY.scatter_variance(1000.0) * 10.0 * 1000.0 - 1.0).abs() < 4e-4);
+        // The mean of two million estimates at K = 10 by an independent simulation: 1.0346(11).
+        let at_10 = ARRAY.scatter_variance(10.0) / ARRAY.scatter_bound(10.0);
+        assert!((at_10 - 1.0346).abs() < 3.0 * 0.0011, "{at_10}");
+    }
+
+    #[test]
+    fn correlation_is_the_sum_of_the_scatters_autocorrelation() {
+        // sin(x)/x over the distance, turned by the line of sight's own Doppler; Cesàro's sum.
+        let summed = |wavelengths: f64, toward: f64| {
+            let count = 4000;
+            let terms = (1..count).map(|n| {
+                let x = std::f64::consts::TAU * wavelengths * f64::from(n);
+                let weight = 1.0 - f64::from(n) / f64::from(count);
+                2.0 * weight * x.sin() / x * (x * toward).cos()
+            });
+            1.0 + terms.sum::<f64>()
+        };
+        for wavelengths in [0.1, 0.3, 0.6, 0.75, 0.97, 1.4, 3.3, 12.2] {
+            for toward in [-0.9, -0.3, 0.0, 0.45, 0.8] {
+                let (found, expected) = (
+                    ARRAY.correlation(wavelengths * ARRAY.wavelength_m, toward),
+                    summed(wavelengths, toward),
+                );
+                assert!(
+                    (found - expected).abs() < 0.02 * expected,
+                    "{wavelengths} {toward}: {found} {expected}"
+                );
+            }
+        }
+        assert_eq!(ARRAY.correlation(f64::INFINITY, 0.3), 1.0);
+        assert!(ARRAY.correlation(0.0, 1.0).is_finite());
+    }
+}

@@ -1,0 +1,300 @@
+//! The pipeline on the vehicle.
+
+use crate::BoxError;
+use crate::estimator::{self, AngleEstimator};
+use crate::geometry::Pose;
+use crate::link_budget::LinkBudget;
+use crate::localize::thermal::ThermalNoise;
+use crate::localize::tracker::{Calibration, OdometryVerdict};
+use crate::localize::{
+    self, AngleMeasurement, History, Localizer, PoseEstimate, Tracker, UpdateReason, UpdateVerdict,
+};
+use crate::observation::{OdometrySample, SensedSsb, SsbObservation};
+use crate::radio_head::RadioHead;
+use crate::settings::{Check, Platform, SettingsError, Site, Vehicle, check_together};
+use crate::wake_up::{self, Situation, WakeUpPolicy};
+
+/// The pipeline on the vehicle. Nothing is allocated once it is warm.
+pub struct Onboard {
+    heads: Vec<RadioHead>,
+    budget: LinkBudget,
+    thermal: ThermalNoise,
+    spacing_wavelengths: f64,
+    height_m: f64,
+    estimator: Box<dyn AngleEstimator>,
+    localizer: History,
+    policy: Box<dyn WakeUpPolicy>,
+    wake_up_time_s: f64,
+    odometry: Option<OdometrySample>,
+    sensed: Vec<SensedSsb>,
+    chosen: Vec<bool>,
+    executions: Vec<Execution>,
+}
+
+/// The user's own code in place of parts of the pipeline.
+#[derive(Default)]
+pub struct Custom {
+    /// In place of the vehicle's angle estimator.
+    pub estimator: Option<Box<dyn AngleEstimator>>,
+    /// In place of the vehicle's localizer.
+    pub localizer: Option<Box<dyn Localizer>>,
+    /// In place of the vehicle's wake-up policy.
+    pub policy: Option<Box<dyn WakeUpPolicy>>,
+}
+
+/// An SSB burst, as far as the pipeline wants to know of it.
+pub trait SsbSource {
+    /// Adds what can be told of the burst's SSBs without estimating an angle; the receiver must be
+    /// on for it.
+    ///
+    /// # Errors
+    /// Whatever the source fails with; it ends the drive.
+    fn sense(&mut self, sensed: &mut Vec<SensedSsb>) -> Result<(), BoxError>;
+
+    /// The SSB that was sensed as number `index` of the burst.
+    ///
+    /// # Errors
+    /// Whatever the source fails with; it ends the drive.
+    fn observe(&mut self, index: usize) -> Result<Observed<'_>, BoxError>;
+}
+
+/// An SSB, ready for the localizer or not yet.
+#[derive(Debug, Clone, Copy)]
+pub enum Observed<'a> {
+    /// As the array received it.
+    Snapshots(&'a SsbObservation),
+    /// With an angle that was estimated elsewhere.
+    Angle(AngleMeasurement),
+}
+
+/// What became of a burst.
+#[derive(Debug, Clone, Copy, PartialEq)]
+pub struct Heard<'a> {
+    /// Whether the receiver listened to it at all.
+    pub listened: bool,
+    /// The angles that were estimated.
+    pub executions: &'a [Execution],
+    /// Whether the error keeps the policy's bound until the next burst, where it has one.
+    pub keeps_bound: Option<bool>,
+}
+
+/// One estimated angle and what became of it.
+#[derive(Debug, Clone, Copy, PartialEq)]
+pub struct Execution {
+    /// The SSB.
+    pub ssb: SensedSsb,
+    /// Its angle; `None` when its snapshots carry none.
+    pub measured: Option<AngleMeasurement>,
+    /// What the localizer did with it.
+    pub verdict: UpdateVerdict,
+    /// The wake-up time that was in force, in seconds.
+    pub wake_up_time_s: f64,
+}
+
+/// Why an odometry sample was left out; the pipeline goes on from what it had.
+#[derive(Debug, Clone, Copy, PartialEq, Eq, thiserror::Error)]
+pub enum OdometryDefect {
+    /// Not later than the sample before.
+    #[error("its time is not after the last sample's")]
+    TimeReversed,
+    /// A value that is not a number.
+    #[error("a value is not a finite number")]
+    NotFinite,
+}
+
+impl Onboard {
+    /// The pipeline of a vehicle at a site, at 0 s and `start`, or in search of its start where the
+    /// vehicle's settings say that it is not known.
+    ///
+    /// # Errors
+    /// [`SettingsError`] when the vehicle cannot serve there, or the platform lacks what it asks.
+    pub fn new(
+        site: &Site,
+        vehicle: &Vehicle,
+        platform: &Platform,
+        start: Pose,
+        custom: Custom,
+    ) -> Result<Self, SettingsError> {
+        let check = Check {
+            file: &vehicle.name,
+        };
+        check_together(site, vehicle, check)?;
+        let spacing_wavelengths = vehicle.array.spacing_wavelengths;
+        let estimator = match custom.estimator {
+            Some(estimator) => estimator,
+            None => estimator::built_in(vehicle).map_err(|error| {
+                let key = "array.spacing_wavelengths";
+                check.error(key, spacing_wavelengths, &error.to_string())
+            })?,
+        };
+        let localizer = match custom.localizer {
+            Some(localizer) => localizer,
+            None => localize::built_in(site, vehicle, start)?,
+        };
+        let policy = match custom.policy {
+            Some(policy) => policy,
+            None => wake_up::built_in(site, vehicle, platform)?,
+        };
+        let heads = RadioHead::heard(site, vehicle);
+        let [_, _, height_m] = vehicle.array.position_m;
+        Ok(Self {
+            budget: LinkBudget::new(site, vehicle),
+            thermal: ThermalNoise::new(site, vehicle),
+            spacing_wavelengths,
+            height_m,
+            estimator,
+            localizer: History::new(localizer),
+            policy,
+            wake_up_time_s: 0.0,
+            odometry: None,
+            sensed: Vec::with_capacity(heads.len()),
+            chosen: Vec::with_capacity(heads.len()),
+            executions: Vec::with_capacity(heads.len()),
+            heads,
+        })
+    }
+
+    /// Takes in an odometry sample, and says what the localizer made of it. The first one is where
+    /// distances are counted from.
+    ///
+    /// # Errors
+    /// Whatever a user's localizer fails with. What is wrong with the sample itself is an
+    /// [`OdometryDefect`]; the state is kept.
+    pub fn odometry(
+        &mut self,
+        sample: &OdometrySample,
+    ) -> Result<Result<OdometryVerdict, OdometryDefect>, BoxError> {
+        if !sample.is_finite() {
+            return Ok(Err(OdometryDefect::NotFinite));
+        }
+        let is_late = |last: OdometrySample| sample.time_s <= last.time_s;
+        if self.odometry.is_some_and(is_late) {
+            return Ok(Err(OdometryDefect::TimeReversed));
+        }
+        self.odometry = Some(*sample);
+        self.localizer.odometry(sample).map(Ok)
+    }
+
+    /// Takes in the SSB burst at `time_s`: listens if the policy says so, considers what is sensed,
+    /// selects the SSBs worth an angle, estimates those and lets the localizer have them. The burst
+    /// may be older than the newest odometry.
+    ///
+    /// # Errors
+    /// Whatever the source, or a user's estimator, policy or localizer, fails with.
+    pub fn hear(
+        &mut self,
+        time_s: f64,
+        source: &mut dyn SsbSource,
+    ) -> Result<Heard<'_>, BoxError> {
+        self.sensed.clear();
+        self.executions.clear();
+        let now = Situation {
+            time_s,
+            speed_mps: self.odometry.map_or(0.0, |sample| sample.speed_mps),
+            localizer: self.localizer.localizer(),
+            heads: &self.heads,
+            budget: &self.budget,
+            height_m: self.height_m,
+        };
+        // As long as the first pose is searched for, every angle helps.
+        let searching = now.localizer.hypotheses().is_some();
+        let listened = searching || self.policy.listens(&now)?;
+        if listened {
+            source.sense(&mut self.sensed)?;
+            self.chosen.clear();
+            self.chosen.resize(self.sensed.len(), searching);
+            if !searching && self.sensed.iter().any(|ssb| now.head(ssb).is_some()) {
+                let chosen = &mut self.chosen;
+                self.wake_up_time_s = self.policy.decide(&now, &self.sensed, chosen)?;
+            }
+            for index in 0..self.sensed.len() {
+                let (Some(&ssb), Some(true)) = (self.sensed.get(index), self.chosen.get(index))
+                else {
+                    continue;
+                };
+                let execution = match source.observe(index)? {
+                    Observed::Snapshots(observation) => self.estimate(observation)?,
+                    Observed::Angle(measured) => self.take_in(ssb, Some(measured))?,
+                };
+                self.executions.push(execution);
+            }
+        }
+        let now = Situation {
+            time_s,
+            speed_mps: self.odometry.map_or(0.0, |sample| sample.speed_mps),
+            localizer: self.localizer.localizer(),
+            heads: &self.heads,
+            budget: &self.budget,
+            height_m: self.height_m,
+        };
+        Ok(Heard {
+            listened,
+            executions: &self.executions,
+            keeps_bound: self.policy.keeps_bound(&now),
+        })
+    }
+
+    /// Estimates the angle of an SSB and lets the localizer have it.
+    fn estimate(&mut self, observation: &SsbObservation) -> Result<Execution, BoxError> {
+        let ssb = observation.ssb;
+        let estimated = self.estimator.estimate(observation)?;
+        let bound_rad = || self.thermal.sigma_rad(ssb.snr_db);
+        let measured = estimated.and_then(|estimated| {
+            estimator::measurement(&ssb, estimated, self.spacing_wavelengths, bound_rad)
+        });
+        self.take_in(ssb, measured)
+    }
+
+    fn take_in(
+        &mut self,
+        ssb: SensedSsb,
+        measured: Option<AngleMeasurement>,
+    ) -> Result<Execution, BoxError> {
+        let mut heads = self.heads.iter();
+        let head = heads.find(|head| head.sends(ssb.pci, ssb.ssb_index));
+        let verdict = match (head, &measured) {
+            (None, _) => UpdateVerdict::unused(UpdateReason::UnknownRadioHead),
+            (_, None) => UpdateVerdict::unused(UpdateReason::Unusable),
+            (Some(head), Some(measured)) => self.localizer.update(head, measured)?,
+        };
+        Ok(Execution {
+            ssb,
+            measured,
+            verdict,
+            wake_up_time_s: self.wake_up_time_s,
+        })
+    }
+
+    /// Number of places the vehicle may be at while it searches for its first pose; `None` once
+    /// that is known. Until then [`pose`](Self::pose) is the mean of these places.
+    pub fn searching(&self) -> Option<usize> {
+        self.localizer.localizer().hypotheses()
+    }
+
+    /// Where the vehicle is believed to be at `time_s`, not before the newest odometry.
+    ///
+    /// # Errors
+    /// Whatever a user's localizer fails with.
+    pub fn pose(&self, time_s: f64) -> Result<PoseEstimate, BoxError> {
+        self.localizer.localizer().pose(time_s)
+    }
+
+    /// How far the array has come from its survey, where the localizer looks for it.
+    pub fn calibration(&self) -> Option<Calibration> {
+        let tracker = self.localizer.localizer().tracker();
+        tracker.map(Tracker::calibration)
+    }
+
+    /// Keeps from now on what smoothing takes, where the localizer is a tracker without a guard,
+    /// whose trackers take each other's place. Angles must come in time from now on.
+    pub fn keep_journal(&mut self) {
+        self.localizer.keep_journal();
+    }
+
+    /// Where the vehicle was at each odometry sample since the journal was begun, by everything
+    /// that is known now; nowhere without journal, or without tracker.
+    pub fn smoothed(&self) -> Vec<PoseEstimate> {
+        let tracker = self.localizer.localizer().tracker();
+        tracker.map(Tracker::smoothed).unwrap_or_default()
+    }
+}

@@ -1,0 +1,8 @@
+//! From samples to SSBs: a [`Receiver`] keeps to the cells of a site while the vehicle drives, and
+//! makes an observation of each of their SSBs.
+
+pub mod despread;
+mod receiver;
+pub mod wideband;
+
+pub use receiver::{ReceiveError, Receiver, ReceiverConfig, SSB_SAMPLES, Window};

@@ -1,0 +1,366 @@
+//! The vehicle's receiver: finds cells, keeps to them, and makes an [`SsbObservation`] of every SSB.
+//!
+//! It is given windows of samples at the base rate (256 to a symbol), however they came about: cut
+//! from a recording, or made by the simulator around each burst.
+
+use nr_ssb::grid::{SUBCARRIERS, SYMBOLS};
+use nr_ssb::search::{SearchConfig, SearchError, Searcher};
+use nr_ssb::track::{TrackError, Tracked, Tracker};
+use nr_ssb::{Complex32, SubcarrierSpacing};
+use num_complex::Complex64;
+use thiserror::Error;
+
+use super::despread::Despread;
+use super::wideband::line_of_sight;
+use crate::elements::for_elements;
+use crate::observation::{SensedSsb, SsbObservation};
+use crate::settings::{Pilots, Site, Vehicle};
+
+/// Samples of an SSB at the base rate: four symbols of 256 with a cyclic prefix of 18.
+pub const SSB_SAMPLES: usize = 4 * 274;
+
+/// SSBs in a row that must be missing before a cell is given up: one second at the usual period.
+const MISSES: u32 = 50;
+/// Time after which a receiver that has cells looks for others, in seconds.
+const SEARCH_INTERVAL_S: f64 = 1.0;
+/// An SSB must lie this many samples inside a window; half a cyclic prefix and the filter's reach.
+const GUARD: f64 = 16.0;
+
+/// What a receiver is told.
+#[derive(Debug, Clone, PartialEq)]
+pub struct ReceiverConfig {
+    /// Absolute frequency of the SSB's centre in Hz.
+    pub ssb_freq_hz: f64,
+    /// Its subcarrier spacing.
+    pub spacing: SubcarrierSpacing,
+    /// Period of the SSB burst in seconds.
+    pub period_s: f64,
+    /// Which resource elements are used.
+    pub pilots: Pilots,
+    /// Snapshots of each SSB where none is known (`pilots` is blind).
+    pub snapshots: usize,
+    /// Complex gain of each antenna's channel, by which it is divided: as many as antennas.
+    pub calibration: Vec<Complex64>,
+    /// Cells to listen to; all without.
+    pub cells: Option<Vec<u16>>,
+}
+
+impl ReceiverConfig {
+    /// The receiver of a vehicle, for the cells of a site that it listens to.
+    pub fn new(site: &Site, vehicle: &Vehicle) -> Self {
+        let spacing = if site.ssb.subcarrier_spacing_khz == 30.0 {
+            SubcarrierSpacing::Khz30
+        } else {
+            SubcarrierSpacing::Khz15
+        };
+        let heads = site.radio_heads.iter().map(|head| head.pci);
+        Self {
+            ssb_freq_hz: site.carrier_mhz * 1e6,
+            spacing,
+            period_s: site.ssb.period_s(),
+            pilots: vehicle.receiver.pilots,
+            snapshots: vehicle.receiver.snapshots.into(),
+            calibration: vehicle.array.calibration(),
+            cells: Some(heads.filter(|pci| vehicle.receiver.hears(*pci)).collect()),
+        }
+    }
+}
+
+/// Samples at the base rate.
+#[derive(Debug, Clone, Copy)]
+pub struct Window<'a> {
+    /// Number of the first sample, counted by the receiver's clock.
+    pub start: u64,
+    /// Time of the first sample in seconds.
+    pub time_s: f64,
+    /// The samples of each antenna, equally many.
+    pub antennas: &'a [&'a [Complex32]],
+}
+
+/// What makes receiving impossible.
+#[derive(Debug, Clone, PartialEq, Error)]
+pub enum ReceiveError {
+    /// The search refuses its settings or samples.
+    #[error(transparent)]
+    Search(#[from] SearchError),
+    /// A tracker refuses its samples.
+    #[error(transparent)]
+    Track(#[from] TrackError),
+    /// Samples of another number of antennas than it was told of.
+    #[error("samples of {found} antennas; the vehicle's array has {elements}")]
+    Antennas {
+        /// Number of antennas that there are samples of.
+        found: usize,
+        /// Number that it was told of.
+        elements: usize,
+    },
+    /// A channel gain of zero or not finite.
+    #[error("gain of channel {0} is not a finite number other than zero")]
+    Calibration(usize),
+}
+
+/// A receiver on one frequency.
+pub struct Receiver(Box<dyn SsbReceiver>);
+
+impl Receiver {
+    /// A receiver that knows no cell yet.
+    ///
+    /// # Errors
+    /// [`ReceiveError::Search`] or [`ReceiveError::Calibration`] for impossible settings.
+    pub fn new(config: ReceiverConfig) -> Result<Self, ReceiveError> {
+        for_elements!(config.calibration.len(), A => {
+            Ok(Self(Box::new(ArrayReceiver::<A>::new(config)?)))
+        })
+    }
+
+    /// What it was told.
+    pub fn config(&self) -> &ReceiverConfig {
+        self.0.config()
+    }
+
+    /// Number of SSBs that are tracked.
+    pub fn tracked(&self) -> usize {
+        self.0.tracked()
+    }
+
+    /// Looks for cells where it is time to, and hands every SSB that lies in the window to `take`.
+    ///
+    /// # Errors
+    /// [`ReceiveError`] where the antennas are not as many as it was told of, or not equally long.
+    pub fn receive(
+        &mut self,
+        window: &Window<'_>,
+        mut take: impl FnMut(&SsbObservation),
+    ) -> Result<(), ReceiveError> {
+        self.0.receive(window, &mut take)
+    }
+}
+
+/// A receiver of any number of antennas.
+trait SsbReceiver: Send {
+    fn config(&self) -> &ReceiverConfig;
+    fn tracked(&self) -> usize;
+    fn receive(
+        &mut self,
+        window: &Window<'_>,
+        take: &mut dyn FnMut(&SsbObservation),
+    ) -> Result<(), ReceiveError>;
+}
+
+struct ArrayReceiver<const A: usize> {
+    config: ReceiverConfig,
+    calibration: [Complex64; A],
+    search: SearchConfig,
+    searcher: Searcher,
+    cells: Vec<Cell<A>>,
+    last_search_s: f64,
+    observation: SsbObservation,
+}
+
+struct Cell<const A: usize> {
+    ssb_index: u8,
+    pci: u16,
+    tracker: Tracker<A>,
+    next_start: f64,
+}
+
+impl<const A: usize> ArrayReceiver<A> {
+    fn new(config: ReceiverConfig) -> Result<Self, ReceiveError> {
+        let unusable = |gain: &Complex64| !gain.norm_sqr().is_normal();
+        if let Some(channel) = config.calibration.iter().position(unusable) {
+            return Err(ReceiveError::Calibration(channel));
+        }
+        let found = config.calibration.len();
+        let calibration = <[Complex64; A]>::try_from(config.calibration.as_slice());
+        let calibration = calibration.map_err(|_| ReceiveError::Antennas { found, elements: A })?;
+        let search = SearchConfig {
+            ssb_freq_hz: Some(config.ssb_freq_hz),
+            ..SearchConfig::new(config.spacing, A)
+        };
+        Ok(Self {
+            searcher: Searcher::new(search.clone())?,
+            search,
+            calibration,
+            cells: Vec::new(),
+            last_search_s: f64::NEG_INFINITY,
+            observation: SsbObservation::new(A),
+            config,
+        })
+    }
+
+    fn search(&mut self, window: &Window<'_>) -> Result<(), ReceiveError> {
+        self.last_search_s = window.time_s;
+        if window
+            .antennas
+            .iter()
+            .any(|samples| samples.len() < SSB_SAMPLES)
+        {
+            return Ok(());
+        }
+        for found in self.searcher.search(window.antennas)? {
+            let pci = found.pci.get();
+            let wanted = self
+                .config
+                .cells
+                .as_ref()
+                .is_none_or(|cells| cells.contains(&pci));
+            let known = |cell: &Cell<A>| (cell.pci, cell.ssb_index) == (pci, found.ssb_index);
+            if wanted && !self.cells.iter().any(known) {
+                let mut found = found.clone();
+                found.sample_start += window.start as f64;
+                self.cells.push(Cell {
+                    ssb_index: found.ssb_index,
+                    pci,
+                    tracker: Tracker::new(&self.search, &found)?,
+                    next_start: found.sample_start,
+                });
+            }
+        }
+        Ok(())
+    }
+}
+
+impl<const A: usize> SsbReceiver for ArrayReceiver<A> {
+    fn config(&self) -> &ReceiverConfig {
+        &self.config
+    }
+
+    fn tracked(&self) -> usize {
+        self.cells.len()
+    }
+
+    fn receive(
+        &mut self,
+        window: &Window<'_>,
+        take: &mut dyn FnMut(&SsbObservation),
+    ) -> Result<(), ReceiveError> {
+        let antennas = <[&[Complex32]; A]>::try_from(window.antennas).map_err(|_| {
+            let found = window.antennas.len();
+            ReceiveError::Antennas { found, elements: A }
+        })?;
+        let since_s = window.time_s - self.last_search_s;
+        if self.cells.is_empty() || since_s >= SEARCH_INTERVAL_S {
+            self.search(window)?;
+        }
+        let base_rate_hz = self.config.spacing.base_rate_hz();
+        let period = self.config.period_s * base_rate_hz;
+        let decode_pbch = matches!(self.config.pilots, Pilots::Ssb);
+        let first = window.start as f64 + GUARD;
+        let length = antennas.first().map_or(0, |samples| samples.len());
+        let last = (window.start as f64) + (length as f64) - SSB_SAMPLES as f64 - GUARD;
+        for cell in &mut self.cells {
+            if cell.next_start < first {
+                // Asleep meanwhile, or the window came late.
+                let missed = ((first - cell.next_start) / period).ceil();
+                cell.next_start += missed * period;
+            }
+            while cell.next_start <= last {
+                let start = cell.next_start;
+                let seen = cell.tracker.track(
+                    &antennas,
+                    window.start as f64,
+                    start,
+                    decode_pbch,
+                )?;
+                // The beam is told by DM-RS; another cell's SSB is not this one.
+                let seen = seen.filter(|seen| seen.ssb_index == cell.ssb_index);
+                cell.next_start = match &seen {
+                    Some(seen) => cell
+                        .tracker
+                        .expected_start(period)
+                        .max(seen.sample_start + 1.0),
+                    None => start + period,
+                };
+                if let Some(seen) = seen {
+                    let elapsed_s = (seen.sample_start - window.start as f64) / base_rate_hz;
+                    let time_s = window.time_s + elapsed_s;
+                    fill(
+                        &mut self.observation,
+                        &self.config,
+                        &self.calibration,
+                        &cell.tracker,
+                        &seen,
+                        time_s,
+                    );
+                    take(&self.observation);
+                }
+            }
+        }
+        self.cells.retain(|cell| cell.tracker.misses() <= MISSES);
+        Ok(())
+    }
+}
+
+/// Makes an observation of a tracked SSB: noise of unit power, channels calibrated.
+fn fill<const A: usize>(
+    into: &mut SsbObservation,
+    config: &ReceiverConfig,
+    calibration: &[Complex64; A],
+    tracker: &Tracker<A>,
+    seen: &Tracked<A>,
+    time_s: f64,
+) {
+    into.restart(SensedSsb {
+        pci: seen.pci.get(),
+        ssb_index: seen.ssb_index,
+        time_s,
+        snr_db: seen.snr_db,
+    });
+    into.cfo_hz = seen.cfo_hz;
+    let noise = seen.noise_variance.iter().sum::<f64>() / A as f64;
+    let scale = noise.max(f64::MIN_POSITIVE).sqrt().recip();
+    let gains = calibration.map(|gain| scale / gain);
+    if config.pilots == Pilots::Blind {
+        return fill_blind(into, config, tracker, gains);
+    }
+    let Some(elements) = received(tracker) else {
+        return;
+    };
+    into.noise_variance = Some(1.0);
+    let delay = seen.residual_delay;
+    let despread = Despread::new(elements, tracker.known(), config.pilots, delay).scaled(&gains);
+    if let Some(told) = line_of_sight(&despread) {
+        into.push(&told.block);
+        return;
+    }
+    for block in despread.blocks() {
+        into.push(&block);
+    }
+}
+
+/// What every antenna received of the last SSB.
+fn received<const A: usize>(
+    tracker: &Tracker<A>,
+) -> Option<[&[[Complex32; SUBCARRIERS]; SYMBOLS]; A]> {
+    let mut elements = [tracker.received(0)?; A];
+    for (antenna, grid) in elements.iter_mut().enumerate() {
+        *grid = tracker.received(antenna)?;
+    }
+    Some(elements)
+}
+
+/// Resource elements of the broadcast channel as snapshots of a signal that is not known.
+fn fill_blind<const A: usize>(
+    into: &mut SsbObservation,
+    config: &ReceiverConfig,
+    tracker: &Tracker<A>,
+    gains: [Complex64; A],
+) {
+    /// Symbol of the SSB that holds nothing but the broadcast channel.
+    const PBCH_SYMBOL: usize = 1;
+    let Some(elements) = received(tracker) else {
+        return;
+    };
+    for number in 0..config.snapshots {
+        let subcarrier = number * SUBCARRIERS / config.snapshots.max(1);
+        let mut snapshot = gains;
+        for (value, grid) in snapshot.iter_mut().zip(elements) {
+            let element = grid[PBCH_SYMBOL]
+                .get(subcarrier)
+                .copied()
+                .unwrap_or_default();
+            *value *= Complex64::new(element.re.into(), element.im.into());
+        }
+        into.push(&snapshot);
+    }
+}

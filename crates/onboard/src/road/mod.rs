@@ -1,0 +1,9 @@
+//! The road, and how a vehicle keeps to it.
+
+mod build;
+mod course;
+mod lane_keeping;
+
+pub use build::{RoadError, Segment};
+pub use course::{Gap, Projection, Road};
+pub use lane_keeping::LaneKeeping;

@@ -1,0 +1,94 @@
+//! The vehicle's antennas.
+
+use num_complex::Complex64;
+use schemars::JsonSchema;
+use serde::{Deserialize, Serialize};
+
+use super::check::Check;
+use super::error::SettingsError;
+
+/// `[array]`: a uniform linear array.
+#[derive(Debug, Clone, PartialEq, Serialize, Deserialize, JsonSchema)]
+#[serde(default, deny_unknown_fields)]
+pub struct ArraySettings {
+    /// Number of antennas.
+    #[schemars(range(min = 2, max = 8))]
+    pub elements: u8,
+    /// Distance between neighbours in wavelengths.
+    #[schemars(range(min = 0.05, max = 0.5))]
+    pub spacing_wavelengths: f64,
+    /// Antenna gain in dBi.
+    #[schemars(range(min = -60.0, max = 60.0))]
+    pub rx_gain_dbi: f64,
+    /// Place of its middle on the vehicle `[forward, left, up]` in metres, from the point on the
+    /// ground whose motion the odometer measures.
+    pub position_m: [f64; 3],
+    /// Standard deviation of that in each of forward and left, in metres.
+    #[schemars(range(min = 0.0, max = 10.0))]
+    pub position_std_m: f64,
+    /// Direction of its axis from the vehicle's forward axis, counter-clockwise, in radians.
+    #[schemars(range(min = -3.2, max = 3.2))]
+    pub mounting_rad: f64,
+    /// Standard deviation of that direction in radians.
+    #[schemars(range(min = 0.0, max = 3.2))]
+    pub mounting_std_rad: f64,
+    /// Random walk of that direction, in radians per root of a metre driven.
+    #[schemars(range(min = 0.0, max = 1.0))]
+    pub mounting_drift_rad_per_sqrt_m: f64,
+    /// Phase, left by calibration, by which each antenna runs ahead of the one before, in radians.
+    #[schemars(range(min = -3.2, max = 3.2))]
+    pub phase_rad: f64,
+    /// Standard deviation of that phase in radians.
+    #[schemars(range(min = 0.0, max = 3.2))]
+    pub phase_std_rad: f64,
+    /// Random walk of that phase, in radians per root of a metre driven.
+    #[schemars(range(min = 0.0, max = 1.0))]
+    pub phase_drift_rad_per_sqrt_m: f64,
+    /// Complex gain `[re, im]` of each channel, by which it is divided; ideal channels without.
+    #[serde(skip_serializing_if = "Option::is_none")]
+    pub channel_gains: Option<Vec<[f64; 2]>>,
+}
+
+impl Default for ArraySettings {
+    fn default() -> Self {
+        Self {
+            elements: 4,
+            spacing_wavelengths: 0.5,
+            rx_gain_dbi: 5.0,
+            position_m: [0.0; 3],
+            position_std_m: 0.0,
+            mounting_rad: 0.0,
+            mounting_std_rad: 0.0,
+            mounting_drift_rad_per_sqrt_m: 0.0,
+            phase_rad: 0.0,
+            phase_std_rad: 0.0,
+            phase_drift_rad_per_sqrt_m: 0.0,
+            channel_gains: None,
+        }
+    }
+}
+
+impl ArraySettings {
+    /// Gains of the channels, one of each antenna.
+    pub fn calibration(&self) -> Vec<Complex64> {
+        match &self.channel_gains {
+            Some(gains) => gains.iter().map(|&[re, im]| Complex64::new(re, im)).collect(),
+            None => vec![Complex64::ONE; self.elements.into()],
+        }
+    }
+
+    pub(super) fn check(&self, check: Check<'_>) -> Result<(), SettingsError> {
+        let Some(gains) = &self.channel_gains else {
+            return Ok(());
+        };
+        let allowed = format!("array.elements is {}: one for each antenna", self.elements);
+        let fits = gains.len() == usize::from(self.elements);
+        let count = format!("a list of {}", gains.len());
+        check.that(fits, "array.channel_gains", count, &allowed)?;
+        gains.iter().enumerate().try_for_each(|(index, [re, im])| {
+            let usable = (re * re + im * im).is_normal();
+            let key = format!("array.channel_gains[{index}]");
+            check.that(usable, &key, format!("[{re}, {im}]"), "it must not be zero")
+        })
+    }
+}

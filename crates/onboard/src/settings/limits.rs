@@ -1,0 +1,119 @@
+//! Numbers against the ranges that the JSON Schema states: one place for both.
+
+use serde_json::{Map, Value};
+
+use super::check::Check;
+use super::error::SettingsError;
+use super::read::join;
+
+/// Refuses the first number, or length of a list, outside the range that `schema` states for it.
+///
+/// # Errors
+/// [`SettingsError::Value`] naming the key and the range.
+pub fn check_limits(value: &Value, schema: &Value, check: Check<'_>) -> Result<(), SettingsError> {
+    let empty = Map::new();
+    let definitions = schema.get("$defs").and_then(Value::as_object);
+    let walk = Walk {
+        definitions: definitions.unwrap_or(&empty),
+        check,
+    };
+    walk.visit(value, schema, "")
+}
+
+struct Walk<'a> {
+    definitions: &'a Map<String, Value>,
+    check: Check<'a>,
+}
+
+impl Walk<'_> {
+    fn visit(&self, value: &Value, schema: &Value, path: &str) -> Result<(), SettingsError> {
+        let target = schema
+            .get("$ref")
+            .and_then(Value::as_str)
+            .and_then(|target| self.definitions.get(target.strip_prefix("#/$defs/")?));
+        if let Some(target) = target {
+            self.visit(value, target, path)?;
+        }
+        for key in ["oneOf", "anyOf", "allOf"] {
+            for variant in schema.get(key).and_then(Value::as_array).into_iter().flatten() {
+                if self.is_meant(value, variant) {
+                    self.visit(value, variant, path)?;
+                }
+            }
+        }
+        match value {
+            Value::Number(number) => self.number(number.as_f64(), schema, path),
+            Value::Array(items) => {
+                self.length(items.len(), schema, path)?;
+                let each = schema.get("items");
+                items.iter().enumerate().try_for_each(|(index, item)| {
+                    let each = each.unwrap_or(&Value::Null);
+                    self.visit(item, each, &format!("{path}[{index}]"))
+                })
+            }
+            Value::Object(table) => table.iter().try_for_each(|(name, item)| {
+                let named = schema.get("properties").and_then(|all| all.get(name));
+                match named.or_else(|| schema.get("additionalProperties")) {
+                    Some(schema) => self.visit(item, schema, &join(path, name)),
+                    None => Ok(()),
+                }
+            }),
+            _ => Ok(()),
+        }
+    }
+
+    /// Whether a variant of several is the one at hand: its tag says so, or it has none.
+    fn is_meant(&self, value: &Value, variant: &Value) -> bool {
+        let tags = variant.get("properties").and_then(Value::as_object);
+        tags.into_iter().flatten().all(|(name, schema)| {
+            schema
+                .get("const")
+                .is_none_or(|tag| value.get(name) == Some(tag))
+        })
+    }
+
+    fn number(
+        &self,
+        number: Option<f64>,
+        schema: &Value,
+        path: &str,
+    ) -> Result<(), SettingsError> {
+        let limit = |name: &str| schema.get(name).and_then(Value::as_f64);
+        let Some(number) = number else {
+            return Ok(());
+        };
+        if let Some(choices) = schema.get("enum").and_then(Value::as_array) {
+            let choices: Vec<f64> = choices.iter().filter_map(Value::as_f64).collect();
+            let listed: Vec<String> = choices.iter().map(f64::to_string).collect();
+            let allowed = format!("it must be one of {}", listed.join(", "));
+            self.check
+                .that(choices.contains(&number), path, number, &allowed)?;
+        }
+        let (least, most) = (limit("minimum"), limit("maximum"));
+        let inside = least.is_none_or(|least| number >= least)
+            && most.is_none_or(|most| number <= most);
+        self.check.that(inside, path, number, &allowed(least, most))
+    }
+
+    fn length(&self, length: usize, schema: &Value, path: &str) -> Result<(), SettingsError> {
+        let limit = |name: &str| schema.get(name).and_then(Value::as_u64);
+        let least = limit("minItems").unwrap_or(0);
+        let most = limit("maxItems").unwrap_or(u64::MAX);
+        let allowed = format!("{least} to {most} entries are allowed");
+        self.check.that(
+            (least..=most).contains(&(length as u64)),
+            path,
+            format!("a list of {length}"),
+            &allowed,
+        )
+    }
+}
+
+fn allowed(least: Option<f64>, most: Option<f64>) -> String {
+    match (least, most) {
+        (Some(least), Some(most)) => format!("it must be between {least} and {most}"),
+        (Some(least), None) => format!("it must not be below {least}"),
+        (None, Some(most)) => format!("it must not be above {most}"),
+        (None, None) => String::new(),
+    }
+}

@@ -1,0 +1,94 @@
+//! How angles and odometry become a pose, and how far that is trusted.
+
+use schemars::JsonSchema;
+use serde::{Deserialize, Serialize};
+
+/// `[localizer]`
+#[derive(Debug, Clone, Copy, PartialEq, Serialize, Deserialize, JsonSchema)]
+#[serde(tag = "kind", rename_all = "kebab-case")]
+pub enum LocalizerSettings {
+    /// The paper's: each angle becomes a heading, distances are added up along it.
+    DeadReckoning(DeadReckoningSettings),
+    /// A Kalman filter over pose, odometer scale and array calibration.
+    Tracker(TrackerSettings),
+}
+
+impl Default for LocalizerSettings {
+    fn default() -> Self {
+        Self::Tracker(TrackerSettings::default())
+    }
+}
+
+/// `kind = "dead-reckoning"`
+#[derive(Debug, Clone, Copy, PartialEq, Eq, Default, Serialize, Deserialize, JsonSchema)]
+#[serde(default, deny_unknown_fields)]
+pub struct DeadReckoningSettings {
+    /// Along which heading the distance between two angles is laid.
+    pub heading_between: HeadingBetween,
+}
+
+/// Along which heading the distance between two angles is laid.
+#[derive(Debug, Clone, Copy, PartialEq, Eq, Default, Serialize, Deserialize, JsonSchema)]
+#[serde(rename_all = "kebab-case")]
+pub enum HeadingBetween {
+    /// The one of the first angle: in a bend it lags behind.
+    #[default]
+    Held,
+    /// The mean of both, once the second is there.
+    Mean,
+}
+
+/// `kind = "tracker"`. What it assumes of odometer, gyroscope, array and lane stands in their own
+/// tables.
+#[derive(Debug, Clone, Copy, PartialEq, Serialize, Deserialize, JsonSchema)]
+#[serde(default, deny_unknown_fields)]
+pub struct TrackerSettings {
+    /// Whether it takes the road's course from the site, where the site has one.
+    pub map: bool,
+    /// Curvature of the path in 1/m (root mean square), where no road tells.
+    #[schemars(range(min = 0.0, max = 10.0))]
+    pub curvature_rms_per_m: f64,
+    /// Distance over which the curvature is forgotten, in metres.
+    #[schemars(range(min = 1e-3, max = 1e6))]
+    pub curvature_correlation_m: f64,
+    /// How the odometer's scale walks, per root of a metre driven.
+    #[schemars(range(min = 0.0, max = 1.0))]
+    pub odometer_scale_walk_per_sqrt_m: f64,
+    /// Probability with which a good angle is taken for an outlier.
+    #[schemars(range(min = 1e-12, max = 0.5))]
+    pub outlier_probability: f64,
+}
+
+impl Default for TrackerSettings {
+    fn default() -> Self {
+        Self {
+            map: true,
+            curvature_rms_per_m: 0.001,
+            curvature_correlation_m: 400.0,
+            odometer_scale_walk_per_sqrt_m: 0.0,
+            outlier_probability: 1e-4,
+        }
+    }
+}
+
+/// `[integrity]`: the tracker mistrusts its sources and states a protection level. Without this
+/// table it does not.
+#[derive(Debug, Clone, Copy, PartialEq, Serialize, Deserialize, JsonSchema)]
+#[serde(default, deny_unknown_fields)]
+pub struct IntegritySettings {
+    /// Protection level in metres above which the position is not to be relied on.
+    #[schemars(range(min = 0.01, max = 1000.0))]
+    pub alert_limit_m: f64,
+    /// Probability with which the error may exceed the protection level.
+    #[schemars(range(min = 1e-12, max = 0.5))]
+    pub risk: f64,
+}
+
+impl Default for IntegritySettings {
+    fn default() -> Self {
+        Self {
+            alert_limit_m: 1.5,
+            risk: 8e-4,
+        }
+    }
+}

@@ -1,0 +1,50 @@
+//! What the vehicle believes, as TOML files for people: a *site* (the plant, one for the fleet), a
+//! *vehicle* and a *platform* (its computer).
+//!
+//! Units are in the names of keys, human ones where people write them; everything that computes
+//! takes the SI values that the types' methods give. Beside every value that can be wrong stands
+//! its standard deviation. Ranges of numbers stand at the fields, where the JSON Schema shows them
+//! and [`TomlFile`] checks them.
+
+mod array;
+mod check;
+mod error;
+mod limits;
+mod localizer;
+mod odometry;
+mod overlay;
+mod platform;
+mod radio;
+mod read;
+mod receiver;
+mod road;
+mod shipped;
+mod site;
+mod start;
+mod toml_file;
+mod vehicle;
+mod wake_up;
+
+pub use array::ArraySettings;
+pub use check::Check;
+pub use error::SettingsError;
+pub use localizer::{
+    DeadReckoningSettings, HeadingBetween, IntegritySettings, LocalizerSettings, TrackerSettings,
+};
+pub use odometry::{DriveKind, GyroscopeSettings, LaneKeepingSettings, OdometerSettings};
+pub use overlay::lay_over;
+pub use platform::{
+    Boundary, Figure, IdleSettings, Platform, PowerMode, Provenance, ReceiverPower,
+};
+pub use radio::{RadioHeadSettings, SsbSettings};
+pub use read::{from_table, parse};
+pub use receiver::{EstimatorMethod, EstimatorSettings, Pilots, ReceiverSettings};
+pub use road::{RoadSettings, SegmentSettings};
+pub use shipped::Shipped;
+pub use site::Site;
+pub use start::StartSettings;
+pub use toml_file::{Library, NamedText, TomlFile};
+pub use vehicle::{PlatformSettings, Vehicle, check_together};
+pub use wake_up::{
+    FixedSettings, PidSettings, SensingMode, SnrSetPoint, UncertaintySettings, WakeUpSettings,
+};

@@ -1,0 +1,116 @@
+//! Laying some keys over others: files that are `like` another one, overrides, truth over belief.
+
+use toml::{Table, Value};
+
+use super::check::Check;
+use super::error::SettingsError;
+
+/// Tags that decide which other keys their table may have.
+const TAGS: [&str; 2] = ["policy", "kind"];
+
+/// Lays `over` over `base`: tables key by key, everything else whole. A tag that changes drops the
+/// keys that belonged to the old one. Where `base` has a list of named tables, a table over it
+/// speaks of its entries by their names, or of `all` of them.
+///
+/// # Errors
+/// [`SettingsError::Value`] for the name of an entry that is not on the list.
+pub fn lay_over(
+    base: &mut Table,
+    over: Table,
+    path: &str,
+    check: Check<'_>,
+) -> Result<(), SettingsError> {
+    if TAGS
+        .iter()
+        .any(|tag| matches!((base.get(*tag), over.get(*tag)), (Some(a), Some(b)) if a != b))
+    {
+        base.clear();
+    }
+    for (key, value) in over {
+        let path = super::read::join(path, &key);
+        match (base.get_mut(&key), value) {
+            (Some(Value::Table(below)), Value::Table(value)) => {
+                lay_over(below, value, &path, check)?;
+            }
+            (Some(Value::Array(entries)), Value::Table(by_name)) => {
+                for (name, value) in by_name {
+                    lay_over_entries(entries, &name, &value, &path, check)?;
+                }
+            }
+            (_, value) => {
+                base.insert(key, value);
+            }
+        }
+    }
+    Ok(())
+}
+
+fn lay_over_entries(
+    entries: &mut [Value],
+    name: &str,
+    value: &Value,
+    path: &str,
+    check: Check<'_>,
+) -> Result<(), SettingsError> {
+    let path = super::read::join(path, name);
+    let Value::Table(value) = value else {
+        return Err(check.error(&path, value, "it must be a table of the entry's keys"));
+    };
+    let mut met = false;
+    for entry in entries.iter_mut().filter_map(Value::as_table_mut) {
+        if name == "all" || entry.get("name").and_then(Value::as_str) == Some(name) {
+            met = true;
+            lay_over(entry, value.clone(), &path, check)?;
+        }
+    }
+    let names: Vec<&str> = entries
+        .iter()
+        .filter_map(|entry| entry.get("name")?.as_str())
+        .collect();
+    let allowed = format!("the entries are named {}, or all", names.join(", "));
+    check.that(met, &path, "unknown", &allowed)
+}
+
+/// Sets the value at a dotted path (`channel.rician_k_db`, `site.radio_heads[0].eirp_dbm`).
+///
+/// Where the path ends in a tag (`wake_up.policy`) whose value changes, the table's other keys
+/// belonged to the old variant and are dropped.
+///
+/// # Errors
+/// [`SettingsError::Shape`] for a path that leads nowhere.
+pub fn set(table: &mut Table, path: &str, value: Value, file: &str) -> Result<(), SettingsError> {
+    let no_such = || SettingsError::Shape {
+        file: file.to_owned(),
+        key: path.to_owned(),
+        message: "there is nothing at this path to override".to_owned(),
+    };
+    let (parents, key) = match path.rsplit_once('.') {
+        Some((parents, key)) => (parents, key),
+        None => ("", path),
+    };
+    let mut here = table;
+    for step in parents.split('.').filter(|step| !step.is_empty()) {
+        let (name, index) = match step.strip_suffix(']').and_then(|s| s.split_once('[')) {
+            Some((name, index)) => (name, Some(index.parse::<usize>().map_err(|_| no_such())?)),
+            None => (step, None),
+        };
+        let entry = here
+            .entry(name)
+            .or_insert_with(|| Value::Table(Table::new()));
+        let entry = match index {
+            Some(index) => entry.as_array_mut().and_then(|items| items.get_mut(index)),
+            None => Some(entry),
+        };
+        here = entry.and_then(Value::as_table_mut).ok_or_else(no_such)?;
+    }
+    if TAGS.contains(&key) && here.get(key) != Some(&value) {
+        here.clear();
+    }
+    here.insert(key.to_owned(), value);
+    Ok(())
+}
+
+/// Whether a path names a tag; such overrides come before those of other keys.
+pub fn ends_in_tag(path: &str) -> bool {
+    TAGS.contains(&path.rsplit_once('.').map_or(path, |(_, key)| key))
+}

@@ -1,0 +1,67 @@
+//! Radio heads and the SSBs they send.
+
+use schemars::JsonSchema;
+use serde::{Deserialize, Serialize};
+
+/// `[[radio_heads]]`
+#[derive(Debug, Clone, PartialEq, Serialize, Deserialize, JsonSchema)]
+#[serde(deny_unknown_fields)]
+pub struct RadioHeadSettings {
+    /// Name for people.
+    #[serde(default)]
+    pub name: String,
+    /// Surveyed place `[x, y, z]` in metres; z is the height, counted as the vehicle's array's is.
+    pub position_m: [f64; 3],
+    /// Standard deviation of the survey in each of x and y, in metres.
+    #[serde(default)]
+    #[schemars(range(min = 0.0, max = 1000.0))]
+    pub position_std_m: f64,
+    /// Physical cell identity (TS 38.211, 7.4.2.1).
+    #[serde(default)]
+    #[schemars(range(min = 0, max = 1007))]
+    pub pci: u16,
+    /// Index of its SSB in the burst.
+    #[serde(default)]
+    #[schemars(range(min = 0, max = 63))]
+    pub ssb_index: u8,
+    /// Transmit power and antenna gain together (EIRP), in dBm.
+    #[serde(default = "small_cell")]
+    #[schemars(range(min = -150.0, max = 120.0))]
+    pub eirp_dbm: f64,
+    /// Standard deviation of that, in dB.
+    #[serde(default)]
+    #[schemars(range(min = 0.0, max = 40.0))]
+    pub eirp_std_db: f64,
+}
+
+const fn small_cell() -> f64 {
+    10.0
+}
+
+/// `[ssb]`
+#[derive(Debug, Clone, Copy, PartialEq, Serialize, Deserialize, JsonSchema)]
+#[serde(default, deny_unknown_fields)]
+pub struct SsbSettings {
+    /// Period of the SSB burst in ms; 5, 10, 20, 40, 80 or 160 (TS 38.331).
+    #[schemars(extend("enum" = [5.0, 10.0, 20.0, 40.0, 80.0, 160.0]))]
+    pub period_ms: f64,
+    /// Subcarrier spacing in kHz; 15, 30, 120 or 240.
+    #[schemars(extend("enum" = [15.0, 30.0, 120.0, 240.0]))]
+    pub subcarrier_spacing_khz: f64,
+}
+
+impl Default for SsbSettings {
+    fn default() -> Self {
+        Self {
+            period_ms: 20.0,
+            subcarrier_spacing_khz: 15.0,
+        }
+    }
+}
+
+impl SsbSettings {
+    /// Period in seconds.
+    pub fn period_s(&self) -> f64 {
+        self.period_ms * 1e-3
+    }
+}

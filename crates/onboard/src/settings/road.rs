@@ -1,0 +1,149 @@
+//! The road.
+
+use schemars::JsonSchema;
+use serde::{Deserialize, Serialize};
+use toml::{Table, Value};
+
+use super::check::Check;
+use super::error::SettingsError;
+use super::toml_file::Library;
+use crate::geometry::{Point, Pose};
+use crate::road::{Road, RoadError, Segment};
+
+/// `[road]`: exactly one of `segments`, `polyline_m` and `file` gives its shape.
+#[derive(Debug, Clone, PartialEq, Serialize, Deserialize, JsonSchema)]
+#[serde(default, deny_unknown_fields)]
+pub struct RoadSettings {
+    /// Width in metres.
+    #[schemars(range(min = 0.1, max = 1000.0))]
+    pub width_m: f64,
+    /// Radius by which the corners of a polyline are rounded, in metres.
+    #[schemars(range(min = 0.01, max = 1e5))]
+    pub corner_radius_m: f64,
+    /// Where `segments` begin.
+    pub start: Pose,
+    /// Lines and arcs that join without a kink.
+    #[serde(skip_serializing_if = "Option::is_none")]
+    pub segments: Option<Vec<SegmentSettings>>,
+    /// Surveyed points `[x, y]` in metres.
+    #[serde(skip_serializing_if = "Option::is_none")]
+    pub polyline_m: Option<Vec<[f64; 2]>>,
+    /// A CSV file with the columns `x_m`, `y_m`, or a GeoJSON `LineString` (projected onto the
+    /// tangent plane of its first point), relative to the site's own place. Its points are
+    /// taken over into `polyline_m` on reading.
+    #[serde(skip_serializing_if = "Option::is_none")]
+    pub file: Option<String>,
+}
+
+/// A line or an arc.
+#[derive(Debug, Clone, Copy, PartialEq, Serialize, Deserialize, JsonSchema)]
+#[serde(deny_unknown_fields)]
+pub struct SegmentSettings {
+    /// Length in metres.
+    #[schemars(range(min = 1e-6, max = 1e5))]
+    pub length_m: f64,
+    /// Turn over this length in radians; left is positive.
+    #[serde(default)]
+    #[schemars(range(min = -100.0, max = 100.0))]
+    pub turn_rad: f64,
+    /// Whether the road is known to lie there. What is given of a stretch that was not surveyed
+    /// is a guess, such as the chord between the ends of the survey, and must be straight. A
+    /// tracker does not keep to it; a simulated vehicle does.
+    #[serde(default = "surveyed")]
+    pub surveyed: bool,
+}
+
+const fn surveyed() -> bool {
+    true
+}
+
+impl Default for RoadSettings {
+    fn default() -> Self {
+        Self {
+            width_m: 5.0,
+            corner_radius_m: 10.0,
+            start: Pose::default(),
+            segments: None,
+            polyline_m: None,
+            file: None,
+        }
+    }
+}
+
+impl RoadSettings {
+    /// Reads `file` into `polyline_m`, so that a resolved road stands on its own.
+    ///
+    /// # Errors
+    /// [`SettingsError`] where the library does not have it, or it has no points.
+    pub fn resolve(
+        table: &mut Table,
+        key: &str,
+        origin: &str,
+        library: &dyn Library,
+    ) -> Result<(), SettingsError> {
+        let Some(Value::String(file)) = table.get("file").cloned() else {
+            return Ok(()); // another type is for the reader to refuse
+        };
+        let check = Check { file: origin };
+        check.that(
+            !table.contains_key("segments") && !table.contains_key("polyline_m"),
+            &format!("{key}.file"),
+            format!("{file:?}"),
+            "only one of `segments`, `polyline_m` and `file` is allowed",
+        )?;
+        let points = library.points_m(&file, origin)?.into_iter();
+        let points = points.map(|point| Value::Array(point.map(Value::Float).to_vec()));
+        table.insert("polyline_m".to_owned(), Value::Array(points.collect()));
+        table.remove("file");
+        Ok(())
+    }
+
+    /// Builds the road; errors name `key` as its own.
+    ///
+    /// # Errors
+    /// [`SettingsError::Value`] when it has no shape, more than one, or an impossible one.
+    pub fn build(&self, key: &str, check: Check<'_>) -> Result<Road, SettingsError> {
+        let (shape, road) = match (&self.segments, &self.polyline_m) {
+            (Some(segments), None) => {
+                let segments: Vec<Segment> = segments
+                    .iter()
+                    .map(|it| Segment {
+                        length_m: it.length_m,
+                        turn_rad: it.turn_rad,
+                        surveyed: it.surveyed,
+                    })
+                    .collect();
+                let road = Road::from_segments(self.start, &segments, self.width_m);
+                ("segments", road)
+            }
+            (None, Some(polyline)) => {
+                let points: Vec<Point> = polyline.iter().map(|&point| point.into()).collect();
+                let road = Road::from_polyline(&points, self.corner_radius_m, self.width_m);
+                ("polyline_m", road)
+            }
+            (None, None) => {
+                let allowed = "one of `segments`, `polyline_m` and `file` is needed";
+                return Err(check.error(key, "without a shape", allowed));
+            }
+            (Some(_), Some(_)) => {
+                let allowed = "only one of `segments`, `polyline_m` and `file` is allowed";
+                return Err(check.error(key, "given twice", allowed));
+            }
+        };
+        road.map_err(|error| {
+            let (at, value) = match error {
+                RoadError::Length { index, length_m } => {
+                    (format!("[{index}].length_m"), length_m.to_string())
+                }
+                RoadError::BentGuess { index, turn_rad } => {
+                    (format!("[{index}].turn_rad"), turn_rad.to_string())
+                }
+                RoadError::RepeatedPoint { index } | RoadError::Reversal { index } => {
+                    (format!("[{index}]"), "not passable".to_owned())
+                }
+                RoadError::Empty => (String::new(), "too short".to_owned()),
+            };
+            check.error(&format!("{key}.{shape}{at}"), value, &error.to_string())
+        })
+    }
+}

@@ -1,0 +1,37 @@
+//! The library that comes with the product, and nothing beside it.
+
+use super::error::SettingsError;
+use super::toml_file::{Library, NamedText};
+
+/// Shipped files by their names; it opens no other.
+#[derive(Debug, Clone, Copy, Default, PartialEq, Eq)]
+pub struct Shipped;
+
+impl Library for Shipped {
+    fn text(
+        &self,
+        what: &'static str,
+        shipped: &[(&'static str, &'static str)],
+        name: &str,
+        _beside: &str,
+    ) -> Result<NamedText, SettingsError> {
+        let found = shipped.iter().find(|it| it.0 == name);
+        found
+            .map(|&(name, text)| NamedText {
+                origin: name.to_owned(),
+                text: text.to_owned(),
+            })
+            .ok_or_else(|| {
+                SettingsError::unknown_name(what, name, shipped.iter().map(|(name, _)| *name))
+            })
+    }
+
+    fn points_m(&self, name: &str, beside: &str) -> Result<Vec<[f64; 2]>, SettingsError> {
+        Err(SettingsError::Value {
+            file: beside.to_owned(),
+            key: "road.file".to_owned(),
+            value: format!("{name:?}"),
+            allowed: "no file is opened here; give the points as `polyline_m`".to_owned(),
+        })
+    }
+}

@@ -1,0 +1,154 @@
+//! A site: what is known of a plant, one file for the whole fleet.
+
+use schemars::JsonSchema;
+use serde::{Deserialize, Serialize};
+use toml::{Table, Value};
+
+use super::check::Check;
+use super::error::SettingsError;
+use super::radio::{RadioHeadSettings, SsbSettings};
+use super::road::RoadSettings;
+use super::toml_file::{Library, TomlFile};
+use crate::geometry::Point;
+use crate::road::Road;
+
+/// A site file.
+#[derive(Debug, Clone, PartialEq, Serialize, Deserialize, JsonSchema)]
+#[serde(deny_unknown_fields)]
+pub struct Site {
+    /// Short name.
+    pub name: String,
+    /// What the site is.
+    #[serde(default)]
+    pub description: String,
+    /// Carrier frequency of the cells, at the SSBs' centre, in MHz.
+    #[serde(default = "mid_band")]
+    #[schemars(range(min = 100.0, max = 100_000.0))]
+    pub carrier_mhz: f64,
+    /// Rician K to be expected, in dB: power of the line of sight over that of the scatter.
+    #[serde(default = "fair_weather")]
+    #[schemars(range(min = -30.0, max = 200.0))]
+    pub rician_k_db: f64,
+    /// The SSBs that the cells send.
+    #[serde(default)]
+    pub ssb: SsbSettings,
+    /// The road; none where vehicles roam.
+    #[serde(default, skip_serializing_if = "Option::is_none")]
+    pub road: Option<RoadSettings>,
+    /// The radio heads.
+    #[schemars(length(min = 1, max = 1000))]
+    pub radio_heads: Vec<RadioHeadSettings>,
+}
+
+const fn mid_band() -> f64 {
+    3500.0
+}
+
+const fn fair_weather() -> f64 {
+    10.0
+}
+
+/// Speed of light in m/s (SI, exact).
+const SPEED_OF_LIGHT_MPS: f64 = 299_792_458.0;
+
+impl Site {
+    /// Wavelength of the carrier in metres.
+    pub fn wavelength_m(&self) -> f64 {
+        SPEED_OF_LIGHT_MPS / (self.carrier_mhz * 1e6)
+    }
+
+    /// The road, where there is one.
+    ///
+    /// # Errors
+    /// [`SettingsError`] when the site has been changed by hand into an impossible one; never after
+    /// reading.
+    pub fn build_road(&self) -> Result<Option<Road>, SettingsError> {
+        let road = self.road.as_ref();
+        road.map(|road| road.build("road", Check { file: &self.name }))
+            .transpose()
+    }
+}
+
+impl TomlFile for Site {
+    const WHAT: &'static str = "site";
+    const SHIPPED: &'static [(&'static str, &'static str)] = &[
+        ("paper", include_str!("../../../../sites/paper.toml")),
+        ("trip-1", include_str!("../../../../sites/trip-1.toml")),
+        ("trip-2", include_str!("../../../../sites/trip-2.toml")),
+        ("trip-4", include_str!("../../../../sites/trip-4.toml")),
+        ("yard", include_str!("../../../../sites/yard.toml")),
+        ("campus", include_str!("../../../../sites/campus.toml")),
+    ];
+
+    fn name(&self) -> &str {
+        &self.name
+    }
+
+    fn resolve(
+        table: &mut Table,
+        origin: &str,
+        library: &dyn Library,
+    ) -> Result<(), SettingsError> {
+        match table.get_mut("road") {
+            Some(Value::Table(road)) => RoadSettings::resolve(road, "road", origin, library),
+            _ => Ok(()),
+        }
+    }
+
+    fn check(&self, check: Check<'_>) -> Result<(), SettingsError> {
+        let road = self.road.as_ref();
+        let road = road.map(|road| road.build("road", check)).transpose()?;
+        for (index, head) in self.radio_heads.iter().enumerate() {
+            head.check(check, index, &self.radio_heads, road.as_ref())?;
+        }
+        Ok(())
+    }
+}
+
+impl RadioHeadSettings {
+    fn check(
+        &self,
+        check: Check<'_>,
+        index: usize,
+        all: &[Self],
+        road: Option<&Road>,
+    ) -> Result<(), SettingsError> {
+        let key = format!("radio_heads[{index}]");
+        let [x_m, y_m, _] = self.position_m;
+        let position = format!("{:?}", self.position_m);
+        if let Some(road) = road {
+            let projection = road.project(Point::new(x_m, y_m));
+            let half_m = 0.5 * road.width_m();
+            let is_on_the_road = (0.0..=road.length_m()).contains(&projection.along_m)
+                && projection.lateral_m.abs() <= half_m;
+            check.that(
+                !is_on_the_road,
+                &format!("{key}.position_m"),
+                &position,
+                &format!(
+                    "that is on the road, {:.1} m along it; it must be more than {half_m} m from \
+                     its middle",
+                    projection.along_m
+                ),
+            )?;
+        }
+        for (other_index, other) in all.iter().take(index).enumerate() {
+            check.that(
+                self.position_m != other.position_m,
+                &format!("{key}.position_m"),
+                &position,
+                &format!("radio_heads[{other_index}] stands in the same place"),
+            )?;
+            check.that(
+                (self.pci, self.ssb_index) != (other.pci, other.ssb_index),
+                &format!("{key}.pci"),
+                self.pci,
+                &format!(
+                    "radio_heads[{other_index}] has the same pci and ssb_index; the pair must be \
+                     different for each"
+                ),
+            )?;
+        }
+        Ok(())
+    }
+}

@@ -1,0 +1,198 @@
+//! A vehicle: what it is built of and how it is set.
+
+use schemars::JsonSchema;
+use serde::{Deserialize, Serialize};
+
+use super::array::ArraySettings;
+use super::check::Check;
+use super::error::SettingsError;
+use super::localizer::{IntegritySettings, LocalizerSettings};
+use super::odometry::{DriveKind, GyroscopeSettings, LaneKeepingSettings, OdometerSettings};
+use super::receiver::{EstimatorMethod, EstimatorSettings, Pilots, ReceiverSettings};
+use super::site::Site;
+use super::start::StartSettings;
+use super::toml_file::TomlFile;
+use super::wake_up::WakeUpSettings;
+
+/// A vehicle file.
+#[derive(Debug, Clone, PartialEq, Serialize, Deserialize, JsonSchema)]
+#[serde(deny_unknown_fields)]
+pub struct Vehicle {
+    /// Short name.
+    pub name: String,
+    /// What the vehicle is.
+    #[serde(default)]
+    pub description: String,
+    /// What its kinematics allow.
+    #[serde(default)]
+    pub drive: DriveKind,
+    /// Top speed in km/h.
+    #[serde(default = "walking_pace")]
+    #[schemars(range(min = 0.1, max = 200.0))]
+    pub top_speed_kmh: f64,
+    /// Acceleration and deceleration in m/s².
+    #[serde(default = "gentle")]
+    #[schemars(range(min = 0.01, max = 20.0))]
+    pub acceleration_mps2: f64,
+    /// How it keeps to the middle of a road.
+    #[serde(default)]
+    pub lane_keeping: LaneKeepingSettings,
+    /// Its antennas.
+    #[serde(default)]
+    pub array: ArraySettings,
+    /// Its receiver.
+    #[serde(default)]
+    pub receiver: ReceiverSettings,
+    /// Its odometer.
+    #[serde(default)]
+    pub odometer: OdometerSettings,
+    /// Its gyroscope, where it has one.
+    #[serde(default, skip_serializing_if = "Option::is_none")]
+    pub gyroscope: Option<GyroscopeSettings>,
+    /// How well the initial pose is known.
+    #[serde(default)]
+    pub start: StartSettings,
+    /// How an angle is estimated.
+    #[serde(default)]
+    pub estimator: EstimatorSettings,
+    /// How angles and odometry become a pose.
+    #[serde(default)]
+    pub localizer: LocalizerSettings,
+    /// Whether and how sources are mistrusted.
+    #[serde(default, skip_serializing_if = "Option::is_none")]
+    pub integrity: Option<IntegritySettings>,
+    /// When an angle is estimated.
+    #[serde(default)]
+    pub wake_up: WakeUpSettings,
+    /// On which computer.
+    #[serde(default)]
+    pub platform: PlatformSettings,
+}
+
+const fn walking_pace() -> f64 {
+    15.0
+}
+
+const fn gentle() -> f64 {
+    0.5
+}
+
+/// `[platform]`: the onboard computer and its power mode.
+#[derive(Debug, Clone, PartialEq, Serialize, Deserialize, JsonSchema)]
+#[serde(default, deny_unknown_fields)]
+pub struct PlatformSettings {
+    /// A shipped platform's name, or the path of a platform file.
+    pub name: String,
+    /// Power mode by its number in the platform file.
+    pub mode: u32,
+}
+
+impl Default for PlatformSettings {
+    fn default() -> Self {
+        Self {
+            name: "jetson-agx-xavier".to_owned(),
+            mode: 0,
+        }
+    }
+}
+
+impl Vehicle {
+    /// Top speed in m/s.
+    pub fn top_speed_mps(&self) -> f64 {
+        self.top_speed_kmh / 3.6
+    }
+
+    /// Whether its localizer follows a road where the site has one.
+    pub const fn follows_road(&self) -> bool {
+        matches!(&self.localizer, LocalizerSettings::Tracker(tracker) if tracker.map)
+    }
+}
+
+impl TomlFile for Vehicle {
+    const WHAT: &'static str = "vehicle";
+    const SHIPPED: &'static [(&'static str, &'static str)] = &[
+        ("paper", include_str!("../../../../vehicles/paper.toml")),
+        ("carrier", include_str!("../../../../vehicles/carrier.toml")),
+        ("tugger", include_str!("../../../../vehicles/tugger.toml")),
+    ];
+
+    fn name(&self) -> &str {
+        &self.name
+    }
+
+    fn check(&self, check: Check<'_>) -> Result<(), SettingsError> {
+        self.array.check(check)?;
+        check.that(
+            self.receiver.pilots == Pilots::Blind
+                || self.estimator.method == EstimatorMethod::MaximumLikelihood,
+            "estimator.method",
+            self.estimator.method,
+            "with known pilots (receiver.pilots) it must be maximum-likelihood",
+        )?;
+        let tracks = matches!(self.localizer, LocalizerSettings::Tracker(_));
+        check.that(
+            tracks || self.integrity.is_none(),
+            "integrity",
+            "given",
+            "it needs localizer.kind = \"tracker\"",
+        )?;
+        check.that(
+            tracks || !matches!(self.wake_up, WakeUpSettings::Uncertainty(_)),
+            "wake_up.policy",
+            "uncertainty",
+            "it needs localizer.kind = \"tracker\", which knows its own error",
+        )?;
+        check.that(
+            self.start.known || self.follows_road(),
+            "start.known",
+            false,
+            "to find the vehicle along the road takes localizer.kind = \"tracker\" with map = true",
+        )?;
+        check.that(
+            self.start.known || self.start.pose.is_none(),
+            "start.known",
+            false,
+            "there is a start.pose",
+        )?;
+        self.wake_up.check(check)
+    }
+}
+
+/// Refuses a vehicle that cannot serve on a site.
+///
+/// # Errors
+/// [`SettingsError::Value`] naming the key of the vehicle and what the site has.
+pub fn check_together(
+    site: &Site,
+    vehicle: &Vehicle,
+    check: Check<'_>,
+) -> Result<(), SettingsError> {
+    for (index, pci) in (vehicle.receiver.pci_allow_list.iter().flatten()).enumerate() {
+        check.that(
+            site.radio_heads.iter().any(|head| head.pci == *pci),
+            &format!("vehicle.receiver.pci_allow_list[{index}]"),
+            pci,
+            "a radio head of the site must have this pci",
+        )?;
+    }
+    let heard = (site.radio_heads.iter()).filter(|head| vehicle.receiver.hears(head.pci));
+    let heard = heard.count();
+    check.that(
+        heard > 0,
+        "vehicle.receiver.pci_allow_list",
+        "empty",
+        "leave it out to listen to all",
+    )?;
+    check.that(
+        vehicle.start.known || site.road.is_some(),
+        "vehicle.start.known",
+        false,
+        "the site has no road to find the vehicle along",
+    )?;
+    check.that(
+        vehicle.start.known || heard > 1,
+        "vehicle.start.known",
+        false,
+        "to find the vehicle takes two radio heads or more; one leaves several places open",
+    )
+}

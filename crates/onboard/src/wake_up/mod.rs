@@ -1,0 +1,16 @@
+//! When an angle of arrival is worth its energy. [`WakeUpPolicy`] is the door for others; the paper's
+//! Algorithm 1 stands in `pid.rs` alone.
+
+mod adaptive;
+mod choose;
+mod fixed;
+mod pid;
+mod policy;
+mod uncertainty;
+
+pub use adaptive::Adaptive;
+pub use choose::built_in;
+pub use fixed::FixedInterval;
+pub use pid::Pid;
+pub use policy::{Situation, WakeUpPolicy};
+pub use uncertainty::UncertaintyDriven;

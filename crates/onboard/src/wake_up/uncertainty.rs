@@ -1,0 +1,176 @@
+//! Wake-up as late as a bound on the error allows, and earlier where information is cheap.
+//!
+//! The paper's t_max keeps a position uncertainty x̃_max by a worst case: the distance driven at
+//! top speed. The tracker knows its error and how it grows, so the rule can be exact: wake up at
+//! the last SSB before the error would, with the stated confidence, exceed the bound, and take the
+//! fewest angles that keep it. Where not even all of them do, the bound is out of reach there, and
+//! [`WakeUpPolicy::keeps_bound`] says so.
+//!
+//! An angle is worth what it takes off the variance of the position a little further on, where
+//! what it says of heading and odometer has become position too. That depends on where the vehicle
+//! is: beside a radio head an angle is worth many of those from afar. Of a constant energy the most
+//! is made where the last angle bought everywhere takes away the same (equal marginal gains), so
+//! an angle of at least that worth, `least_gain_m2`, is taken before the bound demands it: the
+//! stretch ahead, where none is worth as much, then begins with a small error.
+
+use super::policy::{Situation, WakeUpPolicy};
+use crate::BoxError;
+use crate::localize::thermal::ThermalNoise;
+use crate::localize::tracker::state::Belief;
+use crate::localize::{RadialQuantile, Tracker};
+use crate::observation::SensedSsb;
+use crate::radio_head::RadioHead;
+use crate::settings::{Site, UncertaintySettings, Vehicle};
+
+/// Longest wake-up time it looks ahead for, in seconds.
+const HORIZON_S: f64 = 20.0;
+
+/// How much further on an angle's worth is judged, in metres.
+const LOOK_AHEAD_M: f64 = 10.0;
+
+/// Most radio heads among which it chooses.
+const MOST_HEADS: usize = 64;
+
+/// The uncertainty-driven policy.
+#[derive(Clone, Debug)]
+pub struct UncertaintyDriven {
+    bound_m: f64,
+    quantile: RadialQuantile,
+    wake_up_cost: f64,
+    least_gain_m2: Option<f64>,
+    period_s: f64,
+    thermal: ThermalNoise,
+}
+
+impl UncertaintyDriven {
+    /// The policy for a site's SSBs.
+    pub fn new(settings: &UncertaintySettings, site: &Site, vehicle: &Vehicle) -> Self {
+        Self {
+            bound_m: settings.bound_m,
+            quantile: RadialQuantile::new(1.0 - settings.confidence),
+            wake_up_cost: settings.wake_up_cost,
+            least_gain_m2: settings.least_gain_m2,
+            period_s: site.ssb.period_s(),
+            thermal: ThermalNoise::new(site, vehicle),
+        }
+    }
+
+    /// Whether the error keeps the bound until the SSB after `time_s` without another angle.
+    pub fn keeps(&self, tracker: &Tracker, time_s: f64) -> bool {
+        self.error_m(tracker, time_s + self.period_s) <= self.bound_m
+    }
+
+    /// The angles to take, one bit for each radio head: those worth their energy, and of the others
+    /// as few as keep the bound until the next SSB. Where nothing keeps it, those worth their
+    /// energy, or all, if any price is to be paid.
+    fn choice(&self, tracker: &Tracker, time_s: f64, heads: &[RadioHead]) -> u64 {
+        let mut demanded = !self.keeps(tracker, time_s);
+        if !demanded && self.least_gain_m2.is_none() {
+            return 0;
+        }
+        let mut belief = tracker.forecast(time_s);
+        let ahead_m = tracker.speed_mps() * (time_s - tracker.time_s()).max(0.0);
+        let spread = |belief: &Belief| {
+            let later = tracker.carry(*belief, LOOK_AHEAD_M);
+            Tracker::principal_variances(&later).iter().sum::<f64>()
+        };
+        let keeps = |belief: &Belief| {
+            let next = tracker.carry(*belief, tracker.speed_mps() * self.period_s);
+            self.quantile.radius(Tracker::principal_variances(&next)) <= self.bound_m
+        };
+        let before = spread(&belief);
+        let mut best_rate = self.least_gain_m2.unwrap_or(f64::INFINITY);
+        let (mut taken, mut worthwhile, mut improving) = (0u64, 0u64, true);
+        for count in 1..=heads.len().min(MOST_HEADS) {
+            let next = (heads.iter().enumerate().take(MOST_HEADS))
+                .filter(|(index, _)| taken >> index & 1 == 0)
+                .filter_map(|(index, head)| {
+                    let thermal = |distance_m| self.thermal.variance(head, distance_m);
+                    let after = tracker.rehearse(&belief, ahead_m, head, thermal)?;
+                    Some((index, after, spread(&after)))
+                })
+                .min_by(|a, b| a.2.total_cmp(&b.2));
+            let Some((index, after, left)) = next else {
+                break;
+            };
+            taken |= 1 << index;
+            belief = after;
+            let rate = (before - left) / (self.wake_up_cost + count as f64);
+            improving &= rate > best_rate;
+            if improving {
+                (worthwhile, best_rate) = (taken, rate);
+            }
+            if demanded && keeps(&belief) {
+                // The angles are taken in the same order for either purpose.
+                worthwhile |= taken;
+                demanded = false;
+            }
+            if !improving && !demanded {
+                break;
+            }
+        }
+        match self.least_gain_m2 {
+            None if demanded => taken,
+            _ => worthwhile,
+        }
+    }
+
+    /// Time from `time_s` on for which the bound holds without another angle, in seconds: the
+    /// latest wake-up.
+    fn wake_up_time_s(&self, tracker: &Tracker, time_s: f64) -> f64 {
+        let holds =
+            |periods: f64| self.error_m(tracker, time_s + periods * self.period_s) <= self.bound_m;
+        let (mut low, mut high) = (0.0, (HORIZON_S / self.period_s).ceil());
+        if holds(high) {
+            return high * self.period_s;
+        }
+        while high - low > 1.0 {
+            let middle = (0.5 * (low + high)).floor();
+            if holds(middle) {
+                low = middle;
+            } else {
+                high = middle;
+            }
+        }
+        (low * self.period_s).max(self.period_s)
+    }
+
+    fn error_m(&self, tracker: &Tracker, time_s: f64) -> f64 {
+        let belief = tracker.forecast(time_s);
+        self.quantile.radius(Tracker::principal_variances(&belief))
+    }
+}
+
+/// A localizer that is no tracker, or does not know yet where it is, takes every angle.
+impl WakeUpPolicy for UncertaintyDriven {
+    /// Whether the error would exceed the bound at the SSB after, or an angle is worth its energy
+    /// anyway.
+    fn listens(&mut self, now: &Situation<'_>) -> Result<bool, BoxError> {
+        let tracker = now.localizer.tracker();
+        Ok(tracker.is_none_or(|tracker| self.choice(tracker, now.time_s, now.heads) != 0))
+    }
+
+    fn decide(
+        &mut self,
+        now: &Situation<'_>,
+        sensed: &[SensedSsb],
+        chosen: &mut [bool],
+    ) -> Result<f64, BoxError> {
+        let Some(tracker) = now.localizer.tracker() else {
+            chosen.fill(true);
+            return Ok(self.period_s);
+        };
+        let choice = self.choice(tracker, now.time_s, now.heads);
+        for (ssb, chosen) in sensed.iter().zip(chosen) {
+            let sends = |head: &RadioHead| head.sends(ssb.pci, ssb.ssb_index);
+            *chosen = (now.heads.iter().position(sends))
+                .is_some_and(|index| index < MOST_HEADS && choice >> index & 1 == 1);
+        }
+        Ok(self.wake_up_time_s(tracker, now.time_s))
+    }
+
+    fn keeps_bound(&self, now: &Situation<'_>) -> Option<bool> {
+        let tracker = now.localizer.tracker()?;
+        Some(self.keeps(tracker, now.time_s))
+    }
+}

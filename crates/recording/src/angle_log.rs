@@ -1,0 +1,157 @@
+//! Angles of arrival that some receiver has already estimated, one per line.
+//!
+//! Columns: `time_s`, `pci`, `ssb_index`, `phase_rad` (electrical angle ω = 2π(d/λ)·cos θ),
+//! `phase_sigma_rad` (its standard deviation from noise), `angle_rad` (θ from the array's axis) and
+//! `snr_db`. Of `phase_rad` and `angle_rad` the former counts.
+
+use std::fmt;
+use std::fmt::Write as _;
+use std::fs;
+use std::path::Path;
+
+use crate::error::RecordingError;
+use crate::csv::Table;
+use onboard::localize::AngleMeasurement;
+use onboard::observation::SensedSsb;
+
+const COLUMNS: [&str; 7] = [
+    "time_s",
+    "pci",
+    "ssb_index",
+    "phase_rad",
+    "phase_sigma_rad",
+    "angle_rad",
+    "snr_db",
+];
+
+/// One angle and the SSB it came from.
+#[derive(Debug, Clone, Copy, PartialEq)]
+pub struct LoggedAngle {
+    /// Cell, beam, time and strength.
+    pub ssb: SensedSsb,
+    /// The angle.
+    pub measured: AngleMeasurement,
+}
+
+/// The usable angles of a file, in its order, and the lines left out.
+#[derive(Debug, Clone, PartialEq, Default)]
+pub struct AngleLog {
+    /// The angles.
+    pub angles: Vec<LoggedAngle>,
+    /// What was left out and why.
+    pub remarks: Vec<AngleRemark>,
+}
+
+/// A line of an angle log that was left out.
+#[derive(Debug, Clone, PartialEq)]
+pub struct AngleRemark {
+    /// Line in the file, from 1.
+    pub line: usize,
+    /// Time of the last usable angle before it, in seconds.
+    pub time_s: f64,
+    /// Why.
+    pub message: String,
+}
+
+impl fmt::Display for AngleRemark {
+    fn fmt(&self, f: &mut fmt::Formatter<'_>) -> fmt::Result {
+        write!(
+            f,
+            "angle log line {}: left out, {}",
+            self.line, self.message
+        )
+    }
+}
+
+/// Reads an angle log.
+///
+/// # Errors
+/// [`RecordingError`] when the file cannot be read or lacks a column. Single lines are only
+/// remarked upon.
+pub fn read_angle_log(file: &Path) -> Result<AngleLog, RecordingError> {
+    let mut log = AngleLog::default();
+    for row in Table::read(file, &COLUMNS, &[])?.rows {
+        match row.values.and_then(|values| angle(&values)) {
+            Ok(angle) => log.angles.push(angle),
+            Err(message) => log.remarks.push(AngleRemark {
+                line: row.line,
+                time_s: log
+                    .angles
+                    .last()
+                    .map_or(f64::NEG_INFINITY, |last| last.measured.time_s),
+                message,
+            }),
+        }
+    }
+    Ok(log)
+}
+
+fn angle(values: &[Option<f64>]) -> Result<LoggedAngle, String> {
+    let mut numbers = [f64::NAN; COLUMNS.len()];
+    for ((number, value), name) in numbers.iter_mut().zip(values).zip(COLUMNS) {
+        *number = value
+            .filter(|value| value.is_finite())
+            .ok_or(format!("{name} is not finite"))?;
+    }
+    let [
+        time_s,
+        pci,
+        ssb_index,
+        phase_rad,
+        phase_sigma_rad,
+        angle_rad,
+        snr_db,
+    ] = numbers;
+    let whole = |value: f64, most: f64| value.fract() == 0.0 && (0.0..=most).contains(&value);
+    if !whole(pci, 1007.0) {
+        return Err(format!("pci {pci} is not an integer from 0 to 1007"));
+    }
+    if !whole(ssb_index, 63.0) {
+        return Err(format!(
+            "ssb_index {ssb_index} is not an integer from 0 to 63"
+        ));
+    }
+    if phase_sigma_rad <= 0.0 {
+        return Err(format!("phase_sigma_rad {phase_sigma_rad} is not above 0"));
+    }
+    let (pci, ssb_index) = (pci as u16, ssb_index as u8);
+    Ok(LoggedAngle {
+        ssb: SensedSsb {
+            pci,
+            ssb_index,
+            time_s,
+            snr_db,
+        },
+        measured: AngleMeasurement {
+            time_s,
+            phase_rad,
+            phase_sigma_rad,
+            angle_rad,
+            snr_db,
+            resolved: true,
+        },
+    })
+}
+
+/// Writes an angle log as [`read_angle_log`] reads it.
+///
+/// # Errors
+/// [`RecordingError::Io`].
+pub fn write_angle_log(file: &Path, angles: &[LoggedAngle]) -> Result<(), RecordingError> {
+    let mut text = COLUMNS.join(",") + "\n";
+    for LoggedAngle { ssb, measured } in angles {
+        // Writing into a string does not fail.
+        let _ = writeln!(
+            text,
+            "{},{},{},{},{},{},{}",
+            measured.time_s,
+            ssb.pci,
+            ssb.ssb_index,
+            measured.phase_rad,
+            measured.phase_sigma_rad,
+            measured.angle_rad,
+            measured.snr_db,
+        );
+    }
+    fs::write(file, text).map_err(|source| RecordingError::io(file, source))
+}

@@ -1,0 +1,39 @@
+//! Recorded drives, in and out, and their [replay]; [scan] looks through a recording for whatever
+//! cells are in it.
+//!
+//! | what | format | |
+//! |---|---|---|
+//! | IQ of one or more antennas | [SigMF](sigmf); one raw file per antenna | read, written; read |
+//! | angles of arrival | [CSV](read_angle_log) | read, written |
+//! | odometry | [CSV](read_odometry_csv); [MCAP](mcap) | read, written |
+//! | trajectories | [TUM](write_tum) | read, written |
+//! | poses, verdicts, diagnoses | [MCAP](mcap) | written |
+//! | sites, vehicles, scenarios, platforms | [TOML](Files) | read |
+//!
+//! A file that cannot be used at all is a [`RecordingError`]; single bad items in it are left out
+//! and reported beside what was read.
+
+mod angle_log;
+mod csv;
+mod error;
+mod library;
+pub mod mcap;
+mod odometry;
+pub mod replay;
+mod road_file;
+pub mod scan;
+pub mod sigmf;
+mod text;
+mod tum;
+
+pub use angle_log::{AngleLog, AngleRemark, LoggedAngle, read_angle_log, write_angle_log};
+pub use error::RecordingError;
+pub use library::{Files, load};
+pub use mcap::{McapWriter, read_odometry_mcap, write_drive_mcap};
+pub use odometry::{
+    OdometryIssue, OdometryLog, OdometryRemark, read_odometry_csv, write_odometry_csv,
+};
+pub use sigmf::{
+    Annotation, Capture, Datatype, Recording, RecordingWarning, RecordingWriter, WriterSettings,
+};
+pub use tum::{TimedPose, read_tum, tum_text, write_tum};

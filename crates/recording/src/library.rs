@@ -1,0 +1,52 @@
+//! Settings files: those that come with the product, and whatever lies in the file system.
+
+use std::path::{Path, PathBuf};
+
+use onboard::settings::{Library, NamedText, SettingsError, Shipped, TomlFile};
+
+use crate::road_file::read_points_m;
+use crate::text::read_text;
+
+/// A settings file is written by people.
+const MOST_BYTES: u64 = 4 << 20;
+
+/// Shipped files by their names, all others by their paths; a path in a file counts from there.
+#[derive(Debug, Clone, Copy, Default, PartialEq, Eq)]
+pub struct Files;
+
+/// A shipped file by its name, or else a file by its path.
+///
+/// # Errors
+/// [`SettingsError`] when there is neither, or when what there is cannot be used.
+pub fn load<T: TomlFile>(name_or_path: &str) -> Result<T, SettingsError> {
+    T::from_library(name_or_path, &Files)
+}
+
+impl Library for Files {
+    fn text(
+        &self,
+        what: &'static str,
+        shipped: &[(&'static str, &'static str)],
+        name: &str,
+        beside: &str,
+    ) -> Result<NamedText, SettingsError> {
+        let path = relative_to(beside, name);
+        match Shipped.text(what, shipped, name, beside) {
+            Err(unknown) if !path.exists() => Err(unknown),
+            Err(_) => Ok(NamedText {
+                text: read_text(&path, MOST_BYTES)?,
+                origin: path.display().to_string(),
+            }),
+            found => found,
+        }
+    }
+
+    fn points_m(&self, name: &str, beside: &str) -> Result<Vec<[f64; 2]>, SettingsError> {
+        read_points_m(&relative_to(beside, name))
+    }
+}
+
+fn relative_to(beside: &str, name: &str) -> PathBuf {
+    let folder = Path::new(beside).parent().unwrap_or(Path::new(""));
+    folder.join(name)
+}

@@ -1,0 +1,183 @@
+//! A located drive as one MCAP file.
+
+use std::collections::BTreeMap;
+use std::fs::File;
+use std::io::BufWriter;
+use std::path::Path;
+
+use mcap::McapError;
+
+use super::writer::{DiagnosticLevel, DiagnosticStatus, Frames, McapWriter, Twist};
+use onboard::localize::IntegrityState;
+use onboard::localize::tracker::Calibration;
+use onboard::Execution;
+use crate::error::RecordingError;
+use crate::replay::{LocatedDrive, LocatedPose, Remark};
+
+/// Topic of the poses.
+const POSE_TOPIC: &str = "/access_av/odometry";
+/// Topic of the smoothed poses.
+const SMOOTHED_TOPIC: &str = "/access_av/smoothed";
+/// Topic of the verdicts.
+const VERDICT_TOPIC: &str = "/access_av/verdicts";
+/// Variance of a wheel speed in (m/s)² and of a gyroscope's rate in (rad/s)².
+const SPEED_VARIANCE: f64 = 1e-4;
+const YAW_RATE_VARIANCE: f64 = 1e-4;
+/// Diagnostics come once a second (REP-107).
+const DIAGNOSTIC_PERIOD_S: f64 = 1.0;
+
+/// Writes poses, verdicts and a diagnosis a second, in order of time. As long as the first pose is
+/// searched for there are no poses. The diagnoses name every item of the input that was remarkable.
+///
+/// # Errors
+/// [`RecordingError`] when the file cannot be written.
+pub fn write_drive_mcap(file: &Path, drive: &LocatedDrive) -> Result<(), RecordingError> {
+    let made = File::create(file).map_err(|source| RecordingError::io(file, source))?;
+    write(BufWriter::new(made), drive).map_err(|error| RecordingError::Write {
+        file: file.display().to_string(),
+        message: error.to_string(),
+    })
+}
+
+fn write(file: BufWriter<File>, drive: &LocatedDrive) -> Result<(), McapError> {
+    let mut writer = McapWriter::new(file)?;
+    let mut executions = drive.executions.iter().peekable();
+    let mut lately: Vec<&Execution> = Vec::new();
+    let mut remarks = drive.remarks.as_slice();
+    let mut diagnosed_s = f64::NEG_INFINITY;
+    let mut smoothed = drive.smoothed.iter().peekable();
+    for pose in &drive.poses {
+        let time_s = pose.estimate.time_s;
+        while let Some(execution) = executions.next_if(|it| it.ssb.time_s <= time_s) {
+            writer.verdict(VERDICT_TOPIC, execution)?;
+            lately.push(execution);
+        }
+        if pose.searching.is_none() {
+            writer.odometry(POSE_TOPIC, Frames::MAP, &pose.estimate, &twist(pose))?;
+        }
+        if let Some(pose) = smoothed.next_if(|it| it.estimate.time_s <= time_s) {
+            writer.odometry(SMOOTHED_TOPIC, Frames::MAP, &pose.estimate, &twist(pose))?;
+        }
+        if time_s - diagnosed_s >= DIAGNOSTIC_PERIOD_S {
+            let known = remarks.partition_point(|remark| remark.time_s <= time_s);
+            let (told, later) = remarks.split_at(known);
+            writer.diagnostics(time_s, &[diagnosis(pose, &lately), input(told)])?;
+            diagnosed_s = time_s;
+            remarks = later;
+            lately.clear();
+        }
+    }
+    for execution in executions {
+        writer.verdict(VERDICT_TOPIC, execution)?;
+    }
+    if let (Some(last), [_, ..]) = (drive.poses.last(), remarks) {
+        writer.diagnostics(last.estimate.time_s, &[input(remarks)])?;
+    }
+    writer.finish()
+}
+
+fn twist(pose: &LocatedPose) -> Twist {
+    Twist {
+        speed_mps: pose.speed_mps,
+        speed_variance: SPEED_VARIANCE,
+        yaw_rate: pose
+            .yaw_rate_radps
+            .map(|rate_radps| (rate_radps, YAW_RATE_VARIANCE)),
+    }
+}
+
+/// What was remarkable about the input lately, item by item.
+fn input(remarks: &[Remark]) -> DiagnosticStatus {
+    let (level, message) = match remarks.len() {
+        0 => (DiagnosticLevel::Ok, "nothing to remark".to_owned()),
+        1 => (DiagnosticLevel::Warn, "1 remarkable item".to_owned()),
+        count => (DiagnosticLevel::Warn, format!("{count} remarkable items")),
+    };
+    let texts = remarks.iter().map(|remark| remark.text.clone());
+    DiagnosticStatus {
+        level,
+        name: "access_av: input".to_owned(),
+        message,
+        values: (1..)
+            .map(|number: usize| number.to_string())
+            .zip(texts)
+            .collect(),
+    }
+}
+
+fn diagnosis(pose: &LocatedPose, lately: &[&Execution]) -> DiagnosticStatus {
+    let accepted = lately
+        .iter()
+        .filter(|execution| execution.verdict.accepted)
+        .count();
+    let state = pose.estimate.integrity.map(|integrity| integrity.state);
+    let (level, message) = match (accepted, lately.len()) {
+        _ if pose.searching.is_some() => (DiagnosticLevel::Warn, "searching for the first pose"),
+        _ if state == Some(IntegrityState::Unavailable) => {
+            (DiagnosticLevel::Error, "position not to be relied on")
+        }
+        _ if state == Some(IntegrityState::Degraded) => (
+            DiagnosticLevel::Warn,
+            "protection level above the alert limit",
+        ),
+        (_, 0) => (DiagnosticLevel::Stale, "no SSB in the last second"),
+        (0, _) => (
+            DiagnosticLevel::Error,
+            "no angle accepted in the last second",
+        ),
+        _ if pose.calibration.is_some_and(|found| found.alarms()) => (
+            DiagnosticLevel::Warn,
+            "the array's mounting or calibration does not hold",
+        ),
+        (few, all) if 2 * few < all => (DiagnosticLevel::Warn, "most angles refused"),
+        _ => (DiagnosticLevel::Ok, "angles accepted"),
+    };
+    let mut cells: Vec<u16> = lately.iter().map(|execution| execution.ssb.pci).collect();
+    cells.sort_unstable();
+    cells.dedup();
+    let mut values = vec![
+        ("angles".to_owned(), lately.len().to_string()),
+        ("accepted".to_owned(), accepted.to_string()),
+        ("cells".to_owned(), format!("{cells:?}")),
+    ];
+    if let Some(Calibration { mounting, phase }) = pose.calibration {
+        for (name, departure) in [("mounting_rad", mounting), ("phase_rad", phase)] {
+            // What is taken as surveyed has nothing to tell.
+            if departure.std_rad > 0.0 {
+                let value = format!("{:.4} ± {:.4}", departure.by_rad, departure.std_rad);
+                values.push((name.to_owned(), value));
+            }
+        }
+    }
+    if let Some(hypotheses) = pose.searching {
+        values.push(("hypotheses".to_owned(), hypotheses.to_string()));
+    }
+    let mut refused = BTreeMap::new();
+    for execution in lately.iter().filter(|it| !it.verdict.accepted) {
+        *refused
+            .entry(execution.verdict.reason.name())
+            .or_insert(0u32) += 1;
+    }
+    values.extend(
+        refused
+            .into_iter()
+            .map(|(reason, count)| (format!("refused: {reason}"), count.to_string())),
+    );
+    if let Some([[x, ..], [_, y, _], _]) = pose.estimate.covariance {
+        values.push((
+            "position_sigma_m".to_owned(),
+            format!("{:.4}", (x + y).sqrt()),
+        ));
+    }
+    if let Some(integrity) = &pose.estimate.integrity {
+        let level_m = format!("{:.3}", integrity.protection_level_m);
+        values.push(("protection_level_m".to_owned(), level_m));
+        values.push(("integrity".to_owned(), integrity.state.name().to_owned()));
+    }
+    DiagnosticStatus {
+        level,
+        name: "access_av: localizer".to_owned(),
+        message: message.to_owned(),
+        values,
+    }
+}

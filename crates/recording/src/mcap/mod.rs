@@ -1,0 +1,14 @@
+//! MCAP as ROS 2 tools write and read it: profile `ros2`, messages in CDR, schemas in `ros2msg`.
+//!
+//! Written are `nav_msgs/msg/Odometry` with covariance and twist, `diagnostic_msgs/msg/
+//! DiagnosticArray` and [`access_av_msgs/msg/AngleVerdict`](McapWriter::verdict); read is odometry.
+
+mod cdr;
+mod drive;
+mod reader;
+mod schema;
+mod writer;
+
+pub use drive::write_drive_mcap;
+pub use reader::read_odometry_mcap;
+pub use writer::{DiagnosticLevel, DiagnosticStatus, Frames, McapWriter, Twist};

@@ -1,0 +1,263 @@
+//! Poses, verdicts and diagnostics into an MCAP file.
+
+use std::collections::BTreeMap;
+use std::io::{Seek, Write};
+
+use mcap::records::MessageHeader;
+use mcap::{McapError, WriteOptions, Writer};
+
+use super::cdr::Encoder;
+use super::schema::{DIAGNOSTICS, ODOMETRY, Schema, VERDICT};
+use onboard::localize::PoseEstimate;
+use onboard::Execution;
+
+/// Variance of what is not observed: large, finite (an infinite one breaks filters downstream).
+const UNOBSERVED: f64 = 1e6;
+/// Indices of x, y and yaw among x, y, z, roll, pitch, yaw.
+const PLANE: [usize; 3] = [0, 1, 5];
+
+/// What rosbag2 needs to play a channel back: reliable, the last ten kept, volatile.
+const QOS_PROFILES: &str = "- history: 1\n  depth: 10\n  reliability: 1\n  durability: 2\n  \
+    deadline:\n    sec: 9223372036\n    nsec: 854775807\n  lifespan:\n    sec: 9223372036\n    \
+    nsec: 854775807\n  liveliness: 1\n  liveliness_lease_duration:\n    sec: 9223372036\n    \
+    nsec: 854775807\n  avoid_ros_namespace_conventions: false";
+
+/// Motion of the vehicle in its own frame.
+#[derive(Debug, Clone, Copy, PartialEq, Default)]
+pub struct Twist {
+    /// Speed along its forward axis in m/s.
+    pub speed_mps: f64,
+    /// Variance of the speed in (m/s)².
+    pub speed_variance: f64,
+    /// Yaw rate in rad/s, counter-clockwise, and its variance in (rad/s)².
+    pub yaw_rate: Option<(f64, f64)>,
+}
+
+/// Names of coordinate frames (REP-105).
+#[derive(Debug, Clone, Copy, PartialEq, Eq)]
+pub struct Frames<'a> {
+    /// The frame of the pose.
+    pub parent: &'a str,
+    /// The frame of the twist.
+    pub child: &'a str,
+}
+
+impl Frames<'_> {
+    /// What a localizer says.
+    pub const MAP: Frames<'static> = Frames {
+        parent: "map",
+        child: "base_link",
+    };
+    /// What odometry says.
+    pub const ODOM: Frames<'static> = Frames {
+        parent: "odom",
+        child: "base_link",
+    };
+}
+
+/// How serious a diagnosis is.
+#[derive(Debug, Clone, Copy, PartialEq, Eq)]
+pub enum DiagnosticLevel {
+    /// All is well.
+    Ok = 0,
+    /// Something needs watching.
+    Warn = 1,
+    /// Something does not work.
+    Error = 2,
+    /// Nothing has been heard for too long.
+    Stale = 3,
+}
+
+/// One diagnosis.
+#[derive(Debug, Clone, PartialEq, Eq)]
+pub struct DiagnosticStatus {
+    /// How serious it is.
+    pub level: DiagnosticLevel,
+    /// What it is about.
+    pub name: String,
+    /// In a few words.
+    pub message: String,
+    /// In values.
+    pub values: Vec<(String, String)>,
+}
+
+/// An MCAP file being written; [`finish`](Self::finish) makes it complete.
+pub struct McapWriter<W: Write + Seek> {
+    file: Writer<W>,
+    /// Channel and next sequence number of each topic.
+    topics: BTreeMap<String, (u16, u32)>,
+    message: Encoder,
+}
+
+impl<W: Write + Seek> McapWriter<W> {
+    /// Begins a file.
+    ///
+    /// # Errors
+    /// [`McapError`] when it cannot be written.
+    pub fn new(file: W) -> Result<Self, McapError> {
+        let options = WriteOptions::new()
+            .profile("ros2")
+            .library(concat!("access-av ", env!("CARGO_PKG_VERSION")))
+            .compression(None);
+        Ok(Self {
+            file: options.create(file)?,
+            topics: BTreeMap::new(),
+            message: Encoder::default(),
+        })
+    }
+
+    /// Writes a pose as `nav_msgs/msg/Odometry`. Axes that are not observed, and all of them where
+    /// the localizer does not know its own error, have a variance of 1e6.
+    ///
+    /// # Errors
+    /// [`McapError`] when it cannot be written.
+    pub fn odometry(
+        &mut self,
+        topic: &str,
+        frames: Frames<'_>,
+        estimate: &PoseEstimate,
+        twist: &Twist,
+    ) -> Result<(), McapError> {
+        let pose = estimate.pose;
+        let (qz, qw) = (0.5 * pose.heading_rad).sin_cos();
+        header(&mut self.message, estimate.time_s, frames.parent).string(frames.child);
+        for value in [pose.x_m, pose.y_m, 0.0, 0.0, 0.0, qz, qw] {
+            self.message.f64(value);
+        }
+        for value in pose_covariance(estimate) {
+            self.message.f64(value);
+        }
+        let (yaw_rate_radps, yaw_rate_variance) = twist.yaw_rate.unwrap_or((0.0, UNOBSERVED));
+        for value in [twist.speed_mps, 0.0, 0.0, 0.0, 0.0, yaw_rate_radps] {
+            self.message.f64(value);
+        }
+        let mut covariance = unobserved();
+        // A vehicle on wheels does not move sideways.
+        for (axis, variance) in
+            PLANE
+                .into_iter()
+                .zip([twist.speed_variance, 1e-4, yaw_rate_variance])
+        {
+            covariance[axis * 7] = variance;
+        }
+        for value in covariance {
+            self.message.f64(value);
+        }
+        self.write(topic, &ODOMETRY, estimate.time_s)
+    }
+
+    /// Writes what the localizer did with an angle as `access_av_msgs/msg/AngleVerdict`.
+    ///
+    /// # Errors
+    /// [`McapError`] when it cannot be written.
+    pub fn verdict(&mut self, topic: &str, execution: &Execution) -> Result<(), McapError> {
+        let (ssb, verdict) = (&execution.ssb, &execution.verdict);
+        let measured = execution.measured.as_ref();
+        header(&mut self.message, ssb.time_s, "base_link")
+            .u16(ssb.pci)
+            .u8(ssb.ssb_index)
+            .u8(u8::from(verdict.accepted))
+            .string(verdict.reason.name())
+            .f64(measured.map_or(f64::NAN, |it| it.phase_rad))
+            .f64(measured.map_or(f64::NAN, |it| it.phase_sigma_rad))
+            .f64(ssb.snr_db)
+            .f64(verdict.mahalanobis_squared.unwrap_or(f64::NAN))
+            .f64(verdict.threshold.unwrap_or(f64::NAN))
+            .f64(execution.wake_up_time_s);
+        self.write(topic, &VERDICT, ssb.time_s)
+    }
+
+    /// Writes diagnoses as `diagnostic_msgs/msg/DiagnosticArray`.
+    ///
+    /// # Errors
+    /// [`McapError`] when it cannot be written.
+    pub fn diagnostics(
+        &mut self,
+        time_s: f64,
+        statuses: &[DiagnosticStatus],
+    ) -> Result<(), McapError> {
+        let message = header(&mut self.message, time_s, "").u32(statuses.len() as u32);
+        for status in statuses {
+            message
+                .u8(status.level as u8)
+                .string(&status.name)
+                .string(&status.message)
+                .string("");
+            message.u32(status.values.len() as u32);
+            for (key, value) in &status.values {
+                message.string(key).string(value);
+            }
+        }
+        self.write("/diagnostics", &DIAGNOSTICS, time_s)
+    }
+
+    /// Completes the file.
+    ///
+    /// # Errors
+    /// [`McapError`] when it cannot be written.
+    pub fn finish(mut self) -> Result<(), McapError> {
+        self.file.finish().map(|_| ())
+    }
+
+    fn write(&mut self, topic: &str, schema: &Schema, time_s: f64) -> Result<(), McapError> {
+        if !self.topics.contains_key(topic) {
+            let id = self
+                .file
+                .add_schema(schema.name, "ros2msg", schema.definition.as_bytes())?;
+            let metadata =
+                BTreeMap::from([("offered_qos_profiles".to_owned(), QOS_PROFILES.to_owned())]);
+            let channel = self.file.add_channel(id, topic, "cdr", &metadata)?;
+            self.topics.insert(topic.to_owned(), (channel, 0));
+        }
+        let Some((channel_id, sequence)) = self.topics.get_mut(topic) else {
+            return Ok(());
+        };
+        let time_ns = nanoseconds(time_s);
+        let header = MessageHeader {
+            channel_id: *channel_id,
+            sequence: *sequence,
+            log_time: time_ns,
+            publish_time: time_ns,
+        };
+        *sequence += 1;
+        self.file
+            .write_to_known_channel(&header, self.message.bytes())
+    }
+}
+
+/// Nanoseconds since the epoch; times before it become the epoch.
+fn nanoseconds(time_s: f64) -> u64 {
+    (time_s * 1e9).round() as u64
+}
+
+/// Begins a message with a `std_msgs/msg/Header`.
+fn header<'a>(message: &'a mut Encoder, time_s: f64, frame: &str) -> &'a mut Encoder {
+    let time_ns = nanoseconds(time_s);
+    message
+        .start()
+        .i32((time_ns / 1_000_000_000) as i32)
+        .u32((time_ns % 1_000_000_000) as u32)
+        .string(frame)
+}
+
+/// 6 × 6, row by row (REP-103), nothing observed.
+fn unobserved() -> [f64; 36] {
+    let mut covariance = [0.0; 36];
+    covariance
+        .iter_mut()
+        .step_by(7)
+        .for_each(|variance| *variance = UNOBSERVED);
+    covariance
+}
+
+fn pose_covariance(estimate: &PoseEstimate) -> [f64; 36] {
+    let mut covariance = unobserved();
+    if let Some(known) = estimate.covariance {
+        for (i, row) in PLANE.into_iter().zip(known) {
+            for (j, value) in PLANE.into_iter().zip(row) {
+                covariance[6 * i + j] = value;
+            }
+        }
+    }
+    covariance
+}

@@ -1,0 +1,168 @@
+//! A drive being replayed.
+
+use onboard::geometry::Pose;
+use onboard::localize::tracker::OdometryVerdict;
+use onboard::observation::OdometrySample;
+use onboard::settings::{Platform, Site, Vehicle};
+use onboard::{Custom, Onboard};
+
+use super::bursts::{Burst, OfSsb, first_burst};
+use super::error::ReplayError;
+use super::located::{LocatedDrive, LocatedPose, Remark};
+use crate::library::load;
+use crate::odometry::OdometryLog;
+
+/// A drive being located.
+pub struct Replay<'a> {
+    onboard: Onboard,
+    odometry: std::iter::Peekable<std::slice::Iter<'a, OdometrySample>>,
+    drive: LocatedDrive,
+    /// Whether the odometry before told of the end of the road.
+    beyond_map: bool,
+    /// Where the gaps of the road begin that were remarked on (m).
+    gaps_m: Vec<f64>,
+}
+
+impl<'a> Replay<'a> {
+    /// A drive of a vehicle at a site, from `start` on.
+    ///
+    /// # Errors
+    /// [`ReplayError::Settings`], [`ReplayError::NoOdometry`].
+    pub fn new(
+        site: &Site,
+        vehicle: &Vehicle,
+        start: Pose,
+        custom: Custom,
+        odometry: &'a OdometryLog,
+    ) -> Result<Self, ReplayError> {
+        if odometry.samples.is_empty() {
+            return Err(ReplayError::NoOdometry);
+        }
+        let platform: Platform = load(&vehicle.platform.name)?;
+        let onboard = Onboard::new(site, vehicle, &platform, start, custom)?;
+        Ok(Self {
+            onboard,
+            beyond_map: false,
+            gaps_m: Vec::new(),
+            odometry: odometry.samples.iter().peekable(),
+            drive: LocatedDrive {
+                remarks: odometry
+                    .remarks
+                    .iter()
+                    .map(|remark| Remark {
+                        time_s: remark.time_s,
+                        text: remark.to_string(),
+                    })
+                    .collect(),
+                ..LocatedDrive::default()
+            },
+        })
+    }
+
+    /// Takes in SSBs, or angles, in the order they are given, after the odometry up to each burst.
+    ///
+    /// # Errors
+    /// [`ReplayError::Custom`].
+    pub fn hear<T: OfSsb>(&mut self, mut ssbs: &[T]) -> Result<(), ReplayError> {
+        while !ssbs.is_empty() {
+            let (burst, later) = ssbs.split_at(first_burst(ssbs));
+            let time_s = burst.first().map_or(f64::NAN, |first| first.ssb().time_s);
+            self.odometry_until(time_s)?;
+            let mut source = Burst(burst);
+            let heard = self.onboard.hear(time_s, &mut source);
+            let heard = heard.map_err(ReplayError::Custom)?;
+            self.drive.executions.extend_from_slice(heard.executions);
+            ssbs = later;
+        }
+        Ok(())
+    }
+
+    /// Takes in the rest of the odometry.
+    ///
+    /// # Errors
+    /// [`ReplayError::Custom`].
+    pub fn finish(mut self) -> Result<LocatedDrive, ReplayError> {
+        self.odometry_until(f64::INFINITY)?;
+        self.drive
+            .remarks
+            .sort_by(|a, b| a.time_s.total_cmp(&b.time_s));
+        Ok(self.drive)
+    }
+
+    /// Drives to be smoothed, in order of time from now on.
+    pub fn keep_journal(&mut self) {
+        self.onboard.keep_journal();
+    }
+
+    /// The poses at the odometry samples as seen from the end of the drive, from the first known
+    /// one on.
+    ///
+    /// # Errors
+    /// [`ReplayError::Custom`].
+    pub fn smoothed(mut self) -> Result<Vec<LocatedPose>, ReplayError> {
+        self.odometry_until(f64::INFINITY)?;
+        let smoothed = self.onboard.smoothed();
+        let poses = &self.drive.poses;
+        let known = poses.iter().skip(poses.len().saturating_sub(smoothed.len()));
+        Ok(known
+            .zip(smoothed)
+            .map(|(pose, estimate)| LocatedPose { estimate, ..*pose })
+            .collect())
+    }
+
+    /// Remarks on something that is not the pipeline's to see.
+    pub fn remark(&mut self, time_s: f64, text: String) {
+        self.drive.remarks.push(Remark { time_s, text });
+    }
+
+    fn odometry_until(&mut self, time_s: f64) -> Result<(), ReplayError> {
+        while let Some(sample) = self.odometry.next_if(|sample| sample.time_s <= time_s) {
+            let at_s = sample.time_s;
+            let verdict = self.onboard.odometry(sample);
+            match verdict.map_err(ReplayError::Custom)? {
+                Ok(OdometryVerdict::DistanceJump { jump_m }) => self.remark(
+                    at_s,
+                    format!(
+                        "odometry at {at_s} s: the distance jumps by {jump_m:.3} m, the speed was \
+                         used instead"
+                    ),
+                ),
+                Ok(OdometryVerdict::BeyondMap { by_m }) => {
+                    if !self.beyond_map {
+                        let text = format!(
+                            "odometry at {at_s} s: {by_m:.1} m beyond the end of the road, \
+                             driving on without it"
+                        );
+                        self.remark(at_s, text);
+                    }
+                    self.beyond_map = true;
+                }
+                Ok(OdometryVerdict::InMapGap { from_m, to_m }) => {
+                    self.beyond_map = false;
+                    if !self.gaps_m.contains(&from_m) {
+                        let text = format!(
+                            "odometry at {at_s} s: the road was not surveyed from {from_m:.1} to \
+                             {to_m:.1} m, driving on without it"
+                        );
+                        self.remark(at_s, text);
+                        self.gaps_m.push(from_m);
+                    }
+                }
+                Ok(_) => self.beyond_map = false,
+                // Nothing is known of the vehicle's place by a sample that is left out.
+                Err(defect) => {
+                    self.remark(at_s, format!("odometry at {at_s} s: left out, {defect}"));
+                    continue;
+                }
+            }
+            self.drive.poses.push(LocatedPose {
+                estimate: self.onboard.pose(at_s).map_err(ReplayError::Custom)?,
+                speed_mps: sample.speed_mps,
+                yaw_rate_radps: sample.yaw_rate_radps,
+                searching: self.onboard.searching(),
+                calibration: self.onboard.calibration(),
+            });
+        }
+        Ok(())
+    }
+}

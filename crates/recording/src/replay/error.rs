@@ -1,0 +1,42 @@
+//! Why a drive cannot be located.
+
+use onboard::BoxError;
+use onboard::receive::ReceiveError;
+use onboard::settings::SettingsError;
+use thiserror::Error;
+
+use crate::error::RecordingError;
+
+/// Why a drive cannot be located.
+#[derive(Debug, Error)]
+#[non_exhaustive]
+pub enum ReplayError {
+    /// Site, vehicle or platform cannot be used.
+    #[error(transparent)]
+    Settings(#[from] SettingsError),
+    /// The recording cannot be read.
+    #[error(transparent)]
+    Recording(#[from] RecordingError),
+    /// The receiver refuses the samples.
+    #[error("{file}: {source}")]
+    Receive {
+        /// The recording.
+        file: String,
+        /// Why.
+        source: ReceiveError,
+    },
+    /// The recording's rate or band does not suit the site.
+    #[error("{file}: {source}")]
+    FrontEnd {
+        /// The recording.
+        file: String,
+        /// Why.
+        source: nr_ssb::front_end::FrontEndError,
+    },
+    /// No usable odometry.
+    #[error("the odometry holds no usable sample")]
+    NoOdometry,
+    /// The user's own code failed.
+    #[error("{0}")]
+    Custom(BoxError),
+}

@@ -1,0 +1,124 @@
+//! A recorded drive as poses.
+
+use std::collections::BTreeMap;
+
+use onboard::geometry::Pose;
+use onboard::localize::UpdateReason;
+use onboard::receive::{Receiver, ReceiverConfig};
+use onboard::settings::{Site, Vehicle};
+use onboard::{Custom, Execution};
+
+use super::drive::Replay;
+use super::error::ReplayError;
+use super::located::{LocatedDrive, LocatedPose};
+use super::receive::receive_recording;
+use super::start::{StartChoice, starting};
+use crate::angle_log::{AngleLog, LoggedAngle};
+use crate::odometry::OdometryLog;
+use crate::sigmf::Recording;
+
+/// Locates a drive by angles that were estimated before, and smooths it if asked to.
+///
+/// # Errors
+/// [`ReplayError`].
+pub fn locate_angles(
+    site: &Site,
+    vehicle: &Vehicle,
+    start: StartChoice,
+    odometry: &OdometryLog,
+    angles: &AngleLog,
+    smooth: bool,
+) -> Result<LocatedDrive, ReplayError> {
+    let (vehicle, start) = starting(site, vehicle, start)?;
+    let mut replay = Replay::new(site, &vehicle, start, Custom::default(), odometry)?;
+    for remark in &angles.remarks {
+        replay.remark(remark.time_s, remark.to_string());
+    }
+    replay.hear(&angles.angles)?;
+    finish(replay, site, &vehicle, start, odometry, smooth)
+}
+
+/// Locates a drive by recorded samples, and smooths it if asked to. Sample 0 was received at
+/// `start_time_s` of the odometry.
+///
+/// # Errors
+/// [`ReplayError`].
+pub fn locate_recording(
+    site: &Site,
+    vehicle: &Vehicle,
+    start: StartChoice,
+    odometry: &OdometryLog,
+    recording: &mut Recording,
+    start_time_s: f64,
+    smooth: bool,
+) -> Result<LocatedDrive, ReplayError> {
+    let (vehicle, start) = starting(site, vehicle, start)?;
+    let mut replay = Replay::new(site, &vehicle, start, Custom::default(), odometry)?;
+    for warning in recording.warnings() {
+        replay.remark(f64::NEG_INFINITY, warning.to_string());
+    }
+    let file = recording.data_file().display().to_string();
+    let mut receiver = Receiver::new(ReceiverConfig::new(site, &vehicle))
+        .map_err(|source| ReplayError::Receive { file, source })?;
+    receive_recording(&mut receiver, recording, start_time_s, |ssbs| {
+        replay.hear(ssbs)
+    })?;
+    finish(replay, site, &vehicle, start, odometry, smooth)
+}
+
+fn finish(
+    replay: Replay<'_>,
+    site: &Site,
+    vehicle: &Vehicle,
+    start: Pose,
+    odometry: &OdometryLog,
+    smooth: bool,
+) -> Result<LocatedDrive, ReplayError> {
+    let mut drive = replay.finish()?;
+    if smooth {
+        drive.smoothed = look_back(site, vehicle, start, odometry, &drive.executions)?;
+    }
+    Ok(drive)
+}
+
+/// Drives once more, to see each pose from the end. A radio head that was found faulty is not
+/// heard before it was trusted again; so nothing needs a guard.
+fn look_back(
+    site: &Site,
+    vehicle: &Vehicle,
+    start: Pose,
+    odometry: &OdometryLog,
+    executions: &[Execution],
+) -> Result<Vec<LocatedPose>, ReplayError> {
+    let unguarded = Vehicle {
+        integrity: None,
+        ..vehicle.clone()
+    };
+    let mut mistrusted_until_s = BTreeMap::new();
+    for execution in executions {
+        if execution.verdict.reason == UpdateReason::Excluded {
+            let ssb = &execution.ssb;
+            mistrusted_until_s.insert((ssb.pci, ssb.ssb_index), ssb.time_s);
+        }
+    }
+    let trusted = |execution: &&Execution| {
+        let ssb = execution.ssb;
+        let until_s = mistrusted_until_s.get(&(ssb.pci, ssb.ssb_index));
+        until_s.is_none_or(|until_s| ssb.time_s > *until_s)
+    };
+    let logged = |execution: &Execution| {
+        Some(LoggedAngle {
+            ssb: execution.ssb,
+            measured: execution.measured?,
+        })
+    };
+    let executions = executions.iter().filter(trusted);
+    let mut angles: Vec<LoggedAngle> = executions.filter_map(logged).collect();
+    // Nothing is late when all is known.
+    angles.sort_by(|a, b| a.ssb.time_s.total_cmp(&b.ssb.time_s));
+    let every = EveryAngle.into_custom();
+    let mut replay = Replay::new(site, &unguarded, start, every, odometry)?;
+    replay.keep_journal();
+    replay.hear(&angles)?;
+    replay.smoothed()
+}

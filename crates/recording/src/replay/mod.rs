@@ -1,0 +1,16 @@
+//! A recorded drive through the pipeline: odometry and SSBs, or angles, in order of time.
+
+mod bursts;
+mod drive;
+mod error;
+mod locate;
+mod located;
+mod receive;
+mod start;
+
+pub use drive::Replay;
+pub use error::ReplayError;
+pub use locate::{locate_angles, locate_recording};
+pub use located::{LocatedDrive, LocatedPose, Remark};
+pub use receive::receive_recording;
+pub use start::{StartChoice, starting};

@@ -1,0 +1,100 @@
+//! The angle of one SSB, for arrays of any number of antennas that the crates know.
+
+use aoa::{AngleEstimate, Array, Calibration, maximum_likelihood_pilots};
+use nr_ssb::search::ReceivedSsb;
+use num_complex::Complex64;
+
+use onboard::receive::despread::Despread;
+use onboard::receive::wideband::line_of_sight;
+use onboard::settings::Pilots;
+
+/// The receiving array.
+#[derive(Debug, Clone, PartialEq)]
+pub struct ArraySetup {
+    /// Distance between neighbouring antennas in wavelengths.
+    pub spacing_wavelengths: f64,
+    /// Complex gain of each channel, by which it is divided; ideal channels without.
+    pub calibration: Option<Vec<Complex64>>,
+}
+
+impl Default for ArraySetup {
+    fn default() -> Self {
+        Self {
+            spacing_wavelengths: 0.5,
+            calibration: None,
+        }
+    }
+}
+
+/// Angle, and the array's response as it was received, calibration taken out.
+#[derive(Debug, Clone, PartialEq)]
+pub(super) struct View {
+    pub estimate: AngleEstimate,
+    /// One snapshot per OFDM symbol, noise power one.
+    pub blocks: Vec<Vec<Complex64>>,
+}
+
+/// Angles of SSBs that a search has found.
+pub(super) trait ArrayView: Send + Sync {
+    /// Looks at an SSB, all of whose known elements are pilots.
+    fn view(&self, ssb: &ReceivedSsb<'_>) -> Option<View>;
+}
+
+/// The view of an array of so many antennas; `None` for a single antenna or more than eight.
+///
+/// # Errors
+/// [`aoa::Error`] for an impossible spacing or gain; [`aoa::Error::CalibrationGain`] of the first
+/// missing channel where the calibration is too short.
+pub(super) fn array_view(
+    antennas: usize,
+    setup: &ArraySetup,
+) -> Result<Option<Box<dyn ArrayView>>, aoa::Error> {
+    Ok(match antennas {
+        2 => Some(Box::new(Looker::<2>::new(setup)?)),
+        3 => Some(Box::new(Looker::<3>::new(setup)?)),
+        4 => Some(Box::new(Looker::<4>::new(setup)?)),
+        5 => Some(Box::new(Looker::<5>::new(setup)?)),
+        6 => Some(Box::new(Looker::<6>::new(setup)?)),
+        7 => Some(Box::new(Looker::<7>::new(setup)?)),
+        8 => Some(Box::new(Looker::<8>::new(setup)?)),
+        _ => None,
+    })
+}
+
+struct Looker<const A: usize> {
+    array: Array<A>,
+    calibration: Calibration<A>,
+}
+
+impl<const A: usize> Looker<A> {
+    fn new(setup: &ArraySetup) -> Result<Self, aoa::Error> {
+        let mut calibration = Calibration::IDENTITY;
+        if let Some(gains) = &setup.calibration {
+            let gains = <[Complex64; A]>::try_from(gains.as_slice())
+                .map_err(|_| aoa::Error::CalibrationGain(gains.len().min(A)))?;
+            calibration = Calibration::new(gains)?;
+        }
+        Ok(Self {
+            array: Array::new(setup.spacing_wavelengths)?,
+            calibration,
+        })
+    }
+}
+
+impl<const A: usize> ArrayView for Looker<A> {
+    fn view(&self, ssb: &ReceivedSsb<'_>) -> Option<View> {
+        let elements = ssb.elements.first_chunk::<A>()?.each_ref();
+        let noise = ssb.noise_variance.iter().sum::<f64>() / A as f64;
+        let scale = noise.max(f64::MIN_POSITIVE).sqrt().recip();
+        let gains = self.calibration.gains().map(|gain| scale / gain);
+        let despread = Despread::new(elements, ssb.known, Pilots::Ssb, 0.0).scaled(&gains);
+        let blocks: Vec<[Complex64; A]> = despread.blocks().collect();
+        let told = line_of_sight(&despread);
+        let looked_at = told
+            .as_ref()
+            .map_or(&blocks[..], |told| std::slice::from_ref(&told.block));
+        let estimate = maximum_likelihood_pilots(looked_at, Some(1.0), &self.array).ok()?;
+        let blocks = blocks.iter().map(|block| block.to_vec()).collect();
+        Some(View { estimate, blocks })
+    }
+}

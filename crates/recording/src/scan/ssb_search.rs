@@ -1,0 +1,262 @@
+//! The search for SSBs at one place in frequency, its plans and buffers kept from one recording to
+//! the next.
+
+use nr_ssb::front_end::FrontEnd;
+use nr_ssb::search::{DetectedSsb, SearchConfig, SearchError, Searcher};
+use nr_ssb::{Complex32, Pci, SubcarrierSpacing};
+
+use onboard::receive::SSB_SAMPLES;
+use super::array_view::{ArraySetup, ArrayView, View, array_view};
+use super::diagnosis::ExchangeVotes;
+use super::iq_source::first_not_finite;
+use super::error::ScanError;
+use crate::error::RecordingError;
+
+/// Searched at once, in seconds.
+pub(super) const BLOCK_S: f64 = 0.02;
+/// Probability that 20 ms of noise make a cell.
+pub(super) const FALSE_ALARM: f64 = 1e-3;
+
+/// What is searched, and for what.
+#[derive(Debug, Clone, PartialEq)]
+pub struct SsbSearchConfig {
+    /// What errors call the samples.
+    pub name: String,
+    /// Samples per second and antenna, an integer multiple of 3.84 MHz.
+    pub sample_rate_hz: f64,
+    /// Frequency in Hz that stands at 0 Hz in the samples.
+    pub centre_frequency_hz: f64,
+    /// Number of antennas.
+    pub antennas: usize,
+    /// Frequency of the SSB's centre in Hz.
+    pub ssb_freq_hz: f64,
+    /// Whether the frequencies are those on the air, which sets the phase of each symbol (TS
+    /// 38.211, 5.4), or only their difference is known.
+    pub absolute: bool,
+    /// Subcarrier spacing of the SSB.
+    pub spacing: SubcarrierSpacing,
+    /// The receiving array, for angles.
+    pub array: ArraySetup,
+    /// Probability that 20 ms of noise make a cell.
+    pub false_alarm: f64,
+}
+
+impl SsbSearchConfig {
+    /// An SSB of known frequency and spacing in samples whose centre is known too.
+    pub fn new(
+        sample_rate_hz: f64,
+        centre_frequency_hz: f64,
+        ssb_freq_hz: f64,
+        spacing: SubcarrierSpacing,
+        antennas: usize,
+    ) -> Self {
+        Self {
+            name: "samples".to_owned(),
+            sample_rate_hz,
+            centre_frequency_hz,
+            antennas,
+            ssb_freq_hz,
+            absolute: true,
+            spacing,
+            array: ArraySetup::default(),
+            false_alarm: FALSE_ALARM,
+        }
+    }
+}
+
+/// One SSB of a recording.
+#[derive(Debug, Clone, PartialEq)]
+pub struct FoundSsb {
+    /// Cell, index, payload, offset and strength.
+    pub ssb: DetectedSsb,
+    /// First sample of the SSB, its cyclic prefix included, at the recording's rate.
+    pub sample_start: f64,
+    /// Its length at the recording's rate.
+    pub sample_count: f64,
+    /// Frequency of its centre in Hz.
+    pub ssb_freq_hz: f64,
+    /// Its subcarrier spacing.
+    pub spacing: SubcarrierSpacing,
+    /// Angle of arrival, with two antennas and more.
+    pub angle: Option<aoa::AngleEstimate>,
+}
+
+/// A search that can be used for one recording after another.
+pub struct SsbSearch {
+    config: SsbSearchConfig,
+    /// Input samples per sample at the base rate.
+    ratio: f64,
+    /// None where the samples are at the base rate and centred already.
+    front_end: Option<FrontEnd>,
+    searcher: Searcher,
+    view: Option<Box<dyn ArrayView>>,
+    base: Vec<Vec<Complex32>>,
+    /// How the array sees the SSBs of one block.
+    seen: Vec<(Pci, f64, View)>,
+    votes: ExchangeVotes,
+    found: Vec<FoundSsb>,
+}
+
+impl SsbSearch {
+    /// Plans a search.
+    ///
+    /// # Errors
+    /// [`ScanError::FrontEnd`], [`ScanError::Search`] or [`ScanError::Array`] for what cannot be.
+    pub fn new(config: SsbSearchConfig) -> Result<Self, ScanError> {
+        let offset_hz = config.ssb_freq_hz - config.centre_frequency_hz;
+        let (rate_hz, spacing) = (config.sample_rate_hz, config.spacing);
+        let front_end = FrontEnd::new(rate_hz, offset_hz, spacing.hz(), config.antennas)
+            .map_err(|source| config.front_end_failed(source))?;
+        let search = SearchConfig {
+            ssb_freq_hz: config.absolute.then_some(config.ssb_freq_hz),
+            false_alarm: config.false_alarm,
+            ..SearchConfig::new(spacing, config.antennas)
+        };
+        let nothing_to_do = rate_hz == spacing.base_rate_hz() && offset_hz == 0.0;
+        Ok(Self {
+            ratio: front_end.input_per_output(),
+            front_end: (!nothing_to_do).then_some(front_end),
+            searcher: Searcher::new(search).map_err(|source| config.search_failed(source))?,
+            view: array_view(config.antennas, &config.array)?,
+            base: vec![Vec::new(); config.antennas],
+            seen: Vec::new(),
+            votes: ExchangeVotes::default(),
+            found: Vec::new(),
+            config,
+        })
+    }
+
+    /// What it was told.
+    pub const fn config(&self) -> &SsbSearchConfig {
+        &self.config
+    }
+
+    /// Every SSB of a recording, in order of time.
+    ///
+    /// # Errors
+    /// [`ScanError`] for another number of antennas, different lengths, less than one SSB, samples
+    /// that are not finite.
+    pub fn search(&mut self, antennas: &[&[Complex32]]) -> Result<&[FoundSsb], ScanError> {
+        let first = antennas.first().map_or(0, |samples| samples.len());
+        if let Some(other) = antennas.iter().find(|samples| samples.len() != first) {
+            let other = other.len();
+            return Err(self
+                .config
+                .search_failed(SearchError::UnequalLengths { first, other }));
+        }
+        if let Some((channel, sample)) = first_not_finite(antennas) {
+            let (file, sample) = (self.config.name.clone(), sample as u64);
+            return Err(RecordingError::NotFinite {
+                file,
+                sample,
+                channel,
+            }
+            .into());
+        }
+        self.begin(first as u64)?;
+        let block = self.block();
+        let mut start = 0;
+        while start < first {
+            let end = first.min(start + block);
+            let slices: Vec<&[Complex32]> = antennas
+                .iter()
+                .map(|samples| samples.get(start..end).unwrap_or_default())
+                .collect();
+            self.push(&slices, end == first)?;
+            start = end;
+        }
+        Ok(&self.found)
+    }
+
+    /// Samples of each antenna to be pushed at once.
+    pub(super) fn block(&self) -> usize {
+        ((BLOCK_S * self.config.sample_rate_hz) as usize).max(1)
+    }
+
+    /// Forgets the last recording; the next one has `length` samples.
+    pub(super) fn begin(&mut self, length: u64) -> Result<(), ScanError> {
+        self.searcher.reset();
+        self.found.clear();
+        self.votes = ExchangeVotes::default();
+        let (samples, needed) = ((length as f64 / self.ratio) as usize, SSB_SAMPLES);
+        if samples < needed {
+            return Err(self
+                .config
+                .search_failed(SearchError::TooShort { samples, needed }));
+        }
+        Ok(())
+    }
+
+    /// Takes the next block of a recording.
+    pub(super) fn push(&mut self, antennas: &[&[Complex32]], last: bool) -> Result<(), ScanError> {
+        let Self {
+            config,
+            front_end,
+            searcher,
+            view,
+            base,
+            seen,
+            votes,
+            ..
+        } = self;
+        let at_base_rate: Vec<&[Complex32]>;
+        let samples = if let Some(front_end) = front_end {
+            base.iter_mut().for_each(Vec::clear);
+            front_end
+                .push(antennas, base)
+                .map_err(|source| config.front_end_failed(source))?;
+            if last {
+                front_end.finish(base);
+            }
+            at_base_rate = base.iter().map(Vec::as_slice).collect();
+            &at_base_rate
+        } else {
+            antennas
+        };
+        seen.clear();
+        let found = searcher
+            .push_with(samples, &mut |ssb, received| {
+                if let Some(view) = view.as_ref().and_then(|view| view.view(received)) {
+                    votes.vote(&view);
+                    seen.push((ssb.pci, ssb.sample_start, view));
+                }
+            })
+            .map_err(|source| config.search_failed(source))?;
+        let ratio = self.ratio;
+        self.found.extend(found.iter().map(|ssb| {
+            let same =
+                |(pci, start, _): &&(Pci, f64, View)| *pci == ssb.pci && *start == ssb.sample_start;
+            FoundSsb {
+                sample_start: ssb.sample_start * ratio,
+                sample_count: SSB_SAMPLES as f64 * ratio,
+                ssb_freq_hz: config.ssb_freq_hz,
+                spacing: config.spacing,
+                angle: seen.iter().find(same).map(|(.., view)| view.estimate),
+                ssb: ssb.clone(),
+            }
+        }));
+        Ok(())
+    }
+
+    /// The SSBs of this recording so far, in order of time.
+    pub(super) fn found(&self) -> &[FoundSsb] {
+        &self.found
+    }
+
+    /// What they say of exchanged channels.
+    pub(super) const fn votes(&self) -> &ExchangeVotes {
+        &self.votes
+    }
+}
+
+impl SsbSearchConfig {
+    fn front_end_failed(&self, source: nr_ssb::front_end::FrontEndError) -> ScanError {
+        let file = self.name.clone();
+        ScanError::FrontEnd { file, source }
+    }
+
+    fn search_failed(&self, source: SearchError) -> ScanError {
+        let file = self.name.clone();
+        ScanError::Search { file, source }
+    }
+}

@@ -1,0 +1,251 @@
+//! The `.sigmf-meta` file.
+
+use std::fs;
+use std::path::Path;
+
+use serde::{Deserialize, Serialize};
+use serde_json::{Map, Value};
+
+use crate::error::RecordingError;
+
+/// Most channels a recording may have.
+const MAX_CHANNELS: usize = 1024;
+/// SigMF's own limit, in Hz.
+const MAX_SAMPLE_RATE_HZ: f64 = 1e12;
+
+/// The whole file.
+#[derive(Debug, Clone, PartialEq, Serialize, Deserialize)]
+pub struct Metadata {
+    /// What holds for all samples.
+    pub global: Global,
+    /// Stretches of samples with one set of receiver settings, by `sample_start`.
+    #[serde(default)]
+    pub captures: Vec<Capture>,
+    /// What is known of single stretches, by `sample_start`.
+    #[serde(default)]
+    pub annotations: Vec<Annotation>,
+}
+
+/// `global`
+#[derive(Debug, Clone, PartialEq, Serialize, Deserialize)]
+pub struct Global {
+    /// Format of a sample, as `cf32_le`.
+    #[serde(rename = "core:datatype")]
+    pub datatype: String,
+    /// Samples per second and channel.
+    #[serde(rename = "core:sample_rate")]
+    pub sample_rate_hz: f64,
+    /// Version of SigMF.
+    #[serde(
+        rename = "core:version",
+        default,
+        skip_serializing_if = "Option::is_none"
+    )]
+    pub version: Option<String>,
+    /// Number of channels, interleaved sample by sample.
+    #[serde(rename = "core:num_channels", default = "one")]
+    pub channels: usize,
+    /// SHA-512 of the data file, hexadecimal.
+    #[serde(
+        rename = "core:sha512",
+        default,
+        skip_serializing_if = "Option::is_none"
+    )]
+    pub sha512: Option<String>,
+    /// What it is, for people.
+    #[serde(
+        rename = "core:description",
+        default,
+        skip_serializing_if = "Option::is_none"
+    )]
+    pub description: Option<String>,
+    /// Everything else.
+    #[serde(flatten)]
+    pub other: Map<String, Value>,
+}
+
+const fn one() -> usize {
+    1
+}
+
+/// One of `captures`.
+#[derive(Debug, Clone, Default, PartialEq, Serialize, Deserialize)]
+pub struct Capture {
+    /// Its first sample.
+    #[serde(rename = "core:sample_start")]
+    pub sample_start: u64,
+    /// Centre frequency in Hz.
+    #[serde(
+        rename = "core:frequency",
+        default,
+        skip_serializing_if = "Option::is_none"
+    )]
+    pub frequency_hz: Option<f64>,
+    /// Everything else.
+    #[serde(flatten)]
+    pub other: Map<String, Value>,
+}
+
+/// One of `annotations`.
+#[derive(Debug, Clone, Default, PartialEq, Serialize, Deserialize)]
+pub struct Annotation {
+    /// Its first sample.
+    #[serde(rename = "core:sample_start")]
+    pub sample_start: u64,
+    /// Number of samples; to the end of the capture where it is not said.
+    #[serde(
+        rename = "core:sample_count",
+        default,
+        skip_serializing_if = "Option::is_none"
+    )]
+    pub sample_count: Option<u64>,
+    /// Lower edge of its band in Hz.
+    #[serde(
+        rename = "core:freq_lower_edge",
+        default,
+        skip_serializing_if = "Option::is_none"
+    )]
+    pub freq_lower_edge_hz: Option<f64>,
+    /// Upper edge of its band in Hz.
+    #[serde(
+        rename = "core:freq_upper_edge",
+        default,
+        skip_serializing_if = "Option::is_none"
+    )]
+    pub freq_upper_edge_hz: Option<f64>,
+    /// What it is, in a few words.
+    #[serde(
+        rename = "core:label",
+        default,
+        skip_serializing_if = "Option::is_none"
+    )]
+    pub label: Option<String>,
+    /// Everything else: `nr:ssb`, `aoa:truth`.
+    #[serde(flatten)]
+    pub other: Map<String, Value>,
+}
+
+impl Metadata {
+    /// Reads and checks a `.sigmf-meta` file.
+    ///
+    /// # Errors
+    /// [`RecordingError`] naming the key where one is missing, of the wrong type or out of range.
+    pub fn read(file: &Path) -> Result<Self, RecordingError> {
+        let text = fs::read(file).map_err(|source| RecordingError::io(file, source))?;
+        Self::parse(&text, file)
+    }
+
+    pub(super) fn parse(text: &[u8], file: &Path) -> Result<Self, RecordingError> {
+        let json: Value = serde_json::from_slice(text).map_err(|error| RecordingError::Syntax {
+            file: file.display().to_string(),
+            format: "JSON",
+            message: error.to_string(),
+        })?;
+        let metadata: Self = serde_path_to_error::deserialize(json).map_err(|error| {
+            explain(file, &error.path().to_string(), &error.inner().to_string())
+        })?;
+        metadata.check(file)?;
+        Ok(metadata)
+    }
+
+    pub(super) fn check(&self, file: &Path) -> Result<(), RecordingError> {
+        let global = &self.global;
+        if !(global.sample_rate_hz > 0.0 && global.sample_rate_hz <= MAX_SAMPLE_RATE_HZ) {
+            let allowed = "it must be a positive number of hertz, at most 1e12";
+            return Err(RecordingError::value(
+                file,
+                "global.core:sample_rate",
+                global.sample_rate_hz,
+                allowed,
+            ));
+        }
+        if !(1..=MAX_CHANNELS).contains(&global.channels) {
+            let allowed = format!("it must be an integer from 1 to {MAX_CHANNELS}");
+            return Err(RecordingError::value(
+                file,
+                "global.core:num_channels",
+                global.channels,
+                allowed,
+            ));
+        }
+        let unsupported = [
+            (
+                "core:metadata_only",
+                "recordings without data have no samples to read",
+            ),
+            (
+                "core:dataset",
+                "only data in a .sigmf-data file of the same name is read",
+            ),
+            (
+                "core:trailing_bytes",
+                "only conforming data, without trailing bytes, is read",
+            ),
+        ];
+        for (key, allowed) in unsupported {
+            if let Some(value) = global.other.get(key).filter(|value| !is_nothing(value)) {
+                return Err(RecordingError::value(
+                    file,
+                    format!("global.{key}"),
+                    value,
+                    allowed,
+                ));
+            }
+        }
+        for (index, capture) in self.captures.iter().enumerate() {
+            let key = |name| format!("captures[{index}].{name}");
+            let header = capture.other.get("core:header_bytes");
+            if let Some(value) = header.filter(|value| !is_nothing(value)) {
+                let allowed = "only conforming data, without header bytes, is read";
+                return Err(RecordingError::value(
+                    file,
+                    key("core:header_bytes"),
+                    value,
+                    allowed,
+                ));
+            }
+            let before = index
+                .checked_sub(1)
+                .and_then(|before| self.captures.get(before));
+            if before.is_some_and(|before| before.sample_start > capture.sample_start) {
+                let allowed = "captures must be in order of their first sample";
+                return Err(RecordingError::value(
+                    file,
+                    key("core:sample_start"),
+                    capture.sample_start,
+                    allowed,
+                ));
+            }
+        }
+        Ok(())
+    }
+}
+
+fn is_nothing(value: &Value) -> bool {
+    matches!(value, Value::Null | Value::Bool(false)) || value.as_u64() == Some(0)
+}
+
+/// serde says what it expected in words; put them into the error's fields.
+fn explain(file: &Path, path: &str, message: &str) -> RecordingError {
+    let at = |name: &str| match path {
+        "." | "" => name.to_owned(),
+        path => format!("{path}.{name}"),
+    };
+    if let Some(name) = message
+        .strip_prefix("missing field `")
+        .and_then(|rest| rest.split('`').next())
+    {
+        return RecordingError::Missing {
+            file: file.display().to_string(),
+            key: at(name),
+            allowed: "SigMF metadata must state it".to_owned(),
+        };
+    }
+    // "invalid type: string "x", expected f64"
+    let (found, expected) = message
+        .split_once(", expected ")
+        .unwrap_or((message, "another type"));
+    let found = found.split_once(": ").map_or(found, |(_, found)| found);
+    let key = if path == "." { "(top level)" } else { path };
+    RecordingError::value(file, key, found, format!("it must be {expected}"))
+}

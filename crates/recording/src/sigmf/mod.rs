@@ -1,0 +1,25 @@
+//! SigMF: IQ samples in `NAME.sigmf-data`, interleaved across channels, and what they are in
+//! `NAME.sigmf-meta` (JSON). <https://sigmf.org>
+//!
+//! Read are `cf32_le` and `ci16_le`, in place and as much as is asked for, so that a recording may
+//! be larger than memory. Keys of extensions (`nr:ssb`, `aoa:truth`) stay JSON.
+//!
+//! ```no_run
+//! use recording::Recording;
+//! let mut recording = Recording::open("drive.sigmf-meta")?;
+//! let mut antennas = Vec::new();
+//! recording.read(0, 1024, &mut antennas)?;
+//! assert_eq!(antennas.len(), recording.channels());
+//! # Ok::<(), recording::RecordingError>(())
+//! ```
+
+mod checksum;
+mod metadata;
+mod reader;
+mod samples;
+mod writer;
+
+pub use metadata::{Annotation, Capture, Global, Metadata};
+pub use reader::{Recording, RecordingWarning};
+pub use samples::Datatype;
+pub use writer::{RecordingWriter, WriterSettings};
