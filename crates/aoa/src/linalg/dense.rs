@@ -1,7 +1,8 @@
 //! Small dense complex linear algebra, on the leading `n` by `n` block of a matrix of fixed capacity.
 
-use crate::Complex64;
-use crate::covariance::{Matrix, zeros};
+use num_complex::Complex64;
+
+use super::matrix::{Matrix, zeros};
 
 /// `a b`, of the leading blocks: `rows` by `inner` times `inner` by `columns`.
 pub(crate) fn product<const N: usize>(

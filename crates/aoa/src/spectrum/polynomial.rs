@@ -2,8 +2,10 @@
 
 use std::f64::consts::{PI, TAU};
 
-use crate::Complex64;
-use crate::covariance::Matrix;
+use num_complex::Complex64;
+
+use super::side_by_side::Spectra;
+use crate::linalg::matrix::Matrix;
 
 /// Newton from a grid of eight points per antenna doubles its digits at each step.
 const NEWTON_STEPS: usize = 6;
@@ -65,6 +67,16 @@ impl<const N: usize> Spectrum<N> {
             power *= rotation;
         }
         (2.0 * f, 2.0 * df, 2.0 * ddf)
+    }
+
+    /// The electrical angle at which `f` is largest, and that value.
+    pub(crate) fn maximum(&self) -> (f64, f64) {
+        let peaks = Spectra::<N, 1> {
+            re: self.lags.map(|lag| [lag.re]),
+            im: self.lags.map(|lag| [lag.im]),
+        }
+        .maxima::<false>();
+        (peaks.phase_rad[0], peaks.value[0])
     }
 
     /// The local maximum within `reach` of `start`, by Newton's method, in (-pi, pi].

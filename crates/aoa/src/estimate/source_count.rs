@@ -1,7 +1,8 @@
 //! How many sources? Information criteria on the eigenvalues (Wax and Kailath 1985).
 
-use crate::eigen::hermitian_eigen;
-use crate::{Covariance, Error};
+use crate::covariance::sample::Covariance;
+use crate::error::Error;
+use crate::linalg::eigen::hermitian_eigen;
 
 /// What a source must add to the likelihood to be counted.
 #[derive(Debug, Clone, Copy, PartialEq, Eq)]

@@ -1,13 +1,13 @@
-//! The inner loops over samples: portable, and for the vector instructions that a processor may have.
-
-mod portable;
-#[cfg(target_arch = "x86_64")]
-mod x86;
+//! The sample types, and for each the kernels that fit the processor.
 
 use num_complex::Complex;
 
-use crate::covariance::Matrix;
-use crate::peak::Spectra;
+use super::portable;
+#[cfg(target_arch = "x86_64")]
+use super::x86;
+use crate::linalg::matrix::Matrix;
+use crate::simd::instructions::dispatch;
+use crate::spectrum::side_by_side::Spectra;
 
 /// A real sample type: `f32` or `f64`.
 pub trait Real: sealed::Kernel + Into<f64> + Send + Sync + 'static {}
@@ -32,58 +32,6 @@ mod sealed {
         );
     }
 }
-
-/// What the processor can do, beyond the baseline.
-#[derive(Debug, Clone, Copy, PartialEq, Eq)]
-pub(crate) enum Instructions {
-    /// The baseline of the architecture.
-    Baseline,
-    /// AVX2 and FMA.
-    #[cfg(target_arch = "x86_64")]
-    Avx2,
-    /// AVX2, FMA and AVX-512 F.
-    #[cfg(target_arch = "x86_64")]
-    Avx512,
-}
-
-#[cfg(target_arch = "x86_64")]
-impl Instructions {
-    #[inline]
-    pub(crate) fn available() -> Self {
-        if !(std::is_x86_feature_detected!("avx2") && std::is_x86_feature_detected!("fma")) {
-            Self::Baseline
-        } else if std::is_x86_feature_detected!("avx512f") {
-            Self::Avx512
-        } else {
-            Self::Avx2
-        }
-    }
-}
-
-#[cfg(not(target_arch = "x86_64"))]
-impl Instructions {
-    pub(crate) const fn available() -> Self {
-        Self::Baseline
-    }
-}
-
-/// Calls the variant of a function that fits the processor.
-macro_rules! dispatch {
-    ($baseline:expr, $avx2:expr, $avx512:expr) => {
-        match $crate::kernel::Instructions::available() {
-            $crate::kernel::Instructions::Baseline => $baseline,
-            // SAFETY: the processor has the features that the function is compiled for.
-            #[cfg(target_arch = "x86_64")]
-            #[allow(unsafe_code)]
-            $crate::kernel::Instructions::Avx2 => unsafe { $avx2 },
-            // SAFETY: as above.
-            #[cfg(target_arch = "x86_64")]
-            #[allow(unsafe_code)]
-            $crate::kernel::Instructions::Avx512 => unsafe { $avx512 },
-        }
-    };
-}
-pub(crate) use dispatch;
 
 macro_rules! kernel {
     ($real:ident, $avx2:ident, $avx512:ident) => {

@@ -1,17 +1,11 @@
-//! The sample covariance and its averages.
+//! The sample covariance.
 
-use num_complex::Complex;
+use num_complex::{Complex, Complex64};
 
-use crate::kernel::Real;
-use crate::spectrum::Spectrum;
-use crate::{Array, Complex64, Error};
-
-/// A Hermitian matrix, row-major.
-pub type Matrix<const N: usize> = [[Complex64; N]; N];
-
-pub(crate) const fn zeros<const N: usize>() -> Matrix<N> {
-    [[Complex64::ZERO; N]; N]
-}
+use crate::error::Error;
+use crate::kernel::real::Real;
+use crate::linalg::matrix::{Matrix, zeros};
+use crate::spectrum::polynomial::Spectrum;
 
 /// Covariance `R = sum_t w_t x_t x_t^H / sum_t w_t` of the antennas, and how many snapshots it
 /// stands for.
@@ -23,9 +17,9 @@ pub(crate) const fn zeros<const N: usize>() -> Matrix<N> {
 /// [`reset`](Covariance::reset).
 #[derive(Debug, Clone, Copy, PartialEq)]
 pub struct Covariance<const N: usize> {
-    sum: Matrix<N>,
-    weight: f64,
-    snapshots: usize,
+    pub(super) sum: Matrix<N>,
+    pub(super) weight: f64,
+    pub(super) snapshots: usize,
 }
 
 impl<const N: usize> Covariance<N> {
@@ -150,58 +144,6 @@ impl<const N: usize> Covariance<N> {
 
     fn trace(&self) -> f64 {
         (0..N).map(|n| self.sum[n][n].re).sum()
-    }
-
-    /// The covariance that ideal channels would have measured: entry (i, j) divided by
-    /// `g_i conj(g_j)`. [`estimate`](crate::estimate) does this by itself.
-    #[must_use]
-    pub fn calibrated(&self, array: &Array<N>) -> Self {
-        if array.is_ideal() {
-            return *self;
-        }
-        let inverse = array.calibration().gains().map(|gain| gain.inv());
-        let mut result = *self;
-        for (i, row) in result.sum.iter_mut().enumerate() {
-            for (j, entry) in row.iter_mut().enumerate() {
-                *entry *= inverse[i] * inverse[j].conj();
-            }
-        }
-        result
-    }
-
-    /// Forward–backward average `(R + J conj(R) J) / 2`, `J` reversing the antennas: two coherent
-    /// sources become two. Only meaningful for ideal (or [`calibrated`](Self::calibrated)) channels.
-    #[must_use]
-    pub fn forward_backward(&self) -> Self {
-        let mut result = *self;
-        for i in 0..N {
-            for j in 0..N {
-                result.sum[i][j] = (self.sum[i][j] + self.sum[N - 1 - i][N - 1 - j].conj()) * 0.5;
-            }
-        }
-        result
-    }
-
-    /// Average over the `N - M + 1` subarrays of `M` antennas: decorrelates coherent sources (Shan,
-    /// Wax and Kailath 1985). Estimate with [`Array::subarray`]. Only meaningful for ideal (or
-    /// [`calibrated`](Self::calibrated)) channels.
-    #[must_use]
-    pub fn spatially_smoothed<const M: usize>(&self) -> Covariance<M> {
-        const { assert!(M >= 2 && M <= N, "a subarray has 2 to N antennas") };
-        let mut sum = zeros::<M>();
-        let scale = 1.0 / (N - M + 1) as f64;
-        for first in 0..=N - M {
-            for i in 0..M {
-                for j in 0..M {
-                    sum[i][j] += self.sum[first + i][first + j] * scale;
-                }
-            }
-        }
-        Covariance {
-            sum,
-            weight: self.weight,
-            snapshots: self.snapshots,
-        }
     }
 
     /// Fails unless the covariance is fit for estimation.

@@ -3,11 +3,11 @@
 
 use std::f64::consts::TAU;
 
-use crate::Complex64;
-use crate::array::aperture;
+use num_complex::Complex64;
+
+use crate::array::steering::aperture;
 use crate::list::List;
-use crate::maximum_likelihood::maximum;
-use crate::spectrum::Spectrum;
+use crate::spectrum::polynomial::Spectrum;
 
 const ITERATIONS: usize = 60;
 
@@ -34,7 +34,7 @@ pub(crate) fn phase<const N: usize>(signal: &Spectrum<N>) -> f64 {
     null.lags[0] += N as f64;
     // Without noise one root is on the circle at the source, the others lie about half way in,
     // between the zeros of the array's pattern; noise moves them little.
-    let (peak, height) = maximum(signal);
+    let (peak, height) = signal.maximum();
     let depth = ((N as f64 - height).max(0.0) / aperture::<N>()).sqrt();
     let mut start = [Complex64::ZERO; N];
     start[0] = Complex64::from_polar(1.0 - depth.min(0.5), peak);

@@ -1,108 +1,32 @@
-//! MUSIC (Schmidt 1986): the directions whose steering vectors are nearest to the signal subspace.
+//! A spectrum at the points of a grid.
 //!
 //! The grid is uniform in the electrical angle, where the array resolves equally well everywhere, and
 //! has the asked-for step at broadside.
 
 use std::f64::consts::{PI, TAU};
 
-use crate::eigen::{HermitianEigen, principal_eigenvector};
-use crate::kernel::dispatch;
-use crate::list::List;
-use crate::math::times_plus;
-use crate::spectrum::Spectrum;
-use crate::{Array, Complex64, Covariance};
+use num_complex::Complex64;
+
+use super::polynomial::Spectrum;
+use crate::simd::instructions::dispatch;
+use crate::simd::math::times_plus;
 
 /// Grid points that are computed side by side.
 const LANES: usize = 64;
 
-/// The signal subspace's spectrum `a^H E_s E_s^H a`. It is N minus the null spectrum, so its largest
-/// local maxima are MUSIC's peaks.
-pub(crate) fn signal_spectrum<const N: usize>(
-    eigen: &HermitianEigen<N>,
-    sources: usize,
-) -> Spectrum<N> {
-    Spectrum::of_subspace(&eigen.vectors[..sources])
-}
-
-/// The null spectrum `a^H E_n E_n^H a`, from the noise subspace itself: near its zeros, N minus the
-/// signal spectrum would lose digits.
-pub(crate) fn null_spectrum<const N: usize>(
-    eigen: &HermitianEigen<N>,
-    sources: usize,
-) -> Spectrum<N> {
-    Spectrum::of_subspace(&eigen.vectors[sources..])
-}
-
-/// The signal spectrum of one source, from the principal eigenvector alone.
-pub(crate) fn signal_spectrum_of_one<const N: usize>(covariance: &Covariance<N>) -> Spectrum<N> {
-    Spectrum::of_subspace(&[principal_eigenvector(covariance.unscaled()).1])
-}
-
-/// The electrical angle of the highest point of the grid, refined if asked.
-pub(crate) fn phase<const N: usize>(
-    spectrum: &Spectrum<N>,
-    array: &Array<N>,
-    grid_rad: f64,
-    refine: bool,
-) -> f64 {
-    let grid = Grid::new(array, grid_rad);
-    let phase = grid.phase(grid.highest_point(spectrum));
-    if refine {
-        spectrum.refined_maximum(phase, grid.step)
-    } else {
-        phase
-    }
-}
-
-/// The electrical angles of the `sources` highest peaks; fewer if the spectrum has fewer.
-pub(crate) fn phases<const N: usize>(
-    spectrum: &Spectrum<N>,
-    sources: usize,
-    array: &Array<N>,
-    grid_rad: f64,
-    refine: bool,
-) -> List<f64, N> {
-    let grid = Grid::new(array, grid_rad);
-    let mut peaks = [(f64::NEG_INFINITY, 0.0); N];
-    let mut before = spectrum.value(grid.phase(grid.points - 1));
-    let mut here = f64::NEG_INFINITY;
-    let mut consider = |point: usize, after: f64| {
-        if here >= before && here > after && here > peaks[sources - 1].0 {
-            peaks[sources - 1] = (here, grid.phase(point));
-            peaks[..sources].sort_unstable_by(|a, b| b.0.total_cmp(&a.0));
-        }
-        (before, here) = (here, after);
-    };
-    let mut blocks = grid.blocks();
-    while let Some(first) = blocks.first {
-        let values = blocks.next_values::<false, N>(spectrum);
-        for (lane, value) in values.iter().enumerate().take(grid.points - first) {
-            consider((first + lane).wrapping_sub(1), *value);
-        }
-    }
-    consider(grid.points - 1, spectrum.value(grid.phase(0)));
-    let found = peaks[..sources].iter().filter(|peak| peak.0.is_finite());
-    let settle = |phase| {
-        if refine {
-            spectrum.refined_maximum(phase, grid.step)
-        } else {
-            phase
-        }
-    };
-    List::collect(0.0, found.map(|peak| settle(peak.1)))
-}
-
 /// A uniform grid of electrical angles on the whole circle.
-struct Grid {
-    points: usize,
-    step: f64,
+pub(crate) struct Grid {
+    pub(crate) points: usize,
+    pub(crate) step: f64,
 }
 
 impl Grid {
-    fn new<const N: usize>(array: &Array<N>, grid_rad: f64) -> Self {
+    /// A grid with steps of `grid_rad` of the angle at broadside, for an array whose electrical angle
+    /// at end-fire is `end_fire_rad`.
+    pub(crate) fn new<const N: usize>(end_fire_rad: f64, grid_rad: f64) -> Self {
         // At broadside, a step of the angle is end_fire times that of the electrical angle. The
         // array's own resolution sets the coarsest useful grid.
-        let points = (TAU / (array.phase_at_end_fire_rad() * grid_rad)).ceil();
+        let points = (TAU / (end_fire_rad * grid_rad)).ceil();
         let points = points.max(8.0 * N as f64);
         Self {
             points: points as usize,
@@ -110,11 +34,13 @@ impl Grid {
         }
     }
 
-    fn phase(&self, point: usize) -> f64 {
+    /// The electrical angle of a point.
+    pub(crate) fn phase(&self, point: usize) -> f64 {
         self.step * point as f64 - PI
     }
 
-    fn blocks(&self) -> Blocks<'_> {
+    /// All its points, in order.
+    pub(crate) fn blocks(&self) -> Blocks<'_> {
         // z = exp(-j omega) of the first block, by doubling.
         let (mut re, mut im) = ([0.0; LANES], [0.0; LANES]);
         Complex64 {
@@ -144,7 +70,7 @@ impl Grid {
     }
 
     /// The point of the grid where the spectrum is largest.
-    fn highest_point<const N: usize>(&self, spectrum: &Spectrum<N>) -> usize {
+    pub(crate) fn highest_point<const N: usize>(&self, spectrum: &Spectrum<N>) -> usize {
         dispatch!(
             self.highest_point_generic::<false, N>(spectrum),
             self.highest_point_avx2(spectrum),
@@ -192,10 +118,10 @@ impl Grid {
 }
 
 /// The grid, block by block.
-struct Blocks<'a> {
+pub(crate) struct Blocks<'a> {
     grid: &'a Grid,
     /// First point of the next block; `None` after the last.
-    first: Option<usize>,
+    pub(crate) first: Option<usize>,
     re: [f64; LANES],
     im: [f64; LANES],
     /// From block to block.
@@ -205,7 +131,7 @@ struct Blocks<'a> {
 impl Blocks<'_> {
     /// The spectrum at the points of the next block.
     #[inline(always)]
-    fn next_values<const FUSED: bool, const N: usize>(
+    pub(crate) fn next_values<const FUSED: bool, const N: usize>(
         &mut self,
         spectrum: &Spectrum<N>,
     ) -> [f64; LANES] {

@@ -6,7 +6,7 @@
 
 use std::f64::consts::{FRAC_PI_2, PI, TAU};
 
-use crate::math::times_plus;
+use crate::simd::math::times_plus;
 
 /// Points of the finest search grid on the circle.
 const CIRCLE: usize = 64;

@@ -6,26 +6,20 @@
 
 use num_complex::Complex;
 
-use crate::array::aperture;
-use crate::estimate::{AngleEstimate, Reason, direction, geometric_doubt};
-use crate::kernel::{Real, dispatch};
-use crate::math::{log10, times_plus};
-use crate::peak::Spectra;
-use crate::spectrum::Spectrum;
-use crate::{Array, Error, Verdict, bound};
+use crate::array::linear::Array;
+use crate::array::steering::aperture;
+use crate::bound;
+use crate::error::Error;
+use crate::kernel::real::Real;
+use crate::result::angle::AngleEstimate;
+use crate::result::direction::{direction, geometric_doubt};
+use crate::result::verdict::{Reason, Verdict};
+use crate::simd::instructions::dispatch;
+use crate::simd::math::{log10, times_plus};
+use crate::spectrum::side_by_side::Spectra;
 
 /// Items of a batch that are searched side by side.
 pub(crate) const BLOCK: usize = 64;
-
-/// Electrical angle at which `a^H M a` is largest, and that value.
-pub(crate) fn maximum<const N: usize>(spectrum: &Spectrum<N>) -> (f64, f64) {
-    let peaks = Spectra::<N, 1> {
-        re: spectrum.lags.map(|lag| [lag.re]),
-        im: spectrum.lags.map(|lag| [lag.im]),
-    }
-    .maxima::<false>();
-    (peaks.phase_rad[0], peaks.value[0])
-}
 
 /// Linear SNR per antenna and snapshot, from the power in the direction of the source,
 /// `a^H R a / N`, and the noise variance. Rounding bounds it at both ends: snapshots without noise

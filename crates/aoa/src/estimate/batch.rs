@@ -2,11 +2,16 @@
 
 use num_complex::Complex;
 
-use crate::kernel::Real;
-use crate::{
-    AngleEstimate, Array, Calibration, Covariance, Error, Method, estimate, estimate_several,
-    maximum_likelihood,
-};
+use super::choice::Method;
+use super::one::estimate;
+use super::several::estimate_several;
+use crate::array::calibration::Calibration;
+use crate::array::linear::Array;
+use crate::covariance::sample::Covariance;
+use crate::error::Error;
+use crate::kernel::real::Real;
+use crate::method::maximum_likelihood;
+use crate::result::angle::AngleEstimate;
 
 /// Samples of many estimates: items of `N` channels of `snapshots` samples each, row-major
 /// `(items, N, snapshots)`.

@@ -1,8 +1,9 @@
 //! Eigenvalues of the small matrices of this field. For four antennas a general library spends its
 //! time on generality; these are the textbook methods on arrays of known size.
 
-use crate::Complex64;
-use crate::covariance::{Matrix, zeros};
+use num_complex::Complex64;
+
+use super::matrix::{Matrix, zeros};
 
 /// A cyclic Jacobi sweep converges quadratically; ten are never needed for N <= 16.
 const SWEEPS: usize = 12;

@@ -1,8 +1,15 @@
 //! One source with known pilots: the entry for despread snapshots.
 
-use crate::estimate::{AngleEstimate, Reason, describe};
-use crate::maximum_likelihood;
-use crate::{Array, Complex64, Covariance, Error, bound};
+use num_complex::Complex64;
+
+use crate::array::linear::Array;
+use crate::bound;
+use crate::covariance::sample::Covariance;
+use crate::error::Error;
+use crate::method::maximum_likelihood;
+use crate::result::angle::AngleEstimate;
+use crate::result::direction::describe;
+use crate::result::verdict::Reason;
 
 /// Maximum likelihood angle from despread pilots.
 ///
@@ -29,7 +36,7 @@ pub fn maximum_likelihood_pilots<const N: usize>(
         .calibrated(array)
         .validated()?;
     let spectrum = covariance.spectrum();
-    let (phase_rad, value) = maximum_likelihood::maximum(&spectrum);
+    let (phase_rad, value) = spectrum.maximum();
     let beam = value / N as f64;
     let noise = match noise_variance {
         Some(value) if value.is_finite() && value > 0.0 => value * covariance.weight(),

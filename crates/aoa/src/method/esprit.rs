@@ -1,9 +1,10 @@
 //! ESPRIT (Roy and Kailath 1989): the rotation between the subspaces of two overlapping subarrays.
 
-use crate::Complex64;
-use crate::covariance::{Matrix, zeros};
-use crate::eigen::{HermitianEigen, general_eigenvalues, hermitian_eigen};
-use crate::linear::{inverse, product};
+use num_complex::Complex64;
+
+use crate::linalg::dense::{inverse, product};
+use crate::linalg::eigen::{HermitianEigen, general_eigenvalues, hermitian_eigen};
+use crate::linalg::matrix::{Matrix, zeros};
 use crate::list::List;
 
 /// Standard deviation over the Cramér–Rao bound, one source and high SNR:

@@ -1,32 +1,15 @@
-//! Gain and phase of the receive channels.
+//! The gains of the receive channels, from a source in a known direction.
 
-use crate::array::steering_vector;
-use crate::eigen::principal_eigenvector;
-use crate::{Array, Complex64, Covariance, Error};
+use num_complex::Complex64;
 
-/// One complex gain per channel. Estimators divide what channel `n` received by gain `n`.
-#[derive(Debug, Clone, Copy, PartialEq)]
-pub struct Calibration<const N: usize> {
-    gains: [Complex64; N],
-}
+use crate::array::calibration::Calibration;
+use crate::array::linear::Array;
+use crate::array::steering::steering_vector;
+use crate::covariance::sample::Covariance;
+use crate::error::Error;
+use crate::linalg::eigen::principal_eigenvector;
 
 impl<const N: usize> Calibration<N> {
-    /// Ideal channels.
-    pub const IDENTITY: Self = Self {
-        gains: [Complex64::ONE; N],
-    };
-
-    /// Channels with these gains.
-    ///
-    /// # Errors
-    /// [`Error::CalibrationGain`] if a gain is zero or not finite.
-    pub fn new(gains: [Complex64; N]) -> Result<Self, Error> {
-        match gains.iter().position(|gain| !gain.norm_sqr().is_normal()) {
-            Some(channel) => Err(Error::CalibrationGain(channel)),
-            None => Ok(Self { gains }),
-        }
-    }
-
     /// Estimates the gains from snapshots of one source in a known direction.
     ///
     /// The principal eigenvector of the covariance is the array's response to the source; divided
@@ -64,21 +47,5 @@ impl<const N: usize> Calibration<N> {
         Self::new(std::array::from_fn(|n| {
             response[n] * steering[n].conj() * common
         }))
-    }
-
-    /// The gains, one per channel.
-    pub const fn gains(&self) -> &[Complex64; N] {
-        &self.gains
-    }
-
-    /// A snapshot as ideal channels would have received it.
-    pub fn apply(&self, snapshot: &[Complex64; N]) -> [Complex64; N] {
-        std::array::from_fn(|n| snapshot[n] / self.gains[n])
-    }
-}
-
-impl<const N: usize> Default for Calibration<N> {
-    fn default() -> Self {
-        Self::IDENTITY
     }
 }
