@@ -1,16 +1,14 @@
-//! What a search is told, and what makes it impossible.
+//! What a search is told.
 
-use crate::numerology::{Lmax, SubcarrierSpacing};
-
-/// Largest number of antennas.
-pub const MAX_ANTENNAS: usize = 16;
+use super::error::SearchError;
+use crate::standard::numerology::{Lmax, SubcarrierSpacing};
 
 /// What a search is told.
 #[derive(Debug, Clone, PartialEq)]
 pub struct SearchConfig {
     /// Subcarrier spacing of the SSB.
     pub spacing: SubcarrierSpacing,
-    /// Number of antennas, 1 to [`MAX_ANTENNAS`].
+    /// Number of antennas, 1 to [`MAX_ANTENNAS`](super::MAX_ANTENNAS).
     pub antennas: usize,
     /// Absolute frequency of the SSB's centre, Hz. Without it the frequency offset comes from
     /// inside the symbols only (TS 38.211 §5.4 hides the rest) and is an order less precise. Zero
@@ -38,49 +36,7 @@ impl SearchConfig {
     }
 }
 
-/// What makes a search impossible.
-#[derive(Debug, Clone, PartialEq, thiserror::Error)]
-#[non_exhaustive]
-pub enum SearchError {
-    /// No antenna, or more than [`MAX_ANTENNAS`].
-    #[error("{0} antennas: 1 to {MAX_ANTENNAS} are possible")]
-    Antennas(usize),
-    /// A setting outside its range.
-    #[error("{name} = {value}: {allowed}")]
-    Setting {
-        /// Which setting.
-        name: &'static str,
-        /// Its value.
-        value: f64,
-        /// What it may be.
-        allowed: &'static str,
-    },
-    /// The number of channels passed differs from that announced.
-    #[error("{given} channels given, {expected} expected")]
-    AntennaCount {
-        /// Channels passed.
-        given: usize,
-        /// Channels announced.
-        expected: usize,
-    },
-    /// Channels of different lengths.
-    #[error("channels hold different numbers of samples: {first} and {other}")]
-    UnequalLengths {
-        /// Length of channel 0.
-        first: usize,
-        /// A length that differs.
-        other: usize,
-    },
-    /// Less than one SSB.
-    #[error("{samples} samples are less than the {needed} of one SSB")]
-    TooShort {
-        /// Length of the recording at the base rate.
-        samples: usize,
-        /// Length of one SSB.
-        needed: usize,
-    },
-}
-
+/// Whether an SSB can be at this frequency.
 pub(super) fn check_frequency(ssb_freq_hz: Option<f64>) -> Result<(), SearchError> {
     match ssb_freq_hz {
         Some(value) if !value.is_finite() => Err(SearchError::Setting {

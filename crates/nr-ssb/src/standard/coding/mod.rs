@@ -1,0 +1,5 @@
+//! Channel coding of the PBCH.
+
+pub mod crc;
+pub mod polar;
+pub mod rate_matching;

@@ -1,0 +1,151 @@
+//! Resource elements of one SSB (TS 38.211 §7.4.3.1).
+//!
+//! Subcarriers k = 0…239 (k = 120 at the SSB's centre frequency) times symbols l = 0…3, flattened with
+//! k fastest: index k + 240·l. PBCH and its DM-RS share their places in every cell; v = PCI mod 4
+//! says which quarter of them is DM-RS.
+
+use std::ops::Range;
+
+use num_complex::Complex32;
+
+use super::pci::Pci;
+use super::sequence::dmrs::DMRS_LEN;
+use super::sequence::pss::SYNC_LEN;
+
+/// Subcarriers of an SSB.
+pub const SUBCARRIERS: usize = 240;
+/// OFDM symbols of an SSB.
+pub const SYMBOLS: usize = 4;
+/// Resource elements of the PBCH in one SSB, DM-RS not counted.
+pub const PBCH_LEN: usize = 432;
+
+/// Where PBCH and DM-RS lie.
+const PBCH_AREAS: [Range<usize>; 4] = [240..480, 480..528, 672..720, 720..960];
+
+const DMRS_INDICES: [[usize; DMRS_LEN]; 4] =
+    [pick(0, true), pick(1, true), pick(2, true), pick(3, true)];
+const PBCH_INDICES: [[usize; PBCH_LEN]; 4] = [
+    pick(0, false),
+    pick(1, false),
+    pick(2, false),
+    pick(3, false),
+];
+
+/// The elements of the PBCH areas that are (`dmrs`), or are not, k = `v` mod 4.
+const fn pick<const N: usize>(v: usize, dmrs: bool) -> [usize; N] {
+    let mut indices = [0; N];
+    let mut n = 0;
+    let mut area = 0;
+    while area < PBCH_AREAS.len() {
+        let mut index = PBCH_AREAS[area].start;
+        while index < PBCH_AREAS[area].end {
+            // 240 and the areas' borders are multiples of 4, so index mod 4 = k mod 4.
+            if (index % 4 == v) == dmrs {
+                indices[n] = index;
+                n += 1;
+            }
+            index += 1;
+        }
+        area += 1;
+    }
+    indices
+}
+
+/// Flat indices of the PSS: k = 56…182, l = 0.
+pub const fn pss_indices() -> Range<usize> {
+    56..56 + SYNC_LEN
+}
+
+/// Flat indices of the SSS: k = 56…182, l = 2.
+pub const fn sss_indices() -> Range<usize> {
+    let start = 2 * SUBCARRIERS + 56;
+    start..start + SYNC_LEN
+}
+
+/// Flat indices of the PBCH, in the order of its symbols.
+pub fn pbch_indices(pci: Pci) -> &'static [usize; PBCH_LEN] {
+    &PBCH_INDICES[usize::from(pci.get() % 4)]
+}
+
+/// Flat indices of the PBCH DM-RS, in the order of [`dmrs`](crate::dmrs::dmrs).
+pub fn dmrs_indices(pci: Pci) -> &'static [usize; DMRS_LEN] {
+    &DMRS_INDICES[usize::from(pci.get() % 4)]
+}
+
+/// The 960 resource elements of one SSB, k fastest.
+#[derive(Debug, Clone, PartialEq)]
+pub struct SsbGrid([Complex32; SUBCARRIERS * SYMBOLS]);
+
+impl SsbGrid {
+    /// A grid of zeros.
+    pub const fn zeros() -> Self {
+        Self([Complex32::ZERO; SUBCARRIERS * SYMBOLS])
+    }
+
+    /// All elements, index k + 240·l.
+    pub const fn elements(&self) -> &[Complex32; SUBCARRIERS * SYMBOLS] {
+        &self.0
+    }
+
+    /// All elements, to be changed.
+    pub const fn elements_mut(&mut self) -> &mut [Complex32; SUBCARRIERS * SYMBOLS] {
+        &mut self.0
+    }
+
+    /// The 240 subcarriers of each symbol, l = 0 to 3.
+    pub fn symbols(&self) -> impl ExactSizeIterator<Item = &[Complex32; SUBCARRIERS]> {
+        self.0.as_chunks().0.iter()
+    }
+
+    /// The 240 subcarriers of each symbol, to be changed.
+    pub fn symbols_mut(&mut self) -> impl ExactSizeIterator<Item = &mut [Complex32; SUBCARRIERS]> {
+        self.0.as_chunks_mut().0.iter_mut()
+    }
+
+    /// Write `values` to the elements that `indices` name, in order.
+    pub fn put(
+        &mut self,
+        indices: impl IntoIterator<Item = usize>,
+        values: impl IntoIterator<Item = Complex32>,
+    ) {
+        for (index, value) in indices.into_iter().zip(values) {
+            if let Some(element) = self.0.get_mut(index) {
+                *element = value;
+            }
+        }
+    }
+}
+
+impl Default for SsbGrid {
+    fn default() -> Self {
+        Self::zeros()
+    }
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    #[test]
+    fn signals_never_overlap_and_leave_only_the_guards() {
+        for pci in Pci::all().take(4) {
+            let mut uses = [0; SUBCARRIERS * SYMBOLS];
+            let all = pss_indices()
+                .chain(sss_indices())
+                .chain(*pbch_indices(pci))
+                .chain(*dmrs_indices(pci));
+            for index in all {
+                uses[index] += 1;
+            }
+            for (index, count) in uses.into_iter().enumerate() {
+                let (k, l) = (index % SUBCARRIERS, index / SUBCARRIERS);
+                let guard = match l {
+                    0 => !(56..183).contains(&k),
+                    2 => (48..56).contains(&k) || (183..192).contains(&k),
+                    _ => false,
+                };
+                assert_eq!(count, i32::from(!guard), "k {k}, l {l}");
+            }
+        }
+    }
+}
