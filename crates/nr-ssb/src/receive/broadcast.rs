@@ -3,7 +3,6 @@
 use num_complex::Complex32;
 
 use super::acquire::{Acquired, Acquirer};
-use crate::search::SearchConfig;
 use crate::standard::coding::rate_matching::E;
 use crate::standard::grid::PBCH_LEN;
 use crate::standard::message::payload::BchPayload;
@@ -42,6 +41,9 @@ struct Undecoded {
 pub(crate) struct BroadcastDecoder {
     decoder: Decoder,
     llrs: [f32; E],
+    spacing: SubcarrierSpacing,
+    /// The burst set size, when told.
+    lmax: Option<Lmax>,
     /// Burst set sizes to try, the likelier first.
     sizes: Vec<Lmax>,
     undecoded: Vec<Undecoded>,
@@ -49,18 +51,27 @@ pub(crate) struct BroadcastDecoder {
 }
 
 impl BroadcastDecoder {
-    pub(crate) fn new(config: &SearchConfig) -> Self {
+    /// A decoder for SSBs of this spacing, `lmax` of them per burst set if that is known, at this
+    /// frequency if that is.
+    pub(crate) fn new(
+        spacing: SubcarrierSpacing,
+        lmax: Option<Lmax>,
+        ssb_freq_hz: Option<f64>,
+    ) -> Self {
         Self {
             decoder: Decoder::default(),
             llrs: [0.0; E],
-            sizes: burst_set_sizes(config),
+            spacing,
+            lmax,
+            sizes: burst_set_sizes(spacing, lmax, ssb_freq_hz),
             undecoded: Vec::with_capacity(KEPT),
-            half_frame_samples: 5e-3 * config.spacing.base_rate_hz(),
+            half_frame_samples: 5e-3 * spacing.base_rate_hz(),
         }
     }
 
-    pub(crate) fn tune(&mut self, config: &SearchConfig) {
-        self.sizes = burst_set_sizes(config);
+    /// Moves to an SSB at another frequency.
+    pub(crate) fn tune(&mut self, ssb_freq_hz: Option<f64>) {
+        self.sizes = burst_set_sizes(self.spacing, self.lmax, ssb_freq_hz);
         self.forget();
     }
 
@@ -173,18 +184,22 @@ fn moved(payload: BchPayload, half_frames: i32) -> BchPayload {
 }
 
 /// Burst set sizes to try, the likelier first.
-fn burst_set_sizes(config: &SearchConfig) -> Vec<Lmax> {
-    match config.lmax {
+fn burst_set_sizes(
+    spacing: SubcarrierSpacing,
+    lmax: Option<Lmax>,
+    ssb_freq_hz: Option<f64>,
+) -> Vec<Lmax> {
+    match lmax {
         Some(lmax) => vec![lmax],
-        None if four_is_usual(config) => vec![Lmax::L4, Lmax::L8],
+        None if four_is_usual(spacing, ssb_freq_hz) => vec![Lmax::L4, Lmax::L8],
         None => vec![Lmax::L8, Lmax::L4],
     }
 }
 
 /// TS 38.213 §4.1: four SSBs up to 3 GHz. Without a frequency, 15 kHz speaks for the bands below.
-fn four_is_usual(config: &SearchConfig) -> bool {
-    match config.ssb_freq_hz {
+fn four_is_usual(spacing: SubcarrierSpacing, ssb_freq_hz: Option<f64>) -> bool {
+    match ssb_freq_hz {
         Some(hz) if hz > 0.0 => hz <= 3e9,
-        _ => config.spacing == SubcarrierSpacing::Khz15,
+        _ => spacing == SubcarrierSpacing::Khz15,
     }
 }

@@ -5,6 +5,7 @@
 
 mod detected;
 mod error;
+mod examine;
 mod searcher;
 mod settings;
 

@@ -1,6 +1,7 @@
 //! What a search is told.
 
 use super::error::SearchError;
+use crate::dsp::received_grid::MAX_ANTENNAS;
 use crate::standard::numerology::{Lmax, SubcarrierSpacing};
 
 /// What a search is told.
@@ -8,7 +9,7 @@ use crate::standard::numerology::{Lmax, SubcarrierSpacing};
 pub struct SearchConfig {
     /// Subcarrier spacing of the SSB.
     pub spacing: SubcarrierSpacing,
-    /// Number of antennas, 1 to [`MAX_ANTENNAS`](super::MAX_ANTENNAS).
+    /// Number of antennas, 1 to [`MAX_ANTENNAS`].
     pub antennas: usize,
     /// Absolute frequency of the SSB's centre, Hz. Without it the frequency offset comes from
     /// inside the symbols only (TS 38.211 §5.4 hides the rest) and is an order less precise. Zero
@@ -33,6 +34,26 @@ impl SearchConfig {
             cfo_range_hz: 0.5 * spacing.hz(),
             false_alarm: 1e-3,
         }
+    }
+
+    /// Whether a search with these settings is possible.
+    pub(super) fn check(&self) -> Result<(), SearchError> {
+        if self.antennas == 0 || self.antennas > MAX_ANTENNAS {
+            return Err(SearchError::Antennas(self.antennas));
+        }
+        let setting = |name, value, allowed| SearchError::Setting {
+            name,
+            value,
+            allowed,
+        };
+        if !(0.0..=5.0 * self.spacing.hz()).contains(&self.cfo_range_hz) {
+            let allowed = "from 0 to 5 subcarriers";
+            return Err(setting("cfo_range_hz", self.cfo_range_hz, allowed));
+        }
+        if !(self.false_alarm > 0.0 && self.false_alarm < 1.0) {
+            return Err(setting("false_alarm", self.false_alarm, "between 0 and 1"));
+        }
+        check_frequency(self.ssb_freq_hz)
     }
 }
 

@@ -135,7 +135,7 @@ impl<const A: usize> Tracker<A> {
             lmax: cell.lmax,
             base_rate_hz,
             acquirer: Acquirer::new(base_rate_hz, config.ssb_freq_hz, A, 0.0),
-            decoder: BroadcastDecoder::new(&config),
+            decoder: BroadcastDecoder::new(config.spacing, config.lmax, config.ssb_freq_hz),
             searcher,
             references: (0..8).map(|ibar_ssb| pilots(pci, ibar_ssb)).collect(),
             chips: [pss(pci.n_id_2()), sss(pci)],
