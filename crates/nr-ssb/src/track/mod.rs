@@ -5,6 +5,13 @@
 //! are despread, symbol by symbol, to one complex number per antenna. The PBCH is decoded only on
 //! request, and its 432 elements are then pilots as well.
 
+mod beams;
+mod despread;
+mod error;
+mod frequency;
+mod tracked;
 mod tracker;
 
-pub use tracker::{TrackError, Tracked, Tracker};
+pub use error::TrackError;
+pub use tracked::Tracked;
+pub use tracker::Tracker;
