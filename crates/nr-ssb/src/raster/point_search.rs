@@ -2,7 +2,9 @@
 
 use num_complex::Complex32;
 
-use super::band::{RasterFind, RasterPoint, ScanError};
+use super::error::ScanError;
+use super::find::RasterFind;
+use super::point::RasterPoint;
 use crate::dsp::hypotheses::cfo_hypotheses;
 use crate::dsp::matched_filter::MatchedFilter;
 use crate::input::front_end::{FrontEnd, FrontEndError};

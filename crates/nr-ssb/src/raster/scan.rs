@@ -1,71 +1,16 @@
-//! Finding the SSB's frequency and subcarrier spacing: the synchronization raster of TS 38.104
-//! §5.4.3, point by point through the recorded band, at 15 and 30 kHz. Test networks place SSBs
-//! elsewhere; for them, and for recordings that do not state their centre, see [`scan_off_raster`].
+//! Scans of a recording: on the raster, and off it.
 
 use std::ops::RangeInclusive;
 
 use num_complex::Complex32;
 
+use super::error::ScanError;
+use super::find::RasterFind;
 use super::placement::placed_at;
+use super::point::{RasterPoint, synchronization_raster};
 use super::point_search::{OFFSET_UNIT_HZ, PointSearch, nearest_offset};
-use crate::input::front_end::FrontEndError;
-use crate::search::{DetectedSsb, SearchError};
 use crate::standard::grid::SUBCARRIERS;
 use crate::standard::numerology::SubcarrierSpacing;
-
-/// A frequency where a cell may place an SSB.
-#[derive(Debug, Clone, Copy, PartialEq)]
-pub struct RasterPoint {
-    /// Global synchronization channel number; `None` off the raster.
-    pub gscn: Option<u16>,
-    /// Frequency of the SSB's centre (subcarrier 120), Hz; relative to the recording's centre where
-    /// that is unknown.
-    pub ssb_freq_hz: f64,
-}
-
-/// The points of the synchronization raster from `low_hz` to `high_hz` (TS 38.104 Table 5.4.3.1-1):
-/// `N · 1.2 MHz + M · 50 kHz`, M = 1, 3, 5, below 3 GHz, `3 GHz + N · 1.44 MHz` up to 24.25 GHz.
-pub fn synchronization_raster(low_hz: f64, high_hz: f64) -> impl Iterator<Item = RasterPoint> {
-    let below = (1..2500_u16).flat_map(|n| {
-        [1, 3, 5].map(move |m| RasterPoint {
-            gscn: Some(3 * n + (m - 1) / 2 - 1),
-            ssb_freq_hz: f64::from(n) * 1.2e6 + f64::from(m) * 50e3,
-        })
-    });
-    let above = (0..14757_u16).map(|n| RasterPoint {
-        gscn: Some(7499 + n),
-        ssb_freq_hz: 3e9 + f64::from(n) * 1.44e6,
-    });
-    below
-        .chain(above)
-        .filter(move |point| (low_hz..=high_hz).contains(&point.ssb_freq_hz))
-}
-
-/// What was found at one raster point.
-#[derive(Debug, Clone, PartialEq)]
-pub struct RasterFind {
-    /// Where.
-    pub point: RasterPoint,
-    /// Subcarrier spacing of its SSBs.
-    pub spacing: SubcarrierSpacing,
-    /// Samples of the recording per sample at the base rate, the unit of
-    /// [`DetectedSsb::sample_start`].
-    pub input_per_output: f64,
-    /// The SSBs, in order of time.
-    pub ssbs: Vec<DetectedSsb>,
-}
-
-/// What makes a scan impossible.
-#[derive(Debug, Clone, PartialEq, thiserror::Error)]
-#[non_exhaustive]
-pub enum ScanError {
-    /// The recording's rate or channels do not suit.
-    #[error(transparent)]
-    FrontEnd(#[from] FrontEndError),
-    /// The search refused its input.
-    #[error(transparent)]
-    Search(#[from] SearchError),
-}
 
 /// Share of the probability of a false cell, 1e-3 for 20 ms, that each of two scans at each of two
 /// spacings may use up.
@@ -216,44 +161,4 @@ fn band(centre_hz: f64, reach_hz: f64) -> RangeInclusive<f64> {
 fn sort(finds: &mut [RasterFind]) {
     let snr_db = |find: &RasterFind| find.strongest().map_or(f64::NEG_INFINITY, |it| it.snr_db);
     finds.sort_by(|a, b| snr_db(b).total_cmp(&snr_db(a)));
-}
-
-impl RasterPoint {
-    const fn off(ssb_freq_hz: f64) -> Self {
-        Self {
-            gscn: None,
-            ssb_freq_hz,
-        }
-    }
-}
-
-impl RasterFind {
-    /// The SSB of highest SNR.
-    fn strongest(&self) -> Option<&DetectedSsb> {
-        self.ssbs
-            .iter()
-            .max_by(|a, b| a.snr_db.total_cmp(&b.snr_db))
-    }
-}
-
-#[cfg(test)]
-mod tests {
-    use super::*;
-
-    #[test]
-    fn raster_points_have_the_numbers_of_the_standard() {
-        let at = |hz: f64| {
-            synchronization_raster(hz - 1.0, hz + 1.0)
-                .next()
-                .unwrap()
-                .gscn
-        };
-        // TS 38.104 Table 5.4.3.1-1: GSCN = 3N + (M − 3)/2 and 7499 + N.
-        assert_eq!(at(1.25e6), Some(2));
-        assert_eq!(at(2_134.85e6), Some(3 * 1779 - 1));
-        assert_eq!(at(1_862.65e6), Some(3 * 1552 + 1));
-        assert_eq!(at(3_000e6), Some(7499));
-        assert_eq!(at(3_512.64e6), Some(7499 + 356));
-        assert_eq!(synchronization_raster(3_001e6, 3_001.4e6).count(), 0);
-    }
 }
