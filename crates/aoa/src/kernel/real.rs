@@ -15,7 +15,10 @@ impl Real for f32 {}
 impl Real for f64 {}
 
 mod sealed {
-    use super::{Complex, Matrix, Spectra};
+    use num_complex::Complex;
+
+    use crate::linalg::matrix::Matrix;
+    use crate::spectrum::side_by_side::Spectra;
 
     /// What is compiled for each type. Reachable by name for nobody else.
     pub trait Kernel: Copy {

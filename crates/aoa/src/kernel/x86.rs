@@ -35,7 +35,7 @@ macro_rules! kernels {
 
             use num_complex::{Complex, Complex64};
 
-            use super::parts_pd;
+            use crate::kernel::x86::parts_pd;
             use crate::kernel::portable;
             use crate::linalg::matrix::{Matrix, zeros};
             use crate::spectrum::side_by_side::Spectra;

@@ -1,5 +1,4 @@
 //! Channel coding of the PBCH.
 
-pub mod crc;
 pub mod polar;
 pub mod rate_matching;

@@ -1,4 +1,5 @@
-//! What the PBCH says, and the bits that say it.
+//! What the PBCH says, the bits that say it, and their checksum.
 
+pub mod crc;
 pub mod mib;
 pub mod payload;

@@ -2,10 +2,10 @@
 
 use num_complex::Complex32;
 
-use crate::standard::coding::crc::crc24c;
 use crate::standard::coding::polar;
 use crate::standard::coding::rate_matching::{E, rate_match};
 use crate::standard::grid::PBCH_LEN;
+use crate::standard::message::crc::crc24c;
 use crate::standard::message::payload::{BchPayload, scramble};
 use crate::standard::numerology::Lmax;
 use crate::standard::pci::Pci;

@@ -4,7 +4,7 @@
 
 use super::code::{INFORMATION_SET, INTERLEAVER, K};
 use super::encode::Codeword;
-use crate::standard::coding::crc::crc24c;
+use crate::standard::message::crc::crc24c;
 
 /// Bits of the payload, which come first in the message.
 const PAYLOAD: usize = 32;

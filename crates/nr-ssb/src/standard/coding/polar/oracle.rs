@@ -9,7 +9,7 @@ use super::code::{INFORMATION_SET, N};
 use super::encode::{Codeword, encode};
 use super::list::ListDecoder;
 use super::tree::Node;
-use crate::standard::coding::crc::crc24c;
+use crate::standard::message::crc::crc24c;
 
 /// A path that enters a node: its metric, its LLRs, its u so far.
 type Entered = (f64, Vec<f64>, Codeword);

@@ -1,16 +1,10 @@
-//! Resource elements of one SSB (TS 38.211 §7.4.3.1).
-//!
-//! Subcarriers k = 0…239 (k = 120 at the SSB's centre frequency) times symbols l = 0…3, flattened with
-//! k fastest: index k + 240·l. PBCH and its DM-RS share their places in every cell; v = PCI mod 4
-//! says which quarter of them is DM-RS.
+//! Which resource elements belong to which signal.
 
 use std::ops::Range;
 
-use num_complex::Complex32;
-
-use super::pci::Pci;
-use super::sequence::dmrs::DMRS_LEN;
-use super::sequence::pss::SYNC_LEN;
+use crate::standard::pci::Pci;
+use crate::standard::sequence::dmrs::DMRS_LEN;
+use crate::standard::sequence::m_sequence::SYNC_LEN;
 
 /// Subcarriers of an SSB.
 pub const SUBCARRIERS: usize = 240;
@@ -70,56 +64,6 @@ pub fn pbch_indices(pci: Pci) -> &'static [usize; PBCH_LEN] {
 /// Flat indices of the PBCH DM-RS, in the order of [`dmrs`](crate::dmrs::dmrs).
 pub fn dmrs_indices(pci: Pci) -> &'static [usize; DMRS_LEN] {
     &DMRS_INDICES[usize::from(pci.get() % 4)]
-}
-
-/// The 960 resource elements of one SSB, k fastest.
-#[derive(Debug, Clone, PartialEq)]
-pub struct SsbGrid([Complex32; SUBCARRIERS * SYMBOLS]);
-
-impl SsbGrid {
-    /// A grid of zeros.
-    pub const fn zeros() -> Self {
-        Self([Complex32::ZERO; SUBCARRIERS * SYMBOLS])
-    }
-
-    /// All elements, index k + 240·l.
-    pub const fn elements(&self) -> &[Complex32; SUBCARRIERS * SYMBOLS] {
-        &self.0
-    }
-
-    /// All elements, to be changed.
-    pub const fn elements_mut(&mut self) -> &mut [Complex32; SUBCARRIERS * SYMBOLS] {
-        &mut self.0
-    }
-
-    /// The 240 subcarriers of each symbol, l = 0 to 3.
-    pub fn symbols(&self) -> impl ExactSizeIterator<Item = &[Complex32; SUBCARRIERS]> {
-        self.0.as_chunks().0.iter()
-    }
-
-    /// The 240 subcarriers of each symbol, to be changed.
-    pub fn symbols_mut(&mut self) -> impl ExactSizeIterator<Item = &mut [Complex32; SUBCARRIERS]> {
-        self.0.as_chunks_mut().0.iter_mut()
-    }
-
-    /// Write `values` to the elements that `indices` name, in order.
-    pub fn put(
-        &mut self,
-        indices: impl IntoIterator<Item = usize>,
-        values: impl IntoIterator<Item = Complex32>,
-    ) {
-        for (index, value) in indices.into_iter().zip(values) {
-            if let Some(element) = self.0.get_mut(index) {
-                *element = value;
-            }
-        }
-    }
-}
-
-impl Default for SsbGrid {
-    fn default() -> Self {
-        Self::zeros()
-    }
 }
 
 #[cfg(test)]
