@@ -60,6 +60,8 @@
 // Loops over vector registers must be compiled into the function that was chosen for the processor.
 #![allow(clippy::inline_always)]
 
+// Each folder uses only those before it: linalg, simd, array; spectrum; kernel; covariance; result;
+// method; estimate.
 mod array;
 pub mod bound;
 mod covariance;

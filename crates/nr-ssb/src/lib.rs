@@ -1,10 +1,75 @@
-//! Synchronization signal blocks (SSBs) of 5G NR: what every cell broadcasts, sequences to samples
-//! and back.
+//! Synchronization signal blocks (SSBs) of 5G NR: what every cell broadcasts, searched
+//! for, tracked, decoded and built.
 //!
 //! An SSB is 240 subcarriers × 4 OFDM symbols: the primary and secondary synchronization signals
 //! (PSS, SSS), which say the cell's identity, and the physical broadcast channel (PBCH) with its
 //! reference signal (DM-RS), which says the time and the master information block (MIB). This crate
-//! follows TS 38.211, 38.212, 38.213 and 38.331; each item names its clause.
+//! follows TS 38.104, 38.211 to 38.213, 38.215 and 38.331; each item names its clause.
+//!
+//! # Search for cells
+//! A recording goes through the [front end](front_end), which brings the SSB to 0 Hz and the samples to
+//! 256 a symbol, 7.68 Msps at 30 kHz spacing. There a [`Searcher`](search::Searcher) finds every SSB
+//! of every cell, in a recording at once or in a stream block by block: whose it is, which beam, when,
+//! how far off in frequency, how strong, and what its PBCH says.
+//!
+//! ```
+//! # use nr_ssb::{BchPayload, Beam, Burst, Case, Complex32, Lmax, Mib, Numerology, Ofdm, Pci};
+//! use nr_ssb::SubcarrierSpacing;
+//! use nr_ssb::front_end::FrontEnd;
+//! use nr_ssb::search::{SearchConfig, Searcher};
+//! # let beams = vec![Beam::new(1), Beam::new(6)];
+//! # let payload = BchPayload::new(Mib::default(), 784, false, 0)?;
+//! # let burst = Burst { pci: Pci::new(601)?, case: Case::C, lmax: Lmax::L8, payload, beams, ssb_freq_hz: Some(3_700.8e6) };
+//! # let numerology = Numerology::from_sample_rate(Case::C.spacing(), 15.36e6)?;
+//! # let sent = burst.iq(&mut Ofdm::new(numerology))?;
+//! # let recording = [sent.clone(), sent.iter().map(|x| x * Complex32::I).collect()];
+//!
+//! // Two antennas at 15.36 Msps, the SSB at the recording's centre.
+//! let spacing = SubcarrierSpacing::Khz30;
+//! let base = FrontEnd::new(15.36e6, 0.0, spacing.hz(), 2)?.process(&recording)?;
+//! let antennas = [base[0].as_slice(), base[1].as_slice()];
+//!
+//! let config = SearchConfig { ssb_freq_hz: Some(3_700.8e6), ..SearchConfig::new(spacing, 2) };
+//! let found = Searcher::new(config)?.search(&antennas)?.to_vec();
+//! let beams: Vec<u8> = found.iter().map(|ssb| ssb.ssb_index).collect();
+//! assert_eq!((found[0].pci.get(), beams), (601, vec![1, 6]));
+//! assert_eq!(found[0].payload.map(|payload| payload.sfn()), Some(784));
+//! # Ok::<(), Box<dyn std::error::Error>>(())
+//! ```
+//!
+//! Where the frequency or the spacing is not known, [`raster::scan`] looks everywhere in the recorded
+//! band. [`diagnose`] says beforehand what is wrong with a recording's channels.
+//!
+//! # Track a cell
+//! Once a cell is known, a [`Tracker`](track::Tracker) needs a small part of a search's time for each
+//! further SSB: it says which beam came, when, and with which complex number at each antenna, from
+//! which an array tells the direction.
+//!
+//! ```
+//! # use nr_ssb::{BchPayload, Beam, Burst, Case, Complex32, Lmax, Mib, Numerology, Ofdm, Pci};
+//! # use nr_ssb::SubcarrierSpacing;
+//! # use nr_ssb::search::{SearchConfig, Searcher};
+//! use nr_ssb::track::Tracker;
+//! # let beams = vec![Beam::new(1), Beam::new(6)];
+//! # let payload = BchPayload::new(Mib::default(), 784, false, 0)?;
+//! # let burst = Burst { pci: Pci::new(601)?, case: Case::C, lmax: Lmax::L8, payload, beams, ssb_freq_hz: Some(3_700.8e6) };
+//! # let numerology = Numerology::from_sample_rate(Case::C.spacing(), 7.68e6)?;
+//! # let sent = burst.iq(&mut Ofdm::new(numerology))?;
+//! # let quarter_turn: Vec<_> = sent.iter().map(|x| x * Complex32::I).collect();
+//! # let antennas = [sent.as_slice(), quarter_turn.as_slice()];
+//! # let config = SearchConfig { ssb_freq_hz: Some(3_700.8e6), ..SearchConfig::new(SubcarrierSpacing::Khz30, 2) };
+//! # let found = Searcher::new(config.clone())?.search(&antennas)?.to_vec();
+//!
+//! let mut tracker = Tracker::<2>::new(&config, &found[0])?;
+//! // The window that begins 20 ms after the first one holds the same beam again.
+//! let period = 0.02 * 7.68e6;
+//! let tracked = tracker.track(&antennas, period, tracker.expected_start(period), false)?;
+//! let tracked = tracked.expect("the cell is still there");
+//! assert_eq!(tracked.ssb_index, 1);
+//! let [first, second] = tracked.blocks[0];
+//! assert!(((second / first).arg().to_degrees() - 90.0).abs() < 0.1);
+//! # Ok::<(), Box<dyn std::error::Error>>(())
+//! ```
 //!
 //! # Conventions
 //! Resource elements are flattened with the subcarrier fastest, index k + 240·l, and k = 120 is the
@@ -33,8 +98,8 @@
 //! # Ok::<(), nr_ssb::Error>(())
 //! ```
 //!
-//! # Read an SSB
-//! Where an SSB begins is known here; a receiver finds it. Each symbol is demodulated, its phase of
+//! # Read an SSB by hand
+//! Where an SSB begins is known here; a search finds it. Each symbol is demodulated, its phase of
 //! TS 38.211 §5.4 taken out, and the PBCH's elements become log-likelihood ratios.
 //!
 //! ```
@@ -70,6 +135,12 @@
 //! # The parts
 //! | to | see |
 //! |---|---|
+//! | find the SSBs at a known frequency | [`search`] |
+//! | look at a known cell again and again | [`track`] |
+//! | find SSBs anywhere in a band | [`raster`] |
+//! | bring a recording to the search's rate | [`front_end`] |
+//! | see what is wrong with its channels | [`diagnose`] |
+//! | know what SS-RSRP, SS-RSRQ, SS-SINR mean here | [`measure`] |
 //! | name a cell | [`Pci`] |
 //! | lay SSBs out in time | [`Case`], [`Lmax`], [`Numerology`] |
 //! | lay them out in frequency | [`grid`] |
@@ -80,8 +151,12 @@
 //! | go between subcarriers and samples | [`Ofdm`] |
 //!
 //! # Errors
-//! Everything that can be wrong with an input is an [`Error`]; nothing panics.
+//! Everything that can be wrong with an input is an [`Error`]; with a recording, a search or a cell to
+//! be tracked a [`FrontEndError`](front_end::FrontEndError), a [`SearchError`](search::SearchError), a
+//! [`ScanError`](raster::ScanError), a [`TrackError`](track::TrackError). Nothing panics.
 
+// Each folder uses only those before it: numeric, standard; transmit, dsp; input, receive; search;
+// track, raster.
 mod dsp;
 mod error;
 mod input;
