@@ -3,11 +3,14 @@
 //! All bounds are for white noise; SNRs are linear, per antenna and snapshot. Electrical angles come
 //! first; [`angle_sigma_rad`] carries a bound over to the angle.
 
-use crate::array::{aperture, steering_vector};
-use crate::covariance::{Matrix, zeros};
-use crate::linear::{adjoint, inverse, product};
+use num_complex::Complex64;
+
+use crate::array::linear::Array;
+use crate::array::steering::{aperture, steering_vector};
+use crate::error::Error;
+use crate::linalg::dense::{adjoint, inverse, product};
+use crate::linalg::matrix::{Matrix, zeros};
 use crate::list::List;
-use crate::{Array, Complex64, Error};
 
 /// One Gaussian source, unknown power: standard deviation of the electrical angle in rad,
 /// `sqrt((1 + 1 / (N snr)) / (2 L snr A))` with `A = N (N^2 - 1) / 12` (Stoica and Nehorai 1990,

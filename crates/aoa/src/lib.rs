@@ -60,37 +60,34 @@
 // Loops over vector registers must be compiled into the function that was chosen for the processor.
 #![allow(clippy::inline_always)]
 
+// Each folder uses only those before it: linalg, simd, array; spectrum; kernel; covariance; result;
+// method; estimate.
 mod array;
-mod batch;
 pub mod bound;
-mod calibration;
 mod covariance;
-mod eigen;
 mod error;
-mod esprit;
 mod estimate;
 mod kernel;
-mod linear;
+mod linalg;
 mod list;
-mod math;
-mod maximum_likelihood;
-mod music;
-mod peak;
-mod pilots;
-mod root_music;
-mod source_count;
+mod method;
+mod result;
+mod simd;
 mod spectrum;
 
-pub use array::Array;
-pub use batch::{Batch, BatchError};
-pub use calibration::Calibration;
-pub use covariance::{Covariance, Matrix};
+pub use array::calibration::Calibration;
+pub use array::linear::Array;
+pub use covariance::sample::Covariance;
 pub use error::Error;
-pub use estimate::{
-    AngleEstimate, AngleEstimates, Method, Reason, Verdict, estimate, estimate_several,
-};
-pub use kernel::Real;
+pub use estimate::batch::{Batch, BatchError};
+pub use estimate::choice::Method;
+pub use estimate::one::estimate;
+pub use estimate::pilots::maximum_likelihood_pilots;
+pub use estimate::several::estimate_several;
+pub use estimate::source_count::{Criterion, source_count};
+pub use kernel::real::Real;
+pub use linalg::matrix::Matrix;
 pub use list::List;
 pub use num_complex::Complex64;
-pub use pilots::maximum_likelihood_pilots;
-pub use source_count::{Criterion, source_count};
+pub use result::angle::{AngleEstimate, AngleEstimates};
+pub use result::verdict::{Reason, Verdict};

@@ -1,10 +1,75 @@
-//! Synchronization signal blocks (SSBs) of 5G NR: what every cell broadcasts, sequences to samples
-//! and back.
+//! Synchronization signal blocks (SSBs) of 5G NR: what every cell broadcasts, searched
+//! for, tracked, decoded and built.
 //!
 //! An SSB is 240 subcarriers × 4 OFDM symbols: the primary and secondary synchronization signals
 //! (PSS, SSS), which say the cell's identity, and the physical broadcast channel (PBCH) with its
 //! reference signal (DM-RS), which says the time and the master information block (MIB). This crate
-//! follows TS 38.211, 38.212, 38.213 and 38.331; each item names its clause.
+//! follows TS 38.104, 38.211 to 38.213, 38.215 and 38.331; each item names its clause.
+//!
+//! # Search for cells
+//! A recording goes through the [front end](front_end), which brings the SSB to 0 Hz and the samples to
+//! 256 a symbol, 7.68 Msps at 30 kHz spacing. There a [`Searcher`](search::Searcher) finds every SSB
+//! of every cell, in a recording at once or in a stream block by block: whose it is, which beam, when,
+//! how far off in frequency, how strong, and what its PBCH says.
+//!
+//! ```
+//! # use nr_ssb::{BchPayload, Beam, Burst, Case, Complex32, Lmax, Mib, Numerology, Ofdm, Pci};
+//! use nr_ssb::SubcarrierSpacing;
+//! use nr_ssb::front_end::FrontEnd;
+//! use nr_ssb::search::{SearchConfig, Searcher};
+//! # let beams = vec![Beam::new(1), Beam::new(6)];
+//! # let payload = BchPayload::new(Mib::default(), 784, false, 0)?;
+//! # let burst = Burst { pci: Pci::new(601)?, case: Case::C, lmax: Lmax::L8, payload, beams, ssb_freq_hz: Some(3_700.8e6) };
+//! # let numerology = Numerology::from_sample_rate(Case::C.spacing(), 15.36e6)?;
+//! # let sent = burst.iq(&mut Ofdm::new(numerology))?;
+//! # let recording = [sent.clone(), sent.iter().map(|x| x * Complex32::I).collect()];
+//!
+//! // Two antennas at 15.36 Msps, the SSB at the recording's centre.
+//! let spacing = SubcarrierSpacing::Khz30;
+//! let base = FrontEnd::new(15.36e6, 0.0, spacing.hz(), 2)?.process(&recording)?;
+//! let antennas = [base[0].as_slice(), base[1].as_slice()];
+//!
+//! let config = SearchConfig { ssb_freq_hz: Some(3_700.8e6), ..SearchConfig::new(spacing, 2) };
+//! let found = Searcher::new(config)?.search(&antennas)?.to_vec();
+//! let beams: Vec<u8> = found.iter().map(|ssb| ssb.ssb_index).collect();
+//! assert_eq!((found[0].pci.get(), beams), (601, vec![1, 6]));
+//! assert_eq!(found[0].payload.map(|payload| payload.sfn()), Some(784));
+//! # Ok::<(), Box<dyn std::error::Error>>(())
+//! ```
+//!
+//! Where the frequency or the spacing is not known, [`raster::scan`] looks everywhere in the recorded
+//! band. [`diagnose`] says beforehand what is wrong with a recording's channels.
+//!
+//! # Track a cell
+//! Once a cell is known, a [`Tracker`](track::Tracker) needs a small part of a search's time for each
+//! further SSB: it says which beam came, when, and with which complex number at each antenna, from
+//! which an array tells the direction.
+//!
+//! ```
+//! # use nr_ssb::{BchPayload, Beam, Burst, Case, Complex32, Lmax, Mib, Numerology, Ofdm, Pci};
+//! # use nr_ssb::SubcarrierSpacing;
+//! # use nr_ssb::search::{SearchConfig, Searcher};
+//! use nr_ssb::track::Tracker;
+//! # let beams = vec![Beam::new(1), Beam::new(6)];
+//! # let payload = BchPayload::new(Mib::default(), 784, false, 0)?;
+//! # let burst = Burst { pci: Pci::new(601)?, case: Case::C, lmax: Lmax::L8, payload, beams, ssb_freq_hz: Some(3_700.8e6) };
+//! # let numerology = Numerology::from_sample_rate(Case::C.spacing(), 7.68e6)?;
+//! # let sent = burst.iq(&mut Ofdm::new(numerology))?;
+//! # let quarter_turn: Vec<_> = sent.iter().map(|x| x * Complex32::I).collect();
+//! # let antennas = [sent.as_slice(), quarter_turn.as_slice()];
+//! # let config = SearchConfig { ssb_freq_hz: Some(3_700.8e6), ..SearchConfig::new(SubcarrierSpacing::Khz30, 2) };
+//! # let found = Searcher::new(config.clone())?.search(&antennas)?.to_vec();
+//!
+//! let mut tracker = Tracker::<2>::new(&config, &found[0])?;
+//! // The window that begins 20 ms after the first one holds the same beam again.
+//! let period = 0.02 * 7.68e6;
+//! let tracked = tracker.track(&antennas, period, tracker.expected_start(period), false)?;
+//! let tracked = tracked.expect("the cell is still there");
+//! assert_eq!(tracked.ssb_index, 1);
+//! let [first, second] = tracked.blocks[0];
+//! assert!(((second / first).arg().to_degrees() - 90.0).abs() < 0.1);
+//! # Ok::<(), Box<dyn std::error::Error>>(())
+//! ```
 //!
 //! # Conventions
 //! Resource elements are flattened with the subcarrier fastest, index k + 240·l, and k = 120 is the
@@ -33,8 +98,8 @@
 //! # Ok::<(), nr_ssb::Error>(())
 //! ```
 //!
-//! # Read an SSB
-//! Where an SSB begins is known here; a receiver finds it. Each symbol is demodulated, its phase of
+//! # Read an SSB by hand
+//! Where an SSB begins is known here; a search finds it. Each symbol is demodulated, its phase of
 //! TS 38.211 §5.4 taken out, and the PBCH's elements become log-likelihood ratios.
 //!
 //! ```
@@ -70,6 +135,12 @@
 //! # The parts
 //! | to | see |
 //! |---|---|
+//! | find the SSBs at a known frequency | [`search`] |
+//! | look at a known cell again and again | [`track`] |
+//! | find SSBs anywhere in a band | [`raster`] |
+//! | bring a recording to the search's rate | [`front_end`] |
+//! | see what is wrong with its channels | [`diagnose`] |
+//! | know what SS-RSRP, SS-RSRQ, SS-SINR mean here | [`measure`] |
 //! | name a cell | [`Pci`] |
 //! | lay SSBs out in time | [`Case`], [`Lmax`], [`Numerology`] |
 //! | lay them out in frequency | [`grid`] |
@@ -80,54 +151,36 @@
 //! | go between subcarriers and samples | [`Ofdm`] |
 //!
 //! # Errors
-//! Everything that can be wrong with an input is an [`Error`]; nothing panics.
+//! Everything that can be wrong with an input is an [`Error`]; with a recording, a search or a cell to
+//! be tracked a [`FrontEndError`](front_end::FrontEndError), a [`SearchError`](search::SearchError), a
+//! [`ScanError`](raster::ScanError), a [`TrackError`](track::TrackError). Nothing panics.
 
-mod acquire;
-mod alignment;
-mod broadcast;
-pub mod burst;
-mod cancel;
-mod cfo;
-mod channel_estimate;
-pub mod crc;
-mod demodulate;
-pub mod diagnose;
-pub mod dmrs;
+// Each folder uses only those before it: numeric, standard; transmit, dsp; input, receive; search;
+// track, raster.
+mod dsp;
 mod error;
-mod false_alarm;
-pub mod front_end;
-mod global_raster;
-pub mod gold;
-pub mod grid;
-mod hermitian;
-mod identify;
-mod matched_filter;
-pub mod measure;
-pub mod mib;
-pub mod numerology;
-pub mod ofdm;
-pub mod payload;
-pub mod pbch;
-mod pci;
-mod point_search;
-pub mod polar;
-pub mod pss;
-mod qpsk;
+mod input;
+mod numeric;
 pub mod raster;
-pub mod rate_matching;
+mod receive;
 pub mod search;
-pub mod sss;
-mod sums;
-mod timing;
+mod standard;
 pub mod track;
+mod transmit;
 
-pub use burst::{Beam, Burst};
 pub use error::Error;
-pub use gold::Gold;
-pub use grid::SsbGrid;
-pub use mib::Mib;
+pub use input::{diagnose, front_end};
 pub use num_complex::Complex32;
-pub use numerology::{Case, Lmax, Numerology, SubcarrierSpacing};
-pub use ofdm::Ofdm;
-pub use payload::BchPayload;
-pub use pci::Pci;
+pub use receive::measure;
+pub use standard::coding::{polar, rate_matching};
+pub use standard::grid::{self, SsbGrid};
+pub use standard::message::crc;
+pub use standard::message::mib::{self, Mib};
+pub use standard::message::payload::{self, BchPayload};
+pub use standard::numerology::{self, Case, Lmax, Numerology, SubcarrierSpacing};
+pub use standard::pbch;
+pub use standard::pci::Pci;
+pub use standard::sequence::gold::{self, Gold};
+pub use standard::sequence::{dmrs, pss, sss};
+pub use transmit::burst::{self, Beam, Burst};
+pub use transmit::ofdm::{self, Ofdm};

@@ -1,14 +1,12 @@
 //! Kernels for any processor.
 
-use num_complex::Complex;
+use num_complex::{Complex, Complex64};
 
-use super::Real;
-use crate::Complex64;
-use crate::covariance::{Matrix, zeros};
-use crate::peak::Spectra;
+use crate::linalg::matrix::{Matrix, zeros};
+use crate::spectrum::side_by_side::Spectra;
 
 /// `sum_t x_t conj(y_t)`.
-pub(super) fn correlation<T: Real>(x: &[Complex<T>], y: &[Complex<T>]) -> Complex64 {
+pub(super) fn correlation<T: Copy + Into<f64>>(x: &[Complex<T>], y: &[Complex<T>]) -> Complex64 {
     let wide = |z: &Complex<T>| Complex64::new(z.re.into(), z.im.into());
     let (mut even, mut odd) = (Complex64::ZERO, Complex64::ZERO);
     for (x, y) in x.chunks(2).zip(y.chunks(2)) {
@@ -20,7 +18,9 @@ pub(super) fn correlation<T: Real>(x: &[Complex<T>], y: &[Complex<T>]) -> Comple
     even + odd
 }
 
-pub(super) fn products<T: Real, const N: usize>(channels: &[&[Complex<T>]; N]) -> Matrix<N> {
+pub(super) fn products<T: Copy + Into<f64>, const N: usize>(
+    channels: &[&[Complex<T>]; N],
+) -> Matrix<N> {
     let mut matrix = zeros::<N>();
     for i in 0..N {
         for j in 0..=i {
@@ -32,7 +32,7 @@ pub(super) fn products<T: Real, const N: usize>(channels: &[&[Complex<T>]; N]) -
 }
 
 /// Adds to each lag what the samples from `start` on contribute.
-pub(super) fn add_lags<T: Real, const N: usize>(
+pub(super) fn add_lags<T: Copy + Into<f64>, const N: usize>(
     rows: &[&[Complex<T>]; N],
     start: usize,
     lags: &mut [Complex64; N],
@@ -44,7 +44,7 @@ pub(super) fn add_lags<T: Real, const N: usize>(
     }
 }
 
-pub(super) fn spectra<T: Real, const N: usize, const W: usize>(
+pub(super) fn spectra<T: Copy + Into<f64>, const N: usize, const W: usize>(
     samples: &[Complex<T>],
     snapshots: usize,
     spectra: &mut Spectra<N, W>,

@@ -7,7 +7,7 @@
 
 use std::arch::x86_64::{__m128d, _mm_addsub_pd, _mm_cvtsd_f64, _mm_unpackhi_pd, _mm_unpacklo_pd};
 
-use crate::Complex64;
+use num_complex::Complex64;
 
 /// The real part `direct_0 + direct_1` and the imaginary part `crossed_1 - crossed_0`.
 #[target_feature(enable = "avx2,fma")]
@@ -33,13 +33,12 @@ macro_rules! kernels {
         pub(in crate::kernel) mod $module {
             use std::arch::x86_64::*;
 
-            use num_complex::Complex;
+            use num_complex::{Complex, Complex64};
 
-            use crate::Complex64;
-            use crate::covariance::{Matrix, zeros};
-            use super::parts_pd;
+            use crate::kernel::x86::parts_pd;
             use crate::kernel::portable;
-            use crate::peak::Spectra;
+            use crate::linalg::matrix::{Matrix, zeros};
+            use crate::spectrum::side_by_side::Spectra;
 
             /// The samples from `start` on.
             #[target_feature(enable = $features)]

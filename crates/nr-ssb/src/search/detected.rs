@@ -1,12 +1,11 @@
 //! What a search finds.
 
-use super::MAX_ANTENNAS;
-use crate::demodulate::ReceivedGrid;
-use crate::grid::SsbGrid;
-use crate::measure::Measurement;
-use crate::numerology::Lmax;
-use crate::payload::BchPayload;
-use crate::pci::Pci;
+use crate::dsp::received_grid::{MAX_ANTENNAS, ReceivedGrid};
+use crate::receive::measure::Measurement;
+use crate::standard::grid::SsbGrid;
+use crate::standard::message::payload::BchPayload;
+use crate::standard::numerology::Lmax;
+use crate::standard::pci::Pci;
 
 /// One received SSB.
 #[derive(Debug, Clone, PartialEq)]

@@ -1,9 +1,8 @@
-//! What a search is told, and what makes it impossible.
+//! What a search is told.
 
-use crate::numerology::{Lmax, SubcarrierSpacing};
-
-/// Largest number of antennas.
-pub const MAX_ANTENNAS: usize = 16;
+use super::error::SearchError;
+use crate::dsp::received_grid::MAX_ANTENNAS;
+use crate::standard::numerology::{Lmax, SubcarrierSpacing};
 
 /// What a search is told.
 #[derive(Debug, Clone, PartialEq)]
@@ -36,51 +35,29 @@ impl SearchConfig {
             false_alarm: 1e-3,
         }
     }
+
+    /// Whether a search with these settings is possible.
+    pub(super) fn check(&self) -> Result<(), SearchError> {
+        if self.antennas == 0 || self.antennas > MAX_ANTENNAS {
+            return Err(SearchError::Antennas(self.antennas));
+        }
+        let setting = |name, value, allowed| SearchError::Setting {
+            name,
+            value,
+            allowed,
+        };
+        if !(0.0..=5.0 * self.spacing.hz()).contains(&self.cfo_range_hz) {
+            let allowed = "from 0 to 5 subcarriers";
+            return Err(setting("cfo_range_hz", self.cfo_range_hz, allowed));
+        }
+        if !(self.false_alarm > 0.0 && self.false_alarm < 1.0) {
+            return Err(setting("false_alarm", self.false_alarm, "between 0 and 1"));
+        }
+        check_frequency(self.ssb_freq_hz)
+    }
 }
 
-/// What makes a search impossible.
-#[derive(Debug, Clone, PartialEq, thiserror::Error)]
-#[non_exhaustive]
-pub enum SearchError {
-    /// No antenna, or more than [`MAX_ANTENNAS`].
-    #[error("{0} antennas: 1 to {MAX_ANTENNAS} are possible")]
-    Antennas(usize),
-    /// A setting outside its range.
-    #[error("{name} = {value}: {allowed}")]
-    Setting {
-        /// Which setting.
-        name: &'static str,
-        /// Its value.
-        value: f64,
-        /// What it may be.
-        allowed: &'static str,
-    },
-    /// The number of channels passed differs from that announced.
-    #[error("{given} channels given, {expected} expected")]
-    AntennaCount {
-        /// Channels passed.
-        given: usize,
-        /// Channels announced.
-        expected: usize,
-    },
-    /// Channels of different lengths.
-    #[error("channels hold different numbers of samples: {first} and {other}")]
-    UnequalLengths {
-        /// Length of channel 0.
-        first: usize,
-        /// A length that differs.
-        other: usize,
-    },
-    /// Less than one SSB.
-    #[error("{samples} samples are less than the {needed} of one SSB")]
-    TooShort {
-        /// Length of the recording at the base rate.
-        samples: usize,
-        /// Length of one SSB.
-        needed: usize,
-    },
-}
-
+/// Whether an SSB can be at this frequency.
 pub(super) fn check_frequency(ssb_freq_hz: Option<f64>) -> Result<(), SearchError> {
     match ssb_freq_hz {
         Some(value) if !value.is_finite() => Err(SearchError::Setting {

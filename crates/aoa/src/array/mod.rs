@@ -1,0 +1,5 @@
+//! The array: where its antennas are, and what its receive channels do to them.
+
+pub(crate) mod calibration;
+pub(crate) mod linear;
+pub(crate) mod steering;

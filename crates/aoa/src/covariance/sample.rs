@@ -1,0 +1,175 @@
+//! The sample covariance.
+
+use num_complex::{Complex, Complex64};
+
+use crate::error::Error;
+use crate::kernel::real::Real;
+use crate::linalg::matrix::{Matrix, zeros};
+use crate::spectrum::polynomial::Spectrum;
+
+/// Covariance `R = sum_t w_t x_t x_t^H / sum_t w_t` of the antennas, and how many snapshots it
+/// stands for.
+///
+/// The mean is *not* removed: despread pilots are the same vector in every snapshot, and that vector
+/// is the signal.
+///
+/// Streaming use: [`Covariance::new`], [`accumulate`](Covariance::accumulate) per snapshot,
+/// [`reset`](Covariance::reset).
+#[derive(Debug, Clone, Copy, PartialEq)]
+pub struct Covariance<const N: usize> {
+    pub(super) sum: Matrix<N>,
+    pub(super) weight: f64,
+    pub(super) snapshots: usize,
+}
+
+impl<const N: usize> Covariance<N> {
+    /// An empty covariance, to be accumulated.
+    pub const fn new() -> Self {
+        Self {
+            sum: zeros(),
+            weight: 0.0,
+            snapshots: 0,
+        }
+    }
+
+    /// The sample covariance of snapshots, one value per antenna each.
+    ///
+    /// # Errors
+    /// [`Error::NoSnapshots`], [`Error::NotFinite`], [`Error::Zero`].
+    pub fn from_snapshots(snapshots: &[[Complex64; N]]) -> Result<Self, Error> {
+        let mut covariance = Self::new();
+        for snapshot in snapshots {
+            covariance.accumulate(snapshot, 1.0);
+        }
+        covariance.validated()
+    }
+
+    /// The sample covariance of channels: `channels[n]` holds the samples of antenna `n`. Channels
+    /// longer than the shortest are cut.
+    ///
+    /// # Errors
+    /// [`Error::NoSnapshots`], [`Error::NotFinite`], [`Error::Zero`].
+    pub fn from_channels<T: Real>(channels: [&[Complex<T>]; N]) -> Result<Self, Error> {
+        let snapshots = channels
+            .iter()
+            .map(|channel| channel.len())
+            .min()
+            .unwrap_or(0);
+        let sum = T::products(&channels.map(|channel| &channel[..snapshots]));
+        Self {
+            sum,
+            weight: snapshots as f64,
+            snapshots,
+        }
+        .validated()
+    }
+
+    /// A covariance known otherwise, standing for `snapshots` snapshots (which set the standard
+    /// deviations of the estimates).
+    ///
+    /// # Errors
+    /// [`Error::NoSnapshots`], [`Error::NotFinite`], [`Error::Zero`], [`Error::NotHermitian`].
+    pub fn from_matrix(matrix: Matrix<N>, snapshots: usize) -> Result<Self, Error> {
+        if !matrix.iter().flatten().all(|entry| entry.is_finite()) {
+            return Err(Error::NotFinite);
+        }
+        let covariance = Self {
+            sum: matrix,
+            weight: 1.0,
+            snapshots,
+        }
+        .validated()?;
+        let tolerance = 1e-9 * covariance.power();
+        let hermitian = (0..N).all(|i| {
+            matrix[i][i].re >= 0.0
+                && (0..=i).all(|j| (matrix[i][j] - matrix[j][i].conj()).norm() <= tolerance)
+        });
+        if hermitian {
+            Ok(covariance)
+        } else {
+            Err(Error::NotHermitian)
+        }
+    }
+
+    /// Adds one snapshot. Bad values are noticed when an estimate is asked for.
+    pub fn accumulate(&mut self, snapshot: &[Complex64; N], weight: f64) {
+        for i in 0..N {
+            for j in 0..=i {
+                let product = snapshot[i] * snapshot[j].conj() * weight;
+                self.sum[i][j] += product;
+                if i != j {
+                    self.sum[j][i] += product.conj();
+                }
+            }
+        }
+        self.weight += weight;
+        self.snapshots += 1;
+    }
+
+    /// Forgets everything accumulated.
+    pub const fn reset(&mut self) {
+        *self = Self::new();
+    }
+
+    /// How many snapshots this stands for.
+    pub const fn snapshots(&self) -> usize {
+        self.snapshots
+    }
+
+    /// The normalised matrix `R`.
+    pub fn matrix(&self) -> Matrix<N> {
+        let scale = 1.0 / self.weight;
+        self.sum.map(|row| row.map(|entry| entry * scale))
+    }
+
+    /// The matrix up to a factor.
+    pub(crate) const fn unscaled(&self) -> &Matrix<N> {
+        &self.sum
+    }
+
+    /// `a^H R a`, up to the same factor.
+    pub(crate) fn spectrum(&self) -> Spectrum<N> {
+        Spectrum::of_matrix(&self.sum)
+    }
+
+    /// The sum of the weights, which is that factor.
+    pub(crate) const fn weight(&self) -> f64 {
+        self.weight
+    }
+
+    /// Mean power per antenna, `trace(R) / N`.
+    pub fn power(&self) -> f64 {
+        self.trace() / (self.weight * N as f64)
+    }
+
+    fn trace(&self) -> f64 {
+        (0..N).map(|n| self.sum[n][n].re).sum()
+    }
+
+    /// Fails unless the covariance is fit for estimation.
+    pub(crate) fn validated(self) -> Result<Self, Error> {
+        if self.snapshots == 0 {
+            return Err(Error::NoSnapshots);
+        }
+        // No entry is larger than the largest on the diagonal.
+        if !(self.weight.is_finite() && self.trace().is_finite()) {
+            return Err(Error::NotFinite);
+        }
+        if self.weight <= 0.0 {
+            return Err(Error::NotPositive {
+                name: "weight",
+                value: self.weight,
+            });
+        }
+        if self.trace() <= 0.0 {
+            return Err(Error::Zero);
+        }
+        Ok(self)
+    }
+}
+
+impl<const N: usize> Default for Covariance<N> {
+    fn default() -> Self {
+        Self::new()
+    }
+}

@@ -1,0 +1,9 @@
+//! What users call: from samples or a covariance to directions.
+
+pub(crate) mod batch;
+pub(crate) mod channel_gains;
+pub(crate) mod choice;
+pub(crate) mod one;
+pub(crate) mod pilots;
+pub(crate) mod several;
+pub(crate) mod source_count;

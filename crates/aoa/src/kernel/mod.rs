@@ -1,0 +1,6 @@
+//! The inner loops over samples: portable, and for the vector instructions that a processor may have.
+
+mod portable;
+pub(crate) mod real;
+#[cfg(target_arch = "x86_64")]
+mod x86;

@@ -1,0 +1,5 @@
+//! Linear algebra of small complex matrices of known size.
+
+pub(crate) mod dense;
+pub(crate) mod eigen;
+pub(crate) mod matrix;

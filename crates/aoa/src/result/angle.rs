@@ -1,0 +1,49 @@
+//! What an estimate says.
+
+use std::f64::consts::{FRAC_PI_2, PI};
+
+use super::verdict::{Reason, Verdict};
+use crate::list::List;
+
+/// A direction, and how well it is known.
+#[derive(Debug, Clone, Copy, PartialEq)]
+pub struct AngleEstimate {
+    /// Electrical angle `omega`, in (-pi, pi]: what was measured. Its noise is Gaussian and does not
+    /// depend on the direction, so filters should take this one.
+    pub phase_rad: f64,
+    /// Standard deviation of `phase_rad`, from the bound at the estimated SNR.
+    pub phase_sigma_rad: f64,
+    /// Angle from the array's axis, 0 to pi.
+    pub angle_rad: f64,
+    /// Standard deviation of `angle_rad`; near end-fire, where the linear law diverges, the angle
+    /// that one standard deviation of `phase_rad` makes there.
+    pub sigma_rad: f64,
+    /// Estimated SNR per antenna and snapshot.
+    pub snr_db: f64,
+    /// Whether the estimate may be relied on.
+    pub verdict: Verdict,
+}
+
+impl AngleEstimate {
+    /// Whether the verdict is [`Verdict::Resolved`].
+    pub fn is_resolved(&self) -> bool {
+        self.verdict == Verdict::Resolved
+    }
+}
+
+/// The estimate of who knows nothing: any direction, not resolved.
+impl Default for AngleEstimate {
+    fn default() -> Self {
+        Self {
+            phase_rad: 0.0,
+            phase_sigma_rad: PI / 3.0_f64.sqrt(),
+            angle_rad: FRAC_PI_2,
+            sigma_rad: FRAC_PI_2,
+            snr_db: f64::NEG_INFINITY,
+            verdict: Verdict::Unresolved(Reason::ThresholdSnr),
+        }
+    }
+}
+
+/// Angle estimates of several sources, by ascending angle.
+pub type AngleEstimates<const N: usize> = List<AngleEstimate, N>;

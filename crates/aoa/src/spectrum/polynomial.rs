@@ -1,0 +1,111 @@
+//! The function that every spectral method searches: `f(omega) = a(omega)^H M a(omega)`.
+
+use std::f64::consts::{PI, TAU};
+
+use num_complex::Complex64;
+
+use super::side_by_side::Spectra;
+use crate::linalg::matrix::Matrix;
+
+/// Newton from a grid of eight points per antenna doubles its digits at each step.
+const NEWTON_STEPS: usize = 6;
+
+/// `f(omega) = a^H M a` of a Hermitian `M` is a trigonometric polynomial of degree N - 1: with `c_k`
+/// the sum along the k-th off-diagonal of `M`,
+/// `f(omega) = c_0 + 2 Re sum_k c_k exp(-j k omega)`.
+#[derive(Debug, Clone, Copy)]
+pub(crate) struct Spectrum<const N: usize> {
+    pub(crate) lags: [Complex64; N],
+}
+
+impl<const N: usize> Spectrum<N> {
+    pub(crate) fn of_matrix(matrix: &Matrix<N>) -> Self {
+        let mut lags = [Complex64::ZERO; N];
+        for i in 0..N {
+            for j in 0..=i {
+                lags[i - j] += matrix[i][j];
+            }
+        }
+        Self { lags }
+    }
+
+    /// The spectrum of the projection on orthonormal vectors, `M = sum u u^H`.
+    pub(crate) fn of_subspace(vectors: &[[Complex64; N]]) -> Self {
+        let mut lags = [Complex64::ZERO; N];
+        for u in vectors {
+            for i in 0..N {
+                for j in 0..=i {
+                    lags[i - j] += u[i] * u[j].conj();
+                }
+            }
+        }
+        Self { lags }
+    }
+
+    /// `-f`, whose maxima are the minima of `f`.
+    pub(crate) fn negated(&self) -> Self {
+        Self {
+            lags: self.lags.map(|lag| -lag),
+        }
+    }
+
+    /// `f` at one electrical angle.
+    pub(crate) fn value(&self, phase_rad: f64) -> f64 {
+        self.derivatives(Complex64::cis(-phase_rad)).0
+    }
+
+    /// f, f', f'' at `rotation = exp(-j omega)`.
+    fn derivatives(&self, rotation: Complex64) -> (f64, f64, f64) {
+        let (mut f, mut df, mut ddf) = (0.5 * self.lags[0].re, 0.0, 0.0);
+        let mut power = rotation;
+        for (k, lag) in self.lags.iter().enumerate().skip(1) {
+            let term = lag * power;
+            let k = k as f64;
+            f += term.re;
+            df += k * term.im;
+            ddf -= k * k * term.re;
+            power *= rotation;
+        }
+        (2.0 * f, 2.0 * df, 2.0 * ddf)
+    }
+
+    /// The electrical angle at which `f` is largest, and that value.
+    pub(crate) fn maximum(&self) -> (f64, f64) {
+        let peaks = Spectra::<N, 1> {
+            re: self.lags.map(|lag| [lag.re]),
+            im: self.lags.map(|lag| [lag.im]),
+        }
+        .maxima::<false>();
+        (peaks.phase_rad[0], peaks.value[0])
+    }
+
+    /// The local maximum within `reach` of `start`, by Newton's method, in (-pi, pi].
+    pub(crate) fn refined_maximum(&self, start: f64, reach: f64) -> f64 {
+        let mut offset: f64 = 0.0;
+        for _ in 0..NEWTON_STEPS {
+            let (_, slope, curvature) = self.derivatives(Complex64::cis(-(start + offset)));
+            // Where the curvature has the wrong sign, walk uphill.
+            let newton = if curvature < 0.0 {
+                -slope / curvature
+            } else {
+                slope.signum() * 0.5 * reach
+            };
+            let next = (offset + newton).clamp(-reach, reach);
+            if !next.is_finite() || (next - offset).abs() < 1e-15 {
+                break;
+            }
+            offset = next;
+        }
+        wrap(start + offset)
+    }
+}
+
+/// Wraps an angle into (-pi, pi].
+pub(crate) fn wrap(angle_rad: f64) -> f64 {
+    let wrapped = angle_rad - TAU * (angle_rad / TAU).round();
+    if wrapped <= -PI {
+        wrapped + TAU
+    } else {
+        wrapped
+    }
+}

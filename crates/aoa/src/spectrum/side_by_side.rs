@@ -1,0 +1,259 @@
+//! Maxima of many spectra side by side.
+//!
+//! One spectrum needs some hundred operations without a branch, so `W` of them are searched together
+//! and the compiler makes vectors of the innermost loops. `FUSED` says whether they are compiled for
+//! a processor that multiplies and adds in one instruction.
+
+use std::f64::consts::{FRAC_PI_2, PI, TAU};
+
+use crate::simd::math::times_plus;
+
+/// Points of the finest search grid on the circle.
+const CIRCLE: usize = 64;
+/// `cos(2 pi i / 64)`.
+const COS: [f64; CIRCLE] = cosines();
+/// From the grid Newton's method needs three steps, four at the worst.
+const NEWTON_STEPS: usize = 6;
+
+/// `W` spectra `f(omega) = c_0 + 2 Re sum_k c_k exp(-j k omega)` of degree N - 1.
+#[derive(Debug, Clone, Copy)]
+pub struct Spectra<const N: usize, const W: usize> {
+    pub re: [[f64; W]; N],
+    pub im: [[f64; W]; N],
+}
+
+/// Where each spectrum is largest, and how large it is there.
+#[derive(Debug, Clone, Copy)]
+pub(crate) struct Peaks<const W: usize> {
+    /// In (-pi, pi].
+    pub(crate) phase_rad: [f64; W],
+    pub(crate) value: [f64; W],
+}
+
+/// The best grid point so far.
+#[derive(Clone, Copy)]
+struct Best<const W: usize> {
+    value: [f64; W],
+    phase: [f64; W],
+    cos: [f64; W],
+    sin: [f64; W],
+}
+
+impl<const N: usize, const W: usize> Spectra<N, W> {
+    pub(crate) const ZERO: Self = Self {
+        re: [[0.0; W]; N],
+        im: [[0.0; W]; N],
+    };
+
+    /// Every stride-th point of the circle is searched: at least eight per antenna up to N = 8.
+    const STRIDE: usize = if N <= 2 {
+        4
+    } else if N <= 4 {
+        2
+    } else {
+        1
+    };
+
+    /// The global maxima: the best point of a grid, then Newton's method.
+    #[inline(always)]
+    pub(crate) fn maxima<const FUSED: bool>(&self) -> Peaks<W> {
+        let best = self.best_grid_points::<FUSED>();
+        self.refined::<FUSED>(&best)
+    }
+
+    #[inline(always)]
+    fn best_grid_points<const FUSED: bool>(&self) -> Best<W> {
+        let mut best = Best {
+            value: [f64::NEG_INFINITY; W],
+            phase: [0.0; W],
+            cos: [1.0; W],
+            sin: [0.0; W],
+        };
+        let mut point = 0;
+        while point <= CIRCLE / 4 {
+            // The sums of even and of odd k give the spectrum at omega, -omega, pi - omega and
+            // omega - pi, which differ only in signs.
+            let angle = TAU * point as f64 / CIRCLE as f64;
+            let (cos, sin) = (COS[point], COS[CIRCLE / 4 - point]);
+            for w in 0..W {
+                let (mut even_cos, mut odd_cos, mut even_sin, mut odd_sin) = (0.0, 0.0, 0.0, 0.0);
+                for k in 1..N {
+                    let c = COS[point * k % CIRCLE];
+                    let s = COS[(point * k + CIRCLE * 3 / 4) % CIRCLE];
+                    if k % 2 == 0 {
+                        even_cos = times_plus::<FUSED>(self.re[k][w], c, even_cos);
+                        even_sin = times_plus::<FUSED>(self.im[k][w], s, even_sin);
+                    } else {
+                        odd_cos = times_plus::<FUSED>(self.re[k][w], c, odd_cos);
+                        odd_sin = times_plus::<FUSED>(self.im[k][w], s, odd_sin);
+                    }
+                }
+                let (right, left) = (odd_sin + even_sin, odd_sin - even_sin);
+                let ahead = even_cos + odd_cos + right.abs();
+                let behind = even_cos - odd_cos + left.abs();
+                let forward = ahead > behind;
+                let value = if forward { ahead } else { behind };
+                let side = if forward { right } else { left };
+                let better = value > best.value[w];
+                let phase = (if forward { angle } else { PI - angle }).copysign(side);
+                best.value[w] = if better { value } else { best.value[w] };
+                best.phase[w] = if better { phase } else { best.phase[w] };
+                best.cos[w] = if better {
+                    if forward { cos } else { -cos }
+                } else {
+                    best.cos[w]
+                };
+                best.sin[w] = if better {
+                    sin.copysign(side)
+                } else {
+                    best.sin[w]
+                };
+            }
+            point += Self::STRIDE;
+        }
+        best
+    }
+
+    #[inline(always)]
+    fn refined<const FUSED: bool>(&self, best: &Best<W>) -> Peaks<W> {
+        let reach = 0.75 * TAU * Self::STRIDE as f64 / CIRCLE as f64;
+        let Best {
+            mut value,
+            phase,
+            mut cos,
+            mut sin,
+        } = *best;
+        let mut offset = [0.0; W];
+        for _ in 0..NEWTON_STEPS {
+            let mut moving = false;
+            for w in 0..W {
+                // z = exp(-j omega), raised to the k-th power as k grows.
+                let (z_re, z_im) = (cos[w], -sin[w]);
+                let (mut power_re, mut power_im) = (z_re, z_im);
+                let (mut f, mut slope, mut curvature) = (0.0, 0.0, 0.0);
+                for k in 1..N {
+                    let (re, im) = (self.re[k][w], self.im[k][w]);
+                    let term_re = times_plus::<FUSED>(re, power_re, -(im * power_im));
+                    let term_im = times_plus::<FUSED>(re, power_im, im * power_re);
+                    let order = k as f64;
+                    f += term_re;
+                    slope = times_plus::<FUSED>(order, term_im, slope);
+                    curvature = times_plus::<FUSED>(-order * order, term_re, curvature);
+                    let next_re = times_plus::<FUSED>(power_re, z_re, -(power_im * z_im));
+                    power_im = times_plus::<FUSED>(power_re, z_im, power_im * z_re);
+                    power_re = next_re;
+                }
+                value[w] = f;
+                // Where the spectrum is convex, walk uphill instead.
+                let newton = -slope / curvature;
+                let uphill = (0.5 * reach).copysign(slope);
+                let step = if curvature < 0.0 { newton } else { uphill };
+                let target = offset[w] + step;
+                let target = if target > reach { reach } else { target };
+                let target = if target < -reach { -reach } else { target };
+                let step = target - offset[w];
+                offset[w] = target;
+                // Rotate by the step, |step| <= 2 reach.
+                let (step_sin, step_cos) = small_sin_cos::<FUSED>(step);
+                let next_cos = times_plus::<FUSED>(cos[w], step_cos, -(sin[w] * step_sin));
+                sin[w] = times_plus::<FUSED>(cos[w], step_sin, sin[w] * step_cos);
+                cos[w] = next_cos;
+                moving |= step.abs() > 1e-7;
+            }
+            // The error squares at each step.
+            if !moving {
+                break;
+            }
+        }
+        let mut peaks = Peaks {
+            phase_rad: [0.0; W],
+            value: [0.0; W],
+        };
+        for w in 0..W {
+            let turned = phase[w] + offset[w];
+            let turned = if turned > PI { turned - TAU } else { turned };
+            peaks.phase_rad[w] = if turned <= -PI { turned + TAU } else { turned };
+            peaks.value[w] = 2.0 * value[w] + self.re[0][w];
+        }
+        peaks
+    }
+}
+
+/// Sine and cosine by their Taylor series: to 1e-14 for |x| < 0.6.
+#[inline(always)]
+fn small_sin_cos<const FUSED: bool>(x: f64) -> (f64, f64) {
+    let squared = x * x;
+    let (mut sin, mut cos) = (0.0, 0.0);
+    for term in SINE_COSINE.iter().rev() {
+        sin = times_plus::<FUSED>(sin, squared, term.0);
+        cos = times_plus::<FUSED>(cos, squared, term.1);
+    }
+    (x * sin, cos)
+}
+
+/// Coefficients of `sin(x) / x` and of `cos(x)` in powers of `x^2`.
+const SINE_COSINE: [(f64, f64); 7] = {
+    let mut series = [(1.0, 1.0); 7];
+    let mut n = 1;
+    while n < series.len() {
+        let order = 2.0 * n as f64;
+        series[n].0 = -series[n - 1].0 / (order * (order + 1.0));
+        series[n].1 = -series[n - 1].1 / (order * (order - 1.0));
+        n += 1;
+    }
+    series
+};
+
+/// The cosines of the grid, by the Taylor series about the nearest multiple of pi / 2.
+const fn cosines() -> [f64; CIRCLE] {
+    let mut table = [0.0; CIRCLE];
+    let mut i = 0;
+    while i < CIRCLE {
+        // Reduce to the first octant, where sine and cosine are both small series.
+        let quadrant = (i + CIRCLE / 8) / (CIRCLE / 4);
+        let x = (i as f64 - (quadrant * CIRCLE / 4) as f64) * (FRAC_PI_2 / (CIRCLE / 4) as f64);
+        let (mut sin, mut cos) = (0.0, 0.0);
+        let mut n = 20.0;
+        while n > 1.0 {
+            sin = (1.0 + sin) * (-x * x / (n * (n + 1.0)));
+            cos = (1.0 + cos) * (-x * x / (n * (n - 1.0)));
+            n -= 2.0;
+        }
+        let (sin, cos) = (x * (1.0 + sin), 1.0 + cos);
+        table[i] = match quadrant % 4 {
+            0 => cos,
+            1 => -sin,
+            2 => -cos,
+            _ => sin,
+        };
+        i += 1;
+    }
+    table
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    #[test]
+    fn the_grid_is_of_cosines() {
+        for (i, value) in COS.iter().enumerate() {
+            assert!(
+                (value - (TAU * i as f64 / CIRCLE as f64).cos()).abs() < 1e-15,
+                "{i}"
+            );
+        }
+    }
+
+    #[test]
+    fn small_angles_have_their_sine_and_cosine() {
+        for i in -60..=60 {
+            let x = f64::from(i) * 0.01;
+            let (sin, cos) = small_sin_cos::<false>(x);
+            assert!(
+                (sin - x.sin()).abs() < 1e-14 && (cos - x.cos()).abs() < 1e-14,
+                "{x}"
+            );
+        }
+    }
+}

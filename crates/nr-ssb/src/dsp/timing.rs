@@ -1,0 +1,150 @@
+//! Timing to a fraction of a sample from the phase slope over the subcarriers.
+
+use std::f64::consts::TAU;
+
+use num_complex::{Complex32, Complex64};
+
+use super::base_rate::SYMBOL_FFT;
+use crate::numeric::phasors::fill_phasors;
+use crate::standard::grid::SUBCARRIERS;
+
+/// Groups of subcarriers that a small delay is estimated from.
+const GROUPS: usize = 30;
+
+/// Delay in samples that maximises `Σ_r |Σ_k z_r(k) exp(j2πk'τ/256)|²`, `k' = k − 120`, over rows
+/// whose phases are unrelated (antennas, or antennas × symbols): the maximum-likelihood delay of
+/// one path. Looks in `±reach` samples on a grid of `1/4`, then by Newton's method.
+pub(crate) fn delay(rows: &[[Complex32; SUBCARRIERS]], reach: f64) -> f64 {
+    let steps = (reach * 4.0).ceil() as i32;
+    let mut best = (f64::NEG_INFINITY, 0.0);
+    for step in -steps..=steps {
+        let delay = f64::from(step) * 0.25;
+        let power = moments(rows, delay).power;
+        if power > best.0 {
+            best = (power, delay);
+        }
+    }
+    refine(rows, best.1, 3)
+}
+
+/// Newton's method for the maximum of [`delay`] from a near start; a step is at most 0.3 samples.
+/// `N` sums over equal groups of subcarriers serve as well as the 240.
+pub(crate) fn refine<const N: usize>(
+    rows: &[[Complex32; N]],
+    start: f64,
+    iterations: usize,
+) -> f64 {
+    let mut delay = start;
+    for _ in 0..iterations {
+        let moments = moments(rows, delay);
+        // Beyond the inflection, half a sample away, uphill is all that is known.
+        delay += if moments.curvature < 0.0 {
+            (-moments.slope / moments.curvature).clamp(-0.3, 0.3)
+        } else {
+            0.3 * moments.slope.signum()
+        };
+    }
+    delay
+}
+
+/// The same for a delay already within half a sample of zero: the antennas are first combined by
+/// their sums over the subcarriers, and groups of eight subcarriers, over which such a delay turns
+/// the phase by less than 0.1 rad, are added up. Both cost less than 0.1 % of the information.
+pub(crate) fn refine_combined(rows: &[[Complex32; SUBCARRIERS]]) -> f64 {
+    let mut combined = [[Complex32::ZERO; GROUPS]];
+    for row in rows {
+        let (groups, _) = row.as_chunks::<{ SUBCARRIERS / GROUPS }>();
+        let sums: [Complex32; GROUPS] =
+            std::array::from_fn(|group| groups.get(group).map_or(Complex32::ZERO, total));
+        let gain = total(&sums).conj();
+        for (slot, z) in combined[0].iter_mut().zip(&sums) {
+            *slot += z * gain;
+        }
+    }
+    refine(&combined, 0.0, 4)
+}
+
+/// Σ a, in two strands.
+fn total<const N: usize>(a: &[Complex32; N]) -> Complex32 {
+    let mut strands = [Complex32::ZERO; 2];
+    for (i, z) in a.iter().enumerate() {
+        strands[i % 2] += z;
+    }
+    strands[0] + strands[1]
+}
+
+/// `exp(j2πk'τ/256)`: takes a delay of τ samples out of the subcarriers.
+pub(crate) fn ramp(delay: f64) -> [Complex32; SUBCARRIERS] {
+    group_ramp(delay)
+}
+
+/// The same at the centres of `N` groups.
+fn group_ramp<const N: usize>(delay: f64) -> [Complex32; N] {
+    let mut ramp = [Complex32::ZERO; N];
+    let cycles = delay / SYMBOL_FFT as f64;
+    fill_phasors(&mut ramp, centre(N, 0) * cycles, width(N) * cycles);
+    ramp
+}
+
+/// Subcarriers of one of `groups` groups.
+fn width(groups: usize) -> f64 {
+    (SUBCARRIERS / groups) as f64
+}
+
+/// The middle of a group, in subcarriers from the SSB's centre.
+fn centre(groups: usize, group: usize) -> f64 {
+    (group as f64 + 0.5) * width(groups) - 0.5 - 120.0
+}
+
+struct Moments {
+    power: f64,
+    slope: f64,
+    curvature: f64,
+}
+
+/// The objective and its first two derivatives with respect to the delay.
+fn moments<const N: usize>(rows: &[[Complex32; N]], delay: f64) -> Moments {
+    let ramp = group_ramp::<N>(delay);
+    let omega = TAU / SYMBOL_FFT as f64;
+    let mut result = Moments {
+        power: 0.0,
+        slope: 0.0,
+        curvature: 0.0,
+    };
+    for row in rows {
+        // Sums of z, k z and k² z, rotated: D' = jω S1, D'' = −ω² S2.
+        let mut sums = [Complex32::ZERO; 3];
+        for (k, (z, phasor)) in row.iter().zip(&ramp).enumerate() {
+            let centred = centre(N, k) as f32;
+            let rotated = z * phasor;
+            let first = rotated * centred;
+            sums[0] += rotated;
+            sums[1] += first;
+            sums[2] += first * centred;
+        }
+        let [s0, s1, s2] = sums.map(|s| Complex64::new(f64::from(s.re), f64::from(s.im)));
+        result.power += s0.norm_sqr();
+        result.slope -= 2.0 * omega * (s0.conj() * s1).im;
+        result.curvature += 2.0 * omega * omega * (s1.norm_sqr() - (s0.conj() * s2).re);
+    }
+    result
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    #[test]
+    fn a_ramp_gives_its_delay() {
+        for truth in [-1.3, -0.25, 0.0, 0.113, 0.9] {
+            let row: [Complex32; SUBCARRIERS] = std::array::from_fn(|k| {
+                let phase = -TAU * (k as f64 - 120.0) * truth / SYMBOL_FFT as f64;
+                Complex32::new(phase.cos() as f32, phase.sin() as f32)
+            });
+            assert!((delay(&[row], 1.5) - truth).abs() < 1e-5);
+            if truth.abs() < 0.5 {
+                assert!((refine_combined(&[row, row]) - truth).abs() < 1e-4);
+            }
+        }
+    }
+}

@@ -1,0 +1,391 @@
+//! Front end: brings the SSB's centre to 0 Hz and the recording to the base rate of 256 samples a
+//! symbol, with everything outside the SSB's 240 subcarriers filtered away.
+//!
+//! Overlap-save in the frequency domain: a block of the input is transformed once, the bins around
+//! the SSB are weighted with a zero-phase raised-cosine low-pass and transformed back at the base
+//! rate. Mixing costs nothing (it is the choice of bins), and output sample `j` belongs exactly to
+//! input time `j · M / L`.
+
+use std::f64::consts::TAU;
+use std::sync::Arc;
+
+use num_complex::{Complex32, Complex64};
+use rustfft::{Fft, FftPlanner};
+
+use crate::dsp::base_rate::SYMBOL_FFT;
+
+/// All input rates are multiples of this one, 256 × 15 kHz.
+pub const RATE_UNIT_HZ: f64 = 3.84e6;
+/// Length of an output block of the overlap-save scheme, in samples at the base rate.
+const BLOCK: usize = 4096;
+/// Samples at the base rate dropped on each side of a block: the reach of the low-pass.
+const MARGIN: usize = 128;
+/// Carrier frequency offset that must pass the filter unharmed, in subcarriers.
+const CFO_MARGIN_SUBCARRIERS: f64 = 0.7;
+
+/// What makes a front end impossible.
+#[derive(Debug, Clone, PartialEq, thiserror::Error)]
+#[non_exhaustive]
+pub enum FrontEndError {
+    /// The input rate is not a positive integer multiple of 3.84 Msps.
+    #[error("sample rate {0} Hz is not an integer multiple of 3.84 MHz")]
+    RateNotMultiple(f64),
+    /// The input rate is below the base rate of the numerology.
+    #[error("sample rate {input_hz} Hz is below the {base_hz} Hz that the SSB needs")]
+    RateTooLow {
+        /// The recording's rate.
+        input_hz: f64,
+        /// 256 × subcarrier spacing.
+        base_hz: f64,
+    },
+    /// The SSB lies outside the recorded band.
+    #[error("an SSB {offset_hz} Hz off the centre does not fit a band of {input_hz} Hz")]
+    OutOfBand {
+        /// SSB centre minus recording centre.
+        offset_hz: f64,
+        /// The recording's rate.
+        input_hz: f64,
+    },
+    /// The number of antennas given differs from that announced.
+    #[error("{given} antennas given, {expected} expected")]
+    AntennaCount {
+        /// Number of channels passed.
+        given: usize,
+        /// Number of channels the front end was made for.
+        expected: usize,
+    },
+    /// The antennas' blocks differ in length.
+    #[error("antennas hold different numbers of samples: {first} and {other}")]
+    UnequalLengths {
+        /// Length of antenna 0.
+        first: usize,
+        /// A length that differs.
+        other: usize,
+    },
+}
+
+/// Mixer, low-pass and rate conversion by L/M for all antennas of one receiver. Any multiple of
+/// 3.84 Msps is an input rate, also 11.52 Msps at 30 kHz (L/M = 2/3).
+pub struct FrontEnd {
+    input_rate_hz: f64,
+    scs_hz: f64,
+    forward: Arc<dyn Fft<f32>>,
+    inverse: Arc<dyn Fft<f32>>,
+    /// Input samples that make one output block.
+    input_block: usize,
+    /// Output samples per input block: L/M.
+    interpolation: usize,
+    decimation: usize,
+    tuning: Tuning,
+    low_pass: Vec<f32>,
+    spectrum: Vec<Complex32>,
+    block: Vec<Complex32>,
+    scratch: Vec<Complex32>,
+    /// Per antenna, input not yet consumed; begins `MARGIN` output samples before the next output.
+    pending: Vec<Vec<Complex32>>,
+    /// Samples put in so far, per antenna.
+    consumed_input: u64,
+    /// Samples given out so far, per antenna.
+    produced: u64,
+}
+
+/// Which frequency becomes 0 Hz.
+#[derive(Debug, Clone, Copy, Default)]
+struct Tuning {
+    /// Bin of the input spectrum.
+    centre_bin: i64,
+    /// What the choice of bins leaves, in cycles per output sample.
+    residual_cycles: f64,
+}
+
+impl FrontEnd {
+    /// A front end from `input_rate_hz` to `256 × scs_hz`, for an SSB whose centre lies
+    /// `offset_hz` above that of the recording.
+    ///
+    /// # Errors
+    /// See [`FrontEndError`].
+    pub fn new(
+        input_rate_hz: f64,
+        offset_hz: f64,
+        scs_hz: f64,
+        antennas: usize,
+    ) -> Result<Self, FrontEndError> {
+        let base_rate_hz = SYMBOL_FFT as f64 * scs_hz;
+        let input_units = in_rate_units(input_rate_hz)?;
+        let base_units = in_rate_units(base_rate_hz)?;
+        if input_units < base_units {
+            return Err(FrontEndError::RateTooLow {
+                input_hz: input_rate_hz,
+                base_hz: base_rate_hz,
+            });
+        }
+        let divisor = gcd(input_units, base_units);
+        let (interpolation, decimation) = (base_units / divisor, input_units / divisor);
+        let input_block = BLOCK / interpolation * decimation;
+        let mut planner = FftPlanner::new();
+        let forward = planner.plan_fft_forward(input_block);
+        let inverse = planner.plan_fft_inverse(BLOCK);
+        let scratch = forward
+            .get_inplace_scratch_len()
+            .max(inverse.get_inplace_scratch_len());
+        let lead_in = MARGIN / interpolation * decimation;
+        let mut front_end = Self {
+            input_rate_hz,
+            scs_hz,
+            forward,
+            inverse,
+            input_block,
+            interpolation,
+            decimation,
+            tuning: Tuning::default(),
+            low_pass: low_pass(input_block),
+            spectrum: vec![Complex32::ZERO; input_block],
+            block: vec![Complex32::ZERO; BLOCK],
+            scratch: vec![Complex32::ZERO; scratch],
+            pending: vec![vec![Complex32::ZERO; lead_in]; antennas],
+            consumed_input: 0,
+            produced: 0,
+        };
+        front_end.tune(offset_hz)?;
+        Ok(front_end)
+    }
+
+    /// Moves to an SSB at another offset from the recording's centre. Between recordings only: in
+    /// the middle of a stream the phase would jump.
+    ///
+    /// # Errors
+    /// [`FrontEndError::OutOfBand`].
+    pub fn tune(&mut self, offset_hz: f64) -> Result<(), FrontEndError> {
+        self.tuning = self.tuning_to(offset_hz)?;
+        Ok(())
+    }
+
+    fn tuning_to(&self, offset_hz: f64) -> Result<Tuning, FrontEndError> {
+        let edge_hz = offset_hz.abs() + 120.0 * self.scs_hz;
+        if edge_hz.is_nan() || edge_hz > 0.5 * self.input_rate_hz {
+            return Err(FrontEndError::OutOfBand {
+                offset_hz,
+                input_hz: self.input_rate_hz,
+            });
+        }
+        let base_rate_hz = SYMBOL_FFT as f64 * self.scs_hz;
+        let bin_hz = base_rate_hz / BLOCK as f64;
+        let centre_bin = (offset_hz / bin_hz).round();
+        Ok(Tuning {
+            centre_bin: centre_bin as i64,
+            residual_cycles: (offset_hz - centre_bin * bin_hz) / base_rate_hz,
+        })
+    }
+
+    /// Input samples per output sample, M/L.
+    pub fn input_per_output(&self) -> f64 {
+        self.decimation as f64 / self.interpolation as f64
+    }
+
+    /// Takes the next samples of every antenna and appends what can be computed to `output`,
+    /// one vector per antenna. About 4096 samples at the base rate are held back.
+    ///
+    /// # Errors
+    /// [`FrontEndError::AntennaCount`], [`FrontEndError::UnequalLengths`].
+    pub fn push<S: AsRef<[Complex32]>>(
+        &mut self,
+        antennas: &[S],
+        output: &mut [Vec<Complex32>],
+    ) -> Result<(), FrontEndError> {
+        self.push_at(antennas, &[self.tuning], &mut [output])
+    }
+
+    fn push_at<S: AsRef<[Complex32]>>(
+        &mut self,
+        antennas: &[S],
+        tunings: &[Tuning],
+        outputs: &mut [&mut [Vec<Complex32>]],
+    ) -> Result<(), FrontEndError> {
+        let mut length = 0;
+        for output in outputs.iter() {
+            length = self.common_length(antennas, output)?;
+        }
+        for (pending, input) in self.pending.iter_mut().zip(antennas) {
+            pending.extend_from_slice(input.as_ref());
+        }
+        self.consumed_input += length as u64;
+        self.run_blocks(tunings, outputs);
+        Ok(())
+    }
+
+    /// Ends the stream: appends the samples held back. The front end is then ready for another.
+    pub fn finish(&mut self, output: &mut [Vec<Complex32>]) {
+        self.finish_at(&[self.tuning], &mut [output]);
+    }
+
+    fn finish_at(&mut self, tunings: &[Tuning], outputs: &mut [&mut [Vec<Complex32>]]) {
+        let (up, down) = (self.interpolation as u64, self.decimation as u64);
+        let total = (self.consumed_input * up).div_ceil(down);
+        while self.produced < total {
+            for pending in &mut self.pending {
+                pending.resize(self.input_block, Complex32::ZERO);
+            }
+            self.run_blocks(tunings, outputs);
+        }
+        let excess = self.produced.saturating_sub(total) as usize;
+        for samples in outputs.iter_mut().flat_map(|output| output.iter_mut()) {
+            samples.truncate(samples.len() - excess.min(samples.len()));
+        }
+        let lead_in = MARGIN / self.interpolation * self.decimation;
+        for pending in &mut self.pending {
+            pending.clear();
+            pending.resize(lead_in, Complex32::ZERO);
+        }
+        self.consumed_input = 0;
+        self.produced = 0;
+    }
+
+    /// A whole recording at once: [`push`](Self::push) and [`finish`](Self::finish).
+    ///
+    /// # Errors
+    /// As [`push`](Self::push).
+    pub fn process<S: AsRef<[Complex32]>>(
+        &mut self,
+        antennas: &[S],
+    ) -> Result<Vec<Vec<Complex32>>, FrontEndError> {
+        let mut output = vec![Vec::new(); antennas.len()];
+        self.push(antennas, &mut output)?;
+        self.finish(&mut output);
+        Ok(output)
+    }
+
+    /// A whole recording brought to several offsets at once, each with its own output for every
+    /// antenna: the transform of the input, most of the work at high rates, is done only once.
+    ///
+    /// # Errors
+    /// As [`tune`](Self::tune) and [`push`](Self::push).
+    pub(crate) fn process_at<S: AsRef<[Complex32]>>(
+        &mut self,
+        antennas: &[S],
+        offsets_hz: &[f64],
+        outputs: &mut [Vec<Vec<Complex32>>],
+    ) -> Result<(), FrontEndError> {
+        let tunings = offsets_hz
+            .iter()
+            .map(|offset_hz| self.tuning_to(*offset_hz));
+        let tunings: Vec<_> = tunings.collect::<Result<_, _>>()?;
+        let mut outputs: Vec<_> = outputs.iter_mut().map(Vec::as_mut_slice).collect();
+        for samples in outputs.iter_mut().flat_map(|output| output.iter_mut()) {
+            samples.clear();
+        }
+        self.push_at(antennas, &tunings, &mut outputs)?;
+        self.finish_at(&tunings, &mut outputs);
+        Ok(())
+    }
+
+    fn common_length<S: AsRef<[Complex32]>>(
+        &self,
+        antennas: &[S],
+        output: &[Vec<Complex32>],
+    ) -> Result<usize, FrontEndError> {
+        let expected = self.pending.len();
+        for given in [antennas.len(), output.len()] {
+            if given != expected {
+                return Err(FrontEndError::AntennaCount { given, expected });
+            }
+        }
+        let first = antennas.first().map_or(0, |samples| samples.as_ref().len());
+        match antennas
+            .iter()
+            .find(|samples| samples.as_ref().len() != first)
+        {
+            Some(samples) => Err(FrontEndError::UnequalLengths {
+                first,
+                other: samples.as_ref().len(),
+            }),
+            None => Ok(first),
+        }
+    }
+
+    fn run_blocks(&mut self, tunings: &[Tuning], outputs: &mut [&mut [Vec<Complex32>]]) {
+        let hop_output = BLOCK - 2 * MARGIN;
+        let hop_input = hop_output / self.interpolation * self.decimation;
+        let available = self.pending.first().map_or(0, Vec::len);
+        let mut start = 0;
+        while start + self.input_block <= available {
+            for antenna in 0..self.pending.len() {
+                let input = &self.pending[antenna][start..start + self.input_block];
+                self.spectrum.copy_from_slice(input);
+                self.forward
+                    .process_with_scratch(&mut self.spectrum, &mut self.scratch);
+                for (tuning, output) in tunings.iter().zip(outputs.iter_mut()) {
+                    self.filter_block(tuning);
+                    let (mut rotation, step) = self.block_phase(tuning);
+                    let kept = self.block[MARGIN..BLOCK - MARGIN].iter();
+                    output[antenna].extend(kept.map(|sample| {
+                        let rotated =
+                            sample * Complex32::new(rotation.re as f32, rotation.im as f32);
+                        rotation *= step;
+                        rotated
+                    }));
+                }
+            }
+            start += hop_input;
+            self.produced += hop_output as u64;
+        }
+        for pending in &mut self.pending {
+            pending.drain(..start);
+        }
+    }
+
+    /// Leaves the part of `spectrum` around the tuning, filtered and at the base rate, in `block`.
+    fn filter_block(&mut self, tuning: &Tuning) {
+        let first = (tuning.centre_bin - (BLOCK / 2) as i64).rem_euclid(self.input_block as i64);
+        let mut source = first as usize;
+        for (index, weight) in self.low_pass.iter().enumerate() {
+            self.block[(index + BLOCK / 2) % BLOCK] = self.spectrum[source] * *weight;
+            source += 1;
+            if source == self.input_block {
+                source = 0;
+            }
+        }
+        self.inverse
+            .process_with_scratch(&mut self.block, &mut self.scratch);
+    }
+
+    /// Phase of the mixer at the first sample of the next output hop, and its step per sample.
+    fn block_phase(&self, tuning: &Tuning) -> (Complex64, Complex64) {
+        let hop_start = i128::from(self.produced) - MARGIN as i128;
+        let start_input = hop_start / self.interpolation as i128 * self.decimation as i128;
+        let bins =
+            (i128::from(tuning.centre_bin) * start_input).rem_euclid(self.input_block as i128);
+        let cycles = bins as f64 / self.input_block as f64
+            + (tuning.residual_cycles * self.produced as f64).fract();
+        (
+            Complex64::cis(-TAU * cycles),
+            Complex64::cis(-TAU * tuning.residual_cycles),
+        )
+    }
+}
+
+/// Weights of the bins −2048…2047: one over the 240 subcarriers and the tolerated frequency
+/// offset, a raised-cosine edge down to the Nyquist frequency, and the scale of the transforms.
+fn low_pass(input_block: usize) -> Vec<f32> {
+    let bins_per_subcarrier = BLOCK as f64 / 256.0;
+    let pass = (120.5 + CFO_MARGIN_SUBCARRIERS) * bins_per_subcarrier;
+    let stop = 128.0 * bins_per_subcarrier;
+    (0..BLOCK)
+        .map(|index| {
+            let bin = (index as f64 - (BLOCK / 2) as f64).abs();
+            let edge = ((bin - pass) / (stop - pass)).clamp(0.0, 1.0);
+            (0.5 * (1.0 + (0.5 * TAU * edge).cos()) / input_block as f64) as f32
+        })
+        .collect()
+}
+
+fn in_rate_units(rate_hz: f64) -> Result<usize, FrontEndError> {
+    let units = (rate_hz / RATE_UNIT_HZ).round();
+    if !(1.0..=4096.0).contains(&units) || (rate_hz / RATE_UNIT_HZ - units).abs() > 1e-6 * units {
+        return Err(FrontEndError::RateNotMultiple(rate_hz));
+    }
+    Ok(units as usize)
+}
+
+fn gcd(a: usize, b: usize) -> usize {
+    if b == 0 { a } else { gcd(b, a % b) }
+}

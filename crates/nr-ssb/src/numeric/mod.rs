@@ -1,0 +1,7 @@
+//! Arithmetic that knows nothing of SSBs.
+
+pub(crate) mod decibel;
+pub(crate) mod false_alarm;
+pub(crate) mod hermitian;
+pub(crate) mod phasors;
+pub(crate) mod sums;

@@ -1,0 +1,15 @@
+//! Finding the SSB's frequency and subcarrier spacing: the synchronization raster of TS 38.104
+//! §5.4.3, point by point through the recorded band, at 15 and 30 kHz. Test networks place SSBs
+//! elsewhere; for them, and for recordings that do not state their centre, see [`scan_off_raster`].
+
+mod error;
+mod find;
+mod placement;
+mod point;
+mod point_search;
+mod scan;
+
+pub use error::ScanError;
+pub use find::RasterFind;
+pub use point::{RasterPoint, synchronization_raster};
+pub use scan::{scan, scan_off_raster, scan_raster};

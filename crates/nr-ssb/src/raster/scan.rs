@@ -1,0 +1,164 @@
+//! Scans of a recording: on the raster, and off it.
+
+use std::ops::RangeInclusive;
+
+use num_complex::Complex32;
+
+use super::error::ScanError;
+use super::find::RasterFind;
+use super::placement::placed_at;
+use super::point::{RasterPoint, synchronization_raster};
+use super::point_search::{OFFSET_UNIT_HZ, PointSearch, nearest_offset};
+use crate::standard::grid::SUBCARRIERS;
+use crate::standard::numerology::SubcarrierSpacing;
+
+/// Share of the probability of a false cell, 1e-3 for 20 ms, that each of two scans at each of two
+/// spacings may use up.
+const FALSE_ALARM: f64 = 0.25e-3;
+const SPACINGS: [SubcarrierSpacing; 2] = [SubcarrierSpacing::Khz15, SubcarrierSpacing::Khz30];
+
+/// All SSBs of a recording, `antennas` channels at `rate_hz` around `centre_hz` (`None`: unknown),
+/// at whatever frequency and subcarrier spacing; the frequency with the strongest SSB first. First
+/// [`scan_raster`]; where it finds nothing, [`scan_off_raster`].
+///
+/// # Errors
+/// Those of [`scan_raster`].
+pub fn scan(
+    antennas: &[&[Complex32]],
+    rate_hz: f64,
+    centre_hz: Option<f64>,
+) -> Result<Vec<RasterFind>, ScanError> {
+    if let Some(centre_hz) = centre_hz {
+        let finds = scan_raster(antennas, rate_hz, centre_hz)?;
+        if !finds.is_empty() {
+            return Ok(finds);
+        }
+    }
+    scan_off_raster(antennas, rate_hz, centre_hz)
+}
+
+/// The SSBs on the points of the synchronization raster, the point with the strongest first.
+///
+/// A point also shows what lies up to half a subcarrier beside it, on the global frequency raster;
+/// such an SSB is placed there, without a GSCN, if the phase between its symbols clearly says so.
+/// In doubt it is taken to be on the point, and the rest for its carrier frequency offset: a cell
+/// that is to be searched for must be on this raster.
+///
+/// The probability of a false cell, half of 1e-3 for 20 ms, is shared among the points.
+///
+/// # Errors
+/// [`ScanError::FrontEnd`] for a rate that is no multiple of 3.84 MHz, [`ScanError::Search`] for
+/// channels of unequal lengths or less than one SSB.
+pub fn scan_raster(
+    antennas: &[&[Complex32]],
+    rate_hz: f64,
+    centre_hz: f64,
+) -> Result<Vec<RasterFind>, ScanError> {
+    let mut finds = Vec::new();
+    for spacing in SPACINGS {
+        let reach = reach_hz(rate_hz, spacing);
+        let points: Vec<_> = synchronization_raster(centre_hz - reach, centre_hz + reach).collect();
+        if points.is_empty() {
+            continue;
+        }
+        let mut at_point = PointSearch::new(
+            spacing,
+            rate_hz,
+            antennas.len(),
+            FALSE_ALARM / points.len() as f64,
+        )?;
+        for find in at_point.search_all(antennas, &points, centre_hz)? {
+            // What the point's neighbours on the global frequency raster hold shows here too.
+            let at = find.point;
+            let band_hz = band(centre_hz, reach);
+            let placed_hz = find.strongest().map_or(at.ssb_freq_hz, |ssb| {
+                placed_at(at.ssb_freq_hz, true, ssb, spacing, band_hz)
+            });
+            finds.push(if placed_hz == at.ssb_freq_hz {
+                find
+            } else {
+                at_point
+                    .search(antennas, RasterPoint::off(placed_hz), Some(centre_hz))?
+                    .unwrap_or(find)
+            });
+        }
+    }
+    sort(&mut finds);
+    Ok(finds)
+}
+
+/// The SSBs anywhere in the band.
+///
+/// The PSS is looked for at steps of a third of a subcarrier through the whole band; the places
+/// of the strongest maxima are then searched. An SSB belongs to a point of the global frequency
+/// raster (TS 38.104 §5.4.2.1: multiples of 5 kHz below 3 GHz, of 15 kHz above), which may be nearer
+/// than its carrier frequency offset. It is the phase between symbols that tells them apart (TS
+/// 38.211 §5.4), and where that leaves a doubt the smaller offset is preferred.
+///
+/// Without the absolute centre frequency there is no raster to count from: an SSB is placed at
+/// the nearest multiple of 15 kHz (the unit of k_SSB, TS 38.211 §7.4.3.1) from the recording's
+/// centre, the rest is frequency offset, and that comes from inside the symbols only and is less
+/// precise, see [`ssb_freq_hz`](crate::search::SearchConfig::ssb_freq_hz). The probability of a false
+/// cell, half of 1e-3 for 20 ms, is shared among all points of the band.
+///
+/// Takes time in proportion to bandwidth squared, duration and antennas: for one antenna and 1 ms
+/// at 23.04 Msps under a second.
+///
+/// # Errors
+/// Those of [`scan_raster`].
+pub fn scan_off_raster(
+    antennas: &[&[Complex32]],
+    rate_hz: f64,
+    centre_hz: Option<f64>,
+) -> Result<Vec<RasterFind>, ScanError> {
+    let mut finds: Vec<RasterFind> = Vec::new();
+    for spacing in SPACINGS {
+        let reach = reach_hz(rate_hz, spacing);
+        if reach.is_nan() || reach < 0.0 {
+            continue;
+        }
+        let all = 2 * (reach / OFFSET_UNIT_HZ) as usize + 1;
+        let mut at_point =
+            PointSearch::new(spacing, rate_hz, antennas.len(), FALSE_ALARM / all as f64)?;
+        let mut found_hz: Vec<f64> = Vec::new();
+        for offset_hz in at_point.likely_offsets(antennas, reach)? {
+            // An SSB also shows, weaker, where its PSS overlaps with a shifted one.
+            let width_hz = SUBCARRIERS as f64 * spacing.hz();
+            if found_hz.iter().any(|hz| (hz - offset_hz).abs() < width_hz) {
+                continue;
+            }
+            let first = at_point.search(antennas, RasterPoint::off(offset_hz), None)?;
+            let Some(strongest) = first.as_ref().and_then(RasterFind::strongest) else {
+                continue;
+            };
+            // A wrong frequency would be taken for an offset (TS 38.211 §5.4).
+            let offset_hz = match centre_hz {
+                Some(centre_hz) => {
+                    let tuned_hz = centre_hz + offset_hz;
+                    let band_hz = band(centre_hz, reach);
+                    placed_at(tuned_hz, false, strongest, spacing, band_hz) - centre_hz
+                }
+                None => nearest_offset(offset_hz + strongest.cfo_hz, reach),
+            };
+            found_hz.push(offset_hz);
+            let point = RasterPoint::off(centre_hz.unwrap_or(0.0) + offset_hz);
+            finds.extend(at_point.search(antennas, point, centre_hz)?);
+        }
+    }
+    sort(&mut finds);
+    Ok(finds)
+}
+
+/// How far from the recording's centre that of an SSB can lie.
+fn reach_hz(rate_hz: f64, spacing: SubcarrierSpacing) -> f64 {
+    0.5 * rate_hz - 0.5 * SUBCARRIERS as f64 * spacing.hz()
+}
+
+fn band(centre_hz: f64, reach_hz: f64) -> RangeInclusive<f64> {
+    centre_hz - reach_hz..=centre_hz + reach_hz
+}
+
+fn sort(finds: &mut [RasterFind]) {
+    let snr_db = |find: &RasterFind| find.strongest().map_or(f64::NEG_INFINITY, |it| it.snr_db);
+    finds.sort_by(|a, b| snr_db(b).total_cmp(&snr_db(a)));
+}

@@ -1,0 +1,205 @@
+//! PBCH of an acquired SSB: which burst set size, and what it says.
+
+use num_complex::Complex32;
+
+use super::acquire::{Acquired, Acquirer};
+use crate::standard::coding::rate_matching::E;
+use crate::standard::grid::PBCH_LEN;
+use crate::standard::message::payload::BchPayload;
+use crate::standard::numerology::{Lmax, SubcarrierSpacing};
+use crate::standard::pbch::{self, Decoder, Period};
+use crate::standard::pci::Pci;
+
+/// Periods that are combined at most, the latest included.
+const PERIODS: usize = 4;
+/// PBCHs kept that did not decode alone.
+const KEPT: usize = 32;
+/// Half frames after which the SFN's high bits have changed for certain.
+const LONGEST_HALF_FRAMES: f64 = 32.0;
+/// How far from a multiple of 5 ms a repetition may lie, samples: clock drift.
+const PERIOD_TOLERANCE: f64 = 3.0;
+
+/// What a PBCH says, and the burst set size under which its checksum held.
+#[derive(Debug, Clone, Copy)]
+pub(crate) struct Broadcast {
+    pub(crate) payload: BchPayload,
+    pub(crate) lmax: Lmax,
+    /// Its resource elements, encoded again.
+    pub(crate) symbols: [Complex32; PBCH_LEN],
+}
+
+/// A PBCH that did not decode alone.
+struct Undecoded {
+    pci: Pci,
+    ibar_ssb: u8,
+    /// First sample of its SSB.
+    time: f64,
+    llrs: [f32; E],
+}
+
+/// PBCH decoder that tries the admissible burst set sizes, and combines periods of a weak cell.
+pub(crate) struct BroadcastDecoder {
+    decoder: Decoder,
+    llrs: [f32; E],
+    spacing: SubcarrierSpacing,
+    /// The burst set size, when told.
+    lmax: Option<Lmax>,
+    /// Burst set sizes to try, the likelier first.
+    sizes: Vec<Lmax>,
+    undecoded: Vec<Undecoded>,
+    half_frame_samples: f64,
+}
+
+impl BroadcastDecoder {
+    /// A decoder for SSBs of this spacing, `lmax` of them per burst set if that is known, at this
+    /// frequency if that is.
+    pub(crate) fn new(
+        spacing: SubcarrierSpacing,
+        lmax: Option<Lmax>,
+        ssb_freq_hz: Option<f64>,
+    ) -> Self {
+        Self {
+            decoder: Decoder::default(),
+            llrs: [0.0; E],
+            spacing,
+            lmax,
+            sizes: burst_set_sizes(spacing, lmax, ssb_freq_hz),
+            undecoded: Vec::with_capacity(KEPT),
+            half_frame_samples: 5e-3 * spacing.base_rate_hz(),
+        }
+    }
+
+    /// Moves to an SSB at another frequency.
+    pub(crate) fn tune(&mut self, ssb_freq_hz: Option<f64>) {
+        self.sizes = burst_set_sizes(self.spacing, self.lmax, ssb_freq_hz);
+        self.forget();
+    }
+
+    /// Forgets the periods heard so far.
+    pub(crate) fn forget(&mut self) {
+        self.undecoded.clear();
+    }
+
+    pub(crate) fn likely_lmax(&self) -> Lmax {
+        self.sizes.first().copied().unwrap_or(Lmax::L8)
+    }
+
+    /// Decodes the SSB that the acquirer holds.
+    pub(crate) fn decode(&mut self, acquirer: &Acquirer, acquired: &Acquired) -> Option<Broadcast> {
+        let &Acquired { pci, ibar_ssb, .. } = acquired;
+        acquirer.log_likelihood_ratios(pci, &acquired.alignment, &mut self.llrs);
+        self.sizes.iter().find_map(|&lmax| {
+            let v = lmax.index_lsb(ibar_ssb);
+            let decoded = self.decoder.decode(&self.llrs, pci, v, lmax).ok()??;
+            fits(&decoded.payload, lmax, ibar_ssb).then(|| Broadcast {
+                payload: decoded.payload,
+                lmax,
+                symbols: decoded.symbols(),
+            })
+        })
+    }
+
+    /// Keeps the PBCH that [`decode`](Self::decode) just failed on, its SSB beginning at sample
+    /// `time`, and decodes it together with up to three earlier ones of the same cell and beam.
+    pub(crate) fn combine(&mut self, acquired: &Acquired, time: f64) -> Option<Broadcast> {
+        let &Acquired { pci, ibar_ssb, .. } = acquired;
+        let half_frame = self.half_frame_samples;
+        if self.undecoded.len() == KEPT {
+            self.undecoded.remove(0);
+        }
+        self.undecoded.push(Undecoded {
+            pci,
+            ibar_ssb,
+            time,
+            llrs: self.llrs,
+        });
+        let repeats = |other: &&Undecoded| {
+            let samples = time - other.time;
+            let whole = (samples / half_frame).round();
+            other.pci == pci
+                && other.ibar_ssb == ibar_ssb
+                && whole.abs() < LONGEST_HALF_FRAMES
+                && (samples - whole * half_frame).abs() < PERIOD_TOLERANCE
+        };
+        // The latest examined, which need not be the latest received.
+        let mut heard = [None; PERIODS];
+        for (slot, other) in heard
+            .iter_mut()
+            .zip(self.undecoded.iter().rev().filter(repeats))
+        {
+            *slot = Some(other);
+        }
+        let count = heard.iter().flatten().count();
+        let time_of = |one: Option<&Undecoded>| one.map_or(f64::INFINITY, |one| one.time);
+        heard.sort_by(|a, b| time_of(*a).total_cmp(&time_of(*b)));
+        let first = heard[0].filter(|_| count > 1)?;
+        let after_first = |time: f64| ((time - first.time) / half_frame).round() as u16;
+        let periods = heard.map(|one| {
+            let one = one.unwrap_or(first);
+            Period {
+                llr: &one.llrs,
+                half_frames: after_first(one.time),
+            }
+        });
+        let elapsed = i32::from(after_first(time));
+        self.sizes.iter().find_map(|&lmax| {
+            let v = lmax.index_lsb(ibar_ssb);
+            let decoded = self
+                .decoder
+                .combine(&periods[..count], pci, v, lmax)
+                .ok()??;
+            let payload = moved(decoded.payload, elapsed);
+            fits(&payload, lmax, ibar_ssb).then(|| Broadcast {
+                payload,
+                lmax,
+                symbols: pbch::encode(&payload, pci, lmax),
+            })
+        })
+    }
+
+    /// What the same SSB says `samples` later (or, if negative, said before); `None` unless that is
+    /// a multiple of 5 ms.
+    pub(crate) fn repeated(&self, payload: BchPayload, samples: f64) -> Option<BchPayload> {
+        let half_frames = (samples / self.half_frame_samples).round();
+        let off = (samples - half_frames * self.half_frame_samples).abs();
+        (off < PERIOD_TOLERANCE).then(|| moved(payload, half_frames as i32))
+    }
+}
+
+/// With four SSBs the DM-RS tells the half frame, and must tell the PBCH's.
+fn fits(payload: &BchPayload, lmax: Lmax, ibar_ssb: u8) -> bool {
+    lmax != Lmax::L4 || payload.half_frame == (ibar_ssb >= 4)
+}
+
+/// The payload of the same SSB `half_frames` later.
+fn moved(payload: BchPayload, half_frames: i32) -> BchPayload {
+    const SFN_CYCLE: i32 = 2048;
+    let now = 2 * i32::from(payload.sfn()) + i32::from(payload.half_frame);
+    let then = (now + half_frames).rem_euclid(SFN_CYCLE);
+    let mut result = payload;
+    result.mib.sfn_msb = (then / 32) as u8;
+    result.sfn_lsb = (then / 2 % 16) as u8;
+    result.half_frame = then % 2 == 1;
+    result
+}
+
+/// Burst set sizes to try, the likelier first.
+fn burst_set_sizes(
+    spacing: SubcarrierSpacing,
+    lmax: Option<Lmax>,
+    ssb_freq_hz: Option<f64>,
+) -> Vec<Lmax> {
+    match lmax {
+        Some(lmax) => vec![lmax],
+        None if four_is_usual(spacing, ssb_freq_hz) => vec![Lmax::L4, Lmax::L8],
+        None => vec![Lmax::L8, Lmax::L4],
+    }
+}
+
+/// TS 38.213 §4.1: four SSBs up to 3 GHz. Without a frequency, 15 kHz speaks for the bands below.
+fn four_is_usual(spacing: SubcarrierSpacing, ssb_freq_hz: Option<f64>) -> bool {
+    match ssb_freq_hz {
+        Some(hz) if hz > 0.0 => hz <= 3e9,
+        _ => spacing == SubcarrierSpacing::Khz15,
+    }
+}

@@ -1,0 +1,6 @@
+//! One SSB, from a candidate in time to cell, beam, message and measurements.
+
+pub(crate) mod acquire;
+pub(crate) mod broadcast;
+pub(crate) mod identify;
+pub mod measure;

@@ -1,0 +1,254 @@
+//! What becomes of a candidate: an SSB that is identified, decoded, measured and taken out of the
+//! samples, or nothing.
+
+use num_complex::Complex32;
+
+use super::detected::{DetectedSsb, ReceivedSsb, SearchCounts};
+use super::settings::SearchConfig;
+use crate::dsp::alignment::Alignment;
+use crate::dsp::base_rate::CYCLIC_PREFIX;
+use crate::dsp::cancel::Canceller;
+use crate::dsp::matched_filter::PssCandidate;
+use crate::dsp::received_grid::MAX_ANTENNAS;
+use crate::numeric::decibel::decibel;
+use crate::receive::acquire::{Acquired, Acquirer};
+use crate::receive::broadcast::{Broadcast, BroadcastDecoder};
+use crate::receive::measure::{Measurement, measure, sss_power};
+use crate::standard::grid::pss_indices;
+use crate::standard::numerology::Lmax;
+use crate::standard::pci::Pci;
+
+/// Part of the threshold for a cell from which on its PBCH is decoded.
+const DECODE_FLOOR: f32 = 0.7;
+/// SNR after combining above which a PBCH always decodes (its block error rate is 1 % at −8 dB):
+/// a stronger "cell" whose PBCH does not decode is none.
+const CERTAIN_DECODE_SNR_DB: f64 = -2.0;
+/// A cell whose PBCH does not decode, with the PSS of a cell so much stronger and so near to it in
+/// time, is taken for what was left of that one.
+const RESIDUE_DB: f64 = 25.0;
+const RESIDUE_SAMPLES: f64 = 1.0;
+/// Two detections of one cell closer than this, in samples, are one SSB.
+const SAME_SSB_SAMPLES: f64 = CYCLIC_PREFIX as f64;
+
+/// Examines candidates, and keeps the SSBs found in a block.
+pub(super) struct Examiner {
+    antennas: usize,
+    base_rate_hz: f64,
+    /// Largest carrier frequency offset that is believed, Hz.
+    tolerated_hz: f64,
+    cell_threshold: f32,
+    acquirer: Acquirer,
+    decoder: BroadcastDecoder,
+    canceller: Canceller,
+    found: Vec<DetectedSsb>,
+    counts: SearchCounts,
+    /// The last SSBs of the block before, to know them again.
+    recent: Vec<(Pci, f64)>,
+}
+
+impl Examiner {
+    /// A PSS that stands out less than `pss_floor` is none, nor a cell whose statistics together
+    /// stay below `cell_threshold`.
+    pub(super) fn new(config: &SearchConfig, pss_floor: f32, cell_threshold: f32) -> Self {
+        let &SearchConfig {
+            spacing,
+            antennas,
+            ssb_freq_hz,
+            lmax,
+            cfo_range_hz,
+            ..
+        } = config;
+        let base_rate_hz = spacing.base_rate_hz();
+        Self {
+            antennas,
+            base_rate_hz,
+            tolerated_hz: cfo_range_hz + spacing.hz() / 6.0,
+            cell_threshold,
+            acquirer: Acquirer::new(base_rate_hz, ssb_freq_hz, antennas, pss_floor),
+            decoder: BroadcastDecoder::new(spacing, lmax, ssb_freq_hz),
+            canceller: Canceller::new(),
+            found: Vec::new(),
+            counts: SearchCounts::default(),
+            recent: Vec::new(),
+        }
+    }
+
+    /// Moves to an SSB at another frequency.
+    pub(super) fn tune(&mut self, ssb_freq_hz: Option<f64>) {
+        self.acquirer.tune(ssb_freq_hz);
+        self.decoder.tune(ssb_freq_hz);
+    }
+
+    /// Forgets the stream so far.
+    pub(super) fn forget(&mut self) {
+        self.found.clear();
+        self.recent.clear();
+        self.decoder.forget();
+    }
+
+    /// Of what was found in the last block keeps what lies near the beginning, at sample
+    /// `block_start`, of the next.
+    pub(super) fn begin_block(&mut self, block_start: f64) {
+        self.counts = SearchCounts::default();
+        self.recent.clear();
+        let near = self
+            .found
+            .iter()
+            .filter(|ssb| ssb.sample_start > block_start - SAME_SSB_SAMPLES);
+        self.recent
+            .extend(near.map(|ssb| (ssb.pci, ssb.sample_start)));
+        self.found.clear();
+    }
+
+    /// The SSBs found in this block, in order of time.
+    pub(super) fn found_in_order(&mut self) -> &[DetectedSsb] {
+        self.found
+            .sort_unstable_by(|a, b| a.sample_start.total_cmp(&b.sample_start));
+        &self.found
+    }
+
+    /// What became of the candidates in this block.
+    pub(super) fn counts(&self) -> SearchCounts {
+        self.counts
+    }
+
+    /// Identifies, decodes, measures and removes the SSB of a candidate.
+    ///
+    /// The samples are those of a block, per antenna, the first of them number `block_start`.
+    pub(super) fn examine(
+        &mut self,
+        (samples, block_start): (&mut [Vec<Complex32>], f64),
+        candidate: &PssCandidate,
+        look: &mut dyn FnMut(&DetectedSsb, &ReceivedSsb<'_>),
+    ) -> Option<Alignment> {
+        self.counts.pss_candidates += 1;
+        let mut acquired = self.acquirer.acquire(samples, candidate)?;
+        if (acquired.alignment.cfo_cycles * self.base_rate_hz).abs() > self.tolerated_hz {
+            return None;
+        }
+        let time = block_start + acquired.alignment.first_sample();
+        let known = self.found.iter().map(|ssb| (ssb.pci, ssb.sample_start));
+        if known
+            .chain(self.recent.iter().copied())
+            .any(|(pci, start)| pci == acquired.pci && (start - time).abs() < SAME_SSB_SAMPLES)
+        {
+            return None;
+        }
+        if acquired.statistic < DECODE_FLOOR * self.cell_threshold {
+            return None;
+        }
+        self.counts.pbch_tried += 1;
+        let mut broadcast = self.decoder.decode(&self.acquirer, &acquired);
+        if broadcast.is_none() {
+            let certain = 10.0_f64.powf(0.1 * CERTAIN_DECODE_SNR_DB);
+            if acquired.statistic < self.cell_threshold || self.acquirer.snr() > certain {
+                return None;
+            }
+            broadcast = self.decoder.combine(&acquired, time);
+            if broadcast.is_none() && self.is_residue(acquired.pci, time) {
+                return None;
+            }
+        }
+        if let Some(broadcast) = &broadcast {
+            self.acquirer.know_pbch(acquired.pci, &broadcast.symbols);
+            self.acquirer.align(samples, &mut acquired.alignment)?;
+            self.complete_earlier(&acquired, broadcast, time);
+        }
+        self.report(block_start, &acquired, broadcast.as_ref());
+        if let Some(ssb) = self.found.last() {
+            let received = ReceivedSsb {
+                elements: &self.acquirer.grids,
+                known: &self.acquirer.reference,
+                noise_variance: &self.acquirer.estimate.noise_variance,
+            };
+            look(ssb, &received);
+        }
+        self.remove(samples, &acquired.alignment);
+        Some(acquired.alignment)
+    }
+
+    /// Whether an SSB may be what a clipped or otherwise distorted stronger one has left: with its
+    /// PSS, in its place, and far below it.
+    fn is_residue(&self, pci: Pci, time: f64) -> bool {
+        let snr_db = decibel(self.acquirer.snr() / self.antennas as f64);
+        self.found.iter().any(|ssb| {
+            ssb.pci.n_id_2() == pci.n_id_2()
+                && (ssb.sample_start - time).abs() < RESIDUE_SAMPLES
+                && ssb.snr_db > snr_db + RESIDUE_DB
+        })
+    }
+
+    fn report(&mut self, block_start: f64, acquired: &Acquired, broadcast: Option<&Broadcast>) {
+        let alignment = &acquired.alignment;
+        let antennas = self.antennas;
+        let mut measurements = [Measurement::default(); MAX_ANTENNAS];
+        let estimate = &self.acquirer.estimate;
+        let inputs = self
+            .acquirer
+            .grids
+            .iter()
+            .zip(&estimate.channel)
+            .zip(&estimate.noise_variance);
+        for (slot, ((grid, channel), noise)) in measurements.iter_mut().zip(inputs) {
+            *slot = measure(grid, sss_power(channel), *noise);
+        }
+        let lmax = broadcast.map_or_else(|| self.decoder.likely_lmax(), |broadcast| broadcast.lmax);
+        let payload = broadcast.map(|broadcast| broadcast.payload);
+        let half_frame = match (payload, lmax) {
+            (Some(payload), _) => Some(payload.half_frame),
+            (None, Lmax::L4) => Some(acquired.ibar_ssb >= 4),
+            (None, _) => None,
+        };
+        self.found.push(DetectedSsb {
+            pci: acquired.pci,
+            ibar_ssb: acquired.ibar_ssb,
+            ssb_index: lmax.index_lsb(acquired.ibar_ssb),
+            half_frame,
+            lmax,
+            payload,
+            sample_start: block_start + alignment.first_sample(),
+            cfo_hz: alignment.cfo_cycles * self.base_rate_hz,
+            symbol_phase_step_rad: alignment.phase_step,
+            snr_db: decibel(self.acquirer.snr() / antennas as f64),
+            statistic: acquired.statistic,
+            coarse_cfo_hz: acquired.coarse_cfo_cycles * self.base_rate_hz,
+            measurements,
+            antennas,
+        });
+    }
+
+    /// Gives earlier SSBs of the same beam, not decoded by themselves, what they must have said.
+    fn complete_earlier(&mut self, acquired: &Acquired, broadcast: &Broadcast, time: f64) {
+        let same = |ssb: &&mut DetectedSsb| {
+            ssb.payload.is_none() && ssb.pci == acquired.pci && ssb.ibar_ssb == acquired.ibar_ssb
+        };
+        for ssb in self.found.iter_mut().filter(same) {
+            let before = ssb.sample_start - time;
+            ssb.payload = self.decoder.repeated(broadcast.payload, before);
+            if let Some(payload) = ssb.payload {
+                ssb.lmax = broadcast.lmax;
+                ssb.ssb_index = payload.ssb_index;
+                ssb.half_frame = Some(payload.half_frame);
+            }
+        }
+    }
+
+    /// Subtracts the SSB. Its channel is estimated without the PSS, which other cells share.
+    fn remove(&mut self, samples: &mut [Vec<Complex32>], alignment: &Alignment) {
+        let phases = alignment.symbol_phases();
+        let pss = self.acquirer.forget_pss();
+        let Acquirer {
+            estimate,
+            grids,
+            reference,
+            ..
+        } = &mut self.acquirer;
+        estimate.fold(grids, reference, &phases);
+        estimate.fit(grids, reference);
+        reference.put(pss_indices(), pss);
+        for (samples, channel) in samples.iter_mut().zip(&estimate.channel) {
+            self.canceller
+                .subtract(samples, alignment, reference, channel);
+        }
+    }
+}

@@ -1,0 +1,208 @@
+//! The search through a recording, or through a stream block by block.
+
+use num_complex::Complex32;
+
+use super::detected::{DetectedSsb, ReceivedSsb, SearchCounts};
+use super::error::SearchError;
+use super::examine::Examiner;
+use super::settings::{SearchConfig, check_frequency};
+use crate::dsp::base_rate::{CYCLIC_PREFIX, SSB_SAMPLES};
+use crate::dsp::hypotheses::cfo_hypotheses;
+use crate::dsp::matched_filter::{MatchedFilter, PssCandidate};
+use crate::numeric::false_alarm::exponential_sum_threshold;
+
+/// Candidates examined per 20 ms at most; what noise and sidelobes offer beyond is not worth it.
+const CANDIDATES_PER_20_MS: usize = 200;
+/// PSS candidates that noise may offer in 20 ms. Each costs an examination, none a false cell.
+const NOISE_CANDIDATES_PER_20_MS: f64 = 4.0;
+/// Part of the threshold that a candidate must keep once the correlation of the antennas' noise is
+/// allowed for, its timing still off by up to half a sample.
+const PSS_FLOOR: f32 = 0.75;
+/// Sums of a million samples' energies stay finite below this.
+const MAX_ENERGY: f32 = 1e30;
+
+/// Searches blocks of samples at the base rate; owns all plans and buffers.
+pub struct Searcher {
+    config: SearchConfig,
+    base_rate_hz: f64,
+    filter: MatchedFilter,
+    examiner: Examiner,
+    pss_threshold: f32,
+    /// Samples of the end of the last block and of this one, per antenna.
+    buffer: Vec<Vec<Complex32>>,
+    /// Number of samples before the buffer's first.
+    buffer_start: u64,
+    candidates: Vec<PssCandidate>,
+}
+
+impl Searcher {
+    /// Plans a search.
+    ///
+    /// # Errors
+    /// [`SearchError::Antennas`], [`SearchError::Setting`].
+    pub fn new(config: SearchConfig) -> Result<Self, SearchError> {
+        config.check()?;
+        let base_rate_hz = config.spacing.base_rate_hz();
+        let hypotheses = cfo_hypotheses(config.cfo_range_hz, config.spacing.hz());
+        let trials = 0.02 * base_rate_hz * 3.0 * hypotheses.len() as f64;
+        let pss_probability = NOISE_CANDIDATES_PER_20_MS / trials;
+        // Any of 336 SSS and 8 DM-RS may make the sum large.
+        let cell_probability = config.false_alarm / (trials * 336.0 * 8.0);
+        let antennas = config.antennas;
+        let pss_threshold = exponential_sum_threshold(antennas, pss_probability) as f32;
+        let cell_threshold = exponential_sum_threshold(antennas + 4, cell_probability) as f32;
+        Ok(Self {
+            base_rate_hz,
+            filter: MatchedFilter::new(config.spacing.hz(), &hypotheses, antennas),
+            examiner: Examiner::new(&config, PSS_FLOOR * pss_threshold, cell_threshold),
+            pss_threshold,
+            buffer: vec![Vec::new(); antennas],
+            buffer_start: 0,
+            candidates: Vec::new(),
+            config,
+        })
+    }
+
+    /// All SSBs in one recording, in order of time.
+    ///
+    /// # Errors
+    /// [`SearchError::AntennaCount`], [`SearchError::UnequalLengths`], [`SearchError::TooShort`].
+    pub fn search(&mut self, antennas: &[&[Complex32]]) -> Result<&[DetectedSsb], SearchError> {
+        self.reset();
+        let samples = self.common_length(antennas)?;
+        if samples < SSB_SAMPLES {
+            return Err(SearchError::TooShort {
+                samples,
+                needed: SSB_SAMPLES,
+            });
+        }
+        self.push(antennas)
+    }
+
+    /// The SSBs that are complete with the next block of a stream, in order of time. Those that
+    /// reach over the block's end come with the next one.
+    ///
+    /// # Errors
+    /// [`SearchError::AntennaCount`], [`SearchError::UnequalLengths`].
+    pub fn push(&mut self, antennas: &[&[Complex32]]) -> Result<&[DetectedSsb], SearchError> {
+        self.push_with(antennas, &mut |_, _| {})
+    }
+
+    /// As [`push`](Self::push), and shows `look` every SSB as it is found, stronger ones first. Its
+    /// payload may become known later, from another SSB.
+    ///
+    /// # Errors
+    /// As [`push`](Self::push).
+    pub fn push_with(
+        &mut self,
+        antennas: &[&[Complex32]],
+        look: &mut dyn FnMut(&DetectedSsb, &ReceivedSsb<'_>),
+    ) -> Result<&[DetectedSsb], SearchError> {
+        let length = self.common_length(antennas)?;
+        let kept = self.buffer.first().map_or(0, Vec::len);
+        let tail = kept.min(SSB_SAMPLES + CYCLIC_PREFIX);
+        self.buffer_start += (kept - tail) as u64;
+        for (buffer, input) in self.buffer.iter_mut().zip(antennas) {
+            buffer.copy_within(kept - tail.., 0);
+            buffer.truncate(tail);
+            // One sample that is not a number, or whose energy is none, would spoil a whole transform.
+            let usable = |x: &Complex32| x.norm_sqr() < MAX_ENERGY;
+            buffer.extend(
+                input
+                    .iter()
+                    .map(|x| if usable(x) { *x } else { Complex32::ZERO }),
+            );
+        }
+        self.examiner.begin_block(self.buffer_start as f64);
+        self.examine_all(tail + length, look);
+        Ok(self.examiner.found_in_order())
+    }
+
+    /// Moves to an SSB at another frequency, and forgets the stream so far.
+    ///
+    /// # Errors
+    /// [`SearchError::Setting`] unless the frequency is finite.
+    pub fn tune(&mut self, ssb_freq_hz: Option<f64>) -> Result<(), SearchError> {
+        check_frequency(ssb_freq_hz)?;
+        self.config.ssb_freq_hz = ssb_freq_hz;
+        self.examiner.tune(ssb_freq_hz);
+        self.reset();
+        Ok(())
+    }
+
+    /// Forgets the stream so far.
+    pub fn reset(&mut self) {
+        self.buffer.iter_mut().for_each(Vec::clear);
+        self.buffer_start = 0;
+        self.examiner.forget();
+    }
+
+    /// The settings.
+    pub fn config(&self) -> &SearchConfig {
+        &self.config
+    }
+
+    /// What became of the candidates in the block searched last.
+    pub fn counts(&self) -> SearchCounts {
+        self.examiner.counts()
+    }
+
+    fn common_length(&self, antennas: &[&[Complex32]]) -> Result<usize, SearchError> {
+        let (given, expected) = (antennas.len(), self.config.antennas);
+        if given != expected {
+            return Err(SearchError::AntennaCount { given, expected });
+        }
+        let first = antennas.first().map_or(0, |samples| samples.len());
+        match antennas.iter().find(|samples| samples.len() != first) {
+            Some(samples) => Err(SearchError::UnequalLengths {
+                first,
+                other: samples.len(),
+            }),
+            None => Ok(first),
+        }
+    }
+
+    fn examine_all(&mut self, length: usize, look: &mut dyn FnMut(&DetectedSsb, &ReceivedSsb<'_>)) {
+        // The PSS of an SSB that lies inside the buffer.
+        let Some(end) = (length + 1).checked_sub(SSB_SAMPLES - CYCLIC_PREFIX) else {
+            return;
+        };
+        let first = CYCLIC_PREFIX;
+        self.candidates.clear();
+        self.filter.run(
+            &self.buffer,
+            first,
+            end,
+            self.pss_threshold,
+            &mut self.candidates,
+        );
+        let blocks = (length as f64 / (0.02 * self.base_rate_hz)).ceil() as usize;
+        for _ in 0..CANDIDATES_PER_20_MS * blocks.max(1) {
+            let strongest = self
+                .candidates
+                .iter()
+                .enumerate()
+                .max_by(|a, b| a.1.statistic.total_cmp(&b.1.statistic))
+                .map(|(index, _)| index);
+            let Some(index) = strongest else { break };
+            let candidate = self.candidates.swap_remove(index);
+            let start = self.buffer_start;
+            let place = (self.buffer.as_mut_slice(), start as f64);
+            let Some(alignment) = self.examiner.examine(place, &candidate, look) else {
+                continue;
+            };
+            // Around an SSB that is now gone the matched filter is run again.
+            let from = alignment.start.saturating_sub(SSB_SAMPLES / 4).max(first);
+            let to = (alignment.start + SSB_SAMPLES).min(end);
+            self.candidates
+                .retain(|other| !(from..to).contains(&other.sample));
+            self.filter.run(
+                &self.buffer,
+                from,
+                to,
+                self.pss_threshold,
+                &mut self.candidates,
+            );
+        }
+    }
+}

@@ -1,0 +1,17 @@
+//! The polar code of the PBCH: K = 56 bits (32 payload, 24 CRC) to N = 512 (TS 38.212 §5.3.1, §7.1.4).
+//!
+//! The decoder is told by `tree` where to stop descending, decodes there with `leaf`, and on the way
+//! holds the paths to the parity `checks`.
+
+mod checks;
+mod code;
+mod encode;
+mod leaf;
+mod list;
+#[cfg(test)]
+mod oracle;
+mod tree;
+
+pub use code::{K, N};
+pub use encode::{Codeword, encode};
+pub use list::{Candidates, ListDecoder};

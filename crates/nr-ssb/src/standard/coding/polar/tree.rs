@@ -1,0 +1,62 @@
+//! The decoding tree: where to stop descending.
+
+use super::code::INFORMATION_SET;
+use super::encode::Codeword;
+use super::leaf::Leaf;
+
+/// The information channels as bits.
+const INFORMATION: Codeword = {
+    let mut channels = [0; 8];
+    let mut k = 0;
+    while k < INFORMATION_SET.len() {
+        let channel = INFORMATION_SET[k] as usize;
+        channels[channel / 64] |= 1 << (channel % 64);
+        k += 1;
+    }
+    channels
+};
+
+/// What a node of the decoding tree asks for.
+#[derive(Debug, Clone, Copy, PartialEq, Eq)]
+pub enum Node {
+    /// All channels frozen: the all-zero word.
+    Rate0,
+    /// A code whose words can all be compared.
+    Leaf(Leaf),
+    /// To be descended into.
+    Split,
+}
+
+impl Node {
+    /// The node over `len` channels, a power of two, from its multiple `first` on.
+    pub fn at(first: usize, len: usize) -> Self {
+        let words = &INFORMATION[first / 64..(first + len).div_ceil(64)];
+        if len > 64 {
+            let frozen = words.iter().all(|word| *word == 0);
+            return if frozen { Self::Rate0 } else { Self::Split };
+        }
+        match words[0] >> (first % 64) & u64::MAX >> (64 - len) {
+            0 => Self::Rate0,
+            rows => Leaf::new(rows, len).map_or(Self::Split, Self::Leaf),
+        }
+    }
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    #[test]
+    fn nodes_are_what_their_channels_say() {
+        let leaf = |rows, len| Node::Leaf(Leaf::new(rows, len).unwrap());
+        assert_eq!(Node::at(0, 512), Node::Split);
+        assert_eq!(Node::at(0, 128), Node::Rate0);
+        assert_eq!(Node::at(384, 32), leaf(1 << 31, 32));
+        assert_eq!(
+            Node::at(192, 64),
+            leaf(1 << 55 | 1 << 61 | 1 << 62 | 1 << 63, 64)
+        );
+        assert_eq!(Node::at(504, 8), Node::Split);
+        assert_eq!(Node::at(504, 4), leaf(0xF, 4));
+    }
+}

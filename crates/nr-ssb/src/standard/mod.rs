@@ -1,0 +1,9 @@
+//! What the standard says of an SSB: identities, layout in time and frequency, sequences, coding.
+
+pub mod coding;
+pub mod grid;
+pub mod message;
+pub mod numerology;
+pub mod pbch;
+pub(crate) mod pci;
+pub mod sequence;

@@ -1,0 +1,44 @@
+//! The size of a burst set.
+
+use crate::error::Error;
+
+/// How many SSBs a burst set can have.
+#[derive(Debug, Clone, Copy, PartialEq, Eq, PartialOrd, Ord, Hash)]
+pub enum Lmax {
+    /// Carriers up to 3 GHz (1.88 GHz where case C is used in TDD bands).
+    L4,
+    /// Carriers up to 6 GHz.
+    L8,
+    /// Frequency range 2; in this crate only in the coding chain.
+    L64,
+}
+
+impl Lmax {
+    /// The number of SSB indices.
+    pub const fn count(self) -> u8 {
+        match self {
+            Self::L4 => 4,
+            Self::L8 => 8,
+            Self::L64 => 64,
+        }
+    }
+
+    /// The low bits of the SSB index, v, which select the PBCH scrambling (TS 38.211 §7.3.3.1).
+    pub const fn index_lsb(self, ssb_index: u8) -> u8 {
+        match self {
+            Self::L4 => ssb_index & 3,
+            Self::L8 | Self::L64 => ssb_index & 7,
+        }
+    }
+
+    /// # Errors
+    /// [`Error::SsbIndex`] for an index that this burst set does not have.
+    pub fn check_index(self, index: u8) -> Result<(), Error> {
+        let count = self.count();
+        if index < count {
+            Ok(())
+        } else {
+            Err(Error::SsbIndex { index, count })
+        }
+    }
+}

@@ -1,0 +1,11 @@
+//! Where an SSB lies in time: subcarrier spacings, SSB patterns, symbols and cyclic prefixes.
+
+mod burst_set;
+mod case;
+mod sampling;
+mod spacing;
+
+pub use burst_set::Lmax;
+pub use case::Case;
+pub use sampling::Numerology;
+pub use spacing::SubcarrierSpacing;

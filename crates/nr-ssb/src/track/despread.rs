@@ -1,0 +1,34 @@
+//! From received resource elements to one complex number per symbol and antenna.
+
+use num_complex::{Complex32, Complex64};
+
+use crate::dsp::received_grid::ReceivedGrid;
+use crate::dsp::timing;
+use crate::numeric::sums::complex_product;
+use crate::standard::grid::{SUBCARRIERS, SYMBOLS, SsbGrid};
+
+/// Blocks and numbers of pilots of [`Tracked`](super::Tracked), with `delay` samples more taken out.
+pub(super) fn despread<const A: usize>(
+    grids: &[ReceivedGrid],
+    reference: &SsbGrid,
+    delay: f64,
+) -> ([[Complex64; A]; SYMBOLS], [u16; SYMBOLS]) {
+    let ramp = timing::ramp(delay);
+    let mut blocks = [[Complex64::ZERO; A]; SYMBOLS];
+    let mut pilots = [0; SYMBOLS];
+    for (l, known) in reference.symbols().enumerate() {
+        let mut weights = [Complex32::ZERO; SUBCARRIERS];
+        let mut energy = 0.0_f32;
+        for ((weight, s), phasor) in weights.iter_mut().zip(known).zip(&ramp) {
+            *weight = s.conj() * phasor;
+            energy += s.norm_sqr();
+        }
+        pilots[l] = energy.round() as u16;
+        let scale = 1.0 / f64::from(energy.max(1.0)).sqrt();
+        for (slot, grid) in blocks[l].iter_mut().zip(grids) {
+            let sum = complex_product(&grid[l], &weights);
+            *slot = Complex64::new(f64::from(sum.re), f64::from(sum.im)) * scale;
+        }
+    }
+    (blocks, pilots)
+}

@@ -1,0 +1,59 @@
+//! The carrier frequency offset of a tracked cell, from one SSB to the next.
+
+use std::f64::consts::TAU;
+
+use num_complex::Complex64;
+
+use crate::dsp::base_rate::SYMBOL_SAMPLES;
+use crate::numeric::phasors::wrap;
+use crate::search::DetectedSsb;
+use crate::standard::grid::SYMBOLS;
+
+/// Wander of the frequency offset from one SSB to the next, Hz: oscillator and Doppler.
+const CFO_WANDER_HZ: f64 = 5.0;
+/// Uncertainty of the frequency offset after the search, Hz.
+const CFO_FIRST_HZ: f64 = 200.0;
+
+/// Follows the offset.
+pub(super) struct FrequencyLoop {
+    base_rate_hz: f64,
+    /// The offset, cycles per sample.
+    pub(super) cfo_cycles: f64,
+    variance: f64,
+    /// Phase from symbol to symbol beyond that of the offset.
+    pub(super) phase_step: f64,
+}
+
+impl FrequencyLoop {
+    /// From what a search found.
+    pub(super) fn new(cell: &DetectedSsb, base_rate_hz: f64) -> Self {
+        Self {
+            base_rate_hz,
+            cfo_cycles: cell.cfo_hz / base_rate_hz,
+            variance: (CFO_FIRST_HZ / base_rate_hz).powi(2),
+            phase_step: cell.symbol_phase_step_rad,
+        }
+    }
+
+    /// Moves the frequency offset by the PSS–SSS phase, weighted by what noise leaves of it.
+    pub(super) fn follow<const A: usize>(
+        &mut self,
+        blocks: &[[Complex64; A]; SYMBOLS],
+        noise: &[f64; A],
+    ) {
+        let (mut turn, mut snr) = (Complex64::ZERO, 0.0);
+        for antenna in 0..A {
+            let weight = 1.0 / noise[antenna].max(1e-30);
+            let (pss, sss) = (blocks[0][antenna], blocks[2][antenna]);
+            turn += pss.conj() * sss * weight;
+            snr += (0.5 * (pss.norm_sqr() + sss.norm_sqr()) * weight - 1.0).max(0.1);
+        }
+        let base = TAU * 2.0 * SYMBOL_SAMPLES as f64;
+        let measured = wrap(turn.arg() - 2.0 * self.phase_step) / base;
+        let variance = 1.0 / (snr * base * base);
+        self.variance += (CFO_WANDER_HZ / self.base_rate_hz).powi(2);
+        let gain = self.variance / (self.variance + variance);
+        self.cfo_cycles += gain * measured;
+        self.variance *= 1.0 - gain;
+    }
+}
