@@ -25,7 +25,7 @@ pub mod road;
 pub mod settings;
 pub mod wake_up;
 
-pub use pipeline::{Custom, Execution, Heard, Observed, Onboard, OdometryDefect, SsbSource};
+pub use pipeline::{Custom, Execution, Heard, Observed, OdometryDefect, Onboard, SsbSource};
 
 /// Whatever a user's own code fails with.
 pub type BoxError = Box<dyn std::error::Error + Send + Sync>;

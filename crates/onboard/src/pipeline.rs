@@ -181,11 +181,7 @@ impl Onboard {
     ///
     /// # Errors
     /// Whatever the source, or a user's estimator, policy or localizer, fails with.
-    pub fn hear(
-        &mut self,
-        time_s: f64,
-        source: &mut dyn SsbSource,
-    ) -> Result<Heard<'_>, BoxError> {
+    pub fn hear(&mut self, time_s: f64, source: &mut dyn SsbSource) -> Result<Heard<'_>, BoxError> {
         self.sensed.clear();
         self.executions.clear();
         let now = Situation {

@@ -9,8 +9,8 @@ use std::fmt::Write as _;
 use std::fs;
 use std::path::Path;
 
-use crate::error::RecordingError;
 use crate::csv::Table;
+use crate::error::RecordingError;
 use onboard::localize::AngleMeasurement;
 use onboard::observation::SensedSsb;
 

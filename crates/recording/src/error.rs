@@ -126,7 +126,8 @@ pub enum RecordingError {
 }
 
 impl RecordingError {
-    pub(crate) fn io(file: &std::path::Path, source: io::Error) -> Self {
+    /// What the file system says of a file.
+    pub fn io(file: &std::path::Path, source: io::Error) -> Self {
         Self::Io {
             file: file.display().to_string(),
             source,

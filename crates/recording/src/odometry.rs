@@ -5,8 +5,8 @@ use std::fmt::Write as _;
 use std::fs;
 use std::path::Path;
 
-use crate::error::RecordingError;
 use crate::csv::Table;
+use crate::error::RecordingError;
 use onboard::observation::OdometrySample;
 
 /// A step in time this many times the usual one is a gap.

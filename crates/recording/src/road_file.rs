@@ -21,9 +21,9 @@ const EARTH_RADIUS_M: f64 = 6_371_008.8;
 pub fn read_points_m(path: &Path) -> Result<Vec<[f64; 2]>, SettingsError> {
     let file = path.display().to_string();
     let text = read_text(path, MOST_BYTES)?;
-    let is_json = path.extension().is_some_and(|end| {
-        end.eq_ignore_ascii_case("geojson") || end.eq_ignore_ascii_case("json")
-    });
+    let is_json = path
+        .extension()
+        .is_some_and(|end| end.eq_ignore_ascii_case("geojson") || end.eq_ignore_ascii_case("json"));
     let points = if is_json {
         from_geojson(&text)
     } else {

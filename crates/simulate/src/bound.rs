@@ -9,19 +9,23 @@
 //!
 //! One angle has the variance of its thermal noise (the Cramér–Rao bound of the snapshots at the
 //! link budget's SNR) and that of the scatter, which successive looks share as
-//! [`ArrayModel::correlation`](super::tracker::ArrayModel::correlation) says: its spectrum at the
+//! [`ArrayModel::correlation`](onboard::localize::tracker::ArrayModel::correlation) says: its spectrum at the
 //! line of sight stands for white noise, as it may where the state changes little in a wavelength.
 
-use super::gaussian::{Gaussian, Matrix, identity, product};
-use super::ideal::IdealFilter;
-use super::thermal::ThermalNoise;
-use super::tracker::motion::Step;
-use super::tracker::sighting::{Footing, Sighting};
-use super::tracker::state::{ACROSS, ALONG, Belief, CURVATURE, HEADING, MOUNTING, SCALE, STATES};
-use super::tracker::{InitialPose, Tracker, TrackerConfig};
-use crate::geometry::{Point, Pose};
-use crate::scenario::{LocalizerSettings, Scenario, ScenarioError, TrackerSettings};
-use crate::world::{MotionProfile, RadioHead, Track};
+use onboard::geometry::{Point, Pose};
+use onboard::localize::gaussian::{Gaussian, Matrix, identity, product};
+use onboard::localize::thermal::ThermalNoise;
+use onboard::localize::tracker::motion::Step;
+use onboard::localize::tracker::sighting::{Footing, Sighting};
+use onboard::localize::tracker::state::{ACROSS, ALONG, Belief, CURVATURE, HEADING, SCALE, STATES};
+use onboard::localize::tracker::{InitialPose, Tracker, TrackerConfig};
+use onboard::radio_head::RadioHead;
+use onboard::road::Road;
+use onboard::settings::{Check, SettingsError};
+
+use crate::ideal_filter::IdealFilter;
+use crate::scenario::Scenario;
+use crate::world::MotionProfile;
 
 /// The bound at one SSB.
 #[derive(Clone, Copy, Debug, PartialEq)]
@@ -49,7 +53,7 @@ pub struct BoundPoint {
 pub struct Bound {
     config: TrackerConfig,
     map: bool,
-    track: Track,
+    road: Road,
     motion: MotionProfile,
     heads: Vec<RadioHead>,
     thermal: ThermalNoise,
@@ -58,39 +62,39 @@ pub struct Bound {
 }
 
 impl Bound {
-    /// The bound of a scenario: its road, radio heads and channel, and what its tracker assumes of
-    /// vehicle and road. A scenario without tracker is taken with the tracker's default settings.
+    /// The bound of a scenario as its vehicle believes it. A vehicle without tracker is taken with
+    /// the tracker's default settings.
     ///
     /// # Errors
-    /// [`ScenarioError`] when the road cannot be built.
-    pub fn new(scenario: &Scenario) -> Result<Self, ScenarioError> {
-        let settings = match scenario.localizer {
-            LocalizerSettings::Tracker(settings) => settings,
-            LocalizerSettings::DeadReckoning(_) => TrackerSettings::default(),
-        };
-        let track = scenario.build_track()?;
+    /// [`SettingsError`] when the road cannot be built.
+    pub fn new(scenario: &Scenario) -> Result<Self, SettingsError> {
+        let (site, vehicle) = (&scenario.site, &scenario.vehicle);
+        let road = scenario.path(Check {
+            file: &scenario.name,
+        })?;
+        let start = &vehicle.start;
         Ok(Self {
-            config: TrackerConfig::new(scenario, &settings),
-            map: settings.map,
-            motion: MotionProfile::new(&scenario.motion, track.length_m()),
-            heads: scenario.radio_heads.iter().map(RadioHead::from).collect(),
-            thermal: ThermalNoise::new(scenario),
+            config: TrackerConfig::new(site, vehicle),
+            map: site.road.is_some() && vehicle.follows_road(),
+            motion: MotionProfile::new(&scenario.motion, vehicle, road.length_m()),
+            heads: RadioHead::heard(site, vehicle),
+            thermal: ThermalNoise::new(site, vehicle),
             start: InitialPose {
-                pose: track.pose(scenario.motion.start_at_m),
+                pose: road.pose(scenario.motion.start_at_m),
                 // A start that is not known is anywhere on the road.
-                position_std_m: if scenario.start.known {
-                    scenario.start.position_std_m
+                position_std_m: if start.known {
+                    start.position_std_m
                 } else {
-                    track.length_m()
+                    road.length_m()
                 },
-                heading_std_rad: if scenario.start.known {
-                    scenario.start.heading_std_rad
+                heading_std_rad: if start.known {
+                    start.heading_std_rad
                 } else {
                     std::f64::consts::PI
                 },
             },
-            track,
-            period_s: scenario.ssb.period_s(),
+            road,
+            period_s: site.ssb.period_s(),
         })
     }
 
@@ -98,7 +102,9 @@ impl Bound {
     pub fn along_route(&self) -> Vec<BoundPoint> {
         let look = self.config.array.scatter_bound(self.config.rician_k);
         let array = &self.config.array;
-        let scatter = |travelled_m, toward| look * array.correlation(travelled_m, toward);
+        let scatter = |travelled_m, sighting: &Sighting| {
+            look * array.correlation(travelled_m, sighting.toward)
+        };
         let mut points = Vec::new();
         self.walk(scatter, |_, belief, time_s, along_m| {
             points.push(self.point(belief, time_s, along_m));
@@ -108,7 +114,8 @@ impl Bound {
 
     /// A filter that makes the errors the tracker says it makes, at every `stride`-th SSB.
     pub fn ideal_filter(&self, stride: usize) -> IdealFilter {
-        let scatter = |travelled_m, toward| self.config.look_variance(travelled_m, toward);
+        let scatter =
+            |travelled_m, sighting: &Sighting| self.config.look_variance(travelled_m, sighting);
         let mut filter = IdealFilter::default();
         let (mut since, mut before) = (identity(), [[0.0; STATES]; STATES]);
         let mut number = 0;
@@ -123,15 +130,15 @@ impl Bound {
         filter
     }
 
-    /// Drives the route with looks whose scatter has the variance `scatter(travelled, toward)`,
+    /// Drives the route with looks whose scatter has the variance `scatter(travelled, sighting)`,
     /// and calls `visit(Ψ, belief, time, distance along the road)` at each SSB, Ψ being what
     /// became of an error since the one before.
     fn walk(
         &self,
-        scatter: impl Fn(f64, f64) -> f64,
+        scatter: impl Fn(f64, &Sighting) -> f64,
         mut visit: impl FnMut(&Matrix<STATES>, &Belief, f64, f64),
     ) {
-        let map = self.map.then_some(&self.track);
+        let map = self.map.then_some(&self.road);
         let mut belief = Tracker::prior(&self.config, map, &self.start);
         let mut last_look_m = f64::NEG_INFINITY;
         let mut before_m = self.motion.at(0.0).along_m;
@@ -142,7 +149,7 @@ impl Bound {
             let mut transition = self.advance(&mut belief, along_m - before_m);
             before_m = along_m;
             let travelled_m = along_m - last_look_m;
-            let scatter = |toward| scatter(travelled_m, toward);
+            let scatter = |sighting: &Sighting| scatter(travelled_m, sighting);
             self.listen(&mut belief, along_m, scatter, &mut transition);
             last_look_m = along_m;
             visit(&transition, &belief, time_s, along_m);
@@ -152,7 +159,7 @@ impl Bound {
     fn advance(&self, belief: &mut Belief, length_m: f64) -> Matrix<STATES> {
         let step = if self.map {
             let curvature_per_m = self
-                .track
+                .road
                 .curvature_per_m(belief.mean[ALONG] + 0.5 * length_m);
             let config = &self.config;
             Step::along_lane(
@@ -181,11 +188,11 @@ impl Bound {
         &self,
         belief: &mut Belief,
         along_m: f64,
-        scatter: impl Fn(f64) -> f64,
+        scatter: impl Fn(&Sighting) -> f64,
         transition: &mut Matrix<STATES>,
     ) {
-        let pose = self.track.pose(along_m);
-        let curvature_per_m = self.track.curvature_per_m(along_m);
+        let pose = self.road.pose(along_m);
+        let curvature_per_m = self.road.curvature_per_m(along_m);
         let footing = if self.map {
             belief.mean[ALONG] = along_m;
             Footing {
@@ -200,17 +207,12 @@ impl Bound {
             belief.mean[CURVATURE] = curvature_per_m;
             Footing::PLANE
         };
-        let (mounting, array) = (belief.mean[MOUNTING], &self.config.array);
         for head in &self.heads {
-            let sighting = Sighting::new(head.position, pose, &footing, mounting, 0.0, array);
-            if let Some(Sighting {
-                row,
-                range_m,
-                toward,
-                ..
-            }) = sighting
-            {
-                let variance = scatter(toward) + self.thermal.variance(head, range_m);
+            let array = &self.config.array;
+            let sighting = Sighting::new(head, pose, &footing, &belief.mean, array);
+            if let Some(sighting) = sighting {
+                let row = sighting.row;
+                let variance = scatter(&sighting) + self.thermal.variance(head, sighting.range_m);
                 let gain = belief.update(0.0, &row, variance);
                 // (I − K H) times the transition so far.
                 let mut seen = [0.0; STATES];
@@ -229,7 +231,7 @@ impl Bound {
     }
 
     fn point(&self, belief: &Belief, time_s: f64, along_m: f64) -> BoundPoint {
-        let pose = self.track.pose(along_m);
+        let pose = self.road.pose(along_m);
         let (sin, cos) = pose.heading_rad.sin_cos();
         let (along, across) = if self.map {
             ([1.0, 0.0], [0.0, 1.0])
@@ -278,8 +280,7 @@ impl Bound {
             let array = &self.config.array;
             let scatter = array.scatter_bound(self.config.rician_k);
             for head in &self.heads {
-                let sighting =
-                    Sighting::new(head.position, pose, &Footing::PLANE, 0.0, 0.0, array)?;
+                let sighting = Sighting::new(head, pose, &Footing::PLANE, &[0.0; STATES], array)?;
                 let thermal = self.thermal.variance(head, sighting.range_m);
                 belief.update(0.0, &sighting.row, (scatter + thermal) / looks);
             }

@@ -1,12 +1,16 @@
 //! Many simulated drives, and what they have in common.
 
+use onboard::Custom;
+use onboard::energy::{Energy, EnergyModel};
+use onboard::geometry::wrap_angle;
 use rayon::ThreadPoolBuilder;
 use rayon::prelude::*;
 
-use super::{ErrorHistogram, Found, IntegritySummary, RunRecord, Simulation, SimulationError};
-use crate::energy::{Energy, EnergyModel};
-use crate::onboard::Custom;
-use crate::scenario::LocalizerSettings;
+use crate::error::SimulationError;
+use crate::histogram::ErrorHistogram;
+use crate::integrity_summary::IntegritySummary;
+use crate::record::{Found, RunRecord, Step};
+use crate::run::{MakeCustom, Simulation};
 
 /// How a campaign is carried out; none of it but `seed`, `first_run` and `runs` touches its numbers.
 #[derive(Clone, Copy)]
@@ -22,7 +26,7 @@ pub struct CampaignOptions<'a> {
     /// Whether to keep every run's record.
     pub keep_records: bool,
     /// The user's own code, made anew for each run.
-    pub custom: &'a (dyn Fn() -> Custom + Sync),
+    pub custom: &'a MakeCustom,
     /// Told how many runs are done; `false` stops the campaign.
     pub progress: &'a dyn Fn(usize) -> bool,
 }
@@ -36,7 +40,7 @@ impl Default for CampaignOptions<'_> {
             runs: 1,
             threads: None,
             keep_records: false,
-            custom: &Custom::default,
+            custom: &|_| Ok(Custom::default()),
             progress: &|_| true,
         }
     }
@@ -131,16 +135,14 @@ impl Simulation {
     /// # Errors
     /// [`SimulationError`] of the first run that fails, or that the caller stopped it.
     pub fn campaign(&self, options: &CampaignOptions<'_>) -> Result<Campaign, SimulationError> {
-        let energy = EnergyModel::new(self.scenario(), self.platform())?;
+        let energy = EnergyModel::new(&self.scenario().vehicle, self.platform())?;
         let mut sums = vec![StepSums::default(); self.steps()];
         let mut errors = ErrorHistogram::default();
         let mut runs = Vec::with_capacity(options.runs);
         let mut integrity = Vec::new();
         let mut records = Vec::new();
-        let alert_limit_m = match self.scenario().localizer {
-            LocalizerSettings::Tracker(settings) => settings.alert_limit_m,
-            LocalizerSettings::DeadReckoning(_) => f64::INFINITY,
-        };
+        let integrity_settings = self.scenario().vehicle.integrity;
+        let alert_limit_m = integrity_settings.map_or(f64::INFINITY, |it| it.alert_limit_m);
         let pool = ThreadPoolBuilder::new()
             .num_threads(options.threads.unwrap_or(0))
             .build()?;
@@ -151,7 +153,7 @@ impl Simulation {
             let (seed, custom) = (options.seed, options.custom);
             let finished: Vec<Result<RunRecord, SimulationError>> = pool.install(|| {
                 let numbers = (first..first + count).into_par_iter();
-                numbers.map(|run| self.run(seed, run, custom())).collect()
+                numbers.map(|run| self.run(seed, run, custom)).collect()
             });
             for record in finished {
                 let record = record?;
@@ -181,7 +183,7 @@ impl Simulation {
 
 impl Campaign {
     /// The campaign of these runs, of equally many steps each.
-    pub(super) fn of(records: impl IntoIterator<Item = RunRecord>) -> Self {
+    pub(crate) fn of(records: impl IntoIterator<Item = RunRecord>) -> Self {
         let mut sums = Vec::new();
         let mut campaign = Self {
             time_s: Vec::new(),
@@ -206,7 +208,7 @@ impl Campaign {
 
 fn summary(record: &RunRecord, energy: Option<&EnergyModel>) -> RunSummary {
     let located = || record.steps.iter().filter(|step| !step.searching);
-    let errors_m = || located().map(super::Step::error_m);
+    let errors_m = || located().map(Step::error_m);
     let duration_s = record.steps.last().map_or(0.0, |step| step.time_s);
     let squares_m2: f64 = errors_m().map(|error_m| error_m * error_m).sum();
     RunSummary {
@@ -232,8 +234,7 @@ fn add_up(record: &RunRecord, sums: &mut [StepSums], errors: &mut ErrorHistogram
         }
         sums.located += 1.0;
         let error_m = step.error_m();
-        let heading_rad =
-            crate::geometry::wrap_angle(step.estimate.heading_rad - step.truth.heading_rad);
+        let heading_rad = wrap_angle(step.estimate.heading_rad - step.truth.heading_rad);
         sums.abs_x_m += (step.estimate.x_m - step.truth.x_m).abs();
         sums.abs_y_m += (step.estimate.y_m - step.truth.y_m).abs();
         sums.square_m2 += error_m * error_m;

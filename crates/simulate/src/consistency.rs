@@ -1,6 +1,6 @@
 //! Whether a localizer is as wrong as it says.
 
-use super::Campaign;
+use crate::campaign::Campaign;
 
 /// Standard normal quantile of a two-sided 95 % band.
 const BAND: f64 = 1.959_964;

@@ -1,8 +1,10 @@
 //! Campaigns of a filter that is exactly as good as it says.
 
-use super::{Campaign, RunRecord, Step};
-use crate::geometry::Pose;
-use crate::localize::ideal::{IdealError, IdealFilter};
+use onboard::geometry::Pose;
+
+use crate::campaign::Campaign;
+use crate::ideal_filter::{IdealError, IdealFilter};
+use crate::record::{RunRecord, Step};
 
 impl IdealFilter {
     /// A campaign of `runs` runs of its errors, along the filter's first two states instead of x

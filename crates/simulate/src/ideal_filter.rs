@@ -7,11 +7,11 @@
 //! so that the steps of a run are far from independent and even a perfect filter's figures scatter
 //! from campaign to campaign.
 
+use onboard::localize::gaussian::{Matrix, product};
+use onboard::localize::tracker::state::{ACROSS, ALONG, STATES};
 use rand::RngExt;
 use rand_distr::StandardNormal;
 
-use super::gaussian::{Matrix, product};
-use super::tracker::state::{ACROSS, ALONG, STATES};
 use crate::random::{Purpose, Streams};
 
 /// A perfectly consistent filter along a route.
@@ -40,7 +40,7 @@ pub struct IdealError {
 
 impl IdealFilter {
     /// Adds the next place: the closed-loop transition to it and the covariances before and after.
-    pub(super) fn push(
+    pub(crate) fn push(
         &mut self,
         transition: &Matrix<STATES>,
         before: &Matrix<STATES>,
@@ -106,12 +106,13 @@ fn cholesky(matrix: &Matrix<STATES>, scale: &Matrix<STATES>) -> Matrix<STATES> {
 
 #[cfg(test)]
 mod tests {
-    use crate::localize::bound::Bound;
+    use crate::bound::Bound;
     use crate::scenario::Scenario;
+    use onboard::settings::{Shipped, TomlFile};
 
     #[test]
     fn its_errors_have_the_covariance_it_states() {
-        let scenario = Scenario::load("paper-real-odometry-2").unwrap();
+        let scenario = Scenario::from_library("paper-real-odometry-2", &Shipped).unwrap();
         let filter = Bound::new(&scenario).unwrap().ideal_filter(200);
         let runs = 4000;
         let mut sums = vec![[0.0; 3]; filter.points.len()];

@@ -1,7 +1,9 @@
 //! How a guarded localizer kept its promises in one run.
 
-use super::{ErrorHistogram, RunRecord};
-use crate::localize::IntegrityState;
+use onboard::localize::IntegrityState;
+
+use crate::histogram::ErrorHistogram;
+use crate::record::RunRecord;
 
 /// Least error in metres that a protection level is divided by: below it the error is no error.
 const LEAST_ERROR_M: f64 = 1e-3;
@@ -111,10 +113,11 @@ impl IntegritySummary {
 
 #[cfg(test)]
 mod tests {
-    use super::super::Step;
+    use onboard::geometry::Pose;
+    use onboard::localize::Integrity;
+
     use super::*;
-    use crate::geometry::Pose;
-    use crate::localize::Integrity;
+    use crate::record::Step;
 
     fn record(steps: &[(f64, f64, IntegrityState)]) -> RunRecord {
         let step = |(number, &(error_m, protection_level_m, state)): (usize, &_)| Step {

@@ -1,55 +1,87 @@
 //! Reception by samples: the air makes them, the same receiver as on the vehicle takes them.
 
-use super::SimulationError;
+use onboard::observation::{SensedSsb, SsbObservation};
+use onboard::receive::{Receiver, ReceiverConfig, Window};
+use onboard::{BoxError, Observed, SsbSource};
+
 use crate::channel::{HeadChannel, IqAir};
-use crate::observation::SsbObservation;
+use crate::error::SimulationError;
 use crate::random::Streams;
-use crate::receive::{Receiver, ReceiverConfig, Window};
 use crate::scenario::Scenario;
-use crate::world::Vehicle;
+use crate::world::Path;
 
 /// Air and receiver of one run.
-pub(super) struct IqReception {
+pub struct IqReception {
     air: IqAir,
     receiver: Receiver,
     observations: Vec<SsbObservation>,
 }
 
+/// One burst, received when the pipeline listens to it.
+pub struct IqBurstReception<'a> {
+    /// Air and receiver.
+    pub reception: &'a mut IqReception,
+    /// Number of the burst.
+    pub number: u64,
+    /// Where the vehicle drives.
+    pub path: &'a Path,
+    /// Channels of the radio heads, and the mean SNR of each (dB).
+    pub channels: &'a [HeadChannel],
+    /// See `channels`.
+    pub snrs_db: &'a [f64],
+}
+
 impl IqReception {
+    /// The air and receiver of the run that `streams` belongs to.
+    ///
+    /// # Errors
+    /// [`SimulationError`] for what cannot be sent as samples.
     pub fn new(scenario: &Scenario, streams: Streams) -> Result<Self, SimulationError> {
+        let config = ReceiverConfig::new(&scenario.site, &scenario.vehicle);
         Ok(Self {
             air: IqAir::new(scenario, streams)?,
-            receiver: Receiver::new(ReceiverConfig::new(scenario))?,
+            receiver: Receiver::new(config)?,
             observations: Vec::new(),
         })
     }
 
-    /// Receives burst number `number`.
-    pub fn receive(
+    fn receive(
         &mut self,
         number: u64,
-        vehicle: &Vehicle,
-        heads: &[HeadChannel],
+        path: &Path,
+        channels: &[HeadChannel],
         snrs_db: &[f64],
     ) -> Result<(), SimulationError> {
-        let burst = self
-            .air
-            .receive(number, |time_s| vehicle.at(time_s), heads, snrs_db)?;
+        let state = |time_s| path.at(time_s);
+        let burst = self.air.receive(number, state, channels, snrs_db)?;
+        let antennas: Vec<_> = burst.antennas.iter().map(Vec::as_slice).collect();
         let window = Window {
             start: burst.start,
             time_s: burst.time_s,
-            antennas: burst.antennas.each_ref().map(Vec::as_slice),
+            antennas: &antennas,
         };
         let observations = &mut self.observations;
         observations.clear();
-        self.receiver
-            .receive(&window, |observation| observations.push(*observation))?;
+        self.receiver.receive(&window, |observation| {
+            observations.push(observation.clone())
+        })?;
         observations.sort_by(|a, b| a.ssb.time_s.total_cmp(&b.ssb.time_s));
         Ok(())
     }
+}
 
-    /// The SSBs of the last burst that the receiver made out, in order of time.
-    pub fn observations(&self) -> &[SsbObservation] {
-        &self.observations
+impl SsbSource for IqBurstReception<'_> {
+    fn sense(&mut self, sensed: &mut Vec<SensedSsb>) -> Result<(), BoxError> {
+        self.reception
+            .receive(self.number, self.path, self.channels, self.snrs_db)?;
+        sensed.extend(self.reception.observations.iter().map(|it| it.ssb));
+        Ok(())
+    }
+
+    fn observe(&mut self, index: usize) -> Result<Observed<'_>, BoxError> {
+        let observation = self.reception.observations.get(index);
+        Ok(Observed::Snapshots(
+            observation.ok_or("no such SSB in the burst")?,
+        ))
     }
 }

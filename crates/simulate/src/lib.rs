@@ -1,48 +1,34 @@
-//! Simulated drives: one run, and campaigns of many.
+//! What is really so: motion, channel and faults around a vehicle, and campaigns of its drives.
+//!
+//! A [`Scenario`](scenario::Scenario) holds what is believed of site and vehicle, and how the world
+//! departs from it; [`truth`] makes the one from the other, and nothing else does.
 
 mod bootstrap;
+pub mod bound;
 mod campaign;
+pub mod channel;
 mod consistency;
+mod error;
 mod histogram;
-mod ideal;
+mod ideal_campaign;
+pub mod ideal_filter;
 mod integrity_summary;
 mod iq_reception;
+pub mod random;
+mod record;
 mod run;
+pub mod scenario;
+mod snapshot_reception;
 mod synth;
-
-use thiserror::Error;
+pub mod truth;
+pub mod world;
 
 pub use bootstrap::bootstrap_interval;
 pub use campaign::{Campaign, CampaignOptions, RunSummary, StepStatistics};
 pub use consistency::Consistency;
+pub use error::SimulationError;
 pub use histogram::ErrorHistogram;
 pub use integrity_summary::IntegritySummary;
-pub use run::{Found, RunRecord, Simulation, Step};
+pub use record::{Found, RunRecord, Step};
+pub use run::{MakeCustom, Simulation};
 pub use synth::{SynthError, SynthSettings, Synthesized, synthesize};
-
-use crate::BoxError;
-use crate::receive::ReceiveError;
-use crate::scenario::ScenarioError;
-
-/// Why a simulation ended early.
-#[derive(Debug, Error)]
-pub enum SimulationError {
-    /// The scenario and the platform do not go together.
-    #[error(transparent)]
-    Scenario(#[from] ScenarioError),
-    /// The user's own estimator or policy failed.
-    #[error("{0}")]
-    Custom(BoxError),
-    /// An SSB of the scenario cannot be sent as samples.
-    #[error("samples: {0}")]
-    Samples(#[from] nr_ssb::Error),
-    /// The receiver refuses its samples.
-    #[error("receiver: {0}")]
-    Receive(#[from] ReceiveError),
-    /// The threads asked for cannot be had.
-    #[error("no threads to run on: {0}")]
-    Threads(#[from] rayon::ThreadPoolBuildError),
-    /// The caller asked to stop.
-    #[error("stopped")]
-    Stopped,
-}

@@ -32,6 +32,8 @@ pub enum Purpose {
     ScatterDelay = 11,
     /// Mounting and calibration of the array.
     Array = 12,
+    /// Places and powers of a radio head.
+    Survey = 13,
 }
 
 /// The random streams of one run.

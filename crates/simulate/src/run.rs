@@ -1,134 +1,49 @@
 //! One simulated drive.
 
-use rand::RngExt;
-use rand_distr::StandardNormal;
+use std::collections::VecDeque;
+use std::sync::Arc;
 
-use super::SimulationError;
-use super::iq_reception::IqReception;
-use crate::channel::{HeadChannel, Reception};
-use crate::geometry::Pose;
-use crate::localize::Integrity;
-use crate::localize::tracker::Calibration;
-use crate::observation::{SensedSsb, SsbObservation};
-use crate::onboard::{Custom, Execution, Onboard};
-use crate::platform::Platform;
-use crate::random::{Purpose, Streams};
-use crate::scenario::{Fidelity, Scenario, ScenarioError};
-use crate::world::{Faults, Odometer, RadioHead, Track, Vehicle};
+use onboard::geometry::Pose;
+use onboard::localize::PoseEstimate;
+use onboard::settings::{Platform, SettingsError};
+use onboard::{BoxError, Custom, Onboard, SsbSource};
+
+use crate::channel::HeadChannel;
+use crate::error::SimulationError;
+use crate::iq_reception::{IqBurstReception, IqReception};
+use crate::random::Streams;
+use crate::record::{RunRecord, Step};
+use crate::scenario::{Fidelity, Scenario};
+use crate::snapshot_reception::{SnapshotBuffers, SnapshotReception};
+use crate::truth::{PropagationMaker, World};
+use crate::world::{Faults, Odometer, Path, VehicleState};
+
+/// The user's own code for a run that starts at the pose the vehicle is told.
+pub type MakeCustom = dyn Fn(Pose) -> Result<Custom, BoxError> + Sync;
 
 /// A scenario on a platform, ready to be run.
-#[derive(Debug, Clone)]
+#[derive(Clone)]
 pub struct Simulation {
-    scenario: Scenario,
+    world: World,
     platform: Platform,
-    track: Track,
     steps: usize,
-}
-
-/// Truth and estimate at one SSB.
-#[derive(Debug, Clone, Copy, PartialEq)]
-pub struct Step {
-    /// Time in seconds.
-    pub time_s: f64,
-    /// Where the vehicle is.
-    pub truth: Pose,
-    /// Where it believes to be.
-    pub estimate: Pose,
-    /// Covariance of (x, y, heading), where the localizer has one.
-    pub covariance: Option<[[f64; 3]; 3]>,
-    /// Protection level and state, where the localizer is guarded.
-    pub integrity: Option<Integrity>,
-    /// Whether it is still in search of its first pose.
-    pub searching: bool,
-    /// SNR of the strongest radio head by link budget and shadowing, in dB.
-    pub snr_db: f64,
-}
-
-impl Step {
-    /// Horizontal error in metres.
-    pub fn error_m(&self) -> f64 {
-        self.truth.point().distance_m(self.estimate.point())
-    }
-
-    /// Sum of the variances of the horizontal error in m²; `None` where the localizer has none.
-    pub fn predicted_m2(&self) -> Option<f64> {
-        let [[xx, ..], [_, yy, _], _] = self.covariance?;
-        Some(xx + yy)
-    }
-
-    /// Squared horizontal error normalised by its covariance (NEES); `None` where the localizer
-    /// has none, or one without area.
-    pub fn nees(&self) -> Option<f64> {
-        let [[xx, xy, _], [_, yy, _], _] = self.covariance?;
-        let (dx, dy) = (
-            self.estimate.x_m - self.truth.x_m,
-            self.estimate.y_m - self.truth.y_m,
-        );
-        let determinant = xx * yy - xy * xy;
-        let nees = (yy * dx * dx - 2.0 * xy * dx * dy + xx * dy * dy) / determinant;
-        (determinant > 0.0).then_some(nees)
-    }
-}
-
-/// All that happened in one run.
-#[derive(Debug, Clone, PartialEq)]
-pub struct RunRecord {
-    /// Its number.
-    pub run: u64,
-    /// One step per SSB.
-    pub steps: Vec<Step>,
-    /// The estimated angles.
-    pub executions: Vec<Execution>,
-    /// SSB bursts that the receiver listened to.
-    pub listened: usize,
-    /// The array as found by the end of the drive, where the localizer looks for it.
-    pub calibration: Option<Calibration>,
-    /// SSBs at which no choice of angles could keep the bound of an uncertainty-driven wake-up.
-    pub out_of_reach: usize,
-}
-
-/// How the first pose came about.
-#[derive(Debug, Clone, Copy, PartialEq)]
-pub struct Found {
-    /// The first step at which the pose was known.
-    pub step: Step,
-    /// Distance driven by then, in metres.
-    pub driven_m: f64,
-}
-
-impl RunRecord {
-    /// How the first pose came about: at once, unless it had to be searched for; `None` if it was
-    /// not found.
-    pub fn found(&self) -> Option<Found> {
-        let first = self.steps.iter().position(|step| !step.searching)?;
-        let until = self.steps.get(..=first)?;
-        let driven_m = |pair: &[Step]| match pair {
-            [from, to] => from.truth.point().distance_m(to.truth.point()),
-            _ => 0.0,
-        };
-        Some(Found {
-            step: *until.last()?,
-            driven_m: until.windows(2).map(driven_m).sum(),
-        })
-    }
 }
 
 impl Simulation {
     /// Prepares a scenario.
     ///
     /// # Errors
-    /// [`ScenarioError`] when the platform lacks what the scenario asks of it.
-    pub fn new(scenario: Scenario, platform: Platform) -> Result<Self, ScenarioError> {
-        let track = scenario.build_track()?;
-        let vehicle = Vehicle::new(track.clone(), &scenario.motion, Streams::new(0, 0));
+    /// [`SettingsError`] when the platform lacks what the scenario asks of it.
+    pub fn new(scenario: &Scenario, platform: Platform) -> Result<Self, SettingsError> {
+        let world = World::new(scenario)?;
         // On to the first SSB that finds the vehicle at its destination.
-        let steps = (vehicle.duration_s() / scenario.ssb.period_s()).ceil() as usize + 1;
+        let steps = (world.duration_s() / scenario.site.ssb.period_s()).ceil() as usize + 1;
         // Whatever the pipeline refuses, it refuses before the first run.
-        Onboard::new(&scenario, &platform, Pose::default(), Custom::default())?;
+        let (site, vehicle) = (&scenario.site, &scenario.vehicle);
+        Onboard::new(site, vehicle, &platform, Pose::default(), Custom::default())?;
         Ok(Self {
-            scenario,
+            world,
             platform,
-            track,
             steps,
         })
     }
@@ -136,15 +51,22 @@ impl Simulation {
     /// A scenario on the platform it names.
     ///
     /// # Errors
-    /// [`ScenarioError`] when there is no such platform, or it lacks what the scenario asks of it.
-    pub fn on_its_platform(scenario: Scenario) -> Result<Self, ScenarioError> {
-        let platform = Platform::load(&scenario.platform.name)?;
+    /// [`SettingsError`] when there is no such platform, or it lacks what the scenario asks of it.
+    pub fn on_its_platform(scenario: &Scenario) -> Result<Self, SettingsError> {
+        let platform = recording::load(&scenario.vehicle.platform.name)?;
         Self::new(scenario, platform)
     }
 
+    /// The same with another propagation.
+    #[must_use]
+    pub fn with_propagation(mut self, propagation: Arc<PropagationMaker>) -> Self {
+        self.world = self.world.with_propagation(propagation);
+        self
+    }
+
     /// The scenario.
-    pub const fn scenario(&self) -> &Scenario {
-        &self.scenario
+    pub fn scenario(&self) -> &Scenario {
+        self.world.scenario()
     }
 
     /// The platform.
@@ -159,28 +81,20 @@ impl Simulation {
 
     /// Time of step `number` in seconds.
     pub fn time_s(&self, number: usize) -> f64 {
-        number as f64 * self.scenario.ssb.period_s()
+        number as f64 * self.scenario().site.ssb.period_s()
     }
 
     /// Drives once. The same seed and run number give the same record to the last bit.
     ///
     /// # Errors
     /// [`SimulationError`] from the user's own code, if any.
-    pub fn run(&self, seed: u64, run: u64, custom: Custom) -> Result<RunRecord, SimulationError> {
-        let scenario = &self.scenario;
-        let streams = Streams::new(seed, run);
-        let vehicle = Vehicle::new(self.track.clone(), &scenario.motion, streams);
-        let start = vehicle.at(0.0);
-        let mut odometer = Odometer::new(scenario.odometer, start, streams);
-        let mut channels: Vec<HeadChannel> = scenario
-            .radio_heads
-            .iter()
-            .enumerate()
-            .map(|(index, head)| HeadChannel::new(scenario, RadioHead::from(head), index, streams))
-            .collect();
-        let believed_start = self.believed_start(start.pose, streams);
-        let mut onboard = Onboard::new(scenario, &self.platform, believed_start, custom)?;
-
+    pub fn run(
+        &self,
+        seed: u64,
+        run: u64,
+        custom: &MakeCustom,
+    ) -> Result<RunRecord, SimulationError> {
+        let mut drive = Drive::new(self, Streams::new(seed, run), custom)?;
         let mut record = RunRecord {
             run,
             steps: Vec::with_capacity(self.steps),
@@ -189,101 +103,166 @@ impl Simulation {
             calibration: None,
             out_of_reach: 0,
         };
-        let mut iq = match scenario.fidelity {
-            Fidelity::Snapshots => None,
-            Fidelity::Iq => Some(IqReception::new(scenario, streams)?),
-        };
-        let mut faults = Faults::new(scenario);
-        let heads: Vec<RadioHead> = scenario.radio_heads.iter().map(RadioHead::from).collect();
-        let mut snrs_db = vec![0.0; channels.len()];
-        let mut receptions: Vec<Reception> = Vec::with_capacity(channels.len());
-        let mut sensed: Vec<SensedSsb> = Vec::with_capacity(channels.len());
-        let mut observation = None;
-        let mut odometry_number = 0u32;
         for number in 0..self.steps {
             let time_s = self.time_s(number);
-            loop {
-                let sample_s = f64::from(odometry_number) * odometer.period_s();
-                if sample_s > time_s {
-                    break;
-                }
-                odometry_number += 1;
-                if let Some(sample) = odometer.sample(vehicle.at(sample_s)) {
-                    // A simulated odometer neither repeats itself nor returns NaN.
-                    let _ = onboard.odometry(&faults.slip(sample));
-                }
-            }
-            let truth = vehicle.at(time_s);
-            for (channel, snr_db) in channels.iter_mut().zip(&mut snrs_db) {
-                *snr_db = channel.next_snr_db(&truth);
-            }
-            if onboard.listens(time_s) {
-                record.listened += 1;
-                receptions.clear();
-                sensed.clear();
-                if let Some(iq) = &mut iq {
-                    iq.receive(number as u64, &vehicle, &channels, &snrs_db)?;
-                    sensed.extend(iq.observations().iter().map(|it| it.ssb));
-                } else {
-                    let of_heads = channels.iter_mut().zip(&snrs_db).zip(&heads);
-                    for (index, ((channel, snr_db), head)) in of_heads.enumerate() {
-                        let mut reception = channel.receive(&truth, *snr_db);
-                        faults.distort(index, head, &truth, &mut reception.gains);
-                        sensed.push(reception.ssb);
-                        receptions.push(reception);
-                    }
-                }
-                let decision = onboard
-                    .consider(time_s, &sensed)
-                    .map_err(SimulationError::Custom)?;
-                if decision.estimate {
-                    // One of the two is empty: samples were received, or snapshots are drawn.
-                    for heard in iq.iter().flat_map(IqReception::observations) {
-                        if onboard.selects(&heard.ssb) {
-                            let execution =
-                                onboard.estimate(heard).map_err(SimulationError::Custom)?;
-                            record.executions.push(execution);
-                        }
-                    }
-                    for (channel, reception) in channels.iter_mut().zip(&receptions) {
-                        if !onboard.selects(&reception.ssb) {
-                            continue;
-                        }
-                        let buffer =
-                            observation.get_or_insert_with(|| SsbObservation::new(reception.ssb));
-                        channel.observe(number as u64, reception, buffer);
-                        let execution =
-                            onboard.estimate(buffer).map_err(SimulationError::Custom)?;
-                        record.executions.push(execution);
-                    }
-                }
-            } else {
-                onboard.advance_to(time_s);
-            }
-            record.out_of_reach += usize::from(onboard.keeps_bound(time_s) == Some(false));
-            let believed = onboard.pose();
+            let truth = drive.path.at(time_s);
+            drive.send(number, truth);
+            drive.odometry_until(time_s, &mut record)?;
+            drive.hear_until(time_s, &mut record)?;
+            let believed = drive.pose(time_s)?;
             record.steps.push(Step {
                 time_s,
                 truth: truth.pose,
                 estimate: believed.pose,
                 covariance: believed.covariance,
                 integrity: believed.integrity,
-                searching: onboard.searching().is_some(),
-                snr_db: snrs_db.iter().copied().fold(f64::NEG_INFINITY, f64::max),
+                searching: drive.onboard.searching().is_some(),
+                snr_db: drive.strongest_db,
             });
         }
-        record.calibration = onboard.calibration();
+        record.calibration = drive.onboard.calibration();
         Ok(record)
     }
+}
 
-    fn believed_start(&self, truth: Pose, streams: Streams) -> Pose {
-        let settings = &self.scenario.start;
-        let mut rng = streams.generator(Purpose::Start, 0);
-        let mut normal = || rng.sample::<f64, _>(StandardNormal);
-        Pose {
-            x_m: truth.x_m + settings.position_std_m * normal(),
-            y_m: truth.y_m + settings.position_std_m * normal(),
-            heading_rad: truth.heading_rad + settings.heading_std_rad * normal(),
+/// A drive going on.
+struct Drive {
+    onboard: Onboard,
+    path: Path,
+    odometer: Odometer,
+    odometry_number: u32,
+    channels: Vec<HeadChannel>,
+    faults: Faults,
+    iq: Option<IqReception>,
+    buffers: SnapshotBuffers,
+    /// Bursts that have been sent and not yet heard.
+    on_the_way: VecDeque<Burst>,
+    latency_s: f64,
+    strongest_db: f64,
+}
+
+struct Burst {
+    number: u64,
+    vehicle: VehicleState,
+    snrs_db: Vec<f64>,
+}
+
+impl Drive {
+    fn new(
+        simulation: &Simulation,
+        streams: Streams,
+        custom: &MakeCustom,
+    ) -> Result<Self, SimulationError> {
+        let scenario = simulation.scenario();
+        let mut truth = simulation.world.draw(streams);
+        let start = truth.told_start;
+        let onboard = Onboard::new(
+            &scenario.site,
+            &scenario.vehicle,
+            &simulation.platform,
+            start,
+            custom(start).map_err(SimulationError::Custom)?,
+        )?;
+        let iq = match scenario.fidelity {
+            Fidelity::Snapshots => None,
+            Fidelity::Iq => Some(IqReception::new(scenario, streams)?),
+        };
+        Ok(Self {
+            onboard,
+            channels: HeadChannel::all(&mut truth, streams),
+            path: truth.path,
+            odometer: truth.odometer,
+            odometry_number: 0,
+            faults: Faults::new(&scenario.faults),
+            iq,
+            buffers: SnapshotBuffers::new(scenario.vehicle.array.elements.into()),
+            on_the_way: VecDeque::new(),
+            latency_s: 1e-3 * scenario.ssb_latency_ms,
+            strongest_db: f64::NEG_INFINITY,
+        })
+    }
+
+    /// Sends burst number `number` to the vehicle at `vehicle`.
+    fn send(&mut self, number: usize, vehicle: VehicleState) {
+        let next_snr_db = |channel: &mut HeadChannel| channel.next_snr_db(&vehicle);
+        let snrs_db: Vec<f64> = self.channels.iter_mut().map(next_snr_db).collect();
+        self.strongest_db = snrs_db.iter().copied().fold(f64::NEG_INFINITY, f64::max);
+        self.on_the_way.push_back(Burst {
+            number: number as u64,
+            vehicle,
+            snrs_db,
+        });
+    }
+
+    /// Odometry up to `time_s`, and what arrives before each sample.
+    fn odometry_until(
+        &mut self,
+        time_s: f64,
+        record: &mut RunRecord,
+    ) -> Result<(), SimulationError> {
+        loop {
+            let sample_s = f64::from(self.odometry_number) * self.odometer.period_s();
+            if sample_s > time_s {
+                return Ok(());
+            }
+            self.odometry_number += 1;
+            let latency_s = self.latency_s;
+            let arrives_before = |it: &mut Burst| it.vehicle.time_s + latency_s < sample_s;
+            while let Some(burst) = self.on_the_way.pop_front_if(arrives_before) {
+                self.hear(&burst, record)?;
+            }
+            if let Some(sample) = self.odometer.sample(self.path.at(sample_s)) {
+                // A simulated odometer neither repeats itself nor returns NaN.
+                let _ = self
+                    .onboard
+                    .odometry(&self.faults.slip(sample))
+                    .map_err(SimulationError::Custom)?;
+            }
         }
+    }
+
+    /// Hears what has arrived by `time_s`.
+    fn hear_until(&mut self, time_s: f64, record: &mut RunRecord) -> Result<(), SimulationError> {
+        let latency_s = self.latency_s;
+        let has_arrived = |it: &mut Burst| it.vehicle.time_s + latency_s <= time_s;
+        while let Some(burst) = self.on_the_way.pop_front_if(has_arrived) {
+            self.hear(&burst, record)?;
+        }
+        Ok(())
+    }
+
+    fn hear(&mut self, burst: &Burst, record: &mut RunRecord) -> Result<(), SimulationError> {
+        let mut by_samples;
+        let mut by_snapshots;
+        let source: &mut dyn SsbSource = if let Some(reception) = &mut self.iq {
+            by_samples = IqBurstReception {
+                reception,
+                number: burst.number,
+                path: &self.path,
+                channels: &self.channels,
+                snrs_db: &burst.snrs_db,
+            };
+            &mut by_samples
+        } else {
+            by_snapshots = SnapshotReception {
+                number: burst.number,
+                vehicle: &burst.vehicle,
+                channels: &mut self.channels,
+                snrs_db: &burst.snrs_db,
+                faults: &self.faults,
+                buffers: &mut self.buffers,
+            };
+            &mut by_snapshots
+        };
+        let heard = self.onboard.hear(burst.vehicle.time_s, source);
+        let heard = heard.map_err(SimulationError::of_drive)?;
+        record.listened += usize::from(heard.listened);
+        record.executions.extend_from_slice(heard.executions);
+        record.out_of_reach += usize::from(heard.keeps_bound == Some(false));
+        Ok(())
+    }
+
+    fn pose(&self, time_s: f64) -> Result<PoseEstimate, SimulationError> {
+        self.onboard.pose(time_s).map_err(SimulationError::Custom)
     }
 }

@@ -1,22 +1,26 @@
 //! A scenario as somebody on the vehicle would have recorded it: samples of all antennas, odometry,
 //! the site, and beside them the truth.
 
+use std::f64::consts::TAU;
 use std::fs;
 use std::path::{Path, PathBuf};
 
+use num_complex::Complex64;
+use onboard::geometry::Pose;
+use onboard::receive::SSB_SAMPLES;
+use onboard::settings::{Check, SettingsError, TomlFile, Vehicle};
+use recording::{
+    Annotation, Datatype, RecordingError, RecordingWriter, TimedPose, WriterSettings,
+    write_odometry_csv, write_tum,
+};
 use serde_json::{Map, json};
 use thiserror::Error;
 
 use crate::channel::{HeadChannel, IqAir};
-use crate::observation::ANTENNAS;
 use crate::random::Streams;
-use crate::receive::SSB_SAMPLES;
-use crate::recording::{
-    Annotation, Datatype, RecordingError, RecordingWriter, Site, TimedPose, WriterSettings,
-    write_odometry_csv, write_tum,
-};
-use crate::scenario::{Check, Scenario, ScenarioError};
-use crate::world::{Faults, Odometer, RadioHead, Vehicle, VehicleState};
+use crate::scenario::Scenario;
+use crate::truth::World;
+use crate::world::{Faults, Odometer, Path as DrivenPath, VehicleState};
 
 /// How a scenario is recorded.
 #[derive(Debug, Clone, Copy, PartialEq)]
@@ -51,7 +55,7 @@ pub struct Synthesized {
 pub enum SynthError {
     /// The scenario cannot be sent as samples.
     #[error(transparent)]
-    Scenario(#[from] ScenarioError),
+    Settings(#[from] SettingsError),
     /// A file cannot be written.
     #[error(transparent)]
     Recording(#[from] RecordingError),
@@ -60,8 +64,9 @@ pub enum SynthError {
     Samples(#[from] nr_ssb::Error),
 }
 
-/// Writes a drive into `directory`: `iq.sigmf-meta` and `iq.sigmf-data`, `odometry.csv`,
-/// `site.toml`, `scenario.toml`, and the truth in `truth.tum` and the recording's annotations.
+/// Writes a drive into `directory`: `iq.sigmf-meta` and `iq.sigmf-data`, `odometry.csv`, what the
+/// vehicle believes in `site.toml` and `vehicle.toml`, `scenario.toml`, and the truth in
+/// `truth.tum` and the recording's annotations.
 ///
 /// # Errors
 /// [`SynthError`].
@@ -70,15 +75,16 @@ pub fn synthesize(
     settings: &SynthSettings,
     directory: &Path,
 ) -> Result<Synthesized, SynthError> {
-    scenario.check_sends_samples(&Check {
+    scenario.check_sends_samples(Check {
         file: &scenario.name,
     })?;
     let streams = Streams::new(settings.seed, settings.run);
-    let vehicle = Vehicle::new(scenario.build_track()?, &scenario.motion, streams);
-    let end_s = settings
-        .duration_s
-        .unwrap_or(f64::INFINITY)
-        .min(vehicle.duration_s());
+    let mut drawn = World::new(scenario)?.draw(streams);
+    let mut channels = HeadChannel::all(&mut drawn, streams);
+    let path = drawn.path;
+    let end_s = path
+        .duration_s()
+        .min(settings.duration_s.unwrap_or(f64::INFINITY));
     let mut air = IqAir::new(scenario, streams)?;
     if settings.continuous {
         air = air.continuous();
@@ -89,32 +95,26 @@ pub fn synthesize(
     };
     fs::create_dir_all(directory).map_err(io(directory))?;
 
+    let told = told_vehicle(scenario, drawn.told_start, air.channel_gains());
     let text_files = [
-        (
-            "site.toml",
-            Site::of_scenario(scenario, vehicle.at(0.0).pose, *air.channel_gains()),
-        ),
+        ("site.toml", scenario.site.to_toml()),
+        ("vehicle.toml", told.to_toml()),
         ("scenario.toml", scenario.to_toml()),
     ];
     for (name, text) in text_files {
         let file = directory.join(name);
         fs::write(&file, text).map_err(io(&file))?;
     }
-    write_odometry(
-        scenario,
-        &vehicle,
-        streams,
-        end_s,
-        &directory.join("odometry.csv"),
-    )?;
+    let odometry = directory.join("odometry.csv");
+    write_odometry(scenario, &path, drawn.odometer, end_s, &odometry)?;
 
     let mut writer = RecordingWriter::create(
         &directory.join("iq"),
         WriterSettings {
             datatype: settings.datatype,
-            channels: ANTENNAS,
+            channels: scenario.vehicle.array.elements.into(),
             sample_rate_hz: air.sample_rate_hz(),
-            frequency_hz: scenario.ssb.carrier_mhz * 1e6,
+            frequency_hz: scenario.site.carrier_mhz * 1e6,
             description: format!(
                 "Simulated from the scenario `{}`, seed {}, run {}. Channel k is antenna k, counted \
              along the vehicle's forward axis.",
@@ -123,37 +123,32 @@ pub fn synthesize(
             global: Map::new(),
         },
     )?;
-    let mut heads: Vec<HeadChannel> = scenario
-        .radio_heads
-        .iter()
-        .enumerate()
-        .map(|(index, head)| HeadChannel::new(scenario, RadioHead::from(head), index, streams))
-        .collect();
-    let mut snrs_db = vec![0.0; heads.len()];
+    let mut snrs_db = vec![0.0; channels.len()];
     let mut truth = Vec::new();
     let mut number = 0u64;
     loop {
-        let time_s = number as f64 * scenario.ssb.period_s();
+        let time_s = number as f64 * scenario.site.ssb.period_s();
         if time_s > end_s {
             break;
         }
-        let here = vehicle.at(time_s);
+        let here = path.at(time_s);
         truth.push(TimedPose {
             time_s,
             pose: here.pose,
         });
-        for (head, snr_db) in heads.iter_mut().zip(&mut snrs_db) {
+        for (head, snr_db) in channels.iter_mut().zip(&mut snrs_db) {
             *snr_db = head.next_snr_db(&here);
         }
-        let burst = air.receive(number, |time_s| vehicle.at(time_s), &heads, &snrs_db)?;
+        let burst = air.receive(number, |time_s| path.at(time_s), &channels, &snrs_db)?;
         if !settings.continuous || number == 0 {
             writer.begin_capture(burst.start);
         }
-        for ((head, snr_db), start) in heads.iter().zip(&snrs_db).zip(&burst.ssb_starts) {
+        for ((head, snr_db), start) in channels.iter().zip(&snrs_db).zip(&burst.ssb_starts) {
             let place = writer.length() as f64 + start - burst.start as f64;
             writer.annotate(annotation(scenario, head, &here, *snr_db, place));
         }
-        writer.write(&burst.antennas.each_ref().map(Vec::as_slice))?;
+        let antennas: Vec<_> = burst.antennas.iter().map(Vec::as_slice).collect();
+        writer.write(&antennas)?;
         number += 1;
     }
     write_tum(&directory.join("truth.tum"), &truth)?;
@@ -165,20 +160,29 @@ pub fn synthesize(
     })
 }
 
+/// The vehicle as its owner would describe it: with the start of this drive, channels as calibrated,
+/// and a tracker to locate it by.
+fn told_vehicle(scenario: &Scenario, start: Pose, channel_gains: &[Complex64]) -> Vehicle {
+    let mut vehicle = scenario.vehicle.clone();
+    let gains = channel_gains.iter().map(|gain| [gain.re, gain.im]);
+    vehicle.array.channel_gains = Some(gains.collect());
+    vehicle.start.pose = vehicle.start.known.then_some(start);
+    vehicle
+}
+
 fn write_odometry(
     scenario: &Scenario,
-    vehicle: &Vehicle,
-    streams: Streams,
+    path: &DrivenPath,
+    mut odometer: Odometer,
     end_s: f64,
     file: &Path,
 ) -> Result<(), RecordingError> {
-    let mut odometer = Odometer::new(scenario.odometer, vehicle.at(0.0), streams);
-    let mut faults = Faults::new(scenario);
+    let mut faults = Faults::new(&scenario.faults);
     let count = (end_s / odometer.period_s()).floor() as usize + 1;
     let samples: Vec<_> = (0..count)
         .filter_map(|number| {
             let time_s = number as f64 * odometer.period_s();
-            let sample = odometer.sample(vehicle.at(time_s))?;
+            let sample = odometer.sample(path.at(time_s))?;
             Some(faults.slip(sample))
         })
         .collect();
@@ -193,10 +197,10 @@ fn annotation(
     sample_start: f64,
 ) -> Annotation {
     let head = channel.head();
-    let ssb_freq_hz = scenario.ssb.carrier_mhz * 1e6;
-    let scs_hz = scenario.ssb.subcarrier_spacing_khz * 1e3;
-    let bearing_rad = vehicle.pose.point().bearing_rad(head.position);
-    let angle_rad = bearing_rad - vehicle.pose.heading_rad - scenario.array.mounting_angle_rad;
+    let ssb_freq_hz = scenario.site.carrier_mhz * 1e6;
+    let scs_hz = scenario.site.ssb.subcarrier_spacing_khz * 1e3;
+    let phase_rad = channel.array().line_of_sight(vehicle, head).phase_rad;
+    let element_rad = TAU * scenario.vehicle.array.spacing_wavelengths;
     let ssb = json!({
         "pci": head.pci,
         "ssb_index": head.ssb_index,
@@ -207,8 +211,8 @@ fn annotation(
     });
     // The array sees the angle from its axis, whichever side the wave comes from.
     let angle = json!({
-        "angle_from_axis_deg": angle_rad.cos().acos().to_degrees(),
-        "element_spacing_wavelengths": scenario.array.spacing_wavelengths,
+        "angle_from_axis_deg": (phase_rad / element_rad).acos().to_degrees(),
+        "element_spacing_wavelengths": scenario.vehicle.array.spacing_wavelengths,
     });
     let pose = json!({
         "time_s": vehicle.time_s,

@@ -51,7 +51,13 @@ mod tests {
 
     #[test]
     fn two_peaks_are_broad_and_nothing_is_nothing() {
-        let two = grid(|angle| if (angle.abs() - 1.0).abs() < 0.01 { 0.0 } else { -99.0 });
+        let two = grid(|angle| {
+            if (angle.abs() - 1.0).abs() < 0.01 {
+                0.0
+            } else {
+                -99.0
+            }
+        });
         assert!(circular_gaussian(&two).unwrap().1 > 0.9);
         assert_eq!(circular_gaussian(&[f64::NEG_INFINITY; 8]), None);
         assert_eq!(circular_gaussian(&[0.0, f64::NAN]), None);

@@ -30,11 +30,7 @@ pub struct DeadReckoning {
 
 impl DeadReckoning {
     /// Begins at a known pose, with an array whose axis points `mounting_rad` from forward.
-    pub const fn new(
-        start: Pose,
-        heading_between: HeadingBetween,
-        mounting_rad: f64,
-    ) -> Self {
+    pub const fn new(start: Pose, heading_between: HeadingBetween, mounting_rad: f64) -> Self {
         Self {
             time_s: 0.0,
             distance_m: 0.0,

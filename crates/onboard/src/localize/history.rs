@@ -171,7 +171,10 @@ impl History {
     }
 
     fn keep_copy_if_due(&mut self, time_s: f64, events: usize) {
-        let last = self.copies.checked_sub(1).and_then(|last| self.kept.get(last));
+        let last = self
+            .copies
+            .checked_sub(1)
+            .and_then(|last| self.kept.get(last));
         if last.is_none_or(|last| time_s - last.time_s < SPACING_S) {
             return;
         }

@@ -57,7 +57,10 @@ pub trait Localizer: Any + Send {
 
 /// Copies a localizer into a slot, without allocation where one of its kind is there already and
 /// [`Clone::clone_from`] needs none.
-pub fn copy_into<L: Localizer + Clone>(localizer: &L, slot: &mut Option<Box<dyn Localizer>>) -> bool {
+pub fn copy_into<L: Localizer + Clone>(
+    localizer: &L,
+    slot: &mut Option<Box<dyn Localizer>>,
+) -> bool {
     let there = slot.as_deref_mut().map(|slot| slot as &mut dyn Any);
     match there.and_then(<dyn Any>::downcast_mut::<L>) {
         Some(there) => there.clone_from(localizer),

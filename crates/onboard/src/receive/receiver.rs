@@ -256,12 +256,9 @@ impl<const A: usize> SsbReceiver for ArrayReceiver<A> {
             }
             while cell.next_start <= last {
                 let start = cell.next_start;
-                let seen = cell.tracker.track(
-                    &antennas,
-                    window.start as f64,
-                    start,
-                    decode_pbch,
-                )?;
+                let seen =
+                    cell.tracker
+                        .track(&antennas, window.start as f64, start, decode_pbch)?;
                 // The beam is told by DM-RS; another cell's SSB is not this one.
                 let seen = seen.filter(|seen| seen.ssb_index == cell.ssb_index);
                 cell.next_start = match &seen {

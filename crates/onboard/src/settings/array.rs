@@ -72,7 +72,10 @@ impl ArraySettings {
     /// Gains of the channels, one of each antenna.
     pub fn calibration(&self) -> Vec<Complex64> {
         match &self.channel_gains {
-            Some(gains) => gains.iter().map(|&[re, im]| Complex64::new(re, im)).collect(),
+            Some(gains) => gains
+                .iter()
+                .map(|&[re, im]| Complex64::new(re, im))
+                .collect(),
             None => vec![Complex64::ONE; self.elements.into()],
         }
     }

@@ -72,6 +72,23 @@ pub enum SettingsError {
 }
 
 impl SettingsError {
+    /// The same defect of a table that another file holds at `path`.
+    #[must_use]
+    pub fn beneath(mut self, holder: &str, path: &str) -> Self {
+        if let Self::UnknownKey { file, key, .. }
+        | Self::Shape { file, key, .. }
+        | Self::Value { file, key, .. } = &mut self
+        {
+            holder.clone_into(file);
+            *key = if key.is_empty() || key.starts_with('(') {
+                path.to_owned()
+            } else {
+                format!("{path}.{key}")
+            };
+        }
+        self
+    }
+
     /// The error for a name that is neither a file nor one of the shipped.
     pub fn unknown_name<'a>(
         what: &'static str,

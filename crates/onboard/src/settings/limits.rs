@@ -35,7 +35,12 @@ impl Walk<'_> {
             self.visit(value, target, path)?;
         }
         for key in ["oneOf", "anyOf", "allOf"] {
-            for variant in schema.get(key).and_then(Value::as_array).into_iter().flatten() {
+            for variant in schema
+                .get(key)
+                .and_then(Value::as_array)
+                .into_iter()
+                .flatten()
+            {
                 if self.is_meant(value, variant) {
                     self.visit(value, variant, path)?;
                 }
@@ -72,12 +77,7 @@ impl Walk<'_> {
         })
     }
 
-    fn number(
-        &self,
-        number: Option<f64>,
-        schema: &Value,
-        path: &str,
-    ) -> Result<(), SettingsError> {
+    fn number(&self, number: Option<f64>, schema: &Value, path: &str) -> Result<(), SettingsError> {
         let limit = |name: &str| schema.get(name).and_then(Value::as_f64);
         let Some(number) = number else {
             return Ok(());
@@ -90,8 +90,8 @@ impl Walk<'_> {
                 .that(choices.contains(&number), path, number, &allowed)?;
         }
         let (least, most) = (limit("minimum"), limit("maximum"));
-        let inside = least.is_none_or(|least| number >= least)
-            && most.is_none_or(|most| number <= most);
+        let inside =
+            least.is_none_or(|least| number >= least) && most.is_none_or(|most| number <= most);
         self.check.that(inside, path, number, &allowed(least, most))
     }
 

@@ -37,6 +37,12 @@ pub fn lay_over(
                     lay_over_entries(entries, &name, &value, &path, check)?;
                 }
             }
+            // Over the name of a file: its keys over those of that file.
+            (Some(Value::String(name)), Value::Table(mut value)) => {
+                let name = Value::String(name.clone());
+                value.entry("like").or_insert(name);
+                base.insert(key, Value::Table(value));
+            }
             (_, value) => {
                 base.insert(key, value);
             }

@@ -191,6 +191,24 @@ fn schema<T: JsonSchema>() -> Json {
     let mut made = MADE.lock().unwrap_or_else(PoisonError::into_inner);
     made.get_or_insert_default()
         .entry(type_name::<T>())
-        .or_insert_with(|| schemars::schema_for!(T).to_value())
+        .or_insert_with(|| with_like(schemars::schema_for!(T).to_value()))
         .clone()
+}
+
+/// Files may say what they are like; their types need not know.
+fn with_like(mut schema: Json) -> Json {
+    let like = serde_json::json!({
+        "type": "string",
+        "description": "A shipped name, or a path: this file's keys are laid over that one's.",
+    });
+    if let Some(properties) = schema.get_mut("properties").and_then(Json::as_object_mut) {
+        properties.insert("like".to_owned(), like.clone());
+    }
+    for held in ["Site", "Vehicle"] {
+        let held = schema.pointer_mut(&format!("/$defs/{held}/properties"));
+        if let Some(properties) = held.and_then(Json::as_object_mut) {
+            properties.insert("like".to_owned(), like.clone());
+        }
+    }
+    schema
 }

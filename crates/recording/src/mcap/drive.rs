@@ -8,11 +8,11 @@ use std::path::Path;
 use mcap::McapError;
 
 use super::writer::{DiagnosticLevel, DiagnosticStatus, Frames, McapWriter, Twist};
-use onboard::localize::IntegrityState;
-use onboard::localize::tracker::Calibration;
-use onboard::Execution;
 use crate::error::RecordingError;
 use crate::replay::{LocatedDrive, LocatedPose, Remark};
+use onboard::Execution;
+use onboard::localize::IntegrityState;
+use onboard::localize::tracker::Calibration;
 
 /// Topic of the poses.
 const POSE_TOPIC: &str = "/access_av/odometry";

@@ -9,9 +9,9 @@ use mcap::sans_io::LinearReaderOptions;
 
 use super::cdr::Decoder;
 use super::schema::ODOMETRY;
-use onboard::observation::OdometrySample;
 use crate::error::RecordingError;
 use crate::odometry::{OdometryCollector, OdometryLog};
+use onboard::observation::OdometrySample;
 
 /// Bytes of the longest record that is read; chunks are customarily below 10 MB.
 const LONGEST_RECORD: usize = 1 << 28;

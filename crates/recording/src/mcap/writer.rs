@@ -8,8 +8,8 @@ use mcap::{McapError, WriteOptions, Writer};
 
 use super::cdr::Encoder;
 use super::schema::{DIAGNOSTICS, ODOMETRY, Schema, VERDICT};
-use onboard::localize::PoseEstimate;
 use onboard::Execution;
+use onboard::localize::PoseEstimate;
 
 /// Variance of what is not observed: large, finite (an infinite one breaks filters downstream).
 const UNOBSERVED: f64 = 1e6;

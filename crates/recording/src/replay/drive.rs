@@ -103,7 +103,9 @@ impl<'a> Replay<'a> {
         self.odometry_until(f64::INFINITY)?;
         let smoothed = self.onboard.smoothed();
         let poses = &self.drive.poses;
-        let known = poses.iter().skip(poses.len().saturating_sub(smoothed.len()));
+        let known = poses
+            .iter()
+            .skip(poses.len().saturating_sub(smoothed.len()));
         Ok(known
             .zip(smoothed)
             .map(|(pose, estimate)| LocatedPose { estimate, ..*pose })

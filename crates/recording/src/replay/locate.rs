@@ -5,7 +5,7 @@ use std::collections::BTreeMap;
 use onboard::geometry::Pose;
 use onboard::localize::UpdateReason;
 use onboard::receive::{Receiver, ReceiverConfig};
-use onboard::settings::{Site, Vehicle};
+use onboard::settings::{Site, Vehicle, WakeUpSettings};
 use onboard::{Custom, Execution};
 
 use super::drive::Replay;
@@ -92,6 +92,7 @@ fn look_back(
 ) -> Result<Vec<LocatedPose>, ReplayError> {
     let unguarded = Vehicle {
         integrity: None,
+        wake_up: WakeUpSettings::default(), // whatever was chosen then is heard again
         ..vehicle.clone()
     };
     let mut mistrusted_until_s = BTreeMap::new();
@@ -116,8 +117,7 @@ fn look_back(
     let mut angles: Vec<LoggedAngle> = executions.filter_map(logged).collect();
     // Nothing is late when all is known.
     angles.sort_by(|a, b| a.ssb.time_s.total_cmp(&b.ssb.time_s));
-    let every = EveryAngle.into_custom();
-    let mut replay = Replay::new(site, &unguarded, start, every, odometry)?;
+    let mut replay = Replay::new(site, &unguarded, start, Custom::default(), odometry)?;
     replay.keep_journal();
     replay.hear(&angles)?;
     replay.smoothed()

@@ -33,7 +33,9 @@ pub fn starting(
     vehicle.start.pose = pose;
     vehicle.start.known = pose.is_some();
     let heard = site.radio_heads.iter();
-    let heard = heard.filter(|head| vehicle.receiver.hears(head.pci)).count();
+    let heard = heard
+        .filter(|head| vehicle.receiver.hears(head.pci))
+        .count();
     let findable = site.road.is_some() && vehicle.follows_road() && heard > 1;
     let file = &vehicle.name;
     Check { file }.that(

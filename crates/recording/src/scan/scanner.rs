@@ -5,11 +5,10 @@ use nr_ssb::raster::{self, RasterPoint};
 use nr_ssb::{Complex32, SubcarrierSpacing};
 
 use super::array_view::ArraySetup;
-use super::error::ScanError;
 use super::diagnosis::{ChannelFault, ExchangeVotes, faults_of_samples};
+use super::error::ScanError;
 use super::iq_source::IqSource;
 use super::ssb_search::{BLOCK_S, FALSE_ALARM, FoundSsb, SsbSearch, SsbSearchConfig};
-use crate::error::RecordingError;
 
 /// Looked through for raster points, in two steps: the usual period, and the longest (TS 38.331).
 const RASTER_WINDOWS_S: [f64; 2] = [0.02, 0.16];

@@ -5,12 +5,12 @@ use nr_ssb::front_end::FrontEnd;
 use nr_ssb::search::{DetectedSsb, SearchConfig, SearchError, Searcher};
 use nr_ssb::{Complex32, Pci, SubcarrierSpacing};
 
-use onboard::receive::SSB_SAMPLES;
 use super::array_view::{ArraySetup, ArrayView, View, array_view};
 use super::diagnosis::ExchangeVotes;
-use super::iq_source::first_not_finite;
 use super::error::ScanError;
+use super::iq_source::first_not_finite;
 use crate::error::RecordingError;
+use onboard::receive::SSB_SAMPLES;
 
 /// Searched at once, in seconds.
 pub(super) const BLOCK_S: f64 = 0.02;

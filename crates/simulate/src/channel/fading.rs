@@ -1,24 +1,28 @@
-//! Rician fading across the array: a line of sight and scatter that stands still during an SSB.
+//! Rician fading across the array, and shadowing: a line of sight and scatter that stands still
+//! during an SSB.
 
 use std::f64::consts::TAU;
 
 use num_complex::Complex64;
+use onboard::settings::{Site, Vehicle};
 use rand::RngExt;
 
-use crate::observation::{ANTENNAS, Snapshot};
+use super::propagation::Propagation;
+use super::shadowing::Shadowing;
 use crate::random::{Purpose, Streams};
-use crate::scenario::{ScatterModel, Scenario};
+use crate::scenario::{ChannelSettings, ScatterModel};
+use crate::world::LineOfSight;
 
-/// The fading of one radio head in one run.
+/// The propagation from one radio head in one run.
 ///
 /// The scatter is a sum of plane waves of fixed directions, uniform over the sphere, and random
 /// phases (Aulin's model), so that it is a function of the distance driven: its autocorrelation is
 /// sin(2πΔ/λ)/(2πΔ/λ), first zero at half a wavelength, and its Doppler spectrum is flat. Like any
 /// wave, the line of sight turns its phase with its own Doppler. Where scatter has a delay spread,
-/// each ray's delay is exponentially distributed, and the channel varies over the band. Nothing is drawn while driving,
-/// and an SSB fades the same whether or not the ones before it were heard.
+/// each ray's delay is exponentially distributed, and the channel varies over the band.
 #[derive(Debug, Clone)]
-pub struct RicianFading {
+pub struct RicianPropagation {
+    shadowing: Shadowing,
     line_of_sight: f64,
     scatter: f64,
     wavenumber_per_m: f64,
@@ -41,18 +45,23 @@ struct Ray {
     delay_s: f64,
 }
 
-impl RicianFading {
-    /// The fading of radio head number `head`.
-    pub fn new(scenario: &Scenario, streams: Streams, head: usize) -> Self {
-        let settings = &scenario.channel;
+impl RicianPropagation {
+    /// The propagation from radio head number `head` of a site to a vehicle, as both are.
+    pub fn new(
+        settings: &ChannelSettings,
+        site: &Site,
+        vehicle: &Vehicle,
+        head: usize,
+        streams: Streams,
+    ) -> Self {
         let mut rng = streams.generator(Purpose::Scatter, head);
-        let k = 10f64.powf(0.1 * settings.rician_k_db);
+        let k = 10f64.powf(0.1 * site.rician_k_db);
         let per_antenna = usize::from(settings.rays);
         let count = match settings.scatter {
-            ScatterModel::PerAntenna => per_antenna * ANTENNAS,
+            ScatterModel::PerAntenna => per_antenna * usize::from(vehicle.array.elements),
             ScatterModel::Rays => per_antenna,
         };
-        let element_rad = TAU * scenario.array.spacing_wavelengths;
+        let element_rad = TAU * vehicle.array.spacing_wavelengths;
         let spread_s = 1e-9 * settings.delay_spread_ns;
         let mut delays = streams.generator(Purpose::ScatterDelay, head);
         let rays = (0..count)
@@ -69,46 +78,54 @@ impl RicianFading {
             })
             .collect();
         Self {
+            shadowing: Shadowing::new(settings, streams, head),
             line_of_sight: (k / (k + 1.0)).sqrt(),
             scatter: ((k + 1.0) * per_antenna as f64).recip().sqrt(),
-            wavenumber_per_m: TAU / scenario.ssb.wavelength_m(),
+            wavenumber_per_m: TAU / site.wavelength_m(),
             rays,
             model: settings.scatter,
             dispersive: spread_s > 0.0,
         }
     }
+}
 
-    /// Gains of the antennas at the carrier, of unit mean power, for a line of sight of electrical
-    /// angle `phase_rad` after `driven_m`, at `range_m` from the radio head.
-    pub fn gains(&self, phase_rad: f64, driven_m: f64, range_m: f64) -> Snapshot {
-        let mut gains = [[Complex64::ZERO; ANTENNAS]];
-        self.response(phase_rad, driven_m, range_m, 0.0, &mut gains);
-        let [gains] = gains;
-        gains
+impl Propagation for RicianPropagation {
+    fn next_shadowing_db(&mut self, along_m: f64) -> f64 {
+        self.shadowing.next_db(along_m)
     }
 
-    /// The same at frequencies `step_hz` apart, the carrier in their middle (of an even number, just
-    /// above it). The line of sight has no delay.
-    pub fn response(
+    fn response(
         &self,
-        phase_rad: f64,
-        driven_m: f64,
-        range_m: f64,
+        sight: &LineOfSight,
+        along_m: f64,
         step_hz: f64,
-        into: &mut [Snapshot],
+        elements: usize,
+        into: &mut [Complex64],
     ) {
-        let direct = Complex64::from_polar(self.line_of_sight, -self.wavenumber_per_m * range_m);
-        into.fill(steering_vector(phase_rad).map(|gain| gain * direct));
-        let first_hz = -((into.len() / 2) as f64) * step_hz;
-        let per_antenna = self.rays.len() / ANTENNAS;
+        let turn = -self.wavenumber_per_m * sight.distance_m;
+        let direct = Complex64::from_polar(self.line_of_sight, turn);
+        let step = Complex64::cis(sight.phase_rad);
+        for gains in into.chunks_exact_mut(elements) {
+            let mut gain = Complex64::ONE;
+            for into in gains {
+                *into = gain * direct;
+                gain *= step;
+            }
+        }
+        let first_hz = -((into.len() / elements / 2) as f64) * step_hz;
+        let per_antenna = self.rays.len() / elements;
         // Without delays one frequency is like another.
-        let count = if self.dispersive { into.len() } else { 1 };
+        let count = if self.dispersive {
+            into.len() / elements
+        } else {
+            1
+        };
         for (number, ray) in self.rays.iter().enumerate() {
-            let doppler = Complex64::cis(self.wavenumber_per_m * driven_m * ray.cosine);
+            let doppler = Complex64::cis(self.wavenumber_per_m * along_m * ray.cosine);
             let mut wave = ray.start * doppler * self.scatter;
             wave *= Complex64::cis(-TAU * first_hz * ray.delay_s);
             let turn = Complex64::cis(-TAU * step_hz * ray.delay_s);
-            for gains in into.iter_mut().take(count) {
+            for gains in into.chunks_exact_mut(elements).take(count) {
                 match self.model {
                     ScatterModel::PerAntenna => {
                         if let Some(gain) = gains.get_mut(number / per_antenna) {
@@ -126,48 +143,67 @@ impl RicianFading {
                 wave *= turn;
             }
         }
-        if let (false, Some(&gains)) = (self.dispersive, into.first()) {
-            into.fill(gains);
+        if !self.dispersive && into.len() > elements {
+            let (first, others) = into.split_at_mut(elements);
+            for gains in others.chunks_exact_mut(elements) {
+                gains.copy_from_slice(first);
+            }
         }
     }
 }
 
-fn steering_vector(phase_rad: f64) -> Snapshot {
-    let step = Complex64::cis(phase_rad);
-    let mut gain = Complex64::ONE;
-    [(); ANTENNAS].map(|()| {
-        let here = gain;
-        gain *= step;
-        here
-    })
-}
-
 #[cfg(test)]
 mod tests {
+    use onboard::settings::{Shipped, TomlFile};
+
     use super::*;
 
-    fn scenario(k_db: f64, scatter: ScatterModel) -> Scenario {
-        let mut scenario = Scenario::load("paper").unwrap();
-        scenario.channel.rician_k_db = k_db;
-        scenario.channel.scatter = scatter;
-        scenario
+    const ELEMENTS: usize = 4;
+
+    fn site(k_db: f64) -> Site {
+        let mut site = Site::from_library("paper", &Shipped).unwrap();
+        site.rician_k_db = k_db;
+        site
+    }
+
+    fn fading(
+        site: &Site,
+        scatter: ScatterModel,
+        delay_spread_ns: f64,
+        streams: Streams,
+    ) -> RicianPropagation {
+        let vehicle = Vehicle::from_library("paper", &Shipped).unwrap();
+        let settings = ChannelSettings {
+            scatter,
+            delay_spread_ns,
+            ..ChannelSettings::default()
+        };
+        RicianPropagation::new(&settings, site, &vehicle, 0, streams)
+    }
+
+    /// Gains at the carrier beside the radio head.
+    fn gains(fading: &RicianPropagation, phase_rad: f64, along_m: f64) -> [Complex64; ELEMENTS] {
+        let sight = LineOfSight {
+            phase_rad,
+            distance_m: 0.0,
+        };
+        let mut gains = [Complex64::ZERO; ELEMENTS];
+        fading.response(&sight, along_m, 0.0, ELEMENTS, &mut gains);
+        gains
     }
 
     /// Mean over runs of f(gains) at antenna 0 of an arriving line of sight at broadside.
     fn mean_power_of_scatter(k_db: f64, model: ScatterModel) -> f64 {
-        let scenario = scenario(k_db, model);
+        let site = site(k_db);
         let runs = 4000;
         let scattered = |run| {
-            let fading = RicianFading::new(&scenario, Streams::new(1, run), 0);
-            let gains = fading.gains(0.3, 1.0, 0.0);
-            let line_of_sight = steering_vector(0.3);
-            gains
-                .iter()
-                .zip(line_of_sight)
-                .map(|(gain, direct)| (gain - direct * fading.line_of_sight).norm_sqr())
-                .sum::<f64>()
+            let fading = fading(&site, model, 0.0, Streams::new(1, run));
+            let direct = |n: usize| Complex64::from_polar(fading.line_of_sight, 0.3 * n as f64);
+            let gains = gains(&fading, 0.3, 1.0);
+            let scatter = gains.iter().enumerate().map(|(n, gain)| gain - direct(n));
+            scatter.map(|gain| gain.norm_sqr()).sum::<f64>()
         };
-        (0..runs).map(scattered).sum::<f64>() / (runs as f64 * ANTENNAS as f64)
+        (0..runs).map(scattered).sum::<f64>() / (runs as f64 * ELEMENTS as f64)
     }
 
     #[test]
@@ -188,15 +224,15 @@ mod tests {
     #[test]
     fn scatter_decorrelates_over_half_a_wavelength() {
         for model in [ScatterModel::PerAntenna, ScatterModel::Rays] {
-            let scenario = scenario(-30.0, model);
-            let wavelength_m = scenario.ssb.wavelength_m();
+            let site = site(-30.0);
+            let wavelength_m = site.wavelength_m();
             // sin(x)/x at 0, π/4, π (its zero) and 3π/2.
             for (wavelengths, sinc) in [(0.0, 1.0), (0.125, 0.9003), (0.5, 0.0), (0.75, -0.2122)] {
                 let runs = 4000;
                 let product = |run| {
-                    let fading = RicianFading::new(&scenario, Streams::new(2, run), 0);
-                    let here = fading.gains(0.0, 7.0, 0.0);
-                    let there = fading.gains(0.0, 7.0 + wavelengths * wavelength_m, 0.0);
+                    let fading = fading(&site, model, 0.0, Streams::new(2, run));
+                    let here = gains(&fading, 0.0, 7.0);
+                    let there = gains(&fading, 0.0, 7.0 + wavelengths * wavelength_m);
                     here.iter()
                         .zip(there)
                         .map(|(a, b)| (a.conj() * b).re)
@@ -215,11 +251,11 @@ mod tests {
     #[test]
     fn antennas_fade_apart_or_together() {
         let product = |model| {
-            let scenario = scenario(-30.0, model);
+            let site = site(-30.0);
             let runs = 4000;
             let one = |run| {
-                let gains =
-                    RicianFading::new(&scenario, Streams::new(4, run), 0).gains(0.0, 0.0, 0.0);
+                let fading = fading(&site, model, 0.0, Streams::new(4, run));
+                let gains = gains(&fading, 0.0, 0.0);
                 (gains[0].conj() * gains[1]).re
             };
             (0..runs).map(one).sum::<f64>() / runs as f64
@@ -232,16 +268,19 @@ mod tests {
     #[test]
     fn scatter_decorrelates_over_frequency_as_its_delays_have_it() {
         for model in [ScatterModel::PerAntenna, ScatterModel::Rays] {
-            let mut scenario = scenario(-30.0, model);
-            scenario.channel.delay_spread_ns = 300.0;
+            let site = site(-30.0);
             let (runs, step_hz) = (4000, 250e3);
             let mut sums = [Complex64::ZERO; 4];
             for run in 0..runs {
-                let mut gains = [[Complex64::ZERO; ANTENNAS]; 4];
-                RicianFading::new(&scenario, Streams::new(5, run), 0)
-                    .response(0.0, 3.0, 0.0, step_hz, &mut gains);
-                for (sum, there) in sums.iter_mut().zip(&gains) {
-                    let pairs = gains[0].iter().zip(there);
+                let mut gains = [Complex64::ZERO; 4 * ELEMENTS];
+                let sight = LineOfSight {
+                    phase_rad: 0.0,
+                    distance_m: 0.0,
+                };
+                fading(&site, model, 300.0, Streams::new(5, run))
+                    .response(&sight, 3.0, step_hz, ELEMENTS, &mut gains);
+                for (sum, there) in sums.iter_mut().zip(gains.chunks_exact(ELEMENTS)) {
+                    let pairs = gains.iter().zip(there);
                     *sum += pairs.map(|(a, b)| a.conj() * b).sum::<Complex64>() / 4.0;
                 }
             }

@@ -11,12 +11,12 @@ use nr_ssb::{
     BchPayload, Case, Complex32, Error, Lmax, Mib, Numerology, Ofdm, Pci, SubcarrierSpacing,
 };
 use num_complex::Complex64;
+use onboard::settings::Site;
 use rand::RngExt;
 use rand_chacha::ChaCha8Rng;
 use rand_distr::StandardNormal;
 
-use super::HeadChannel;
-use crate::observation::{ANTENNAS, Snapshot};
+use super::head_channel::HeadChannel;
 use crate::random::{Purpose, Streams};
 use crate::scenario::{IqSettings, Scenario};
 use crate::world::{Faults, VehicleState};
@@ -41,16 +41,16 @@ pub struct IqAir {
     /// Error of the receiver's oscillator: positive is too fast.
     oscillator: f64,
     head_oscillators: Vec<f64>,
-    channel_gains: [Complex64; ANTENNAS],
+    channel_gains: Vec<Complex64>,
     noise: ChaCha8Rng,
     /// Whether samples are made from one burst to the next, without a gap.
     continuous: bool,
     faults: Faults,
     /// Gains of the antennas at each subcarrier, and a symbol's samples.
-    response: Vec<Snapshot>,
+    response: Vec<Complex64>,
     symbol: Vec<Complex32>,
     /// Sum of all SSBs at each antenna, before the converter.
-    sum: [Vec<Complex64>; ANTENNAS],
+    sum: Vec<Vec<Complex64>>,
     burst: IqBurst,
 }
 
@@ -62,28 +62,32 @@ pub struct IqBurst {
     /// The vehicle's time at it, in seconds.
     pub time_s: f64,
     /// The samples of each antenna; full scale of the converter is one.
-    pub antennas: [Vec<Complex32>; ANTENNAS],
+    pub antennas: Vec<Vec<Complex32>>,
     /// Where each radio head's SSB begins, by the receiver's clock; in the order of the heads.
     pub ssb_starts: Vec<f64>,
 }
 
 impl IqAir {
-    /// The air of the run that `streams` belongs to.
+    /// The air of the run that `streams` belongs to. What it sends is as the site plans it; where
+    /// from and how strong the channels say.
     ///
     /// # Errors
     /// [`Error`] for a numerology of frequency range 2.
     pub fn new(scenario: &Scenario, streams: Streams) -> Result<Self, Error> {
-        let (case, spacing) = case_of(scenario);
-        let ssb_freq_hz = scenario.ssb.carrier_mhz * 1e6;
+        let site = &scenario.site;
+        let elements = usize::from(scenario.vehicle.array.elements);
+        let (case, spacing) = case_of(site);
+        let ssb_freq_hz = site.carrier_mhz * 1e6;
         let settings = scenario.iq;
         let mut hardware = streams.generator(Purpose::ReceiverHardware, 0);
         let mut normal = || hardware.sample::<f64, _>(StandardNormal);
         let oscillator = 1e-6 * settings.oscillator_ppm * normal();
-        let channel_gains = [(); ANTENNAS].map(|()| {
+        let channel_gains = (0..elements).map(|_| {
             let gain = 10f64.powf(0.05 * settings.channel_gain_db * normal());
             Complex64::from_polar(gain, settings.channel_phase_rad * normal())
         });
-        let head_oscillators = (0..scenario.radio_heads.len())
+        let channel_gains = channel_gains.collect();
+        let head_oscillators = (0..site.radio_heads.len())
             .map(|index| {
                 let mut rng = streams.generator(Purpose::HeadOscillator, index);
                 1e-6 * settings.head_oscillator_ppm * rng.sample::<f64, _>(StandardNormal)
@@ -101,17 +105,20 @@ impl IqAir {
             ofdm: Ofdm::new(numerology),
             ssb_freq_hz,
             settings,
-            period_s: scenario.ssb.period_s(),
+            period_s: site.ssb.period_s(),
             oscillator,
             head_oscillators,
             channel_gains,
             noise: streams.generator(Purpose::SampleNoise, 0),
             continuous: false,
-            faults: Faults::new(scenario),
-            response: vec![[Complex64::ZERO; ANTENNAS]; SUBCARRIERS],
+            faults: Faults::new(&scenario.faults),
+            response: vec![Complex64::ZERO; elements * SUBCARRIERS],
             symbol: vec![Complex32::ZERO; numerology.ssb_symbol_len()],
-            sum: Default::default(),
-            burst: IqBurst::default(),
+            sum: vec![Vec::new(); elements],
+            burst: IqBurst {
+                antennas: vec![Vec::new(); elements],
+                ..IqBurst::default()
+            },
         })
     }
 
@@ -128,7 +135,7 @@ impl IqAir {
     }
 
     /// Gains of the receive channels, as a calibration would find them.
-    pub const fn channel_gains(&self) -> &[Complex64; ANTENNAS] {
+    pub fn channel_gains(&self) -> &[Complex64] {
         &self.channel_gains
     }
 
@@ -214,8 +221,8 @@ impl IqAir {
         )?;
         let first_symbol = self.case.start_symbol(head.ssb_index)?;
         let time_s = number as f64 * self.period_s;
-        let range_m = state(time_s).pose.point().distance_m(head.position);
-        let delay = range_m / SPEED_OF_LIGHT_MPS * rate_hz;
+        let sight = channel.array().line_of_sight(&state(time_s), head);
+        let delay = sight.distance_m / SPEED_OF_LIGHT_MPS * rate_hz;
         let start = half_frame_start + self.numerology.symbol_start(first_symbol) as f64 + delay;
         let place = (start - self.burst.start as f64).floor();
         // What is left of the delay becomes a phase ramp over the subcarriers.
@@ -223,6 +230,7 @@ impl IqAir {
         let oscillator = self.head_oscillators.get(index).copied().unwrap_or(0.0);
         let cfo = (oscillator - self.oscillator) * self.ssb_freq_hz / rate_hz;
         let symbol_len = self.numerology.ssb_symbol_len();
+        let elements = self.channel_gains.len();
         for (l, subcarriers) in grid.symbols().enumerate() {
             let phase = symbol_phase(self.numerology, first_symbol + l, self.ssb_freq_hz);
             let mut shifted = *subcarriers;
@@ -237,14 +245,15 @@ impl IqAir {
             let step_hz = self.numerology.spacing().hz();
             channel.response(&here, snr_db, step_hz, &mut self.response);
             if self.faults.any_at(middle_s) {
-                for gains in &mut self.response {
-                    self.faults.distort(index, head, &here, gains);
+                for gains in self.response.chunks_exact_mut(elements) {
+                    let array = channel.array();
+                    self.faults.distort(index, head, array, &here, gains);
                 }
             }
             let begin = place as usize + l * symbol_len;
             for (antenna, sum) in self.sum.iter_mut().enumerate() {
                 let mut faded = shifted;
-                for (element, gains) in faded.iter_mut().zip(&self.response) {
+                for (element, gains) in faded.iter_mut().zip(self.response.chunks_exact(elements)) {
                     let gain = gains.get(antenna).copied().unwrap_or_default();
                     *element *= Complex32::new(gain.re as f32, gain.im as f32);
                 }
@@ -272,7 +281,7 @@ impl IqAir {
         self.noise.set_stream(number);
         self.noise.set_word_pos(0);
         let sigma = FRAC_1_SQRT_2 / (FFT_SIZE as f64).sqrt();
-        for (sum, gain) in self.sum.iter_mut().zip(self.channel_gains) {
+        for (sum, gain) in self.sum.iter_mut().zip(&self.channel_gains) {
             for sample in sum {
                 let re: f64 = self.noise.sample(StandardNormal);
                 let im: f64 = self.noise.sample(StandardNormal);
@@ -309,8 +318,8 @@ impl IqAir {
     }
 }
 
-fn case_of(scenario: &Scenario) -> (Case, SubcarrierSpacing) {
-    if scenario.ssb.subcarrier_spacing_khz == 30.0 {
+fn case_of(site: &Site) -> (Case, SubcarrierSpacing) {
+    if site.ssb.subcarrier_spacing_khz == 30.0 {
         (Case::C, SubcarrierSpacing::Khz30)
     } else {
         (Case::A, SubcarrierSpacing::Khz15)

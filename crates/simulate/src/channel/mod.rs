@@ -1,13 +1,14 @@
-//! From truth to snapshots or samples: link budget, shadowing, fading, noise.
+//! The channel between radio heads and the vehicle's antennas, as snapshots or as samples.
+//! [`Propagation`] is the door for others.
 
 mod fading;
+mod head_channel;
 mod iq;
-mod link_budget;
+mod propagation;
 mod shadowing;
-mod snapshots;
 
-pub use fading::RicianFading;
+pub use fading::RicianPropagation;
+pub use head_channel::{HeadChannel, Reception};
 pub use iq::{IqAir, IqBurst};
-pub use link_budget::LinkBudget;
+pub use propagation::Propagation;
 pub use shadowing::Shadowing;
-pub use snapshots::{HeadChannel, Reception};

@@ -1,18 +1,18 @@
 //! Things that go wrong, at stated times.
 
+use onboard::settings::{Check, SettingsError};
 use schemars::JsonSchema;
 use serde::{Deserialize, Serialize};
-
-use super::{Check, ScenarioError};
-use crate::observation::ANTENNAS;
 
 /// `[[faults]]`
 #[derive(Debug, Clone, Copy, PartialEq, Serialize, Deserialize, JsonSchema)]
 #[serde(deny_unknown_fields)]
 pub struct FaultSettings {
     /// From when on, in seconds.
+    #[schemars(range(min = 0.0, max = 1e9))]
     pub from_s: f64,
     /// Until when, in seconds.
+    #[schemars(range(min = 0.0, max = 1e9))]
     pub until_s: f64,
     /// What goes wrong.
     pub what: FaultKind,
@@ -24,14 +24,15 @@ pub struct FaultSettings {
 pub enum FaultKind {
     /// A radio head is heard by a detour: its electrical angle is off.
     NonLineOfSight {
-        /// Number of the radio head in the scenario, from 0.
+        /// Number of the radio head in the site, from 0.
         radio_head: usize,
         /// Error of the electrical angle in radians.
+        #[schemars(range(min = -6.3, max = 6.3))]
         bias_rad: f64,
     },
     /// A radio head, or one that pretends to be it, is not where the survey says.
     MovedHead {
-        /// Number of the radio head in the scenario, from 0.
+        /// Number of the radio head in the site, from 0.
         radio_head: usize,
         /// How far off it is, `[x, y]` in metres.
         by_m: [f64; 2],
@@ -39,6 +40,7 @@ pub enum FaultKind {
     /// The wheels slip: the odometer reads so many times the distance.
     OdometerSlip {
         /// Reading over distance.
+        #[schemars(range(min = 0.0, max = 10.0))]
         ratio: f64,
     },
     /// An antenna's signal no longer follows the field.
@@ -49,46 +51,40 @@ pub enum FaultKind {
 }
 
 impl FaultSettings {
-    pub(super) fn check(
+    /// Refuses what contradicts itself, or the site and its vehicle.
+    ///
+    /// # Errors
+    /// [`SettingsError::Value`].
+    pub fn check(
         &self,
-        check: &Check<'_>,
+        check: Check<'_>,
         index: usize,
         heads: usize,
-    ) -> Result<(), ScenarioError> {
+        elements: u8,
+    ) -> Result<(), SettingsError> {
         let key = |name: &str| format!("faults[{index}].{name}");
-        check.not_negative(&key("from_s"), self.from_s)?;
-        let after = "it must be after from_s";
+        let later = self.until_s > self.from_s;
         check.that(
-            self.until_s > self.from_s,
+            later,
             &key("until_s"),
             self.until_s,
-            after,
+            "it must be after from_s",
         )?;
-        let known = |radio_head: usize| {
-            let allowed = format!("the scenario has {heads} radio heads, counted from 0");
-            check.that(
+        match self.what {
+            FaultKind::NonLineOfSight { radio_head, .. }
+            | FaultKind::MovedHead { radio_head, .. } => check.that(
                 radio_head < heads,
                 &key("what.radio_head"),
                 radio_head,
-                &allowed,
-            )
-        };
-        match self.what {
-            FaultKind::NonLineOfSight {
-                radio_head,
-                bias_rad,
-            } => {
-                known(radio_head)?;
-                check.between(&key("what.bias_rad"), bias_rad, -6.3, 6.3)
-            }
-            FaultKind::MovedHead { radio_head, .. } => known(radio_head),
-            FaultKind::OdometerSlip { ratio } => {
-                check.between(&key("what.ratio"), ratio, 0.0, 10.0)
-            }
-            FaultKind::StuckAntenna { antenna } => {
-                let allowed = format!("the array has {ANTENNAS} antennas, counted from 0");
-                check.that(antenna < ANTENNAS, &key("what.antenna"), antenna, &allowed)
-            }
+                &format!("the site has {heads} radio heads, counted from 0"),
+            ),
+            FaultKind::StuckAntenna { antenna } => check.that(
+                antenna < usize::from(elements),
+                &key("what.antenna"),
+                antenna,
+                &format!("the array has {elements} antennas, counted from 0"),
+            ),
+            FaultKind::OdometerSlip { .. } => Ok(()),
         }
     }
 }

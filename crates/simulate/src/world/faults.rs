@@ -1,31 +1,27 @@
 //! Faults, brought into what the sensors deliver.
 
-use std::f64::consts::TAU;
-
 use num_complex::Complex64;
+use onboard::observation::OdometrySample;
+use onboard::radio_head::RadioHead;
 
-use super::{RadioHead, VehicleState};
-use crate::observation::{OdometrySample, Snapshot};
-use crate::scenario::{FaultKind, FaultSettings, Scenario};
+use super::array::{TrueArray, steer};
+use super::path::VehicleState;
+use crate::scenario::{FaultKind, FaultSettings};
 
-/// The faults of a scenario.
+/// The faults of a run.
 #[derive(Debug, Clone)]
 pub struct Faults {
     all: Vec<FaultSettings>,
-    element_rad: f64,
-    mounting_angle_rad: f64,
     /// The odometer's own last distance, and what slip has added to it, in metres.
     distance_m: f64,
     slipped_m: f64,
 }
 
 impl Faults {
-    /// The scenario's.
-    pub fn new(scenario: &Scenario) -> Self {
+    /// These faults.
+    pub fn new(all: &[FaultSettings]) -> Self {
         Self {
-            all: scenario.faults.clone(),
-            element_rad: TAU * scenario.array.spacing_wavelengths,
-            mounting_angle_rad: scenario.array.mounting_angle_rad,
+            all: all.to_vec(),
             distance_m: 0.0,
             slipped_m: 0.0,
         }
@@ -48,8 +44,9 @@ impl Faults {
         &self,
         index: usize,
         head: &RadioHead,
+        array: &TrueArray,
         vehicle: &VehicleState,
-        gains: &mut Snapshot,
+        gains: &mut [Complex64],
     ) {
         for fault in self.at(vehicle.time_s) {
             match fault {
@@ -58,15 +55,11 @@ impl Faults {
                     bias_rad,
                 } if radio_head == index => steer(gains, bias_rad),
                 FaultKind::MovedHead { radio_head, by_m } if radio_head == index => {
-                    let mut moved = head.position;
-                    moved.x_m += by_m[0];
-                    moved.y_m += by_m[1];
-                    let phase_rad = |place| {
-                        let bearing_rad = vehicle.pose.point().bearing_rad(place);
-                        let axis_rad = vehicle.pose.heading_rad + self.mounting_angle_rad;
-                        self.element_rad * (bearing_rad - axis_rad).cos()
-                    };
-                    steer(gains, phase_rad(moved) - phase_rad(head.position));
+                    let mut moved = *head;
+                    moved.position.x_m += by_m[0];
+                    moved.position.y_m += by_m[1];
+                    let phase_rad = |head| array.line_of_sight(vehicle, head).phase_rad;
+                    steer(gains, phase_rad(&moved) - phase_rad(head));
                 }
                 FaultKind::StuckAntenna { antenna } => {
                     if let Some(gain) = gains.get_mut(antenna) {
@@ -92,15 +85,5 @@ impl Faults {
         sample.distance_m += self.slipped_m;
         sample.speed_mps *= ratio;
         sample
-    }
-}
-
-/// Turns the wave by `phase_rad` from antenna to antenna.
-fn steer(gains: &mut Snapshot, phase_rad: f64) {
-    let step = Complex64::cis(phase_rad);
-    let mut turn = Complex64::ONE;
-    for gain in gains {
-        *gain *= turn;
-        turn *= step;
     }
 }

@@ -1,19 +1,13 @@
-//! The truth: where the road runs, how the vehicle moves on it, what its odometer makes of that.
+//! What moves and what measures it, as it really is.
 
-mod array_drift;
+mod array;
 mod faults;
-mod lane_keeping;
-mod motion;
+mod motion_profile;
 mod odometer;
-mod radio_head;
-mod track;
-mod vehicle;
+mod path;
 
-pub use array_drift::ArrayDrift;
+pub use array::{LineOfSight, TrueArray};
 pub use faults::Faults;
-pub use lane_keeping::LaneKeeping;
-pub use motion::{Motion, MotionProfile};
+pub use motion_profile::{Motion, MotionProfile};
 pub use odometer::Odometer;
-pub use radio_head::RadioHead;
-pub use track::{Gap, Projection, Segment, Track, TrackError};
-pub use vehicle::{Vehicle, VehicleState};
+pub use path::{Path, VehicleState};

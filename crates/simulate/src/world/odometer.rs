@@ -1,37 +1,36 @@
 //! What the odometer makes of the truth: a scale error, noise, a drifting gyroscope, lost samples.
 
+use onboard::observation::OdometrySample;
+use onboard::settings::{GyroscopeSettings, OdometerSettings};
 use rand::RngExt;
 use rand_chacha::ChaCha8Rng;
 use rand_distr::StandardNormal;
 
-use super::VehicleState;
-use crate::observation::OdometrySample;
-use crate::random::{Purpose, Streams};
-use crate::scenario::OdometerSettings;
+use super::path::VehicleState;
 
 /// The odometer of one run.
 #[derive(Debug, Clone)]
 pub struct Odometer {
+    /// As they are: their standard deviations have been drawn from already.
     settings: OdometerSettings,
+    gyroscope: Option<GyroscopeSettings>,
     rng: ChaCha8Rng,
-    scale: f64,
-    gyro_bias_radps: f64,
     measured_m: f64,
     last: VehicleState,
 }
 
 impl Odometer {
-    /// The odometer at the start of a drive.
-    pub fn new(settings: OdometerSettings, start: VehicleState, streams: Streams) -> Self {
-        let mut rng = streams.generator(Purpose::Odometer, 0);
-        let mut normal = || rng.sample::<f64, _>(StandardNormal);
-        let scale = 1.0 + settings.scale_error_std * normal();
-        let gyro_bias_radps = settings.gyro.map_or(0.0, |gyro| gyro.bias_std_radps) * normal();
+    /// The odometer at the start of a drive; `rng` draws its noise.
+    pub const fn new(
+        settings: OdometerSettings,
+        gyroscope: Option<GyroscopeSettings>,
+        rng: ChaCha8Rng,
+        start: VehicleState,
+    ) -> Self {
         Self {
             settings,
+            gyroscope,
             rng,
-            scale,
-            gyro_bias_radps,
             measured_m: 0.0,
             last: start,
         }
@@ -52,15 +51,15 @@ impl Odometer {
         } else {
             0.5 * (now.speed_mps + self.last.speed_mps) * duration_s
         };
-        let mut step_m = self.scale * driven_m;
+        let mut step_m = self.settings.scale * driven_m;
         if self.settings.noise_m_per_sqrt_m > 0.0 {
             step_m += self.settings.noise_m_per_sqrt_m * driven_m.sqrt() * self.normal();
         }
         self.measured_m += step_m;
-        let yaw_rate_radps = self.settings.gyro.and_then(|gyro| {
+        let yaw_rate_radps = self.gyroscope.and_then(|gyro| {
             let turn_rad = now.pose.heading_rad - self.last.pose.heading_rad
                 + gyro.noise_rad_per_sqrt_s * duration_s.sqrt() * self.normal();
-            (duration_s > 0.0).then(|| turn_rad / duration_s + self.gyro_bias_radps)
+            (duration_s > 0.0).then(|| turn_rad / duration_s + gyro.bias_radps)
         });
         self.last = now;
         let lost = self.settings.dropout_probability > 0.0
@@ -68,7 +67,7 @@ impl Odometer {
         (!lost).then_some(OdometrySample {
             time_s: now.time_s,
             distance_m: self.measured_m,
-            speed_mps: self.scale * now.speed_mps,
+            speed_mps: self.settings.scale * now.speed_mps,
             yaw_rate_radps,
         })
     }
@@ -81,7 +80,9 @@ impl Odometer {
 #[cfg(test)]
 mod tests {
     use super::*;
-    use crate::geometry::Pose;
+    use onboard::geometry::Pose;
+
+    use crate::random::{Purpose, Streams};
 
     fn state(time_s: f64) -> VehicleState {
         let along_m = 4.0 * time_s;
@@ -99,7 +100,8 @@ mod tests {
     }
 
     fn drive(settings: OdometerSettings, run: u64) -> (usize, Option<OdometrySample>) {
-        let mut odometer = Odometer::new(settings, state(0.0), Streams::new(1, run));
+        let rng = Streams::new(1, run).generator(Purpose::Odometer, 0);
+        let mut odometer = Odometer::new(settings, None, rng, state(0.0));
         let samples: Vec<_> = (1..=500)
             .filter_map(|k| odometer.sample(state(f64::from(k) * 0.02)))
             .collect();
@@ -114,9 +116,8 @@ mod tests {
     }
 
     #[test]
-    fn scale_and_noise_have_their_spread() {
+    fn noise_has_its_spread() {
         let noisy = OdometerSettings {
-            scale_error_std: 0.003,
             noise_m_per_sqrt_m: 0.01,
             ..Default::default()
         };
@@ -126,7 +127,7 @@ mod tests {
             .map(|last| (last.distance_m - 40.0).powi(2))
             .sum::<f64>()
             / runs as f64;
-        let expected_m2 = (0.003_f64 * 40.0).powi(2) + 0.01_f64.powi(2) * 40.0;
+        let expected_m2 = 0.01_f64.powi(2) * 40.0;
         // Four standard deviations of a sample variance, √(2/n).
         assert!((variance_m2 / expected_m2 - 1.0).abs() < 4.0 * (2.0 / runs as f64).sqrt());
     }

@@ -12,12 +12,12 @@
 
 use super::bank::Bank;
 use super::config::IntegrityConfig;
-use crate::localize::quantile::RadialQuantile;
 use super::separation::SeparatedRadius;
 use crate::clone_in_place::clone_in_place;
 use crate::localize::integrity_state::{Integrity, IntegrityState};
 use crate::localize::measurement::{AngleMeasurement, UpdateVerdict};
 use crate::localize::pose_estimate::PoseEstimate;
+use crate::localize::quantile::RadialQuantile;
 use crate::localize::tracker::{OdometryVerdict, Tracker};
 use crate::observation::OdometrySample;
 use crate::radio_head::RadioHead;

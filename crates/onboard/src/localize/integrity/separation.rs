@@ -2,8 +2,8 @@
 
 use std::f64::consts::TAU;
 
-use crate::localize::quantile::RadialQuantile;
 use crate::localize::gaussian::principal_variances;
+use crate::localize::quantile::RadialQuantile;
 
 /// Directions over which the probability is summed.
 const DIRECTIONS: usize = 48;

@@ -122,7 +122,10 @@ impl TrackerConfig {
     /// a moment.
     pub fn look_variance(&self, travelled_m: f64, sighting: &Sighting) -> f64 {
         let scatter = self.array.scatter_variance(self.rician_k);
-        let correlation = self.array.correlation(travelled_m, sighting.toward).max(1.0);
+        let correlation = self
+            .array
+            .correlation(travelled_m, sighting.toward)
+            .max(1.0);
         let mut variance = scatter * correlation;
         if sighting.survey_variance > 0.0 {
             // Standing still nothing new is learnt, but the variance must stay a number.

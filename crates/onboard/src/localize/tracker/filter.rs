@@ -237,7 +237,11 @@ impl Tracker {
         }
     }
 
-    pub(super) fn look(&self, head: &RadioHead, measured: &AngleMeasurement) -> Result<Look, UpdateReason> {
+    pub(super) fn look(
+        &self,
+        head: &RadioHead,
+        measured: &AngleMeasurement,
+    ) -> Result<Look, UpdateReason> {
         let sigma = measured.phase_sigma_rad;
         let usable = measured.time_s.is_finite()
             && measured.phase_rad.is_finite()

@@ -15,11 +15,7 @@ use crate::road::Road;
 
 impl Tracker {
     /// The belief before any measurement.
-    pub fn prior(
-        config: &TrackerConfig,
-        map: Option<&Road>,
-        start: &InitialPose,
-    ) -> Belief {
+    pub fn prior(config: &TrackerConfig, map: Option<&Road>, start: &InitialPose) -> Belief {
         let mut sigma = [0.0; STATES];
         sigma[SCALE] = config.odometer_scale_std;
         sigma[YAW_RATE_BIAS] = config.yaw_rate_bias_std_radps;

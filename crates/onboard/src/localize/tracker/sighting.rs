@@ -298,7 +298,14 @@ mod tests {
         let states = [ALONG, ACROSS, HEADING, MOUNTING];
         let see = |x: [f64; 4]| {
             let (pose, footing) = on_circle(x[0], x[1], x[2], 0.0);
-            Sighting::new(&head(40.0, 30.0, 0.0), pose, &footing, &mean(x[3], 0.0), &ARRAY).unwrap()
+            Sighting::new(
+                &head(40.0, 30.0, 0.0),
+                pose,
+                &footing,
+                &mean(x[3], 0.0),
+                &ARRAY,
+            )
+            .unwrap()
         };
         // A covariance without symmetry but its own.
         let factor = [

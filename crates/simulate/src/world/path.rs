@@ -1,17 +1,17 @@
 //! The vehicle's true pose: on the road, but for its lateral wander.
 
+use onboard::geometry::Pose;
+use onboard::road::{LaneKeeping, Road};
 use rand::RngExt;
 use rand_distr::StandardNormal;
 
-use super::{MotionProfile, Track};
-use crate::geometry::Pose;
+use super::motion_profile::MotionProfile;
 use crate::random::{Purpose, Streams};
-use crate::scenario::{MotionSettings, WanderSettings};
 
-/// The vehicle on its road, in one run.
+/// The path of the vehicle on its road, in one run.
 #[derive(Debug, Clone)]
-pub struct Vehicle {
-    track: Track,
+pub struct Path {
+    road: Road,
     motion: MotionProfile,
     wander: Wander,
 }
@@ -31,13 +31,12 @@ pub struct VehicleState {
     pub pose: Pose,
 }
 
-impl Vehicle {
-    /// The vehicle of the run that `streams` belongs to.
-    pub fn new(track: Track, settings: &MotionSettings, streams: Streams) -> Self {
-        let motion = MotionProfile::new(settings, track.length_m());
-        let wander = Wander::new(settings.lateral_wander, track.length_m(), streams);
+impl Path {
+    /// The path of the run that `streams` belongs to.
+    pub fn new(road: Road, motion: MotionProfile, keeping: LaneKeeping, streams: Streams) -> Self {
+        let wander = Wander::new(keeping, road.length_m(), streams);
         Self {
-            track,
+            road,
             motion,
             wander,
         }
@@ -51,7 +50,7 @@ impl Vehicle {
     /// The truth at `time_s`.
     pub fn at(&self, time_s: f64) -> VehicleState {
         let motion = self.motion.at(time_s);
-        let middle = self.track.pose(motion.along_m);
+        let middle = self.road.pose(motion.along_m);
         let Some((lateral_m, slope)) = self.wander.at(motion.along_m) else {
             return VehicleState {
                 time_s,
@@ -62,7 +61,7 @@ impl Vehicle {
             };
         };
         // Beside the middle of a bend, a metre of road is 1 − κd metres long.
-        let stretch = 1.0 - self.track.curvature_per_m(motion.along_m) * lateral_m;
+        let stretch = 1.0 - self.road.curvature_per_m(motion.along_m) * lateral_m;
         let mut pose = middle.offset_left(lateral_m);
         pose.heading_rad += slope.atan2(stretch);
         VehicleState {
@@ -87,11 +86,10 @@ struct Wander {
 }
 
 impl Wander {
-    fn new(settings: WanderSettings, length_m: f64, streams: Streams) -> Self {
-        if settings.rms_m == 0.0 {
+    fn new(keeping: LaneKeeping, length_m: f64, streams: Streams) -> Self {
+        if keeping.rms_m == 0.0 {
             return Self { knots: Vec::new() };
         }
-        let keeping = settings.lane_keeping();
         let transition = keeping.transition(KNOT_M);
         let noise = keeping.noise(&transition);
         // Cholesky factor of the noise of one step.
@@ -145,24 +143,22 @@ impl Wander {
 #[cfg(test)]
 mod tests {
     use super::*;
-    use crate::world::Segment;
+    use onboard::road::Segment;
+    use onboard::settings::{Shipped, TomlFile, Vehicle};
 
-    fn wandering(run: u64) -> Vehicle {
+    use crate::scenario::MotionSettings;
+
+    fn wandering(run: u64) -> Path {
         let bend = [Segment {
             length_m: 300.0,
             turn_rad: 0.25,
             surveyed: true,
         }];
-        let track = Track::from_segments(Pose::default(), &bend, 5.0).unwrap();
-        let lateral_wander = WanderSettings {
-            rms_m: 0.1,
-            ..Default::default()
-        };
-        let settings = MotionSettings {
-            lateral_wander,
-            ..Default::default()
-        };
-        Vehicle::new(track, &settings, Streams::new(5, run))
+        let road = Road::from_segments(Pose::default(), &bend, 5.0).unwrap();
+        let vehicle = Vehicle::from_library("carrier", &Shipped).unwrap();
+        let motion = MotionProfile::new(&MotionSettings::default(), &vehicle, road.length_m());
+        let keeping = vehicle.lane_keeping.process();
+        Path::new(road, motion, keeping, Streams::new(5, run))
     }
 
     #[test]

@@ -1,5 +1,7 @@
 //! When the vehicle is where along the road: accelerate, cruise, brake, between one stop and the next.
 
+use onboard::settings::Vehicle;
+
 use crate::scenario::MotionSettings;
 
 /// A drive from end to end of the road, with its stops.
@@ -87,8 +89,13 @@ impl Leg {
 }
 
 impl MotionProfile {
-    /// The drive to the end of a road of `length_m`. Stops are in driving order and on the road.
-    pub fn new(settings: &MotionSettings, length_m: f64) -> Self {
+    /// The drive of a vehicle to the end of a road of `length_m`. Stops are in driving order and on
+    /// the road.
+    pub fn new(settings: &MotionSettings, vehicle: &Vehicle, length_m: f64) -> Self {
+        let acceleration_mps2 = settings
+            .acceleration_mps2
+            .unwrap_or(vehicle.acceleration_mps2);
+        let top_speed_kmh = settings.top_speed_kmh.unwrap_or(vehicle.top_speed_kmh);
         let (mut time_s, mut along_m) = (0.0, settings.start_at_m);
         let ahead = settings.stops.iter().filter(|stop| stop.at_m > along_m);
         let ends: Vec<_> = ahead.map(|stop| (stop.at_m, stop.dwell_s)).collect();
@@ -98,8 +105,8 @@ impl MotionProfile {
                 time_s,
                 along_m,
                 end_m - along_m,
-                settings.acceleration_mps2,
-                settings.top_speed_mps(),
+                acceleration_mps2,
+                top_speed_kmh / 3.6,
             );
             time_s += leg.duration_s() + dwell_s;
             along_m = end_m;
@@ -135,12 +142,19 @@ impl MotionProfile {
 
 #[cfg(test)]
 mod tests {
+    use onboard::settings::{Shipped, TomlFile};
+
     use super::*;
     use crate::scenario::StopSettings;
 
+    fn profile(settings: &MotionSettings, length_m: f64) -> MotionProfile {
+        let vehicle = Vehicle::from_library("paper", &Shipped).unwrap();
+        MotionProfile::new(settings, &vehicle, length_m)
+    }
+
     #[test]
     fn papers_trip_takes_80_33_s() {
-        let profile = MotionProfile::new(&MotionSettings::default(), 300.0);
+        let profile = profile(&MotionSettings::default(), 300.0);
         // 2·(v/a) + (300 − v²/a)/v with v = 25/6 m/s and a = 1/2 m/s².
         assert!((profile.duration_s() - 241.0 / 3.0).abs() < 1e-9);
         let middle = profile.at(0.5 * profile.duration_s());
@@ -156,7 +170,7 @@ mod tests {
             at_m: 100.0,
             dwell_s: 7.0,
         }];
-        let profile = MotionProfile::new(
+        let profile = profile(
             &MotionSettings {
                 stops,
                 ..Default::default()
@@ -178,7 +192,7 @@ mod tests {
                 stops,
                 ..Default::default()
             };
-            MotionProfile::new(&settings, 300.0)
+            profile(&settings, 300.0)
         };
         let profile = begin(120.0, vec![stop(80.0), stop(120.0), stop(200.0)]);
         assert_eq!(profile, begin(120.0, vec![stop(200.0)]));
@@ -188,7 +202,7 @@ mod tests {
 
     #[test]
     fn short_legs_never_reach_top_speed() {
-        let profile = MotionProfile::new(&MotionSettings::default(), 2.0);
+        let profile = profile(&MotionSettings::default(), 2.0);
         assert!((profile.at(0.5 * profile.duration_s()).speed_mps - 1.0).abs() < 1e-12);
         assert!((profile.duration_s() - 4.0).abs() < 1e-12);
     }
@@ -199,7 +213,7 @@ mod tests {
             at_m: 120.0,
             dwell_s: 2.0,
         }];
-        let profile = MotionProfile::new(
+        let profile = profile(
             &MotionSettings {
                 stops,
                 ..Default::default()

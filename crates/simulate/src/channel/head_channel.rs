@@ -1,0 +1,190 @@
+//! From the vehicle's true place to what its array receives of one radio head.
+
+use std::f64::consts::FRAC_1_SQRT_2;
+
+use num_complex::Complex64;
+use onboard::link_budget::LinkBudget;
+use onboard::observation::{MAX_ELEMENTS, SensedSsb, SsbObservation};
+use onboard::radio_head::RadioHead;
+use onboard::settings::ReceiverSettings;
+use rand::{Rng, RngExt};
+use rand_chacha::ChaCha8Rng;
+use rand_distr::StandardNormal;
+
+use super::propagation::Propagation;
+use crate::random::{Purpose, Streams};
+use crate::truth::Truth;
+use crate::world::{TrueArray, VehicleState};
+
+/// The channel from one radio head to the vehicle in one run.
+pub struct HeadChannel {
+    head: RadioHead,
+    budget: LinkBudget,
+    propagation: Box<dyn Propagation>,
+    array: TrueArray,
+    receiver: ReceiverSettings,
+    snr_noise: ChaCha8Rng,
+    snapshot_noise: ChaCha8Rng,
+}
+
+/// One SSB at the array, before noise.
+#[derive(Debug, Clone, Copy, PartialEq)]
+pub struct Reception {
+    /// What the receiver senses of it without estimating an angle.
+    pub ssb: SensedSsb,
+    gains: [Complex64; MAX_ELEMENTS],
+    elements: usize,
+}
+
+impl Reception {
+    /// Gains of the antennas, relative to unit noise power.
+    pub fn gains(&self) -> &[Complex64] {
+        self.gains.get(..self.elements).unwrap_or_default()
+    }
+
+    /// The same, to be changed.
+    pub fn gains_mut(&mut self) -> &mut [Complex64] {
+        self.gains.get_mut(..self.elements).unwrap_or_default()
+    }
+}
+
+impl HeadChannel {
+    /// The channels of a run, one from each radio head, in the order of the site; they take over
+    /// how the truth has the signals come.
+    pub fn all(truth: &mut Truth, streams: Streams) -> Vec<Self> {
+        let budget = LinkBudget::new(&truth.site, &truth.vehicle);
+        let propagation = std::mem::take(&mut truth.propagation).into_iter();
+        let heads = truth.heads.iter().zip(propagation).enumerate();
+        heads
+            .map(|(index, (&head, propagation))| Self {
+                head,
+                budget,
+                propagation,
+                array: truth.array.clone(),
+                receiver: truth.vehicle.receiver.clone(),
+                snr_noise: streams.generator(Purpose::SensedSnr, index),
+                snapshot_noise: streams.generator(Purpose::Snapshots, index),
+            })
+            .collect()
+    }
+
+    /// The radio head, where it stands.
+    pub const fn head(&self) -> &RadioHead {
+        &self.head
+    }
+
+    /// The array, as it is by now.
+    pub const fn array(&self) -> &TrueArray {
+        &self.array
+    }
+
+    /// Mean SNR in dB of the SSB that arrives now: link budget and shadowing. To be called once for
+    /// each SSB, in order.
+    pub fn next_snr_db(&mut self, vehicle: &VehicleState) -> f64 {
+        self.array.advance(vehicle.along_m);
+        let distance_m = self.array.line_of_sight(vehicle, &self.head).distance_m;
+        let shadowing_db = self.propagation.next_shadowing_db(vehicle.along_m);
+        self.budget.snr_db(&self.head, distance_m) + shadowing_db
+    }
+
+    /// Gains of the antennas at frequencies `step_hz` apart around the carrier, for a mean SNR of
+    /// `snr_db`; see [`Propagation::response`].
+    pub fn response(
+        &self,
+        vehicle: &VehicleState,
+        snr_db: f64,
+        step_hz: f64,
+        into: &mut [Complex64],
+    ) {
+        let elements = self.array.elements();
+        let sight = self.array.line_of_sight(vehicle, &self.head);
+        (self.propagation).response(&sight, vehicle.along_m, step_hz, elements, into);
+        let amplitude = 10f64.powf(0.05 * snr_db);
+        for gains in into.chunks_exact_mut(elements) {
+            for gain in gains.iter_mut() {
+                *gain *= amplitude;
+            }
+            self.array.turn(gains);
+        }
+    }
+
+    /// The SSB of mean SNR `snr_db` at the array, with fading.
+    pub fn receive(&mut self, vehicle: &VehicleState, snr_db: f64) -> Reception {
+        let mut reception = Reception {
+            ssb: SensedSsb {
+                pci: self.head.pci,
+                ssb_index: self.head.ssb_index,
+                time_s: vehicle.time_s,
+                snr_db: 0.0,
+            },
+            gains: [Complex64::ZERO; MAX_ELEMENTS],
+            elements: self.array.elements(),
+        };
+        self.response(vehicle, snr_db, 0.0, reception.gains_mut());
+        let gains = reception.gains();
+        let power = gains.iter().map(Complex64::norm_sqr).sum::<f64>() / gains.len() as f64;
+        let mut sensed_db = 10.0 * power.log10();
+        if self.receiver.snr_noise_db > 0.0 {
+            let error: f64 = self.snr_noise.sample(StandardNormal);
+            sensed_db += self.receiver.snr_noise_db * error;
+        }
+        reception.ssb.snr_db = sensed_db;
+        reception
+    }
+
+    /// The array's output for SSB number `number`, noise of unit power included.
+    ///
+    /// Blind, each snapshot carries one unknown QPSK symbol, as a resource element of the broadcast
+    /// channel does (TS 38.211, 7.3.3.1). With pilots there
+    /// is one despread block per OFDM symbol: N known resource elements add up to an N-fold SNR,
+    /// their common phase unknown from symbol to symbol.
+    pub fn observe(&mut self, number: u64, reception: &Reception, into: &mut SsbObservation) {
+        into.restart(reception.ssb);
+        // Each SSB has its own nonce: it sounds the same whether or not earlier ones were heard.
+        self.snapshot_noise.set_stream(number);
+        self.snapshot_noise.set_word_pos(0);
+        match self.receiver.pilots.per_symbol() {
+            None => {
+                for _ in 0..self.receiver.snapshots {
+                    let signal = self.qpsk();
+                    self.push(reception, signal, into);
+                }
+            }
+            Some(symbols) => {
+                into.noise_variance = Some(1.0);
+                for &resource_elements in symbols {
+                    let signal = self.qpsk() * f64::from(resource_elements).sqrt();
+                    self.push(reception, signal, into);
+                }
+            }
+        }
+    }
+
+    fn push(&mut self, reception: &Reception, signal: Complex64, into: &mut SsbObservation) {
+        let mut snapshot = *reception;
+        for gain in snapshot.gains_mut() {
+            *gain = *gain * signal + self.complex_normal();
+        }
+        into.push(snapshot.gains());
+    }
+
+    /// A random QPSK symbol.
+    fn qpsk(&mut self) -> Complex64 {
+        let bits = self.snapshot_noise.next_u32();
+        let level = |bit: u32| {
+            if bits >> bit & 1 == 0 {
+                FRAC_1_SQRT_2
+            } else {
+                -FRAC_1_SQRT_2
+            }
+        };
+        Complex64::new(level(0), level(1))
+    }
+
+    /// A circular Gaussian of unit power.
+    fn complex_normal(&mut self) -> Complex64 {
+        let re: f64 = self.snapshot_noise.sample(StandardNormal);
+        let im: f64 = self.snapshot_noise.sample(StandardNormal);
+        Complex64::new(re, im) * FRAC_1_SQRT_2
+    }
+}

@@ -1,0 +1,165 @@
+//! The one place where truth is made, from what is believed.
+
+use std::sync::Arc;
+
+use onboard::geometry::Pose;
+use onboard::radio_head::RadioHead;
+use onboard::road::Road;
+use onboard::settings::{Check, SettingsError, Site, Vehicle};
+use rand::RngExt;
+use rand_distr::StandardNormal;
+
+use crate::channel::{Propagation, RicianPropagation};
+use crate::random::{Purpose, Streams};
+use crate::scenario::Scenario;
+use crate::world::{MotionProfile, Odometer, Path, TrueArray};
+
+/// Makes the propagation of radio head number `index` of a site to a vehicle, in the run of the
+/// streams.
+pub type PropagationMaker =
+    dyn Fn(&Site, &Vehicle, usize, Streams) -> Box<dyn Propagation> + Send + Sync;
+
+/// What is so on average, over all runs: what is believed, and how the world departs from it.
+#[derive(Clone)]
+pub struct World {
+    scenario: Arc<Scenario>,
+    site: Site,
+    vehicle: Vehicle,
+    road: Road,
+    motion: MotionProfile,
+    propagation: Arc<PropagationMaker>,
+}
+
+/// What is so in one run.
+pub struct Truth {
+    /// The site: radio heads where they stand, with the power they send.
+    pub site: Site,
+    /// The vehicle, as it is built and measures.
+    pub vehicle: Vehicle,
+    /// The radio heads of that site, those that the vehicle does not listen to included.
+    pub heads: Vec<RadioHead>,
+    /// The array, at the start of the drive.
+    pub array: TrueArray,
+    /// The odometer, at the start of the drive.
+    pub odometer: Odometer,
+    /// Where the vehicle drives.
+    pub path: Path,
+    /// The initial pose as the vehicle is told it: a measurement, as wrong as stated.
+    pub told_start: Pose,
+    /// How each radio head's signal comes to the vehicle.
+    pub propagation: Vec<Box<dyn Propagation>>,
+}
+
+impl World {
+    /// The world of a scenario.
+    ///
+    /// # Errors
+    /// [`SettingsError`] when the scenario has been changed by hand into an impossible one; never
+    /// after reading.
+    pub fn new(scenario: &Scenario) -> Result<Self, SettingsError> {
+        let check = Check {
+            file: &scenario.name,
+        };
+        let (site, vehicle) = scenario
+            .truth
+            .depart(&scenario.site, &scenario.vehicle, check)?;
+        let true_road = site.road.as_ref();
+        let road = match (&scenario.motion.path, true_road) {
+            (None, Some(road)) => road.build("truth.site.road", check)?,
+            _ => scenario.path(check)?,
+        };
+        let motion = MotionProfile::new(&scenario.motion, &vehicle, road.length_m());
+        Ok(Self {
+            scenario: Arc::new(scenario.clone()),
+            site,
+            vehicle,
+            road,
+            motion,
+            propagation: default_propagation(scenario),
+        })
+    }
+
+    /// The world with another propagation.
+    #[must_use]
+    pub fn with_propagation(mut self, propagation: Arc<PropagationMaker>) -> Self {
+        self.propagation = propagation;
+        self
+    }
+
+    /// The scenario.
+    pub fn scenario(&self) -> &Scenario {
+        &self.scenario
+    }
+
+    /// Duration of the drive in seconds; wandering takes no time.
+    pub const fn duration_s(&self) -> f64 {
+        self.motion.duration_s()
+    }
+
+    /// What is so in the run that `streams` belongs to: every value drawn from its standard
+    /// deviation.
+    pub fn draw(&self, streams: Streams) -> Truth {
+        let factor = self.scenario.truth.factor();
+        let (mut site, mut vehicle) = (self.site.clone(), self.vehicle.clone());
+        for (index, head) in site.radio_heads.iter_mut().enumerate() {
+            let mut rng = streams.generator(Purpose::Survey, index);
+            let mut normal = || factor * rng.sample::<f64, _>(StandardNormal);
+            let [x_m, y_m, _] = &mut head.position_m;
+            *x_m += head.position_std_m * normal();
+            *y_m += head.position_std_m * normal();
+            head.eirp_dbm += head.eirp_std_db * normal();
+        }
+        let mut walk = streams.generator(Purpose::Array, 0);
+        let mut normal = || factor * walk.sample::<f64, _>(StandardNormal);
+        let array = &mut vehicle.array;
+        array.mounting_rad += array.mounting_std_rad * normal();
+        array.phase_rad += array.phase_std_rad * normal();
+        let mut place = streams.generator(Purpose::Array, 1);
+        let mut normal = || factor * place.sample::<f64, _>(StandardNormal);
+        let [forward_m, left_m, _] = &mut array.position_m;
+        *forward_m += array.position_std_m * normal();
+        *left_m += array.position_std_m * normal();
+        // The odometer's noise goes on from what its constants were drawn by.
+        let mut noise = streams.generator(Purpose::Odometer, 0);
+        let mut normal = || factor * noise.sample::<f64, _>(StandardNormal);
+        vehicle.odometer.scale += vehicle.odometer.scale_std * normal();
+        let bias = normal();
+        if let Some(gyroscope) = &mut vehicle.gyroscope {
+            gyroscope.bias_radps += gyroscope.bias_std_radps * bias;
+        }
+
+        let keeping = vehicle.lane_keeping.process();
+        let path = Path::new(self.road.clone(), self.motion.clone(), keeping, streams);
+        let start = path.at(0.0);
+        let told = &self.scenario.vehicle.start;
+        let mut rng = streams.generator(Purpose::Start, 0);
+        let mut normal = || factor * rng.sample::<f64, _>(StandardNormal);
+        let told_start = Pose {
+            x_m: start.pose.x_m + told.position_std_m * normal(),
+            y_m: start.pose.y_m + told.position_std_m * normal(),
+            heading_rad: start.pose.heading_rad + told.heading_std_rad * normal(),
+        };
+        Truth {
+            heads: site.radio_heads.iter().map(RadioHead::from).collect(),
+            array: TrueArray::new(vehicle.array.clone(), walk),
+            odometer: Odometer::new(vehicle.odometer, vehicle.gyroscope, noise, start),
+            propagation: (0..site.radio_heads.len())
+                .map(|index| (self.propagation)(&site, &vehicle, index, streams))
+                .collect(),
+            path,
+            told_start,
+            site,
+            vehicle,
+        }
+    }
+}
+
+/// The scenario's own.
+fn default_propagation(scenario: &Scenario) -> Arc<PropagationMaker> {
+    let channel = scenario.channel;
+    Arc::new(move |site, vehicle, index, streams| {
+        Box::new(RicianPropagation::new(
+            &channel, site, vehicle, index, streams,
+        ))
+    })
+}

@@ -1,0 +1,133 @@
+//! How the array really sits on the vehicle, and what its phase calibration leaves.
+
+use std::f64::consts::TAU;
+
+use num_complex::Complex64;
+use onboard::radio_head::RadioHead;
+use onboard::settings::ArraySettings;
+use rand::RngExt;
+use rand_chacha::ChaCha8Rng;
+use rand_distr::StandardNormal;
+
+use super::path::VehicleState;
+
+/// The array of one run: as drawn at the start, then walking at random over the distance driven.
+#[derive(Debug, Clone)]
+pub struct TrueArray {
+    /// As it is at the start; its standard deviations have been drawn from already.
+    settings: ArraySettings,
+    rng: ChaCha8Rng,
+    along_m: f64,
+}
+
+/// The line of sight from a radio head.
+#[derive(Debug, Clone, Copy, PartialEq)]
+pub struct LineOfSight {
+    /// Electrical angle in radians, not wrapped.
+    pub phase_rad: f64,
+    /// Length in metres.
+    pub distance_m: f64,
+}
+
+impl TrueArray {
+    /// An array that is so at the start; `rng` draws how it walks.
+    pub const fn new(settings: ArraySettings, rng: ChaCha8Rng) -> Self {
+        Self {
+            settings,
+            rng,
+            along_m: 0.0,
+        }
+    }
+
+    /// Number of antennas.
+    pub fn elements(&self) -> usize {
+        self.settings.elements.into()
+    }
+
+    /// Moves on to this distance along the road; to be called once for each SSB, in order.
+    pub fn advance(&mut self, along_m: f64) {
+        let root_m = (along_m - self.along_m).abs().sqrt();
+        self.along_m = along_m;
+        let mut normal = || self.rng.sample::<f64, _>(StandardNormal);
+        let array = &mut self.settings;
+        array.mounting_rad += array.mounting_drift_rad_per_sqrt_m * root_m * normal();
+        array.phase_rad += array.phase_drift_rad_per_sqrt_m * root_m * normal();
+    }
+
+    /// How it sees a radio head.
+    pub fn line_of_sight(&self, vehicle: &VehicleState, head: &RadioHead) -> LineOfSight {
+        let [forward_m, left_m, up_m] = self.settings.position_m;
+        let eye = vehicle.pose.beside(forward_m, left_m);
+        let distance_m = head.distance_m(eye, up_m);
+        let level = eye.distance_m(head.position) / distance_m;
+        let to_axis_rad =
+            eye.bearing_rad(head.position) - vehicle.pose.heading_rad - self.settings.mounting_rad;
+        let element_rad = TAU * self.settings.spacing_wavelengths;
+        LineOfSight {
+            phase_rad: element_rad * level * to_axis_rad.cos(),
+            distance_m,
+        }
+    }
+
+    /// What the array makes of the field at its antennas: each channel runs ahead of the one before.
+    pub fn turn(&self, gains: &mut [Complex64]) {
+        steer(gains, self.settings.phase_rad);
+    }
+}
+
+/// Turns a wave by `phase_rad` from antenna to antenna.
+pub fn steer(gains: &mut [Complex64], phase_rad: f64) {
+    if phase_rad == 0.0 {
+        return;
+    }
+    let step = Complex64::cis(phase_rad);
+    let mut turn = Complex64::ONE;
+    for gain in gains {
+        *gain *= turn;
+        turn *= step;
+    }
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+    use crate::random::{Purpose, Streams};
+
+    #[test]
+    fn drift_has_its_spread() {
+        let settings = ArraySettings {
+            mounting_drift_rad_per_sqrt_m: 0.004,
+            phase_drift_rad_per_sqrt_m: 0.01,
+            ..ArraySettings::default()
+        };
+        let runs = 2000;
+        let mut squares = [0.0; 2];
+        for run in 0..runs {
+            let rng = Streams::new(1, run).generator(Purpose::Array, 0);
+            let mut array = TrueArray::new(settings.clone(), rng);
+            for step in 1..=100 {
+                array.advance(0.25 * f64::from(step));
+            }
+            squares[0] += array.settings.mounting_rad.powi(2) / runs as f64;
+            squares[1] += array.settings.phase_rad.powi(2) / runs as f64;
+        }
+        // 0.004² · 25 m and 0.01² · 25 m; four deviations of a sample variance.
+        for (found, expected) in squares.into_iter().zip([4e-4, 2.5e-3]) {
+            let ratio: f64 = found / expected;
+            assert!(
+                (ratio - 1.0).abs() < 4.0 * (2.0 / runs as f64).sqrt(),
+                "{ratio}"
+            );
+        }
+    }
+
+    #[test]
+    fn an_array_without_phase_errors_passes_the_field_on() {
+        let rng = Streams::new(1, 0).generator(Purpose::Array, 0);
+        let mut array = TrueArray::new(ArraySettings::default(), rng);
+        array.advance(50.0);
+        let mut gains = [Complex64::new(1.0, 2.0); 4];
+        array.turn(&mut gains);
+        assert_eq!(gains, [Complex64::new(1.0, 2.0); 4]);
+    }
+}
