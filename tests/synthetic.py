@@ -7,7 +7,7 @@ from types import SimpleNamespace
 import numpy as np
 import polars as pl
 
-from access_av.evaluate import Evaluation, cases
+from access_av.paper.evaluation import Evaluation, cases
 from access_av.platform import Figure, PowerMode
 
 ROWS = [

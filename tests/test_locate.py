@@ -11,7 +11,7 @@ import pytest
 from mcap.reader import make_reader
 
 from access_av import drives
-from access_av.facts import tomllib
+from access_av.toml import tomllib
 
 if TYPE_CHECKING:
     from collections.abc import Callable

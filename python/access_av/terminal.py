@@ -16,7 +16,7 @@ from rich.progress import (
 )
 from rich.table import Table
 
-from access_av.methods import METHODS, label
+from access_av.methods import label
 from access_av.recorded_angles import mean_absolute_error_deg
 from access_av.report.parts import value_text
 
@@ -25,8 +25,6 @@ if TYPE_CHECKING:
 
     import polars as pl
 
-    from access_av.claims import Claim
-    from access_av.evaluate import Evaluation
     from access_av.recorded_angles import BurstAngle
     from access_av.simulation import Simulation
 
@@ -63,6 +61,16 @@ def table(head: Sequence[str], *, title: str = "", text: int = 1) -> Table:
     for index, name in enumerate(head):
         made.add_column(name, justify="left" if index < text else "right", overflow="fold")
     return made
+
+
+def show_error(error: Exception) -> None:
+    """One message for a bad input."""
+    if isinstance(error, OSError) and error.filename is not None:
+        message = f"{error.filename}: {error.strerror}"
+    else:
+        message = str(error)
+    errors.print("[bold red]error:[/]", end=" ")
+    errors.print(message, markup=False, soft_wrap=True)
 
 
 def show_points(points: pl.DataFrame, title: str = "") -> None:
@@ -180,39 +188,3 @@ def show_cells(title: str, cells: Sequence[dict[str, Any]]) -> None:
         }
         made.add_row(*(texts[column] for column in columns))
     console.print(made)
-
-
-def show_evaluation(evaluation: Evaluation) -> None:
-    """Accuracy and energy per mode, fixed methods beside the adaptive one."""
-    energy = table(["mode", *map(label, METHODS), "adaptive"], title="Energy of a trip in J")
-    error = table(["mode", *map(label, METHODS), "adaptive"], title="Worst error in Y in m")
-    for mode in evaluation.platform.modes:
-        rows = [
-            *evaluation.campaign("Q").filter(mode=mode.number).iter_rows(named=True),
-            *evaluation.campaign("R").filter(mode=mode.number).iter_rows(named=True),
-        ]
-        name = str(mode.number) if is_narrow() else f"{mode.number} {mode.name}"
-        energy.add_row(name, *(f"{row['energy_j']:.1f}" for row in rows))
-        error.add_row(name, *(f"{row['worst_error_y_m']:.3f}" for row in rows))
-    console.print(error)
-    console.print(energy)
-
-
-def show_claims(claims: Sequence[Claim]) -> None:
-    """The paper's claims with their verdicts."""
-    made = table(["claim", "paper", "obtained", ""], title="Claims of the paper", text=4)
-    for claim in claims:
-        name = claim.id.split("_")[0] if is_narrow() else claim.id
-        fitted = " (fitted)" if claim.fitted and not is_narrow() else ""
-        made.add_row(
-            name,
-            value_text(claim.stated),
-            value_text(claim.obtained),
-            f"[green]✓[/]{fitted}" if claim.reproduced else "[red]✗ not reproduced[/]",
-        )
-    console.print(made)
-    reproduced = sum(claim.reproduced for claim in claims)
-    console.print(f"[bold]{reproduced} of {len(claims)} claims reproduced.[/]")
-    for claim in claims:
-        if not claim.reproduced:
-            console.print(f"  {claim.id}: {claim.note}")
