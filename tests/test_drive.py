@@ -34,7 +34,12 @@ def test_guarded_tracker_states_levels(guarded: Simulation) -> None:
     table, integrity = guarded.trajectories, guarded.integrity
     assert table is not None
     assert integrity is not None
-    for name in ("protection_level_m", "variance_x_m2", "variance_y_m2", "variance_heading_rad2"):
+    for name in (
+        "protection_level_m",
+        "covariance_xx_m2",
+        "covariance_yy_m2",
+        "covariance_heading_rad2",
+    ):
         assert table[name].null_count() == 0
         assert (table[name] >= 0.0).all()
     assert integrity.epochs == table.height
@@ -47,7 +52,7 @@ def test_guarded_tracker_states_levels(guarded: Simulation) -> None:
 def test_dead_reckoning_states_none() -> None:
     result = simulate("paper", runs=1, keep_trajectories=True)
     assert result.trajectories is not None
-    for name in ("protection_level_m", "integrity", "variance_x_m2", "covariance_xy_m2"):
+    for name in ("protection_level_m", "integrity", "covariance_xx_m2", "covariance_xy_m2"):
         assert result.trajectories[name].null_count() == result.trajectories.height
     assert result.trajectories.schema["integrity"] == pl.String
     assert result.integrity is None

@@ -101,14 +101,13 @@ def synthesize(
 
 @dataclass(frozen=True)
 class Drive:
-    """A located drive.
+    """A located drive. :mod:`access_av.columns` says what each table's columns are.
 
     Attributes
     ----------
     poses
-        One row per odometry sample: time, pose, speed, covariance, and protection level and
-        integrity where the site asks for them (null where unknown). ``searching`` as long as the
-        first pose is not known; the pose is then the mean of where the vehicle may be.
+        One row per odometry sample. ``searching`` as long as the first pose is not known; the
+        pose is then the mean of where the vehicle may be.
     angles
         One row per angle: SSB, angle, and what the localizer did with it.
     remarks

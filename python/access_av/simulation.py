@@ -5,7 +5,7 @@ from __future__ import annotations
 import math
 from dataclasses import dataclass
 from pathlib import Path
-from typing import TYPE_CHECKING
+from typing import TYPE_CHECKING, Any
 
 import polars as pl
 
@@ -72,23 +72,17 @@ def horizontal_error_m() -> pl.Expr:
 
 @dataclass(frozen=True)
 class Simulation:
-    """What many drives found.
+    """What many drives found. :mod:`access_av.columns` says what each table's columns are.
 
     Attributes
     ----------
     steps
-        Statistics over all runs, one row per SSB: ``time_s``, ``mean_abs_error_x_m``,
-        ``mean_abs_error_y_m``, ``rms_error_m``, ``mean_snr_db`` and more. Errors are of the runs
-        that know their pose by then, null where none does.
+        Statistics over all runs, one row per SSB. Errors are of the runs that know their pose by
+        then.
     runs
-        One row per run: ``run``, ``executions``, ``energy_j``, ``rms_error_m`` and more.
-        ``found_s`` and ``found_m`` are time and distance driven until the first pose was known.
+        One row per run.
     trajectories
-        Truth and estimate, one row per run and SSB: ``run``, ``time_s``, ``x_m``, ``y_m``,
-        ``heading_rad``, ``true_x_m``, ``true_y_m``, ``error_x_m``, ``error_y_m`` and more.
-        ``searching`` as long as the first pose is not known. Variances, ``protection_level_m`` and
-        ``integrity`` (``ok``, ``degraded``, ``unavailable``) are null where the localizer does not
-        state them. ``None`` unless kept.
+        Truth and estimate, one row per run and SSB. ``None`` unless kept.
     executions
         The angle estimates, one row each. ``None`` unless trajectories were kept.
     error_quantiles_m
@@ -178,19 +172,15 @@ def simulate(
         progress=progress,
     )
     return Simulation(
-        steps=pl.DataFrame(found.steps).fill_nan(None),
-        runs=pl.DataFrame(found.runs).with_columns(
-            pl.col("found_s", "found_m", "rms_error_m", "final_error_m").fill_nan(None)
-        ),
-        trajectories=None if found.trajectories is None else _stated(found.trajectories),
-        executions=None if found.executions is None else pl.DataFrame(found.executions),
+        steps=_table(found.steps),
+        runs=_table(found.runs),
+        trajectories=None if found.trajectories is None else _table(found.trajectories),
+        executions=None if found.executions is None else _table(found.executions),
         error_quantiles_m=found.error_quantiles_m,
     )
 
 
-def _stated(columns: Mapping[str, NDArray[np.generic]]) -> pl.DataFrame:
-    """Trajectories, with null for what the localizer does not state."""
-    table = pl.DataFrame(columns, schema_overrides={"integrity": pl.String})
-    return table.with_columns(
-        pl.col("^(variance|covariance)_.*$", "protection_level_m").fill_nan(None)
-    )
+def _table(columns: Mapping[str, Any]) -> pl.DataFrame:
+    """A table with null for what is not known."""
+    words = {name: pl.String for name in ("integrity", "reason") if name in columns}
+    return pl.DataFrame(columns, schema_overrides=words).fill_nan(None)

@@ -14,7 +14,7 @@ from rich.progress import (
     TextColumn,
     TimeRemainingColumn,
 )
-from rich.table import Table
+from rich.table import Table as RichTable
 
 from access_av.methods import label
 from access_av.recorded_angles import mean_absolute_error_deg
@@ -25,6 +25,7 @@ if TYPE_CHECKING:
 
     import polars as pl
 
+    from access_av.columns import Table
     from access_av.recorded_angles import BurstAngle
     from access_av.simulation import Simulation
 
@@ -55,9 +56,9 @@ def progress(title: str) -> Iterator[Callable[[int, int], None]]:
         yield lambda done, total: bar.update(task, completed=done, total=total)
 
 
-def table(head: Sequence[str], *, title: str = "", text: int = 1) -> Table:
+def table(head: Sequence[str], *, title: str = "", text: int = 1) -> RichTable:
     """An empty table; the first ``text`` columns hold words, the others numbers."""
-    made = Table(title=title or None, box=box.SIMPLE_HEAD, title_justify="left", pad_edge=False)
+    made = RichTable(title=title or None, box=box.SIMPLE_HEAD, title_justify="left", pad_edge=False)
     for index, name in enumerate(head):
         made.add_column(name, justify="left" if index < text else "right", overflow="fold")
     return made
@@ -107,7 +108,7 @@ def show_simulation(result: Simulation, title: str) -> None:
         },
         "duration / s": steps["time_s"].max(),
         "executions": runs["executions"].mean(),
-        "energy / J": runs["energy_j"].fill_nan(None).mean(),
+        "energy / J": runs["energy_j"].mean(),
     }
     if runs["found_s"].fill_null(1.0).max() != 0.0:
         rows["runs in which the vehicle was found"] = runs.height - runs["found_s"].null_count()
@@ -139,9 +140,19 @@ def show_bound(summary: dict[str, Any]) -> None:
             str(head["pci"]),
             str(head["ssb_index"]),
             f"{head['nearest_m']:.0f}–{head['farthest_m']:.0f}",
-            f"{head['least_snr_db']:.0f} to {head['most_snr_db']:.0f}",
+            f"{head['least_expected_snr_db']:.0f} to {head['most_expected_snr_db']:.0f}",
             f"{head['visible_share']:.1%}",
         )
+    console.print(made)
+
+
+def show_columns(columns: Table) -> None:
+    """The columns of one table."""
+    where = columns.where.replace("`", "")
+    console.print(f"[bold]{columns.name}[/]  {columns.row}. {where}.")
+    made = table(["column", "unit", "meaning", "null when"], text=4)
+    for one in columns.records():
+        made.add_row(one["name"], one["unit"], one["meaning"], one["null"])
     console.print(made)
 
 

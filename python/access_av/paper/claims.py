@@ -189,7 +189,7 @@ def _worst_y(evaluation: Evaluation, method: str) -> Finding:
     return Finding(
         row["worst_error_y_m"],
         fitted=(RADIO,),
-        note=f"Worst at the fixed interval of {row['wake_up_ms']:g} ms.",
+        note=f"Worst at the fixed interval of {row['base_wake_up_ms']:g} ms.",
     )
 
 

@@ -106,7 +106,7 @@ def _track(lines: dict[str, pl.DataFrame]) -> Spec:
 
 
 def _sigma(lines: dict[str, pl.DataFrame]) -> Spec:
-    sigma_m = (pl.col("xx_m2") + pl.col("yy_m2")).sqrt().alias("sigma_m")
+    sigma_m = (pl.col("covariance_xx_m2") + pl.col("covariance_yy_m2")).sqrt().alias("sigma_m")
     chart = (
         alt.Chart(_together(lines, sigma_m))
         .mark_line(strokeWidth=2)

@@ -22,8 +22,10 @@ if TYPE_CHECKING:
 def signal(evaluation: Evaluation, specs: dict[str, Spec]) -> str:
     """SNR along the track."""
     specs["snr"] = _snr_chart(evaluation)
-    highest = evaluation.snr.sort("snr_db").row(-1, named=True)
-    return figure("snr", f"Highest {highest['snr_db']:.1f} dB at {highest['time_s']:.1f} s.")
+    highest = evaluation.snr.sort("mean_true_snr_db").row(-1, named=True)
+    return figure(
+        "snr", f"Highest {highest['mean_true_snr_db']:.1f} dB at {highest['time_s']:.1f} s."
+    )
 
 
 def accuracy(evaluation: Evaluation, specs: dict[str, Spec]) -> str:
@@ -34,7 +36,7 @@ def accuracy(evaluation: Evaluation, specs: dict[str, Spec]) -> str:
     by_mode = pl.concat([evaluation.campaign("Q"), evaluation.campaign("R")])
     groups: dict[tuple[float, ...], list[int]] = {}
     for mode in evaluation.campaign("R")["mode"]:
-        times = tuple(by_mode.filter(pl.col("mode") == mode)["wake_up_ms"])
+        times = tuple(by_mode.filter(pl.col("mode") == mode)["base_wake_up_ms"])
         groups.setdefault(times, []).append(mode)
     for times, modes in groups.items():
         name = "Mode" if len(modes) == 1 else "Modes"
@@ -54,16 +56,19 @@ def accuracy_table(evaluation: Evaluation) -> str:
     """Worst and RMS errors of every operating point."""
     rows = []
     for point in evaluation.points.unique(
-        ["campaign", "method", "adaptive", "wake_up_ms"], maintain_order=True
+        ["campaign", "method", "adaptive", "base_wake_up_ms"], maintain_order=True
     ).iter_rows(named=True):
         modes = evaluation.points.filter(
-            *(pl.col(key) == point[key] for key in ("campaign", "method", "adaptive", "wake_up_ms"))
+            *(
+                pl.col(key) == point[key]
+                for key in ("campaign", "method", "adaptive", "base_wake_up_ms")
+            )
         )["mode"]
         rows.append(
             (
                 escape(label(point["method"], adaptive=point["adaptive"])),
                 "every SSB" if point["campaign"] == "P" else ", ".join(map(str, modes)),
-                f"{point['wake_up_ms']:g}",
+                f"{point['base_wake_up_ms']:g}",
                 number(point["worst_error_x_m"]),
                 number(point["worst_error_y_m"]),
                 number(point["rms_error_m"]),
@@ -81,10 +86,10 @@ def _snr_chart(evaluation: Evaluation) -> Spec:
         .mark_line(color=BLUE, strokeWidth=2)
         .encode(
             x=alt.X("time_s:Q", title="time / s"),
-            y=alt.Y("snr_db:Q", title="SNR / dB"),
+            y=alt.Y("mean_true_snr_db:Q", title="SNR / dB"),
             tooltip=[
                 alt.Tooltip("time_s:Q", title="time / s", format=".1f"),
-                alt.Tooltip("snr_db:Q", title="SNR / dB", format=".2f"),
+                alt.Tooltip("mean_true_snr_db:Q", title="SNR / dB", format=".2f"),
             ],
         )
     )
@@ -102,7 +107,7 @@ def _error_chart(evaluation: Evaluation, points: pl.DataFrame, axis: str) -> Spe
     lines = pl.concat(
         thinned(evaluation.series(point)).select(
             pl.col("time_s"),
-            pl.col(f"error_{axis}_m").alias("error_m"),
+            pl.col(f"mean_abs_error_{axis}_m").alias("error_m"),
             pl.lit(name).alias("line"),
         )
         for name, point in zip(names, points.iter_rows(named=True), strict=True)

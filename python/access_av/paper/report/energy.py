@@ -110,7 +110,7 @@ def _executions_chart(evaluation: Evaluation) -> Spec:
 
 def _grouped_bars(evaluation: Evaluation, column: str, title: str, digits: str) -> alt.Chart:
     table = by_mode(evaluation).select(
-        "mode", "line", pl.col(column).round(4), "wake_up_ms", "energy_provenance"
+        "mode", "line", pl.col(column).round(4), "base_wake_up_ms", "energy_provenance"
     )
     bars: alt.Chart = (
         alt.Chart(table)
@@ -124,7 +124,7 @@ def _grouped_bars(evaluation: Evaluation, column: str, title: str, digits: str) 
                 alt.Tooltip("mode:O", title="power mode"),
                 alt.Tooltip("line:N", title="method"),
                 alt.Tooltip(f"{column}:Q", title=title, format=digits),
-                alt.Tooltip("wake_up_ms:Q", title="base wake-up time / ms"),
+                alt.Tooltip("base_wake_up_ms:Q", title="base wake-up time / ms"),
                 alt.Tooltip("energy_provenance:N", title="energy per execution"),
             ],
         )
