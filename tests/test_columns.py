@@ -10,7 +10,7 @@ import numpy as np
 import polars as pl
 import pytest
 
-from access_av import Scenario, bound, columns, drives, nr, simulate
+from access_av import Scenario, bound, columns, drives, nr, simulate, statistics
 from conftest import ROOT
 
 if TYPE_CHECKING:
@@ -85,6 +85,9 @@ def test_simulation(scenario: str, changes: dict[str, object]) -> None:
     )
     for name in ("steps", "runs", "trajectories", "executions"):
         check(name, getattr(found, name))
+    assert found.trajectories is not None
+    check("nees", statistics.nees(found.trajectories))
+    check("mean_nees", statistics.mean_nees(found.trajectories))
 
 
 def test_located_drives(tmp_path: Path) -> None:

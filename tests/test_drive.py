@@ -13,7 +13,6 @@ import pytest
 from access_av import Scenario, simulate
 from access_av.errors import InputError
 from access_av.report.drive import render_drive
-from access_av.simulation import Integrity
 
 if TYPE_CHECKING:
     from collections.abc import Callable
@@ -57,25 +56,6 @@ def test_dead_reckoning_states_none() -> None:
     assert result.trajectories.schema["integrity"] == pl.String
     assert result.integrity is None
     assert '"stanford"' not in render_drive(Scenario.load("paper"), result, seed=1)
-
-
-def test_integrity_is_counted_by_hand() -> None:
-    table = pl.DataFrame(
-        {
-            "error_x_m": [0.3, 0.0, 0.6, 3.0, 1.0],
-            "error_y_m": [0.4, 0.2, 0.8, 4.0, 0.0],
-            "protection_level_m": [1.0, 0.1, 4.0, 1.0, None],
-            "integrity": ["ok", "ok", "degraded", "unavailable", None],
-        }
-    )
-    # Errors 0.5, 0.2, 1 and 5 m: ratios 2, 0.5, 4 and 0.2.
-    found = Integrity.of(table)
-    assert found is not None
-    assert found.epochs == 4
-    assert found.state_shares == {"ok": 0.5, "degraded": 0.25, "unavailable": 0.25}
-    assert np.isclose(found.median_level_over_error, 1.25)
-    assert found.exceedances == 1
-    assert Integrity.of(table.tail(1)) is None
 
 
 def test_page_has_every_chart_and_loads_nothing(guarded: Simulation) -> None:

@@ -16,6 +16,7 @@ are first used, so that importing the package takes no time.
 ``aoa``                angle of arrival with linear arrays
 ``nr``                 SSBs: find them in samples and recordings, build them
 ``recorded_angles``    angles from the annotated recording of a linear array
+``statistics``         consistency and integrity of simulated drives, intervals over runs
 ``drives``             recorded drives: errors against a truth, summary
 ``columns``            what the columns of every table are
 ``cost``, ``carbon``   money and greenhouse gas of equipment and energy, with sources
@@ -39,7 +40,7 @@ from access_av.errors import InputError
 from access_av.lazy import attach
 
 if TYPE_CHECKING:
-    from access_av import aoa, carbon, columns, cost, drives, nr, paper, recorded_angles
+    from access_av import aoa, carbon, columns, cost, drives, nr, paper, recorded_angles, statistics
     from access_av.design_space import Query, explore
     from access_av.drives import Drive, SynthesizedDrive, locate, synthesize
     from access_av.error_bound import ErrorBound, bound
@@ -74,6 +75,7 @@ __all__ = [
     "paper",
     "recorded_angles",
     "simulate",
+    "statistics",
     "synthesize",
 ]
 
@@ -87,5 +89,15 @@ __getattr__, __dir__ = attach(
         "access_av.platform": ["Platform"],
         "access_av.simulation": ["Simulation", "simulate"],
     },
-    modules=["aoa", "carbon", "columns", "cost", "drives", "nr", "paper", "recorded_angles"],
+    modules=[
+        "aoa",
+        "carbon",
+        "columns",
+        "cost",
+        "drives",
+        "nr",
+        "paper",
+        "recorded_angles",
+        "statistics",
+    ],
 )

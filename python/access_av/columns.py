@@ -54,6 +54,7 @@ class Table:
 _GLOSSARY = {
     # Time, run, place.
     "run": ("1", "Number of the run"),
+    "runs": ("1", "How many runs the row is of"),
     "time_s": ("s", "Time from the start of the drive, or by the recording's clock"),
     "x_m": ("m", "Place, x in the map's frame; of a drive, as estimated"),
     "y_m": ("m", "Place, y in the map's frame; of a drive, as estimated"),
@@ -90,6 +91,14 @@ _GLOSSARY = {
     "covariance_y_heading_m_rad": ("m·rad", "Covariance of y and heading, by the localizer"),
     "protection_level_m": ("m", "Horizontal protection level"),
     "integrity": ("text", "State of integrity: ok, degraded, unavailable"),
+    "nees": (
+        "1",
+        "Normalised estimation error squared of the position; 2 on average if consistent",
+    ),
+    "mean_nees": ("1", "Mean of nees over the runs"),
+    "band_low": ("1", "Low end of the 95 % band of mean_nees of a consistent localizer"),
+    "band_high": ("1", "High end of it"),
+    "in_band": ("true or false", "mean_nees is within the band"),
     # SSBs, SNR, angles.
     "pci": ("1", "Physical cell identity"),
     "ssb_index": ("1", "Index of the SSB: the beam"),
@@ -271,6 +280,19 @@ TABLES: Mapping[str, Table] = {
                 **dict.fromkeys((*_ANGLE, "estimator_snr_db"), _NO_ANGLE),
                 **dict.fromkeys(_COMPARED, _NOT_COMPARED),
             },
+        ),
+        Table(
+            "nees",
+            "An SSB of a run",
+            "`access_av.statistics.nees(…)`",
+            ("run", "time_s", "nees"),
+            {"nees": f"{_NO_COVARIANCE}, or an area of it; or the first pose is not known yet"},
+        ),
+        Table(
+            "mean_nees",
+            "An SSB, over the runs that have a NEES",
+            "`access_av.statistics.mean_nees(…)`",
+            ("time_s", "runs", "mean_nees", "band_low", "band_high", "in_band"),
         ),
         Table(
             "odometry",

@@ -11,6 +11,7 @@ import polars as pl
 
 from access_av import _core
 from access_av.platform import Platform
+from access_av.statistics.integrity import Integrity
 
 if TYPE_CHECKING:
     from collections.abc import Callable, Mapping
@@ -19,55 +20,6 @@ if TYPE_CHECKING:
     from numpy.typing import NDArray
 
 Scenario = _core.Scenario
-
-
-@dataclass(frozen=True)
-class Integrity:
-    """How protection levels and errors went together.
-
-    Attributes
-    ----------
-    epochs
-        Number of steps with a protection level.
-    state_shares
-        Share of them in each state.
-    median_level_over_error
-        Median of protection level by horizontal error.
-    exceedances
-        Steps in state ``ok`` whose error lay beyond the protection level.
-    """
-
-    epochs: int
-    state_shares: Mapping[str, float]
-    median_level_over_error: float
-    exceedances: int
-
-    @classmethod
-    def of(cls, trajectories: pl.DataFrame) -> Integrity | None:
-        """Count in a table of trajectories; ``None`` where no step has a protection level."""
-        stated = trajectories.filter(pl.col("protection_level_m").is_not_null()).select(
-            "protection_level_m",
-            "integrity",
-            error_m=horizontal_error_m(),
-        )
-        if stated.is_empty():
-            return None
-        ratio = (pl.col("protection_level_m") / pl.col("error_m")).median()
-        beyond = (pl.col("integrity") == "ok") & (pl.col("error_m") > pl.col("protection_level_m"))
-        return cls(
-            epochs=stated.height,
-            state_shares={
-                state: stated.filter(integrity=state).height / stated.height
-                for state in ("ok", "degraded", "unavailable")
-            },
-            median_level_over_error=float(stated.select(ratio).item()),
-            exceedances=stated.filter(beyond).height,
-        )
-
-
-def horizontal_error_m() -> pl.Expr:
-    """Distance between truth and estimate, in a table of trajectories."""
-    return (pl.col("error_x_m") ** 2 + pl.col("error_y_m") ** 2).sqrt()
 
 
 @dataclass(frozen=True)

@@ -15,7 +15,8 @@ from access_av.report.parts import figure, source, tile
 if TYPE_CHECKING:
     from access_av._core import Scenario
     from access_av.report.chart import Spec
-    from access_av.simulation import Integrity, Simulation
+    from access_av.simulation import Simulation
+    from access_av.statistics.integrity import Integrity
 
 
 def render_drive(scenario: Scenario, result: Simulation, seed: int) -> str:

@@ -9,7 +9,7 @@ import altair as alt
 import polars as pl
 
 from access_av.report.chart import BLUE, GREEN, ORANGE, finish, thinned
-from access_av.simulation import horizontal_error_m
+from access_av.statistics.consistency import horizontal_error_m
 
 if TYPE_CHECKING:
     from access_av.error_bound import ErrorBound
