@@ -144,6 +144,7 @@ def test_a_consistent_localizer_is_found_consistent() -> None:
     table = drives(np.random.default_rng(2), runs=40, steps=400)
     found = Consistency.of(table)
     assert found.runs == 40
+    assert all(Consistency.of(table) == found for _ in range(5))
     assert found.anees is not None
     assert found.anees_interval is not None
     assert found.in_band is not None
@@ -195,7 +196,7 @@ def test_the_start_can_be_left_out_and_searching_counts_nowhere() -> None:
     assert Consistency.of(wild, skip=1).anees == Consistency.of(table, skip=1).anees
     searching = wild.with_columns(searching=first)
     assert Consistency.of(searching).anees == Consistency.of(table, skip=1).anees
-    assert Consistency.of(searching).rms_error_m < 10.0
+    assert Consistency.of(searching).rms_error_m < 10.0  # type: ignore[operator]
 
 
 def test_without_covariances_only_errors_are_told() -> None:
@@ -205,7 +206,17 @@ def test_without_covariances_only_errors_are_told() -> None:
     found = Consistency.of(table)
     assert (found.anees, found.anees_interval, found.in_band) == (None, None, None)
     assert found.predicted_rms_error_m is None
+    assert found.rms_error_m is not None
     assert found.rms_error_m > 0.0
+
+
+def test_a_vehicle_that_was_never_found_has_no_error() -> None:
+    table = drives(np.random.default_rng(6), runs=2, steps=10).with_columns(searching=True)
+    found = Consistency.of(table)
+    assert (found.rms_error_m, found.p90_error_m, found.anees) == (None, None, None)
+    settled_nowhere = Consistency.of(table.with_columns(searching=False), skip=10)
+    assert settled_nowhere.anees is None
+    assert settled_nowhere.rms_error_m is not None
 
 
 def guarded(*steps: tuple[float, float | None, str | None], run: int = 0) -> pl.DataFrame:

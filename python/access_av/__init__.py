@@ -79,25 +79,26 @@ __all__ = [
     "synthesize",
 ]
 
-__getattr__, __dir__ = attach(
-    __name__,
-    {
-        "access_av.design_space": ["Query", "explore"],
-        "access_av.drives": ["Drive", "SynthesizedDrive", "locate", "synthesize"],
-        "access_av.error_bound": ["ErrorBound", "bound"],
-        "access_av.paper.evaluation": ["Evaluation", "evaluate"],
-        "access_av.platform": ["Platform"],
-        "access_av.simulation": ["Simulation", "simulate"],
-    },
-    modules=[
-        "aoa",
-        "carbon",
-        "columns",
-        "cost",
-        "drives",
-        "nr",
-        "paper",
-        "recorded_angles",
-        "statistics",
-    ],
-)
+if not TYPE_CHECKING:
+    __getattr__, __dir__ = attach(
+        __name__,
+        {
+            "access_av.design_space": ["Query", "explore"],
+            "access_av.drives": ["Drive", "SynthesizedDrive", "locate", "synthesize"],
+            "access_av.error_bound": ["ErrorBound", "bound"],
+            "access_av.paper.evaluation": ["Evaluation", "evaluate"],
+            "access_av.platform": ["Platform"],
+            "access_av.simulation": ["Simulation", "simulate"],
+        },
+        modules=[
+            "aoa",
+            "carbon",
+            "columns",
+            "cost",
+            "drives",
+            "nr",
+            "paper",
+            "recorded_angles",
+            "statistics",
+        ],
+    )

@@ -35,13 +35,14 @@ __all__ = [
     "study",
 ]
 
-__getattr__, __dir__ = attach(
-    __name__,
-    {
-        "access_av.paper.claims": ["Claim", "check_claims"],
-        "access_av.paper.energy_fit": ["fit_energy"],
-        "access_av.paper.evaluation": ["Evaluation", "evaluate"],
-        "access_av.paper.statements": ["paper_numbers"],
-    },
-    modules=["claims", "energy_fit", "evaluation", "study"],
-)
+if not TYPE_CHECKING:
+    __getattr__, __dir__ = attach(
+        __name__,
+        {
+            "access_av.paper.claims": ["Claim", "check_claims"],
+            "access_av.paper.energy_fit": ["fit_energy"],
+            "access_av.paper.evaluation": ["Evaluation", "evaluate"],
+            "access_av.paper.statements": ["paper_numbers"],
+        },
+        modules=["claims", "energy_fit", "evaluation", "study"],
+    )

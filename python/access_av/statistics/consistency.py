@@ -2,7 +2,8 @@
 
 All of it works on a table of trajectories, as ``access_av.simulate(…, keep_trajectories=True)``
 returns and ``trajectories.parquet`` holds. Steps at which the first pose is not known yet count
-nowhere.
+nowhere. The same table gives the same bytes: sums are taken of lists, because those that
+``group_by`` takes depend on its threads in the last digit.
 """
 
 from __future__ import annotations
@@ -137,8 +138,9 @@ def mean_nees(trajectories: pl.DataFrame, *, probability: float = 0.95) -> pl.Da
         nees(trajectories)
         .drop_nulls("nees")
         .group_by("time_s")
-        .agg(runs=pl.len(), mean_nees=pl.col("nees").mean())
+        .agg("nees")
         .sort("time_s")
+        .select("time_s", runs=pl.col("nees").list.len(), mean_nees=pl.col("nees").list.mean())
     )
     bands = {runs: nees_band(runs, probability=probability) for runs in steps["runs"].unique()}
     low, high = (
@@ -161,7 +163,8 @@ class Consistency:
     runs
         Number of runs.
     rms_error_m
-        Root mean square of the horizontal error over track and runs.
+        Root mean square of the horizontal error over track and runs; ``None`` where no run ever
+        knows its pose.
     predicted_rms_error_m
         What the localizer's covariances make of it; ``None`` where it has none.
     p90_error_m
@@ -186,9 +189,9 @@ class Consistency:
     """
 
     runs: int
-    rms_error_m: float
+    rms_error_m: float | None
     predicted_rms_error_m: float | None
-    p90_error_m: float
+    p90_error_m: float | None
     anees: float | None
     anees_interval: tuple[float, float] | None
     in_band: float | None
@@ -210,21 +213,22 @@ class Consistency:
             error_m=horizontal_error_m(),
             predicted_m2=pl.col("covariance_xx_m2") + pl.col("covariance_yy_m2"),
         )
-        settled = trajectories.filter(pl.col("time_s").is_in(times_s[skip:].implode()))
+        after_s = times_s[skip] if skip < len(times_s) else math.inf
+        settled = trajectories.filter(pl.col("time_s") >= after_s)
         by_run = (
             nees(settled)
             .drop_nulls("nees")
             .group_by("run", maintain_order=True)
-            .agg(pl.col("nees").sum().alias("sum"), pl.len())
-            .select("sum", "len")
+            .agg("nees")
+            .select(pl.col("nees").list.sum().alias("sum"), pl.col("nees").list.len().alias("len"))
             .to_numpy()
         )
         judged = len(by_run) > 0
         return cls(
             runs=trajectories["run"].n_unique(),
-            rms_error_m=_root_mean(known, pl.col("error_m") ** 2) or 0.0,
+            rms_error_m=_root_mean(known, pl.col("error_m") ** 2),
             predicted_rms_error_m=_root_mean(known, pl.col("predicted_m2")),
-            p90_error_m=float(known["error_m"].quantile(0.9, "linear") or 0.0),
+            p90_error_m=known["error_m"].quantile(0.9, "linear"),
             anees=_anees(by_run) if judged else None,
             anees_interval=bootstrap_interval(by_run, _anees) if judged else None,
             in_band=_share(mean_nees(settled)["in_band"]) if judged else None,
@@ -233,7 +237,8 @@ class Consistency:
 
 def _root_mean(steps: pl.DataFrame, squared: pl.Expr) -> float | None:
     """Root of the mean over the steps, each being the mean over its runs."""
-    mean = steps.group_by("time_s").agg(squared.mean().alias("mean"))["mean"].mean()
+    by_step = steps.group_by("time_s").agg(squared.alias("squared")).sort("time_s")
+    mean = by_step["squared"].list.mean().mean()
     return None if mean is None else math.sqrt(mean)  # type: ignore[arg-type]
 
 
