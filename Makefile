@@ -4,7 +4,7 @@ BIN := .venv/bin
 SOURCES := $(shell find crates scenarios platforms -type f 2>/dev/null) Cargo.toml Cargo.lock pyproject.toml
 
 .DEFAULT_GOAL := help
-.PHONY: help demo test lint lint-python bench clean
+.PHONY: help demo test lint lint-python docs bench clean
 
 help: ## List these commands
 	@sed -n 's/^\([a-z-]*\):.*## /  make \1\t/p' $(MAKEFILE_LIST) | expand -t 20
@@ -27,6 +27,9 @@ lint-python: .venv/installed-test
 	$(BIN)/mypy
 	$(BIN)/stubtest access_av._core
 
+docs: .venv/installed ## Write docs/columns.md from the table of columns
+	$(BIN)/access-av columns --markdown > docs/columns.md
+
 bench: .venv/installed-bench ## Compare angle estimators and cell search with their peers; time the evaluation
 	$(BIN)/python benches/aoa_peers.py
 	$(BIN)/python benches/nr_peers.py
@@ -47,6 +50,9 @@ clean: ## Remove what was built (results stay)
 	$(BIN)/python -m pip install --quiet --editable '.[test]'
 	@touch $@
 
-.venv/installed-bench: .venv/installed
+.venv/installed-docs: .venv/installed ## Write docs/columns.md from the table of columns
+	$(BIN)/access-av columns --markdown > docs/columns.md
+
+bench: .venv/installed
 	$(BIN)/python -m pip install --quiet --editable '.[bench]'
 	@touch $@

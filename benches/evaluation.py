@@ -9,8 +9,7 @@ import time
 from rich.console import Console
 from rich.table import Table
 
-from access_av import simulate
-from access_av.evaluate import evaluate
+from access_av import evaluate, simulate
 
 
 def main() -> None:

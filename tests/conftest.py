@@ -42,7 +42,7 @@ def access_av(
 @pytest.fixture(scope="session")
 def quick_study(tmp_path_factory: pytest.TempPathFactory) -> Path:
     """Results of a small evaluation, in a directory that stands for ``results/``."""
-    from access_av import study
+    from access_av.paper import study
 
     results = tmp_path_factory.mktemp("results")
     directory = results / "2000-01-01T000000.000-evaluate"

@@ -7,7 +7,7 @@ from types import SimpleNamespace
 import numpy as np
 import polars as pl
 
-from access_av.evaluate import Evaluation, cases
+from access_av.paper.evaluation import Evaluation, cases
 from access_av.platform import Figure, PowerMode
 
 ROWS = [
@@ -56,16 +56,16 @@ def evaluation() -> Evaluation:
         setting = case.setting
         worst_y = 0.2 if setting.adaptive else WORST_Y_M[setting.method]
         if setting.adaptive:
-            executions = float(ADAPTIVE_EXECUTIONS[int(setting.wake_up_ms)])
+            executions = float(ADAPTIVE_EXECUTIONS[int(setting.base_wake_up_ms)])
         else:
-            executions = float(int(80_330 / setting.wake_up_ms) + 1)
+            executions = float(int(80_330 / setting.base_wake_up_ms) + 1)
         error_y = worst_y * (time_s / time_s[-1]) ** 1.5
         errors[setting] = pl.DataFrame(
-            {"time_s": time_s, "error_x_m": error_y / 10, "error_y_m": error_y}
+            {"time_s": time_s, "mean_abs_error_x_m": error_y / 10, "mean_abs_error_y_m": error_y}
         ).select(
             pl.lit(setting.method).alias("method"),
             pl.lit(setting.adaptive).alias("adaptive"),
-            pl.lit(setting.wake_up_ms).alias("wake_up_ms"),
+            pl.lit(setting.base_wake_up_ms).alias("base_wake_up_ms"),
             pl.all(),
         )
         energy = case.mode.energy_per_execution_j[setting.method] if case.mode else None
@@ -76,7 +76,7 @@ def evaluation() -> Evaluation:
                 "mode_name": case.mode.name if case.mode else None,
                 "method": setting.method,
                 "adaptive": setting.adaptive,
-                "wake_up_ms": setting.wake_up_ms,
+                "base_wake_up_ms": setting.base_wake_up_ms,
                 "executions": executions,
                 "worst_error_x_m": worst_y / 10,
                 "worst_error_y_m": worst_y,
@@ -89,7 +89,7 @@ def evaluation() -> Evaluation:
     return Evaluation(
         points=pl.DataFrame(points, infer_schema_length=None),
         errors=pl.concat(errors.values()),
-        snr=pl.DataFrame({"time_s": time_s, "snr_db": 1 + 9 * np.sin(time_s / 35) ** 2}),
+        snr=pl.DataFrame({"time_s": time_s, "mean_true_snr_db": 1 + 9 * np.sin(time_s / 35) ** 2}),
         scenario=SimpleNamespace(name="synthetic", to_toml=lambda: 'name = "synthetic"\n'),
         platform=board,
         runs=2,

@@ -9,7 +9,7 @@ import polars as pl
 import pytest
 
 from access_av import Scenario, _core
-from access_av.bound import ErrorBound, bound
+from access_av.error_bound import ErrorBound, bound
 from access_av.report.placement import render_bound
 
 if TYPE_CHECKING:

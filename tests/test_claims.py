@@ -7,8 +7,8 @@ import polars as pl
 import pytest
 
 import synthetic
-from access_av import facts
-from access_av.claims import FINDINGS, as_records, check_claims, judge
+from access_av.paper.claims import FINDINGS, as_records, check_claims, judge
+from access_av.paper.statements import stated_claims
 
 
 @pytest.mark.parametrize(
@@ -29,7 +29,7 @@ def test_rules(rule: str, stated: object, obtained: object, met: bool) -> None:
 
 
 def test_there_is_a_finding_for_every_claim_of_the_paper() -> None:
-    assert list(FINDINGS) == list(facts.load("paper")["claims"])
+    assert list(FINDINGS) == list(stated_claims())
     assert len(FINDINGS) == 17
 
 

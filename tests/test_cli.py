@@ -19,8 +19,8 @@ TRAJECTORY_COLUMNS = {
     "run", "time_s", "x_m", "y_m", "heading_rad", "true_x_m", "true_y_m", "error_x_m", "error_y_m",
 }  # fmt: skip
 COMMANDS = [
-    "evaluate", "run", "explore", "bound", "aoa", "scan", "synth", "locate", "fit", "scenario",
-    "platform",
+    "evaluate", "run", "explore", "bound", "aoa", "scan", "synth", "locate", "fit", "columns",
+    "scenario", "platform",
 ]  # fmt: skip
 
 

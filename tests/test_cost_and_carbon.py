@@ -3,6 +3,7 @@ from __future__ import annotations
 import pytest
 
 from access_av import carbon, cost
+from access_av.paper.statements import trips_per_day
 
 
 def test_four_roadside_units_cost_what_the_paper_says() -> None:
@@ -16,7 +17,7 @@ def test_a_lidar_costs_more_than_130_adapters() -> None:
 
 
 def test_the_papers_saving_per_day_follows_from_its_saving_per_trip() -> None:
-    saving = cost.Saving(per_trip_j=370.8)
+    saving = cost.Saving(per_trip_j=370.8, trips_per_day=trips_per_day())
     assert saving.per_day_kj == pytest.approx(398.84, rel=1e-3)
     assert saving.fleet_per_day_mj(100) == pytest.approx(39.884, rel=1e-3)
 
@@ -32,6 +33,11 @@ def test_ranges_are_ordered_and_embodied_does_not_depend_on_the_grid() -> None:
 def test_use_is_power_times_lifetime_times_grid() -> None:
     box = carbon.footprint("onboard_box", 2, "germany")
     assert box.use_kg.central == pytest.approx(2 * 10 * 35_040 * 381e-6)
+
+
+def test_an_energy_a_day_is_365_times_as_much_a_year() -> None:
+    # 3 kWh a day at 381 g.
+    assert carbon.use_kg_per_year(3 * 3.6e6, "germany") == pytest.approx(3 * 365 * 0.381)
 
 
 def test_unknown_grid() -> None:

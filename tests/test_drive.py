@@ -13,7 +13,6 @@ import pytest
 from access_av import Scenario, simulate
 from access_av.errors import InputError
 from access_av.report.drive import render_drive
-from access_av.simulation import Integrity
 
 if TYPE_CHECKING:
     from collections.abc import Callable
@@ -34,7 +33,12 @@ def test_guarded_tracker_states_levels(guarded: Simulation) -> None:
     table, integrity = guarded.trajectories, guarded.integrity
     assert table is not None
     assert integrity is not None
-    for name in ("protection_level_m", "variance_x_m2", "variance_y_m2", "variance_heading_rad2"):
+    for name in (
+        "protection_level_m",
+        "covariance_xx_m2",
+        "covariance_yy_m2",
+        "covariance_heading_rad2",
+    ):
         assert table[name].null_count() == 0
         assert (table[name] >= 0.0).all()
     assert integrity.epochs == table.height
@@ -47,30 +51,11 @@ def test_guarded_tracker_states_levels(guarded: Simulation) -> None:
 def test_dead_reckoning_states_none() -> None:
     result = simulate("paper", runs=1, keep_trajectories=True)
     assert result.trajectories is not None
-    for name in ("protection_level_m", "integrity", "variance_x_m2", "covariance_xy_m2"):
+    for name in ("protection_level_m", "integrity", "covariance_xx_m2", "covariance_xy_m2"):
         assert result.trajectories[name].null_count() == result.trajectories.height
     assert result.trajectories.schema["integrity"] == pl.String
     assert result.integrity is None
     assert '"stanford"' not in render_drive(Scenario.load("paper"), result, seed=1)
-
-
-def test_integrity_is_counted_by_hand() -> None:
-    table = pl.DataFrame(
-        {
-            "error_x_m": [0.3, 0.0, 0.6, 3.0, 1.0],
-            "error_y_m": [0.4, 0.2, 0.8, 4.0, 0.0],
-            "protection_level_m": [1.0, 0.1, 4.0, 1.0, None],
-            "integrity": ["ok", "ok", "degraded", "unavailable", None],
-        }
-    )
-    # Errors 0.5, 0.2, 1 and 5 m: ratios 2, 0.5, 4 and 0.2.
-    found = Integrity.of(table)
-    assert found is not None
-    assert found.epochs == 4
-    assert found.state_shares == {"ok": 0.5, "degraded": 0.25, "unavailable": 0.25}
-    assert np.isclose(found.median_level_over_error, 1.25)
-    assert found.exceedances == 1
-    assert Integrity.of(table.tail(1)) is None
 
 
 def test_page_has_every_chart_and_loads_nothing(guarded: Simulation) -> None:

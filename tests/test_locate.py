@@ -11,7 +11,7 @@ import pytest
 from mcap.reader import make_reader
 
 from access_av import drives
-from access_av.facts import tomllib
+from access_av.toml import tomllib
 
 if TYPE_CHECKING:
     from collections.abc import Callable
@@ -234,7 +234,7 @@ def test_smoothing_writes_a_second_trajectory(access_av: Cli, drive: Path, tmp_p
     )
     assert smoothed["time_s"].equals(poses["time_s"])
     # What comes later can only add information.
-    variance_m2 = pl.col("xx_m2") + pl.col("yy_m2")
+    variance_m2 = pl.col("covariance_xx_m2") + pl.col("covariance_yy_m2")
     before, after = (table.select(variance_m2).to_series() for table in (poses, smoothed))
     assert (after <= before * (1 + 1e-9)).all()
     assert after.sum() < before.sum()

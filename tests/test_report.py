@@ -5,8 +5,8 @@ import re
 import pytest
 
 import synthetic
-from access_av.claims import check_claims
-from access_av.report import render
+from access_av.paper.claims import check_claims
+from access_av.paper.report.page import render
 from access_av.report.parts import value_text
 
 

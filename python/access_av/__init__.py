@@ -1,5 +1,28 @@
 """Localization of factory vehicles from 5G synchronization signal blocks (SSBs).
 
+What is done is a function here, what there is to know about is a module; both come in when they
+are first used, so that importing the package takes no time.
+
+=====================  ============================================================================
+``simulate``           drive a scenario many times
+``bound``              how well any localizer can do in it
+``synthesize``         record a scenario's drive as somebody on the vehicle would have
+``locate``             where the vehicle was in a recorded drive
+``evaluate``           the paper's evaluation
+``explore``            operating points that meet an energy budget and an error
+``Scenario``           what is driven: load, change, write out
+``Platform``           the onboard computer: power modes, energy per execution
+``Recording``          samples on disk (SigMF, raw)
+``aoa``                angle of arrival with linear arrays
+``nr``                 SSBs: find them in samples and recordings, build them
+``recorded_angles``    angles from the annotated recording of a linear array
+``statistics``         consistency and integrity of simulated drives, intervals over runs
+``drives``             recorded drives: errors against a truth, summary
+``columns``            what the columns of every table are
+``cost``, ``carbon``   money and greenhouse gas of equipment and energy, with sources
+``paper``              the paper's numbers, evaluation and claims
+=====================  ============================================================================
+
 Examples
 --------
 >>> import access_av
@@ -8,17 +31,74 @@ Examples
 True
 """
 
+from __future__ import annotations
+
+from typing import TYPE_CHECKING
+
 from access_av._core import Recording, RecordingError, Scenario, ScenarioError, __version__
-from access_av.platform import Platform
-from access_av.simulation import Simulation, simulate
+from access_av.errors import InputError
+from access_av.lazy import attach
+
+if TYPE_CHECKING:
+    from access_av import aoa, carbon, columns, cost, drives, nr, paper, recorded_angles, statistics
+    from access_av.design_space import Query, explore
+    from access_av.drives import Drive, SynthesizedDrive, locate, synthesize
+    from access_av.error_bound import ErrorBound, bound
+    from access_av.paper.evaluation import Evaluation, evaluate
+    from access_av.platform import Platform
+    from access_av.simulation import Simulation, simulate
 
 __all__ = [
+    "Drive",
+    "ErrorBound",
+    "Evaluation",
+    "InputError",
     "Platform",
+    "Query",
     "Recording",
     "RecordingError",
     "Scenario",
     "ScenarioError",
     "Simulation",
+    "SynthesizedDrive",
     "__version__",
+    "aoa",
+    "bound",
+    "carbon",
+    "columns",
+    "cost",
+    "drives",
+    "evaluate",
+    "explore",
+    "locate",
+    "nr",
+    "paper",
+    "recorded_angles",
     "simulate",
+    "statistics",
+    "synthesize",
 ]
+
+if not TYPE_CHECKING:
+    __getattr__, __dir__ = attach(
+        __name__,
+        {
+            "access_av.design_space": ["Query", "explore"],
+            "access_av.drives": ["Drive", "SynthesizedDrive", "locate", "synthesize"],
+            "access_av.error_bound": ["ErrorBound", "bound"],
+            "access_av.paper.evaluation": ["Evaluation", "evaluate"],
+            "access_av.platform": ["Platform"],
+            "access_av.simulation": ["Simulation", "simulate"],
+        },
+        modules=[
+            "aoa",
+            "carbon",
+            "columns",
+            "cost",
+            "drives",
+            "nr",
+            "paper",
+            "recorded_angles",
+            "statistics",
+        ],
+    )

@@ -6,9 +6,9 @@ Every number carries its source (``facts/carbon.toml``); nothing here is measure
 from __future__ import annotations
 
 from dataclasses import dataclass
-from typing import TYPE_CHECKING
+from typing import TYPE_CHECKING, Any
 
-from access_av import facts
+from access_av.toml import shipped
 
 if TYPE_CHECKING:
     from collections.abc import Mapping
@@ -49,7 +49,7 @@ class Footprint:
 
 def grids() -> dict[str, float]:
     """Carbon intensity of electricity by region, in gCO2e per kWh, lowest first."""
-    table = {k: float(v) for k, v in facts.load("carbon")["grid"].items() if k != "source"}
+    table = {k: float(v) for k, v in _facts()["grid"].items() if k != "source"}
     return dict(sorted(table.items(), key=lambda item: item[1]))
 
 
@@ -66,7 +66,7 @@ def footprint(thing: str, units: int, grid: str) -> Footprint:
     >>> round(footprint("onboard_box", 1, "germany").use_kg.central, 1)
     133.5
     """
-    entry = facts.load("carbon")["things"][thing]
+    entry = _facts()["things"][thing]
     use_wh = Range.read(entry["power_w"]).times(Range.read(entry["lifetime_h"]))
     return Footprint(
         embodied_kg=Range.read(entry["embodied_kg"]).scaled(units),
@@ -78,7 +78,21 @@ def footprint(thing: str, units: int, grid: str) -> Footprint:
     )
 
 
-def use_kg_per_year(energy_j_per_trip: float, vehicles: int, grid: str) -> float:
-    """Emissions of an energy per trip, in a year of trips without a break, in kgCO2e."""
-    trips = facts.trips_per_day() * 365.0 * vehicles
-    return energy_j_per_trip * trips / KWH_IN_J * grids()[grid] / 1e3
+def use_kg_per_year(energy_j_per_day: float, grid: str) -> float:
+    """Emissions of an energy per day, in a year, in kgCO2e.
+
+    Examples
+    --------
+    >>> use_kg_per_year(KWH_IN_J, "germany")
+    139.065
+    """
+    return energy_j_per_day * 365.0 / KWH_IN_J * grids()[grid] / 1e3
+
+
+def grid_source() -> str:
+    """Where :func:`grids` has its values from."""
+    return str(_facts()["grid"]["source"])
+
+
+def _facts() -> dict[str, Any]:
+    return shipped("facts", "carbon.toml")

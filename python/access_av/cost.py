@@ -3,8 +3,9 @@
 from __future__ import annotations
 
 from dataclasses import dataclass
+from typing import Any
 
-from access_av import facts
+from access_av.toml import shipped
 
 
 @dataclass(frozen=True)
@@ -31,7 +32,7 @@ def roadside_units(units: int) -> RoadsideUnitCost:
     >>> roadside_units(4).capital_low_usd
     52000.0
     """
-    entry = facts.load("cost")["roadside_unit"]
+    entry = shipped("facts", "cost.toml")["roadside_unit"]
     return RoadsideUnitCost(
         units=units,
         capital_low_usd=float(units * entry["capital_usd"]["low"]),
@@ -41,22 +42,34 @@ def roadside_units(units: int) -> RoadsideUnitCost:
     )
 
 
+def sensors() -> list[dict[str, Any]]:
+    """Sensors with ``name``, ``price_usd`` and ``source``: a LiDAR and a 5G adapter."""
+    return list(shipped("facts", "cost.toml")["sensor"])
+
+
 def sensor_cost_ratio() -> float:
     """How many 5G adapters one LiDAR costs."""
-    lidar, adapter = facts.load("cost")["sensor"]
+    lidar, adapter = sensors()
     return float(lidar["price_usd"] / adapter["price_usd"])
 
 
 @dataclass(frozen=True)
 class Saving:
-    """Energy that adaptive wake-up saves against a fixed baseline."""
+    """Energy that one way of driving saves against another, trip by trip.
+
+    Examples
+    --------
+    >>> Saving(per_trip_j=100.0, trips_per_day=1000.0).fleet_per_day_mj(vehicles=50)
+    5.0
+    """
 
     per_trip_j: float
+    trips_per_day: float
 
     @property
     def per_day_kj(self) -> float:
-        """One vehicle, 24 hours of trips without a break."""
-        return self.per_trip_j * facts.trips_per_day() / 1e3
+        """One vehicle, 24 hours."""
+        return self.per_trip_j * self.trips_per_day / 1e3
 
     def fleet_per_day_mj(self, vehicles: int) -> float:
         """A fleet, 24 hours."""

@@ -79,12 +79,9 @@ def synthesize(
     Examples
     --------
     >>> import tempfile
-    >>> from access_av import drives
-    >>> here = tempfile.mkdtemp()
-    >>> drives.synthesize("paper-real-odometry-2", here, duration_s=2.0).bursts
-    101
-    >>> located = drives.locate(here + "/site.toml", here + "/odometry.csv", here + "/iq")
-    >>> located.poses.height
+    >>> import access_av
+    >>> with tempfile.TemporaryDirectory() as drive:
+    ...     access_av.synthesize("paper-real-odometry-2", drive, duration_s=2.0).bursts
     101
     """
     if datatype not in DATATYPES:
@@ -104,14 +101,13 @@ def synthesize(
 
 @dataclass(frozen=True)
 class Drive:
-    """A located drive.
+    """A located drive. :mod:`access_av.columns` says what each table's columns are.
 
     Attributes
     ----------
     poses
-        One row per odometry sample: time, pose, speed, covariance, and protection level and
-        integrity where the site asks for them (null where unknown). ``searching`` as long as the
-        first pose is not known; the pose is then the mean of where the vehicle may be.
+        One row per odometry sample. ``searching`` as long as the first pose is not known; the
+        pose is then the mean of where the vehicle may be.
     angles
         One row per angle: SSB, angle, and what the localizer did with it.
     remarks
@@ -181,6 +177,18 @@ def locate(
         When the recording or the odometry cannot be used.
     ScenarioError
         When the site file cannot be used.
+
+    Examples
+    --------
+    >>> import tempfile
+    >>> import access_av
+    >>> with tempfile.TemporaryDirectory() as drive:
+    ...     _ = access_av.synthesize("paper-real-odometry-2", drive, duration_s=2.0)
+    ...     located = access_av.locate(
+    ...         f"{drive}/site.toml", f"{drive}/odometry.csv", f"{drive}/iq.sigmf-meta"
+    ...     )
+    >>> located.poses.height
+    101
     """
     located = _core.locate(
         site,

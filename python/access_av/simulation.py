@@ -5,12 +5,13 @@ from __future__ import annotations
 import math
 from dataclasses import dataclass
 from pathlib import Path
-from typing import TYPE_CHECKING
+from typing import TYPE_CHECKING, Any
 
 import polars as pl
 
 from access_av import _core
 from access_av.platform import Platform
+from access_av.statistics.integrity import Integrity
 
 if TYPE_CHECKING:
     from collections.abc import Callable, Mapping
@@ -22,73 +23,18 @@ Scenario = _core.Scenario
 
 
 @dataclass(frozen=True)
-class Integrity:
-    """How protection levels and errors went together.
-
-    Attributes
-    ----------
-    epochs
-        Number of steps with a protection level.
-    state_shares
-        Share of them in each state.
-    median_level_over_error
-        Median of protection level by horizontal error.
-    exceedances
-        Steps in state ``ok`` whose error lay beyond the protection level.
-    """
-
-    epochs: int
-    state_shares: Mapping[str, float]
-    median_level_over_error: float
-    exceedances: int
-
-    @classmethod
-    def of(cls, trajectories: pl.DataFrame) -> Integrity | None:
-        """Count in a table of trajectories; ``None`` where no step has a protection level."""
-        stated = trajectories.filter(pl.col("protection_level_m").is_not_null()).select(
-            "protection_level_m",
-            "integrity",
-            error_m=horizontal_error_m(),
-        )
-        if stated.is_empty():
-            return None
-        ratio = (pl.col("protection_level_m") / pl.col("error_m")).median()
-        beyond = (pl.col("integrity") == "ok") & (pl.col("error_m") > pl.col("protection_level_m"))
-        return cls(
-            epochs=stated.height,
-            state_shares={
-                state: stated.filter(integrity=state).height / stated.height
-                for state in ("ok", "degraded", "unavailable")
-            },
-            median_level_over_error=float(stated.select(ratio).item()),
-            exceedances=stated.filter(beyond).height,
-        )
-
-
-def horizontal_error_m() -> pl.Expr:
-    """Distance between truth and estimate, in a table of trajectories."""
-    return (pl.col("error_x_m") ** 2 + pl.col("error_y_m") ** 2).sqrt()
-
-
-@dataclass(frozen=True)
 class Simulation:
-    """What many drives found.
+    """What many drives found. :mod:`access_av.columns` says what each table's columns are.
 
     Attributes
     ----------
     steps
-        Statistics over all runs, one row per SSB: ``time_s``, ``mean_abs_error_x_m``,
-        ``mean_abs_error_y_m``, ``rms_error_m``, ``mean_snr_db`` and more. Errors are of the runs
-        that know their pose by then, null where none does.
+        Statistics over all runs, one row per SSB. Errors are of the runs that know their pose by
+        then.
     runs
-        One row per run: ``run``, ``executions``, ``energy_j``, ``rms_error_m`` and more.
-        ``found_s`` and ``found_m`` are time and distance driven until the first pose was known.
+        One row per run.
     trajectories
-        Truth and estimate, one row per run and SSB: ``run``, ``time_s``, ``x_m``, ``y_m``,
-        ``heading_rad``, ``true_x_m``, ``true_y_m``, ``error_x_m``, ``error_y_m`` and more.
-        ``searching`` as long as the first pose is not known. Variances, ``protection_level_m`` and
-        ``integrity`` (``ok``, ``degraded``, ``unavailable``) are null where the localizer does not
-        state them. ``None`` unless kept.
+        Truth and estimate, one row per run and SSB. ``None`` unless kept.
     executions
         The angle estimates, one row each. ``None`` unless trajectories were kept.
     error_quantiles_m
@@ -178,19 +124,15 @@ def simulate(
         progress=progress,
     )
     return Simulation(
-        steps=pl.DataFrame(found.steps).fill_nan(None),
-        runs=pl.DataFrame(found.runs).with_columns(
-            pl.col("found_s", "found_m", "rms_error_m", "final_error_m").fill_nan(None)
-        ),
-        trajectories=None if found.trajectories is None else _stated(found.trajectories),
-        executions=None if found.executions is None else pl.DataFrame(found.executions),
+        steps=_table(found.steps),
+        runs=_table(found.runs),
+        trajectories=None if found.trajectories is None else _table(found.trajectories),
+        executions=None if found.executions is None else _table(found.executions),
         error_quantiles_m=found.error_quantiles_m,
     )
 
 
-def _stated(columns: Mapping[str, NDArray[np.generic]]) -> pl.DataFrame:
-    """Trajectories, with null for what the localizer does not state."""
-    table = pl.DataFrame(columns, schema_overrides={"integrity": pl.String})
-    return table.with_columns(
-        pl.col("^(variance|covariance)_.*$", "protection_level_m").fill_nan(None)
-    )
+def _table(columns: Mapping[str, Any]) -> pl.DataFrame:
+    """A table with null for what is not known."""
+    words = {name: pl.String for name in ("integrity", "reason") if name in columns}
+    return pl.DataFrame(columns, schema_overrides=words).fill_nan(None)

@@ -14,9 +14,9 @@ from rich.progress import (
     TextColumn,
     TimeRemainingColumn,
 )
-from rich.table import Table
+from rich.table import Table as RichTable
 
-from access_av.methods import METHODS, label
+from access_av.methods import label
 from access_av.recorded_angles import mean_absolute_error_deg
 from access_av.report.parts import value_text
 
@@ -25,8 +25,7 @@ if TYPE_CHECKING:
 
     import polars as pl
 
-    from access_av.claims import Claim
-    from access_av.evaluate import Evaluation
+    from access_av.columns import Table
     from access_av.recorded_angles import BurstAngle
     from access_av.simulation import Simulation
 
@@ -57,12 +56,22 @@ def progress(title: str) -> Iterator[Callable[[int, int], None]]:
         yield lambda done, total: bar.update(task, completed=done, total=total)
 
 
-def table(head: Sequence[str], *, title: str = "", text: int = 1) -> Table:
+def table(head: Sequence[str], *, title: str = "", text: int = 1) -> RichTable:
     """An empty table; the first ``text`` columns hold words, the others numbers."""
-    made = Table(title=title or None, box=box.SIMPLE_HEAD, title_justify="left", pad_edge=False)
+    made = RichTable(title=title or None, box=box.SIMPLE_HEAD, title_justify="left", pad_edge=False)
     for index, name in enumerate(head):
         made.add_column(name, justify="left" if index < text else "right", overflow="fold")
     return made
+
+
+def show_error(error: Exception) -> None:
+    """One message for a bad input."""
+    if isinstance(error, OSError) and error.filename is not None:
+        message = f"{error.filename}: {error.strerror}"
+    else:
+        message = str(error)
+    errors.print("[bold red]error:[/]", end=" ")
+    errors.print(message, markup=False, soft_wrap=True)
 
 
 def show_points(points: pl.DataFrame, title: str = "") -> None:
@@ -99,7 +108,7 @@ def show_simulation(result: Simulation, title: str) -> None:
         },
         "duration / s": steps["time_s"].max(),
         "executions": runs["executions"].mean(),
-        "energy / J": runs["energy_j"].fill_nan(None).mean(),
+        "energy / J": runs["energy_j"].mean(),
     }
     if runs["found_s"].fill_null(1.0).max() != 0.0:
         rows["runs in which the vehicle was found"] = runs.height - runs["found_s"].null_count()
@@ -131,9 +140,19 @@ def show_bound(summary: dict[str, Any]) -> None:
             str(head["pci"]),
             str(head["ssb_index"]),
             f"{head['nearest_m']:.0f}–{head['farthest_m']:.0f}",
-            f"{head['least_snr_db']:.0f} to {head['most_snr_db']:.0f}",
+            f"{head['least_expected_snr_db']:.0f} to {head['most_expected_snr_db']:.0f}",
             f"{head['visible_share']:.1%}",
         )
+    console.print(made)
+
+
+def show_columns(columns: Table) -> None:
+    """The columns of one table."""
+    where = columns.where.replace("`", "")
+    console.print(f"[bold]{columns.name}[/]  {columns.row}. {where}.")
+    made = table(["column", "unit", "meaning", "null when"], text=4)
+    for one in columns.records():
+        made.add_row(one["name"], one["unit"], one["meaning"], one["null"])
     console.print(made)
 
 
@@ -180,39 +199,3 @@ def show_cells(title: str, cells: Sequence[dict[str, Any]]) -> None:
         }
         made.add_row(*(texts[column] for column in columns))
     console.print(made)
-
-
-def show_evaluation(evaluation: Evaluation) -> None:
-    """Accuracy and energy per mode, fixed methods beside the adaptive one."""
-    energy = table(["mode", *map(label, METHODS), "adaptive"], title="Energy of a trip in J")
-    error = table(["mode", *map(label, METHODS), "adaptive"], title="Worst error in Y in m")
-    for mode in evaluation.platform.modes:
-        rows = [
-            *evaluation.campaign("Q").filter(mode=mode.number).iter_rows(named=True),
-            *evaluation.campaign("R").filter(mode=mode.number).iter_rows(named=True),
-        ]
-        name = str(mode.number) if is_narrow() else f"{mode.number} {mode.name}"
-        energy.add_row(name, *(f"{row['energy_j']:.1f}" for row in rows))
-        error.add_row(name, *(f"{row['worst_error_y_m']:.3f}" for row in rows))
-    console.print(error)
-    console.print(energy)
-
-
-def show_claims(claims: Sequence[Claim]) -> None:
-    """The paper's claims with their verdicts."""
-    made = table(["claim", "paper", "obtained", ""], title="Claims of the paper", text=4)
-    for claim in claims:
-        name = claim.id.split("_")[0] if is_narrow() else claim.id
-        fitted = " (fitted)" if claim.fitted and not is_narrow() else ""
-        made.add_row(
-            name,
-            value_text(claim.stated),
-            value_text(claim.obtained),
-            f"[green]✓[/]{fitted}" if claim.reproduced else "[red]✗ not reproduced[/]",
-        )
-    console.print(made)
-    reproduced = sum(claim.reproduced for claim in claims)
-    console.print(f"[bold]{reproduced} of {len(claims)} claims reproduced.[/]")
-    for claim in claims:
-        if not claim.reproduced:
-            console.print(f"  {claim.id}: {claim.note}")

@@ -205,9 +205,10 @@ impl LocatedDrive {
     }
 
     /// One pose per odometry sample: columns `time_s`, `x_m`, `y_m`, `heading_rad`, `speed_mps`,
-    /// the covariance `xx_m2`, `xy_m2`, `yy_m2`, `heading_rad2` and the `protection_level_m`, NaN where
-    /// they are not known, `integrity`: `ok`, `degraded`, `unavailable` or None, and `searching`:
-    /// whether the first pose is not yet known, and this one the mean of where the vehicle may be.
+    /// `covariance_xx_m2`, `covariance_xy_m2`, `covariance_yy_m2`, `covariance_heading_rad2` and
+    /// `protection_level_m`, NaN where they are not known, `integrity`: `ok`, `degraded`,
+    /// `unavailable` or None, and `searching`: whether the first pose is not yet known, and this one
+    /// the mean of where the vehicle may be.
     #[getter]
     fn poses<'py>(&self, py: Python<'py>) -> PyResult<Bound<'py, PyDict>> {
         pose_columns(py, &self.core.poses)
@@ -302,10 +303,10 @@ fn pose_columns<'py>(
     columns.set_item("y_m", column(|it| it.estimate.pose.y_m))?;
     columns.set_item("heading_rad", column(|it| it.estimate.pose.heading_rad))?;
     columns.set_item("speed_mps", column(|it| it.speed_mps))?;
-    columns.set_item("xx_m2", column(|it| covariance(it, 0, 0)))?;
-    columns.set_item("xy_m2", column(|it| covariance(it, 0, 1)))?;
-    columns.set_item("yy_m2", column(|it| covariance(it, 1, 1)))?;
-    columns.set_item("heading_rad2", column(|it| covariance(it, 2, 2)))?;
+    columns.set_item("covariance_xx_m2", column(|it| covariance(it, 0, 0)))?;
+    columns.set_item("covariance_xy_m2", column(|it| covariance(it, 0, 1)))?;
+    columns.set_item("covariance_yy_m2", column(|it| covariance(it, 1, 1)))?;
+    columns.set_item("covariance_heading_rad2", column(|it| covariance(it, 2, 2)))?;
     columns.set_item(
         "protection_level_m",
         column(|it| {

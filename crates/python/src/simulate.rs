@@ -180,7 +180,7 @@ fn steps(py: Python<'_>, campaign: &Campaign) -> PyResult<Py<PyDict>> {
         ("mean_abs_error_y_m", |step| step.mean_abs_error_y_m),
         ("rms_error_m", |step| step.rms_error_m),
         ("rms_heading_error_rad", |step| step.rms_heading_error_rad),
-        ("mean_snr_db", |step| step.mean_snr_db),
+        ("mean_true_snr_db", |step| step.mean_snr_db),
         ("p50_error_m", |step| step.p50_error_m),
         ("p90_error_m", |step| step.p90_error_m),
         ("p99_error_m", |step| step.p99_error_m),
@@ -227,7 +227,7 @@ fn run_table(py: Python<'_>, campaign: &Campaign) -> PyResult<Py<PyDict>> {
     Ok(table.unbind())
 }
 
-/// Variances and protection levels are NaN where the localizer does not know its own error, states
+/// Covariances and protection levels are NaN where the localizer does not know its own error, states
 /// of integrity `None`.
 fn trajectories(py: Python<'_>, records: &[RunRecord]) -> PyResult<Py<PyDict>> {
     let table = PyDict::new(py);
@@ -246,10 +246,10 @@ fn trajectories(py: Python<'_>, records: &[RunRecord]) -> PyResult<Py<PyDict>> {
         ("true_heading_rad", |step| step.truth.heading_rad),
         ("error_x_m", |step| step.estimate.x_m - step.truth.x_m),
         ("error_y_m", |step| step.estimate.y_m - step.truth.y_m),
-        ("snr_db", |step| step.snr_db),
-        ("variance_x_m2", |step| covariance(step, 0, 0)),
-        ("variance_y_m2", |step| covariance(step, 1, 1)),
-        ("variance_heading_rad2", |step| covariance(step, 2, 2)),
+        ("true_snr_db", |step| step.snr_db),
+        ("covariance_xx_m2", |step| covariance(step, 0, 0)),
+        ("covariance_yy_m2", |step| covariance(step, 1, 1)),
+        ("covariance_heading_rad2", |step| covariance(step, 2, 2)),
         ("covariance_xy_m2", |step| covariance(step, 0, 1)),
         ("covariance_x_heading_m_rad", |step| covariance(step, 0, 2)),
         ("covariance_y_heading_m_rad", |step| covariance(step, 1, 2)),
@@ -292,7 +292,7 @@ fn executions(py: Python<'_>, records: &[RunRecord]) -> PyResult<Py<PyDict>> {
         column(py, rows(), |execution| execution.ssb.ssb_index),
     )?;
     let columns: [Column<Execution>; 8] = [
-        ("sensed_snr_db", |execution| execution.ssb.snr_db),
+        ("snr_db", |execution| execution.ssb.snr_db),
         ("phase_rad", |execution| {
             measured(execution, |angle| angle.phase_rad)
         }),
@@ -302,7 +302,7 @@ fn executions(py: Python<'_>, records: &[RunRecord]) -> PyResult<Py<PyDict>> {
         ("angle_rad", |execution| {
             measured(execution, |angle| angle.angle_rad)
         }),
-        ("snr_db", |execution| {
+        ("estimator_snr_db", |execution| {
             measured(execution, |angle| angle.snr_db)
         }),
         ("mahalanobis_squared", |e| {
@@ -322,8 +322,8 @@ fn executions(py: Python<'_>, records: &[RunRecord]) -> PyResult<Py<PyDict>> {
         "accepted",
         column(py, rows(), |execution| execution.verdict.accepted),
     )?;
-    let verdicts = PyList::new(py, rows().map(|execution| execution.verdict.reason.name()))?;
-    table.set_item("verdict", verdicts)?;
+    let reasons = PyList::new(py, rows().map(|execution| execution.verdict.reason.name()))?;
+    table.set_item("reason", reasons)?;
     Ok(table.unbind())
 }
 

@@ -9,13 +9,14 @@ from typing import TYPE_CHECKING
 
 from access_av.errors import InputError
 from access_av.report import drive_charts as charts
-from access_av.report.page import fill
+from access_av.report.page import sheet
 from access_av.report.parts import figure, source, tile
 
 if TYPE_CHECKING:
-    from access_av import Scenario
-    from access_av.report.charts import Spec
-    from access_av.simulation import Integrity, Simulation
+    from access_av._core import Scenario
+    from access_av.report.chart import Spec
+    from access_av.simulation import Simulation
+    from access_av.statistics.integrity import Integrity
 
 
 def render_drive(scenario: Scenario, result: Simulation, seed: int) -> str:
@@ -73,8 +74,7 @@ def render_drive(scenario: Scenario, result: Simulation, seed: int) -> str:
     ]
     if integrity is not None:
         tiles.append(tile(f"{integrity.exceedances}", "errors beyond the protection level"))
-    return fill(
-        "sheet.html",
+    return sheet(
         specs,
         title=f"ACCESS-AV drive: {escape(scenario.name)}",
         kicker="ACCESS-AV drive",

@@ -8,15 +8,13 @@ from typing import TYPE_CHECKING
 import altair as alt
 import polars as pl
 
-from access_av.report.charts import finish, thinned
-from access_av.simulation import horizontal_error_m
+from access_av.report.chart import BLUE, GREEN, ORANGE, finish, thinned
+from access_av.statistics.consistency import horizontal_error_m
 
 if TYPE_CHECKING:
-    from access_av.bound import ErrorBound
-    from access_av.report.charts import Spec
+    from access_av.error_bound import ErrorBound
+    from access_av.report.chart import Spec
 
-# Okabe and Ito's colours, as in the report.
-BLUE, ORANGE, GREEN = "#2f7ed8", "#d55e00", "#009e73"
 # Bins of the Stanford diagram per factor of ten: 12 % wide.
 BINS_PER_DECADE = 20
 # Errors below a millimetre are drawn as one.

@@ -9,16 +9,14 @@ from typing import TYPE_CHECKING
 import altair as alt
 import polars as pl
 
-from access_av.report.charts import finish, thinned
-from access_av.report.page import fill
+from access_av.report.chart import BLUE, ORANGE, finish, thinned
+from access_av.report.page import sheet
 from access_av.report.parts import figure, source, table, tile
 
 if TYPE_CHECKING:
     from access_av.drives import Drive
-    from access_av.report.charts import Spec
+    from access_av.report.chart import Spec
 
-# Okabe and Ito's colours, as in the report.
-BLUE, ORANGE = "#2f7ed8", "#d55e00"
 MOST_REMARKS = 50
 
 
@@ -28,7 +26,7 @@ def render_located(drive: Drive, site: str, numbers: dict[str, float]) -> str:
     Parameters
     ----------
     drive
-        What :func:`access_av.drives.locate` returned.
+        What :func:`access_av.locate` returned.
     site
         The site file's text.
     numbers
@@ -77,8 +75,7 @@ def render_located(drive: Drive, site: str, numbers: dict[str, float]) -> str:
         headline = f"{numbers['p90_error_m']:.2f} m or less in nine of ten epochs"
         tiles.append(tile(f"{numbers['rms_error_m']:.3f} m", "RMS of the horizontal error"))
         tiles.append(tile(f"{numbers['p90_error_m']:.3f} m", "its 90th percentile"))
-    return fill(
-        "sheet.html",
+    return sheet(
         specs,
         title="ACCESS-AV located drive",
         kicker="ACCESS-AV located drive",
@@ -109,7 +106,7 @@ def _track(lines: dict[str, pl.DataFrame]) -> Spec:
 
 
 def _sigma(lines: dict[str, pl.DataFrame]) -> Spec:
-    sigma_m = (pl.col("xx_m2") + pl.col("yy_m2")).sqrt().alias("sigma_m")
+    sigma_m = (pl.col("covariance_xx_m2") + pl.col("covariance_yy_m2")).sqrt().alias("sigma_m")
     chart = (
         alt.Chart(_together(lines, sigma_m))
         .mark_line(strokeWidth=2)

@@ -13,22 +13,27 @@ import vl_convert
 if TYPE_CHECKING:
     from collections.abc import Mapping
 
-    from access_av.report.charts import Spec
+    from access_av.report.chart import Spec
+
+
+def sheet(specs: Mapping[str, Spec], **fields: object) -> str:
+    """A page of sections under a headline; the fields are those of ``sheet.html``."""
+    return fill(_read("sheet.html"), specs, **fields)
 
 
 def fill(template: str, specs: Mapping[str, Spec], **fields: object) -> str:
-    """A template of this package with its fields, its charts, style and code filled in.
+    """A template with its fields, its charts, style and code filled in.
 
     Parameters
     ----------
     template
-        Name of the template.
+        The template's text.
     specs
         Charts by the ``id`` of their place.
     fields
         What goes into the template's other fields, as HTML.
     """
-    return Template(_read(template)).substitute(
+    return Template(template).substitute(
         fields,
         style=_read("style.css"),
         footer=f"ACCESS-AV {version('access-av')}. This localizer is not a safety function "

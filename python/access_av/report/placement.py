@@ -6,13 +6,13 @@ from html import escape
 from importlib.metadata import version
 from typing import TYPE_CHECKING
 
-from access_av.bound import MAP_TRAVEL_M, VISIBLE_SNR_DB
+from access_av.error_bound import MAP_TRAVEL_M, VISIBLE_SNR_DB
 from access_av.report import drive_charts as charts
-from access_av.report.page import fill
+from access_av.report.page import sheet
 from access_av.report.parts import figure, number, source, table, tile
 
 if TYPE_CHECKING:
-    from access_av.bound import ErrorBound
+    from access_av.error_bound import ErrorBound
 
 
 def render_bound(bound: ErrorBound) -> str:
@@ -32,7 +32,7 @@ def render_bound(bound: ErrorBound) -> str:
             number(one["x_m"], 1),
             number(one["y_m"], 1),
             f"{one['nearest_m']:.0f} to {one['farthest_m']:.0f}",
-            f"{one['least_snr_db']:.1f} to {one['most_snr_db']:.1f}",
+            f"{one['least_expected_snr_db']:.1f} to {one['most_expected_snr_db']:.1f}",
             f"{one['visible_share']:.1%}",
         )
         for one in summary["heads"]
@@ -48,8 +48,7 @@ def render_bound(bound: ErrorBound) -> str:
         "</section><section><h2>Provenance</h2>"
         f"{source('Scenario, all defaults written out', scenario.to_toml())}</section>"
     )
-    return fill(
-        "sheet.html",
+    return sheet(
         specs,
         title=f"ACCESS-AV bound: {escape(scenario.name)}",
         kicker="ACCESS-AV bound",

@@ -3,11 +3,11 @@
 from __future__ import annotations
 
 import json
-from pathlib import Path  # noqa: TC003 (Typer reads annotations at run time)
 from typing import Annotated
 
 import typer
 
+from access_av.commands.options import AsJson, Out, ScenarioArgument
 from access_av.terminal import console, show_bound
 
 app = typer.Typer()
@@ -17,21 +17,19 @@ app = typer.Typer()
     epilog="Example: [bold]access-av bound yard --map-step-m 10 --out results/yard-bound[/]",
 )
 def bound(
-    scenario: Annotated[str, typer.Argument(help="Shipped name, or path of a TOML file.")],
-    out: Annotated[
-        Path | None, typer.Option(help="Directory for the files; else a new one in results/.")
-    ] = None,
+    scenario: ScenarioArgument,
+    out: Out = None,
     map_step_m: Annotated[
         float | None, typer.Option(help="Side of the map's squares; else a round length that fits.")
     ] = None,
-    as_json: Annotated[bool, typer.Option("--json", help="Print JSON.")] = False,
+    as_json: AsJson = False,
 ) -> None:
     """Tell how well any localizer can do, before anything is built.
 
     The posterior Cramér-Rao bound of the horizontal error: along the route and over the site.
     Writes bound.parquet, map.parquet, report.html, scenario.toml and manifest.json.
     """
-    from access_av.bound import bound as error_bound
+    from access_av.error_bound import bound as error_bound
     from access_av.files import ResultsDirectory
     from access_av.report.placement import render_bound
 

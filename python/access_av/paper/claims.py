@@ -1,7 +1,7 @@
 """The paper's claims beside what the evaluation obtains.
 
 Errors are the mean over the runs of the absolute error, worst along the track. What the paper
-states is in ``facts/paper.toml``; how each number is obtained is here.
+states is in ``paper.toml``; how each number is obtained is here.
 """
 
 from __future__ import annotations
@@ -11,14 +11,16 @@ from typing import TYPE_CHECKING, Any
 
 import polars as pl
 
-from access_av import cost, facts
-from access_av.explore import Query, answer
-from access_av.methods import METHODS, label
+from access_av.cost import Saving, roadside_units, sensor_cost_ratio
+from access_av.design_space import Query, explore
+from access_av.methods import label
+from access_av.paper.methods import METHODS
+from access_av.paper.statements import of_claim, stated_claims, trips_per_day
 
 if TYPE_CHECKING:
     from collections.abc import Callable, Mapping
 
-    from access_av.evaluate import Evaluation
+    from access_av.paper.evaluation import Evaluation
 
 REPRODUCED = "reproduced"
 NOT_REPRODUCED = "not reproduced"
@@ -66,7 +68,7 @@ class Finding:
 
 
 def judge(rule: str, stated: Any, obtained: Any, tolerance: float = 0.0) -> bool:
-    """Whether an obtained value meets a stated one under a rule of ``facts/paper.toml``.
+    """Whether an obtained value meets a stated one under a rule of ``paper.toml``.
 
     Examples
     --------
@@ -96,7 +98,7 @@ def judge(rule: str, stated: Any, obtained: Any, tolerance: float = 0.0) -> bool
 def check_claims(evaluation: Evaluation) -> list[Claim]:
     """Judge every claim of the paper, in the paper's order."""
     claims = []
-    for claim_id, entry in facts.load("paper")["claims"].items():
+    for claim_id, entry in stated_claims().items():
         try:
             finding = FINDINGS[claim_id](evaluation)
         except MissingModeError as error:
@@ -187,7 +189,7 @@ def _worst_y(evaluation: Evaluation, method: str) -> Finding:
     return Finding(
         row["worst_error_y_m"],
         fitted=(RADIO,),
-        note=f"Worst at the fixed interval of {row['wake_up_ms']:g} ms.",
+        note=f"Worst at the fixed interval of {row['base_wake_up_ms']:g} ms.",
     )
 
 
@@ -285,10 +287,11 @@ def _e4(evaluation: Evaluation) -> Finding:
     )
 
 
-def saving(evaluation: Evaluation, mode: int) -> cost.Saving:
+def saving(evaluation: Evaluation, mode: int) -> Saving:
     """What adaptive MUSIC saves in a mode against MUSIC at its base wake-up time."""
     fixed_j = _fixed_by_method(evaluation, mode, "energy_j")["music"]
-    return cost.Saving(per_trip_j=fixed_j - _adaptive(evaluation, mode, "energy_j"))
+    adaptive_j = _adaptive(evaluation, mode, "energy_j")
+    return Saving(per_trip_j=fixed_j - adaptive_j, trips_per_day=trips_per_day())
 
 
 def _e5(evaluation: Evaluation) -> Finding:
@@ -303,7 +306,7 @@ def _e6(evaluation: Evaluation) -> Finding:
 
 
 def _d1(evaluation: Evaluation) -> Finding:
-    found = answer(evaluation.campaign("R"), Query(max_energy_j=210.0))
+    found = explore(evaluation.campaign("R"), Query(**of_claim("d1_budget_210_j", "query")))
     if found.is_empty():
         return Finding(None, (RADIO, ENERGY), note="No mode is within the budget.")
     best = found.row(0, named=True)
@@ -314,7 +317,9 @@ def _d1(evaluation: Evaluation) -> Finding:
 
 
 def _d2(evaluation: Evaluation) -> Finding:
-    found = answer(evaluation.campaign("R"), Query(max_energy_j=260.0, max_rms_m=0.15))
+    found = explore(
+        evaluation.campaign("R"), Query(**of_claim("d2_budget_260_j_rms_015_m", "query"))
+    )
     return Finding(
         sorted(found["mode"].to_list()),
         fitted=(RADIO, ENERGY),
@@ -327,11 +332,11 @@ def _d2(evaluation: Evaluation) -> Finding:
 
 
 def _c1(_: Evaluation) -> Finding:
-    return Finding(cost.sensor_cost_ratio())
+    return Finding(sensor_cost_ratio())
 
 
 def _c2(_: Evaluation) -> Finding:
-    four = cost.roadside_units(4)
+    four = roadside_units(4)
     return Finding(
         {
             "capital_low": four.capital_low_usd,

@@ -1,16 +1,16 @@
-"""Commands that take or make recordings: ``scan``, ``synth``, ``locate``."""
+"""Commands that make and locate recorded drives: ``synth``, ``locate``."""
 
 from __future__ import annotations
 
-import json
 import math
-from pathlib import Path  # noqa: TC003 (Typer reads annotations at run time)
+from pathlib import Path
 from typing import TYPE_CHECKING, Annotated
 
 import typer
 
+from access_av.commands.options import Out, ScenarioArgument
 from access_av.errors import InputError
-from access_av.terminal import console, errors, show_cells
+from access_av.terminal import console, errors
 
 if TYPE_CHECKING:
     from access_av.drives import Drive
@@ -21,90 +21,10 @@ MOST_REMARKS = 10
 
 
 @app.command(
-    epilog="Example: [bold]access-av scan captures/*.sigmf-meta --json[/]",
-)
-def scan(
-    recordings: Annotated[
-        list[Path],
-        typer.Argument(help="SigMF recordings; with --sample-rate-hz one raw cf32 file a channel."),
-    ],
-    ssb_freq_hz: Annotated[
-        float | None,
-        typer.Option(min=0.0, help="Centre of the SSB; else the raster is searched."),
-    ] = None,
-    scs_khz: Annotated[
-        int | None, typer.Option(help="Subcarrier spacing, 15 or 30; else both are tried.")
-    ] = None,
-    centre_hz: Annotated[
-        float | None, typer.Option(min=0.0, help="Centre of the recording; else as recorded.")
-    ] = None,
-    sample_rate_hz: Annotated[
-        float | None, typer.Option(help="The files are raw cf32, and this is their rate.")
-    ] = None,
-    spacing_wavelengths: Annotated[
-        float | None,
-        typer.Option(min=0.01, max=10.0, help="Antenna spacing; else as recorded, or 0.5."),
-    ] = None,
-    calibration: Annotated[
-        str | None,
-        typer.Option(
-            metavar="GAINS", help="Gain of each channel, as 1,0.9+0.2j,1j,-1; else as recorded."
-        ),
-    ] = None,
-    unconfirmed: Annotated[
-        bool, typer.Option(help="Also SSBs too weak for their message to be decoded.")
-    ] = False,
-    as_json: Annotated[bool, typer.Option("--json", help="Print JSON.")] = False,
-) -> None:
-    """Find every SSB in recordings of cells that nobody has described.
-
-    Prints cell, beam, time, frequency offset, strength and message of each SSB whose message passes
-    its checksum, and with several channels the angle it arrives from. Channels that are clipped,
-    silent or exchanged are named.
-    """
-    from access_av import nr
-    from access_av._core import Recording
-
-    gains = None if calibration is None else _gains(calibration)
-    if sample_rate_hz is not None:
-        opened = [Recording.open_raw(recordings, sample_rate_hz=sample_rate_hz)]
-    else:
-        opened = [Recording.open(path) for path in recordings]
-    found = []
-    for path, recording in zip(recordings, opened, strict=False):
-        for warning in recording.warnings:
-            errors.print(f"[yellow]warning:[/] {warning}", soft_wrap=True)
-        result = nr.scan_as_recorded(
-            recording,
-            spacing_wavelengths=spacing_wavelengths,
-            calibration=gains,
-            centre_frequency_hz=centre_hz,
-            ssb_freq_hz=ssb_freq_hz,
-            scs_khz=scs_khz,
-        )
-        for fault in result.faults:
-            errors.print(f"[yellow]warning:[/] {path}: {fault}", soft_wrap=True)
-        cells = [nr.record(cell) for cell in result.cells]
-        weak = [] if unconfirmed else [cell for cell in cells if cell["mib_bits"] is None]
-        cells = [cell for cell in cells if cell not in weak]
-        found += [{"recording": str(path), **cell} for cell in cells]
-        if as_json:
-            continue
-        if cells:
-            show_cells(path.name, cells)
-        else:
-            console.print(f"{path}: no SSB found.", soft_wrap=True)
-        if weak:
-            console.print(f"{len(weak)} more without a message: --unconfirmed lists them.")
-    if as_json:
-        print(json.dumps(found, indent=2))
-
-
-@app.command(
     epilog="Example: [bold]access-av synth paper-real-odometry-2 --out drive --duration-s 20[/]",
 )
 def synth(
-    scenario: Annotated[str, typer.Argument(help="Shipped name, or path of a TOML file.")],
+    scenario: ScenarioArgument,
     out: Annotated[Path, typer.Option(help="Directory for the files.")],
     duration_s: Annotated[
         float | None, typer.Option(min=0.02, help="From the start on; else the whole drive.")
@@ -147,9 +67,7 @@ def locate(
     recording: Annotated[Path, typer.Option(help="SigMF recording, or CSV log of angles.")],
     odometry: Annotated[Path, typer.Option(help="CSV, or MCAP with nav_msgs/Odometry.")],
     site: Annotated[Path, typer.Option(help="TOML: radio heads, road, array.")],
-    out: Annotated[
-        Path | None, typer.Option(help="Directory for the files; else a new one in results/.")
-    ] = None,
+    out: Out = None,
     truth: Annotated[
         Path | None, typer.Option(help="TUM trajectory to compare with, where there is one.")
     ] = None,
@@ -246,12 +164,3 @@ def _pose(text: str) -> tuple[float, float, float]:
     if not all(map(math.isfinite, (x_m, y_m, heading_rad))):
         raise InputError(f"--start {text}: the numbers must be finite")
     return x_m, y_m, heading_rad
-
-
-def _gains(text: str) -> list[complex]:
-    try:
-        return [complex(part.replace(" ", "")) for part in text.split(",")]
-    except ValueError as error:
-        raise InputError(
-            f"--calibration {text}: write one complex number a channel, as 1,0.9+0.2j,1j,-1"
-        ) from error

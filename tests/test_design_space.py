@@ -4,7 +4,7 @@ import polars as pl
 import pytest
 
 import synthetic
-from access_av.explore import Query, answer, pareto_front
+from access_av.design_space import Query, explore, pareto_front
 
 
 @pytest.fixture(scope="module")
@@ -13,28 +13,28 @@ def points() -> pl.DataFrame:
 
 
 def test_budget_of_210_j_leaves_mode_7(points: pl.DataFrame) -> None:
-    assert answer(points, Query(max_energy_j=210.0))["mode"].to_list() == [7]
+    assert explore(points, Query(max_energy_j=210.0))["mode"].to_list() == [7]
 
 
 def test_answers_come_by_energy(points: pl.DataFrame) -> None:
-    found = answer(points, Query())
+    found = explore(points, Query())
     assert found.height == 8
     assert found["energy_j"].is_sorted()
 
 
 def test_every_bound_is_kept(points: pl.DataFrame) -> None:
-    found = answer(
+    found = explore(
         points, Query(max_energy_j=260.0, max_rms_m=0.15, max_worst_m=0.2, max_executions=350)
     )
     assert sorted(found["mode"]) == [2, 3]
 
 
 def test_modes_can_be_chosen(points: pl.DataFrame) -> None:
-    assert sorted(answer(points, Query(modes=[1, 4]))["mode"]) == [1, 4]
+    assert sorted(explore(points, Query(modes=[1, 4]))["mode"]) == [1, 4]
 
 
 def test_nothing_may_qualify(points: pl.DataFrame) -> None:
-    assert answer(points, Query(max_energy_j=1.0)).is_empty()
+    assert explore(points, Query(max_energy_j=1.0)).is_empty()
 
 
 def test_a_query_reads_as_a_sentence() -> None:

@@ -7,13 +7,13 @@ from typing import TYPE_CHECKING
 
 import polars as pl
 
-from access_av.claims import Claim, as_records, check_claims
 from access_av.errors import InputError
-from access_av.evaluate import Evaluation, evaluate, require_energy
 from access_av.files import RESULTS, ResultsDirectory
-from access_av.fit import demands, fit_energy
+from access_av.paper.claims import Claim, as_records, check_claims
+from access_av.paper.energy_fit import demands, fit_energy
+from access_av.paper.evaluation import Evaluation, evaluate, require_energy
+from access_av.paper.report.page import render
 from access_av.platform import Figure, Platform
-from access_av.report import render
 
 if TYPE_CHECKING:
     from collections.abc import Callable
@@ -84,7 +84,7 @@ def fit_platform(
 
     See Also
     --------
-    access_av.fit.fit_energy : How.
+    access_av.paper.energy_fit.fit_energy : How.
     """
     board = Platform.load(platform)
     executions = evaluate(scenario, board, runs=runs, seed=seed, threads=threads, progress=progress)

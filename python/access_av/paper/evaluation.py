@@ -18,11 +18,12 @@ from typing import TYPE_CHECKING, Any
 import numpy as np
 import polars as pl
 
-from access_av import facts
+from access_av._core import Scenario
 from access_av.errors import InputError
-from access_av.methods import METHODS
+from access_av.paper.methods import METHODS
+from access_av.paper.statements import paper_numbers
 from access_av.platform import Platform, PowerMode
-from access_av.simulation import Scenario, simulate
+from access_av.simulation import simulate
 
 if TYPE_CHECKING:
     from collections.abc import Callable, Mapping
@@ -38,7 +39,7 @@ class Setting:
 
     method: str
     adaptive: bool
-    wake_up_ms: float
+    base_wake_up_ms: float
 
     def apply(self, scenario: Scenario, mode: PowerMode) -> Scenario:
         """The scenario with this method and wake-up policy, in a power mode."""
@@ -47,9 +48,9 @@ class Setting:
             "platform.mode": mode.number,
         }
         if self.adaptive:
-            changes |= {"wake_up.policy": "pid", "wake_up.base_ms": self.wake_up_ms}
+            changes |= {"wake_up.policy": "pid", "wake_up.base_ms": self.base_wake_up_ms}
         else:
-            changes |= {"wake_up.policy": "fixed", "wake_up.interval_ms": self.wake_up_ms}
+            changes |= {"wake_up.policy": "fixed", "wake_up.interval_ms": self.base_wake_up_ms}
         return scenario.with_overrides(changes)
 
 
@@ -66,17 +67,23 @@ def cases(platform: Platform) -> list[Case]:
     """Every operating point of the three campaigns on a platform."""
     for mode in platform.modes:
         _require(platform, mode, "base_wake_up_ms", mode.base_wake_up_ms)
-    ssb_ms = facts.load("paper")["wake_up"]["ssb_period_ms"]
+    ssb_ms = paper_numbers()["wake_up"]["ssb_period_ms"]
     every_ssb = [
-        Case("P", Setting(method, adaptive=False, wake_up_ms=ssb_ms)) for method in METHODS
+        Case("P", Setting(method, adaptive=False, base_wake_up_ms=ssb_ms)) for method in METHODS
     ]
     fixed = [
-        Case("Q", Setting(method, adaptive=False, wake_up_ms=mode.base_wake_up_ms[method]), mode)
+        Case(
+            "Q", Setting(method, adaptive=False, base_wake_up_ms=mode.base_wake_up_ms[method]), mode
+        )
         for mode in platform.modes
         for method in METHODS
     ]
     adaptive = [
-        Case("R", Setting("music", adaptive=True, wake_up_ms=mode.base_wake_up_ms["music"]), mode)
+        Case(
+            "R",
+            Setting("music", adaptive=True, base_wake_up_ms=mode.base_wake_up_ms["music"]),
+            mode,
+        )
         for mode in platform.modes
     ]
     return every_ssb + fixed + adaptive
@@ -89,16 +96,11 @@ class Evaluation:
     Attributes
     ----------
     points
-        One row per operating point: ``campaign`` (P, Q, R), ``mode``, ``mode_name``, ``method``,
-        ``adaptive``, ``wake_up_ms``, ``executions`` (mean over the runs), ``worst_error_x_m`` and
-        ``worst_error_y_m`` (mean over the runs of the absolute error, worst along the track),
-        ``rms_error_m`` (horizontal, over track and runs), ``energy_per_execution_j``,
-        ``energy_j`` and ``energy_provenance``.
+        One row per operating point; columns ``operating_points`` of :mod:`access_av.columns`.
     errors
-        One row per setting and time: ``method``, ``adaptive``, ``wake_up_ms``, ``time_s``,
-        ``error_x_m``, ``error_y_m`` (means over the runs of the absolute error).
+        Mean errors, one row per setting and time; columns ``errors``.
     snr
-        ``time_s``, ``snr_db`` (mean over the runs, per antenna and sample).
+        SNR along the track; columns ``snr``.
     """
 
     points: pl.DataFrame
@@ -116,13 +118,15 @@ class Evaluation:
 
     def series(self, point: Mapping[str, Any]) -> pl.DataFrame:
         """Errors against time at an operating point."""
-        keys = ("method", "adaptive", "wake_up_ms")
+        keys = ("method", "adaptive", "base_wake_up_ms")
         return self.errors.filter(*(pl.col(key) == point[key] for key in keys))
 
     def horizontal_error_m(self, point: Mapping[str, Any]) -> NDArray[np.float64]:
         """Mean absolute errors in X and Y, put together, against time."""
         series = self.series(point)
-        x_m, y_m = (series[name].to_numpy() for name in ("error_x_m", "error_y_m"))
+        x_m, y_m = (
+            series[name].to_numpy() for name in ("mean_abs_error_x_m", "mean_abs_error_y_m")
+        )
         return np.asarray(np.hypot(x_m, y_m), dtype=np.float64)
 
 
@@ -157,6 +161,14 @@ def evaluate(
     -------
     Evaluation
         Operating points, errors against time, SNR along the track.
+
+    Examples
+    --------
+    >>> found = evaluate(runs=1, seed=1)
+    >>> found.points["campaign"].unique().sort().to_list()
+    ['P', 'Q', 'R']
+    >>> found.campaign("R").height
+    8
     """
     started = time.monotonic()
     scenario = Scenario.load(scenario) if isinstance(scenario, str) else scenario
@@ -179,7 +191,7 @@ def evaluate(
     return Evaluation(
         points=pl.DataFrame([_point(case, results[case.setting]) for case in wanted]),
         errors=pl.concat([_errors(setting, result) for setting, result in results.items()]),
-        snr=reference.steps.select("time_s", pl.col("mean_snr_db").alias("snr_db")),
+        snr=reference.steps.select("time_s", "mean_true_snr_db"),
         scenario=scenario,
         platform=platform,
         runs=runs,
@@ -219,16 +231,16 @@ def _point(case: Case, result: Simulation) -> dict[str, Any]:
     ).row(0)
     per_execution = case.mode.energy_per_execution_j.get(case.setting.method) if case.mode else None
     # Idle and listening power do not depend on the mode; they count where the platform says so.
-    besides_j = float(
-        result.runs.select((pl.col("energy_j") - pl.col("energy_executions_j")).mean()).item()
-    )
+    besides_j = result.runs.select(
+        (pl.col("energy_j") - pl.col("energy_executions_j")).mean()
+    ).item()
     return {
         "campaign": case.campaign,
         "mode": case.mode.number if case.mode else None,
         "mode_name": case.mode.name if case.mode else None,
         "method": case.setting.method,
         "adaptive": case.setting.adaptive,
-        "wake_up_ms": case.setting.wake_up_ms,
+        "base_wake_up_ms": case.setting.base_wake_up_ms,
         "executions": executions,
         "worst_error_x_m": worst_x_m,
         "worst_error_y_m": worst_y_m,
@@ -243,8 +255,8 @@ def _errors(setting: Setting, result: Simulation) -> pl.DataFrame:
     return result.steps.select(
         pl.lit(setting.method).alias("method"),
         pl.lit(setting.adaptive).alias("adaptive"),
-        pl.lit(setting.wake_up_ms).alias("wake_up_ms"),
+        pl.lit(setting.base_wake_up_ms).alias("base_wake_up_ms"),
         pl.col("time_s"),
-        pl.col("mean_abs_error_x_m").alias("error_x_m"),
-        pl.col("mean_abs_error_y_m").alias("error_y_m"),
+        "mean_abs_error_x_m",
+        "mean_abs_error_y_m",
     )

@@ -3,9 +3,10 @@ from __future__ import annotations
 import pytest
 
 import synthetic
-from access_av import facts, study
-from access_av.fit import ModeDemand, fit_energy
-from access_av.methods import METHODS
+from access_av.paper import study
+from access_av.paper.energy_fit import ModeDemand, fit_energy
+from access_av.paper.methods import METHODS
+from access_av.paper.statements import paper_numbers
 from access_av.platform import Platform
 
 Energies = dict[int, dict[str, float]]
@@ -30,7 +31,7 @@ def energies(demands: dict[int, ModeDemand]) -> Energies:
 
 
 def test_mode_0_meets_the_stated_sums(demands: dict[int, ModeDemand], energies: Energies) -> None:
-    stated = facts.load("paper")["energy_j"]
+    stated = paper_numbers()["energy_j"]
     for method in METHODS:
         total_j = energies[0][method] * demands[0].fixed_executions[method]
         assert total_j == pytest.approx(stated["fixed_mode_0"][method], rel=0.05)

@@ -38,17 +38,12 @@ class ErrorBound:
     scenario
         The scenario.
     route
-        One row per SSB of the drive: ``time_s``, ``along_m``, ``x_m``, ``y_m``, ``bound_m`` (least
-        root mean square of the horizontal error), ``along_std_m``, ``across_std_m``,
-        ``heading_std_rad``, ``odometer_scale_std``.
+        One row per SSB of the drive; columns ``bound_route`` of :mod:`access_av.columns`.
     heads
-        One row per radio head: ``name``, ``pci``, ``ssb_index``, ``x_m``, ``y_m``, the range of
-        its distance and of its SNR along the route, and ``visible_share``, the share of the
-        route's SSBs above :data:`VISIBLE_SNR_DB`.
+        One row per radio head; columns ``bound_heads``.
     site
-        The bound over the site: ``x_m`` and ``y_m``, middles of squares of ``map_step_m``, and
-        ``bound_m``, null where the radio heads leave a direction open. Of a vehicle that has
-        listened for ``map_looks`` independent looks, knows its heading to
+        The bound over the site, one row per square of ``map_step_m``; columns ``bound_map``. Of a
+        vehicle that has listened for ``map_looks`` independent looks, knows its heading to
         ``map_heading_std_rad`` and nothing of its place.
     """
 
@@ -160,8 +155,8 @@ def _heads(core: _core.Bound, settings: list[dict[str, Any]], route: pl.DataFram
                 "y_m": float(head_y_m),
                 "nearest_m": float(distance_m.min()),
                 "farthest_m": float(distance_m.max()),
-                "least_snr_db": float(snr_db.min()),
-                "most_snr_db": float(snr_db.max()),
+                "least_expected_snr_db": float(snr_db.min()),
+                "most_expected_snr_db": float(snr_db.max()),
                 "visible_share": float((snr_db >= VISIBLE_SNR_DB).mean()),
             }
         )

@@ -23,19 +23,18 @@ from __future__ import annotations
 from dataclasses import dataclass
 from typing import TYPE_CHECKING
 
-from access_av import facts
 from access_av.errors import InputError
-from access_av.methods import METHODS
+from access_av.paper.methods import METHODS
+from access_av.paper.statements import of_claim, paper_numbers
 
 if TYPE_CHECKING:
     from collections.abc import Mapping
 
-    from access_av.evaluate import Evaluation
+    from access_av.paper.evaluation import Evaluation
 
-BUDGET_MODE_7_J = 210.0
-BUDGET_WIDE_J = 260.0
-WITHIN_WIDE_BUDGET = (2, 3, 6)
 HIGH_SAVING_MODES = (6, 7)
+# Claims of the budget that only mode 7 keeps, and of the wide one that the modes it lists keep.
+NARROW_BUDGET, WIDE_BUDGET = "d1_budget_210_j", "d2_budget_260_j_rms_015_m"
 # Distance kept from a stated bound, so that another seed does not cross it.
 MARGIN = 0.02
 
@@ -102,7 +101,7 @@ def fit_energy(modes: Mapping[int, ModeDemand]) -> dict[int, dict[str, float]]:
     InputError
         When a mode that the paper gives figures for is missing.
     """
-    needed = {0, 7, *WITHIN_WIDE_BUDGET}
+    needed = {0, 7, *of_claim(WIDE_BUDGET)}
     if not needed <= modes.keys():
         raise InputError(
             f"the platform has the modes {sorted(modes)}; the fit needs {sorted(needed)}, "
@@ -125,11 +124,14 @@ def fit_energy(modes: Mapping[int, ModeDemand]) -> dict[int, dict[str, float]]:
 
 
 def _fit_music(modes: Mapping[int, ModeDemand]) -> dict[int, float]:
-    stated = facts.load("paper")["energy_j"]
+    sums_j = paper_numbers()["energy_j"]
+    narrow_j, wide_j = (
+        float(of_claim(claim, "query")["max_energy_j"]) for claim in (NARROW_BUDGET, WIDE_BUDGET)
+    )
     zero = modes[0]
-    most_j = stated["fixed_mode_0"]["music"]
+    most_j = sums_j["fixed_mode_0"]["music"]
     energy_0 = most_j / zero.fixed_executions["music"]
-    energies = {0: energy_0, 7: stated["adaptive_mode_7"] / modes[7].adaptive_executions}
+    energies = {0: energy_0, 7: sums_j["adaptive_mode_7"] / modes[7].adaptive_executions}
     for mode, demand in modes.items():
         if mode in energies:
             continue
@@ -138,10 +140,8 @@ def _fit_music(modes: Mapping[int, ModeDemand]) -> dict[int, float]:
             * (demand.base_wake_up_s["music"] / zero.base_wake_up_s["music"])
             * (busy_core_power_w(demand.cpu_hz) / busy_core_power_w(zero.cpu_hz))
         )
-        if mode in WITHIN_WIDE_BUDGET:
-            low_j, high_j = BUDGET_MODE_7_J, BUDGET_WIDE_J
-        else:
-            low_j, high_j = BUDGET_WIDE_J, float("inf")
+        within = mode in of_claim(WIDE_BUDGET)
+        low_j, high_j = (narrow_j, wide_j) if within else (wide_j, float("inf"))
         low = low_j * (1.0 + MARGIN) / demand.adaptive_executions
         high = min(
             high_j * (1.0 - MARGIN) / demand.adaptive_executions,
@@ -153,11 +153,11 @@ def _fit_music(modes: Mapping[int, ModeDemand]) -> dict[int, float]:
 
 def _power_ratios_in_mode_0(modes: Mapping[int, ModeDemand], music_j: float) -> dict[str, float]:
     """Power of each method while it computes, relative to MUSIC, in mode 0."""
-    stated = facts.load("paper")["energy_j"]["fixed_mode_0"]
+    fixed_j = paper_numbers()["energy_j"]["fixed_mode_0"]
     zero = modes[0]
     music_w = music_j / zero.base_wake_up_s["music"]
     return {
-        method: stated[method]
+        method: fixed_j[method]
         / zero.fixed_executions[method]
         / zero.base_wake_up_s[method]
         / music_w
@@ -174,7 +174,7 @@ def _common_factor(
     modes: Mapping[int, ModeDemand], music: Mapping[int, float], ratio: Mapping[str, float]
 ) -> float:
     """Solve the average saving for the factor; the saving is linear in its inverse."""
-    wanted: float = facts.load("paper")["claims"]["e4_average_saving_percent"]["stated"] / 100.0
+    wanted: float = of_claim("e4_average_saving_percent") / 100.0
     constant = scaled = 0.0
     for mode, demand in modes.items():
         adaptive_j = music[mode] * demand.adaptive_executions

@@ -51,13 +51,13 @@ class Query:
         return " and ".join(parts) or "any operating point"
 
 
-def answer(points: pl.DataFrame, query: Query) -> pl.DataFrame:
+def explore(points: pl.DataFrame, query: Query) -> pl.DataFrame:
     """Operating points that meet a query, the one with the least energy first.
 
     Parameters
     ----------
     points
-        Operating points as :func:`access_av.evaluate.evaluate` gives them.
+        Operating points as :func:`access_av.evaluate` gives them.
     query
         The bounds.
 
@@ -65,6 +65,14 @@ def answer(points: pl.DataFrame, query: Query) -> pl.DataFrame:
     -------
     polars.DataFrame
         The rows that qualify, by energy, then by error. May be empty.
+
+    Examples
+    --------
+    >>> points = pl.DataFrame(
+    ...     {"mode": [0, 1], "energy_j": [256.0, 207.0], "rms_error_m": [0.12, 0.17]}
+    ... )
+    >>> explore(points, Query(max_rms_m=0.15))["mode"].to_list()
+    [0]
     """
     bounds = {
         "energy_j": query.max_energy_j,

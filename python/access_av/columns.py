@@ -1,0 +1,465 @@
+"""The columns of every table that is written or returned: one name for one quantity.
+
+:data:`GLOSSARY` says once what a name means; :data:`TABLES` says which names a table has and when a
+value is null. Nothing else is in a table, and no value is NaN. ``docs/columns.md`` is made from
+this, and tests hold what is really produced to it.
+
+Examples
+--------
+>>> from access_av import columns
+>>> columns.TABLES["executions"].null["angle_rad"]
+'the snapshots carry no angle'
+>>> columns.GLOSSARY["covariance_xy_m2"].unit
+'m²'
+"""
+
+from __future__ import annotations
+
+from dataclasses import dataclass, field
+from typing import TYPE_CHECKING, Any
+
+from access_av.errors import InputError
+
+if TYPE_CHECKING:
+    from collections.abc import Mapping
+
+
+@dataclass(frozen=True)
+class Column:
+    """What a column's name means, in whatever table it stands."""
+
+    name: str
+    unit: str
+    meaning: str
+
+
+@dataclass(frozen=True)
+class Table:
+    """A table: what a row is, where it is found, its columns in order, when a value is null."""
+
+    name: str
+    row: str
+    where: str
+    columns: tuple[str, ...]
+    null: Mapping[str, str] = field(default_factory=dict)
+
+    def records(self) -> list[dict[str, str]]:
+        """Name, unit, meaning and null-when of each column."""
+        return [
+            {**vars(GLOSSARY[name]), "null": self.null.get(name, "never")} for name in self.columns
+        ]
+
+
+# A unit of 1 is a count, a number without a unit or an index; text and truth values say so.
+_GLOSSARY = {
+    # Time, run, place.
+    "run": ("1", "Number of the run"),
+    "runs": ("1", "How many runs the row is of"),
+    "time_s": ("s", "Time from the start of the drive, or by the recording's clock"),
+    "x_m": ("m", "Place, x in the map's frame; of a drive, as estimated"),
+    "y_m": ("m", "Place, y in the map's frame; of a drive, as estimated"),
+    "heading_rad": ("rad", "Heading, counter-clockwise from +x; of a drive, as estimated"),
+    "speed_mps": ("m/s", "Speed along the vehicle's heading"),
+    "true_x_m": ("m", "True place, x"),
+    "true_y_m": ("m", "True place, y"),
+    "true_heading_rad": ("rad", "True heading"),
+    "along_m": ("m", "Distance along the road from its start"),
+    "distance_m": ("m", "Distance driven, by the odometer"),
+    "yaw_rate_radps": ("rad/s", "Yaw rate, by the gyroscope"),
+    "searching": ("true or false", "The first pose is not known yet"),
+    # Errors of the position.
+    "error_x_m": ("m", "Estimate minus truth, x"),
+    "error_y_m": ("m", "Estimate minus truth, y"),
+    "error_m": ("m", "Horizontal error: distance between estimate and truth"),
+    "mean_abs_error_x_m": ("m", "Mean over the runs of the absolute error in x"),
+    "mean_abs_error_y_m": ("m", "Mean over the runs of the absolute error in y"),
+    "worst_error_x_m": ("m", "Largest mean_abs_error_x_m along the track"),
+    "worst_error_y_m": ("m", "Largest mean_abs_error_y_m along the track"),
+    "rms_error_m": ("m", "Root mean square of the horizontal error over all the row stands for"),
+    "max_error_m": ("m", "Largest horizontal error"),
+    "final_error_m": ("m", "Horizontal error at the end"),
+    "p50_error_m": ("m", "Median of the horizontal error over the runs"),
+    "p90_error_m": ("m", "90th percentile of the horizontal error over the runs"),
+    "p99_error_m": ("m", "99th percentile of the horizontal error over the runs"),
+    "rms_heading_error_rad": ("rad", "Root mean square of the heading error over the runs"),
+    # What the localizer says of its own error.
+    "covariance_xx_m2": ("m²", "Variance of x, by the localizer"),
+    "covariance_yy_m2": ("m²", "Variance of y, by the localizer"),
+    "covariance_xy_m2": ("m²", "Covariance of x and y, by the localizer"),
+    "covariance_heading_rad2": ("rad²", "Variance of the heading, by the localizer"),
+    "covariance_x_heading_m_rad": ("m·rad", "Covariance of x and heading, by the localizer"),
+    "covariance_y_heading_m_rad": ("m·rad", "Covariance of y and heading, by the localizer"),
+    "protection_level_m": ("m", "Horizontal protection level"),
+    "integrity": ("text", "State of integrity: ok, degraded, unavailable"),
+    "nees": (
+        "1",
+        "Normalised estimation error squared of the position; 2 on average if consistent",
+    ),
+    "mean_nees": ("1", "Mean of nees over the runs"),
+    "band_low": ("1", "Low end of the 95 % band of mean_nees of a consistent localizer"),
+    "band_high": ("1", "High end of it"),
+    "in_band": ("true or false", "mean_nees is within the band"),
+    # SSBs, SNR, angles.
+    "pci": ("1", "Physical cell identity"),
+    "ssb_index": ("1", "Index of the SSB: the beam"),
+    "snr_db": ("dB", "SNR that the receiver measured of the SSB or burst"),
+    "estimator_snr_db": ("dB", "SNR per antenna and snapshot that the angle estimator found"),
+    "true_snr_db": ("dB", "SNR of the strongest radio head by link budget and shadowing"),
+    "mean_true_snr_db": ("dB", "Mean over the runs of true_snr_db"),
+    "phase_rad": ("rad", "Electrical angle ω = 2π(d/λ)·cos θ between neighbouring antennas"),
+    "phase_sigma_rad": ("rad", "Standard deviation of phase_rad from noise"),
+    "angle_rad": ("rad", "Angle of arrival θ from the array's axis"),
+    "resolved": ("true or false", "The estimator vouches for the angle's standard deviation"),
+    "accepted": ("true or false", "The localizer used the angle"),
+    "reason": (
+        "text",
+        "Why the angle was taken or left: consistent, outlier, unusable, unknown radio head, "
+        "time reversed, excluded",
+    ),
+    "mahalanobis_squared": ("1", "Squared Mahalanobis distance of the angle from the expected one"),
+    "threshold": ("1", "The largest mahalanobis_squared that is accepted"),
+    # Wake-up and energy.
+    "wake_up_time_s": ("s", "Wake-up time in force"),
+    "base_wake_up_ms": ("ms", "Base wake-up time, or the fixed interval"),
+    "executions": ("1", "Angle estimates in a run; of several runs their mean"),
+    "listened": ("1", "SSB bursts listened to"),
+    "energy_j": ("J", "Energy of a run; of several runs their mean"),
+    "energy_executions_j": ("J", "Of it, for angle estimates"),
+    "energy_listening_j": ("J", "Of it, for listening"),
+    "energy_idle_j": ("J", "Of it, while idle"),
+    "energy_per_execution_j": ("J", "Energy of one angle estimate"),
+    "energy_provenance": (
+        "text",
+        "Where energy_per_execution_j is from: measured, fitted, datasheet, assumed",
+    ),
+    "found_s": ("s", "Time until the first pose was known"),
+    "found_m": ("m", "Distance driven until the first pose was known"),
+    # Bound.
+    "bound_m": ("m", "Least root mean square of the horizontal error of any localizer"),
+    "along_std_m": ("m", "Its part along the road"),
+    "across_std_m": ("m", "Its part across the road"),
+    "heading_std_rad": ("rad", "Least root mean square of the heading's error"),
+    "odometer_scale_std": ("1", "Least root mean square of the error of the odometer's scale"),
+    "nearest_m": ("m", "Least distance from the route"),
+    "farthest_m": ("m", "Largest distance from the route"),
+    "least_expected_snr_db": ("dB", "Least SNR on the route by the link budget alone"),
+    "most_expected_snr_db": ("dB", "Largest SNR on the route by the link budget alone"),
+    "visible_share": ("1", "Share of the route's SSBs that 3GPP wants detected (−6 dB or more)"),
+    # Operating points and claims.
+    "campaign": (
+        "text",
+        "P: every SSB; Q: fixed at what the computer manages; R: adaptive",
+    ),
+    "mode": ("1", "Power mode of the platform"),
+    "mode_name": ("text", "Its name"),
+    "method": ("text", "Angle-of-arrival method: music, esprit, root_music"),
+    "adaptive": ("true or false", "The wake-up time adapts"),
+    "id": ("text", "Short name"),
+    "says": ("text", "What the paper says"),
+    "where": ("text", "Section of the paper"),
+    "stated": ("any", "The paper's value: a number, a list or a table of numbers"),
+    "obtained": ("any", "Ours, in the same shape"),
+    "unit": ("text", "Unit of stated and obtained"),
+    "verdict": (
+        "text",
+        "Of a claim: reproduced or not reproduced; of an angle: resolved, or why it may not be "
+        "relied on",
+    ),
+    "fitted": ("true or false", "A parameter was chosen with the claim in view"),
+    "note": ("text", "What else there is to say"),
+    # Recordings.
+    "name": ("text", "Name of the radio head"),
+    "recording": ("text", "Path of the recording"),
+    "half_frame": ("1", "Half of the radio frame, 0 or 1"),
+    "sfn": ("1", "System frame number"),
+    "cfo_hz": ("Hz", "Carrier frequency offset"),
+    "sample_start": ("1", "Sample nearest to the beginning"),
+    "sample_offset": ("1", "What is left from sample_start to the beginning, in samples"),
+    "mib_bits": ("text", "The 24 bits of the message (MIB)"),
+    "ssb_freq_hz": ("Hz", "Centre of the SSB"),
+    "scs_khz": ("kHz", "Subcarrier spacing"),
+    "lmax": ("1", "SSB candidates in a half frame"),
+    "rsrp_dbfs": ("dB", "Received power of a resource element, a value per channel, to full scale"),
+    "rsrq_db": ("dB", "Received quality, a value per channel"),
+    "sinr_db": ("dB", "Signal to interference and noise, a value per channel"),
+    "angle_deg": ("°", "Angle of arrival from the array's axis"),
+    "azimuth_deg": ("°", "Azimuth from broadside, counter-clockwise: 90° − angle_deg"),
+    "azimuth_from_broadside_deg": ("°", "Azimuth from broadside, counter-clockwise"),
+    "sigma_deg": ("°", "Standard deviation of the angle from noise"),
+    "label": ("text", "The annotation's label"),
+    "truth_deg": ("°", "Annotated azimuth from broadside"),
+}
+
+GLOSSARY: Mapping[str, Column] = {
+    name: Column(name, unit, meaning) for name, (unit, meaning) in _GLOSSARY.items()
+}
+
+_NO_COVARIANCE = "the localizer does not know its own error"
+_NOT_GUARDED = "the localizer is not guarded"
+_NO_ANGLE = "the snapshots carry no angle"
+_NOT_COMPARED = "the angle was not compared with a prediction"
+_NOT_FOUND = "the first pose was not found"
+_NONE_KNOWS = "no run knows its pose yet"
+_NO_MODE = "every SSB (campaign P): no power mode"
+_NO_FIGURE = "the platform has no figure for the method"
+_NO_ARRAY = "one channel only; the key is absent then"
+_UNDECODED = "the message was not decoded"
+
+_ERRORS = (
+    "mean_abs_error_x_m", "mean_abs_error_y_m", "rms_error_m", "rms_heading_error_rad",
+    "mean_true_snr_db", "p50_error_m", "p90_error_m", "p99_error_m",
+)  # fmt: skip
+_COVARIANCES = (
+    "covariance_xx_m2", "covariance_yy_m2", "covariance_heading_rad2", "covariance_xy_m2",
+    "covariance_x_heading_m_rad", "covariance_y_heading_m_rad",
+)  # fmt: skip
+_ANGLE = ("phase_rad", "phase_sigma_rad", "angle_rad")
+_COMPARED = ("mahalanobis_squared", "threshold")
+_POSE = ("x_m", "y_m", "heading_rad")
+_POSES = (
+    "time_s", *_POSE, "speed_mps", "covariance_xx_m2", "covariance_xy_m2", "covariance_yy_m2",
+    "covariance_heading_rad2", "protection_level_m", "integrity", "searching",
+)  # fmt: skip
+_POSES_NULL = {
+    **{name: _NO_COVARIANCE for name in _POSES if name.startswith("covariance")},
+    "protection_level_m": _NOT_GUARDED,
+    "integrity": _NOT_GUARDED,
+}
+_ENERGIES = ("energy_j", "energy_executions_j", "energy_listening_j", "energy_idle_j")
+
+TABLES: Mapping[str, Table] = {
+    table.name: table
+    for table in (
+        Table(
+            "steps",
+            "An SSB, over all runs",
+            "`access_av.simulate(…).steps`",
+            ("time_s", *_ERRORS),
+            {name: _NONE_KNOWS for name in _ERRORS if name != "mean_true_snr_db"},
+        ),
+        Table(
+            "runs",
+            "A run",
+            "`access_av.simulate(…).runs`",
+            (
+                "run", "executions", "listened", *_ENERGIES, "rms_error_m", "max_error_m",
+                "final_error_m", "found_s", "found_m",
+            ),
+            {
+                **dict.fromkeys(_ENERGIES, _NO_FIGURE),
+                **dict.fromkeys(
+                    ("rms_error_m", "max_error_m", "final_error_m", "found_s", "found_m"),
+                    _NOT_FOUND,
+                ),
+            },
+        ),
+        Table(
+            "trajectories",
+            "An SSB of a run, with truth and estimate",
+            "`trajectories.parquet` of `access-av run`; `access_av.simulate(…).trajectories`",
+            (
+                "run", "time_s", *_POSE, "true_x_m", "true_y_m", "true_heading_rad", "error_x_m",
+                "error_y_m", "true_snr_db", *_COVARIANCES, "protection_level_m", "searching",
+                "integrity",
+            ),
+            {
+                **dict.fromkeys(_COVARIANCES, _NO_COVARIANCE),
+                "protection_level_m": _NOT_GUARDED,
+                "integrity": _NOT_GUARDED,
+            },
+        ),
+        Table(
+            "executions",
+            "An angle estimate, and what became of it",
+            "`executions.parquet` of `access-av run`; `access_av.simulate(…).executions`",
+            (
+                "run", "time_s", "pci", "ssb_index", "snr_db", *_ANGLE, "estimator_snr_db",
+                *_COMPARED, "wake_up_time_s", "resolved", "accepted", "reason",
+            ),
+            {
+                **dict.fromkeys((*_ANGLE, "estimator_snr_db"), _NO_ANGLE),
+                **dict.fromkeys(_COMPARED, _NOT_COMPARED),
+            },
+        ),
+        Table(
+            "nees",
+            "An SSB of a run",
+            "`access_av.statistics.nees(…)`",
+            ("run", "time_s", "nees"),
+            {"nees": f"{_NO_COVARIANCE}, or an area of it; or the first pose is not known yet"},
+        ),
+        Table(
+            "mean_nees",
+            "An SSB, over the runs that have a NEES",
+            "`access_av.statistics.mean_nees(…)`",
+            ("time_s", "runs", "mean_nees", "band_low", "band_high", "in_band"),
+        ),
+        Table(
+            "odometry",
+            "An odometry sample",
+            "`odometry.csv` of `access-av synth`; `access-av locate --odometry`",
+            ("time_s", "distance_m", "speed_mps", "yaw_rate_radps"),
+            {"yaw_rate_radps": "there is no gyroscope; the column is absent then"},
+        ),
+        Table(
+            "poses",
+            "An odometry sample, and where the vehicle was",
+            "`poses.parquet` of `access-av locate`; `access_av.locate(…).poses`",
+            _POSES,
+            _POSES_NULL,
+        ),
+        Table(
+            "smoothed",
+            "The same as seen from the end of the drive",
+            "`smoothed.parquet` of `access-av locate --smooth`; `access_av.locate(…).smoothed`",
+            _POSES,
+            {**_POSES_NULL, "protection_level_m": "always", "integrity": "always"},
+        ),
+        Table(
+            "angles",
+            "An angle, and what became of it",
+            "`angles.parquet` of `access-av locate`; `access_av.locate(…).angles`. A CSV log of "
+            "angles for `access-av locate --recording` has the first seven",
+            ("time_s", "pci", "ssb_index", "snr_db", *_ANGLE, "accepted", "reason", *_COMPARED),
+            {**dict.fromkeys(_ANGLE, _NO_ANGLE), **dict.fromkeys(_COMPARED, _NOT_COMPARED)},
+        ),
+        Table(
+            "located_errors",
+            "A pose whose truth is known",
+            "`access_av.drives.error_m(…)`",
+            ("time_s", "error_m"),
+        ),
+        Table(
+            "bound_route",
+            "An SSB of the drive, every SSB being used",
+            "`bound.parquet` of `access-av bound`; `access_av.bound(…).route`",
+            (
+                "time_s", "along_m", "x_m", "y_m", "bound_m", "along_std_m", "across_std_m",
+                "heading_std_rad", "odometer_scale_std",
+            ),
+        ),
+        Table(
+            "bound_map",
+            "A square of the site, at its middle",
+            "`map.parquet` of `access-av bound`; `access_av.bound(…).site`",
+            ("x_m", "y_m", "bound_m"),
+            {"bound_m": "the radio heads leave a direction open"},
+        ),
+        Table(
+            "bound_heads",
+            "A radio head",
+            "`access-av bound --json`; `access_av.bound(…).heads`",
+            (
+                "name", "pci", "ssb_index", "x_m", "y_m", "nearest_m", "farthest_m",
+                "least_expected_snr_db", "most_expected_snr_db", "visible_share",
+            ),
+        ),
+        Table(
+            "operating_points",
+            "An operating point of the evaluation",
+            "`operating_points.parquet` of `access-av evaluate`; `access-av explore --json`; "
+            "`access_av.evaluate(…).points`",
+            (
+                "campaign", "mode", "mode_name", "method", "adaptive", "base_wake_up_ms",
+                "executions", "worst_error_x_m", "worst_error_y_m", "rms_error_m",
+                "energy_per_execution_j", "energy_j", "energy_provenance",
+            ),
+            {
+                **dict.fromkeys(("mode", "mode_name"), _NO_MODE),
+                **dict.fromkeys(
+                    ("energy_per_execution_j", "energy_j", "energy_provenance"),
+                    f"{_NO_MODE}; or {_NO_FIGURE}",
+                ),
+            },
+        ),
+        Table(
+            "errors",
+            "A setting of the evaluation and an SSB",
+            "`errors.parquet` of `access-av evaluate`; `access_av.evaluate(…).errors`",
+            (
+                "method", "adaptive", "base_wake_up_ms", "time_s", "mean_abs_error_x_m",
+                "mean_abs_error_y_m",
+            ),
+        ),
+        Table(
+            "snr",
+            "An SSB, over all runs",
+            "`snr.parquet` of `access-av evaluate`; `access_av.evaluate(…).snr`",
+            ("time_s", "mean_true_snr_db"),
+        ),
+        Table(
+            "claims",
+            "A claim of the paper",
+            "`claims.json` of `access-av evaluate`",
+            (
+                "id", "says", "where", "stated", "obtained", "unit", "verdict", "fitted", "note",
+            ),
+            {"obtained": "the platform lacks a power mode, or nothing is within the budget"},
+        ),
+        Table(
+            "cells",
+            "An SSB found in a recording",
+            "`access-av scan --json`; all but `recording`: `access_av.nr.record(cell)`",
+            (
+                "recording", "pci", "ssb_index", "half_frame", "sfn", "cfo_hz", "snr_db",
+                "sample_start", "sample_offset", "mib_bits", "ssb_freq_hz", "scs_khz", "lmax",
+                "rsrp_dbfs", "rsrq_db", "sinr_db", "angle_deg", "azimuth_deg", "sigma_deg",
+                "verdict",
+            ),
+            {
+                **dict.fromkeys(("half_frame", "sfn", "mib_bits"), _UNDECODED),
+                **dict.fromkeys(("angle_deg", "azimuth_deg", "sigma_deg", "verdict"), _NO_ARRAY),
+            },
+        ),
+        Table(
+            "bursts",
+            "An annotated burst of a linear array's recording",
+            "`access-av aoa --json`",
+            (
+                "sample_start", "azimuth_from_broadside_deg", "sigma_deg", "snr_db", "label",
+                "truth_deg",
+            ),
+            {"truth_deg": "not annotated; the key is absent then"},
+        ),
+    )
+}  # fmt: skip
+
+
+def table(name: str) -> Table:
+    """A table by its name.
+
+    Raises
+    ------
+    InputError
+        When there is none; names those there are.
+    """
+    if name not in TABLES:
+        raise InputError(f"no table {name}; there are: {', '.join(TABLES)}")
+    return TABLES[name]
+
+
+def as_json(tables: list[Table]) -> dict[str, Any]:
+    """Tables as plain values."""
+    return {
+        table.name: {"row": table.row, "where": table.where, "columns": table.records()}
+        for table in tables
+    }
+
+
+def markdown() -> str:
+    """The text of ``docs/columns.md``."""
+    parts = [
+        "# Columns of every table",
+        "Made by `make docs`. The same quantity has the same name, unit and meaning everywhere. "
+        "Units are SI and stand in the name; a unit of 1 is a count or a number without one. What "
+        "is not known is null, never NaN. `access-av columns TABLE` prints the same.",
+    ]
+    for table in TABLES.values():
+        rows = [
+            f"| `{one['name']}` | {one['unit']} | {one['meaning']} | {one['null']} |"
+            for one in table.records()
+        ]
+        head = "| column | unit | meaning | null when |\n|---|---|---|---|"
+        parts += [f"## {table.name}", f"Row: {table.row[0].lower()}{table.row[1:]}. {table.where}."]
+        parts.append("\n".join([head, *rows]))
+    return "\n\n".join(parts) + "\n"

@@ -1,0 +1,127 @@
+"""Commands that look into recordings: ``scan``, ``aoa``."""
+
+from __future__ import annotations
+
+import json
+from pathlib import Path
+from typing import Annotated
+
+import typer
+
+from access_av.commands.options import AsJson
+from access_av.errors import InputError
+from access_av.terminal import console, errors, show_bursts, show_cells
+
+app = typer.Typer()
+
+
+@app.command(
+    epilog="Example: [bold]access-av scan captures/*.sigmf-meta --json[/]",
+)
+def scan(
+    recordings: Annotated[
+        list[Path],
+        typer.Argument(help="SigMF recordings; with --sample-rate-hz one raw cf32 file a channel."),
+    ],
+    ssb_freq_hz: Annotated[
+        float | None,
+        typer.Option(min=0.0, help="Centre of the SSB; else the raster is searched."),
+    ] = None,
+    scs_khz: Annotated[
+        int | None, typer.Option(help="Subcarrier spacing, 15 or 30; else both are tried.")
+    ] = None,
+    centre_hz: Annotated[
+        float | None, typer.Option(min=0.0, help="Centre of the recording; else as recorded.")
+    ] = None,
+    sample_rate_hz: Annotated[
+        float | None, typer.Option(help="The files are raw cf32, and this is their rate.")
+    ] = None,
+    spacing_wavelengths: Annotated[
+        float | None,
+        typer.Option(min=0.01, max=10.0, help="Antenna spacing; else as recorded, or 0.5."),
+    ] = None,
+    calibration: Annotated[
+        str | None,
+        typer.Option(
+            metavar="GAINS", help="Gain of each channel, as 1,0.9+0.2j,1j,-1; else as recorded."
+        ),
+    ] = None,
+    unconfirmed: Annotated[
+        bool, typer.Option(help="Also SSBs too weak for their message to be decoded.")
+    ] = False,
+    as_json: AsJson = False,
+) -> None:
+    """Find every SSB in recordings of cells that nobody has described.
+
+    Prints cell, beam, time, frequency offset, strength and message of each SSB whose message passes
+    its checksum, and with several channels the angle it arrives from. Channels that are clipped,
+    silent or exchanged are named.
+    """
+    from access_av import nr
+    from access_av._core import Recording
+
+    gains = None if calibration is None else _gains(calibration)
+    if sample_rate_hz is not None:
+        opened = [Recording.open_raw(recordings, sample_rate_hz=sample_rate_hz)]
+    else:
+        opened = [Recording.open(path) for path in recordings]
+    found = []
+    for path, recording in zip(recordings, opened, strict=False):
+        for warning in recording.warnings:
+            errors.print(f"[yellow]warning:[/] {warning}", soft_wrap=True)
+        result = nr.scan_as_recorded(
+            recording,
+            spacing_wavelengths=spacing_wavelengths,
+            calibration=gains,
+            centre_frequency_hz=centre_hz,
+            ssb_freq_hz=ssb_freq_hz,
+            scs_khz=scs_khz,
+        )
+        for fault in result.faults:
+            errors.print(f"[yellow]warning:[/] {path}: {fault}", soft_wrap=True)
+        cells = [nr.record(cell) for cell in result.cells]
+        weak = [] if unconfirmed else [cell for cell in cells if cell["mib_bits"] is None]
+        cells = [cell for cell in cells if cell not in weak]
+        found += [{"recording": str(path), **cell} for cell in cells]
+        if as_json:
+            continue
+        if cells:
+            show_cells(path.name, cells)
+        else:
+            console.print(f"{path}: no SSB found.", soft_wrap=True)
+        if weak:
+            console.print(f"{len(weak)} more without a message: --unconfirmed lists them.")
+    if as_json:
+        print(json.dumps(found, indent=2))
+
+
+@app.command(epilog="Example: [bold]access-av aoa captures/array1.sigmf-meta --json[/]")
+def aoa(
+    recording: Annotated[Path, typer.Argument(help="SigMF recording of a linear array.")],
+    spacing: Annotated[
+        float | None,
+        typer.Option(min=0.01, max=10.0, help="Antenna spacing in wavelengths; else as recorded."),
+    ] = None,
+    as_json: AsJson = False,
+) -> None:
+    """Estimate angles of arrival from a multi-antenna recording.
+
+    Reference bursts calibrate the channels, every other annotated burst is estimated. Azimuths
+    are counter-clockwise from the array's broadside.
+    """
+    from access_av.recorded_angles import estimate_bursts
+
+    bursts = estimate_bursts(recording, spacing_wavelengths=spacing)
+    if as_json:
+        print(json.dumps([burst.as_record() for burst in bursts], indent=2))
+    else:
+        show_bursts(bursts)
+
+
+def _gains(text: str) -> list[complex]:
+    try:
+        return [complex(part.replace(" ", "")) for part in text.split(",")]
+    except ValueError as error:
+        raise InputError(
+            f"--calibration {text}: write one complex number a channel, as 1,0.9+0.2j,1j,-1"
+        ) from error

@@ -1,0 +1,77 @@
+"""The command ``run``: drive one scenario."""
+
+from __future__ import annotations
+
+from typing import Annotated, Any
+
+import typer
+
+from access_av.commands.options import Out, Runs, ScenarioArgument, Seed, Threads
+from access_av.errors import InputError
+from access_av.terminal import console, progress, show_simulation
+from access_av.toml import tomllib
+
+app = typer.Typer()
+
+
+@app.command(
+    epilog="Example: [bold]access-av run paper --runs 10 --set channel.rician_k_db=10[/]",
+)
+def run(
+    scenario: ScenarioArgument,
+    runs: Runs = 1,
+    seed: Seed = 1,
+    threads: Threads = None,
+    out: Out = None,
+    overrides: Annotated[
+        list[str] | None,
+        typer.Option("--set", metavar="KEY=VALUE", help="Change one key; may be repeated."),
+    ] = None,
+) -> None:
+    """Drive one scenario and write its trajectories.
+
+    Writes trajectories.parquet, executions.parquet, trajectory.tum and truth.tum (the first run),
+    report.html, scenario.toml with every default, and manifest.json.
+    """
+    import polars as pl
+
+    from access_av._core import Scenario
+    from access_av.files import ResultsDirectory, tum_trajectory
+    from access_av.report.drive import render_drive
+    from access_av.simulation import simulate
+
+    chosen = Scenario.load(scenario)
+    if overrides:
+        chosen = chosen.with_overrides(dict(map(_override, overrides)))
+    directory = ResultsDirectory.create(f"run-{chosen.name}", out)
+    with progress("Driving") as tick:
+        result = simulate(
+            chosen, runs=runs, seed=seed, threads=threads, keep_trajectories=True, progress=tick
+        )
+    if result.trajectories is None or result.executions is None:  # they were asked for
+        raise RuntimeError("the simulation kept no trajectories")
+    directory.write_table("trajectories.parquet", result.trajectories)
+    directory.write_table("executions.parquet", result.executions)
+    first = result.trajectories.filter(run=0)
+    known = first.filter(~pl.col("searching"))
+    for name, poses, prefix in (("trajectory.tum", known, ""), ("truth.tum", first, "true_")):
+        columns = ("time_s", f"{prefix}x_m", f"{prefix}y_m", f"{prefix}heading_rad")
+        directory.write_text(name, tum_trajectory(*(poses[column] for column in columns)))
+    directory.write_text("report.html", render_drive(chosen, result, seed))
+    directory.write_text("scenario.toml", chosen.resolved().to_toml())
+    directory.write_manifest(scenario=chosen.name, runs=runs, seed=seed)
+    directory.link_latest()
+
+    show_simulation(result, title=f"{chosen.name}: {runs} runs, seed {seed}")
+    console.print(f"Report: {directory.path / 'report.html'}", soft_wrap=True)
+
+
+def _override(text: str) -> tuple[str, Any]:
+    """Split KEY=VALUE; the value is read as TOML, and as plain text where it is none."""
+    key, equals, value = text.partition("=")
+    if not equals or not key.strip():
+        raise InputError(f"--set {text}: write KEY=VALUE, for example channel.rician_k_db=10")
+    try:
+        return key.strip(), tomllib.loads(f"value = {value}")["value"]
+    except tomllib.TOMLDecodeError:
+        return key.strip(), value.strip()

@@ -1,0 +1,48 @@
+"""The ACCESS-AV paper: its numbers, its evaluation, its claims beside what is obtained.
+
+Everything outside of this package is general and knows nothing of it.
+
+Examples
+--------
+>>> from access_av import paper
+>>> paper.paper_numbers()["trip"]["length_m"]
+300.0
+"""
+
+from __future__ import annotations
+
+from typing import TYPE_CHECKING
+
+from access_av.lazy import attach
+
+if TYPE_CHECKING:
+    from access_av.paper import claims, energy_fit, evaluation, study
+    from access_av.paper.claims import Claim, check_claims
+    from access_av.paper.energy_fit import fit_energy
+    from access_av.paper.evaluation import Evaluation, evaluate
+    from access_av.paper.statements import paper_numbers
+
+__all__ = [
+    "Claim",
+    "Evaluation",
+    "check_claims",
+    "claims",
+    "energy_fit",
+    "evaluate",
+    "evaluation",
+    "fit_energy",
+    "paper_numbers",
+    "study",
+]
+
+if not TYPE_CHECKING:
+    __getattr__, __dir__ = attach(
+        __name__,
+        {
+            "access_av.paper.claims": ["Claim", "check_claims"],
+            "access_av.paper.energy_fit": ["fit_energy"],
+            "access_av.paper.evaluation": ["Evaluation", "evaluate"],
+            "access_av.paper.statements": ["paper_numbers"],
+        },
+        modules=["claims", "energy_fit", "evaluation", "study"],
+    )

@@ -1,0 +1,1 @@
+"""The report of the evaluation, a file per section."""

@@ -1,0 +1,45 @@
+"""What the paper states, as data: ``paper.toml``."""
+
+from __future__ import annotations
+
+from typing import Any
+
+from access_av.toml import shipped
+
+
+def paper_numbers() -> dict[str, Any]:
+    """The whole of ``paper.toml``: settings, energies, one entry per claim.
+
+    Examples
+    --------
+    >>> paper_numbers()["trip"]["duration_s"]
+    80.33
+    """
+    return shipped("paper", "paper.toml")
+
+
+def stated_claims() -> dict[str, Any]:
+    """The entries of the claims by their ids, in the paper's order."""
+    return dict(paper_numbers()["claims"])
+
+
+def of_claim(claim_id: str, key: str = "stated") -> Any:
+    """What the paper states in a claim, or another field of the claim's entry.
+
+    Examples
+    --------
+    >>> of_claim("e4_average_saving_percent")
+    43.09
+    """
+    return stated_claims()[claim_id][key]
+
+
+def trips_per_day() -> float:
+    """Trips of the paper's length that follow one another without a break in 24 hours.
+
+    Examples
+    --------
+    >>> round(trips_per_day(), 1)
+    1075.6
+    """
+    return 86_400.0 / float(paper_numbers()["trip"]["duration_s"])

@@ -1,0 +1,40 @@
+"""Statistics of simulated drives: consistency, integrity, and how far they are known.
+
+Examples
+--------
+>>> import access_av
+>>> from access_av import statistics
+>>> drives = access_av.simulate("paper-real-odometry-4", runs=5, keep_trajectories=True)
+>>> consistency = statistics.Consistency.of(drives.trajectories, skip=50)
+>>> bool(0.3 < consistency.anees < 3.0)
+True
+"""
+
+from access_av.statistics.alarms import Alarms
+from access_av.statistics.bootstrap import bootstrap_interval
+from access_av.statistics.consistency import (
+    Consistency,
+    horizontal_error_m,
+    mean_nees,
+    nees,
+    nees_band,
+)
+from access_av.statistics.distributions import beta_quantile, chi_squared_quantile
+from access_av.statistics.integrity import Integrity, stanford_counts
+from access_av.statistics.proportions import clopper_pearson, wilson
+
+__all__ = [
+    "Alarms",
+    "Consistency",
+    "Integrity",
+    "beta_quantile",
+    "bootstrap_interval",
+    "chi_squared_quantile",
+    "clopper_pearson",
+    "horizontal_error_m",
+    "mean_nees",
+    "nees",
+    "nees_band",
+    "stanford_counts",
+    "wilson",
+]

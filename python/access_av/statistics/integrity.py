@@ -1,0 +1,174 @@
+"""How protection levels and errors went together."""
+
+from __future__ import annotations
+
+from dataclasses import dataclass
+from typing import TYPE_CHECKING
+
+import numpy as np
+import polars as pl
+
+from access_av.statistics.bootstrap import bootstrap_interval
+from access_av.statistics.consistency import horizontal_error_m
+from access_av.statistics.proportions import clopper_pearson
+
+if TYPE_CHECKING:
+    from collections.abc import Mapping
+
+    from numpy.typing import NDArray
+
+STATES = ("ok", "degraded", "unavailable")
+
+
+@dataclass(frozen=True)
+class Integrity:
+    """How a guarded localizer kept its promises.
+
+    Attributes
+    ----------
+    runs
+        Number of runs with a protection level.
+    epochs
+        Number of steps with a protection level.
+    state_shares
+        Share of them in each state; that of ``ok`` is the availability.
+    median_level_over_error
+        Median of protection level by horizontal error.
+    exceedances
+        Steps in state ``ok`` whose error lay beyond the protection level.
+    runs_with_exceedances
+        Runs with at least one of them.
+    exceedance_share
+        ``exceedances`` by the steps in state ``ok``; 0 where there is none.
+    exceedance_interval
+        Its 95 % interval by the bootstrap over whole runs. Its high end is 0 where nothing
+        happened: then ``run_interval`` says how little that means.
+    run_interval
+        95 % interval of the share of runs with an exceedance, by Clopper and Pearson. Epochs of a
+        run hang together; runs do not.
+
+    Examples
+    --------
+    >>> trajectories = pl.DataFrame(
+    ...     {
+    ...         "run": [0, 0, 1, 1],
+    ...         "error_x_m": [0.3, 0.0, 0.6, 0.1],
+    ...         "error_y_m": [0.4, 0.2, 0.8, 0.0],
+    ...         "protection_level_m": [1.0, 0.1, 4.0, 0.4],
+    ...         "integrity": ["ok", "ok", "degraded", "ok"],
+    ...     }
+    ... )
+    >>> found = Integrity.of(trajectories)
+    >>> found.availability, found.exceedances, found.runs_with_exceedances
+    (0.75, 1, 1)
+    """
+
+    runs: int
+    epochs: int
+    state_shares: Mapping[str, float]
+    median_level_over_error: float
+    exceedances: int
+    runs_with_exceedances: int
+    exceedance_share: float
+    exceedance_interval: tuple[float, float]
+    run_interval: tuple[float, float]
+
+    @property
+    def availability(self) -> float:
+        """Share of the epochs in state ``ok``."""
+        return self.state_shares["ok"]
+
+    @classmethod
+    def of(cls, trajectories: pl.DataFrame) -> Integrity | None:
+        """Count in a table of trajectories; ``None`` where no step has a protection level."""
+        stated = _stated(trajectories)
+        if stated.is_empty():
+            return None
+        ok = pl.col("integrity") == "ok"
+        beyond = ok & (pl.col("error_m") > pl.col("protection_level_m"))
+        by_run = (
+            stated.group_by("run", maintain_order=True)
+            .agg(beyond.sum().alias("beyond"), ok.sum().alias("ok"))
+            .select("beyond", "ok")
+            .to_numpy()
+            .astype(np.float64)
+        )
+        runs, affected = len(by_run), int((by_run[:, 0] > 0).sum())
+        ratio = (pl.col("protection_level_m") / pl.col("error_m")).median()
+        return cls(
+            runs=runs,
+            epochs=stated.height,
+            state_shares={
+                state: stated.filter(integrity=state).height / stated.height for state in STATES
+            },
+            median_level_over_error=float(stated.select(ratio).item()),
+            exceedances=int(by_run[:, 0].sum()),
+            runs_with_exceedances=affected,
+            exceedance_share=_share(by_run),
+            exceedance_interval=bootstrap_interval(by_run, _share),
+            run_interval=clopper_pearson(affected, runs),
+        )
+
+
+def stanford_counts(trajectories: pl.DataFrame, alert_limit_m: float) -> dict[str, int]:
+    """Epochs in each region of the Stanford diagram of error against protection level.
+
+    ``nominal``: error ≤ level ≤ limit. ``misleading``: level < error ≤ limit. ``hazardous``
+    (hazardously misleading): level ≤ limit < error. ``unavailable``: level > limit, error ≤ level.
+    ``unavailable_misleading``: level > limit, error > level (Tossaint, Samson, Toran,
+    Ventura-Traveset, Hernández-Pajares, Juan, Sanz and Ramos-Bosch, The Stanford–ESA integrity
+    diagram, Navigation 54, 2007).
+
+    Parameters
+    ----------
+    trajectories
+        Columns ``trajectories`` of :mod:`access_av.columns`; steps without a protection level
+        count nowhere.
+    alert_limit_m
+        Alert limit.
+
+    Returns
+    -------
+    dict
+        Number of epochs by region.
+
+    Examples
+    --------
+    >>> trajectories = pl.DataFrame(
+    ...     {
+    ...         "run": [0, 0, 0],
+    ...         "error_x_m": [0.1, 0.9, 2.0],
+    ...         "error_y_m": [0.0, 0.0, 0.0],
+    ...         "protection_level_m": [0.5, 0.5, 0.5],
+    ...         "integrity": ["ok", "ok", "ok"],
+    ...     }
+    ... )
+    >>> counts = stanford_counts(trajectories, alert_limit_m=1.5)
+    >>> counts["nominal"], counts["misleading"], counts["hazardous"]
+    (1, 1, 1)
+    """
+    error, level = pl.col("error_m"), pl.col("protection_level_m")
+    held, vouched = error <= level, level <= alert_limit_m
+    regions = {
+        "nominal": vouched & held,
+        "misleading": vouched & ~held & (error <= alert_limit_m),
+        "hazardous": vouched & (error > alert_limit_m),
+        "unavailable": ~vouched & held,
+        "unavailable_misleading": ~vouched & ~held,
+    }
+    counts = _stated(trajectories).select(
+        region.sum().alias(name) for name, region in regions.items()
+    )
+    return {name: int(count) for name, count in counts.row(0, named=True).items()}
+
+
+def _stated(trajectories: pl.DataFrame) -> pl.DataFrame:
+    """The steps with a protection level, and their ``error_m``."""
+    return trajectories.filter(pl.col("protection_level_m").is_not_null()).select(
+        "run", "protection_level_m", "integrity", error_m=horizontal_error_m()
+    )
+
+
+def _share(beyond_and_ok: NDArray[np.float64]) -> float:
+    beyond, ok = beyond_and_ok.sum(axis=0)
+    return float(beyond / max(1.0, ok))

@@ -1,0 +1,89 @@
+"""Intervals of a proportion from independent trials."""
+
+from __future__ import annotations
+
+import math
+from statistics import NormalDist
+
+from access_av.statistics.distributions import beta_quantile
+
+
+def clopper_pearson(
+    successes: int, trials: int, *, probability: float = 0.95
+) -> tuple[float, float]:
+    """Exact interval of a proportion: it holds the true one at least with ``probability``.
+
+    With ``alpha = 1 - probability``, the ends are the quantile ``alpha / 2`` of
+    ``Beta(successes, trials - successes + 1)`` and the quantile ``1 - alpha / 2`` of
+    ``Beta(successes + 1, trials - successes)`` (Clopper and Pearson, Biometrika 26, 1934).
+
+    Parameters
+    ----------
+    successes
+        How often it happened.
+    trials
+        Of how many independent trials.
+    probability
+        Coverage, above 0 and below 1.
+
+    Returns
+    -------
+    tuple of float
+        Low and high end.
+
+    Examples
+    --------
+    Nothing in 300 trials: below 1.2 %, the rule of three with 97.5 %.
+
+    >>> [round(end, 4) for end in clopper_pearson(0, 300)]
+    [0.0, 0.0122]
+    >>> [round(end, 4) for end in clopper_pearson(5, 10)]
+    [0.1871, 0.8129]
+    """
+    _check(successes, trials, probability)
+    tail = 0.5 * (1.0 - probability)
+    low = beta_quantile(tail, successes, trials - successes + 1) if successes else 0.0
+    failures = trials - successes
+    high = beta_quantile(1.0 - tail, successes + 1, failures) if failures else 1.0
+    return low, high
+
+
+def wilson(successes: int, trials: int, *, probability: float = 0.95) -> tuple[float, float]:
+    """Score interval of a proportion: shorter than the exact one, right on average.
+
+    ``(p + z²/2n ± z·sqrt(p(1 − p)/n + z²/4n²)) / (1 + z²/n)`` with the normal quantile z of
+    ``(1 + probability) / 2`` (Wilson, Journal of the American Statistical Association 22, 1927).
+
+    Parameters
+    ----------
+    successes
+        How often it happened.
+    trials
+        Of how many independent trials.
+    probability
+        Coverage, above 0 and below 1.
+
+    Returns
+    -------
+    tuple of float
+        Low and high end.
+
+    Examples
+    --------
+    >>> [round(end, 4) for end in wilson(5, 10)]
+    [0.2366, 0.7634]
+    """
+    _check(successes, trials, probability)
+    z = NormalDist().inv_cdf(0.5 * (1.0 + probability))
+    share, spread = successes / trials, z * z / trials
+    middle = share + 0.5 * spread
+    half = z * math.sqrt((share * (1.0 - share) + 0.25 * spread) / trials)
+    scale = 1.0 + spread
+    return max(0.0, (middle - half) / scale), min(1.0, (middle + half) / scale)
+
+
+def _check(successes: int, trials: int, probability: float) -> None:
+    if not 0 <= successes <= trials or trials < 1:
+        raise ValueError(f"{successes} of {trials}: there must be a trial, and no more successes")
+    if not 0.0 < probability < 1.0:
+        raise ValueError(f"`probability` is {probability}; it must be above 0 and below 1")

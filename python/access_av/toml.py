@@ -1,0 +1,29 @@
+"""TOML, and the TOML files that come with the package."""
+
+from __future__ import annotations
+
+import sys
+from functools import cache
+from importlib import resources
+from typing import Any
+
+if sys.version_info >= (3, 11):
+    import tomllib
+else:
+    import tomli as tomllib
+
+
+__all__ = ["shipped", "tomllib"]
+
+
+@cache
+def shipped(*path: str) -> dict[str, Any]:
+    """Read a TOML file of this package, by its path inside it.
+
+    Examples
+    --------
+    >>> shipped("facts", "cost.toml")["roadside_unit"]["yearly_usd"]
+    2400
+    """
+    text = resources.files("access_av").joinpath(*path).read_text(encoding="utf-8")
+    return tomllib.loads(text)
