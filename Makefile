@@ -1,10 +1,10 @@
 # ACCESS-AV: what a person types. `make help` lists it.
 PYTHON ?= python3
 BIN := .venv/bin
-SOURCES := $(shell find crates scenarios platforms -type f 2>/dev/null) Cargo.toml Cargo.lock pyproject.toml
+SOURCES := $(shell find crates sites vehicles scenarios platforms -type f 2>/dev/null) Cargo.toml Cargo.lock pyproject.toml
 
 .DEFAULT_GOAL := help
-.PHONY: help demo test lint lint-python docs bench clean
+.PHONY: help demo test test-aarch64 lint lint-python docs bench clean
 
 help: ## List these commands
 	@sed -n 's/^\([a-z-]*\):.*## /  make \1\t/p' $(MAKEFILE_LIST) | expand -t 20
@@ -16,6 +16,22 @@ test: .venv/installed-test ## Run every test: Rust, static checks of the Python 
 	cargo test --workspace --quiet
 	$(MAKE) --no-print-directory lint-python
 	$(BIN)/python -m pytest
+
+AARCH64 := aarch64-unknown-linux-gnu
+# What the compiler of another processor needs (Debian: rustc-web cargo-web libstd-rust-web-dev:arm64
+# gcc-aarch64-linux-gnu libc6:arm64 qemu-user); a rustup with that target serves as well.
+EMULATED := CARGO_TARGET_AARCH64_UNKNOWN_LINUX_GNU_LINKER=aarch64-linux-gnu-gcc \
+	CARGO_TARGET_AARCH64_UNKNOWN_LINUX_GNU_RUNNER="qemu-aarch64 -L /"
+ifneq ($(wildcard /usr/lib/rustlib/$(AARCH64)),)
+EMULATED += RUSTC=/usr/bin/rustc /usr/bin/cargo
+else
+EMULATED += cargo
+endif
+
+test-aarch64: ## Build what runs on the vehicle for aarch64 and test it, emulated on another processor
+	@command -v aarch64-linux-gnu-gcc >/dev/null && command -v qemu-aarch64 >/dev/null || { echo \
+	  "not tested: gcc-aarch64-linux-gnu, qemu-user, libc6:arm64, a Rust for $(AARCH64) needed"; exit 2; }
+	$(EMULATED) test --quiet --release --target $(AARCH64) -p aoa -p nr-ssb -p onboard
 
 lint: lint-python ## Check formatting and lints of both languages
 	cargo fmt --all --check
@@ -50,9 +66,6 @@ clean: ## Remove what was built (results stay)
 	$(BIN)/python -m pip install --quiet --editable '.[test]'
 	@touch $@
 
-.venv/installed-docs: .venv/installed ## Write docs/columns.md from the table of columns
-	$(BIN)/access-av columns --markdown > docs/columns.md
-
-bench: .venv/installed
+.venv/installed-bench: .venv/installed
 	$(BIN)/python -m pip install --quiet --editable '.[bench]'
 	@touch $@

@@ -10,7 +10,9 @@ are first used, so that importing the package takes no time.
 ``locate``             where the vehicle was in a recorded drive
 ``evaluate``           the paper's evaluation
 ``explore``            operating points that meet an energy budget and an error
-``Scenario``           what is driven: load, change, write out
+``Site``               the plant as the vehicles believe it to be: load, change, write out
+``Vehicle``            a vehicle as it believes to be built, and how it is set
+``Scenario``           a site, a vehicle, and the world around them, otherwise or not
 ``Platform``           the onboard computer: power modes, energy per execution
 ``Recording``          samples on disk (SigMF, raw)
 ``aoa``                angle of arrival with linear arrays
@@ -35,7 +37,15 @@ from __future__ import annotations
 
 from typing import TYPE_CHECKING
 
-from access_av._core import Recording, RecordingError, Scenario, ScenarioError, __version__
+from access_av._core import (
+    Recording,
+    RecordingError,
+    Scenario,
+    SettingsError,
+    Site,
+    Vehicle,
+    __version__,
+)
 from access_av.errors import InputError
 from access_av.lazy import attach
 
@@ -58,9 +68,11 @@ __all__ = [
     "Recording",
     "RecordingError",
     "Scenario",
-    "ScenarioError",
+    "SettingsError",
     "Simulation",
+    "Site",
     "SynthesizedDrive",
+    "Vehicle",
     "__version__",
     "aoa",
     "bound",

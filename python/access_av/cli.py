@@ -7,7 +7,7 @@ from typing import Annotated
 
 import typer
 
-from access_av._core import RecordingError, ScenarioError, __version__
+from access_av._core import RecordingError, SettingsError, __version__
 from access_av.commands import bound, columns, drives, files, recordings, run
 from access_av.errors import InputError
 from access_av.paper import commands as paper
@@ -41,7 +41,7 @@ def _options(
 
 for _room in (paper, run, bound, recordings, drives, columns):
     app.add_typer(_room.app)
-for _what in ("scenario", "platform"):
+for _what in ("site", "vehicle", "scenario", "platform"):
     app.add_typer(files.files_app(_what), name=_what)
 
 
@@ -49,6 +49,6 @@ def main() -> None:
     """Entry point: turns every bad input into one message and exit code 2."""
     try:
         app()
-    except (ScenarioError, RecordingError, InputError, OSError) as error:
+    except (SettingsError, RecordingError, InputError, OSError) as error:
         show_error(error)
         sys.exit(2)

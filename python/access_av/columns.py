@@ -114,7 +114,7 @@ _GLOSSARY = {
     "reason": (
         "text",
         "Why the angle was taken or left: consistent, outlier, unusable, unknown radio head, "
-        "time reversed, excluded",
+        "too late, excluded",
     ),
     "mahalanobis_squared": ("1", "Squared Mahalanobis distance of the angle from the expected one"),
     "threshold": ("1", "The largest mahalanobis_squared that is accepted"),

@@ -14,7 +14,7 @@ from access_av.errors import InputError
 if TYPE_CHECKING:
     from collections.abc import Mapping
 
-    from access_av._core import Scenario
+    from access_av._core import Scenario, Site, Vehicle
 
 
 DATATYPES = ("ci16_le", "cf32_le")
@@ -52,7 +52,7 @@ def synthesize(
     """Record a scenario's drive as somebody on the vehicle would have.
 
     Writes ``iq.sigmf-meta`` and ``iq.sigmf-data`` (all antennas, the truth in the annotations),
-    ``odometry.csv``, ``site.toml``, ``scenario.toml`` and ``truth.tum``.
+    ``odometry.csv``, ``site.toml``, ``vehicle.toml``, ``scenario.toml`` and ``truth.tum``.
 
     Parameters
     ----------
@@ -71,7 +71,7 @@ def synthesize(
 
     Raises
     ------
-    ScenarioError
+    SettingsError
         When the scenario cannot be sent as samples.
     InputError
         When the datatype is another one.
@@ -137,10 +137,11 @@ class Drive:
 
 
 def locate(
-    site: str | Path,
+    site: Site | str | Path,
     odometry: str | Path,
     recording: str | Path,
     *,
+    vehicle: Vehicle | str | Path = "default",
     topic: str | None = None,
     start_time_s: float = 0.0,
     start: tuple[float, float, float] | None = None,
@@ -152,22 +153,25 @@ def locate(
     Parameters
     ----------
     site
-        Site file: radio heads, road, array.
+        Radio heads and, where there is one, the road; or the name or path of a site file.
     odometry
         CSV with the columns ``time_s``, ``distance_m``, ``speed_mps`` and, with a gyroscope,
         ``yaw_rate_radps``; or an MCAP file with ``nav_msgs/msg/Odometry``.
     recording
         SigMF recording of the array's samples, or a CSV log of angles with the columns ``time_s``,
         ``pci``, ``ssb_index``, ``phase_rad``, ``phase_sigma_rad``, ``angle_rad``, ``snr_db``.
+    vehicle
+        Array, odometer, and how the vehicle locates itself; or the name or path of a vehicle
+        file. Its wake-up policy is honoured.
     topic
         Topic of the odometry in an MCAP file with several.
     start_time_s
         Time of the recording's first sample by the odometry's clock.
     start
-        Initial pose (x in metres, y in metres, heading in radians) in place of the site's. A site
-        without one leaves it to be found along the road, by two radio heads or more.
+        Initial pose (x in metres, y in metres, heading in radians) in place of the vehicle's.
+        Without any, the vehicle is found along the road, by two radio heads or more.
     from_scratch
-        Find the vehicle along the road even if the site has an initial pose.
+        Find the vehicle along the road even if its file has an initial pose.
     smooth
         Also look back from the end of the drive: every pose by all angles, before it and after.
 
@@ -175,8 +179,8 @@ def locate(
     ------
     RecordingError
         When the recording or the odometry cannot be used.
-    ScenarioError
-        When the site file cannot be used.
+    SettingsError
+        When the site or vehicle file cannot be used.
 
     Examples
     --------
@@ -185,13 +189,17 @@ def locate(
     >>> with tempfile.TemporaryDirectory() as drive:
     ...     _ = access_av.synthesize("paper-real-odometry-2", drive, duration_s=2.0)
     ...     located = access_av.locate(
-    ...         f"{drive}/site.toml", f"{drive}/odometry.csv", f"{drive}/iq.sigmf-meta"
+    ...         f"{drive}/site.toml",
+    ...         f"{drive}/odometry.csv",
+    ...         f"{drive}/iq.sigmf-meta",
+    ...         vehicle=f"{drive}/vehicle.toml",
     ...     )
     >>> located.poses.height
     101
     """
     located = _core.locate(
-        site,
+        site if isinstance(site, _core.Site) else _core.Site.load(str(site)),
+        vehicle if isinstance(vehicle, _core.Vehicle) else _core.Vehicle.load(str(vehicle)),
         odometry,
         recording,
         topic=topic,

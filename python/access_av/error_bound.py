@@ -87,7 +87,7 @@ def bound(scenario: _core.Scenario | str, *, map_step_m: float | None = None) ->
 
     Raises
     ------
-    ScenarioError
+    SettingsError
         When the scenario cannot be used.
     InputError
         When the map would have more than :data:`MOST_MAP_CELLS` squares.
@@ -100,7 +100,7 @@ def bound(scenario: _core.Scenario | str, *, map_step_m: float | None = None) ->
     """
     if not isinstance(scenario, _core.Scenario):
         scenario = _core.Scenario.load(scenario)
-    settings = json.loads(scenario.to_json())
+    settings = json.loads(scenario.site.to_json())
     core = _core.Bound(scenario)
     route = pl.DataFrame(core.along_route())
     heads = _heads(core, settings["radio_heads"], route)
@@ -114,7 +114,7 @@ def bound(scenario: _core.Scenario | str, *, map_step_m: float | None = None) ->
             f"--map-step-m {step_m:g}: gives {cells:.3g} squares; "
             f"allowed are at most {MOST_MAP_CELLS}, from {_least_step(low, high):.2g} m on"
         )
-    wavelength_m = SPEED_OF_LIGHT_MPS / (settings["ssb"]["carrier_mhz"] * 1e6)
+    wavelength_m = SPEED_OF_LIGHT_MPS / (settings["carrier_mhz"] * 1e6)
     looks = max(1.0, MAP_TRAVEL_M * LOOKS_PER_WAVELENGTH / wavelength_m)
     heading_std_rad = float(route.select(pl.col("heading_std_rad").median()).item())
     x_m, y_m = (
@@ -144,7 +144,7 @@ def _heads(core: _core.Bound, settings: list[dict[str, Any]], route: pl.DataFram
     snrs_db = core.snr_db(x_m, y_m)
     rows = []
     for number, (head, snr_db) in enumerate(zip(settings, snrs_db, strict=True), start=1):
-        head_x_m, head_y_m = head["position_m"]
+        head_x_m, head_y_m, _ = head["position_m"]
         distance_m = np.hypot(x_m - head_x_m, y_m - head_y_m)
         rows.append(
             {

@@ -67,7 +67,7 @@ class Platform:
 
         Raises
         ------
-        ScenarioError
+        SettingsError
             When there is neither, or the file cannot be used; names the key and what is allowed.
         """
         return cls(_core.Platform.load(name_or_path))

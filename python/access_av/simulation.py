@@ -14,10 +14,13 @@ from access_av.platform import Platform
 from access_av.statistics.integrity import Integrity
 
 if TYPE_CHECKING:
-    from collections.abc import Callable, Mapping
+    from collections.abc import Callable, Mapping, Sequence
+    from typing import TypeAlias
 
     import numpy as np
     from numpy.typing import NDArray
+
+    Estimate: TypeAlias = float | tuple[float, float] | NDArray[np.float64] | None
 
 Scenario = _core.Scenario
 
@@ -67,8 +70,10 @@ def simulate(
     platform: Platform | None = None,
     threads: int | None = None,
     keep_trajectories: bool = False,
-    estimator: Callable[[NDArray[np.complex128]], float] | None = None,
-    policy: Callable[[float, float, float], float] | None = None,
+    estimator: Callable[[NDArray[np.complex128]], Estimate] | None = None,
+    policy: Callable[[_core.Situation], bool | Sequence[bool]] | None = None,
+    localizer: Callable[[dict[str, Any], dict[str, Any], tuple[float, float, float]], Any]
+    | None = None,
     progress: Callable[[int, int], None] | None = None,
 ) -> Simulation:
     """Drive a scenario many times.
@@ -88,11 +93,25 @@ def simulate(
     keep_trajectories
         Whether to keep every drive's trajectory and executions, not only their statistics.
     estimator
-        In place of the scenario's: takes complex snapshots of shape (antennas, snapshots) and
-        returns the angle from the array's axis in radians.
+        In place of the vehicle's angle estimator: takes complex snapshots of shape (antennas,
+        snapshots) and returns the angle from the array's axis in radians, 0 to π; or that angle
+        and its standard deviation; or the logarithm of its likelihood over the electrical angle,
+        at equally spaced values from −π on; or ``None`` where there is no angle. An angle without
+        standard deviation gets the Cramér–Rao bound at its SSB's SNR, which is said once.
     policy
-        In place of the scenario's controller: takes the SNR error, the velocity error and the
-        seconds since its last call, and returns the wake-up time in seconds.
+        In place of the vehicle's wake-up policy: called with the :class:`Situation
+        <access_av._core.Situation>` at each burst that is listened to, it returns whether to
+        estimate the angles of its SSBs, or a list with an answer for each. If it has a method
+        ``listens``, that is asked first, with nothing sensed; else every burst is listened to.
+        An attribute ``wake_up_time_s`` is recorded with each execution.
+    localizer
+        In place of the vehicle's localizer: called as ``localizer(site, vehicle, start)`` at the
+        start of each run, with both settings as dictionaries and the initial pose (x and y in
+        metres, heading in radians) as the vehicle is told it. The object it returns needs the
+        methods ``odometry(time_s, distance_m, speed_mps, yaw_rate_radps)``, ``angle(time_s, head,
+        phase_rad, phase_sigma_rad)``, which may return whether the angle was used, and
+        ``pose(time_s)``, which returns x, y, heading and, if it is known, the 3 by 3 covariance of
+        the three. Late angles go to copies of it (:func:`copy.deepcopy`).
     progress
         Called as ``progress(done, total)`` with numbers of drives.
 
@@ -103,8 +122,10 @@ def simulate(
 
     Raises
     ------
-    ScenarioError
+    SettingsError
         When the scenario cannot be used; names the key and what is allowed.
+    ValueError
+        When an estimator, policy or localizer returns what it must not; names the call.
 
     Examples
     --------
@@ -121,6 +142,7 @@ def simulate(
         keep_trajectories=keep_trajectories,
         estimator=estimator,
         policy=policy,
+        localizer=localizer,
         progress=progress,
     )
     return Simulation(

@@ -1,15 +1,15 @@
 //! The posterior Cramér–Rao bound along a route and over its site, as columns.
 
-use access_av::channel::LinkBudget;
-use access_av::geometry::Point;
-use access_av::localize::bound::{Bound as CoreBound, BoundPoint};
-use access_av::world::RadioHead;
 use numpy::{PyArray1, PyArray2, PyReadonlyArray1};
+use onboard::geometry::Point;
+use onboard::link_budget::LinkBudget;
+use onboard::radio_head::RadioHead;
 use pyo3::exceptions::PyValueError;
 use pyo3::prelude::*;
 use pyo3::types::PyDict;
+use simulate::bound::{Bound as CoreBound, BoundPoint};
 
-use crate::scenario::{Scenario, scenario_error};
+use crate::settings::{Scenario, settings_error};
 
 /// A column's name, and its value in a row.
 type Column = (&'static str, fn(&BoundPoint) -> f64);
@@ -20,6 +20,7 @@ pub struct ErrorBound {
     bound: CoreBound,
     budget: LinkBudget,
     heads: Vec<RadioHead>,
+    height_m: f64,
 }
 
 #[pymethods]
@@ -27,9 +28,16 @@ impl ErrorBound {
     #[new]
     fn new(scenario: &Scenario) -> PyResult<Self> {
         Ok(Self {
-            bound: CoreBound::new(&scenario.0).map_err(scenario_error)?,
-            budget: LinkBudget::new(&scenario.0),
-            heads: scenario.0.radio_heads.iter().map(RadioHead::from).collect(),
+            bound: CoreBound::new(&scenario.0).map_err(settings_error)?,
+            budget: LinkBudget::new(&scenario.0.site, &scenario.0.vehicle),
+            heads: scenario
+                .0
+                .site
+                .radio_heads
+                .iter()
+                .map(RadioHead::from)
+                .collect(),
+            height_m: scenario.0.vehicle.array.position_m[2],
         })
     }
 
@@ -102,8 +110,10 @@ impl ErrorBound {
             .heads
             .iter()
             .map(|head| {
-                let snr_db =
-                    |place: &Point| self.budget.snr_db(head, head.position.distance_m(*place));
+                let snr_db = |place: &Point| {
+                    let distance_m = head.distance_m(*place, self.height_m);
+                    self.budget.snr_db(head, distance_m)
+                };
                 places.iter().map(snr_db).collect()
             })
             .collect();

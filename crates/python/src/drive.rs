@@ -2,26 +2,28 @@
 
 use std::path::{Path, PathBuf};
 
-use access_av::geometry::Pose;
-use access_av::localize::AngleMeasurement;
-use access_av::recording::{
-    Datatype, Recording, Site, TimedPose, read_angle_log, read_odometry_csv, read_odometry_mcap,
-    write_drive_mcap, write_tum,
-};
-use access_av::replay::{self, ReplayError};
-use access_av::simulate::{SynthError, SynthSettings};
 use numpy::PyArray1;
+use onboard::Execution;
+use onboard::geometry::Pose;
+use onboard::localize::AngleMeasurement;
+use onboard::settings::{Site as CoreSite, Vehicle as CoreVehicle};
 use pyo3::exceptions::PyValueError;
 use pyo3::prelude::*;
 use pyo3::types::PyDict;
+use recording::replay::{self, ReplayError, StartChoice};
+use recording::{
+    Datatype, Recording, TimedPose, read_angle_log, read_odometry_csv, read_odometry_mcap,
+    write_drive_mcap, write_tum,
+};
+use simulate::{SynthError, SynthSettings};
 
 use crate::recording::{RecordingError, recording_error};
-use crate::scenario::{Scenario, scenario_error};
+use crate::settings::{Scenario, Site, Vehicle, settings_error};
 
 /// Record a scenario's drive as somebody on the vehicle would have.
 ///
-/// Writes `iq.sigmf-meta`, `iq.sigmf-data`, `odometry.csv`, `site.toml`, `scenario.toml` and
-/// `truth.tum`.
+/// Writes `iq.sigmf-meta`, `iq.sigmf-data`, `odometry.csv`, `site.toml`, `vehicle.toml`,
+/// `scenario.toml` and `truth.tum`.
 ///
 /// Parameters
 /// ----------
@@ -71,9 +73,9 @@ pub fn synthesize(
         datatype,
     };
     let made = py
-        .detach(|| access_av::simulate::synthesize(&scenario.0, &settings, &directory))
+        .detach(|| simulate::synthesize(&scenario.0, &settings, &directory))
         .map_err(|error| match error {
-            SynthError::Scenario(error) => scenario_error(error),
+            SynthError::Settings(error) => settings_error(error),
             SynthError::Recording(error) => recording_error(error),
             other => PyValueError::new_err(other.to_string()),
         })?;
@@ -84,8 +86,10 @@ pub fn synthesize(
 ///
 /// Parameters
 /// ----------
-/// site : path-like
-///     Site file: radio heads, road, array.
+/// site : Site
+///     Radio heads and, where there is one, the road.
+/// vehicle : Vehicle
+///     Array, odometer, and how the vehicle locates itself.
 /// odometry : path-like
 ///     CSV with the columns `time_s`, `distance_m`, `speed_mps` and, with a gyroscope,
 ///     `yaw_rate_radps`; or an MCAP file with `nav_msgs/msg/Odometry`.
@@ -96,25 +100,26 @@ pub fn synthesize(
 /// start_time_s : float
 ///     Time of the recording's first sample by the odometry's clock.
 /// start : tuple of float, optional
-///     Initial pose (x in metres, y in metres, heading in radians) in place of the site's.
+///     Initial pose (x in metres, y in metres, heading in radians) in place of the vehicle's.
 /// from_scratch : bool
-///     Whether to find the vehicle along the road, even if the site has an initial pose.
+///     Whether to find the vehicle along the road, even if the vehicle has an initial pose.
 /// smooth : bool
 ///     Whether to look back from the end of the drive too, which fills `smoothed`.
 ///
 /// Raises
 /// ------
-/// RecordingError, ScenarioError
-///     An unusable recording or odometry; an unusable site file.
+/// RecordingError, SettingsError
+///     An unusable recording or odometry; a vehicle that cannot serve at the site.
 #[pyfunction]
 #[pyo3(signature = (
-    site, odometry, recording, *, topic = None, start_time_s = 0.0, start = None,
+    site, vehicle, odometry, recording, *, topic = None, start_time_s = 0.0, start = None,
     from_scratch = false, smooth = false
 ))]
 #[allow(clippy::too_many_arguments, clippy::needless_pass_by_value)] // Python's keywords
 pub fn locate(
     py: Python<'_>,
-    site: PathBuf,
+    site: &Site,
+    vehicle: &Vehicle,
     odometry: PathBuf,
     recording: PathBuf,
     topic: Option<&str>,
@@ -138,52 +143,69 @@ pub fn locate(
             "give either `start` or `from_scratch`",
         ));
     }
-    py.detach(|| {
-        let origin = site.display().to_string();
-        let mut site = Site::read(&site)?;
-        if pose.is_some() || from_scratch {
-            site = site.starting_at(pose, &origin)?;
-        }
-        run(&site, &odometry, &recording, topic, start_time_s, smooth)
-    })
-    .map(|core| LocatedDrive { core })
-    .map_err(replay_error)
+    let start = match pose {
+        Some(pose) => StartChoice::At(pose),
+        None if from_scratch => StartChoice::Unknown,
+        None => StartChoice::AsSet,
+    };
+    let drive = RecordedDrive {
+        odometry: &odometry,
+        recording: &recording,
+        topic,
+        start_time_s,
+        start,
+    };
+    py.detach(|| drive.locate(&site.0, &vehicle.0, smooth))
+        .map(|core| LocatedDrive { core })
+        .map_err(replay_error)
 }
 
-fn run(
-    site: &Site,
-    odometry: &Path,
-    recording: &Path,
-    topic: Option<&str>,
+/// Where a drive was recorded, and when and where it begins.
+struct RecordedDrive<'a> {
+    odometry: &'a Path,
+    recording: &'a Path,
+    topic: Option<&'a str>,
     start_time_s: f64,
-    smooth: bool,
-) -> Result<replay::LocatedDrive, ReplayError> {
-    let is = |path: &Path, extension: &str| {
-        path.extension()
-            .is_some_and(|it| it.eq_ignore_ascii_case(extension))
-    };
-    let odometry = if is(odometry, "mcap") {
-        read_odometry_mcap(odometry, topic)?
-    } else {
-        read_odometry_csv(odometry)?
-    };
-    if is(recording, "csv") {
-        replay::locate_angles(site, &odometry, &read_angle_log(recording)?, smooth)
-    } else {
-        replay::locate_recording(
-            site,
-            &odometry,
-            &mut Recording::open(recording)?,
-            start_time_s,
-            smooth,
-        )
+    start: StartChoice,
+}
+
+impl RecordedDrive<'_> {
+    fn locate(
+        &self,
+        site: &CoreSite,
+        vehicle: &CoreVehicle,
+        smooth: bool,
+    ) -> Result<replay::LocatedDrive, ReplayError> {
+        let is = |path: &Path, extension: &str| {
+            path.extension()
+                .is_some_and(|it| it.eq_ignore_ascii_case(extension))
+        };
+        let odometry = if is(self.odometry, "mcap") {
+            read_odometry_mcap(self.odometry, self.topic)?
+        } else {
+            read_odometry_csv(self.odometry)?
+        };
+        if is(self.recording, "csv") {
+            let angles = read_angle_log(self.recording)?;
+            replay::locate_angles(site, vehicle, self.start, &odometry, &angles, smooth)
+        } else {
+            replay::locate_recording(
+                site,
+                vehicle,
+                self.start,
+                &odometry,
+                &mut Recording::open(self.recording)?,
+                self.start_time_s,
+                smooth,
+            )
+        }
     }
 }
 
 #[allow(clippy::needless_pass_by_value)] // the shape that `map_err` wants
 fn replay_error(error: ReplayError) -> PyErr {
     match error {
-        ReplayError::Site(error) => scenario_error(error),
+        ReplayError::Settings(error) => settings_error(error),
         ReplayError::Recording(error) => recording_error(error),
         other => RecordingError::new_err(other.to_string()),
     }
@@ -227,9 +249,7 @@ impl LocatedDrive {
         let angles = &self.core.executions;
         let columns = PyDict::new(py);
         let measured = |value: fn(&AngleMeasurement) -> f64| {
-            let of = move |it: &access_av::onboard::Execution| {
-                it.measured.as_ref().map_or(f64::NAN, value)
-            };
+            let of = move |it: &Execution| it.measured.as_ref().map_or(f64::NAN, value);
             PyArray1::from_iter(py, angles.iter().map(of))
         };
         let each = || angles.iter();

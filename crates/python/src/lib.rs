@@ -1,11 +1,12 @@
 //! `access_av._core`: the bindings, nothing else. One file per room of the core.
 mod aoa;
 mod bound;
+mod campaign;
 mod drive;
 mod nr;
+mod plug_ins;
 mod recording;
-mod scenario;
-mod simulate;
+mod settings;
 
 use pyo3::pymodule;
 
@@ -47,13 +48,15 @@ mod _core {
     #[pymodule_export]
     use crate::bound::ErrorBound;
     #[pymodule_export]
+    use crate::campaign::{SimulationResult, simulate};
+    #[pymodule_export]
     use crate::drive::{LocatedDrive, locate, synthesize};
+    #[pymodule_export]
+    use crate::plug_ins::{RadioHead, SensedSsb, Situation};
     #[pymodule_export]
     use crate::recording::{Recording, RecordingError};
     #[pymodule_export]
-    use crate::scenario::{Platform, Scenario, ScenarioError};
-    #[pymodule_export]
-    use crate::simulate::{SimulationResult, simulate};
+    use crate::settings::{Platform, Scenario, SettingsError, Site, Vehicle};
 
     #[pymodule_init]
     fn init(module: &Bound<'_, PyModule>) -> PyResult<()> {

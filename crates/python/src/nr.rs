@@ -6,9 +6,6 @@ mod searcher;
 pub use burst::build_burst;
 pub use searcher::Searcher;
 
-use access_av::receive::{
-    ArraySetup, FoundSsb, IqSource, SampleBlock, Scan as CoreScan, ScanError, ScanSettings,
-};
 use aoa::AngleEstimate;
 use nr_ssb::SubcarrierSpacing;
 use num_complex::{Complex32, Complex64};
@@ -16,6 +13,9 @@ use numpy::{PyArrayDyn, PyArrayMethods, PyReadonlyArrayDyn, PyUntypedArrayMethod
 use pyo3::exceptions::PyValueError;
 use pyo3::prelude::*;
 use pyo3::types::PyDict;
+use recording::scan::{
+    ArraySetup, FoundSsb, IqSource, SampleBlock, Scan as CoreScan, ScanError, ScanSettings,
+};
 
 use crate::recording::{Recording, RecordingError};
 
@@ -205,7 +205,7 @@ pub fn scan(
     };
     let core = recording.core_mut();
     let found = py
-        .detach(|| access_av::receive::scan(core, &settings))
+        .detach(|| recording::scan::scan(core, &settings))
         .map_err(scan_error)?;
     Scan::of(py, &found)
 }
@@ -265,7 +265,7 @@ pub fn search(
     };
     let source: &mut (dyn IqSource + Send) = &mut block;
     let found = py
-        .detach(|| access_av::receive::scan(source, &settings))
+        .detach(|| recording::scan::scan(source, &settings))
         .map_err(scan_error)?;
     Scan::of(py, &found).map(|scan| scan.cells)
 }

@@ -2,12 +2,12 @@
 
 use std::path::PathBuf;
 
-use access_av::recording::{Recording as CoreRecording, RecordingError as CoreError};
 use num_complex::Complex32;
 use numpy::{PyArray2, PyArrayMethods};
 use pyo3::create_exception;
 use pyo3::exceptions::PyValueError;
 use pyo3::prelude::*;
+use recording::{Recording as CoreRecording, RecordingError as CoreError};
 
 create_exception!(
     access_av._core,

@@ -26,7 +26,7 @@ pub struct CampaignOptions<'a> {
     /// Whether to keep every run's record.
     pub keep_records: bool,
     /// The user's own code, made anew for each run.
-    pub custom: &'a MakeCustom,
+    pub custom: &'a MakeCustom<'a>,
     /// Told how many runs are done; `false` stops the campaign.
     pub progress: &'a dyn Fn(usize) -> bool,
 }

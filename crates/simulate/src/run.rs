@@ -19,7 +19,7 @@ use crate::truth::{PropagationMaker, World};
 use crate::world::{Faults, Odometer, Path, VehicleState};
 
 /// The user's own code for a run that starts at the pose the vehicle is told.
-pub type MakeCustom = dyn Fn(Pose) -> Result<Custom, BoxError> + Sync;
+pub type MakeCustom<'a> = dyn Fn(Pose) -> Result<Custom, BoxError> + Sync + 'a;
 
 /// A scenario on a platform, ready to be run.
 #[derive(Clone)]
@@ -92,7 +92,7 @@ impl Simulation {
         &self,
         seed: u64,
         run: u64,
-        custom: &MakeCustom,
+        custom: &MakeCustom<'_>,
     ) -> Result<RunRecord, SimulationError> {
         let mut drive = Drive::new(self, Streams::new(seed, run), custom)?;
         let mut record = RunRecord {
@@ -151,7 +151,7 @@ impl Drive {
     fn new(
         simulation: &Simulation,
         streams: Streams,
-        custom: &MakeCustom,
+        custom: &MakeCustom<'_>,
     ) -> Result<Self, SimulationError> {
         let scenario = simulation.scenario();
         let mut truth = simulation.world.draw(streams);

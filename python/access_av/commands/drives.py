@@ -36,7 +36,7 @@ def synth(
     ] = False,
     datatype: Annotated[str, typer.Option(help="ci16_le or cf32_le.")] = "ci16_le",
 ) -> None:
-    """Record a scenario's drive: samples of all antennas, odometry, site, truth.
+    """Record a scenario's drive: samples of all antennas, odometry, site, vehicle, truth.
 
     The samples are SigMF, so that any other receiver can be fed with them; the truth is in their
     annotations and in truth.tum. Without --continuous the receiver sleeps between the bursts, and
@@ -61,12 +61,16 @@ def synth(
 
 @app.command(
     epilog="Example: [bold]access-av locate --recording drive/iq.sigmf-meta "
-    "--odometry drive/odometry.csv --site drive/site.toml --truth drive/truth.tum[/]",
+    "--odometry drive/odometry.csv --site drive/site.toml --vehicle drive/vehicle.toml "
+    "--truth drive/truth.tum[/]",
 )
 def locate(
     recording: Annotated[Path, typer.Option(help="SigMF recording, or CSV log of angles.")],
     odometry: Annotated[Path, typer.Option(help="CSV, or MCAP with nav_msgs/Odometry.")],
-    site: Annotated[Path, typer.Option(help="TOML: radio heads, road, array.")],
+    site: Annotated[str, typer.Option(help="Radio heads and road: shipped name, or TOML file.")],
+    vehicle: Annotated[
+        str, typer.Option(help="Array, odometer, localizer: shipped name, or TOML file.")
+    ] = "default",
     out: Out = None,
     truth: Annotated[
         Path | None, typer.Option(help="TUM trajectory to compare with, where there is one.")
@@ -79,7 +83,7 @@ def locate(
         str | None,
         typer.Option(
             metavar="X,Y,HEADING",
-            help="Initial pose in m, m, rad, in place of the site's; or the word scratch.",
+            help="Initial pose in m, m, rad, in place of the vehicle's; or the word scratch.",
         ),
     ] = None,
     smooth: Annotated[
@@ -90,19 +94,22 @@ def locate(
 
     Writes drive.mcap (poses with covariance and twist, verdicts, diagnostics), trajectory.tum,
     poses.parquet, angles.parquet and report.html. Items of the input that cannot be used are
-    named, and the rest is used. Without an initial pose, in the site file or by --start, the
+    named, and the rest is used. Without an initial pose, in the vehicle file or by --start, the
     vehicle is found along the road; that takes two radio heads or more. --smooth adds
     smoothed.tum, smoothed.parquet and the topic /access_av/smoothed.
     """
     from access_av import drives
+    from access_av._core import Site, Vehicle
     from access_av.files import ResultsDirectory
     from access_av.report.located import render_located
 
     from_scratch = start is not None and start.strip() == "scratch"
+    believed = Site.load(site), Vehicle.load(vehicle)
     drive = drives.locate(
-        site,
+        believed[0],
         odometry,
         recording,
+        vehicle=believed[1],
         topic=topic,
         start_time_s=start_time_s,
         start=None if start is None or from_scratch else _pose(start),
@@ -110,7 +117,7 @@ def locate(
         smooth=smooth,
     )
     if drive.smoothed is not None and drive.smoothed.is_empty() and not _lost(drive):
-        raise InputError(f"{site}: --smooth needs localizer.kind = tracker")
+        raise InputError(f"{vehicle}: --smooth needs localizer.kind = tracker")
     numbers = drives.summary(drive, truth)
     directory = ResultsDirectory.create("locate", out)
     drive.write_mcap(directory.path / "drive.mcap")
@@ -120,9 +127,9 @@ def locate(
     if drive.smoothed is not None:
         directory.write_table("smoothed.parquet", drive.smoothed)
         drive.write_smoothed_tum(directory.path / "smoothed.tum")
-    site_text = site.read_text(encoding="utf-8")
-    directory.write_text("report.html", render_located(drive, site_text, numbers))
-    directory.write_text("site.toml", site_text)
+    directory.write_text("report.html", render_located(drive, *believed, numbers))
+    for name, settings in zip(("site.toml", "vehicle.toml"), believed, strict=True):
+        directory.write_text(name, settings.to_toml())
     directory.write_manifest(recording=str(recording), odometry=str(odometry), **numbers)
     directory.link_latest()
     for remark in drive.remarks[:MOST_REMARKS]:

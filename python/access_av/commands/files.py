@@ -1,4 +1,4 @@
-"""Commands that show, check and describe scenario and platform files."""
+"""Commands that show, check and describe site, vehicle, scenario and platform files."""
 
 from __future__ import annotations
 
@@ -6,14 +6,14 @@ from typing import Annotated, Any
 
 import typer
 
-from access_av._core import Scenario, ScenarioError
-from access_av.platform import Platform
+from access_av._core import Platform, Scenario, SettingsError, Site, Vehicle
 from access_av.terminal import console, show_error
 
 
 def files_app(what: str) -> typer.Typer:
     """Commands that show, check and describe the files of one kind."""
-    kind: Any = {"scenario": Scenario, "platform": Platform}[what]
+    kinds = {"site": Site, "vehicle": Vehicle, "scenario": Scenario, "platform": Platform}
+    kind: Any = kinds[what]
     files = typer.Typer(no_args_is_help=True, help=f"Show, check and describe {what} files.")
     example = kind.names()[0]
 
@@ -39,7 +39,7 @@ def files_app(what: str) -> typer.Typer:
             try:
                 kind.load(name)
                 console.print(f"{name}: fine", soft_wrap=True)
-            except ScenarioError as error:
+            except SettingsError as error:
                 show_error(error)
                 wrong += 1
         if wrong:

@@ -15,7 +15,7 @@ app = typer.Typer()
 
 
 @app.command(
-    epilog="Example: [bold]access-av run paper --runs 10 --set channel.rician_k_db=10[/]",
+    epilog="Example: [bold]access-av run paper --runs 10 --set site.rician_k_db=10[/]",
 )
 def run(
     scenario: ScenarioArgument,
@@ -70,7 +70,7 @@ def _override(text: str) -> tuple[str, Any]:
     """Split KEY=VALUE; the value is read as TOML, and as plain text where it is none."""
     key, equals, value = text.partition("=")
     if not equals or not key.strip():
-        raise InputError(f"--set {text}: write KEY=VALUE, for example channel.rician_k_db=10")
+        raise InputError(f"--set {text}: write KEY=VALUE, for example site.rician_k_db=10")
     try:
         return key.strip(), tomllib.loads(f"value = {value}")["value"]
     except tomllib.TOMLDecodeError:

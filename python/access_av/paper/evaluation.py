@@ -44,13 +44,19 @@ class Setting:
     def apply(self, scenario: Scenario, mode: PowerMode) -> Scenario:
         """The scenario with this method and wake-up policy, in a power mode."""
         changes: dict[str, Any] = {
-            "estimator.method": self.method.replace("_", "-"),
-            "platform.mode": mode.number,
+            "vehicle.estimator.method": self.method.replace("_", "-"),
+            "vehicle.platform.mode": mode.number,
         }
         if self.adaptive:
-            changes |= {"wake_up.policy": "pid", "wake_up.base_ms": self.base_wake_up_ms}
+            changes |= {
+                "vehicle.wake_up.policy": "pid",
+                "vehicle.wake_up.base_ms": self.base_wake_up_ms,
+            }
         else:
-            changes |= {"wake_up.policy": "fixed", "wake_up.interval_ms": self.base_wake_up_ms}
+            changes |= {
+                "vehicle.wake_up.policy": "fixed",
+                "vehicle.wake_up.interval_ms": self.base_wake_up_ms,
+            }
         return scenario.with_overrides(changes)
 
 

@@ -53,7 +53,7 @@ def render_drive(scenario: Scenario, result: Simulation, seed: int) -> str:
         )
     integrity = result.integrity
     if integrity is not None:
-        alert_limit_m = json.loads(scenario.to_json())["localizer"]["alert_limit_m"]
+        alert_limit_m = json.loads(scenario.vehicle.to_json())["integrity"]["alert_limit_m"]
         specs["stanford"] = charts.stanford(result.trajectories, alert_limit_m)
         sections.append(
             _section("Integrity", _integrity_text(integrity, alert_limit_m), figure("stanford"))

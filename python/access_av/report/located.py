@@ -14,21 +14,24 @@ from access_av.report.page import sheet
 from access_av.report.parts import figure, source, table, tile
 
 if TYPE_CHECKING:
+    from access_av._core import Site, Vehicle
     from access_av.drives import Drive
     from access_av.report.chart import Spec
 
 MOST_REMARKS = 50
 
 
-def render_located(drive: Drive, site: str, numbers: dict[str, float]) -> str:
+def render_located(
+    drive: Drive, site: Site, vehicle: Vehicle, numbers: dict[str, float]
+) -> str:
     """A located drive as an HTML page that loads nothing.
 
     Parameters
     ----------
     drive
         What :func:`access_av.locate` returned.
-    site
-        The site file's text.
+    site, vehicle
+        What was believed of both.
     numbers
         What :func:`access_av.drives.summary` returned.
     """
@@ -63,7 +66,9 @@ def render_located(drive: Drive, site: str, numbers: dict[str, float]) -> str:
                 source("The first of them", listed),
             )
         )
-    sections.append(_section("Provenance", "", source("Site file", site)))
+    believed = source("Site, all defaults written out", site.to_toml())
+    believed += source("Vehicle, all defaults written out", vehicle.to_toml())
+    sections.append(_section("Provenance", "", believed))
     share = numbers["accepted"] / max(1.0, numbers["angles"])
     tiles = [
         tile(f"{numbers['duration_s']:.1f} s", "duration"),

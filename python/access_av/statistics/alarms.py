@@ -33,7 +33,7 @@ class Alarms:
     --------
     >>> import access_av
     >>> scenario = access_av.Scenario.load("paper-real-odometry-4").with_overrides(
-    ...     {"localizer.integrity": True}
+    ...     {"vehicle.integrity": {}}
     ... )
     >>> drives = access_av.simulate(scenario, runs=2, keep_trajectories=True)
     >>> Alarms.of(drives.trajectories, alert_limit_m=1.5).longest_silence_s

@@ -37,7 +37,7 @@ impl Default for ReceiverSettings {
             noise_figure_db: 5.0,
             temperature_k: 290.0,
             bandwidth_mhz: 3.6,
-            pilots: Pilots::PssSss,
+            pilots: Pilots::Ssb,
             snapshots: 20,
             snr_noise_db: 0.0,
             pci_allow_list: None,
@@ -62,10 +62,10 @@ pub enum Pilots {
     /// The primary synchronization signal.
     Pss,
     /// Both synchronization signals.
-    #[default]
     #[serde(rename = "pss+sss")]
     PssSss,
     /// All of it, the broadcast channel having been decoded.
+    #[default]
     Ssb,
 }
 

@@ -111,6 +111,7 @@ impl Vehicle {
 impl TomlFile for Vehicle {
     const WHAT: &'static str = "vehicle";
     const SHIPPED: &'static [(&'static str, &'static str)] = &[
+        ("default", include_str!("../../../../vehicles/default.toml")),
         ("paper", include_str!("../../../../vehicles/paper.toml")),
         ("carrier", include_str!("../../../../vehicles/carrier.toml")),
         ("tugger", include_str!("../../../../vehicles/tugger.toml")),

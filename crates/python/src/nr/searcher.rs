@@ -1,8 +1,8 @@
 //! A search whose plans and buffers are kept.
 
-use access_av::receive::{ArraySetup, FoundSsb, SsbSearch, SsbSearchConfig};
 use num_complex::Complex64;
 use pyo3::prelude::*;
+use recording::scan::{ArraySetup, FoundSsb, SsbSearch, SsbSearchConfig};
 
 use super::{Cell, complex_samples, rows, scan_error, subcarrier_spacing};
 

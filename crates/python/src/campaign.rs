@@ -1,22 +1,24 @@
 //! Campaigns of simulated drives, as columns.
 
-use access_av::BoxError;
-use access_av::estimator::CustomEstimator;
-use access_av::localize::AngleMeasurement;
-use access_av::observation::{ANTENNAS, Snapshot};
-use access_av::onboard::{Custom, Execution};
-use access_av::platform::Platform as CorePlatform;
-use access_av::simulate::{
+use std::sync::Arc;
+use std::sync::atomic::AtomicBool;
+
+use ::simulate::scenario::Scenario as CoreScenario;
+use ::simulate::{
     Campaign, CampaignOptions, RunRecord, RunSummary, Simulation, SimulationError, Step,
     StepStatistics,
 };
-use access_av::wake_up::Controller;
-use numpy::{Element, PyArray1, PyArray2};
+use numpy::{Element, PyArray1};
+use onboard::geometry::Pose;
+use onboard::localize::AngleMeasurement;
+use onboard::settings::Platform as CorePlatform;
+use onboard::{BoxError, Custom, Execution};
 use pyo3::exceptions::{PyRuntimeError, PyValueError};
 use pyo3::prelude::*;
 use pyo3::types::{PyDict, PyList};
 
-use crate::scenario::{Platform, Scenario, scenario_error};
+use crate::plug_ins::{PythonEstimator, PythonLocalizer, PythonPolicy};
+use crate::settings::{Platform, Scenario, settings_error};
 
 /// What a campaign found, as columns of equal length.
 #[pyclass(frozen, get_all, module = "access_av._core")]
@@ -35,15 +37,14 @@ pub struct SimulationResult {
 
 /// Drive a scenario many times.
 ///
-/// The same seed gives the same bytes whatever the number of threads. `estimator` takes snapshots
-/// of shape (antennas, snapshots) and returns an angle from the array's axis in radians; `policy`
-/// takes the SNR error, the velocity error and the seconds since its last call, and returns the
-/// wake-up time in seconds. `progress` is called with the runs done and their total. Exceptions
-/// raised in any of them end the campaign and reach the caller.
+/// The same seed gives the same bytes whatever the number of threads. `estimator`, `policy` and
+/// `localizer` stand in for the vehicle's own; `access_av.simulate` says how they are called.
+/// `progress` is called with the runs done and their total. Exceptions raised in any of them end
+/// the campaign and reach the caller.
 #[pyfunction]
 #[pyo3(signature = (
     scenario, runs = 100, seed = 1, *, platform = None, threads = None, first_run = 0,
-    keep_trajectories = false, estimator = None, policy = None, progress = None
+    keep_trajectories = false, estimator = None, policy = None, localizer = None, progress = None
 ))]
 #[allow(clippy::too_many_arguments, clippy::needless_pass_by_value)] // as Python passes them
 pub fn simulate(
@@ -57,6 +58,7 @@ pub fn simulate(
     keep_trajectories: bool,
     estimator: Option<Py<PyAny>>,
     policy: Option<Py<PyAny>>,
+    localizer: Option<Py<PyAny>>,
     progress: Option<Py<PyAny>>,
 ) -> PyResult<SimulationResult> {
     if runs == 0 || threads == Some(0) {
@@ -66,9 +68,16 @@ pub fn simulate(
     }
     let platform = match platform {
         Some(platform) => platform.0.clone(),
-        None => CorePlatform::load(&scenario.0.platform.name).map_err(scenario_error)?,
+        None => recording::load::<CorePlatform>(&scenario.0.vehicle.platform.name)
+            .map_err(settings_error)?,
     };
-    let simulation = Simulation::new(scenario.0.clone(), platform).map_err(scenario_error)?;
+    let simulation = Simulation::new(&scenario.0, platform).map_err(settings_error)?;
+    let plug_ins = PlugIns {
+        estimator,
+        policy,
+        localizer,
+        told_of_sigma: Arc::new(AtomicBool::new(false)),
+    };
     let campaign = py.detach(|| {
         let raised = std::cell::RefCell::new(None);
         let options = CampaignOptions {
@@ -77,7 +86,7 @@ pub fn simulate(
             runs,
             threads,
             keep_records: keep_trajectories,
-            custom: &|| custom(estimator.as_ref(), policy.as_ref()),
+            custom: &|start| plug_ins.custom(&scenario.0, start),
             progress: &|done| {
                 let told = Python::attach(|py| {
                     py.check_signals()?;
@@ -109,7 +118,7 @@ pub fn simulate(
 
 fn python_error(error: SimulationError) -> PyErr {
     match error {
-        SimulationError::Scenario(error) => scenario_error(error),
+        SimulationError::Settings(error) => settings_error(error),
         SimulationError::Custom(error) => match error.downcast::<PyErr>() {
             Ok(raised) => *raised,
             Err(other) => PyRuntimeError::new_err(other.to_string()),
@@ -118,46 +127,39 @@ fn python_error(error: SimulationError) -> PyErr {
     }
 }
 
-/// A Python callable in place of the angle estimator.
-struct PythonEstimator(Py<PyAny>);
-
-impl CustomEstimator for PythonEstimator {
-    fn angle_rad(&mut self, snapshots: &[Snapshot]) -> Result<f64, BoxError> {
-        let angle = Python::attach(|py| {
-            let rows: Vec<Vec<_>> = (0..ANTENNAS)
-                .map(|antenna| snapshots.iter().map(|snapshot| snapshot[antenna]).collect())
-                .collect();
-            let array = PyArray2::from_vec2(py, &rows).map_err(PyErr::from)?;
-            self.0.call1(py, (array,))?.extract::<f64>(py)
-        });
-        Ok(angle?)
-    }
+/// The user's own Python code in place of parts of the pipeline.
+struct PlugIns {
+    estimator: Option<Py<PyAny>>,
+    policy: Option<Py<PyAny>>,
+    localizer: Option<Py<PyAny>>,
+    /// Whether it was said that an estimator without standard deviations gets the bound.
+    told_of_sigma: Arc<AtomicBool>,
 }
 
-/// A Python callable in place of Algorithm 1.
-#[derive(Debug)]
-struct PythonController(Py<PyAny>);
-
-impl Controller for PythonController {
-    fn wake_up_time_s(
-        &mut self,
-        snr_error: f64,
-        velocity_error: f64,
-        interval_s: f64,
-    ) -> Result<f64, BoxError> {
-        let wake_up_time_s = Python::attach(|py| {
-            let arguments = (snr_error, velocity_error, interval_s);
-            self.0.call1(py, arguments)?.extract::<f64>(py)
-        });
-        Ok(wake_up_time_s?)
+impl PlugIns {
+    fn custom(&self, scenario: &CoreScenario, start: Pose) -> Result<Custom, BoxError> {
+        Python::attach(|py| {
+            let spacing_wavelengths = scenario.vehicle.array.spacing_wavelengths;
+            let estimator = self.estimator.as_ref().map(|call| {
+                let told = self.told_of_sigma.clone();
+                Box::new(PythonEstimator::new(
+                    call.clone_ref(py),
+                    spacing_wavelengths,
+                    told,
+                )) as _
+            });
+            let policy = self.policy.as_ref();
+            let policy = policy.map(|call| Box::new(PythonPolicy::new(call.clone_ref(py))) as _);
+            let localizer = self.localizer.as_ref().map(|class| {
+                PythonLocalizer::new(class.bind(py), scenario, start).map(|it| Box::new(it) as _)
+            });
+            Ok(Custom {
+                estimator,
+                policy,
+                localizer: localizer.transpose()?,
+            })
+        })
     }
-}
-
-fn custom(estimator: Option<&Py<PyAny>>, policy: Option<&Py<PyAny>>) -> Custom {
-    Python::attach(|py| Custom {
-        estimator: estimator.map(|f| Box::new(PythonEstimator(f.clone_ref(py))) as _),
-        controller: policy.map(|f| Box::new(PythonController(f.clone_ref(py))) as _),
-    })
 }
 
 /// A column's name, and its value in a row.

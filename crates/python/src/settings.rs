@@ -1,24 +1,31 @@
-//! Scenarios and platforms: reading, overriding, writing out.
+//! Sites, vehicles, scenarios and platforms: reading, overriding, writing out.
 
-use access_av::platform::Platform as CorePlatform;
-use access_av::scenario::{Scenario as CoreScenario, ScenarioError as CoreError};
+use std::hash::{DefaultHasher, Hash, Hasher};
+
+use onboard::settings::{
+    Platform as CorePlatform, SettingsError as CoreError, Site as CoreSite, TomlFile,
+    Vehicle as CoreVehicle,
+};
 use pyo3::create_exception;
 use pyo3::exceptions::{PyTypeError, PyValueError};
 use pyo3::prelude::*;
 use pyo3::types::{PyBool, PyDict, PyFloat, PyInt, PyList, PyString, PyTuple};
+use recording::Files;
+use simulate::scenario::Scenario as CoreScenario;
 use toml::{Table, Value};
 
 create_exception!(
     access_av._core,
-    ScenarioError,
+    SettingsError,
     PyValueError,
-    "An unusable scenario or platform; the message names file, key and what is allowed."
+    "An unusable site, vehicle, scenario or platform; the message names file, key and what is \
+     allowed."
 );
 
 /// The Python error for a core error.
 #[allow(clippy::needless_pass_by_value)] // the shape that `map_err` wants
-pub fn scenario_error(error: CoreError) -> PyErr {
-    ScenarioError::new_err(error.to_string())
+pub fn settings_error(error: CoreError) -> PyErr {
+    SettingsError::new_err(error.to_string())
 }
 
 /// A Python class for a checked TOML file of which some are shipped by name, with what is its own.
@@ -35,14 +42,14 @@ macro_rules! toml_file {
                 " file by its path.")]
             #[staticmethod]
             fn load(name_or_path: &str) -> PyResult<Self> {
-                <$core>::load(name_or_path).map(Self).map_err(scenario_error)
+                recording::load::<$core>(name_or_path).map(Self).map_err(settings_error)
             }
 
             #[doc = concat!("Read a ", $what, " from TOML; `origin` is the file that errors name.")]
             #[staticmethod]
             #[pyo3(signature = (text, origin = "<string>"))]
             fn from_toml(text: &str, origin: &str) -> PyResult<Self> {
-                <$core>::from_toml(text, origin).map(Self).map_err(scenario_error)
+                <$core>::from_toml(text, origin, &Files).map(Self).map_err(settings_error)
             }
 
             #[doc = concat!("Names of the shipped ", $what, "s.")]
@@ -61,7 +68,7 @@ macro_rules! toml_file {
             fn with_overrides(&self, overrides: &Bound<'_, PyDict>) -> PyResult<Self> {
                 let pairs = pairs(overrides)?;
                 let borrowed = pairs.iter().map(|(path, value)| (path.as_str(), value.clone()));
-                self.0.with_overrides(borrowed).map(Self).map_err(scenario_error)
+                self.0.with_overrides(borrowed, &Files).map(Self).map_err(settings_error)
             }
 
             #[doc = concat!("The ", $what, " as TOML, every default written out.")]
@@ -80,8 +87,29 @@ macro_rules! toml_file {
                 &self.0.name
             }
 
+            /// What it is for.
+            #[getter]
+            fn description(&self) -> &str {
+                &self.0.description
+            }
+
             fn __repr__(&self) -> String {
                 format!("{}({:?})", stringify!($class), self.0.name)
+            }
+
+            fn __hash__(&self) -> u64 {
+                let mut hasher = DefaultHasher::new();
+                self.0.to_toml().hash(&mut hasher);
+                hasher.finish()
+            }
+
+            /// Copies and pickles are made by way of TOML.
+            fn __reduce__<'py>(
+                slf: &Bound<'py, Self>,
+            ) -> PyResult<(Bound<'py, PyAny>, (String, String))> {
+                let core = &slf.get().0;
+                let from_toml = slf.get_type().getattr("from_toml")?;
+                Ok((from_toml, (core.to_toml(), core.name.clone())))
             }
 
             $($own)*
@@ -90,31 +118,58 @@ macro_rules! toml_file {
 }
 
 toml_file! {
-    /// A scenario, checked.
-    Scenario(CoreScenario), "scenario",
+    /// A site, checked: the plant as the vehicles believe it to be.
+    Site(CoreSite), "site",
+}
 
-    /// What the scenario is for.
-    #[getter]
-    fn description(&self) -> &str {
-        &self.0.description
-    }
+toml_file! {
+    /// A vehicle, checked: what it is built of and how it is set, as it believes.
+    Vehicle(CoreVehicle), "vehicle",
 
-    /// The scenario with the wake-up times written out that it leaves to the platform, which is
+    /// The vehicle with the wake-up times written out that it leaves to the platform, which is
     /// the one it names unless another is given.
     #[pyo3(signature = (platform = None))]
     fn resolved(&self, platform: Option<&Platform>) -> PyResult<Self> {
-        let resolved = match platform {
-            Some(platform) => platform.0.resolve(&self.0),
-            None => CorePlatform::load(&self.0.platform.name)
-                .and_then(|platform| platform.resolve(&self.0)),
-        };
-        resolved.map(Self).map_err(scenario_error)
+        resolve(&self.0, platform).map(Self).map_err(settings_error)
+    }
+}
+
+toml_file! {
+    /// A scenario, checked: a site, a vehicle, and the world around them.
+    Scenario(CoreScenario), "scenario",
+
+    /// The site, as it is believed to be.
+    #[getter]
+    fn site(&self) -> Site {
+        Site(self.0.site.clone())
+    }
+
+    /// The vehicle, as it is believed to be.
+    #[getter]
+    fn vehicle(&self) -> Vehicle {
+        Vehicle(self.0.vehicle.clone())
+    }
+
+    /// The scenario with the wake-up times written out that its vehicle leaves to the platform,
+    /// which is the one it names unless another is given.
+    #[pyo3(signature = (platform = None))]
+    fn resolved(&self, platform: Option<&Platform>) -> PyResult<Self> {
+        let mut resolved = self.0.clone();
+        resolved.vehicle = resolve(&self.0.vehicle, platform).map_err(settings_error)?;
+        Ok(Self(resolved))
     }
 }
 
 toml_file! {
     /// A platform, checked.
     Platform(CorePlatform), "platform",
+}
+
+fn resolve(vehicle: &CoreVehicle, platform: Option<&Platform>) -> Result<CoreVehicle, CoreError> {
+    match platform {
+        Some(platform) => platform.0.resolve(vehicle),
+        None => recording::load::<CorePlatform>(&vehicle.platform.name)?.resolve(vehicle),
+    }
 }
 
 fn pairs(overrides: &Bound<'_, PyDict>) -> PyResult<Vec<(String, Value)>> {

@@ -1,0 +1,470 @@
+//! Python code in place of parts of the pipeline: what it is given, and what it returns, checked.
+
+use std::f64::consts::{PI, TAU};
+use std::sync::Arc;
+use std::sync::atomic::{AtomicBool, Ordering};
+
+use numpy::{PyArray2, PyReadonlyArray1};
+use onboard::BoxError;
+use onboard::estimator::{AngleEstimator, EstimatedAngle};
+use onboard::geometry::Pose;
+use onboard::localize::tracker::OdometryVerdict;
+use onboard::localize::{AngleMeasurement, Localizer, PoseEstimate, UpdateReason, UpdateVerdict};
+use onboard::observation::{OdometrySample, SensedSsb as CoreSensed, SsbObservation};
+use onboard::radio_head::RadioHead as CoreHead;
+use onboard::wake_up::{Situation as CoreSituation, WakeUpPolicy};
+use pyo3::exceptions::{PyUserWarning, PyValueError};
+use pyo3::prelude::*;
+use pyo3::types::PyTuple;
+use simulate::scenario::Scenario;
+
+/// A radio head where the site has it.
+#[pyclass(frozen, get_all, module = "access_av._core")]
+pub struct RadioHead {
+    /// Physical cell identity.
+    pci: u16,
+    /// Index of its SSB in the burst.
+    ssb_index: u8,
+    /// Place in metres ...
+    x_m: f64,
+    /// ... and ...
+    y_m: f64,
+    /// ... height.
+    z_m: f64,
+}
+
+impl From<&CoreHead> for RadioHead {
+    fn from(head: &CoreHead) -> Self {
+        Self {
+            pci: head.pci,
+            ssb_index: head.ssb_index,
+            x_m: head.position.x_m,
+            y_m: head.position.y_m,
+            z_m: head.height_m,
+        }
+    }
+}
+
+/// An SSB whose angle has not been estimated yet.
+#[pyclass(frozen, get_all, module = "access_av._core")]
+pub struct SensedSsb {
+    /// Physical cell identity.
+    pci: u16,
+    /// Index of the SSB in the burst.
+    ssb_index: u8,
+    /// SNR that was sensed, in dB.
+    snr_db: f64,
+    /// SNR that the link budget promises at the estimated place, in dB; `None` where no radio head
+    /// of the site sends this SSB.
+    expected_snr_db: Option<f64>,
+}
+
+/// What a wake-up policy may base its decision on.
+#[pyclass(frozen, get_all, module = "access_av._core")]
+pub struct Situation {
+    /// Time of the burst in seconds.
+    time_s: f64,
+    /// Speed by the odometer in m/s.
+    speed_mps: f64,
+    /// Where the vehicle believes to be, in metres ...
+    x_m: f64,
+    /// ... and ...
+    y_m: f64,
+    /// ... its heading in radians.
+    heading_rad: f64,
+    /// Covariance of (x, y, heading), where the localizer has one.
+    covariance: Option<[[f64; 3]; 3]>,
+    /// The site's radio heads.
+    heads: Vec<Py<RadioHead>>,
+    /// What was sensed of the burst; empty as long as the receiver sleeps.
+    sensed: Vec<Py<SensedSsb>>,
+}
+
+impl Situation {
+    fn new(py: Python<'_>, now: &CoreSituation<'_>, sensed: &[CoreSensed]) -> PyResult<Self> {
+        let failed = |error: BoxError| PyErr::from(PlugInError(error));
+        let estimate = now.localizer.pose(now.time_s).map_err(failed)?;
+        let sensed = sensed.iter().map(|ssb| {
+            let expected = now.head(ssb).map(|head| now.expected_snr_db(head));
+            let told = SensedSsb {
+                pci: ssb.pci,
+                ssb_index: ssb.ssb_index,
+                snr_db: ssb.snr_db,
+                expected_snr_db: expected.transpose().map_err(failed)?,
+            };
+            Py::new(py, told)
+        });
+        let heads = now
+            .heads
+            .iter()
+            .map(|head| Py::new(py, RadioHead::from(head)));
+        Ok(Self {
+            time_s: now.time_s,
+            speed_mps: now.speed_mps,
+            x_m: estimate.pose.x_m,
+            y_m: estimate.pose.y_m,
+            heading_rad: estimate.pose.heading_rad,
+            covariance: estimate.covariance,
+            heads: heads.collect::<PyResult<_>>()?,
+            sensed: sensed.collect::<PyResult<_>>()?,
+        })
+    }
+}
+
+/// An error that passed through the core; it comes out as it went in.
+struct PlugInError(BoxError);
+
+impl From<PlugInError> for PyErr {
+    fn from(error: PlugInError) -> Self {
+        match error.0.downcast::<Self>() {
+            Ok(raised) => *raised,
+            Err(other) => PyValueError::new_err(other.to_string()),
+        }
+    }
+}
+
+/// A Python callable in place of the angle estimator.
+pub struct PythonEstimator {
+    call: Py<PyAny>,
+    element_rad: f64,
+    told_of_sigma: Arc<AtomicBool>,
+}
+
+impl PythonEstimator {
+    /// `call` for an array of this spacing; `told_of_sigma` is shared by all runs.
+    pub fn new(call: Py<PyAny>, spacing_wavelengths: f64, told_of_sigma: Arc<AtomicBool>) -> Self {
+        Self {
+            call,
+            element_rad: TAU * spacing_wavelengths,
+            told_of_sigma,
+        }
+    }
+
+    fn angle(
+        &self,
+        py: Python<'_>,
+        angle_rad: f64,
+        sigma_rad: Option<f64>,
+    ) -> PyResult<EstimatedAngle> {
+        if !(0.0..=PI).contains(&angle_rad) {
+            return Err(refused(&format!(
+                "estimator returned an angle of {angle_rad} rad; it must be between 0 and pi"
+            )));
+        }
+        match sigma_rad {
+            Some(sigma_rad) if !(sigma_rad > 0.0 && sigma_rad.is_finite()) => {
+                return Err(refused(&format!(
+                    "estimator returned a standard deviation of {sigma_rad} rad; it must be above 0"
+                )));
+            }
+            None if !self.told_of_sigma.swap(true, Ordering::Relaxed) => PyErr::warn(
+                py,
+                &py.get_type::<PyUserWarning>(),
+                c"the estimator states no standard deviation; the Cramer-Rao bound at each SSB's \
+                  SNR is taken",
+                1,
+            )?,
+            _ => {}
+        }
+        let (sin, cos) = angle_rad.sin_cos();
+        // To the second order, for end-fire.
+        let spread = |sigma: f64| self.element_rad * (sin * sigma + 0.5 * sigma * sigma);
+        Ok(EstimatedAngle::Angle {
+            phase_rad: self.element_rad * cos,
+            phase_sigma_rad: sigma_rad.map(spread),
+            snr_db: None,
+            resolved: true,
+        })
+    }
+
+    fn understand(&self, found: &Bound<'_, PyAny>) -> PyResult<Option<EstimatedAngle>> {
+        let py = found.py();
+        if found.is_none() {
+            return Ok(None);
+        }
+        if let Ok(angle_rad) = found.extract::<f64>() {
+            return self.angle(py, angle_rad, None).map(Some);
+        }
+        if let Ok((angle_rad, sigma_rad)) = found.extract::<(f64, f64)>() {
+            return self.angle(py, angle_rad, Some(sigma_rad)).map(Some);
+        }
+        if let Ok(log) = found.extract::<PyReadonlyArray1<'_, f64>>() {
+            let log = log.as_array().to_vec();
+            if log.len() < 8 || !log.iter().any(|value| value.is_finite()) {
+                return Err(refused(
+                    "estimator returned a log-likelihood without a finite value, or of fewer than \
+                     8 electrical angles",
+                ));
+            }
+            if log
+                .iter()
+                .any(|value| value.is_nan() || *value == f64::INFINITY)
+            {
+                return Err(refused(
+                    "estimator returned a log-likelihood that is no number",
+                ));
+            }
+            return Ok(Some(EstimatedAngle::LogLikelihood(log)));
+        }
+        Err(refused(&format!(
+            "estimator returned a {}; allowed are an angle in radians, (angle, standard deviation), \
+             a float64 array of the log-likelihood over the electrical angle, and None",
+            found.get_type().name()?
+        )))
+    }
+}
+
+fn refused(message: &str) -> PyErr {
+    PyValueError::new_err(message.to_owned())
+}
+
+/// Says at which SSB a plug-in failed, and keeps the exception's type.
+fn at(py: Python<'_>, error: PyErr, what: &str) -> PyErr {
+    // A note leaves the exception what it is (Python 3.11 and later).
+    let _ = error.value(py).call_method1("add_note", (what,));
+    error
+}
+
+impl AngleEstimator for PythonEstimator {
+    fn estimate(
+        &mut self,
+        observation: &SsbObservation,
+    ) -> Result<Option<EstimatedAngle>, BoxError> {
+        let estimated = Python::attach(|py| {
+            let elements = observation.elements();
+            let values = observation.values();
+            let rows: Vec<Vec<_>> = (0..elements)
+                .map(|antenna| {
+                    values
+                        .iter()
+                        .skip(antenna)
+                        .step_by(elements)
+                        .copied()
+                        .collect()
+                })
+                .collect();
+            let estimated = PyArray2::from_vec2(py, &rows)
+                .map_err(PyErr::from)
+                .and_then(|snapshots| self.call.bind(py).call1((snapshots,)))
+                .and_then(|found| self.understand(&found));
+            let ssb = &observation.ssb;
+            let what = || {
+                let (pci, index, time_s) = (ssb.pci, ssb.ssb_index, ssb.time_s);
+                format!("in the estimator, for the SSB of pci {pci}, index {index}, at {time_s} s")
+            };
+            estimated.map_err(|error| at(py, error, &what()))
+        });
+        Ok(estimated?)
+    }
+}
+
+/// A Python callable in place of the wake-up policy.
+pub struct PythonPolicy(Py<PyAny>);
+
+impl PythonPolicy {
+    /// `call`, and its method `listens` if it has one.
+    pub const fn new(call: Py<PyAny>) -> Self {
+        Self(call)
+    }
+}
+
+impl WakeUpPolicy for PythonPolicy {
+    fn listens(&mut self, now: &CoreSituation<'_>) -> Result<bool, BoxError> {
+        let listens = Python::attach(|py| {
+            let policy = self.0.bind(py);
+            if !policy.hasattr("listens")? {
+                return Ok(true);
+            }
+            let situation = Situation::new(py, now, &[])?;
+            let found = policy.call_method1("listens", (situation,))?;
+            found
+                .extract::<bool>()
+                .map_err(|_| refused("policy.listens returned something else than True or False"))
+        });
+        Ok(listens?)
+    }
+
+    fn decide(
+        &mut self,
+        now: &CoreSituation<'_>,
+        sensed: &[CoreSensed],
+        chosen: &mut [bool],
+    ) -> Result<f64, BoxError> {
+        let wake_up_time_s = Python::attach(|py| -> PyResult<f64> {
+            let what = format!("in the policy, at {} s", now.time_s);
+            let policy = self.0.bind(py);
+            let situation = Situation::new(py, now, sensed)?;
+            let found = policy
+                .call1((situation,))
+                .map_err(|error| at(py, error, &what))?;
+            if let Ok(all) = found.extract::<bool>() {
+                chosen.fill(all);
+            } else if let Ok(each) = found.extract::<Vec<bool>>()
+                && each.len() == chosen.len()
+            {
+                chosen.copy_from_slice(&each);
+            } else {
+                let message = format!(
+                    "policy returned {}; it must be True, False, or a list of them, one for each \
+                     of the {} sensed SSBs",
+                    found.repr()?,
+                    sensed.len()
+                );
+                return Err(at(py, refused(&message), &what));
+            }
+            let stated = policy.getattr_opt("wake_up_time_s")?;
+            let Some(stated) = stated else {
+                return Ok(f64::NAN);
+            };
+            let time_s: f64 = stated.extract()?;
+            if time_s.is_nan() || time_s < 0.0 {
+                let message = format!("policy.wake_up_time_s is {time_s}; it must not be below 0");
+                return Err(at(py, refused(&message), &what));
+            }
+            Ok(time_s)
+        });
+        Ok(wake_up_time_s?)
+    }
+}
+
+/// A Python object in place of the localizer.
+pub struct PythonLocalizer(Py<PyAny>);
+
+impl PythonLocalizer {
+    /// `class(site, vehicle, start)`, with site and vehicle as dictionaries, and the start as the
+    /// vehicle is told it: x and y in metres, heading in radians.
+    ///
+    /// # Errors
+    /// What the class raises.
+    pub fn new(class: &Bound<'_, PyAny>, scenario: &Scenario, start: Pose) -> PyResult<Self> {
+        use onboard::settings::TomlFile;
+        let loads = class.py().import("json")?.getattr("loads")?;
+        let site = loads.call1((scenario.site.to_json(),))?;
+        let vehicle = loads.call1((scenario.vehicle.to_json(),))?;
+        let start = (start.x_m, start.y_m, start.heading_rad);
+        Ok(Self(class.call1((site, vehicle, start))?.unbind()))
+    }
+}
+
+impl Localizer for PythonLocalizer {
+    fn odometry(&mut self, sample: &OdometrySample) -> Result<OdometryVerdict, BoxError> {
+        let arguments = (
+            sample.time_s,
+            sample.distance_m,
+            sample.speed_mps,
+            sample.yaw_rate_radps,
+        );
+        Python::attach(|py| {
+            let what = format!("in localizer.odometry, at {} s", sample.time_s);
+            let called = self.0.bind(py).call_method1("odometry", arguments);
+            called.map(drop).map_err(|error| at(py, error, &what))
+        })?;
+        Ok(OdometryVerdict::Accepted)
+    }
+
+    fn update(
+        &mut self,
+        head: &CoreHead,
+        measured: &AngleMeasurement,
+    ) -> Result<UpdateVerdict, BoxError> {
+        let accepted = Python::attach(|py| {
+            let what = format!("in localizer.angle, at {} s", measured.time_s);
+            let arguments = (
+                measured.time_s,
+                RadioHead::from(head),
+                measured.phase_rad,
+                measured.phase_sigma_rad,
+            );
+            let told = self.0.bind(py).call_method1("angle", arguments);
+            let told = told.map_err(|error| at(py, error, &what))?;
+            if told.is_none() {
+                return Ok(true);
+            }
+            let accepted = told.extract::<bool>();
+            accepted.map_err(|_| {
+                let message = "localizer.angle returned something else than True, False or None";
+                at(py, refused(message), &what)
+            })
+        })?;
+        let reason = if accepted {
+            UpdateReason::Consistent
+        } else {
+            UpdateReason::Outlier
+        };
+        Ok(UpdateVerdict {
+            accepted,
+            ..UpdateVerdict::unused(reason)
+        })
+    }
+
+    fn pose(&self, time_s: f64) -> Result<PoseEstimate, BoxError> {
+        let estimate = Python::attach(|py| {
+            let what = format!("in localizer.pose, at {time_s} s");
+            let found = self.0.bind(py).call_method1("pose", (time_s,));
+            found
+                .and_then(|found| pose_estimate(&found, time_s))
+                .map_err(|error| at(py, error, &what))
+        });
+        Ok(estimate?)
+    }
+
+    /// By `copy.deepcopy`; an object that cannot be copied gets no late angles.
+    fn copy_to(&self, slot: &mut Option<Box<dyn Localizer>>) -> bool {
+        let copy = Python::attach(|py| {
+            let deepcopy = py.import("copy")?.getattr("deepcopy")?;
+            Ok::<_, PyErr>(deepcopy.call1((&self.0,))?.unbind())
+        });
+        copy.map(|copy| *slot = Some(Box::new(Self(copy)))).is_ok()
+    }
+}
+
+fn pose_estimate(found: &Bound<'_, PyAny>, time_s: f64) -> PyResult<PoseEstimate> {
+    let shape = || {
+        refused(
+            "localizer.pose returned something else than (x_m, y_m, heading_rad) or (x_m, y_m, \
+             heading_rad, covariance), with the 3 by 3 covariance of the three",
+        )
+    };
+    let found = found.cast::<PyTuple>().map_err(|_| shape())?;
+    let number = |index: usize| -> PyResult<f64> {
+        let value = found.get_item(index).map_err(|_| shape())?;
+        value.extract().map_err(|_| shape())
+    };
+    let [x_m, y_m, heading_rad] = [number(0)?, number(1)?, number(2)?];
+    if ![x_m, y_m, heading_rad]
+        .iter()
+        .all(|value| value.is_finite())
+    {
+        return Err(refused(
+            "localizer.pose returned a value that is not finite",
+        ));
+    }
+    let covariance = match found.len() {
+        3 => None,
+        4 => {
+            let rows = found.get_item(3)?;
+            let rows = rows.call_method0("tolist").unwrap_or(rows);
+            let matrix: [[f64; 3]; 3] = rows.extract().map_err(|_| shape())?;
+            let finite = matrix.iter().flatten().all(|value| value.is_finite());
+            let positive = (0..3).all(|i| matrix.get(i).and_then(|row| row.get(i)) >= Some(&0.0));
+            if !finite || !positive {
+                return Err(refused(
+                    "localizer.pose returned a covariance that is not finite, or has a negative \
+                     variance",
+                ));
+            }
+            Some(matrix)
+        }
+        _ => return Err(shape()),
+    };
+    Ok(PoseEstimate {
+        time_s,
+        pose: Pose {
+            x_m,
+            y_m,
+            heading_rad,
+        },
+        covariance,
+        integrity: None,
+    })
+}

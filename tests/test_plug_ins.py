@@ -1,0 +1,214 @@
+"""A user's own estimator, policy and localizer: the documented ones, and those that misbehave."""
+
+from __future__ import annotations
+
+import re
+import warnings
+from typing import TYPE_CHECKING, Any
+
+import numpy as np
+import pytest
+
+import access_av
+from conftest import ROOT
+
+if TYPE_CHECKING:
+    from collections.abc import Callable
+
+DOCS = (ROOT / "docs/plug-ins.md").read_text(encoding="utf-8")
+SHORT = access_av.Scenario.load("paper-real-odometry-2").with_overrides(
+    {"motion.start_at_m": 280.0}
+)
+
+
+def test_documented_examples_run(capsys: pytest.CaptureFixture[str]) -> None:
+    names: dict[str, Any] = {}
+    for block in re.findall(r"```python\n(.*?)```", DOCS, flags=re.DOTALL):
+        exec(block, names)
+    printed = capsys.readouterr().out
+    errors_m = [float(number) for number in re.findall(r"([\d.]+) m", printed)]
+    # As good as what is built in, up to what a plain filter in the plane loses without the map.
+    assert len(errors_m) == 4, printed
+    assert max(errors_m) < 0.6, printed
+
+
+def bartlett(snapshots: np.ndarray) -> float:
+    angles_rad = np.linspace(0.0, np.pi, 361)
+    steering = np.exp(1j * np.pi * np.outer(np.cos(angles_rad), np.arange(len(snapshots))))
+    return float(angles_rad[(abs(steering.conj() @ snapshots) ** 2).sum(axis=1).argmax()])
+
+
+def test_without_sigma_the_bound_is_taken_and_said_once() -> None:
+    with pytest.warns(UserWarning, match="Cramer-Rao") as said:
+        result = access_av.simulate(SHORT, runs=3, keep_trajectories=True, estimator=bartlett)
+    assert len(said) == 1
+    assert result.executions is not None
+    accepted = result.executions["accepted"]
+    assert accepted.mean() > 0.9  # type: ignore[operator]
+    built_in = access_av.simulate(SHORT, runs=3, keep_trajectories=True)
+    assert built_in.executions is not None
+    sigmas = [table["phase_sigma_rad"].median() for table in (result.executions, built_in.executions)]
+    # The bound at the sensed SNR is what maximum likelihood states, fading aside.
+    assert 0.8 < sigmas[0] / sigmas[1] < 1.25  # type: ignore[operator]
+
+
+def test_a_likelihood_is_as_good_as_its_maximum() -> None:
+    phases = np.arange(-np.pi, np.pi, 2.0 * np.pi / 720)
+    steering = np.exp(1j * np.outer(phases, np.arange(4)))
+
+    def likelihood(snapshots: np.ndarray) -> np.ndarray:
+        return (abs(steering.conj() @ snapshots) ** 2).sum(axis=1) / 4.0
+
+    told = access_av.simulate(SHORT, runs=2, estimator=likelihood)
+    built_in = access_av.simulate(SHORT, runs=2)
+    assert told.rms_error_m < 1.2 * built_in.rms_error_m
+
+
+@pytest.mark.parametrize(
+    ("returned", "named"),
+    [
+        (12345.0, "between 0 and pi"),
+        (float("nan"), "between 0 and pi"),
+        ((1.0, -0.1), "must be above 0"),
+        ((1.0, float("nan")), "must be above 0"),
+        ("left", "returned a str"),
+        (np.full(360, np.nan), "log-likelihood"),
+        (np.zeros(3), "log-likelihood"),
+    ],
+)
+def test_estimates_that_cannot_be_are_refused(returned: Any, named: str) -> None:
+    with pytest.raises(ValueError, match=named) as raised:
+        access_av.simulate(SHORT, estimator=lambda _: returned)
+    if hasattr(raised.value, "__notes__"):
+        assert "pci 1, index 0" in raised.value.__notes__[0]
+
+
+def test_no_angle_is_no_error() -> None:
+    result = access_av.simulate(SHORT, keep_trajectories=True, estimator=lambda _: None)
+    assert result.executions is not None
+    assert set(result.executions["reason"]) == {"unusable"}
+
+
+def raising(*_: Any) -> Any:
+    raise KeyError("mine")
+
+
+@pytest.mark.parametrize("place", ["estimator", "policy", "localizer"])
+def test_exceptions_come_out_as_they_went_in(place: str) -> None:
+    with pytest.raises(KeyError, match="mine"):
+        access_av.simulate(SHORT, **{place: raising})  # type: ignore[arg-type]
+
+
+@pytest.mark.parametrize("returned", [None, 3, [True], "yes", [1.0, 2.0]])
+def test_answers_of_a_policy_that_cannot_be_are_refused(returned: Any) -> None:
+    with pytest.raises(ValueError, match="policy returned"):
+        access_av.simulate(SHORT, policy=lambda _: returned)
+
+
+def test_a_policy_sees_the_situation_and_decides() -> None:
+    seen: list[Any] = []
+
+    class Policy:
+        wake_up_time_s = 0.5
+
+        def listens(self, situation: Any) -> bool:
+            assert situation.sensed == []
+            return round(situation.time_s * 50) % 2 == 0
+
+        def __call__(self, situation: Any) -> list[bool]:
+            seen.append(situation)
+            return [ssb.pci == 2 for ssb in situation.sensed]
+
+    result = access_av.simulate(SHORT, keep_trajectories=True, policy=Policy())
+    assert result.executions is not None
+    assert set(result.executions["pci"]) == {2}
+    assert set(result.executions["wake_up_time_s"]) == {0.5}
+    assert result.executions.height == len(seen) == result.runs["listened"][0]
+    first = seen[0]
+    assert [head.pci for head in first.heads] == [1, 2]
+    assert first.heads[0].x_m == 205.0
+    assert abs(first.sensed[0].snr_db - first.sensed[0].expected_snr_db) < 15.0
+    assert len(first.covariance) == 3
+
+
+class Standing:
+    """A localizer that believes to stand."""
+
+    answer: Any = None
+
+    def __init__(self, site: dict[str, Any], vehicle: dict[str, Any], start: tuple[float, ...]):
+        assert site["radio_heads"][0]["name"] == "roadside"
+        assert vehicle["array"]["elements"] == 4
+        self.start = start
+
+    def odometry(self, *_: Any) -> None: ...
+
+    def angle(self, time_s: float, head: Any, phase_rad: float, sigma_rad: float) -> Any:
+        assert head.pci in (1, 2)
+        assert sigma_rad > 0.0
+        return self.answer
+
+    def pose(self, time_s: float) -> Any:
+        return self.start
+
+
+def with_pose(pose: Any) -> type[Standing]:
+    return type("Other", (Standing,), {"pose": lambda self, time_s: pose})
+
+
+def test_a_localizer_stands_in_for_the_built_in_one() -> None:
+    result = access_av.simulate(SHORT, keep_trajectories=True, localizer=Standing)
+    assert result.trajectories is not None
+    moved = result.trajectories["x_m"].n_unique()
+    assert moved == 1
+    assert result.trajectories["covariance_xx_m2"].null_count() == result.trajectories.height
+
+
+@pytest.mark.parametrize(
+    ("pose", "named"),
+    [
+        ((1.0, float("nan"), 0.0), "not finite"),
+        ((1.0, 2.0), "something else"),
+        ("here", "something else"),
+        ((1.0, 2.0, 0.0, [[1.0]]), "something else"),
+        ((1.0, 2.0, 0.0, -np.eye(3)), "negative"),
+    ],
+)
+def test_poses_that_cannot_be_are_refused(pose: Any, named: str) -> None:
+    with pytest.raises(ValueError, match=named):
+        access_av.simulate(SHORT, localizer=with_pose(pose))
+
+
+def test_late_angles_go_to_copies_of_a_localizer() -> None:
+    class Filter(Standing):
+        """Remembers in which order things came."""
+
+        def __init__(self, *arguments: Any) -> None:
+            super().__init__(*arguments)
+            self.times: list[float] = []
+
+        def odometry(self, time_s: float, *_: Any) -> None:
+            self.times.append(time_s)
+
+        def angle(self, time_s: float, *_: Any) -> bool:
+            assert not self.times or time_s >= self.times[-1]
+            return True
+
+    late = SHORT.with_overrides({"ssb_latency_ms": 70.0, "vehicle.wake_up.interval_ms": 200.0})
+    result = access_av.simulate(late, keep_trajectories=True, localizer=Filter)
+    assert result.executions is not None
+    assert set(result.executions["reason"]) == {"consistent"}
+
+
+@pytest.mark.parametrize("make", [access_av.Site, access_av.Vehicle, access_av.Scenario])
+def test_settings_are_copied_compared_hashed_and_pickled(make: Callable[..., Any]) -> None:
+    import copy
+    import pickle
+
+    one = make.load("paper")  # type: ignore[attr-defined]
+    with warnings.catch_warnings():
+        warnings.simplefilter("error")
+        for other in (copy.deepcopy(one), pickle.loads(pickle.dumps(one))):
+            assert other == one
+            assert hash(other) == hash(one)
+    assert one != make.load("yard" if make is not access_av.Vehicle else "tugger")  # type: ignore[attr-defined]
