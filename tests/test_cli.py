@@ -73,7 +73,8 @@ def test_run_is_the_same_for_one_and_two_threads(access_av: Cli, tmp_path: Path)
 
 def test_set_changes_one_key(access_av: Cli, tmp_path: Path) -> None:
     done = access_av(
-        "run", "paper", "--set", "channel.rician_k_db=7.5", "--set", "estimator.method=esprit",
+        "run", "paper", "--set", "site.rician_k_db=7.5",
+        "--set", "vehicle.estimator.method=esprit",
         "--out", tmp_path / "r",
     )  # fmt: skip
     assert done.code == 0, done.err
@@ -115,7 +116,7 @@ def test_evaluate_shows_tables_in_a_narrow_terminal(access_av: Cli, tmp_path: Pa
 
 
 def test_shipped_files_are_listed_shown_and_fine(access_av: Cli, tmp_path: Path) -> None:
-    for what in ("scenario", "platform"):
+    for what in ("site", "vehicle", "scenario", "platform"):
         names = access_av(what, "list").out.split()
         assert names
         for name in names:
@@ -126,25 +127,37 @@ def test_shipped_files_are_listed_shown_and_fine(access_av: Cli, tmp_path: Path)
         assert json.loads(access_av(what, "schema").out)["$schema"]
 
 
-SCENARIO = 'name = "mine"\n[track]\nsegments = [{ length_m = 300.0, turn_rad = 0.25 }]\n'
-HEAD = "[[radio_heads]]\nposition_m = [205.0, 100.0]\ntx_power_dbm = -27.0\n"
+SCENARIO = (
+    'name = "mine"\nvehicle = "paper"\n[site]\nname = "mine"\n'
+    "[site.road]\nsegments = [{ length_m = 300.0, turn_rad = 0.25 }]\n"
+)
+HEAD = "[[site.radio_heads]]\nposition_m = [205.0, 100.0, 0.0]\n"
+PID = '[vehicle]\nlike = "paper"\n[vehicle.wake_up]\nbase_ms = 300.0\n'
 
 
 @pytest.mark.parametrize(
     ("text", "named"),
     [
         (SCENARIO + HEAD + "[chanel]\n", ["chanel", "channel"]),
-        (SCENARIO + HEAD + "[channel]\nrician_k = 3.0\n", ["channel.rician_k", "rician_k_db"]),
-        (SCENARIO + HEAD + '[channel]\nrician_k_db = "ten"\n', ["channel.rician_k_db"]),
-        (SCENARIO + HEAD + "[channel]\nrician_k_db = nan\n", ["channel.rician_k_db", "finite"]),
-        (SCENARIO.replace("300.0", "-300.0") + HEAD, ["length_m", "-300"]),
-        (SCENARIO + HEAD.replace("[205.0, 100.0]", "[0.0, 0.0]"), ["radio_heads[0]"]),
-        (SCENARIO + HEAD + '[wake_up]\npolicy = "pid"\nbase_ms = 300.0\n', ["t_max_ms", "300"]),
+        (SCENARIO + HEAD + "[channel]\nray = 3\n", ["channel.ray", "rays"]),
+        (SCENARIO + HEAD + '[channel]\nrays = "ten"\n', ["channel.rays"]),
+        (SCENARIO + HEAD + "[channel]\nshadowing_std_db = nan\n", ["shadowing_std_db", "finite"]),
+        (SCENARIO.replace("300.0", "-300.0") + HEAD, ["site.road.segments[0].length_m", "-300"]),
+        (SCENARIO + HEAD.replace("[205.0, 100.0,", "[0.0, 0.0,"), ["site.radio_heads[0]"]),
+        (SCENARIO.replace('vehicle = "paper"\n', "") + HEAD + PID, ["vehicle.wake_up.t_max_ms"]),
+        (SCENARIO + HEAD + "[truth.vehicle.array]\nmountin_rad = 1\n",
+         ["truth.vehicle.array.mountin_rad", "mounting_rad"]),
+        (SCENARIO + HEAD + "[truth.vehicle.gyroscope]\nbias_radps = 1.0\n",
+         ["truth.vehicle.gyroscope", "nothing believes"]),
+        (SCENARIO + HEAD + '[truth.vehicle.localizer]\nkind = "tracker"\n',
+         ["truth.vehicle.localizer", "facts"]),
+        (SCENARIO.replace('vehicle = "paper"', 'vehicle = "papr"') + HEAD, ["vehicle", "papr"]),
         (SCENARIO, ["radio_heads"]),
         ("name = \n", ["TOML"]),
     ],
     ids=[
-        "table", "key", "type", "nan", "negative", "head-on-track", "t-max", "missing", "syntax",
+        "table", "key", "type", "nan", "negative", "head-on-road", "t-max", "truth-key",
+        "truth-unbelieved", "truth-setting", "vehicle-name", "missing", "syntax",
     ],
 )  # fmt: skip
 def test_bad_scenarios_end_with_2_and_name_file_and_key(
@@ -164,7 +177,7 @@ def test_bad_scenarios_end_with_2_and_name_file_and_key(
     ("arguments", "named"),
     [
         (["run", "papier"], ["papier", "paper"]),
-        (["run", "paper", "--set", "channel.rician_k=3"], ["rician_k", "rician_k_db"]),
+        (["run", "paper", "--set", "site.rician_k=3"], ["rician_k", "rician_k_db"]),
         (["run", "paper", "--set", "nonsense"], ["KEY=VALUE"]),
         (["run", "paper", "--runs", "0"], ["--runs"]),
         (["run", "paper", "--seed", "-1"], ["--seed"]),

@@ -65,8 +65,8 @@ def test_the_page_is_made_from_the_table() -> None:
     assert page == columns.markdown(), "make docs"
 
 
-GUARDED = {"localizer.integrity": True}
-LOST = {"start.known": False, "radio_heads[0].tx_power_dbm": -150.0}
+GUARDED = {"vehicle.integrity": {}}
+LOST = {"vehicle.start.known": False, "site.radio_heads[0].eirp_dbm": -140.0}
 
 
 @pytest.mark.parametrize(
@@ -74,7 +74,7 @@ LOST = {"start.known": False, "radio_heads[0].tx_power_dbm": -150.0}
     [
         ("paper", {}),
         ("paper-real-odometry-2", GUARDED),
-        ("paper-real-odometry-2", LOST | {"radio_heads[1].tx_power_dbm": -150.0}),
+        ("paper-real-odometry-2", LOST | {"site.radio_heads[1].eirp_dbm": -140.0}),
         ("nlos-and-faults", {}),
     ],
     ids=["dead-reckoning", "guarded", "lost", "faults"],
@@ -93,7 +93,8 @@ def test_simulation(scenario: str, changes: dict[str, object]) -> None:
 def test_located_drives(tmp_path: Path) -> None:
     drives.synthesize("paper-real-odometry-2", tmp_path, duration_s=6.0)
     site, odometry = tmp_path / "site.toml", tmp_path / "odometry.csv"
-    drive = drives.locate(site, odometry, tmp_path / "iq", smooth=True)
+    vehicle = tmp_path / "vehicle.toml"
+    drive = drives.locate(site, odometry, tmp_path / "iq", vehicle=vehicle, smooth=True)
     assert drive.smoothed is not None
     check("poses", drive.poses)
     check("smoothed", drive.smoothed)
@@ -105,7 +106,7 @@ def test_located_drives(tmp_path: Path) -> None:
     # What is written can be read: the log of angles has the columns that its table says.
     log = tmp_path / "angles.csv"
     drive.angles.select(columns.TABLES["angles"].columns[:7]).drop_nulls().write_csv(log)
-    assert drives.locate(site, odometry, log).angles.height > 0
+    assert drives.locate(site, odometry, log, vehicle=vehicle).angles.height > 0
 
 
 def test_bound() -> None:

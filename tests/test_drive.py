@@ -21,7 +21,7 @@ if TYPE_CHECKING:
     from access_av import Simulation
     from conftest import Finished
 
-GUARDED = Scenario.load("paper-real-odometry-2").with_overrides({"localizer.integrity": True})
+GUARDED = Scenario.load("paper-real-odometry-2").with_overrides({"vehicle.integrity": {}})
 
 
 @pytest.fixture(scope="module")
@@ -81,7 +81,7 @@ def test_run_tells_percentiles_and_integrity(
     access_av: Callable[..., Finished], tmp_path: Path
 ) -> None:
     done = access_av(
-        "run", "paper-real-odometry-2", "--set", "localizer.integrity=true", "--out", tmp_path,
+        "run", "paper-real-odometry-2", "--set", "vehicle.integrity={}", "--out", tmp_path,
     )  # fmt: skip
     assert done.code == 0, done.err
     for text in ("50% below", "90% below", "99% below", "protection level / error", "epochs ok"):
@@ -92,7 +92,7 @@ def test_run_tells_percentiles_and_integrity(
 def test_a_start_from_scratch_says_when_it_was_found(
     access_av: Callable[..., Finished], tmp_path: Path
 ) -> None:
-    changes = {"start.known": False, "motion.start_at_m": 200.0}
+    changes = {"vehicle.start.known": False, "motion.start_at_m": 200.0}
     done = access_av(
         "run", "paper-real-odometry-2", "--runs", "2", "--out", tmp_path,
         *(f"--set={key}={str(value).lower()}" for key, value in changes.items()),
@@ -110,9 +110,9 @@ def test_a_start_from_scratch_says_when_it_was_found(
 
 def test_a_vehicle_that_cannot_be_found_has_no_error() -> None:
     # Nothing is heard.
-    silent = {f"radio_heads[{index}].tx_power_dbm": -150.0 for index in (0, 1)}
+    silent = {f"site.radio_heads[{index}].eirp_dbm": -140.0 for index in (0, 1)}
     scenario = Scenario.load("paper-real-odometry-2").with_overrides(
-        {"start.known": False, "motion.start_at_m": 290.0, **silent}
+        {"vehicle.start.known": False, "motion.start_at_m": 290.0, **silent}
     )
     result = simulate(scenario, keep_trajectories=True)
     assert result.runs["found_s"].null_count() == 1

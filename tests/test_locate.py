@@ -4,13 +4,13 @@ import json
 import re
 import subprocess
 import sys
-from typing import TYPE_CHECKING
+from typing import TYPE_CHECKING, Any
 
 import polars as pl
 import pytest
 from mcap.reader import make_reader
 
-from access_av import drives
+from access_av import Vehicle, drives
 from access_av.toml import tomllib
 
 if TYPE_CHECKING:
@@ -35,8 +35,19 @@ def drive(tmp_path_factory: pytest.TempPathFactory) -> Path:
 def arguments(drive: Path, out: Path) -> list[object]:
     return [
         "locate", "--recording", drive / "iq.sigmf-meta", "--odometry", drive / "odometry.csv",
-        "--site", drive / "site.toml", "--out", out,
+        "--site", drive / "site.toml", "--out", out, "--vehicle", drive / "vehicle.toml",
     ]  # fmt: skip
+
+
+def locate(drive: Path, **given: Any) -> drives.Drive:
+    """A synthesized drive, with other files in place of its own."""
+    return drives.locate(
+        given.pop("site", drive / "site.toml"),
+        given.pop("odometry", drive / "odometry.csv"),
+        drive / "iq",
+        vehicle=given.pop("vehicle", drive / "vehicle.toml"),
+        **given,
+    )
 
 
 def test_a_synthesized_drive_is_located(access_av: Cli, drive: Path, tmp_path: Path) -> None:
@@ -115,32 +126,35 @@ def test_mcap_odometry_and_bad_items_are_taken_in(
 ) -> None:
     # Our own poses as odometry, by way of MCAP.
     access_av(*arguments(drive, tmp_path))
-    located = drives.locate(drive / "site.toml", tmp_path / "drive.mcap", drive / "iq")
+    located = locate(drive, odometry=tmp_path / "drive.mcap")
     assert located.poses.height == 601
     rows = (drive / "odometry.csv").read_text().splitlines()
     spoilt = tmp_path / "odometry.csv"
     spoilt.write_text("\n".join([*rows[:100], "nan,1,2", rows[50], "a,b", *rows[100:]]))
-    done = access_av(*arguments(drive, tmp_path / "again")[:4], spoilt, "--site",
-                     drive / "site.toml", "--out", tmp_path / "again")  # fmt: skip
+    given = arguments(drive, tmp_path / "again")
+    given[4] = spoilt
+    done = access_av(*given)
     assert done.code == 0, done.err
     assert done.err.count("left out") == 3
 
 
-def test_integrity_comes_with_the_poses_where_the_site_asks_for_it(
+def test_integrity_comes_with_the_poses_where_the_vehicle_asks_for_it(
     drive: Path, tmp_path: Path
 ) -> None:
-    text = (drive / "site.toml").read_text()
-    site = tmp_path / "site.toml"
-    site.write_text(text.replace("integrity = false", "integrity = true"))
-    poses = drives.locate(site, drive / "odometry.csv", drive / "iq").poses
+    vehicle = tmp_path / "vehicle.toml"
+    vehicle.write_text((drive / "vehicle.toml").read_text() + "[integrity]\n")
+    poses = locate(drive, vehicle=vehicle).poses
     assert set(poses["integrity"].unique()) <= {"ok", "degraded", "unavailable"}
     assert poses["protection_level_m"].max() > 0.1  # type: ignore[operator]
-    assert (
-        drives.locate(drive / "site.toml", drive / "odometry.csv", drive / "iq")
-        .poses["integrity"]
-        .is_null()
-        .all()
-    )
+    assert locate(drive).poses["integrity"].is_null().all()
+
+
+def test_a_replayed_drive_honours_the_wake_up_policy(drive: Path) -> None:
+    every = locate(drive).angles
+    half = Vehicle.load(str(drive / "vehicle.toml")).with_overrides({"wake_up.interval_ms": 500.0})
+    some = locate(drive, vehicle=half).angles
+    assert some["time_s"].round(2).diff().drop_nulls().is_in([0.0, 0.5, 0.52, 0.48]).all()
+    assert 20 * some.height <= every.height * 1.2
 
 
 def test_what_cannot_be_located_says_why(access_av: Cli, drive: Path, tmp_path: Path) -> None:
@@ -164,17 +178,17 @@ def test_synth_refuses_what_it_cannot_send(access_av: Cli, tmp_path: Path) -> No
     assert "no-such" in done.err
 
 
-def without_start(site: str) -> str:
-    return re.sub(r"\[initial_pose\]\n(\w+ = .*\n)+", "", site)
+def without_start(vehicle: str) -> str:
+    return re.sub(r"\[start\.pose\]\n(\w+ = .*\n)+", "", vehicle)
 
 
 def test_without_an_initial_pose_the_vehicle_is_found(
     access_av: Cli, drive: Path, tmp_path: Path
 ) -> None:
-    site = tmp_path / "site.toml"
-    site.write_text(without_start((drive / "site.toml").read_text()))
+    vehicle = tmp_path / "vehicle.toml"
+    vehicle.write_text(without_start((drive / "vehicle.toml").read_text()))
     given = arguments(drive, tmp_path / "out")
-    given[6] = site
+    given[10] = vehicle
     done = access_av(*given, "--truth", drive / "truth.tum")
     assert done.code == 0, done.err
     driven_m = float(re.findall(r"Found after ([0-9.]+) m", done.out)[0])
@@ -193,16 +207,12 @@ def test_without_an_initial_pose_the_vehicle_is_found(
 def test_the_start_may_be_given_with_the_command(
     access_av: Cli, drive: Path, tmp_path: Path
 ) -> None:
-    pose = tomllib.loads((drive / "site.toml").read_text())["initial_pose"]
-    site = tmp_path / "site.toml"
-    site.write_text(without_start((drive / "site.toml").read_text()))
-    given = drives.locate(drive / "site.toml", drive / "odometry.csv", drive / "iq").poses
-    told = drives.locate(
-        site,
-        drive / "odometry.csv",
-        drive / "iq",
-        start=(pose["x_m"], pose["y_m"], pose["heading_rad"]),
-    ).poses
+    pose = tomllib.loads((drive / "vehicle.toml").read_text())["start"]["pose"]
+    vehicle = tmp_path / "vehicle.toml"
+    vehicle.write_text(without_start((drive / "vehicle.toml").read_text()))
+    given = locate(drive).poses
+    start = (pose["x_m"], pose["y_m"], pose["heading_rad"])
+    told = locate(drive, vehicle=vehicle, start=start).poses
     assert told.equals(given)
     searched = arguments(drive, tmp_path / "out")
     assert "Found after" in access_av(*searched, "--start", "scratch").out
@@ -213,14 +223,14 @@ def test_the_start_may_be_given_with_the_command(
 
 
 def test_one_radio_head_cannot_find_it(access_av: Cli, drive: Path, tmp_path: Path) -> None:
-    site = tmp_path / "site.toml"
-    text = without_start((drive / "site.toml").read_text())
-    site.write_text("pci_allow_list = [1]\n" + text)
+    vehicle = tmp_path / "vehicle.toml"
+    text = without_start((drive / "vehicle.toml").read_text())
+    vehicle.write_text(text.replace("[receiver]", "[receiver]\npci_allow_list = [1]"))
     given = arguments(drive, tmp_path / "out")
-    given[6] = site
+    given[10] = vehicle
     done = access_av(*given)
     assert done.code == 2
-    assert "initial_pose" in done.err
+    assert "start.pose" in done.err
     assert "two radio heads" in done.err
 
 

@@ -59,8 +59,14 @@ impl Pose {
     /// The pose after `length_m` along an arc of constant `curvature_per_m` (left is positive).
     #[must_use]
     pub fn along_arc(self, length_m: f64, curvature_per_m: f64) -> Self {
+        self.along_chord(length_m, length_m * curvature_per_m)
+    }
+
+    /// The pose after `length_m` along an arc that turns by `turn_rad`; of no length, on the spot.
+    #[must_use]
+    pub fn along_chord(self, length_m: f64, turn_rad: f64) -> Self {
         // The chord of an arc points along its mean heading and is sinc(turn/2) times as long.
-        let half_turn = 0.5 * length_m * curvature_per_m;
+        let half_turn = 0.5 * turn_rad;
         let sinc = if half_turn.abs() < 1e-4 {
             1.0 - half_turn * half_turn / 6.0
         } else {

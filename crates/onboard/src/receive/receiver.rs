@@ -87,7 +87,7 @@ pub enum ReceiveError {
     #[error(transparent)]
     Track(#[from] TrackError),
     /// Samples of another number of antennas than it was told of.
-    #[error("samples of {found} antennas; the vehicle's array has {elements}")]
+    #[error("{found} channels; the vehicle's array has {elements}")]
     Antennas {
         /// Number of antennas that there are samples of.
         found: usize,

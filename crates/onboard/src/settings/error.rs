@@ -75,6 +75,14 @@ impl SettingsError {
     /// The same defect of a table that another file holds at `path`.
     #[must_use]
     pub fn beneath(mut self, holder: &str, path: &str) -> Self {
+        if let Self::UnknownName { name, .. } = &self {
+            return Self::Value {
+                value: format!("{name:?}"),
+                allowed: self.to_string(),
+                file: holder.to_owned(),
+                key: path.to_owned(),
+            };
+        }
         if let Self::UnknownKey { file, key, .. }
         | Self::Shape { file, key, .. }
         | Self::Value { file, key, .. } = &mut self

@@ -12,7 +12,8 @@ pub enum DriveKind {
     /// Steered wheels: it turns only as it drives, and its path bends slowly.
     #[default]
     Road,
-    /// Two driven wheels: it also turns on the spot.
+    /// Two driven wheels: it also turns on the spot, wherever its yaw rate says. It roams: no road
+    /// is followed.
     Differential,
 }
 

@@ -175,7 +175,8 @@ fn take_after_likes<T: TomlFile>(
                 return Err(check.error("like", other, "it must be the name of a file"));
             }
         };
-        let base = library.text(T::WHAT, T::SHIPPED, &name, &beside)?;
+        let base = library.text(T::WHAT, T::SHIPPED, &name, &beside);
+        let base = base.map_err(|error| error.beneath(&beside, "like"))?;
         let mut laid = parse(&base.text, &base.origin)?;
         lay_over(&mut laid, std::mem::take(table), "", check)?;
         *table = laid;

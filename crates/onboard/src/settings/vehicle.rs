@@ -103,8 +103,9 @@ impl Vehicle {
     }
 
     /// Whether its localizer follows a road where the site has one.
-    pub const fn follows_road(&self) -> bool {
-        matches!(&self.localizer, LocalizerSettings::Tracker(tracker) if tracker.map)
+    pub fn follows_road(&self) -> bool {
+        let maps = matches!(&self.localizer, LocalizerSettings::Tracker(tracker) if tracker.map);
+        maps && self.drive == DriveKind::Road
     }
 }
 
@@ -147,7 +148,8 @@ impl TomlFile for Vehicle {
             self.start.known || self.follows_road(),
             "start.known",
             false,
-            "to find the vehicle along the road takes localizer.kind = \"tracker\" with map = true",
+            "to find the vehicle along the road takes localizer.kind = \"tracker\" with map = true, and \
+             drive = \"road\"",
         )?;
         check.that(
             self.start.known || self.start.pose.is_none(),

@@ -152,7 +152,8 @@ fn hold<T: TomlFile>(
 ) -> Result<(), SettingsError> {
     let held = match table.get(T::WHAT).cloned() {
         Some(Value::String(name)) => {
-            let named = library.text(T::WHAT, T::SHIPPED, &name, origin)?;
+            let named = library.text(T::WHAT, T::SHIPPED, &name, origin);
+            let named = named.map_err(|error| error.beneath(origin, T::WHAT))?;
             T::from_toml(&named.text, &named.origin, library)?
         }
         Some(Value::Table(held)) => {

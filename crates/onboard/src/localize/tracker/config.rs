@@ -1,10 +1,10 @@
 //! What the tracker assumes of vehicle, road and radio.
 
-use super::motion::{MotionNoise, PathBend};
+use super::motion::{MotionNoise, PathBend, Yaw};
 use super::sighting::{ArrayModel, Sighting};
 use crate::localize::quantile::normal_quantile;
 use crate::road::LaneKeeping;
-use crate::settings::{LocalizerSettings, Site, TrackerSettings, Vehicle};
+use crate::settings::{DriveKind, LocalizerSettings, Site, TrackerSettings, Vehicle};
 
 /// The best that the tracker takes for granted where nothing is said.
 const LEAST_ODOMETER_SCALE_STD: f64 = 0.001;
@@ -14,6 +14,8 @@ const LEAST_LANE_RMS_M: f64 = 0.02;
 /// Assumptions of the tracker, SI and radians: what site and vehicle state.
 #[derive(Clone, Copy, Debug, PartialEq)]
 pub struct TrackerConfig {
+    /// What the vehicle's kinematics allow.
+    pub drive: DriveKind,
     /// The array.
     pub array: ArrayModel,
     /// Rician K of the channel as a power ratio: what scatter adds to each angle's variance.
@@ -55,6 +57,11 @@ pub struct TrackerConfig {
     pub top_speed_mps: f64,
 }
 
+/// How a vehicle with differential drive turns as it drives, and as it stands, where no yaw rate
+/// tells: by half a radian over a metre, and over a second.
+const UNKNOWN_TURN_RAD2_PER_M: f64 = 0.25;
+const UNKNOWN_TURN_RAD2_PER_S: f64 = 0.25;
+
 /// A gyroscope that nothing is stated of: angle random walk (rad/√s) and bias (rad/s).
 const USUAL_GYROSCOPE: [f64; 2] = [1e-3, 1e-3];
 
@@ -76,6 +83,7 @@ impl TrackerConfig {
             [gyroscope.noise_rad_per_sqrt_s, gyroscope.bias_std_radps]
         });
         Self {
+            drive: vehicle.drive,
             array: ArrayModel {
                 elements: array.elements,
                 spacing_wavelengths: array.spacing_wavelengths,
@@ -139,6 +147,16 @@ impl TrackerConfig {
     /// back to the middle of the lane.
     pub fn curvature_variance(&self) -> f64 {
         self.path_bend.curvature_per_m.powi(2) + self.lane_keeping.pull_per_m().powi(2)
+    }
+
+    /// The turn of a vehicle with differential drive of which no yaw rate tells: any.
+    pub fn unknown_turn(&self, length_m: f64, duration_s: f64) -> Yaw {
+        Yaw {
+            turn_rad: self.yaw_rate_bias_radps * duration_s,
+            duration_s,
+            variance: UNKNOWN_TURN_RAD2_PER_M * length_m.abs()
+                + UNKNOWN_TURN_RAD2_PER_S * duration_s,
+        }
     }
 
     /// Variance of the distance (m²) driven during `duration_s` without odometry.

@@ -19,6 +19,7 @@ use crate::localize::smoother::Journal;
 use crate::observation::OdometrySample;
 use crate::radio_head::RadioHead;
 use crate::road::{Gap, Road};
+use crate::settings::DriveKind;
 
 /// Longest step over which the road's curvature is taken as constant (m).
 const STEP_M: f64 = 1.0;
@@ -127,7 +128,7 @@ impl Tracker {
             duration_s,
             variance: self.config.yaw_noise_rad_per_sqrt_s.powi(2) * duration_s,
         });
-        self.advance(reading_m, yaw);
+        self.advance(reading_m, duration_s, yaw);
         if jumped {
             self.add_along_variance(self.config.coasting_variance(duration_s));
         }
@@ -147,7 +148,7 @@ impl Tracker {
         }
     }
 
-    fn advance(&mut self, reading_m: f64, yaw: Option<Yaw>) {
+    fn advance(&mut self, reading_m: f64, duration_s: f64, yaw: Option<Yaw>) {
         let steps = (reading_m.abs() / STEP_M).ceil().max(1.0);
         let share = 1.0 / steps;
         let yaw = yaw.map(|yaw| Yaw {
@@ -156,14 +157,7 @@ impl Tracker {
             variance: yaw.variance * share,
         });
         for _ in 0..steps as usize {
-            let mut step = self.step(&self.belief, reading_m * share);
-            if let Some(yaw) = yaw {
-                let (residual, row, variance) = step.turn_seen(&self.belief.mean, &yaw);
-                self.measure(residual, &row, variance);
-                step = self
-                    .step(&self.belief, reading_m * share)
-                    .informed(&self.belief.mean, &yaw);
-            }
+            let step = self.next_step(reading_m * share, duration_s * share, yaw);
             if let Some(journal) = &mut self.journal {
                 journal.moved(&step.jacobian);
             }
@@ -173,8 +167,33 @@ impl Tracker {
         self.watch_the_map();
     }
 
+    /// The step that odometry tells of; a gyroscope's word on the present state is taken in.
+    fn next_step(&mut self, reading_m: f64, duration_s: f64, yaw: Option<Yaw>) -> Step {
+        if self.config.drive == DriveKind::Differential {
+            let turn = yaw.unwrap_or_else(|| self.config.unknown_turn(reading_m, duration_s));
+            return Step::turning(&self.belief.mean, reading_m, &turn, &self.config.noise);
+        }
+        let step = self.step(&self.belief, reading_m);
+        let Some(yaw) = yaw else {
+            return step;
+        };
+        let (residual, row, variance) = step.turn_seen(&self.belief.mean, &yaw);
+        self.measure(residual, &row, variance);
+        self.step(&self.belief, reading_m)
+            .informed(&self.belief.mean, &yaw)
+    }
+
+    /// The step that is to be expected over what the odometer would read.
     pub(super) fn step(&self, belief: &Belief, reading_m: f64) -> Step {
         let (mean, config) = (&belief.mean, &self.config);
+        if config.drive == DriveKind::Differential {
+            let straight_on = Yaw {
+                turn_rad: 0.0,
+                duration_s: 0.0,
+                variance: 0.0,
+            };
+            return Step::turning(mean, reading_m, &straight_on, &config.noise);
+        }
         let middle_m = mean[ALONG] + 0.5 * reading_m;
         let curvature_per_m = (self.map.as_ref()).map_or(0.0, |map| map.curvature_per_m(middle_m));
         let noise = &config.noise;

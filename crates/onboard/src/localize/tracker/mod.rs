@@ -14,6 +14,7 @@ mod forecast;
 mod interface;
 mod journal;
 mod locate;
+mod map_watch;
 pub mod motion;
 mod off_map;
 mod place;

@@ -5,11 +5,15 @@
 //! **Without a map** (Cartesian). The curvature of the path is a first-order Gauss–Markov process
 //! over the distance travelled; heading and position are its integrals.
 //!
-//! Noise in the odometer is a random walk over distance in both.
+//! **With differential drive** (Cartesian). The vehicle turns as the yaw rate says, on the spot too;
+//! no prior of its path stands against that.
+//!
+//! Noise in the odometer is a random walk over distance in all of them.
 
 use super::state::{
     ACROSS, ALONG, Belief, CURVATURE, HEADING, MOUNTING, PHASE, SCALE, STATES, YAW_RATE_BIAS,
 };
+use crate::geometry::Pose;
 use crate::localize::gaussian::{Matrix, identity};
 use crate::road::LaneKeeping;
 
@@ -197,6 +201,61 @@ impl Step {
         }
     }
 
+    /// The step of a vehicle that turns as its yaw rate says, wherever that leads:
+    /// `ψ⁺ = ψ + τ`, `p⁺ = p + l sinc(τ/2) (cos, sin)(ψ + τ/2)`, for the length l and the turn
+    /// `τ = ∫ yaw rate dt − b Δt`, b being the yaw rate's bias.
+    pub fn turning(start: &[f64; STATES], reading_m: f64, yaw: &Yaw, walk: &MotionNoise) -> Self {
+        let scale = 1.0 + start[SCALE];
+        let length = reading_m / scale;
+        let turn_rad = yaw.turn_rad - start[YAW_RATE_BIAS] * yaw.duration_s;
+        let before = Pose {
+            x_m: start[ALONG],
+            y_m: start[ACROSS],
+            heading_rad: start[HEADING],
+        };
+        let after = before.along_chord(length, turn_rad);
+        let step = [after.x_m - before.x_m, after.y_m - before.y_m];
+        // By a turn the chord turns by half of it; what it gains or loses in length is of the
+        // second order.
+        let by_turn = [-0.5 * step[1], 0.5 * step[0]];
+
+        let mut f = identity();
+        f[ALONG][HEADING] = -step[1];
+        f[ACROSS][HEADING] = step[0];
+        f[ALONG][SCALE] = -step[0] / scale;
+        f[ACROSS][SCALE] = -step[1] / scale;
+        f[ALONG][YAW_RATE_BIAS] = -yaw.duration_s * by_turn[0];
+        f[ACROSS][YAW_RATE_BIAS] = -yaw.duration_s * by_turn[1];
+        f[HEADING][YAW_RATE_BIAS] = -yaw.duration_s;
+
+        let distance = length.abs();
+        let mut q = [[0.0; STATES]; STATES];
+        let spread = walk.odometer_m_per_sqrt_m.powi(2) * distance;
+        let (sin, cos) = (start[HEADING] + 0.5 * turn_rad).sin_cos();
+        let along = [cos, sin, 0.0];
+        let turned = [by_turn[0], by_turn[1], 1.0];
+        for (i, row) in [ALONG, ACROSS, HEADING].into_iter().enumerate() {
+            for (j, column) in [ALONG, ACROSS, HEADING].into_iter().enumerate() {
+                q[row][column] =
+                    spread * along[i] * along[j] + yaw.variance * turned[i] * turned[j];
+            }
+        }
+        slow_states(&mut q, walk, distance);
+
+        let mut mean = *start;
+        mean[ALONG] = after.x_m;
+        mean[ACROSS] = after.y_m;
+        mean[HEADING] = after.heading_rad;
+        mean[CURVATURE] = 0.0;
+        Self {
+            mean,
+            jacobian: f,
+            noise: q,
+            turn_rad,
+            turn_row: [0.0; STATES],
+        }
+    }
+
     /// Moves a belief by this step.
     pub fn apply(&self, belief: &mut Belief) {
         belief.mean = self.mean;
@@ -244,7 +303,6 @@ fn slow_states(q: &mut Matrix<STATES>, noise: &MotionNoise, distance_m: f64) {
 #[cfg(test)]
 mod tests {
     use super::*;
-    use crate::geometry::Pose;
 
     const BEND: PathBend = PathBend {
         curvature_per_m: 0.01,
@@ -308,6 +366,34 @@ mod tests {
                 }
                 let expected = slope(less.turn_rad, more.turn_rad);
                 assert!((made.turn_row[state] - expected).abs() < 1e-8);
+            }
+        }
+    }
+
+    #[test]
+    fn the_jacobian_of_a_turn_is_the_derivative() {
+        let mut start = state([5.0, 1.5, 0.2, 0.0, 0.01]);
+        start[YAW_RATE_BIAS] = 0.02;
+        let yaw = Yaw {
+            turn_rad: 0.004,
+            duration_s: 0.02,
+            variance: 0.0,
+        };
+        let step = |start: &[f64; STATES]| Step::turning(start, 0.1, &yaw, &MotionNoise::default());
+        for by in [ALONG, ACROSS, HEADING, SCALE, YAW_RATE_BIAS] {
+            let beside = |by_so_much: f64| {
+                let mut start = start;
+                start[by] += by_so_much;
+                step(&start).mean
+            };
+            let (less, more) = (beside(-1e-5), beside(1e-5));
+            for row in [ALONG, ACROSS, HEADING] {
+                let slope = (more[row] - less[row]) / 2e-5;
+                let found = step(&start).jacobian[row][by];
+                assert!(
+                    (found - slope).abs() < 1e-6,
+                    "{row} by {by}: {found} {slope}"
+                );
             }
         }
     }
