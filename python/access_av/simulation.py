@@ -11,6 +11,7 @@ import polars as pl
 
 from access_av import _core
 from access_av.platform import Platform
+from access_av.statistics.consistency import Consistency
 from access_av.statistics.integrity import Integrity
 
 if TYPE_CHECKING:
@@ -23,6 +24,9 @@ if TYPE_CHECKING:
     Estimate: TypeAlias = float | tuple[float, float] | NDArray[np.float64] | None
 
 Scenario = _core.Scenario
+
+# The first ten seconds of SSBs every 20 ms.
+SETTLED_STEPS = 500
 
 
 @dataclass(frozen=True)
@@ -54,6 +58,16 @@ class Simulation:
     def integrity(self) -> Integrity | None:
         """How protection levels and errors went together; ``None`` where none were stated."""
         return None if self.trajectories is None else Integrity.of(self.trajectories)
+
+    @property
+    def consistency(self) -> Consistency | None:
+        """Errors against what the localizer says of them; ``None`` without trajectories.
+
+        The first :data:`SETTLED_STEPS` are left out of the NEES: an exact start has no covariance.
+        """
+        if self.trajectories is None:
+            return None
+        return Consistency.of(self.trajectories, skip=min(SETTLED_STEPS, self.steps.height - 1))
 
     @property
     def rms_error_m(self) -> float:

@@ -114,6 +114,12 @@ def show_simulation(result: Simulation, title: str) -> None:
         rows["runs in which the vehicle was found"] = runs.height - runs["found_s"].null_count()
         rows["driven until found, median / m"] = runs["found_m"].median()
         rows["driven until found, most / m"] = runs["found_m"].max()
+    consistency = result.consistency
+    if consistency is not None and consistency.anees is not None:
+        rows["NEES / 2, 1 if as wrong as it says"] = consistency.anees
+        if consistency.anees_interval is not None and runs.height > 1:
+            low, high = consistency.anees_interval
+            rows |= {"its 95 % interval, from": low, "to": high}
     integrity = result.integrity
     if integrity is not None:
         rows["protection level / error, median"] = integrity.median_level_over_error

@@ -137,6 +137,8 @@ struct Drive {
     buffers: SnapshotBuffers,
     /// Bursts that have been sent and not yet heard.
     on_the_way: VecDeque<Burst>,
+    /// Buffers of bursts that have been heard.
+    spare: Vec<Vec<f64>>,
     latency_s: f64,
     strongest_db: f64,
 }
@@ -177,6 +179,7 @@ impl Drive {
             iq,
             buffers: SnapshotBuffers::new(scenario.vehicle.array.elements.into()),
             on_the_way: VecDeque::new(),
+            spare: Vec::new(),
             latency_s: 1e-3 * scenario.ssb_latency_ms,
             strongest_db: f64::NEG_INFINITY,
         })
@@ -184,8 +187,9 @@ impl Drive {
 
     /// Sends burst number `number` to the vehicle at `vehicle`.
     fn send(&mut self, number: usize, vehicle: VehicleState) {
+        let mut snrs_db = self.spare.pop().unwrap_or_default();
         let next_snr_db = |channel: &mut HeadChannel| channel.next_snr_db(&vehicle);
-        let snrs_db: Vec<f64> = self.channels.iter_mut().map(next_snr_db).collect();
+        snrs_db.extend(self.channels.iter_mut().map(next_snr_db));
         self.strongest_db = snrs_db.iter().copied().fold(f64::NEG_INFINITY, f64::max);
         self.on_the_way.push_back(Burst {
             number: number as u64,
@@ -209,7 +213,7 @@ impl Drive {
             let latency_s = self.latency_s;
             let arrives_before = |it: &mut Burst| it.vehicle.time_s + latency_s < sample_s;
             while let Some(burst) = self.on_the_way.pop_front_if(arrives_before) {
-                self.hear(&burst, record)?;
+                self.hear(burst, record)?;
             }
             if let Some(sample) = self.odometer.sample(self.path.at(sample_s)) {
                 // A simulated odometer neither repeats itself nor returns NaN.
@@ -226,12 +230,12 @@ impl Drive {
         let latency_s = self.latency_s;
         let has_arrived = |it: &mut Burst| it.vehicle.time_s + latency_s <= time_s;
         while let Some(burst) = self.on_the_way.pop_front_if(has_arrived) {
-            self.hear(&burst, record)?;
+            self.hear(burst, record)?;
         }
         Ok(())
     }
 
-    fn hear(&mut self, burst: &Burst, record: &mut RunRecord) -> Result<(), SimulationError> {
+    fn hear(&mut self, burst: Burst, record: &mut RunRecord) -> Result<(), SimulationError> {
         let mut by_samples;
         let mut by_snapshots;
         let source: &mut dyn SsbSource = if let Some(reception) = &mut self.iq {
@@ -259,6 +263,9 @@ impl Drive {
         record.listened += usize::from(heard.listened);
         record.executions.extend_from_slice(heard.executions);
         record.out_of_reach += usize::from(heard.keeps_bound == Some(false));
+        let mut snrs_db = burst.snrs_db;
+        snrs_db.clear();
+        self.spare.push(snrs_db);
         Ok(())
     }
 

@@ -23,7 +23,10 @@ const COPIES: usize = 8;
 /// Time between two copies in seconds: the oldest of them is at least [`HISTORY_S`] old.
 const SPACING_S: f64 = HISTORY_S / (COPIES - 2) as f64;
 
-/// Most that is remembered of what came in; with more, the oldest copies are given up early.
+/// What is usually remembered of what came in ...
+const USUAL_EVENTS: usize = 256;
+
+/// ... and the most; with more, the oldest copies are given up early.
 const MOST_EVENTS: usize = 4096;
 
 /// A localizer that can go back in time.
@@ -59,7 +62,7 @@ impl History {
     pub fn new(localizer: Box<dyn Localizer>) -> Self {
         let mut made = Self {
             localizer,
-            events: VecDeque::with_capacity(MOST_EVENTS + 1),
+            events: VecDeque::with_capacity(USUAL_EVENTS),
             kept: Default::default(),
             copies: 0,
             spare: None,

@@ -82,7 +82,7 @@ impl HeadChannel {
     /// each SSB, in order.
     pub fn next_snr_db(&mut self, vehicle: &VehicleState) -> f64 {
         self.array.advance(vehicle.along_m);
-        let distance_m = self.array.line_of_sight(vehicle, &self.head).distance_m;
+        let distance_m = self.array.distance_m(vehicle, &self.head);
         let shadowing_db = self.propagation.next_shadowing_db(vehicle.along_m);
         self.budget.snr_db(&self.head, distance_m) + shadowing_db
     }
@@ -161,11 +161,12 @@ impl HeadChannel {
     }
 
     fn push(&mut self, reception: &Reception, signal: Complex64, into: &mut SsbObservation) {
-        let mut snapshot = *reception;
-        for gain in snapshot.gains_mut() {
-            *gain = *gain * signal + self.complex_normal();
+        let mut snapshot = [Complex64::ZERO; MAX_ELEMENTS];
+        let gains = reception.gains();
+        for (value, gain) in snapshot.iter_mut().zip(gains) {
+            *value = gain * signal + self.complex_normal();
         }
-        into.push(snapshot.gains());
+        into.push(snapshot.get(..gains.len()).unwrap_or_default());
     }
 
     /// A random QPSK symbol.

@@ -3,6 +3,7 @@
 use std::f64::consts::TAU;
 
 use num_complex::Complex64;
+use onboard::geometry::Point;
 use onboard::radio_head::RadioHead;
 use onboard::settings::ArraySettings;
 use rand::RngExt;
@@ -56,9 +57,8 @@ impl TrueArray {
 
     /// How it sees a radio head.
     pub fn line_of_sight(&self, vehicle: &VehicleState, head: &RadioHead) -> LineOfSight {
-        let [forward_m, left_m, up_m] = self.settings.position_m;
-        let eye = vehicle.pose.beside(forward_m, left_m);
-        let distance_m = head.distance_m(eye, up_m);
+        let eye = self.eye(vehicle);
+        let distance_m = head.distance_m(eye, self.height_m());
         let level = eye.distance_m(head.position) / distance_m;
         let to_axis_rad =
             eye.bearing_rad(head.position) - vehicle.pose.heading_rad - self.settings.mounting_rad;
@@ -67,6 +67,25 @@ impl TrueArray {
             phase_rad: element_rad * level * to_axis_rad.cos(),
             distance_m,
         }
+    }
+
+    /// How far it is from a radio head, in metres.
+    pub fn distance_m(&self, vehicle: &VehicleState, head: &RadioHead) -> f64 {
+        head.distance_m(self.eye(vehicle), self.height_m())
+    }
+
+    /// Where its middle is.
+    fn eye(&self, vehicle: &VehicleState) -> Point {
+        match self.settings.position_m {
+            // Asked for at every SSB, heard or not.
+            [0.0, 0.0, _] => vehicle.pose.point(),
+            [forward_m, left_m, _] => vehicle.pose.beside(forward_m, left_m),
+        }
+    }
+
+    const fn height_m(&self) -> f64 {
+        let [_, _, up_m] = self.settings.position_m;
+        up_m
     }
 
     /// What the array makes of the field at its antennas: each channel runs ahead of the one before.
