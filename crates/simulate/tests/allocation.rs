@@ -10,12 +10,11 @@ use std::f64::consts::PI;
 use onboard::localize::AngleMeasurement;
 use onboard::observation::{OdometrySample, SensedSsb};
 use onboard::radio_head::RadioHead;
-use onboard::settings::{Check, Shipped, TomlFile};
+use onboard::settings::{Check, Shipped, TomlFile, UncertaintySettings, WakeUpSettings};
 use onboard::{Custom, Onboard};
 use recording::LoggedAngle;
 use simulate::scenario::Scenario;
 use simulate::world::MotionProfile;
-use toml::Value;
 
 use common::{Burst, changed, shipped, simulation, value};
 use counting::allocations;
@@ -29,14 +28,15 @@ fn the_counter_counts() {
 fn a_drive_under_way_allocates_nothing() {
     let guarded = || ("vehicle.integrity", value("{}"));
     // A bound that every angle is demanded for.
-    let demanding = [
-        ("vehicle.wake_up.bound_m", Value::from(1e-3)),
-        ("vehicle.wake_up.least_gain_m2", 0.0.into()),
-    ];
+    let mut demanding = shipped("yard");
+    demanding.vehicle.wake_up = WakeUpSettings::Uncertainty(UncertaintySettings {
+        bound_m: 1e-3,
+        ..UncertaintySettings::default()
+    });
     for (scenario, least_accepted) in [
         (shipped("paper-real-odometry-4"), 2000),
         (changed("paper-real-odometry-4", [guarded()]), 2000),
-        (changed("yard", demanding), 2000),
+        (demanding, 2000),
         (shipped("yard"), 20),
         (shipped("paper"), 200),
     ] {

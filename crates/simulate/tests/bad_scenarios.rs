@@ -254,7 +254,7 @@ fn radio_heads_have_their_own_place_and_name() {
     assert_says(
         with_heads(in_the_plane),
         "site.radio_heads[0].position_m",
-        "3 elements",
+        "an array of length 3",
     );
 }
 
