@@ -4,7 +4,7 @@
 use std::path::PathBuf;
 use std::sync::atomic::{AtomicUsize, Ordering};
 
-use access_av::recording::{Recording, RecordingError};
+use recording::{Recording, RecordingError};
 
 static NEXT: AtomicUsize = AtomicUsize::new(0);
 

@@ -1,19 +1,19 @@
 //! What an SSB costs on the vehicle, one thread: from samples to angle, and from angle to pose.
-//! `cargo bench -p access-av`.
+//! `cargo bench -p simulate`.
 #![allow(clippy::unwrap_used, reason = "this is a benchmark")]
 
 use std::f64::consts::TAU;
 
-use access_av::estimator::AngleEstimator;
-use access_av::localize::tracker::{InitialPose, TrackerConfig};
-use access_av::localize::{AngleMeasurement, Tracker};
-use access_av::observation::OdometrySample;
-use access_av::random::{Purpose, Streams};
-use access_av::receive::{Receiver, ReceiverConfig, Window};
-use access_av::scenario::{LocalizerSettings, Scenario};
-use access_av::world::RadioHead;
 use nr_ssb::{BchPayload, Beam, Burst, Case, Complex32, Lmax, Mib, Numerology, Ofdm, Pci};
+use onboard::estimator::{EstimatedAngle, built_in};
+use onboard::localize::tracker::{InitialPose, TrackerConfig};
+use onboard::localize::{AngleMeasurement, Tracker};
+use onboard::observation::OdometrySample;
+use onboard::radio_head::RadioHead;
+use onboard::receive::{Receiver, ReceiverConfig, Window};
+use onboard::settings::{Shipped, Site, TomlFile, Vehicle};
 use rand_distr::{Distribution, StandardNormal};
+use simulate::random::{Purpose, Streams};
 
 const ANTENNAS: usize = 4;
 /// 20 ms at 3.84 Msps.
@@ -23,15 +23,20 @@ fn main() {
     divan::main();
 }
 
-/// 20 ms of the scenario's cell on four antennas at 20 dB per resource element.
-fn samples(scenario: &Scenario) -> Vec<Vec<Complex32>> {
+fn believed(site: &str) -> (Site, Vehicle) {
+    let site = Site::from_library(site, &Shipped).unwrap();
+    (site, Vehicle::from_library("carrier", &Shipped).unwrap())
+}
+
+/// 20 ms of the site's first cell on four antennas at 20 dB per resource element.
+fn samples(site: &Site) -> Vec<Vec<Complex32>> {
     let burst = Burst {
-        pci: Pci::new(scenario.radio_heads[0].pci).unwrap(),
+        pci: Pci::new(site.radio_heads[0].pci).unwrap(),
         case: Case::A,
         lmax: Lmax::L8,
         payload: BchPayload::new(Mib::default(), 7, false, 0).unwrap(),
         beams: vec![Beam::new(0)],
-        ssb_freq_hz: Some(scenario.ssb.carrier_mhz * 1e6),
+        ssb_freq_hz: Some(site.carrier_mhz * 1e6),
     };
     let numerology = Numerology::new(burst.case.spacing(), 256).unwrap();
     let sent = burst.iq(&mut Ofdm::new(numerology)).unwrap();
@@ -53,26 +58,31 @@ fn samples(scenario: &Scenario) -> Vec<Vec<Complex32>> {
 
 #[divan::bench(args = ["pss", "pss+sss", "ssb"])]
 fn samples_to_angle(bencher: divan::Bencher, pilots: &str) {
-    let scenario = Scenario::load("paper-real-odometry")
-        .and_then(|it| it.with_overrides([("receiver.pilots", pilots.into())]))
+    let (site, vehicle) = believed("trip-1");
+    let vehicle = vehicle
+        .with_overrides([("receiver.pilots", pilots.into())], &Shipped)
         .unwrap();
-    let samples = samples(&scenario);
+    let samples = samples(&site);
     let antennas: [&[Complex32]; ANTENNAS] = std::array::from_fn(|n| samples[n].as_slice());
-    let mut receiver = Receiver::new(ReceiverConfig::new(&scenario)).unwrap();
-    let mut estimator = AngleEstimator::new(&scenario, None).unwrap();
+    let mut receiver = Receiver::new(ReceiverConfig::new(&site, &vehicle)).unwrap();
+    let mut estimator = built_in(&vehicle).unwrap();
     let mut number = 0;
     let mut next = || {
         // The clock stands still, so that no other cells are looked for.
         let window = Window {
             start: (number * PERIOD) as u64,
             time_s: 0.0,
-            antennas,
+            antennas: &antennas,
         };
         number += 1;
         let mut phase_rad = None;
         let take = |observation: &_| {
-            let angle = estimator.estimate(observation).unwrap();
-            phase_rad = angle.map(|angle| angle.phase_rad);
+            if let Some(EstimatedAngle::Angle {
+                phase_rad: found, ..
+            }) = estimator.estimate(observation).unwrap()
+            {
+                phase_rad = Some(found);
+            }
         };
         receiver.receive(&window, take).unwrap();
         phase_rad.unwrap()
@@ -83,19 +93,16 @@ fn samples_to_angle(bencher: divan::Bencher, pilots: &str) {
 
 #[divan::bench(args = [true, false])]
 fn angle_to_pose(bencher: divan::Bencher, map: bool) {
-    let scenario = Scenario::load("paper-real-odometry-2").unwrap();
-    let LocalizerSettings::Tracker(settings) = scenario.localizer else {
-        return;
-    };
-    let track = scenario.build_track().unwrap();
-    let heads: Vec<RadioHead> = scenario.radio_heads.iter().map(RadioHead::from).collect();
-    let config = TrackerConfig::new(&scenario, &settings);
+    let (site, vehicle) = believed("trip-2");
+    let road = site.build_road().unwrap().unwrap();
+    let heads = RadioHead::heard(&site, &vehicle);
+    let config = TrackerConfig::new(&site, &vehicle);
     let start = InitialPose {
-        pose: track.pose(0.0),
+        pose: road.pose(0.0),
         position_std_m: 1.0,
         heading_std_rad: 0.05,
     };
-    let known = map.then(|| std::sync::Arc::new(track));
+    let known = map.then(|| std::sync::Arc::new(road));
     let mut tracker = Tracker::new(config, known, &heads, &start);
     let mut at = |metres: f64| {
         tracker.odometry(&OdometrySample {

@@ -1,5 +1,5 @@
 //! Protection levels, alarms and false alarms, nominal and under each fault:
-//! `cargo run --release -p access-av --example integrity_table -- [runs] [seed ...]`.
+//! `cargo run --release -p simulate --example integrity_table -- [runs] [seed ...]`.
 //!
 //! The epochs of a run hang together: beside each share stand the end of its 95 % interval by the
 //! bootstrap over runs, and in how many runs anything happened at all. Silent is the longest time
@@ -7,20 +7,16 @@
 //! be it that the protection level passed the limit or that a source was suspected.
 #![allow(clippy::print_stdout, reason = "prints a table")]
 
-use std::error::Error;
+mod common;
 
-use access_av::scenario::{FaultKind, FaultSettings, Scenario};
-use access_av::simulate::{CampaignOptions, IntegritySummary, Simulation, bootstrap_interval};
+use simulate::scenario::{FaultKind, FaultSettings, Scenario};
+use simulate::{IntegritySummary, bootstrap_interval};
+use toml::{Table, Value};
 
-fn main() -> Result<(), Box<dyn Error>> {
-    let mut arguments = std::env::args().skip(1);
-    let runs: usize = arguments.next().map_or(Ok(40), |text| text.parse())?;
-    let mut seeds: Vec<u64> = arguments
-        .map(|text| text.parse())
-        .collect::<Result<_, _>>()?;
-    if seeds.is_empty() {
-        seeds.push(1);
-    }
+use common::{Result, arguments, campaign, changed};
+
+fn main() -> Result<()> {
+    let (runs, seeds) = arguments(40, 1)?;
     println!("{runs} runs of each, seeds {seeds:?}");
     println!(
         "                      beyond PL while ok    runs         PL/error      worst  silent  early alarms/h"
@@ -29,23 +25,17 @@ fn main() -> Result<(), Box<dyn Error>> {
         "case                     share    limit   with    epochs   median  not ok      m       s     all  suspected"
     );
     for (name, scenario) in cases()? {
-        let simulation = Simulation::on_its_platform(scenario)?;
         let mut driven = Vec::new();
         for &seed in &seeds {
-            let campaign = simulation.campaign(&CampaignOptions {
-                seed,
-                runs,
-                ..CampaignOptions::default()
-            })?;
-            driven.extend(campaign.integrity);
+            driven.extend(campaign(&scenario, seed, runs)?.integrity);
         }
         print(name, &driven);
     }
     Ok(())
 }
 
-fn cases() -> Result<Vec<(&'static str, Scenario)>, Box<dyn Error>> {
-    let shipped = Scenario::load("nlos-and-faults")?;
+fn cases() -> Result<Vec<(&'static str, Scenario)>> {
+    let shipped = changed("nlos-and-faults", [])?;
     let with = |faults: Vec<FaultSettings>| Scenario {
         faults,
         ..shipped.clone()
@@ -79,8 +69,8 @@ fn cases() -> Result<Vec<(&'static str, Scenario)>, Box<dyn Error>> {
         ("all, one by one", shipped.clone()),
     ];
     for name in ["paper-real-odometry-2", "paper-real-odometry-4", "yard"] {
-        let guarded = [("localizer.integrity", true.into())];
-        cases.push((name, Scenario::load(name)?.with_overrides(guarded)?));
+        let guarded = [("vehicle.integrity", Value::Table(Table::new()))];
+        cases.push((name, changed(name, guarded)?));
     }
     Ok(cases)
 }

@@ -1,25 +1,26 @@
 //! Starts from scratch: from where on the road is the vehicle found, after what distance, and is it
-//! there? `cargo run --release --example start_table -- [starts] [seed]`.
+//! there? `cargo run --release -p simulate --example start_table -- [starts] [seed]`.
 
 #![allow(clippy::print_stdout, reason = "this is a program")]
 
-use std::error::Error;
+mod common;
 
-use access_av::localize::gaussian::principal_variances;
-use access_av::onboard::Custom;
-use access_av::platform::Platform;
-use access_av::random::{Purpose, Streams};
-use access_av::scenario::Scenario;
-use access_av::simulate::{Found, Simulation};
+use onboard::Custom;
+use onboard::localize::gaussian::principal_variances;
+use onboard::settings::{Check, Shipped, TomlFile};
 use rand::RngExt;
+use simulate::random::{Purpose, Streams};
+use simulate::scenario::Scenario;
+use simulate::{Found, Simulation};
+
+use common::{Result, arguments, changed};
 
 /// Road that is left ahead of the last starting point (m).
 const AHEAD_M: f64 = 60.0;
 
-fn main() -> Result<(), Box<dyn Error>> {
-    let mut arguments = std::env::args().skip(1);
-    let starts: u64 = arguments.next().map_or(Ok(100), |text| text.parse())?;
-    let seed: u64 = arguments.next().map_or(Ok(1), |text| text.parse())?;
+fn main() -> Result<()> {
+    let (starts, seeds) = arguments(100, 1)?;
+    let seed = seeds.first().copied().unwrap_or_default();
 
     println!("{starts} starts, seed {seed}; right: within 2 m and 4 standard deviations");
     println!(
@@ -28,11 +29,11 @@ fn main() -> Result<(), Box<dyn Error>> {
     );
     for name in ["paper-real-odometry-2", "yard"] {
         for either in [false, true] {
-            let scenario = Scenario::load(name)?.with_overrides([
-                ("start.known", false.into()),
-                ("start.either_direction", either.into()),
-            ])?;
-            let finds = search(&scenario, starts, seed)?;
+            let unknown = [
+                ("vehicle.start.known", false.into()),
+                ("vehicle.start.either_direction", either.into()),
+            ];
+            let finds = search(&changed(name, unknown)?, starts as u64, seed)?;
             let sorted = |of: fn(&Found) -> f64| {
                 let mut values: Vec<f64> = finds.iter().map(of).collect();
                 values.sort_by(f64::total_cmp);
@@ -60,16 +61,18 @@ fn main() -> Result<(), Box<dyn Error>> {
 }
 
 /// Searches from each of the starting points; those in which the vehicle was found.
-fn search(scenario: &Scenario, starts: u64, seed: u64) -> Result<Vec<Found>, Box<dyn Error>> {
-    let platform = Platform::load(&scenario.platform.name)?;
-    let length_m = scenario.build_track()?.length_m();
+fn search(scenario: &Scenario, starts: u64, seed: u64) -> Result<Vec<Found>> {
+    let file = &scenario.name;
+    let length_m = scenario.path(Check { file })?.length_m();
     let mut finds = Vec::new();
     for run in 0..starts {
         let mut random = Streams::new(seed, run).generator(Purpose::Start, 1);
         let start_m = random.random::<f64>() * (length_m - AHEAD_M);
-        let there = scenario.with_overrides([("motion.start_at_m", start_m.into())])?;
-        let simulation = Simulation::new(there, platform.clone())?;
-        finds.extend(simulation.run(seed, run, Custom::default())?.found());
+        let there = [("motion.start_at_m", start_m.into())];
+        let there = scenario.with_overrides(there, &Shipped)?;
+        let simulation = Simulation::on_its_platform(&there)?;
+        let record = simulation.run(seed, run, &|_| Ok(Custom::default()))?;
+        finds.extend(record.found());
     }
     Ok(finds)
 }

@@ -1,17 +1,18 @@
 //! The tracker against its bound, against its own covariance and against the paper's method:
-//! `cargo run --release --example tracker_table -- [runs] [seed]`.
+//! `cargo run --release -p simulate --example tracker_table -- [runs] [seed]`.
 //!
 //! Below each of the first lines stands what campaigns of that size by a perfectly consistent
 //! filter show: an odometer's scale stays with it for a whole run, so that figures scatter however
 //! good the filter.
 #![allow(clippy::print_stdout, reason = "prints a table")]
 
-use std::error::Error;
+mod common;
 
-use access_av::localize::bound::{Bound, BoundPoint};
-use access_av::scenario::Scenario;
-use access_av::simulate::{Campaign, CampaignOptions, Consistency, Simulation};
+use simulate::bound::{Bound, BoundPoint};
+use simulate::{Campaign, Consistency};
 use toml::Value;
+
+use common::{Result, arguments, changed, fixed};
 
 /// SSBs before the errors are held against the covariance: an exact start has no error ellipse. A
 /// perfect filter's errors are drawn as far apart.
@@ -20,18 +21,10 @@ const SETTLING: usize = 50;
 /// Campaigns of a perfect filter.
 const CAMPAIGNS: u64 = 200;
 
-fn main() -> Result<(), Box<dyn Error>> {
-    let mut arguments = std::env::args().skip(1);
-    let runs: usize = arguments.next().map_or(Ok(100), |text| text.parse())?;
-    let seed: u64 = arguments.next().map_or(Ok(1), |text| text.parse())?;
-    let drive = |scenario: Scenario| -> Result<Campaign, Box<dyn Error>> {
-        let simulation = Simulation::on_its_platform(scenario)?;
-        Ok(simulation.campaign(&CampaignOptions {
-            seed,
-            runs,
-            ..CampaignOptions::default()
-        })?)
-    };
+fn main() -> Result<()> {
+    let (runs, seeds) = arguments(100, 1)?;
+    let seed = seeds.first().copied().unwrap_or_default();
+    let drive = |scenario| common::campaign(&scenario, seed, runs);
 
     println!("{runs} runs, seed {seed}");
     println!(
@@ -42,7 +35,7 @@ fn main() -> Result<(), Box<dyn Error>> {
         "paper-real-odometry-2",
         "paper-real-odometry-4",
     ] {
-        let scenario = Scenario::load(name)?;
+        let scenario = changed(name, [])?;
         let bound = Bound::new(&scenario)?;
         let points = bound.along_route();
         let square_m2: f64 = points.iter().map(|p| p.position_rms_m.powi(2)).sum();
@@ -77,11 +70,12 @@ fn main() -> Result<(), Box<dyn Error>> {
         ("no map", false, 0.0),
         ("no map, heading 0.02", false, 0.02),
     ] {
-        let scenario = Scenario::load("paper-real-odometry-2")?.with_overrides([
-            ("start.position_std_m", Value::from(5.0)),
-            ("start.heading_std_rad", heading_std_rad.into()),
-            ("localizer.map", map.into()),
-        ])?;
+        let vague = [
+            ("vehicle.start.position_std_m", Value::from(5.0)),
+            ("vehicle.start.heading_std_rad", heading_std_rad.into()),
+            ("vehicle.localizer.map", map.into()),
+        ];
+        let scenario = changed("paper-real-odometry-2", vague)?;
         let bound = Bound::new(&scenario)?;
         let points = bound.along_route();
         let ideal = bound.ideal_filter(SETTLING);
@@ -108,14 +102,14 @@ fn main() -> Result<(), Box<dyn Error>> {
         let mut executions = 0.0;
         for localizer in [
             vec![],
-            vec![("localizer.kind", Value::from("tracker"))],
+            vec![("vehicle.localizer.kind", Value::from("tracker"))],
             vec![
-                ("localizer.kind", "tracker".into()),
-                ("localizer.map", false.into()),
+                ("vehicle.localizer.kind", "tracker".into()),
+                ("vehicle.localizer.map", false.into()),
             ],
         ] {
             let settings = policy.iter().cloned().chain(localizer);
-            let campaign = drive(Scenario::load("paper")?.with_overrides(settings)?)?;
+            let campaign = drive(changed("paper", settings)?)?;
             worst.extend(campaign.worst_mean_abs_error_m());
             executions = campaign.mean_executions();
         }
@@ -153,14 +147,11 @@ fn largest_ratio<'a>(campaign: &Campaign, bound: impl IntoIterator<Item = &'a Bo
 
 /// The paper's adaptive wake-up in every mode, and fixed intervals.
 fn policies() -> Vec<(String, Vec<(&'static str, Value)>)> {
-    let mode = |mode: i64| (format!("mode {mode}"), vec![("platform.mode", mode.into())]);
-    let fixed = |interval_ms: f64| {
-        let settings = vec![
-            ("wake_up.policy", "fixed".into()),
-            ("wake_up.interval_ms", interval_ms.into()),
-        ];
-        (format!("{interval_ms} ms"), settings)
+    let mode = |mode: i64| {
+        let settings = vec![("vehicle.platform.mode", mode.into())];
+        (format!("mode {mode}"), settings)
     };
+    let fixed = |interval_ms: f64| (format!("{interval_ms} ms"), fixed(interval_ms).to_vec());
     (0..8)
         .map(mode)
         .chain([20.0, 80.0, 120.0, 240.0].map(fixed))

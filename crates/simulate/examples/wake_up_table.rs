@@ -1,14 +1,16 @@
 //! What each wake-up policy costs and what error it leaves, on the yard, with the settings shipped:
-//! `cargo run --release -p access-av --example wake_up_table -- [runs] [seed ...]`.
+//! `cargo run --release -p simulate --example wake_up_table -- [runs] [seed ...]`.
 //!
 //! Every policy drives the same runs over the same radio channel. Beside the uncertainty-driven
 //! policy stands the strict one, which listens to the bound alone.
 #![allow(clippy::print_stdout, reason = "prints a table")]
 
-use std::error::Error;
+mod common;
 
-use access_av::scenario::{Scenario, WakeUpSettings};
-use access_av::simulate::{CampaignOptions, Simulation};
+use onboard::settings::WakeUpSettings;
+use simulate::scenario::Scenario;
+
+use common::{Result, arguments, campaign, changed, fixed};
 
 /// One policy, one outcome for each seed.
 struct Policy {
@@ -24,15 +26,8 @@ struct Outcome {
     out_of_reach: f64,
 }
 
-fn main() -> Result<(), Box<dyn Error>> {
-    let mut arguments = std::env::args().skip(1);
-    let runs: usize = arguments.next().map_or(Ok(30), |text| text.parse())?;
-    let mut seeds: Vec<u64> = arguments
-        .map(|text| text.parse())
-        .collect::<Result<_, _>>()?;
-    if seeds.is_empty() {
-        seeds.push(11);
-    }
+fn main() -> Result<()> {
+    let (runs, seeds) = arguments(30, 11)?;
     let mut policies = policies()?;
     for policy in &mut policies {
         for &seed in &seeds {
@@ -54,9 +49,12 @@ fn main() -> Result<(), Box<dyn Error>> {
     }
     println!("\nagainst each other: mean over the seeds, least and most");
     println!("policy               against             share of executions      p90 over p90");
-    let (driven, references): (Vec<_>, Vec<_>) = policies
-        .iter()
-        .partition(|policy| matches!(policy.scenario.wake_up, WakeUpSettings::Uncertainty(_)));
+    let (driven, references): (Vec<_>, Vec<_>) = policies.iter().partition(|policy| {
+        matches!(
+            policy.scenario.vehicle.wake_up,
+            WakeUpSettings::Uncertainty(_)
+        )
+    });
     for policy in driven {
         for reference in &references {
             let share = policy.against(reference, |it| it.executions);
@@ -67,8 +65,7 @@ fn main() -> Result<(), Box<dyn Error>> {
     Ok(())
 }
 
-fn policies() -> Result<Vec<Policy>, Box<dyn Error>> {
-    let yard = Scenario::load("yard")?;
+fn policies() -> Result<Vec<Policy>> {
     let policy = |name: &str, scenario: Scenario| Policy {
         name: name.to_owned(),
         scenario,
@@ -77,22 +74,19 @@ fn policies() -> Result<Vec<Policy>, Box<dyn Error>> {
     let mut policies = Vec::new();
     for base_ms in [80.0, 150.0] {
         let settings = [
-            ("wake_up.policy", "pid".into()),
-            ("wake_up.base_ms", base_ms.into()),
+            ("vehicle.wake_up.policy", "pid".into()),
+            ("vehicle.wake_up.base_ms", base_ms.into()),
         ];
         let name = format!("PID, base {base_ms} ms");
-        policies.push(policy(&name, yard.with_overrides(settings)?));
+        policies.push(policy(&name, changed("yard", settings)?));
     }
     for interval_ms in [20.0, 240.0] {
-        let settings = [
-            ("wake_up.policy", "fixed".into()),
-            ("wake_up.interval_ms", interval_ms.into()),
-        ];
         let name = format!("fixed {interval_ms} ms");
-        policies.push(policy(&name, yard.with_overrides(settings)?));
+        policies.push(policy(&name, changed("yard", fixed(interval_ms))?));
     }
+    let yard = changed("yard", [])?;
     let mut strict = yard.clone();
-    if let WakeUpSettings::Uncertainty(settings) = &mut strict.wake_up {
+    if let WakeUpSettings::Uncertainty(settings) = &mut strict.vehicle.wake_up {
         settings.least_gain_m2 = None;
     }
     policies.push(policy("uncertainty", yard));
@@ -100,20 +94,15 @@ fn policies() -> Result<Vec<Policy>, Box<dyn Error>> {
     Ok(policies)
 }
 
-fn drive(scenario: &Scenario, runs: usize, seed: u64) -> Result<Outcome, Box<dyn Error>> {
-    let simulation = Simulation::on_its_platform(scenario.clone())?;
-    let campaign = simulation.campaign(&CampaignOptions {
-        seed,
-        runs,
-        ..CampaignOptions::default()
-    })?;
+fn drive(scenario: &Scenario, runs: usize, seed: u64) -> Result<Outcome> {
+    let campaign = campaign(scenario, seed, runs)?;
     let listened: usize = campaign.runs.iter().map(|run| run.listened).sum();
     let out_of_reach: usize = campaign.runs.iter().map(|run| run.out_of_reach).sum();
     Ok(Outcome {
         p90_m: campaign.errors.quantile_m(0.9).unwrap_or(f64::NAN),
         executions: campaign.mean_executions(),
         listened: listened as f64 / runs as f64,
-        out_of_reach: out_of_reach as f64 / (runs * simulation.steps()) as f64,
+        out_of_reach: out_of_reach as f64 / (runs * campaign.steps.len()) as f64,
     })
 }
 

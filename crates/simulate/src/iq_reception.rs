@@ -63,7 +63,7 @@ impl IqReception {
         let observations = &mut self.observations;
         observations.clear();
         self.receiver.receive(&window, |observation| {
-            observations.push(observation.clone())
+            observations.push(observation.clone());
         })?;
         observations.sort_by(|a, b| a.ssb.time_s.total_cmp(&b.ssb.time_s));
         Ok(())

@@ -210,9 +210,7 @@ impl Drive {
                 return Ok(());
             }
             self.odometry_number += 1;
-            let latency_s = self.latency_s;
-            let arrives_before = |it: &mut Burst| it.vehicle.time_s + latency_s < sample_s;
-            while let Some(burst) = self.on_the_way.pop_front_if(arrives_before) {
+            while let Some(burst) = self.arrived(|arrives_s| arrives_s < sample_s) {
                 self.hear(burst, record)?;
             }
             if let Some(sample) = self.odometer.sample(self.path.at(sample_s)) {
@@ -227,12 +225,16 @@ impl Drive {
 
     /// Hears what has arrived by `time_s`.
     fn hear_until(&mut self, time_s: f64, record: &mut RunRecord) -> Result<(), SimulationError> {
-        let latency_s = self.latency_s;
-        let has_arrived = |it: &mut Burst| it.vehicle.time_s + latency_s <= time_s;
-        while let Some(burst) = self.on_the_way.pop_front_if(has_arrived) {
+        while let Some(burst) = self.arrived(|arrives_s| arrives_s <= time_s) {
             self.hear(burst, record)?;
         }
         Ok(())
+    }
+
+    /// The next burst, if the time at which it arrives is `by` now.
+    fn arrived(&mut self, by: impl Fn(f64) -> bool) -> Option<Burst> {
+        let arrives_s = self.on_the_way.front()?.vehicle.time_s + self.latency_s;
+        by(arrives_s).then(|| self.on_the_way.pop_front()).flatten()
     }
 
     fn hear(&mut self, burst: Burst, record: &mut RunRecord) -> Result<(), SimulationError> {

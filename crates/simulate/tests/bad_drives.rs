@@ -7,19 +7,22 @@ mod common;
 use std::fs;
 use std::path::{Path, PathBuf};
 
-use access_av::localize::UpdateReason;
-use access_av::recording::{
-    Site, read_angle_log, read_odometry_csv, write_angle_log, write_drive_mcap, write_odometry_csv,
-};
-use access_av::replay::{LocatedDrive, locate_angles};
-use access_av::scenario::Scenario;
-use access_av::simulate::Step;
 use mcap::MessageStream;
+use onboard::localize::UpdateReason;
+use recording::replay::{LocatedDrive, StartChoice, locate_angles};
+use recording::{
+    AngleLog, OdometryLog, read_angle_log, read_odometry_csv, write_angle_log, write_drive_mcap,
+    write_odometry_csv,
+};
+use simulate::Step;
+use simulate::scenario::Scenario;
+
+use common::{changed, shipped, value};
 
 /// A drive as files, and its truth.
 struct Drive {
     dir: PathBuf,
-    site: Site,
+    scenario: Scenario,
     odometry: Vec<String>,
     angles: Vec<String>,
     truth: Vec<Step>,
@@ -28,13 +31,9 @@ struct Drive {
 impl Drive {
     fn new(name: &str) -> Self {
         let dir = common::scratch(name);
-        let road = toml::from_str::<toml::Table>("s = [{ length_m = 60.0, turn_rad = 0.1 }]");
-        let scenario = Scenario::load("paper-real-odometry-2")
-            .unwrap()
-            .with_overrides([("track.segments", road.unwrap()["s"].clone())])
-            .unwrap();
+        let road = value("[{ length_m = 60.0, turn_rad = 0.1 }]");
+        let scenario = changed("paper-real-odometry-2", [("site.road.segments", road)]);
         let (odometry, angles, record) = common::logs(&scenario, 4);
-        let text = Site::of_scenario(&scenario, record.steps[0].truth, [1.0.into(); 4]);
         write_odometry_csv(&dir.join("odometry.csv"), &odometry.samples).unwrap();
         write_angle_log(&dir.join("angles.csv"), &angles.angles).unwrap();
         let lines = |name: &str| {
@@ -44,7 +43,7 @@ impl Drive {
         Self {
             odometry: lines("odometry.csv"),
             angles: lines("angles.csv"),
-            site: Site::from_toml(&text, "site.toml").unwrap(),
+            scenario,
             truth: record.steps,
             dir,
         }
@@ -57,7 +56,13 @@ impl Drive {
         fs::write(&angles, self.angles.join("\n")).unwrap();
         let odometry = read_odometry_csv(&odometry).unwrap();
         let angles = read_angle_log(&angles).unwrap();
-        locate_angles(&self.site, &odometry, &angles, false).unwrap()
+        self.locate_these(&odometry, &angles)
+    }
+
+    fn locate_these(&self, odometry: &OdometryLog, angles: &AngleLog) -> LocatedDrive {
+        let (site, vehicle) = (&self.scenario.site, &self.scenario.vehicle);
+        let start = StartChoice::At(self.truth[0].truth);
+        locate_angles(site, vehicle, start, odometry, angles, false).unwrap()
     }
 
     /// The largest error of any pose in its own standard deviations.
@@ -210,9 +215,9 @@ fn bad_angles_are_named_and_passed_over() {
         executions.filter(|it| it.verdict.reason == reason).count()
     };
     assert_eq!(refused(UpdateReason::UnknownRadioHead), 1);
-    assert_eq!(refused(UpdateReason::TimeReversed), 1);
+    assert_eq!(refused(UpdateReason::TooLate), 1);
     assert!(told.contains("refused: unknown radio head"));
-    assert!(told.contains("refused: time reversed"));
+    assert!(told.contains("refused: too late"));
     assert_eq!(located.poses, sound.poses);
 }
 
@@ -224,7 +229,7 @@ fn a_measurement_without_a_variance_is_unusable_whoever_made_it() {
         drive.locate();
         read_odometry_csv(&drive.dir.join("odometry.csv")).unwrap()
     };
-    let (_, mut angles, _) = common::logs(&Scenario::load("paper-real-odometry-2").unwrap(), 4);
+    let (_, mut angles, _) = common::logs(&shipped("paper-real-odometry-2"), 4);
     angles.angles.truncate(4);
     for (angle, sigma_rad) in angles
         .angles
@@ -233,7 +238,7 @@ fn a_measurement_without_a_variance_is_unusable_whoever_made_it() {
     {
         angle.measured.phase_sigma_rad = sigma_rad;
     }
-    let located = locate_angles(&drive.site, &odometry, &angles, false).unwrap();
+    let located = drive.locate_these(&odometry, &angles);
     let reasons: Vec<_> = located
         .executions
         .iter()

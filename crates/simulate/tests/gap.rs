@@ -4,16 +4,13 @@
 
 mod common;
 
-use std::sync::Arc;
+use onboard::settings::{Shipped, TomlFile};
+use recording::replay::{LocatedDrive, LocatedPose, StartChoice, locate_angles};
+use simulate::RunRecord;
+use simulate::scenario::Scenario;
+use toml::Value;
 
-use access_av::localize::Tracker;
-use access_av::localize::tracker::{InitialPose, OdometryVerdict, TrackerConfig};
-use access_av::observation::OdometrySample;
-use access_av::recording::Site;
-use access_av::replay::{LocatedDrive, LocatedPose, locate_angles};
-use access_av::scenario::{LocalizerSettings, Scenario};
-use access_av::simulate::RunRecord;
-use access_av::world::Gap;
+use common::{changed, value};
 
 /// Road on both sides of the gap (m) ...
 const SURVEYED_M: f64 = 90.0;
@@ -22,11 +19,11 @@ const SURVEYED_M: f64 = 90.0;
 const RADIUS_M: f64 = 200.0;
 const TURN_RAD: f64 = 0.1;
 
-fn with_road(scenario: &Scenario, turn_rad: f64, gap: &str) -> Scenario {
-    let surveyed = format!("{{ length_m = {SURVEYED_M}, turn_rad = {turn_rad:?} }}");
-    let road = format!("it = [{surveyed}, {gap}, {surveyed}]");
-    let road = toml::from_str::<toml::Table>(&road).unwrap()["it"].clone();
-    scenario.with_overrides([("track.segments", road)]).unwrap()
+fn with_road(scenario: &Scenario, gap: &str) -> Scenario {
+    let surveyed = format!("{{ length_m = {SURVEYED_M}, turn_rad = 0.1 }}");
+    let road = value(&format!("[{surveyed}, {gap}, {surveyed}]"));
+    let changes = [("site.road.segments", road)];
+    scenario.with_overrides(changes, &Shipped).unwrap()
 }
 
 fn gap_m() -> f64 {
@@ -35,16 +32,19 @@ fn gap_m() -> f64 {
 
 /// The paper's trip; the road bends by about as much as it does in the gap.
 fn scenario() -> Scenario {
-    Scenario::load("paper-real-odometry-2")
-        .unwrap()
-        .with_overrides([
-            ("localizer.curvature_rms_per_m", (1.0 / RADIUS_M).into()),
+    changed(
+        "paper-real-odometry-2",
+        [
             (
-                "localizer.curvature_correlation_m",
+                "vehicle.localizer.curvature_rms_per_m",
+                Value::from(1.0 / RADIUS_M),
+            ),
+            (
+                "vehicle.localizer.curvature_correlation_m",
                 (2.0 * RADIUS_M * TURN_RAD).into(),
             ),
-        ])
-        .unwrap()
+        ],
+    )
 }
 
 /// A drive on the true road, located by a map that has the chord instead, and smoothed.
@@ -56,14 +56,14 @@ fn drive(seed: u64, surveyed: bool) -> (LocatedDrive, RunRecord) {
         format!("{{ length_m = {length_m:?}, turn_rad = {turn_rad:?} }}")
     };
     let bends = [1.0, -1.0, -1.0, 1.0].map(quarter).join(", ");
-    let (odometry, angles, record) = common::logs(&with_road(&scenario, 0.1, &bends), seed);
+    let (odometry, angles, record) = common::logs(&with_road(&scenario, &bends), seed);
 
     let chord = format!("{{ length_m = {:?}, surveyed = {surveyed} }}", gap_m());
-    let map = with_road(&scenario, 0.1, &chord);
-    let text = Site::of_scenario(&map, record.steps[0].truth, [1.0.into(); 4]);
-    let site = Site::from_toml(&text, "site.toml").unwrap();
+    let map = with_road(&scenario, &chord);
+    let start = StartChoice::At(record.steps[0].truth);
+    let (site, vehicle) = (&map.site, &map.vehicle);
     (
-        locate_angles(&site, &odometry, &angles, true).unwrap(),
+        locate_angles(site, vehicle, start, &odometry, &angles, true).unwrap(),
         record,
     )
 }
@@ -121,81 +121,5 @@ fn the_guess_taken_for_the_road_leads_astray() {
         let (located, record) = drive(seed, true);
         let squares = located.poses.iter().skip(50).map(|it| error(it, &record).1);
         assert!(squares.fold(0.0, f64::max) > 16.0);
-    }
-}
-
-/// A tracker that hears nothing, on a straight road.
-fn tracker(at_m: f64, aside_m: f64, position_std_m: f64) -> (Tracker, Gap) {
-    let chord = format!("{{ length_m = {:?}, surveyed = false }}", gap_m());
-    let scenario = with_road(&scenario(), 0.0, &chord);
-    let LocalizerSettings::Tracker(settings) = scenario.localizer else {
-        unreachable!("the scenario uses the tracker");
-    };
-    let map = Arc::new(scenario.build_track().unwrap());
-    let gap = map.gap_between(0.0, map.length_m()).unwrap();
-    let start = InitialPose {
-        pose: map.pose(at_m).offset_left(aside_m),
-        position_std_m,
-        heading_std_rad: 0.01,
-    };
-    let config = TrackerConfig::new(&scenario, &settings);
-    (Tracker::new(config, Some(map), &[], &start), gap)
-}
-
-/// Odometry at 4 m/s.
-fn sample(number: u32) -> OdometrySample {
-    let time_s = 0.02 * f64::from(number);
-    OdometrySample {
-        time_s,
-        distance_m: 4.0 * time_s,
-        speed_mps: 4.0,
-        yaw_rate_radps: None,
-    }
-}
-
-#[test]
-fn the_gap_is_told_and_costs_certainty_until_the_lane_is_kept_again() {
-    let (mut tracker, gap) = tracker(60.0, 0.0, 0.1);
-    assert_eq!(tracker.odometry(&sample(0)), OdometryVerdict::First);
-    let lane_m2 = tracker.config().lane_keeping.stationary()[0];
-    let (mut told_m, mut before) = (Vec::new(), 0.0);
-    for number in 1..(150 * 50 / 4) {
-        let verdict = tracker.odometry(&sample(number));
-        let along_m = 60.0 + 0.08 * f64::from(number);
-        let [larger, smaller] = tracker.pose(0.02 * f64::from(number)).principal_variances();
-        if verdict == OdometryVerdict::Accepted {
-            // Across the road it is as sure as the lane is kept, or surer.
-            assert!(smaller < (1.0 + 1e-9) * lane_m2, "{along_m} {smaller}");
-        } else {
-            let Gap { from_m, to_m } = gap;
-            assert_eq!(verdict, OdometryVerdict::InMapGap { from_m, to_m });
-            if !told_m.is_empty() {
-                assert!(larger > before, "{along_m}");
-            }
-            before = larger;
-            told_m.push(along_m);
-        }
-    }
-    // By then the place is known to 0.1 m of start, 0.003 of scale and 0.01 m per √m, and the
-    // verdict comes a sample later.
-    let margin_m =
-        |driven_m: f64| 3.0 * (0.01 + (0.003 * driven_m).powi(2) + 1e-4 * driven_m).sqrt() + 0.08;
-    let (first_m, last_m) = (told_m[0], told_m[told_m.len() - 1]);
-    let (early_m, late_m) = (gap.from_m - first_m, last_m - gap.to_m);
-    assert!(early_m > 0.0 && early_m < margin_m(30.0), "{early_m}");
-    assert!(late_m > 0.0 && late_m < margin_m(111.0), "{late_m}");
-    // Eighty metres of a path that bends as it likes.
-    assert!(before > 1.0, "{before}");
-}
-
-#[test]
-fn a_start_in_the_gap_is_not_drawn_to_the_guess() {
-    let (tracker, _) = tracker(130.0, 2.0, 0.5);
-    let (on_the_guess, _) = self::tracker(130.0, 0.0, 0.5);
-    let pose = tracker.pose(0.0);
-    let moved_m = (pose.pose.point()).distance_m(on_the_guess.pose(0.0).pose.point());
-    assert!((moved_m - 2.0).abs() < 1e-9, "{moved_m}");
-    for variance in pose.principal_variances() {
-        assert!((variance - 0.25).abs() < 1e-9, "{variance}");
     }
 }

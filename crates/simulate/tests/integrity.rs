@@ -1,22 +1,27 @@
 //! Protection levels and alarms on simulated drives, nominal and under faults.
 //!
 //! The promises are 1e-3 and 1e-2 of the epochs in state `ok`; the command
-//! `cargo run --release -p access-av --example integrity_table` counts them over millions. Here a
+//! `cargo run --release -p simulate --example integrity_table` counts them over millions. Here a
 //! few runs are held to what chance allows for their number: the epochs of a run hang together over
 //! tens of seconds, a run being worth about eight of them.
-#![allow(clippy::unwrap_used)] // helpers of tests
+#![allow(clippy::unwrap_used, reason = "this is a test")]
 
-use access_av::localize::IntegrityState;
-use access_av::onboard::Custom;
-use access_av::scenario::{FaultKind, FaultSettings, Scenario};
-use access_av::simulate::{CampaignOptions, IntegritySummary, RunRecord, Simulation, Step};
+mod common;
+
+use onboard::localize::IntegrityState;
+use simulate::scenario::{FaultKind, FaultSettings, Scenario};
+use simulate::{IntegritySummary, Step};
+
+use common::{changed, drives, shipped, value};
 
 const SEED: u64 = 77;
 const ALERT_LIMIT_M: f64 = 1.5;
 
 fn scenario(faults: Vec<FaultSettings>) -> Scenario {
-    let shipped = Scenario::load("nlos-and-faults").unwrap();
-    Scenario { faults, ..shipped }
+    Scenario {
+        faults,
+        ..shipped("nlos-and-faults")
+    }
 }
 
 fn fault(from_s: f64, until_s: f64, what: FaultKind) -> FaultSettings {
@@ -27,14 +32,8 @@ fn fault(from_s: f64, until_s: f64, what: FaultKind) -> FaultSettings {
     }
 }
 
-fn summaries(scenario: Scenario, runs: usize) -> Vec<IntegritySummary> {
-    let options = CampaignOptions {
-        seed: SEED,
-        runs,
-        ..CampaignOptions::default()
-    };
-    let simulation = Simulation::on_its_platform(scenario).unwrap();
-    simulation.campaign(&options).unwrap().integrity
+fn summaries(scenario: &Scenario, runs: usize) -> Vec<IntegritySummary> {
+    common::campaign(scenario, SEED, runs).integrity
 }
 
 /// Most runs of `runs` that may leave the protection level at all where the risk is `risk`: of 8
@@ -47,7 +46,7 @@ fn most_affected(runs: usize, risk: f64) -> usize {
 #[test]
 fn nominal_drives_are_ok_and_within_their_level() {
     let runs = 16;
-    let summaries = summaries(scenario(Vec::new()), runs);
+    let summaries = summaries(&scenario(Vec::new()), runs);
     let affected = (summaries.iter())
         .filter(|run| run.beyond > run.ok / 100)
         .count();
@@ -68,7 +67,7 @@ fn a_moved_radio_head_is_bounded_or_told_in_time() {
             radio_head: 2,
             by_m,
         };
-        let summaries = summaries(scenario(vec![fault(25.0, 60.0, what)]), runs);
+        let summaries = summaries(&scenario(vec![fault(25.0, 60.0, what)]), runs);
         let affected = (summaries.iter())
             .filter(|run| run.beyond > run.ok / 100)
             .count();
@@ -88,7 +87,7 @@ fn a_moved_radio_head_is_bounded_or_told_in_time() {
 #[test]
 fn an_antenna_that_sticks_is_told() {
     let stuck = fault(25.0, 60.0, FaultKind::StuckAntenna { antenna: 1 });
-    for record in drives(&scenario(vec![stuck]), 3) {
+    for record in drives(&scenario(vec![stuck]), SEED, 3) {
         let during = record
             .steps
             .iter()
@@ -102,13 +101,6 @@ fn an_antenna_that_sticks_is_told() {
     }
 }
 
-fn drives(scenario: &Scenario, runs: u64) -> Vec<RunRecord> {
-    let simulation = Simulation::on_its_platform(scenario.clone()).unwrap();
-    (0..runs)
-        .map(|run| simulation.run(SEED, run, Custom::default()).unwrap())
-        .collect()
-}
-
 /// Two of four at once: nobody can tell which, and the position is carried away.
 #[test]
 fn led_astray_it_says_so_and_finds_back() {
@@ -120,7 +112,7 @@ fn led_astray_it_says_so_and_finds_back() {
         fault(20.0, 30.0, what)
     };
     let scenario = scenario(vec![wall(0, 0.9), wall(1, -0.9)]);
-    for record in drives(&scenario, 6) {
+    for record in drives(&scenario, SEED, 6) {
         let worst_m = record.steps.iter().map(Step::error_m).fold(0.0, f64::max);
         let unsaid = (record.steps.iter())
             .filter(|step| step.error_m() > ALERT_LIMIT_M)
@@ -153,11 +145,9 @@ fn led_astray_it_says_so_and_finds_back() {
 fn one_radio_head_is_trusted_as_far_as_odometry_goes() {
     let alone = |faults| Scenario {
         faults,
-        ..(Scenario::load("paper-real-odometry").unwrap())
-            .with_overrides([("localizer.integrity", true.into())])
-            .unwrap()
+        ..changed("paper-real-odometry", [("vehicle.integrity", value("{}"))])
     };
-    let nominal = drives(&alone(Vec::new()), 2);
+    let nominal = drives(&alone(Vec::new()), SEED, 2);
     for record in &nominal {
         let level_m = |time_s: f64| {
             let step = record
@@ -174,7 +164,7 @@ fn one_radio_head_is_trusted_as_far_as_odometry_goes() {
         by_m: [10.0, 0.0],
     };
     let runs = 8;
-    let summaries = summaries(alone(vec![fault(10.0, 90.0, what)]), runs);
+    let summaries = summaries(&alone(vec![fault(10.0, 90.0, what)]), runs);
     let affected = (summaries.iter())
         .filter(|run| run.beyond > run.ok / 100)
         .count();

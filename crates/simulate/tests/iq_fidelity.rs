@@ -1,41 +1,43 @@
 //! `fidelity = "iq"` agrees with `fidelity = "snapshots"`, and its receiver keeps the cells.
 #![allow(clippy::unwrap_used, clippy::print_stdout, reason = "this is a test")]
 
+mod common;
+
 use std::f64::consts::TAU;
 
-use access_av::geometry::{Point, wrap_angle};
-use access_av::onboard::Custom;
-use access_av::platform::Platform;
-use access_av::scenario::Scenario;
-use access_av::simulate::{RunRecord, Simulation};
+use onboard::Execution;
+use onboard::geometry::{Point, wrap_angle};
+use onboard::settings::{Shipped, TomlFile};
+use simulate::RunRecord;
+use simulate::scenario::Scenario;
 use toml::Value;
+
+use common::{changed, shipped, value};
 
 /// The paper's drive, 80 m of it, with known pilots, an angle at every SSB.
 fn scenario(fidelity: &str, k_db: f64, more: &[(&'static str, Value)]) -> Scenario {
-    let segments: Value =
-        toml::from_str::<toml::Table>("s = [{ length_m = 80.0, turn_rad = 0.1 }]").unwrap()["s"]
-            .clone();
     let mut overrides = vec![
         ("fidelity", Value::from(fidelity)),
-        ("receiver.pilots", Value::from("ssb")),
-        ("estimator.method", Value::from("maximum-likelihood")),
-        ("wake_up.policy", Value::from("fixed")),
-        ("wake_up.interval_ms", Value::from(1.0)),
-        ("channel.rician_k_db", Value::from(k_db)),
+        ("vehicle.receiver.pilots", Value::from("ssb")),
+        (
+            "vehicle.estimator.method",
+            Value::from("maximum-likelihood"),
+        ),
+        ("vehicle.wake_up.policy", Value::from("fixed")),
+        ("vehicle.wake_up.interval_ms", Value::from(1.0)),
+        ("site.rician_k_db", Value::from(k_db)),
         ("channel.shadowing_std_db", Value::from(0.0)),
-        ("track.segments", segments),
+        (
+            "site.road.segments",
+            value("[{ length_m = 80.0, turn_rad = 0.1 }]"),
+        ),
     ];
     overrides.extend(more.iter().cloned());
-    Scenario::load("paper")
-        .unwrap()
-        .with_overrides(overrides)
-        .unwrap()
+    changed("paper", overrides)
 }
 
 fn drive(scenario: &Scenario, run: u64) -> RunRecord {
-    let platform = Platform::load("jetson-agx-xavier").unwrap();
-    let simulation = Simulation::new(scenario.clone(), platform).unwrap();
-    simulation.run(3, run, Custom::default()).unwrap()
+    common::run(scenario, 3, run)
 }
 
 /// Error of the electrical angle of one SSB, and the deviation that the receiver states.
@@ -54,18 +56,19 @@ impl Seen {
 
 /// One error per SSB.
 fn errors(scenario: &Scenario, record: &RunRecord) -> Vec<Seen> {
-    let head = Point::from(scenario.radio_heads[0].position_m);
+    let [x_m, y_m, _] = scenario.site.radio_heads[0].position_m;
+    let head = Point::new(x_m, y_m);
     let mut driven_m = vec![0.0];
     for pair in record.steps.windows(2) {
         let [from, to] = [&pair[0], &pair[1]].map(|step| step.truth.point());
         driven_m.push(driven_m[driven_m.len() - 1] + from.distance_m(to));
     }
-    let of = |execution: &access_av::onboard::Execution| {
+    let of = |execution: &Execution| {
         let measured = execution.measured.unwrap();
-        let step = (measured.time_s / scenario.ssb.period_s() + 1e-6).floor() as usize;
+        let step = (measured.time_s / scenario.site.ssb.period_s() + 1e-6).floor() as usize;
         let truth = record.steps[step].truth;
         let angle_rad = truth.point().bearing_rad(head) - truth.heading_rad;
-        let phase_rad = TAU * scenario.array.spacing_wavelengths * angle_rad.cos();
+        let phase_rad = TAU * scenario.vehicle.array.spacing_wavelengths * angle_rad.cos();
         Seen {
             driven_m: driven_m[step],
             error_rad: wrap_angle(measured.phase_rad - phase_rad),
@@ -85,7 +88,7 @@ fn noise_makes_the_same_angle_errors_in_samples_and_in_snapshots() {
     // Noise only: every SSB is independent.
     for pilots in ["ssb", "pss+sss", "pss"] {
         let by = |fidelity| {
-            let more = [("receiver.pilots", Value::from(pilots))];
+            let more = [("vehicle.receiver.pilots", Value::from(pilots))];
             let scenario = scenario(fidelity, 60.0, &more);
             let record = drive(&scenario, 1);
             assert_eq!(record.executions.len(), record.steps.len(), "{fidelity}");
@@ -116,7 +119,7 @@ fn noise_makes_the_same_angle_errors_in_samples_and_in_snapshots() {
 #[test]
 fn scatter_makes_the_same_angle_errors_in_samples_and_in_snapshots() {
     // Scatter of 10 dB, the same in both by its random streams: SSB by SSB the errors are alike.
-    let strong = [("radio_heads[0].tx_power_dbm", Value::from(10.0))];
+    let strong = [("site.radio_heads[0].eirp_dbm", Value::from(20.0))];
     let of = |fidelity| {
         let scenario = scenario(fidelity, 10.0, &strong);
         let errors = errors(&scenario, &drive(&scenario, 2));
@@ -141,8 +144,8 @@ fn scatter_with_a_delay_spread_is_averaged_over_the_band_and_owned_up_to() {
     let (k_db, spread_s, bandwidth_hz) = (5.0, 300e-9, 240.0 * 30e3);
     let of = |spread_ns: f64| {
         let more = [
-            ("radio_heads[0].tx_power_dbm", Value::from(-10.0)),
-            ("ssb.subcarrier_spacing_khz", Value::from(30.0)),
+            ("site.radio_heads[0].eirp_dbm", Value::from(0.0)),
+            ("site.ssb.subcarrier_spacing_khz", Value::from(30.0)),
             ("channel.delay_spread_ns", Value::from(spread_ns)),
             ("channel.rays", Value::from(64)),
         ];
@@ -151,7 +154,7 @@ fn scatter_with_a_delay_spread_is_averaged_over_the_band_and_owned_up_to() {
         // A wavelength apart, scatter is independent.
         let mut last_m = f64::NEG_INFINITY;
         all.retain(|error| {
-            let far = error.driven_m >= last_m + scenario.ssb.wavelength_m();
+            let far = error.driven_m >= last_m + scenario.site.wavelength_m();
             last_m = if far { error.driven_m } else { last_m };
             far
         });
@@ -182,8 +185,9 @@ fn scatter_with_a_delay_spread_is_averaged_over_the_band_and_owned_up_to() {
 #[test]
 fn faults_act_on_samples_as_on_snapshots() {
     let fault = |what: &str| {
-        let text = format!("f = [{{ from_s = 0.0, until_s = 1e3, what = {what} }}]");
-        toml::from_str::<toml::Table>(&text).unwrap()["f"].clone()
+        value(&format!(
+            "[{{ from_s = 0.0, until_s = 1e3, what = {what} }}]"
+        ))
     };
     for what in [
         "{ kind = \"non-line-of-sight\", radio_head = 0, bias_rad = 0.6 }",
@@ -193,7 +197,7 @@ fn faults_act_on_samples_as_on_snapshots() {
         let of = |fidelity| {
             let more = [
                 ("faults", fault(what)),
-                ("radio_heads[0].tx_power_dbm", Value::from(10.0)),
+                ("site.radio_heads[0].eirp_dbm", Value::from(20.0)),
             ];
             let scenario = scenario(fidelity, 60.0, &more);
             let errors = errors(&scenario, &drive(&scenario, 1));
@@ -215,17 +219,15 @@ fn faults_act_on_samples_as_on_snapshots() {
 
 #[test]
 fn several_cells_blind_snapshots_and_bad_hardware_are_survived() {
-    let second = toml::from_str::<toml::Table>(
-        "[[radio_heads]]\nposition_m = [205.0, 100.0]\npci = 1\ntx_power_dbm = 0.0\n\
-         [[radio_heads]]\nposition_m = [40.0, -60.0]\npci = 400\nssb_index = 3\ntx_power_dbm = 0.0\n",
-    )
-    .unwrap()["radio_heads"]
-        .clone();
+    let two = value(
+        "[{ position_m = [205.0, 100.0, 0.0], pci = 1, eirp_dbm = 10.0 }, \
+         { position_m = [40.0, -60.0, 0.0], pci = 400, ssb_index = 3, eirp_dbm = 10.0 }]",
+    );
     let more = [
-        ("radio_heads", second),
-        ("receiver.pilots", Value::from("blind")),
-        ("estimator.method", Value::from("root-music")),
-        ("ssb.subcarrier_spacing_khz", Value::from(30.0)),
+        ("site.radio_heads", two),
+        ("vehicle.receiver.pilots", Value::from("blind")),
+        ("vehicle.estimator.method", Value::from("root-music")),
+        ("site.ssb.subcarrier_spacing_khz", Value::from(30.0)),
         ("iq.oscillator_ppm", Value::from(1.0)),
         ("iq.adc_bits", Value::from(4)),
         ("iq.adc_headroom_db", Value::from(6.0)),
@@ -260,20 +262,20 @@ fn samples_repeat_to_the_last_bit_and_differ_by_run() {
 
 #[test]
 fn what_cannot_be_sent_as_samples_is_refused() {
-    let scenario = Scenario::load("paper").unwrap();
+    let scenario = shipped("paper");
     for (key, value) in [
-        ("ssb.subcarrier_spacing_khz", Value::from(120.0)),
-        ("radio_heads[0].ssb_index", Value::from(8)),
+        ("site.ssb.subcarrier_spacing_khz", Value::from(120.0)),
+        ("site.radio_heads[0].ssb_index", Value::from(8)),
         ("iq.adc_bits", Value::from(0)),
         ("iq.oscillator_ppm", Value::from(3.0)),
         // More than a quarter of the cyclic prefix.
         ("channel.delay_spread_ns", Value::from(1200.0)),
     ] {
         let overrides = [("fidelity", Value::from("iq")), (key, value)];
-        let error = scenario.with_overrides(overrides).unwrap_err();
+        let error = scenario.with_overrides(overrides, &Shipped).unwrap_err();
         assert!(error.to_string().contains(key), "{error}");
     }
     let delays = [("channel.delay_spread_ns", Value::from(300.0))];
-    let error = scenario.with_overrides(delays).unwrap_err();
+    let error = scenario.with_overrides(delays, &Shipped).unwrap_err();
     assert!(error.to_string().contains("fidelity"), "{error}");
 }

@@ -3,19 +3,23 @@
 
 mod common;
 
-use std::fs;
 use std::path::Path;
 
-use access_av::geometry::Point;
-use access_av::receive::{ScanSettings, scan};
-use access_av::recording::{
-    Datatype, LoggedAngle, OdometryLog, Recording, Site, read_angle_log, read_odometry_csv,
+use onboard::receive::ReceiveError;
+use onboard::settings::{SettingsError, Site, Vehicle};
+use recording::replay::{
+    LocatedDrive, LocatedPose, ReplayError, StartChoice, locate_angles, locate_recording,
+};
+use recording::scan::{ScanSettings, scan};
+use recording::{
+    Datatype, LoggedAngle, OdometryLog, Recording, load, read_angle_log, read_odometry_csv,
     read_tum, write_angle_log,
 };
-use access_av::replay::{LocatedDrive, ReplayError, locate_angles, locate_recording};
-use access_av::scenario::{Scenario, ScenarioError};
-use access_av::simulate::{SynthSettings, synthesize};
+use simulate::scenario::Scenario;
+use simulate::{SynthSettings, synthesize};
 use toml::Value;
+
+use common::{changed, shipped, value};
 
 const SETTINGS: SynthSettings = SynthSettings {
     seed: 1,
@@ -26,18 +30,35 @@ const SETTINGS: SynthSettings = SynthSettings {
 };
 
 fn scenario() -> Scenario {
-    let segments: Value =
-        toml::from_str::<toml::Table>("s = [{ length_m = 60.0, turn_rad = 0.1 }]").unwrap()["s"]
-            .clone();
-    Scenario::load("paper-real-odometry-2")
-        .unwrap()
-        .with_overrides([
-            ("track.segments", segments),
-            ("radio_heads[1].ssb_index", Value::from(2)),
+    changed(
+        "paper-real-odometry-2",
+        [
+            (
+                "site.road.segments",
+                value("[{ length_m = 60.0, turn_rad = 0.1 }]"),
+            ),
+            ("site.radio_heads[1].ssb_index", Value::from(2)),
             ("iq.channel_phase_rad", Value::from(0.5)),
             ("iq.channel_gain_db", Value::from(1.0)),
-        ])
-        .unwrap()
+        ],
+    )
+}
+
+/// Site and vehicle as they were written beside a drive.
+fn believed(dir: &Path) -> (Site, Vehicle) {
+    let path = |name: &str| dir.join(name).display().to_string();
+    let site = load(&path("site.toml")).unwrap();
+    (site, load(&path("vehicle.toml")).unwrap())
+}
+
+/// Locates recorded samples from where the vehicle's file says that the drive begins.
+fn locate(
+    (site, vehicle): &(Site, Vehicle),
+    odometry: &OdometryLog,
+    recording: &mut Recording,
+) -> Result<LocatedDrive, ReplayError> {
+    let start = StartChoice::AsSet;
+    locate_recording(site, vehicle, start, odometry, recording, 0.0, false)
 }
 
 /// Root mean square of the horizontal error in metres.
@@ -46,9 +67,7 @@ fn rms_error_m(drive: &LocatedDrive, truth: &Path) -> f64 {
     let squares: Vec<f64> = truth
         .iter()
         .filter_map(|truth| {
-            let near = |it: &&access_av::replay::LocatedPose| {
-                (it.estimate.time_s - truth.time_s).abs() < 1e-6
-            };
+            let near = |it: &&LocatedPose| (it.estimate.time_s - truth.time_s).abs() < 1e-6;
             let pose = drive.poses.iter().find(near)?;
             Some(
                 pose.estimate
@@ -67,13 +86,13 @@ fn rms_error_m(drive: &LocatedDrive, truth: &Path) -> f64 {
 fn a_recorded_drive_is_located() {
     let dir = common::scratch("drive");
     let made = synthesize(&scenario(), &SETTINGS, &dir).unwrap();
-    let site = Site::read(&dir.join("site.toml")).unwrap();
+    let believed = believed(&dir);
     let odometry = read_odometry_csv(&dir.join("odometry.csv")).unwrap();
     let mut recording = Recording::open(&made.recording).unwrap();
     assert_eq!(recording.warnings(), []);
     assert_eq!(recording.length(), made.samples);
 
-    let drive = locate_recording(&site, &odometry, &mut recording, 0.0, false).unwrap();
+    let drive = locate(&believed, &odometry, &mut recording).unwrap();
     assert_eq!(drive.poses.len(), odometry.samples.len());
     // Two heads; what the acquisition of the second costs is a burst or two.
     assert!(
@@ -106,13 +125,15 @@ fn a_recorded_drive_is_located() {
     let file = dir.join("angles.csv");
     write_angle_log(&file, &angles).unwrap();
     let angles = read_angle_log(&file).unwrap();
-    let again = locate_angles(&site, &odometry, &angles, false).unwrap();
+    let (site, vehicle) = &believed;
+    let start = StartChoice::AsSet;
+    let again = locate_angles(site, vehicle, start, &odometry, &angles, false).unwrap();
     let from_angles_m = rms_error_m(&again, &dir.join("truth.tum"));
     assert_eq!(
         again.executions[20].verdict.reason.name(),
         "unknown radio head"
     );
-    assert_eq!(again.executions[100].verdict.reason.name(), "time reversed");
+    assert_eq!(again.executions[100].verdict.reason.name(), "too late");
     println!("RMS error {from_samples_m:.3} m from samples, {from_angles_m:.3} m from angles");
     assert!(from_samples_m < 0.5, "{from_samples_m}");
     assert!((from_samples_m - from_angles_m).abs() < 1e-6);
@@ -146,9 +167,9 @@ fn a_recording_without_gaps_is_scanned_and_located_alike() {
     }
     assert_eq!(found.ssbs.len(), annotations.len());
 
-    let site = Site::read(&dir.join("site.toml")).unwrap();
+    let believed = believed(&dir);
     let odometry = read_odometry_csv(&dir.join("odometry.csv")).unwrap();
-    let drive = locate_recording(&site, &odometry, &mut recording, 0.0, false).unwrap();
+    let drive = locate(&believed, &odometry, &mut recording).unwrap();
     assert_eq!(drive.executions.len(), 2 * made.bursts);
 }
 
@@ -160,69 +181,37 @@ fn what_does_not_fit_together_is_refused() {
         ..SETTINGS
     };
     let made = synthesize(&scenario(), &settings, &dir).unwrap();
-    let text = fs::read_to_string(dir.join("site.toml")).unwrap();
-    let site = Site::from_toml(&text, "site.toml").unwrap();
+    let believed = believed(&dir);
     let mut recording = Recording::open(&made.recording).unwrap();
-    let error =
-        locate_recording(&site, &OdometryLog::default(), &mut recording, 0.0, false).unwrap_err();
+    let error = locate(&believed, &OdometryLog::default(), &mut recording).unwrap_err();
     assert!(matches!(error, ReplayError::NoOdometry));
 
     let odometry = read_odometry_csv(&dir.join("odometry.csv")).unwrap();
-    let mut elsewhere = site.clone();
-    elsewhere.scenario.ssb.carrier_mhz = 3600.0;
-    let error = locate_recording(&elsewhere, &odometry, &mut recording, 0.0, false).unwrap_err();
+    let mut elsewhere = believed.clone();
+    elsewhere.0.carrier_mhz = 3600.0;
+    let error = locate(&elsewhere, &odometry, &mut recording).unwrap_err();
     assert!(matches!(error, ReplayError::FrontEnd { .. }), "{error}");
 
     let data = dir.join("iq.sigmf-data");
     let mut mono = Recording::open_raw(&[&data], 3.84e6, Some(3.5e9)).unwrap();
-    let error = locate_recording(&site, &odometry, &mut mono, 0.0, false).unwrap_err();
-    assert!(matches!(error, ReplayError::Channels { channels: 1, .. }));
+    let error = locate(&believed, &odometry, &mut mono).unwrap_err();
+    let ReplayError::Receive { source, .. } = &error else {
+        panic!("{error}")
+    };
+    let (found, elements) = (1, 4);
+    assert_eq!(*source, ReceiveError::Antennas { found, elements });
 
-    let scenario = Scenario::load("paper").unwrap();
-    let mut far = scenario.clone();
-    far.ssb.subcarrier_spacing_khz = 120.0;
+    let mut far = shipped("paper");
+    far.site.ssb.subcarrier_spacing_khz = 120.0;
     assert!(synthesize(&far, &settings, &dir).is_err());
-}
 
-#[test]
-fn site_files_are_checked() {
-    let head =
-        |pci: u16, x: f64| format!("[[radio_heads]]\nposition_m = [{x:.1}, 80.0]\npci = {pci}\n");
-    let start = "[initial_pose]\nx_m = 1.0\ny_m = 2.0\nheading_rad = 0.3\n";
-    let good = format!("{start}{}{}", head(1, 0.0), head(2, 50.0));
-    let site = Site::from_toml(&good, "site.toml").unwrap();
-    assert_eq!(site.initial_pose.unwrap().point(), Point::new(1.0, 2.0));
-    assert_eq!(site.scenario.radio_heads.len(), 2);
-    let listed = Site::from_toml(&format!("pci_allow_list = [2]\n{good}"), "site.toml").unwrap();
-    assert_eq!(listed.scenario.radio_heads.len(), 1);
-    assert_eq!(listed.receiver_config().cells, Some(vec![2]));
-
-    let cases = [
-        (
-            format!("{start}{}{}", head(1, 0.0), head(2, 0.0)),
-            "radio_heads[1].position_m",
-        ),
-        (
-            format!("{start}{}{}", head(1, 0.0), head(1, 50.0)),
-            "radio_heads[1].pci",
-        ),
-        (format!("pci_allow_list = [3]\n{good}"), "pci_allow_list[0]"),
-        (format!("pci_allow_list = []\n{good}"), "pci_allow_list"),
-        (format!("radio_heads = []\n{start}"), "radio_heads"),
-        (head(1, 0.0), "initial_pose"),
-        (
-            format!("channel_gains = [[1.0, 0.0], [0.0, 0.0], [1.0, 0.0], [1.0, 0.0]]\n{good}"),
-            "channel_gains[1]",
-        ),
-        (format!("pci_allow = [1]\n{good}"), "pci_allow"),
-    ];
-    for (text, expected) in cases {
-        match Site::from_toml(&text, "site.toml").unwrap_err() {
-            ScenarioError::Value { file, key, .. }
-            | ScenarioError::UnknownKey { file, key, .. } => {
-                assert_eq!((file.as_str(), key.as_str()), ("site.toml", expected));
-            }
-            other => panic!("{expected}: {other}"),
-        }
-    }
+    // One radio head leaves several places open.
+    let (mut site, mut vehicle) = believed;
+    vehicle.start.pose = None;
+    site.radio_heads.truncate(1);
+    let error = locate(&(site, vehicle), &odometry, &mut recording).unwrap_err();
+    let ReplayError::Settings(SettingsError::Value { key, .. }) = &error else {
+        panic!("{error}")
+    };
+    assert_eq!(key, "start.pose");
 }

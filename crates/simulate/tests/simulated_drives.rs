@@ -1,21 +1,22 @@
 //! Whole simulated drives: what they cost, that they repeat to the bit, and that the user's own code
 //! takes part in them.
-#![allow(clippy::unwrap_used)] // helpers of tests
+#![allow(clippy::unwrap_used, reason = "this is a test")]
 
-use access_av::BoxError;
-use access_av::estimator::CustomEstimator;
-use access_av::observation::Snapshot;
-use access_av::onboard::Custom;
-use access_av::platform::Platform;
-use access_av::scenario::Scenario;
-use access_av::simulate::{Campaign, CampaignOptions, Simulation, SimulationError};
-use access_av::wake_up::Controller;
+mod common;
+
+use std::f64::consts::PI;
+
+use onboard::estimator::{AngleEstimator, EstimatedAngle};
+use onboard::observation::{SensedSsb, SsbObservation};
+use onboard::wake_up::{Situation, WakeUpPolicy};
+use onboard::{BoxError, Custom, Execution};
+use simulate::{Campaign, CampaignOptions, Simulation, SimulationError, Step};
 use toml::Value;
 
+use common::{NONE, changed, shipped};
+
 fn simulation(overrides: &[(&str, Value)]) -> Simulation {
-    let paper = Scenario::load("paper").unwrap();
-    let scenario = paper.with_overrides(overrides.iter().cloned()).unwrap();
-    Simulation::new(scenario, Platform::load("jetson-agx-xavier").unwrap()).unwrap()
+    common::simulation(&changed("paper", overrides.iter().cloned()))
 }
 
 fn campaign(simulation: &Simulation, runs: usize, threads: usize) -> Campaign {
@@ -25,7 +26,7 @@ fn campaign(simulation: &Simulation, runs: usize, threads: usize) -> Campaign {
         runs,
         threads: Some(threads),
         keep_records: true,
-        custom: &Custom::default,
+        custom: NONE,
         progress: &|_| true,
     };
     simulation.campaign(&options).unwrap()
@@ -45,25 +46,25 @@ fn worst_m(campaign: &Campaign) -> (f64, f64) {
 
 fn fixed(method: &str, interval_ms: f64) -> Vec<(&'static str, Value)> {
     vec![
-        ("wake_up.policy", "fixed".into()),
-        ("wake_up.interval_ms", interval_ms.into()),
-        ("estimator.method", method.into()),
+        ("vehicle.wake_up.policy", "fixed".into()),
+        ("vehicle.wake_up.interval_ms", interval_ms.into()),
+        ("vehicle.estimator.method", method.into()),
     ]
 }
 
 #[test]
 fn same_bytes_whatever_the_threads() {
     let simulation = simulation(&[
-        ("motion.lateral_wander.rms_m", 0.1.into()),
-        ("odometer.scale_error_std", 0.003.into()),
+        ("vehicle.lane_keeping.rms_m", 0.1.into()),
+        ("vehicle.odometer.scale_std", 0.003.into()),
         ("channel.shadowing_correlation_m", 5.0.into()),
-        ("receiver.snr_noise_db", 1.0.into()),
+        ("vehicle.receiver.snr_noise_db", 1.0.into()),
     ]);
     let one = campaign(&simulation, 18, 1);
     let two = campaign(&simulation, 18, 2);
     // NaN-free by construction, so equality is equality of bits but for the sign of zero.
     assert_eq!(one, two);
-    let other = simulation.run(8, 0, Custom::default()).unwrap();
+    let other = simulation.run(8, 0, NONE).unwrap();
     assert_ne!(one.records[0], other);
 }
 
@@ -76,17 +77,11 @@ fn adding_runs_keeps_the_ones_before() {
 
 #[test]
 fn policies_meet_the_same_radio_channel() {
-    let every = simulation(&fixed("music", 20.0))
-        .run(3, 0, Custom::default())
-        .unwrap();
-    let fourth = simulation(&fixed("music", 80.0))
-        .run(3, 0, Custom::default())
-        .unwrap();
+    let every = simulation(&fixed("music", 20.0)).run(3, 0, NONE).unwrap();
+    let fourth = simulation(&fixed("music", 80.0)).run(3, 0, NONE).unwrap();
     let mut compared = 0;
     for execution in &fourth.executions {
-        let same_ssb = |other: &&access_av::onboard::Execution| {
-            (other.ssb.time_s - execution.ssb.time_s).abs() < 1e-9
-        };
+        let same_ssb = |other: &&Execution| (other.ssb.time_s - execution.ssb.time_s).abs() < 1e-9;
         let other = every.executions.iter().find(same_ssb).unwrap();
         assert_eq!(other.measured, execution.measured);
         compared += 1;
@@ -117,10 +112,7 @@ fn the_papers_trip() {
 
 #[test]
 fn a_standing_vehicle_stays_where_it_is() {
-    let platform = Platform::load("jetson-agx-xavier").unwrap();
-    let scenario = Scenario::load("paper-stop-and-go").unwrap();
-    let simulation = Simulation::new(scenario, platform).unwrap();
-    let record = simulation.run(1, 0, Custom::default()).unwrap();
+    let record = common::run(&shipped("paper-stop-and-go"), 1, 0);
     // It stops at 90 m, 90/(25/6) s and one ramp of 25/3 s after the start, for 8 s.
     let stop_s = 90.0 / (25.0 / 6.0) + 25.0 / 3.0;
     let standing: Vec<_> = record
@@ -129,9 +121,7 @@ fn a_standing_vehicle_stays_where_it_is() {
         .filter(|step| (stop_s + 0.1..stop_s + 7.9).contains(&step.time_s))
         .collect();
     assert_eq!(standing.len(), 390);
-    let moved = |pair: &[&access_av::simulate::Step]| {
-        pair[0].truth.point().distance_m(pair[1].truth.point())
-    };
+    let moved = |pair: &[&Step]| pair[0].truth.point().distance_m(pair[1].truth.point());
     assert!(standing.windows(2).all(|pair| moved(pair) < 1e-9));
     let (first, last) = (standing[0].estimate.point(), standing[389].estimate.point());
     assert!(first.distance_m(last) < 0.1, "{first:?} {last:?}");
@@ -140,22 +130,38 @@ fn a_standing_vehicle_stays_where_it_is() {
 
 struct Sideways;
 
-impl CustomEstimator for Sideways {
-    fn angle_rad(&mut self, snapshots: &[Snapshot]) -> Result<f64, BoxError> {
-        if snapshots.len() == 20 {
-            Ok(1.0)
-        } else {
-            Err("not twenty".into())
+impl AngleEstimator for Sideways {
+    fn estimate(
+        &mut self,
+        observation: &SsbObservation,
+    ) -> Result<Option<EstimatedAngle>, BoxError> {
+        if observation.count() != 20 {
+            return Err("not twenty".into());
         }
+        Ok(Some(EstimatedAngle::Angle {
+            phase_rad: PI * 1f64.cos(),
+            phase_sigma_rad: None,
+            snr_db: None,
+            resolved: true,
+        }))
     }
 }
 
-#[derive(Debug)]
+/// In order at the start of the drive, and never again.
 struct Failing;
 
-impl Controller for Failing {
-    fn wake_up_time_s(&mut self, _: f64, _: f64, interval_s: f64) -> Result<f64, BoxError> {
-        if interval_s > 0.0 {
+impl WakeUpPolicy for Failing {
+    fn listens(&mut self, _: &Situation<'_>) -> Result<bool, BoxError> {
+        Ok(true)
+    }
+
+    fn decide(
+        &mut self,
+        now: &Situation<'_>,
+        _: &[SensedSsb],
+        _: &mut [bool],
+    ) -> Result<f64, BoxError> {
+        if now.time_s > 0.0 {
             Err("out of order".into())
         } else {
             Ok(0.1)
@@ -164,27 +170,27 @@ impl Controller for Failing {
 }
 
 #[test]
-fn own_estimators_and_controllers_take_part() {
+fn own_estimators_and_policies_take_part() {
     let simulation = simulation(&[]);
-    let custom = Custom {
-        estimator: Some(Box::new(Sideways)),
-        ..Custom::default()
+    let sideways = |_| {
+        Ok(Custom {
+            estimator: Some(Box::new(Sideways)),
+            ..Custom::default()
+        })
     };
-    let record = simulation.run(1, 0, custom).unwrap();
-    let angles = record
+    let record = simulation.run(1, 0, &sideways).unwrap();
+    let mut angles = record
         .executions
         .iter()
         .filter_map(|execution| execution.measured);
-    assert!(
-        angles
-            .map(|angle| angle.angle_rad)
-            .all(|angle_rad| angle_rad == 1.0)
-    );
-    let custom = Custom {
-        controller: Some(Box::new(Failing)),
-        ..Custom::default()
+    assert!(angles.all(|angle| angle.phase_rad == PI * 1f64.cos()));
+    let failing = |_| {
+        Ok(Custom {
+            policy: Some(Box::new(Failing)),
+            ..Custom::default()
+        })
     };
-    let error = simulation.run(1, 0, custom).unwrap_err();
+    let error = simulation.run(1, 0, &failing).unwrap_err();
     assert!(
         matches!(&error, SimulationError::Custom(inner) if inner.to_string() == "out of order")
     );
@@ -198,7 +204,7 @@ fn the_caller_can_stop() {
         runs: 1000,
         threads: Some(1),
         keep_records: false,
-        custom: &Custom::default,
+        custom: NONE,
         progress: &|_| false,
     };
     let outcome = simulation(&[]).campaign(&options);

@@ -3,31 +3,38 @@
 
 mod common;
 
-use access_av::geometry::Pose;
-use access_av::localize::PoseEstimate;
-use access_av::recording::Site;
-use access_av::replay::{LocatedDrive, locate_angles};
-use access_av::scenario::Scenario;
-use access_av::simulate::Step;
+use onboard::localize::PoseEstimate;
+use recording::replay::{LocatedDrive, StartChoice, locate_angles};
+use recording::{AngleLog, OdometryLog};
+use simulate::scenario::Scenario;
+use simulate::{RunRecord, Step};
 use toml::Value;
 
-use common::logs;
+use common::{changed, logs, shipped, value};
 
-/// The site of a scenario, for a drive that starts at `pose`.
-fn site(scenario: &Scenario, pose: Pose) -> Site {
-    let text = Site::of_scenario(scenario, pose, [1.0.into(); 4]);
-    Site::from_toml(&text, "site.toml").unwrap()
+/// Locates a run of a scenario, from its true start where that is known.
+fn locate(
+    scenario: &Scenario,
+    (odometry, angles, record): &(OdometryLog, AngleLog, RunRecord),
+    smooth: bool,
+) -> LocatedDrive {
+    let (site, vehicle) = (&scenario.site, &scenario.vehicle);
+    let start = if vehicle.start.known {
+        StartChoice::At(record.steps[0].truth)
+    } else {
+        StartChoice::Unknown
+    };
+    locate_angles(site, vehicle, start, odometry, angles, smooth).unwrap()
 }
 
 /// Located and smoothed drives of a scenario, beside their truths.
 fn drives(scenario: &Scenario, runs: u64) -> Vec<(LocatedDrive, Vec<Step>)> {
     (0..runs)
         .map(|seed| {
-            let (odometry, angles, record) = logs(scenario, 100 + seed);
-            let site = site(scenario, record.steps[0].truth);
-            let drive = locate_angles(&site, &odometry, &angles, true).unwrap();
+            let logs = logs(scenario, 100 + seed);
+            let drive = locate(scenario, &logs, true);
             assert_eq!(drive.smoothed.len(), drive.poses.len());
-            (drive, record.steps)
+            (drive, logs.2.steps)
         })
         .collect()
 }
@@ -58,7 +65,7 @@ fn nees(estimate: &PoseEstimate, truth: &Step) -> f64 {
 fn smoothed_drives_are_better_and_as_good_as_they_say() {
     let runs = 30;
     for name in ["paper-real-odometry", "paper-real-odometry-2"] {
-        let drives = drives(&Scenario::load(name).unwrap(), runs);
+        let drives = drives(&shipped(name), runs);
         // Mean over a drive of what smoothing takes off the squared error, and ought to.
         let (mut gained, mut promised, mut filtered, mut smoothed) = (vec![], 0.0, 0.0, 0.0);
         for (drive, truths) in &drives {
@@ -105,26 +112,22 @@ fn smoothed_drives_are_better_and_as_good_as_they_say() {
 
 #[test]
 fn the_last_pose_is_the_filters() {
-    let yaw = toml::from_str::<toml::Table>("g = { noise_rad_per_sqrt_s = 1e-3 }").unwrap();
+    let yaw = value("{ noise_rad_per_sqrt_s = 1e-3 }");
     for changes in [
         vec![],
-        vec![("odometer.gyro", yaw["g"].clone())],
-        vec![("localizer.map", Value::from(false))],
-        vec![("localizer.integrity", Value::from(true))],
+        vec![("vehicle.gyroscope", yaw)],
+        vec![("vehicle.localizer.map", Value::from(false))],
+        vec![("vehicle.integrity", value("{}"))],
     ] {
-        let scenario = Scenario::load("paper-real-odometry-2")
-            .unwrap()
-            .with_overrides(changes)
-            .unwrap();
-        let (odometry, mut angles, record) = logs(&scenario, 1);
-        let site = site(&scenario, record.steps[0].truth);
-        let end_s = odometry.samples.last().unwrap().time_s;
-        angles.angles.retain(|angle| angle.ssb.time_s < end_s);
-        let drive = locate_angles(&site, &odometry, &angles, true).unwrap();
+        let scenario = changed("paper-real-odometry-2", changes);
+        let mut logs = logs(&scenario, 1);
+        let end_s = logs.0.samples.last().unwrap().time_s;
+        logs.1.angles.retain(|angle| angle.ssb.time_s < end_s);
+        let drive = locate(&scenario, &logs, true);
         let (last, smoothed) = (drive.poses.last().unwrap(), drive.smoothed.last().unwrap());
         assert_eq!(last.estimate.pose, smoothed.estimate.pose);
         assert_eq!(last.estimate.covariance, smoothed.estimate.covariance);
-        let unasked = locate_angles(&site, &odometry, &angles, false).unwrap();
+        let unasked = locate(&scenario, &logs, false);
         assert_eq!(unasked.poses, drive.poses);
         assert!(unasked.smoothed.is_empty());
     }
@@ -132,13 +135,9 @@ fn the_last_pose_is_the_filters() {
 
 #[test]
 fn a_drive_that_was_found_is_smoothed_from_there() {
-    let scenario = Scenario::load("paper-real-odometry-2")
-        .unwrap()
-        .with_overrides([("start.known", false.into())])
-        .unwrap();
-    let (odometry, angles, record) = logs(&scenario, 1);
-    let site = site(&scenario, record.steps[0].truth);
-    let drive = locate_angles(&site, &odometry, &angles, true).unwrap();
+    let unknown = [("vehicle.start.known", false.into())];
+    let scenario = changed("paper-real-odometry-2", unknown);
+    let drive = locate(&scenario, &logs(&scenario, 1), true);
     let known: Vec<f64> = drive
         .poses
         .iter()

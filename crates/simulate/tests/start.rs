@@ -3,32 +3,32 @@
 
 mod common;
 
-use access_av::localize::IntegrityState;
-use access_av::localize::gaussian::principal_variances;
-use access_av::random::{Purpose, Streams};
-use access_av::recording::{Site, write_drive_mcap};
-use access_av::replay::{LocatedDrive, locate_angles};
-use access_av::scenario::{Scenario, ScenarioError};
-use access_av::simulate::RunRecord;
+use onboard::localize::IntegrityState;
+use onboard::localize::gaussian::principal_variances;
+use onboard::settings::{Check, SettingsError, Shipped, TomlFile};
 use rand::Rng as _;
+use recording::replay::{LocatedDrive, StartChoice, locate_angles};
+use recording::{read_odometry_mcap, write_drive_mcap};
+use simulate::RunRecord;
+use simulate::random::{Purpose, Streams};
+use simulate::scenario::Scenario;
 use toml::Value;
 
-use common::{logs, run};
+use common::{changed, logs, run, shipped, value};
 
 fn unknown(name: &str) -> Scenario {
-    Scenario::load(name)
-        .unwrap()
-        .with_overrides([("start.known", false.into())])
-        .unwrap()
+    changed(name, [("vehicle.start.known", false.into())])
 }
 
 /// A run that begins anywhere on the road but its last 60 m.
 fn run_from_anywhere(scenario: &Scenario, seed: u64, number: u64) -> RunRecord {
     let mut random = Streams::new(seed, number).generator(Purpose::Start, 1);
     let share = f64::from(random.next_u32()) / f64::from(u32::MAX);
-    let start_m = share * (scenario.build_track().unwrap().length_m() - 60.0);
+    let road = scenario.path(Check { file: "test" }).unwrap();
+    let start_m = share * (road.length_m() - 60.0);
     let there = [("motion.start_at_m", Value::Float(start_m))];
-    run(&scenario.with_overrides(there).unwrap(), seed, number)
+    let there = scenario.with_overrides(there, &Shipped).unwrap();
+    run(&there, seed, number)
 }
 
 /// Within 2 m of the truth, and within four standard deviations.
@@ -57,14 +57,16 @@ fn a_vehicle_anywhere_on_its_road_is_found() {
 
 #[test]
 fn while_it_searches_it_listens_always_and_vouches_for_nothing() {
-    let road = toml::from_str::<toml::Table>("s = [{ length_m = 60.0, turn_rad = 0.05 }]");
-    let scenario = unknown("paper-real-odometry-2")
-        .with_overrides([
-            ("localizer.integrity", true.into()),
-            ("wake_up.policy", "uncertainty".into()),
-            ("track.segments", road.unwrap()["s"].clone()),
-        ])
-        .unwrap();
+    let road = value("[{ length_m = 60.0, turn_rad = 0.05 }]");
+    let scenario = changed(
+        "paper-real-odometry-2",
+        [
+            ("vehicle.start.known", false.into()),
+            ("vehicle.integrity", value("{}")),
+            ("vehicle.wake_up.policy", "uncertainty".into()),
+            ("site.road.segments", road),
+        ],
+    );
     let record = run(&scenario, 3, 0);
     let found = record.found().unwrap();
     let until = record
@@ -74,7 +76,7 @@ fn while_it_searches_it_listens_always_and_vouches_for_nothing() {
         .unwrap();
     assert!(found.step.time_s > 0.0 && until > 10, "{found:?}");
     // Both radio heads at each SSB, whatever the policy.
-    let looked = |step: &&access_av::onboard::Execution| step.ssb.time_s < found.step.time_s;
+    let looked = |step: &&onboard::Execution| step.ssb.time_s < found.step.time_s;
     assert_eq!(record.executions.iter().filter(looked).count(), 2 * until);
     for step in &record.steps[..until] {
         let integrity = step.integrity.unwrap();
@@ -89,22 +91,22 @@ fn while_it_searches_it_listens_always_and_vouches_for_nothing() {
 
 #[test]
 fn what_cannot_be_found_is_refused() {
-    let paper = Scenario::load("paper").unwrap();
-    let refused = |scenario: &Scenario, changes: &[(&str, Value)], why: &str| {
+    let refused = |name: &str, changes: &[(&str, Value)], why: &str| {
         let changes = changes.iter().cloned();
-        match scenario.with_overrides(changes.chain([("start.known", false.into())])) {
-            Err(ScenarioError::Value { key, allowed, .. }) => {
-                assert_eq!(key, "start.known");
+        let unknown = changes.chain([("vehicle.start.known", false.into())]);
+        match shipped(name).with_overrides(unknown, &Shipped) {
+            Err(SettingsError::Value { key, allowed, .. }) => {
+                assert_eq!(key, "vehicle.start.known");
                 assert!(allowed.contains(why), "{allowed}");
             }
             other => panic!("{other:?}"),
         }
     };
-    refused(&paper, &[], "tracker");
-    let tracker = [("localizer.kind", Value::from("tracker"))];
-    refused(&paper, &tracker, "two radio heads");
-    let two = Scenario::load("paper-real-odometry-2").unwrap();
-    refused(&two, &[("localizer.map", false.into())], "map = true");
+    refused("paper", &[], "tracker");
+    let tracker = [("vehicle.localizer.kind", Value::from("tracker"))];
+    refused("paper", &tracker, "two radio heads");
+    let no_map = [("vehicle.localizer.map", false.into())];
+    refused("paper-real-odometry-2", &no_map, "map = true");
 }
 
 /// Errors of the published poses in metres and in their own standard deviations.
@@ -122,22 +124,20 @@ fn errors(drive: &LocatedDrive, record: &RunRecord) -> Vec<(f64, f64)> {
 #[test]
 fn a_recorded_drive_either_way_needs_no_initial_pose() {
     // The paper's road driven from its end to its beginning, which the site does not know.
-    let along = Scenario::load("paper-real-odometry-2").unwrap();
-    let end = along.build_track().unwrap().reversed().pose(0.0);
-    let start: Value = toml::Value::try_from(end).unwrap();
-    let segment: Value =
-        toml::from_str::<toml::Table>("s = [{ length_m = 300.0, turn_rad = -0.25 }]").unwrap()["s"]
-            .clone();
-    let against = along
-        .with_overrides([("track.start", start), ("track.segments", segment)])
-        .unwrap();
-    let (odometry, angles, record) = logs(&against, 5);
+    let mut scenario = unknown("paper-real-odometry-2");
+    let road = scenario.path(Check { file: "test" }).unwrap();
+    let end = Value::try_from(road.reversed().pose(0.0)).unwrap();
+    let segments = value("[{ length_m = 300.0, turn_rad = -0.25 }]");
+    let against = [("site.road.start", end), ("site.road.segments", segments)];
+    let (odometry, angles, record) = logs(&changed("paper-real-odometry-2", against), 5);
 
-    let text = Site::of_scenario(&unknown("paper-real-odometry-2"), end, [1.0.into(); 4]);
-    let either = text.replace("either_direction = false", "either_direction = true");
-    let site = Site::from_toml(&either, "site.toml").unwrap();
-    assert_eq!(site.initial_pose, None);
-    let drive = locate_angles(&site, &odometry, &angles, false).unwrap();
+    scenario.vehicle.start.either_direction = true;
+    let locate = |scenario: &Scenario| {
+        let (site, vehicle) = (&scenario.site, &scenario.vehicle);
+        locate_angles(site, vehicle, StartChoice::AsSet, &odometry, &angles, false).unwrap()
+    };
+    assert_eq!(scenario.vehicle.start.pose, None);
+    let drive = locate(&scenario);
     let errors = errors(&drive, &record);
     // Found within a few metres of 300, and from then on as good as the tracker says.
     assert!(
@@ -158,8 +158,8 @@ fn a_recorded_drive_either_way_needs_no_initial_pose() {
 
     // Who takes the road for one-way does not find the vehicle there, and the angles say so: a
     // tracker that is right refuses one in ten thousand.
-    let site = Site::from_toml(&text, "site.toml").unwrap();
-    let misled = locate_angles(&site, &odometry, &angles, false).unwrap();
+    scenario.vehicle.start.either_direction = false;
+    let misled = locate(&scenario);
     let (last, truth) = (misled.poses.last().unwrap(), record.steps.last().unwrap());
     assert!(last.estimate.pose.point().distance_m(truth.truth.point()) > 50.0);
     let refused = misled.executions.iter().filter(|it| !it.verdict.accepted);
@@ -168,7 +168,6 @@ fn a_recorded_drive_either_way_needs_no_initial_pose() {
     // No pose is published before there is one.
     let dir = common::scratch("start-mcap");
     write_drive_mcap(&dir.join("drive.mcap"), &drive).unwrap();
-    let published =
-        access_av::recording::read_odometry_mcap(&dir.join("drive.mcap"), None).unwrap();
+    let published = read_odometry_mcap(&dir.join("drive.mcap"), None).unwrap();
     assert_eq!(published.samples.len(), errors.len());
 }

@@ -1,22 +1,20 @@
 //! The uncertainty-driven wake-up on simulated drives: what it saves, and that it keeps its bound.
-#![allow(clippy::unwrap_used)] // helpers of tests
+#![allow(clippy::unwrap_used, reason = "this is a test")]
 
-use access_av::localize::gaussian::principal_variances;
-use access_av::localize::integrity::RadialQuantile;
-use access_av::onboard::Custom;
-use access_av::scenario::{Scenario, UncertaintySettings, WakeUpSettings};
-use access_av::simulate::{CampaignOptions, RunRecord, RunSummary, Simulation, Step};
+mod common;
+
+use onboard::localize::RadialQuantile;
+use onboard::localize::gaussian::principal_variances;
+use onboard::settings::{Shipped, TomlFile, UncertaintySettings, WakeUpSettings};
+use simulate::scenario::Scenario;
+use simulate::{RunRecord, RunSummary, Step};
+
+use common::{drives, shipped};
 
 const SEED: u64 = 57;
 
-fn runs(scenario: Scenario, runs: usize) -> Vec<RunSummary> {
-    let options = CampaignOptions {
-        seed: SEED,
-        runs,
-        ..CampaignOptions::default()
-    };
-    let simulation = Simulation::on_its_platform(scenario).unwrap();
-    simulation.campaign(&options).unwrap().runs
+fn runs(scenario: &Scenario, runs: usize) -> Vec<RunSummary> {
+    common::campaign(scenario, SEED, runs).runs
 }
 
 /// Mean over runs, and the standard error of it.
@@ -30,16 +28,15 @@ fn mean(values: impl Iterator<Item = f64> + Clone) -> (f64, f64) {
 /// The same runs under either policy: their differences are held against their own spread.
 #[test]
 fn half_the_executions_of_the_pid_for_no_more_error() {
-    let yard = Scenario::load("yard").unwrap();
-    let driven = runs(yard.clone(), 6);
+    let yard = shipped("yard");
+    let driven = runs(&yard, 6);
     for base_ms in [80.0, 150.0] {
-        let pid = yard
-            .with_overrides([
-                ("wake_up.policy", "pid".into()),
-                ("wake_up.base_ms", base_ms.into()),
-            ])
-            .unwrap();
-        let pid = runs(pid, 6);
+        let changes = [
+            ("vehicle.wake_up.policy", "pid".into()),
+            ("vehicle.wake_up.base_ms", base_ms.into()),
+        ];
+        let pid = yard.with_overrides(changes, &Shipped).unwrap();
+        let pid = runs(&pid, 6);
         let pairs = || driven.iter().zip(&pid);
         let (share, error) =
             mean(pairs().map(|(mine, pid)| mine.executions as f64 / pid.executions as f64));
@@ -60,14 +57,9 @@ fn on_demand(bound_m: f64, runs: u64) -> Vec<RunRecord> {
         confidence: 0.9,
         ..UncertaintySettings::default()
     };
-    let scenario = Scenario {
-        wake_up: WakeUpSettings::Uncertainty(settings),
-        ..Scenario::load("paper-real-odometry-4").unwrap()
-    };
-    let simulation = Simulation::on_its_platform(scenario).unwrap();
-    (0..runs)
-        .map(|run| simulation.run(SEED, run, Custom::default()).unwrap())
-        .collect()
+    let mut scenario = shipped("paper-real-odometry-4");
+    scenario.vehicle.wake_up = WakeUpSettings::Uncertainty(settings);
+    drives(&scenario, SEED, runs)
 }
 
 /// Variances of the horizontal error along its principal axes, larger first.

@@ -41,7 +41,7 @@ impl Walk<'_> {
                 .into_iter()
                 .flatten()
             {
-                if self.is_meant(value, variant) {
+                if is_meant(value, variant) {
                     self.visit(value, variant, path)?;
                 }
             }
@@ -65,16 +65,6 @@ impl Walk<'_> {
             }),
             _ => Ok(()),
         }
-    }
-
-    /// Whether a variant of several is the one at hand: its tag says so, or it has none.
-    fn is_meant(&self, value: &Value, variant: &Value) -> bool {
-        let tags = variant.get("properties").and_then(Value::as_object);
-        tags.into_iter().flatten().all(|(name, schema)| {
-            schema
-                .get("const")
-                .is_none_or(|tag| value.get(name) == Some(tag))
-        })
     }
 
     fn number(&self, number: Option<f64>, schema: &Value, path: &str) -> Result<(), SettingsError> {
@@ -107,6 +97,16 @@ impl Walk<'_> {
             &allowed,
         )
     }
+}
+
+/// Whether a variant of several is the one at hand: its tag says so, or it has none.
+fn is_meant(value: &Value, variant: &Value) -> bool {
+    let tags = variant.get("properties").and_then(Value::as_object);
+    tags.into_iter().flatten().all(|(name, schema)| {
+        schema
+            .get("const")
+            .is_none_or(|tag| value.get(name) == Some(tag))
+    })
 }
 
 fn allowed(least: Option<f64>, most: Option<f64>) -> String {

@@ -47,7 +47,9 @@ impl Adaptive {
     fn take(&mut self, time_s: f64, snr_error: f64, velocity_error: f64) -> bool {
         let usable = !self.deferral || snr_error <= 0.0;
         let interval_s = self.last_sensed_s.map(|last_s| time_s - last_s);
-        self.last_sensed_s = Some(time_s);
+        if interval_s.is_none_or(|interval_s| interval_s > 0.0) {
+            self.last_sensed_s = Some(time_s);
+        }
         let estimate_if_due = self.is_due(time_s) && usable;
         // The first SSB has no interval before it: Algorithm 1 begins with the second.
         if let Some(interval_s) = interval_s.filter(|interval_s| *interval_s > 0.0) {
@@ -119,6 +121,21 @@ mod tests {
         }
         assert!(take(&mut policy, 20, 8.1));
         assert!(!take(&mut policy, 21, 9.0), "the base time has not passed");
+    }
+
+    #[test]
+    fn a_late_ssb_leaves_the_controller_alone() {
+        let settings = PidSettings::default();
+        let (mut policy, mut undisturbed) = (adaptive(&settings), adaptive(&settings));
+        for number in 0..50 {
+            if number == 30 {
+                assert!(!take(&mut policy, 20, 9.0));
+            }
+            let snr_db = 7.0 + f64::from(number % 7);
+            let chosen = take(&mut policy, number, snr_db);
+            assert_eq!(chosen, take(&mut undisturbed, number, snr_db));
+            assert_eq!(policy.wake_up_time_s, undisturbed.wake_up_time_s);
+        }
     }
 
     #[test]

@@ -4,12 +4,18 @@ use super::policy::{SAME_TIME_S, Situation, WakeUpPolicy};
 use crate::BoxError;
 use crate::observation::SensedSsb;
 
-/// Due at every multiple of the interval; each is served by the first SSB at or after it. Waiting
-/// for an SSB does not shift the ones that follow.
+/// All SSBs of a burst lie this close together: 64 of them, their own length less than half a frame
+/// (TS 38.213, 4.1).
+const BURST_S: f64 = 4.9e-3;
+
+/// Due at every multiple of the interval; each is served by the first burst at or after it. Waiting
+/// for a burst does not shift the ones that follow. What comes late, from before the last burst
+/// that served or along with it, is taken: whether it would have served is not remembered.
 #[derive(Debug, Clone, Copy, PartialEq)]
 pub struct FixedInterval {
     interval_s: f64,
     served: u64,
+    served_at_s: f64,
 }
 
 impl FixedInterval {
@@ -18,12 +24,14 @@ impl FixedInterval {
         Self {
             interval_s,
             served: 0,
+            served_at_s: f64::NEG_INFINITY,
         }
     }
 
     /// Whether an estimate is due by `time_s`.
     pub fn is_due(&self, time_s: f64) -> bool {
         time_s + SAME_TIME_S >= self.served as f64 * self.interval_s
+            || time_s < self.served_at_s + BURST_S
     }
 
     /// Takes the SSB at `time_s` if an estimate is due.
@@ -31,7 +39,10 @@ impl FixedInterval {
         let due = self.is_due(time_s);
         if due {
             // One SSB serves every due time up to it.
-            self.served = ((time_s + SAME_TIME_S) / self.interval_s).floor() as u64 + 1;
+            let served = ((time_s + SAME_TIME_S) / self.interval_s).floor() as u64 + 1;
+            if served > self.served {
+                (self.served, self.served_at_s) = (served, time_s);
+            }
         }
         due
     }
@@ -73,6 +84,16 @@ mod tests {
         assert_eq!(executions(0.075), 1072);
         assert!(executions(0.065) > 1235);
         assert!(executions(0.1) > 800);
+    }
+
+    #[test]
+    fn what_comes_late_is_taken_and_shifts_nothing() {
+        let mut policy = FixedInterval::new(0.08);
+        assert!(policy.take(0.0) && policy.take(0.16));
+        // From before, and another SSB of the burst that served.
+        assert!(policy.take(0.02) && policy.take(0.163));
+        assert!(!policy.take(0.18) && !policy.take(0.22));
+        assert!(policy.take(0.24));
     }
 
     #[test]

@@ -5,8 +5,9 @@ use onboard::{BoxError, Observed, SsbSource};
 
 use crate::angle_log::LoggedAngle;
 
-/// All SSBs of a burst lie within half a frame (TS 38.213, 4.1).
-const BURST_S: f64 = 0.005;
+/// All SSBs of a burst begin this close together: within half a frame (TS 38.213, 4.1), less their
+/// own length. Bursts may come every half frame.
+const BURST_S: f64 = 4.9e-3;
 
 /// Something that came with one SSB.
 pub trait OfSsb {
@@ -58,4 +59,28 @@ pub fn first_burst<T: OfSsb>(ssbs: &[T]) -> usize {
     };
     let of_burst = |it: &&T| (it.ssb().time_s - first_s).abs() < BURST_S;
     ssbs.iter().take_while(of_burst).count().max(1)
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    #[test]
+    fn bursts_every_half_frame_are_told_apart() {
+        let ssb = |time_s| {
+            let mut observation = SsbObservation::new(4);
+            observation.restart(SensedSsb {
+                time_s,
+                ..observation.ssb
+            });
+            observation
+        };
+        for number in 0..100 {
+            let start_s = f64::from(number) * 0.005;
+            let next_s = f64::from(number + 1) * 0.005;
+            let ssbs = [start_s, start_s + 4.67e-3, next_s].map(ssb);
+            assert_eq!(first_burst(&ssbs), 2, "{start_s}");
+        }
+        assert_eq!(first_burst::<SsbObservation>(&[]), 0);
+    }
 }

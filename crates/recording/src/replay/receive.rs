@@ -79,7 +79,7 @@ pub fn receive_recording(
             observations.clear();
             receiver
                 .receive(&window, |observation| {
-                    observations.push(observation.clone())
+                    observations.push(observation.clone());
                 })
                 .map_err(receive_failed)?;
             observations.sort_by(|a, b| a.ssb.time_s.total_cmp(&b.ssb.time_s));

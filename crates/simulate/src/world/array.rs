@@ -40,6 +40,11 @@ impl TrueArray {
         }
     }
 
+    /// How it is by now; the standard deviations in it have been drawn from already.
+    pub const fn settings(&self) -> &ArraySettings {
+        &self.settings
+    }
+
     /// Number of antennas.
     pub fn elements(&self) -> usize {
         self.settings.elements.into()

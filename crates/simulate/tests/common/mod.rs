@@ -1,64 +1,82 @@
 //! What several tests share.
 #![allow(
     dead_code,
+    unused_imports,
     clippy::unwrap_used,
-    clippy::print_stdout,
     reason = "shared by tests"
 )]
 
-use std::path::{Path, PathBuf};
+#[path = "../../../recording/tests/common/mod.rs"]
+mod files;
 
-use access_av::onboard::Custom;
-use access_av::platform::Platform;
-use access_av::random::Streams;
-use access_av::recording::{AngleLog, LoggedAngle, OdometryLog};
-use access_av::scenario::Scenario;
-use access_av::simulate::{RunRecord, Simulation};
-use access_av::world::{Odometer, Vehicle};
+use onboard::observation::SensedSsb;
+use onboard::settings::{Shipped, TomlFile};
+use onboard::{BoxError, Custom, Observed, SsbSource};
+use recording::{AngleLog, LoggedAngle, OdometryLog};
+use simulate::random::Streams;
+use simulate::scenario::Scenario;
+use simulate::truth::World;
+use simulate::{Campaign, CampaignOptions, MakeCustom, RunRecord, Simulation};
+use toml::Value;
 
-/// Where the reference data is, or `None` with a printed reason.
-pub fn data_dir() -> Option<PathBuf> {
-    let dir = std::env::var_os("ACCESS_AV_DATA").map_or_else(
-        || Path::new(env!("CARGO_MANIFEST_DIR")).join("../../../shared/data"),
-        PathBuf::from,
-    );
-    if dir.is_dir() {
-        return Some(dir);
-    }
-    println!(
-        "skipped: no reference data at {} (set ACCESS_AV_DATA)",
-        dir.display()
-    );
-    None
+pub use files::scratch;
+
+/// None of the user's own code.
+pub const NONE: &MakeCustom = &|_| Ok(Custom::default());
+
+/// A shipped scenario.
+pub fn shipped(name: &str) -> Scenario {
+    Scenario::from_library(name, &Shipped).unwrap()
 }
 
-/// An empty directory of its own for a test.
-pub fn scratch(name: &str) -> PathBuf {
-    let dir = Path::new(env!("CARGO_TARGET_TMPDIR")).join(name);
-    if dir.exists() {
-        std::fs::remove_dir_all(&dir).unwrap();
-    }
-    std::fs::create_dir_all(&dir).unwrap();
-    dir
+/// A shipped scenario with some of its keys changed.
+pub fn changed<'a>(name: &str, overrides: impl IntoIterator<Item = (&'a str, Value)>) -> Scenario {
+    let scenario = shipped(name).with_overrides(overrides, &Shipped);
+    scenario.unwrap_or_else(|error| panic!("{error}"))
+}
+
+/// The value of a TOML expression.
+pub fn value(text: &str) -> Value {
+    let table = format!("it = {text}").parse::<toml::Table>();
+    table.unwrap()["it"].clone()
+}
+
+/// A scenario on its platform.
+pub fn simulation(scenario: &Scenario) -> Simulation {
+    Simulation::on_its_platform(scenario).unwrap()
 }
 
 /// One run of a scenario.
 pub fn run(scenario: &Scenario, seed: u64, number: u64) -> RunRecord {
-    let platform = Platform::load(&scenario.platform.name).unwrap();
-    let simulation = Simulation::new(scenario.clone(), platform).unwrap();
-    simulation.run(seed, number, Custom::default()).unwrap()
+    simulation(scenario).run(seed, number, NONE).unwrap()
+}
+
+/// The first runs of a scenario.
+pub fn drives(scenario: &Scenario, seed: u64, runs: u64) -> Vec<RunRecord> {
+    let simulation = simulation(scenario);
+    (0..runs)
+        .map(|run| simulation.run(seed, run, NONE).unwrap())
+        .collect()
+}
+
+/// The first runs of a scenario as a campaign.
+pub fn campaign(scenario: &Scenario, seed: u64, runs: usize) -> Campaign {
+    let options = CampaignOptions {
+        seed,
+        runs,
+        ..CampaignOptions::default()
+    };
+    simulation(scenario).campaign(&options).unwrap()
 }
 
 /// Odometry and angles of a run, as a vehicle would have logged them.
 pub fn logs(scenario: &Scenario, seed: u64) -> (OdometryLog, AngleLog, RunRecord) {
     let record = run(scenario, seed, 0);
-    let streams = Streams::new(seed, 0);
-    let vehicle = Vehicle::new(scenario.build_track().unwrap(), &scenario.motion, streams);
-    let mut odometer = Odometer::new(scenario.odometer, vehicle.at(0.0), streams);
+    let mut truth = World::new(scenario).unwrap().draw(Streams::new(seed, 0));
     let times = record.steps.iter().map(|step| step.time_s);
     let odometry = OdometryLog {
         samples: times
-            .filter_map(|time_s| odometer.sample(vehicle.at(time_s)))
+            .filter_map(|time_s| truth.odometer.sample(truth.path.at(time_s)))
             .collect(),
         remarks: Vec::new(),
     };
@@ -71,4 +89,18 @@ pub fn logs(scenario: &Scenario, seed: u64) -> (OdometryLog, AngleLog, RunRecord
         remarks: Vec::new(),
     };
     (odometry, angles, record)
+}
+
+/// A burst whose angles are known.
+pub struct Burst<'a>(pub &'a [LoggedAngle]);
+
+impl SsbSource for Burst<'_> {
+    fn sense(&mut self, sensed: &mut Vec<SensedSsb>) -> Result<(), BoxError> {
+        sensed.extend(self.0.iter().map(|angle| angle.ssb));
+        Ok(())
+    }
+
+    fn observe(&mut self, index: usize) -> Result<Observed<'_>, BoxError> {
+        Ok(Observed::Angle(self.0[index].measured))
+    }
 }

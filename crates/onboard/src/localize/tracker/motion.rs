@@ -273,6 +273,7 @@ impl Step {
 
     /// This step, its noise known in part from a gyroscope: measurement and motion share the
     /// noise of the heading, so it is decorrelated (Anderson & Moore, Optimal Filtering, 5.5).
+    #[must_use]
     pub fn informed(mut self, start: &[f64; STATES], yaw: &Yaw) -> Self {
         let total = self.noise[HEADING][HEADING] + yaw.variance;
         if total <= 0.0 {

@@ -3,17 +3,17 @@
 
 mod common;
 
-use access_av::receive::{
-    ArraySetup, ChannelFault, FoundSsb, SampleBlock, ScanError, ScanSettings, SsbSearch,
-    SsbSearchConfig, scan,
-};
-use access_av::recording::Recording;
 use nr_ssb::diagnose::Fault;
 use nr_ssb::{BchPayload, Beam, Burst, Case, Lmax, Mib, Numerology, Ofdm, Pci};
 use num_complex::{Complex32, Complex64};
 use rand::{RngExt, SeedableRng};
 use rand_chacha::ChaCha8Rng;
 use rand_distr::StandardNormal;
+use recording::Recording;
+use recording::scan::{
+    ArraySetup, ChannelFault, FoundSsb, SampleBlock, ScanError, ScanSettings, SsbSearch,
+    SsbSearchConfig, scan,
+};
 use serde_json::Value;
 
 const SSB_HZ: f64 = 3_700.8e6;

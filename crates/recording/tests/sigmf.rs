@@ -6,12 +6,12 @@ mod common;
 use std::fs;
 use std::path::{Path, PathBuf};
 
-use access_av::recording::{
+use num_complex::Complex32;
+use proptest::prelude::*;
+use recording::{
     Annotation, Datatype, Recording, RecordingError, RecordingWarning, RecordingWriter,
     WriterSettings,
 };
-use num_complex::Complex32;
-use proptest::prelude::*;
 use serde_json::{Map, Value, json};
 
 const LENGTH: usize = 70_000; // more than one block of the reader

@@ -10,11 +10,11 @@ use std::path::Path;
 use mcap::{Compression, MessageStream, WriteOptions};
 use proptest::prelude::*;
 
-use access_av::geometry::Pose;
-use access_av::localize::{AngleMeasurement, PoseEstimate};
-use access_av::observation::{OdometrySample, SensedSsb};
-use access_av::recording::mcap::{Frames, Twist};
-use access_av::recording::{
+use onboard::geometry::Pose;
+use onboard::localize::{AngleMeasurement, PoseEstimate};
+use onboard::observation::{OdometrySample, SensedSsb};
+use recording::mcap::{Frames, Twist};
+use recording::{
     LoggedAngle, McapWriter, OdometryIssue, RecordingError, TimedPose, read_angle_log,
     read_odometry_csv, read_odometry_mcap, read_tum, write_angle_log, write_odometry_csv,
     write_tum,

@@ -1,0 +1,100 @@
+//! A tracker that hears nothing, where the road was not surveyed.
+#![allow(clippy::unwrap_used, reason = "this is a test")]
+
+use std::sync::Arc;
+
+use onboard::localize::Tracker;
+use onboard::localize::tracker::{InitialPose, OdometryVerdict, TrackerConfig};
+use onboard::observation::OdometrySample;
+use onboard::road::Gap;
+use onboard::settings::{Shipped, Site, TomlFile, Vehicle};
+
+/// Radius of the bends that the road may have in the gap (m), and their turn (rad).
+const RADIUS_M: f64 = 200.0;
+const TURN_RAD: f64 = 0.1;
+
+/// A tracker on a straight road: 90 m of it, 80 m that nobody has surveyed, and 90 m again.
+fn tracker(at_m: f64, aside_m: f64, position_std_m: f64) -> (Tracker, Gap) {
+    let gap_m = 4.0 * RADIUS_M * TURN_RAD.sin();
+    let road = format!(
+        "like = 'trip-2'\n[road]\nsegments = [{{ length_m = 90.0 }}, \
+         {{ length_m = {gap_m:?}, surveyed = false }}, {{ length_m = 90.0 }}]"
+    );
+    let site = Site::from_toml(&road, "site.toml", &Shipped).unwrap();
+    let bends = [
+        ("localizer.curvature_rms_per_m", (1.0 / RADIUS_M).into()),
+        (
+            "localizer.curvature_correlation_m",
+            (2.0 * RADIUS_M * TURN_RAD).into(),
+        ),
+    ];
+    let carrier = Vehicle::from_library("carrier", &Shipped).unwrap();
+    let vehicle = carrier.with_overrides(bends, &Shipped).unwrap();
+    let map = Arc::new(site.build_road().unwrap().unwrap());
+    let gap = map.gap_between(0.0, map.length_m()).unwrap();
+    let start = InitialPose {
+        pose: map.pose(at_m).offset_left(aside_m),
+        position_std_m,
+        heading_std_rad: 0.01,
+    };
+    let config = TrackerConfig::new(&site, &vehicle);
+    (Tracker::new(config, Some(map), &[], &start), gap)
+}
+
+/// Odometry at 4 m/s.
+fn sample(number: u32) -> OdometrySample {
+    let time_s = 0.02 * f64::from(number);
+    OdometrySample {
+        time_s,
+        distance_m: 4.0 * time_s,
+        speed_mps: 4.0,
+        yaw_rate_radps: None,
+    }
+}
+
+#[test]
+fn the_gap_is_told_and_costs_certainty_until_the_lane_is_kept_again() {
+    let (mut tracker, gap) = tracker(60.0, 0.0, 0.1);
+    assert_eq!(tracker.odometry(&sample(0)), OdometryVerdict::First);
+    let lane_m2 = tracker.config().lane_keeping.stationary()[0];
+    let (mut told_m, mut before) = (Vec::new(), 0.0);
+    for number in 1..(150 * 50 / 4) {
+        let verdict = tracker.odometry(&sample(number));
+        let along_m = 60.0 + 0.08 * f64::from(number);
+        let [larger, smaller] = tracker.pose(0.02 * f64::from(number)).principal_variances();
+        if verdict == OdometryVerdict::Accepted {
+            // Across the road it is as sure as the lane is kept, or surer.
+            assert!(smaller < (1.0 + 1e-9) * lane_m2, "{along_m} {smaller}");
+        } else {
+            let Gap { from_m, to_m } = gap;
+            assert_eq!(verdict, OdometryVerdict::InMapGap { from_m, to_m });
+            if !told_m.is_empty() {
+                assert!(larger > before, "{along_m}");
+            }
+            before = larger;
+            told_m.push(along_m);
+        }
+    }
+    // By then the place is known to 0.1 m of start, 0.003 of scale and 0.01 m per √m, and the
+    // verdict comes a sample later.
+    let margin_m =
+        |driven_m: f64| 3.0 * (0.01 + (0.003 * driven_m).powi(2) + 1e-4 * driven_m).sqrt() + 0.08;
+    let (first_m, last_m) = (told_m[0], told_m[told_m.len() - 1]);
+    let (early_m, late_m) = (gap.from_m - first_m, last_m - gap.to_m);
+    assert!(early_m > 0.0 && early_m < margin_m(30.0), "{early_m}");
+    assert!(late_m > 0.0 && late_m < margin_m(111.0), "{late_m}");
+    // Eighty metres of a path that bends as it likes.
+    assert!(before > 1.0, "{before}");
+}
+
+#[test]
+fn a_start_in_the_gap_is_not_drawn_to_the_guess() {
+    let (tracker, _) = tracker(130.0, 2.0, 0.5);
+    let (on_the_guess, _) = self::tracker(130.0, 0.0, 0.5);
+    let pose = tracker.pose(0.0);
+    let moved_m = (pose.pose.point()).distance_m(on_the_guess.pose(0.0).pose.point());
+    assert!((moved_m - 2.0).abs() < 1e-9, "{moved_m}");
+    for variance in pose.principal_variances() {
+        assert!((variance - 0.25).abs() < 1e-9, "{variance}");
+    }
+}

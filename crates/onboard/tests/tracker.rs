@@ -1,0 +1,203 @@
+//! The tracker on input that no drive should bring.
+#![allow(clippy::unwrap_used, reason = "this is a test")]
+
+use std::sync::Arc;
+
+use onboard::geometry::Pose;
+use onboard::localize::tracker::{InitialPose, OdometryVerdict, TrackerConfig};
+use onboard::localize::{AngleMeasurement, Tracker, UpdateReason};
+use onboard::observation::OdometrySample;
+use onboard::radio_head::RadioHead;
+use onboard::road::Road;
+use onboard::settings::{Shipped, Site, TomlFile, Vehicle};
+
+fn site() -> Site {
+    Site::from_library("trip-1", &Shipped).unwrap()
+}
+
+fn road() -> Road {
+    site().build_road().unwrap().unwrap()
+}
+
+fn tracker() -> (Tracker, RadioHead) {
+    let vehicle = Vehicle::from_library("carrier", &Shipped).unwrap();
+    let heads = RadioHead::heard(&site(), &vehicle);
+    let start = InitialPose {
+        pose: Pose::default(),
+        position_std_m: 0.5,
+        heading_std_rad: 0.01,
+    };
+    let config = TrackerConfig::new(&site(), &vehicle);
+    let mut tracker = Tracker::new(config, Some(Arc::new(road())), &heads, &start);
+    assert_eq!(tracker.odometry(&sample(0.0, 0.0)), OdometryVerdict::First);
+    assert_eq!(
+        tracker.odometry(&sample(0.1, 0.4)),
+        OdometryVerdict::Accepted
+    );
+    (tracker, heads[0])
+}
+
+fn sample(time_s: f64, distance_m: f64) -> OdometrySample {
+    OdometrySample {
+        time_s,
+        distance_m,
+        speed_mps: 4.0,
+        yaw_rate_radps: None,
+    }
+}
+
+fn angle(time_s: f64, phase_rad: f64, phase_sigma_rad: f64) -> AngleMeasurement {
+    AngleMeasurement {
+        time_s,
+        phase_rad,
+        phase_sigma_rad,
+        angle_rad: 0.0,
+        snr_db: 20.0,
+        resolved: true,
+    }
+}
+
+#[test]
+fn bad_angles_are_named_and_leave_the_state() {
+    let (mut tracker, head) = tracker();
+    let before = tracker.clone();
+    let stranger = RadioHead { pci: 999, ..head };
+    let here = RadioHead {
+        position: tracker.pose(0.1).pose.point(),
+        ..head
+    };
+    let good = angle(0.12, 2.8, 0.01);
+    for (head, measured, reason) in [
+        (head, angle(0.12, f64::NAN, 0.01), UpdateReason::Unusable),
+        (head, angle(f64::NAN, 2.8, 0.01), UpdateReason::Unusable),
+        (head, angle(0.12, 2.8, f64::NAN), UpdateReason::Unusable),
+        (head, angle(0.12, 2.8, -0.01), UpdateReason::Unusable),
+        (head, angle(0.12, 2.8, 0.0), UpdateReason::Unusable),
+        (head, angle(0.05, 2.8, 0.01), UpdateReason::TooLate),
+        (head, angle(0.12, -1.0, 0.01), UpdateReason::Outlier),
+        (stranger, good, UpdateReason::UnknownRadioHead),
+    ] {
+        let verdict = tracker.update(&head, &measured);
+        assert_eq!(verdict.reason, reason);
+        assert!(!verdict.accepted && verdict.threshold.is_some());
+        assert_eq!(tracker, before);
+    }
+    tracker.set_excluded(&head, true);
+    assert_eq!(tracker.update(&head, &good).reason, UpdateReason::Excluded);
+    tracker.set_excluded(&head, false);
+    assert!(
+        tracker.update(&here, &good).accepted,
+        "the survey counts, not the caller's place"
+    );
+    assert_ne!(tracker, before);
+}
+
+#[test]
+fn an_angle_nobody_vouches_for_counts_as_far_as_it_is_likely() {
+    let sure = angle(0.12, 0.0, 0.01);
+    let after = |off_rad: f64, resolved: bool| {
+        let (mut tracker, head) = tracker();
+        // Where the tracker sees the head, and a little off.
+        let residual_rad = tracker.innovation(&head, &sure).unwrap().residual;
+        let measured = AngleMeasurement {
+            phase_rad: off_rad - residual_rad,
+            resolved,
+            ..sure
+        };
+        let before = tracker.pose(0.12);
+        let verdict = tracker.update(&head, &measured);
+        assert_eq!(verdict.accepted, resolved || off_rad < 0.2);
+        let moved_m = tracker
+            .pose(0.12)
+            .pose
+            .point()
+            .distance_m(before.pose.point());
+        (moved_m, tracker.pose(0.12).principal_variances()[0])
+    };
+    // Close to where it is expected it is most likely right ...
+    let ((sure_m, sure_m2), (unsure_m, unsure_m2)) = (after(0.1, true), after(0.1, false));
+    assert!(
+        unsure_m < sure_m && unsure_m > 0.8 * sure_m,
+        "{unsure_m} {sure_m}"
+    );
+    assert!(unsure_m2 > sure_m2);
+    // ... and far off, if within the gate, it says nothing.
+    let ((sure_m, _), (unsure_m, _)) = (after(0.33, true), after(0.33, false));
+    assert!(sure_m > 0.0);
+    assert_eq!(unsure_m, 0.0);
+}
+
+#[test]
+fn bad_odometry_is_named_and_leaves_the_state() {
+    let (mut tracker, _) = tracker();
+    let before = tracker.clone();
+    for (sample, verdict) in [
+        (sample(0.1, 0.4), OdometryVerdict::Duplicate),
+        (sample(0.05, 0.3), OdometryVerdict::TimeBackwards),
+        (sample(f64::NAN, 0.5), OdometryVerdict::NotFinite),
+        (sample(0.2, f64::INFINITY), OdometryVerdict::NotFinite),
+    ] {
+        assert_eq!(tracker.odometry(&sample), verdict);
+        assert_eq!(tracker, before);
+    }
+}
+
+#[test]
+fn beyond_the_end_of_the_map_it_drives_on_and_comes_back() {
+    let length_m = road().length_m();
+    let (mut tracker, _) = tracker();
+    let (mut beyond, mut before) = (0, [0.0; 2]);
+    let across = |tracker: &Tracker, time_s: f64| tracker.pose(time_s).principal_variances();
+    // Out to 60 m beyond the end and back again, backwards.
+    let turn_s = (length_m + 60.0) / 4.0;
+    for number in 6..(2.0 * turn_s / 0.02) as u32 {
+        let time_s = 0.02 * f64::from(number);
+        let place_m = 4.0 * (turn_s - (time_s - turn_s).abs());
+        let verdict = tracker.odometry(&sample(time_s, place_m));
+        assert!(verdict.accepted(), "{verdict:?}");
+        if let OdometryVerdict::BeyondMap { by_m } = verdict {
+            beyond += 1;
+            assert!(
+                (by_m - (place_m - length_m)).abs() < 1.0,
+                "{by_m} {place_m}"
+            );
+            if beyond > 1 && time_s < turn_s {
+                let now = across(&tracker, time_s);
+                assert!(
+                    now[0] >= before[0] && now[1] >= before[1],
+                    "{now:?} {before:?}"
+                );
+            }
+            before = across(&tracker, time_s);
+        }
+    }
+    // Beyond the end from three deviations of the place (0.9 m of scale, 0.5 m of start) on.
+    assert!(beyond > 2 * 50 * 13 && beyond < 2 * 50 * 15, "{beyond}");
+    // Sixty metres without a lane, and the lane is kept again.
+    let lane_m2 = across(&tracker, 2.0 * turn_s)[1];
+    assert!(
+        before[1] > 2.0 * lane_m2 && lane_m2 < 0.1_f64.powi(2),
+        "{before:?} {lane_m2}"
+    );
+}
+
+#[test]
+fn a_gap_loses_time_and_a_jump_loses_certainty() {
+    let (mut gap, _) = tracker();
+    assert!(matches!(
+        gap.odometry(&sample(2.1, 8.4)),
+        OdometryVerdict::AfterGap { .. }
+    ));
+    let at_m = gap.pose(2.1).pose.x_m;
+    assert!((at_m - 8.4).abs() < 0.05, "{at_m}");
+
+    let (mut jump, _) = tracker();
+    assert!(matches!(
+        jump.odometry(&sample(2.1, 5000.0)),
+        OdometryVerdict::DistanceJump { .. }
+    ));
+    // The counter is worthless, the speed is not: 2 s at 4 m/s.
+    assert!((jump.pose(2.1).pose.x_m - 8.4).abs() < 0.05);
+    let variance = |tracker: &Tracker| tracker.pose(2.1).principal_variances()[0];
+    assert!(variance(&jump) > variance(&gap) + 1.0);
+}
