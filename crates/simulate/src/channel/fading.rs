@@ -123,8 +123,11 @@ impl Propagation for RicianPropagation {
         for (number, ray) in self.rays.iter().enumerate() {
             let doppler = Complex64::cis(self.wavenumber_per_m * along_m * ray.cosine);
             let mut wave = ray.start * doppler * self.scatter;
-            wave *= Complex64::cis(-TAU * first_hz * ray.delay_s);
-            let turn = Complex64::cis(-TAU * step_hz * ray.delay_s);
+            let mut turn = Complex64::ONE;
+            if self.dispersive {
+                wave *= Complex64::cis(-TAU * first_hz * ray.delay_s);
+                turn = Complex64::cis(-TAU * step_hz * ray.delay_s);
+            }
             for gains in into.chunks_exact_mut(elements).take(count) {
                 match self.model {
                     ScatterModel::PerAntenna => {
