@@ -6,11 +6,14 @@ import json
 import re
 import subprocess
 from graphlib import CycleError, TopologicalSorter
-from pathlib import Path
+from typing import TYPE_CHECKING
 
 import pytest
 
 from conftest import ROOT
+
+if TYPE_CHECKING:
+    from pathlib import Path
 
 # Each crate and what it may use of the others: arrows run one way.
 CRATES = {

@@ -47,7 +47,9 @@ def test_without_sigma_the_bound_is_taken_and_said_once() -> None:
     assert accepted.mean() > 0.9  # type: ignore[operator]
     built_in = access_av.simulate(SHORT, runs=3, keep_trajectories=True)
     assert built_in.executions is not None
-    sigmas = [table["phase_sigma_rad"].median() for table in (result.executions, built_in.executions)]
+    sigmas = [
+        table["phase_sigma_rad"].median() for table in (result.executions, built_in.executions)
+    ]
     # The bound at the sensed SNR is what maximum likelihood states, fading aside.
     assert 0.8 < sigmas[0] / sigmas[1] < 1.25  # type: ignore[operator]
 

@@ -104,12 +104,12 @@ def locate(
     from access_av.report.located import render_located
 
     from_scratch = start is not None and start.strip() == "scratch"
-    believed = Site.load(site), Vehicle.load(vehicle)
+    plant, carrier = Site.load(site), Vehicle.load(vehicle)
     drive = drives.locate(
-        believed[0],
+        plant,
         odometry,
         recording,
-        vehicle=believed[1],
+        vehicle=carrier,
         topic=topic,
         start_time_s=start_time_s,
         start=None if start is None or from_scratch else _pose(start),
@@ -127,9 +127,9 @@ def locate(
     if drive.smoothed is not None:
         directory.write_table("smoothed.parquet", drive.smoothed)
         drive.write_smoothed_tum(directory.path / "smoothed.tum")
-    directory.write_text("report.html", render_located(drive, *believed, numbers))
-    for name, settings in zip(("site.toml", "vehicle.toml"), believed, strict=True):
-        directory.write_text(name, settings.to_toml())
+    directory.write_text("report.html", render_located(drive, plant, carrier, numbers))
+    directory.write_text("site.toml", plant.to_toml())
+    directory.write_text("vehicle.toml", carrier.to_toml())
     directory.write_manifest(recording=str(recording), odometry=str(odometry), **numbers)
     directory.link_latest()
     for remark in drive.remarks[:MOST_REMARKS]:
