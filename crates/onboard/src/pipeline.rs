@@ -16,11 +16,9 @@ use crate::wake_up::{self, Situation, WakeUpPolicy};
 
 /// The pipeline on the vehicle. Nothing is allocated once it is warm.
 pub struct Onboard {
-    heads: Vec<RadioHead>,
-    budget: LinkBudget,
+    surroundings: Surroundings,
     thermal: ThermalNoise,
     spacing_wavelengths: f64,
-    height_m: f64,
     estimator: Box<dyn AngleEstimator>,
     localizer: History,
     policy: Box<dyn WakeUpPolicy>,
@@ -29,6 +27,31 @@ pub struct Onboard {
     sensed: Vec<SensedSsb>,
     chosen: Vec<bool>,
     executions: Vec<Execution>,
+}
+
+/// What does not change during a drive.
+struct Surroundings {
+    heads: Vec<RadioHead>,
+    budget: LinkBudget,
+    height_m: f64,
+}
+
+impl Surroundings {
+    fn at<'a>(
+        &'a self,
+        time_s: f64,
+        odometry: Option<OdometrySample>,
+        localizer: &'a History,
+    ) -> Situation<'a> {
+        Situation {
+            time_s,
+            speed_mps: odometry.map_or(0.0, |sample| sample.speed_mps),
+            localizer: localizer.localizer(),
+            heads: &self.heads,
+            budget: &self.budget,
+            height_m: self.height_m,
+        }
+    }
 }
 
 /// The user's own code in place of parts of the pipeline.
@@ -138,10 +161,8 @@ impl Onboard {
         let heads = RadioHead::heard(site, vehicle);
         let [_, _, height_m] = vehicle.array.position_m;
         Ok(Self {
-            budget: LinkBudget::new(site, vehicle),
             thermal: ThermalNoise::new(site, vehicle),
             spacing_wavelengths,
-            height_m,
             estimator,
             localizer: History::new(localizer),
             policy,
@@ -150,7 +171,11 @@ impl Onboard {
             sensed: Vec::with_capacity(heads.len()),
             chosen: Vec::with_capacity(heads.len()),
             executions: Vec::with_capacity(heads.len()),
-            heads,
+            surroundings: Surroundings {
+                heads,
+                budget: LinkBudget::new(site, vehicle),
+                height_m,
+            },
         })
     }
 
@@ -184,14 +209,7 @@ impl Onboard {
     pub fn hear(&mut self, time_s: f64, source: &mut dyn SsbSource) -> Result<Heard<'_>, BoxError> {
         self.sensed.clear();
         self.executions.clear();
-        let now = Situation {
-            time_s,
-            speed_mps: self.odometry.map_or(0.0, |sample| sample.speed_mps),
-            localizer: self.localizer.localizer(),
-            heads: &self.heads,
-            budget: &self.budget,
-            height_m: self.height_m,
-        };
+        let now = self.surroundings.at(time_s, self.odometry, &self.localizer);
         // As long as the first pose is searched for, every angle helps.
         let searching = now.localizer.hypotheses().is_some();
         let listened = searching || self.policy.listens(&now)?;
@@ -215,14 +233,7 @@ impl Onboard {
                 self.executions.push(execution);
             }
         }
-        let now = Situation {
-            time_s,
-            speed_mps: self.odometry.map_or(0.0, |sample| sample.speed_mps),
-            localizer: self.localizer.localizer(),
-            heads: &self.heads,
-            budget: &self.budget,
-            height_m: self.height_m,
-        };
+        let now = self.surroundings.at(time_s, self.odometry, &self.localizer);
         Ok(Heard {
             listened,
             executions: &self.executions,
@@ -246,7 +257,7 @@ impl Onboard {
         ssb: SensedSsb,
         measured: Option<AngleMeasurement>,
     ) -> Result<Execution, BoxError> {
-        let mut heads = self.heads.iter();
+        let mut heads = self.surroundings.heads.iter();
         let head = heads.find(|head| head.sends(ssb.pci, ssb.ssb_index));
         let verdict = match (head, &measured) {
             (None, _) => UpdateVerdict::unused(UpdateReason::UnknownRadioHead),
