@@ -52,3 +52,6 @@ def main() -> None:
     except (SettingsError, RecordingError, InputError, OSError) as error:
         show_error(error)
         sys.exit(2)
+    except KeyboardInterrupt:
+        show_error(InputError("interrupted; what was finished is kept"))
+        sys.exit(130)

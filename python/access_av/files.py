@@ -5,6 +5,7 @@ from __future__ import annotations
 import json
 import os
 import sys
+import warnings
 from dataclasses import dataclass
 from datetime import datetime, timezone
 from importlib.metadata import version
@@ -14,6 +15,8 @@ from typing import TYPE_CHECKING, Any
 import numpy as np
 
 if TYPE_CHECKING:
+    from collections.abc import Callable
+
     import polars as pl
     from numpy.typing import ArrayLike
 
@@ -39,19 +42,20 @@ class ResultsDirectory:
 
     def link_latest(self) -> None:
         """Point ``results/latest`` here, wherever this directory is."""
-        RESULTS.mkdir(parents=True, exist_ok=True)
         fresh = RESULTS / f".latest-{os.getpid()}"
-        here = os.path.relpath(self.path.resolve(), RESULTS.resolve())
-        fresh.symlink_to(here, target_is_directory=True)
-        fresh.replace(RESULTS / "latest")
+        try:
+            RESULTS.mkdir(parents=True, exist_ok=True)
+            here = os.path.relpath(self.path.resolve(), RESULTS.resolve())
+            fresh.symlink_to(here, target_is_directory=True)
+            fresh.replace(RESULTS / "latest")
+        except OSError as error:
+            # The work is done and written; only its short name is missing.
+            warnings.warn(f"{RESULTS / 'latest'}: {error.strerror}", stacklevel=2)
+            fresh.unlink(missing_ok=True)
 
     def write_text(self, name: str, text: str) -> Path:
         """Write a text file."""
-        target = self.path / name
-        partial = self.path / f".{name}.partial"
-        partial.write_text(text, encoding="utf-8")
-        partial.replace(target)
-        return target
+        return self._whole(name, lambda partial: partial.write_text(text, encoding="utf-8"))
 
     def write_json(self, name: str, value: object) -> Path:
         """Write a JSON file."""
@@ -59,10 +63,20 @@ class ResultsDirectory:
 
     def write_table(self, name: str, table: pl.DataFrame) -> Path:
         """Write a Parquet file."""
-        target = self.path / name
-        partial = self.path / f".{name}.partial"
-        table.write_parquet(partial, compression="zstd")
-        partial.replace(target)
+        return self._whole(name, lambda file: table.write_parquet(file, compression="zstd"))
+
+    def _whole(self, name: str, write: Callable[[Path], object]) -> Path:
+        """Have a file written beside its place and put there; nothing is left of a failure."""
+        target, partial = self.path / name, self.path / f".{name}.partial"
+        try:
+            write(partial)
+            partial.replace(target)
+        except OSError as error:
+            partial.unlink(missing_ok=True)
+            raise OSError(error.errno, error.strerror or str(error), str(target)) from error
+        except BaseException:
+            partial.unlink(missing_ok=True)
+            raise
         return target
 
     def write_manifest(self, **settings: Any) -> Path:

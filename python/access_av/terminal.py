@@ -29,8 +29,9 @@ if TYPE_CHECKING:
     from access_av.recorded_angles import BurstAngle
     from access_av.simulation import Simulation
 
-console = Console(highlight=False)
-errors = Console(stderr=True, highlight=False)
+# What is printed may come from files: it is text, never markup. Styles are given beside it.
+console = Console(highlight=False, markup=False)
+errors = Console(stderr=True, highlight=False, markup=False)
 
 NARROW = 80
 
@@ -70,8 +71,28 @@ def show_error(error: Exception) -> None:
         message = f"{error.filename}: {error.strerror}"
     else:
         message = str(error)
-    errors.print("[bold red]error:[/]", end=" ")
-    errors.print(message, markup=False, soft_wrap=True)
+    errors.print("error:", style="bold red", end=" ")
+    errors.print(plain(message), soft_wrap=True)
+
+
+def show_warning(message: str) -> None:
+    """One message for an item that was left out, or is remarkable."""
+    errors.print("warning:", style="yellow", end=" ")
+    errors.print(plain(message), soft_wrap=True)
+
+
+def plain(text: str) -> str:
+    r"""Text with control characters written out: a terminal is to obey nobody's file.
+
+    Examples
+    --------
+    >>> plain("a\x1b[2Jb")
+    'a\\x1b[2Jb'
+    """
+    return "".join(
+        sign if sign.isprintable() or sign == "\n" else sign.encode("unicode_escape").decode()
+        for sign in text
+    )
 
 
 def show_points(points: pl.DataFrame, title: str = "") -> None:
@@ -155,7 +176,8 @@ def show_bound(summary: dict[str, Any]) -> None:
 def show_columns(columns: Table) -> None:
     """The columns of one table."""
     where = columns.where.replace("`", "")
-    console.print(f"[bold]{columns.name}[/]  {columns.row}. {where}.")
+    console.print(columns.name, style="bold", end="")
+    console.print(f"  {columns.row}. {where}.")
     made = table(["column", "unit", "meaning", "null when"], text=4)
     for one in columns.records():
         made.add_row(one["name"], one["unit"], one["meaning"], one["null"])

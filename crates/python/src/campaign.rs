@@ -20,6 +20,11 @@ use pyo3::types::{PyDict, PyList};
 use crate::plug_ins::{PythonEstimator, PythonLocalizer, PythonPolicy};
 use crate::settings::{Platform, Scenario, settings_error};
 
+/// A campaign of more is better made of several.
+const MOST_RUNS: usize = 1_000_000;
+/// More threads than any machine has cores for.
+const MOST_THREADS: usize = 1024;
+
 /// What a campaign found, as columns of equal length.
 #[pyclass(frozen, get_all, module = "access_av._core")]
 pub struct SimulationResult {
@@ -61,10 +66,13 @@ pub fn simulate(
     localizer: Option<Py<PyAny>>,
     progress: Option<Py<PyAny>>,
 ) -> PyResult<SimulationResult> {
-    if runs == 0 || threads == Some(0) {
-        return Err(PyValueError::new_err(
-            "`runs` and `threads` must be at least 1",
-        ));
+    if !(1..=MOST_RUNS).contains(&runs) {
+        let message = format!("`runs` is {runs}; it must be between 1 and {MOST_RUNS}");
+        return Err(PyValueError::new_err(message));
+    }
+    if threads.is_some_and(|threads| !(1..=MOST_THREADS).contains(&threads)) {
+        let message = format!("`threads` must be between 1 and {MOST_THREADS}");
+        return Err(PyValueError::new_err(message));
     }
     let platform = match platform {
         Some(platform) => platform.0.clone(),

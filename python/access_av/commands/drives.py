@@ -10,7 +10,7 @@ import typer
 
 from access_av.commands.options import Out, ScenarioArgument
 from access_av.errors import InputError
-from access_av.terminal import console, errors
+from access_av.terminal import console, show_warning
 
 if TYPE_CHECKING:
     from access_av.drives import Drive
@@ -133,9 +133,9 @@ def locate(
     directory.write_manifest(recording=str(recording), odometry=str(odometry), **numbers)
     directory.link_latest()
     for remark in drive.remarks[:MOST_REMARKS]:
-        errors.print(f"[yellow]warning:[/] {remark}", soft_wrap=True)
+        show_warning(remark)
     if len(drive.remarks) > MOST_REMARKS:
-        errors.print(f"[yellow]warning:[/] {len(drive.remarks) - MOST_REMARKS} more like these")
+        show_warning(f"{len(drive.remarks) - MOST_REMARKS} more like these")
     console.print(
         f"{numbers['angles']:.0f} angles, {numbers['accepted']:.0f} accepted, "
         f"in {numbers['duration_s']:.1f} s."

@@ -10,9 +10,11 @@ import typer
 ScenarioArgument = Annotated[str, typer.Argument(help="Shipped name, or path of a TOML file.")]
 ScenarioOption = Annotated[str, typer.Option(help="Shipped name, or path of a TOML file.")]
 PlatformOption = Annotated[str, typer.Option(help="Shipped name, or path of a TOML file.")]
-Runs = Annotated[int, typer.Option(min=1, help="Drives per setting.")]
-Seed = Annotated[int, typer.Option(min=0, help="Same seed, same results.")]
-Threads = Annotated[int | None, typer.Option(min=1, help="Worker threads; all cores if not given.")]
+Runs = Annotated[int, typer.Option(min=1, max=1_000_000, help="Drives per setting.")]
+Seed = Annotated[int, typer.Option(min=0, max=2**64 - 1, help="Same seed, same results.")]
+Threads = Annotated[
+    int | None, typer.Option(min=1, max=1024, help="Worker threads; all cores if not given.")
+]
 Out = Annotated[
     Path | None, typer.Option(help="Directory for the files; else a new one in results/.")
 ]

@@ -10,7 +10,7 @@ import typer
 
 from access_av.commands.options import AsJson
 from access_av.errors import InputError
-from access_av.terminal import console, errors, show_bursts, show_cells
+from access_av.terminal import console, show_bursts, show_cells, show_warning
 
 app = typer.Typer()
 
@@ -68,7 +68,7 @@ def scan(
     found = []
     for path, recording in zip(recordings, opened, strict=False):
         for warning in recording.warnings:
-            errors.print(f"[yellow]warning:[/] {warning}", soft_wrap=True)
+            show_warning(warning)
         result = nr.scan_as_recorded(
             recording,
             spacing_wavelengths=spacing_wavelengths,
@@ -78,7 +78,7 @@ def scan(
             scs_khz=scs_khz,
         )
         for fault in result.faults:
-            errors.print(f"[yellow]warning:[/] {path}: {fault}", soft_wrap=True)
+            show_warning(f"{path}: {fault}")
         cells = [nr.record(cell) for cell in result.cells]
         weak = [] if unconfirmed else [cell for cell in cells if cell["mib_bits"] is None]
         cells = [cell for cell in cells if cell not in weak]

@@ -39,7 +39,7 @@ def fill(template: str, specs: Mapping[str, Spec], **fields: object) -> str:
         footer=f"ACCESS-AV {version('access-av')}. This localizer is not a safety function "
         "in the sense of ISO 3691-4.",
         bundle=vl_convert.javascript_bundle("window.vegaEmbed = vegaEmbed;"),
-        specs=json.dumps(specs, separators=(",", ":")).replace("</", "<\\/"),
+        specs=json.dumps(specs, separators=(",", ":")).replace("<", "\\u003c"),
         script=_read("page.js"),
     )
 

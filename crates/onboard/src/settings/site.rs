@@ -114,6 +114,13 @@ impl RadioHeadSettings {
         road: Option<&Road>,
     ) -> Result<(), SettingsError> {
         let key = format!("radio_heads[{index}]");
+        let is_text = |sign: char| !sign.is_control();
+        check.that(
+            self.name.chars().count() <= 64 && self.name.chars().all(is_text),
+            &format!("{key}.name"),
+            format!("{:?}", self.name.chars().take(64).collect::<String>()),
+            "it must be of at most 64 characters, none of them a control character",
+        )?;
         let [x_m, y_m, _] = self.position_m;
         let position = format!("{:?}", self.position_m);
         if let Some(road) = road {

@@ -115,8 +115,14 @@ pub trait TomlFile: Serialize + DeserializeOwned + JsonSchema {
         let settings: Self = from_table(table, origin)?;
         let json = serde_json::to_value(&settings).unwrap_or_default();
         check_limits(&json, &schema::<Self>(), check)?;
-        let name_is_usable = !settings.name().trim().is_empty();
-        check.that(name_is_usable, "name", "empty", "it needs a name")?;
+        let name = settings.name();
+        check.that(
+            is_usable_name(name),
+            "name",
+            format!("{name:?}"),
+            "it must be of 1 to 64 letters, digits, `.`, `-`, `_` and blanks, and begin with a \
+             letter or digit",
+        )?;
         settings.check(check)?;
         Ok(settings)
     }
@@ -157,6 +163,15 @@ pub trait TomlFile: Serialize + DeserializeOwned + JsonSchema {
     fn schema_json() -> String {
         serde_json::to_string_pretty(&schema::<Self>()).unwrap_or_default()
     }
+}
+
+/// Names become names of files and parts of pages.
+fn is_usable_name(name: &str) -> bool {
+    let allowed = |sign: char| sign.is_alphanumeric() || ['.', '-', '_', ' '].contains(&sign);
+    name.chars().count() <= 64
+        && name.chars().all(allowed)
+        && name.starts_with(|first: char| first.is_alphanumeric())
+        && !name.ends_with(' ')
 }
 
 /// Lays a table over the file that it says it is like.
