@@ -39,14 +39,25 @@ pub struct History {
     copies: usize,
     /// What the localizer is swapped with when it goes back, so that its memory serves again.
     spare: Option<Box<dyn Localizer>>,
-    /// Time of the newest odometry.
+    /// Time of the newest odometry ...
     now_s: f64,
+    /// ... and of the newest of all that came in.
+    newest_s: f64,
 }
 
 #[derive(Clone, Copy)]
 enum Event {
     Odometry(OdometrySample),
     Angle(RadioHead, AngleMeasurement),
+}
+
+impl Event {
+    const fn time_s(&self) -> f64 {
+        match self {
+            Self::Odometry(sample) => sample.time_s,
+            Self::Angle(_, measured) => measured.time_s,
+        }
+    }
 }
 
 #[derive(Default)]
@@ -67,6 +78,7 @@ impl History {
             copies: 0,
             spare: None,
             now_s: f64::NEG_INFINITY,
+            newest_s: f64::NEG_INFINITY,
         };
         made.keep_copy(f64::NEG_INFINITY, 0);
         made
@@ -102,8 +114,11 @@ impl History {
         head: &RadioHead,
         measured: &AngleMeasurement,
     ) -> Result<UpdateVerdict, BoxError> {
-        // A time that is no number is for the localizer to refuse.
-        if measured.time_s < self.now_s {
+        // Between the same odometry samples angles can be taken in any order, if need be. A time that
+        // is no number is for the localizer to refuse.
+        let is_late =
+            measured.time_s < self.now_s || (self.copies > 0 && measured.time_s < self.newest_s);
+        if is_late {
             return self.update_late(head, measured);
         }
         let verdict = self.localizer.update(head, measured)?;
@@ -122,10 +137,8 @@ impl History {
         let Some(copy) = from.checked_sub(1).and_then(|from| self.kept.get(from)) else {
             return Ok(UpdateVerdict::unused(UpdateReason::TooLate));
         };
-        // In time it would have come before the first odometry after it.
-        let time_s = measured.time_s;
-        let is_later =
-            |event: &Event| matches!(event, Event::Odometry(sample) if sample.time_s > time_s);
+        // In time it would have come before the first that is later.
+        let is_later = |event: &Event| event.time_s() > measured.time_s;
         let place = (self.events.iter().skip(copy.events))
             .position(is_later)
             .map_or(self.events.len(), |place| copy.events + place);
@@ -163,6 +176,7 @@ impl History {
         if let Event::Odometry(sample) = event {
             self.now_s = sample.time_s;
         }
+        self.newest_s = self.newest_s.max(event.time_s());
         if self.copies == 0 {
             return; // nothing to go back to
         }
@@ -204,7 +218,7 @@ impl History {
                 // A single moment holds more than can be remembered: begin anew from here.
                 self.events.clear();
                 self.copies = 0;
-                self.keep_copy(self.now_s, 0);
+                self.keep_copy(self.newest_s, 0);
                 return;
             }
             self.drop_oldest();
