@@ -123,6 +123,7 @@ _GLOSSARY = {
     "base_wake_up_ms": ("ms", "Base wake-up time, or the fixed interval"),
     "executions": ("1", "Angle estimates in a run; of several runs their mean"),
     "listened": ("1", "SSB bursts listened to"),
+    "longest_gap_s": ("s", "Longest time from one angle estimate to the next; 0 with fewer than two"),
     "energy_j": ("J", "Energy of a run; of several runs their mean"),
     "energy_executions_j": ("J", "Of it, for angle estimates"),
     "energy_listening_j": ("J", "Of it, for listening"),
@@ -242,8 +243,8 @@ TABLES: Mapping[str, Table] = {
             "A run",
             "`access_av.simulate(…).runs`",
             (
-                "run", "executions", "listened", *_ENERGIES, "rms_error_m", "max_error_m",
-                "final_error_m", "found_s", "found_m",
+                "run", "executions", "listened", "longest_gap_s", *_ENERGIES, "rms_error_m",
+                "max_error_m", "final_error_m", "found_s", "found_m",
             ),
             {
                 **dict.fromkeys(_ENERGIES, _NO_FIGURE),
