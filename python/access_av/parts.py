@@ -11,13 +11,13 @@ import json
 import os
 from dataclasses import dataclass
 from importlib.metadata import version
-from pathlib import Path
 from typing import TYPE_CHECKING, Any
 
 import numpy as np
 
 if TYPE_CHECKING:
     from collections.abc import Callable, Mapping
+    from pathlib import Path
 
     from numpy.typing import NDArray
 
@@ -43,6 +43,7 @@ class Parts:
         Examples
         --------
         >>> import tempfile
+        >>> from pathlib import Path
         >>> parts = Parts(Path(tempfile.mkdtemp()))
         >>> for _ in range(2):
         ...     part = parts.get({"seed": 1}, lambda: print("computed") or {"x": np.arange(2)})

@@ -18,9 +18,9 @@ energies per execution that agree with them, given the executions the simulation
    stated to exceed 52 %). The factor stays between a half and two: where an average saving asks for
    another, there is no such power, and the claim fails.
 
-Of the 24 energies per execution of eight modes and three methods, 11 numbers are free: MUSIC's eight,
-the two ratios and the factor. Six of them are solved for from as many stated figures, the others kept
-within what is stated of budgets. :data:`FREE` and :data:`STATED_FIGURES` count them.
+Of the 24 energies per execution of eight modes and three methods, 11 numbers are free: MUSIC's
+eight, the two ratios and the factor. Five of them are solved for from as many stated figures, the
+others kept within what is stated of budgets. :data:`FREE` and :data:`SOLVED` count them.
 """
 
 from __future__ import annotations
@@ -38,7 +38,6 @@ if TYPE_CHECKING:
     from collections.abc import Mapping
 
     from access_av.paper.outcome import Numbers
-    from access_av.platform import PowerMode
 
 HIGH_SAVING_MODES = (6, 7)
 # Claims of the budget that only mode 7 keeps, and of the wide one that the modes it lists keep.
@@ -49,7 +48,7 @@ MARGIN = 0.02
 # How far ESPRIT's and Root-MUSIC's power may depart from their ratio to MUSIC's in mode 0.
 LEAST_FACTOR, MOST_FACTOR = 0.5, 2.0
 # Numbers that the fit is free in, and stated figures that it solves for.
-FREE, STATED_FIGURES = 11, 6
+FREE, SOLVED = 11, 5
 
 
 @dataclass(frozen=True)
@@ -72,18 +71,6 @@ class ModeDemand:
     base_wake_up_s: Mapping[str, float]
     fixed_executions: Mapping[str, float]
     adaptive_executions: float | Numbers
-
-
-def demand(
-    mode: PowerMode, fixed_executions: Mapping[str, float], adaptive_executions: float | Numbers
-) -> ModeDemand:
-    """What is asked of a power mode of a platform."""
-    return ModeDemand(
-        cpu_hz=mode.cpu_hz,
-        base_wake_up_s={method: mode.base_wake_up_ms[method] / 1e3 for method in METHODS},
-        fixed_executions=fixed_executions,
-        adaptive_executions=adaptive_executions,
-    )
 
 
 def busy_core_power_w(cpu_hz: float) -> float:

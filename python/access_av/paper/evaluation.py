@@ -20,7 +20,7 @@ import polars as pl
 from access_av._core import Scenario
 from access_av.errors import InputError
 from access_av.paper.drives import Driven, Driver
-from access_av.paper.energy_fit import NEEDED_MODES, demand, fit_energy
+from access_av.paper.energy_fit import NEEDED_MODES, ModeDemand, fit_energy
 from access_av.paper.findings import MissingFigureError, energy_j
 from access_av.paper.methods import METHODS
 from access_av.paper.outcome import Drives, Outcome
@@ -30,7 +30,6 @@ from access_av.platform import Platform
 
 if TYPE_CHECKING:
     from collections.abc import Callable, Mapping, Sequence
-
 
     from access_av.platform import PowerMode
 
@@ -122,7 +121,7 @@ class Evaluation:
     @property
     def longest_gap_s(self) -> float:
         """Longest time between two adaptive estimates, in any mode and run."""
-        return max(drives.longest_gap_s for drives in self.outcome.adaptive.values())
+        return max(float(drives.longest_gap_s) for drives in self.outcome.adaptive.values())
 
     def campaign(self, name: str) -> pl.DataFrame:
         """Operating points of one campaign."""
@@ -217,7 +216,11 @@ def evaluate_with(driver: Driver, reading: Reading) -> Evaluation:
 
 
 def outcome_of(
-    drives: Sequence[tuple[Case, Drives]], platform: Platform, trip_s: float, *, fit_each: bool = False
+    drives: Sequence[tuple[Case, Drives]],
+    platform: Platform,
+    trip_s: float,
+    *,
+    fit_each: bool = False,
 ) -> tuple[Outcome, bool]:
     """What the claims are judged by, and whether its energies were fitted anew.
 
@@ -235,19 +238,7 @@ def outcome_of(
     figures = [it for mode in platform.modes for it in mode.energy_per_execution_j.values()]
     refits = adaptive.keys() >= NEEDED_MODES and all(it.provenance == "fitted" for it in figures)
     if refits:
-        energies_j = fit_energy(
-            {
-                mode.number: demand(
-                    mode,
-                    {
-                        method: float(fixed[mode.number, method].executions[0])
-                        for method in METHODS
-                    },
-                    adaptive[mode.number].executions[: None if fit_each else 1],
-                )
-                for mode in platform.modes
-            }
-        )
+        energies_j = fit_energy(_demands(platform, fixed, adaptive, None if fit_each else 1))
     else:
         energies_j = {
             mode.number: {
@@ -258,6 +249,30 @@ def outcome_of(
         }
     duty = float(paper_numbers()["day"]["duty"])
     return Outcome(every_ssb, fixed, adaptive, energies_j, trip_s, duty, platform.name), refits
+
+
+def demands(outcome: Outcome, platform: Platform) -> dict[int, ModeDemand]:
+    """What an evaluation asked of each power mode."""
+    return _demands(platform, outcome.fixed, outcome.adaptive, 1)
+
+
+def _demands(
+    platform: Platform,
+    fixed: Mapping[tuple[int, str], Drives],
+    adaptive: Mapping[int, Drives],
+    variants: int | None,
+) -> dict[int, ModeDemand]:
+    return {
+        mode.number: ModeDemand(
+            cpu_hz=mode.cpu_hz,
+            base_wake_up_s={method: mode.base_wake_up_ms[method] / 1e3 for method in METHODS},
+            fixed_executions={
+                method: float(fixed[mode.number, method].executions[0]) for method in METHODS
+            },
+            adaptive_executions=adaptive[mode.number].executions[:variants],
+        )
+        for mode in platform.modes
+    }
 
 
 def _point(case: Case, outcome: Outcome, refitted: bool) -> dict[str, Any]:

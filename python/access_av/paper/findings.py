@@ -1,7 +1,7 @@
 """What an evaluation obtains for each claim of the paper.
 
-Errors are the mean over the runs of the absolute error, worst along the track. What the paper states
-is in ``paper.toml``; how each number is obtained is here. All numbers are arrays over variants
+Errors are the mean over the runs of the absolute error, worst along the track. What the paper
+states is in ``paper.toml``; how each number is obtained is here. All are arrays over variants
 (:mod:`access_av.paper.outcome`).
 """
 

@@ -1,7 +1,7 @@
 """By how much a claim is met: the rules of ``paper.toml``.
 
-A margin is relative to what is stated; it is positive where the claim is met, and continuous, so that
-it has an interval and a sensitivity. Obtained values may be arrays over variants.
+A margin is relative to what is stated; it is positive where the claim is met, and continuous, so
+that it has an interval and a sensitivity. Obtained values may be arrays over variants.
 """
 
 from __future__ import annotations

@@ -1,7 +1,7 @@
 """What the claims are judged by: the paper's three campaigns as numbers.
 
-Every number is an array over *variants* of the same campaigns: the sample as it is, resamples of its
-runs (which make intervals), or readings that a search lays side by side. Claims do not care which.
+Every number is an array over *variants* of the same campaigns: the sample as it is, resamples of
+its runs (which make intervals), or readings that a search lays side by side. Claims do not care.
 """
 
 from __future__ import annotations

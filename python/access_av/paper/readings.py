@@ -1,7 +1,7 @@
 """Readings of the paper: each a scenario that fills in what the paper leaves open.
 
-A reading is a small TOML file ``like = "paper"`` in ``readings/``; ``readings/index.toml`` has their
-order, and what of each was chosen in view of the paper's claims.
+A reading is a small TOML file ``like = "paper"`` in ``readings/``; ``readings/index.toml`` has
+their order, and what of each was chosen in view of the paper's claims.
 """
 
 from __future__ import annotations

@@ -21,9 +21,7 @@ if TYPE_CHECKING:
 MOST_REMARKS = 50
 
 
-def render_located(
-    drive: Drive, site: Site, vehicle: Vehicle, numbers: dict[str, float]
-) -> str:
+def render_located(drive: Drive, site: Site, vehicle: Vehicle, numbers: dict[str, float]) -> str:
     """A located drive as an HTML page that loads nothing.
 
     Parameters
