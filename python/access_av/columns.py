@@ -123,6 +123,10 @@ _GLOSSARY = {
     "base_wake_up_ms": ("ms", "Base wake-up time, or the fixed interval"),
     "executions": ("1", "Angle estimates in a run; of several runs their mean"),
     "listened": ("1", "SSB bursts listened to"),
+    "longest_gap_s": (
+        "s",
+        "Longest time between two angle estimates; 0 with fewer",
+    ),
     "energy_j": ("J", "Energy of a run; of several runs their mean"),
     "energy_executions_j": ("J", "Of it, for angle estimates"),
     "energy_listening_j": ("J", "Of it, for listening"),
@@ -146,6 +150,7 @@ _GLOSSARY = {
     "most_expected_snr_db": ("dB", "Largest SNR on the route by the link budget alone"),
     "visible_share": ("1", "Share of the route's SSBs that 3GPP wants detected (−6 dB or more)"),
     # Operating points and claims.
+    "reading": ("text", "Name of the reading of the paper"),
     "campaign": (
         "text",
         "P: every SSB; Q: fixed at what the computer manages; R: adaptive",
@@ -162,11 +167,43 @@ _GLOSSARY = {
     "unit": ("text", "Unit of stated and obtained"),
     "verdict": (
         "text",
-        "Of a claim: reproduced or not reproduced; of an angle: resolved, or why it may not be "
-        "relied on",
+        "Of a claim: reproduced, not reproduced, not judged; of an angle: resolved, or why it may "
+        "not be relied on",
     ),
-    "fitted": ("true or false", "A parameter was chosen with the claim in view"),
+    "interval": ("any", "95 % interval of obtained over the runs, in its shape"),
+    "turns_with_seed": ("true or false", "Other runs may give another verdict"),
+    "evidence": (
+        "text",
+        "What the verdict is worth: independent, chosen in view of it, by construction, arithmetic",
+    ),
     "note": ("text", "What else there is to say"),
+    "constant_ms": ("ms", "Constant wake-up time in the place of the controller's"),
+    "constant_executions": ("1", "executions with the constant"),
+    "constant_rms_m": ("m", "rms_error_m with the constant"),
+    "gain_m": ("m", "By how much rms_error_m is less with the controller, on the same runs"),
+    "gain_low_m": ("m", "Low end of its paired 95 % interval"),
+    "gain_high_m": ("m", "High end of it"),
+    "matters": ("1", "1: the controller helps; -1: it harms; 0: no difference of 5 % of the error"),
+    "map": ("true or false", "Our tracker knows the road's course"),
+    "worst_error_m": ("m", "The larger of worst_error_x_m and worst_error_y_m"),
+    "papers_executions": ("1", "executions of the paper's adaptive point"),
+    "papers_energy_j": ("J", "energy_j of the paper's adaptive point"),
+    "papers_worst_m": ("m", "worst_error_m of the paper's adaptive point"),
+    "papers_rms_m": ("m", "rms_error_m of the paper's adaptive point"),
+    "error_less_m": ("m", "By how much our rms_error_m is less, on the same runs"),
+    "error_less_low_m": ("m", "Low end of its paired 95 % interval"),
+    "error_less_high_m": ("m", "High end of it"),
+    "executions_less": ("1", "By how much our executions are less, on the same runs"),
+    "executions_less_low": ("1", "Low end of its paired 95 % interval"),
+    "executions_less_high": ("1", "High end of it"),
+    "claim": ("text", "Id of the claim"),
+    "dimension": ("text", "What the paper leaves open"),
+    "first": ("1", "First-order Sobol index of the claim's margin"),
+    "total": ("1", "Total Sobol index of it"),
+    "first_low": ("1", "Low end of the 95 % interval of first"),
+    "first_high": ("1", "High end of it"),
+    "total_low": ("1", "Low end of the 95 % interval of total"),
+    "total_high": ("1", "High end of it"),
     # Recordings.
     "name": ("text", "Name of the radio head"),
     "recording": ("text", "Path of the recording"),
@@ -242,8 +279,8 @@ TABLES: Mapping[str, Table] = {
             "A run",
             "`access_av.simulate(…).runs`",
             (
-                "run", "executions", "listened", *_ENERGIES, "rms_error_m", "max_error_m",
-                "final_error_m", "found_s", "found_m",
+                "run", "executions", "listened", "longest_gap_s", *_ENERGIES, "rms_error_m",
+                "max_error_m", "final_error_m", "found_s", "found_m",
             ),
             {
                 **dict.fromkeys(_ENERGIES, _NO_FIGURE),
@@ -356,11 +393,11 @@ TABLES: Mapping[str, Table] = {
         ),
         Table(
             "operating_points",
-            "An operating point of the evaluation",
-            "`operating_points.parquet` of `access-av evaluate`; `access-av explore --json`; "
-            "`access_av.evaluate(…).points`",
+            "An operating point of a reading of the paper",
+            "`operating_points.parquet` of `access-av evaluate`; `access-av explore --json`; all "
+            "but `reading`: `access_av.evaluate(…).points`",
             (
-                "campaign", "mode", "mode_name", "method", "adaptive", "base_wake_up_ms",
+                "reading", "campaign", "mode", "mode_name", "method", "adaptive", "base_wake_up_ms",
                 "executions", "worst_error_x_m", "worst_error_y_m", "rms_error_m",
                 "energy_per_execution_j", "energy_j", "energy_provenance",
             ),
@@ -374,10 +411,11 @@ TABLES: Mapping[str, Table] = {
         ),
         Table(
             "errors",
-            "A setting of the evaluation and an SSB",
-            "`errors.parquet` of `access-av evaluate`; `access_av.evaluate(…).errors`",
+            "A setting of a reading and an SSB",
+            "`errors.parquet` of `access-av evaluate`; all but `reading`: "
+            "`access_av.evaluate(…).errors`",
             (
-                "method", "adaptive", "base_wake_up_ms", "time_s", "mean_abs_error_x_m",
+                "reading", "method", "adaptive", "base_wake_up_ms", "time_s", "mean_abs_error_x_m",
                 "mean_abs_error_y_m",
             ),
         ),
@@ -389,12 +427,55 @@ TABLES: Mapping[str, Table] = {
         ),
         Table(
             "claims",
-            "A claim of the paper",
+            "A claim of the paper under a reading",
             "`claims.json` of `access-av evaluate`",
             (
-                "id", "says", "where", "stated", "obtained", "unit", "verdict", "fitted", "note",
+                "reading", "id", "says", "where", "stated", "obtained", "interval", "unit",
+                "verdict", "turns_with_seed", "evidence", "note",
             ),
-            {"obtained": "the platform lacks a power mode, or nothing is within the budget"},
+            {
+                "obtained": "it could not be judged, or nothing is within the budget",
+                "interval": "nothing in it is drawn, or it is of modes",
+            },
+        ),
+        Table(
+            "ablations",
+            "A reading and a power mode, with a constant in the controller's place",
+            "`ablations.parquet` of `access-av evaluate`",
+            (
+                "reading", "mode", "constant_ms", "executions", "constant_executions",
+                "rms_error_m", "constant_rms_m", "gain_m", "gain_low_m", "gain_high_m", "matters",
+            ),
+        ),
+        Table(
+            "fixed_front",
+            "MUSIC at a fixed interval",
+            "`fixed_front.parquet` of `access-av evaluate`",
+            (
+                "base_wake_up_ms", "executions", "worst_error_x_m", "worst_error_y_m",
+                "rms_error_m",
+            ),
+        ),
+        Table(
+            "ours",
+            "A power mode: our localizer and wake-up beside the paper's adaptive point",
+            "`ours.parquet` of `access-av evaluate`",
+            (
+                "mode", "map", "executions", "papers_executions", "energy_j", "papers_energy_j",
+                "worst_error_m", "papers_worst_m", "rms_error_m", "papers_rms_m", "error_less_m",
+                "error_less_low_m", "error_less_high_m", "executions_less", "executions_less_low",
+                "executions_less_high",
+            ),
+            dict.fromkeys(("energy_j", "papers_energy_j"), _NO_FIGURE),
+        ),
+        Table(
+            "unknowns",
+            "A claim and something that the paper leaves open",
+            "`unknowns.parquet` of `access-av evaluate --unknowns`",
+            (
+                "claim", "dimension", "first", "total", "first_low", "first_high", "total_low",
+                "total_high",
+            ),
         ),
         Table(
             "cells",

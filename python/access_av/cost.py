@@ -57,14 +57,29 @@ def sensor_cost_ratio() -> float:
 class Saving:
     """Energy that one way of driving saves against another, trip by trip.
 
+    Attributes
+    ----------
+    per_trip_j
+        Energy saved in one trip.
+    trip_s
+        Duration of the trip.
+    duty
+        Share of the day that is driven, trip after trip.
+
     Examples
     --------
-    >>> Saving(per_trip_j=100.0, trips_per_day=1000.0).fleet_per_day_mj(vehicles=50)
+    >>> Saving(per_trip_j=100.0, trip_s=86.4, duty=0.5).fleet_per_day_mj(vehicles=100)
     5.0
     """
 
     per_trip_j: float
-    trips_per_day: float
+    trip_s: float
+    duty: float = 1.0
+
+    @property
+    def trips_per_day(self) -> float:
+        """Trips of one vehicle in 24 hours."""
+        return 86_400.0 * self.duty / self.trip_s
 
     @property
     def per_day_kj(self) -> float:

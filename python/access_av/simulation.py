@@ -46,6 +46,8 @@ class Simulation:
         The angle estimates, one row each. ``None`` unless trajectories were kept.
     error_quantiles_m
         Quantiles of the horizontal error over all runs and SSBs, by probability.
+    errors_m
+        Estimate minus truth in x and y, of shape (runs, SSBs, 2). ``None`` unless kept.
     """
 
     steps: pl.DataFrame
@@ -53,6 +55,7 @@ class Simulation:
     trajectories: pl.DataFrame | None
     executions: pl.DataFrame | None
     error_quantiles_m: Mapping[float, float]
+    errors_m: NDArray[np.float32] | None = None
 
     @property
     def integrity(self) -> Integrity | None:
@@ -84,6 +87,7 @@ def simulate(
     platform: Platform | None = None,
     threads: int | None = None,
     keep_trajectories: bool = False,
+    errors_every: int | None = None,
     estimator: Callable[[NDArray[np.complex128]], Estimate] | None = None,
     policy: Callable[[_core.Situation], bool | Sequence[bool]] | None = None,
     localizer: Callable[[dict[str, Any], dict[str, Any], tuple[float, float, float]], Any]
@@ -106,6 +110,8 @@ def simulate(
         Worker threads; all cores when ``None``. Results do not depend on it.
     keep_trajectories
         Whether to keep every drive's trajectory and executions, not only their statistics.
+    errors_every
+        Keep every drive's errors in x and y at each so many SSBs, for statistics over whole runs.
     estimator
         In place of the vehicle's angle estimator: takes complex snapshots of shape (antennas,
         snapshots) and returns the angle from the array's axis in radians, 0 to π; or that angle
@@ -154,6 +160,7 @@ def simulate(
         platform=platform.core if platform else None,
         threads=threads,
         keep_trajectories=keep_trajectories,
+        errors_every=errors_every,
         estimator=estimator,
         policy=policy,
         localizer=localizer,
@@ -165,6 +172,7 @@ def simulate(
         trajectories=None if found.trajectories is None else _table(found.trajectories),
         executions=None if found.executions is None else _table(found.executions),
         error_quantiles_m=found.error_quantiles_m,
+        errors_m=found.errors_m,
     )
 
 

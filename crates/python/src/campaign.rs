@@ -8,7 +8,7 @@ use ::simulate::{
     Campaign, CampaignOptions, RunRecord, RunSummary, Simulation, SimulationError, Step,
     StepStatistics,
 };
-use numpy::{Element, PyArray1};
+use numpy::{Element, PyArray1, PyArray3, PyArrayMethods};
 use onboard::geometry::Pose;
 use onboard::localize::AngleMeasurement;
 use onboard::settings::Platform as CorePlatform;
@@ -38,6 +38,8 @@ pub struct SimulationResult {
     executions: Option<Py<PyDict>>,
     /// Quantiles of the horizontal error over all runs and SSBs, in metres, by probability.
     error_quantiles_m: Py<PyDict>,
+    /// Errors in x and y in metres, of shape (runs, SSBs, 2); `None` unless kept.
+    errors_m: Option<Py<PyArray3<f32>>>,
 }
 
 /// Drive a scenario many times.
@@ -49,7 +51,7 @@ pub struct SimulationResult {
 #[pyfunction]
 #[pyo3(signature = (
     scenario, runs = 100, seed = 1, *, platform = None, threads = None, first_run = 0,
-    keep_trajectories = false, estimator = None, policy = None, localizer = None, progress = None
+    keep_trajectories = false, errors_every = None, estimator = None, policy = None, localizer = None, progress = None
 ))]
 #[allow(clippy::too_many_arguments, clippy::needless_pass_by_value)] // as Python passes them
 pub fn simulate(
@@ -61,6 +63,7 @@ pub fn simulate(
     threads: Option<usize>,
     first_run: u64,
     keep_trajectories: bool,
+    errors_every: Option<usize>,
     estimator: Option<Py<PyAny>>,
     policy: Option<Py<PyAny>>,
     localizer: Option<Py<PyAny>>,
@@ -73,6 +76,9 @@ pub fn simulate(
     if threads.is_some_and(|threads| !(1..=MOST_THREADS).contains(&threads)) {
         let message = format!("`threads` must be between 1 and {MOST_THREADS}");
         return Err(PyValueError::new_err(message));
+    }
+    if errors_every == Some(0) {
+        return Err(PyValueError::new_err("`errors_every` must be at least 1"));
     }
     let platform = match platform {
         Some(platform) => platform.0.clone(),
@@ -94,6 +100,7 @@ pub fn simulate(
             runs,
             threads,
             keep_records: keep_trajectories,
+            errors_every,
             custom: &|start| plug_ins.custom(&scenario.0, start),
             progress: &|done| {
                 let told = Python::attach(|py| {
@@ -121,7 +128,17 @@ pub fn simulate(
             .then(|| executions(py, &campaign.records))
             .transpose()?,
         error_quantiles_m: error_quantiles(py, &campaign)?,
+        errors_m: errors_every
+            .map(|_| errors(py, &campaign))
+            .transpose()?,
     })
+}
+
+fn errors(py: Python<'_>, campaign: &Campaign) -> PyResult<Py<PyArray3<f32>>> {
+    let runs = campaign.runs.len();
+    let shape = [runs, campaign.errors_m.len() / runs, 2];
+    let flat = PyArray1::from_slice(py, campaign.errors_m.as_flattened());
+    Ok(flat.reshape(shape)?.unbind())
 }
 
 fn python_error(error: SimulationError) -> PyErr {
@@ -208,7 +225,8 @@ fn run_table(py: Python<'_>, campaign: &Campaign) -> PyResult<Py<PyDict>> {
     table.set_item("run", column(py, runs, |run| run.run))?;
     table.set_item("executions", column(py, runs, |run| run.executions as u64))?;
     table.set_item("listened", column(py, runs, |run| run.listened as u64))?;
-    let columns: [Column<RunSummary>; 9] = [
+    let columns: [Column<RunSummary>; 10] = [
+        ("longest_gap_s", |run| run.longest_gap_s),
         ("energy_j", |run| {
             run.energy.map_or(f64::NAN, |energy| energy.total_j())
         }),

@@ -25,6 +25,8 @@ pub struct CampaignOptions<'a> {
     pub threads: Option<usize>,
     /// Whether to keep every run's record.
     pub keep_records: bool,
+    /// Keeps each run's errors at every so many SSBs, which takes far less than its record.
+    pub errors_every: Option<usize>,
     /// The user's own code, made anew for each run.
     pub custom: &'a MakeCustom<'a>,
     /// Told how many runs are done; `false` stops the campaign.
@@ -40,6 +42,7 @@ impl Default for CampaignOptions<'_> {
             runs: 1,
             threads: None,
             keep_records: false,
+            errors_every: None,
             custom: &|_| Ok(Custom::default()),
             progress: &|_| true,
         }
@@ -83,6 +86,8 @@ pub struct RunSummary {
     pub listened: usize,
     /// SSBs at which no choice of angles could keep the bound of an uncertainty-driven wake-up.
     pub out_of_reach: usize,
+    /// Longest time from one estimated angle to the next, in seconds; 0 with fewer than two.
+    pub longest_gap_s: f64,
     /// Its energy, where the platform has figures for the method.
     pub energy: Option<Energy>,
     /// Root mean square of its horizontal error in metres.
@@ -110,6 +115,8 @@ pub struct Campaign {
     pub integrity: Vec<IntegritySummary>,
     /// The runs' records, where asked for.
     pub records: Vec<RunRecord>,
+    /// Errors in x and y in metres of each run at every so many SSBs, run by run, where asked for.
+    pub errors_m: Vec<[f32; 2]>,
 }
 
 #[derive(Default, Clone)]
@@ -141,6 +148,7 @@ impl Simulation {
         let mut runs = Vec::with_capacity(options.runs);
         let mut integrity = Vec::new();
         let mut records = Vec::new();
+        let mut errors_m = Vec::new();
         let integrity_settings = self.scenario().vehicle.integrity;
         let alert_limit_m = integrity_settings.map_or(f64::INFINITY, |it| it.alert_limit_m);
         let pool = ThreadPoolBuilder::new()
@@ -160,6 +168,10 @@ impl Simulation {
                 add_up(&record, &mut sums, &mut errors);
                 runs.push(summary(&record, energy.as_ref()));
                 integrity.extend(IntegritySummary::new(&record, alert_limit_m));
+                if let Some(every) = options.errors_every {
+                    let kept = record.steps.iter().step_by(every.max(1));
+                    errors_m.extend(kept.map(Step::error_xy_m));
+                }
                 if options.keep_records {
                     records.push(record);
                 }
@@ -177,6 +189,7 @@ impl Simulation {
             errors,
             integrity,
             records,
+            errors_m,
         })
     }
 }
@@ -192,6 +205,7 @@ impl Campaign {
             errors: ErrorHistogram::default(),
             integrity: Vec::new(),
             records: Vec::new(),
+            errors_m: Vec::new(),
         };
         for record in records {
             if sums.is_empty() {
@@ -210,12 +224,16 @@ fn summary(record: &RunRecord, energy: Option<&EnergyModel>) -> RunSummary {
     let located = || record.steps.iter().filter(|step| !step.searching);
     let errors_m = || located().map(Step::error_m);
     let duration_s = record.steps.last().map_or(0.0, |step| step.time_s);
+    let executions = record.executions.as_slice();
+    let times_s = executions.iter().map(|execution| execution.ssb.time_s);
+    let gaps_s = times_s.clone().zip(times_s.skip(1)).map(|(before, after)| after - before);
     let squares_m2: f64 = errors_m().map(|error_m| error_m * error_m).sum();
     RunSummary {
         run: record.run,
         executions: record.executions.len(),
         listened: record.listened,
         out_of_reach: record.out_of_reach,
+        longest_gap_s: gaps_s.fold(0.0, f64::max),
         energy: energy
             .map(|model| model.of_run(record.executions.len(), record.listened, duration_s)),
         rms_error_m: (squares_m2 / located().count() as f64).sqrt(),

@@ -25,6 +25,12 @@ pub struct Step {
 }
 
 impl Step {
+    /// Estimate minus truth in x and in y, in metres.
+    pub fn error_xy_m(&self) -> [f32; 2] {
+        let (estimate, truth) = (self.estimate, self.truth);
+        [estimate.x_m - truth.x_m, estimate.y_m - truth.y_m].map(|error_m| error_m as f32)
+    }
+
     /// Horizontal error in metres.
     pub fn error_m(&self) -> f64 {
         self.truth.point().distance_m(self.estimate.point())

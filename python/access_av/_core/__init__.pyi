@@ -185,6 +185,8 @@ class SimulationResult:
     def executions(self) -> dict[str, Any] | None: ...
     @property
     def error_quantiles_m(self) -> dict[float, float]: ...
+    @property
+    def errors_m(self) -> NDArray[np.float32] | None: ...
 
 @final
 class Bound:
@@ -208,6 +210,7 @@ def simulate(
     threads: int | None = None,
     first_run: int = 0,
     keep_trajectories: bool = False,
+    errors_every: int | None = None,
     estimator: Callable[[NDArray[np.complex128]], Any] | None = None,
     policy: Callable[[Situation], bool | Sequence[bool]] | None = None,
     localizer: Callable[..., Any] | None = None,

@@ -16,15 +16,17 @@ from typing import TYPE_CHECKING
 from access_av.lazy import attach
 
 if TYPE_CHECKING:
-    from access_av.paper import claims, energy_fit, evaluation, study
+    from access_av.paper import claims, energy_fit, evaluation, readings, study
     from access_av.paper.claims import Claim, check_claims
     from access_av.paper.energy_fit import fit_energy
     from access_av.paper.evaluation import Evaluation, evaluate
+    from access_av.paper.readings import Reading
     from access_av.paper.statements import paper_numbers
 
 __all__ = [
     "Claim",
     "Evaluation",
+    "Reading",
     "check_claims",
     "claims",
     "energy_fit",
@@ -32,6 +34,7 @@ __all__ = [
     "evaluation",
     "fit_energy",
     "paper_numbers",
+    "readings",
     "study",
 ]
 
@@ -42,7 +45,8 @@ if not TYPE_CHECKING:
             "access_av.paper.claims": ["Claim", "check_claims"],
             "access_av.paper.energy_fit": ["fit_energy"],
             "access_av.paper.evaluation": ["Evaluation", "evaluate"],
+            "access_av.paper.readings": ["Reading"],
             "access_av.paper.statements": ["paper_numbers"],
         },
-        modules=["claims", "energy_fit", "evaluation", "study"],
+        modules=["claims", "energy_fit", "evaluation", "readings", "study"],
     )

@@ -1,50 +1,63 @@
-"""The paper's claims beside what the evaluation obtains.
-
-Errors are the mean over the runs of the absolute error, worst along the track. What the paper
-states is in ``paper.toml``; how each number is obtained is here.
-"""
+"""The paper's claims beside what the evaluation obtains, with what each verdict is worth."""
 
 from __future__ import annotations
 
 from dataclasses import asdict, dataclass
 from typing import TYPE_CHECKING, Any
 
-import polars as pl
+import numpy as np
 
-from access_av.cost import Saving, roadside_units, sensor_cost_ratio
-from access_av.design_space import Query, explore
-from access_av.methods import label
-from access_av.paper.methods import METHODS
-from access_av.paper.statements import of_claim, stated_claims, trips_per_day
+from access_av.errors import InputError
+from access_av.paper.findings import FINDINGS, Finding, MissingFigureError
+from access_av.paper.margins import margin
+from access_av.paper.statements import stated_claims
 
 if TYPE_CHECKING:
-    from collections.abc import Callable, Mapping
+    from collections.abc import Collection, Mapping
 
-    from access_av.paper.evaluation import Evaluation
+    from access_av.paper.outcome import Numbers, Outcome
 
 REPRODUCED = "reproduced"
 NOT_REPRODUCED = "not reproduced"
+NOT_JUDGED = "not judged"
 
-# The parameters that were chosen with the paper's claims in view.
-RADIO = (
-    "what the paper leaves open of radio and controller (SNR level, Rician K, SNR set point and "
-    "its scale, heading between two estimates)"
-)
-ENERGY = "energy per execution, per mode and method"
+INDEPENDENT = "independent"
+CHOSEN = "chosen in view of it"
+BY_CONSTRUCTION = "by construction"
+ARITHMETIC = "arithmetic"
+# From the one that says most to the one that says least.
+EVIDENCE = (INDEPENDENT, CHOSEN, BY_CONSTRUCTION, ARITHMETIC)
+
+# A verdict turns with the seed unless its margin is this many standard deviations of the difference
+# between two seeds away from zero: 99 % of other seeds agree.
+SAFE_DEVIATIONS = 2.58
 
 
 @dataclass(frozen=True)
 class Claim:
-    """One statement of the paper and what we obtain for it."""
+    """One statement of the paper under one reading, and what is obtained for it.
 
+    Attributes
+    ----------
+    interval
+        95 % interval of ``obtained`` over the runs; ``None`` where nothing is drawn, or for modes.
+    turns_with_seed
+        Whether other runs may give another verdict.
+    evidence
+        One of :data:`EVIDENCE`: what the verdict is worth.
+    """
+
+    reading: str
     id: str
     says: str
     where: str
     stated: Any
     obtained: Any
+    interval: Any
     unit: str
     verdict: str
-    fitted: bool
+    turns_with_seed: bool
+    evidence: str
     note: str
 
     @property
@@ -53,75 +66,56 @@ class Claim:
         return self.verdict == REPRODUCED
 
 
-class MissingModeError(Exception):
-    """A power mode that a claim is about and the platform does not have."""
-
-
-@dataclass(frozen=True)
-class Finding:
-    """What the evaluation gives for a claim, and what was fitted to get there."""
-
-    obtained: Any
-    fitted: tuple[str, ...] = ()
-    note: str = ""
-    conflict: str = ""
-
-
-def judge(rule: str, stated: Any, obtained: Any, tolerance: float = 0.0) -> bool:
-    """Whether an obtained value meets a stated one under a rule of ``paper.toml``.
+def evidence(entry: Mapping[str, Any], chosen: Collection[str]) -> str:
+    """What it is worth that a claim is met, where ``chosen`` was chosen in view of the claims.
 
     Examples
     --------
-    >>> judge("about", 0.8, 0.7, tolerance=0.25), judge("above", 52.0, 51.9)
-    (True, False)
+    >>> evidence({"rests_on": ["radio"]}, chosen=["controller"])
+    'independent'
     """
-    if obtained is None:
-        return False
-    if rule == "exactly":
-        return bool(stated == obtained)
-    if rule == "query":
-        return bool(
-            obtained["best_mode"] == stated["best_mode"]
-            and judge("about", stated["energy_j"], obtained["energy_j"], tolerance)
-            and obtained["rms_m"] < stated["rms_below_m"]
-        )
-    if isinstance(stated, dict):
-        return all(judge(rule, stated[key], obtained[key], tolerance) for key in stated)
-    compare: Mapping[str, Callable[[], bool]] = {
-        "at_most": lambda: obtained <= stated,
-        "above": lambda: obtained > stated,
-        "about": lambda: abs(obtained - stated) <= tolerance * stated,
-    }
-    return bool(compare[rule]())
+    if "evidence" in entry:
+        return str(entry["evidence"])
+    # Energies are fitted to the paper's figures under every reading.
+    return CHOSEN if {*entry["rests_on"]} & {*chosen, "energy"} else INDEPENDENT
 
 
-def check_claims(evaluation: Evaluation) -> list[Claim]:
-    """Judge every claim of the paper, in the paper's order."""
-    claims = []
+def check_claims(
+    outcome: Outcome,
+    *,
+    reading: str = "",
+    chosen: Collection[str] = ("radio", "controller"),
+    stated: Mapping[str, Any] | None = None,
+) -> list[Claim]:
+    """Judge every claim of the paper, in the paper's order.
+
+    Parameters
+    ----------
+    outcome
+        The campaigns of one reading; variants beside the first are resamples of its runs.
+    reading
+        Its name.
+    chosen
+        What of it was chosen in view of the claims.
+    stated
+        Claims as ``paper.toml`` has them; its own when ``None``. One that cannot be judged says why
+        in its note, and the others are judged.
+    """
+    return [
+        _judge(claim_id, entry, outcome, reading, chosen)
+        for claim_id, entry in (stated_claims() if stated is None else stated).items()
+    ]
+
+
+def margins(outcome: Outcome) -> dict[str, Numbers]:
+    """By how much each claim is met in every variant; what cannot be judged is absent."""
+    found = {}
     for claim_id, entry in stated_claims().items():
         try:
-            finding = FINDINGS[claim_id](evaluation)
-        except MissingModeError as error:
-            finding = Finding(None, note=str(error))
-        met = judge(
-            entry["rule"], entry["stated"], finding.obtained, float(entry.get("tolerance", 0.0))
-        )
-        fitted_note = f"Fitted: {'; '.join(finding.fitted)}." if finding.fitted else ""
-        notes = (finding.note, "" if met else finding.conflict, fitted_note)
-        claims.append(
-            Claim(
-                id=claim_id,
-                says=entry["says"],
-                where=entry["where"],
-                stated=entry["stated"],
-                obtained=_rounded(finding.obtained),
-                unit=entry["unit"],
-                verdict=REPRODUCED if met else NOT_REPRODUCED,
-                fitted=bool(finding.fitted),
-                note=" ".join(filter(None, notes)),
-            )
-        )
-    return claims
+            found[claim_id] = margin(entry, FINDINGS[claim_id](outcome).value)
+        except MissingFigureError:
+            continue
+    return found
 
 
 def as_records(claims: list[Claim]) -> list[dict[str, Any]]:
@@ -129,239 +123,84 @@ def as_records(claims: list[Claim]) -> list[dict[str, Any]]:
     return [asdict(claim) for claim in claims]
 
 
-def _rounded(value: Any) -> Any:
-    if isinstance(value, float):
-        return round(value, 4)
-    if isinstance(value, dict):
-        return {key: _rounded(item) for key, item in value.items()}
-    return value
-
-
-# --- Accuracy -------------------------------------------------------------------------------------
-
-
-def _worst(points: pl.DataFrame) -> float:
-    worst = points.select(pl.max_horizontal("worst_error_x_m", "worst_error_y_m").max()).item()
-    return float(worst)
-
-
-def _a1(evaluation: Evaluation) -> Finding:
-    adaptive = evaluation.campaign("R")
-    worst_x_m, worst_y_m = adaptive.select(pl.col("worst_error_x_m", "worst_error_y_m").max()).row(
-        0
-    )
-    return Finding(
-        max(worst_x_m, worst_y_m),
-        fitted=(RADIO,),
-        note=f"Worst over the modes: X {worst_x_m:.3f} m, Y {worst_y_m:.3f} m.",
-    )
-
-
-def _a2(evaluation: Evaluation) -> Finding:
-    least, against = 1.0, ""
-    for point in evaluation.campaign("R").iter_rows(named=True):
-        ours = evaluation.horizontal_error_m(point)
-        for rival in (
-            evaluation.campaign("Q").filter(pl.col("mode") == point["mode"]).iter_rows(named=True)
-        ):
-            fraction = float((ours < evaluation.horizontal_error_m(rival)).mean())
-            if fraction < least:
-                least, against = fraction, f"{label(rival['method'])} in mode {point['mode']}"
-    return Finding(
-        least,
-        fitted=(RADIO,),
-        note=f"Closest rival: {against}." if against else "Everywhere, against every rival.",
+def _judge(
+    claim_id: str,
+    entry: Mapping[str, Any],
+    outcome: Outcome,
+    reading: str,
+    chosen: Collection[str],
+) -> Claim:
+    finding: Finding | None = None
+    met, turns = False, False
+    try:
+        if claim_id not in FINDINGS:
+            raise InputError(f"nothing is obtained for it; claims are: {', '.join(FINDINGS)}")
+        finding = FINDINGS[claim_id](outcome)
+        by = np.atleast_1d(margin(entry, finding.value))
+        met = bool(by[0] >= 0.0)
+        turns = _turns(by)
+        note = " ".join(filter(None, (finding.note, "" if met else finding.conflict)))
+    except (MissingFigureError, InputError) as error:
+        finding, note = None, f"Not judged: {error}"
+    return Claim(
+        reading=reading,
+        id=claim_id,
+        says=entry["says"],
+        where=entry["where"],
+        stated=entry["stated"],
+        obtained=None if finding is None else _obtained(entry, finding.value),
+        interval=None if finding is None else _interval(finding.value),
+        unit=entry["unit"],
+        verdict=NOT_JUDGED if finding is None else REPRODUCED if met else NOT_REPRODUCED,
+        turns_with_seed=turns,
+        evidence=evidence(entry, chosen),
+        note=note,
     )
 
 
-def _a3(evaluation: Evaluation) -> Finding:
-    worst = {
-        method: _worst(evaluation.campaign("P").filter(pl.col("method") == method))
-        for method in METHODS
-    }
-    each = ", ".join(f"{label(method)} {value:.2f} m" for method, value in worst.items())
-    return Finding(sum(worst.values()) / len(worst), fitted=(RADIO,), note=f"{each}.")
+def _turns(margins: Numbers) -> bool:
+    spread = float(np.std(margins[1:])) if len(margins) > 2 else 0.0
+    return bool(abs(margins[0]) < SAFE_DEVIATIONS * np.sqrt(2.0) * spread)
 
 
-def _worst_y(evaluation: Evaluation, method: str) -> Finding:
-    fixed = pl.concat([evaluation.campaign("P"), evaluation.campaign("Q")])
-    row = fixed.filter(pl.col("method") == method).sort("worst_error_y_m").row(-1, named=True)
-    return Finding(
-        row["worst_error_y_m"],
-        fitted=(RADIO,),
-        note=f"Worst at the fixed interval of {row['base_wake_up_ms']:g} ms.",
-    )
-
-
-def _a4(evaluation: Evaluation) -> Finding:
-    return _worst_y(evaluation, "esprit")
-
-
-def _a5(evaluation: Evaluation) -> Finding:
-    return _worst_y(evaluation, "root_music")
-
-
-def _a6(evaluation: Evaluation) -> Finding:
-    return Finding(
-        max(_worst(_in_mode(evaluation, "R", mode)) for mode in (1, 2, 3)),
-        fitted=(RADIO,),
-        conflict=(
-            "Modes 1, 2 and 3 wake up least often, and scatter that stays the same during an SSB "
-            "weighs most there: the bound is kept at a Rician K of 40 dB, while at 30 dB the error "
-            "is about 0.2 m and falls on either side of it from seed to seed."
-        ),
-    )
-
-
-# --- Energy ---------------------------------------------------------------------------------------
-
-
-def _in_mode(evaluation: Evaluation, campaign: str, mode: int) -> pl.DataFrame:
-    rows = evaluation.campaign(campaign).filter(pl.col("mode") == mode)
-    if rows.is_empty():
-        raise MissingModeError(f"Platform {evaluation.platform.name} has no mode {mode}.")
-    return rows
-
-
-def _fixed_by_method(evaluation: Evaluation, mode: int, column: str) -> dict[str, float]:
-    rows = _in_mode(evaluation, "Q", mode)
-    return dict(zip(rows["method"], rows[column], strict=True))
-
-
-def _adaptive(evaluation: Evaluation, mode: int, column: str) -> float:
-    return float(_in_mode(evaluation, "R", mode)[column].item())
-
-
-def savings_percent(evaluation: Evaluation, mode: int) -> dict[str, float]:
-    """Energy that adaptive MUSIC saves in a mode, against each fixed method."""
-    adaptive_j = _adaptive(evaluation, mode, "energy_j")
-    fixed_j = _fixed_by_method(evaluation, mode, "energy_j")
-    return {method: 100.0 * (1.0 - adaptive_j / energy_j) for method, energy_j in fixed_j.items()}
-
-
-def _mean_saving_percent(evaluation: Evaluation, mode: int) -> float:
-    savings = savings_percent(evaluation, mode)
-    return sum(savings.values()) / len(savings)
-
-
-def _e1(evaluation: Evaluation) -> Finding:
-    return Finding(_fixed_by_method(evaluation, 0, "energy_j"), fitted=(ENERGY,))
-
-
-def _e2(evaluation: Evaluation) -> Finding:
-    return Finding(_fixed_by_method(evaluation, 0, "executions"))
-
-
-def _e3_saving(evaluation: Evaluation) -> Finding:
-    each = "; ".join(
-        f"mode {mode}: "
-        + ", ".join(
-            f"{label(method)} {percent:.1f} %"
-            for method, percent in savings_percent(evaluation, mode).items()
+def _obtained(entry: Mapping[str, Any], value: Any) -> Any:
+    """The value of the sample as it is, in the stated one's shape."""
+    if entry["rule"] == "modes":
+        query = entry["query"]
+        return sorted(
+            mode
+            for mode, each in value.items()
+            if _first(each["energy_j"]) <= query["max_energy_j"]
+            and _first(each["rms_m"]) <= query["max_rms_m"]
         )
-        for mode in (6, 7)
-    )
-    return Finding(
-        min(_mean_saving_percent(evaluation, mode) for mode in (6, 7)),
-        fitted=(ENERGY,),
-        note=f"Mean over the three fixed methods, the lesser of both modes ({each}).",
-    )
-
-
-def _e3_executions(evaluation: Evaluation) -> Finding:
-    in_6, in_7 = (_fixed_by_method(evaluation, mode, "executions") for mode in (6, 7))
-    return Finding({method: min(in_6[method], in_7[method]) for method in METHODS})
-
-
-def _e4(evaluation: Evaluation) -> Finding:
-    modes = evaluation.campaign("R")["mode"].to_list()
-    means = [_mean_saving_percent(evaluation, mode) for mode in modes]
-    music = [savings_percent(evaluation, mode)["music"] for mode in modes]
-    return Finding(
-        sum(means) / len(means),
-        fitted=(ENERGY,),
-        note=(
-            f"Mean over modes and methods. Against fixed MUSIC alone, where the energy per "
-            f"execution cancels out and nothing is fitted: {sum(music) / len(music):.1f} %."
-        ),
-    )
-
-
-def saving(evaluation: Evaluation, mode: int) -> Saving:
-    """What adaptive MUSIC saves in a mode against MUSIC at its base wake-up time."""
-    fixed_j = _fixed_by_method(evaluation, mode, "energy_j")["music"]
-    adaptive_j = _adaptive(evaluation, mode, "energy_j")
-    return Saving(per_trip_j=fixed_j - adaptive_j, trips_per_day=trips_per_day())
-
-
-def _e5(evaluation: Evaluation) -> Finding:
-    return Finding(saving(evaluation, 0).per_day_kj, fitted=(ENERGY,))
-
-
-def _e6(evaluation: Evaluation) -> Finding:
-    return Finding(saving(evaluation, 0).fleet_per_day_mj(vehicles=100), fitted=(ENERGY,))
-
-
-# --- Design space and cost ------------------------------------------------------------------------
-
-
-def _d1(evaluation: Evaluation) -> Finding:
-    found = explore(evaluation.campaign("R"), Query(**of_claim("d1_budget_210_j", "query")))
-    if found.is_empty():
-        return Finding(None, (RADIO, ENERGY), note="No mode is within the budget.")
-    best = found.row(0, named=True)
-    return Finding(
-        {"best_mode": best["mode"], "energy_j": best["energy_j"], "rms_m": best["rms_error_m"]},
-        fitted=(RADIO, ENERGY),
-    )
-
-
-def _d2(evaluation: Evaluation) -> Finding:
-    found = explore(
-        evaluation.campaign("R"), Query(**of_claim("d2_budget_260_j_rms_015_m", "query"))
-    )
-    return Finding(
-        sorted(found["mode"].to_list()),
-        fitted=(RADIO, ENERGY),
-        conflict=(
-            "Modes 6 and 7 have the same base wake-up time (100 ms), so the adaptive drive and its "
-            "error are the same in both; mode 7 needs 206.5 J (d1). Whatever bound admits mode 6 "
-            "admits mode 7 too, and the paper's list leaves it out."
-        ),
-    )
-
-
-def _c1(_: Evaluation) -> Finding:
-    return Finding(sensor_cost_ratio())
-
-
-def _c2(_: Evaluation) -> Finding:
-    four = roadside_units(4)
-    return Finding(
-        {
-            "capital_low": four.capital_low_usd,
-            "capital_high": four.capital_high_usd,
-            "yearly": four.yearly_usd,
+    if entry["rule"] == "query":
+        budget_j = entry["query"]["max_energy_j"]
+        energies_j = {mode: _first(each["energy_j"]) for mode, each in value.items()}
+        within = {mode: energy for mode, energy in energies_j.items() if energy <= budget_j}
+        if not within:
+            return None
+        best = min(within, key=lambda mode: within[mode])
+        return {
+            "best_mode": best,
+            "energy_j": round(within[best], 4),
+            "rms_m": round(_first(value[best]["rms_m"]), 4),
         }
-    )
+    if isinstance(value, dict):
+        return {key: round(_first(item), 4) for key, item in value.items()}
+    return round(_first(value), 4)
 
 
-FINDINGS: dict[str, Callable[[Evaluation], Finding]] = {
-    "a1_adaptive_worst_m": _a1,
-    "a2_adaptive_beats_fixed": _a2,
-    "a3_theoretical_20ms_worst_m": _a3,
-    "a4_esprit_worst_y_m": _a4,
-    "a5_root_music_worst_y_m": _a5,
-    "a6_modes_1_2_3_adaptive_worst_m": _a6,
-    "e1_mode0_fixed_j": _e1,
-    "e2_mode0_executions": _e2,
-    "e3_mode67_saving_percent": _e3_saving,
-    "e3_mode67_executions": _e3_executions,
-    "e4_average_saving_percent": _e4,
-    "e5_mode0_saved_per_day_kj": _e5,
-    "e6_fleet_of_100_saved_per_day_mj": _e6,
-    "d1_budget_210_j": _d1,
-    "d2_budget_260_j_rms_015_m": _d2,
-    "c1_sensor_cost_ratio_above": _c1,
-    "c2_four_rsu_usd": _c2,
-}
+def _first(value: Numbers) -> float:
+    return float(np.atleast_1d(value)[0])
+
+
+def _interval(value: Any) -> Any:
+    if isinstance(value, dict):
+        if any(isinstance(item, dict) for item in value.values()):
+            return None
+        each = {key: _interval(item) for key, item in value.items()}
+        return each if any(each.values()) else None
+    drawn = np.atleast_1d(value)[1:]
+    if len(drawn) < 2 or np.ptp(drawn) == 0.0:
+        return None
+    return [round(float(end), 4) for end in np.quantile(drawn, (0.025, 0.975))]

@@ -1,4 +1,4 @@
-"""Commands of the paper: ``evaluate``, ``explore`` and ``fit``."""
+"""Commands of the paper: ``evaluate``, ``readings``, ``search``, ``explore`` and ``fit``."""
 
 from __future__ import annotations
 
@@ -9,50 +9,156 @@ from typing import Annotated, Any
 
 import typer
 
-from access_av.commands.options import (
-    AsJson,
-    Out,
-    PlatformOption,
-    Runs,
-    ScenarioOption,
-    Seed,
-    Threads,
-)
+from access_av.commands.options import AsJson, Out, PlatformOption, Runs, Seed, Threads
 from access_av.terminal import console, progress, show_points, table
 
 app = typer.Typer()
+
+ReadingOption = Annotated[str, typer.Option(help="Name of a reading, or path of a scenario file.")]
 
 
 @app.command(
     epilog="Example: [bold]access-av evaluate --runs 20 --out results/quick[/]",
 )
 def evaluate(
-    scenario: ScenarioOption = "paper",
+    reading: Annotated[
+        list[str] | None,
+        typer.Option(help="Only these readings: names, or paths of scenario files."),
+    ] = None,
+    scenario: Annotated[
+        str | None, typer.Option(help="Instead of readings: a scenario of the paper's trip.")
+    ] = None,
     platform: PlatformOption = "jetson-agx-xavier",
     runs: Runs = 100,
     seed: Seed = 1,
+    unknowns: Annotated[
+        bool, typer.Option("--unknowns", help="Also: on what the claims hang (takes minutes).")
+    ] = False,
+    claims: Annotated[
+        Path | None, typer.Option(help="Claims to judge, as in paper.toml; else the paper's.")
+    ] = None,
     threads: Threads = None,
     out: Out = None,
 ) -> None:
-    """Run the paper's whole evaluation and write the report.
+    """Read the paper in every way it can be, judge its claims, write the report.
 
-    Three campaigns: every method at every SSB, every method at what the computer manages, and
-    adaptive MUSIC, each over all power modes. results/latest points to the files.
+    Three campaigns for each reading: every method at every SSB, every method at what the computer
+    manages, and adaptive MUSIC, each over all power modes. results/latest points to the files.
     """
+    from access_av.files import RESULTS
     from access_av.paper import study
-    from access_av.paper.terminal import show_claims, show_evaluation
+    from access_av.paper.terminal import show_study
 
+    names = [*(reading or []), *([scenario] if scenario else [])]
     with progress("Driving") as tick:
-        finished = study.run(
-            scenario, platform, runs=runs, seed=seed, threads=threads, out=out, progress=tick
+        made, directory = study.run(
+            names,
+            platform,
+            runs=runs,
+            seed=seed,
+            threads=threads,
+            out=out,
+            parts=RESULTS / "parts" if unknowns else None,
+            stated=None if claims is None else _claims(claims),
+            progress=tick,
         )
-    show_evaluation(finished.evaluation)
-    show_claims(finished.claims)
+    show_study(made)
     console.print(
-        f"{runs} runs per setting in {finished.evaluation.duration_s:.1f} s. "
-        f"Report: {finished.directory.path / 'report.html'}",
+        f"{runs} runs per setting in {made.duration_s:.1f} s. "
+        f"Report: {directory.path / 'report.html'}",
         soft_wrap=True,
     )
+
+
+def _claims(path: Path) -> dict[str, Any]:
+    from access_av.errors import InputError
+    from access_av.toml import tomllib
+
+    try:
+        read = tomllib.loads(path.read_text(encoding="utf-8"))
+    except (tomllib.TOMLDecodeError, UnicodeDecodeError) as error:
+        raise InputError(f"{path}: {error}") from error
+    found = read.get("claims")
+    if not isinstance(found, dict) or not found:
+        raise InputError(f"{path}: no table [claims]")
+    for name, entry in found.items():
+        if not isinstance(entry, dict):
+            raise InputError(f"{path}: claims.{name}: it must be a table")
+        needed = {"says", "where", "unit", "rule", "stated"}
+        if missing := sorted(needed - entry.keys()):
+            raise InputError(f"{path}: claims.{name}: {', '.join(missing)} missing")
+        if not {"rests_on", "evidence"} & entry.keys():
+            raise InputError(f"{path}: claims.{name}: it needs `rests_on` or `evidence`")
+    return dict(found)
+
+
+@app.command(
+    epilog="Example: [bold]access-av readings gate-t-max[/]",
+)
+def readings(
+    name: Annotated[str | None, typer.Argument(help="Print this one as a scenario.")] = None,
+) -> None:
+    """List the readings of the paper, or print one with every default written out."""
+    from access_av.paper import readings as known
+
+    if name is not None:
+        print(known.load(name).scenario.to_toml(), end="")
+        return
+    made = table(["reading", "what it is", "chosen in view of the claims"], text=3)
+    for one in known.load_all():
+        made.add_row(one.name, one.scenario.description, ", ".join(one.chosen) or "nothing")
+    console.print(made)
+
+
+@app.command(
+    epilog="Example: [bold]access-av search --worlds 64 --controllers 32[/]",
+)
+def search(
+    platform: PlatformOption = "jetson-agx-xavier",
+    worlds: Annotated[int, typer.Option(min=1, help="Worlds to draw.")] = 64,
+    controllers: Annotated[int, typer.Option(min=1, help="Controllers in each.")] = 32,
+    runs: Runs = 20,
+    confirm: Annotated[
+        int, typer.Option(min=0, help="Drives per setting of the best and its neighbours.")
+    ] = 200,
+    seed: Seed = 1,
+    threads: Threads = None,
+    out: Annotated[
+        Path | None, typer.Option(help="Write the best reading as a scenario file.")
+    ] = None,
+) -> None:
+    """Search for the reading of Algorithm 1 as written that meets most claims.
+
+    Draws from what the paper leaves open; no gate, t_max kept. A search that was stopped goes on
+    where it was (results/parts). The best one and its neighbours are driven again, more often.
+    """
+    from access_av.files import RESULTS
+    from access_av.paper.search import as_reading, confirmed, sample
+    from access_av.paper.terminal import show_search
+    from access_av.platform import Platform
+
+    board = Platform.load(platform)
+    with progress("Readings") as tick:
+        found = sample(
+            board,
+            RESULTS / "parts",
+            worlds=worlds,
+            controllers=controllers,
+            runs=runs,
+            seed=seed,
+            threads=threads,
+            progress=tick,
+        )
+    checked = (
+        confirmed(board, found, RESULTS / "parts", runs=confirm, seed=seed + 1, threads=threads)
+        if confirm
+        else []
+    )
+    show_search(found, checked)
+    if out is not None:
+        best = checked[0].values if checked else found.values(found.best()[0])
+        out.write_text(as_reading(best).scenario.to_toml(), encoding="utf-8")
+        console.print(f"Scenario: {out}", soft_wrap=True)
 
 
 def _finite(value: float | None) -> float | None:
@@ -75,6 +181,7 @@ def explore(
     max_executions: Annotated[float | None, _bound("Angle estimates in a trip.")] = None,
     mode: Annotated[list[int] | None, typer.Option(help="Only these power modes.")] = None,
     fixed: Annotated[bool, typer.Option("--fixed", help="Also the fixed wake-up times.")] = False,
+    reading: ReadingOption = "gate",
     results: Annotated[
         Path | None, typer.Option(help="Results of an evaluation; else results/latest.")
     ] = None,
@@ -89,7 +196,7 @@ def explore(
     from access_av.paper import study
 
     with progress("No evaluation yet, driving") as tick:
-        points = study.operating_points(results, progress=tick)
+        points = study.operating_points(results, reading, progress=tick)
     if not fixed:
         points = points.filter(adaptive=True)
     query = Query(max_energy_j, max_rms_m, max_worst_m, max_executions, mode)
@@ -114,7 +221,7 @@ def explore(
     epilog="Example: [bold]access-av fit --runs 100 --out fitted.toml[/]",
 )
 def fit(
-    scenario: ScenarioOption = "paper",
+    reading: ReadingOption = "gate",
     platform: PlatformOption = "jetson-agx-xavier",
     runs: Runs = 100,
     seed: Seed = 1,
@@ -130,17 +237,19 @@ def fit(
     """
     from access_av.methods import label
     from access_av.paper import study
+    from access_av.paper.energy_fit import FREE, SOLVED
     from access_av.paper.methods import METHODS
 
     with progress("Counting executions") as tick:
         fitted = study.fit_platform(
-            scenario, platform, runs=runs, seed=seed, threads=threads, progress=tick
+            reading, platform, runs=runs, seed=seed, threads=threads, progress=tick
         )
     made = table(["mode", *map(label, METHODS)], title="Energy per execution in J, fitted")
     for mode in fitted.modes:
         energies = (mode.energy_per_execution_j[method] for method in METHODS)
         made.add_row(str(mode.number), *(f"{energy.value:.4f}" for energy in energies))
     console.print(made)
+    console.print(f"{FREE} numbers were free, {SOLVED} of them solved for from stated figures.")
     if out is not None:
         out.write_text(fitted.to_toml(), encoding="utf-8")
         console.print(f"Platform file: {out}", soft_wrap=True)

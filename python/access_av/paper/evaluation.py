@@ -1,4 +1,4 @@
-"""The paper's evaluation: three campaigns over methods, power modes and wake-up policies.
+"""The paper's evaluation under one reading: three campaigns over methods, modes and policies.
 
 P   every method at every SSB (20 ms), what the radio would allow;
 Q   every method in every power mode at its base wake-up time, what the computer allows;
@@ -12,7 +12,6 @@ from __future__ import annotations
 
 import time
 from dataclasses import dataclass
-from functools import partial
 from typing import TYPE_CHECKING, Any
 
 import numpy as np
@@ -20,20 +19,22 @@ import polars as pl
 
 from access_av._core import Scenario
 from access_av.errors import InputError
+from access_av.paper.drives import Driven, Driver
+from access_av.paper.energy_fit import NEEDED_MODES, ModeDemand, fit_energy
+from access_av.paper.findings import MissingFigureError, energy_j
 from access_av.paper.methods import METHODS
+from access_av.paper.outcome import Drives, Outcome
+from access_av.paper.readings import SHIPPED, Reading, load
 from access_av.paper.statements import paper_numbers
-from access_av.platform import Platform, PowerMode
-from access_av.simulation import simulate
+from access_av.platform import Platform
 
 if TYPE_CHECKING:
-    from collections.abc import Callable, Mapping
+    from collections.abc import Callable, Mapping, Sequence
 
-    from numpy.typing import NDArray
-
-    from access_av.simulation import Simulation
+    from access_av.platform import PowerMode
 
 
-@dataclass(frozen=True, order=True)
+@dataclass(frozen=True)
 class Setting:
     """What a drive depends on besides scenario and seed."""
 
@@ -41,18 +42,10 @@ class Setting:
     adaptive: bool
     base_wake_up_ms: float
 
-    def apply(self, scenario: Scenario, mode: PowerMode) -> Scenario:
-        """The scenario with this method and wake-up policy, in a power mode."""
-        changes: dict[str, Any] = {
-            "vehicle.estimator.method": self.method.replace("_", "-"),
-            "vehicle.platform.mode": mode.number,
-        }
-        if self.adaptive:
-            changes |= {
-                "vehicle.wake_up.policy": "pid",
-                "vehicle.wake_up.base_ms": self.base_wake_up_ms,
-            }
-        else:
+    def apply(self, scenario: Scenario) -> Scenario:
+        """The scenario with this method, and with this interval where it is a fixed one."""
+        changes: dict[str, Any] = {"vehicle.estimator.method": self.method.replace("_", "-")}
+        if not self.adaptive:
             changes |= {
                 "vehicle.wake_up.policy": "fixed",
                 "vehicle.wake_up.interval_ms": self.base_wake_up_ms,
@@ -72,24 +65,20 @@ class Case:
 def cases(platform: Platform) -> list[Case]:
     """Every operating point of the three campaigns on a platform."""
     for mode in platform.modes:
-        _require(platform, mode, "base_wake_up_ms", mode.base_wake_up_ms)
+        if missing := [method for method in METHODS if method not in mode.base_wake_up_ms]:
+            raise InputError(
+                f"platform {platform.name}: mode {mode.number} has no `base_wake_up_ms` for "
+                f"{', '.join(missing)}; the evaluation compares {', '.join(METHODS)}"
+            )
     ssb_ms = paper_numbers()["wake_up"]["ssb_period_ms"]
-    every_ssb = [
-        Case("P", Setting(method, adaptive=False, base_wake_up_ms=ssb_ms)) for method in METHODS
-    ]
+    every_ssb = [Case("P", Setting(method, False, ssb_ms)) for method in METHODS]
     fixed = [
-        Case(
-            "Q", Setting(method, adaptive=False, base_wake_up_ms=mode.base_wake_up_ms[method]), mode
-        )
+        Case("Q", Setting(method, False, mode.base_wake_up_ms[method]), mode)
         for mode in platform.modes
         for method in METHODS
     ]
     adaptive = [
-        Case(
-            "R",
-            Setting("music", adaptive=True, base_wake_up_ms=mode.base_wake_up_ms["music"]),
-            mode,
-        )
+        Case("R", Setting("music", True, mode.base_wake_up_ms["music"]), mode)
         for mode in platform.modes
     ]
     return every_ssb + fixed + adaptive
@@ -97,7 +86,7 @@ def cases(platform: Platform) -> list[Case]:
 
 @dataclass(frozen=True)
 class Evaluation:
-    """All results of an evaluation, as tables.
+    """All results of one reading.
 
     Attributes
     ----------
@@ -107,16 +96,32 @@ class Evaluation:
         Mean errors, one row per setting and time; columns ``errors``.
     snr
         SNR along the track; columns ``snr``.
+    outcome
+        What the claims are judged by.
+    refitted
+        Whether the energies per execution were fitted to the paper anew, or are the platform's.
     """
 
+    reading: Reading
     points: pl.DataFrame
     errors: pl.DataFrame
     snr: pl.DataFrame
-    scenario: Scenario
+    outcome: Outcome
     platform: Platform
     runs: int
     seed: int
-    duration_s: float
+    refitted: bool
+    duration_s: float = 0.0
+
+    @property
+    def scenario(self) -> Scenario:
+        """The reading's scenario."""
+        return self.reading.scenario
+
+    @property
+    def longest_gap_s(self) -> float:
+        """Longest time between two adaptive estimates, in any mode and run."""
+        return max(float(drives.longest_gap_s) for drives in self.outcome.adaptive.values())
 
     def campaign(self, name: str) -> pl.DataFrame:
         """Operating points of one campaign."""
@@ -127,17 +132,9 @@ class Evaluation:
         keys = ("method", "adaptive", "base_wake_up_ms")
         return self.errors.filter(*(pl.col(key) == point[key] for key in keys))
 
-    def horizontal_error_m(self, point: Mapping[str, Any]) -> NDArray[np.float64]:
-        """Mean absolute errors in X and Y, put together, against time."""
-        series = self.series(point)
-        x_m, y_m = (
-            series[name].to_numpy() for name in ("mean_abs_error_x_m", "mean_abs_error_y_m")
-        )
-        return np.asarray(np.hypot(x_m, y_m), dtype=np.float64)
-
 
 def evaluate(
-    scenario: Scenario | str = "paper",
+    reading: Reading | Scenario | str = SHIPPED,
     platform: Platform | str = "jetson-agx-xavier",
     *,
     runs: int = 100,
@@ -145,13 +142,13 @@ def evaluate(
     threads: int | None = None,
     progress: Callable[[int, int], None] | None = None,
 ) -> Evaluation:
-    """Run the three campaigns.
+    """Run the three campaigns under one reading.
 
     Parameters
     ----------
-    scenario
-        A scenario, or the name or path of one. Its estimator and wake-up interval are replaced
-        by each campaign's; its controller settings are kept.
+    reading
+        A reading, its name or path, or a scenario. Its estimator is replaced by each campaign's,
+        its wake-up policy by the fixed campaigns' intervals.
     platform
         A platform, or the name or path of one.
     runs
@@ -176,89 +173,144 @@ def evaluate(
     >>> found.campaign("R").height
     8
     """
+    if isinstance(reading, Scenario):
+        reading = Reading(reading.name, reading.description, reading, (), keeps_t_max=False)
+    elif isinstance(reading, str):
+        reading = load(reading)
+    board = Platform.load(platform) if isinstance(platform, str) else platform
+    planned = len({case.setting for case in cases(board)})
+    driver = Driver(board, runs, seed, threads, progress=progress, planned=planned)
+    return evaluate_with(driver, reading)
+
+
+def evaluate_with(driver: Driver, reading: Reading) -> Evaluation:
+    """The same, by a driver that may know some of the drives already."""
     started = time.monotonic()
-    scenario = Scenario.load(scenario) if isinstance(scenario, str) else scenario
-    platform = Platform.load(platform) if isinstance(platform, str) else platform
+    platform = driver.platform
+    driven: dict[Setting, Driven] = {}
     wanted = cases(platform)
-    settings = {case.setting: case.mode or platform.modes[0] for case in wanted}
-    total = runs * len(settings)
-    results: dict[Setting, Simulation] = {}
-    for setting, mode in settings.items():
-        before = runs * len(results)
-        results[setting] = simulate(
-            setting.apply(scenario, mode),
-            runs=runs,
-            seed=seed,
-            platform=platform,
-            threads=threads,
-            progress=progress and partial(_tick, progress, before, total),
-        )
-    reference = results[wanted[0].setting]
+    for case in wanted:
+        if case.setting not in driven:
+            scenario = case.setting.apply(reading.scenario)
+            if case.setting.adaptive and case.mode is not None:
+                scenario = scenario.with_overrides({"vehicle.platform.mode": case.mode.number})
+            driven[case.setting] = driver.drive(scenario)
+    reference = driven[wanted[0].setting].steps
+    outcome, refitted = outcome_of(
+        [(case, driven[case.setting].drives) for case in wanted], platform, driver.trip_s
+    )
     return Evaluation(
-        points=pl.DataFrame([_point(case, results[case.setting]) for case in wanted]),
-        errors=pl.concat([_errors(setting, result) for setting, result in results.items()]),
-        snr=reference.steps.select("time_s", "mean_true_snr_db"),
-        scenario=scenario,
+        reading=reading,
+        points=pl.DataFrame(
+            [_point(case, outcome, refitted) for case in wanted], infer_schema_length=None
+        ),
+        errors=pl.concat([_errors(setting, each.steps) for setting, each in driven.items()]),
+        snr=reference.select("time_s", "mean_true_snr_db"),
+        outcome=outcome,
         platform=platform,
-        runs=runs,
-        seed=seed,
+        runs=driver.runs,
+        seed=driver.seed,
+        refitted=refitted,
         duration_s=time.monotonic() - started,
     )
 
 
-def _require(platform: Platform, mode: PowerMode, key: str, table: Mapping[str, Any]) -> None:
-    if missing := [method for method in METHODS if method not in table]:
-        raise InputError(
-            f"platform {platform.name}: mode {mode.number} has no `{key}` for "
-            f"{', '.join(missing)}; the evaluation compares {', '.join(METHODS)}"
-        )
+def outcome_of(
+    drives: Sequence[tuple[Case, Drives]],
+    platform: Platform,
+    trip_s: float,
+    *,
+    fit_each: bool = False,
+) -> tuple[Outcome, bool]:
+    """What the claims are judged by, and whether its energies were fitted anew.
 
-
-def require_energy(platform: Platform) -> None:
-    """Refuse a platform that lacks an energy per execution.
-
-    Raises
-    ------
-    InputError
-        Naming mode and method.
+    A platform whose energies were fitted to the paper gets those that fit the reading's own
+    executions, those of the first variant unless ``fit_each``; one that was measured keeps its
+    figures.
     """
-    for mode in platform.modes:
-        _require(platform, mode, "energy_per_execution_j", mode.energy_per_execution_j)
+    every_ssb = {case.setting.method: each for case, each in drives if case.mode is None}
+    fixed, adaptive = {}, {}
+    for case, each in drives:
+        if case.mode is not None and case.campaign == "Q":
+            fixed[case.mode.number, case.setting.method] = each
+        elif case.mode is not None:
+            adaptive[case.mode.number] = each
+    figures = [it for mode in platform.modes for it in mode.energy_per_execution_j.values()]
+    refits = adaptive.keys() >= NEEDED_MODES and all(it.provenance == "fitted" for it in figures)
+    if refits:
+        energies_j = fit_energy(_demands(platform, fixed, adaptive, None if fit_each else 1))
+    else:
+        energies_j = {
+            mode.number: {
+                method: np.asarray(figure.value)
+                for method, figure in mode.energy_per_execution_j.items()
+            }
+            for mode in platform.modes
+        }
+    duty = float(paper_numbers()["day"]["duty"])
+    return Outcome(every_ssb, fixed, adaptive, energies_j, trip_s, duty, platform.name), refits
 
 
-def _tick(progress: Callable[[int, int], None], before: int, total: int, done: int, _: int) -> None:
-    progress(before + done, total)
+def demands(outcome: Outcome, platform: Platform) -> dict[int, ModeDemand]:
+    """What an evaluation asked of each power mode."""
+    return _demands(platform, outcome.fixed, outcome.adaptive, 1)
 
 
-def _point(case: Case, result: Simulation) -> dict[str, Any]:
-    executions = float(result.runs.select(pl.col("executions").mean()).item())
-    worst_x_m, worst_y_m = result.steps.select(
-        pl.col("mean_abs_error_x_m", "mean_abs_error_y_m").max()
-    ).row(0)
-    per_execution = case.mode.energy_per_execution_j.get(case.setting.method) if case.mode else None
-    # Idle and listening power do not depend on the mode; they count where the platform says so.
-    besides_j = result.runs.select(
-        (pl.col("energy_j") - pl.col("energy_executions_j")).mean()
-    ).item()
+def _demands(
+    platform: Platform,
+    fixed: Mapping[tuple[int, str], Drives],
+    adaptive: Mapping[int, Drives],
+    variants: int | None,
+) -> dict[int, ModeDemand]:
     return {
-        "campaign": case.campaign,
-        "mode": case.mode.number if case.mode else None,
-        "mode_name": case.mode.name if case.mode else None,
-        "method": case.setting.method,
-        "adaptive": case.setting.adaptive,
-        "base_wake_up_ms": case.setting.base_wake_up_ms,
-        "executions": executions,
-        "worst_error_x_m": worst_x_m,
-        "worst_error_y_m": worst_y_m,
-        "rms_error_m": result.rms_error_m,
-        "energy_per_execution_j": per_execution.value if per_execution else None,
-        "energy_j": executions * per_execution.value + besides_j if per_execution else None,
-        "energy_provenance": per_execution.provenance if per_execution else None,
+        mode.number: ModeDemand(
+            cpu_hz=mode.cpu_hz,
+            base_wake_up_s={method: mode.base_wake_up_ms[method] / 1e3 for method in METHODS},
+            fixed_executions={
+                method: float(fixed[mode.number, method].executions[0]) for method in METHODS
+            },
+            adaptive_executions=adaptive[mode.number].executions[:variants],
+        )
+        for mode in platform.modes
     }
 
 
-def _errors(setting: Setting, result: Simulation) -> pl.DataFrame:
-    return result.steps.select(
+def _point(case: Case, outcome: Outcome, refitted: bool) -> dict[str, Any]:
+    method, mode = case.setting.method, case.mode
+    per_execution_j = total_j = provenance = None
+    if mode is None:
+        drives = outcome.every_ssb[method]
+    else:
+        adaptive = case.setting.adaptive
+        drives = outcome.adaptive[mode.number] if adaptive else outcome.fixed[mode.number, method]
+        try:
+            total_j = float(energy_j(outcome, mode.number, method, adaptive=adaptive)[0])
+            per_execution_j = float(
+                np.atleast_1d(outcome.energy_per_execution_j[mode.number][method])[0]
+            )
+            figure = mode.energy_per_execution_j[method]
+            provenance = "fitted" if refitted else figure.provenance
+        except MissingFigureError:
+            pass
+    return {
+        "campaign": case.campaign,
+        "mode": mode.number if mode else None,
+        "mode_name": mode.name if mode else None,
+        "method": method,
+        "adaptive": case.setting.adaptive,
+        "base_wake_up_ms": case.setting.base_wake_up_ms,
+        "executions": float(drives.executions[0]),
+        "worst_error_x_m": float(drives.worst_x_m[0]),
+        "worst_error_y_m": float(drives.worst_y_m[0]),
+        "rms_error_m": float(drives.rms_error_m[0]),
+        "energy_per_execution_j": per_execution_j,
+        "energy_j": total_j,
+        "energy_provenance": provenance,
+    }
+
+
+def _errors(setting: Setting, steps: pl.DataFrame) -> pl.DataFrame:
+    return steps.select(
         pl.lit(setting.method).alias("method"),
         pl.lit(setting.adaptive).alias("adaptive"),
         pl.lit(setting.base_wake_up_ms).alias("base_wake_up_ms"),

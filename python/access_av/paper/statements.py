@@ -32,14 +32,3 @@ def of_claim(claim_id: str, key: str = "stated") -> Any:
     43.09
     """
     return stated_claims()[claim_id][key]
-
-
-def trips_per_day() -> float:
-    """Trips of the paper's length that follow one another without a break in 24 hours.
-
-    Examples
-    --------
-    >>> round(trips_per_day(), 1)
-    1075.6
-    """
-    return 86_400.0 / float(paper_numbers()["trip"]["duration_s"])

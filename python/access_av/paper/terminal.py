@@ -5,6 +5,8 @@ from __future__ import annotations
 from typing import TYPE_CHECKING
 
 from access_av.methods import label
+from access_av.paper import summary
+from access_av.paper.claims import NOT_JUDGED
 from access_av.paper.methods import METHODS
 from access_av.report.parts import value_text
 from access_av.terminal import console, is_narrow, table
@@ -14,6 +16,29 @@ if TYPE_CHECKING:
 
     from access_av.paper.claims import Claim
     from access_av.paper.evaluation import Evaluation
+    from access_av.paper.search import Confirmed, Sample
+    from access_av.paper.study import Study
+
+
+def mark(claim: Claim) -> str:
+    """A verdict in two signs: met or not, and whether it turns with the seed."""
+    sign = "–" if claim.verdict == NOT_JUDGED else "✓" if claim.reproduced else "✗"
+    return sign + ("?" if claim.turns_with_seed else "")
+
+
+def show_study(study: Study) -> None:
+    """Claims by readings, the shown reading's modes, what it comes to."""
+    show_evaluation(study.shown)
+    _show_claims(study)
+    console.print(f"[bold]{summary.headline(study)}.[/]")
+    console.print(summary.lead(study))
+    shown = study.of(study.shown.reading.name)
+    console.print(f"Claims met under “{study.shown.reading.title}”: {summary.counts_text(shown)}.")
+    console.print(summary.ours_text(study))
+    for reading, why in study.unusable.items():
+        console.print(f"Not evaluated: {reading}: {why}", markup=False)
+    for note in sorted({it.id + ": " + it.note for it in study.claims if it.verdict == NOT_JUDGED}):
+        console.print(note, markup=False)
 
 
 def show_evaluation(evaluation: Evaluation) -> None:
@@ -26,27 +51,58 @@ def show_evaluation(evaluation: Evaluation) -> None:
             *evaluation.campaign("R").filter(mode=mode.number).iter_rows(named=True),
         ]
         name = str(mode.number) if is_narrow() else f"{mode.number} {mode.name}"
-        energy.add_row(name, *(f"{row['energy_j']:.1f}" for row in rows))
+        energies = (row["energy_j"] for row in rows)
+        energy.add_row(name, *("–" if it is None else f"{it:.1f}" for it in energies))
         error.add_row(name, *(f"{row['worst_error_y_m']:.3f}" for row in rows))
     console.print(error)
     console.print(energy)
 
 
-def show_claims(claims: Sequence[Claim]) -> None:
-    """The paper's claims with their verdicts."""
-    made = table(["claim", "paper", "obtained", ""], title="Claims of the paper", text=4)
-    for claim in claims:
-        name = claim.id.split("_")[0] if is_narrow() else claim.id
-        fitted = " (fitted)" if claim.fitted and not is_narrow() else ""
-        made.add_row(
-            name,
+def _show_claims(study: Study) -> None:
+    shown = study.of(study.shown.reading.name)
+    wide = not is_narrow()
+    head = ["claim", "paper", "obtained", "evidence"] if wide else ["claim", "paper", "obtained"]
+    made = table(head, title="Claims of the paper", text=4)
+    for claim in shown:
+        row = [
+            claim.id if wide else claim.id.split("_")[0],
             value_text(claim.stated),
-            value_text(claim.obtained),
-            f"[green]✓[/]{fitted}" if claim.reproduced else "[red]✗ not reproduced[/]",
+            f"{value_text(claim.obtained)} {mark(claim)}",
+            claim.evidence,
+        ]
+        made.add_row(*row[: len(head)])
+    console.print(made)
+    columns = [each.reading.name for each in study.evaluations]
+    matrix = table(
+        ["claim", *(map(str, range(1, len(columns) + 1)))],
+        title="Claims by readings (✓ met, ✗ not, ? turns with the seed)",
+    )
+    by_reading = [study.of(name) for name in columns]
+    for claims in zip(*by_reading, strict=True):
+        name = claims[0].id if wide else claims[0].id.split("_")[0]
+        matrix.add_row(name, *map(mark, claims))
+    console.print(matrix)
+    console.print(", ".join(f"{i} {name}" for i, name in enumerate(columns, start=1)))
+
+
+def show_search(found: Sample, checked: Sequence[Confirmed]) -> None:
+    """The best readings that a search found, and what more runs make of the best."""
+    held = found.held()
+    made = table(
+        ["held", "executions", "worst m", "what was drawn"],
+        title=f"Of {len(held)} readings, those that meet most of {len(found.margins)} claims",
+    )
+    for index in found.best()[:8]:
+        drawn = ", ".join(f"{name} {value_text(it)}" for name, it in found.values(index).items())
+        made.add_row(
+            f"{held[index]:.0f}",
+            f"{found.executions[index]:.0f}",
+            f"{found.worst_error_m[index]:.2f}",
+            drawn,
         )
     console.print(made)
-    reproduced = sum(claim.reproduced for claim in claims)
-    console.print(f"[bold]{reproduced} of {len(claims)} claims reproduced.[/]")
-    for claim in claims:
-        if not claim.reproduced:
-            console.print(f"  {claim.id}: {claim.note}")
+    if checked:
+        again = table(["reading", "held", "not met"], title="Driven again", text=1)
+        for each in checked:
+            again.add_row(each.label, str(each.held), ", ".join(each.missed))
+        console.print(again)

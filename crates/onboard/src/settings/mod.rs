@@ -46,5 +46,6 @@ pub use start::StartSettings;
 pub use toml_file::{Library, NamedText, TomlFile};
 pub use vehicle::{PlatformSettings, Vehicle, check_together};
 pub use wake_up::{
-    FixedSettings, PidSettings, SensingMode, SnrSetPoint, UncertaintySettings, WakeUpSettings,
+    DeltaT, DueSettings, FixedSettings, GatedSettings, PidSettings, SensingMode, SnrSetPoint,
+    UncertaintySettings, WakeUpSettings,
 };

@@ -10,7 +10,6 @@ use super::error::SettingsError;
 use super::receiver::EstimatorMethod;
 use super::toml_file::TomlFile;
 use super::vehicle::{PlatformSettings, Vehicle};
-use super::wake_up::WakeUpSettings;
 
 /// A platform file.
 #[derive(Debug, Clone, PartialEq, Serialize, Deserialize, JsonSchema)]
@@ -195,12 +194,7 @@ impl Platform {
     /// As [`base_wake_up_s`](Self::base_wake_up_s).
     pub fn resolve(&self, vehicle: &Vehicle) -> Result<Vehicle, SettingsError> {
         let mut resolved = vehicle.clone();
-        let time_ms = match &mut resolved.wake_up {
-            WakeUpSettings::Fixed(fixed) => &mut fixed.interval_ms,
-            WakeUpSettings::Pid(pid) => &mut pid.base_ms,
-            WakeUpSettings::Uncertainty(_) => return Ok(resolved),
-        };
-        if time_ms.is_none() {
+        if let Some(time_ms @ None) = resolved.wake_up.base_ms() {
             *time_ms = Some(self.base_wake_up_s(vehicle)? * 1e3);
         }
         Ok(resolved)

@@ -14,6 +14,8 @@ pub enum WakeUpSettings {
     Fixed(FixedSettings),
     /// The paper's Algorithm 1.
     Pid(PidSettings),
+    /// An estimate that is due waits for an SSB that is not below a set point.
+    Gated(GatedSettings),
     /// As late as a bound on the error allows; needs the tracker.
     Uncertainty(UncertaintySettings),
 }
@@ -70,8 +72,11 @@ pub struct PidSettings {
     pub snr_scale_db: f64,
     /// When the controller's inputs are sensed.
     pub sensing: SensingMode,
-    /// Whether an estimate that is due waits for an SSB that is not below the set point.
-    pub deferral: bool,
+    /// What Algorithm 1 takes for Δt.
+    pub delta_t: DeltaT,
+    /// What u = 1 adds to the wake-up time, in ms.
+    #[schemars(range(min = 1e-3, max = 3.6e6))]
+    pub u_unit_ms: f64,
     /// Bound on the magnitude of the integral term's sum; 0 removes it.
     #[schemars(range(min = 0.0, max = 1e6))]
     pub integral_clamp: f64,
@@ -90,10 +95,46 @@ impl Default for PidSettings {
             snr_set_point: SnrSetPoint::Expected { offset_db: 3.0 },
             snr_scale_db: 10.0,
             sensing: SensingMode::EverySsb,
-            deferral: true,
+            delta_t: DeltaT::Seconds,
+            u_unit_ms: 1000.0,
             integral_clamp: 0.5,
         }
     }
+}
+
+/// `policy = "gated"`
+#[derive(Debug, Clone, Copy, PartialEq, Serialize, Deserialize, JsonSchema)]
+#[serde(default, deny_unknown_fields)]
+pub struct GatedSettings {
+    /// No angle is estimated from an SSB that is weaker.
+    pub snr_set_point: SnrSetPoint,
+    /// Longest time from one estimate to the next in ms, however weak the SSB is then; without it,
+    /// a good SSB is waited for as long as it takes.
+    #[serde(skip_serializing_if = "Option::is_none")]
+    #[schemars(range(min = 0.1, max = 3.6e6))]
+    pub latest_ms: Option<f64>,
+    /// What makes an estimate due.
+    pub due: DueSettings,
+}
+
+impl Default for GatedSettings {
+    fn default() -> Self {
+        Self {
+            snr_set_point: SnrSetPoint::Expected { offset_db: 3.0 },
+            latest_ms: None,
+            due: DueSettings::Pid(PidSettings::default()),
+        }
+    }
+}
+
+/// What makes an estimate due, so long after the last one.
+#[derive(Debug, Clone, Copy, PartialEq, Serialize, Deserialize, JsonSchema)]
+#[serde(tag = "policy", rename_all = "kebab-case")]
+pub enum DueSettings {
+    /// A constant time.
+    Fixed(FixedSettings),
+    /// The paper's Algorithm 1.
+    Pid(PidSettings),
 }
 
 /// The SNR at which the SNR error is zero.
@@ -125,6 +166,17 @@ pub enum SensingMode {
     WakeUp,
 }
 
+/// What Algorithm 1 takes for Δt, over which it integrates and by which it divides.
+#[derive(Debug, Clone, Copy, PartialEq, Eq, Default, Serialize, Deserialize, JsonSchema)]
+#[serde(rename_all = "kebab-case")]
+pub enum DeltaT {
+    /// The time since the inputs were sensed before, in seconds.
+    #[default]
+    Seconds,
+    /// One for every time that they are sensed.
+    Steps,
+}
+
 /// `policy = "uncertainty"`
 #[derive(Debug, Clone, Copy, PartialEq, Serialize, Deserialize, JsonSchema)]
 #[serde(default, deny_unknown_fields)]
@@ -136,6 +188,11 @@ pub struct UncertaintySettings {
     /// Probability with which it is kept.
     #[schemars(range(min = 0.01, max = 0.999_999))]
     pub confidence: f64,
+    /// Shortest time from one wake-up to the next in ms: what the computer needs for an estimate.
+    /// Without it, a wake-up may follow at the next SSB.
+    #[serde(skip_serializing_if = "Option::is_none")]
+    #[schemars(range(min = 0.1, max = 3.6e6))]
+    pub base_ms: Option<f64>,
     /// Energy of waking the receiver up, in executions.
     #[schemars(range(min = 0.0, max = 1e3))]
     pub wake_up_cost: f64,
@@ -152,6 +209,7 @@ impl Default for UncertaintySettings {
         Self {
             bound_m: 0.3,
             confidence: 0.9,
+            base_ms: None,
             wake_up_cost: 0.5,
             least_gain_m2: None,
         }
@@ -159,16 +217,43 @@ impl Default for UncertaintySettings {
 }
 
 impl WakeUpSettings {
+    /// The wake-up time that a vehicle's settings may leave to its platform, if there is one.
+    pub(super) const fn base_ms(&mut self) -> Option<&mut Option<f64>> {
+        match self {
+            Self::Fixed(fixed) => Some(&mut fixed.interval_ms),
+            Self::Pid(pid) => Some(&mut pid.base_ms),
+            Self::Gated(gated) => Some(match &mut gated.due {
+                DueSettings::Fixed(fixed) => &mut fixed.interval_ms,
+                DueSettings::Pid(pid) => &mut pid.base_ms,
+            }),
+            Self::Uncertainty(_) => None,
+        }
+    }
+
     pub(super) fn check(&self, check: Check<'_>) -> Result<(), SettingsError> {
-        let Self::Pid(PidSettings {
-            base_ms: Some(base_ms),
-            t_max_ms,
-            ..
-        }) = self
-        else {
-            return Ok(());
+        let not_below = |key: &str, longest_ms: f64, base_ms: Option<f64>, base: &str| {
+            let base_ms = base_ms.unwrap_or(0.0);
+            let allowed = format!("it must not be below {base}, {base_ms}");
+            check.that(longest_ms >= base_ms, key, longest_ms, &allowed)
         };
-        let allowed = format!("it must not be below wake_up.base_ms, {base_ms}");
-        check.that(t_max_ms >= base_ms, "wake_up.t_max_ms", t_max_ms, &allowed)
+        let t_max = |pid: &PidSettings, place: &str| {
+            let (key, base) = (format!("{place}.t_max_ms"), format!("{place}.base_ms"));
+            not_below(&key, pid.t_max_ms, pid.base_ms, &base)
+        };
+        match self {
+            Self::Pid(pid) => t_max(pid, "wake_up"),
+            Self::Gated(gated) => {
+                let (base_ms, base) = match &gated.due {
+                    DueSettings::Fixed(fixed) => (fixed.interval_ms, "wake_up.due.interval_ms"),
+                    DueSettings::Pid(pid) => {
+                        t_max(pid, "wake_up.due")?;
+                        (pid.base_ms, "wake_up.due.base_ms")
+                    }
+                };
+                let latest_ms = gated.latest_ms.unwrap_or(f64::INFINITY);
+                not_below("wake_up.latest_ms", latest_ms, base_ms, base)
+            }
+            Self::Fixed(_) | Self::Uncertainty(_) => Ok(()),
+        }
     }
 }

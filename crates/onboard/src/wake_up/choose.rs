@@ -1,10 +1,15 @@
 //! The policy that a vehicle's settings choose.
 
 use super::adaptive::Adaptive;
+use super::controller::Controller;
+use super::due::Due;
 use super::fixed::FixedInterval;
+use super::gated::Gated;
 use super::policy::WakeUpPolicy;
 use super::uncertainty::UncertaintyDriven;
-use crate::settings::{Check, Platform, SettingsError, Site, Vehicle, WakeUpSettings};
+use crate::settings::{
+    Check, DueSettings, PidSettings, Platform, SettingsError, Site, Vehicle, WakeUpSettings,
+};
 
 /// The policy of a vehicle at a site, base wake-up times being the platform's where the settings
 /// leave them to it.
@@ -20,26 +25,54 @@ pub fn built_in(
         Some(explicit_ms) => Ok(explicit_ms * 1e-3),
         None => platform.base_wake_up_s(vehicle),
     };
+    let controlled = |settings: &PidSettings, key: &str| {
+        let base_s = interval_s(settings.base_ms)?;
+        not_before(base_s, settings.t_max_ms, key, vehicle)?;
+        let controller = Controller::new(settings, base_s, vehicle.top_speed_mps());
+        Ok(Due::controlled(controller, settings.sensing))
+    };
     Ok(match vehicle.wake_up {
         WakeUpSettings::Fixed(settings) => {
             Box::new(FixedInterval::new(interval_s(settings.interval_ms)?))
         }
         WakeUpSettings::Pid(settings) => {
-            let base_s = interval_s(settings.base_ms)?;
-            let file = &vehicle.name;
-            Check { file }.that(
-                settings.t_max_ms * 1e-3 >= base_s,
-                "wake_up.t_max_ms",
-                settings.t_max_ms,
-                &format!(
-                    "it must not be below the base wake-up time, {} ms",
-                    base_s * 1e3
-                ),
-            )?;
-            Box::new(Adaptive::new(&settings, base_s, vehicle.top_speed_mps()))
+            Box::new(Adaptive::new(controlled(&settings, "wake_up.t_max_ms")?))
+        }
+        WakeUpSettings::Gated(settings) => {
+            let (due, shortest_s) = match settings.due {
+                DueSettings::Fixed(due) => {
+                    let shortest_s = interval_s(due.interval_ms)?;
+                    (Due::constant(shortest_s), shortest_s)
+                }
+                DueSettings::Pid(due) => {
+                    let shortest_s = interval_s(due.base_ms)?;
+                    (controlled(&due, "wake_up.due.t_max_ms")?, shortest_s)
+                }
+            };
+            let latest_s = match settings.latest_ms {
+                Some(latest_ms) => {
+                    not_before(shortest_s, latest_ms, "wake_up.latest_ms", vehicle)?;
+                    latest_ms * 1e-3
+                }
+                None => f64::INFINITY,
+            };
+            Box::new(Gated::new(due, settings.snr_set_point, latest_s))
         }
         WakeUpSettings::Uncertainty(settings) => {
             Box::new(UncertaintyDriven::new(&settings, site, vehicle))
         }
     })
+}
+
+/// Refuses a longest wake-up time below the shortest.
+fn not_before(
+    base_s: f64,
+    longest_ms: f64,
+    key: &str,
+    vehicle: &Vehicle,
+) -> Result<(), SettingsError> {
+    let file = &vehicle.name;
+    let base_ms = base_s * 1e3;
+    let allowed = format!("it must not be below the base wake-up time, {base_ms} ms");
+    Check { file }.that(longest_ms >= base_ms - 1e-9, key, longest_ms, &allowed)
 }

@@ -3,14 +3,20 @@
 
 mod adaptive;
 mod choose;
+mod controller;
+mod due;
 mod fixed;
+mod gated;
 mod pid;
 mod policy;
 mod uncertainty;
 
 pub use adaptive::Adaptive;
 pub use choose::built_in;
+pub use controller::Controller;
+pub use due::Due;
 pub use fixed::FixedInterval;
+pub use gated::Gated;
 pub use pid::Pid;
 pub use policy::{Situation, WakeUpPolicy};
 pub use uncertainty::UncertaintyDriven;

@@ -1,11 +1,13 @@
-//! The paper's Algorithm 1.
+//! The paper's Algorithm 1, and nothing else. What feeds it is `controller.rs`, what obeys it
+//! `adaptive.rs`; that an estimate waits for a better SSB is another policy, `gated.rs`.
 
 use crate::settings::PidSettings;
 
 /// Algorithm 1: "Adaptive Wake-Up Time Calculation". Numbers in comments are the paper's lines.
 ///
-/// The errors have no unit; `u` is read as seconds, which with the paper's gains moves the wake-up
-/// time across [t_base, t_max] within the errors that occur.
+/// The paper gives neither the unit of `u` nor that of Δt. The unit of `u` stands in the settings
+/// (seconds move the wake-up time across [t_base, t_max] within the errors that occur); Δt is the
+/// caller's.
 #[derive(Debug, Clone, Copy, PartialEq)]
 pub struct Pid {
     kp: f64,
@@ -15,6 +17,7 @@ pub struct Pid {
     weight_velocity: f64,
     base_s: f64,
     max_s: f64,
+    u_unit_s: f64,
     integral_clamp: f64,
     integral: f64,
     previous_error: f64,
@@ -33,6 +36,7 @@ impl Pid {
             weight_velocity: settings.weight_velocity, // 4
             base_s,                                    // 5
             max_s: settings.t_max_ms * 1e-3,           // 5
+            u_unit_s: settings.u_unit_ms * 1e-3,
             // Not in the paper: a shortfall that lasts would otherwise keep the wake-up time at
             // its bound long after it has passed.
             integral_clamp: if settings.integral_clamp > 0.0 {
@@ -48,15 +52,15 @@ impl Pid {
         &mut self,
         snr_error: f64,
         velocity_error: f64,
-        interval_s: f64,
+        delta_t: f64,
     ) -> f64 {
         let error = self.weight_snr * snr_error + self.weight_velocity * velocity_error; // 10
-        self.integral = (self.integral + error * interval_s) // 11
+        self.integral = (self.integral + error * delta_t) // 11
             .clamp(-self.integral_clamp, self.integral_clamp);
-        let derivative = (error - self.previous_error) / interval_s; // 12
+        let derivative = (error - self.previous_error) / delta_t; // 12
         let u = self.kp * error + self.ki * self.integral + self.kd * derivative; // 13
         self.previous_error = error; // 14
-        let wake_up_time_s = self.base_s + u; // 15
+        let wake_up_time_s = self.base_s + u * self.u_unit_s; // 15
         wake_up_time_s.max(self.base_s).min(self.max_s) // 16, 17
     }
 }

@@ -5,6 +5,7 @@ use crate::link_budget::LinkBudget;
 use crate::localize::Localizer;
 use crate::observation::SensedSsb;
 use crate::radio_head::RadioHead;
+use crate::settings::SnrSetPoint;
 
 /// Clock readings this close count as equal: far below any SSB period, far above rounding.
 pub const SAME_TIME_S: f64 = 1e-9;
@@ -31,6 +32,29 @@ impl Situation<'_> {
     pub fn head(&self, ssb: &SensedSsb) -> Option<&RadioHead> {
         let mut heads = self.heads.iter();
         heads.find(|head| head.sends(ssb.pci, ssb.ssb_index))
+    }
+
+    /// The strongest of the sensed SSBs that are on the map, and its radio head.
+    pub fn strongest<'s>(&self, sensed: &'s [SensedSsb]) -> Option<(&'s SensedSsb, &RadioHead)> {
+        let known = sensed.iter().filter_map(|ssb| Some((ssb, self.head(ssb)?)));
+        known.max_by(|a, b| a.0.snr_db.total_cmp(&b.0.snr_db))
+    }
+
+    /// By how much the SNR of an SSB falls short of a set point, in dB; negative above it.
+    ///
+    /// # Errors
+    /// Whatever the localizer fails with.
+    pub fn snr_shortfall_db(
+        &self,
+        set_point: SnrSetPoint,
+        ssb: &SensedSsb,
+        head: &RadioHead,
+    ) -> Result<f64, BoxError> {
+        let set_point_db = match set_point {
+            SnrSetPoint::Expected { offset_db } => self.expected_snr_db(head)? + offset_db,
+            SnrSetPoint::Absolute { snr_db } => snr_db,
+        };
+        Ok(set_point_db - ssb.snr_db)
     }
 
     /// The SNR that the link budget promises of a radio head at the estimated place, in dB.

@@ -13,7 +13,7 @@
 //! an angle of at least that worth, `least_gain_m2`, is taken before the bound demands it: the
 //! stretch ahead, where none is worth as much, then begins with a small error.
 
-use super::policy::{Situation, WakeUpPolicy};
+use super::policy::{SAME_TIME_S, Situation, WakeUpPolicy};
 use crate::BoxError;
 use crate::localize::thermal::ThermalNoise;
 use crate::localize::tracker::state::Belief;
@@ -39,6 +39,8 @@ pub struct UncertaintyDriven {
     wake_up_cost: f64,
     least_gain_m2: Option<f64>,
     period_s: f64,
+    base_s: f64,
+    last_wake_up_s: Option<f64>,
     thermal: ThermalNoise,
 }
 
@@ -51,6 +53,8 @@ impl UncertaintyDriven {
             wake_up_cost: settings.wake_up_cost,
             least_gain_m2: settings.least_gain_m2,
             period_s: site.ssb.period_s(),
+            base_s: settings.base_ms.unwrap_or(0.0) * 1e-3,
+            last_wake_up_s: None,
             thermal: ThermalNoise::new(site, vehicle),
         }
     }
@@ -146,6 +150,10 @@ impl WakeUpPolicy for UncertaintyDriven {
     /// Whether the error would exceed the bound at the SSB after, or an angle is worth its energy
     /// anyway.
     fn listens(&mut self, now: &Situation<'_>) -> Result<bool, BoxError> {
+        let is_free = |last_s: f64| now.time_s - last_s + SAME_TIME_S >= self.base_s;
+        if !self.last_wake_up_s.is_none_or(is_free) {
+            return Ok(false);
+        }
         let tracker = now.localizer.tracker();
         Ok(tracker.is_none_or(|tracker| self.choice(tracker, now.time_s, now.heads) != 0))
     }
@@ -156,6 +164,7 @@ impl WakeUpPolicy for UncertaintyDriven {
         sensed: &[SensedSsb],
         chosen: &mut [bool],
     ) -> Result<f64, BoxError> {
+        self.last_wake_up_s = Some(now.time_s);
         let Some(tracker) = now.localizer.tracker() else {
             chosen.fill(true);
             return Ok(self.period_s);

@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import math
 from html import escape
 from typing import TYPE_CHECKING
 
@@ -60,8 +61,11 @@ def _chart(evaluation: Evaluation) -> Spec:
             4
         ),
     )
-    most_j = 10.0 * float(table.select(pl.col("energy_j").max() / 10).item().__ceil__())
-    most_m = 0.1 * float(table.select(pl.col("rms_error_m").max() * 10).item().__ceil__())
+    table = table.filter(pl.col("energy_j").is_not_null())
+    most_j, most_m = (
+        step * math.ceil(float(table.select(pl.col(name).max().fill_null(step)).item()) / step)
+        for name, step in (("energy_j", 10.0), ("rms_error_m", 0.1))
+    )
     wide_j = float(of_claim("d2_budget_260_j_rms_015_m", "query")["max_energy_j"])
     budget = alt.param(
         name="max_energy_j",

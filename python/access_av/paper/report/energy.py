@@ -9,7 +9,8 @@ import altair as alt
 import polars as pl
 
 from access_av.methods import LABELS, label
-from access_av.paper.claims import savings_percent
+from access_av.paper.energy_fit import FREE, SOLVED
+from access_av.paper.findings import MissingFigureError, savings_percent
 from access_av.paper.methods import ADAPTIVE_LABEL, METHODS
 from access_av.paper.report.lines import NAMES, by_mode, scale
 from access_av.paper.statements import paper_numbers
@@ -26,10 +27,35 @@ def energy_text(evaluation: Evaluation) -> str:
     return escape(
         "Energy of a trip is the number of executions times the energy of one execution. "
         f"Boundary: {evaluation.platform.energy_boundary}. Bars are ours; diamonds are the "
-        "values the paper states. Energies per execution were fitted to those and to the paper’s "
-        "statements about the rest (access-av fit), so agreement here is a check of the "
-        "executions, not of the power."
+        "values the paper states. "
+        + (
+            "Energies per execution were fitted to those and to the paper’s statements about the "
+            f"rest, under each reading anew: {FREE} numbers are free, {SOLVED} of them solved for "
+            "from stated figures. So agreement here is a check of the executions, not of the power."
+            if evaluation.refitted
+            else "Energies per execution are the platform’s own."
+        )
+        + _missing(evaluation)
     )
+
+
+def _missing(evaluation: Evaluation) -> str:
+    """Which energies the platform has no figure for."""
+    missing = [
+        f"{label(method)} in mode {mode.number}"
+        for mode in evaluation.platform.modes
+        for method in METHODS
+        if method not in mode.energy_per_execution_j
+    ]
+    return f" The platform has no figure for {', '.join(missing)}." if missing else ""
+
+
+def _savings(evaluation: Evaluation, mode: int) -> float | None:
+    try:
+        savings = savings_percent(evaluation.outcome, mode)
+    except MissingFigureError:
+        return None
+    return sum(float(value[0]) for value in savings.values()) / len(savings)
 
 
 def energy(evaluation: Evaluation, specs: dict[str, Spec]) -> str:
@@ -48,13 +74,12 @@ def energy_table(evaluation: Evaluation) -> str:
         fixed = evaluation.campaign("Q").filter(pl.col("mode") == mode.number)
         adaptive = evaluation.campaign("R").filter(pl.col("mode") == mode.number)
         stated = paper.get(f"adaptive_mode_{mode.number}")
-        savings = savings_percent(evaluation, mode.number)
         rows.append(
             (
                 f"{mode.number} {escape(mode.name)}",
                 *(number(value, 1) for value in fixed["energy_j"]),
                 number(adaptive["energy_j"].item(), 1) + (f" (paper {stated})" if stated else ""),
-                number(sum(savings.values()) / len(savings), 1),
+                number(_savings(evaluation, mode.number), 1),
                 number(adaptive["executions"].item(), 0),
             )
         )

@@ -9,8 +9,8 @@ import altair as alt
 import polars as pl
 
 from access_av import carbon, cost
-from access_av.paper.claims import saving
-from access_av.paper.statements import of_claim
+from access_av.paper.findings import MissingFigureError, saving
+from access_av.paper.statements import of_claim, paper_numbers
 from access_av.report.chart import BLUE, GREEN, ORANGE, finish
 from access_av.report.parts import figure, number, table
 
@@ -20,18 +20,23 @@ if TYPE_CHECKING:
 
 # The paper's four units and its fleet.
 UNITS_NOT_BUILT = 4
-FLEET = 100
+FLEET = paper_numbers()["day"]["fleet"]
 
 
 def cost_text(evaluation: Evaluation) -> str:
     """What roadside units would cost, and what energy is saved in a day."""
     units = cost.roadside_units(UNITS_NOT_BUILT)
     mode = evaluation.platform.modes[0].number
-    saved = saving(evaluation, mode)
+    try:
+        saved = saving(evaluation.outcome, mode)
+    except MissingFigureError as error:
+        return escape(str(error))
+    outcome = evaluation.outcome
     return escape(
         f"{units.units} roadside units would cost {units.capital_low_usd:,.0f} to "
         f"{units.capital_high_usd:,.0f} USD and {units.yearly_usd:,.0f} USD a year "
-        f"({units.source}). In mode {mode} one vehicle saves {saved.per_day_kj:.1f} kJ a day "
+        f"({units.source}). In mode {mode}, on trips of {outcome.trip_s:.1f} s driven "
+        f"{outcome.duty:.0%} of the day, one vehicle saves {saved.per_day_kj:.1f} kJ a day "
         f"(paper: {of_claim('e5_mode0_saved_per_day_kj')}), a fleet of {FLEET} saves "
         f"{saved.fleet_per_day_mj(FLEET):.2f} MJ "
         f"(paper: {of_claim('e6_fleet_of_100_saved_per_day_mj')})."
@@ -55,7 +60,10 @@ def carbon_section(evaluation: Evaluation, specs: dict[str, Spec]) -> str:
     onboard = {grid: carbon.footprint("onboard_box", 1, grid) for grid in carbon.grids()}
     specs["carbon-chart"] = _carbon_chart(avoided)
     mode = evaluation.platform.modes[0].number
-    saved_j_per_day = FLEET * saving(evaluation, mode).per_day_kj * 1e3
+    try:
+        saved_j = FLEET * saving(evaluation.outcome, mode).per_day_kj * 1e3
+    except MissingFigureError:
+        saved_j = None
 
     def span(values: carbon.Range) -> str:
         return f"{values.central:,.0f} ({values.low:,.0f}–{values.high:,.0f})"
@@ -66,7 +74,7 @@ def carbon_section(evaluation: Evaluation, specs: dict[str, Spec]) -> str:
             number(intensity, 0),
             span(avoided[grid].use_kg),
             span(onboard[grid].use_kg),
-            number(carbon.use_kg_per_year(saved_j_per_day, grid), 0),
+            number(None if saved_j is None else carbon.use_kg_per_year(saved_j, grid), 0),
         )
         for grid, intensity in carbon.grids().items()
     ]

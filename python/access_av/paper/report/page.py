@@ -7,34 +7,36 @@ from importlib import resources
 from importlib.metadata import version
 from typing import TYPE_CHECKING
 
-import polars as pl
-
-from access_av.cost import sensor_cost_ratio
 from access_av.methods import label
-from access_av.paper.claims import savings_percent
+from access_av.paper import summary
 from access_av.paper.methods import METHODS
-from access_av.paper.report import accuracy, design_space, energy, equipment
-from access_av.paper.statements import of_claim
+from access_av.paper.report import (
+    accuracy,
+    controller,
+    design_space,
+    energy,
+    equipment,
+    readings,
+    unknowns,
+)
 from access_av.report.page import fill
-from access_av.report.parts import badge, number, source, table, tile, value_text
+from access_av.report.parts import badge, number, source, table, tile
 
 if TYPE_CHECKING:
-    from access_av.paper.claims import Claim
     from access_av.paper.evaluation import Evaluation
+    from access_av.paper.study import Study
     from access_av.report.chart import Spec
 
 TEMPLATE = resources.files(__package__).joinpath("page.html")
 
 
-def render(evaluation: Evaluation, claims: list[Claim]) -> str:
+def render(study: Study) -> str:
     """The whole report as HTML.
 
     Parameters
     ----------
-    evaluation
-        Results of :func:`access_av.evaluate`.
-    claims
-        Results of :func:`access_av.paper.check_claims`.
+    study
+        The paper under several readings; the shown one's charts are drawn in full.
 
     Returns
     -------
@@ -42,17 +44,22 @@ def render(evaluation: Evaluation, claims: list[Claim]) -> str:
         An HTML page that loads nothing.
     """
     specs: dict[str, Spec] = {}
-    reproduced = sum(claim.reproduced for claim in claims)
+    evaluation = study.shown
     return fill(
         TEMPLATE.read_text(encoding="utf-8"),
         specs,
-        scenario_name=escape(evaluation.scenario.name),
-        headline=f"{reproduced} of {len(claims)} claims of the paper reproduced",
-        lead=_lead(evaluation),
-        tiles=_tiles(evaluation),
-        meta=_meta(evaluation),
+        shown=escape(evaluation.reading.title),
+        headline=escape(summary.headline(study)),
+        lead=escape(summary.lead(study)),
+        tiles=_tiles(study),
+        meta=_meta(study),
         runs=evaluation.runs,
-        claims=_claims(claims),
+        readings=readings.readings(study),
+        matrix=readings.matrix(study),
+        claims=readings.claims(study),
+        contribution=controller.contribution(study, specs),
+        unknowns=unknowns.unknowns(study, specs),
+        ours=controller.ours(study),
         signal=accuracy.signal(evaluation, specs),
         accuracy=accuracy.accuracy(evaluation, specs),
         accuracy_table=accuracy.accuracy_table(evaluation),
@@ -68,85 +75,47 @@ def render(evaluation: Evaluation, claims: list[Claim]) -> str:
     )
 
 
-def _lead(evaluation: Evaluation) -> str:
-    adaptive, fixed = evaluation.campaign("R"), evaluation.campaign("Q")
-    worst = adaptive.select(pl.max_horizontal("worst_error_x_m", "worst_error_y_m").max()).item()
-    grown = fixed.select(pl.col("worst_error_y_m").max()).item()
-    return (
-        f"Adaptive wake-up keeps the error within {worst:.2f} m in X and Y in every power mode; "
-        f"fixed intervals let it grow to {grown:.2f} m. "
-        "Simulated with the paper's track, radio and controller."
+def _tiles(study: Study) -> str:
+    """By what its verdict is worth: claims met under the shown reading."""
+    name = study.shown.reading.title
+    met = summary.counts(study.of(study.shown.reading.name))
+    made = [
+        tile(f"{held} of {judged}", f"claims {kind}, met under “{name}”")
+        for kind, (held, judged) in met.items()
+        if judged
+    ]
+    with_map = [each for each in study.ours if each.map]
+    better = sum(each.is_better for each in with_map)
+    made.append(
+        tile(f"{better} of {len(with_map)}", "modes in which ours is better in error and energy")
     )
+    return "".join(made)
 
 
-def _tiles(evaluation: Evaluation) -> str:
-    adaptive, fixed = evaluation.campaign("R"), evaluation.campaign("Q")
-    worst = adaptive.select(pl.max_horizontal("worst_error_x_m", "worst_error_y_m").max()).item()
-    modes = adaptive["mode"].to_list()
-    savings = [value for mode in modes for value in savings_percent(evaluation, mode).values()]
-    first = modes[0]
-    instead = fixed.filter(mode=first, method="music")["executions"].item()
-    return "".join(
-        (
-            tile(
-                f"{worst:.2f} m",
-                "worst adaptive error, any mode "
-                f"(paper: within {of_claim('a1_adaptive_worst_m')} m)",
-            ),
-            tile(
-                f"{sum(savings) / len(savings):.1f} %",
-                f"energy saved on average (paper: {of_claim('e4_average_saving_percent')} %)",
-            ),
-            tile(
-                f"{adaptive['executions'][0]:.0f}",
-                f"executions in mode {first}, adaptive, instead of {instead:.0f}",
-            ),
-            tile(
-                f"{sensor_cost_ratio():.0f} ×",
-                f"cheaper than a LiDAR (paper: over {of_claim('c1_sensor_cost_ratio_above'):g} ×)",
-            ),
-        )
-    )
-
-
-def _meta(evaluation: Evaluation) -> str:
+def _meta(study: Study) -> str:
+    evaluation = study.shown
     return escape(
-        f"Scenario “{evaluation.scenario.name}”, platform “{evaluation.platform.name}”, "
+        f"{len(study.evaluations)} readings, platform “{evaluation.platform.name}”, "
         f"{evaluation.runs} runs per setting, seed {evaluation.seed}, "
         f"version {version('access-av')}."
     )
-
-
-def _claims(claims: list[Claim]) -> str:
-    rows = []
-    for claim in claims:
-        verdict = badge(claim.verdict, "yes" if claim.reproduced else "no")
-        fitted = " " + badge("fitted", "fit") if claim.fitted else ""
-        rows.append(
-            (
-                f"<b>{escape(claim.says)}</b><small>{escape(claim.where)} · "
-                f"<code>{escape(claim.id)}</code></small><small>{escape(claim.note)}</small>",
-                escape(value_text(claim.stated)),
-                escape(value_text(claim.obtained)),
-                escape(claim.unit),
-                verdict + fitted,
-            )
-        )
-    return table(("Claim", "Paper", "Obtained", "Unit", "Verdict"), rows)
 
 
 def _provenance(evaluation: Evaluation) -> str:
     rows = []
     for mode in evaluation.platform.modes:
         for method in METHODS:
-            energy = mode.energy_per_execution_j[method]
+            figure = mode.energy_per_execution_j.get(method)
+            used_j = evaluation.outcome.energy_per_execution_j[mode.number].get(method)
             rows.append(
                 (
                     f"{mode.number} {escape(mode.name)}",
                     escape(label(method)),
-                    number(energy.value, 4),
-                    badge(energy.provenance, "fit"),
-                    escape(energy.source),
+                    number(None if used_j is None else float(used_j.flat[0]), 4),
+                    badge("fitted" if evaluation.refitted else figure.provenance, "fit")
+                    if figure
+                    else "the platform has none",
+                    escape(figure.source) if figure else "",
                 )
             )
     head = ("Mode", "Method", "J per execution", "Provenance", "Source")

@@ -1,0 +1,66 @@
+//! What Algorithm 1 is told of radio and drive.
+
+use super::pid::Pid;
+use super::policy::Situation;
+use crate::BoxError;
+use crate::observation::SensedSsb;
+use crate::radio_head::RadioHead;
+use crate::settings::{DeltaT, PidSettings, SnrSetPoint};
+
+/// Algorithm 1 with its inputs: the SNR error is positive when the signal is too weak, the velocity
+/// error the shortfall from the top speed, 0 when cruising and 1 when standing.
+#[derive(Debug)]
+pub struct Controller {
+    pid: Pid,
+    set_point: SnrSetPoint,
+    snr_scale_db: f64,
+    top_speed_mps: f64,
+    delta_t: DeltaT,
+    last_sensed_s: Option<f64>,
+}
+
+impl Controller {
+    /// Algorithm 1 from the base wake-up time on.
+    pub fn new(settings: &PidSettings, base_s: f64, top_speed_mps: f64) -> Self {
+        Self {
+            pid: Pid::new(settings, base_s),
+            set_point: settings.snr_set_point,
+            snr_scale_db: settings.snr_scale_db,
+            top_speed_mps,
+            delta_t: settings.delta_t,
+            last_sensed_s: None,
+        }
+    }
+
+    /// The wake-up time after an SSB; `None` after the first, which has no interval before it.
+    ///
+    /// # Errors
+    /// Whatever the localizer fails with.
+    pub fn sense(
+        &mut self,
+        now: &Situation<'_>,
+        ssb: &SensedSsb,
+        head: &RadioHead,
+    ) -> Result<Option<f64>, BoxError> {
+        let interval_s = self.last_sensed_s.map(|last_s| now.time_s - last_s);
+        if interval_s.is_some_and(|interval_s| interval_s <= 0.0) {
+            return Ok(None); // late: the clock stays where it is
+        }
+        self.last_sensed_s = Some(now.time_s);
+        let Some(interval_s) = interval_s else {
+            return Ok(None);
+        };
+        let delta_t = match self.delta_t {
+            DeltaT::Seconds => interval_s,
+            DeltaT::Steps => 1.0,
+        };
+        let snr_error = now.snr_shortfall_db(self.set_point, ssb, head)? / self.snr_scale_db;
+        let velocity_error = (self.top_speed_mps - now.speed_mps) / self.top_speed_mps;
+        let pid = &mut self.pid;
+        Ok(Some(pid.calculate_wake_up_time(
+            snr_error,
+            velocity_error,
+            delta_t,
+        )))
+    }
+}

@@ -1,0 +1,150 @@
+"""What the controller itself contributes: a constant in its place that executes as often.
+
+Everything else stays, the gate included where a reading has one, and the runs are the same. What is
+left of a difference, run by run, is the controller's.
+"""
+
+from __future__ import annotations
+
+from dataclasses import dataclass
+from typing import TYPE_CHECKING
+
+import numpy as np
+
+from access_av.paper.evaluation import cases
+from access_av.paper.statements import paper_numbers
+
+if TYPE_CHECKING:
+    from access_av._core import Scenario
+    from access_av.paper.drives import Driver
+    from access_av.paper.evaluation import Evaluation
+    from access_av.paper.outcome import Drives
+    from access_av.paper.readings import Reading
+
+# Intervals of the front, in ms: from every SSB to beyond the paper's t_max.
+FRONT_MS = (20.0, 40.0, 60.0, 80.0, 100.0, 120.0, 150.0, 180.0, 240.0, 320.0, 480.0, 1000.0)
+# A difference below this share of the error matters to nobody.
+LEAST_SHARE = 0.05
+
+
+@dataclass(frozen=True)
+class Ablation:
+    """A power mode of a reading with its controller, and with a constant in its place.
+
+    Attributes
+    ----------
+    constant_ms
+        The constant wake-up time.
+    executions, constant_executions
+        With the controller and with the constant.
+    rms_error_m, constant_rms_m
+        RMS errors of both.
+    gain_m
+        By how much the controller's RMS error is less.
+    gain_low_m, gain_high_m
+        Its paired 95 % interval: both drive the same runs, which are resampled together.
+    matters
+        1 where the controller helps, -1 where it harms, 0 where it makes no difference. It makes
+        one where the whole interval is beyond :data:`LEAST_SHARE` of the error.
+    """
+
+    reading: str
+    mode: int
+    constant_ms: float
+    executions: float
+    constant_executions: float
+    rms_error_m: float
+    constant_rms_m: float
+    gain_m: float
+    gain_low_m: float
+    gain_high_m: float
+    matters: int
+
+
+def ablate(driver: Driver, evaluation: Evaluation) -> list[Ablation]:
+    """The ablation of a reading in every power mode that drives differently."""
+    found = []
+    base_seen = set()
+    for case in cases(driver.platform):
+        mode, base_ms = case.mode, case.setting.base_wake_up_ms
+        if not case.setting.adaptive or mode is None or base_ms in base_seen:
+            continue
+        base_seen.add(base_ms)
+        drives = evaluation.outcome.adaptive[mode.number]
+        reading = evaluation.reading
+        constant_ms, constant = (_gated if reading.is_gated else _fixed)(
+            driver, reading, drives, base_ms
+        )
+        found.append(compare(reading.name, mode.number, drives, constant, constant_ms))
+    return found
+
+
+def compare(
+    reading: str, mode: int, drives: Drives, constant: Drives, constant_ms: float
+) -> Ablation:
+    """Drives with the controller against drives with the constant, on the same runs."""
+    gains_m = constant.rms_error_m - drives.rms_error_m
+    low_m, high_m = np.quantile(gains_m[1:], (0.025, 0.975)) if len(gains_m) > 1 else (0.0, 0.0)
+    least_m = LEAST_SHARE * float(drives.rms_error_m[0])
+    return Ablation(
+        reading=reading,
+        mode=mode,
+        constant_ms=constant_ms,
+        executions=float(drives.executions[0]),
+        constant_executions=float(constant.executions[0]),
+        rms_error_m=float(drives.rms_error_m[0]),
+        constant_rms_m=float(constant.rms_error_m[0]),
+        gain_m=float(gains_m[0]),
+        gain_low_m=float(low_m),
+        gain_high_m=float(high_m),
+        matters=1 if low_m > least_m else -1 if high_m < -least_m else 0,
+    )
+
+
+def front(driver: Driver, reading: Reading) -> list[tuple[float, Drives]]:
+    """MUSIC at fixed intervals from the shortest to the longest, in the reading's world."""
+    return [(ms, driver.drive(fixed(reading.scenario, ms)).drives) for ms in FRONT_MS]
+
+
+def fixed(scenario: Scenario, interval_ms: float) -> Scenario:
+    """The scenario with MUSIC at a fixed interval."""
+    return scenario.with_overrides(
+        {"vehicle.wake_up.policy": "fixed", "vehicle.wake_up.interval_ms": interval_ms}
+    )
+
+
+def _fixed(driver: Driver, reading: Reading, drives: Drives, _: float) -> tuple[float, Drives]:
+    """A fixed interval of as many executions: so many fit into the trip."""
+    executions = round(float(drives.executions[0]))
+    interval_ms = round(1e3 * driver.trip_s / (executions - 0.5), 3)
+    return interval_ms, driver.drive(fixed(reading.scenario, interval_ms)).drives
+
+
+def _gated(
+    driver: Driver, reading: Reading, drives: Drives, base_ms: float
+) -> tuple[float, Drives]:
+    """A constant behind the same gate: of those that an SSB period apart, the nearest in number.
+
+    More is never due than at the base wake-up time, and less the longer the constant is.
+    """
+    period_ms = paper_numbers()["wake_up"]["ssb_period_ms"]
+    latest_ms = reading.wake_up.get("latest_ms", np.inf)
+    wanted = float(drives.executions[0])
+    best_ms, best = base_ms, None
+    constant_ms = base_ms
+    while constant_ms <= latest_ms:
+        scenario = reading.scenario.with_overrides(
+            {
+                "vehicle.wake_up.due.policy": "fixed",
+                "vehicle.wake_up.due.interval_ms": constant_ms,
+            }
+        )
+        found = driver.drive(scenario).drives
+        executions = float(found.executions[0])
+        if best is None or abs(executions - wanted) < abs(float(best.executions[0]) - wanted):
+            best_ms, best = constant_ms, found
+        if executions <= wanted:
+            break
+        constant_ms = (constant_ms // period_ms + 1) * period_ms
+    assert best is not None
+    return best_ms, best

@@ -1,0 +1,102 @@
+"""Drives of one setting after another, each simulated once."""
+
+from __future__ import annotations
+
+from dataclasses import dataclass, field, replace
+from typing import TYPE_CHECKING, Any
+
+import numpy as np
+import polars as pl
+
+from access_av.paper.outcome import EVERY, Drives, Numbers, resamples
+from access_av.simulation import simulate
+
+if TYPE_CHECKING:
+    from collections.abc import Callable
+
+    from access_av._core import Scenario
+    from access_av.platform import Platform
+
+RESAMPLES = 200
+
+
+@dataclass(frozen=True)
+class Driven:
+    """A setting's drives, and their statistics at each SSB."""
+
+    drives: Drives
+    steps: pl.DataFrame
+
+
+@dataclass
+class Driver:
+    """Simulates settings on one platform with one seed, and remembers what it has driven."""
+
+    platform: Platform
+    runs: int
+    seed: int
+    threads: int | None = None
+    count: int = RESAMPLES
+    progress: Callable[[int, int], None] | None = None
+    planned: int = 0
+    known: dict[str, Driven] = field(default_factory=dict)
+
+    @property
+    def trip_s(self) -> float:
+        """Duration of the trip that was driven."""
+        steps = next(iter(self.known.values())).steps
+        return float(steps.select(pl.col("time_s").max()).item())
+
+    def drive(self, scenario: Scenario) -> Driven:
+        """Many drives of a scenario, from memory where another one is the same but for its name."""
+        first_mode = self.platform.modes[0].number
+        # A power mode acts by its base wake-up time, which is written out here.
+        scenario = scenario.resolved(self.platform.core).with_overrides(
+            {"name": "drive", "description": "", "vehicle.platform.mode": first_mode}
+        )
+        key = scenario.to_toml()
+        if key not in self.known:
+            self.known[key] = self._drive(scenario)
+            if self.progress is not None:
+                done = len(self.known) * self.runs
+                self.progress(done, max(done, self.planned * self.runs))
+        return self.known[key]
+
+    def _drive(self, scenario: Scenario) -> Driven:
+        found = simulate(
+            scenario,
+            runs=self.runs,
+            seed=self.seed,
+            platform=self.platform,
+            threads=self.threads,
+            errors_every=EVERY,
+        )
+        assert found.errors_m is not None
+        weights = self._weights()
+        drives = Drives.of_runs(
+            found.runs["executions"].to_numpy().astype(np.float64), found.errors_m, weights
+        )
+        # The sample as it is, at every SSB.
+        exact: dict[str, Any] = {}
+        for axis in "xy":
+            worst_m = getattr(drives, f"worst_{axis}_m").copy()
+            worst_m[0] = found.steps[f"mean_abs_error_{axis}_m"].max()
+            exact[f"worst_{axis}_m"] = worst_m
+        rms_m = drives.rms_error_m.copy()
+        rms_m[0] = found.rms_error_m
+        besides_j = found.runs.select(
+            (pl.col("energy_j") - pl.col("energy_executions_j")).mean()
+        ).item()
+        return Driven(
+            replace(
+                drives,
+                **exact,
+                rms_error_m=rms_m,
+                longest_gap_s=float(found.runs.select(pl.col("longest_gap_s").max()).item()),
+                besides_j=besides_j or 0.0,
+            ),
+            found.steps,
+        )
+
+    def _weights(self) -> Numbers:
+        return resamples(self.runs, self.count)

@@ -1,0 +1,110 @@
+"""By how much a claim is met: the rules of ``paper.toml``.
+
+A margin is relative to what is stated; it is positive where the claim is met, and continuous, so
+that it has an interval and a sensitivity. Obtained values may be arrays over variants.
+"""
+
+from __future__ import annotations
+
+from typing import TYPE_CHECKING, Any
+
+import numpy as np
+
+from access_av.errors import InputError
+
+if TYPE_CHECKING:
+    from collections.abc import Callable, Mapping
+
+    from access_av.paper.outcome import Numbers
+
+
+def margin(entry: Mapping[str, Any], obtained: Any) -> Numbers:
+    """The margin of an obtained value under a claim's entry; below zero where it is not met.
+
+    Raises
+    ------
+    InputError
+        When the entry's rule is none of :data:`RULES`; names those there are.
+
+    Examples
+    --------
+    >>> entry = {"rule": "about", "stated": 0.8, "tolerance": 0.25}
+    >>> bool(margin(entry, 0.7) >= 0), bool(margin(entry, 1.1) >= 0)
+    (True, False)
+    """
+    rule = entry["rule"]
+    if rule not in RULES:
+        raise InputError(f"unknown rule {rule!r}; there are: {', '.join(RULES)}")
+    return np.asarray(RULES[rule](entry, obtained), dtype=np.float64)
+
+
+def _least(margins: list[Numbers]) -> Numbers:
+    return np.asarray(np.min(np.broadcast_arrays(*margins), axis=0), dtype=np.float64)
+
+
+def _each(compare: Callable[[float, Any, float], Numbers]) -> Callable[..., Numbers]:
+    """A comparison of numbers, or of several by name of which all have to be met."""
+
+    def rule(entry: Mapping[str, Any], obtained: Any) -> Numbers:
+        stated, tolerance = entry["stated"], float(entry.get("tolerance", 0.0))
+        if isinstance(stated, dict):
+            return _least([compare(stated[key], obtained[key], tolerance) for key in stated])
+        return compare(stated, obtained, tolerance)
+
+    return rule
+
+
+def _at_most(stated: float, obtained: Any, _: float) -> Numbers:
+    return np.asarray((stated - obtained) / stated)
+
+
+def _above(stated: float, obtained: Any, _: float) -> Numbers:
+    # The next number below: what equals the bound is not above it.
+    return np.asarray((obtained - np.nextafter(stated, np.inf)) / stated)
+
+
+def _about(stated: float, obtained: Any, tolerance: float) -> Numbers:
+    return np.asarray((tolerance * stated - np.abs(obtained - stated)) / stated)
+
+
+def _query(entry: Mapping[str, Any], modes: Mapping[int, Mapping[str, Numbers]]) -> Numbers:
+    stated, budget_j = entry["stated"], float(entry["query"]["max_energy_j"])
+    best = modes[stated["best_mode"]]
+    others = [each for number, each in modes.items() if number != stated["best_mode"]]
+    return _least(
+        [
+            _at_most(budget_j, best["energy_j"], 0.0),
+            *((other["energy_j"] - best["energy_j"]) / best["energy_j"] for other in others),
+            _about(stated["energy_j"], best["energy_j"], float(entry["tolerance"])),
+            -_above(stated["rms_below_m"], best["rms_m"], 0.0),
+        ]
+    )
+
+
+def _modes(entry: Mapping[str, Any], modes: Mapping[int, Mapping[str, Numbers]]) -> Numbers:
+    query = entry["query"]
+    within = {
+        number: _least(
+            [
+                _at_most(query["max_energy_j"], each["energy_j"], 0.0),
+                _at_most(query["max_rms_m"], each["rms_m"], 0.0),
+            ]
+        )
+        for number, each in modes.items()
+    }
+    listed = [within[number] for number in entry["stated"]]
+    others = [
+        -np.nextafter(margin, np.inf)
+        for number, margin in within.items()
+        if number not in entry["stated"]
+    ]
+    return _least(listed + others)
+
+
+RULES: dict[str, Callable[..., Numbers]] = {
+    "at_most": _each(_at_most),
+    "above": _each(_above),
+    "about": _each(_about),
+    "query": _query,
+    "modes": _modes,
+}

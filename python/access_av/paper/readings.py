@@ -1,0 +1,159 @@
+"""Readings of the paper: each a scenario that fills in what the paper leaves open.
+
+A reading is a small TOML file ``like = "paper"`` in ``readings/``; ``readings/index.toml`` has
+their order, and what of each was chosen in view of the paper's claims.
+"""
+
+from __future__ import annotations
+
+import json
+from dataclasses import dataclass
+from importlib import resources
+from pathlib import Path
+from typing import TYPE_CHECKING, Any
+
+from access_av._core import Scenario
+from access_av.errors import InputError
+from access_av.paper.statements import paper_numbers
+from access_av.toml import shipped
+
+if TYPE_CHECKING:
+    from collections.abc import Iterable
+
+OPEN = ("radio", "controller")
+# The one that the scenario `paper` is.
+SHIPPED = "gate"
+
+
+@dataclass(frozen=True)
+class Reading:
+    """One way to read the paper.
+
+    Attributes
+    ----------
+    chosen
+        What of it was chosen with the paper's claims in view: of :data:`OPEN`.
+    keeps_t_max
+        Whether it claims to keep t_max.
+    """
+
+    name: str
+    title: str
+    scenario: Scenario
+    chosen: tuple[str, ...]
+    keeps_t_max: bool
+
+    @property
+    def wake_up(self) -> dict[str, Any]:
+        """Its wake-up settings."""
+        return dict(json.loads(self.scenario.to_json())["vehicle"]["wake_up"])
+
+    @property
+    def is_gated(self) -> bool:
+        """Whether estimates wait for a better SSB."""
+        return bool(self.wake_up["policy"] == "gated")
+
+    @property
+    def t_max_s(self) -> float | None:
+        """Its t_max; ``None`` where it has no controller."""
+        settings = self.wake_up
+        t_max_ms = settings.get("due", settings).get("t_max_ms")
+        return None if t_max_ms is None else t_max_ms / 1e3
+
+    def keeps(self, longest_gap_s: float) -> bool:
+        """Whether a longest time between two estimates keeps t_max, to the next SSB."""
+        period_s = paper_numbers()["wake_up"]["ssb_period_ms"] / 1e3
+        return self.t_max_s is None or longest_gap_s < self.t_max_s + period_s - 1e-9
+
+
+def names() -> list[str]:
+    """Names of the shipped readings, in the evaluation's order.
+
+    Examples
+    --------
+    >>> names()[:2]
+    ['every-ssb', 'wake-ups']
+    """
+    return list(shipped("paper", "readings", "index.toml"))
+
+
+def load(name_or_path: str) -> Reading:
+    """A shipped reading by its name, or else a scenario file that is one.
+
+    Raises
+    ------
+    SettingsError
+        When the file cannot be used; names the key and what is allowed.
+    InputError
+        When its trip is not the paper's; names the command that serves.
+
+    Examples
+    --------
+    >>> load("gate-t-max").wake_up["latest_ms"]
+    240.0
+    """
+    index = shipped("paper", "readings", "index.toml")
+    if name_or_path in index:
+        entry = index[name_or_path]
+        with resources.as_file(resources.files(__package__).joinpath("readings")) as place:
+            scenario = Scenario.load(str(place / f"{name_or_path}.toml"))
+        return Reading(
+            name_or_path, entry["title"], scenario, tuple(entry["chosen"]), entry["keeps_t_max"]
+        )
+    if not Path(name_or_path).exists() and name_or_path not in Scenario.names():
+        raise InputError(f"no reading {name_or_path}; there are: {', '.join(index)}; or a file")
+    scenario = Scenario.load(name_or_path)
+    check_trip(scenario)
+    title = scenario.description or scenario.name
+    return Reading(scenario.name, title, scenario, OPEN, keeps_t_max=False)
+
+
+def load_all(chosen: Iterable[str] = ()) -> list[Reading]:
+    """These readings, or all that are shipped."""
+    return [load(name) for name in list(chosen) or names()]
+
+
+def check_trip(scenario: Scenario) -> None:
+    """Refuse a scenario whose trip the paper's claims do not speak of.
+
+    Raises
+    ------
+    InputError
+        Naming what differs, and the command that serves.
+
+    Examples
+    --------
+    >>> check_trip(Scenario.load("paper"))
+    """
+    paper = json.loads(Scenario.load("paper").to_json())
+    other = json.loads(scenario.to_json())
+    differs = [
+        what
+        for what, place in (
+            ("its road", ("site", "road")),
+            ("its radio heads' places", ("site", "radio_heads")),
+            ("its motion", ("motion",)),
+            ("its top speed", ("vehicle", "top_speed_kmh")),
+            ("its localizer", ("vehicle", "localizer", "kind")),
+            ("its receiver, which knows pilots,", ("vehicle", "receiver", "pilots")),
+        )
+        if _at(paper, place) != _at(other, place)
+    ]
+    if differs:
+        raise InputError(
+            f"scenario {scenario.name}: {differs[0]} is not the paper's, whose claims `access-av "
+            f"evaluate` judges on the paper's trip; for errors, executions and energy of this one: "
+            f"access-av run {scenario.name}; for what any localizer could reach: access-av bound "
+            f"{scenario.name}"
+        )
+
+
+def _at(settings: dict[str, Any], place: tuple[str, ...]) -> Any:
+    found: Any = settings
+    for key in place:
+        found = found.get(key, {})
+    if place[-1] == "radio_heads":
+        return [head["position_m"] for head in found]
+    if place[-1] == "road":
+        return {key: value for key, value in found.items() if key != "position_std_m"}
+    return found

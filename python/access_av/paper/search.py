@@ -1,0 +1,292 @@
+"""Many readings of the paper, drawn from what it leaves open and judged by its claims.
+
+Worlds are drawn first, and several controllers for each: the fixed campaigns are driven once a
+world. A world with its controllers is one part on disk, so that a search that was stopped goes on.
+"""
+
+from __future__ import annotations
+
+from dataclasses import dataclass
+from typing import TYPE_CHECKING, Any
+
+import numpy as np
+
+from access_av._core import Scenario
+from access_av.paper.claims import margins
+from access_av.paper.drives import Driver
+from access_av.paper.evaluation import Case, cases, outcome_of
+from access_av.paper.outcome import Drives, Numbers
+from access_av.paper.readings import OPEN, Reading
+from access_av.paper.space import (
+    CONTROLLER,
+    GATE,
+    WORLD,
+    Dimension,
+    controller_changes,
+    latin_hypercube,
+    named,
+    world_changes,
+)
+from access_av.paper.statements import stated_claims
+from access_av.parts import Parts
+
+if TYPE_CHECKING:
+    from collections.abc import Callable, Mapping, Sequence
+    from pathlib import Path
+
+    from access_av.platform import Platform
+
+
+@dataclass(frozen=True)
+class Sample:
+    """Readings and how they do by the claims.
+
+    Attributes
+    ----------
+    dimensions
+        What was drawn.
+    coordinates
+        One row per reading, from 0 to 1.
+    world
+        Which world each reading is in.
+    margins
+        Of each claim, in the readings' order.
+    longest_gap_s
+        Longest time between two estimates in any mode.
+    executions
+        Of adaptive MUSIC in the platform's first mode.
+    worst_error_m
+        Worst error of adaptive MUSIC in any mode.
+    """
+
+    dimensions: tuple[Dimension, ...]
+    coordinates: Numbers
+    world: Numbers
+    margins: Mapping[str, Numbers]
+    longest_gap_s: Numbers
+    executions: Numbers
+    worst_error_m: Numbers
+
+    def held(self) -> Numbers:
+        """How many claims each reading meets."""
+        held = [margin >= 0.0 for margin in self.margins.values()]
+        return np.asarray(np.sum(held, axis=0), dtype=np.float64)
+
+    def best(self) -> list[int]:
+        """Readings in order: most claims first, of those the ones that miss the rest by least."""
+        short = np.sum([np.clip(margin, -1.0, 0.0) for margin in self.margins.values()], axis=0)
+        return [int(index) for index in np.lexsort((-short, -self.held()))]
+
+    def values(self, index: int) -> dict[str, Any]:
+        """What was drawn for a reading."""
+        return named(self.dimensions, self.coordinates[index].tolist())
+
+
+def sample(
+    platform: Platform,
+    parts: Path,
+    *,
+    worlds: int,
+    controllers: int,
+    runs: int,
+    seed: int = 1,
+    gates: bool = False,
+    threads: int | None = None,
+    progress: Callable[[int, int], None] | None = None,
+) -> Sample:
+    """Draw readings, and judge each by the paper's claims.
+
+    Parameters
+    ----------
+    worlds, controllers
+        How many worlds, and how many controllers in each.
+    runs
+        Drives per setting.
+    gates
+        Whether a gate is one of the things drawn; without, all is Algorithm 1 as written.
+    parts
+        Directory of the parts; those that are there are not computed again.
+    """
+    own = (*CONTROLLER, GATE) if gates else CONTROLLER
+    world_points = latin_hypercube(worlds, len(WORLD), seed)
+    own_points = latin_hypercube(worlds * controllers, len(own), seed + 1)
+    own_points = own_points.reshape(worlds, controllers, len(own))
+    found: list[dict[str, Any]] = []
+    store = Parts(parts)
+    for index in range(worlds):
+        world = named(WORLD, world_points[index].tolist())
+        here = [named(own, point) for point in own_points[index].tolist()]
+        depends_on = _depends_on(platform, world, here, runs, seed)
+
+        def compute(world: dict[str, Any] = world, here: list[dict[str, Any]] = here) -> Any:
+            return judge(platform, world, here, runs=runs, seed=seed, threads=threads)
+
+        found.append(store.get(depends_on, compute))
+        if progress is not None:
+            progress((index + 1) * controllers, worlds * controllers)
+    repeated = np.repeat(world_points, controllers, axis=0)
+    return Sample(
+        dimensions=(*WORLD, *own),
+        coordinates=np.hstack([repeated, own_points.reshape(-1, len(own))]),
+        world=np.repeat(np.arange(worlds), controllers),
+        margins={
+            name: np.concatenate([part[name] for part in found])
+            for name in found[0]
+            if name in stated_claims()
+        },
+        **{
+            name: np.concatenate([part[name] for part in found])
+            for name in ("longest_gap_s", "executions", "worst_error_m")
+        },
+    )
+
+
+def _depends_on(
+    platform: Platform,
+    world: Mapping[str, Any],
+    controllers: Sequence[Mapping[str, Any]],
+    runs: int,
+    seed: int,
+) -> dict[str, Any]:
+    """Everything that a part's numbers depend on, besides the version."""
+    return {
+        "world": world,
+        "controllers": controllers,
+        "runs": runs,
+        "seed": seed,
+        "platform": platform.to_toml(),
+        "scenario": Scenario.load("paper").to_toml(),
+        "claims": {name: _rule(entry) for name, entry in stated_claims().items()},
+    }
+
+
+def _rule(entry: Mapping[str, Any]) -> dict[str, Any]:
+    """What of a claim decides its margin."""
+    return {key: entry.get(key) for key in ("rule", "stated", "tolerance", "query")}
+
+
+def judge(
+    platform: Platform,
+    world: Mapping[str, Any],
+    controllers: Sequence[Mapping[str, Any]],
+    *,
+    runs: int,
+    seed: int,
+    threads: int | None = None,
+) -> dict[str, Numbers]:
+    """Margins of all claims, and the longest gap, of several controllers in one world."""
+    driver = Driver(platform, runs, seed, threads, count=0)
+    paper = Scenario.load("paper").with_overrides(world_changes(world))
+    scenarios = [
+        paper.with_overrides(controller_changes(point, world["eirp_dbm"])) for point in controllers
+    ]
+    drives: list[tuple[Case, Drives]] = []
+    for case in cases(platform):
+        if case.setting.adaptive and case.mode is not None:
+            mode = {"vehicle.platform.mode": case.mode.number}
+            each = [
+                driver.drive(case.setting.apply(scenario).with_overrides(mode)).drives
+                for scenario in scenarios
+            ]
+            drives.append((case, _side_by_side(each)))
+        else:
+            drives.append((case, driver.drive(case.setting.apply(paper)).drives))
+    outcome, _ = outcome_of(drives, platform, driver.trip_s, fit_each=True)
+    gaps_s = [np.atleast_1d(each.longest_gap_s) for each in outcome.adaptive.values()]
+    count = len(controllers)
+    first = outcome.adaptive[platform.modes[0].number]
+    return {
+        "longest_gap_s": np.max(gaps_s, axis=0),
+        "executions": first.executions,
+        "worst_error_m": np.max([each.worst_m for each in outcome.adaptive.values()], axis=0),
+        **{name: np.broadcast_to(margin, count) for name, margin in margins(outcome).items()},
+    }
+
+
+def _side_by_side(readings: list[Drives]) -> Drives:
+    """One setting under several readings, as variants."""
+
+    def joined(name: str) -> Any:
+        return np.concatenate([np.atleast_1d(getattr(each, name)) for each in readings])
+
+    return Drives(
+        **{
+            name: joined(name)
+            for name in ("executions", "worst_x_m", "worst_y_m", "rms_error_m", "horizontal_m")
+        },
+        longest_gap_s=joined("longest_gap_s"),
+    )
+
+
+def as_reading(values: Mapping[str, Any], name: str = "found") -> Reading:
+    """What was drawn, as a reading."""
+    world = {dimension.name: values[dimension.name] for dimension in WORLD}
+    scenario = Scenario.load("paper").with_overrides(
+        world_changes(world)
+        | controller_changes(values, world["eirp_dbm"])
+        | {"name": name, "description": "Found by access-av search"}
+    )
+    return Reading(name, "Found by the search", scenario, OPEN, keeps_t_max=True)
+
+
+@dataclass(frozen=True)
+class Confirmed:
+    """A reading that was driven again.
+
+    Attributes
+    ----------
+    label
+        The best one, or what was moved to be beside it.
+    held
+        How many claims it meets.
+    missed
+        Ids of the others.
+    """
+
+    label: str
+    values: Mapping[str, Any]
+    held: int
+    missed: list[str]
+
+
+def confirmed(
+    platform: Platform,
+    found: Sample,
+    parts: Path,
+    *,
+    runs: int,
+    seed: int,
+    threads: int | None = None,
+) -> list[Confirmed]:
+    """Drive the best reading and its neighbours again; the best of them comes first.
+
+    A neighbour differs by a tenth of a controller's dimension, or by another choice.
+    """
+    best = found.values(found.best()[0])
+    start = found.coordinates[found.best()[0]]
+    points, labels = [best], ["the best"]
+    for d, dimension in enumerate(found.dimensions):
+        if dimension in CONTROLLER:
+            there = start.copy()
+            step = 1.0 / len(dimension.choices) if dimension.choices else 0.1
+            there[d] += step if start[d] < 0.5 else -step
+            values = named(found.dimensions, there.tolist())
+            points.append(values)
+            labels.append(f"{dimension.label}: {values[dimension.name]}")
+    world = {dimension.name: best[dimension.name] for dimension in WORLD}
+
+    def compute() -> dict[str, Numbers]:
+        return judge(platform, world, points, runs=runs, seed=seed, threads=threads)
+
+    depends_on = {**_depends_on(platform, world, points, runs, seed), "confirmed": True}
+    part = Parts(parts).get(depends_on, compute)
+    again = [
+        Confirmed(
+            label=labels[index],
+            values=values,
+            held=sum(bool(part[name][index] >= 0.0) for name in found.margins),
+            missed=[name for name in found.margins if part[name][index] < 0.0],
+        )
+        for index, values in enumerate(points)
+    ]
+    return sorted(again, key=lambda each: -each.held)

@@ -1,0 +1,146 @@
+"""What the paper leaves open, as a space to draw readings from.
+
+Each dimension has a stated range and says how it changes the paper's scenario. Dimensions of the
+*world* change what is driven through, and so every campaign; those of the *controller* only what
+adaptive MUSIC does in it. Points are coordinates from 0 to 1.
+"""
+
+from __future__ import annotations
+
+from dataclasses import dataclass
+from typing import TYPE_CHECKING, Any
+
+import numpy as np
+
+if TYPE_CHECKING:
+    from collections.abc import Mapping, Sequence
+
+    from access_av.paper.outcome import Numbers
+
+# SNR in the middle of the track at the shipped radiated power, in dB.
+MIDDLE_SNR_DB, SHIPPED_EIRP_DBM = 5.0, -17.3
+
+
+@dataclass(frozen=True)
+class Dimension:
+    """One thing that the paper leaves open.
+
+    Attributes
+    ----------
+    label
+        What a reader is told.
+    low, high
+        Range; logarithmic where ``is_log``.
+    choices
+        What there is to choose from, where it is not a number.
+    """
+
+    name: str
+    label: str
+    low: float = 0.0
+    high: float = 1.0
+    is_log: bool = False
+    choices: tuple[str, ...] = ()
+
+    def at(self, coordinate: float) -> Any:
+        """The value at a coordinate from 0 to 1.
+
+        Examples
+        --------
+        >>> Dimension("scale", "", 2.0, 20.0, is_log=True).at(1.0)
+        20.0
+        """
+        if self.choices:
+            return self.choices[min(int(coordinate * len(self.choices)), len(self.choices) - 1)]
+        if self.is_log:
+            return float(f"{self.low * (self.high / self.low) ** coordinate:.4g}")
+        return float(f"{self.low + (self.high - self.low) * coordinate:.4g}")
+
+    @property
+    def range_text(self) -> str:
+        """Its range in words."""
+        return ", ".join(self.choices) if self.choices else f"{self.low:g} to {self.high:g}"
+
+
+WORLD = (
+    Dimension("eirp_dbm", "radiated power / dBm", -23.3, -11.3),
+    Dimension("rician_k_db", "Rician K / dB", 5.0, 45.0),
+    Dimension("scatter", "scatter", choices=("per-antenna", "rays")),
+    Dimension("correlation_m", "shadowing lasts / m", 0.05, 20.0, is_log=True),
+    Dimension("heading", "heading between estimates", choices=("held", "mean")),
+    Dimension("snapshots", "snapshots", 10.0, 40.0),
+)
+CONTROLLER = (
+    Dimension("link_error_db", "link budget off by / dB", -6.0, 6.0),
+    Dimension("set_point", "set point", choices=("expected", "absolute")),
+    Dimension("offset_db", "set point / dB", -3.0, 12.0),
+    Dimension("scale_db", "SNR scale / dB", 2.0, 20.0, is_log=True),
+    Dimension("clamp", "integral clamp", 0.05, 50.0, is_log=True),
+    Dimension("u_unit_ms", "unit of u / ms", 20.0, 1000.0, is_log=True),
+    Dimension("delta_t", "unit of Δt", choices=("seconds", "steps")),
+    Dimension("sensing", "computed at", choices=("every-ssb", "wake-up")),
+)
+GATE = Dimension("gate", "gate", choices=("none", "within t_max", "without bound"))
+
+
+def world_changes(point: Mapping[str, Any]) -> dict[str, Any]:
+    """What a point of :data:`WORLD` changes of the paper's scenario, by dotted paths."""
+    return {
+        "site.radio_heads[0].eirp_dbm": point["eirp_dbm"],
+        "site.rician_k_db": point["rician_k_db"],
+        "channel.scatter": point["scatter"],
+        "channel.shadowing_correlation_m": point["correlation_m"],
+        "vehicle.localizer.heading_between": point["heading"],
+        "vehicle.receiver.snapshots": round(point["snapshots"]),
+    }
+
+
+def controller_changes(point: Mapping[str, Any], eirp_dbm: float) -> dict[str, Any]:
+    """What a point of :data:`CONTROLLER`, and a gate, change in a world of this radiated power.
+
+    What the vehicle believes of its link budget departs from the truth, not the other way round.
+    """
+    if point["set_point"] == "expected":
+        set_point = {"kind": "expected", "offset_db": point["offset_db"]}
+    else:
+        middle_db = MIDDLE_SNR_DB + eirp_dbm - SHIPPED_EIRP_DBM
+        set_point = {"kind": "absolute", "snr_db": round(middle_db + point["offset_db"], 3)}
+    pid = {
+        "policy": "pid",
+        "snr_set_point": set_point,
+        "snr_scale_db": point["scale_db"],
+        "integral_clamp": point["clamp"],
+        "u_unit_ms": point["u_unit_ms"],
+        "delta_t": point["delta_t"],
+        "sensing": point["sensing"],
+    }
+    gate = point.get("gate", "none")
+    bound = {"latest_ms": 240.0} if gate == "within t_max" else {}
+    gated = {"policy": "gated", "snr_set_point": set_point, "due": pid, **bound}
+    return {
+        "vehicle.wake_up": pid if gate == "none" else gated,
+        "site.radio_heads[0].eirp_dbm": round(eirp_dbm + point["link_error_db"], 4),
+        "truth.site": {"radio_heads": {"roadside": {"eirp_dbm": eirp_dbm}}},
+    }
+
+
+def latin_hypercube(count: int, dimensions: int, seed: int) -> Numbers:
+    """Points from 0 to 1 of which every dimension is covered evenly.
+
+    Examples
+    --------
+    >>> points = latin_hypercube(4, 2, seed=1)
+    >>> sorted((points[:, 0] * 4).astype(int).tolist())
+    [0, 1, 2, 3]
+    """
+    rng = np.random.default_rng(seed)
+    strata = np.stack([rng.permutation(count) for _ in range(dimensions)], axis=1)
+    return np.asarray((strata + rng.random((count, dimensions))) / count)
+
+
+def named(dimensions: Sequence[Dimension], coordinates: Sequence[float]) -> dict[str, Any]:
+    """The values at coordinates, by the names of the dimensions."""
+    return {
+        dimension.name: dimension.at(float(coordinate))
+        for dimension, coordinate in zip(dimensions, coordinates, strict=True)
+    }

@@ -1,0 +1,173 @@
+"""What the evaluation comes to, in sentences made from what was obtained."""
+
+from __future__ import annotations
+
+from collections import Counter
+from dataclasses import dataclass
+from typing import TYPE_CHECKING
+
+from access_av.paper.claims import EVIDENCE, NOT_JUDGED
+
+if TYPE_CHECKING:
+    from collections.abc import Sequence
+
+    from access_av.paper.ablation import Ablation
+    from access_av.paper.claims import Claim
+    from access_av.paper.readings import Reading
+    from access_av.paper.study import Study
+
+# The halves of the paper's promise: adaptive is as accurate as stated, and saves what is stated.
+ACCURACY = ("a1_adaptive_worst_m", "a2_adaptive_beats_fixed")
+ENERGY = ("e3_mode67_saving_percent", "e4_average_saving_percent")
+
+
+@dataclass(frozen=True)
+class Half:
+    """Which halves hold under a reading, and what carries them.
+
+    Attributes
+    ----------
+    gated
+        Whether estimates wait for a better SSB, which the paper's Algorithm 1 does not say.
+    keeps_t_max
+        Whether no two estimates are further apart than its t_max, as measured.
+    controller
+        In how many of the power modes the controller helps, makes no difference, and harms.
+    """
+
+    reading: Reading
+    accuracy: bool
+    energy: bool
+    gated: bool
+    keeps_t_max: bool
+    longest_gap_s: float
+    controller: tuple[int, int, int]
+
+
+def halves(study: Study) -> list[Half]:
+    """Which halves hold under each reading."""
+    found = []
+    for each in study.evaluations:
+        held = {claim.id for claim in study.of(each.reading.name) if claim.reproduced}
+        ablations = [one for one in study.ablations if one.reading == each.reading.name]
+        found.append(
+            Half(
+                reading=each.reading,
+                accuracy=held.issuperset(ACCURACY),
+                energy=held.issuperset(ENERGY),
+                gated=each.reading.is_gated,
+                keeps_t_max=each.reading.keeps(each.longest_gap_s),
+                longest_gap_s=each.longest_gap_s,
+                controller=controller(ablations),
+            )
+        )
+    return found
+
+
+def controller(ablations: Sequence[Ablation]) -> tuple[int, int, int]:
+    """In how many power modes the controller helps, makes no difference, and harms."""
+    found = Counter(each.matters for each in ablations)
+    return found[1], found[0], found[-1]
+
+
+def controller_text(counts: tuple[int, int, int]) -> str:
+    """The same in words.
+
+    Examples
+    --------
+    >>> controller_text((0, 4, 0))
+    'makes no difference'
+    """
+    helps, same, harms = counts
+    if not helps and not harms:
+        return "makes no difference"
+    modes = helps + same + harms
+    parts = [
+        f"{word} in {count} of {modes} modes"
+        for word, count in (("helps", helps), ("makes no difference", same), ("harms", harms))
+        if count
+    ]
+    return parts[0].split(" in ")[0] if len(parts) == 1 else ", ".join(parts)
+
+
+def headline(study: Study) -> str:
+    """Which halves hold together, in a line."""
+    found = halves(study)
+    both = [half for half in found if half.accuracy and half.energy]
+    if any(not half.gated and half.keeps_t_max for half in both):
+        return "Accuracy and energy hold together under Algorithm 1 as written"
+    if both and all(half.gated for half in both):
+        return "Accuracy or energy as written; both only with a gate the paper does not state"
+    if both:
+        return "Accuracy and energy hold together, but t_max is not kept"
+    return "Accuracy and energy do not hold together under any reading"
+
+
+def lead(study: Study) -> str:
+    """Which halves hold under which readings, and why."""
+    found = halves(study)
+
+    def titles(chosen: list[Half]) -> str:
+        named = [f"“{half.reading.title}”" for half in chosen]
+        return ", ".join(named) if named else "none of the readings"
+
+    both = [half for half in found if half.accuracy and half.energy]
+    sentences = [
+        "The accuracy half (a1, a2) alone holds under "
+        f"{titles([half for half in found if half.accuracy and not half.energy])}; the energy half "
+        "(e3, e4) alone under "
+        f"{titles([half for half in found if half.energy and not half.accuracy])}; both under "
+        f"{titles(both)}."
+    ]
+    for half in both:
+        t_max = (
+            "t_max is kept"
+            if half.keeps_t_max
+            else f"t_max is exceeded (longest gap {half.longest_gap_s:.2f} s)"
+        )
+        if half.gated:
+            sentences.append(
+                f"Under “{half.reading.title}” estimates wait for a better SSB, which Algorithm 1 "
+                f"does not say; {t_max}, and Algorithm 1 {controller_text(half.controller)} "
+                "against a constant in its place."
+            )
+        else:
+            sentences.append(
+                f"Under “{half.reading.title}” {t_max}, and Algorithm 1 "
+                f"{controller_text(half.controller)} against as many fixed wake-ups."
+            )
+    return " ".join(sentences)
+
+
+def counts(claims: Sequence[Claim]) -> dict[str, tuple[int, int]]:
+    """Claims met, and claims judged, by what a verdict is worth."""
+    found = {}
+    for kind in EVIDENCE:
+        judged = [it for it in claims if it.evidence == kind and it.verdict != NOT_JUDGED]
+        found[kind] = (sum(it.reproduced for it in judged), len(judged))
+    return found
+
+
+def counts_text(claims: Sequence[Claim]) -> str:
+    """The same in words."""
+    return ", ".join(
+        f"{met} of {judged} {kind}" for kind, (met, judged) in counts(claims).items() if judged
+    )
+
+
+def ours_text(study: Study) -> str:
+    """Ours beside the paper's adaptive point."""
+    with_map = [each for each in study.ours if each.map]
+    if not with_map:
+        return ""
+    better = sum(each.is_better for each in with_map)
+    fewer = [each.papers_executions / each.executions for each in with_map]
+    worst_m, papers_m = (
+        max(getattr(each, name) for each in with_map) for name in ("rms_error_m", "papers_rms_m")
+    )
+    return (
+        f"Our tracker, which knows the road and wakes up when its own error asks for it, is better "
+        f"in error and energy at once in {better} of {len(with_map)} power modes (paired, 95 %): "
+        f"{min(fewer):.0f} to {max(fewer):.0f} times fewer executions, RMS error at most "
+        f"{worst_m:.2f} m against {papers_m:.2f} m."
+    )
