@@ -117,16 +117,19 @@ fn depart<T: TomlFile + Clone>(
     lay_over(&mut table, over.clone(), &path, check)?;
     // Whatever it reads is already in the table.
     let library: &dyn Library = &Shipped;
-    let departed = T::from_table(table, check.file, library)
-        .map_err(|error| error.beneath(check.file, &path))?;
+    let departed =
+        T::from_table(table, check.file, library).map_err(|error| error.beneath(check.file, &path));
     for key in over.keys() {
+        // What else there is not, the reader knows better.
+        let exists = base.contains_key(key) || departed.is_ok();
         check.that(
-            facts.contains(&key.as_str()),
+            facts.contains(&key.as_str()) || !exists,
             &format!("{path}.{key}"),
             "given",
             &format!("only facts can be otherwise: {}", facts.join(", ")),
         )?;
     }
+    let departed = departed?;
     believed_in(&base, &over, &path, check)?;
     Ok(departed)
 }
