@@ -123,3 +123,17 @@ def test_no_two_files_of_a_crate_import_each_other(crate: str) -> None:
         tuple(TopologicalSorter(graph).static_order())
     except CycleError as error:
         pytest.fail(f"{crate}: " + " -> ".join(error.args[1]))
+
+
+def test_the_page_on_the_house_names_files_that_are_there() -> None:
+    page = (ROOT / "docs/architecture.md").read_text(encoding="utf-8")
+    for row in re.findall(r"^\| (?:a|an) .*$", page, re.M):
+        named = [path for path in re.findall(r"`([\w/.-]+\.(?:rs|toml))`", row) if "=" not in path]
+        assert named or row.startswith("| array") or row.startswith("| an odometer"), row
+        for path in named:
+            found = [
+                *ROOT.glob(path),
+                *ROOT.glob(f"crates/*/src/{path}"),
+                *ROOT.glob(f"crates/{path}"),
+            ]
+            assert found, f"{path} in: {row}"
