@@ -2,12 +2,18 @@
 
 from __future__ import annotations
 
+from dataclasses import replace
 from types import SimpleNamespace
 
 import numpy as np
 import polars as pl
 
-from access_av.paper.evaluation import Evaluation, cases
+from access_av.paper import ablation, ours
+from access_av.paper.claims import check_claims
+from access_av.paper.evaluation import Evaluation, _point, cases, outcome_of
+from access_av.paper.outcome import Drives
+from access_av.paper.readings import load
+from access_av.paper.study import Study
 from access_av.platform import Figure, PowerMode
 
 ROWS = [
@@ -24,6 +30,8 @@ METHODS = ("music", "esprit", "root_music")
 ADAPTIVE_EXECUTIONS = {80: 430, 100: 388, 120: 354, 150: 302}
 WORST_Y_M = {"music": 0.65, "esprit": 1.2, "root_music": 0.7}
 MUSIC_J = (0.61, 0.9, 0.83, 0.83, 0.76, 0.69, 0.65, 0.532)
+TRIP_S = 80.34
+TIME_S = np.arange(0.0, TRIP_S, 0.02)
 
 
 def platform() -> SimpleNamespace:
@@ -34,7 +42,7 @@ def platform() -> SimpleNamespace:
             cpu_hz=mhz * 1e6,
             base_wake_up_ms=dict(zip(METHODS, map(float, times), strict=True)),
             energy_per_execution_j={
-                method: Figure(MUSIC_J[number] * factor, "fitted", "a test", "marginal")
+                method: Figure(MUSIC_J[number] * factor, "assumed", "a test", "marginal")
                 for method, factor in zip(METHODS, (1.0, 0.85, 0.9), strict=True)
             },
         )
@@ -45,54 +53,85 @@ def platform() -> SimpleNamespace:
         modes=modes,
         energy_boundary="marginal",
         to_toml=lambda: 'name = "synthetic"\n',
+        core=None,
     )
 
 
-def evaluation() -> Evaluation:
+def drives(worst_y_m: float, executions: float, *, spread: float = 0.0) -> Drives:
+    """Drives whose error grows to its worst at the end; variants scatter about the first."""
+    factors = 1.0 + spread * np.concatenate([[0.0], np.linspace(-2.0, 2.0, 20)])
+    curve = worst_y_m * (TIME_S[::5] / TIME_S[-1]) ** 1.5
+    return Drives(
+        executions=np.full(21, float(executions)),
+        worst_x_m=worst_y_m / 10 * factors,
+        worst_y_m=worst_y_m * factors,
+        rms_error_m=worst_y_m * 0.6 * factors,
+        horizontal_m=np.outer(factors, curve),
+        longest_gap_s=0.24,
+    )
+
+
+def evaluation(
+    *, adaptive_worst_m: float = 0.2, spread: float = 0.0, trip_s: float = TRIP_S
+) -> Evaluation:
     board = platform()
-    time_s = np.arange(0.0, 80.33, 0.02)
-    points, errors = [], {}
+    found, errors = [], {}
     for case in cases(board):
         setting = case.setting
-        worst_y = 0.2 if setting.adaptive else WORST_Y_M[setting.method]
+        worst_m = adaptive_worst_m if setting.adaptive else WORST_Y_M[setting.method]
         if setting.adaptive:
-            executions = float(ADAPTIVE_EXECUTIONS[int(setting.base_wake_up_ms)])
+            executions = ADAPTIVE_EXECUTIONS[int(setting.base_wake_up_ms)]
         else:
-            executions = float(int(80_330 / setting.base_wake_up_ms) + 1)
-        error_y = worst_y * (time_s / time_s[-1]) ** 1.5
+            executions = int(80_330 / setting.base_wake_up_ms) + 1
+        found.append((case, drives(worst_m, executions, spread=spread)))
+        error_m = worst_m * (TIME_S / TIME_S[-1]) ** 1.5
         errors[setting] = pl.DataFrame(
-            {"time_s": time_s, "mean_abs_error_x_m": error_y / 10, "mean_abs_error_y_m": error_y}
+            {"time_s": TIME_S, "mean_abs_error_x_m": error_m / 10, "mean_abs_error_y_m": error_m}
         ).select(
             pl.lit(setting.method).alias("method"),
             pl.lit(setting.adaptive).alias("adaptive"),
             pl.lit(setting.base_wake_up_ms).alias("base_wake_up_ms"),
             pl.all(),
         )
-        energy = case.mode.energy_per_execution_j[setting.method] if case.mode else None
-        points.append(
-            {
-                "campaign": case.campaign,
-                "mode": case.mode.number if case.mode else None,
-                "mode_name": case.mode.name if case.mode else None,
-                "method": setting.method,
-                "adaptive": setting.adaptive,
-                "base_wake_up_ms": setting.base_wake_up_ms,
-                "executions": executions,
-                "worst_error_x_m": worst_y / 10,
-                "worst_error_y_m": worst_y,
-                "rms_error_m": worst_y * 0.6,
-                "energy_per_execution_j": energy.value if energy else None,
-                "energy_j": executions * energy.value if energy else None,
-                "energy_provenance": energy.provenance if energy else None,
-            }
-        )
+    outcome, refitted = outcome_of(found, board, trip_s)
     return Evaluation(
-        points=pl.DataFrame(points, infer_schema_length=None),
+        reading=load("gate"),
+        points=pl.DataFrame(
+            [_point(case, outcome, refitted) for case, _ in found], infer_schema_length=None
+        ),
         errors=pl.concat(errors.values()),
-        snr=pl.DataFrame({"time_s": time_s, "mean_true_snr_db": 1 + 9 * np.sin(time_s / 35) ** 2}),
-        scenario=SimpleNamespace(name="synthetic", to_toml=lambda: 'name = "synthetic"\n'),
+        snr=pl.DataFrame({"time_s": TIME_S, "mean_true_snr_db": 1 + 9 * np.sin(TIME_S / 35) ** 2}),
+        outcome=outcome,
         platform=board,
         runs=2,
         seed=1,
+        refitted=refitted,
+    )
+
+
+def study(*, controller_gain: float = 0.0) -> Study:
+    """A study of two readings whose controllers gain so much of the RMS error."""
+    shown = evaluation(spread=0.01)
+    other = replace(shown, reading=load("every-ssb"))
+    constant = drives(0.2 * (1.0 + controller_gain), 430, spread=0.02)
+    return Study(
+        evaluations=[other, shown],
+        claims=[
+            claim
+            for each in (other, shown)
+            for claim in check_claims(each.outcome, reading=each.reading.name)
+        ],
+        ablations=[
+            ablation.compare(each.reading.name, mode, each.outcome.adaptive[mode], constant, 80.0)
+            for each in (other, shown)
+            for mode in (0, 1, 4, 5)
+        ],
+        front=[(80.0, drives(0.6, 1005)), (240.0, drives(0.9, 335))],
+        ours=[
+            ours.beside(shown, mode.number, drives(0.1, 30), knows_road=True)
+            for mode in shown.platform.modes
+        ],
+        unknowns=None,
+        unusable={"broken": "broken.toml: `wake_up.t_max_ms` = 100"},
         duration_s=1.0,
     )

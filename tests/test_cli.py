@@ -19,8 +19,8 @@ TRAJECTORY_COLUMNS = {
     "run", "time_s", "x_m", "y_m", "heading_rad", "true_x_m", "true_y_m", "error_x_m", "error_y_m",
 }  # fmt: skip
 COMMANDS = [
-    "evaluate", "run", "explore", "bound", "aoa", "scan", "synth", "locate", "fit", "columns",
-    "scenario", "platform",
+    "evaluate", "readings", "search", "run", "explore", "bound", "aoa", "scan", "synth", "locate",
+    "fit", "columns", "scenario", "platform",
 ]  # fmt: skip
 
 
@@ -32,7 +32,20 @@ def test_help_lists_every_command(access_av: Cli) -> None:
 
 
 @pytest.mark.parametrize(
-    "command", ["evaluate", "run", "explore", "bound", "aoa", "scan", "synth", "locate", "fit"]
+    "command",
+    [
+        "evaluate",
+        "readings",
+        "search",
+        "run",
+        "explore",
+        "bound",
+        "aoa",
+        "scan",
+        "synth",
+        "locate",
+        "fit",
+    ],
 )
 def test_help_of_each_command_has_an_example(access_av: Cli, command: str) -> None:
     done = access_av(command, "--help", columns=60)
@@ -87,11 +100,12 @@ def test_set_changes_one_key(access_av: Cli, tmp_path: Path) -> None:
 def test_evaluation_leaves_its_files(quick_study: Path) -> None:
     names = {path.name for path in (quick_study / "latest").iterdir()}
     assert names == {
-        "claims.json", "errors.parquet", "manifest.json", "operating_points.parquet",
-        "platform.toml", "report.html", "scenario.toml", "snr.parquet",
+        "ablations.parquet", "claims.json", "errors.parquet", "fixed_front.parquet",
+        "manifest.json", "operating_points.parquet", "ours.parquet", "platform.toml", "report.html",
+        "scenario.toml", "snr.parquet",
     }  # fmt: skip
     claims = json.loads((quick_study / "latest/claims.json").read_text())
-    assert len(claims) == 17
+    assert len(claims) == 2 * 17
 
 
 def test_explore_answers_from_the_last_evaluation(
@@ -108,9 +122,10 @@ def test_explore_answers_from_the_last_evaluation(
 
 
 def test_evaluate_shows_tables_in_a_narrow_terminal(access_av: Cli, tmp_path: Path) -> None:
-    done = access_av("evaluate", "--runs", "1", "--out", str(tmp_path / "e"), columns=60)
+    arguments = ("--reading", "gate", "--runs", "1", "--out", str(tmp_path / "e"))
+    done = access_av("evaluate", *arguments, columns=60)
     assert done.code == 0, done.err
-    assert "claims reproduced" in done.out
+    assert "Claims met under" in done.out
     tables = done.out.split("Claims of the paper")[0]
     assert max(map(len, tables.splitlines())) <= 60
 
@@ -132,7 +147,7 @@ SCENARIO = (
     "[site.road]\nsegments = [{ length_m = 300.0, turn_rad = 0.25 }]\n"
 )
 HEAD = "[[site.radio_heads]]\nposition_m = [205.0, 100.0, 0.0]\n"
-PID = '[vehicle]\nlike = "paper"\n[vehicle.wake_up]\nbase_ms = 300.0\n'
+PID = '[vehicle]\nlike = "paper"\n[vehicle.wake_up.due]\nbase_ms = 300.0\n'
 
 
 @pytest.mark.parametrize(
@@ -144,7 +159,7 @@ PID = '[vehicle]\nlike = "paper"\n[vehicle.wake_up]\nbase_ms = 300.0\n'
         (SCENARIO + HEAD + "[channel]\nshadowing_std_db = nan\n", ["shadowing_std_db", "finite"]),
         (SCENARIO.replace("300.0", "-300.0") + HEAD, ["site.road.segments[0].length_m", "-300"]),
         (SCENARIO + HEAD.replace("[205.0, 100.0,", "[0.0, 0.0,"), ["site.radio_heads[0]"]),
-        (SCENARIO.replace('vehicle = "paper"\n', "") + HEAD + PID, ["vehicle.wake_up.t_max_ms"]),
+        (SCENARIO.replace('vehicle = "paper"\n', "") + HEAD + PID, ["vehicle.wake_up.due.t_max_ms"]),
         (SCENARIO + HEAD + "[truth.vehicle.array]\nmountin_rad = 1\n",
          ["truth.vehicle.array.mountin_rad", "mounting_rad"]),
         (SCENARIO + HEAD + "[truth.vehicle.gyroscope]\nbias_radps = 1.0\n",

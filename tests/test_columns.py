@@ -4,6 +4,8 @@ from __future__ import annotations
 
 import json
 import re
+import tempfile
+from pathlib import Path
 from typing import TYPE_CHECKING, Any
 
 import numpy as np
@@ -11,11 +13,13 @@ import polars as pl
 import pytest
 
 from access_av import Scenario, bound, columns, drives, nr, simulate, statistics
+from access_av.paper.search import sample
+from access_av.paper.unknowns import sobol
+from access_av.platform import Platform
 from conftest import ROOT
 
 if TYPE_CHECKING:
     from collections.abc import Callable
-    from pathlib import Path
 
     from conftest import Finished
 
@@ -118,9 +122,17 @@ def test_bound() -> None:
 
 
 def test_evaluation(quick_study: Path) -> None:
-    for name in ("operating_points", "errors", "snr"):
+    names = ("operating_points", "errors", "snr", "ablations", "fixed_front", "ours")
+    for name in names:
         check(name, pl.read_parquet(quick_study / "latest" / f"{name}.parquet"))
     check("claims", json.loads((quick_study / "latest/claims.json").read_text()))
+
+
+def test_unknowns() -> None:
+    platform = Platform.load("jetson-agx-xavier")
+    with tempfile.TemporaryDirectory() as parts:
+        drawn = sample(platform, Path(parts), worlds=2, controllers=2, runs=1, gates=True)
+    check("unknowns", pl.DataFrame([vars(it) for it in sobol(drawn, 1, count=3).indices]))
 
 
 def test_cells_and_bursts(access_av: Callable[..., Finished], data: Path) -> None:

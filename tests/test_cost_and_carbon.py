@@ -3,7 +3,7 @@ from __future__ import annotations
 import pytest
 
 from access_av import carbon, cost
-from access_av.paper.statements import trips_per_day
+from access_av.paper.statements import paper_numbers
 
 
 def test_four_roadside_units_cost_what_the_paper_says() -> None:
@@ -17,9 +17,15 @@ def test_a_lidar_costs_more_than_130_adapters() -> None:
 
 
 def test_the_papers_saving_per_day_follows_from_its_saving_per_trip() -> None:
-    saving = cost.Saving(per_trip_j=370.8, trips_per_day=trips_per_day())
+    saving = cost.Saving(per_trip_j=370.8, trip_s=paper_numbers()["trip"]["duration_s"])
     assert saving.per_day_kj == pytest.approx(398.84, rel=1e-3)
     assert saving.fleet_per_day_mj(100) == pytest.approx(39.884, rel=1e-3)
+
+
+def test_a_saving_per_day_is_of_its_own_trip_and_duty() -> None:
+    long = cost.Saving(per_trip_j=370.8, trip_s=178.6, duty=0.5)
+    assert long.trips_per_day == pytest.approx(43_200 / 178.6)
+    assert long.per_day_kj == pytest.approx(398.84 * 80.33 / 178.6 / 2, rel=1e-3)
 
 
 def test_ranges_are_ordered_and_embodied_does_not_depend_on_the_grid() -> None:

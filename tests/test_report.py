@@ -1,19 +1,20 @@
 from __future__ import annotations
 
 import re
+from dataclasses import replace
 
 import pytest
 
 import synthetic
-from access_av.paper.claims import check_claims
+from access_av.paper import summary
 from access_av.paper.report.page import render
+from access_av.paper.report.readings import readings
 from access_av.report.parts import value_text
 
 
 @pytest.fixture(scope="module")
 def page() -> str:
-    evaluation = synthetic.evaluation()
-    return render(evaluation, check_claims(evaluation))
+    return render(synthetic.study())
 
 
 def test_loads_nothing(page: str) -> None:
@@ -27,19 +28,53 @@ def test_loads_nothing(page: str) -> None:
 
 def test_holds_every_chart(page: str) -> None:
     places = set(re.findall(r'class="chart" id="([^"]+)"', page))
-    assert {"snr", "energy-bars", "executions", "design-space", "rsu-cost", "sensor-cost"} <= places
+    assert places >= {
+        "snr", "energy-bars", "executions", "design-space", "rsu-cost", "sensor-cost", "ablation",
+        "front",
+    }  # fmt: skip
     assert sum(name.startswith("error-") for name in places) == 12
     for name in places:
         assert f'"{name}":{{' in page
 
 
-def test_holds_claims_settings_and_version(page: str) -> None:
-    for text in ("a1_adaptive_worst_m", "c2_four_rsu_usd", "seed 1", "2 runs", "version "):
+def test_holds_readings_claims_settings_and_version(page: str) -> None:
+    for text in (
+        "a1_adaptive_worst_m", "c2_four_rsu_usd", "seed 1", "2 runs", "version ",
+        "Algorithm 1 at every SSB", "by construction", "arithmetic",
+        "Not evaluated: broken", "t_max_ms",
+    ):  # fmt: skip
         assert text in page
 
 
 def test_is_small_enough_to_mail(page: str) -> None:
     assert len(page.encode()) < 2_000_000
+
+
+@pytest.mark.parametrize(
+    ("gain", "said"),
+    [(0.0, "makes no difference"), (0.5, "helps"), (-0.5, "harms")],
+)
+def test_says_that_the_controller_matters_only_where_it_does(gain: float, said: str) -> None:
+    """A constant in the controller's place is told from a controller by what it obtains."""
+    study = synthetic.study(controller_gain=gain)
+    text = readings(study)
+    assert text.count(f'<td data-label="Algorithm 1 against a constant">{said}</td>') == 2
+    for other in {"makes no difference", "helps", "harms"} - {said}:
+        assert other not in text
+
+
+def test_sentences_are_made_from_what_was_obtained() -> None:
+    study = synthetic.study()
+    assert "do not hold together under any reading" in summary.headline(study)
+    met = {claim.id: replace(claim, verdict="reproduced") for claim in study.of("gate")}
+    both = replace(study, claims=[*study.of("every-ssb"), *met.values()])
+    assert "only with a gate" in summary.headline(both)
+    assert "which Algorithm 1 does not say" in summary.lead(both)
+    assert "Algorithm 1 makes no difference" in summary.lead(both)
+    without = [replace(claim, reading="every-ssb") for claim in met.values()]
+    assert "under Algorithm 1 as written" in summary.headline(
+        replace(study, claims=[*without, *study.of("gate")])
+    )
 
 
 def test_values_of_every_shape_can_be_shown() -> None:

@@ -68,7 +68,7 @@ class Saving:
 
     Examples
     --------
-    >>> Saving(per_trip_j=100.0, trip_s=86.4, duty=0.5).fleet_per_day_mj(vehicles=100)
+    >>> round(Saving(per_trip_j=100.0, trip_s=86.4, duty=0.5).fleet_per_day_mj(vehicles=100), 9)
     5.0
     """
 

@@ -46,12 +46,12 @@ def evaluate(
     manages, and adaptive MUSIC, each over all power modes. results/latest points to the files.
     """
     from access_av.files import RESULTS
-    from access_av.paper import study
+    from access_av.paper import results
     from access_av.paper.terminal import show_study
 
     names = [*(reading or []), *([scenario] if scenario else [])]
     with progress("Driving") as tick:
-        made, directory = study.run(
+        made, directory = results.run(
             names,
             platform,
             runs=runs,
@@ -193,10 +193,10 @@ def explore(
     """
     from access_av.design_space import Query
     from access_av.design_space import explore as answer
-    from access_av.paper import study
+    from access_av.paper.results import operating_points
 
     with progress("No evaluation yet, driving") as tick:
-        points = study.operating_points(results, reading, progress=tick)
+        points = operating_points(results, reading, progress=tick)
     if not fixed:
         points = points.filter(adaptive=True)
     query = Query(max_energy_j, max_rms_m, max_worst_m, max_executions, mode)

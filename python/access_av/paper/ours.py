@@ -80,11 +80,12 @@ def compare(driver: Driver, evaluation: Evaluation) -> list[Comparison]:
                 }
             )
             drives = driver.drive(scenario).drives
-            found.append(_beside(evaluation, mode.number, drives, knows_road=knows_road))
+            found.append(beside(evaluation, mode.number, drives, knows_road=knows_road))
     return found
 
 
-def _beside(evaluation: Evaluation, mode: int, ours: Drives, *, knows_road: bool) -> Comparison:
+def beside(evaluation: Evaluation, mode: int, ours: Drives, *, knows_road: bool) -> Comparison:
+    """Drives of ours beside the paper's adaptive point in a mode."""
     papers = evaluation.outcome.adaptive[mode]
     papers_j: float | None = None
     ours_j: float | None = None

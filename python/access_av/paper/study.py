@@ -1,4 +1,4 @@
-"""A study from start to files: every reading evaluated and judged, the report; open it again."""
+"""The paper under several readings: each evaluated, judged and held against others."""
 
 from __future__ import annotations
 
@@ -10,9 +10,8 @@ import polars as pl
 
 from access_av._core import SettingsError
 from access_av.errors import InputError
-from access_av.files import RESULTS, ResultsDirectory
-from access_av.paper import ablation, ours, readings
-from access_av.paper.claims import Claim, as_records, check_claims
+from access_av.paper import ablation, ours
+from access_av.paper.claims import Claim, check_claims
 from access_av.paper.drives import Driver
 from access_av.paper.energy_fit import fit_energy
 from access_av.paper.evaluation import Evaluation, cases, demands, evaluate, evaluate_with
@@ -28,10 +27,9 @@ if TYPE_CHECKING:
     from access_av.paper.outcome import Drives
     from access_av.paper.readings import Reading
 
-POINTS_FILE = "operating_points.parquet"
 FIT_SOURCE = "access-av fit: agrees with the sums and statements of the paper"
 # Of `evaluate --unknowns`: worlds, controllers in each, drives per setting.
-UNKNOWNS = (128, 8, 10)
+UNKNOWNS = (1024, 1, 6)
 
 
 @dataclass(frozen=True)
@@ -191,45 +189,6 @@ def study(
     )
 
 
-def write(made: Study, out: Path | None, render: Callable[[Study], str]) -> ResultsDirectory:
-    """Write tables, claims, report, scenarios, platform and manifest."""
-    directory = ResultsDirectory.create("evaluate", out)
-    for name, table in made.tables().items():
-        directory.write_table(f"{name}.parquet", table)
-    directory.write_json("claims.json", as_records(made.claims))
-    directory.write_text("report.html", render(made))
-    shown = made.shown
-    directory.write_text("scenario.toml", shown.scenario.resolved(shown.platform.core).to_toml())
-    directory.write_text("platform.toml", shown.platform.to_toml())
-    directory.write_manifest(
-        readings=[each.reading.name for each in made.evaluations],
-        unusable=dict(made.unusable),
-        platform=shown.platform.name,
-        runs=shown.runs,
-        seed=shown.seed,
-        duration_s=round(made.duration_s, 3),
-    )
-    directory.link_latest()
-    return directory
-
-
-def run(
-    names: Sequence[str] = (),
-    platform: str = "jetson-agx-xavier",
-    *,
-    runs: int,
-    seed: int,
-    out: Path | None = None,
-    **how: Any,
-) -> tuple[Study, ResultsDirectory]:
-    """Evaluate these readings, or all that are shipped, and write the results."""
-    from access_av.paper.report.page import render
-
-    chosen = readings.load_all(names)
-    made = study(chosen, Platform.load(platform), runs=runs, seed=seed, **how)
-    return made, write(made, out, render)
-
-
 def fit_platform(
     reading: str,
     platform: str,
@@ -262,44 +221,3 @@ def fit_platform(
             for mode, by_method in energies_j.items()
         }
     )
-
-
-def operating_points(
-    results: Path | None = None,
-    reading: str = SHIPPED,
-    *,
-    progress: Callable[[int, int], None] | None = None,
-) -> pl.DataFrame:
-    """Operating points of an earlier evaluation, or of a new one where there is none.
-
-    Parameters
-    ----------
-    results
-        Directory of an evaluation. ``None`` takes ``results/latest`` if that is one, else the
-        newest one in ``results/`` and, where there is none, runs the paper's.
-    reading
-        Under which reading.
-    progress
-        Called as ``progress(done, total)`` while a new one runs.
-
-    Raises
-    ------
-    InputError
-        When ``results`` holds no evaluation, or not of that reading.
-    """
-    if results is not None:
-        file = results / POINTS_FILE
-        if not file.is_file():
-            raise InputError(f"{results}: no evaluation here ({POINTS_FILE} is missing)")
-    else:
-        earlier = sorted(RESULTS.glob(f"*-evaluate/{POINTS_FILE}"))
-        earlier += RESULTS.glob(f"latest/{POINTS_FILE}")
-        if not earlier:
-            _, directory = run([reading], runs=100, seed=1, progress=progress)
-            earlier = [directory.path / POINTS_FILE]
-        file = earlier[-1]
-    points = pl.read_parquet(file)
-    there = points["reading"].unique(maintain_order=True).to_list()
-    if reading not in there:
-        raise InputError(f"{file.parent}: no reading {reading} here; there are: {', '.join(there)}")
-    return points.filter(pl.col("energy_j").is_not_null(), reading=reading)

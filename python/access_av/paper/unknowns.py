@@ -142,7 +142,7 @@ def expansion(coordinates: Numbers, levels: list[int]) -> tuple[list[tuple[int, 
             column = powers[:, k] - powers[:, k].mean()
             for before in columns:
                 column = column - before * (column @ before) / points
-            columns.append(column / np.sqrt(np.mean(column**2)))
+            columns.append(column / max(np.sqrt(np.mean(column**2)), 1e-9))
         single.append(columns)
     terms: list[tuple[int, ...]] = []
     values: list[Numbers] = []

@@ -47,11 +47,16 @@ def figure(chart_id: str, caption: str = "", title: str = "") -> str:
 
 
 def table(
-    head: Sequence[str], rows: Iterable[Sequence[str]], *, numbers: Sequence[int] = ()
+    head: Sequence[str],
+    rows: Iterable[Sequence[str]],
+    *,
+    numbers: Sequence[int] = (),
+    kind: str = "cards",
 ) -> str:
     """A table; ``numbers`` are the columns set to the right. Cells are HTML already.
 
-    On a narrow screen each row becomes a card whose lines are named after the head.
+    On a narrow screen each row of ``cards`` becomes a card whose lines are named after the head; a
+    ``matrix`` keeps its columns, and leaves out of its cells what is small or in a ``span``.
     """
 
     def cell(tag: str, column: int, content: str) -> str:
@@ -67,7 +72,7 @@ def table(
         for row in rows
     )
     return (
-        f'<div class="table"><table class="cards"><thead><tr>{top}</tr></thead>'
+        f'<div class="table"><table class="{kind}"><thead><tr>{top}</tr></thead>'
         f"<tbody>{body}</tbody></table></div>"
     )
 

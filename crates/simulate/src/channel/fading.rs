@@ -7,6 +7,7 @@ use num_complex::Complex64;
 use onboard::settings::{Site, Vehicle};
 use rand::RngExt;
 
+use super::phasor::phasor;
 use super::propagation::Propagation;
 use super::shadowing::Shadowing;
 use crate::random::{Purpose, Streams};
@@ -121,12 +122,12 @@ impl Propagation for RicianPropagation {
             1
         };
         for (number, ray) in self.rays.iter().enumerate() {
-            let doppler = Complex64::cis(self.wavenumber_per_m * along_m * ray.cosine);
+            let doppler = phasor(self.wavenumber_per_m * along_m * ray.cosine);
             let mut wave = ray.start * doppler * self.scatter;
             let mut turn = Complex64::ONE;
             if self.dispersive {
-                wave *= Complex64::cis(-TAU * first_hz * ray.delay_s);
-                turn = Complex64::cis(-TAU * step_hz * ray.delay_s);
+                wave *= phasor(-TAU * first_hz * ray.delay_s);
+                turn = phasor(-TAU * step_hz * ray.delay_s);
             }
             for gains in into.chunks_exact_mut(elements).take(count) {
                 match self.model {

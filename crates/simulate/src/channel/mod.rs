@@ -4,6 +4,7 @@
 mod fading;
 mod head_channel;
 mod iq;
+mod phasor;
 mod propagation;
 mod shadowing;
 

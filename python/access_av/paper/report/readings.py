@@ -55,13 +55,13 @@ def matrix(study: Study) -> str:
     head = ("Claim", "Paper", *(str(index) for index in range(1, len(columns) + 1)))
     rows = [
         (
-            f"<b>{escape(claims[0].says)}</b><small><code>{escape(claims[0].id)}</code></small>",
-            escape(value_text(claims[0].stated)),
+            f"<b>{escape(_short(claims[0]))}</b> <span>{escape(claims[0].says)}</span>",
+            f"<span>{escape(value_text(claims[0].stated))}</span>",
             *(_cell(claim) for claim in claims),
         )
         for claims in zip(*columns, strict=True)
     ]
-    return table(head, rows)
+    return table(head, rows, kind="matrix")
 
 
 def claims(study: Study) -> str:
@@ -86,6 +86,10 @@ def claims(study: Study) -> str:
             )
         )
     return table(("Claim", "Paper", "Obtained", "Unit", "Evidence", "Verdict"), rows)
+
+
+def _short(claim: Claim) -> str:
+    return claim.id.split("_")[0]
 
 
 def _met(held: bool) -> str:
