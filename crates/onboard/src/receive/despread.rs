@@ -67,6 +67,7 @@ impl<const A: usize> Despread<A> {
     }
 
     /// The same with each antenna multiplied by a gain.
+    #[must_use]
     pub fn scaled(mut self, gains: &[Complex64; A]) -> Self {
         for sum in self.sums.iter_mut().flatten() {
             for (value, gain) in sum.iter_mut().zip(gains) {
