@@ -64,14 +64,15 @@ fn warm_tracking_allocates_nothing() {
     let mut tracker = Tracker::<4>::new(&config, &cell).unwrap();
     let antennas = std::array::from_fn(|antenna| slices[antenna]);
     let start = cell.sample_start;
-    // Found where expected, without and with the PBCH; elsewhere, by a search; and not at all.
+    // Found where expected, without and with the PBCH; near by; and not at all.
     let silent = vec![vec![nr_ssb::Complex32::ZERO; 76_800]; 4];
     let nothing = std::array::from_fn(|antenna| silent[antenna].as_slice());
     let mut visit = || {
         for (window, expected, decode_pbch, there) in [
             (&antennas, start, false, true),
             (&antennas, start, true, true),
-            (&antennas, start + 5_000.0, false, true),
+            (&antennas, start + 5.0, false, true),
+            (&antennas, start + 5_000.0, false, false),
             (&nothing, start, false, false),
         ] {
             let seen = tracker.track(window, 0.0, expected, decode_pbch).unwrap();

@@ -58,8 +58,10 @@ pub struct MatchedFilter {
     forward: Arc<dyn Fft<f32>>,
     inverse: Arc<dyn Fft<f32>>,
     bin_hz: f64,
-    /// Frequency offsets looked at, bins.
+    /// Frequency offsets looked at, bins from the centre.
     hypotheses: Vec<isize>,
+    /// The frequency offset that they lie around, bins.
+    centre: isize,
     /// Conjugated spectrum of each PSS.
     replicas: [Vec<Complex32>; 3],
     block: Vec<Complex32>,
@@ -102,6 +104,7 @@ impl MatchedFilter {
             inverse,
             bin_hz,
             hypotheses: cfo_hypotheses_hz.iter().map(nearest_bin).collect(),
+            centre: 0,
             replicas,
             block: vec![Complex32::ZERO; BLOCK],
             spectra: vec![vec![Complex32::ZERO; BLOCK]; antennas],
@@ -112,6 +115,13 @@ impl MatchedFilter {
             best: vec![0.0; HOP],
             best_hypothesis: vec![0; HOP],
         }
+    }
+
+    /// Moves the hypotheses to lie around this offset; with it they reach 64 subcarriers at most.
+    pub fn centre(&mut self, cfo_hz: f64) {
+        let widest = self.hypotheses.iter().map(|it| it.abs()).max().unwrap_or(0);
+        let reach = QUARTER as isize - widest;
+        self.centre = ((cfo_hz / self.bin_hz).round() as isize).clamp(-reach, reach);
     }
 
     /// Appends to `candidates` the maxima above `threshold` whose PSS starts in
@@ -173,7 +183,7 @@ impl MatchedFilter {
     fn correlate(&mut self, n_id_2: usize) {
         let (above, below) = self.replicas[n_id_2].split_at(QUARTER);
         for (hypothesis, shift) in self.hypotheses.iter().enumerate() {
-            let centre = (BLOCK / 2).saturating_add_signed(*shift);
+            let centre = (BLOCK / 2).saturating_add_signed(self.centre + shift);
             self.sum.fill(0.0);
             for (spectrum, inverse_energy) in self.spectra.iter().zip(&self.inverse_energy) {
                 let (positive, negative) = self.product.split_at_mut(QUARTER);
@@ -216,7 +226,7 @@ impl MatchedFilter {
             let candidate = PssCandidate {
                 n_id_2,
                 sample: start + lag,
-                cfo_hz: self.hypotheses[hypothesis as usize] as f64 * self.bin_hz,
+                cfo_hz: (self.centre + self.hypotheses[hypothesis as usize]) as f64 * self.bin_hz,
                 statistic,
             };
             let near = candidates.iter_mut().rev().take(64).find(|other| {

@@ -32,17 +32,6 @@ pub(crate) fn complex_product<const N: usize>(a: &[Complex32; N], b: &[Complex32
     Complex32::new(re.iter().sum(), im.iter().sum())
 }
 
-/// Σ a b, one real.
-pub(crate) fn real_product<const N: usize>(a: &[Complex32; N], b: &[f32; N]) -> Complex32 {
-    let (mut re, mut im) = ([0.0_f32; STRANDS], [0.0_f32; STRANDS]);
-    for i in 0..N {
-        let strand = i % STRANDS;
-        re[strand] += a[i].re * b[i];
-        im[strand] += a[i].im * b[i];
-    }
-    Complex32::new(re.iter().sum(), im.iter().sum())
-}
-
 /// Σ |a|².
 pub(crate) fn energy<const N: usize>(a: &[Complex32; N]) -> f32 {
     let mut strands = [0.0_f32; STRANDS];
@@ -65,8 +54,6 @@ mod tests {
         let expected: f32 = a.iter().map(Complex32::norm_sqr).sum();
         assert!((energy(&a) / expected - 1.0).abs() < 1e-6);
         let (x, y) = (a.map(|a| a.re), b.map(|b| b.im));
-        let expected: Complex32 = a.iter().zip(&y).map(|(a, y)| a * y).sum();
-        assert!((real_product(&a, &y) - expected).norm() < 1e-2);
         let expected: f32 = x.iter().zip(&y).map(|(x, y)| x * y).sum();
         assert!((inner_product(&x, &y) / expected - 1.0).abs() < 1e-6);
     }

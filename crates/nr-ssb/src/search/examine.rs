@@ -34,7 +34,9 @@ const SAME_SSB_SAMPLES: f64 = CYCLIC_PREFIX as f64;
 pub(super) struct Examiner {
     antennas: usize,
     base_rate_hz: f64,
-    /// Largest carrier frequency offset that is believed, Hz.
+    /// Carrier frequency offset that is searched around, and the largest distance from it that is
+    /// believed, Hz.
+    centre_hz: f64,
     tolerated_hz: f64,
     cell_threshold: f32,
     acquirer: Acquirer,
@@ -55,6 +57,7 @@ impl Examiner {
             antennas,
             ssb_freq_hz,
             lmax,
+            cfo_centre_hz,
             cfo_range_hz,
             ..
         } = config;
@@ -62,6 +65,7 @@ impl Examiner {
         Self {
             antennas,
             base_rate_hz,
+            centre_hz: cfo_centre_hz,
             tolerated_hz: cfo_range_hz + spacing.hz() / 6.0,
             cell_threshold,
             acquirer: Acquirer::new(base_rate_hz, ssb_freq_hz, antennas, pss_floor),
@@ -77,6 +81,11 @@ impl Examiner {
     pub(super) fn tune(&mut self, ssb_freq_hz: Option<f64>) {
         self.acquirer.tune(ssb_freq_hz);
         self.decoder.tune(ssb_freq_hz);
+    }
+
+    /// Moves to cells around another carrier frequency offset.
+    pub(super) fn centre(&mut self, cfo_centre_hz: f64) {
+        self.centre_hz = cfo_centre_hz;
     }
 
     /// Forgets the stream so far.
@@ -123,7 +132,8 @@ impl Examiner {
     ) -> Option<Alignment> {
         self.counts.pss_candidates += 1;
         let mut acquired = self.acquirer.acquire(samples, candidate)?;
-        if (acquired.alignment.cfo_cycles * self.base_rate_hz).abs() > self.tolerated_hz {
+        let cfo_hz = acquired.alignment.cfo_cycles * self.base_rate_hz;
+        if (cfo_hz - self.centre_hz).abs() > self.tolerated_hz {
             return None;
         }
         let time = block_start + acquired.alignment.first_sample();

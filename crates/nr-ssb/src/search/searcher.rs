@@ -49,11 +49,13 @@ impl Searcher {
         // Any of 336 SSS and 8 DM-RS may make the sum large.
         let cell_probability = config.false_alarm / (trials * 336.0 * 8.0);
         let antennas = config.antennas;
+        let mut filter = MatchedFilter::new(config.spacing.hz(), &hypotheses, antennas);
+        filter.centre(config.cfo_centre_hz);
         let pss_threshold = exponential_sum_threshold(antennas, pss_probability) as f32;
         let cell_threshold = exponential_sum_threshold(antennas + 4, cell_probability) as f32;
         Ok(Self {
             base_rate_hz,
-            filter: MatchedFilter::new(config.spacing.hz(), &hypotheses, antennas),
+            filter,
             examiner: Examiner::new(&config, PSS_FLOOR * pss_threshold, cell_threshold),
             pss_threshold,
             buffer: vec![Vec::new(); antennas],
@@ -127,6 +129,22 @@ impl Searcher {
         self.config.ssb_freq_hz = ssb_freq_hz;
         self.examiner.tune(ssb_freq_hz);
         self.reset();
+        Ok(())
+    }
+
+    /// Searches around this carrier frequency offset from now on.
+    ///
+    /// # Errors
+    /// [`SearchError::Setting`] if it is more than 32 subcarriers.
+    pub fn centre(&mut self, cfo_centre_hz: f64) -> Result<(), SearchError> {
+        let config = SearchConfig {
+            cfo_centre_hz,
+            ..self.config.clone()
+        };
+        config.check()?;
+        self.config = config;
+        self.filter.centre(cfo_centre_hz);
+        self.examiner.centre(cfo_centre_hz);
         Ok(())
     }
 

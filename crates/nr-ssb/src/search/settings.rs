@@ -17,7 +17,10 @@ pub struct SearchConfig {
     pub ssb_freq_hz: Option<f64>,
     /// SSBs per burst set, when known. Else the one usual for the frequency is tried first.
     pub lmax: Option<Lmax>,
-    /// Largest carrier frequency offset, Hz.
+    /// Carrier frequency offset around which is searched, Hz: that of a receiver whose oscillator
+    /// is known from a cell it has found.
+    pub cfo_centre_hz: f64,
+    /// Largest carrier frequency offset to either side of the centre, Hz.
     pub cfo_range_hz: f64,
     /// Probability that 20 ms of noise make a cell.
     pub false_alarm: f64,
@@ -31,13 +34,14 @@ impl SearchConfig {
             antennas,
             ssb_freq_hz: None,
             lmax: None,
+            cfo_centre_hz: 0.0,
             cfo_range_hz: 0.5 * spacing.hz(),
             false_alarm: 1e-3,
         }
     }
 
     /// Whether a search with these settings is possible.
-    pub(super) fn check(&self) -> Result<(), SearchError> {
+    pub(crate) fn check(&self) -> Result<(), SearchError> {
         if self.antennas == 0 || self.antennas > MAX_ANTENNAS {
             return Err(SearchError::Antennas(self.antennas));
         }
@@ -49,6 +53,10 @@ impl SearchConfig {
         if !(0.0..=5.0 * self.spacing.hz()).contains(&self.cfo_range_hz) {
             let allowed = "from 0 to 5 subcarriers";
             return Err(setting("cfo_range_hz", self.cfo_range_hz, allowed));
+        }
+        if self.cfo_centre_hz.is_nan() || self.cfo_centre_hz.abs() > 32.0 * self.spacing.hz() {
+            let allowed = "32 subcarriers to either side at most";
+            return Err(setting("cfo_centre_hz", self.cfo_centre_hz, allowed));
         }
         if !(self.false_alarm > 0.0 && self.false_alarm < 1.0) {
             return Err(setting("false_alarm", self.false_alarm, "between 0 and 1"));

@@ -2,9 +2,12 @@
 
 use num_complex::Complex32;
 
+use super::late::{DelaySearch, Groups, INDEPENDENT, grouped, ramp};
+use crate::dsp::base_rate::SYMBOL_FFT;
 use crate::dsp::received_grid::ReceivedGrid;
 use crate::numeric::false_alarm::exponential_sum_threshold;
-use crate::numeric::sums::{energy, inner_product, real_product};
+use crate::numeric::phasors::fill_phasors;
+use crate::numeric::sums::{complex_product, energy, inner_product};
 use crate::standard::grid::{
     SUBCARRIERS, SYMBOLS, SsbGrid, dmrs_indices, pss_indices, sss_indices,
 };
@@ -13,8 +16,21 @@ use crate::standard::sequence::dmrs::{DMRS_LEN, dmrs};
 use crate::standard::sequence::pss::{SYNC_LEN, pss};
 use crate::standard::sequence::sss::sss;
 
-/// Probability that noise at the expected place passes for the cell.
+/// Probability that noise around the expected place passes for the cell.
 const FALSE_ALARM: f64 = 1e-4;
+/// Standard deviations by which the DM-RS of the beam that is named must stand out of what the
+/// same elements give by chance: 17 without noise, and reached by chance once in 6 million.
+const BEAM_STANDS_OUT: f32 = 5.5;
+
+/// Part of the energy that rounding may leave over, or take too much, of a signal without noise.
+const ROUNDING: f32 = 1e-6;
+
+/// Which SSB was received, and by how many samples later than the grids have it.
+#[derive(Debug, Clone, Copy)]
+pub(super) struct Seen {
+    pub(super) ibar_ssb: u8,
+    pub(super) delay: f64,
+}
 
 /// The pilots of one cell's beams.
 pub(super) struct Beams {
@@ -25,6 +41,10 @@ pub(super) struct Beams {
     chips: [[f32; SYNC_LEN]; 2],
     /// DM-RS per ī_SSB, real and imaginary parts.
     dmrs: Vec<[[f32; DMRS_LEN]; 2]>,
+    delays: DelaySearch,
+    /// Per antenna: PSS and SSS despread, and the energy that they came with.
+    sync: Vec<Groups>,
+    energies: Vec<f32>,
     threshold: f64,
 }
 
@@ -39,7 +59,10 @@ impl Beams {
                 .map(|ibar_ssb| dmrs(pci, ibar_ssb))
                 .map(|r| [r.map(|r| r.re), r.map(|r| r.im)])
                 .collect(),
-            threshold: exponential_sum_threshold(antennas, FALSE_ALARM),
+            delays: DelaySearch::new(),
+            sync: vec![Groups::default(); antennas],
+            energies: vec![0.0; antennas],
+            threshold: exponential_sum_threshold(antennas, FALSE_ALARM / INDEPENDENT),
         }
     }
 
@@ -48,26 +71,37 @@ impl Beams {
         self.references.get(usize::from(ibar_ssb))
     }
 
-    /// ī_SSB, if PSS and SSS say that the cell is there.
+    /// Which SSB it is and how late, if PSS and SSS say that the cell is there and the DM-RS
+    /// leaves no doubt of the beam.
     pub(super) fn identify(
-        &self,
+        &mut self,
         grids: &[ReceivedGrid],
         phases: &[Complex32; SYMBOLS],
-    ) -> Option<u8> {
+    ) -> Option<Seen> {
+        // PSS and SSS lie on the same subcarriers of their symbols.
+        let outputs = self.sync.iter_mut().zip(&mut self.energies);
+        for (grid, (groups, power)) in grids.iter().zip(outputs) {
+            let pss = grid[0].get(pss_indices())?.first_chunk::<SYNC_LEN>()?;
+            let sss = grid[2].get(pss_indices())?.first_chunk::<SYNC_LEN>()?;
+            let [pss_chips, sss_chips] = &self.chips;
+            let sums = grouped(pss, pss_chips)
+                .into_iter()
+                .zip(grouped(sss, sss_chips));
+            for (sum, (a, b)) in groups.iter_mut().zip(sums) {
+                *sum = a * phases[0] + b * phases[2];
+            }
+            *power = energy(pss) + energy(sss);
+        }
+        let delay = self.delays.run(&self.sync);
+        let sync_ramp = ramp(delay);
         let mut statistic = 0.0;
         let mut combined = [Complex32::ZERO; DMRS_LEN];
-        for grid in grids {
-            // PSS and SSS lie on the same subcarriers of their symbols.
-            let mut gain = Complex32::ZERO;
-            let mut power = 0.0_f32;
-            for (l, chips) in [0, 2].into_iter().zip(&self.chips) {
-                let received = grid[l].get(pss_indices())?.first_chunk::<SYNC_LEN>()?;
-                gain += real_product(received, chips) * phases[l];
-                power += energy(received);
-            }
+        for (grid, (groups, power)) in grids.iter().zip(self.sync.iter().zip(&self.energies)) {
             // |Σ|²/N against the energy that it leaves over: noise whatever the channel's level.
+            let gain = complex_product(groups, &sync_ramp);
             let explained = gain.norm_sqr() / (2 * SYNC_LEN) as f32;
-            let noise = ((power - explained) / (2 * SYNC_LEN - 1) as f32).max(f32::MIN_POSITIVE);
+            let left = (power - explained).max(ROUNDING * power);
+            let noise = (left / (2 * SYNC_LEN - 1) as f32).max(f32::MIN_POSITIVE);
             statistic += f64::from(explained / noise);
             let weight = gain.conj() / noise;
             for (slot, index) in combined.iter_mut().zip(dmrs_indices(self.pci)) {
@@ -78,13 +112,22 @@ impl Beams {
         if statistic.is_nan() || statistic <= self.threshold {
             return None;
         }
+        // DM-RS lie on every fourth subcarrier.
+        let mut undelayed = [Complex32::ZERO; SUBCARRIERS / 4];
+        let cycles = delay / SYMBOL_FFT as f64;
+        let first = f64::from(self.pci.get() % 4) - 120.0;
+        fill_phasors(&mut undelayed, first * cycles, 4.0 * cycles);
+        for (slot, index) in combined.iter_mut().zip(dmrs_indices(self.pci)) {
+            *slot *= undelayed[index % SUBCARRIERS / 4];
+        }
+        let by_chance = (0.5 * energy(&combined)).sqrt();
         let (re, im) = (combined.map(|w| w.re), combined.map(|w| w.im));
         let fit = |[real, imaginary]: &[[f32; DMRS_LEN]; 2]| {
             inner_product(&re, real) + inner_product(&im, imaginary)
         };
         let fits = self.dmrs.iter().map(fit).zip(0..);
-        fits.max_by(|a, b| a.0.total_cmp(&b.0))
-            .map(|(_, ibar_ssb)| ibar_ssb)
+        let (best, ibar_ssb) = fits.max_by(|a, b| a.0.total_cmp(&b.0))?;
+        (best > BEAM_STANDS_OUT * by_chance).then_some(Seen { ibar_ssb, delay })
     }
 }
 

@@ -9,8 +9,8 @@ use crate::numeric::phasors::wrap;
 use crate::search::DetectedSsb;
 use crate::standard::grid::SYMBOLS;
 
-/// Wander of the frequency offset from one SSB to the next, Hz: oscillator and Doppler.
-const CFO_WANDER_HZ: f64 = 5.0;
+/// Wander of the frequency offset in a second, Hz: oscillator and Doppler.
+const CFO_WANDER_HZ_PER_SQRT_S: f64 = 35.0;
 /// Uncertainty of the frequency offset after the search, Hz.
 const CFO_FIRST_HZ: f64 = 200.0;
 
@@ -35,9 +35,11 @@ impl FrequencyLoop {
         }
     }
 
-    /// Moves the frequency offset by the PSS–SSS phase, weighted by what noise leaves of it.
+    /// Moves the frequency offset, after so many seconds, by the PSS–SSS phase, weighted by what
+    /// noise leaves of it.
     pub(super) fn follow<const A: usize>(
         &mut self,
+        elapsed_s: f64,
         blocks: &[[Complex64; A]; SYMBOLS],
         noise: &[f64; A],
     ) {
@@ -51,7 +53,7 @@ impl FrequencyLoop {
         let base = TAU * 2.0 * SYMBOL_SAMPLES as f64;
         let measured = wrap(turn.arg() - 2.0 * self.phase_step) / base;
         let variance = 1.0 / (snr * base * base);
-        self.variance += (CFO_WANDER_HZ / self.base_rate_hz).powi(2);
+        self.variance += elapsed_s * (CFO_WANDER_HZ_PER_SQRT_S / self.base_rate_hz).powi(2);
         let gain = self.variance / (self.variance + variance);
         self.cfo_cycles += gain * measured;
         self.variance *= 1.0 - gain;

@@ -37,6 +37,4 @@ pub struct Tracked<const A: usize> {
     pub measurements: [Measurement; A],
     /// What the PBCH says, if it was asked for and its checksum held.
     pub payload: Option<BchPayload>,
-    /// The SSB was not where it was expected and was found again by a search.
-    pub reacquired: bool,
 }

@@ -1,27 +1,41 @@
 //! The tracker of one cell.
 
+use std::f64::consts::TAU;
+
 use num_complex::Complex32;
 
 use super::beams::Beams;
+use super::clock::ClockLoop;
 use super::despread::despread;
 use super::error::TrackError;
 use super::frequency::FrequencyLoop;
+use super::late::REACH;
 use super::tracked::Tracked;
 use crate::dsp::alignment::Alignment;
-use crate::dsp::base_rate::CYCLIC_PREFIX;
+use crate::dsp::base_rate::{CYCLIC_PREFIX, SYMBOL_FFT};
 use crate::dsp::timing;
 use crate::numeric::decibel::decibel;
 use crate::receive::acquire::{Acquired, Acquirer};
 use crate::receive::broadcast::BroadcastDecoder;
 use crate::receive::measure::measure;
-use crate::search::{DetectedSsb, SearchConfig, SearchError, Searcher};
+use crate::search::{DetectedSsb, SearchConfig, SearchError};
 use crate::standard::grid::{SUBCARRIERS, SYMBOLS, SsbGrid};
 use crate::standard::message::payload::BchPayload;
 use crate::standard::numerology::Lmax;
 use crate::standard::pci::Pci;
 
-/// Part of a timing deviation that is taken for a rate error of the clocks.
-const DRIFT_GAIN: f64 = 0.2;
+/// Standard deviations of the time expected within which an SSB is looked for.
+const DEVIATIONS: f64 = 4.0;
+/// Samples beyond that: another path may have become the strongest.
+const OTHER_PATH: f64 = 2.0;
+/// Demodulations to either side that a look takes at most: 60 samples.
+const STEPS: usize = 5;
+/// Samples from one to the next: their reaches meet.
+const STEP: f64 = 2.0 * REACH as f64;
+/// An SSB later or earlier than this, samples, is demodulated again where it is.
+const NEAR: f64 = 0.5;
+/// Square of the spread of the pilots' phase over a delay of a sample, rad².
+const PHASE_SPREAD: f64 = (TAU * 60.0 / SYMBOL_FFT as f64) * (TAU * 60.0 / SYMBOL_FFT as f64);
 
 /// Tracker of one cell; owns all plans and buffers.
 pub struct Tracker<const A: usize> {
@@ -30,12 +44,9 @@ pub struct Tracker<const A: usize> {
     base_rate_hz: f64,
     acquirer: Acquirer,
     decoder: BroadcastDecoder,
-    searcher: Searcher,
     beams: Beams,
     frequency: FrequencyLoop,
-    last_start: f64,
-    /// Samples per sample that the cell's clock is slow.
-    drift: f64,
+    clock: ClockLoop,
     misses: u32,
 }
 
@@ -43,36 +54,45 @@ impl<const A: usize> Tracker<A> {
     /// Tracks a cell that a search with these settings found.
     ///
     /// # Errors
-    /// Those of [`Searcher::new`]; [`SearchError::AntennaCount`] unless the settings are for `A`.
+    /// [`SearchError`] for impossible settings, or unless they are for `A` antennas.
     pub fn new(config: &SearchConfig, cell: &DetectedSsb) -> Result<Self, TrackError> {
+        config.check()?;
         if config.antennas != A {
             let (given, expected) = (config.antennas, A);
             return Err(SearchError::AntennaCount { given, expected }.into());
         }
-        let config = SearchConfig {
-            lmax: Some(cell.lmax),
-            ..config.clone()
-        };
-        let searcher = Searcher::new(config.clone())?;
         let base_rate_hz = config.spacing.base_rate_hz();
+        let carrier_hz = config.ssb_freq_hz;
         Ok(Self {
             pci: cell.pci,
             lmax: cell.lmax,
             base_rate_hz,
-            acquirer: Acquirer::new(base_rate_hz, config.ssb_freq_hz, A, 0.0),
-            decoder: BroadcastDecoder::new(config.spacing, config.lmax, config.ssb_freq_hz),
-            searcher,
+            acquirer: Acquirer::new(base_rate_hz, carrier_hz, A, 0.0),
+            decoder: BroadcastDecoder::new(config.spacing, Some(cell.lmax), carrier_hz),
             beams: Beams::new(cell.pci, A),
             frequency: FrequencyLoop::new(cell, base_rate_hz),
-            last_start: cell.sample_start,
-            drift: 0.0,
+            clock: ClockLoop::new(cell.sample_start, cell.cfo_hz, carrier_hz, base_rate_hz),
             misses: 0,
         })
     }
 
-    /// Where the SSB that follows the last one by `samples` of the cell's clock will begin.
+    /// Where an SSB will begin that is sent `samples` of the cell's clock after the last one, the
+    /// drift of the clocks allowed for, after a sleep too.
     pub fn expected_start(&self, samples: f64) -> f64 {
-        self.last_start + samples * (1.0 + self.drift)
+        self.clock.expected_start(samples)
+    }
+
+    /// Takes up the cell where a search has found it, sent `samples` of the cell's clock after the
+    /// last SSB: what of the clocks was not foreseen is learned from it.
+    pub fn found(&mut self, cell: &DetectedSsb, samples: f64) {
+        self.frequency = FrequencyLoop::new(cell, self.base_rate_hz);
+        self.clock.found(cell.sample_start, samples);
+        self.misses = 0;
+    }
+
+    /// Carrier frequency offset, filtered, Hz.
+    pub fn cfo_hz(&self) -> f64 {
+        self.frequency.cfo_cycles * self.base_rate_hz
     }
 
     /// SSBs in a row that were not there.
@@ -80,13 +100,12 @@ impl<const A: usize> Tracker<A> {
         self.misses
     }
 
-    /// Looks at the SSB expected to begin at `expected_start`, in a window whose first sample is
-    /// number `window_start`. `None` if the cell is not there: not where it was expected, nor, by a
-    /// search, anywhere in the window.
+    /// Looks for the SSB expected to begin at `expected_start`, in a window whose first sample is
+    /// number `window_start`: six samples to either side, and further the less certain the clocks
+    /// are. `None` if it is not there, or which beam it is stays in doubt.
     ///
     /// # Errors
-    /// [`TrackError::Window`] if the window does not hold the expected SSB,
-    /// [`SearchError::UnequalLengths`].
+    /// [`TrackError::Window`] if the window does not hold the expected SSB.
     pub fn track(
         &mut self,
         antennas: &[&[Complex32]; A],
@@ -94,18 +113,55 @@ impl<const A: usize> Tracker<A> {
         expected_start: f64,
         decode_pbch: bool,
     ) -> Result<Option<Tracked<A>>, TrackError> {
-        let outside = || TrackError::Window {
-            expected: expected_start,
-            window_start,
-            samples: antennas
-                .iter()
-                .map(|samples| samples.len())
-                .min()
-                .unwrap_or(0),
+        let expected = expected_start - window_start;
+        let reach = DEVIATIONS * self.clock.deviation(expected_start) + OTHER_PATH;
+        let steps = ((reach - REACH as f64) / STEP)
+            .ceil()
+            .clamp(0.0, STEPS as f64) as usize;
+        let mut seen = None;
+        for step in 0..=2 * steps {
+            // 0, +1, −1, +2, …
+            let away = step.div_ceil(2) as f64 * STEP;
+            let place = expected + if step % 2 == 1 { away } else { -away };
+            let Some(alignment) = self.demodulated(antennas, place) else {
+                if step > 0 {
+                    continue;
+                }
+                return Err(TrackError::Window {
+                    expected: expected_start,
+                    window_start,
+                    samples: antennas.iter().map(|it| it.len()).min().unwrap_or(0),
+                });
+            };
+            seen = self.look(antennas, alignment, decode_pbch);
+            if seen.is_some() {
+                break;
+            }
+        }
+        let Some(tracked) = &mut seen else {
+            self.misses += 1;
+            return Ok(None);
         };
-        let pss_start = expected_start - window_start + CYCLIC_PREFIX as f64;
+        self.misses = 0;
+        tracked.sample_start += window_start;
+        let elapsed_s = self.clock.elapsed_s(tracked.sample_start);
+        let (blocks, noise) = (&tracked.blocks, &tracked.noise_variance);
+        self.frequency.follow(elapsed_s, blocks, noise);
+        tracked.cfo_hz = self.cfo_hz();
+        // Of a path on `N` elements in noise.
+        let pilots: u16 = tracked.pilots.iter().sum();
+        let snr = 10.0_f64.powf(0.1 * tracked.snr_db) * A as f64 * f64::from(pilots);
+        let variance = 0.5 / (PHASE_SPREAD * snr.max(1.0));
+        let late = tracked.sample_start - expected_start;
+        self.clock.follow(expected_start, late, variance);
+        Ok(seen)
+    }
+
+    /// Demodulates the SSB that begins at `place` of the window, as far as it lies inside.
+    fn demodulated(&mut self, antennas: &[&[Complex32]; A], place: f64) -> Option<Alignment> {
+        let pss_start = place + CYCLIC_PREFIX as f64;
         if pss_start.is_nan() || pss_start < 0.0 {
-            return Err(outside());
+            return None;
         }
         let alignment = Alignment {
             start: pss_start.round() as usize,
@@ -116,25 +172,8 @@ impl<const A: usize> Tracker<A> {
         let Acquirer {
             demodulator, grids, ..
         } = &mut self.acquirer;
-        demodulator
-            .run(antennas, &alignment, grids)
-            .ok_or_else(outside)?;
-        let mut seen = self.look(alignment, decode_pbch);
-        if seen.is_none() {
-            seen = self.reacquire(antennas, decode_pbch)?;
-        }
-        let Some(tracked) = &mut seen else {
-            self.misses += 1;
-            return Ok(None);
-        };
-        self.misses = 0;
-        tracked.sample_start += window_start;
-        let elapsed = tracked.sample_start - self.last_start;
-        if !tracked.reacquired && elapsed > 0.5 * self.base_rate_hz * 5e-3 {
-            self.drift += DRIFT_GAIN * (tracked.sample_start - expected_start) / elapsed;
-        }
-        self.last_start = tracked.sample_start;
-        Ok(seen)
+        demodulator.run(antennas, &alignment, grids)?;
+        Some(alignment)
     }
 
     /// Received resource elements of one antenna, `[symbol][subcarrier]`, of the last SSB, delay
@@ -150,9 +189,29 @@ impl<const A: usize> Tracker<A> {
     }
 
     /// Everything from the demodulated grids on.
-    fn look(&mut self, mut alignment: Alignment, decode_pbch: bool) -> Option<Tracked<A>> {
+    fn look(
+        &mut self,
+        antennas: &[&[Complex32]; A],
+        mut alignment: Alignment,
+        decode_pbch: bool,
+    ) -> Option<Tracked<A>> {
         let phases = alignment.symbol_phases();
-        let ibar_ssb = self.beams.identify(&self.acquirer.grids, &phases)?;
+        let mut travelled = 0.0;
+        let mut found = self.beams.identify(&self.acquirer.grids, &phases)?;
+        // At the edge of the reach the delay may be larger than what was seen of it.
+        while found.delay.abs() > NEAR {
+            travelled += found.delay.abs();
+            if travelled > STEP {
+                return None;
+            }
+            alignment.shift(found.delay)?;
+            let Acquirer {
+                demodulator, grids, ..
+            } = &mut self.acquirer;
+            demodulator.run(antennas, &alignment, grids)?;
+            found = self.beams.identify(&self.acquirer.grids, &phases)?;
+        }
+        let ibar_ssb = found.ibar_ssb;
         self.acquirer
             .reference
             .clone_from(self.beams.reference(ibar_ssb)?);
@@ -168,7 +227,7 @@ impl<const A: usize> Tracker<A> {
         } = &mut self.acquirer;
         estimate.fold(grids, reference, &phases);
         estimate.estimate_noise();
-        let delay = timing::refine_combined(&estimate.rows);
+        let delay = timing::refine_combined(&estimate.rows, found.delay);
         let (blocks, pilots) = despread(grids, reference, delay);
         let noise_variance = std::array::from_fn(|antenna| estimate.noise_variance[antenna]);
         // Samples that are no numbers, or beyond all bounds, must not reach what is kept.
@@ -187,7 +246,6 @@ impl<const A: usize> Tracker<A> {
             snr += power / noise.max(1e-30) / A as f64;
             measure(&grids[antenna], power, noise)
         });
-        self.frequency.follow(&blocks, &noise_variance);
         let half_frame = match (payload, self.lmax) {
             (Some(BchPayload { half_frame, .. }), _) => Some(half_frame),
             (None, Lmax::L4) => Some(ibar_ssb >= 4),
@@ -198,7 +256,7 @@ impl<const A: usize> Tracker<A> {
             ssb_index: self.lmax.index_lsb(ibar_ssb),
             half_frame,
             sample_start: alignment.first_sample(),
-            cfo_hz: self.frequency.cfo_cycles * self.base_rate_hz,
+            cfo_hz: self.cfo_hz(),
             snr_db: decibel(snr),
             blocks,
             residual_delay: delay,
@@ -206,7 +264,6 @@ impl<const A: usize> Tracker<A> {
             noise_variance,
             measurements,
             payload,
-            reacquired: false,
         })
     }
 
@@ -230,45 +287,5 @@ impl<const A: usize> Tracker<A> {
         let broadcast = self.decoder.decode(&self.acquirer, &acquired)?;
         self.acquirer.know_pbch(self.pci, &broadcast.symbols);
         Some(broadcast.payload)
-    }
-
-    /// Searches the whole window for the cell.
-    fn reacquire(
-        &mut self,
-        antennas: &[&[Complex32]; A],
-        decode_pbch: bool,
-    ) -> Result<Option<Tracked<A>>, TrackError> {
-        let found = match self.searcher.search(antennas) {
-            Ok(found) => found,
-            Err(SearchError::TooShort { .. }) => return Ok(None),
-            Err(error) => return Err(error.into()),
-        };
-        let Some(cell) = found.iter().find(|ssb| ssb.pci == self.pci) else {
-            return Ok(None);
-        };
-        self.frequency = FrequencyLoop::new(cell, self.base_rate_hz);
-        let mut alignment = Alignment {
-            start: 0,
-            delay: 0.0,
-            cfo_cycles: self.frequency.cfo_cycles,
-            phase_step: self.frequency.phase_step,
-        };
-        if alignment
-            .shift(cell.sample_start + CYCLIC_PREFIX as f64)
-            .is_none()
-        {
-            return Ok(None);
-        }
-        let Acquirer {
-            demodulator, grids, ..
-        } = &mut self.acquirer;
-        if demodulator.run(antennas, &alignment, grids).is_none() {
-            return Ok(None);
-        }
-        let seen = self.look(alignment, decode_pbch);
-        Ok(seen.map(|tracked| Tracked {
-            reacquired: true,
-            ..tracked
-        }))
     }
 }

@@ -19,10 +19,16 @@ use crate::settings::{Pilots, Site, Vehicle};
 /// Samples of an SSB at the base rate: four symbols of 256 with a cyclic prefix of 18.
 pub const SSB_SAMPLES: usize = 4 * 274;
 
-/// SSBs in a row that must be missing before a cell is given up: one second at the usual period.
-const MISSES: u32 = 50;
+/// SSBs in a row that must be missing before one is given up, and for how many seconds.
+const MISSES: u32 = 8;
+const ABSENT_S: f64 = 2.0;
 /// Time after which a receiver that has cells looks for others, in seconds.
 const SEARCH_INTERVAL_S: f64 = 1.0;
+/// The same where it has none, once it has looked at every frequency offset.
+const LOST_INTERVAL_S: f64 = 0.1;
+/// Largest error of the receiver's oscillator in parts per million, over its carrier: three times
+/// the standard deviation that a scenario may give it.
+const OSCILLATOR_PPM: f64 = 60.0;
 /// An SSB must lie this many samples inside a window; half a cyclic prefix and the filter's reach.
 const GUARD: f64 = 16.0;
 
@@ -123,6 +129,11 @@ impl Receiver {
         self.0.tracked()
     }
 
+    /// Number of windows that were searched for cells.
+    pub fn searches(&self) -> u64 {
+        self.0.searches()
+    }
+
     /// Looks for cells where it is time to, and hands every SSB that lies in the window to `take`.
     ///
     /// # Errors
@@ -140,6 +151,7 @@ impl Receiver {
 trait SsbReceiver: Send {
     fn config(&self) -> &ReceiverConfig;
     fn tracked(&self) -> usize;
+    fn searches(&self) -> u64;
     fn receive(
         &mut self,
         window: &Window<'_>,
@@ -154,6 +166,10 @@ struct ArrayReceiver<const A: usize> {
     searcher: Searcher,
     cells: Vec<Cell<A>>,
     last_search_s: f64,
+    searches: u64,
+    /// Frequency offset that cells were last found at, in Hz, and searches in vain since.
+    offset_hz: f64,
+    in_vain: u32,
     observation: SsbObservation,
 }
 
@@ -161,7 +177,29 @@ struct Cell<const A: usize> {
     ssb_index: u8,
     pci: u16,
     tracker: Tracker<A>,
+    /// Periods after the last SSB seen that the next one is expected, and where.
+    periods: f64,
     next_start: f64,
+    last_seen_s: f64,
+}
+
+impl<const A: usize> Cell<A> {
+    /// Moves on by some bursts; the clocks drift meanwhile as they were seen to.
+    fn skip(&mut self, bursts: f64, period: f64) {
+        self.periods += bursts;
+        self.next_start = self.tracker.expected_start(self.periods * period);
+    }
+
+    /// Begins to count anew: its SSB was seen.
+    fn seen(&mut self, time_s: f64, period: f64) {
+        self.last_seen_s = time_s;
+        self.periods = 0.0;
+        self.skip(1.0, period);
+    }
+
+    fn is_lost(&self, time_s: f64) -> bool {
+        self.tracker.misses() >= MISSES && time_s - self.last_seen_s >= ABSENT_S
+    }
 }
 
 impl<const A: usize> ArrayReceiver<A> {
@@ -183,37 +221,82 @@ impl<const A: usize> ArrayReceiver<A> {
             calibration,
             cells: Vec::new(),
             last_search_s: f64::NEG_INFINITY,
+            searches: 0,
+            offset_hz: 0.0,
+            in_vain: 0,
             observation: SsbObservation::new(A),
             config,
         })
     }
 
+    /// Whether it is time to search. A receiver without cells looks at every frequency offset that
+    /// its oscillator may have at once, then now and then.
+    fn searches_now(&self, time_s: f64) -> bool {
+        let interval_s = if !self.cells.is_empty() {
+            SEARCH_INTERVAL_S
+        } else if self.in_vain < self.offsets() {
+            0.0
+        } else {
+            LOST_INTERVAL_S
+        };
+        time_s - self.last_search_s >= interval_s
+    }
+
+    /// Frequency offsets, a subcarrier apart, that the oscillator may have.
+    fn offsets(&self) -> u32 {
+        let subcarriers =
+            1e-6 * OSCILLATOR_PPM * self.config.ssb_freq_hz / self.config.spacing.hz();
+        2 * (subcarriers - 0.5).ceil().clamp(0.0, 15.0) as u32 + 1
+    }
+
+    /// The frequency offset to search around: that of the cells there are, else the last one known,
+    /// one subcarrier above, one below, two above, and so on.
+    fn centre_hz(&self) -> f64 {
+        if let Some(cell) = self.cells.iter().min_by_key(|cell| cell.tracker.misses()) {
+            return cell.tracker.cfo_hz();
+        }
+        let turn = self.in_vain % self.offsets();
+        let away = f64::from(turn.div_ceil(2)) * self.config.spacing.hz();
+        self.offset_hz + if turn % 2 == 1 { away } else { -away }
+    }
+
     fn search(&mut self, window: &Window<'_>) -> Result<(), ReceiveError> {
-        self.last_search_s = window.time_s;
-        if window
-            .antennas
-            .iter()
-            .any(|samples| samples.len() < SSB_SAMPLES)
-        {
+        let period = self.config.period_s * self.config.spacing.base_rate_hz();
+        let too_short = |samples: &&[Complex32]| samples.len() < SSB_SAMPLES;
+        if window.antennas.iter().any(too_short) {
             return Ok(());
         }
+        self.last_search_s = window.time_s;
+        self.searches += 1;
+        self.searcher.centre(self.centre_hz())?;
+        self.in_vain = self.in_vain.saturating_add(1);
         for found in self.searcher.search(window.antennas)? {
             let pci = found.pci.get();
-            let wanted = self
-                .config
-                .cells
-                .as_ref()
-                .is_none_or(|cells| cells.contains(&pci));
-            let known = |cell: &Cell<A>| (cell.pci, cell.ssb_index) == (pci, found.ssb_index);
-            if wanted && !self.cells.iter().any(known) {
-                let mut found = found.clone();
-                found.sample_start += window.start as f64;
-                self.cells.push(Cell {
+            let wanted = self.config.cells.as_ref();
+            if wanted.is_some_and(|cells| !cells.contains(&pci)) {
+                continue;
+            }
+            (self.in_vain, self.offset_hz) = (0, found.cfo_hz);
+            let mut found = found.clone();
+            found.sample_start += window.start as f64;
+            let same = |cell: &&mut Cell<A>| (cell.pci, cell.ssb_index) == (pci, found.ssb_index);
+            match self.cells.iter_mut().find(same) {
+                Some(cell) if cell.tracker.misses() > 0 => {
+                    // Bursts since it was seen last.
+                    let late = (found.sample_start - cell.next_start) / period;
+                    let bursts = cell.periods + late.round();
+                    cell.tracker.found(&found, bursts.max(1.0) * period);
+                    (cell.periods, cell.next_start) = (0.0, found.sample_start);
+                }
+                Some(_) => {}
+                None => self.cells.push(Cell {
                     ssb_index: found.ssb_index,
                     pci,
                     tracker: Tracker::new(&self.search, &found)?,
+                    periods: 0.0,
                     next_start: found.sample_start,
-                });
+                    last_seen_s: window.time_s,
+                }),
             }
         }
         Ok(())
@@ -229,6 +312,10 @@ impl<const A: usize> SsbReceiver for ArrayReceiver<A> {
         self.cells.len()
     }
 
+    fn searches(&self) -> u64 {
+        self.searches
+    }
+
     fn receive(
         &mut self,
         window: &Window<'_>,
@@ -238,8 +325,7 @@ impl<const A: usize> SsbReceiver for ArrayReceiver<A> {
             let found = window.antennas.len();
             ReceiveError::Antennas { found, elements: A }
         })?;
-        let since_s = window.time_s - self.last_search_s;
-        if self.cells.is_empty() || since_s >= SEARCH_INTERVAL_S {
+        if self.searches_now(window.time_s) {
             self.search(window)?;
         }
         let base_rate_hz = self.config.spacing.base_rate_hz();
@@ -251,8 +337,10 @@ impl<const A: usize> SsbReceiver for ArrayReceiver<A> {
         for cell in &mut self.cells {
             if cell.next_start < first {
                 // Asleep meanwhile, or the window came late.
-                let missed = ((first - cell.next_start) / period).ceil();
-                cell.next_start += missed * period;
+                let drifted =
+                    cell.tracker.expected_start(period) - cell.tracker.expected_start(0.0);
+                let bursts = ((first - cell.next_start) / drifted).ceil();
+                cell.skip(bursts, period);
             }
             while cell.next_start <= last {
                 let start = cell.next_start;
@@ -261,29 +349,24 @@ impl<const A: usize> SsbReceiver for ArrayReceiver<A> {
                         .track(&antennas, window.start as f64, start, decode_pbch)?;
                 // The beam is told by DM-RS; another cell's SSB is not this one.
                 let seen = seen.filter(|seen| seen.ssb_index == cell.ssb_index);
-                cell.next_start = match &seen {
-                    Some(seen) => cell
-                        .tracker
-                        .expected_start(period)
-                        .max(seen.sample_start + 1.0),
-                    None => start + period,
+                let Some(seen) = seen else {
+                    cell.skip(1.0, period);
+                    continue;
                 };
-                if let Some(seen) = seen {
-                    let elapsed_s = (seen.sample_start - window.start as f64) / base_rate_hz;
-                    let time_s = window.time_s + elapsed_s;
-                    fill(
-                        &mut self.observation,
-                        &self.config,
-                        &self.calibration,
-                        &cell.tracker,
-                        &seen,
-                        time_s,
-                    );
-                    take(&self.observation);
-                }
+                cell.seen(window.time_s, period);
+                let elapsed_s = (seen.sample_start - window.start as f64) / base_rate_hz;
+                fill(
+                    &mut self.observation,
+                    &self.config,
+                    &self.calibration,
+                    &cell.tracker,
+                    &seen,
+                    window.time_s + elapsed_s,
+                );
+                take(&self.observation);
             }
         }
-        self.cells.retain(|cell| cell.tracker.misses() <= MISSES);
+        self.cells.retain(|cell| !cell.is_lost(window.time_s));
         Ok(())
     }
 }

@@ -9,7 +9,7 @@ use serde::{Deserialize, Serialize};
 pub struct IqSettings {
     /// Standard deviation of the error of the receiver's oscillator in parts per million, drawn
     /// once per run. It shifts the carrier and stretches the sampling clock alike.
-    #[schemars(range(min = 0.0, max = 1.0))]
+    #[schemars(range(min = 0.0, max = 20.0))]
     pub oscillator_ppm: f64,
     /// The same of each radio head's (TS 38.104 allows 0.05).
     #[schemars(range(min = 0.0, max = 0.2))]

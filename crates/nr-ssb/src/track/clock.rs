@@ -1,0 +1,147 @@
+//! The cell's clock beside the receiver's: when the next SSB comes, and how well that is known.
+//!
+//! A Kalman filter of two states: when the last SSB began, and by how much a sample of the cell
+//! lasts longer than one of the receiver. Both carrier and samples come from one oscillator, so
+//! that a frequency offset of `f` at a carrier `F` tells a drift of `−f/F` before any time has
+//! passed; from then on the drift is learned from when SSBs come. Between two of them it wanders,
+//! as oscillators and the Doppler effect of a changing speed make it.
+
+/// Standard deviation by which the drift wanders in a second: oscillator and acceleration.
+const WANDER_PER_SQRT_S: f64 = 1e-8;
+/// Standard deviation of a drift that the frequency offset told.
+const DRIFT_BY_CFO: f64 = 1e-7;
+/// The same where no carrier frequency is known: the worst oscillators.
+const DRIFT_UNKNOWN: f64 = 2e-5;
+/// Standard deviation of the time that a search tells, samples.
+const SEARCHED: f64 = 0.1;
+/// The least of any time: paths come and go, samples.
+const PATHS: f64 = 0.03;
+
+/// Follows one cell's clock.
+#[derive(Debug, Clone)]
+pub(super) struct ClockLoop {
+    base_rate_hz: f64,
+    /// First sample of the last SSB.
+    last_start: f64,
+    /// Samples per sample that the cell's clock is slow.
+    drift: f64,
+    covariance: Covariance,
+}
+
+/// Of beginning and drift, samples.
+#[derive(Debug, Clone, Copy)]
+struct Covariance {
+    start: f64,
+    both: f64,
+    drift: f64,
+}
+
+impl ClockLoop {
+    /// From when a search found an SSB, and from its frequency offset if the carrier is known.
+    pub(super) fn new(start: f64, cfo_hz: f64, carrier_hz: Option<f64>, base_rate_hz: f64) -> Self {
+        let told = carrier_hz.filter(|hz| *hz > 0.0).map(|hz| -cfo_hz / hz);
+        let sigma = told.map_or(DRIFT_UNKNOWN, |_| DRIFT_BY_CFO);
+        Self {
+            base_rate_hz,
+            last_start: start,
+            drift: told.unwrap_or(0.0),
+            covariance: Covariance {
+                start: SEARCHED * SEARCHED,
+                both: 0.0,
+                drift: sigma * sigma,
+            },
+        }
+    }
+
+    /// When an SSB begins that is sent `samples` of the cell's clock after the last one.
+    pub(super) fn expected_start(&self, samples: f64) -> f64 {
+        self.last_start + samples * (1.0 + self.drift)
+    }
+
+    /// Time since the last SSB, seconds.
+    pub(super) fn elapsed_s(&self, start: f64) -> f64 {
+        (start - self.last_start).abs() / self.base_rate_hz
+    }
+
+    /// Standard deviation of what is expected to begin at `expected`, samples.
+    pub(super) fn deviation(&self, expected: f64) -> f64 {
+        self.predicted(expected).start.sqrt()
+    }
+
+    /// Takes in an SSB that was expected at `expected` and came `late` samples later, known to
+    /// `variance`.
+    pub(super) fn follow(&mut self, expected: f64, late: f64, variance: f64) {
+        let Covariance { start, both, drift } = self.predicted(expected);
+        let total = start + variance + PATHS * PATHS;
+        let (time_gain, drift_gain) = (start / total, both / total);
+        self.last_start = expected + time_gain * late;
+        self.drift += drift_gain * late;
+        self.covariance = Covariance {
+            start: start * (1.0 - time_gain),
+            both: both * (1.0 - time_gain),
+            drift: drift - drift_gain * both,
+        };
+    }
+
+    /// Takes in an SSB that a search found, sent `samples` of the cell's clock after the last one:
+    /// the two tell the drift, whatever was believed of it.
+    pub(super) fn found(&mut self, start: f64, samples: f64) {
+        let drift = (start - self.last_start) / samples - 1.0;
+        if drift.abs() < 10.0 * DRIFT_UNKNOWN {
+            self.drift = drift;
+            let variance = 2.0 * SEARCHED * SEARCHED;
+            self.covariance.drift = variance / (samples * samples) + WANDER_PER_SQRT_S.powi(2);
+        }
+        self.last_start = start;
+        self.covariance.start = SEARCHED * SEARCHED;
+        self.covariance.both = 0.0;
+    }
+
+    /// The covariance when an SSB is expected to begin.
+    fn predicted(&self, expected: f64) -> Covariance {
+        let elapsed = expected - self.last_start;
+        let wander = WANDER_PER_SQRT_S.powi(2) / self.base_rate_hz * elapsed.abs();
+        let Covariance { start, both, drift } = self.covariance;
+        Covariance {
+            start: start + elapsed * (2.0 * both + elapsed * (drift + wander / 3.0)),
+            both: both + elapsed * (drift + 0.5 * wander),
+            drift: drift + wander,
+        }
+    }
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    const RATE: f64 = 7.68e6;
+    const PERIOD: f64 = 0.02 * RATE;
+
+    #[test]
+    fn a_frequency_offset_tells_the_drift_and_times_correct_it() {
+        let mut clock = ClockLoop::new(1000.0, -7000.0, Some(3.5e9), RATE);
+        assert!((clock.expected_start(PERIOD) - 1000.0 - PERIOD * (1.0 + 2e-6)).abs() < 1e-6);
+        // The truth is 2.3 ppm.
+        let truth = |n: f64| 1000.0 + n * PERIOD * (1.0 + 2.3e-6);
+        for n in 1..50 {
+            let expected = clock.expected_start(PERIOD);
+            clock.follow(expected, truth(f64::from(n)) - expected, 1e-4);
+        }
+        assert!((clock.drift - 2.3e-6).abs() < 2e-9, "{}", clock.drift);
+        // Ten seconds of sleep are bridged within what it says of itself.
+        let expected = clock.expected_start(500.0 * PERIOD);
+        let error = (expected - truth(549.0)).abs();
+        assert!(error < 4.0 * clock.deviation(expected), "{error}");
+        assert!(clock.deviation(expected) < 4.0);
+    }
+
+    #[test]
+    fn two_searches_tell_a_drift_that_nothing_else_did() {
+        let mut clock = ClockLoop::new(0.0, 0.0, Some(3.5e9), RATE);
+        clock.found(50.0 * PERIOD * (1.0 - 1e-5), 50.0 * PERIOD);
+        assert!((clock.drift + 1e-5).abs() < 1e-12);
+        // What cannot be a drift is another beginning.
+        clock.found(60.0 * PERIOD, 5.0 * PERIOD);
+        assert!((clock.drift + 1e-5).abs() < 1e-12);
+    }
+}
