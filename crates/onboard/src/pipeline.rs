@@ -184,8 +184,11 @@ impl Onboard {
     pub fn hear(&mut self, time_s: f64, source: &mut dyn SsbSource) -> Result<Heard<'_>, BoxError> {
         self.sensed.clear();
         self.executions.clear();
+        let newest = self.odometry.map(|sample| sample.time_s);
+        let now_s = newest.map_or(time_s, |newest_s| newest_s.max(time_s));
         let now = Situation {
             time_s,
+            now_s,
             speed_mps: self.odometry.map_or(0.0, |sample| sample.speed_mps),
             localizer: self.localizer.localizer(),
             heads: &self.heads,
@@ -217,6 +220,7 @@ impl Onboard {
         }
         let now = Situation {
             time_s,
+            now_s,
             speed_mps: self.odometry.map_or(0.0, |sample| sample.speed_mps),
             localizer: self.localizer.localizer(),
             heads: &self.heads,
