@@ -43,8 +43,10 @@ impl Surroundings {
         odometry: Option<OdometrySample>,
         localizer: &'a History,
     ) -> Situation<'a> {
+        let newest_s = odometry.map_or(time_s, |sample| sample.time_s);
         Situation {
             time_s,
+            now_s: newest_s.max(time_s),
             speed_mps: odometry.map_or(0.0, |sample| sample.speed_mps),
             localizer: localizer.localizer(),
             heads: &self.heads,

@@ -63,6 +63,7 @@ impl Localizer for StraightOn {
     }
 
     fn pose(&self, time_s: f64) -> Result<PoseEstimate, BoxError> {
+        assert!(time_s >= self.now_s, "the past is nobody's business");
         Ok(PoseEstimate {
             time_s,
             pose: self.start.along_arc(self.driven_m, 0.0),
@@ -94,7 +95,12 @@ fn straight_on(patience: usize) -> impl Fn(Pose) -> Result<Custom, BoxError> {
 #[test]
 fn a_localizer_of_ones_own_drives_and_may_give_up() {
     for latency_ms in [0.0, 100.0] {
-        let late = [("ssb_latency_ms", Value::from(latency_ms))];
+        // Algorithm 1 asks where the vehicle is.
+        let late = [
+            ("ssb_latency_ms", Value::from(latency_ms)),
+            ("vehicle.wake_up.policy", "pid".into()),
+            ("vehicle.wake_up.base_ms", 20.0.into()),
+        ];
         let scenario = changed("paper-real-odometry-2", late);
         let record = run_with(&scenario, &straight_on(usize::MAX)).unwrap();
         let reason = |it: &onboard::Execution| it.verdict.reason;

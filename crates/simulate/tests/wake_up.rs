@@ -50,8 +50,8 @@ fn half_the_executions_of_the_pid_for_no_more_error() {
     }
 }
 
-/// Every SSB of the drive with four radio heads, on the bound's demand alone.
-fn on_demand(bound_m: f64, runs: u64) -> Vec<RunRecord> {
+/// The drive with four radio heads, on the bound's demand alone, SSBs coming so late.
+fn on_demand(bound_m: f64, latency_ms: f64, runs: u64) -> Vec<RunRecord> {
     let settings = UncertaintySettings {
         bound_m,
         confidence: 0.9,
@@ -59,6 +59,7 @@ fn on_demand(bound_m: f64, runs: u64) -> Vec<RunRecord> {
     };
     let mut scenario = shipped("paper-real-odometry-4");
     scenario.vehicle.wake_up = WakeUpSettings::Uncertainty(settings);
+    scenario.ssb_latency_ms = latency_ms;
     drives(&scenario, SEED, runs)
 }
 
@@ -68,18 +69,23 @@ fn variances(step: &Step) -> [f64; 2] {
     principal_variances(xx, xy, yy)
 }
 
+/// The largest error that the tracker predicts with a probability of 90 %.
+fn most_predicted_m(record: &RunRecord) -> f64 {
+    let quantile = RadialQuantile::new(0.1);
+    let predicted_m = |step: &Step| quantile.radius(variances(step));
+    record.steps.iter().map(predicted_m).fold(0.0, f64::max)
+}
+
 #[test]
 fn the_bound_is_kept_with_its_confidence_and_as_late_as_can_be() {
     let bound_m = 0.3;
-    let quantile = RadialQuantile::new(0.1);
-    let predicted_m = |step: &Step| quantile.radius(variances(step));
-    let records = on_demand(bound_m, 12);
+    let records = on_demand(bound_m, 0.0, 12);
     for record in &records {
         // An angle may turn out an outlier, one in 10⁴ by the gate, and leave its SSB without.
         assert!(record.out_of_reach <= 3, "{}", record.out_of_reach);
         // Until the next SSB the error grows by less than 3 %: as late as can be is nearly at the
         // bound, and one angle missed barely beyond.
-        let most_m = record.steps.iter().map(predicted_m).fold(0.0, f64::max);
+        let most_m = most_predicted_m(record);
         assert!((0.97..1.03).contains(&(most_m / bound_m)), "{most_m}");
         assert!(record.listened < record.steps.len());
     }
@@ -92,8 +98,16 @@ fn the_bound_is_kept_with_its_confidence_and_as_late_as_can_be() {
 }
 
 #[test]
+fn the_bound_is_kept_by_ssbs_that_come_late() {
+    for record in on_demand(0.3, 100.0, 3) {
+        let most_m = most_predicted_m(&record);
+        assert!((0.97..1.03).contains(&(most_m / 0.3)), "{most_m}");
+    }
+}
+
+#[test]
 fn a_bound_out_of_reach_is_told_and_everything_tried() {
-    for record in on_demand(0.02, 1) {
+    for record in on_demand(0.02, 0.0, 1) {
         let steps = record.steps.len();
         assert!(
             10 * record.out_of_reach > 9 * steps,
@@ -106,7 +120,7 @@ fn a_bound_out_of_reach_is_told_and_everything_tried() {
 
 #[test]
 fn a_looser_bound_costs_less() {
-    let executions = [0.15, 0.3, 0.6].map(|bound_m| on_demand(bound_m, 1)[0].executions.len());
+    let executions = [0.15, 0.3, 0.6].map(|bound_m| on_demand(bound_m, 0.0, 1)[0].executions.len());
     assert!(
         executions[0] > 2 * executions[1] && executions[1] > 2 * executions[2],
         "{executions:?}"

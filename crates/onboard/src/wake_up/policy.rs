@@ -15,6 +15,9 @@ pub const SAME_TIME_S: f64 = 1e-9;
 pub struct Situation<'a> {
     /// Time of the burst in seconds.
     pub time_s: f64,
+    /// Time of the newest that came in, this burst or odometry, in seconds: where a burst comes late,
+    /// the localizer is beyond it.
+    pub now_s: f64,
     /// Speed by the odometer, in m/s.
     pub speed_mps: f64,
     /// The localizer, which knows where the vehicle is and, if it is the tracker, how well.
@@ -62,7 +65,7 @@ impl Situation<'_> {
     /// # Errors
     /// Whatever the localizer fails with.
     pub fn expected_snr_db(&self, head: &RadioHead) -> Result<f64, BoxError> {
-        let place = self.localizer.pose(self.time_s)?.pose.point();
+        let place = self.localizer.pose(self.now_s)?.pose.point();
         let distance_m = head.distance_m(place, self.height_m);
         Ok(self.budget.snr_db(head, distance_m))
     }

@@ -155,7 +155,7 @@ impl WakeUpPolicy for UncertaintyDriven {
             return Ok(false);
         }
         let tracker = now.localizer.tracker();
-        Ok(tracker.is_none_or(|tracker| self.choice(tracker, now.time_s, now.heads) != 0))
+        Ok(tracker.is_none_or(|tracker| self.choice(tracker, now.now_s, now.heads) != 0))
     }
 
     fn decide(
@@ -169,17 +169,17 @@ impl WakeUpPolicy for UncertaintyDriven {
             chosen.fill(true);
             return Ok(self.period_s);
         };
-        let choice = self.choice(tracker, now.time_s, now.heads);
+        let choice = self.choice(tracker, now.now_s, now.heads);
         for (ssb, chosen) in sensed.iter().zip(chosen) {
             let sends = |head: &RadioHead| head.sends(ssb.pci, ssb.ssb_index);
             *chosen = (now.heads.iter().position(sends))
                 .is_some_and(|index| index < MOST_HEADS && choice >> index & 1 == 1);
         }
-        Ok(self.wake_up_time_s(tracker, now.time_s))
+        Ok(self.wake_up_time_s(tracker, now.now_s))
     }
 
     fn keeps_bound(&self, now: &Situation<'_>) -> Option<bool> {
         let tracker = now.localizer.tracker()?;
-        Some(self.keeps(tracker, now.time_s))
+        Some(self.keeps(tracker, now.now_s))
     }
 }

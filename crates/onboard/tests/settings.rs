@@ -1,0 +1,330 @@
+//! Sites and vehicles as files: what they may be like, what is laid over what, and what is refused.
+#![allow(clippy::unwrap_used, reason = "this is a test")]
+
+use onboard::receive::ReceiverConfig;
+use onboard::settings::{
+    Check, EstimatorMethod, Library, LocalizerSettings, NamedText, Pilots, SettingsError, Shipped,
+    Site, TomlFile, Vehicle, WakeUpSettings, check_together,
+};
+
+/// Files in memory, beside the shipped ones.
+struct Shelf(&'static [(&'static str, &'static str)]);
+
+impl Library for Shelf {
+    fn text(
+        &self,
+        what: &'static str,
+        shipped: &[(&'static str, &'static str)],
+        name: &str,
+        beside: &str,
+    ) -> Result<NamedText, SettingsError> {
+        match self.0.iter().find(|it| it.0 == name) {
+            Some((name, text)) => Ok(NamedText {
+                origin: (*name).to_owned(),
+                text: (*text).to_owned(),
+            }),
+            None => Shipped.text(what, shipped, name, beside),
+        }
+    }
+
+    fn points_m(&self, _: &str, _: &str) -> Result<Vec<[f64; 2]>, SettingsError> {
+        Ok(vec![[0.0, 0.0], [80.0, 0.0], [80.0, 50.0]])
+    }
+}
+
+const EMPTY: Shelf = Shelf(&[]);
+
+fn vehicle(text: &str) -> Result<Vehicle, SettingsError> {
+    Vehicle::from_toml(text, "vehicle.toml", &EMPTY)
+}
+
+fn site(text: &str) -> Result<Site, SettingsError> {
+    Site::from_toml(text, "site.toml", &EMPTY)
+}
+
+/// File, key and what is allowed there.
+fn refusal<T>(outcome: Result<T, SettingsError>) -> (String, String, String) {
+    let error = outcome.map(drop).unwrap_err();
+    let message = error.to_string();
+    match error {
+        SettingsError::Value { file, key, .. }
+        | SettingsError::UnknownKey { file, key, .. }
+        | SettingsError::Shape { file, key, .. } => (file, key, message),
+        other => panic!("{other}"),
+    }
+}
+
+#[test]
+fn a_file_is_like_another_but_for_its_own_keys() {
+    let carrier = Vehicle::from_library("carrier", &Shipped).unwrap();
+    let mine = vehicle("like = 'carrier'\nname = 'mine'\nodometer.scale = 1.01").unwrap();
+    assert_eq!((mine.name.as_str(), mine.odometer.scale), ("mine", 1.01));
+    // A table's other keys are those of the file it is like.
+    assert_eq!(mine.odometer.scale_std, carrier.odometer.scale_std);
+    let mut again = mine.clone();
+    again.name.clone_from(&carrier.name);
+    again.odometer.scale = 1.0;
+    assert_eq!(again, carrier);
+    // What is written out stands by itself.
+    assert!(!mine.to_toml().contains("like ="));
+    assert_eq!(vehicle(&mine.to_toml()).unwrap(), mine);
+    // A list is replaced as a whole.
+    let moved = "like = 'trip-2'\n[[radio_heads]]\nposition_m = [10.0, 50.0, 8.0]";
+    assert_eq!(site(moved).unwrap().radio_heads.len(), 1);
+}
+
+#[test]
+fn likes_lead_from_file_to_file_and_end() {
+    let shelf = Shelf(&[
+        ("a", "like = 'b'\nname = 'a'\nodometer.scale = 1.02"),
+        (
+            "b",
+            "like = 'tugger'\nodometer = { scale = 1.01, scale_std = 0.2 }",
+        ),
+        ("loop", "like = 'pool'"),
+        ("pool", "like = 'loop'"),
+        ("wrong", "like = 'b'\nodometer.skale = 1.0"),
+    ]);
+    let a = Vehicle::from_library("a", &shelf).unwrap();
+    assert_eq!((a.odometer.scale, a.odometer.scale_std), (1.02, 0.2));
+    assert!(matches!(a.wake_up, WakeUpSettings::Uncertainty(_)));
+
+    let (file, key, message) = refusal(Vehicle::from_library("loop", &shelf));
+    assert_eq!((file.as_str(), key.as_str()), ("loop", "like"));
+    assert!(message.contains("at most 8 files"), "{message}");
+    let (file, key, _) = refusal(Vehicle::from_library("wrong", &shelf));
+    assert_eq!((file.as_str(), key.as_str()), ("wrong", "odometer.skale"));
+    let (_, key, message) = refusal(vehicle("like = 7"));
+    assert!(key == "like" && message.contains("the name of a file"));
+    let message = vehicle("like = 'carier'").unwrap_err().to_string();
+    assert!(message.contains("did you mean `carrier`?"), "{message}");
+    // A site is not like a vehicle.
+    let message = site("like = 'carrier'").unwrap_err().to_string();
+    assert!(message.contains("no site `carrier`"), "{message}");
+}
+
+#[test]
+fn another_kind_takes_none_of_the_old_ones_keys() {
+    let fixed = vehicle("like = 'tugger'\n[wake_up]\npolicy = 'fixed'\ninterval_ms = 40").unwrap();
+    let WakeUpSettings::Fixed(settings) = fixed.wake_up else {
+        panic!("{:?}", fixed.wake_up)
+    };
+    assert_eq!(settings.interval_ms, Some(40.0));
+    // The same kind keeps them.
+    let tight = vehicle("like = 'tugger'\nwake_up = { policy = 'uncertainty', bound_m = 0.1 }");
+    let WakeUpSettings::Uncertainty(settings) = tight.unwrap().wake_up else {
+        panic!("the policy is uncertainty")
+    };
+    assert_eq!(
+        (settings.bound_m, settings.least_gain_m2),
+        (0.1, Some(1e-4))
+    );
+    // And so does a table that names no kind.
+    let told = "like = 'paper'\nwake_up.snr_set_point = { kind = 'absolute', snr_db = 5.0 }";
+    assert!(matches!(
+        vehicle(told).unwrap().wake_up,
+        WakeUpSettings::Pid(_)
+    ));
+    let tracker = "like = 'paper'\nlocalizer.kind = 'tracker'";
+    let tracker = vehicle(tracker).unwrap().localizer;
+    assert!(matches!(tracker, LocalizerSettings::Tracker(_)));
+}
+
+#[test]
+fn entries_of_a_list_are_laid_over_by_name_or_all_at_once() {
+    let yard = Site::from_library("yard", &Shipped).unwrap();
+    let surveyed = site(
+        "like = 'yard'\n[radio_heads]\nall = { position_std_m = 0.1, eirp_dbm = 3.0 }\n\
+         gate.eirp_dbm = 20.0",
+    )
+    .unwrap();
+    assert_eq!(surveyed.radio_heads.len(), yard.radio_heads.len());
+    for (head, shipped) in surveyed.radio_heads.iter().zip(&yard.radio_heads) {
+        assert_eq!(head.position_m, shipped.position_m);
+        assert_eq!(head.position_std_m, 0.1);
+        let eirp_dbm = if head.name == "gate" { 20.0 } else { 3.0 };
+        assert_eq!(head.eirp_dbm, eirp_dbm);
+    }
+    let (_, key, message) = refusal(site("like = 'yard'\nradio_heads.gaet.eirp_dbm = 3.0"));
+    assert_eq!(key, "radio_heads.gaet");
+    assert!(
+        message.contains("named gate, hall, dock, store, or all"),
+        "{message}"
+    );
+    let (_, key, message) = refusal(site("like = 'yard'\nradio_heads.gate = 3.0"));
+    assert_eq!(key, "radio_heads.gate");
+    assert!(message.contains("a table of the entry's keys"), "{message}");
+}
+
+#[test]
+fn overrides_go_by_path_and_are_checked_like_a_file() {
+    let yard = Site::from_library("yard", &Shipped).unwrap();
+    let louder = yard
+        .with_overrides([("radio_heads[2].eirp_dbm", 20.into())], &Shipped)
+        .unwrap();
+    assert_eq!(louder.radio_heads[2].eirp_dbm, 20.0);
+    for (path, key, allowed) in [
+        (
+            "radio_heads[2].eirp_dbm",
+            "radio_heads[2].eirp_dbm",
+            "between -150 and 120",
+        ),
+        (
+            "radio_heads[9].eirp_dbm",
+            "radio_heads[9].eirp_dbm",
+            "nothing at this path",
+        ),
+        ("rician_kdb", "rician_kdb", "did you mean `rician_k_db`?"),
+        ("carrier_mhz", "carrier_mhz", "between 100 and 100000"),
+        (
+            "ssb.period_ms",
+            "ssb.period_ms",
+            "one of 5, 10, 20, 40, 80, 160",
+        ),
+    ] {
+        let outcome = yard.with_overrides([(path, 999_999.into())], &Shipped);
+        let (file, told, message) = refusal(outcome);
+        assert_eq!((file.as_str(), told.as_str()), ("yard with overrides", key));
+        assert!(message.contains(allowed), "{message}");
+    }
+}
+
+#[test]
+fn a_site_need_not_have_a_road() {
+    let roaming = "name = 'hall'\nradio_heads = [{ position_m = [9.0, 9.0, 6.0] }]";
+    let hall = site(roaming).unwrap();
+    assert_eq!(hall.build_road().unwrap(), None);
+    let file = "road.file = 'road.csv'";
+    let with_road = site(&format!("{roaming}\n{file}")).unwrap();
+    // Points on disk become points in the file: it stands by itself.
+    let road = with_road.build_road().unwrap().unwrap();
+    assert!((road.length_m() - (130.0 - 20.0 + 5.0 * std::f64::consts::PI)).abs() < 1e-9);
+    assert_eq!(site(&with_road.to_toml()).unwrap(), with_road);
+    let outcome = Site::from_toml(&format!("{roaming}\n{file}"), "site.toml", &Shipped);
+    let (_, key, message) = refusal(outcome);
+    assert!(
+        key == "road.file" && message.contains("polyline_m"),
+        "{message}"
+    );
+
+    // There a vehicle must know where it starts.
+    let mut carrier = Vehicle::from_library("carrier", &Shipped).unwrap();
+    let check = Check { file: "both" };
+    check_together(&hall, &carrier, check).unwrap();
+    carrier.start.known = false;
+    let (_, key, message) = refusal(check_together(&hall, &carrier, check));
+    assert_eq!(key, "vehicle.start.known");
+    assert!(message.contains("no road"), "{message}");
+}
+
+#[test]
+fn site_files_are_checked() {
+    let head = |pci: u16, x: f64| {
+        format!("[[radio_heads]]\nposition_m = [{x:.1}, 80.0, 0.0]\npci = {pci}\n")
+    };
+    let good = format!("name = 'plant'\n{}{}", head(1, 0.0), head(2, 50.0));
+    assert_eq!(site(&good).unwrap().radio_heads.len(), 2);
+    for (text, expected) in [
+        (
+            format!("name = 'plant'\n{}{}", head(1, 0.0), head(2, 0.0)),
+            "radio_heads[1].position_m",
+        ),
+        (
+            format!("name = 'plant'\n{}{}", head(1, 0.0), head(1, 50.0)),
+            "radio_heads[1].pci",
+        ),
+        ("name = 'plant'\nradio_heads = []".to_owned(), "radio_heads"),
+        (good.replace("'plant'", "' '"), "name"),
+        (good.replace("name = 'plant'\n", ""), "name"),
+        (format!("rician_k = 7\n{good}"), "rician_k"),
+    ] {
+        let (file, key, _) = refusal(site(&text));
+        assert_eq!((file.as_str(), key.as_str()), ("site.toml", expected));
+    }
+}
+
+#[test]
+fn vehicle_files_are_checked() {
+    for (text, expected) in [
+        (
+            "channel_gains = [[1.0, 0.0], [0.0, 0.0], [1.0, 0.0], [1.0, 0.0]]",
+            "array.channel_gains[1]",
+        ),
+        ("channel_gains = [[1.0, 0.0]]", "array.channel_gains"),
+        ("elements = 9", "array.elements"),
+        ("elements = 2.5", "array.elements"),
+        ("position_m = [1.0, 2.0]", "array.position_m"),
+        ("mounting_deg = 3", "array.mounting_deg"),
+    ] {
+        let (file, key, message) = refusal(vehicle(&format!("name = 'mine'\n[array]\n{text}")));
+        assert_eq!(
+            (file.as_str(), key.as_str()),
+            ("vehicle.toml", expected),
+            "{message}"
+        );
+    }
+    for (text, expected) in [
+        (
+            "localizer.kind = 'dead-reckoning'\nintegrity = {}",
+            "integrity",
+        ),
+        (
+            "localizer.kind = 'dead-reckoning'\nwake_up.policy = 'uncertainty'",
+            "wake_up.policy",
+        ),
+        (
+            "localizer.map = false\nlocalizer.kind = 'tracker'\nstart.known = false",
+            "start.known",
+        ),
+        (
+            "start = { known = false, pose = { x_m = 1.0 } }",
+            "start.known",
+        ),
+        (
+            "receiver.pilots = 'pss'\nestimator.method = 'esprit'",
+            "estimator.method",
+        ),
+    ] {
+        let (_, key, message) = refusal(vehicle(&format!("name = 'mine'\n{text}")));
+        assert_eq!(key, expected, "{message}");
+    }
+}
+
+#[test]
+fn a_vehicle_hears_the_radio_heads_on_its_list() {
+    let trip = Site::from_library("trip-2", &Shipped).unwrap();
+    let with = |list: &str| {
+        let list = format!("like = 'carrier'\nreceiver.pci_allow_list = {list}");
+        vehicle(&list).unwrap()
+    };
+    let check = Check { file: "both" };
+    let listening = with("[2]");
+    check_together(&trip, &listening, check).unwrap();
+    assert_eq!(ReceiverConfig::new(&trip, &listening).cells, Some(vec![2]));
+    for (list, expected) in [("[3]", "[0]"), ("[1, 7]", "[1]"), ("[]", "")] {
+        let (_, key, _) = refusal(check_together(&trip, &with(list), check));
+        assert_eq!(key, format!("vehicle.receiver.pci_allow_list{expected}"));
+    }
+    // One of two leaves several places open.
+    let mut lost = with("[2]");
+    lost.start.known = false;
+    let (_, key, message) = refusal(check_together(&trip, &lost, check));
+    assert_eq!(key, "vehicle.start.known");
+    assert!(message.contains("two radio heads"), "{message}");
+}
+
+#[test]
+fn defaults_are_a_vehicle_that_drives() {
+    let plain = vehicle("name = 'plain'").unwrap();
+    assert_eq!(plain.receiver.pilots, Pilots::PssSss);
+    assert_eq!(plain.estimator.method, EstimatorMethod::MaximumLikelihood);
+    assert!(plain.follows_road() && plain.start.known);
+    for name in Vehicle::names() {
+        let shipped = Vehicle::from_library(name, &Shipped).unwrap();
+        assert_eq!(vehicle(&shipped.to_toml()).unwrap(), shipped);
+    }
+    for name in Site::names() {
+        let shipped = Site::from_library(name, &Shipped).unwrap();
+        assert_eq!(site(&shipped.to_toml()).unwrap(), shipped);
+    }
+}
