@@ -38,8 +38,8 @@ def readings(study: Study) -> str:
         "Reading",
         "Accuracy half",
         "Energy half",
-        "t_max, longest gap",
-        "Algorithm 1 against a constant",
+        "t_max",
+        "Algorithm 1",
         "Claims met",
     )
     unusable = "".join(
