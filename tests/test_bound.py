@@ -67,7 +67,7 @@ def test_one_head_alone_leaves_a_direction_open() -> None:
 
 def test_snr_is_the_link_budgets() -> None:
     core = _core.Bound(
-        Scenario.load("paper").with_overrides({"radio_heads[0].tx_power_dbm": -27.0})
+        Scenario.load("paper").with_overrides({"site.radio_heads[0].eirp_dbm": -17.0})
     )
     # Worked by hand in the core's own test: 8.083 dB at 100 m.
     snr_db = core.snr_db(np.array([205.0]), np.array([0.0]))

@@ -89,7 +89,9 @@ def claims(study: Study) -> str:
 
 
 def _short(claim: Claim) -> str:
-    return claim.id.split("_")[0]
+    number, *words = claim.id.split("_")
+    # Two claims are e3: one of the saving, one of the executions.
+    return f"{number} {words[-1]}" if number == "e3" and words[-1] == "executions" else number
 
 
 def _met(held: bool) -> str:
