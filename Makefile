@@ -9,7 +9,7 @@ SOURCES := $(shell find crates sites vehicles scenarios platforms -type f 2>/dev
 help: ## List these commands
 	@sed -n 's/^\([a-z-]*\):.*## /  make \1\t/p' $(MAKEFILE_LIST) | expand -t 20
 
-demo: .venv/installed ## Install into .venv, run the paper's whole evaluation, write results/latest/report.html
+demo: .venv/installed ## Install into .venv, evaluate the paper under every reading, write results/latest/report.html
 	$(BIN)/access-av evaluate
 
 test: .venv/installed-test ## Run every test: Rust, static checks of the Python side, pytest

@@ -128,9 +128,7 @@ pub fn simulate(
             .then(|| executions(py, &campaign.records))
             .transpose()?,
         error_quantiles_m: error_quantiles(py, &campaign)?,
-        errors_m: errors_every
-            .map(|_| errors(py, &campaign))
-            .transpose()?,
+        errors_m: errors_every.map(|_| errors(py, &campaign)).transpose()?,
     })
 }
 

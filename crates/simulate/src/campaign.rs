@@ -226,7 +226,10 @@ fn summary(record: &RunRecord, energy: Option<&EnergyModel>) -> RunSummary {
     let duration_s = record.steps.last().map_or(0.0, |step| step.time_s);
     let executions = record.executions.as_slice();
     let times_s = executions.iter().map(|execution| execution.ssb.time_s);
-    let gaps_s = times_s.clone().zip(times_s.skip(1)).map(|(before, after)| after - before);
+    let gaps_s = times_s
+        .clone()
+        .zip(times_s.skip(1))
+        .map(|(before, after)| after - before);
     let squares_m2: f64 = errors_m().map(|error_m| error_m * error_m).sum();
     RunSummary {
         run: record.run,

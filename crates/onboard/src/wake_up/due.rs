@@ -85,3 +85,25 @@ impl Due {
         self.has_passed(time_s, self.wake_up_time_s)
     }
 }
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    #[test]
+    fn a_constant_time_passes_from_the_last_estimate_on() {
+        let mut due = Due::constant(0.08);
+        assert!(due.listens(0.0), "there was no estimate yet");
+        due.estimated(0.02);
+        assert!(!due.listens(0.08) && due.listens(0.1));
+        assert!(due.has_passed(0.26, 0.24) && !due.has_passed(0.24, 0.24));
+    }
+
+    #[test]
+    fn a_controller_that_senses_every_ssb_keeps_the_receiver_on() {
+        let settings = crate::settings::PidSettings::default();
+        let mut due = Due::controlled(Controller::new(&settings, 0.08, 4.0), SensingMode::EverySsb);
+        due.estimated(1.0);
+        assert!(due.listens(1.02));
+    }
+}

@@ -37,8 +37,8 @@ def unknowns(study: Study, specs: dict[str, Spec]) -> str:
     )
     return (
         f"<p>{found.readings} readings of {found.runs} runs each, drawn from the ranges below. A "
-        "total index of 0.6 means: were that one thing known, 60 % of what the claim's margin "
-        "varies by could go. Cells below "
+        "total index of 0.6 means: 60 % of what the claim's margin varies by involves that one "
+        "thing, by itself or together with others. Cells below "
         f"{LEAST_TOTAL:.0%} are left empty; “unexplained” is what the expansion cannot say.</p>"
         + figure("sobol", "Total Sobol index of each claim's margin.", "On what the claims hang")
         + figure(
