@@ -3,6 +3,9 @@ PYTHON ?= python3
 BIN := .venv/bin
 SOURCES := $(shell find crates sites vehicles scenarios platforms -type f 2>/dev/null) Cargo.toml Cargo.lock pyproject.toml
 
+# Reference vectors and recordings, beside the project.
+DATA := $(abspath $(or $(ACCESS_AV_DATA),../shared/data))
+
 .DEFAULT_GOAL := help
 .PHONY: help demo test test-aarch64 lint lint-python docs bench clean
 
@@ -14,6 +17,8 @@ demo: .venv/installed ## Install into .venv, evaluate the paper under every read
 
 test: .venv/installed-test ## Run every test: Rust, static checks of the Python side, pytest
 	cargo test --workspace --quiet
+	@if [ -d "$(DATA)" ]; then ACCESS_AV_DATA="$(DATA)" cargo test --quiet -p nr-ssb -- --ignored; \
+	  else echo "not tested: reference vectors and recordings; no $(DATA) (ACCESS_AV_DATA)"; fi
 	$(MAKE) --no-print-directory lint-python
 	$(BIN)/python -m pytest
 

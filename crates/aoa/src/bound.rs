@@ -33,6 +33,17 @@ pub fn known_signal<const N: usize>(total_snr: f64) -> f64 {
     (2.0 * total_snr * aperture::<N>()).sqrt().recip()
 }
 
+/// [`known_signal`] with another SNR `g_n` at each antenna (0 where a channel is dead):
+/// `sqrt(1 / (2 A))` with `A = sum g_n n^2 - (sum g_n n)^2 / sum g_n`.
+pub fn known_signal_unequal<const N: usize>(total_snrs: &[f64; N]) -> f64 {
+    let moment = |power: i32| -> f64 {
+        let terms = total_snrs.iter().enumerate();
+        terms.map(|(n, snr)| snr * (n as f64).powi(power)).sum()
+    };
+    let aperture = moment(2) - moment(1).powi(2) / moment(0);
+    (2.0 * aperture).sqrt().recip()
+}
+
 /// A bound on the angle from a bound on the electrical angle:
 /// `sigma_theta = sigma_omega / (2 pi (d / lambda) sin(theta))`. It diverges at end-fire.
 pub fn angle_sigma_rad<const N: usize>(

@@ -41,6 +41,12 @@ pub enum Error {
         /// Its value.
         value: f64,
     },
+    /// Fewer than two channels have a finite noise variance.
+    #[error("a direction needs two living channels, not {living}")]
+    DeadChannels {
+        /// Channels with a finite noise variance.
+        living: usize,
+    },
     /// The matrix given as covariance is not Hermitian with a non-negative diagonal.
     #[error("a covariance matrix must be Hermitian with a non-negative diagonal")]
     NotHermitian,

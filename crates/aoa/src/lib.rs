@@ -49,7 +49,8 @@
 //!
 //! Several sources: [`estimate_several`], and [`source_count`] for how many. Coherent ones
 //! (reflections) need [`Covariance::forward_backward`] or [`Covariance::spatially_smoothed`] first.
-//! Known pilots: [`maximum_likelihood_pilots`]. Many estimates in one call: [`Batch`]. Real
+//! Known pilots: [`maximum_likelihood_pilots`], and [`maximum_likelihood_pilots_unequal`] where the
+//! channels' noise differs or one is dead. Many estimates in one call: [`Batch`]. Real
 //! receivers: [`Calibration`].
 //!
 //! # What an estimate does not know
@@ -85,6 +86,7 @@ pub use estimate::one::estimate;
 pub use estimate::pilots::maximum_likelihood_pilots;
 pub use estimate::several::estimate_several;
 pub use estimate::source_count::{Criterion, source_count};
+pub use estimate::unequal::maximum_likelihood_pilots_unequal;
 pub use kernel::real::Real;
 pub use linalg::matrix::Matrix;
 pub use list::List;

@@ -7,3 +7,4 @@ pub(crate) mod one;
 pub(crate) mod pilots;
 pub(crate) mod several;
 pub(crate) mod source_count;
+pub(crate) mod unequal;

@@ -21,14 +21,11 @@ fn data_dir() -> PathBuf {
 pub struct Vectors(PathBuf);
 
 impl Vectors {
-    /// The file, or `None` with the reason printed if it is not there.
-    pub fn open(name: &str) -> Option<Self> {
+    /// The file.
+    pub fn open(name: &str) -> Self {
         let path = data_dir().join("vectors").join(name);
-        if path.is_file() {
-            return Some(Self(path));
-        }
-        println!("skipped: no reference vectors at {}", path.display());
-        None
+        assert!(path.is_file(), "no reference vectors at {}", path.display());
+        Self(path)
     }
 
     /// The bytes of one array: an `.npz` is a zip archive of `.npy` files.

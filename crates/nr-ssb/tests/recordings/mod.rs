@@ -21,25 +21,19 @@ impl Recording {
     }
 }
 
-/// Where the reference data is, or `None` with a printed reason.
-pub fn data_dir() -> Option<PathBuf> {
+/// Where the reference data is.
+fn data_dir() -> PathBuf {
     let dir = std::env::var_os("ACCESS_AV_DATA").map_or_else(
         || Path::new(env!("CARGO_MANIFEST_DIR")).join("../../../shared/data"),
         PathBuf::from,
     );
-    if dir.is_dir() {
-        return Some(dir);
-    }
-    println!(
-        "skipped: no reference data at {} (set ACCESS_AV_DATA)",
-        dir.display()
-    );
-    None
+    assert!(dir.is_dir(), "no recordings at {}", dir.display());
+    dir
 }
 
 /// All recordings with an `nr:ssb` annotation.
-pub fn annotated(dir: &Path) -> Vec<Recording> {
-    let mut paths: Vec<PathBuf> = std::fs::read_dir(dir.join("captures"))
+pub fn annotated() -> Vec<Recording> {
+    let mut paths: Vec<PathBuf> = std::fs::read_dir(data_dir().join("captures"))
         .unwrap()
         .map(|entry| entry.unwrap().path())
         .filter(|path| {

@@ -1,0 +1,120 @@
+//! One source with known pilots, received by channels whose noise differs.
+
+use num_complex::Complex64;
+
+use crate::array::linear::Array;
+use crate::bound;
+use crate::covariance::sample::Covariance;
+use crate::error::Error;
+use crate::result::angle::AngleEstimate;
+use crate::result::direction::describe;
+use crate::result::verdict::Reason;
+use crate::spectrum::polynomial::Spectrum;
+
+/// Directions that the pattern of the weighted array is looked at in.
+const DIRECTIONS: usize = 64;
+/// A direction that receives this part of the source's power is another source's as well.
+const ALIKE: f64 = 0.98;
+
+/// [`maximum_likelihood_pilots`](crate::maximum_likelihood_pilots) where the noise of antenna `n` has
+/// the variance `noise_variances[n]` per block, as received; infinite where a channel is dead.
+///
+/// With weights `w_n = |gain_n|^2 / sigma_n^2` the likelihood is largest where
+/// `sum_b |sum_n w_n a_n* x_nb|^2` is: what is far from the source and noisy counts little. The
+/// standard deviation is [`bound::known_signal_unequal`]'s and, as with equal noise, what the unknown
+/// gain of each block costs. The verdict allows for the side lobes of a thinned array.
+///
+/// # Errors
+/// [`Error::NotPositive`] for a bad noise variance, [`Error::DeadChannels`] if fewer than two
+/// channels live, and those of [`Covariance::from_snapshots`].
+pub fn maximum_likelihood_pilots_unequal<const N: usize>(
+    blocks: &[[Complex64; N]],
+    noise_variances: &[f64; N],
+    array: &Array<N>,
+) -> Result<AngleEstimate, Error> {
+    if let Some(&value) = noise_variances.iter().find(|it| it.is_nan() || **it <= 0.0) {
+        let name = "noise_variances";
+        return Err(Error::NotPositive { name, value });
+    }
+    let gains = array.calibration().gains();
+    let weights: [f64; N] = std::array::from_fn(|n| gains[n].norm_sqr() / noise_variances[n]);
+    let living = weights.iter().filter(|weight| **weight > 0.0).count();
+    if living < 2 {
+        return Err(Error::DeadChannels { living });
+    }
+    let mut covariance = Covariance::new();
+    for block in blocks {
+        // Whatever a dead channel holds must not come in.
+        let live = |n| {
+            if weights[n] > 0.0 {
+                block[n]
+            } else {
+                Complex64::ZERO
+            }
+        };
+        covariance.accumulate(&std::array::from_fn(live), 1.0);
+    }
+    let covariance = covariance.validated()?.calibrated(array);
+    let mut weighted = *covariance.unscaled();
+    for (row, a) in weighted.iter_mut().zip(weights) {
+        for (entry, b) in row.iter_mut().zip(weights) {
+            *entry *= a * b;
+        }
+    }
+    let (phase_rad, value) = Spectrum::of_matrix(&weighted).maximum();
+    let total: f64 = weights.iter().sum();
+    let count = blocks.len();
+    let per_block = value / (total * count as f64);
+    let snr = ((per_block - 1.0) / N as f64).max(1e-9);
+    // The SNR of each antenna, all blocks together.
+    let snrs = weights.map(|weight| snr * (N * count) as f64 * weight / total);
+    let lost = 1.0 + 1.0 / (N as f64 * snr);
+    let sigma = bound::known_signal_unequal(&snrs) * lost.sqrt();
+    let alike = strongest_side_lobe(&weights);
+    let doubt = if alike > ALIKE {
+        Some(Reason::Ambiguous)
+    } else {
+        let enough = bound::resolvable_snr::<N>(count) / (1.0 - alike);
+        (snr < enough).then_some(Reason::ThresholdSnr)
+    };
+    Ok(describe(phase_rad, sigma, snr, doubt, array))
+}
+
+/// Power that the weighted array receives from the worst direction beside its main lobe, over that
+/// from its own.
+fn strongest_side_lobe<const N: usize>(weights: &[f64; N]) -> f64 {
+    let total: f64 = weights.iter().sum();
+    let power = |direction: usize| {
+        let step = std::f64::consts::PI * direction as f64 / DIRECTIONS as f64;
+        let at = |(n, weight): (usize, &f64)| Complex64::from_polar(*weight, step * n as f64);
+        let sum: Complex64 = weights.iter().enumerate().map(at).sum();
+        sum.norm_sqr() / (total * total)
+    };
+    let mut last = 1.0;
+    let mut worst: Option<f64> = None;
+    for direction in 1..=DIRECTIONS {
+        let here = power(direction);
+        // Down the main lobe first, then over everything beyond.
+        if let Some(worst) = &mut worst {
+            *worst = worst.max(here);
+        } else if here > last {
+            worst = Some(here);
+        }
+        last = here;
+    }
+    worst.unwrap_or(0.0)
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    #[test]
+    fn side_lobes_are_those_of_the_book() {
+        // Four equal elements: the first side lobe is 11.3 dB down; every second one: as strong.
+        let uniform = strongest_side_lobe(&[1.0; 4]);
+        assert!((10.0 * uniform.log10() + 11.3).abs() < 0.2, "{uniform}");
+        assert!(strongest_side_lobe(&[1.0, 0.0, 1.0, 0.0]) > ALIKE);
+        assert!(strongest_side_lobe(&[1.0, 1.0, 0.0, 1.0]) < 0.7);
+    }
+}
