@@ -20,6 +20,7 @@ pub struct Onboard {
     budget: LinkBudget,
     thermal: ThermalNoise,
     spacing_wavelengths: f64,
+    lateness_s: f64,
     height_m: f64,
     estimator: Box<dyn AngleEstimator>,
     localizer: History,
@@ -141,6 +142,7 @@ impl Onboard {
             budget: LinkBudget::new(site, vehicle),
             thermal: ThermalNoise::new(site, vehicle),
             spacing_wavelengths,
+            lateness_s: vehicle.receiver.lateness_s,
             height_m,
             estimator,
             localizer: History::new(localizer),
@@ -246,6 +248,10 @@ impl Onboard {
         ssb: SensedSsb,
         measured: Option<AngleMeasurement>,
     ) -> Result<Execution, BoxError> {
+        let measured = measured.map(|measured| AngleMeasurement {
+            time_s: measured.time_s - self.lateness_s,
+            ..measured
+        });
         let mut heads = self.heads.iter();
         let head = heads.find(|head| head.sends(ssb.pci, ssb.ssb_index));
         let verdict = match (head, &measured) {

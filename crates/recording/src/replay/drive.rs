@@ -129,6 +129,13 @@ impl<'a> Replay<'a> {
                          used instead"
                     ),
                 ),
+                Ok(OdometryVerdict::YawRateRefused { radps }) => self.remark(
+                    at_s,
+                    format!(
+                        "odometry at {at_s} s: no vehicle turns by {radps} rad/s, its yaw rate was \
+                         refused; check its unit, or vehicle.top_yaw_rate_radps"
+                    ),
+                ),
                 Ok(OdometryVerdict::BeyondMap { by_m }) => {
                     if !self.beyond_map {
                         let text = format!(

@@ -90,11 +90,12 @@ fn look_back(
     odometry: &OdometryLog,
     executions: &[Execution],
 ) -> Result<Vec<LocatedPose>, ReplayError> {
-    let unguarded = Vehicle {
+    let mut unguarded = Vehicle {
         integrity: None,
         wake_up: WakeUpSettings::default(), // whatever was chosen then is heard again
         ..vehicle.clone()
     };
+    unguarded.receiver.lateness_s = 0.0; // taken off already
     let mut mistrusted_until_s = BTreeMap::new();
     for execution in executions {
         if execution.verdict.reason == UpdateReason::Excluded {
@@ -108,10 +109,10 @@ fn look_back(
         until_s.is_none_or(|until_s| ssb.time_s > *until_s)
     };
     let logged = |execution: &Execution| {
-        Some(LoggedAngle {
-            ssb: execution.ssb,
-            measured: execution.measured?,
-        })
+        let measured = execution.measured?;
+        let mut ssb = execution.ssb;
+        ssb.time_s = measured.time_s;
+        Some(LoggedAngle { ssb, measured })
     };
     let executions = executions.iter().filter(trusted);
     let mut angles: Vec<LoggedAngle> = executions.filter_map(logged).collect();

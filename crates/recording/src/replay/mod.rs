@@ -7,6 +7,7 @@ mod locate;
 mod located;
 mod receive;
 mod start;
+mod stated;
 
 pub use drive::Replay;
 pub use error::ReplayError;
@@ -14,3 +15,4 @@ pub use locate::{locate_angles, locate_recording};
 pub use located::{LocatedDrive, LocatedPose, Remark};
 pub use receive::receive_recording;
 pub use start::{StartChoice, starting};
+pub use stated::as_stated;

@@ -69,6 +69,7 @@ impl Tracker {
         let travelled_m = self.driven_m + ahead_m - known.last_look_m;
         let variance =
             thermal(sighting.range_m) + self.config.look_variance(travelled_m, &sighting);
+        let variance = variance + self.config.phase_bias.variance(f64::INFINITY, travelled_m);
         let mut rehearsed = *belief;
         rehearsed.update(0.0, &sighting.row, variance);
         Some(rehearsed)

@@ -20,6 +20,7 @@ mod off_map;
 mod place;
 mod prior;
 pub mod sighting;
+mod speed_steps;
 pub mod state;
 
 pub use calibration::{Calibration, Departure};

@@ -256,6 +256,17 @@ impl Step {
         }
     }
 
+    /// No step: the vehicle stands, and nothing becomes less certain.
+    pub fn standing(start: &[f64; STATES]) -> Self {
+        Self {
+            mean: *start,
+            jacobian: identity(),
+            noise: [[0.0; STATES]; STATES],
+            turn_rad: 0.0,
+            turn_row: [0.0; STATES],
+        }
+    }
+
     /// Moves a belief by this step.
     pub fn apply(&self, belief: &mut Belief) {
         belief.mean = self.mean;

@@ -7,7 +7,7 @@ use super::filter::Tracker;
 use super::interface::InitialPose;
 use super::locate::locate;
 use super::state::{
-    ACROSS, ALONG, Belief, CURVATURE, HEADING, MOUNTING, PHASE, SCALE, STATES, YAW_RATE_BIAS,
+    ACROSS, ALONG, Belief, CURVATURE, HEADING, LATENESS, MOUNTING, PHASE, SCALE, STATES, YAW_RATE_BIAS,
 };
 use crate::geometry::wrap_angle;
 use crate::radio_head::RadioHead;
@@ -21,6 +21,7 @@ impl Tracker {
         sigma[YAW_RATE_BIAS] = config.yaw_rate_bias_std_radps;
         sigma[MOUNTING] = config.mounting_std_rad;
         sigma[PHASE] = config.phase_std_rad;
+        sigma[LATENESS] = config.lateness_std_s;
         let mut mean = [0.0; STATES];
         mean[SCALE] = config.odometer_scale - 1.0;
         mean[YAW_RATE_BIAS] = config.yaw_rate_bias_radps;
