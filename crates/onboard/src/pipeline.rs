@@ -7,7 +7,7 @@ use crate::link_budget::LinkBudget;
 use crate::localize::thermal::ThermalNoise;
 use crate::localize::tracker::{Calibration, OdometryVerdict};
 use crate::localize::{
-    self, AngleMeasurement, History, Localizer, PoseEstimate, Tracker, UpdateReason, UpdateVerdict,
+    self, AngleMeasurement, History, Localizer, PoseEstimate, Recovered, Tracker, UpdateReason, UpdateVerdict,
 };
 use crate::observation::{OdometrySample, SensedSsb, SsbObservation};
 use crate::radio_head::RadioHead;
@@ -195,7 +195,7 @@ impl Onboard {
             height_m: self.height_m,
         };
         // As long as the first pose is searched for, every angle helps.
-        let searching = now.localizer.hypotheses().is_some();
+        let searching = now.localizer.hypotheses().is_some() || now.localizer.is_lost();
         let listened = searching || self.policy.listens(&now)?;
         if listened {
             source.sense(&mut self.sensed)?;
@@ -271,6 +271,16 @@ impl Onboard {
     /// that is known. Until then [`pose`](Self::pose) is the mean of these places.
     pub fn searching(&self) -> Option<usize> {
         self.localizer.localizer().hypotheses()
+    }
+
+    /// Whether the angles come from elsewhere than expected, so that the pose is not to be relied on.
+    pub fn is_lost(&self) -> bool {
+        self.localizer.localizer().is_lost()
+    }
+
+    /// How the localizer came back when it was lost last.
+    pub fn recovered(&self) -> Option<Recovered> {
+        self.localizer.localizer().recovered()
     }
 
     /// Where the vehicle is believed to be at `time_s`, not before the newest odometry.

@@ -1,6 +1,7 @@
 //! A drive being replayed.
 
 use onboard::geometry::Pose;
+use onboard::localize::Recovered;
 use onboard::localize::tracker::OdometryVerdict;
 use onboard::observation::OdometrySample;
 use onboard::settings::{Platform, Site, Vehicle};
@@ -17,6 +18,9 @@ pub struct Replay<'a> {
     onboard: Onboard,
     odometry: std::iter::Peekable<std::slice::Iter<'a, OdometrySample>>,
     drive: LocatedDrive,
+    /// Whether the localizer was lost, and how it came back last.
+    was_lost: bool,
+    recovered: Option<Recovered>,
     /// Whether the odometry before told of the end of the road.
     beyond_map: bool,
     /// Where the gaps of the road begin that were remarked on (m).
@@ -42,6 +46,8 @@ impl<'a> Replay<'a> {
         let onboard = Onboard::new(site, vehicle, &platform, start, custom)?;
         Ok(Self {
             onboard,
+            was_lost: false,
+            recovered: None,
             beyond_map: false,
             gaps_m: Vec::new(),
             odometry: odometry.samples.iter().peekable(),
@@ -72,9 +78,33 @@ impl<'a> Replay<'a> {
             let heard = self.onboard.hear(time_s, &mut source);
             let heard = heard.map_err(ReplayError::Custom)?;
             self.drive.executions.extend_from_slice(heard.executions);
+            self.remark_on_loss(time_s);
             ssbs = later;
         }
         Ok(())
+    }
+
+    fn remark_on_loss(&mut self, time_s: f64) {
+        let (is_lost, recovered) = (self.onboard.is_lost(), self.onboard.recovered());
+        if is_lost && !self.was_lost {
+            let text = format!(
+                "angles at {time_s:.1} s: they come from elsewhere than expected, the position is \
+                 not available; searching"
+            );
+            self.remark(time_s, text);
+        }
+        if let Some(how) = recovered.filter(|_| recovered != self.recovered) {
+            let text = format!(
+                "angles at {time_s:.1} s: found again, {:.2} m from and {:.2} rad against where it \
+                 was believed to be",
+                how.moved_m, how.turned_rad
+            );
+            self.remark(time_s, text);
+        } else if self.was_lost && !is_lost {
+            let text = format!("angles at {time_s:.1} s: they come from where expected again");
+            self.remark(time_s, text);
+        }
+        (self.was_lost, self.recovered) = (is_lost, recovered);
     }
 
     /// Takes in the rest of the odometry.

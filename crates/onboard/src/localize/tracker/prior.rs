@@ -71,6 +71,12 @@ impl Tracker {
         belief
     }
 
+    /// Counts distances on from where another tracker of the same vehicle does.
+    pub(in crate::localize) fn resume(&mut self, other: &Self) {
+        self.odometry = other.odometry;
+        self.driven_m = other.driven_m;
+    }
+
     /// The same tracker begun anew where it is, every source in use, its place known to
     /// `position_std_m` and its heading by the road alone, or by a quarter turn where no map tells
     /// how the road lies.
