@@ -159,11 +159,7 @@ impl Drive {
         let vehicle = Vehicle::from_toml(&text, "vehicle", &Shipped).expect("a vehicle");
         let site = Site::from_toml(&self.site, "site", &Shipped).expect("a site");
         let (odometry, angles) = (&self.odometry, &self.angles);
-        let mut sigmas: Vec<f64> = (angles.angles.iter())
-            .map(|it| it.measured.phase_sigma_rad)
-            .collect();
-        sigmas.sort_by(f64::total_cmp);
-        let (site, vehicle) = as_stated(&site, &vehicle, sigmas[sigmas.len() / 2]);
+        let (site, vehicle) = as_stated(&site, &vehicle);
         locate_angles(&site, &vehicle, StartChoice::At(start), odometry, angles, smooth)
             .expect("a located drive")
     }
@@ -221,7 +217,12 @@ impl Drive {
         }
         let _ = write!(
             text,
-            " ok {:5.1}% beyond {:5.2}% nees/2 {:6.2} heading {:6.2} taken {:5.1}% remarks {}",
+            " nis {:4.2} ok {:5.1}% beyond {:5.2}% nees/2 {:6.2} heading {:6.2} taken {:5.1}% remarks {}",
+            {
+                let seen = located.executions.iter().filter(|it| it.verdict.accepted);
+                seen.filter_map(|it| it.verdict.mahalanobis_squared).sum::<f64>()
+                    / accepted.max(1) as f64
+            },
             share(ok),
             share(beyond),
             nees / f64::from(all),
@@ -247,9 +248,19 @@ impl Drive {
     }
 }
 
+/// RMS in each minute.
+fn print_minutes(drive: &Drive, poses: &[LocatedPose]) {
+    if std::env::var_os("MINUTES").is_some() {
+        let minutes = (0..22).map(|it| drive.rms_m(poses, f64::from(it) * 60.0, f64::from(it) * 60.0 + 60.0));
+        let minutes: Vec<String> = minutes.map(|rms_m| format!("{rms_m:.2}")).collect();
+        println!("      {}", minutes.join(" "));
+    }
+}
+
 fn report(label: &str, drive: &Drive, located: &LocatedDrive) {
     println!("{:10} {label:18} {}", drive.name, drive.judge(located));
     drive.print_remarks(located);
+    print_minutes(drive, &located.poses);
 }
 
 fn main() {
@@ -304,6 +315,7 @@ fn faults(drive: &Drive, told: &str) {
             bad.remarks.len()
         );
         drive.print_remarks(&bad);
+        print_minutes(drive, &bad.poses);
     };
     let off = |dx: f64, dy: f64, turn: f64| Pose {
         x_m: drive.start.x_m + dx,

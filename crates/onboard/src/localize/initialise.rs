@@ -147,6 +147,11 @@ impl Initialiser {
         Self::on(config, Ground::Plane(area), heads)
     }
 
+    /// Whether all of an area is searched as finely as is useful.
+    pub fn is_small(area: Area) -> bool {
+        area.spacing_m(MOST_HYPOTHESES / f64::from(HEADINGS), SPACING_M) <= SPACING_M
+    }
+
     fn on(config: TrackerConfig, ground: Ground, heads: &[RadioHead]) -> Self {
         let mut made = Self {
             config,

@@ -133,13 +133,14 @@ impl Recovery {
         }
     }
 
+    /// A search nearby, or wherever radio heads are: at once where that is no more to look at.
     fn begin(&self, now_s: f64, is_wide: bool) -> Option<Search> {
         let setup = &self.setup;
         let (config, heads) = (setup.config, setup.heads.as_slice());
         let mut initialiser = match &setup.road {
             Some(road) => Initialiser::new(config, road.clone(), true, heads),
             None if heads.len() < LEAST_HEADS => return None,
-            None if is_wide => Initialiser::in_plane(config, Area::of_heads(heads), heads),
+            None if is_wide || Initialiser::is_small(Area::of_heads(heads)) => Initialiser::in_plane(config, Area::of_heads(heads), heads),
             None => {
                 let here = self.tracked.pose(now_s);
                 let three_m = 3.0 * here.principal_variances()[0].sqrt();

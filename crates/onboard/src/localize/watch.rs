@@ -6,7 +6,7 @@ use super::measurement::{UpdateReason, UpdateVerdict};
 const WEIGHT: f64 = 1.0 / 16.0;
 
 /// Angles before anything is said.
-const LEAST: u32 = 8;
+const LEAST: u32 = 5;
 
 /// Share of refused angles above which the vehicle is lost, and below which it is not.
 const LOST: f64 = 0.5;

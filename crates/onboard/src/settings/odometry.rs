@@ -73,6 +73,11 @@ pub struct GyroscopeSettings {
     /// Standard deviation of that in rad/s.
     #[schemars(range(min = 0.0, max = 10.0))]
     pub bias_std_radps: f64,
+    /// How the bias walks, in rad/s per root of a second; 0 is a constant bias on a road, and a
+    /// tenth of its standard deviation for a differential drive, whose wheels grip as the floor
+    /// lets them.
+    #[schemars(range(min = 0.0, max = 10.0))]
+    pub bias_walk_radps_per_sqrt_s: f64,
 }
 
 /// `[lane_keeping]`: how the vehicle strays from the middle of the road and comes back.

@@ -38,6 +38,11 @@ pub struct ReceiverSettings {
     /// radians.
     #[schemars(range(min = 0.0, max = 3.2))]
     pub phase_bias_std_rad: f64,
+    /// Share of an angle's stated variance that stays so; 0.5 for logged angles where it is not
+    /// stated, and 0 for the receiver's own, whose deviation is that of thermal noise.
+    #[serde(skip_serializing_if = "Option::is_none")]
+    #[schemars(range(min = 0.0, max = 1.0))]
+    pub phase_bias_share: Option<f64>,
     /// Time over which that error is forgotten, in seconds.
     #[schemars(range(min = 1e-3, max = 1e9))]
     pub phase_bias_correlation_s: f64,
@@ -61,6 +66,7 @@ impl Default for ReceiverSettings {
             lateness_s: 0.0,
             lateness_std_s: None,
             phase_bias_std_rad: 0.0,
+            phase_bias_share: None,
             phase_bias_correlation_s: 1.0,
             phase_bias_correlation_m: 1.0,
             pci_allow_list: None,

@@ -4,7 +4,9 @@ use super::motion::{MotionNoise, PathBend, Yaw};
 use super::sighting::{ArrayModel, Sighting};
 use crate::localize::quantile::normal_quantile;
 use crate::road::LaneKeeping;
-use crate::settings::{DriveKind, LocalizerSettings, Site, TrackerSettings, Vehicle};
+use crate::settings::{
+    DriveKind, LocalizerSettings, RoadSettings, Site, TrackerSettings, Vehicle,
+};
 
 /// The best that the tracker takes for granted where nothing is said.
 const LEAST_ODOMETER_SCALE_STD: f64 = 0.001;
@@ -76,6 +78,8 @@ pub struct TrackerConfig {
 pub struct PhaseBias {
     /// Stationary deviation (rad).
     pub std_rad: f64,
+    /// Share of each angle's own variance that is of this kind.
+    pub share: f64,
     /// Time over which it is forgotten (s).
     pub correlation_s: f64,
     /// Distance over which it is forgotten (m).
@@ -83,17 +87,18 @@ pub struct PhaseBias {
 }
 
 impl PhaseBias {
-    /// Variance (rad²) of an angle so long and so far after the radio head's last one, as if looks
-    /// were independent: with the correlation `ρ = e^{−Δ}` between neighbours the mean of many looks
+    /// Variance (rad²) of an angle of the stated deviation, so long and so far after the radio head's
+    /// last one, as if looks were independent: with the correlation `ρ = e^{−Δ}` between neighbours the mean of many looks
     /// has `(1 + ρ)/(1 − ρ) = coth Δ/2` times the variance that independent ones would leave it.
-    pub fn variance(&self, elapsed_s: f64, travelled_m: f64) -> f64 {
-        let variance = self.std_rad * self.std_rad;
-        if variance == 0.0 {
-            return 0.0;
+    pub fn variance(&self, sigma_rad: f64, elapsed_s: f64, travelled_m: f64) -> f64 {
+        let own = sigma_rad * sigma_rad;
+        let (stays, shared) = (self.std_rad * self.std_rad, self.share * own);
+        if stays + shared == 0.0 {
+            return own;
         }
         let steps = elapsed_s.abs() / self.correlation_s + travelled_m.abs() / self.correlation_m;
         // At the same instant nothing new is learnt, but the variance must stay a number.
-        variance / (0.5 * steps.max(1e-6)).tanh()
+        own - shared + (stays + shared) / (0.5 * steps.max(1e-6)).tanh()
     }
 }
 
@@ -110,9 +115,12 @@ const USUAL_GYROSCOPE: [f64; 2] = [1e-3, 1e-3];
 const USUAL_WHEELS: [f64; 2] = [0.05, 0.05];
 const USUAL_WHEELS_TURN: [f64; 2] = [0.05, 0.01];
 
+/// How far the scale of such wheels walks, as they grip as the floor lets them (per √m).
+const USUAL_SCALE_WALK_PER_SQRT_M: f64 = 0.03;
+
 /// Lateness of angles on a differential drive, where nothing is stated (s): at walking pace its
 /// turns show it.
-const USUAL_LATENESS_STD_S: f64 = 0.05;
+const USUAL_LATENESS_STD_S: f64 = 0.1;
 
 impl TrackerConfig {
     /// What a tracker on a vehicle assumes at a site.
@@ -123,8 +131,9 @@ impl TrackerConfig {
         };
         let (odometer, array) = (&vehicle.odometer, &vehicle.array);
         let keeping = vehicle.lane_keeping.process();
+        let survey_std_m = site.road.as_ref().map_or(0.0, RoadSettings::survey_std_m);
         let lane_keeping = LaneKeeping {
-            rms_m: keeping.rms_m.max(LEAST_LANE_RMS_M),
+            rms_m: keeping.rms_m.max(LEAST_LANE_RMS_M).hypot(survey_std_m),
             ..keeping
         };
         let gyroscope = vehicle.gyroscope.as_ref();
@@ -160,7 +169,13 @@ impl TrackerConfig {
                     USUAL_WHEELS[0],
                     LEAST_ODOMETER_NOISE_M_PER_SQRT_M,
                 ),
-                scale_per_sqrt_m: settings.odometer_scale_walk_per_sqrt_m,
+                scale_per_sqrt_m: or_usual(
+                    settings.odometer_scale_walk_per_sqrt_m,
+                    USUAL_SCALE_WALK_PER_SQRT_M,
+                    0.0,
+                ),
+                yaw_bias_radps_per_sqrt_s: gyroscope
+                    .map_or(0.0, |it| it.bias_walk_radps_per_sqrt_s),
                 mounting_rad_per_sqrt_m: array.mounting_drift_rad_per_sqrt_m,
                 phase_rad_per_sqrt_m: array.phase_drift_rad_per_sqrt_m,
             },
@@ -184,11 +199,14 @@ impl TrackerConfig {
             top_yaw_rate_radps: vehicle.top_yaw_rate_radps,
             yaw_noise_rad_per_sqrt_m: gyroscope.map_or(0.0, |it| it.noise_rad_per_sqrt_m),
             yaw_noise_rad_per_sqrt_rad: gyroscope.map_or(0.0, |it| it.noise_rad_per_sqrt_rad),
-            lateness_std_s: receiver
-                .lateness_std_s
-                .unwrap_or(if wheels { USUAL_LATENESS_STD_S } else { 0.0 }),
+            lateness_std_s: receiver.lateness_std_s.unwrap_or(if wheels {
+                USUAL_LATENESS_STD_S
+            } else {
+                0.0
+            }),
             phase_bias: PhaseBias {
                 std_rad: receiver.phase_bias_std_rad,
+                share: receiver.phase_bias_share.unwrap_or(0.0),
                 correlation_s: receiver.phase_bias_correlation_s,
                 correlation_m: receiver.phase_bias_correlation_m,
             },

@@ -371,9 +371,9 @@ impl Tracker {
         let travelled_m = place_m - head.last_look_m;
         let shared = (self.config).look_variance(travelled_m, &sighting);
         let elapsed_s = measured.time_s - head.last_look_s;
-        let stays = self.config.phase_bias.variance(elapsed_s, travelled_m);
+        let stated = (self.config.phase_bias).variance(sigma, elapsed_s, travelled_m);
         let measurement_variance =
-            sigma * sigma + shared + stays + sighting.row[ALONG].powi(2) * ahead_variance + bend.variance;
+            stated + shared + sighting.row[ALONG].powi(2) * ahead_variance + bend.variance;
         let residual = wrap_angle(measured.phase_rad - sighting.phase_rad - bend.shift_rad);
         let innovation = (self.belief).innovation(residual, &sighting.row, measurement_variance);
         Ok(Look {
