@@ -5,7 +5,7 @@ use crate::estimator::{self, AngleEstimator};
 use crate::geometry::Pose;
 use crate::link_budget::LinkBudget;
 use crate::localize::thermal::ThermalNoise;
-use crate::localize::tracker::{Calibration, OdometryVerdict};
+use crate::localize::tracker::{Calibration, Findings, OdometryVerdict};
 use crate::localize::{
     self, AngleMeasurement, History, Localizer, PoseEstimate, Recovered, Tracker, UpdateReason, UpdateVerdict,
 };
@@ -295,6 +295,12 @@ impl Onboard {
     pub fn calibration(&self) -> Option<Calibration> {
         let tracker = self.localizer.localizer().tracker();
         tracker.map(Tracker::calibration)
+    }
+
+    /// What the drive has shown of odometer, yaw rate and clock, where the localizer looks for it.
+    pub fn findings(&self) -> Option<Findings> {
+        let tracker = self.localizer.localizer().tracker();
+        tracker.map(Tracker::findings)
     }
 
     /// Keeps from now on what smoothing takes, where the localizer is a tracker without a guard,

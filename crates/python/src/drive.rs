@@ -187,6 +187,7 @@ impl RecordedDrive<'_> {
         };
         if is(self.recording, "csv") {
             let angles = read_angle_log(self.recording)?;
+            let (site, vehicle) = &replay::as_stated(site, vehicle);
             replay::locate_angles(site, vehicle, self.start, &odometry, &angles, smooth)
         } else {
             replay::locate_recording(

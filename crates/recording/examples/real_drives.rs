@@ -248,6 +248,32 @@ impl Drive {
     }
 }
 
+/// The first minute, each three seconds.
+fn print_trace(drive: &Drive, poses: &[LocatedPose]) {
+    if std::env::var_os("TRACE").is_none() {
+        return;
+    }
+    let mut next_s = 0.0;
+    for pose in poses.iter().filter(|it| it.estimate.time_s < 90.0) {
+        let at_s = pose.estimate.time_s;
+        let (true, Some(truth)) = (at_s >= next_s, drive.true_pose(at_s)) else {
+            continue;
+        };
+        next_s = at_s + 3.0;
+        let (is, c) = (pose.estimate.pose, pose.estimate.covariance.unwrap_or_default());
+        println!(
+            "  {at_s:6.1} x {:6.3} ({:.3}) y {:6.3} ({:.3}) heading {:6.3} ({:.3}) mounting {:?}",
+            is.x_m - truth.x_m,
+            c[0][0].sqrt(),
+            is.y_m - truth.y_m,
+            c[1][1].sqrt(),
+            wrap_angle(is.heading_rad - truth.heading_rad),
+            c[2][2].sqrt(),
+            pose.calibration.map(|it| it.mounting.by_rad),
+        );
+    }
+}
+
 /// RMS in each minute.
 fn print_minutes(drive: &Drive, poses: &[LocatedPose]) {
     if std::env::var_os("MINUTES").is_some() {
@@ -261,6 +287,7 @@ fn report(label: &str, drive: &Drive, located: &LocatedDrive) {
     println!("{:10} {label:18} {}", drive.name, drive.judge(located));
     drive.print_remarks(located);
     print_minutes(drive, &located.poses);
+    print_trace(drive, &located.poses);
 }
 
 fn main() {

@@ -156,6 +156,37 @@ fn with_straights(points: &[Point]) -> Result<Vec<Point>, RoadError> {
     Ok(dense)
 }
 
+/// How far points scatter about what their neighbours say: root mean square distance of each from
+/// the cubic through the two before and the two after it, as independent errors would leave it.
+fn scatter_m(points: &[Point]) -> f64 {
+    let mut along_m = vec![0.0];
+    for pair in points.windows(2) {
+        if let [from, to] = pair {
+            along_m.push(along_m.last().copied().unwrap_or_default() + from.distance_m(*to));
+        }
+    }
+    let mut squares = Vec::with_capacity(points.len());
+    for (places, at) in points.windows(5).zip(along_m.windows(5)) {
+        let (&[a, b, middle, c, d], &[ta, tb, t, tc, td]) = (places, at) else {
+            continue;
+        };
+        let others = [(a, ta), (b, tb), (c, tc), (d, td)];
+        let (mut x_m, mut y_m, mut noise) = (middle.x_m, middle.y_m, 1.0);
+        for (index, (point, own)) in others.iter().enumerate() {
+            let rest = others.iter().enumerate().filter(|(other, _)| *other != index);
+            let weight: f64 = rest.map(|(_, (_, other))| (t - other) / (own - other)).product();
+            x_m -= weight * point.x_m;
+            y_m -= weight * point.y_m;
+            noise += weight * weight;
+        }
+        squares.push((x_m * x_m + y_m * y_m) / noise);
+    }
+    squares.sort_by(f64::total_cmp);
+    // The median of a sum of two squares is 2 ln 2 times the variance of each.
+    let median = squares.get(squares.len() / 2).copied().unwrap_or_default();
+    (median / std::f64::consts::LN_2).sqrt()
+}
+
 /// A cubic spline over a parameter that grows by the distance between its points.
 struct Spline {
     /// Growth of the parameter from each point to the next.
@@ -175,6 +206,7 @@ impl Spline {
                 _ => None,
             })
             .collect();
+        let std_m = std_m.min(scatter_m(points));
         let most = std_m * std_m * points.len() as f64;
         let mut best = Self::with_penalty(points, &steps, 0.0);
         // λ has the dimension of a length cubed.

@@ -2,7 +2,7 @@
 
 use onboard::geometry::Pose;
 use onboard::localize::Recovered;
-use onboard::localize::tracker::OdometryVerdict;
+use onboard::localize::tracker::{Findings, OdometryVerdict};
 use onboard::observation::OdometrySample;
 use onboard::settings::{Platform, Site, Vehicle};
 use onboard::{Custom, Onboard};
@@ -12,6 +12,10 @@ use super::error::ReplayError;
 use super::located::{LocatedDrive, LocatedPose, Remark};
 use crate::library::load;
 use crate::odometry::OdometryLog;
+
+/// Departures of the odometer's scale, and of the angles' lateness (s), below which nobody minds.
+const LEAST_SCALE: f64 = 0.03;
+const LEAST_LATENESS_S: f64 = 0.03;
 
 /// A drive being located.
 pub struct Replay<'a> {
@@ -84,6 +88,34 @@ impl<'a> Replay<'a> {
         Ok(())
     }
 
+    /// Remarks on what the drive showed of the vehicle that its settings do not say.
+    fn remark_on_findings(&mut self) {
+        let Some(findings) = self.onboard.findings() else {
+            return;
+        };
+        let time_s = self.drive.poses.last().map_or(0.0, |last| last.estimate.time_s);
+        let Findings {
+            odometer_scale,
+            lateness_s,
+            ..
+        } = findings;
+        if odometer_scale.is_remarkable(LEAST_SCALE) {
+            let text = format!(
+                "the odometer reads {:.3} ± {:.3} m per metre driven; check odometer.scale",
+                odometer_scale.found, odometer_scale.std
+            );
+            self.remark(time_s, text);
+        }
+        if lateness_s.is_remarkable(LEAST_LATENESS_S) {
+            let text = format!(
+                "angles are {:.0} ± {:.0} ms later than stated; check receiver.lateness_s",
+                1e3 * lateness_s.found,
+                1e3 * lateness_s.std
+            );
+            self.remark(time_s, text);
+        }
+    }
+
     fn remark_on_loss(&mut self, time_s: f64) {
         let (is_lost, recovered) = (self.onboard.is_lost(), self.onboard.recovered());
         if is_lost && !self.was_lost {
@@ -113,6 +145,7 @@ impl<'a> Replay<'a> {
     /// [`ReplayError::Custom`].
     pub fn finish(mut self) -> Result<LocatedDrive, ReplayError> {
         self.odometry_until(f64::INFINITY)?;
+        self.remark_on_findings();
         self.drive
             .remarks
             .sort_by(|a, b| a.time_s.total_cmp(&b.time_s));
@@ -199,6 +232,7 @@ impl<'a> Replay<'a> {
                 speed_mps: sample.speed_mps,
                 yaw_rate_radps: sample.yaw_rate_radps,
                 searching: self.onboard.searching(),
+                is_lost: self.onboard.is_lost(),
                 calibration: self.onboard.calibration(),
             });
         }

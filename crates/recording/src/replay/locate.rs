@@ -12,7 +12,9 @@ use super::drive::Replay;
 use super::error::ReplayError;
 use super::located::{LocatedDrive, LocatedPose};
 use super::receive::receive_recording;
+use super::doubts::doubts;
 use super::start::{StartChoice, starting};
+use super::stated::with_phases;
 use crate::angle_log::{AngleLog, LoggedAngle};
 use crate::odometry::OdometryLog;
 use crate::sigmf::Recording;
@@ -34,7 +36,11 @@ pub fn locate_angles(
     for remark in &angles.remarks {
         replay.remark(remark.time_s, remark.to_string());
     }
-    replay.hear(&angles.angles)?;
+    let angles = with_phases(&angles.angles, vehicle.array.spacing_wavelengths);
+    for (time_s, text) in doubts(site, &vehicle, odometry, &angles)? {
+        replay.remark(time_s, text);
+    }
+    replay.hear(&angles)?;
     finish(replay, site, &vehicle, start, odometry, smooth)
 }
 

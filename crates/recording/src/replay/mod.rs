@@ -1,6 +1,7 @@
 //! A recorded drive through the pipeline: odometry and SSBs, or angles, in order of time.
 
 mod bursts;
+mod doubts;
 mod drive;
 mod error;
 mod locate;

@@ -13,6 +13,9 @@ const LEAST_ODOMETER_SCALE_STD: f64 = 0.001;
 const LEAST_ODOMETER_NOISE_M_PER_SQRT_M: f64 = 0.003;
 const LEAST_LANE_RMS_M: f64 = 0.02;
 
+/// Wavelength along the road of the errors of its survey (m).
+const SURVEY_WAVELENGTH_M: f64 = 20.0;
+
 /// Assumptions of the tracker, SI and radians: what site and vehicle state.
 #[derive(Clone, Copy, Debug, PartialEq)]
 pub struct TrackerConfig {
@@ -118,6 +121,9 @@ const USUAL_WHEELS_TURN: [f64; 2] = [0.05, 0.01];
 /// How far the scale of such wheels walks, as they grip as the floor lets them (per √m).
 const USUAL_SCALE_WALK_PER_SQRT_M: f64 = 0.03;
 
+/// Mounting angle of an array on such a vehicle, where no deviation is stated (rad).
+const USUAL_MOUNTING_STD_RAD: f64 = 0.02;
+
 /// Lateness of angles on a differential drive, where nothing is stated (s): at walking pace its
 /// turns show it.
 const USUAL_LATENESS_STD_S: f64 = 0.1;
@@ -134,6 +140,11 @@ impl TrackerConfig {
         let survey_std_m = site.road.as_ref().map_or(0.0, RoadSettings::survey_std_m);
         let lane_keeping = LaneKeeping {
             rms_m: keeping.rms_m.max(LEAST_LANE_RMS_M).hypot(survey_std_m),
+            wavelength_m: if survey_std_m > 0.0 {
+                keeping.wavelength_m.min(SURVEY_WAVELENGTH_M)
+            } else {
+                keeping.wavelength_m
+            },
             ..keeping
         };
         let gyroscope = vehicle.gyroscope.as_ref();
@@ -189,7 +200,7 @@ impl TrackerConfig {
             yaw_noise_rad_per_sqrt_s: yaw_noise,
             yaw_rate_bias_radps: gyroscope.map_or(0.0, |gyroscope| gyroscope.bias_radps),
             yaw_rate_bias_std_radps: yaw_bias_std,
-            mounting_std_rad: array.mounting_std_rad,
+            mounting_std_rad: or_usual(array.mounting_std_rad, USUAL_MOUNTING_STD_RAD, 0.0),
             phase_rad: array.phase_rad,
             phase_std_rad: array.phase_std_rad,
             gate: normal_quantile(0.5 * settings.outlier_probability).powi(2),
