@@ -340,6 +340,8 @@ fn pose_columns<'py>(
     columns.set_item("integrity", poses.iter().map(state).collect::<Vec<_>>())?;
     let searching = poses.iter().map(|it| it.searching.is_some());
     columns.set_item("searching", PyArray1::from_iter(py, searching))?;
+    let lost = poses.iter().map(|it| it.is_lost);
+    columns.set_item("lost", PyArray1::from_iter(py, lost))?;
     Ok(columns)
 }
 

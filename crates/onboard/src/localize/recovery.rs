@@ -39,6 +39,9 @@ const PATIENCE_S: f64 = 20.0;
 /// After a find that was no better than the tracker nothing is searched for, so long (s).
 const REST_S: f64 = 10.0;
 
+/// Way to be driven before a find is believed (m): who stands hears the same errors again and again.
+const LEAST_WAY_M: f64 = 0.5;
+
 /// Log-likelihood by which a find must foretell the angles better.
 const BETTER: f64 = 15.0;
 
@@ -83,6 +86,8 @@ struct Search {
     /// Log-likelihood of the tracker by the same angles.
     own: f64,
     since_s: f64,
+    /// Distance driven then (m).
+    since_m: f64,
     is_wide: bool,
 }
 
@@ -121,6 +126,10 @@ impl Recovery {
             return;
         };
         let is_ahead = search.initialiser.best() - search.own > BETTER;
+        let way_m = self.tracked.tracker().driven_m() - search.since_m;
+        if is_ahead && way_m < LEAST_WAY_M {
+            return;
+        }
         if is_ahead && let Some(found) = search.initialiser.found() {
             self.take(found, now_s);
         } else if !is_ahead && (self.watch.is_sure() || search.initialiser.found().is_some()) {
@@ -154,6 +163,7 @@ impl Recovery {
             initialiser,
             own: 0.0,
             since_s: now_s,
+            since_m: self.tracked.tracker().driven_m(),
             is_wide,
         })
     }

@@ -43,7 +43,7 @@ pub struct ReceiverSettings {
     #[serde(skip_serializing_if = "Option::is_none")]
     #[schemars(range(min = 0.0, max = 1.0))]
     pub phase_bias_share: Option<f64>,
-    /// Time over which that error is forgotten, in seconds.
+    /// Time over which that error is forgotten, in seconds, provided that the vehicle moves.
     #[schemars(range(min = 1e-3, max = 1e9))]
     pub phase_bias_correlation_s: f64,
     /// Distance over which that error is forgotten, in metres.
@@ -68,7 +68,7 @@ impl Default for ReceiverSettings {
             phase_bias_std_rad: 0.0,
             phase_bias_share: None,
             phase_bias_correlation_s: 1.0,
-            phase_bias_correlation_m: 1.0,
+            phase_bias_correlation_m: 0.3,
             pci_allow_list: None,
         }
     }

@@ -75,6 +75,9 @@ pub struct TrackerConfig {
     pub top_speed_mps: f64,
 }
 
+/// Turn over which an error of the angles is forgotten (rad).
+const FORGETTING_TURN_RAD: f64 = 0.5;
+
 /// An error of the electrical angle that stays from look to look, each radio head's its own: a
 /// first-order Gauss–Markov process over time and distance.
 #[derive(Clone, Copy, Debug, PartialEq)]
@@ -93,15 +96,19 @@ impl PhaseBias {
     /// Variance (rad²) of an angle of the stated deviation, so long and so far after the radio head's
     /// last one, as if looks were independent: with the correlation `ρ = e^{−Δ}` between neighbours the mean of many looks
     /// has `(1 + ρ)/(1 − ρ) = coth Δ/2` times the variance that independent ones would leave it.
-    pub fn variance(&self, sigma_rad: f64, elapsed_s: f64, travelled_m: f64) -> f64 {
+    pub fn variance(&self, sigma_rad: f64, elapsed_s: f64, moved: (f64, f64)) -> f64 {
         let own = sigma_rad * sigma_rad;
         let (stays, shared) = (self.std_rad * self.std_rad, self.share * own);
         if stays + shared == 0.0 {
             return own;
         }
-        let steps = elapsed_s.abs() / self.correlation_s + travelled_m.abs() / self.correlation_m;
+        // Neither time nor way alone forgets: who stands sees the same error, and who drives on is
+        // not another's sensor. Turning shows the radio head to another part of it.
+        let (travelled_m, turned_rad) = moved;
+        let by_way = travelled_m.abs() / self.correlation_m + turned_rad.abs() / FORGETTING_TURN_RAD;
+        let steps = (elapsed_s.abs() / self.correlation_s).min(by_way);
         // At the same instant nothing new is learnt, but the variance must stay a number.
-        own - shared + (stays + shared) / (0.5 * steps.max(1e-6)).tanh()
+        own - shared + (stays + shared) / (0.5 * steps.max(1e-4)).tanh()
     }
 }
 

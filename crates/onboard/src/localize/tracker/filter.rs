@@ -48,8 +48,10 @@ pub(super) struct Head {
     pub excluded: bool,
     /// Distance driven when its last angle was used (m) ...
     pub last_look_m: f64,
-    /// ... and the time then (s).
+    /// ... the time then (s) ...
     pub last_look_s: f64,
+    /// ... and the angle turned (rad).
+    pub last_look_rad: f64,
 }
 
 impl Head {
@@ -67,6 +69,7 @@ pub struct Tracker {
     pub(super) belief: Belief,
     pub(super) odometry: Option<OdometrySample>,
     pub(super) driven_m: f64,
+    pub(super) turned_rad: f64,
     /// Where the vehicle is that the map does not tell how the road goes on.
     pub(super) off_map: Option<OffMap>,
     pub(super) journal: Option<Journal<STATES>>,
@@ -80,6 +83,7 @@ clone_in_place!(Tracker {
     belief,
     odometry,
     driven_m,
+    turned_rad,
     off_map,
     journal,
     speed_steps
@@ -99,6 +103,7 @@ impl Tracker {
             excluded: false,
             last_look_m: f64::NEG_INFINITY,
             last_look_s: f64::NEG_INFINITY,
+            last_look_rad: f64::NEG_INFINITY,
         };
         let mut tracker = Self {
             config,
@@ -107,6 +112,7 @@ impl Tracker {
             belief,
             odometry: None,
             driven_m: 0.0,
+            turned_rad: 0.0,
             off_map: None,
             journal: None,
             speed_steps: SpeedSteps::default(),
@@ -222,6 +228,7 @@ impl Tracker {
             }
             step.apply(&mut self.belief);
         }
+        self.turned_rad += yaw.map_or(0.0, |yaw| yaw.turn_rad.abs()) * steps;
         self.driven_m += reading_m.abs() / (1.0 + self.belief.mean[SCALE]);
         self.watch_the_map();
     }
@@ -323,6 +330,7 @@ impl Tracker {
         if let Some(head) = self.heads.get_mut(looked.head) {
             head.last_look_m = looked.place_m;
             head.last_look_s = measured.time_s;
+            head.last_look_rad = self.turned_rad;
         }
         self.verdict(UpdateReason::Consistent, Some(mahalanobis2))
     }
@@ -371,7 +379,9 @@ impl Tracker {
         let travelled_m = place_m - head.last_look_m;
         let shared = (self.config).look_variance(travelled_m, &sighting);
         let elapsed_s = measured.time_s - head.last_look_s;
-        let stated = (self.config.phase_bias).variance(sigma, elapsed_s, travelled_m);
+        let turned_rad = self.turned_rad - head.last_look_rad;
+        let moved = (travelled_m, turned_rad);
+        let stated = (self.config.phase_bias).variance(sigma, elapsed_s, moved);
         let measurement_variance =
             stated + shared + sighting.row[ALONG].powi(2) * ahead_variance + bend.variance;
         let residual = wrap_angle(measured.phase_rad - sighting.phase_rad - bend.shift_rad);
