@@ -7,7 +7,8 @@ use crate::link_budget::LinkBudget;
 use crate::localize::thermal::ThermalNoise;
 use crate::localize::tracker::{Calibration, Findings, OdometryVerdict};
 use crate::localize::{
-    self, AngleMeasurement, History, Localizer, PoseEstimate, Recovered, Tracker, UpdateReason, UpdateVerdict,
+    self, AngleMeasurement, History, Localizer, PoseEstimate, Recovered, Tracker, UpdateReason,
+    UpdateVerdict,
 };
 use crate::observation::{OdometrySample, SensedSsb, SsbObservation};
 use crate::radio_head::RadioHead;

@@ -21,7 +21,11 @@ fn drive(seed: u64) {
     for pci in 0..rng.random_range(1..7) {
         let [x, y] = [(); 2].map(|()| rng.random_range(-15.0..15.0_f64));
         let z = rng.random_range(0.0..5.0_f64);
-        writeln!(site, "[[radio_heads]]\npci = {pci}\nposition_m = [{x:?}, {y:?}, {z:?}]").unwrap();
+        writeln!(
+            site,
+            "[[radio_heads]]\npci = {pci}\nposition_m = [{x:?}, {y:?}, {z:?}]"
+        )
+        .unwrap();
     }
     let kind = if rng.random() { "road" } else { "differential" };
     let has_yaw: bool = rng.random();
@@ -46,9 +50,17 @@ fn drive(seed: u64) {
     for step in 0..500 {
         let time_s = 0.05 * f64::from(step);
         if step % 20 == 0 {
-            speed_mps = if rng.random() { rng.random_range(-0.5..3.0) } else { 0.0 };
+            speed_mps = if rng.random() {
+                rng.random_range(-0.5..3.0)
+            } else {
+                0.0
+            };
             let spot = kind == "differential" || speed_mps != 0.0;
-            rate_radps = if spot { rng.random_range(-1.0..1.0) } else { 0.0 };
+            rate_radps = if spot {
+                rng.random_range(-1.0..1.0)
+            } else {
+                0.0
+            };
         }
         let step_m = 0.05 * speed_mps;
         truth = truth.along_chord(step_m, 0.05 * rate_radps);
@@ -69,7 +81,11 @@ fn drive(seed: u64) {
                 continue;
             }
             let noise: f64 = rng.sample(StandardNormal);
-            let outlier = if rng.random_bool(0.05) { rng.random_range(-3.0..3.0) } else { 0.0 };
+            let outlier = if rng.random_bool(0.05) {
+                rng.random_range(-3.0..3.0)
+            } else {
+                0.0
+            };
             let eye = truth.beside(0.2, 0.1);
             let ground_m = eye.distance_m(head.position);
             let level = ground_m / ground_m.hypot(head.height_m - 0.5).max(1e-9);
@@ -88,14 +104,20 @@ fn drive(seed: u64) {
         let (pose, covariance) = (estimate.pose, estimate.covariance.unwrap());
         assert!(pose.x_m.is_finite() && pose.y_m.is_finite() && pose.heading_rad.is_finite());
         for (axis, row) in covariance.iter().enumerate() {
-            assert!(row[axis] >= 0.0, "drive {seed}, step {step}: {covariance:?}");
+            assert!(
+                row[axis] >= 0.0,
+                "drive {seed}, step {step}: {covariance:?}"
+            );
         }
         let std_m = estimate.principal_variances()[0].sqrt();
         if let Some((last, last_std_m)) = before {
             let moved_m = pose.point().distance_m(last.point());
             // Several angles a step, each within the gate; the odometer's step, or a gap's.
             let most_m = 0.4 + 5.0 * last_std_m.max(std_m);
-            assert!(moved_m <= most_m, "drive {seed}, step {step}: {moved_m} of {most_m}");
+            assert!(
+                moved_m <= most_m,
+                "drive {seed}, step {step}: {moved_m} of {most_m}"
+            );
         }
         if !(gap_from..=gap_to).contains(&step) {
             before = Some((pose, std_m));

@@ -131,7 +131,10 @@ impl Drive {
 
     fn true_pose(&self, time_s: f64) -> Option<Pose> {
         let after = self.truth.partition_point(|it| it.time_s <= time_s);
-        let (a, b) = (self.truth.get(after.checked_sub(1)?)?, self.truth.get(after)?);
+        let (a, b) = (
+            self.truth.get(after.checked_sub(1)?)?,
+            self.truth.get(after)?,
+        );
         let share = (time_s - a.time_s) / (b.time_s - a.time_s);
         let mix = |a: f64, b: f64| a + share * (b - a);
         Some(Pose {
@@ -145,7 +148,14 @@ impl Drive {
     fn locate(&self, vehicle: &str, start: Pose, smooth: bool) -> LocatedDrive {
         let mounting = format!("mounting_rad = {:?}\n", self.mounting_rad);
         let mut text = vehicle.replace("[array]\n", &format!("[array]\n{mounting}"));
-        for table in ["receiver", "odometer", "gyroscope", "array", "integrity", "localizer"] {
+        for table in [
+            "receiver",
+            "odometer",
+            "gyroscope",
+            "array",
+            "integrity",
+            "localizer",
+        ] {
             // To try a setting: RECEIVER="phase_bias_correlation_s = 2.0".
             let Ok(keys) = std::env::var(table.to_uppercase()) else {
                 continue;
@@ -160,15 +170,22 @@ impl Drive {
         let site = Site::from_toml(&self.site, "site", &Shipped).expect("a site");
         let (odometry, angles) = (&self.odometry, &self.angles);
         let (site, vehicle) = as_stated(&site, &vehicle);
-        locate_angles(&site, &vehicle, StartChoice::At(start), odometry, angles, smooth)
-            .expect("a located drive")
+        locate_angles(
+            &site,
+            &vehicle,
+            StartChoice::At(start),
+            odometry,
+            angles,
+            smooth,
+        )
+        .expect("a located drive")
     }
 
     /// RMS error from a time on.
     fn rms_m(&self, poses: &[LocatedPose], from_s: f64, to_s: f64) -> f64 {
-        let errors = poses.iter().filter(|pose| {
-            pose.estimate.time_s >= from_s && pose.estimate.time_s <= to_s
-        });
+        let errors = poses
+            .iter()
+            .filter(|pose| pose.estimate.time_s >= from_s && pose.estimate.time_s <= to_s);
         let squares: Vec<f64> = errors
             .filter_map(|pose| {
                 let truth = self.true_pose(pose.estimate.time_s)?;
@@ -189,8 +206,8 @@ impl Drive {
             let at = pose.estimate.pose;
             let (dx, dy) = (at.x_m - truth.x_m, at.y_m - truth.y_m);
             if let Some([[xx, xy, _], [_, yy, _], [_, _, hh]]) = pose.estimate.covariance {
-                nees += 0.5 * (yy * dx * dx - 2.0 * xy * dx * dy + xx * dy * dy)
-                    / (xx * yy - xy * xy);
+                nees +=
+                    0.5 * (yy * dx * dx - 2.0 * xy * dx * dy + xx * dy * dy) / (xx * yy - xy * xy);
                 nees_heading += wrap_angle(at.heading_rad - truth.heading_rad).powi(2) / hh;
             }
             if let Some(integrity) = pose.estimate.integrity
@@ -201,7 +218,9 @@ impl Drive {
             }
         }
         let share = |part: u32| 100.0 * f64::from(part) / f64::from(all.max(1));
-        let accepted = (located.executions.iter()).filter(|it| it.verdict.accepted).count();
+        let accepted = (located.executions.iter())
+            .filter(|it| it.verdict.accepted)
+            .count();
         let mut text = format!(
             "rms {:8.3}",
             self.rms_m(&located.poses, f64::NEG_INFINITY, f64::INFINITY)
@@ -220,7 +239,8 @@ impl Drive {
             " nis {:4.2} ok {:5.1}% beyond {:5.2}% nees/2 {:6.2} heading {:6.2} taken {:5.1}% remarks {}",
             {
                 let seen = located.executions.iter().filter(|it| it.verdict.accepted);
-                seen.filter_map(|it| it.verdict.mahalanobis_squared).sum::<f64>()
+                seen.filter_map(|it| it.verdict.mahalanobis_squared)
+                    .sum::<f64>()
                     / accepted.max(1) as f64
             },
             share(ok),
@@ -237,7 +257,11 @@ impl Drive {
         if std::env::var_os("REMARKS").is_some() {
             let mut seen: BTreeMap<String, usize> = BTreeMap::new();
             for remark in &located.remarks {
-                let key: String = remark.text.chars().filter(|c| !c.is_ascii_digit()).collect();
+                let key: String = remark
+                    .text
+                    .chars()
+                    .filter(|c| !c.is_ascii_digit())
+                    .collect();
                 let count = seen.entry(key).or_default();
                 *count += 1;
                 if *count <= 3 {
@@ -260,7 +284,10 @@ fn print_trace(drive: &Drive, poses: &[LocatedPose]) {
             continue;
         };
         next_s = at_s + 3.0;
-        let (is, c) = (pose.estimate.pose, pose.estimate.covariance.unwrap_or_default());
+        let (is, c) = (
+            pose.estimate.pose,
+            pose.estimate.covariance.unwrap_or_default(),
+        );
         println!(
             "  {at_s:6.1} x {:6.3} ({:.3}) y {:6.3} ({:.3}) heading {:6.3} ({:.3}) mounting {:?}",
             is.x_m - truth.x_m,
@@ -277,7 +304,8 @@ fn print_trace(drive: &Drive, poses: &[LocatedPose]) {
 /// RMS in each minute.
 fn print_minutes(drive: &Drive, poses: &[LocatedPose]) {
     if std::env::var_os("MINUTES").is_some() {
-        let minutes = (0..22).map(|it| drive.rms_m(poses, f64::from(it) * 60.0, f64::from(it) * 60.0 + 60.0));
+        let minutes =
+            (0..22).map(|it| drive.rms_m(poses, f64::from(it) * 60.0, f64::from(it) * 60.0 + 60.0));
         let minutes: Vec<String> = minutes.map(|rms_m| format!("{rms_m:.2}")).collect();
         println!("      {}", minutes.join(" "));
     }
@@ -310,12 +338,20 @@ fn main() {
         if only.as_ref().is_some_and(|only| *only != drive.name) {
             continue;
         }
-        let told = if drive.name.starts_with("litw") { LITW } else { MRCLAM };
+        let told = if drive.name.starts_with("litw") {
+            LITW
+        } else {
+            MRCLAM
+        };
         if wants("told") {
             report("told", &drive, &drive.locate(told, drive.start, true));
         }
         if wants("defaults") {
-            report("defaults", &drive, &drive.locate(DEFAULTS, drive.start, true));
+            report(
+                "defaults",
+                &drive,
+                &drive.locate(DEFAULTS, drive.start, true),
+            );
         }
         if wants("faults") {
             faults(&drive, told);
@@ -370,7 +406,9 @@ fn faults(drive: &Drive, told: &str) {
     });
     compare("yaw 20 rad/s", &spiked, drive.start, at_s + 30.0);
     let mut deaf = drive.clone();
-    deaf.angles.angles.retain(|it| !(at_s..at_s + 60.0).contains(&it.measured.time_s));
+    deaf.angles
+        .angles
+        .retain(|it| !(at_s..at_s + 60.0).contains(&it.measured.time_s));
     compare("a minute deaf", &deaf, drive.start, at_s + 90.0);
     for factor in [1.1, 0.9] {
         let scaled = edit(&mut |_, sample| {
@@ -400,7 +438,10 @@ fn street(folder: &Path) {
             let Some(pose) = truth.true_pose(it.measured.time_s) else {
                 return false;
             };
-            let head = heads.iter().find(|head| head[0] == f64::from(it.ssb.pci)).unwrap();
+            let head = heads
+                .iter()
+                .find(|head| head[0] == f64::from(it.ssb.pci))
+                .unwrap();
             let (dx, dy, dz) = (head[1] - pose.x_m, head[2] - pose.y_m, head[3] - 1.5);
             let ground = dx.hypot(dy);
             let level = ground / ground.hypot(dz);
@@ -441,12 +482,20 @@ fn street(folder: &Path) {
             ("line 5 m", polyline(5.0)),
         ] {
             let drive = with_road(&drive, &road);
-            report(&format!("exact {speeds} {label}"), &drive, &drive.locate(STREET, drive.start, true));
+            report(
+                &format!("exact {speeds} {label}"),
+                &drive,
+                &drive.locate(STREET, drive.start, true),
+            );
         }
     }
     for (label, drive) in [("real", &base), ("real 2 m", &sparse), ("real raw", &raw)] {
         report(label, drive, &drive.locate(STREET, drive.start, false));
         let mapped = with_road(drive, &segments);
-        report(&format!("{label} map"), &mapped, &mapped.locate(STREET, drive.start, false));
+        report(
+            &format!("{label} map"),
+            &mapped,
+            &mapped.locate(STREET, drive.start, false),
+        );
     }
 }

@@ -102,7 +102,16 @@ pub fn read_angle_log(file: &Path) -> Result<AngleLog, RecordingError> {
 }
 
 fn angle(values: &[Option<f64>]) -> Result<LoggedAngle, String> {
-    let &[time_s, pci, ssb_index, phase_rad, phase_sigma_rad, angle_rad, angle_sigma_rad, snr_db] = values
+    let &[
+        time_s,
+        pci,
+        ssb_index,
+        phase_rad,
+        phase_sigma_rad,
+        angle_rad,
+        angle_sigma_rad,
+        snr_db,
+    ] = values
     else {
         return Err("too few columns".to_owned());
     };
@@ -134,7 +143,9 @@ fn angle(values: &[Option<f64>]) -> Result<LoggedAngle, String> {
         ));
     }
     if phase_sigma_rad <= 0.0 {
-        return Err(format!("its standard deviation {phase_sigma_rad} is not above 0"));
+        return Err(format!(
+            "its standard deviation {phase_sigma_rad} is not above 0"
+        ));
     }
     let (pci, ssb_index) = (pci as u16, ssb_index as u8);
     Ok(LoggedAngle {

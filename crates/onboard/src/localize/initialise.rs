@@ -9,10 +9,10 @@
 use std::f64::consts::TAU;
 use std::sync::Arc;
 
-use super::measurement::{AngleMeasurement, UpdateReason, UpdateVerdict};
-use super::pose_estimate::PoseEstimate;
 use super::area::Area;
 use super::gaussian::Innovation;
+use super::measurement::{AngleMeasurement, UpdateReason, UpdateVerdict};
+use super::pose_estimate::PoseEstimate;
 use super::tracker::state::{ACROSS, ALONG, HEADING, STATES};
 use super::tracker::{InitialPose, OdometryVerdict, Tracker, TrackerConfig};
 use crate::geometry::{Pose, wrap_angle};
@@ -259,9 +259,8 @@ impl Initialiser {
                 .map_or(0.0, |road| road.length_m());
             (-3.0 * std_m..=length_m + 3.0 * std_m).contains(&along_m)
         };
-        self.hypotheses.retain(|hypothesis| {
-            possible(hypothesis) && hypothesis.log_likelihood > best - BEHIND
-        });
+        self.hypotheses
+            .retain(|hypothesis| possible(hypothesis) && hypothesis.log_likelihood > best - BEHIND);
         let in_plane = matches!(self.ground, Ground::Plane(_));
         let mut kept = 0;
         for index in 0..self.hypotheses.len() {

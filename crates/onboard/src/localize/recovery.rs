@@ -149,7 +149,9 @@ impl Recovery {
         let mut initialiser = match &setup.road {
             Some(road) => Initialiser::new(config, road.clone(), true, heads),
             None if heads.len() < LEAST_HEADS => return None,
-            None if is_wide || Initialiser::is_small(Area::of_heads(heads)) => Initialiser::in_plane(config, Area::of_heads(heads), heads),
+            None if is_wide || Initialiser::is_small(Area::of_heads(heads)) => {
+                Initialiser::in_plane(config, Area::of_heads(heads), heads)
+            }
             None => {
                 let here = self.tracked.pose(now_s);
                 let three_m = 3.0 * here.principal_variances()[0].sqrt();

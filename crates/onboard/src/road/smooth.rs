@@ -46,10 +46,17 @@ impl Road {
             let count = (step / PIECE_M).ceil().max(1.0) as u32;
             for part in 0..count {
                 let share = |part: u32| f64::from(part) / f64::from(count);
-                let (start, end) = (spline.pose(leg, share(part)), spline.pose(leg, share(part + 1)));
+                let (start, end) = (
+                    spline.pose(leg, share(part)),
+                    spline.pose(leg, share(part + 1)),
+                );
                 let turn_rad = wrap_angle(end.heading_rad - start.heading_rad);
                 let half = 0.5 * turn_rad;
-                let sinc = if half.abs() < 1e-4 { 1.0 } else { half.sin() / half };
+                let sinc = if half.abs() < 1e-4 {
+                    1.0
+                } else {
+                    half.sin() / half
+                };
                 let arc_m = start.point().distance_m(end.point()) / sinc;
                 if arc_m > 0.0 {
                     pieces.push(Piece {
@@ -135,7 +142,11 @@ fn with_straights(points: &[Point]) -> Result<Vec<Point>, RoadError> {
         let (sin, cos) = bearing_rad.sin_cos();
         let on_leg = |at_m: f64| Point::new(point.x_m + at_m * cos, point.y_m + at_m * sin);
         if to_m > from_m {
-            let begins_m = if turn_rad.abs() > CORNER_RAD { from_m } else { 0.0 };
+            let begins_m = if turn_rad.abs() > CORNER_RAD {
+                from_m
+            } else {
+                0.0
+            };
             let inside_m = to_m - from_m;
             // Two at each end stop the spline from swinging; between them nothing happens.
             for at_m in [
@@ -173,8 +184,13 @@ fn scatter_m(points: &[Point]) -> f64 {
         let others = [(a, ta), (b, tb), (c, tc), (d, td)];
         let (mut x_m, mut y_m, mut noise) = (middle.x_m, middle.y_m, 1.0);
         for (index, (point, own)) in others.iter().enumerate() {
-            let rest = others.iter().enumerate().filter(|(other, _)| *other != index);
-            let weight: f64 = rest.map(|(_, (_, other))| (t - other) / (own - other)).product();
+            let rest = others
+                .iter()
+                .enumerate()
+                .filter(|(other, _)| *other != index);
+            let weight: f64 = rest
+                .map(|(_, (_, other))| (t - other) / (own - other))
+                .product();
             x_m -= weight * point.x_m;
             y_m -= weight * point.y_m;
             noise += weight * weight;
@@ -287,13 +303,17 @@ impl Spline {
         let (a, b) = (1.0 - share, share);
         let bend = step * step / 6.0;
         let along = |from: f64, to: f64, first: f64, last: f64| {
-            let value = a * from + b * to + bend * ((a * a * a - a) * first + (b * b * b - b) * last);
+            let value =
+                a * from + b * to + bend * ((a * a * a - a) * first + (b * b * b - b) * last);
             let slope = (to - from) / step
                 + step / 6.0 * ((1.0 - 3.0 * a * a) * first + (3.0 * b * b - 1.0) * last);
             (value, slope)
         };
         let ([fx, fy], [tx, ty]) = (second(leg), second(leg + 1));
-        let ((x_m, dx), (y_m, dy)) = (along(from.x_m, to.x_m, fx, tx), along(from.y_m, to.y_m, fy, ty));
+        let ((x_m, dx), (y_m, dy)) = (
+            along(from.x_m, to.x_m, fx, tx),
+            along(from.y_m, to.y_m, fy, ty),
+        );
         Pose {
             x_m,
             y_m,
@@ -303,7 +323,10 @@ impl Spline {
 }
 
 /// Solves a symmetric positive definite system of bandwidth two by its factors L D Lᵀ.
-#[allow(clippy::indexing_slicing, reason = "every index is below the length all three share")]
+#[allow(
+    clippy::indexing_slicing,
+    reason = "every index is below the length all three share"
+)]
 fn solve(bands: Vec<[f64; 3]>, mut right: Vec<[f64; 2]>) -> Vec<[f64; 2]> {
     let n = bands.len();
     let mut factors = bands; // d, l1, l2 of each column
@@ -385,7 +408,13 @@ mod tests {
 
     #[test]
     fn long_legs_stay_straight_and_corners_are_rounded() {
-        let points = [[0.0, 0.0], [100.0, 0.0], [100.0, 80.0], [103.0, 90.0], [140.0, 200.0]];
+        let points = [
+            [0.0, 0.0],
+            [100.0, 0.0],
+            [100.0, 80.0],
+            [103.0, 90.0],
+            [140.0, 200.0],
+        ];
         let road = Road::through_points(&points.map(Point::from), 0.02, 4.0).unwrap();
         for (x_m, y_m) in [(50.0, 0.0), (85.0, 0.0), (100.0, 40.0), (121.5, 145.0)] {
             let off_m = road.project(Point::new(x_m, y_m)).lateral_m;

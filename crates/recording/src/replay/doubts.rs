@@ -34,9 +34,8 @@ pub fn doubts(
         return Ok(doubts);
     };
     let start_s = first.time_s;
-    let inside = |it: &&LoggedAngle| {
-        (first.time_s - 1.0..=last.time_s + 1.0).contains(&it.measured.time_s)
-    };
+    let inside =
+        |it: &&LoggedAngle| (first.time_s - 1.0..=last.time_s + 1.0).contains(&it.measured.time_s);
     let heard: Vec<&LoggedAngle> = angles.iter().filter(inside).collect();
     if let (Some(angle), true) = (angles.first(), heard.is_empty()) {
         return Err(ReplayError::Clocks {
@@ -88,7 +87,10 @@ pub fn doubts(
     let mut before_s = start_s;
     for time_s in times_s.chain([last.time_s]) {
         if time_s - before_s > SILENCE_S {
-            let text = format!("no angle for {:.0} s from {before_s:.1} s on", time_s - before_s);
+            let text = format!(
+                "no angle for {:.0} s from {before_s:.1} s on",
+                time_s - before_s
+            );
             doubts.push((before_s, text));
         }
         before_s = before_s.max(time_s);

@@ -93,7 +93,11 @@ impl<'a> Replay<'a> {
         let Some(findings) = self.onboard.findings() else {
             return;
         };
-        let time_s = self.drive.poses.last().map_or(0.0, |last| last.estimate.time_s);
+        let time_s = self
+            .drive
+            .poses
+            .last()
+            .map_or(0.0, |last| last.estimate.time_s);
         let Findings {
             odometer_scale,
             lateness_s,

@@ -8,11 +8,11 @@ use onboard::receive::{Receiver, ReceiverConfig};
 use onboard::settings::{Site, Vehicle, WakeUpSettings};
 use onboard::{Custom, Execution};
 
+use super::doubts::doubts;
 use super::drive::Replay;
 use super::error::ReplayError;
 use super::located::{LocatedDrive, LocatedPose};
 use super::receive::receive_recording;
-use super::doubts::doubts;
 use super::start::{StartChoice, starting};
 use super::stated::with_phases;
 use crate::angle_log::{AngleLog, LoggedAngle};

@@ -4,9 +4,7 @@ use super::motion::{MotionNoise, PathBend, Yaw};
 use super::sighting::{ArrayModel, Sighting};
 use crate::localize::quantile::normal_quantile;
 use crate::road::LaneKeeping;
-use crate::settings::{
-    DriveKind, LocalizerSettings, RoadSettings, Site, TrackerSettings, Vehicle,
-};
+use crate::settings::{DriveKind, LocalizerSettings, RoadSettings, Site, TrackerSettings, Vehicle};
 
 /// The best that the tracker takes for granted where nothing is said.
 const LEAST_ODOMETER_SCALE_STD: f64 = 0.001;
@@ -105,7 +103,8 @@ impl PhaseBias {
         // Neither time nor way alone forgets: who stands sees the same error, and who drives on is
         // not another's sensor. Turning shows the radio head to another part of it.
         let (travelled_m, turned_rad) = moved;
-        let by_way = travelled_m.abs() / self.correlation_m + turned_rad.abs() / FORGETTING_TURN_RAD;
+        let by_way =
+            travelled_m.abs() / self.correlation_m + turned_rad.abs() / FORGETTING_TURN_RAD;
         let steps = (elapsed_s.abs() / self.correlation_s).min(by_way);
         // At the same instant nothing new is learnt, but the variance must stay a number.
         own - shared + (stays + shared) / (0.5 * steps.max(1e-4)).tanh()
@@ -156,13 +155,21 @@ impl TrackerConfig {
         };
         let gyroscope = vehicle.gyroscope.as_ref();
         let wheels = vehicle.drive == DriveKind::Differential;
-        let usual = if wheels { USUAL_WHEELS_TURN } else { USUAL_GYROSCOPE };
+        let usual = if wheels {
+            USUAL_WHEELS_TURN
+        } else {
+            USUAL_GYROSCOPE
+        };
         let [yaw_noise, yaw_bias_std] = gyroscope.map_or(usual, |gyroscope| {
             [gyroscope.noise_rad_per_sqrt_s, gyroscope.bias_std_radps]
         });
         // What is zero is not stated.
         let or_usual = |stated: f64, usual: f64, least: f64| {
-            if wheels && stated == 0.0 { usual } else { stated.max(least) }
+            if wheels && stated == 0.0 {
+                usual
+            } else {
+                stated.max(least)
+            }
         };
         let receiver = &vehicle.receiver;
         Self {

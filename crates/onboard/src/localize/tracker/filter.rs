@@ -11,9 +11,7 @@ use super::motion::{Step, Yaw};
 use super::off_map::OffMap;
 use super::sighting::Sighting;
 use super::speed_steps::SpeedSteps;
-use super::state::{
-    ACROSS, ALONG, Belief, HEADING, LATENESS, SCALE, STATES, YAW_RATE_BIAS,
-};
+use super::state::{ACROSS, ALONG, Belief, HEADING, LATENESS, SCALE, STATES, YAW_RATE_BIAS};
 use crate::clone_in_place::clone_in_place;
 use crate::geometry::wrap_angle;
 use crate::localize::gaussian::Innovation;
@@ -373,7 +371,9 @@ impl Tracker {
             .find(|(_, mine)| mine.is(head))
             .ok_or(UpdateReason::UnknownRadioHead)?;
         let (ahead_m, ahead_variance) = self.coasting(measured.time_s);
-        let sighting = self.sight(&head.known, ahead_m).ok_or(UpdateReason::Unusable)?;
+        let sighting = self
+            .sight(&head.known, ahead_m)
+            .ok_or(UpdateReason::Unusable)?;
         let bend = sighting.bend(&self.belief.covariance);
         let place_m = self.driven_m + ahead_m;
         let travelled_m = place_m - head.last_look_m;
@@ -409,8 +409,8 @@ impl Tracker {
         if map.is_none() {
             let read = self.odometry.and_then(|sample| sample.yaw_rate_radps);
             let top = self.config.top_yaw_rate_radps;
-            rate_radps = read.filter(|rate| rate.abs() <= top).unwrap_or_default()
-                - mean[YAW_RATE_BIAS];
+            rate_radps =
+                read.filter(|rate| rate.abs() <= top).unwrap_or_default() - mean[YAW_RATE_BIAS];
             pose.heading_rad -= rate_radps * mean[LATENESS];
         }
         let mut sighting = Sighting::new(head, pose, &footing, mean, array)?;

@@ -7,7 +7,8 @@ use super::filter::Tracker;
 use super::interface::InitialPose;
 use super::locate::locate;
 use super::state::{
-    ACROSS, ALONG, Belief, CURVATURE, HEADING, LATENESS, MOUNTING, PHASE, SCALE, STATES, YAW_RATE_BIAS,
+    ACROSS, ALONG, Belief, CURVATURE, HEADING, LATENESS, MOUNTING, PHASE, SCALE, STATES,
+    YAW_RATE_BIAS,
 };
 use crate::geometry::wrap_angle;
 use crate::radio_head::RadioHead;

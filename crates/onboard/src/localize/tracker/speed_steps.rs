@@ -26,7 +26,11 @@ impl SpeedSteps {
         let unusual_mps = UNUSUAL * self.mean_square.sqrt();
         let leaps = step_mps > least_mps.max(unusual_mps);
         let square = step_mps * step_mps;
-        let share = if square > self.mean_square { RISE } else { FALL };
+        let share = if square > self.mean_square {
+            RISE
+        } else {
+            FALL
+        };
         self.mean_square += share * (square - self.mean_square);
         if leaps { step_mps / fastest_mps } else { 0.0 }
     }
