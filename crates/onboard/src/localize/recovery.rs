@@ -214,19 +214,7 @@ impl Localizer for Recovery {
     fn pose(&self, time_s: f64) -> Result<PoseEstimate, BoxError> {
         let mut estimate = self.tracked.pose(time_s);
         if let Some(search) = &self.search {
-            let elsewhere = search.initialiser.pose(time_s);
-            let apart = [
-                elsewhere.pose.x_m - estimate.pose.x_m,
-                elsewhere.pose.y_m - estimate.pose.y_m,
-                wrap_angle(elsewhere.pose.heading_rad - estimate.pose.heading_rad),
-            ];
-            if let (Some(own), Some(other)) = (&mut estimate.covariance, elsewhere.covariance) {
-                for (i, row) in own.iter_mut().enumerate() {
-                    for (j, value) in row.iter_mut().enumerate() {
-                        *value += other[i][j] + apart[i] * apart[j];
-                    }
-                }
-            }
+            estimate.cover(&search.initialiser.pose(time_s));
             let level_m = self.setup.quantile.radius(estimate.principal_variances());
             if let Some(integrity) = &mut estimate.integrity {
                 integrity.state = IntegrityState::Unavailable;
