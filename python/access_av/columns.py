@@ -67,6 +67,7 @@ _GLOSSARY = {
     "distance_m": ("m", "Distance driven, by the odometer"),
     "yaw_rate_radps": ("rad/s", "Yaw rate, by the gyroscope"),
     "searching": ("true or false", "The first pose is not known yet"),
+    "lost": ("true or false", "The angles come from elsewhere than expected; do not rely on the pose"),
     # Errors of the position.
     "error_x_m": ("m", "Estimate minus truth, x"),
     "error_y_m": ("m", "Estimate minus truth, y"),
@@ -255,7 +256,7 @@ _COMPARED = ("mahalanobis_squared", "threshold")
 _POSE = ("x_m", "y_m", "heading_rad")
 _POSES = (
     "time_s", *_POSE, "speed_mps", "covariance_xx_m2", "covariance_xy_m2", "covariance_yy_m2",
-    "covariance_heading_rad2", "protection_level_m", "integrity", "searching",
+    "covariance_heading_rad2", "protection_level_m", "integrity", "searching", "lost",
 )  # fmt: skip
 _POSES_NULL = {
     **{name: _NO_COVARIANCE for name in _POSES if name.startswith("covariance")},

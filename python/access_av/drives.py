@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import math
 from dataclasses import dataclass
 from pathlib import Path
 from typing import TYPE_CHECKING, Any
@@ -16,6 +17,9 @@ if TYPE_CHECKING:
 
     from access_av._core import Scenario, Site, Vehicle
 
+
+# Longest time between two poses of the truth between which it is taken for a straight line (s).
+MOST_TRUTH_GAP_S = 1.0
 
 DATATYPES = ("ci16_le", "cf32_le")
 
@@ -155,11 +159,14 @@ def locate(
     site
         Radio heads and, where there is one, the road; or the name or path of a site file.
     odometry
-        CSV with the columns ``time_s``, ``distance_m``, ``speed_mps`` and, with a gyroscope,
-        ``yaw_rate_radps``; or an MCAP file with ``nav_msgs/msg/Odometry``.
+        CSV with the columns ``time_s``, ``distance_m``, ``speed_mps`` and, from a gyroscope or from
+        the wheels, ``yaw_rate_radps``; or an MCAP file with ``nav_msgs/msg/Odometry``.
     recording
         SigMF recording of the array's samples, or a CSV log of angles with the columns ``time_s``,
-        ``pci``, ``ssb_index``, ``phase_rad``, ``phase_sigma_rad``, ``angle_rad``, ``snr_db``.
+        ``pci`` and either ``phase_rad`` (electrical angle) with ``phase_sigma_rad``, or ``angle_rad``
+        (from the array's axis) with ``angle_sigma_rad``; ``ssb_index`` and ``snr_db`` may be there.
+        What is stated as the deviation is taken for all of the error: the site's ``rician_k_db``
+        adds nothing.
     vehicle
         Array, odometer, and how the vehicle locates itself; or the name or path of a vehicle
         file. Its wake-up policy is honoured.
@@ -169,7 +176,8 @@ def locate(
         Time of the recording's first sample by the odometry's clock.
     start
         Initial pose (x in metres, y in metres, heading in radians) in place of the vehicle's.
-        Without any, the vehicle is found along the road, by two radio heads or more.
+        Without any, the vehicle is found: along the road by two radio heads or more, elsewhere by
+        three.
     from_scratch
         Find the vehicle along the road even if its file has an initial pose.
     smooth
@@ -218,37 +226,62 @@ def _poses(columns: Mapping[str, Any]) -> pl.DataFrame:
     return table.with_columns(pl.col(pl.Float64).fill_nan(None))
 
 
+def read_tum(file: str | Path) -> pl.DataFrame:
+    """A TUM trajectory as ``time_s``, ``x_m``, ``y_m``, ``heading_rad``; ``#`` begins a comment.
+
+    Raises
+    ------
+    InputError
+        When the file is no TUM trajectory.
+    """
+    lines = Path(file).read_text(encoding="utf-8").splitlines()
+    rows = [line.split() for line in lines if line.strip() and not line.lstrip().startswith("#")]
+    try:
+        values = [[float(cell) for cell in row] for row in rows]
+    except ValueError as error:
+        raise InputError(f"{file}: not a TUM trajectory ({error})") from error
+    if not values or any(len(row) != 8 for row in values):
+        raise InputError(f"{file}: not a TUM trajectory (8 numbers a line)")
+    heading = [
+        math.atan2(2 * (qw * qz + qx * qy), 1 - 2 * (qy * qy + qz * qz))
+        for *_, qx, qy, qz, qw in values
+    ]
+    columns = {name: [row[i] for row in values] for i, name in enumerate(("time_s", "x_m", "y_m"))}
+    return pl.DataFrame({**columns, "heading_rad": heading}).sort("time_s")
+
+
 def error_m(poses: pl.DataFrame, truth: str | Path) -> pl.DataFrame:
-    """Horizontal error at the times that a TUM trajectory of the truth has too.
+    """Horizontal error at the poses' times, the truth between its own times on a straight line.
 
     Parameters
     ----------
     poses
-        Poses of a located drive; those before the first known one are passed over.
+        Poses of a located drive; those before the first known one are passed over, and those that
+        are before, after or in a gap of more than a second of the truth.
     truth
-        TUM trajectory; times within a microsecond belong together.
+        TUM trajectory, at times of its own.
 
     Raises
     ------
     InputError
         When the file is no TUM trajectory, or shares no time with the drive.
     """
-    rows = [line.split() for line in Path(truth).read_text(encoding="utf-8").splitlines()]
-    if not rows or any(len(row) != 8 for row in rows):
-        raise InputError(f"{truth}: not a TUM trajectory (8 numbers a line)")
-    true = pl.DataFrame(
-        {
-            "time_us": [round(float(row[0]) * 1e6) for row in rows],
-            "true_x_m": [float(row[1]) for row in rows],
-            "true_y_m": [float(row[2]) for row in rows],
-        }
+    known = poses.filter(~pl.col("searching")).sort("time_s")
+    true = read_tum(truth).select("time_s", "x_m", "y_m")
+    before = true.rename({"x_m": "x0", "y_m": "y0"}).with_columns(t0="time_s")
+    after = true.rename({"x_m": "x1", "y_m": "y1"}).with_columns(t1="time_s")
+    both = (
+        known.join_asof(before, on="time_s", strategy="backward")
+        .join_asof(after, on="time_s", strategy="forward")
+        .filter(pl.col("t1") - pl.col("t0") <= MOST_TRUTH_GAP_S)
     )
-    timed = poses.with_columns(time_us=(pl.col("time_s") * 1e6).round().cast(pl.Int64))
-    both = timed.filter(~pl.col("searching")).join(true, on="time_us")
     if both.is_empty():
         raise InputError(f"{truth}: no time in common with the drive")
-    dx, dy = pl.col("x_m") - pl.col("true_x_m"), pl.col("y_m") - pl.col("true_y_m")
-    return both.select("time_s", error_m=(dx**2 + dy**2).sqrt())
+    span = pl.col("t1") - pl.col("t0")
+    share = pl.when(span > 0).then((pl.col("time_s") - pl.col("t0")) / span).otherwise(0.0)
+    dx = pl.col("x_m") - pl.col("x0") - share * (pl.col("x1") - pl.col("x0"))
+    dy = pl.col("y_m") - pl.col("y0") - share * (pl.col("y1") - pl.col("y0"))
+    return both.select("time_s", error_m=(dx**2 + dy**2).sqrt(), error_x_m=dx, error_y_m=dy)
 
 
 def summary(drive: Drive, truth: str | Path | None = None) -> dict[str, float]:
@@ -267,10 +300,27 @@ def summary(drive: Drive, truth: str | Path | None = None) -> dict[str, float]:
         )
         numbers["found_m"] = float(steps.filter(time_s=known["time_s"][0])["driven_m"][0])
     if truth is not None and not known.is_empty():
-        errors = error_m(drive.poses, truth)["error_m"]
+        against = error_m(drive.poses, truth)
+        errors = against["error_m"]
+        numbers |= _honesty(drive.poses, against)
         numbers["rms_error_m"] = float((errors**2).mean() ** 0.5)  # type: ignore[operator]
         numbers["p90_error_m"] = float(errors.quantile(0.9, "linear") or 0.0)
         if drive.smoothed is not None and not drive.smoothed.is_empty():
             errors = error_m(drive.smoothed, truth)["error_m"]
             numbers["smoothed_rms_error_m"] = float((errors**2).mean() ** 0.5)  # type: ignore[operator]
     return numbers
+
+
+def _honesty(poses: pl.DataFrame, against: pl.DataFrame) -> dict[str, float]:
+    """What the localizer said of its error beside the error: mean NEES over both axes, shares of the
+    time ``ok`` and, of all time, beyond the protection level while ``ok``."""
+    xx, xy, yy = (pl.col(f"covariance_{it}_m2") for it in ("xx", "xy", "yy"))
+    dx, dy = pl.col("error_x_m"), pl.col("error_y_m")
+    squared = (yy * dx**2 - 2 * xy * dx * dy + xx * dy**2) / (xx * yy - xy**2)
+    ok = pl.col("integrity") == "ok"
+    row = poses.join(against, on="time_s").select(
+        nees_per_axis=squared.filter(squared.is_finite()).mean() / 2,
+        ok_share=ok.mean(),
+        beyond_while_ok=(ok & (pl.col("error_m") > pl.col("protection_level_m"))).mean(),
+    )
+    return {name: value for name, value in row.row(0, named=True).items() if value is not None}

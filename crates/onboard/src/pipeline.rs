@@ -5,9 +5,10 @@ use crate::estimator::{self, AngleEstimator};
 use crate::geometry::Pose;
 use crate::link_budget::LinkBudget;
 use crate::localize::thermal::ThermalNoise;
-use crate::localize::tracker::{Calibration, OdometryVerdict};
+use crate::localize::tracker::{Calibration, Findings, OdometryVerdict};
 use crate::localize::{
-    self, AngleMeasurement, History, Localizer, PoseEstimate, Tracker, UpdateReason, UpdateVerdict,
+    self, AngleMeasurement, History, Localizer, PoseEstimate, Recovered, Tracker, UpdateReason,
+    UpdateVerdict,
 };
 use crate::observation::{OdometrySample, SensedSsb, SsbObservation};
 use crate::radio_head::RadioHead;
@@ -19,6 +20,7 @@ pub struct Onboard {
     surroundings: Surroundings,
     thermal: ThermalNoise,
     spacing_wavelengths: f64,
+    lateness_s: f64,
     estimator: Box<dyn AngleEstimator>,
     localizer: History,
     policy: Box<dyn WakeUpPolicy>,
@@ -165,6 +167,7 @@ impl Onboard {
         Ok(Self {
             thermal: ThermalNoise::new(site, vehicle),
             spacing_wavelengths,
+            lateness_s: vehicle.receiver.lateness_s,
             estimator,
             localizer: History::new(localizer),
             policy,
@@ -213,7 +216,7 @@ impl Onboard {
         self.executions.clear();
         let now = self.surroundings.at(time_s, self.odometry, &self.localizer);
         // As long as the first pose is searched for, every angle helps.
-        let searching = now.localizer.hypotheses().is_some();
+        let searching = now.localizer.hypotheses().is_some() || now.localizer.is_lost();
         let listened = searching || self.policy.listens(&now)?;
         if listened {
             source.sense(&mut self.sensed)?;
@@ -259,6 +262,10 @@ impl Onboard {
         ssb: SensedSsb,
         measured: Option<AngleMeasurement>,
     ) -> Result<Execution, BoxError> {
+        let measured = measured.map(|measured| AngleMeasurement {
+            time_s: measured.time_s - self.lateness_s,
+            ..measured
+        });
         let mut heads = self.surroundings.heads.iter();
         let head = heads.find(|head| head.sends(ssb.pci, ssb.ssb_index));
         let verdict = match (head, &measured) {
@@ -280,6 +287,16 @@ impl Onboard {
         self.localizer.localizer().hypotheses()
     }
 
+    /// Whether the angles come from elsewhere than expected, so that the pose is not to be relied on.
+    pub fn is_lost(&self) -> bool {
+        self.localizer.localizer().is_lost()
+    }
+
+    /// How the localizer came back when it was lost last.
+    pub fn recovered(&self) -> Option<Recovered> {
+        self.localizer.localizer().recovered()
+    }
+
     /// Where the vehicle is believed to be at `time_s`, not before the newest odometry.
     ///
     /// # Errors
@@ -292,6 +309,12 @@ impl Onboard {
     pub fn calibration(&self) -> Option<Calibration> {
         let tracker = self.localizer.localizer().tracker();
         tracker.map(Tracker::calibration)
+    }
+
+    /// What the drive has shown of odometer, yaw rate and clock, where the localizer looks for it.
+    pub fn findings(&self) -> Option<Findings> {
+        let tracker = self.localizer.localizer().tracker();
+        tracker.map(Tracker::findings)
     }
 
     /// Keeps from now on what smoothing takes, where the localizer is a tracker without a guard,

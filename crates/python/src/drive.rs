@@ -187,6 +187,7 @@ impl RecordedDrive<'_> {
         };
         if is(self.recording, "csv") {
             let angles = read_angle_log(self.recording)?;
+            let (site, vehicle) = &replay::as_stated(site, vehicle);
             replay::locate_angles(site, vehicle, self.start, &odometry, &angles, smooth)
         } else {
             replay::locate_recording(
@@ -339,6 +340,8 @@ fn pose_columns<'py>(
     columns.set_item("integrity", poses.iter().map(state).collect::<Vec<_>>())?;
     let searching = poses.iter().map(|it| it.searching.is_some());
     columns.set_item("searching", PyArray1::from_iter(py, searching))?;
+    let lost = poses.iter().map(|it| it.is_lost);
+    columns.set_item("lost", PyArray1::from_iter(py, lost))?;
     Ok(columns)
 }
 

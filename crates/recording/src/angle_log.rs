@@ -1,8 +1,9 @@
 //! Angles of arrival that some receiver has already estimated, one per line.
 //!
-//! Columns: `time_s`, `pci`, `ssb_index`, `phase_rad` (electrical angle ω = 2π(d/λ)·cos θ),
-//! `phase_sigma_rad` (its standard deviation from noise), `angle_rad` (θ from the array's axis) and
-//! `snr_db`. Of `phase_rad` and `angle_rad` the former counts.
+//! Columns: `time_s`, `pci` and either `phase_rad` (electrical angle ω = 2π(d/λ)·cos θ) with its
+//! standard deviation `phase_sigma_rad`, or `angle_rad` (θ from the array's axis) with
+//! `angle_sigma_rad`; where both are given the former counts. `ssb_index` (0 without) and `snr_db`
+//! need not be there.
 
 use std::fmt;
 use std::fmt::Write as _;
@@ -23,6 +24,20 @@ const COLUMNS: [&str; 7] = [
     "angle_rad",
     "snr_db",
 ];
+
+/// Columns that every log has, and those of which some may be missing.
+const REQUIRED: [&str; 2] = ["time_s", "pci"];
+const OPTIONAL: [&str; 6] = [
+    "ssb_index",
+    "phase_rad",
+    "phase_sigma_rad",
+    "angle_rad",
+    "angle_sigma_rad",
+    "snr_db",
+];
+
+/// SNR (dB) of an angle of which none is stated: good enough for any policy.
+const UNSTATED_SNR_DB: f64 = 20.0;
 
 /// One angle and the SSB it came from.
 #[derive(Debug, Clone, Copy, PartialEq)]
@@ -70,7 +85,7 @@ impl fmt::Display for AngleRemark {
 /// remarked upon.
 pub fn read_angle_log(file: &Path) -> Result<AngleLog, RecordingError> {
     let mut log = AngleLog::default();
-    for row in Table::read(file, &COLUMNS, &[])?.rows {
+    for row in Table::read(file, &REQUIRED, &OPTIONAL)?.rows {
         match row.values.and_then(|values| angle(&values)) {
             Ok(angle) => log.angles.push(angle),
             Err(message) => log.remarks.push(AngleRemark {
@@ -87,21 +102,37 @@ pub fn read_angle_log(file: &Path) -> Result<AngleLog, RecordingError> {
 }
 
 fn angle(values: &[Option<f64>]) -> Result<LoggedAngle, String> {
-    let mut numbers = [f64::NAN; COLUMNS.len()];
-    for ((number, value), name) in numbers.iter_mut().zip(values).zip(COLUMNS) {
-        *number = value
-            .filter(|value| value.is_finite())
-            .ok_or(format!("{name} is not finite"))?;
-    }
-    let [
+    let &[
         time_s,
         pci,
         ssb_index,
         phase_rad,
         phase_sigma_rad,
         angle_rad,
+        angle_sigma_rad,
         snr_db,
-    ] = numbers;
+    ] = values
+    else {
+        return Err("too few columns".to_owned());
+    };
+    let finite = |value: Option<f64>, name: &str| match value {
+        Some(value) if !value.is_finite() => Err(format!("{name} is not finite")),
+        value => Ok(value),
+    };
+    let needed = |value: Option<f64>, name: &str| {
+        finite(value, name)?.ok_or_else(|| format!("{name} is missing"))
+    };
+    let (time_s, pci) = (needed(time_s, "time_s")?, needed(pci, "pci")?);
+    let ssb_index = finite(ssb_index, "ssb_index")?.unwrap_or(0.0);
+    let snr_db = finite(snr_db, "snr_db")?.unwrap_or(UNSTATED_SNR_DB);
+    let angle_rad = finite(angle_rad, "angle_rad")?;
+    // Without a phase the deviation is that of the angle, until the array's spacing is known.
+    let (phase_rad, phase_sigma_rad) = match (finite(phase_rad, "phase_rad")?, angle_rad) {
+        (Some(phase_rad), _) => (phase_rad, needed(phase_sigma_rad, "phase_sigma_rad")?),
+        (None, Some(_)) => (f64::NAN, needed(angle_sigma_rad, "angle_sigma_rad")?),
+        (None, None) => return Err("neither phase_rad nor angle_rad is there".to_owned()),
+    };
+    let angle_rad = angle_rad.unwrap_or(f64::NAN);
     let whole = |value: f64, most: f64| value.fract() == 0.0 && (0.0..=most).contains(&value);
     if !whole(pci, 1007.0) {
         return Err(format!("pci {pci} is not an integer from 0 to 1007"));
@@ -112,7 +143,9 @@ fn angle(values: &[Option<f64>]) -> Result<LoggedAngle, String> {
         ));
     }
     if phase_sigma_rad <= 0.0 {
-        return Err(format!("phase_sigma_rad {phase_sigma_rad} is not above 0"));
+        return Err(format!(
+            "its standard deviation {phase_sigma_rad} is not above 0"
+        ));
     }
     let (pci, ssb_index) = (pci as u16, ssb_index as u8);
     Ok(LoggedAngle {

@@ -19,6 +19,9 @@ app = typer.Typer()
 
 MOST_REMARKS = 10
 
+# Share of the time that a drive may be lost without that being its result.
+MOST_LOST = 0.2
+
 
 @app.command(
     epilog="Example: [bold]access-av synth paper-real-odometry-2 --out drive --duration-s 20[/]",
@@ -65,7 +68,13 @@ def synth(
     "--truth drive/truth.tum[/]",
 )
 def locate(
-    recording: Annotated[Path, typer.Option(help="SigMF recording, or CSV log of angles.")],
+    recording: Annotated[
+        Path,
+        typer.Option(
+            help="SigMF recording, or CSV log of angles: time_s, pci, "
+            "phase_rad and phase_sigma_rad (or angle_rad and angle_sigma_rad); docs/locate.md."
+        ),
+    ],
     odometry: Annotated[Path, typer.Option(help="CSV, or MCAP with nav_msgs/Odometry.")],
     site: Annotated[str, typer.Option(help="Radio heads and road: shipped name, or TOML file.")],
     vehicle: Annotated[
@@ -154,6 +163,15 @@ def locate(
     if "smoothed_rms_error_m" in numbers:
         console.print(f"Smoothed: RMS {numbers['smoothed_rms_error_m']:.3f} m.")
     console.print(f"Files: {directory.path}", soft_wrap=True)
+    share = float(drive.poses["lost"].mean() or 0.0)  # type: ignore[arg-type]
+    if share > MOST_LOST or bool(drive.poses["lost"][-1]):
+        errors.print(
+            f"[red]not available:[/] for {share:.0%} of the time the angles came from elsewhere than "
+            "expected. Check, in this order: start pose, array.mounting_rad (sign, mirrored array), "
+            "places and PCIs of the radio heads, phase_rad against angle_rad, the clocks.",
+            soft_wrap=True,
+        )
+        raise typer.Exit(3)
 
 
 def _lost(drive: Drive) -> bool:

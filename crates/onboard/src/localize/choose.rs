@@ -2,12 +2,13 @@
 
 use std::sync::Arc;
 
+use super::area::Area;
 use super::dead_reckoning::DeadReckoning;
 use super::initialise::Initialiser;
 use super::localizer::Localizer;
+use super::recovery::Recovery;
 use super::search::Search;
 use super::tracker::{InitialPose, Tracker, TrackerConfig};
-use super::tracking::tracking;
 use crate::geometry::Pose;
 use crate::radio_head::RadioHead;
 use crate::settings::{LocalizerSettings, SettingsError, Site, Vehicle};
@@ -31,11 +32,16 @@ pub fn built_in(
     let heads = RadioHead::heard(site, vehicle);
     let integrity = vehicle.integrity.as_ref().map(Into::into);
     let road = site.build_road()?;
+    let road = road.filter(|_| vehicle.follows_road());
     match road {
         Some(road) if !vehicle.start.known => {
             let either = vehicle.start.either_direction;
-            let search = Initialiser::new(config, road, either, &heads);
-            Ok(Box::new(Search::new(search, integrity)))
+            let search = Initialiser::new(config, road.clone(), either, &heads);
+            Ok(Box::new(Search::new(search, Some(road), integrity)))
+        }
+        None if !vehicle.start.known => {
+            let search = Initialiser::in_plane(config, Area::of_heads(&heads), &heads);
+            Ok(Box::new(Search::new(search, None, integrity)))
         }
         road => {
             let start = InitialPose {
@@ -43,9 +49,9 @@ pub fn built_in(
                 position_std_m: vehicle.start.position_std_m,
                 heading_std_rad: vehicle.start.heading_std_rad,
             };
-            let map = road.filter(|_| vehicle.follows_road()).map(Arc::new);
+            let map = road.clone().map(Arc::new);
             let tracker = Tracker::new(config, map, &heads, &start);
-            Ok(tracking(tracker, &heads, integrity))
+            Ok(Box::new(Recovery::new(tracker, road, &heads, integrity)))
         }
     }
 }

@@ -1,6 +1,7 @@
-//! A start from scratch: the vehicle knows the road and hears radio heads, but not where it is.
+//! A start from scratch: the vehicle hears radio heads, but does not know where it is.
 //!
-//! One tracker for each metre of the road, and for each direction in which it may be driven: a sum of
+//! One tracker for each metre of the road, and for each direction in which it may be driven; without
+//! a road, one for each square of the plane and each of twelve headings: a sum of
 //! Gaussians (Sorenson and Alspach 1971), each weighed by how well it foretells the angles. Those
 //! that fall far behind or leave the road are given up, those that meet become one. The vehicle is
 //! found when all that are left, taken as one Gaussian, know its place.
@@ -8,9 +9,11 @@
 use std::f64::consts::TAU;
 use std::sync::Arc;
 
+use super::area::Area;
+use super::gaussian::Innovation;
 use super::measurement::{AngleMeasurement, UpdateReason, UpdateVerdict};
 use super::pose_estimate::PoseEstimate;
-use super::tracker::state::{ALONG, STATES};
+use super::tracker::state::{ACROSS, ALONG, HEADING, STATES};
 use super::tracker::{InitialPose, OdometryVerdict, Tracker, TrackerConfig};
 use crate::geometry::{Pose, wrap_angle};
 use crate::observation::OdometrySample;
@@ -35,10 +38,36 @@ const FOUND_STD_M: f64 = 0.4;
 /// Probability of the other direction of travel at which it is ruled out.
 const OTHER_WAY: f64 = 1e-5;
 
+/// Standard deviation of the heading at which it is found in the plane (rad).
+const FOUND_STD_RAD: f64 = 0.2;
+
+/// Headings of the first hypotheses in each square of the plane, and the most hypotheses.
+const HEADINGS: u32 = 12;
+const MOST_HYPOTHESES: f64 = 4000.0;
+
+/// What an angle says for the belief it met. Looks that are not independent have a variance that
+/// says so, and cost alike.
+pub(super) fn log_likelihood(innovation: Option<Innovation>, verdict: &UpdateVerdict) -> f64 {
+    match (innovation, verdict.reason) {
+        (Some(seen), UpdateReason::Consistent) => {
+            -0.5 * (seen.mahalanobis2() + (TAU * seen.variance).ln())
+        }
+        (Some(_), _) => -OUTLIER,
+        (None, _) => 0.0,
+    }
+}
+
+/// Where the vehicle may be.
+#[derive(Clone, Debug)]
+enum Ground {
+    Roads(Vec<Arc<Road>>),
+    Plane(Area),
+}
+
 /// A hypothesis of where the vehicle is.
 #[derive(Clone, Debug)]
 struct Hypothesis {
-    /// Number of the road it drives on.
+    /// Number of the road it drives on; 0 in the plane.
     road: usize,
     tracker: Tracker,
     log_likelihood: f64,
@@ -54,6 +83,18 @@ impl Hypothesis {
         )
     }
 
+    /// Whether another one in the plane is within a deviation of it in each direction.
+    fn meets(&self, other: &Self) -> bool {
+        let (mine, yours) = (self.tracker.belief(), other.tracker.belief());
+        [ALONG, ACROSS, HEADING].into_iter().all(|state| {
+            let mut apart = mine.mean[state] - yours.mean[state];
+            if state == HEADING {
+                apart = wrap_angle(apart);
+            }
+            apart * apart < mine.covariance[state][state]
+        })
+    }
+
     /// Takes in another hypothesis on the same road: the Gaussian of the same mean and covariance
     /// as both together.
     fn absorb(&mut self, other: &Self) {
@@ -64,6 +105,7 @@ impl Hypothesis {
         for (apart, mean) in apart.iter_mut().zip(one.mean) {
             *apart -= mean;
         }
+        apart[HEADING] = wrap_angle(apart[HEADING]);
         for i in 0..STATES {
             one.mean[i] += weight * apart[i];
             for j in 0..STATES {
@@ -81,7 +123,7 @@ impl Hypothesis {
 #[derive(Clone, Debug)]
 pub struct Initialiser {
     config: TrackerConfig,
-    roads: Vec<Arc<Road>>,
+    ground: Ground,
     heads: Vec<RadioHead>,
     hypotheses: Vec<Hypothesis>,
 }
@@ -96,9 +138,24 @@ impl Initialiser {
         heads: &[RadioHead],
     ) -> Self {
         let against = either_direction.then(|| Arc::new(road.reversed()));
+        let roads = [Arc::new(road)].into_iter().chain(against).collect();
+        Self::on(config, Ground::Roads(roads), heads)
+    }
+
+    /// The vehicle may be anywhere in an area, heading anywhere.
+    pub fn in_plane(config: TrackerConfig, area: Area, heads: &[RadioHead]) -> Self {
+        Self::on(config, Ground::Plane(area), heads)
+    }
+
+    /// Whether all of an area is searched as finely as is useful.
+    pub fn is_small(area: Area) -> bool {
+        area.spacing_m(MOST_HYPOTHESES / f64::from(HEADINGS), SPACING_M) <= SPACING_M
+    }
+
+    fn on(config: TrackerConfig, ground: Ground, heads: &[RadioHead]) -> Self {
         let mut made = Self {
             config,
-            roads: [Arc::new(road)].into_iter().chain(against).collect(),
+            ground,
             heads: heads.to_vec(),
             hypotheses: Vec::new(),
         };
@@ -106,8 +163,41 @@ impl Initialiser {
         made
     }
 
+    /// Counts distances on from where another tracker of the same vehicle does.
+    pub(super) fn resume(&mut self, other: &Tracker) {
+        for hypothesis in &mut self.hypotheses {
+            hypothesis.tracker.resume(other);
+        }
+    }
+
     fn restart(&mut self) {
-        for (number, road) in self.roads.iter().enumerate() {
+        let roads = match &self.ground {
+            Ground::Roads(roads) => roads,
+            Ground::Plane(area) => {
+                let spacing_m = area.spacing_m(MOST_HYPOTHESES / f64::from(HEADINGS), SPACING_M);
+                let turn_rad = TAU / f64::from(HEADINGS);
+                for place in area.places(spacing_m) {
+                    self.hypotheses.extend((0..HEADINGS).map(|number| {
+                        let start = InitialPose {
+                            pose: Pose {
+                                x_m: place.x_m,
+                                y_m: place.y_m,
+                                heading_rad: wrap_angle(f64::from(number) * turn_rad),
+                            },
+                            position_std_m: 0.5 * spacing_m,
+                            heading_std_rad: 0.5 * turn_rad,
+                        };
+                        Hypothesis {
+                            road: 0,
+                            tracker: Tracker::new(self.config, None, &self.heads, &start),
+                            log_likelihood: 0.0,
+                        }
+                    }));
+                }
+                return;
+            }
+        };
+        for (number, road) in roads.iter().enumerate() {
             let count = (road.length_m() / SPACING_M).ceil().max(1.0);
             let spacing_m = road.length_m() / count;
             let heads = &self.heads;
@@ -141,14 +231,7 @@ impl Initialiser {
         for (rank, hypothesis) in self.hypotheses.iter_mut().enumerate() {
             let innovation = hypothesis.tracker.innovation(head, measured);
             let verdict = hypothesis.tracker.update(head, measured);
-            // Looks that are not independent have a variance that says so, and cost alike.
-            hypothesis.log_likelihood -= match (innovation, verdict.reason) {
-                (Some(seen), UpdateReason::Consistent) => {
-                    0.5 * (seen.mahalanobis2() + (TAU * seen.variance).ln())
-                }
-                (Some(_), _) => OUTLIER,
-                (None, _) => 0.0,
-            };
+            hypothesis.log_likelihood += log_likelihood(innovation, &verdict);
             if rank == 0 {
                 first = verdict;
             }
@@ -165,15 +248,20 @@ impl Initialiser {
             .hypotheses
             .first()
             .map_or(0.0, |best| best.log_likelihood);
-        let roads = &self.roads;
-        self.hypotheses.retain(|hypothesis| {
+        let ground = &self.ground;
+        let possible = |hypothesis: &Hypothesis| {
+            let Ground::Roads(roads) = ground else {
+                return true;
+            };
             let (along_m, std_m) = hypothesis.along_m();
             let length_m = roads
                 .get(hypothesis.road)
                 .map_or(0.0, |road| road.length_m());
-            let on_the_road = (-3.0 * std_m..=length_m + 3.0 * std_m).contains(&along_m);
-            on_the_road && hypothesis.log_likelihood > best - BEHIND
-        });
+            (-3.0 * std_m..=length_m + 3.0 * std_m).contains(&along_m)
+        };
+        self.hypotheses
+            .retain(|hypothesis| possible(hypothesis) && hypothesis.log_likelihood > best - BEHIND);
+        let in_plane = matches!(self.ground, Ground::Plane(_));
         let mut kept = 0;
         for index in 0..self.hypotheses.len() {
             let (better, rest) = self.hypotheses.split_at_mut(index);
@@ -182,6 +270,9 @@ impl Initialiser {
             };
             let (along_m, std_m) = hypothesis.along_m();
             let met = better.iter_mut().take(kept).find(|other| {
+                if in_plane {
+                    return hypothesis.meets(other);
+                }
                 other.road == hypothesis.road && (other.along_m().0 - along_m).abs() < std_m
             });
             if let Some(other) = met {
@@ -208,6 +299,13 @@ impl Initialiser {
         self.hypotheses.len()
     }
 
+    /// Log-likelihood of the best hypothesis.
+    pub(super) fn best(&self) -> f64 {
+        self.hypotheses
+            .first()
+            .map_or(f64::NEG_INFINITY, |best| best.log_likelihood)
+    }
+
     /// One tracker for all hypotheses that are left, once they know the position.
     pub fn found(&self) -> Option<Tracker> {
         let spread = self.pose(f64::NEG_INFINITY).principal_variances();
@@ -221,7 +319,10 @@ impl Initialiser {
                 other_way += (hypothesis.log_likelihood - best).exp();
             }
         }
-        (spread[0] < FOUND_STD_M * FOUND_STD_M && other_way < OTHER_WAY).then_some(one.tracker)
+        let heading_known = matches!(self.ground, Ground::Roads(_))
+            || one.tracker.belief().covariance[HEADING][HEADING] < FOUND_STD_RAD * FOUND_STD_RAD;
+        let placed = spread[0] < FOUND_STD_M * FOUND_STD_M;
+        (placed && heading_known && other_way < OTHER_WAY).then_some(one.tracker)
     }
 
     /// Mean and covariance over all hypotheses, each weighed by its likelihood: where the vehicle

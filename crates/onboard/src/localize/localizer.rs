@@ -9,6 +9,17 @@ use crate::BoxError;
 use crate::observation::OdometrySample;
 use crate::radio_head::RadioHead;
 
+/// How a localizer that was lost came back.
+#[derive(Debug, Clone, Copy, PartialEq)]
+pub struct Recovered {
+    /// When, in seconds.
+    pub time_s: f64,
+    /// By how far its place changed, in metres ...
+    pub moved_m: f64,
+    /// ... and its heading, counter-clockwise in radians.
+    pub turned_rad: f64,
+}
+
 /// What turns odometry and angles into a pose.
 ///
 /// Odometry comes in order of time, with finite values. Angles are no older than the newest
@@ -43,6 +54,17 @@ pub trait Localizer: Any + Send {
 
     /// Number of places the vehicle may be at, as long as its first pose is searched for.
     fn hypotheses(&self) -> Option<usize> {
+        None
+    }
+
+    /// Whether the angles come from elsewhere than expected, so that the pose is not to be relied on
+    /// and every further angle helps.
+    fn is_lost(&self) -> bool {
+        false
+    }
+
+    /// How it came back when it was lost last.
+    fn recovered(&self) -> Option<Recovered> {
         None
     }
 

@@ -2,7 +2,7 @@
 
 use super::gaussian;
 use super::integrity_state::Integrity;
-use crate::geometry::Pose;
+use crate::geometry::{Pose, wrap_angle};
 
 /// Where a localizer believes the vehicle to be.
 #[derive(Debug, Clone, Copy, PartialEq)]
@@ -19,6 +19,22 @@ pub struct PoseEstimate {
 }
 
 impl PoseEstimate {
+    /// Widens the covariance by another estimate that may be the right one.
+    pub fn cover(&mut self, other: &Self) {
+        let apart = [
+            other.pose.x_m - self.pose.x_m,
+            other.pose.y_m - self.pose.y_m,
+            wrap_angle(other.pose.heading_rad - self.pose.heading_rad),
+        ];
+        if let (Some(own), Some(theirs)) = (&mut self.covariance, &other.covariance) {
+            for ((row, theirs), a) in own.iter_mut().zip(theirs).zip(apart) {
+                for ((value, theirs), b) in row.iter_mut().zip(theirs).zip(apart) {
+                    *value += theirs + a * b;
+                }
+            }
+        }
+    }
+
     /// Variances of the horizontal error along its principal axes, larger first, in m²; infinite
     /// where the localizer does not know them.
     pub fn principal_variances(&self) -> [f64; 2] {

@@ -1,21 +1,23 @@
-//! The search for the first pose, and the tracker that comes out of it.
+//! The search for the first pose, along the road or in the plane, and the tracker that comes out of it.
 
 use super::initialise::Initialiser;
 use super::integrity::IntegrityConfig;
 use super::integrity_state::{Integrity, IntegrityState};
-use super::localizer::{Localizer, copy_into};
+use super::localizer::{Localizer, Recovered, copy_into};
 use super::measurement::{AngleMeasurement, UpdateVerdict};
 use super::pose_estimate::PoseEstimate;
 use super::quantile::RadialQuantile;
+use super::recovery::Recovery;
 use super::tracker::{OdometryVerdict, Tracker};
-use super::tracking::tracking;
 use crate::BoxError;
 use crate::observation::OdometrySample;
 use crate::radio_head::RadioHead;
+use crate::road::Road;
 
-/// A localizer that first searches for the vehicle along the road.
+/// A localizer that first searches for the vehicle.
 pub struct Search {
     initialiser: Initialiser,
+    road: Option<Road>,
     integrity: Option<(IntegrityConfig, RadialQuantile)>,
     found: Option<Box<dyn Localizer>>,
     keeps_journal: bool,
@@ -29,6 +31,7 @@ impl Clone for Search {
         }
         Self {
             initialiser: self.initialiser.clone(),
+            road: self.road.clone(),
             integrity: self.integrity.clone(),
             found,
             keeps_journal: self.keeps_journal,
@@ -48,9 +51,14 @@ impl Clone for Search {
 
 impl Search {
     /// A search, from which a tracker comes, guarded or not.
-    pub fn new(initialiser: Initialiser, integrity: Option<IntegrityConfig>) -> Self {
+    pub fn new(
+        initialiser: Initialiser,
+        road: Option<Road>,
+        integrity: Option<IntegrityConfig>,
+    ) -> Self {
         Self {
             initialiser,
+            road,
             integrity: integrity.map(|config| (config, RadialQuantile::new(config.risk))),
             found: None,
             keeps_journal: false,
@@ -77,7 +85,9 @@ impl Localizer for Search {
         let verdict = self.initialiser.update(head, measured);
         if let Some(tracker) = self.initialiser.found() {
             let config = self.integrity.as_ref().map(|(config, _)| *config);
-            let mut localizer = tracking(tracker, self.initialiser.heads(), config);
+            let (road, heads) = (self.road.clone(), self.initialiser.heads());
+            let mut localizer: Box<dyn Localizer> =
+                Box::new(Recovery::new(tracker, road, heads, config));
             if self.keeps_journal {
                 localizer.keep_journal();
             }
@@ -106,6 +116,14 @@ impl Localizer for Search {
 
     fn hypotheses(&self) -> Option<usize> {
         self.found.is_none().then(|| self.initialiser.left())
+    }
+
+    fn is_lost(&self) -> bool {
+        self.found.as_ref().is_some_and(|found| found.is_lost())
+    }
+
+    fn recovered(&self) -> Option<Recovered> {
+        self.found.as_ref()?.recovered()
     }
 
     fn tracker(&self) -> Option<&Tracker> {

@@ -3,6 +3,7 @@
 mod build;
 mod course;
 mod lane_keeping;
+mod smooth;
 
 pub use build::{RoadError, Segment};
 pub use course::{Gap, Projection, Road};

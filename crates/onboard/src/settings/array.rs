@@ -29,7 +29,8 @@ pub struct ArraySettings {
     /// Direction of its axis from the vehicle's forward axis, counter-clockwise, in radians.
     #[schemars(range(min = -3.2, max = 3.2))]
     pub mounting_rad: f64,
-    /// Standard deviation of that direction in radians.
+    /// Standard deviation of that direction in radians; 0 is known exactly on a road, and 0.02 for a
+    /// differential drive.
     #[schemars(range(min = 0.0, max = 3.2))]
     pub mounting_std_rad: f64,
     /// Random walk of that direction, in radians per root of a metre driven.

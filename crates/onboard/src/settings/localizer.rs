@@ -51,7 +51,8 @@ pub struct TrackerSettings {
     /// Distance over which the curvature is forgotten, in metres.
     #[schemars(range(min = 1e-3, max = 1e6))]
     pub curvature_correlation_m: f64,
-    /// How the odometer's scale walks, per root of a metre driven.
+    /// How the odometer's scale walks, per root of a metre driven; 0 is a constant scale on a road,
+    /// and 0.05 for a differential drive.
     #[schemars(range(min = 0.0, max = 1.0))]
     pub odometer_scale_walk_per_sqrt_m: f64,
     /// Probability with which a good angle is taken for an outlier.

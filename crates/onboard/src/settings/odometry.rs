@@ -33,6 +33,9 @@ pub struct OdometerSettings {
     /// Standard deviation of the distance after one metre, growing with the root of distance.
     #[schemars(range(min = 0.0, max = 10.0))]
     pub noise_m_per_sqrt_m: f64,
+    /// Standard deviation of a single reading of the speed, in m/s.
+    #[schemars(range(min = 0.0, max = 10.0))]
+    pub speed_noise_mps: f64,
     /// Probability that a sample is lost.
     #[schemars(range(min = 0.0, max = 0.99))]
     pub dropout_probability: f64,
@@ -45,24 +48,36 @@ impl Default for OdometerSettings {
             scale: 1.0,
             scale_std: 0.0,
             noise_m_per_sqrt_m: 0.0,
+            speed_noise_mps: 0.0,
             dropout_probability: 0.0,
         }
     }
 }
 
-/// `[gyroscope]`
+/// `[gyroscope]`: whatever tells the yaw rate, a gyroscope or a pair of wheels.
 #[derive(Debug, Clone, Copy, PartialEq, Default, Serialize, Deserialize, JsonSchema)]
 #[serde(default, deny_unknown_fields)]
 pub struct GyroscopeSettings {
     /// Angle random walk in rad/√s.
     #[schemars(range(min = 0.0, max = 10.0))]
     pub noise_rad_per_sqrt_s: f64,
+    /// The same by the distance driven, in rad/√m: wheels of unequal grip.
+    #[schemars(range(min = 0.0, max = 10.0))]
+    pub noise_rad_per_sqrt_m: f64,
+    /// The same by the angle turned, in rad/√rad: wheels that slip as they turn.
+    #[schemars(range(min = 0.0, max = 10.0))]
+    pub noise_rad_per_sqrt_rad: f64,
     /// Constant bias in rad/s.
     #[schemars(range(min = -10.0, max = 10.0))]
     pub bias_radps: f64,
     /// Standard deviation of that in rad/s.
     #[schemars(range(min = 0.0, max = 10.0))]
     pub bias_std_radps: f64,
+    /// How the bias walks, in rad/s per root of a second; 0 is a constant bias on a road, and a
+    /// tenth of its standard deviation for a differential drive, whose wheels grip as the floor
+    /// lets them.
+    #[schemars(range(min = 0.0, max = 10.0))]
+    pub bias_walk_radps_per_sqrt_s: f64,
 }
 
 /// `[lane_keeping]`: how the vehicle strays from the middle of the road and comes back.

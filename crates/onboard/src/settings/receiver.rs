@@ -26,6 +26,29 @@ pub struct ReceiverSettings {
     /// Standard deviation of the sensed SNR in dB.
     #[schemars(range(min = 0.0, max = 40.0))]
     pub snr_noise_db: f64,
+    /// How much older than its time stamp an angle is, in seconds.
+    #[schemars(range(min = -1.0, max = 0.4))]
+    pub lateness_s: f64,
+    /// Standard deviation of that, within which it is found while driving, in seconds; without, 0
+    /// on a road and 0.05 s for a differential drive.
+    #[serde(skip_serializing_if = "Option::is_none")]
+    #[schemars(range(min = 0.0, max = 0.5))]
+    pub lateness_std_s: Option<f64>,
+    /// Standard deviation of the error of the electrical angle that stays from look to look, in
+    /// radians.
+    #[schemars(range(min = 0.0, max = 3.2))]
+    pub phase_bias_std_rad: f64,
+    /// Share of an angle's stated variance that stays so; 0.5 for logged angles where it is not
+    /// stated, and 0 for the receiver's own, whose deviation is that of thermal noise.
+    #[serde(skip_serializing_if = "Option::is_none")]
+    #[schemars(range(min = 0.0, max = 1.0))]
+    pub phase_bias_share: Option<f64>,
+    /// Time over which that error is forgotten, in seconds, provided that the vehicle moves.
+    #[schemars(range(min = 1e-3, max = 1e9))]
+    pub phase_bias_correlation_s: f64,
+    /// Distance over which that error is forgotten, in metres.
+    #[schemars(range(min = 1e-3, max = 1e9))]
+    pub phase_bias_correlation_m: f64,
     /// Cells to listen to; all that the site has without.
     #[serde(skip_serializing_if = "Option::is_none")]
     pub pci_allow_list: Option<Vec<u16>>,
@@ -40,6 +63,12 @@ impl Default for ReceiverSettings {
             pilots: Pilots::Ssb,
             snapshots: 20,
             snr_noise_db: 0.0,
+            lateness_s: 0.0,
+            lateness_std_s: None,
+            phase_bias_std_rad: 0.0,
+            phase_bias_share: None,
+            phase_bias_correlation_s: 1.0,
+            phase_bias_correlation_m: 0.3,
             pci_allow_list: None,
         }
     }

@@ -17,9 +17,14 @@ pub struct RoadSettings {
     /// Width in metres.
     #[schemars(range(min = 0.1, max = 1000.0))]
     pub width_m: f64,
-    /// Radius by which the corners of a polyline are rounded, in metres.
+    /// Standard deviation across the road of where it is said to be, in metres.
+    #[schemars(range(min = 0.0, max = 100.0))]
+    pub position_std_m: f64,
+    /// Radius by which the corners of a polyline are rounded, in metres. Without, the road runs
+    /// smoothly through its points, as closely as they were surveyed.
+    #[serde(skip_serializing_if = "Option::is_none")]
     #[schemars(range(min = 0.01, max = 1e5))]
-    pub corner_radius_m: f64,
+    pub corner_radius_m: Option<f64>,
     /// Where `segments` begin.
     pub start: Pose,
     /// Lines and arcs that join without a kink.
@@ -53,6 +58,9 @@ pub struct SegmentSettings {
     pub surveyed: bool,
 }
 
+/// Standard deviation of points that nothing is stated of (m).
+const DRAWN_STD_M: f64 = 0.02;
+
 const fn surveyed() -> bool {
     true
 }
@@ -61,7 +69,8 @@ impl Default for RoadSettings {
     fn default() -> Self {
         Self {
             width_m: 5.0,
-            corner_radius_m: 10.0,
+            position_std_m: 0.0,
+            corner_radius_m: None,
             start: Pose::default(),
             segments: None,
             polyline_m: None,
@@ -98,6 +107,14 @@ impl RoadSettings {
         Ok(())
     }
 
+    /// Standard deviation across the road of where it is: as stated, or that of points that somebody
+    /// drew.
+    pub fn survey_std_m(&self) -> f64 {
+        let is_drawn = self.polyline_m.is_some() && self.corner_radius_m.is_none();
+        let least_m = if is_drawn { DRAWN_STD_M } else { 0.0 };
+        self.position_std_m.max(least_m)
+    }
+
     /// Builds the road; errors name `key` as its own.
     ///
     /// # Errors
@@ -118,7 +135,10 @@ impl RoadSettings {
             }
             (None, Some(polyline)) => {
                 let points: Vec<Point> = polyline.iter().map(|&point| point.into()).collect();
-                let road = Road::from_polyline(&points, self.corner_radius_m, self.width_m);
+                let road = match self.corner_radius_m {
+                    Some(radius_m) => Road::from_polyline(&points, radius_m, self.width_m),
+                    None => Road::through_points(&points, self.survey_std_m(), self.width_m),
+                };
                 ("polyline_m", road)
             }
             (None, None) => {

@@ -34,6 +34,10 @@ pub struct Vehicle {
     #[serde(default = "gentle")]
     #[schemars(range(min = 0.01, max = 20.0))]
     pub acceleration_mps2: f64,
+    /// Yaw rate in rad/s that it cannot exceed; what is read beyond is refused.
+    #[serde(default = "half_a_turn")]
+    #[schemars(range(min = 0.01, max = 100.0))]
+    pub top_yaw_rate_radps: f64,
     /// How it keeps to the middle of a road.
     #[serde(default)]
     pub lane_keeping: LaneKeepingSettings,
@@ -71,6 +75,10 @@ pub struct Vehicle {
 
 const fn walking_pace() -> f64 {
     15.0
+}
+
+const fn half_a_turn() -> f64 {
+    4.0
 }
 
 const fn gentle() -> f64 {

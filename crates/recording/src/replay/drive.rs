@@ -1,7 +1,8 @@
 //! A drive being replayed.
 
 use onboard::geometry::Pose;
-use onboard::localize::tracker::OdometryVerdict;
+use onboard::localize::Recovered;
+use onboard::localize::tracker::{Findings, OdometryVerdict};
 use onboard::observation::OdometrySample;
 use onboard::settings::{Platform, Site, Vehicle};
 use onboard::{Custom, Onboard};
@@ -12,11 +13,18 @@ use super::located::{LocatedDrive, LocatedPose, Remark};
 use crate::library::load;
 use crate::odometry::OdometryLog;
 
+/// Departures of the odometer's scale, and of the angles' lateness (s), below which nobody minds.
+const LEAST_SCALE: f64 = 0.03;
+const LEAST_LATENESS_S: f64 = 0.03;
+
 /// A drive being located.
 pub struct Replay<'a> {
     onboard: Onboard,
     odometry: std::iter::Peekable<std::slice::Iter<'a, OdometrySample>>,
     drive: LocatedDrive,
+    /// Whether the localizer was lost, and how it came back last.
+    was_lost: bool,
+    recovered: Option<Recovered>,
     /// Whether the odometry before told of the end of the road.
     beyond_map: bool,
     /// Where the gaps of the road begin that were remarked on (m).
@@ -42,6 +50,8 @@ impl<'a> Replay<'a> {
         let onboard = Onboard::new(site, vehicle, &platform, start, custom)?;
         Ok(Self {
             onboard,
+            was_lost: false,
+            recovered: None,
             beyond_map: false,
             gaps_m: Vec::new(),
             odometry: odometry.samples.iter().peekable(),
@@ -72,9 +82,65 @@ impl<'a> Replay<'a> {
             let heard = self.onboard.hear(time_s, &mut source);
             let heard = heard.map_err(ReplayError::Custom)?;
             self.drive.executions.extend_from_slice(heard.executions);
+            self.remark_on_loss(time_s);
             ssbs = later;
         }
         Ok(())
+    }
+
+    /// Remarks on what the drive showed of the vehicle that its settings do not say.
+    fn remark_on_findings(&mut self) {
+        let Some(findings) = self.onboard.findings() else {
+            return;
+        };
+        let time_s = self
+            .drive
+            .poses
+            .last()
+            .map_or(0.0, |last| last.estimate.time_s);
+        let Findings {
+            odometer_scale,
+            lateness_s,
+            ..
+        } = findings;
+        if odometer_scale.is_remarkable(LEAST_SCALE) {
+            let text = format!(
+                "the odometer reads {:.3} ± {:.3} m per metre driven; check odometer.scale",
+                odometer_scale.found, odometer_scale.std
+            );
+            self.remark(time_s, text);
+        }
+        if lateness_s.is_remarkable(LEAST_LATENESS_S) {
+            let text = format!(
+                "angles are {:.0} ± {:.0} ms later than stated; check receiver.lateness_s",
+                1e3 * lateness_s.found,
+                1e3 * lateness_s.std
+            );
+            self.remark(time_s, text);
+        }
+    }
+
+    fn remark_on_loss(&mut self, time_s: f64) {
+        let (is_lost, recovered) = (self.onboard.is_lost(), self.onboard.recovered());
+        if is_lost && !self.was_lost {
+            let text = format!(
+                "angles at {time_s:.1} s: they come from elsewhere than expected, the position is \
+                 not available; searching"
+            );
+            self.remark(time_s, text);
+        }
+        if let Some(how) = recovered.filter(|_| recovered != self.recovered) {
+            let text = format!(
+                "angles at {time_s:.1} s: found again, {:.2} m from and {:.2} rad against where it \
+                 was believed to be",
+                how.moved_m, how.turned_rad
+            );
+            self.remark(time_s, text);
+        } else if self.was_lost && !is_lost {
+            let text = format!("angles at {time_s:.1} s: they come from where expected again");
+            self.remark(time_s, text);
+        }
+        (self.was_lost, self.recovered) = (is_lost, recovered);
     }
 
     /// Takes in the rest of the odometry.
@@ -83,6 +149,7 @@ impl<'a> Replay<'a> {
     /// [`ReplayError::Custom`].
     pub fn finish(mut self) -> Result<LocatedDrive, ReplayError> {
         self.odometry_until(f64::INFINITY)?;
+        self.remark_on_findings();
         self.drive
             .remarks
             .sort_by(|a, b| a.time_s.total_cmp(&b.time_s));
@@ -129,6 +196,13 @@ impl<'a> Replay<'a> {
                          used instead"
                     ),
                 ),
+                Ok(OdometryVerdict::YawRateRefused { radps }) => self.remark(
+                    at_s,
+                    format!(
+                        "odometry at {at_s} s: no vehicle turns by {radps} rad/s, its yaw rate was \
+                         refused; check its unit, or vehicle.top_yaw_rate_radps"
+                    ),
+                ),
                 Ok(OdometryVerdict::BeyondMap { by_m }) => {
                     if !self.beyond_map {
                         let text = format!(
@@ -162,6 +236,7 @@ impl<'a> Replay<'a> {
                 speed_mps: sample.speed_mps,
                 yaw_rate_radps: sample.yaw_rate_radps,
                 searching: self.onboard.searching(),
+                is_lost: self.onboard.is_lost(),
                 calibration: self.onboard.calibration(),
             });
         }

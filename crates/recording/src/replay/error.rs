@@ -33,6 +33,17 @@ pub enum ReplayError {
         /// Why.
         source: nr_ssb::front_end::FrontEndError,
     },
+    /// Angles and odometry of different times.
+    #[error(
+        "no angle falls into the odometry's time: odometry begins at {odometry_s} s, angles at \
+         {angles_s} s; both must be told by one clock"
+    )]
+    Clocks {
+        /// Time of the first odometry sample (s).
+        odometry_s: f64,
+        /// Time of the first angle (s).
+        angles_s: f64,
+    },
     /// No usable odometry.
     #[error("the odometry holds no usable sample")]
     NoOdometry,

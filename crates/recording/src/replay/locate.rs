@@ -8,11 +8,13 @@ use onboard::receive::{Receiver, ReceiverConfig};
 use onboard::settings::{Site, Vehicle, WakeUpSettings};
 use onboard::{Custom, Execution};
 
+use super::doubts::doubts;
 use super::drive::Replay;
 use super::error::ReplayError;
 use super::located::{LocatedDrive, LocatedPose};
 use super::receive::receive_recording;
 use super::start::{StartChoice, starting};
+use super::stated::with_phases;
 use crate::angle_log::{AngleLog, LoggedAngle};
 use crate::odometry::OdometryLog;
 use crate::sigmf::Recording;
@@ -34,7 +36,11 @@ pub fn locate_angles(
     for remark in &angles.remarks {
         replay.remark(remark.time_s, remark.to_string());
     }
-    replay.hear(&angles.angles)?;
+    let angles = with_phases(&angles.angles, vehicle.array.spacing_wavelengths);
+    for (time_s, text) in doubts(site, &vehicle, odometry, &angles)? {
+        replay.remark(time_s, text);
+    }
+    replay.hear(&angles)?;
     finish(replay, site, &vehicle, start, odometry, smooth)
 }
 
@@ -90,11 +96,12 @@ fn look_back(
     odometry: &OdometryLog,
     executions: &[Execution],
 ) -> Result<Vec<LocatedPose>, ReplayError> {
-    let unguarded = Vehicle {
+    let mut unguarded = Vehicle {
         integrity: None,
         wake_up: WakeUpSettings::default(), // whatever was chosen then is heard again
         ..vehicle.clone()
     };
+    unguarded.receiver.lateness_s = 0.0; // taken off already
     let mut mistrusted_until_s = BTreeMap::new();
     for execution in executions {
         if execution.verdict.reason == UpdateReason::Excluded {
@@ -108,10 +115,10 @@ fn look_back(
         until_s.is_none_or(|until_s| ssb.time_s > *until_s)
     };
     let logged = |execution: &Execution| {
-        Some(LoggedAngle {
-            ssb: execution.ssb,
-            measured: execution.measured?,
-        })
+        let measured = execution.measured?;
+        let mut ssb = execution.ssb;
+        ssb.time_s = measured.time_s;
+        Some(LoggedAngle { ssb, measured })
     };
     let executions = executions.iter().filter(trusted);
     let mut angles: Vec<LoggedAngle> = executions.filter_map(logged).collect();

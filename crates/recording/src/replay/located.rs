@@ -16,6 +16,8 @@ pub struct LocatedPose {
     /// Number of places the vehicle may be at, while the first pose is searched for; the estimate
     /// is their mean.
     pub searching: Option<usize>,
+    /// Whether the angles came from elsewhere than expected, so that the pose is not to be relied on.
+    pub is_lost: bool,
     /// How far the array has come from its survey.
     pub calibration: Option<Calibration>,
 }

@@ -1,12 +1,14 @@
 //! A recorded drive through the pipeline: odometry and SSBs, or angles, in order of time.
 
 mod bursts;
+mod doubts;
 mod drive;
 mod error;
 mod locate;
 mod located;
 mod receive;
 mod start;
+mod stated;
 
 pub use drive::Replay;
 pub use error::ReplayError;
@@ -14,3 +16,4 @@ pub use locate::{locate_angles, locate_recording};
 pub use located::{LocatedDrive, LocatedPose, Remark};
 pub use receive::receive_recording;
 pub use start::{StartChoice, starting};
+pub use stated::as_stated;

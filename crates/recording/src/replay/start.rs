@@ -1,7 +1,7 @@
 //! Where a recorded drive begins.
 
 use onboard::geometry::Pose;
-use onboard::settings::{Check, SettingsError, Site, Vehicle};
+use onboard::settings::{Check, LocalizerSettings, SettingsError, Site, Vehicle};
 
 /// Where a drive begins, if not where the vehicle's settings say.
 #[derive(Debug, Clone, Copy, PartialEq, Default)]
@@ -36,14 +36,16 @@ pub fn starting(
     let heard = heard
         .filter(|head| vehicle.receiver.hears(head.pci))
         .count();
-    let findable = site.road.is_some() && vehicle.follows_road() && heard > 1;
+    let along_road = site.road.is_some() && vehicle.follows_road();
+    let tracks = matches!(vehicle.localizer, LocalizerSettings::Tracker(_));
+    let findable = tracks && heard > if along_road { 1 } else { 2 };
     let file = &vehicle.name;
     Check { file }.that(
         pose.is_some() || findable,
         "start.pose",
         "missing",
-        "without it the vehicle is found along the road, which takes a site with a road, a tracker \
-         that follows it (localizer.map) and two radio heads or more",
+        "without it the vehicle is found by a tracker (localizer.kind), along a road that it follows \
+         by two radio heads or more, elsewhere by three",
     )?;
     Ok((vehicle, pose.unwrap_or_default()))
 }

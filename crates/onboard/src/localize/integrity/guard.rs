@@ -139,6 +139,10 @@ impl Guard {
     pub fn pose(&self, time_s: f64) -> PoseEstimate {
         let mut pose = self.bank.main().pose(time_s);
         pose.integrity = Some(self.integrity(time_s));
+        if let Some(restarted) = &self.restarted {
+            // It may take over.
+            pose.cover(&restarted.bank.main().pose(time_s));
+        }
         pose
     }
 

@@ -4,12 +4,15 @@ use super::motion::{MotionNoise, PathBend, Yaw};
 use super::sighting::{ArrayModel, Sighting};
 use crate::localize::quantile::normal_quantile;
 use crate::road::LaneKeeping;
-use crate::settings::{DriveKind, LocalizerSettings, Site, TrackerSettings, Vehicle};
+use crate::settings::{DriveKind, LocalizerSettings, RoadSettings, Site, TrackerSettings, Vehicle};
 
 /// The best that the tracker takes for granted where nothing is said.
 const LEAST_ODOMETER_SCALE_STD: f64 = 0.001;
 const LEAST_ODOMETER_NOISE_M_PER_SQRT_M: f64 = 0.003;
 const LEAST_LANE_RMS_M: f64 = 0.02;
+
+/// Wavelength along the road of the errors of its survey (m).
+const SURVEY_WAVELENGTH_M: f64 = 20.0;
 
 /// Assumptions of the tracker, SI and radians: what site and vehicle state.
 #[derive(Clone, Copy, Debug, PartialEq)]
@@ -51,10 +54,61 @@ pub struct TrackerConfig {
     pub acceleration_mps2: f64,
     /// Acceleration that the vehicle cannot do: the odometer slipped (m/s²).
     pub leap_mps2: f64,
+    /// Standard deviation of a reading of the speed (m/s).
+    pub speed_noise_mps: f64,
+    /// Yaw rate that no sample can exceed (rad/s).
+    pub top_yaw_rate_radps: f64,
+    /// Random walk of the heading by what tells the yaw rate, per distance (rad/√m) and per angle
+    /// turned (rad/√rad).
+    pub yaw_noise_rad_per_sqrt_m: f64,
+    /// See there.
+    pub yaw_noise_rad_per_sqrt_rad: f64,
+    /// Standard deviation of the angles' lateness (s); 0 takes their times as exact.
+    pub lateness_std_s: f64,
+    /// The error of an angle that stays from look to look.
+    pub phase_bias: PhaseBias,
     /// Time between odometry samples above which they are reported as a gap (s).
     pub gap_s: f64,
     /// Speed that no odometry sample can exceed (m/s).
     pub top_speed_mps: f64,
+}
+
+/// Turn over which an error of the angles is forgotten (rad).
+const FORGETTING_TURN_RAD: f64 = 0.5;
+
+/// An error of the electrical angle that stays from look to look, each radio head's its own: a
+/// first-order Gauss–Markov process over time and distance.
+#[derive(Clone, Copy, Debug, PartialEq)]
+pub struct PhaseBias {
+    /// Stationary deviation (rad).
+    pub std_rad: f64,
+    /// Share of each angle's own variance that is of this kind.
+    pub share: f64,
+    /// Time over which it is forgotten (s).
+    pub correlation_s: f64,
+    /// Distance over which it is forgotten (m).
+    pub correlation_m: f64,
+}
+
+impl PhaseBias {
+    /// Variance (rad²) of an angle of the stated deviation, so long and so far after the radio head's
+    /// last one, as if looks were independent: with the correlation `ρ = e^{−Δ}` between neighbours the mean of many looks
+    /// has `(1 + ρ)/(1 − ρ) = coth Δ/2` times the variance that independent ones would leave it.
+    pub fn variance(&self, sigma_rad: f64, elapsed_s: f64, moved: (f64, f64)) -> f64 {
+        let own = sigma_rad * sigma_rad;
+        let (stays, shared) = (self.std_rad * self.std_rad, self.share * own);
+        if stays + shared == 0.0 {
+            return own;
+        }
+        // Neither time nor way alone forgets: who stands sees the same error, and who drives on is
+        // not another's sensor. Turning shows the radio head to another part of it.
+        let (travelled_m, turned_rad) = moved;
+        let by_way =
+            travelled_m.abs() / self.correlation_m + turned_rad.abs() / FORGETTING_TURN_RAD;
+        let steps = (elapsed_s.abs() / self.correlation_s).min(by_way);
+        // At the same instant nothing new is learnt, but the variance must stay a number.
+        own - shared + (stays + shared) / (0.5 * steps.max(1e-4)).tanh()
+    }
 }
 
 /// How a vehicle with differential drive turns as it drives, and as it stands, where no yaw rate
@@ -65,6 +119,21 @@ const UNKNOWN_TURN_RAD2_PER_S: f64 = 0.25;
 /// A gyroscope that nothing is stated of: angle random walk (rad/√s) and bias (rad/s).
 const USUAL_GYROSCOPE: [f64; 2] = [1e-3, 1e-3];
 
+/// Wheels that nothing is stated of, on which a differential drive turns: random walk (m/√m) and
+/// scale of the distance, random walk (rad/√s) and bias (rad/s) of the turn.
+const USUAL_WHEELS: [f64; 2] = [0.05, 0.05];
+const USUAL_WHEELS_TURN: [f64; 2] = [0.05, 0.01];
+
+/// How far the scale of such wheels walks, as they grip as the floor lets them (per √m).
+const USUAL_SCALE_WALK_PER_SQRT_M: f64 = 0.03;
+
+/// Mounting angle of an array on such a vehicle, where no deviation is stated (rad).
+const USUAL_MOUNTING_STD_RAD: f64 = 0.02;
+
+/// Lateness of angles on a differential drive, where nothing is stated (s): at walking pace its
+/// turns show it.
+const USUAL_LATENESS_STD_S: f64 = 0.1;
+
 impl TrackerConfig {
     /// What a tracker on a vehicle assumes at a site.
     pub fn new(site: &Site, vehicle: &Vehicle) -> Self {
@@ -74,14 +143,35 @@ impl TrackerConfig {
         };
         let (odometer, array) = (&vehicle.odometer, &vehicle.array);
         let keeping = vehicle.lane_keeping.process();
+        let survey_std_m = site.road.as_ref().map_or(0.0, RoadSettings::survey_std_m);
         let lane_keeping = LaneKeeping {
-            rms_m: keeping.rms_m.max(LEAST_LANE_RMS_M),
+            rms_m: keeping.rms_m.max(LEAST_LANE_RMS_M).hypot(survey_std_m),
+            wavelength_m: if survey_std_m > 0.0 {
+                keeping.wavelength_m.min(SURVEY_WAVELENGTH_M)
+            } else {
+                keeping.wavelength_m
+            },
             ..keeping
         };
         let gyroscope = vehicle.gyroscope.as_ref();
-        let [yaw_noise, yaw_bias_std] = gyroscope.map_or(USUAL_GYROSCOPE, |gyroscope| {
+        let wheels = vehicle.drive == DriveKind::Differential;
+        let usual = if wheels {
+            USUAL_WHEELS_TURN
+        } else {
+            USUAL_GYROSCOPE
+        };
+        let [yaw_noise, yaw_bias_std] = gyroscope.map_or(usual, |gyroscope| {
             [gyroscope.noise_rad_per_sqrt_s, gyroscope.bias_std_radps]
         });
+        // What is zero is not stated.
+        let or_usual = |stated: f64, usual: f64, least: f64| {
+            if wheels && stated == 0.0 {
+                usual
+            } else {
+                stated.max(least)
+            }
+        };
+        let receiver = &vehicle.receiver;
         Self {
             drive: vehicle.drive,
             array: ArrayModel {
@@ -99,25 +189,52 @@ impl TrackerConfig {
                 steering_rad_per_sqrt_m: lane_keeping.steering_rad_per_sqrt_m(),
             },
             noise: MotionNoise {
-                odometer_m_per_sqrt_m: odometer
-                    .noise_m_per_sqrt_m
-                    .max(LEAST_ODOMETER_NOISE_M_PER_SQRT_M),
-                scale_per_sqrt_m: settings.odometer_scale_walk_per_sqrt_m,
+                odometer_m_per_sqrt_m: or_usual(
+                    odometer.noise_m_per_sqrt_m,
+                    USUAL_WHEELS[0],
+                    LEAST_ODOMETER_NOISE_M_PER_SQRT_M,
+                ),
+                scale_per_sqrt_m: or_usual(
+                    settings.odometer_scale_walk_per_sqrt_m,
+                    USUAL_SCALE_WALK_PER_SQRT_M,
+                    0.0,
+                ),
+                yaw_bias_radps_per_sqrt_s: gyroscope
+                    .map_or(0.0, |it| it.bias_walk_radps_per_sqrt_s),
                 mounting_rad_per_sqrt_m: array.mounting_drift_rad_per_sqrt_m,
                 phase_rad_per_sqrt_m: array.phase_drift_rad_per_sqrt_m,
             },
             odometer_scale: odometer.scale,
-            odometer_scale_std: odometer.scale_std.max(LEAST_ODOMETER_SCALE_STD),
+            odometer_scale_std: or_usual(
+                odometer.scale_std,
+                USUAL_WHEELS[1],
+                LEAST_ODOMETER_SCALE_STD,
+            ),
             mounting_rad: array.mounting_rad,
             yaw_noise_rad_per_sqrt_s: yaw_noise,
             yaw_rate_bias_radps: gyroscope.map_or(0.0, |gyroscope| gyroscope.bias_radps),
             yaw_rate_bias_std_radps: yaw_bias_std,
-            mounting_std_rad: array.mounting_std_rad,
+            mounting_std_rad: or_usual(array.mounting_std_rad, USUAL_MOUNTING_STD_RAD, 0.0),
             phase_rad: array.phase_rad,
             phase_std_rad: array.phase_std_rad,
             gate: normal_quantile(0.5 * settings.outlier_probability).powi(2),
             acceleration_mps2: 2.0 * vehicle.acceleration_mps2,
             leap_mps2: 10.0 * vehicle.acceleration_mps2,
+            speed_noise_mps: odometer.speed_noise_mps,
+            top_yaw_rate_radps: vehicle.top_yaw_rate_radps,
+            yaw_noise_rad_per_sqrt_m: gyroscope.map_or(0.0, |it| it.noise_rad_per_sqrt_m),
+            yaw_noise_rad_per_sqrt_rad: gyroscope.map_or(0.0, |it| it.noise_rad_per_sqrt_rad),
+            lateness_std_s: receiver.lateness_std_s.unwrap_or(if wheels {
+                USUAL_LATENESS_STD_S
+            } else {
+                0.0
+            }),
+            phase_bias: PhaseBias {
+                std_rad: receiver.phase_bias_std_rad,
+                share: receiver.phase_bias_share.unwrap_or(0.0),
+                correlation_s: receiver.phase_bias_correlation_s,
+                correlation_m: receiver.phase_bias_correlation_m,
+            },
             gap_s: 5.0 / odometer.rate_hz,
             top_speed_mps: 1.5 * vehicle.top_speed_mps(),
         }

@@ -10,7 +10,8 @@ use super::locate::locate;
 use super::motion::{Step, Yaw};
 use super::off_map::OffMap;
 use super::sighting::Sighting;
-use super::state::{ALONG, Belief, HEADING, SCALE, STATES};
+use super::speed_steps::SpeedSteps;
+use super::state::{ACROSS, ALONG, Belief, HEADING, LATENESS, SCALE, STATES, YAW_RATE_BIAS};
 use crate::clone_in_place::clone_in_place;
 use crate::geometry::wrap_angle;
 use crate::localize::gaussian::Innovation;
@@ -24,12 +25,31 @@ use crate::settings::DriveKind;
 /// Longest step over which the road's curvature is taken as constant (m).
 const STEP_M: f64 = 1.0;
 
+/// Deviations of the speed's reading from which on a step of it is slip, and the most that slip
+/// adds to the deviation of the odometer's scale.
+const SIGMAS_OF_SLIP: f64 = 5.0;
+const MOST_SLIP: f64 = 0.3;
+
+/// Squared Mahalanobis distance up to which the yaw rate on a road is taken at its word: 6σ.
+const TURN_GATE: f64 = 36.0;
+
+/// What a refused yaw rate may have hidden: that the vehicle turned by this much faster or slower
+/// than before (rad/s, a standard deviation).
+const REFUSED_RADPS: f64 = 0.5;
+
+/// Most that angles can be later than stated (s).
+const MOST_LATENESS_S: f64 = 0.5;
+
 #[derive(Clone, Copy, Debug, PartialEq)]
 pub(super) struct Head {
     pub known: RadioHead,
     pub excluded: bool,
-    /// Distance driven when its last angle was used (m).
+    /// Distance driven when its last angle was used (m) ...
     pub last_look_m: f64,
+    /// ... the time then (s) ...
+    pub last_look_s: f64,
+    /// ... and the angle turned (rad).
+    pub last_look_rad: f64,
 }
 
 impl Head {
@@ -47,9 +67,11 @@ pub struct Tracker {
     pub(super) belief: Belief,
     pub(super) odometry: Option<OdometrySample>,
     pub(super) driven_m: f64,
+    pub(super) turned_rad: f64,
     /// Where the vehicle is that the map does not tell how the road goes on.
     pub(super) off_map: Option<OffMap>,
     pub(super) journal: Option<Journal<STATES>>,
+    pub(super) speed_steps: SpeedSteps,
 }
 
 clone_in_place!(Tracker {
@@ -59,8 +81,10 @@ clone_in_place!(Tracker {
     belief,
     odometry,
     driven_m,
+    turned_rad,
     off_map,
-    journal
+    journal,
+    speed_steps
 });
 
 impl Tracker {
@@ -76,6 +100,8 @@ impl Tracker {
             known,
             excluded: false,
             last_look_m: f64::NEG_INFINITY,
+            last_look_s: f64::NEG_INFINITY,
+            last_look_rad: f64::NEG_INFINITY,
         };
         let mut tracker = Self {
             config,
@@ -84,8 +110,10 @@ impl Tracker {
             belief,
             odometry: None,
             driven_m: 0.0,
+            turned_rad: 0.0,
             off_map: None,
             journal: None,
+            speed_steps: SpeedSteps::default(),
         };
         tracker.watch_the_map();
         tracker
@@ -109,11 +137,14 @@ impl Tracker {
             return OdometryVerdict::TimeBackwards;
         }
         self.odometry = Some(*sample);
-        // A jump of the speed that no vehicle can do is a jump of the odometer's scale: slip.
-        let leap_mps = (sample.speed_mps - previous.speed_mps).abs();
-        if leap_mps > self.config.leap_mps2 * duration_s.max(0.02) {
-            let leap = leap_mps / previous.speed_mps.abs().max(sample.speed_mps.abs());
-            self.belief.covariance[SCALE][SCALE] += leap * leap;
+        // A jump of the speed that no vehicle can do is a jump of the odometer's scale: slip. A
+        // differential drive's wheels may obey at once.
+        if self.config.drive == DriveKind::Road {
+            let usual_mps = SIGMAS_OF_SLIP * self.config.speed_noise_mps;
+            let least_mps = usual_mps.max(self.config.leap_mps2 * duration_s.max(0.02));
+            let leap = (self.speed_steps).leap(previous.speed_mps, sample.speed_mps, least_mps);
+            let variance = &mut self.belief.covariance[SCALE][SCALE];
+            *variance = variance.max((*variance + leap * leap).min(MOST_SLIP * MOST_SLIP));
         }
         let moved_m = sample.distance_m - previous.distance_m;
         // A counter that was reset or overflowed says nothing of the distance: the speeds do.
@@ -123,10 +154,22 @@ impl Tracker {
         } else {
             moved_m
         };
-        let yaw = sample.yaw_rate_radps.map(|rate| Yaw {
-            turn_rad: rate * duration_s,
-            duration_s,
-            variance: self.config.yaw_noise_rad_per_sqrt_s.powi(2) * duration_s,
+        let read_radps = sample.yaw_rate_radps;
+        let credible = |rate: &f64| rate.abs() <= self.config.top_yaw_rate_radps;
+        let refused = read_radps.filter(|rate| !credible(rate));
+        // The vehicle turns on as before, or by anything that a moment allows.
+        let rate = read_radps.filter(credible);
+        let before = previous.yaw_rate_radps.filter(credible);
+        let yaw = rate.or(before.filter(|_| refused.is_some())).map(|rate| {
+            let mut yaw = self.yaw(rate, reading_m, duration_s);
+            let change_rad = (before.unwrap_or(rate) - rate) * duration_s;
+            if refused.is_some() {
+                yaw.variance += (REFUSED_RADPS * duration_s).powi(2);
+            } else if self.turns_as_told() {
+                // When between two samples the rate changed nobody knows: evenly distributed.
+                yaw.variance += change_rad * change_rad / 12.0;
+            }
+            yaw
         });
         self.advance(reading_m, duration_s, yaw);
         if jumped {
@@ -135,6 +178,8 @@ impl Tracker {
         self.ask(sample.time_s);
         if jumped {
             OdometryVerdict::DistanceJump { jump_m: moved_m }
+        } else if let Some(radps) = refused {
+            OdometryVerdict::YawRateRefused { radps }
         } else if duration_s > self.config.gap_s {
             OdometryVerdict::AfterGap { gap_s: duration_s }
         } else {
@@ -146,6 +191,24 @@ impl Tracker {
                 None => OdometryVerdict::Accepted,
             }
         }
+    }
+
+    /// What the yaw rate says of a step.
+    fn yaw(&self, rate_radps: f64, reading_m: f64, duration_s: f64) -> Yaw {
+        let config = &self.config;
+        let turn_rad = rate_radps * duration_s;
+        Yaw {
+            turn_rad,
+            duration_s,
+            variance: config.yaw_noise_rad_per_sqrt_s.powi(2) * duration_s
+                + config.yaw_noise_rad_per_sqrt_m.powi(2) * reading_m.abs()
+                + config.yaw_noise_rad_per_sqrt_rad.powi(2) * turn_rad.abs(),
+        }
+    }
+
+    /// Whether the yaw rate alone, if there is one, says how the vehicle turns.
+    fn turns_as_told(&self) -> bool {
+        self.config.drive == DriveKind::Differential || self.map.is_none()
     }
 
     fn advance(&mut self, reading_m: f64, duration_s: f64, yaw: Option<Yaw>) {
@@ -163,6 +226,7 @@ impl Tracker {
             }
             step.apply(&mut self.belief);
         }
+        self.turned_rad += yaw.map_or(0.0, |yaw| yaw.turn_rad.abs()) * steps;
         self.driven_m += reading_m.abs() / (1.0 + self.belief.mean[SCALE]);
         self.watch_the_map();
     }
@@ -171,13 +235,32 @@ impl Tracker {
     fn next_step(&mut self, reading_m: f64, duration_s: f64, yaw: Option<Yaw>) -> Step {
         if self.config.drive == DriveKind::Differential {
             let turn = yaw.unwrap_or_else(|| self.config.unknown_turn(reading_m, duration_s));
+            if reading_m == 0.0 && turn.turn_rad == 0.0 && yaw.is_some() {
+                return Step::standing(&self.belief.mean); // the wheels do
+            }
             return Step::turning(&self.belief.mean, reading_m, &turn, &self.config.noise);
+        }
+        if let (None, Some(yaw)) = (&self.map, yaw) {
+            if reading_m != 0.0 {
+                return Step::turning(&self.belief.mean, reading_m, &yaw, &self.config.noise);
+            }
+            // Steered wheels that stand do not turn: what is read is the bias.
+            let mut row = [0.0; STATES];
+            row[YAW_RATE_BIAS] = yaw.duration_s;
+            let expected = self.belief.mean[YAW_RATE_BIAS] * yaw.duration_s;
+            self.measure(yaw.turn_rad - expected, &row, yaw.variance);
+            return Step::standing(&self.belief.mean);
         }
         let step = self.step(&self.belief, reading_m);
         let Some(yaw) = yaw else {
             return step;
         };
-        let (residual, row, variance) = step.turn_seen(&self.belief.mean, &yaw);
+        let (residual, row, mut variance) = step.turn_seen(&self.belief.mean, &yaw);
+        // What hardly can be counts as much as keeps it at the gate (Huber).
+        let surprise = self.belief.innovation(residual, &row, variance);
+        if surprise.mahalanobis2() > TURN_GATE {
+            variance += residual * residual / TURN_GATE - surprise.variance;
+        }
         self.measure(residual, &row, variance);
         self.step(&self.belief, reading_m)
             .informed(&self.belief.mean, &yaw)
@@ -241,10 +324,22 @@ impl Tracker {
             (residual, variance) = likely;
         }
         self.measure(residual, &looked.row, variance);
+        self.keep_bounds();
         if let Some(head) = self.heads.get_mut(looked.head) {
             head.last_look_m = looked.place_m;
+            head.last_look_s = measured.time_s;
+            head.last_look_rad = self.turned_rad;
         }
         self.verdict(UpdateReason::Consistent, Some(mahalanobis2))
+    }
+
+    /// An odometer that reads twice or half of what is driven, or an angle older than memory, is no
+    /// more believed however well it would explain the angles.
+    fn keep_bounds(&mut self) {
+        let mean = &mut self.belief.mean;
+        let scale = self.config.odometer_scale;
+        mean[SCALE] = mean[SCALE].clamp(0.5 * scale - 1.0, 2.0 * scale - 1.0);
+        mean[LATENESS] = mean[LATENESS].clamp(-MOST_LATENESS_S, MOST_LATENESS_S);
     }
 
     fn verdict(&self, reason: UpdateReason, mahalanobis2: Option<f64>) -> UpdateVerdict {
@@ -276,20 +371,19 @@ impl Tracker {
             .find(|(_, mine)| mine.is(head))
             .ok_or(UpdateReason::UnknownRadioHead)?;
         let (ahead_m, ahead_variance) = self.coasting(measured.time_s);
-        let (pose, footing) = locate(&self.belief.mean, ahead_m, self.map.as_deref());
-        let sighting = Sighting::new(
-            &head.known,
-            pose,
-            &footing,
-            &self.belief.mean,
-            &self.config.array,
-        )
-        .ok_or(UpdateReason::Unusable)?;
+        let sighting = self
+            .sight(&head.known, ahead_m)
+            .ok_or(UpdateReason::Unusable)?;
         let bend = sighting.bend(&self.belief.covariance);
         let place_m = self.driven_m + ahead_m;
-        let shared = (self.config).look_variance(place_m - head.last_look_m, &sighting);
+        let travelled_m = place_m - head.last_look_m;
+        let shared = (self.config).look_variance(travelled_m, &sighting);
+        let elapsed_s = measured.time_s - head.last_look_s;
+        let turned_rad = self.turned_rad - head.last_look_rad;
+        let moved = (travelled_m, turned_rad);
+        let stated = (self.config.phase_bias).variance(sigma, elapsed_s, moved);
         let measurement_variance =
-            sigma * sigma + shared + sighting.row[ALONG].powi(2) * ahead_variance + bend.variance;
+            stated + shared + sighting.row[ALONG].powi(2) * ahead_variance + bend.variance;
         let residual = wrap_angle(measured.phase_rad - sighting.phase_rad - bend.shift_rad);
         let innovation = (self.belief).innovation(residual, &sighting.row, measurement_variance);
         Ok(Look {
@@ -299,6 +393,32 @@ impl Tracker {
             row: sighting.row,
             innovation,
         })
+    }
+
+    /// A radio head as it is seen `ahead_m` further on than the belief, or rather was seen when the
+    /// angle was received.
+    fn sight(&self, head: &RadioHead, ahead_m: f64) -> Option<Sighting> {
+        let (mean, map, array) = (&self.belief.mean, self.map.as_deref(), &self.config.array);
+        if self.config.lateness_std_s == 0.0 {
+            let (pose, footing) = locate(mean, ahead_m, map);
+            return Sighting::new(head, pose, &footing, mean, array);
+        }
+        let speed_mps = self.speed_mps();
+        let (mut pose, footing) = locate(mean, ahead_m - speed_mps * mean[LATENESS], map);
+        let mut rate_radps = 0.0;
+        if map.is_none() {
+            let read = self.odometry.and_then(|sample| sample.yaw_rate_radps);
+            let top = self.config.top_yaw_rate_radps;
+            rate_radps =
+                read.filter(|rate| rate.abs() <= top).unwrap_or_default() - mean[YAW_RATE_BIAS];
+            pose.heading_rad -= rate_radps * mean[LATENESS];
+        }
+        let mut sighting = Sighting::new(head, pose, &footing, mean, array)?;
+        let (sin, cos) = (pose.heading_rad - footing.direction_rad).sin_cos();
+        let row = &mut sighting.row;
+        row[LATENESS] = -speed_mps * (row[ALONG] * cos / footing.stretch + row[ACROSS] * sin)
+            - rate_radps * row[HEADING];
+        Some(sighting)
     }
 
     pub(super) fn measure(&mut self, residual: f64, row: &[f64; STATES], variance: f64) {

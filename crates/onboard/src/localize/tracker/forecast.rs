@@ -67,8 +67,12 @@ impl Tracker {
         let array = &self.config.array;
         let sighting = Sighting::new(&known.known, pose, &footing, &belief.mean, array)?;
         let travelled_m = self.driven_m + ahead_m - known.last_look_m;
-        let variance =
-            thermal(sighting.range_m) + self.config.look_variance(travelled_m, &sighting);
+        let own = thermal(sighting.range_m).sqrt();
+        let variance = self
+            .config
+            .phase_bias
+            .variance(own, f64::INFINITY, (travelled_m, 0.0))
+            + self.config.look_variance(travelled_m, &sighting);
         let mut rehearsed = *belief;
         rehearsed.update(0.0, &sighting.row, variance);
         Some(rehearsed)

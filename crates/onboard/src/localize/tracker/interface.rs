@@ -42,6 +42,11 @@ pub enum OdometryVerdict {
         /// By how much, in metres.
         jump_m: f64,
     },
+    /// Used, but for its yaw rate, by which no vehicle turns: it turned on as before.
+    YawRateRefused {
+        /// What was read, in rad/s.
+        radps: f64,
+    },
     /// Refused: the same time as the one before.
     Duplicate,
     /// Refused: older than the one before.
@@ -61,6 +66,7 @@ impl OdometryVerdict {
                 | Self::BeyondMap { .. }
                 | Self::InMapGap { .. }
                 | Self::DistanceJump { .. }
+                | Self::YawRateRefused { .. }
         )
     }
 }

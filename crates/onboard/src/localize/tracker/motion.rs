@@ -35,6 +35,8 @@ pub struct MotionNoise {
     pub odometer_m_per_sqrt_m: f64,
     /// Random walk of the odometer's scale (1 per √m).
     pub scale_per_sqrt_m: f64,
+    /// Random walk of the yaw rate's bias (rad/s per √s).
+    pub yaw_bias_radps_per_sqrt_s: f64,
     /// Random walk of the mounting angle (rad per √m).
     pub mounting_rad_per_sqrt_m: f64,
     /// Random walk of the phase offset (rad per √m).
@@ -241,6 +243,7 @@ impl Step {
             }
         }
         slow_states(&mut q, walk, distance);
+        q[YAW_RATE_BIAS][YAW_RATE_BIAS] = walk.yaw_bias_radps_per_sqrt_s.powi(2) * yaw.duration_s;
 
         let mut mean = *start;
         mean[ALONG] = after.x_m;
@@ -252,6 +255,17 @@ impl Step {
             jacobian: f,
             noise: q,
             turn_rad,
+            turn_row: [0.0; STATES],
+        }
+    }
+
+    /// No step: the vehicle stands, and nothing becomes less certain.
+    pub fn standing(start: &[f64; STATES]) -> Self {
+        Self {
+            mean: *start,
+            jacobian: identity(),
+            noise: [[0.0; STATES]; STATES],
+            turn_rad: 0.0,
             turn_row: [0.0; STATES],
         }
     }

@@ -7,7 +7,8 @@ use super::filter::Tracker;
 use super::interface::InitialPose;
 use super::locate::locate;
 use super::state::{
-    ACROSS, ALONG, Belief, CURVATURE, HEADING, MOUNTING, PHASE, SCALE, STATES, YAW_RATE_BIAS,
+    ACROSS, ALONG, Belief, CURVATURE, HEADING, LATENESS, MOUNTING, PHASE, SCALE, STATES,
+    YAW_RATE_BIAS,
 };
 use crate::geometry::wrap_angle;
 use crate::radio_head::RadioHead;
@@ -21,6 +22,7 @@ impl Tracker {
         sigma[YAW_RATE_BIAS] = config.yaw_rate_bias_std_radps;
         sigma[MOUNTING] = config.mounting_std_rad;
         sigma[PHASE] = config.phase_std_rad;
+        sigma[LATENESS] = config.lateness_std_s;
         let mut mean = [0.0; STATES];
         mean[SCALE] = config.odometer_scale - 1.0;
         mean[YAW_RATE_BIAS] = config.yaw_rate_bias_radps;
@@ -68,6 +70,12 @@ impl Tracker {
             belief.update(value - expected, &row, std * std);
         }
         belief
+    }
+
+    /// Counts distances on from where another tracker of the same vehicle does.
+    pub(in crate::localize) fn resume(&mut self, other: &Self) {
+        self.odometry = other.odometry;
+        self.driven_m = other.driven_m;
     }
 
     /// The same tracker begun anew where it is, every source in use, its place known to

@@ -6,6 +6,9 @@ use crate::geometry::Pose;
 use crate::localize::gaussian::Matrix;
 use crate::radio_head::RadioHead;
 
+/// Distance below which a radio head has no direction (m).
+const NEAREST_M: f64 = 0.05;
+
 /// What the array turns an angle into.
 #[derive(Clone, Copy, Debug, PartialEq)]
 pub struct ArrayModel {
@@ -121,8 +124,8 @@ pub struct Bend {
 
 impl Sighting {
     /// A radio head seen from `pose` by an array whose mounting and phase are those of the state
-    /// `mean`; `None` when it is closer than a metre, where an angle says nothing that an update
-    /// could use.
+    /// `mean`; `None` when it is as good as above or in the array, where its direction is any. What
+    /// nearness leaves of an angle is for [`bend`](Self::bend) to say.
     pub fn new(
         head: &RadioHead,
         pose: Pose,
@@ -134,7 +137,7 @@ impl Sighting {
         let eye = pose.beside(forward_m, left_m);
         let ground_m = eye.distance_m(head.position);
         let range_m = ground_m.hypot(head.height_m - up_m);
-        if range_m < 1.0 || ground_m == 0.0 {
+        if range_m < NEAREST_M || ground_m < NEAREST_M {
             return None;
         }
         let bearing = eye.bearing_rad(head.position);

@@ -1,10 +1,10 @@
-//! What the tracker knows about: eight states, the same with and without a map. A state that a
+//! What the tracker knows about: nine states, the same with and without a map. A state that a
 //! setting switches off has zero variance and never moves.
 
 use crate::localize::gaussian::Gaussian;
 
 /// Number of states.
-pub const STATES: usize = 8;
+pub const STATES: usize = 9;
 
 /// The tracker's belief.
 pub type Belief = Gaussian<STATES>;
@@ -25,3 +25,5 @@ pub const YAW_RATE_BIAS: usize = 5;
 pub const MOUNTING: usize = 6;
 /// Constant offset of the electrical angle left by the phase calibration (rad per element).
 pub const PHASE: usize = 7;
+/// How much later angles come than their setting says (s).
+pub const LATENESS: usize = 8;

@@ -1,0 +1,426 @@
+//! Roads of continuous curvature through surveyed points at any spacing.
+//!
+//! A cubic smoothing spline over the length of the polyline minimises
+//! `Σ |p_i − f(t_i)|² + λ ∫ |f″|² dt`, λ as large as the survey's deviation lets it be (Reinsch, Numer.
+//! Math. 10, 1967; the banded form is Green and Silverman's, 1994, 2.3). Where a leg is long against
+//! the bend at its end the bend is near its end: points are put in between, so that the leg stays
+//! straight.
+
+use super::build::RoadError;
+use super::course::{Piece, Road};
+use crate::geometry::{Point, Pose, wrap_angle};
+
+/// Most by which the road may bulge from a leg towards the outside of a bend (m).
+const BULGE_M: f64 = 0.5;
+
+/// How much longer than its neighbour a leg of the same bend may be.
+const UNEVEN: f64 = 2.0;
+
+/// Turn at one point from which on it is a corner and not a point of a bend (rad), and the radius
+/// by which a vehicle gets round it (m).
+const CORNER_RAD: f64 = 0.7;
+const CORNER_RADIUS_M: f64 = 5.0;
+
+/// Length of the arcs by which the spline is driven along (m).
+const PIECE_M: f64 = 0.5;
+
+/// Steps of the search for λ, each a factor of two.
+const HALVINGS: u32 = 50;
+
+impl Road {
+    /// A road of continuous curvature through points that were surveyed to `position_std_m`.
+    ///
+    /// # Errors
+    /// [`RoadError`] when points repeat or the line turns back on itself.
+    pub fn through_points(
+        points: &[Point],
+        position_std_m: f64,
+        width_m: f64,
+    ) -> Result<Self, RoadError> {
+        let points = with_straights(points)?;
+        let spline = Spline::new(&points, position_std_m);
+        let mut pieces: Vec<Piece> = Vec::new();
+        let mut length_m = 0.0;
+        for leg in 0..spline.steps.len() {
+            let step = spline.steps.get(leg).copied().unwrap_or_default();
+            let count = (step / PIECE_M).ceil().max(1.0) as u32;
+            for part in 0..count {
+                let share = |part: u32| f64::from(part) / f64::from(count);
+                let (start, end) = (
+                    spline.pose(leg, share(part)),
+                    spline.pose(leg, share(part + 1)),
+                );
+                let turn_rad = wrap_angle(end.heading_rad - start.heading_rad);
+                let half = 0.5 * turn_rad;
+                let sinc = if half.abs() < 1e-4 {
+                    1.0
+                } else {
+                    half.sin() / half
+                };
+                let arc_m = start.point().distance_m(end.point()) / sinc;
+                if arc_m > 0.0 {
+                    pieces.push(Piece {
+                        start_m: length_m,
+                        length_m: arc_m,
+                        curvature_per_m: turn_rad / arc_m,
+                        start,
+                    });
+                    length_m += arc_m;
+                }
+            }
+        }
+        if pieces.is_empty() {
+            return Err(RoadError::Empty);
+        }
+        Ok(Self {
+            pieces,
+            gaps: Vec::new(),
+            length_m,
+            width_m,
+        })
+    }
+}
+
+/// The points, corners rounded, and more of them on legs that are long against the bends they join.
+fn with_straights(points: &[Point]) -> Result<Vec<Point>, RoadError> {
+    let legs: Vec<(f64, f64)> = points
+        .windows(2)
+        .filter_map(|pair| match pair {
+            [from, to] => Some((from.distance_m(*to), from.bearing_rad(*to))),
+            _ => None,
+        })
+        .collect();
+    if let Some(index) = legs.iter().position(|leg| leg.0 <= 0.0) {
+        return Err(RoadError::RepeatedPoint { index });
+    }
+    if legs.is_empty() {
+        return Err(RoadError::Empty);
+    }
+    let turn_rad = |index: usize| match (legs.get(index.wrapping_sub(1)), legs.get(index)) {
+        (Some(before), Some(after)) => wrap_angle(after.1 - before.1),
+        _ => 0.0,
+    };
+    // How far from a point its bend may reach along each of its legs.
+    let reach_m = |index: usize| {
+        let shorter_m = match (legs.get(index.wrapping_sub(1)), legs.get(index)) {
+            (Some(before), Some(after)) => before.0.min(after.0),
+            _ => f64::INFINITY,
+        };
+        let turn_rad = turn_rad(index).abs();
+        if turn_rad > CORNER_RAD {
+            return (CORNER_RADIUS_M * (0.5 * turn_rad).tan()).min(0.45 * shorter_m);
+        }
+        (UNEVEN * shorter_m).min(8.0 * BULGE_M / turn_rad.max(1e-9))
+    };
+    let mut dense = Vec::with_capacity(points.len());
+    for (index, &point) in points.iter().enumerate() {
+        let turn_rad = turn_rad(index);
+        if turn_rad.abs() > 0.999 * std::f64::consts::PI {
+            return Err(RoadError::Reversal { index });
+        }
+        if turn_rad.abs() > CORNER_RAD
+            && let Some(before) = legs.get(index.wrapping_sub(1))
+        {
+            // Points of the arc that touches both legs, so far from their corner.
+            let cut_m = reach_m(index);
+            let entry = Pose {
+                x_m: point.x_m - cut_m * before.1.cos(),
+                y_m: point.y_m - cut_m * before.1.sin(),
+                heading_rad: before.1,
+            };
+            let arc_m = cut_m * turn_rad.abs() / (0.5 * turn_rad.abs()).tan();
+            let at = |share: f64| entry.along_chord(share * arc_m, share * turn_rad).point();
+            dense.extend((0..=6).map(|part| at(f64::from(part) / 6.0)));
+        } else {
+            dense.push(point);
+        }
+        let Some(&(leg_m, bearing_rad)) = legs.get(index) else {
+            break;
+        };
+        let from_m = reach_m(index).min(leg_m);
+        let to_m = leg_m - reach_m(index + 1).min(leg_m);
+        let (sin, cos) = bearing_rad.sin_cos();
+        let on_leg = |at_m: f64| Point::new(point.x_m + at_m * cos, point.y_m + at_m * sin);
+        if to_m > from_m {
+            let begins_m = if turn_rad.abs() > CORNER_RAD {
+                from_m
+            } else {
+                0.0
+            };
+            let inside_m = to_m - from_m;
+            // Two at each end stop the spline from swinging; between them nothing happens.
+            for at_m in [
+                0.5 * (begins_m + from_m),
+                from_m,
+                from_m + 0.1 * inside_m.min(10.0 * from_m),
+                to_m - 0.1 * inside_m.min(10.0 * (leg_m - to_m)),
+                to_m,
+            ] {
+                let last = dense.last().copied().unwrap_or(point);
+                let next = on_leg(at_m);
+                if last.distance_m(next) > 1e-3 * leg_m && at_m < leg_m * (1.0 - 1e-3) {
+                    dense.push(next);
+                }
+            }
+        }
+    }
+    Ok(dense)
+}
+
+/// How far points scatter about what their neighbours say: root mean square distance of each from
+/// the cubic through the two before and the two after it, as independent errors would leave it.
+fn scatter_m(points: &[Point]) -> f64 {
+    let mut along_m = vec![0.0];
+    for pair in points.windows(2) {
+        if let [from, to] = pair {
+            along_m.push(along_m.last().copied().unwrap_or_default() + from.distance_m(*to));
+        }
+    }
+    let mut squares = Vec::with_capacity(points.len());
+    for (places, at) in points.windows(5).zip(along_m.windows(5)) {
+        let (&[a, b, middle, c, d], &[ta, tb, t, tc, td]) = (places, at) else {
+            continue;
+        };
+        let others = [(a, ta), (b, tb), (c, tc), (d, td)];
+        let (mut x_m, mut y_m, mut noise) = (middle.x_m, middle.y_m, 1.0);
+        for (index, (point, own)) in others.iter().enumerate() {
+            let rest = others
+                .iter()
+                .enumerate()
+                .filter(|(other, _)| *other != index);
+            let weight: f64 = rest
+                .map(|(_, (_, other))| (t - other) / (own - other))
+                .product();
+            x_m -= weight * point.x_m;
+            y_m -= weight * point.y_m;
+            noise += weight * weight;
+        }
+        squares.push((x_m * x_m + y_m * y_m) / noise);
+    }
+    squares.sort_by(f64::total_cmp);
+    // The median of a sum of two squares is 2 ln 2 times the variance of each.
+    let median = squares.get(squares.len() / 2).copied().unwrap_or_default();
+    (median / std::f64::consts::LN_2).sqrt()
+}
+
+/// A cubic spline over a parameter that grows by the distance between its points.
+struct Spline {
+    /// Growth of the parameter from each point to the next.
+    steps: Vec<f64>,
+    points: Vec<Point>,
+    /// Second derivatives at the points.
+    seconds: Vec<[f64; 2]>,
+}
+
+impl Spline {
+    /// The smoothest spline that leaves a root mean square distance of `std_m` from the points.
+    fn new(points: &[Point], std_m: f64) -> Self {
+        let steps: Vec<f64> = points
+            .windows(2)
+            .filter_map(|pair| match pair {
+                [from, to] => Some(from.distance_m(*to)),
+                _ => None,
+            })
+            .collect();
+        let std_m = std_m.min(scatter_m(points));
+        let most = std_m * std_m * points.len() as f64;
+        let mut best = Self::with_penalty(points, &steps, 0.0);
+        // λ has the dimension of a length cubed.
+        let (mut low, mut high) = (-20.0, 20.0);
+        for _ in 0..HALVINGS {
+            let middle: f64 = 0.5 * (low + high);
+            let made = Self::with_penalty(points, &steps, middle.exp());
+            let squares: f64 = (made.points.iter().zip(points))
+                .map(|(a, b)| a.distance_m(*b).powi(2))
+                .sum();
+            if squares <= most {
+                (low, best) = (middle, made);
+            } else {
+                high = middle;
+            }
+        }
+        best
+    }
+
+    /// Solves `(R + λ Qᵀ Q) γ = Qᵀ p` for the second derivatives γ at the inner points; the spline
+    /// then passes `p − λ Q γ`.
+    fn with_penalty(points: &[Point], steps: &[f64], penalty: f64) -> Self {
+        let count = points.len();
+        let inner = count.saturating_sub(2);
+        let step = |index: usize| steps.get(index).copied().unwrap_or(1.0);
+        // Column j of Q has these three entries at rows j, j + 1 and j + 2.
+        let column = |j: usize| {
+            let (a, c) = (step(j).recip(), step(j + 1).recip());
+            [a, -a - c, c]
+        };
+        // Bands of the matrix: its diagonal and the two beside it.
+        let mut bands = vec![[0.0; 3]; inner];
+        let mut right = vec![[0.0; 2]; inner];
+        for j in 0..inner {
+            let here = column(j);
+            let next = column(j + 1);
+            let after = column(j + 2);
+            let dot = here.iter().map(|value| value * value).sum::<f64>();
+            bands[j] = [
+                (step(j) + step(j + 1)) / 3.0 + penalty * dot,
+                step(j + 1) / 6.0 + penalty * (here[1] * next[0] + here[2] * next[1]),
+                penalty * here[2] * after[0],
+            ];
+            for (row, weight) in here.iter().enumerate() {
+                if let Some(point) = points.get(j + row) {
+                    right[j][0] += weight * point.x_m;
+                    right[j][1] += weight * point.y_m;
+                }
+            }
+        }
+        let inner_seconds = solve(bands, right);
+        let mut fitted = points.to_vec();
+        for (j, second) in inner_seconds.iter().enumerate() {
+            for (row, weight) in column(j).iter().enumerate() {
+                if let Some(point) = fitted.get_mut(j + row) {
+                    point.x_m -= penalty * weight * second[0];
+                    point.y_m -= penalty * weight * second[1];
+                }
+            }
+        }
+        let mut seconds = vec![[0.0; 2]; count];
+        if let Some(inside) = seconds.get_mut(1..=inner) {
+            inside.copy_from_slice(&inner_seconds);
+        }
+        Self {
+            steps: steps.to_vec(),
+            points: fitted,
+            seconds,
+        }
+    }
+
+    /// Place and direction at a share of the way from one point to the next.
+    fn pose(&self, leg: usize, share: f64) -> Pose {
+        let point = |index: usize| self.points.get(index).copied().unwrap_or_default();
+        let second = |index: usize| self.seconds.get(index).copied().unwrap_or_default();
+        let step = self.steps.get(leg).copied().unwrap_or(1.0);
+        let (from, to) = (point(leg), point(leg + 1));
+        let (a, b) = (1.0 - share, share);
+        let bend = step * step / 6.0;
+        let along = |from: f64, to: f64, first: f64, last: f64| {
+            let value =
+                a * from + b * to + bend * ((a * a * a - a) * first + (b * b * b - b) * last);
+            let slope = (to - from) / step
+                + step / 6.0 * ((1.0 - 3.0 * a * a) * first + (3.0 * b * b - 1.0) * last);
+            (value, slope)
+        };
+        let ([fx, fy], [tx, ty]) = (second(leg), second(leg + 1));
+        let ((x_m, dx), (y_m, dy)) = (
+            along(from.x_m, to.x_m, fx, tx),
+            along(from.y_m, to.y_m, fy, ty),
+        );
+        Pose {
+            x_m,
+            y_m,
+            heading_rad: dy.atan2(dx),
+        }
+    }
+}
+
+/// Solves a symmetric positive definite system of bandwidth two by its factors L D Lᵀ.
+#[allow(
+    clippy::indexing_slicing,
+    reason = "every index is below the length all three share"
+)]
+fn solve(bands: Vec<[f64; 3]>, mut right: Vec<[f64; 2]>) -> Vec<[f64; 2]> {
+    let n = bands.len();
+    let mut factors = bands; // d, l1, l2 of each column
+    for i in 0..n {
+        if i >= 1 {
+            let [d, l1, _] = factors[i - 1];
+            factors[i][0] -= d * l1 * l1;
+        }
+        if i >= 2 {
+            let [d, _, l2] = factors[i - 2];
+            factors[i][0] -= d * l2 * l2;
+        }
+        let mut beside = factors[i][1];
+        if i >= 1 {
+            let [d, l1, l2] = factors[i - 1];
+            beside -= d * l1 * l2;
+        }
+        let d = factors[i][0];
+        factors[i][1] = beside / d;
+        factors[i][2] /= d;
+    }
+    for axis in 0..2 {
+        for i in 0..n {
+            if i >= 1 {
+                right[i][axis] -= factors[i - 1][1] * right[i - 1][axis];
+            }
+            if i >= 2 {
+                right[i][axis] -= factors[i - 2][2] * right[i - 2][axis];
+            }
+        }
+        for i in 0..n {
+            right[i][axis] /= factors[i][0];
+        }
+        for i in (0..n).rev() {
+            if i + 1 < n {
+                right[i][axis] -= factors[i][1] * right[i + 1][axis];
+            }
+            if i + 2 < n {
+                right[i][axis] -= factors[i][2] * right[i + 2][axis];
+            }
+        }
+    }
+    right
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    /// A left bend of 20 m radius between straights, sampled at a spacing.
+    fn bend(spacing_m: f64) -> (Road, Road) {
+        let segment = |length_m: f64, turn_rad: f64| super::super::build::Segment {
+            length_m,
+            turn_rad,
+            surveyed: true,
+        };
+        let segments = [segment(30.0, 0.0), segment(30.0, 1.5), segment(30.0, 0.0)];
+        let exact = Road::from_segments(Pose::default(), &segments, 4.0).unwrap();
+        let count = (90.0 / spacing_m).round() as u32;
+        let points: Vec<Point> = (0..=count)
+            .map(|it| exact.pose(f64::from(it) * 90.0 / f64::from(count)).point())
+            .collect();
+        let made = Road::through_points(&points, 0.01, 4.0).unwrap();
+        (exact, made)
+    }
+
+    #[test]
+    fn a_sampled_bend_is_the_bend_at_any_spacing() {
+        for (spacing_m, most_m) in [(0.5, 0.03), (1.0, 0.03), (2.0, 0.04), (5.0, 0.12)] {
+            let (exact, made) = bend(spacing_m);
+            for step in 0..=180 {
+                let place = exact.pose(0.5 * f64::from(step)).point();
+                let off_m = made.project(place).lateral_m.abs();
+                assert!(off_m < most_m, "{spacing_m}: {off_m} at {step}");
+            }
+            assert!((made.length_m() - 90.0).abs() < 0.1, "{}", made.length_m());
+        }
+    }
+
+    #[test]
+    fn long_legs_stay_straight_and_corners_are_rounded() {
+        let points = [
+            [0.0, 0.0],
+            [100.0, 0.0],
+            [100.0, 80.0],
+            [103.0, 90.0],
+            [140.0, 200.0],
+        ];
+        let road = Road::through_points(&points.map(Point::from), 0.02, 4.0).unwrap();
+        for (x_m, y_m) in [(50.0, 0.0), (85.0, 0.0), (100.0, 40.0), (121.5, 145.0)] {
+            let off_m = road.project(Point::new(x_m, y_m)).lateral_m;
+            assert!(off_m.abs() < 0.3, "{x_m} {y_m}: {off_m}");
+        }
+        let corner_m = road.project(Point::new(100.0, 0.0)).lateral_m;
+        assert!(corner_m.abs() < 2.5, "{corner_m}");
+    }
+}

@@ -1,0 +1,122 @@
+//! What a recorded drive shows to be wrong before it is located.
+
+use std::collections::BTreeMap;
+use std::f64::consts::TAU;
+
+use onboard::geometry::wrap_angle;
+use onboard::settings::{Site, Vehicle};
+
+use super::error::ReplayError;
+use crate::angle_log::LoggedAngle;
+use crate::odometry::OdometryLog;
+
+/// Time without any angle that is remarked on (s).
+const SILENCE_S: f64 = 20.0;
+
+/// By how much phase and angle may contradict each other (rad).
+const CONTRADICTION_RAD: f64 = 0.2;
+
+/// Remarks, and when in the drive they belong (s).
+pub type Doubts = Vec<(f64, String)>;
+
+/// What odometry and angles show to be wrong with themselves, each other, site or vehicle.
+///
+/// # Errors
+/// [`ReplayError::Clocks`] where not a single angle falls into the time of the odometry.
+pub fn doubts(
+    site: &Site,
+    vehicle: &Vehicle,
+    odometry: &OdometryLog,
+    angles: &[LoggedAngle],
+) -> Result<Doubts, ReplayError> {
+    let mut doubts = Doubts::new();
+    let (Some(first), Some(last)) = (odometry.samples.first(), odometry.samples.last()) else {
+        return Ok(doubts);
+    };
+    let start_s = first.time_s;
+    let inside =
+        |it: &&LoggedAngle| (first.time_s - 1.0..=last.time_s + 1.0).contains(&it.measured.time_s);
+    let heard: Vec<&LoggedAngle> = angles.iter().filter(inside).collect();
+    if let (Some(angle), true) = (angles.first(), heard.is_empty()) {
+        return Err(ReplayError::Clocks {
+            odometry_s: first.time_s,
+            angles_s: angle.measured.time_s,
+        });
+    }
+    let outside = angles.len() - heard.len();
+    if outside > 0 {
+        let text = format!("{outside} angles lie outside of the odometry's time; check the clocks");
+        doubts.push((start_s, text));
+    }
+
+    let mut unknown: BTreeMap<(u16, u8), usize> = BTreeMap::new();
+    for it in angles {
+        let known = |head: &&_| {
+            let head: &onboard::settings::RadioHeadSettings = head;
+            (head.pci, head.ssb_index) == (it.ssb.pci, it.ssb.ssb_index)
+        };
+        if !site.radio_heads.iter().any(|head| known(&head)) {
+            *unknown.entry((it.ssb.pci, it.ssb.ssb_index)).or_default() += 1;
+        }
+    }
+    for ((pci, index), count) in unknown {
+        let text = format!(
+            "{count} angles are of pci {pci}, ssb_index {index}, which the site does not have; they \
+             are not used"
+        );
+        doubts.push((start_s, text));
+    }
+
+    let slope = TAU * vehicle.array.spacing_wavelengths;
+    let both = angles.iter().filter(|it| it.measured.angle_rad.is_finite());
+    let contradicts = |it: &&LoggedAngle| {
+        let expected = slope * it.measured.angle_rad.cos();
+        wrap_angle(it.measured.phase_rad - expected).abs() > CONTRADICTION_RAD
+    };
+    let contradicting = both.clone().filter(contradicts).count();
+    if 10 * contradicting > both.count() {
+        let text = format!(
+            "{contradicting} of {} angles have a phase_rad that is not 2π d/λ cos angle_rad; \
+             phase_rad is used; check which is which, and array.spacing_wavelengths",
+            angles.len()
+        );
+        doubts.push((start_s, text));
+    }
+
+    let times_s = heard.iter().map(|it| it.measured.time_s);
+    let mut before_s = start_s;
+    for time_s in times_s.chain([last.time_s]) {
+        if time_s - before_s > SILENCE_S {
+            let text = format!(
+                "no angle for {:.0} s from {before_s:.1} s on",
+                time_s - before_s
+            );
+            doubts.push((before_s, text));
+        }
+        before_s = before_s.max(time_s);
+    }
+    doubts.extend(of_odometry(odometry));
+    Ok(doubts)
+}
+
+/// Distances that the speeds contradict.
+fn of_odometry(odometry: &OdometryLog) -> Option<(f64, String)> {
+    let (mut by_speed_m, mut by_distance_m) = (0.0, 0.0);
+    for pair in odometry.samples.windows(2) {
+        let [from, to] = pair else {
+            continue;
+        };
+        let mean_mps = 0.5 * (from.speed_mps + to.speed_mps);
+        by_speed_m += mean_mps.abs() * (to.time_s - from.time_s);
+        by_distance_m += (to.distance_m - from.distance_m).abs();
+    }
+    let start_s = odometry.samples.first()?.time_s;
+    let ratio = by_distance_m / by_speed_m;
+    (by_speed_m > 1.0 && !(0.7..1.5).contains(&ratio)).then(|| {
+        let text = format!(
+            "odometry: distances add up to {by_distance_m:.1} m, speeds to {by_speed_m:.1} m; check \
+             the units of distance_m and speed_mps"
+        );
+        (start_s, text)
+    })
+}

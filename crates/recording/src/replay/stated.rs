@@ -1,0 +1,44 @@
+//! What is believed of angles whose deviation somebody else has stated.
+
+use std::f64::consts::TAU;
+
+use onboard::settings::{Site, Vehicle};
+
+use crate::angle_log::LoggedAngle;
+
+/// Share of a stated variance that stays from look to look on the sensors that were looked into.
+const USUAL_SHARE: f64 = 0.5;
+
+/// Rician K (dB) of no scatter.
+const NO_SCATTER_DB: f64 = 200.0;
+
+/// Site and vehicle for angles whose stated deviation is all of their error: the site's scatter is
+/// not added to it, and looks at one radio head within a second or a metre do not count as
+/// independent, unless the receiver's settings say otherwise.
+pub fn as_stated(site: &Site, vehicle: &Vehicle) -> (Site, Vehicle) {
+    let site = Site {
+        rician_k_db: NO_SCATTER_DB,
+        ..site.clone()
+    };
+    let mut vehicle = vehicle.clone();
+    vehicle.receiver.phase_bias_share.get_or_insert(USUAL_SHARE);
+    (site, vehicle)
+}
+
+/// Electrical angles for those that were logged as angles from the array's axis.
+pub fn with_phases(angles: &[LoggedAngle], spacing_wavelengths: f64) -> Vec<LoggedAngle> {
+    let slope = TAU * spacing_wavelengths;
+    let with_phase = |logged: &LoggedAngle| {
+        let mut logged = *logged;
+        let measured = &mut logged.measured;
+        if measured.phase_rad.is_nan() {
+            let (sin, cos) = measured.angle_rad.sin_cos();
+            let sigma = measured.phase_sigma_rad;
+            measured.phase_rad = slope * cos;
+            // Along the axis the angle moves the phase by its square.
+            measured.phase_sigma_rad = slope * sigma * sin.abs().hypot(sigma * cos);
+        }
+        logged
+    };
+    angles.iter().map(with_phase).collect()
+}
