@@ -2,8 +2,8 @@
 
 The drives are wheel odometry, bearings to landmarks and motion-capture truth that others recorded:
 the UTIAS multi-robot data sets (MRCLAM; Leung et al., IJRR 2011,
-http://asrl.utias.utoronto.ca/datasets/mrclam/), for education and research. Download and unpack one,
-convert a robot's drive and compare:
+http://asrl.utias.utoronto.ca/datasets/mrclam/), for education and research. Download and unpack
+one, convert a robot's drive and compare:
 
     python benches/real_drives.py convert MRCLAM_Dataset6 3 drives/d6r3
     python benches/real_drives.py table drives
@@ -181,7 +181,7 @@ def textbook_filter(drive: dict, sheet: dict[str, float]) -> np.ndarray:
 
 
 def smoothing_and_mapping(drive: dict, sheet: dict[str, float]) -> np.ndarray | None:
-    """GTSAM's iSAM2 with robust bearings, one pose each 0.2 s; nothing where it is not installed."""
+    """GTSAM's iSAM2 with robust bearings, one pose each 0.2 s; nothing where not installed."""
     try:
         import gtsam
     except ImportError:
@@ -191,9 +191,7 @@ def smoothing_and_mapping(drive: dict, sheet: dict[str, float]) -> np.ndarray | 
     graph, values = gtsam.NonlinearFactorGraph(), gtsam.Values()
     pose = gtsam.Pose2(start["x_m"], start["y_m"], start["heading_rad"])
     exact = gtsam.noiseModel.Isotropic.Sigma(2, 1e-3)
-    graph.add(
-        gtsam.PriorFactorPose2(keys("x", 0), pose, gtsam.noiseModel.Isotropic.Sigma(3, 0.05))
-    )
+    graph.add(gtsam.PriorFactorPose2(keys("x", 0), pose, gtsam.noiseModel.Isotropic.Sigma(3, 0.05)))
     values.insert(keys("x", 0), pose)
     for pci, place in drive["landmarks"].items():
         graph.add(gtsam.PriorFactorPoint2(keys("l", pci), gtsam.Point2(*place), exact))
@@ -211,7 +209,9 @@ def smoothing_and_mapping(drive: dict, sheet: dict[str, float]) -> np.ndarray | 
         if time - since < 0.2:
             continue
         number += 1
-        along = max(1e-3, sheet["distance_noise"] * math.sqrt(abs(moved.x())) + 0.02 * abs(moved.x()))
+        along = max(
+            1e-3, sheet["distance_noise"] * math.sqrt(abs(moved.x())) + 0.02 * abs(moved.x())
+        )
         noise = gtsam.noiseModel.Diagonal.Sigmas(
             np.array([along, 2e-3, sheet["yaw_noise"] * math.sqrt(time - since)])
         )
@@ -225,9 +225,7 @@ def smoothing_and_mapping(drive: dict, sheet: dict[str, float]) -> np.ndarray | 
             model = gtsam.noiseModel.Robust.Create(
                 huber, gtsam.noiseModel.Isotropic.Sigma(1, sigma)
             )
-            graph.add(
-                gtsam.BearingFactor2D(here, keys("l", int(pci)), gtsam.Rot2(bearing), model)
-            )
+            graph.add(gtsam.BearingFactor2D(here, keys("l", int(pci)), gtsam.Rot2(bearing), model))
         isam.update(graph, values)
         graph, values = gtsam.NonlinearFactorGraph(), gtsam.Values()
         pose = isam.calculateEstimatePose2(here)
@@ -302,7 +300,13 @@ def table(folder: Path, defaults: bool) -> None:
         mapped = smoothing_and_mapping(drive, PEERS)
         row.append(math.nan if mapped is None else rms_m(drive, mapped))
         found = ours(drive, sheet_of(drive, defaults)) or {}
-        keys = ("rms_error_m", "smoothed_rms_error_m", "ok_share", "beyond_while_ok", "nees_per_axis")
+        keys = (
+            "rms_error_m",
+            "smoothed_rms_error_m",
+            "ok_share",
+            "beyond_while_ok",
+            "nees_per_axis",
+        )
         row += [found.get(key, math.nan) for key in keys]
         print(f"{drive['name']:12}" + "".join(f"{value:15.3f}" for value in row), flush=True)
 

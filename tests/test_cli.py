@@ -159,7 +159,10 @@ PID = '[vehicle]\nlike = "paper"\n[vehicle.wake_up.due]\nbase_ms = 300.0\n'
         (SCENARIO + HEAD + "[channel]\nshadowing_std_db = nan\n", ["shadowing_std_db", "finite"]),
         (SCENARIO.replace("300.0", "-300.0") + HEAD, ["site.road.segments[0].length_m", "-300"]),
         (SCENARIO + HEAD.replace("[205.0, 100.0,", "[0.0, 0.0,"), ["site.radio_heads[0]"]),
-        (SCENARIO.replace('vehicle = "paper"\n', "") + HEAD + PID, ["vehicle.wake_up.due.t_max_ms"]),
+        (
+            SCENARIO.replace('vehicle = "paper"\n', "") + HEAD + PID,
+            ["vehicle.wake_up.due.t_max_ms"],
+        ),
         (SCENARIO + HEAD + "[truth.vehicle.array]\nmountin_rad = 1\n",
          ["truth.vehicle.array.mountin_rad", "mounting_rad"]),
         (SCENARIO + HEAD + "[truth.vehicle.gyroscope]\nbias_radps = 1.0\n",

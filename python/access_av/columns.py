@@ -67,7 +67,10 @@ _GLOSSARY = {
     "distance_m": ("m", "Distance driven, by the odometer"),
     "yaw_rate_radps": ("rad/s", "Yaw rate, by the gyroscope"),
     "searching": ("true or false", "The first pose is not known yet"),
-    "lost": ("true or false", "The angles come from elsewhere than expected; do not rely on the pose"),
+    "lost": (
+        "true or false",
+        "The angles come from elsewhere than expected; do not rely on the pose",
+    ),
     # Errors of the position.
     "error_x_m": ("m", "Estimate minus truth, x"),
     "error_y_m": ("m", "Estimate minus truth, y"),

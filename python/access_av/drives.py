@@ -163,8 +163,9 @@ def locate(
         the wheels, ``yaw_rate_radps``; or an MCAP file with ``nav_msgs/msg/Odometry``.
     recording
         SigMF recording of the array's samples, or a CSV log of angles with the columns ``time_s``,
-        ``pci`` and either ``phase_rad`` (electrical angle) with ``phase_sigma_rad``, or ``angle_rad``
-        (from the array's axis) with ``angle_sigma_rad``; ``ssb_index`` and ``snr_db`` may be there.
+        ``pci`` and either ``phase_rad`` (electrical angle) with ``phase_sigma_rad``, or
+        ``angle_rad`` (from the array's axis) with ``angle_sigma_rad``; ``ssb_index`` and ``snr_db``
+        may be there.
         What is stated as the deviation is taken for all of the error: the site's ``rician_k_db``
         adds nothing.
     vehicle
@@ -312,8 +313,11 @@ def summary(drive: Drive, truth: str | Path | None = None) -> dict[str, float]:
 
 
 def _honesty(poses: pl.DataFrame, against: pl.DataFrame) -> dict[str, float]:
-    """What the localizer said of its error beside the error: mean NEES over both axes, shares of the
-    time ``ok`` and, of all time, beyond the protection level while ``ok``."""
+    """Compare what the localizer said of its error with the error.
+
+    Mean NEES over both axes; shares of the time ``ok`` and, of all time, beyond the protection
+    level while ``ok``.
+    """
     xx, xy, yy = (pl.col(f"covariance_{it}_m2") for it in ("xx", "xy", "yy"))
     dx, dy = pl.col("error_x_m"), pl.col("error_y_m")
     squared = (yy * dx**2 - 2 * xy * dx * dy + xx * dy**2) / (xx * yy - xy**2)

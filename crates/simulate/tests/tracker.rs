@@ -310,8 +310,11 @@ fn a_gyroscope_helps_as_much_as_it_says() {
         let mut with = without.clone();
         with.vehicle.gyroscope = Some(GyroscopeSettings {
             noise_rad_per_sqrt_s: 1e-3,
+            noise_rad_per_sqrt_m: 0.0,
+            noise_rad_per_sqrt_rad: 0.0,
             bias_radps: 0.0,
             bias_std_radps: 1e-3,
+            bias_walk_radps_per_sqrt_s: 0.0,
         });
         // The same drives, but for the gyroscope: what it takes from the squared error of a run.
         let [without, with] = [without, with].map(|scenario| squares(&drives(&scenario, SEED, 32)));

@@ -10,7 +10,7 @@ import typer
 
 from access_av.commands.options import Out, ScenarioArgument
 from access_av.errors import InputError
-from access_av.terminal import console, show_warning
+from access_av.terminal import console, errors, show_warning
 
 if TYPE_CHECKING:
     from access_av.drives import Drive
@@ -166,9 +166,10 @@ def locate(
     share = float(drive.poses["lost"].mean() or 0.0)  # type: ignore[arg-type]
     if share > MOST_LOST or bool(drive.poses["lost"][-1]):
         errors.print(
-            f"[red]not available:[/] for {share:.0%} of the time the angles came from elsewhere than "
-            "expected. Check, in this order: start pose, array.mounting_rad (sign, mirrored array), "
-            "places and PCIs of the radio heads, phase_rad against angle_rad, the clocks.",
+            f"not available: for {share:.0%} of the time the angles came from elsewhere than "
+            "expected. Check, in this order: start pose, array.mounting_rad (sign, mirrored "
+            "array), places and PCIs of the radio heads, phase_rad against angle_rad, the clocks.",
+            style="red",
             soft_wrap=True,
         )
         raise typer.Exit(3)

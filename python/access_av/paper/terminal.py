@@ -30,7 +30,7 @@ def show_study(study: Study) -> None:
     """Claims by readings, the shown reading's modes, what it comes to."""
     show_evaluation(study.shown)
     _show_claims(study)
-    console.print(f"[bold]{summary.headline(study)}.[/]")
+    console.print(f"{summary.headline(study)}.", style="bold")
     console.print(summary.lead(study))
     shown = study.of(study.shown.reading.name)
     console.print(f"Claims met under “{study.shown.reading.title}”: {summary.counts_text(shown)}.")

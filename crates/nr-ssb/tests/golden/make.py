@@ -147,7 +147,12 @@ def cases():
 # each kind of bit: (24 MIB bits, SFN, half frame, SSB index, k_SSB's highest bit, PCI, Lmax).
 def chains():
     bits = recursion([1, 0, 1, 1, 0, 0, 1], [3, 0], 200)
-    plan = [(601, 0, 1, 4, 0, 341), (1, 1, 3, 4, 1, 682), (1007, 1, 6, 8, 0, 1023), (258, 0, 7, 8, 1, 5)]
+    plan = [
+        (601, 0, 1, 4, 0, 341),
+        (1, 1, 3, 4, 1, 682),
+        (1007, 1, 6, 8, 0, 1023),
+        (258, 0, 7, 8, 1, 5),
+    ]
     plan += [(500, 1, 45, 64, 0, 86), (3, 0, 19, 64, 0, 617)]
     for n, (pci, half, index, lmax, k_msb, sfn) in enumerate(plan):
         mib = [0] + [sfn >> i & 1 for i in range(9, 3, -1)] + bits[17 * n : 17 * n + 17]
@@ -157,7 +162,9 @@ def chains():
 def packed(bits):
     """Bits as hexadecimal digits, the first bit most significant, zeros at the end."""
     bits = list(bits) + [0] * (-len(bits) % 4)
-    return "".join(f"{int(''.join(map(str, bits[i:i + 4])), 2):x}" for i in range(0, len(bits), 4))
+    return "".join(
+        f"{int(''.join(map(str, bits[i : i + 4])), 2):x}" for i in range(0, len(bits), 4)
+    )
 
 
 def write():
@@ -200,7 +207,9 @@ def check(directory):
     known = np.load(f"{directory}/pbch.npz")
     keys = ("payload", "payload_scrambled", "crc24c", "polar512", "ratematched864")
     for i in range(len(known["pci"])):
-        one = {key: int(known[key][i]) for key in ("sfn", "hrf", "ssb_idx", "kssb_msb", "pci", "lmax")}
+        one = {
+            key: int(known[key][i]) for key in ("sfn", "hrf", "ssb_idx", "kssb_msb", "pci", "lmax")
+        }
         stages = pbch((tuple(map(int, known["mib"][i])), *one.values()))
         for key, stage in zip(keys, stages):
             assert list(known[key][i]) == stage, (i, key)
