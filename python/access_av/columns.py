@@ -368,7 +368,7 @@ TABLES: Mapping[str, Table] = {
             "located_errors",
             "A pose whose truth is known",
             "`access_av.drives.error_m(…)`",
-            ("time_s", "error_m"),
+            ("time_s", "error_m", "error_x_m", "error_y_m"),
         ),
         Table(
             "bound_route",
