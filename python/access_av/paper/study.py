@@ -29,7 +29,7 @@ if TYPE_CHECKING:
 
 FIT_SOURCE = "access-av fit: agrees with the sums and statements of the paper"
 # Of `evaluate --unknowns`: worlds, controllers in each, drives per setting.
-UNKNOWNS = (512, 2, 6)
+UNKNOWNS = (128, 8, 10)
 
 
 @dataclass(frozen=True)
