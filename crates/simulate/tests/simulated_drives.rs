@@ -26,6 +26,7 @@ fn campaign(simulation: &Simulation, runs: usize, threads: usize) -> Campaign {
         runs,
         threads: Some(threads),
         keep_records: true,
+        errors_every: None,
         custom: NONE,
         progress: &|_| true,
     };
@@ -204,6 +205,7 @@ fn the_caller_can_stop() {
         runs: 1000,
         threads: Some(1),
         keep_records: false,
+        errors_every: None,
         custom: NONE,
         progress: &|_| false,
     };
