@@ -43,7 +43,7 @@ fn misspelt_keys_get_the_nearest_known_one() {
     let nearest = "did you mean `t_max_ms`?";
     assert_says(
         with_line("t_max_ms =", "tmax_ms ="),
-        "vehicle.wake_up.tmax_ms",
+        "vehicle.wake_up.due.tmax_ms",
         nearest,
     );
     let nearest = "did you mean `channel`?";
@@ -66,12 +66,16 @@ fn wrong_units_are_unknown_keys() {
 fn wrong_types_say_what_is_expected() {
     let outcome = with_line("carrier_mhz = 3500.0", "carrier_mhz = \"3.5 GHz\"");
     assert_says(outcome, "site.carrier_mhz", "expected f64");
-    let outcome = with_line("deferral = true", "deferral = 1");
-    assert_says(outcome, "vehicle.wake_up.deferral", "expected a boolean");
+    let outcome = with_line("either_direction = false", "either_direction = 0");
+    assert_says(
+        outcome,
+        "vehicle.start.either_direction",
+        "expected a boolean",
+    );
     let outcome = with_line("method = \"music\"", "method = \"musik\"");
     assert_says(outcome, "vehicle.estimator.method", "did you mean `music`?");
     let outcome = with_line("policy = \"pid\"", "policy = \"pdi\"");
-    assert_says(outcome, "vehicle.wake_up.policy", "did you mean `pid`?");
+    assert_says(outcome, "vehicle.wake_up.due", "did you mean `pid`?");
     let outcome = with_line("offset_db = 3.0", "offset = 3.1");
     assert_says(
         outcome,
@@ -159,7 +163,7 @@ fn numbers_must_be_finite_and_in_range() {
         (
             "snr_scale_db = 10.0",
             "snr_scale_db = 0",
-            "vehicle.wake_up.snr_scale_db",
+            "vehicle.wake_up.due.snr_scale_db",
         ),
     ] {
         assert_says(with_line(line, bad), key, "must");
@@ -195,7 +199,7 @@ fn a_guess_of_the_road_is_straight() {
 #[test]
 fn contradictions_name_both_sides() {
     let outcome = with_line("t_max_ms = 240.0", "base_ms = 250.0\nt_max_ms = 240.0");
-    assert_says(outcome, "vehicle.wake_up.t_max_ms", "wake_up.base_ms, 250");
+    assert_says(outcome, "vehicle.wake_up.due.t_max_ms", "base_ms, 250");
     let outcome = with_line("pilots = \"blind\"", "pilots = \"pss+sss\"");
     assert_says(outcome, "vehicle.estimator.method", "receiver.pilots");
     let outcome = with_line("stops = []", "stops = [{ at_m = 301, dwell_s = 1 }]");
