@@ -218,7 +218,7 @@ fn base_time_of_the_platform_counts_too() {
     let simulation = Simulation::on_its_platform(&scenario).map(drop);
     let message = simulation.unwrap_err().to_string();
     assert!(
-        message.contains("wake_up.t_max_ms") && message.contains("80 ms"),
+        message.contains("t_max_ms") && message.contains("80 ms"),
         "{message}"
     );
 }

@@ -267,7 +267,7 @@ fn what_cannot_be_sent_as_samples_is_refused() {
         ("site.ssb.subcarrier_spacing_khz", Value::from(120.0)),
         ("site.radio_heads[0].ssb_index", Value::from(8)),
         ("iq.adc_bits", Value::from(0)),
-        ("iq.oscillator_ppm", Value::from(3.0)),
+        ("iq.oscillator_ppm", Value::from(1000.0)),
         // More than a quarter of the cyclic prefix.
         ("channel.delay_spread_ns", Value::from(1200.0)),
     ] {

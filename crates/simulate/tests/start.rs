@@ -156,14 +156,14 @@ fn a_recorded_drive_either_way_needs_no_initial_pose() {
         drive.poses.len() - errors.len()
     );
 
-    // Who takes the road for one-way does not find the vehicle there, and the angles say so: a
-    // tracker that is right refuses one in ten thousand.
+    // Who takes the road for one-way cannot find the vehicle there, and says so; who is right is
+    // sure of it to the end.
+    assert!(!drive.poses.last().unwrap().is_lost);
     scenario.vehicle.start.either_direction = false;
     let misled = locate(&scenario);
-    let (last, truth) = (misled.poses.last().unwrap(), record.steps.last().unwrap());
-    assert!(last.estimate.pose.point().distance_m(truth.truth.point()) > 50.0);
-    let refused = misled.executions.iter().filter(|it| !it.verdict.accepted);
-    assert!(refused.count() * 10 > misled.executions.len());
+    let lost = misled.poses.iter().filter(|it| it.is_lost).count();
+    println!("{lost} poses of {} known to be lost", misled.poses.len());
+    assert!(lost * 20 > misled.poses.len());
 
     // No pose is published before there is one.
     let dir = common::scratch("start-mcap");
