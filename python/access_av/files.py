@@ -2,10 +2,12 @@
 
 from __future__ import annotations
 
+import fcntl
 import json
 import os
 import sys
 import warnings
+from contextlib import suppress
 from dataclasses import dataclass
 from datetime import datetime, timezone
 from importlib.metadata import version
@@ -13,6 +15,9 @@ from pathlib import Path
 from typing import TYPE_CHECKING, Any
 
 import numpy as np
+
+from access_av import interrupt
+from access_av.errors import InputError
 
 if TYPE_CHECKING:
     from collections.abc import Callable
@@ -23,22 +28,41 @@ if TYPE_CHECKING:
 RESULTS = Path("results")
 
 
+class Lock:
+    """Keeps a folder from being written by two at a time, as long as this object is there."""
+
+    def __init__(self, folder: Path):
+        self._descriptor = os.open(folder, os.O_RDONLY)
+        try:
+            fcntl.flock(self._descriptor, fcntl.LOCK_EX | fcntl.LOCK_NB)
+        except BlockingIOError as error:
+            message = f"{folder}: another run is writing here; give another --out"
+            raise InputError(message) from error
+        except OSError:
+            pass  # a file system without locks
+
+    def __del__(self) -> None:
+        os.close(self._descriptor)
+
+
 @dataclass(frozen=True)
 class ResultsDirectory:
     """Where one command's results go. Files appear whole: written beside, then renamed."""
 
     path: Path
+    lock: Lock
 
     @classmethod
     def create(cls, command: str, out: Path | None = None) -> ResultsDirectory:
         """Make the directory: ``out``, or a new one under ``results/``."""
         if out is None:
-            now = datetime.now(timezone.utc).strftime("%Y-%m-%dT%H%M%S.%f")[:-3]
-            out = RESULTS / f"{now}-{command}"
+            out = _new(command)
         if out.exists() and not out.is_dir():
             raise NotADirectoryError(f"{out}: is a file; --out takes a directory")
         out.mkdir(parents=True, exist_ok=True)
-        return cls(out)
+        lock = Lock(out)
+        interrupt.writing(out)
+        return cls(out, lock)
 
     def link_latest(self) -> None:
         """Point ``results/latest`` here, wherever this directory is."""
@@ -90,6 +114,16 @@ class ResultsDirectory:
                 **settings,
             },
         )
+
+
+def _new(command: str) -> Path:
+    """A folder of its own, also for runs that begin at the same time."""
+    while True:
+        now = datetime.now(timezone.utc).strftime("%Y-%m-%dT%H%M%S.%f")[:-3]
+        with suppress(FileExistsError):
+            out = RESULTS / f"{now}-{command}"
+            out.mkdir(parents=True)
+            return out
 
 
 def tum_trajectory(

@@ -2,11 +2,11 @@
 
 use std::fmt;
 use std::fmt::Write as _;
-use std::fs;
 use std::path::Path;
 
 use crate::csv::Table;
 use crate::error::RecordingError;
+use crate::file as files;
 use onboard::observation::OdometrySample;
 
 /// A step in time this many times the usual one is a gap.
@@ -219,5 +219,5 @@ pub fn write_odometry_csv(file: &Path, samples: &[OdometrySample]) -> Result<(),
         }
         text.push('\n');
     }
-    fs::write(file, text).map_err(|source| RecordingError::io(file, source))
+    files::write(file, text.as_bytes())
 }

@@ -8,7 +8,7 @@ from typing import Annotated
 import typer
 
 from access_av.commands.options import AsJson, Out, ScenarioArgument
-from access_av.terminal import console, show_bound
+from access_av.terminal import console, progress, show_bound
 
 app = typer.Typer()
 
@@ -29,12 +29,15 @@ def bound(
     The posterior Cramér-Rao bound of the horizontal error: along the route and over the site.
     Writes bound.parquet, map.parquet, report.html, scenario.toml and manifest.json.
     """
+    from access_av._core import Scenario
     from access_av.error_bound import bound as error_bound
     from access_av.files import ResultsDirectory
     from access_av.report.placement import render_bound
 
-    found = error_bound(scenario, map_step_m=map_step_m)
-    directory = ResultsDirectory.create(f"bound-{found.scenario.name}", out)
+    chosen = Scenario.load(scenario)
+    directory = ResultsDirectory.create(f"bound-{chosen.name}", out)
+    with progress("Bounding"):
+        found = error_bound(chosen, map_step_m=map_step_m)
     directory.write_table("bound.parquet", found.route)
     directory.write_table("map.parquet", found.site)
     directory.write_text("report.html", render_bound(found))

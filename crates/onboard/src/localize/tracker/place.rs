@@ -3,6 +3,7 @@
 use super::filter::Tracker;
 use super::locate::locate;
 use super::state::{Belief, SCALE};
+use crate::localize::gaussian::transformed;
 use crate::localize::pose_estimate::PoseEstimate;
 
 impl Tracker {
@@ -54,20 +55,10 @@ impl Tracker {
             }
         }
         inner[0][0] += lag_variance;
-        let mut covariance = [[0.0; 3]; 3];
-        for i in 0..3 {
-            for j in 0..3 {
-                for k in 0..3 {
-                    for l in 0..3 {
-                        covariance[i][j] += jacobian[i][k] * inner[k][l] * jacobian[j][l];
-                    }
-                }
-            }
-        }
         PoseEstimate {
             time_s,
             pose,
-            covariance: Some(covariance),
+            covariance: Some(transformed(&jacobian, &inner)),
             integrity: None,
         }
     }
