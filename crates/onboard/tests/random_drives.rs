@@ -120,11 +120,7 @@ fn drive(seed: u64) {
                 "drive {seed}, step {step}: {moved_m} of {most_m}"
             );
         }
-        if !(gap_from..=gap_to).contains(&step) {
-            before = Some((pose, std_m));
-        } else {
-            before = None;
-        }
+        before = (!(gap_from..=gap_to).contains(&step)).then_some((pose, std_m));
     }
 }
 
