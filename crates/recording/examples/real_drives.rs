@@ -252,21 +252,21 @@ impl Drive {
         );
         text
     }
+}
 
-    fn print_remarks(&self, located: &LocatedDrive) {
-        if std::env::var_os("REMARKS").is_some() {
-            let mut seen: BTreeMap<String, usize> = BTreeMap::new();
-            for remark in &located.remarks {
-                let key: String = remark
-                    .text
-                    .chars()
-                    .filter(|c| !c.is_ascii_digit())
-                    .collect();
-                let count = seen.entry(key).or_default();
-                *count += 1;
-                if *count <= 3 {
-                    println!("      {}", remark.text);
-                }
+fn print_remarks(located: &LocatedDrive) {
+    if std::env::var_os("REMARKS").is_some() {
+        let mut seen: BTreeMap<String, usize> = BTreeMap::new();
+        for remark in &located.remarks {
+            let key: String = remark
+                .text
+                .chars()
+                .filter(|c| !c.is_ascii_digit())
+                .collect();
+            let count = seen.entry(key).or_default();
+            *count += 1;
+            if *count <= 3 {
+                println!("      {}", remark.text);
             }
         }
     }
@@ -313,7 +313,7 @@ fn print_minutes(drive: &Drive, poses: &[LocatedPose]) {
 
 fn report(label: &str, drive: &Drive, located: &LocatedDrive) {
     println!("{:10} {label:18} {}", drive.name, drive.judge(located));
-    drive.print_remarks(located);
+    print_remarks(located);
     print_minutes(drive, &located.poses);
     print_trace(drive, &located.poses);
 }
@@ -377,7 +377,7 @@ fn faults(drive: &Drive, told: &str) {
             is / was,
             bad.remarks.len()
         );
-        drive.print_remarks(&bad);
+        print_remarks(&bad);
         print_minutes(drive, &bad.poses);
     };
     let off = |dx: f64, dy: f64, turn: f64| Pose {
