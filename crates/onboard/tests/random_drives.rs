@@ -120,7 +120,8 @@ fn drive(seed: u64) {
                 "drive {seed}, step {step}: {moved_m} of {most_m}"
             );
         }
-        before = (!(gap_from..=gap_to).contains(&step)).then_some((pose, std_m));
+        let gap = (gap_from..=gap_to).contains(&step);
+        before = (!gap).then_some((pose, std_m));
     }
 }
 
