@@ -39,7 +39,7 @@ LONG: dict[str, list[str]] = {
     "vehicle": ["vehicle", "check", *access_av.Vehicle.names() * 40],
     "platform": ["platform", "check", *access_av.Platform.names() * 40],
 }  # fmt: skip
-LATEST_S = 3.0
+LATEST_S = 2.0
 # The interpreter starts before the program does; what Ctrl-C does then is Python's own.
 PYTHON_S = 0.15
 

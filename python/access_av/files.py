@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import fcntl
+import io
 import json
 import os
 import sys
@@ -20,8 +21,6 @@ from access_av import interrupt
 from access_av.errors import InputError
 
 if TYPE_CHECKING:
-    from collections.abc import Callable
-
     import polars as pl
     from numpy.typing import ArrayLike
 
@@ -79,7 +78,8 @@ class ResultsDirectory:
 
     def write_text(self, name: str, text: str) -> Path:
         """Write a text file."""
-        return self._whole(name, lambda partial: partial.write_text(text, encoding="utf-8"))
+        # A path may hold bytes that are no text.
+        return self._whole(name, text.encode("utf-8", "backslashreplace"))
 
     def write_json(self, name: str, value: object) -> Path:
         """Write a JSON file."""
@@ -87,13 +87,15 @@ class ResultsDirectory:
 
     def write_table(self, name: str, table: pl.DataFrame) -> Path:
         """Write a Parquet file."""
-        return self._whole(name, lambda file: table.write_parquet(file, compression="zstd"))
+        held = io.BytesIO()
+        table.write_parquet(held, compression="zstd")
+        return self._whole(name, held.getbuffer())
 
-    def _whole(self, name: str, write: Callable[[Path], object]) -> Path:
-        """Have a file written beside its place and put there; nothing is left of a failure."""
+    def _whole(self, name: str, content: bytes | memoryview) -> Path:
+        """Write a file beside its place and put it there; nothing is left of a failure."""
         target, partial = self.path / name, self.path / f".{name}.partial"
         try:
-            write(partial)
+            partial.write_bytes(content)
             partial.replace(target)
         except OSError as error:
             partial.unlink(missing_ok=True)

@@ -91,7 +91,9 @@ pub fn synthesize(
         .map_err(|error| match error {
             SynthError::Settings(error) => settings_error(error),
             SynthError::Recording(error) => recording_error(error),
-            SynthError::Stopped => raised.take().unwrap_or_else(|| PyValueError::new_err("stopped")),
+            SynthError::Stopped => raised
+                .take()
+                .unwrap_or_else(|| PyValueError::new_err("stopped")),
             other => PyValueError::new_err(brief(other)),
         })?;
     Ok((made.recording, made.bursts, made.samples))
@@ -108,8 +110,7 @@ pub fn synthesize(
 pub fn read_tum(py: Python<'_>, file: PathBuf) -> PyResult<Bound<'_, PyDict>> {
     let poses = recording::read_tum(&file).map_err(recording_error)?;
     let columns = PyDict::new(py);
-    let column =
-        |value: fn(&TimedPose) -> f64| PyArray1::from_iter(py, poses.iter().map(value));
+    let column = |value: fn(&TimedPose) -> f64| PyArray1::from_iter(py, poses.iter().map(value));
     columns.set_item("time_s", column(|it| it.time_s))?;
     columns.set_item("x_m", column(|it| it.pose.x_m))?;
     columns.set_item("y_m", column(|it| it.pose.y_m))?;

@@ -21,6 +21,15 @@ pub struct OdometryLog {
     pub remarks: Vec<OdometryRemark>,
 }
 
+impl OdometryLog {
+    /// Whether a time is that of the drive, up to a second before it or after.
+    pub fn covers(&self, time_s: f64) -> bool {
+        let (first, last) = (self.samples.first(), self.samples.last());
+        first.is_some_and(|it| time_s >= it.time_s - 1.0)
+            && last.is_some_and(|it| time_s <= it.time_s + 1.0)
+    }
+}
+
 /// What is remarkable about one item of an odometry file.
 #[derive(Debug, Clone, PartialEq)]
 pub struct OdometryRemark {

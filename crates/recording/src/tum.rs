@@ -49,13 +49,16 @@ pub fn write_tum(file: &Path, poses: &[TimedPose]) -> Result<(), RecordingError>
 /// [`RecordingError::Io`], or [`RecordingError::Value`] naming the line that is not eight numbers
 /// with a unit quaternion.
 pub fn read_tum(file: &Path) -> Result<Vec<TimedPose>, RecordingError> {
-    let bytes =
-        files::read(file, MOST_BYTES).map_err(|source| RecordingError::io(file, source))?;
+    let bytes = files::read(file, MOST_BYTES).map_err(|source| RecordingError::io(file, source))?;
     let text = String::from_utf8_lossy(&bytes);
-    let lines = text.trim_start_matches('\u{feff}').lines().enumerate().filter(|(_, line)| {
-        let line = line.trim();
-        !line.is_empty() && !line.starts_with('#')
-    });
+    let lines = text
+        .trim_start_matches('\u{feff}')
+        .lines()
+        .enumerate()
+        .filter(|(_, line)| {
+            let line = line.trim();
+            !line.is_empty() && !line.starts_with('#')
+        });
     lines
         .map(|(index, line)| {
             pose(line).ok_or_else(|| {

@@ -146,7 +146,11 @@ impl Simulation {
             .num_threads(options.threads.unwrap_or(0))
             .build()?;
         let wave = 8 * pool.current_num_threads();
-        let at_once = if options.keep_records { options.runs } else { options.runs.min(wave) };
+        let at_once = if options.keep_records {
+            options.runs
+        } else {
+            options.runs.min(wave)
+        };
         self.scenario().check_runs(at_once)?;
         let energy = EnergyModel::new(&self.scenario().vehicle, self.platform())?;
         let mut sums = vec![StepSums::default(); self.steps()];

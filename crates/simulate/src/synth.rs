@@ -10,8 +10,8 @@ use onboard::geometry::Pose;
 use onboard::receive::SSB_SAMPLES;
 use onboard::settings::{Check, SettingsError, TomlFile, Vehicle};
 use recording::{
-    Annotation, Datatype, RecordingError, RecordingWriter, TimedPose, WriterSettings,
-    write_file, write_odometry_csv, write_tum,
+    Annotation, Datatype, RecordingError, RecordingWriter, TimedPose, WriterSettings, write_file,
+    write_odometry_csv, write_tum,
 };
 use serde_json::{Map, json};
 use thiserror::Error;

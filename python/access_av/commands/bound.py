@@ -7,7 +7,7 @@ from typing import Annotated
 
 import typer
 
-from access_av.commands.options import AsJson, Out, ScenarioArgument
+from access_av.commands.options import AllowLarge, AsJson, Out, ScenarioArgument, load_scenario
 from access_av.terminal import console, progress, show_bound
 
 app = typer.Typer()
@@ -19,6 +19,7 @@ app = typer.Typer()
 def bound(
     scenario: ScenarioArgument,
     out: Out = None,
+    allow_large: AllowLarge = False,
     map_step_m: Annotated[
         float | None, typer.Option(help="Side of the map's squares; else a round length that fits.")
     ] = None,
@@ -29,12 +30,11 @@ def bound(
     The posterior Cramér-Rao bound of the horizontal error: along the route and over the site.
     Writes bound.parquet, map.parquet, report.html, scenario.toml and manifest.json.
     """
-    from access_av._core import Scenario
     from access_av.error_bound import bound as error_bound
     from access_av.files import ResultsDirectory
     from access_av.report.placement import render_bound
 
-    chosen = Scenario.load(scenario)
+    chosen = load_scenario(scenario, allow_large=allow_large)
     directory = ResultsDirectory.create(f"bound-{chosen.name}", out)
     with progress("Bounding"):
         found = error_bound(chosen, map_step_m=map_step_m)

@@ -8,7 +8,7 @@ from typing import TYPE_CHECKING, Annotated
 
 import typer
 
-from access_av.commands.options import Out, ScenarioArgument
+from access_av.commands.options import AllowLarge, Out, ScenarioArgument, load_scenario
 from access_av.errors import InputError
 from access_av.terminal import console, errors, progress, show_warning
 
@@ -38,6 +38,7 @@ def synth(
         bool, typer.Option("--continuous", help="Also the time between the bursts (large).")
     ] = False,
     datatype: Annotated[str, typer.Option(help="ci16_le or cf32_le.")] = "ci16_le",
+    allow_large: AllowLarge = False,
 ) -> None:
     """Record a scenario's drive: samples of all antennas, odometry, site, vehicle, truth.
 
@@ -46,10 +47,9 @@ def synth(
     each capture says where in time it belongs (core:global_index).
     """
     from access_av import drives
-    from access_av._core import Scenario
     from access_av.files import ResultsDirectory
 
-    chosen = Scenario.load(scenario)
+    chosen = load_scenario(scenario, allow_large=allow_large)
     directory = ResultsDirectory.create("synth", out)
     with progress("Recording") as tick:
         made = drives.synthesize(

@@ -227,7 +227,8 @@ mod tests {
             assert!(hh > 0.0 && hh < 1e-12, "{hh}");
             assert!((xh, yh) == (hx, hy));
             let minor = xx * yy - xy * xy;
-            let whole = xx * (yy * hh - yh * hy) - xy * (xy * hh - yh * hx) + xh * (xy * hy - yy * hx);
+            let whole =
+                xx * (yy * hh - yh * hy) - xy * (xy * hh - yh * hx) + xh * (xy * hy - yy * hx);
             assert!(minor > 0.0 && whole > 0.0, "{minor} {whole}");
         }
     }

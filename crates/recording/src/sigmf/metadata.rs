@@ -134,7 +134,8 @@ impl Metadata {
     /// # Errors
     /// [`RecordingError`] naming the key where one is missing, of the wrong type or out of range.
     pub fn read(file: &Path) -> Result<Self, RecordingError> {
-        let text = files::read(file, MOST_BYTES).map_err(|source| RecordingError::io(file, source))?;
+        let text =
+            files::read(file, MOST_BYTES).map_err(|source| RecordingError::io(file, source))?;
         Self::parse(&text, file)
     }
 

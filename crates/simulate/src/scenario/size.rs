@@ -31,7 +31,12 @@ pub struct DriveSize {
 
 impl DriveSize {
     /// The size of a drive of `vehicle` along `road`.
-    pub(super) fn new(motion: &MotionSettings, site: &Site, vehicle: &Vehicle, road: &Road) -> Self {
+    pub(super) fn new(
+        motion: &MotionSettings,
+        site: &Site,
+        vehicle: &Vehicle,
+        road: &Road,
+    ) -> Self {
         let top_speed_mps = motion.top_speed_kmh.unwrap_or(vehicle.top_speed_kmh) / 3.6;
         let acceleration_mps2 = (motion.acceleration_mps2).unwrap_or(vehicle.acceleration_mps2);
         // Each leg takes one ramp more than at top speed throughout, or less if it is short.

@@ -6,6 +6,10 @@ use super::state::{Belief, SCALE};
 use crate::localize::gaussian::transformed;
 use crate::localize::pose_estimate::PoseEstimate;
 
+/// Nothing is known better than to a nanometre and a nanoradian: so much the covariance says at
+/// least, though a belief that began exactly has no width.
+const LEAST_VARIANCE: f64 = 1e-18;
+
 impl Tracker {
     /// The pose at `time_s`, carried on from the newest odometry at its speed.
     pub fn pose(&self, time_s: f64) -> PoseEstimate {
@@ -55,10 +59,14 @@ impl Tracker {
             }
         }
         inner[0][0] += lag_variance;
+        let mut covariance = transformed(&jacobian, &inner);
+        for i in 0..3 {
+            covariance[i][i] += LEAST_VARIANCE;
+        }
         PoseEstimate {
             time_s,
             pose,
-            covariance: Some(transformed(&jacobian, &inner)),
+            covariance: Some(covariance),
             integrity: None,
         }
     }
