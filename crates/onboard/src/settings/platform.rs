@@ -190,6 +190,7 @@ pub enum Extent {
 
 impl Extent {
     /// The other end.
+    #[must_use]
     pub fn opposite(self) -> Self {
         match self {
             Self::Low => Self::High,
