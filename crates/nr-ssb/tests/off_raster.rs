@@ -92,6 +92,9 @@ fn a_centre_between_all_rasters_gives_the_right_frequency_and_offset() {
         (Khz30, 3_600.135e6, 7.0e3, -2.0),
         (Khz30, 3_600.150e6, 4.3e3, 1.0),
         (Khz15, 3_600.165e6, 7.0e3, 1.7),
+        // On no raster at all.
+        (Khz15, 3_500.0e6, 0.0, 0.6),
+        (Khz30, 3_500.0e6, 4.3e3, -0.8),
     ] {
         let mut cell = air::Cell::random(&mut rng, spacing, 1);
         cell.ssb_freq_hz = ssb_freq_hz;
@@ -123,7 +126,7 @@ fn noise_holds_no_cell_anywhere() {
 #[test]
 fn a_band_narrower_than_an_ssb_holds_none() {
     let samples = air::silence(1, 10_000);
-    let finds = scan_off_raster(&air::slices(&samples), 1.92e6, None).unwrap();
+    let finds = scan_off_raster(&air::slices(&samples), 1.92e6, None, &[]).unwrap();
     assert!(finds.is_empty());
 }
 
@@ -169,7 +172,8 @@ fn recordings_that_hide_their_centre_give_the_same_cells() {
             "{name}"
         );
         // With the centre, the place is known to the hertz.
-        let finds = scan_off_raster(&part, recording.rate_hz, Some(recording.centre_hz)).unwrap();
+        let finds =
+            scan_off_raster(&part, recording.rate_hz, Some(recording.centre_hz), &[]).unwrap();
         let found_hz = finds[0].point.ssb_freq_hz;
         assert!(
             (found_hz - number("ssb_freq_hz")).abs() < 1.0,

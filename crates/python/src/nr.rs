@@ -167,7 +167,7 @@ impl Scan {
 /// Parameters
 /// ----------
 /// recording : Recording
-///     The recording; its rate must be an integer multiple of 3.84 MHz.
+///     The recording, at any usual rate that holds an SSB: 3.84 Msps at least.
 /// centre_frequency_hz : float, optional
 ///     In place of what the recording states.
 /// ssb_freq_hz : float, optional
@@ -217,7 +217,7 @@ pub fn scan(
 /// samples : ndarray
 ///     Complex samples, `(samples,)` or `(antennas, samples)`.
 /// sample_rate_hz : float
-///     An integer multiple of 3.84 MHz.
+///     Any usual rate that holds an SSB: 3.84 Msps at least.
 /// centre_frequency_hz : float
 ///     Frequency that stands at 0 Hz in the samples.
 /// ssb_freq_hz, scs_khz, spacing_wavelengths, calibration

@@ -4,9 +4,11 @@
 
 mod error;
 mod find;
+mod parallel;
 mod placement;
 mod point;
 mod point_search;
+mod pss_scan;
 mod scan;
 
 pub use error::ScanError;

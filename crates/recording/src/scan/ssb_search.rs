@@ -22,7 +22,7 @@ pub(super) const FALSE_ALARM: f64 = 1e-3;
 pub struct SsbSearchConfig {
     /// What errors call the samples.
     pub name: String,
-    /// Samples per second and antenna, an integer multiple of 3.84 MHz.
+    /// Samples per second and antenna.
     pub sample_rate_hz: f64,
     /// Frequency in Hz that stands at 0 Hz in the samples.
     pub centre_frequency_hz: f64,
