@@ -115,6 +115,44 @@ fn a_centre_between_all_rasters_gives_the_right_frequency_and_offset() {
     }
 }
 
+/// A strong cell on the raster hides none off it, 20 dB weaker, whatever their spacings.
+#[test]
+fn a_weak_cell_off_the_raster_is_found_beside_a_strong_one_on_it() {
+    use SubcarrierSpacing::{Khz15, Khz30};
+    let mut rng = air::rng(77);
+    for spacings in [[Khz30, Khz30], [Khz30, Khz15], [Khz15, Khz30]] {
+        let centre_hz = 3_700.8e6;
+        let cells = [
+            (centre_hz - 1.44e6, 20.0, 0.05e-3),
+            (centre_hz + 3.075e6, 0.0, 1.5e-3),
+        ];
+        let mut received = vec![vec![nr_ssb::Complex32::ZERO; 46_080]];
+        let mut sent = Vec::new();
+        for (spacing, (ssb_freq_hz, snr_db, delay_s)) in spacings.into_iter().zip(cells) {
+            let mut cell = air::Cell::random(&mut rng, spacing, 1);
+            cell.ssb_freq_hz = ssb_freq_hz;
+            cell.ssb_indices = vec![1];
+            cell.delay = delay_s * spacing.base_rate_hz() + 0.3;
+            cell.cfo_hz = 1e-6 * ssb_freq_hz;
+            let samples = on_the_air(&cell, ssb_freq_hz - centre_hz, f64::INFINITY, &mut rng);
+            // As wide as it is, a resource element of 30 kHz collects twice the noise.
+            let width_db = 10.0 * (spacing.hz() / 30e3).log10();
+            let amplitude = 10f64.powf(0.05 * (snr_db + width_db)) as f32;
+            for (sum, x) in received[0].iter_mut().zip(&samples[0]) {
+                *sum += x * amplitude;
+            }
+            sent.push((spacing, ssb_freq_hz, cell.pci));
+        }
+        air::add_noise(&mut received, -3.0, &mut rng);
+        let finds = scan(&air::slices(&received), RATE_HZ, Some(centre_hz)).unwrap();
+        let found: Vec<_> = finds
+            .iter()
+            .map(|it| (it.spacing, it.point.ssb_freq_hz, it.ssbs[0].pci.get()))
+            .collect();
+        assert_eq!(found, sent);
+    }
+}
+
 #[test]
 fn noise_holds_no_cell_anywhere() {
     let mut samples = air::silence(2, 46_080);

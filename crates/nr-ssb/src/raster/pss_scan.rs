@@ -103,9 +103,12 @@ fn strongest(mut seen: Vec<Seen>, scs_hz: f64) -> Vec<f64> {
             it.sample.abs_diff(one.sample) < SYMBOL_SAMPLES
                 && (it.offset_hz - one.offset_hz).abs() < width_hz
         });
-        if !shadow && !offsets.contains(&one.offset_hz) {
+        if shadow {
+            continue;
+        }
+        kept.push(one);
+        if !offsets.contains(&one.offset_hz) {
             offsets.push(one.offset_hz);
-            kept.push(one);
         }
     }
     offsets

@@ -94,7 +94,7 @@ pub fn scan_raster(
     Ok(finds)
 }
 
-/// The SSBs anywhere in the band, `known` ones and what overlaps with them left out.
+/// The SSBs anywhere in the band but where `known` ones are.
 ///
 /// The PSS is looked for at steps of half a subcarrier through the whole band; the places of the
 /// strongest maxima are then searched. An SSB belongs to a point of the global frequency
@@ -132,9 +132,9 @@ pub fn scan_off_raster(
             .map(|find| find.point.ssb_freq_hz - centre_hz.unwrap_or(0.0))
             .collect();
         for offset_hz in likely_offsets(spacing, rate_hz, antennas, reach)? {
-            // An SSB also shows, weaker, where its PSS overlaps with a shifted one.
-            let width_hz = SUBCARRIERS as f64 * spacing.hz();
-            if found_hz.iter().any(|hz| (hz - offset_hz).abs() < width_hz) {
+            // What is there shows a subcarrier beside as well.
+            let same_place = |hz: &f64| (hz - offset_hz).abs() < 1.5 * spacing.hz();
+            if found_hz.iter().any(same_place) {
                 continue;
             }
             let first = at_point.search(antennas, RasterPoint::off(offset_hz), None)?;
@@ -152,15 +152,16 @@ pub fn scan_off_raster(
             };
             found_hz.push(offset_hz);
             let point = RasterPoint::off(centre_hz.unwrap_or(0.0) + offset_hz);
-            finds.extend(at_point.search(antennas, point, centre_hz)?);
+            let find = at_point.search(antennas, point, centre_hz)?;
+            finds.extend(find.filter(|find| !known.iter().chain(&finds).any(|it| it.casts(find))));
         }
     }
     sort(&mut finds);
     Ok(finds)
 }
 
-/// How far from the recording's centre that of an SSB can lie.
-fn reach_hz(rate_hz: f64, spacing: SubcarrierSpacing) -> f64 {
+/// How far from the recording's centre that of an SSB can lie; negative where no SSB fits.
+pub fn reach_hz(rate_hz: f64, spacing: SubcarrierSpacing) -> f64 {
     0.5 * rate_hz - 0.5 * SUBCARRIERS as f64 * spacing.hz()
 }
 
