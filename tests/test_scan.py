@@ -7,7 +7,7 @@ from typing import TYPE_CHECKING
 import numpy as np
 import pytest
 
-from access_av import RecordingError, nr
+from access_av import RecordingError, Scenario, nr, synthesize
 
 if TYPE_CHECKING:
     from collections.abc import Callable
@@ -130,6 +130,31 @@ def test_noise_holds_no_cell(access_av: Cli, tmp_path: Path) -> None:
     options = ["--sample-rate-hz", RATE_HZ, "--centre-hz", SSB_HZ]
     assert json.loads(access_av("scan", file, *options, "--json").out) == []
     assert "no SSB found" in access_av("scan", file, *options).out
+
+
+def test_nothing_found_says_where_was_looked_and_what_to_try(
+    access_av: Cli, tmp_path: Path
+) -> None:
+    file = tmp_path / "noise.cf32"
+    noise = np.random.default_rng(2).normal(size=(40_000, 2)) @ [1, 1j]
+    noise.astype(np.complex64).tofile(file)
+    options = ["--sample-rate-hz", RATE_HZ, "--centre-hz", SSB_HZ]
+    told = " ".join(access_av("scan", file, *options).out.split())
+    for words in ("raster", "any frequency from", "the first 5 ms of 1 channel", "--cfo-ppm"):
+        assert words in told
+
+
+@pytest.mark.parametrize("scenario", ["yard", "paper-real-odometry-4"])
+def test_synthesized_drives_are_scanned_without_being_told_anything(
+    scenario: str, tmp_path: Path
+) -> None:
+    # At 3500.0 MHz: on no raster at all.
+    drive = synthesize(scenario, tmp_path, duration_s=0.1)
+    site = json.loads(Scenario.load(scenario).site.to_json())
+    cells = nr.scan_as_recorded(nr.Recording.open(drive.recording)).cells
+    decoded = {cell.pci for cell in cells if cell.mib_bits}
+    assert decoded == {head["pci"] for head in site["radio_heads"]}
+    assert {cell.ssb_freq_hz for cell in cells} == {3.5e9}
 
 
 def test_real_recordings_are_scanned_without_being_told_anything(
