@@ -83,7 +83,7 @@ def test_searchers_of_several_threads_do_not_disturb_each_other() -> None:
 
 
 def test_a_searcher_says_what_it_cannot_use() -> None:
-    with pytest.raises(RecordingError, match=r"multiple of 3\.84 MHz"):
+    with pytest.raises(RecordingError, match="below the 3840000 Hz"):
         nr.Searcher(1e6, centre_frequency_hz=0, ssb_freq_hz=0, scs_khz=15, antennas=1)
     for wrong, message in (
         ({"scs_khz": 60}, "allowed: 15, 30"),
@@ -105,7 +105,7 @@ def test_a_searcher_says_what_it_cannot_use() -> None:
 
 def test_search_says_what_it_cannot_use() -> None:
     samples = array_burst()
-    with pytest.raises(RecordingError, match=r"multiple of 3\.84 MHz"):
+    with pytest.raises(RecordingError, match="below the 3840000 Hz"):
         nr.search(samples, 1e6, centre_frequency_hz=SSB_HZ)
     with pytest.raises(RecordingError, match="less than the"):
         nr.search(samples[:, :300], RATE_HZ, centre_frequency_hz=SSB_HZ, ssb_freq_hz=SSB_HZ)
