@@ -9,8 +9,9 @@ import typer
 
 from access_av import interrupt
 from access_av._core import RecordingError, SettingsError, __version__
-from access_av.commands import bound, columns, drives, files, recordings, run
+from access_av.commands import bound, columns, drives, files, profile, recordings, run
 from access_av.errors import InputError
+from access_av.paper import codesign_command as codesign
 from access_av.paper import commands as paper
 from access_av.terminal import console, give_up_output, show_error, write_what_can_be_written
 
@@ -40,7 +41,7 @@ def _options(
     pass
 
 
-for _room in (paper, run, bound, recordings, drives, columns):
+for _room in (paper, codesign, run, bound, recordings, drives, profile, columns):
     app.add_typer(_room.app)
 for _what in ("site", "vehicle", "scenario", "platform"):
     app.add_typer(files.files_app(_what), name=_what)

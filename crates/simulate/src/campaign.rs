@@ -3,6 +3,7 @@
 use onboard::Custom;
 use onboard::energy::{Energy, EnergyModel};
 use onboard::geometry::wrap_angle;
+use onboard::settings::Extent;
 use rayon::ThreadPoolBuilder;
 use rayon::prelude::*;
 
@@ -152,7 +153,7 @@ impl Simulation {
             options.runs.min(wave)
         };
         self.scenario().check_runs(at_once)?;
-        let energy = EnergyModel::new(&self.scenario().vehicle, self.platform())?;
+        let energy = EnergyModel::new(&self.scenario().vehicle, self.platform(), Extent::Value)?;
         let mut sums = vec![StepSums::default(); self.steps()];
         let mut errors = ErrorHistogram::default();
         let mut runs = Vec::new();
