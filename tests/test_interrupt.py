@@ -32,6 +32,7 @@ LONG: dict[str, list[str]] = {
     ],
     "scan": ["scan", "drive/iq.sigmf-meta"],
     "aoa": ["aoa", "drive/iq.sigmf-meta"],
+    "profile": ["profile", "--out", "profiled.toml"],
     "readings": ["readings"],
     "columns": ["columns"],
     "scenario": ["scenario", "check", *access_av.Scenario.names() * 40],

@@ -5,6 +5,7 @@ from __future__ import annotations
 import fcntl
 import io
 import json
+import math
 import os
 import sys
 import warnings
@@ -78,32 +79,17 @@ class ResultsDirectory:
 
     def write_text(self, name: str, text: str) -> Path:
         """Write a text file."""
-        # A path may hold bytes that are no text.
-        return self._whole(name, text.encode("utf-8", "backslashreplace"))
+        return write_whole(self.path / name, text)
 
     def write_json(self, name: str, value: object) -> Path:
         """Write a JSON file."""
-        return self.write_text(name, json.dumps(value, indent=2, ensure_ascii=False) + "\n")
+        return self.write_text(name, json_text(value) + "\n")
 
     def write_table(self, name: str, table: pl.DataFrame) -> Path:
         """Write a Parquet file."""
         held = io.BytesIO()
         table.write_parquet(held, compression="zstd")
-        return self._whole(name, held.getbuffer())
-
-    def _whole(self, name: str, content: bytes | memoryview) -> Path:
-        """Write a file beside its place and put it there; nothing is left of a failure."""
-        target, partial = self.path / name, self.path / f".{name}.partial"
-        try:
-            partial.write_bytes(content)
-            partial.replace(target)
-        except OSError as error:
-            partial.unlink(missing_ok=True)
-            raise OSError(error.errno, error.strerror or str(error), str(target)) from error
-        except BaseException:
-            partial.unlink(missing_ok=True)
-            raise
-        return target
+        return write_whole(self.path / name, held.getbuffer())
 
     def write_manifest(self, **settings: Any) -> Path:
         """Write ``manifest.json``: the version, the command line and the settings."""
@@ -116,6 +102,43 @@ class ResultsDirectory:
                 **settings,
             },
         )
+
+
+def write_whole(target: Path, content: str | bytes | memoryview) -> Path:
+    """Write a file beside its place and put it there; nothing is left of a failure."""
+    if isinstance(content, str):
+        # What names a file may hold bytes that are no text.
+        content = content.encode("utf-8", "backslashreplace")
+    partial = target.with_name(f".{target.name}.partial")
+    try:
+        partial.write_bytes(content)
+        partial.replace(target)
+    except BaseException as error:
+        with suppress(OSError):
+            partial.unlink(missing_ok=True)
+        if isinstance(error, OSError):
+            raise OSError(error.errno, error.strerror or str(error), str(target)) from error
+        raise
+    return target
+
+
+def json_text(value: Any) -> str:
+    """JSON, with null for what is no finite number.
+
+    Examples
+    --------
+    >>> json.loads(json_text({"found_s": [1.5, float("nan")]}))
+    {'found_s': [1.5, None]}
+    """
+
+    def finite(part: Any) -> Any:
+        if isinstance(part, dict):
+            return {key: finite(item) for key, item in part.items()}
+        if isinstance(part, list | tuple):
+            return [finite(item) for item in part]
+        return None if isinstance(part, float) and not math.isfinite(part) else part
+
+    return json.dumps(finite(value), indent=2, ensure_ascii=False, allow_nan=False)
 
 
 def _new(command: str) -> Path:

@@ -2,7 +2,6 @@
 
 from __future__ import annotations
 
-import json
 from typing import Annotated
 
 import typer
@@ -31,7 +30,7 @@ def bound(
     Writes bound.parquet, map.parquet, report.html, scenario.toml and manifest.json.
     """
     from access_av.error_bound import bound as error_bound
-    from access_av.files import ResultsDirectory
+    from access_av.files import ResultsDirectory, json_text
     from access_av.report.placement import render_bound
 
     chosen = load_scenario(scenario, allow_large=allow_large)
@@ -45,7 +44,7 @@ def bound(
     directory.write_manifest(scenario=found.scenario.name, map_step_m=found.map_step_m)
     summary = found.summary()
     if as_json:
-        print(json.dumps({**summary, "directory": str(directory.path)}, indent=2))
+        print(json_text({**summary, "directory": str(directory.path)}))
         return
     show_bound(summary)
     console.print(f"Report: {directory.path / 'report.html'}", soft_wrap=True)

@@ -2,7 +2,6 @@
 
 from __future__ import annotations
 
-import json
 from pathlib import Path
 from typing import Annotated
 
@@ -68,6 +67,7 @@ def scan(
     """
     from access_av import nr
     from access_av._core import Recording
+    from access_av.files import json_text
 
     gains = None if calibration is None else _gains(calibration)
     found = []
@@ -106,7 +106,7 @@ def scan(
         if weak:
             console.print(f"{len(weak)} more without a message: --unconfirmed lists them.")
     if as_json:
-        print(json.dumps(found, indent=2))
+        print(json_text(found))
 
 
 @app.command(epilog="Example: [bold]access-av aoa captures/array1.sigmf-meta --json[/]")
@@ -123,12 +123,13 @@ def aoa(
     Reference bursts calibrate the channels, every other annotated burst is estimated. Azimuths
     are counter-clockwise from the array's broadside.
     """
+    from access_av.files import json_text
     from access_av.recorded_angles import estimate_bursts
 
     with progress("Estimating"):
         bursts = estimate_bursts(recording, spacing_wavelengths=spacing)
     if as_json:
-        print(json.dumps([burst.as_record() for burst in bursts], indent=2))
+        print(json_text([burst.as_record() for burst in bursts]))
     else:
         show_bursts(bursts)
 
