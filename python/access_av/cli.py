@@ -9,7 +9,16 @@ import typer
 
 from access_av import interrupt
 from access_av._core import RecordingError, SettingsError, __version__
-from access_av.commands import bound, columns, drives, files, profile, recordings, run
+from access_av.commands import (
+    bound,
+    columns,
+    designs,
+    drives,
+    files,
+    profile,
+    recordings,
+    run,
+)
 from access_av.errors import InputError
 from access_av.paper import codesign_command as codesign
 from access_av.paper import commands as paper
@@ -41,7 +50,7 @@ def _options(
     pass
 
 
-for _room in (paper, codesign, run, bound, recordings, drives, profile, columns):
+for _room in (paper, codesign, run, bound, designs, recordings, drives, profile, columns):
     app.add_typer(_room.app)
 for _what in ("site", "vehicle", "scenario", "platform"):
     app.add_typer(files.files_app(_what), name=_what)
