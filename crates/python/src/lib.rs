@@ -3,6 +3,7 @@ mod aoa;
 mod bound;
 mod campaign;
 mod drive;
+mod message;
 mod nr;
 mod plug_ins;
 mod recording;
@@ -50,7 +51,7 @@ mod _core {
     #[pymodule_export]
     use crate::campaign::{SimulationResult, simulate};
     #[pymodule_export]
-    use crate::drive::{LocatedDrive, locate, synthesize};
+    use crate::drive::{LocatedDrive, locate, read_tum, synthesize};
     #[pymodule_export]
     use crate::plug_ins::{RadioHead, SensedSsb, Situation};
     #[pymodule_export]
