@@ -3,7 +3,7 @@
 mod bounds;
 mod result;
 mod samples;
-mod spectrum;
+mod spectra;
 mod statistics;
 
 use aoa::{Array, Batch, Calibration, Complex64, Method, Real, Smoothing};
@@ -15,7 +15,7 @@ pub use bounds::crb_rad;
 pub use result::AngleEstimate;
 use result::Estimates;
 use samples::{Samples, Visitor, value_error};
-pub use spectrum::spectrum;
+pub use spectra::spectrum;
 pub use statistics::{calibrate, covariance, estimate_sources, forward_backward};
 
 /// What the caller asked for, besides the samples.
