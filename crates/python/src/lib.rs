@@ -21,7 +21,7 @@ mod _core {
         #[pymodule_export]
         use crate::aoa::{
             AngleEstimate, calibrate, covariance, crb_rad, esprit, estimate_sources,
-            forward_backward, maximum_likelihood, music, root_music,
+            forward_backward, maximum_likelihood, music, root_music, spectrum,
         };
         use pyo3::prelude::*;
 
