@@ -3,6 +3,7 @@
 use onboard::Custom;
 use onboard::energy::{Energy, EnergyModel};
 use onboard::geometry::wrap_angle;
+use onboard::settings::Extent;
 use rayon::prelude::*;
 use rayon::{ThreadPool, ThreadPoolBuildError, ThreadPoolBuilder};
 
@@ -157,7 +158,7 @@ impl Simulation {
         count: usize,
         drive: impl Fn(usize) -> Result<RunRecord, SimulationError> + Sync,
     ) -> Result<Campaign, SimulationError> {
-        let energy = EnergyModel::new(&self.scenario().vehicle, self.platform())?;
+        let energy = EnergyModel::new(&self.scenario().vehicle, self.platform(), Extent::Value)?;
         let mut sums = vec![StepSums::new(options.quantiles); self.steps()];
         let mut runs = Vec::with_capacity(count);
         let mut integrity = Vec::new();
