@@ -57,6 +57,18 @@ class Simulation:
     error_quantiles_m: Mapping[float, float]
     errors_m: NDArray[np.float32] | None = None
 
+    @classmethod
+    def of(cls, found: _core.SimulationResult) -> Simulation:
+        """What the core found, as tables."""
+        return cls(
+            steps=_table(found.steps),
+            runs=_table(found.runs),
+            trajectories=None if found.trajectories is None else _table(found.trajectories),
+            executions=None if found.executions is None else _table(found.executions),
+            error_quantiles_m=found.error_quantiles_m,
+            errors_m=found.errors_m,
+        )
+
     @property
     def integrity(self) -> Integrity | None:
         """How protection levels and errors went together; ``None`` where none were stated."""
@@ -166,14 +178,7 @@ def simulate(
         localizer=localizer,
         progress=progress,
     )
-    return Simulation(
-        steps=_table(found.steps),
-        runs=_table(found.runs),
-        trajectories=None if found.trajectories is None else _table(found.trajectories),
-        executions=None if found.executions is None else _table(found.executions),
-        error_quantiles_m=found.error_quantiles_m,
-        errors_m=found.errors_m,
-    )
+    return Simulation.of(found)
 
 
 def _table(columns: Mapping[str, Any]) -> pl.DataFrame:

@@ -49,7 +49,7 @@ mod _core {
     #[pymodule_export]
     use crate::bound::ErrorBound;
     #[pymodule_export]
-    use crate::campaign::{SimulationResult, simulate};
+    use crate::campaign::{SimulationResult, Tapes, simulate};
     #[pymodule_export]
     use crate::drive::{LocatedDrive, locate, read_tum, synthesize};
     #[pymodule_export]

@@ -5,13 +5,16 @@ use std::sync::Arc;
 use onboard::geometry::Pose;
 use onboard::radio_head::RadioHead;
 use onboard::road::Road;
-use onboard::settings::{Check, SettingsError, Site, Vehicle};
+use onboard::settings::{
+    Check, EstimatorMethod, EstimatorSettings, LocalizerSettings, PlatformSettings, SettingsError,
+    Site, Vehicle, WakeUpSettings,
+};
 use rand::RngExt;
 use rand_distr::StandardNormal;
 
 use crate::channel::{Propagation, RicianPropagation};
 use crate::random::{Purpose, Streams};
-use crate::scenario::Scenario;
+use crate::scenario::{Fidelity, Scenario, TruthSettings};
 use crate::world::{MotionProfile, Odometer, Path, TrueArray};
 
 /// Makes the propagation of radio head number `index` of a site to a vehicle, in the run of the
@@ -89,6 +92,34 @@ impl World {
         self.motion.duration_s()
     }
 
+    /// Whether what an SSB brings depends neither on when it is heard nor on which others are.
+    pub(crate) fn is_independent_of_listening(&self) -> bool {
+        let scenario = &self.scenario;
+        scenario.fidelity == Fidelity::Snapshots
+            && scenario.ssb_latency_ms == 0.0
+            && self.vehicle.receiver.snr_noise_db == 0.0
+    }
+
+    /// Whether the same comes to the vehicle in another world, run by run. Both are taken to have
+    /// their scenario's own propagation.
+    pub(crate) fn sounds_like(&self, other: &Self) -> bool {
+        let besides = |scenario: &Scenario| Scenario {
+            name: String::new(),
+            description: String::new(),
+            site: self.site.clone(),
+            vehicle: what_it_is(&scenario.vehicle),
+            truth: TruthSettings {
+                std_factor: scenario.truth.factor(),
+                ..TruthSettings::default()
+            },
+            ..scenario.clone()
+        };
+        self.site == other.site
+            && what_it_is(&self.vehicle) == what_it_is(&other.vehicle)
+            && self.road == other.road
+            && besides(&self.scenario) == besides(&other.scenario)
+    }
+
     /// What is so in the run that `streams` belongs to: every value drawn from its standard
     /// deviation.
     pub fn draw(&self, streams: Streams) -> Truth {
@@ -144,6 +175,24 @@ impl World {
             site,
             vehicle,
         }
+    }
+}
+
+/// A vehicle without what its localizer, wake-up policy and computer are set to, and without the
+/// estimator's method.
+fn what_it_is(vehicle: &Vehicle) -> Vehicle {
+    Vehicle {
+        name: String::new(),
+        description: String::new(),
+        estimator: EstimatorSettings {
+            method: EstimatorMethod::default(),
+            ..vehicle.estimator
+        },
+        localizer: LocalizerSettings::default(),
+        integrity: None,
+        wake_up: WakeUpSettings::default(),
+        platform: PlatformSettings::default(),
+        ..vehicle.clone()
     }
 }
 

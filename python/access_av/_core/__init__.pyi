@@ -231,6 +231,28 @@ def simulate(
 ) -> SimulationResult: ...
 
 @final
+class Tapes:
+    @staticmethod
+    def record(
+        scenario: Scenario,
+        runs: int = 100,
+        seed: int = 1,
+        *,
+        methods: Sequence[str],
+        platform: Platform | None = None,
+        threads: int | None = None,
+    ) -> Tapes | None: ...
+    def serve(self, scenario: Scenario, *, platform: Platform | None = None) -> bool: ...
+    def simulate(
+        self,
+        scenario: Scenario,
+        *,
+        platform: Platform | None = None,
+        threads: int | None = None,
+        errors_every: int | None = None,
+    ) -> SimulationResult: ...
+
+@final
 class Recording:
     @staticmethod
     def open(path: str | PathLike[str], *, verify: bool = True) -> Recording: ...
