@@ -2,6 +2,7 @@
 mod aoa;
 mod bound;
 mod campaign;
+mod channel;
 mod drive;
 mod nr;
 mod plug_ins;
@@ -49,6 +50,8 @@ mod _core {
     use crate::bound::ErrorBound;
     #[pymodule_export]
     use crate::campaign::{SimulationResult, simulate};
+    #[pymodule_export]
+    use crate::channel::{channel_drops, check_paths};
     #[pymodule_export]
     use crate::drive::{LocatedDrive, locate, synthesize};
     #[pymodule_export]

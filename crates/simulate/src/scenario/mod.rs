@@ -7,7 +7,7 @@ mod motion;
 mod scenario_file;
 mod truth;
 
-pub use channel::{ChannelSettings, ScatterModel};
+pub use channel::{BlockageSettings, ChannelModel, ChannelSettings, HallSettings, ScatterModel};
 pub use faults::{FaultKind, FaultSettings};
 pub use iq::IqSettings;
 pub use motion::{MotionSettings, StopSettings};
