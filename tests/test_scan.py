@@ -7,7 +7,7 @@ from typing import TYPE_CHECKING
 import numpy as np
 import pytest
 
-from access_av import RecordingError, nr
+from access_av import RecordingError, Scenario, nr, synthesize
 
 if TYPE_CHECKING:
     from collections.abc import Callable
@@ -83,7 +83,7 @@ def test_searchers_of_several_threads_do_not_disturb_each_other() -> None:
 
 
 def test_a_searcher_says_what_it_cannot_use() -> None:
-    with pytest.raises(RecordingError, match=r"multiple of 3\.84 MHz"):
+    with pytest.raises(RecordingError, match="below the 3840000 Hz"):
         nr.Searcher(1e6, centre_frequency_hz=0, ssb_freq_hz=0, scs_khz=15, antennas=1)
     for wrong, message in (
         ({"scs_khz": 60}, "allowed: 15, 30"),
@@ -105,7 +105,7 @@ def test_a_searcher_says_what_it_cannot_use() -> None:
 
 def test_search_says_what_it_cannot_use() -> None:
     samples = array_burst()
-    with pytest.raises(RecordingError, match=r"multiple of 3\.84 MHz"):
+    with pytest.raises(RecordingError, match="below the 3840000 Hz"):
         nr.search(samples, 1e6, centre_frequency_hz=SSB_HZ)
     with pytest.raises(RecordingError, match="less than the"):
         nr.search(samples[:, :300], RATE_HZ, centre_frequency_hz=SSB_HZ, ssb_freq_hz=SSB_HZ)
@@ -130,6 +130,31 @@ def test_noise_holds_no_cell(access_av: Cli, tmp_path: Path) -> None:
     options = ["--sample-rate-hz", RATE_HZ, "--centre-hz", SSB_HZ]
     assert json.loads(access_av("scan", file, *options, "--json").out) == []
     assert "no SSB found" in access_av("scan", file, *options).out
+
+
+def test_nothing_found_says_where_was_looked_and_what_to_try(
+    access_av: Cli, tmp_path: Path
+) -> None:
+    file = tmp_path / "noise.cf32"
+    noise = np.random.default_rng(2).normal(size=(40_000, 2)) @ [1, 1j]
+    noise.astype(np.complex64).tofile(file)
+    options = ["--sample-rate-hz", RATE_HZ, "--centre-hz", SSB_HZ]
+    told = " ".join(access_av("scan", file, *options).out.split())
+    for words in ("raster", "any frequency from", "the first 5 ms of 1 channel", "--cfo-ppm"):
+        assert words in told
+
+
+@pytest.mark.parametrize("scenario", ["yard", "paper-real-odometry-4"])
+def test_synthesized_drives_are_scanned_without_being_told_anything(
+    scenario: str, tmp_path: Path
+) -> None:
+    # At 3500.0 MHz: on no raster at all.
+    drive = synthesize(scenario, tmp_path, duration_s=0.1)
+    site = json.loads(Scenario.load(scenario).site.to_json())
+    cells = nr.scan_as_recorded(nr.Recording.open(drive.recording)).cells
+    decoded = {cell.pci for cell in cells if cell.mib_bits}
+    assert decoded == {head["pci"] for head in site["radio_heads"]}
+    assert {cell.ssb_freq_hz for cell in cells} == {3.5e9}
 
 
 def test_real_recordings_are_scanned_without_being_told_anything(

@@ -8,8 +8,19 @@ from typing import Annotated
 import typer
 
 from access_av._core import RecordingError, SettingsError, __version__
-from access_av.commands import bound, columns, drives, files, integrity, radio, recordings, run
+from access_av.commands import (
+    bound,
+    columns,
+    drives,
+    files,
+    integrity,
+    profile,
+    radio,
+    recordings,
+    run,
+)
 from access_av.errors import InputError
+from access_av.paper import codesign_command as codesign
 from access_av.paper import commands as paper
 from access_av.terminal import console, show_error
 
@@ -39,7 +50,7 @@ def _options(
     pass
 
 
-for _room in (paper, run, bound, radio, integrity, recordings, drives, columns):
+for _room in (paper, codesign, run, bound, radio, integrity, recordings, drives, profile, columns):
     app.add_typer(_room.app)
 for _what in ("site", "vehicle", "scenario", "platform"):
     app.add_typer(files.files_app(_what), name=_what)

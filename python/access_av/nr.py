@@ -60,7 +60,7 @@ def scan_as_recorded(
     calibration
         Complex gain of each channel; without it that of the annotation around each SSB, if any.
     **where
-        ``centre_frequency_hz``, ``ssb_freq_hz`` and ``scs_khz`` of :func:`scan`.
+        ``centre_frequency_hz``, ``ssb_freq_hz``, ``scs_khz`` and ``cfo_ppm`` of :func:`scan`.
 
     Raises
     ------
@@ -90,7 +90,7 @@ def scan_as_recorded(
             for cell in scan(recording, calibration=gains.tolist(), **where).cells:
                 if abs(cell.sample_start - start) < 0.5 * cell.sample_count:
                     cells = [cell if _same(cell, other) else other for other in cells]
-    return Scan(cells, found.faults)
+    return Scan(cells, found.faults, found.looked)
 
 
 def _same(one: Cell, other: Cell) -> bool:

@@ -22,12 +22,17 @@ BOUNDARIES = {
 
 @dataclass(frozen=True)
 class Figure:
-    """A number with its provenance: ``measured``, ``fitted``, ``datasheet`` or ``assumed``."""
+    """A number with its provenance and, where it is known, the range that holds it.
+
+    ``provenance`` is ``measured``, ``fitted``, ``datasheet``, ``projected`` or ``assumed``.
+    """
 
     value: float
     provenance: str
     source: str
     boundary: str
+    low: float | None = None
+    high: float | None = None
 
 
 @dataclass(frozen=True)
@@ -91,7 +96,7 @@ class Platform:
         return Platform(
             self.core.with_overrides(
                 {
-                    f"modes[{index}].energy_per_execution_j.{_as_written(method)}": vars(figure)
+                    f"modes[{index}].energy_per_execution_j.{_as_written(method)}": _stated(figure)
                     for index, mode in enumerate(self.modes)
                     for method, figure in energies_j[mode.number].items()
                 }
@@ -129,6 +134,10 @@ class Platform:
             for figure in mode.energy_per_execution_j.values()
         }
         return "; ".join(BOUNDARIES[boundary] for boundary in sorted(found))
+
+
+def _stated(figure: Figure) -> dict[str, Any]:
+    return {key: value for key, value in vars(figure).items() if value is not None}
 
 
 def _as_written(method: str) -> str:

@@ -48,7 +48,7 @@
 //! | [`Method::EspritLs`], [`Method::EspritTls`] | N - 1 | 5 % above it with four antennas |
 //!
 //! Several sources: [`estimate_several`], and [`source_count`] for how many. Coherent ones
-//! (reflections) need [`Covariance::forward_backward`] or [`Covariance::spatially_smoothed`] first.
+//! (reflections) need [`estimate_several_smoothed`].
 //! Known pilots: [`maximum_likelihood_pilots`], and [`maximum_likelihood_pilots_unequal`] where the
 //! channels' noise differs or one is dead. Many estimates in one call: [`Batch`]. Real
 //! receivers: [`Calibration`].
@@ -84,7 +84,7 @@ pub use estimate::batch::{Batch, BatchError};
 pub use estimate::choice::Method;
 pub use estimate::one::estimate;
 pub use estimate::pilots::maximum_likelihood_pilots;
-pub use estimate::several::estimate_several;
+pub use estimate::several::{estimate_several, estimate_several_smoothed};
 pub use estimate::source_count::{Criterion, source_count};
 pub use estimate::unequal::maximum_likelihood_pilots_unequal;
 pub use kernel::real::Real;

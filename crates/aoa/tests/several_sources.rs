@@ -2,7 +2,10 @@
 
 mod common;
 
-use aoa::{Array, Complex64, Covariance, Criterion, bound, estimate_several, source_count};
+use aoa::{
+    AngleEstimate, Array, Complex64, Covariance, Criterion, Method, Reason, Verdict, bound,
+    estimate_several, estimate_several_smoothed, source_count,
+};
 use common::{METHODS, Random, exact};
 
 #[test]
@@ -97,12 +100,10 @@ fn coherent_sources_need_averaging() {
     let coherent: [Complex64; 4] =
         std::array::from_fn(|n| direct[n] + reflected[n] * Complex64::from_polar(0.8, 1.0));
     let covariance = Covariance::from_snapshots(&[coherent; 10]).unwrap();
-    let averaged = covariance.forward_backward();
-    let smoothed = covariance.spatially_smoothed::<3>();
-    let ideal = array.subarray::<3>().unwrap();
     for method in &METHODS[1..] {
-        let found = estimate_several(*method, &averaged, &array, 2).unwrap();
-        let small = estimate_several(*method, &smoothed, &ideal, 2).unwrap();
+        let found = estimate_several_smoothed::<4, 4>(*method, &covariance, &array, 2, true);
+        let small = estimate_several_smoothed::<4, 3>(*method, &covariance, &array, 2, false);
+        let (found, small) = (found.unwrap(), small.unwrap());
         for k in 0..2 {
             assert!(
                 (found[k].angle_rad.to_degrees() - truth[k]).abs() < 1e-4,
@@ -113,6 +114,124 @@ fn coherent_sources_need_averaging() {
                 "{method:?}"
             );
         }
+    }
+}
+
+/// Snapshots of two sources of 15 dB whose waveforms have this correlation, in unit noise.
+fn correlated<const N: usize>(
+    random: &mut Random,
+    phases: [f64; 2],
+    correlation: f64,
+    count: usize,
+) -> Vec<[Complex64; N]> {
+    let array = Array::<N>::half_wavelength();
+    let responses = phases.map(|phase| array.steering_vector(phase));
+    let amplitude = 10.0_f64.powf(15.0 / 20.0);
+    let own = (1.0 - correlation * correlation).max(0.0).sqrt();
+    (0..count)
+        .map(|_| {
+            let (one, other) = (random.gaussian(), random.gaussian());
+            // Neither in phase nor in quadrature.
+            let second = one * Complex64::from_polar(correlation, -0.8) + other * own;
+            std::array::from_fn(|n| {
+                (responses[0][n] * one + responses[1][n] * second) * amplitude + random.gaussian()
+            })
+        })
+        .collect()
+}
+
+/// Normalised squared errors of the resolved estimates, and how many of all are.
+fn consistency<const N: usize, const M: usize>(
+    random: &mut Random,
+    method: Method,
+    correlation: f64,
+    forward_backward: bool,
+) -> (f64, f64) {
+    let array = Array::<N>::half_wavelength();
+    let phases = [-0.7, 0.9];
+    let trials = 400;
+    let (mut sum, mut resolved) = (0.0, 0.0);
+    for _ in 0..trials {
+        let snapshots = correlated::<N>(random, phases, correlation, 50);
+        let covariance = Covariance::from_snapshots(&snapshots).unwrap();
+        let found = if N == M && !forward_backward {
+            estimate_several(method, &covariance, &array, 2)
+                .unwrap()
+                .to_vec()
+        } else {
+            let found =
+                estimate_several_smoothed::<N, M>(method, &covariance, &array, 2, forward_backward);
+            found.unwrap().to_vec()
+        };
+        // By ascending angle, that is by descending phase.
+        for (estimate, phase) in found.iter().zip([0.9, -0.7]) {
+            if estimate.is_resolved() {
+                resolved += 1.0;
+                sum += ((estimate.phase_rad - phase) / estimate.phase_sigma_rad).powi(2);
+            }
+        }
+    }
+    (
+        sum / f64::max(resolved, 1.0),
+        resolved / (2.0 * f64::from(trials)),
+    )
+}
+
+#[test]
+fn what_is_resolved_knows_how_good_it_is_whatever_the_correlation() {
+    let mut random = Random::new(15);
+    for method in &METHODS[1..] {
+        for correlation in [0.0, 0.5, 0.9, 0.95, 0.99, 1.0] {
+            for (name, (nees, resolved)) in [
+                (
+                    "4",
+                    consistency::<4, 4>(&mut random, *method, correlation, false),
+                ),
+                (
+                    "4, averaged",
+                    consistency::<4, 4>(&mut random, *method, correlation, true),
+                ),
+                (
+                    "4, by 3",
+                    consistency::<4, 3>(&mut random, *method, correlation, false),
+                ),
+                (
+                    "8",
+                    consistency::<8, 8>(&mut random, *method, correlation, false),
+                ),
+                (
+                    "8, by 6, averaged",
+                    consistency::<8, 6>(&mut random, *method, correlation, true),
+                ),
+            ] {
+                println!("{method:?} {correlation} {name}: NEES {nees:.2}, resolved {resolved:.2}");
+                // Four standard deviations of the mean of so many squares beside what is asked.
+                let chance = 4.0 * (2.0 / (800.0 * resolved).max(1.0)).sqrt();
+                assert!(
+                    nees < 1.3 + chance,
+                    "{method:?} {correlation} {name}: {nees}"
+                );
+                if name.ends_with("averaged") || correlation < 0.6 {
+                    assert!(
+                        resolved > 0.9,
+                        "{method:?} {correlation} {name}: {resolved}"
+                    );
+                }
+            }
+        }
+    }
+}
+
+#[test]
+fn coherent_sources_are_called_so() {
+    let mut random = Random::new(16);
+    let array = Array::<4>::half_wavelength();
+    for method in &METHODS[1..] {
+        let snapshots = correlated::<4>(&mut random, [-0.7, 0.9], 1.0, 50);
+        let covariance = Covariance::from_snapshots(&snapshots).unwrap();
+        let found = estimate_several(*method, &covariance, &array, 2).unwrap();
+        let correlated = |it: &AngleEstimate| it.verdict == Verdict::Unresolved(Reason::Correlated);
+        assert!(found.iter().all(correlated), "{method:?} {found:?}");
     }
 }
 

@@ -1,4 +1,5 @@
 //! Channels whose noise differs, or that are dead.
+#![allow(clippy::unwrap_used, reason = "this is a test")]
 
 mod common;
 

@@ -21,7 +21,12 @@ fn every_annotated_ssb_is_found_without_being_told_where() {
             Some(recording.centre_hz),
         )
         .unwrap();
-        assert_eq!(finds.len(), 1, "{name}: one raster point holds cells");
+        let places: Vec<_> = finds.iter().map(|it| (it.point, &it.ssbs)).collect();
+        assert_eq!(
+            finds.len(),
+            1,
+            "{name}: one raster point holds cells: {places:?}"
+        );
         let find = &finds[0];
         for annotation in &recording.annotations {
             let truth = &annotation["nr:ssb"];

@@ -92,43 +92,68 @@ proptest! {
     }
 }
 
-/// 11.52 Msps is three halves of the base rate at 30 kHz.
+/// Rates of common receivers, and what they are of the base rate.
 #[test]
-fn a_rate_of_three_halves_is_converted() {
-    let spacing = SubcarrierSpacing::Khz30;
-    let mut rng = air::rng(5);
-    let mut cell = air::Cell::random(&mut rng, spacing, 1);
-    cell.delay = 333.25;
-    let mut samples = air::silence(1, 30_000);
-    cell.add_to(&mut samples);
-    air::add_noise(&mut samples, 15.0, &mut rng);
-    let recorded: Vec<_> = air::raised(&samples[0], 3, 0.0)
-        .into_iter()
-        .step_by(2)
-        .collect();
-    let mut front_end = FrontEnd::new(11.52e6, 0.0, 30e3, 1).unwrap();
-    let base = front_end.process(&[&recorded]).unwrap();
-    assert_eq!(base[0].len(), 30_000);
-    let mut searcher = Searcher::new(SearchConfig {
-        ssb_freq_hz: Some(cell.ssb_freq_hz),
-        ..SearchConfig::new(spacing, 1)
-    })
-    .unwrap();
-    let found = searcher.search(&air::slices(&base)).unwrap();
-    assert_eq!(found.len(), 1);
-    assert_eq!(found[0].payload.unwrap().sfn(), cell.sfn);
-    assert!((found[0].sample_start - cell.ssb_start(cell.ssb_indices[0])).abs() < 0.05);
+fn rates_that_are_no_multiple_are_converted() {
+    use SubcarrierSpacing::{Khz15, Khz30};
+    for (spacing, rate_hz, up, down) in [
+        (Khz30, 11.52e6, 3, 2),
+        (Khz15, 5e6, 125, 96),
+        (Khz15, 10e6, 125, 48),
+        (Khz30, 10e6, 125, 96),
+        (Khz15, 20e6, 625, 120),
+        (Khz30, 20e6, 125, 48),
+        (Khz30, 25e6, 625, 192),
+        (Khz30, 50e6, 625, 96),
+        (Khz30, 61.44e6, 8, 1),
+    ] {
+        let mut rng = air::rng(5);
+        let mut cell = air::Cell::random(&mut rng, spacing, 1);
+        cell.delay = 333.25;
+        let mut samples = air::silence(1, 28_800);
+        cell.add_to(&mut samples);
+        air::add_noise(&mut samples, 15.0, &mut rng);
+        let recorded = air::resampled(&samples[0], up, down);
+        let mut front_end = FrontEnd::new(rate_hz, 0.0, spacing.hz(), 1).unwrap();
+        // In blocks as they come: nothing is lost or doubled between them.
+        let mut base = vec![Vec::new()];
+        for block in recorded.chunks(10_007) {
+            front_end.push(&[block], &mut base).unwrap();
+        }
+        front_end.finish(&mut base);
+        assert_eq!(base[0].len(), 28_800, "{rate_hz}");
+        let mut searcher = Searcher::new(SearchConfig {
+            ssb_freq_hz: Some(cell.ssb_freq_hz),
+            ..SearchConfig::new(spacing, 1)
+        })
+        .unwrap();
+        let found = searcher.search(&air::slices(&base)).unwrap();
+        assert_eq!(found.len(), 1, "{rate_hz}");
+        assert_eq!(found[0].payload.unwrap().sfn(), cell.sfn);
+        assert!((found[0].snr_db - 15.0).abs() < 1.0, "{}", found[0].snr_db);
+        assert!((found[0].sample_start - cell.ssb_start(cell.ssb_indices[0])).abs() < 0.05);
+    }
 }
 
 #[test]
 fn bad_input_is_named() {
     let spacing = SubcarrierSpacing::Khz15;
     let rate = |rate_hz| FrontEnd::new(rate_hz, 0.0, 15e3, 1).err();
-    assert_eq!(rate(5e6), Some(FrontEndError::RateNotMultiple(5e6)));
-    assert!(matches!(
-        rate(f64::NAN),
-        Some(FrontEndError::RateNotMultiple(_))
-    ));
+    for rate_hz in [f64::NAN, f64::INFINITY, -7.68e6, 0.0, 1e300, 5.123_457e6] {
+        let error = rate(rate_hz).unwrap();
+        assert!(matches!(error, FrontEndError::Rate { .. }), "{rate_hz}");
+    }
+    for antennas in [0, 17, usize::MAX] {
+        let error = FrontEnd::new(7.68e6, 0.0, 15e3, antennas).err();
+        assert_eq!(error, Some(FrontEndError::Antennas(antennas)));
+    }
+    for scs_hz in [0.0, -15e3, f64::NAN, 1e-300] {
+        let error = FrontEnd::new(7.68e6, 0.0, scs_hz, 1).err();
+        assert!(
+            matches!(error, Some(FrontEndError::Rate { .. })),
+            "{scs_hz}"
+        );
+    }
     let wide = FrontEnd::new(3.84e6, 0.0, 30e3, 1).err();
     assert!(matches!(wide, Some(FrontEndError::RateTooLow { .. })));
     let outside = FrontEnd::new(23.04e6, 10e6, 30e3, 1).err();

@@ -88,7 +88,9 @@ fn places_in_the_grid() {
     let used = |indices: &[usize]| {
         assert!(indices.is_sorted());
         let mut used = vec![0; 960];
-        indices.iter().for_each(|index| used[*index] = 1);
+        for index in indices {
+            used[*index] = 1;
+        }
         used
     };
     for line in lines("dmrs_index") {

@@ -92,6 +92,9 @@ fn a_centre_between_all_rasters_gives_the_right_frequency_and_offset() {
         (Khz30, 3_600.135e6, 7.0e3, -2.0),
         (Khz30, 3_600.150e6, 4.3e3, 1.0),
         (Khz15, 3_600.165e6, 7.0e3, 1.7),
+        // On no raster at all.
+        (Khz15, 3_500.0e6, 0.0, 0.6),
+        (Khz30, 3_500.0e6, 4.3e3, -0.8),
     ] {
         let mut cell = air::Cell::random(&mut rng, spacing, 1);
         cell.ssb_freq_hz = ssb_freq_hz;
@@ -112,6 +115,44 @@ fn a_centre_between_all_rasters_gives_the_right_frequency_and_offset() {
     }
 }
 
+/// A strong cell on the raster hides none off it, 20 dB weaker, whatever their spacings.
+#[test]
+fn a_weak_cell_off_the_raster_is_found_beside_a_strong_one_on_it() {
+    use SubcarrierSpacing::{Khz15, Khz30};
+    let mut rng = air::rng(77);
+    for spacings in [[Khz30, Khz30], [Khz30, Khz15], [Khz15, Khz30]] {
+        let centre_hz = 3_700.8e6;
+        let cells = [
+            (centre_hz - 1.44e6, 20.0, 0.05e-3),
+            (centre_hz + 3.075e6, 0.0, 1.5e-3),
+        ];
+        let mut received = vec![vec![nr_ssb::Complex32::ZERO; 46_080]];
+        let mut sent = Vec::new();
+        for (spacing, (ssb_freq_hz, snr_db, delay_s)) in spacings.into_iter().zip(cells) {
+            let mut cell = air::Cell::random(&mut rng, spacing, 1);
+            cell.ssb_freq_hz = ssb_freq_hz;
+            cell.ssb_indices = vec![1];
+            cell.delay = delay_s * spacing.base_rate_hz() + 0.3;
+            cell.cfo_hz = 1e-6 * ssb_freq_hz;
+            let samples = on_the_air(&cell, ssb_freq_hz - centre_hz, f64::INFINITY, &mut rng);
+            // As wide as it is, a resource element of 30 kHz collects twice the noise.
+            let width_db = 10.0 * (spacing.hz() / 30e3).log10();
+            let amplitude = 10f64.powf(0.05 * (snr_db + width_db)) as f32;
+            for (sum, x) in received[0].iter_mut().zip(&samples[0]) {
+                *sum += x * amplitude;
+            }
+            sent.push((spacing, ssb_freq_hz, cell.pci));
+        }
+        air::add_noise(&mut received, -3.0, &mut rng);
+        let finds = scan(&air::slices(&received), RATE_HZ, Some(centre_hz)).unwrap();
+        let found: Vec<_> = finds
+            .iter()
+            .map(|it| (it.spacing, it.point.ssb_freq_hz, it.ssbs[0].pci.get()))
+            .collect();
+        assert_eq!(found, sent);
+    }
+}
+
 #[test]
 fn noise_holds_no_cell_anywhere() {
     let mut samples = air::silence(2, 46_080);
@@ -123,7 +164,7 @@ fn noise_holds_no_cell_anywhere() {
 #[test]
 fn a_band_narrower_than_an_ssb_holds_none() {
     let samples = air::silence(1, 10_000);
-    let finds = scan_off_raster(&air::slices(&samples), 1.92e6, None).unwrap();
+    let finds = scan_off_raster(&air::slices(&samples), 1.92e6, None, &[]).unwrap();
     assert!(finds.is_empty());
 }
 
@@ -169,7 +210,8 @@ fn recordings_that_hide_their_centre_give_the_same_cells() {
             "{name}"
         );
         // With the centre, the place is known to the hertz.
-        let finds = scan_off_raster(&part, recording.rate_hz, Some(recording.centre_hz)).unwrap();
+        let finds =
+            scan_off_raster(&part, recording.rate_hz, Some(recording.centre_hz), &[]).unwrap();
         let found_hz = finds[0].point.ssb_freq_hz;
         assert!(
             (found_hz - number("ssb_freq_hz")).abs() < 1.0,

@@ -1,6 +1,13 @@
 //! Energy of a run, line by line: what was counted and what was not.
+//!
+//! Each burst that is listened to costs the receiver's on-time (settling, then the burst) and the
+//! cycles of receiving it; each estimate its own cycles; what remains of the run the board idles, or
+//! sleeps. Energies above idle add to one another and to at most one that holds the board's idle
+//! power: two of those would count it twice.
 
-use crate::settings::{Boundary, Platform, Provenance, SettingsError, Vehicle};
+use crate::settings::{
+    Boundary, Extent, Figure, Platform, PowerMode, Provenance, SettingsError, Vehicle,
+};
 
 /// How the energy of a run follows from what happened in it.
 #[derive(Debug, Clone, Copy, PartialEq)]
@@ -8,10 +15,19 @@ pub struct EnergyModel {
     per_execution_j: f64,
     per_listening_j: f64,
     idle_w: f64,
-    /// What the energy per execution counts.
+    sleep: Option<Sleep>,
+    /// What the sum of it counts.
     pub boundary: Boundary,
     /// Where the energy per execution comes from.
     pub provenance: Provenance,
+}
+
+/// What sleeping between wake-ups takes.
+#[derive(Debug, Clone, Copy, PartialEq)]
+struct Sleep {
+    power_w: f64,
+    /// Awake for each burst: transition, settling, burst, computation, in seconds.
+    awake_s: f64,
 }
 
 /// Energy of a run in joules.
@@ -19,7 +35,7 @@ pub struct EnergyModel {
 pub struct Energy {
     /// Of estimating angles.
     pub executions_j: f64,
-    /// Of listening to SSBs; 0 where the platform does not count it.
+    /// Of listening to SSBs, and of receiving them; 0 where the platform does not count it.
     pub listening_j: f64,
     /// Of the idle board; 0 where the platform does not count it.
     pub idle_j: f64,
@@ -34,42 +50,129 @@ impl Energy {
 
 impl EnergyModel {
     /// The energy model of a vehicle's method on its platform and mode; `None` where the platform
-    /// has no energy figure for that method.
+    /// has no energy figure for that method. `extent` says whether every figure is taken as it is,
+    /// or at the end of its range that makes for the least or the most energy.
     ///
     /// # Errors
-    /// [`SettingsError`] when the platform has no such mode.
-    pub fn new(vehicle: &Vehicle, platform: &Platform) -> Result<Option<Self>, SettingsError> {
+    /// [`SettingsError`] when the platform has no such mode, or counts the idle board twice.
+    pub fn new(
+        vehicle: &Vehicle,
+        platform: &Platform,
+        extent: Extent,
+    ) -> Result<Option<Self>, SettingsError> {
         let mode = platform.mode(&vehicle.platform, &vehicle.name)?;
-        let (idle, receiver) = (&platform.idle, &platform.receiver);
-        let idle_w = idle
-            .power_w
+        let Some(execution) = Execution::new(vehicle, platform, mode, extent) else {
+            return Ok(None);
+        };
+        let idle = platform
+            .idle_power_w(mode)
+            .filter(|_| platform.idle.counted);
+        let receiver = &platform.receiver;
+        let radio = receiver.power_w.as_ref().filter(|_| receiver.counted);
+        let boundary = platform.boundary_of_sum([
+            Some(execution.boundary),
+            radio.map(|figure| figure.boundary),
+            idle.map(|figure| figure.boundary),
+        ])?;
+        // What is measured above idle at the rails is more at the wall.
+        let efficiency = platform.supply_efficiency.as_ref();
+        let loss = match (efficiency, boundary) {
+            (Some(efficiency), Boundary::Wall) => 1.0 / efficiency.at(extent.opposite()),
+            _ => 1.0,
+        };
+        let scale = |boundary| {
+            if boundary == Boundary::Marginal {
+                loss
+            } else {
+                1.0
+            }
+        };
+        let settling_ms = receiver
+            .settling_ms
             .as_ref()
-            .filter(|_| idle.counted)
-            .map_or(0.0, |f| f.value);
-        let receiver_w = receiver
-            .power_w
-            .as_ref()
-            .filter(|_| receiver.counted)
-            .map_or(0.0, |f| f.value);
-        Ok(mode
-            .energy_per_execution_j
-            .get(&vehicle.estimator.method)
-            .map(|figure| Self {
-                per_execution_j: figure.value,
-                per_listening_j: receiver_w * receiver.on_time_ms * 1e-3,
-                idle_w,
-                boundary: figure.boundary,
-                provenance: figure.provenance,
-            }))
+            .map_or(0.0, |it| it.at(extent));
+        let on_s = (settling_ms + receiver.on_time_ms) * 1e-3;
+        let radio_j = radio.map_or(0.0, |it| it.at(extent) * on_s * scale(it.boundary));
+        let cpu = platform.cpu.as_ref().filter(|_| receiver.counted);
+        let burst_s = cpu.map_or(0.0, |cpu| {
+            cpu.cycles_per_burst.at(extent) / (mode.cpu_mhz * 1e6)
+        });
+        let burst_j = platform
+            .core_power_w(mode, extent)
+            .map_or(0.0, |(core_w, figure)| {
+                burst_s * core_w * scale(figure.boundary)
+            });
+        let sleep = platform.suspend.as_ref().map(|suspend| Sleep {
+            power_w: suspend.power_w.at(extent),
+            awake_s: suspend.transition_ms.at(extent) * 1e-3 + on_s + burst_s + execution.time_s,
+        });
+        Ok(Some(Self {
+            per_execution_j: execution.energy_j * scale(execution.boundary),
+            per_listening_j: radio_j + burst_j,
+            idle_w: idle.map_or(0.0, |figure| figure.at(extent)),
+            sleep,
+            boundary,
+            provenance: execution.provenance,
+        }))
     }
 
     /// Energy of a run of so many executions, SSB bursts listened to, and seconds.
     pub fn of_run(&self, executions: usize, listened: usize, duration_s: f64) -> Energy {
+        let idle_j = match self.sleep {
+            Some(sleep) if self.idle_w > 0.0 => {
+                // Bursts too close for a sleep in between keep the board awake.
+                let awake_s = (listened as f64 * sleep.awake_s).min(duration_s);
+                awake_s * self.idle_w + (duration_s - awake_s) * sleep.power_w
+            }
+            _ => duration_s * self.idle_w,
+        };
         Energy {
             executions_j: executions as f64 * self.per_execution_j,
             listening_j: listened as f64 * self.per_listening_j,
-            idle_j: duration_s * self.idle_w,
+            idle_j,
         }
+    }
+}
+
+/// One estimate: as the mode states it, else its cycles at the mode's clock.
+struct Execution {
+    energy_j: f64,
+    time_s: f64,
+    boundary: Boundary,
+    provenance: Provenance,
+}
+
+impl Execution {
+    fn new(
+        vehicle: &Vehicle,
+        platform: &Platform,
+        mode: &PowerMode,
+        extent: Extent,
+    ) -> Option<Self> {
+        let method = &vehicle.estimator.method;
+        let cpu = platform.cpu.as_ref();
+        let cycles = cpu.and_then(|cpu| cpu.cycles_per_execution.get(method));
+        let time_s = cycles.map_or(0.0, |cycles| cycles.at(extent) / (mode.cpu_mhz * 1e6));
+        if let Some(stated) = mode.energy_per_execution_j.get(method) {
+            return Some(Self {
+                energy_j: Figure::at(stated, extent),
+                time_s,
+                boundary: stated.boundary,
+                provenance: stated.provenance,
+            });
+        }
+        let projected = cycles?.provenance == Provenance::Projected;
+        let (core_w, figure) = platform.core_power_w(mode, extent)?;
+        Some(Self {
+            energy_j: time_s * core_w,
+            time_s,
+            boundary: figure.boundary,
+            provenance: if projected {
+                Provenance::Projected
+            } else {
+                figure.provenance
+            },
+        })
     }
 }
 
@@ -80,39 +183,140 @@ mod tests {
     use super::*;
     use crate::settings::{Shipped, TomlFile};
 
-    fn paper() -> (Vehicle, Platform) {
-        let vehicle = Vehicle::from_library("paper", &Shipped).unwrap();
-        let platform = Platform::from_library("jetson-agx-xavier", &Shipped).unwrap();
-        (vehicle, platform)
+    fn vehicle() -> Vehicle {
+        Vehicle::from_library("paper", &Shipped).unwrap()
+    }
+
+    fn platform(name: &str) -> Platform {
+        Platform::from_library(name, &Shipped).unwrap()
+    }
+
+    fn model(platform: &Platform, extent: Extent) -> EnergyModel {
+        EnergyModel::new(&vehicle(), platform, extent)
+            .unwrap()
+            .unwrap()
     }
 
     #[test]
     fn papers_mode_0() {
-        let (vehicle, platform) = paper();
-        let model = EnergyModel::new(&vehicle, &platform).unwrap().unwrap();
+        let model = model(&platform("jetson-agx-xavier"), Extent::Value);
         let energy = model.of_run(1005, 4018, 80.33);
         assert!(
             (energy.total_j() / 627.22 - 1.0).abs() < 0.005,
             "{energy:?}"
         );
         assert_eq!((energy.listening_j, energy.idle_j), (0.0, 0.0));
+        assert_eq!(model.boundary, Boundary::Unstated);
     }
 
     #[test]
-    fn idle_and_listening_count_when_asked() {
-        let (vehicle, platform) = paper();
-        let counted = platform
-            .with_overrides(
-                [
-                    ("idle.counted", Value::Boolean(true)),
-                    ("receiver.counted", Value::Boolean(true)),
-                ],
-                &Shipped,
-            )
+    fn the_receiver_counts_when_asked() {
+        let counted = platform("jetson-agx-xavier")
+            .with_overrides([("receiver.counted", Value::Boolean(true))], &Shipped)
             .unwrap();
-        let model = EnergyModel::new(&vehicle, &counted).unwrap().unwrap();
-        let energy = model.of_run(0, 100, 10.0);
-        assert!((energy.idle_j - 69.7).abs() < 1e-9, "{energy:?}");
-        assert!(energy.listening_j > 0.0);
+        let energy = model(&counted, Extent::Value).of_run(0, 100, 10.0);
+        let receiver = &counted.receiver;
+        let on_ms = receiver.on_time_ms + receiver.settling_ms.as_ref().unwrap().value;
+        let radio_j = 100.0 * on_ms * 1e-3 * receiver.power_w.as_ref().unwrap().value;
+        assert!((energy.listening_j - radio_j).abs() < 1e-9, "{energy:?}");
+        assert_eq!(energy.idle_j, 0.0);
+    }
+
+    #[test]
+    fn the_idle_board_is_not_counted_twice() {
+        let twice = platform("jetson-agx-xavier")
+            .with_overrides([("idle.counted", Value::Boolean(true))], &Shipped)
+            .unwrap();
+        let error = EnergyModel::new(&vehicle(), &twice, Extent::Value).unwrap_err();
+        let message = error.to_string();
+        assert!(
+            message.contains("idle.counted") && message.contains("unstated"),
+            "{message}"
+        );
+    }
+
+    const CONTROLLED: &str = r#"
+        name = "round figures"
+        [idle]
+        counted = true
+        power_w = { value = 4.0, provenance = "assumed", source = "test", boundary = "soc-rails" }
+        [receiver]
+        counted = true
+        on_time_ms = 5.0
+        settling_ms = { value = 5.0, low = 1.0, high = 15.0, provenance = "assumed", source = "test" }
+        power_w = { value = 1.0, low = 0.5, high = 2.0, provenance = "assumed", source = "test", boundary = "marginal" }
+        [cpu]
+        cycles_per_burst = { value = 2e6, provenance = "assumed", source = "test" }
+        cycles_per_execution.music = { value = 4e6, provenance = "assumed", source = "test" }
+        [cpu.core]
+        reference_mhz = 1000.0
+        power_w = { value = 0.5, provenance = "assumed", source = "test", boundary = "marginal" }
+        exponent = { value = 3.0, provenance = "assumed", source = "test" }
+        [[modes]]
+        mode = 0
+        name = "fast"
+        cpu_mhz = 2000.0
+        cores = 4
+    "#;
+
+    #[test]
+    fn cycles_make_time_and_energy() {
+        let platform = Platform::from_toml(CONTROLLED, "test", &Shipped).unwrap();
+        let model = model(&platform, Extent::Value);
+        let energy = model.of_run(10, 100, 10.0);
+        // A core takes 0.5 W · 2³ = 4 W; an estimate 2 ms of it, a burst 1 ms and 10 ms of 1 W.
+        assert!(
+            (energy.executions_j - 10.0 * 8e-3).abs() < 1e-12,
+            "{energy:?}"
+        );
+        assert!(
+            (energy.listening_j - 100.0 * 14e-3).abs() < 1e-12,
+            "{energy:?}"
+        );
+        assert!((energy.idle_j - 40.0).abs() < 1e-12, "{energy:?}");
+        assert_eq!(model.boundary, Boundary::SocRails);
+        assert!((platform.base_wake_up_s(&vehicle()).unwrap() - 3e-3).abs() < 1e-12);
+    }
+
+    #[test]
+    fn ranges_hold_the_value_between_them() {
+        let platform = Platform::from_toml(CONTROLLED, "test", &Shipped).unwrap();
+        let total_j = |extent| model(&platform, extent).of_run(10, 100, 10.0).listening_j;
+        assert!((total_j(Extent::Low) - 100.0 * (3e-3 + 4e-3)).abs() < 1e-12);
+        assert!((total_j(Extent::High) - 100.0 * (40e-3 + 4e-3)).abs() < 1e-12);
+    }
+
+    #[test]
+    fn at_the_wall_what_is_above_idle_costs_the_conversion_too() {
+        let text = CONTROLLED.replace("soc-rails", "wall");
+        let supplied = format!(
+            "supply_efficiency = {{ value = 0.8, provenance = \"assumed\", source = \"test\" }}\n{text}"
+        );
+        let platform = Platform::from_toml(&supplied, "test", &Shipped).unwrap();
+        let energy = model(&platform, Extent::Value).of_run(10, 100, 10.0);
+        assert!(
+            (energy.executions_j - 10.0 * 8e-3 / 0.8).abs() < 1e-12,
+            "{energy:?}"
+        );
+        assert!((energy.idle_j - 40.0).abs() < 1e-12, "{energy:?}");
+    }
+
+    #[test]
+    fn between_wake_ups_far_apart_the_board_sleeps() {
+        let text = format!(
+            "{CONTROLLED}\n[suspend]\n\
+             power_w = {{ value = 0.5, provenance = \"assumed\", source = \"test\", boundary = \"soc-rails\" }}\n\
+             transition_ms = {{ value = 87.0, provenance = \"assumed\", source = \"test\" }}\n"
+        );
+        let platform = Platform::from_toml(&text, "test", &Shipped).unwrap();
+        let model = model(&platform, Extent::Value);
+        // Awake 87 + 10 + 1 + 2 = 100 ms a burst.
+        let energy = model.of_run(10, 10, 10.0);
+        assert!(
+            (energy.idle_j - (4.0 + 9.0 * 0.5)).abs() < 1e-9,
+            "{energy:?}"
+        );
+        let busy = model.of_run(500, 500, 10.0);
+        assert!((busy.idle_j - 40.0).abs() < 1e-9, "{busy:?}");
     }
 }

@@ -1,4 +1,5 @@
 //! A vehicle with two driven wheels.
+#![allow(clippy::unwrap_used, reason = "this is a test")]
 
 use onboard::geometry::Pose;
 use onboard::localize::built_in;

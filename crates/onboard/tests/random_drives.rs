@@ -120,11 +120,8 @@ fn drive(seed: u64) {
                 "drive {seed}, step {step}: {moved_m} of {most_m}"
             );
         }
-        if !(gap_from..=gap_to).contains(&step) {
-            before = Some((pose, std_m));
-        } else {
-            before = None;
-        }
+        let gap = (gap_from..=gap_to).contains(&step);
+        before = (!gap).then_some((pose, std_m));
     }
 }
 

@@ -135,17 +135,24 @@ impl Cell {
 ///     The SSBs in order of time.
 /// faults : list of str
 ///     What is wrong with single channels: clipped, silent, exchanged.
+/// looked : list of str
+///     Where was looked: spacings, frequencies, how much of the recording.
 #[pyclass(frozen, get_all, module = "access_av._core.nr")]
 pub struct Scan {
     cells: Vec<Py<Cell>>,
     faults: Vec<String>,
+    looked: Vec<String>,
 }
 
 #[pymethods]
 impl Scan {
     #[new]
-    fn new(cells: Vec<Py<Cell>>, faults: Vec<String>) -> Self {
-        Self { cells, faults }
+    const fn new(cells: Vec<Py<Cell>>, faults: Vec<String>, looked: Vec<String>) -> Self {
+        Self {
+            cells,
+            faults,
+            looked,
+        }
     }
 }
 
@@ -158,6 +165,7 @@ impl Scan {
                 .map(|ssb| Py::new(py, Cell::from(ssb)))
                 .collect::<Result<_, _>>()?,
             faults: scan.faults.iter().map(ToString::to_string).collect(),
+            looked: scan.looked.iter().map(ToString::to_string).collect(),
         })
     }
 }
@@ -167,13 +175,16 @@ impl Scan {
 /// Parameters
 /// ----------
 /// recording : Recording
-///     The recording; its rate must be an integer multiple of 3.84 MHz.
+///     The recording, at any usual rate that holds an SSB: 3.84 Msps at least.
 /// centre_frequency_hz : float, optional
 ///     In place of what the recording states.
 /// ssb_freq_hz : float, optional
 ///     Absolute frequency of the SSB's centre; the synchronization raster is searched without.
 /// scs_khz : int, optional
 ///     Subcarrier spacing, 15 or 30; both are tried without.
+/// cfo_ppm : float, optional
+///     Largest offset of the oscillators where `ssb_freq_hz` is given, up to five subcarriers;
+///     half a subcarrier without.
 /// spacing_wavelengths : float
 ///     Distance between neighbouring antennas.
 /// calibration : array_like, optional
@@ -184,19 +195,22 @@ impl Scan {
 /// RecordingError
 ///     A rate, band or length that cannot be searched; samples that are not finite.
 #[pyfunction]
-#[pyo3(signature = (recording, *, centre_frequency_hz = None, ssb_freq_hz = None, scs_khz = None, spacing_wavelengths = 0.5, calibration = None))]
+#[allow(clippy::too_many_arguments)]
+#[pyo3(signature = (recording, *, centre_frequency_hz = None, ssb_freq_hz = None, scs_khz = None, cfo_ppm = None, spacing_wavelengths = 0.5, calibration = None))]
 pub fn scan(
     py: Python<'_>,
     recording: &mut Recording,
     centre_frequency_hz: Option<f64>,
     ssb_freq_hz: Option<f64>,
     scs_khz: Option<u32>,
+    cfo_ppm: Option<f64>,
     spacing_wavelengths: f64,
     calibration: Option<Vec<Complex64>>,
 ) -> PyResult<Scan> {
     let settings = ScanSettings {
         ssb_freq_hz,
         spacing: scs_khz.map(subcarrier_spacing).transpose()?,
+        cfo_ppm,
         centre_frequency_hz,
         array: ArraySetup {
             spacing_wavelengths,
@@ -217,10 +231,10 @@ pub fn scan(
 /// samples : ndarray
 ///     Complex samples, `(samples,)` or `(antennas, samples)`.
 /// sample_rate_hz : float
-///     An integer multiple of 3.84 MHz.
+///     Any usual rate that holds an SSB: 3.84 Msps at least.
 /// centre_frequency_hz : float
 ///     Frequency that stands at 0 Hz in the samples.
-/// ssb_freq_hz, scs_khz, spacing_wavelengths, calibration
+/// ssb_freq_hz, scs_khz, cfo_ppm, spacing_wavelengths, calibration
 ///     As for `scan`.
 ///
 /// Returns
@@ -236,7 +250,7 @@ pub fn scan(
 /// >>> cell.pci, cell.ssb_index, cell.sfn
 /// (42, 1, 7)
 #[pyfunction]
-#[pyo3(signature = (samples, sample_rate_hz, *, centre_frequency_hz, ssb_freq_hz = None, scs_khz = None, spacing_wavelengths = 0.5, calibration = None))]
+#[pyo3(signature = (samples, sample_rate_hz, *, centre_frequency_hz, ssb_freq_hz = None, scs_khz = None, cfo_ppm = None, spacing_wavelengths = 0.5, calibration = None))]
 #[allow(clippy::too_many_arguments)]
 pub fn search(
     py: Python<'_>,
@@ -245,6 +259,7 @@ pub fn search(
     centre_frequency_hz: f64,
     ssb_freq_hz: Option<f64>,
     scs_khz: Option<u32>,
+    cfo_ppm: Option<f64>,
     spacing_wavelengths: f64,
     calibration: Option<Vec<Complex64>>,
 ) -> PyResult<Vec<Py<Cell>>> {
@@ -252,6 +267,7 @@ pub fn search(
     let settings = ScanSettings {
         ssb_freq_hz,
         spacing: scs_khz.map(subcarrier_spacing).transpose()?,
+        cfo_ppm,
         centre_frequency_hz: None,
         array: ArraySetup {
             spacing_wavelengths,

@@ -2,8 +2,9 @@
 
 use std::hash::{DefaultHasher, Hash, Hasher};
 
+use onboard::energy::EnergyModel;
 use onboard::settings::{
-    Platform as CorePlatform, SettingsError as CoreError, Site as CoreSite, TomlFile,
+    Extent, Platform as CorePlatform, SettingsError as CoreError, Site as CoreSite, TomlFile,
     Vehicle as CoreVehicle,
 };
 use pyo3::create_exception;
@@ -163,6 +164,53 @@ toml_file! {
 toml_file! {
     /// A platform, checked.
     Platform(CorePlatform), "platform",
+
+    /// Energy in joules of a run of so many executions, SSB bursts listened to, and seconds, by a
+    /// vehicle's method and power mode: `(executions, listening, idle, boundary)`. `extent` is
+    /// "value", or "low" or "high" for that end of every figure's range. `None` where the platform
+    /// has no figure for the method.
+    #[pyo3(signature = (vehicle, executions, listened, duration_s, extent = "value"))]
+    fn energy_j(
+        &self,
+        vehicle: &Vehicle,
+        executions: usize,
+        listened: usize,
+        duration_s: f64,
+        extent: &str,
+    ) -> PyResult<Option<(f64, f64, f64, String)>> {
+        let model = EnergyModel::new(&vehicle.0, &self.0, extent_of(extent)?);
+        Ok(model.map_err(settings_error)?.map(|model| {
+            let energy = model.of_run(executions, listened, duration_s);
+            let boundary = model.boundary.to_string();
+            (energy.executions_j, energy.listening_j, energy.idle_j, boundary)
+        }))
+    }
+
+    /// Shortest time between two estimates, in seconds, of a vehicle's method in its mode.
+    fn base_wake_up_s(&self, vehicle: &Vehicle) -> PyResult<f64> {
+        self.0.base_wake_up_s(&vehicle.0).map_err(settings_error)
+    }
+
+    /// Power in watts of the board with so many busy cores, by the mode's place in the file; `None`
+    /// where the platform has no model of it.
+    fn busy_power_w(&self, mode: usize, cores: u32) -> PyResult<Option<f64>> {
+        let modes = &self.0.modes;
+        let mode = modes.get(mode).ok_or_else(|| {
+            PyValueError::new_err(format!("`mode` is {mode}; there are {}", modes.len()))
+        })?;
+        Ok(self.0.busy_power_w(mode, cores))
+    }
+}
+
+fn extent_of(name: &str) -> PyResult<Extent> {
+    match name {
+        "low" => Ok(Extent::Low),
+        "value" => Ok(Extent::Value),
+        "high" => Ok(Extent::High),
+        _ => Err(PyValueError::new_err(format!(
+            "`extent` is {name:?}; allowed are \"low\", \"value\" and \"high\""
+        ))),
+    }
 }
 
 fn resolve(vehicle: &CoreVehicle, platform: Option<&Platform>) -> Result<CoreVehicle, CoreError> {

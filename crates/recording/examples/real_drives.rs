@@ -195,6 +195,15 @@ impl Drive {
         (squares.iter().sum::<f64>() / squares.len().max(1) as f64).sqrt()
     }
 
+    /// Half the squared error of the place in units of its covariance.
+    fn half_nees(&self, pose: &LocatedPose) -> Option<f64> {
+        let truth = self.true_pose(pose.estimate.time_s)?;
+        let [[xx, xy, _], [_, yy, _], _] = pose.estimate.covariance?;
+        let at = pose.estimate.pose;
+        let (dx, dy) = (at.x_m - truth.x_m, at.y_m - truth.y_m);
+        Some(0.5 * (yy * dx * dx - 2.0 * xy * dx * dy + xx * dy * dy) / (xx * yy - xy * xy))
+    }
+
     fn judge(&self, located: &LocatedDrive) -> String {
         let (mut ok, mut beyond, mut all, mut nees) = (0, 0, 0, 0.0);
         let mut nees_heading = 0.0;
@@ -205,9 +214,8 @@ impl Drive {
             all += 1;
             let at = pose.estimate.pose;
             let (dx, dy) = (at.x_m - truth.x_m, at.y_m - truth.y_m);
-            if let Some([[xx, xy, _], [_, yy, _], [_, _, hh]]) = pose.estimate.covariance {
-                nees +=
-                    0.5 * (yy * dx * dx - 2.0 * xy * dx * dy + xx * dy * dy) / (xx * yy - xy * xy);
+            nees += self.half_nees(pose).unwrap_or(0.0);
+            if let Some([_, _, [_, _, hh]]) = pose.estimate.covariance {
                 nees_heading += wrap_angle(at.heading_rad - truth.heading_rad).powi(2) / hh;
             }
             if let Some(integrity) = pose.estimate.integrity
@@ -252,21 +260,22 @@ impl Drive {
         );
         text
     }
+}
 
-    fn print_remarks(&self, located: &LocatedDrive) {
-        if std::env::var_os("REMARKS").is_some() {
-            let mut seen: BTreeMap<String, usize> = BTreeMap::new();
-            for remark in &located.remarks {
-                let key: String = remark
-                    .text
-                    .chars()
-                    .filter(|c| !c.is_ascii_digit())
-                    .collect();
-                let count = seen.entry(key).or_default();
-                *count += 1;
-                if *count <= 3 {
-                    println!("      {}", remark.text);
-                }
+/// The first remarks of each kind.
+fn print_remarks(located: &LocatedDrive) {
+    if std::env::var_os("REMARKS").is_some() {
+        let mut seen: BTreeMap<String, usize> = BTreeMap::new();
+        for remark in &located.remarks {
+            let key: String = remark
+                .text
+                .chars()
+                .filter(|c| !c.is_ascii_digit())
+                .collect();
+            let count = seen.entry(key).or_default();
+            *count += 1;
+            if *count <= 3 {
+                println!("      {}", remark.text);
             }
         }
     }
@@ -301,19 +310,32 @@ fn print_trace(drive: &Drive, poses: &[LocatedPose]) {
     }
 }
 
-/// RMS in each minute.
+/// RMS in each minute, and NEES/2.
 fn print_minutes(drive: &Drive, poses: &[LocatedPose]) {
-    if std::env::var_os("MINUTES").is_some() {
-        let minutes =
-            (0..22).map(|it| drive.rms_m(poses, f64::from(it) * 60.0, f64::from(it) * 60.0 + 60.0));
-        let minutes: Vec<String> = minutes.map(|rms_m| format!("{rms_m:.2}")).collect();
-        println!("      {}", minutes.join(" "));
+    if std::env::var_os("MINUTES").is_none() {
+        return;
     }
+    let end_s = poses.last().map_or(0.0, |pose| pose.estimate.time_s);
+    let (mut rms_m, mut nees) = (String::new(), String::new());
+    for minute in 0..(end_s / 60.0).ceil() as u32 {
+        let from_s = f64::from(minute) * 60.0;
+        let _ = write!(rms_m, " {:5.2}", drive.rms_m(poses, from_s, from_s + 60.0));
+        let within = poses
+            .iter()
+            .filter(|it| (from_s..from_s + 60.0).contains(&it.estimate.time_s));
+        let all: Vec<f64> = within.filter_map(|it| drive.half_nees(it)).collect();
+        let _ = write!(
+            nees,
+            " {:5.2}",
+            all.iter().sum::<f64>() / all.len().max(1) as f64
+        );
+    }
+    println!("   rms   {rms_m}\n   nees/2{nees}");
 }
 
 fn report(label: &str, drive: &Drive, located: &LocatedDrive) {
     println!("{:10} {label:18} {}", drive.name, drive.judge(located));
-    drive.print_remarks(located);
+    print_remarks(located);
     print_minutes(drive, &located.poses);
     print_trace(drive, &located.poses);
 }
@@ -353,12 +375,41 @@ fn main() {
                 &drive.locate(DEFAULTS, drive.start, true),
             );
         }
+        if wanted.iter().any(|it| it == "parts") {
+            parts(&drive, told);
+        }
         if wants("faults") {
             faults(&drive, told);
         }
     }
     if wants("street") && only.is_none() {
         street(&data.join("street"));
+    }
+}
+
+/// The drive from several starts on: whether what holds of the whole holds of its parts.
+fn parts(drive: &Drive, told: &str) {
+    const LENGTH_S: f64 = 300.0;
+    let end_s = drive.truth.last().map_or(0.0, |last| last.time_s);
+    let mut from_s = 30.0;
+    while from_s + LENGTH_S < end_s {
+        let within = from_s..from_s + LENGTH_S;
+        let mut part = drive.clone();
+        part.odometry
+            .samples
+            .retain(|it| within.contains(&it.time_s));
+        part.angles
+            .angles
+            .retain(|it| within.contains(&it.measured.time_s));
+        part.start = drive
+            .true_pose(part.odometry.samples[0].time_s)
+            .unwrap_or(drive.start);
+        report(
+            &format!("from {from_s} s"),
+            &part,
+            &part.locate(told, part.start, false),
+        );
+        from_s += 90.0;
     }
 }
 
@@ -377,7 +428,7 @@ fn faults(drive: &Drive, told: &str) {
             is / was,
             bad.remarks.len()
         );
-        drive.print_remarks(&bad);
+        print_remarks(&bad);
         print_minutes(drive, &bad.poses);
     };
     let off = |dx: f64, dy: f64, turn: f64| Pose {

@@ -4,7 +4,7 @@
 mod common;
 
 use nr_ssb::diagnose::Fault;
-use nr_ssb::{BchPayload, Beam, Burst, Case, Lmax, Mib, Numerology, Ofdm, Pci};
+use nr_ssb::{BchPayload, Beam, Burst, Case, Lmax, Mib, Numerology, Ofdm, Pci, SubcarrierSpacing};
 use num_complex::{Complex32, Complex64};
 use rand::{RngExt, SeedableRng};
 use rand_chacha::ChaCha8Rng;
@@ -261,6 +261,65 @@ fn a_cell_off_the_raster_is_found_where_the_recording_was_tuned_to() {
 }
 
 #[test]
+fn a_poor_oscillator_is_found_where_its_offset_is_allowed() {
+    // 20 ppm of 3.7 GHz are two and a half subcarriers.
+    for ppm in [-20.0, -8.0, 8.0, 20.0] {
+        let mut antennas = half_frame(0.3, 12);
+        let step = std::f64::consts::TAU * 1e-6 * ppm * SSB_HZ / RATE_HZ;
+        for (n, x) in antennas.iter_mut().flat_map(|it| it.iter_mut().enumerate()) {
+            let turn = Complex64::cis(step * n as f64);
+            *x *= Complex32::new(turn.re as f32, turn.im as f32);
+        }
+        let allowed = ScanSettings {
+            cfo_ppm: Some(20.0),
+            ..known()
+        };
+        let found = scan(&mut block(&antennas), &allowed).unwrap();
+        assert_eq!(found.ssbs.len(), 1, "{ppm}");
+        assert!((found.ssbs[0].ssb.cfo_hz - 1e-6 * ppm * SSB_HZ).abs() < 50.0);
+        assert!(found.ssbs[0].ssb.payload.is_some());
+        let found = scan(&mut block(&antennas), &known()).unwrap();
+        assert!(found.ssbs.is_empty(), "{ppm}");
+    }
+    let beyond = ScanSettings {
+        cfo_ppm: Some(50.0),
+        ..known()
+    };
+    let error = scan(&mut block(&half_frame(0.3, 12)), &beyond).unwrap_err();
+    assert!(error.to_string().contains("5 subcarriers"), "{error}");
+}
+
+#[test]
+fn a_scan_says_where_it_has_looked() {
+    let antennas = noise(38_400, 20.0, &mut ChaCha8Rng::seed_from_u64(3));
+    let mut source = block(&antennas);
+    source.centre_frequency_hz = Some(3_699.84e6);
+    let looked = |found: recording::scan::Scan| -> Vec<String> {
+        assert!(found.ssbs.is_empty());
+        found.looked.iter().map(ToString::to_string).collect()
+    };
+    let found = scan(&mut source, &ScanSettings::default()).unwrap();
+    assert_eq!(
+        looked(found),
+        [
+            "15 kHz spacing, 3 points of the synchronization raster, the first 5 ms of 4 channels",
+            "15 kHz spacing, any frequency from 3697.800 to 3701.880 MHz, the first 5 ms of 1 channel",
+            "30 kHz spacing, 1 point of the synchronization raster, the first 5 ms of 4 channels",
+            "30 kHz spacing, any frequency from 3699.600 to 3700.080 MHz, the first 5 ms of 1 channel",
+        ]
+    );
+    let told = ScanSettings {
+        spacing: Some(SubcarrierSpacing::Khz30),
+        ..known()
+    };
+    let found = scan(&mut block(&antennas), &told).unwrap();
+    assert_eq!(
+        looked(found),
+        ["30 kHz spacing, SSB at 3700.800 MHz ± 15.0 kHz, the first 5 ms of 4 channels"]
+    );
+}
+
+#[test]
 fn what_cannot_be_scanned_says_why() {
     let antennas = half_frame(0.0, 5);
     let mut source = block(&antennas);
@@ -269,12 +328,9 @@ fn what_cannot_be_scanned_says_why() {
     assert!(matches!(error, ScanError::NoCentreFrequency { .. }));
 
     let mut source = block(&antennas);
-    source.sample_rate_hz = 10e6;
+    source.sample_rate_hz = 5.123_457e6;
     let error = scan(&mut source, &known()).unwrap_err();
-    assert!(
-        error.to_string().contains("multiple of 3.84 MHz"),
-        "{error}"
-    );
+    assert!(error.to_string().contains("a fraction of it"), "{error}");
 
     let far = ScanSettings {
         ssb_freq_hz: Some(SSB_HZ + 3e6),

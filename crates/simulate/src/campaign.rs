@@ -3,6 +3,7 @@
 use onboard::Custom;
 use onboard::energy::{Energy, EnergyModel};
 use onboard::geometry::wrap_angle;
+use onboard::settings::Extent;
 use rayon::ThreadPoolBuilder;
 use rayon::prelude::*;
 
@@ -142,7 +143,7 @@ impl Simulation {
     /// # Errors
     /// [`SimulationError`] of the first run that fails, or that the caller stopped it.
     pub fn campaign(&self, options: &CampaignOptions<'_>) -> Result<Campaign, SimulationError> {
-        let energy = EnergyModel::new(&self.scenario().vehicle, self.platform())?;
+        let energy = EnergyModel::new(&self.scenario().vehicle, self.platform(), Extent::Value)?;
         let mut sums = vec![StepSums::default(); self.steps()];
         let mut errors = ErrorHistogram::default();
         let mut runs = Vec::with_capacity(options.runs);

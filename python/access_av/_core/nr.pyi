@@ -55,11 +55,15 @@ class Cell:
 
 @final
 class Scan:
-    def __new__(cls, cells: Sequence[Cell], faults: Sequence[str]) -> Scan: ...
+    def __new__(
+        cls, cells: Sequence[Cell], faults: Sequence[str], looked: Sequence[str]
+    ) -> Scan: ...
     @property
     def cells(self) -> list[Cell]: ...
     @property
     def faults(self) -> list[str]: ...
+    @property
+    def looked(self) -> list[str]: ...
 
 @final
 class Searcher:
@@ -82,6 +86,7 @@ def scan(
     centre_frequency_hz: float | None = None,
     ssb_freq_hz: float | None = None,
     scs_khz: int | None = None,
+    cfo_ppm: float | None = None,
     spacing_wavelengths: float = 0.5,
     calibration: Sequence[complex] | None = None,
 ) -> Scan: ...
@@ -92,6 +97,7 @@ def search(
     centre_frequency_hz: float,
     ssb_freq_hz: float | None = None,
     scs_khz: int | None = None,
+    cfo_ppm: float | None = None,
     spacing_wavelengths: float = 0.5,
     calibration: Sequence[complex] | None = None,
 ) -> list[Cell]: ...

@@ -2,12 +2,13 @@
 
 from __future__ import annotations
 
+import json
 from typing import Annotated, Any
 
 import typer
 
 from access_av._core import Platform, Scenario, SettingsError, Site, Vehicle
-from access_av.terminal import console, show_error
+from access_av.terminal import console, show_error, table
 
 
 def files_app(what: str) -> typer.Typer:
@@ -49,4 +50,29 @@ def files_app(what: str) -> typer.Typer:
     def schema() -> None:
         print(kind.schema_json())
 
+    if what == "platform":
+        files.command(epilog="Example: [bold]access-av platform power jetson-agx-xavier-engine[/]")(
+            power
+        )
     return files
+
+
+def power(name: Annotated[str, typer.Argument(help="Shipped name, or path.")]) -> None:
+    """Lay the modelled power of the busy board beside what was measured, mode by mode."""
+    platform = Platform.load(name)
+    made = table(["mode", "name", "cores", "MHz", "modelled W", "measured W", "off %"], text=2)
+    for index, mode in enumerate(json.loads(platform.to_json())["modes"]):
+        modelled_w = platform.busy_power_w(index, mode["cores"])
+        measured_w = mode.get("full_load_power_w", {}).get("value")
+        made.add_row(
+            str(mode["mode"]),
+            mode["name"],
+            str(mode["cores"]),
+            f"{mode['cpu_mhz']:.1f}",
+            "–" if modelled_w is None else f"{modelled_w:.2f}",
+            "–" if measured_w is None else f"{measured_w:.2f}",
+            "–"
+            if modelled_w is None or measured_w is None
+            else f"{100.0 * (modelled_w / measured_w - 1.0):+.1f}",
+        )
+    console.print(made)

@@ -14,6 +14,11 @@ from access_av.terminal import console, show_bursts, show_cells, show_warning
 
 app = typer.Typer()
 
+NOT_FOUND = """\
+Try --centre-hz if the recording's centre is not as it states; --ssb-freq-hz and --scs-khz, which
+find weaker cells; with them --cfo-ppm 20 for poor oscillators; a recording of 160 ms or more, the
+longest time between the SSBs of a cell."""
+
 
 @app.command(
     epilog="Example: [bold]access-av scan captures/*.sigmf-meta --json[/]",
@@ -29,6 +34,10 @@ def scan(
     ] = None,
     scs_khz: Annotated[
         int | None, typer.Option(help="Subcarrier spacing, 15 or 30; else both are tried.")
+    ] = None,
+    cfo_ppm: Annotated[
+        float | None,
+        typer.Option(min=0.0, help="With --ssb-freq-hz: largest offset of the oscillators."),
     ] = None,
     centre_hz: Annotated[
         float | None, typer.Option(min=0.0, help="Centre of the recording; else as recorded.")
@@ -76,6 +85,7 @@ def scan(
             centre_frequency_hz=centre_hz,
             ssb_freq_hz=ssb_freq_hz,
             scs_khz=scs_khz,
+            cfo_ppm=cfo_ppm,
         )
         for fault in result.faults:
             show_warning(f"{path}: {fault}")
@@ -88,7 +98,10 @@ def scan(
         if cells:
             show_cells(path.name, cells)
         else:
-            console.print(f"{path}: no SSB found.", soft_wrap=True)
+            console.print(f"{path}: no SSB found. Looked for were", soft_wrap=True)
+            for where in result.looked:
+                console.print(f"  {where}", soft_wrap=True)
+            console.print(NOT_FOUND, soft_wrap=True)
         if weak:
             console.print(f"{len(weak)} more without a message: --unconfirmed lists them.")
     if as_json:

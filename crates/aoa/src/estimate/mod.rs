@@ -7,4 +7,5 @@ pub(crate) mod one;
 pub(crate) mod pilots;
 pub(crate) mod several;
 pub(crate) mod source_count;
+mod spread;
 pub(crate) mod unequal;

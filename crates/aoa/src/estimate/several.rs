@@ -1,23 +1,29 @@
 //! Several sources, by any method that can tell them apart.
 
-use std::f64::consts::PI;
-
 use num_complex::Complex64;
 
 use super::choice::{Method, checked_grid};
 use super::one::estimate;
+use super::spread::{Averaging, Spread};
 use crate::array::linear::Array;
 use crate::bound;
 use crate::covariance::sample::Covariance;
 use crate::error::Error;
 use crate::linalg::dense::{adjoint, inverse, product};
 use crate::linalg::eigen::{HermitianEigen, hermitian_eigen};
+use crate::linalg::matrix::Matrix;
 use crate::list::List;
 use crate::method::{esprit, music, root_music};
 use crate::result::angle::{AngleEstimate, AngleEstimates};
 use crate::result::direction::describe;
 use crate::result::verdict::Reason;
 use crate::spectrum::polynomial::wrap;
+
+/// Correlation of two sources above which it is named as what made them unresolved.
+const CORRELATED: f64 = 0.5;
+/// Largest share of a signal eigenvector's power that noise may mix into it for the spread to be what
+/// the linear theory says.
+const LINEAR: f64 = 0.02;
 
 /// Directions of `sources` sources, by ascending angle.
 ///
@@ -30,50 +36,83 @@ pub fn estimate_several<const N: usize>(
     array: &Array<N>,
     sources: usize,
 ) -> Result<AngleEstimates<N>, Error> {
-    let maximum = method.maximum_sources::<N>();
+    if sources == 1 {
+        let only = estimate(method, covariance, array)?;
+        return Ok(List::collect(only, [only]));
+    }
+    estimate_several_smoothed::<N, N>(method, covariance, array, sources, false)
+}
+
+/// Directions of correlated sources: as [`estimate_several`], the covariance averaged over the
+/// `N - M + 1` subarrays of `M` antennas ([`Covariance::spatially_smoothed`]) and, if asked, over the
+/// array's symmetry ([`Covariance::forward_backward`]). The standard deviations are those of what was
+/// averaged: the subarrays share antennas, and the average of their covariances is known less well
+/// than that of as many independent ones.
+///
+/// # Errors
+/// As [`estimate_several`] with `M` antennas.
+pub fn estimate_several_smoothed<const N: usize, const M: usize>(
+    method: Method,
+    covariance: &Covariance<N>,
+    array: &Array<N>,
+    sources: usize,
+    forward_backward: bool,
+) -> Result<AngleEstimates<M>, Error> {
+    let maximum = method.maximum_sources::<M>();
     if sources == 0 || sources > maximum {
         return Err(Error::TooManySources {
             requested: sources,
             maximum,
         });
     }
-    if sources == 1 {
-        let only = estimate(method, covariance, array)?;
-        return Ok(List::collect(only, [only]));
-    }
-    let covariance = covariance.calibrated(array).validated()?;
-    let eigen = hermitian_eigen(covariance.matrix(), N);
-    let mut phases = subspace_phases(method, &eigen, sources, array)?;
+    let full = covariance.calibrated(array).validated()?;
+    let averaging = Averaging::<N, M> { forward_backward };
+    let averaged = averaging.average(&full);
+    let array = array.subarray::<M>()?;
+    let eigen = hermitian_eigen(averaged.matrix(), M);
+    let mut phases = subspace_phases(method, &eigen, sources, &array)?;
     let mut separated = phases.len() == sources;
     if !separated {
         // The spectrum has fewer peaks than sources; the roots of the same polynomial are complete.
-        phases = subspace_phases(Method::RootMusic, &eigen, sources, array)?;
+        phases = subspace_phases(Method::RootMusic, &eigen, sources, &array)?;
     }
-    let noise_variance = eigen.values[sources..].iter().sum::<f64>() / (N - sources) as f64;
-    let noise_variance = noise_variance.max(eigen.values[0] * 1e-15);
-    let strengths = strengths(&phases, &covariance, noise_variance);
-    separated &= strengths.is_some();
-    let strengths = strengths.unwrap_or(Strengths {
-        snr: [1e-9; N],
-        phase_sigma_rad: [PI; N],
-    });
-    let weakest = (eigen.values[sources - 1] / noise_variance - 1.0) / N as f64;
-    let hidden = weakest < bound::resolvable_snr::<N>(covariance.snapshots());
-    let mut estimates = [None; N];
+    let noise_variance = noise_variance(&eigen, sources);
+    let powers = source_powers(&phases, &full, noise_variance);
+    let spread = Spread {
+        eigen: &eigen,
+        sources,
+        noise_variance,
+        averaging,
+        covariance: &full.matrix(),
+        snapshots: full.snapshots(),
+    };
+    let sigmas = spread.phase_sigmas_rad(method, &phases);
+    separated &= powers.is_some() && sigmas.is_some();
+    let powers = powers.unwrap_or_default();
+    let sigmas = sigmas.unwrap_or_else(|| List::collect(0.0, [std::f64::consts::PI; M]));
+    let hidden = !shows(&eigen, sources, full.snapshots()) || spread.mixing() > LINEAR;
+    // Of coherent sources only one shows at all, until the array's symmetry tells them apart.
+    let averaged_again = || hermitian_eigen(full.forward_backward().matrix(), N);
+    let correlated = powers.largest_correlation(sources) > CORRELATED
+        || hidden && shows(&averaged_again(), sources, full.snapshots());
+    let mut estimates = [None; M];
     for (k, place) in estimates[..sources].iter_mut().enumerate() {
-        let (phase, sigma) = (phases[k], strengths.phase_sigma_rad[k]);
+        let (phase, sigma) = (phases[k], sigmas[k]);
         let close = (0..sources).any(|other| {
             let gap = wrap(phases[other] - phase).abs();
-            other != k && gap < 2.0 * sigma.hypot(strengths.phase_sigma_rad[other])
+            other != k && gap < 2.0 * sigma.hypot(sigmas[other])
         });
-        let doubt = if hidden {
+        let doubt = if (hidden || close || !separated) && correlated {
+            Some(Reason::Correlated)
+        } else if hidden {
             Some(Reason::ThresholdSnr)
         } else if close || !separated {
             Some(Reason::SourcesNotSeparated)
         } else {
             None
         };
-        *place = Some(describe(phase, sigma, strengths.snr[k], doubt, array));
+        let snr = powers.snr(k, noise_variance);
+        *place = Some(describe(phase, sigma, snr, doubt, &array));
     }
     estimates[..sources].sort_unstable_by(|a, b| match (a, b) {
         (Some(a), Some(b)) => a.angle_rad.total_cmp(&b.angle_rad),
@@ -83,6 +122,18 @@ pub fn estimate_several<const N: usize>(
         AngleEstimate::default(),
         estimates.into_iter().flatten(),
     ))
+}
+
+/// The mean of the eigenvalues that no source has.
+fn noise_variance<const N: usize>(eigen: &HermitianEigen<N>, sources: usize) -> f64 {
+    let mean = eigen.values[sources..].iter().sum::<f64>() / (N - sources) as f64;
+    mean.max(eigen.values[0] * 1e-15)
+}
+
+/// Whether the weakest source stands out of the noise.
+fn shows<const N: usize>(eigen: &HermitianEigen<N>, sources: usize, snapshots: usize) -> bool {
+    let ratio = eigen.values[sources - 1] / noise_variance(eigen, sources);
+    (ratio - 1.0) / N as f64 >= bound::resolvable_snr::<N>(snapshots)
 }
 
 /// Electrical angles from the eigenvectors.
@@ -112,18 +163,36 @@ fn subspace_phases<const N: usize>(
     }
 }
 
-struct Strengths<const N: usize> {
-    snr: [f64; N],
-    phase_sigma_rad: [f64; N],
+/// The covariance of the sources.
+struct SourcePowers<const N: usize>(Matrix<N>);
+
+impl<const N: usize> Default for SourcePowers<N> {
+    fn default() -> Self {
+        Self([[Complex64::ZERO; N]; N])
+    }
 }
 
-/// Each source's SNR, from `S = A^+ (R - sigma^2 I) A^+H`, and the stochastic bound for that `S`.
-/// `None` if the steering vectors do not tell the sources apart.
-fn strengths<const N: usize>(
+impl<const N: usize> SourcePowers<N> {
+    fn snr(&self, source: usize, noise_variance: f64) -> f64 {
+        (self.0[source][source].re / noise_variance).max(1e-9)
+    }
+
+    fn largest_correlation(&self, sources: usize) -> f64 {
+        let pairs = (0..sources).flat_map(|i| (0..i).map(move |j| (i, j)));
+        let squared = pairs.map(|(i, j)| {
+            let power = (self.0[i][i].re * self.0[j][j].re).max(f64::MIN_POSITIVE);
+            self.0[i][j].norm_sqr() / power
+        });
+        squared.fold(0.0, f64::max).sqrt()
+    }
+}
+
+/// `S = A^+ (R - sigma^2 I) A^+H`; `None` if the steering vectors do not tell the sources apart.
+fn source_powers<const N: usize>(
     phases: &[f64],
     covariance: &Covariance<N>,
     noise_variance: f64,
-) -> Option<Strengths<N>> {
+) -> Option<SourcePowers<N>> {
     let sources = phases.len();
     let steering = bound::steering_matrix::<N>(phases);
     let adjoint_steering = adjoint(&steering);
@@ -138,20 +207,6 @@ fn strengths<const N: usize>(
         row[n] -= noise_variance;
     }
     let half = product(&pseudo_inverse, &signal, [sources, N, N]);
-    let mut powers = product(&half, &adjoint(&pseudo_inverse), [sources, N, sources]);
-    let floor = noise_variance * 1e-9;
-    for k in 0..sources {
-        powers[k][k] = Complex64::from(powers[k][k].re.max(floor));
-    }
-    let sigma =
-        bound::stochastic_of(phases, &powers, noise_variance, covariance.snapshots()).ok()?;
-    let mut strengths = Strengths {
-        snr: [0.0; N],
-        phase_sigma_rad: [0.0; N],
-    };
-    for k in 0..sources {
-        strengths.snr[k] = powers[k][k].re / noise_variance;
-        strengths.phase_sigma_rad[k] = sigma[k];
-    }
-    Some(strengths)
+    let powers = product(&half, &adjoint(&pseudo_inverse), [sources, N, sources]);
+    Some(SourcePowers(powers))
 }

@@ -23,16 +23,20 @@ pub enum Reason {
     Ambiguous,
     /// Fewer peaks than sources, or two sources closer than their standard deviations.
     SourcesNotSeparated,
+    /// Sources that are reflections of each other, more alike than the method can tell apart: average
+    /// over subarrays.
+    Correlated,
 }
 
 impl Verdict {
     /// Every verdict there is.
-    pub const ALL: [Self; 5] = [
+    pub const ALL: [Self; 6] = [
         Self::Resolved,
         Self::Unresolved(Reason::ThresholdSnr),
         Self::Unresolved(Reason::NearEndFire),
         Self::Unresolved(Reason::Ambiguous),
         Self::Unresolved(Reason::SourcesNotSeparated),
+        Self::Unresolved(Reason::Correlated),
     ];
 
     /// Its place in [`Verdict::ALL`].
@@ -43,6 +47,7 @@ impl Verdict {
             Self::Unresolved(Reason::NearEndFire) => 2,
             Self::Unresolved(Reason::Ambiguous) => 3,
             Self::Unresolved(Reason::SourcesNotSeparated) => 4,
+            Self::Unresolved(Reason::Correlated) => 5,
         }
     }
 }
@@ -54,6 +59,7 @@ impl fmt::Display for Reason {
             Self::NearEndFire => "too near to the array's axis",
             Self::Ambiguous => "several directions fit: elements more than half a wavelength apart",
             Self::SourcesNotSeparated => "sources not separated",
+            Self::Correlated => "sources too correlated: average over subarrays",
         })
     }
 }

@@ -1,9 +1,9 @@
 //! The carrier frequency offsets that the matched filter tries.
 
-/// Offsets from −range to +range, no further apart than a third of a subcarrier, so placed that
-/// each answers for the same width.
-pub(crate) fn cfo_hypotheses(range_hz: f64, scs_hz: f64) -> Vec<f64> {
-    let count = (2.0 * range_hz / (scs_hz / 3.0)).ceil().max(1.0);
+/// Offsets from −range to +range, no further apart than `step_hz`, so placed that each answers for
+/// the same width.
+pub(crate) fn cfo_hypotheses(range_hz: f64, step_hz: f64) -> Vec<f64> {
+    let count = (2.0 * range_hz / step_hz).ceil().max(1.0);
     let width = 2.0 * range_hz / count;
     (0..count as usize)
         .map(|i| width * (i as f64 + 0.5) - range_hz)

@@ -13,13 +13,18 @@ use num_complex::{Complex32, Complex64};
 use rustfft::{Fft, FftPlanner};
 
 use crate::dsp::base_rate::SYMBOL_FFT;
+use crate::dsp::received_grid::MAX_ANTENNAS;
 
-/// All input rates are multiples of this one, 256 × 15 kHz.
-pub const RATE_UNIT_HZ: f64 = 3.84e6;
-/// Length of an output block of the overlap-save scheme, in samples at the base rate.
-const BLOCK: usize = 4096;
-/// Samples at the base rate dropped on each side of a block: the reach of the low-pass.
-const MARGIN: usize = 128;
+/// Most that the input rate may be of the base rate.
+const MOST_OVERSAMPLING: f64 = 4096.0;
+/// Largest numerator of the fraction that the base rate is of the input rate.
+const MOST_INTERPOLATION: usize = 1024;
+/// By how much that fraction may miss the rates, relative: a tenth of what good oscillators do.
+const RATE_TOLERANCE: f64 = 1e-7;
+/// Most samples at the base rate in an output block of the overlap-save scheme.
+const MOST_BLOCK: usize = 4096;
+/// Samples at the base rate dropped on each side of a block at least: the reach of the low-pass.
+const LEAST_MARGIN: usize = 128;
 /// Carrier frequency offset that must pass the filter unharmed, in subcarriers.
 const CFO_MARGIN_SUBCARRIERS: f64 = 0.7;
 
@@ -27,9 +32,17 @@ const CFO_MARGIN_SUBCARRIERS: f64 = 0.7;
 #[derive(Debug, Clone, PartialEq, thiserror::Error)]
 #[non_exhaustive]
 pub enum FrontEndError {
-    /// The input rate is not a positive integer multiple of 3.84 Msps.
-    #[error("sample rate {0} Hz is not an integer multiple of 3.84 MHz")]
-    RateNotMultiple(f64),
+    /// The input rate is not positive, or stands in no simple ratio to the base rate.
+    #[error(
+        "sample rate {input_hz} Hz: {base_hz} Hz must be a fraction of it, up to 1024 over any \
+         integer, within 0.1 ppm (10, 20, 25, 50 Msps and all multiples of 3.84 Msps are)"
+    )]
+    Rate {
+        /// The recording's rate.
+        input_hz: f64,
+        /// 256 × subcarrier spacing.
+        base_hz: f64,
+    },
     /// The input rate is below the base rate of the numerology.
     #[error("sample rate {input_hz} Hz is below the {base_hz} Hz that the SSB needs")]
     RateTooLow {
@@ -38,6 +51,9 @@ pub enum FrontEndError {
         /// 256 × subcarrier spacing.
         base_hz: f64,
     },
+    /// No antenna, or more than [`MAX_ANTENNAS`].
+    #[error("{0} antennas: 1 to {MAX_ANTENNAS} are possible")]
+    Antennas(usize),
     /// The SSB lies outside the recorded band.
     #[error("an SSB {offset_hz} Hz off the centre does not fit a band of {input_hz} Hz")]
     OutOfBand {
@@ -64,8 +80,8 @@ pub enum FrontEndError {
     },
 }
 
-/// Mixer, low-pass and rate conversion by L/M for all antennas of one receiver. Any multiple of
-/// 3.84 Msps is an input rate, also 11.52 Msps at 30 kHz (L/M = 2/3).
+/// Mixer, low-pass and rate conversion by L/M for all antennas of one receiver: L/M = 1/4 from 30.72
+/// to 7.68 Msps, 2/3 from 11.52, 48/125 from 20.
 pub struct FrontEnd {
     input_rate_hz: f64,
     scs_hz: f64,
@@ -73,6 +89,8 @@ pub struct FrontEnd {
     inverse: Arc<dyn Fft<f32>>,
     /// Input samples that make one output block.
     input_block: usize,
+    /// Output samples dropped on each side of a block, a multiple of L.
+    margin: usize,
     /// Output samples per input block: L/M.
     interpolation: usize,
     decimation: usize,
@@ -81,7 +99,7 @@ pub struct FrontEnd {
     spectrum: Vec<Complex32>,
     block: Vec<Complex32>,
     scratch: Vec<Complex32>,
-    /// Per antenna, input not yet consumed; begins `MARGIN` output samples before the next output.
+    /// Per antenna, input not yet consumed; begins `margin` output samples before the next output.
     pending: Vec<Vec<Complex32>>,
     /// Samples put in so far, per antenna.
     consumed_input: u64,
@@ -110,37 +128,37 @@ impl FrontEnd {
         scs_hz: f64,
         antennas: usize,
     ) -> Result<Self, FrontEndError> {
-        let base_rate_hz = SYMBOL_FFT as f64 * scs_hz;
-        let input_units = in_rate_units(input_rate_hz)?;
-        let base_units = in_rate_units(base_rate_hz)?;
-        if input_units < base_units {
-            return Err(FrontEndError::RateTooLow {
-                input_hz: input_rate_hz,
-                base_hz: base_rate_hz,
-            });
+        if antennas == 0 || antennas > MAX_ANTENNAS {
+            return Err(FrontEndError::Antennas(antennas));
         }
-        let divisor = gcd(input_units, base_units);
-        let (interpolation, decimation) = (base_units / divisor, input_units / divisor);
-        let input_block = BLOCK / interpolation * decimation;
+        let base_rate_hz = SYMBOL_FFT as f64 * scs_hz;
+        let (interpolation, decimation) = rate_ratio(input_rate_hz, base_rate_hz)?;
+        let repeats = (1..=MOST_BLOCK / interpolation)
+            .rev()
+            .find(|repeats| is_smooth(*repeats))
+            .unwrap_or(1);
+        let (block, input_block) = (repeats * interpolation, repeats * decimation);
+        let margin = LEAST_MARGIN.next_multiple_of(interpolation);
         let mut planner = FftPlanner::new();
         let forward = planner.plan_fft_forward(input_block);
-        let inverse = planner.plan_fft_inverse(BLOCK);
+        let inverse = planner.plan_fft_inverse(block);
         let scratch = forward
             .get_inplace_scratch_len()
             .max(inverse.get_inplace_scratch_len());
-        let lead_in = MARGIN / interpolation * decimation;
+        let lead_in = margin / interpolation * decimation;
         let mut front_end = Self {
             input_rate_hz,
             scs_hz,
             forward,
             inverse,
             input_block,
+            margin,
             interpolation,
             decimation,
             tuning: Tuning::default(),
-            low_pass: low_pass(input_block),
+            low_pass: low_pass(block, input_block),
             spectrum: vec![Complex32::ZERO; input_block],
-            block: vec![Complex32::ZERO; BLOCK],
+            block: vec![Complex32::ZERO; block],
             scratch: vec![Complex32::ZERO; scratch],
             pending: vec![vec![Complex32::ZERO; lead_in]; antennas],
             consumed_input: 0,
@@ -169,7 +187,7 @@ impl FrontEnd {
             });
         }
         let base_rate_hz = SYMBOL_FFT as f64 * self.scs_hz;
-        let bin_hz = base_rate_hz / BLOCK as f64;
+        let bin_hz = base_rate_hz / self.block.len() as f64;
         let centre_bin = (offset_hz / bin_hz).round();
         Ok(Tuning {
             centre_bin: centre_bin as i64,
@@ -231,7 +249,7 @@ impl FrontEnd {
         for samples in outputs.iter_mut().flat_map(|output| output.iter_mut()) {
             samples.truncate(samples.len() - excess.min(samples.len()));
         }
-        let lead_in = MARGIN / self.interpolation * self.decimation;
+        let lead_in = self.margin / self.interpolation * self.decimation;
         for pending in &mut self.pending {
             pending.clear();
             pending.resize(lead_in, Complex32::ZERO);
@@ -303,7 +321,8 @@ impl FrontEnd {
     }
 
     fn run_blocks(&mut self, tunings: &[Tuning], outputs: &mut [&mut [Vec<Complex32>]]) {
-        let hop_output = BLOCK - 2 * MARGIN;
+        let margin = self.margin;
+        let hop_output = self.block.len() - 2 * margin;
         let hop_input = hop_output / self.interpolation * self.decimation;
         let available = self.pending.first().map_or(0, Vec::len);
         let mut start = 0;
@@ -316,7 +335,7 @@ impl FrontEnd {
                 for (tuning, output) in tunings.iter().zip(outputs.iter_mut()) {
                     self.filter_block(tuning);
                     let (mut rotation, step) = self.block_phase(tuning);
-                    let kept = self.block[MARGIN..BLOCK - MARGIN].iter();
+                    let kept = self.block[margin..margin + hop_output].iter();
                     output[antenna].extend(kept.map(|sample| {
                         let rotated =
                             sample * Complex32::new(rotation.re as f32, rotation.im as f32);
@@ -335,10 +354,11 @@ impl FrontEnd {
 
     /// Leaves the part of `spectrum` around the tuning, filtered and at the base rate, in `block`.
     fn filter_block(&mut self, tuning: &Tuning) {
-        let first = (tuning.centre_bin - (BLOCK / 2) as i64).rem_euclid(self.input_block as i64);
+        let length = self.block.len();
+        let first = (tuning.centre_bin - (length / 2) as i64).rem_euclid(self.input_block as i64);
         let mut source = first as usize;
         for (index, weight) in self.low_pass.iter().enumerate() {
-            self.block[(index + BLOCK / 2) % BLOCK] = self.spectrum[source] * *weight;
+            self.block[(index + length.div_ceil(2)) % length] = self.spectrum[source] * *weight;
             source += 1;
             if source == self.input_block {
                 source = 0;
@@ -350,7 +370,7 @@ impl FrontEnd {
 
     /// Phase of the mixer at the first sample of the next output hop, and its step per sample.
     fn block_phase(&self, tuning: &Tuning) -> (Complex64, Complex64) {
-        let hop_start = i128::from(self.produced) - MARGIN as i128;
+        let hop_start = i128::from(self.produced) - self.margin as i128;
         let start_input = hop_start / self.interpolation as i128 * self.decimation as i128;
         let bins =
             (i128::from(tuning.centre_bin) * start_input).rem_euclid(self.input_block as i128);
@@ -363,29 +383,46 @@ impl FrontEnd {
     }
 }
 
-/// Weights of the bins −2048…2047: one over the 240 subcarriers and the tolerated frequency
-/// offset, a raised-cosine edge down to the Nyquist frequency, and the scale of the transforms.
-fn low_pass(input_block: usize) -> Vec<f32> {
-    let bins_per_subcarrier = BLOCK as f64 / 256.0;
+/// Weights of the bins of an output block, lowest frequency first: one over the 240 subcarriers and
+/// the tolerated frequency offset, a raised-cosine edge down to the Nyquist frequency, and the scale
+/// of the transforms.
+fn low_pass(block: usize, input_block: usize) -> Vec<f32> {
+    let bins_per_subcarrier = block as f64 / SYMBOL_FFT as f64;
     let pass = (120.5 + CFO_MARGIN_SUBCARRIERS) * bins_per_subcarrier;
     let stop = 128.0 * bins_per_subcarrier;
-    (0..BLOCK)
+    (0..block)
         .map(|index| {
-            let bin = (index as f64 - (BLOCK / 2) as f64).abs();
+            let bin = (index as f64 - (block / 2) as f64).abs();
             let edge = ((bin - pass) / (stop - pass)).clamp(0.0, 1.0);
             (0.5 * (1.0 + (0.5 * TAU * edge).cos()) / input_block as f64) as f32
         })
         .collect()
 }
 
-fn in_rate_units(rate_hz: f64) -> Result<usize, FrontEndError> {
-    let units = (rate_hz / RATE_UNIT_HZ).round();
-    if !(1.0..=4096.0).contains(&units) || (rate_hz / RATE_UNIT_HZ - units).abs() > 1e-6 * units {
-        return Err(FrontEndError::RateNotMultiple(rate_hz));
+/// L and M, the base rate being L/M of the input rate.
+fn rate_ratio(input_hz: f64, base_hz: f64) -> Result<(usize, usize), FrontEndError> {
+    if !(input_hz > 0.0 && base_hz > 0.0 && input_hz <= MOST_OVERSAMPLING * base_hz) {
+        return Err(FrontEndError::Rate { input_hz, base_hz });
     }
-    Ok(units as usize)
+    if input_hz < base_hz * (1.0 - RATE_TOLERANCE) {
+        return Err(FrontEndError::RateTooLow { input_hz, base_hz });
+    }
+    let ratio = |up: usize| (up, input_hz / base_hz * up as f64);
+    (1..=MOST_INTERPOLATION)
+        .map(ratio)
+        .find(|(_, down)| (down - down.round()).abs() < RATE_TOLERANCE * down)
+        .map(|(up, down)| (up, down.round() as usize))
+        .ok_or(FrontEndError::Rate { input_hz, base_hz })
 }
 
-fn gcd(a: usize, b: usize) -> usize {
-    if b == 0 { a } else { gcd(b, a % b) }
+/// Whether transforms of this length are fast: no prime factor above 7.
+fn is_smooth(length: usize) -> bool {
+    let without = |rest: usize, prime: usize| {
+        std::iter::successors(Some(rest), |it| {
+            it.is_multiple_of(prime).then(|| it / prime)
+        })
+        .last()
+    };
+    let rest = [2, 3, 5, 7].into_iter().try_fold(length, without);
+    rest == Some(1)
 }

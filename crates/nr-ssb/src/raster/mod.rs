@@ -4,12 +4,14 @@
 
 mod error;
 mod find;
+mod parallel;
 mod placement;
 mod point;
 mod point_search;
+mod pss_scan;
 mod scan;
 
 pub use error::ScanError;
 pub use find::RasterFind;
 pub use point::{RasterPoint, synchronization_raster};
-pub use scan::{scan, scan_off_raster, scan_raster};
+pub use scan::{reach_hz, scan, scan_off_raster, scan_raster};

@@ -2,6 +2,7 @@
 //!
 //! Cells that are to be searched for lie on the synchronization raster, others anywhere on the
 //! global frequency raster (TS 38.104 §5.4.2.1): multiples of 5 kHz below 3 GHz, of 15 kHz above.
+//! Test signals keep to neither, as one at 3500.0 MHz.
 //! What is received is that frequency plus the offset of the oscillators, and inside a symbol the
 //! two cannot be told apart. Between symbols they can: by TS 38.211 §5.4 symbol `l` carries
 //! `exp(−j2π f_SSB t_l)`, whereas an offset turns it by `exp(+j2π Δf t_l)`. A receiver that supposes a
@@ -27,8 +28,11 @@ const OSCILLATOR: f64 = 1e-6;
 const COARSE_AT_0_DB: f64 = 0.04;
 /// ... and however strong the SSB, echoes reaching over the cyclic prefix.
 const COARSE_AT_BEST: f64 = 0.01;
-/// What must speak against a point of the synchronization raster, in squared standard deviations.
+/// What must speak against a point of the synchronization raster, and against one of the global
+/// frequency raster, in squared standard deviations.
 const RASTER_PREFERENCE: f64 = 16.0;
+/// Transmitters that keep to no raster are set by people, to multiples of this.
+const SET_BY_HAND_HZ: f64 = 5e3;
 
 /// Where inside `band_hz` an SSB was placed that a search around `tuned_hz` found there, `on_raster`
 /// being whether that is a point of the synchronization raster.
@@ -49,14 +53,17 @@ pub(crate) fn placed_at(
         let carrier_step = carrier_reset_step(frequency_hz, spacing.base_rate_hz());
         let disagreement_hz = wrap(step - carrier_step) / (TAU * symbol_s);
         let offset_hz = received_hz + disagreement_hz - frequency_hz;
-        (disagreement_hz / coarse_hz).powi(2) + (offset_hz / (OSCILLATOR * frequency_hz)).powi(2)
+        let units = frequency_hz / if frequency_hz < 3e9 { 5e3 } else { 15e3 };
+        let off_raster = (units - units.round()).abs() > 1e-3;
+        (disagreement_hz / coarse_hz).powi(2)
+            + (offset_hz / (OSCILLATOR * frequency_hz)).powi(2)
+            + if off_raster { RASTER_PREFERENCE } else { 0.0 }
     };
-    let unit_hz = if received_hz < 3e9 { 5e3 } else { 15e3 };
-    let nearest = (received_hz / unit_hz).round();
-    // All that an offset of up to half a subcarrier may hide.
-    let reach = (0.5 * spacing.hz() / unit_hz).ceil();
+    let nearest = (received_hz / SET_BY_HAND_HZ).round();
+    // All that an offset of up to half a subcarrier, rounded up to a raster point, may hide.
+    let reach = (0.5 * spacing.hz() / 15e3).ceil() * 3.0;
     let best = (0..=2 * reach as usize)
-        .map(|i| (nearest - reach + i as f64) * unit_hz)
+        .map(|i| (nearest - reach + i as f64) * SET_BY_HAND_HZ)
         .filter(|hz| band_hz.contains(hz))
         .min_by(|a, b| cost(*a).total_cmp(&cost(*b)));
     match best {

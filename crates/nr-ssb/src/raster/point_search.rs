@@ -5,24 +5,12 @@ use num_complex::Complex32;
 use super::error::ScanError;
 use super::find::RasterFind;
 use super::point::RasterPoint;
-use crate::dsp::hypotheses::cfo_hypotheses;
-use crate::dsp::matched_filter::MatchedFilter;
 use crate::input::front_end::{FrontEnd, FrontEndError};
-use crate::numeric::false_alarm::exponential_sum_threshold;
 use crate::search::{SearchConfig, Searcher};
 use crate::standard::numerology::SubcarrierSpacing;
 
-/// Off the raster, the PSS is looked for at multiples of this off the recording's centre.
-pub(crate) const OFFSET_UNIT_HZ: f64 = 15e3;
-/// Half of what one tuning of the front end shows of the band: the PSS's 127 subcarriers may lie
-/// anywhere among 240.
-const TILE_SUBCARRIERS: f64 = 55.0;
-/// Maxima that noise may offer in a scan off the raster.
-const NOISE_CANDIDATES: f64 = 4.0;
-/// Points off the raster that are searched at most.
-const MOST_POINTS: usize = 16;
 /// Offsets that the front end is tuned to at once.
-const AT_ONCE: usize = 8;
+pub(crate) const AT_ONCE: usize = 8;
 
 /// See the module; owns the searcher's plans and the samples at the base rate.
 pub(crate) struct PointSearch {
@@ -64,7 +52,7 @@ impl PointSearch {
         self.look(0, point, centre_hz.is_some())
     }
 
-    /// The SSBs at many points of known frequency.
+    /// The SSBs at up to [`AT_ONCE`] points of known frequency.
     pub(crate) fn search_all(
         &mut self,
         antennas: &[&[Complex32]],
@@ -72,12 +60,10 @@ impl PointSearch {
         centre_hz: f64,
     ) -> Result<Vec<RasterFind>, ScanError> {
         let mut finds = Vec::new();
-        for points in points.chunks(AT_ONCE) {
-            let offsets_hz = points.iter().map(|point| point.ssb_freq_hz - centre_hz);
-            self.tune(antennas, &offsets_hz.collect::<Vec<_>>())?;
-            for (index, point) in points.iter().enumerate() {
-                finds.extend(self.look(index, *point, true)?);
-            }
+        let offsets_hz = points.iter().map(|point| point.ssb_freq_hz - centre_hz);
+        self.tune(antennas, &offsets_hz.collect::<Vec<_>>())?;
+        for (index, point) in points.iter().enumerate() {
+            finds.extend(self.look(index, *point, true)?);
         }
         Ok(finds)
     }
@@ -105,54 +91,4 @@ impl PointSearch {
             ssbs: ssbs.to_vec(),
         }))
     }
-
-    /// Offsets from the recording's centre, multiples of 15 kHz up to `reach_hz`, where the PSS
-    /// stands out, the likeliest first.
-    ///
-    /// The band is cut into tiles as wide as the PSS can wander inside the front end's pass band.
-    pub(crate) fn likely_offsets(
-        &mut self,
-        antennas: &[&[Complex32]],
-        reach_hz: f64,
-    ) -> Result<Vec<f64>, ScanError> {
-        let scs_hz = self.spacing.hz();
-        let tiles = (reach_hz / (TILE_SUBCARRIERS * scs_hz)).ceil().max(1.0);
-        let half_tile_hz = reach_hz / tiles;
-        let hypotheses = cfo_hypotheses(half_tile_hz + 0.5 * scs_hz, scs_hz);
-        let mut filter = MatchedFilter::new(scs_hz, &hypotheses, antennas.len());
-        let mut seen: Vec<(f32, f64)> = Vec::new();
-        let mut candidates = Vec::new();
-        let centres: Vec<f64> = (0..tiles as usize)
-            .map(|tile| (2.0 * tile as f64 + 1.0) * half_tile_hz - reach_hz)
-            .collect();
-        for centres_hz in centres.chunks(AT_ONCE) {
-            self.tune(antennas, centres_hz)?;
-            for (tile_hz, base) in centres_hz.iter().zip(&self.bases) {
-                let samples = base.first().map_or(0, Vec::len);
-                let trials = samples as f64 * 3.0 * hypotheses.len() as f64 * tiles;
-                let probability = NOISE_CANDIDATES / trials.max(NOISE_CANDIDATES);
-                let threshold = exponential_sum_threshold(antennas.len(), probability);
-                candidates.clear();
-                filter.run(base, 0, samples, threshold as f32, &mut candidates);
-                seen.extend(candidates.iter().map(|candidate| {
-                    let offset_hz = nearest_offset(tile_hz + candidate.cfo_hz, reach_hz);
-                    (candidate.statistic, offset_hz)
-                }));
-            }
-        }
-        seen.sort_by(|a, b| b.0.total_cmp(&a.0));
-        let mut offsets = Vec::new();
-        for (_, offset_hz) in seen {
-            if offsets.len() < MOST_POINTS && !offsets.contains(&offset_hz) {
-                offsets.push(offset_hz);
-            }
-        }
-        Ok(offsets)
-    }
-}
-
-/// The multiple of 15 kHz nearest to `hz` inside the reach.
-pub(crate) fn nearest_offset(hz: f64, reach_hz: f64) -> f64 {
-    let last = (reach_hz / OFFSET_UNIT_HZ).floor();
-    (hz / OFFSET_UNIT_HZ).round().clamp(-last, last) * OFFSET_UNIT_HZ
 }

@@ -6,9 +6,11 @@ use num_complex::Complex32;
 
 use super::error::ScanError;
 use super::find::RasterFind;
+use super::parallel::in_parallel;
 use super::placement::placed_at;
 use super::point::{RasterPoint, synchronization_raster};
-use super::point_search::{OFFSET_UNIT_HZ, PointSearch, nearest_offset};
+use super::point_search::{AT_ONCE, PointSearch};
+use super::pss_scan::{OFFSET_UNIT_HZ, likely_offsets, nearest_offset};
 use crate::standard::grid::SUBCARRIERS;
 use crate::standard::numerology::SubcarrierSpacing;
 
@@ -18,8 +20,8 @@ const FALSE_ALARM: f64 = 0.25e-3;
 const SPACINGS: [SubcarrierSpacing; 2] = [SubcarrierSpacing::Khz15, SubcarrierSpacing::Khz30];
 
 /// All SSBs of a recording, `antennas` channels at `rate_hz` around `centre_hz` (`None`: unknown),
-/// at whatever frequency and subcarrier spacing; the frequency with the strongest SSB first. First
-/// [`scan_raster`]; where it finds nothing, [`scan_off_raster`].
+/// at whatever frequency and subcarrier spacing; the frequency with the strongest SSB first:
+/// [`scan_raster`], then [`scan_off_raster`] for what is beside.
 ///
 /// # Errors
 /// Those of [`scan_raster`].
@@ -28,13 +30,14 @@ pub fn scan(
     rate_hz: f64,
     centre_hz: Option<f64>,
 ) -> Result<Vec<RasterFind>, ScanError> {
-    if let Some(centre_hz) = centre_hz {
-        let finds = scan_raster(antennas, rate_hz, centre_hz)?;
-        if !finds.is_empty() {
-            return Ok(finds);
-        }
-    }
-    scan_off_raster(antennas, rate_hz, centre_hz)
+    let mut finds = match centre_hz {
+        Some(centre_hz) => scan_raster(antennas, rate_hz, centre_hz)?,
+        None => Vec::new(),
+    };
+    let beside = scan_off_raster(antennas, rate_hz, centre_hz, &finds)?;
+    finds.extend(beside);
+    sort(&mut finds);
+    Ok(finds)
 }
 
 /// The SSBs on the points of the synchronization raster, the point with the strongest first.
@@ -47,7 +50,7 @@ pub fn scan(
 /// The probability of a false cell, half of 1e-3 for 20 ms, is shared among the points.
 ///
 /// # Errors
-/// [`ScanError::FrontEnd`] for a rate that is no multiple of 3.84 MHz, [`ScanError::Search`] for
+/// [`ScanError::FrontEnd`] for a rate that cannot be converted, [`ScanError::Search`] for
 /// channels of unequal lengths or less than one SSB.
 pub fn scan_raster(
     antennas: &[&[Complex32]],
@@ -61,36 +64,40 @@ pub fn scan_raster(
         if points.is_empty() {
             continue;
         }
-        let mut at_point = PointSearch::new(
-            spacing,
-            rate_hz,
-            antennas.len(),
-            FALSE_ALARM / points.len() as f64,
-        )?;
-        for find in at_point.search_all(antennas, &points, centre_hz)? {
-            // What the point's neighbours on the global frequency raster hold shows here too.
-            let at = find.point;
-            let band_hz = band(centre_hz, reach);
-            let placed_hz = find.strongest().map_or(at.ssb_freq_hz, |ssb| {
-                placed_at(at.ssb_freq_hz, true, ssb, spacing, band_hz)
-            });
-            finds.push(if placed_hz == at.ssb_freq_hz {
-                find
-            } else {
-                at_point
-                    .search(antennas, RasterPoint::off(placed_hz), Some(centre_hz))?
-                    .unwrap_or(find)
-            });
-        }
+        let false_alarm = FALSE_ALARM / points.len() as f64;
+        let worker = || PointSearch::new(spacing, rate_hz, antennas.len(), false_alarm);
+        let batches: Vec<&[RasterPoint]> = points.chunks(AT_ONCE).collect();
+        let found = in_parallel(&batches, worker, |at_point, points| {
+            let placed = |find: RasterFind, at_point: &mut PointSearch| {
+                // What the point's neighbours on the global frequency raster hold shows here too.
+                let at = find.point;
+                let band_hz = band(centre_hz, reach);
+                let placed_hz = find.strongest().map_or(at.ssb_freq_hz, |ssb| {
+                    placed_at(at.ssb_freq_hz, true, ssb, spacing, band_hz)
+                });
+                if placed_hz == at.ssb_freq_hz {
+                    return Ok(find);
+                }
+                let there =
+                    at_point.search(antennas, RasterPoint::off(placed_hz), Some(centre_hz))?;
+                Ok(there.unwrap_or(find))
+            };
+            let finds = at_point.search_all(antennas, points, centre_hz)?;
+            finds
+                .into_iter()
+                .map(|find| placed(find, at_point))
+                .collect::<Result<Vec<_>, _>>()
+        })?;
+        finds.extend(found.into_iter().flatten());
     }
     sort(&mut finds);
     Ok(finds)
 }
 
-/// The SSBs anywhere in the band.
+/// The SSBs anywhere in the band but where `known` ones are.
 ///
-/// The PSS is looked for at steps of a third of a subcarrier through the whole band; the places
-/// of the strongest maxima are then searched. An SSB belongs to a point of the global frequency
+/// The PSS is looked for at steps of half a subcarrier through the whole band; the places of the
+/// strongest maxima are then searched. An SSB belongs to a point of the global frequency
 /// raster (TS 38.104 §5.4.2.1: multiples of 5 kHz below 3 GHz, of 15 kHz above), which may be nearer
 /// than its carrier frequency offset. It is the phase between symbols that tells them apart (TS
 /// 38.211 §5.4), and where that leaves a doubt the smaller offset is preferred.
@@ -101,8 +108,7 @@ pub fn scan_raster(
 /// precise, see [`ssb_freq_hz`](crate::search::SearchConfig::ssb_freq_hz). The probability of a false
 /// cell, half of 1e-3 for 20 ms, is shared among all points of the band.
 ///
-/// Takes time in proportion to bandwidth squared, duration and antennas: for one antenna and 1 ms
-/// at 23.04 Msps under a second.
+/// Takes time in proportion to bandwidth squared, duration and antennas, on all processors.
 ///
 /// # Errors
 /// Those of [`scan_raster`].
@@ -110,6 +116,7 @@ pub fn scan_off_raster(
     antennas: &[&[Complex32]],
     rate_hz: f64,
     centre_hz: Option<f64>,
+    known: &[RasterFind],
 ) -> Result<Vec<RasterFind>, ScanError> {
     let mut finds: Vec<RasterFind> = Vec::new();
     for spacing in SPACINGS {
@@ -120,11 +127,14 @@ pub fn scan_off_raster(
         let all = 2 * (reach / OFFSET_UNIT_HZ) as usize + 1;
         let mut at_point =
             PointSearch::new(spacing, rate_hz, antennas.len(), FALSE_ALARM / all as f64)?;
-        let mut found_hz: Vec<f64> = Vec::new();
-        for offset_hz in at_point.likely_offsets(antennas, reach)? {
-            // An SSB also shows, weaker, where its PSS overlaps with a shifted one.
-            let width_hz = SUBCARRIERS as f64 * spacing.hz();
-            if found_hz.iter().any(|hz| (hz - offset_hz).abs() < width_hz) {
+        let same = known.iter().filter(|find| find.spacing == spacing);
+        let mut found_hz: Vec<f64> = same
+            .map(|find| find.point.ssb_freq_hz - centre_hz.unwrap_or(0.0))
+            .collect();
+        for offset_hz in likely_offsets(spacing, rate_hz, antennas, reach)? {
+            // What is there shows a subcarrier beside as well.
+            let same_place = |hz: &f64| (hz - offset_hz).abs() < 1.5 * spacing.hz();
+            if found_hz.iter().any(same_place) {
                 continue;
             }
             let first = at_point.search(antennas, RasterPoint::off(offset_hz), None)?;
@@ -142,15 +152,16 @@ pub fn scan_off_raster(
             };
             found_hz.push(offset_hz);
             let point = RasterPoint::off(centre_hz.unwrap_or(0.0) + offset_hz);
-            finds.extend(at_point.search(antennas, point, centre_hz)?);
+            let find = at_point.search(antennas, point, centre_hz)?;
+            finds.extend(find.filter(|find| !known.iter().chain(&finds).any(|it| it.casts(find))));
         }
     }
     sort(&mut finds);
     Ok(finds)
 }
 
-/// How far from the recording's centre that of an SSB can lie.
-fn reach_hz(rate_hz: f64, spacing: SubcarrierSpacing) -> f64 {
+/// How far from the recording's centre that of an SSB can lie; negative where no SSB fits.
+pub fn reach_hz(rate_hz: f64, spacing: SubcarrierSpacing) -> f64 {
     0.5 * rate_hz - 0.5 * SUBCARRIERS as f64 * spacing.hz()
 }
 

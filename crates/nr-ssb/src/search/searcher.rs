@@ -43,7 +43,7 @@ impl Searcher {
     pub fn new(config: SearchConfig) -> Result<Self, SearchError> {
         config.check()?;
         let base_rate_hz = config.spacing.base_rate_hz();
-        let hypotheses = cfo_hypotheses(config.cfo_range_hz, config.spacing.hz());
+        let hypotheses = cfo_hypotheses(config.cfo_range_hz, config.spacing.hz() / 3.0);
         let trials = 0.02 * base_rate_hz * 3.0 * hypotheses.len() as f64;
         let pss_probability = NOISE_CANDIDATES_PER_20_MS / trials;
         // Any of 336 SSS and 8 DM-RS may make the sum large.

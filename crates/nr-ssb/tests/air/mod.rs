@@ -130,19 +130,25 @@ pub fn delayed(samples: &[Complex32], fraction: f64) -> Vec<Complex32> {
 
 /// Interpolates to `factor` times the rate and mixes up by `cycles` per output sample.
 pub fn raised(samples: &[Complex32], factor: usize, cycles: f64) -> Vec<Complex32> {
+    let wide = resampled(samples, factor, 1);
+    let mixed = wide.iter().enumerate();
+    mixed
+        .map(|(i, x)| x * phasor(TAU * cycles * i as f64))
+        .collect()
+}
+
+/// Interpolates to `up / down` times the rate; `down` must divide the number of samples.
+pub fn resampled(samples: &[Complex32], up: usize, down: usize) -> Vec<Complex32> {
     let n = samples.len();
     let mut planner = FftPlanner::new();
     let mut spectrum = samples.to_vec();
     planner.plan_fft_forward(n).process(&mut spectrum);
-    let mut wide = vec![Complex32::ZERO; n * factor];
+    let mut wide = vec![Complex32::ZERO; n / down * up];
     let end = wide.len() - n / 2;
     wide[..n / 2].copy_from_slice(&spectrum[..n / 2]);
     wide[end..].copy_from_slice(&spectrum[n / 2..]);
-    planner.plan_fft_inverse(n * factor).process(&mut wide);
-    let mixed = wide.iter().enumerate();
-    mixed
-        .map(|(i, x)| x * phasor(TAU * cycles * i as f64) / n as f32)
-        .collect()
+    planner.plan_fft_inverse(wide.len()).process(&mut wide);
+    wide.iter().map(|x| x / n as f32).collect()
 }
 
 /// Noise such that a resource element of unit gain has this SNR.

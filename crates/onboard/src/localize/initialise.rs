@@ -139,12 +139,12 @@ impl Initialiser {
     ) -> Self {
         let against = either_direction.then(|| Arc::new(road.reversed()));
         let roads = [Arc::new(road)].into_iter().chain(against).collect();
-        Self::on(config, Ground::Roads(roads), heads)
+        Self::on(&config, Ground::Roads(roads), heads)
     }
 
     /// The vehicle may be anywhere in an area, heading anywhere.
     pub fn in_plane(config: TrackerConfig, area: Area, heads: &[RadioHead]) -> Self {
-        Self::on(config, Ground::Plane(area), heads)
+        Self::on(&config, Ground::Plane(area), heads)
     }
 
     /// Whether all of an area is searched as finely as is useful.
@@ -152,9 +152,9 @@ impl Initialiser {
         area.spacing_m(MOST_HYPOTHESES / f64::from(HEADINGS), SPACING_M) <= SPACING_M
     }
 
-    fn on(config: TrackerConfig, ground: Ground, heads: &[RadioHead]) -> Self {
+    fn on(config: &TrackerConfig, ground: Ground, heads: &[RadioHead]) -> Self {
         let mut made = Self {
-            config,
+            config: *config,
             ground,
             heads: heads.to_vec(),
             hypotheses: Vec::new(),

@@ -34,7 +34,8 @@ pub use localizer::{
 pub use odometry::{DriveKind, GyroscopeSettings, LaneKeepingSettings, OdometerSettings};
 pub use overlay::lay_over;
 pub use platform::{
-    Boundary, Figure, IdleSettings, Platform, PowerMode, Provenance, ReceiverPower,
+    Boundary, CorePower, CpuSettings, Extent, Figure, IdleSettings, Platform, PowerMode,
+    Provenance, Quantity, ReceiverPower, SuspendSettings,
 };
 pub use radio::{RadioHeadSettings, SsbSettings};
 pub use read::{from_table, parse};

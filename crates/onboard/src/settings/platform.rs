@@ -1,12 +1,15 @@
 //! The onboard computer: its power modes, how fast they estimate and what that costs.
 
-use std::collections::BTreeMap;
+use std::collections::{BTreeMap, BTreeSet};
+use std::fmt;
 
 use schemars::JsonSchema;
 use serde::{Deserialize, Serialize};
+use serde_json::Value as Json;
 
 use super::check::Check;
 use super::error::SettingsError;
+use super::read::join;
 use super::receiver::EstimatorMethod;
 use super::toml_file::TomlFile;
 use super::vehicle::{PlatformSettings, Vehicle};
@@ -26,6 +29,16 @@ pub struct Platform {
     /// Power drawn by the radio receiver while it listens.
     #[serde(default)]
     pub receiver: ReceiverPower,
+    /// What a computation costs, for modes without a figure of their own.
+    #[serde(default, skip_serializing_if = "Option::is_none")]
+    pub cpu: Option<CpuSettings>,
+    /// Sleep between wake-ups; without, the board idles.
+    #[serde(default, skip_serializing_if = "Option::is_none")]
+    pub suspend: Option<SuspendSettings>,
+    /// Share of the power at the wall that reaches the rails; without, figures above idle are taken
+    /// for what the wall sees of them.
+    #[serde(default, skip_serializing_if = "Option::is_none")]
+    pub supply_efficiency: Option<Quantity>,
     /// The power modes.
     #[schemars(length(min = 1, max = 1000))]
     pub modes: Vec<PowerMode>,
@@ -51,6 +64,9 @@ pub struct ReceiverPower {
     /// How long it is on for one SSB burst, in ms.
     #[schemars(range(min = 0.0, max = 1000.0))]
     pub on_time_ms: f64,
+    /// How long it is on before that, until oscillator and gain have settled, in ms.
+    #[serde(skip_serializing_if = "Option::is_none")]
+    pub settling_ms: Option<Quantity>,
     /// Its power in watts.
     #[serde(skip_serializing_if = "Option::is_none")]
     pub power_w: Option<Figure>,
@@ -61,9 +77,60 @@ impl Default for ReceiverPower {
         Self {
             counted: false,
             on_time_ms: 5.0,
+            settling_ms: None,
             power_w: None,
         }
     }
+}
+
+/// `[cpu]`: an execution takes its cycles at the mode's clock, at the power of one busy core.
+#[derive(Debug, Clone, PartialEq, Serialize, Deserialize, JsonSchema)]
+#[serde(deny_unknown_fields)]
+pub struct CpuSettings {
+    /// Cycles of one estimate, per method.
+    #[serde(default)]
+    pub cycles_per_execution: BTreeMap<EstimatorMethod, Quantity>,
+    /// Cycles of receiving one SSB burst, whether or not an angle is estimated from it.
+    pub cycles_per_burst: Quantity,
+    /// Power of a busy core, for modes that do not state it.
+    #[serde(default, skip_serializing_if = "Option::is_none")]
+    pub core: Option<CorePower>,
+}
+
+/// `[cpu.core]`: `P·(f / f_ref)^n`
+#[derive(Debug, Clone, PartialEq, Serialize, Deserialize, JsonSchema)]
+#[serde(deny_unknown_fields)]
+pub struct CorePower {
+    /// Power of one busy core above idle, at `reference_mhz`, in watts.
+    pub power_w: Figure,
+    /// Clock that `power_w` is stated for, in MHz.
+    #[schemars(range(min = 1.0, max = 1e5))]
+    pub reference_mhz: f64,
+    /// Power of the clock that it grows with: 1 at constant voltage, 3 where the voltage follows.
+    pub exponent: Quantity,
+}
+
+impl CorePower {
+    fn at(&self, cpu_mhz: f64, extent: Extent) -> f64 {
+        let clock = cpu_mhz / self.reference_mhz;
+        // Below the reference clock, the greater exponent makes for the smaller power.
+        let end = if clock < 1.0 {
+            extent.opposite()
+        } else {
+            extent
+        };
+        self.power_w.at(extent) * clock.powf(self.exponent.at(end))
+    }
+}
+
+/// `[suspend]`: the board sleeps whenever the next burst that it listens to is far enough.
+#[derive(Debug, Clone, PartialEq, Serialize, Deserialize, JsonSchema)]
+#[serde(deny_unknown_fields)]
+pub struct SuspendSettings {
+    /// Power asleep in watts.
+    pub power_w: Figure,
+    /// Time to fall asleep and wake up again, at idle power, in ms.
+    pub transition_ms: Quantity,
 }
 
 /// A number and where it comes from.
@@ -73,12 +140,86 @@ pub struct Figure {
     /// The number, in the unit its key names.
     #[schemars(range(min = 0.0, max = 1e9))]
     pub value: f64,
+    /// The least it may be.
+    #[serde(default, skip_serializing_if = "Option::is_none")]
+    #[schemars(range(min = -1e9, max = 1e9))]
+    pub low: Option<f64>,
+    /// The most it may be.
+    #[serde(default, skip_serializing_if = "Option::is_none")]
+    #[schemars(range(min = 0.0, max = 1e9))]
+    pub high: Option<f64>,
     /// How it came about.
     pub provenance: Provenance,
     /// Document, data set or fit it is taken from.
     pub source: String,
     /// What is counted in it.
     pub boundary: Boundary,
+}
+
+/// A number that is neither power nor energy, and where it comes from.
+#[derive(Debug, Clone, PartialEq, Serialize, Deserialize, JsonSchema)]
+#[serde(deny_unknown_fields)]
+pub struct Quantity {
+    /// The number, in the unit its key names.
+    #[schemars(range(min = 0.0, max = 1e12))]
+    pub value: f64,
+    /// The least it may be.
+    #[serde(default, skip_serializing_if = "Option::is_none")]
+    #[schemars(range(min = 0.0, max = 1e12))]
+    pub low: Option<f64>,
+    /// The most it may be.
+    #[serde(default, skip_serializing_if = "Option::is_none")]
+    #[schemars(range(min = 0.0, max = 1e12))]
+    pub high: Option<f64>,
+    /// How it came about.
+    pub provenance: Provenance,
+    /// Document, data set or fit it is taken from.
+    pub source: String,
+}
+
+/// Which value of a range is meant.
+#[derive(Debug, Clone, Copy, PartialEq, Eq)]
+pub enum Extent {
+    /// The least that it may be.
+    Low,
+    /// The value itself.
+    Value,
+    /// The most that it may be.
+    High,
+}
+
+impl Extent {
+    /// The other end.
+    #[must_use]
+    pub fn opposite(self) -> Self {
+        match self {
+            Self::Low => Self::High,
+            Self::Value => Self::Value,
+            Self::High => Self::Low,
+        }
+    }
+
+    fn of(self, value: f64, low: Option<f64>, high: Option<f64>) -> f64 {
+        match self {
+            Self::Low => low.unwrap_or(value),
+            Self::Value => value,
+            Self::High => high.unwrap_or(value),
+        }
+    }
+}
+
+impl Figure {
+    /// Its value, or an end of its range; the value where it states no range.
+    pub fn at(&self, extent: Extent) -> f64 {
+        extent.of(self.value, self.low, self.high)
+    }
+}
+
+impl Quantity {
+    /// Its value, or an end of its range; the value where it states no range.
+    pub fn at(&self, extent: Extent) -> f64 {
+        extent.of(self.value, self.low, self.high)
+    }
 }
 
 /// How a number came about.
@@ -91,6 +232,8 @@ pub enum Provenance {
     Fitted,
     /// From the maker's documents.
     Datasheet,
+    /// Measured on another machine and carried over by cycles and clock.
+    Projected,
     /// Somebody's judgement.
     Assumed,
 }
@@ -107,6 +250,17 @@ pub enum Boundary {
     Wall,
     /// The source does not say.
     Unstated,
+}
+
+impl fmt::Display for Boundary {
+    fn fmt(&self, formatter: &mut fmt::Formatter<'_>) -> fmt::Result {
+        formatter.write_str(match self {
+            Self::Marginal => "marginal",
+            Self::SocRails => "soc-rails",
+            Self::Wall => "wall",
+            Self::Unstated => "unstated",
+        })
+    }
 }
 
 /// `[[modes]]`
@@ -129,11 +283,18 @@ pub struct PowerMode {
     /// CPU frequency in MHz as the paper prints it, where it differs.
     #[serde(default, skip_serializing_if = "Option::is_none")]
     pub paper_cpu_mhz: Option<f64>,
-    /// Shortest time between two estimates in ms, per method.
+    /// Power of the board in this mode whether or not anything is estimated, in watts; without, the
+    /// platform's.
+    #[serde(default, skip_serializing_if = "Option::is_none")]
+    pub idle_power_w: Option<Figure>,
+    /// Power of one busy core above idle, in watts; without, that of `cpu.core` at the clock.
+    #[serde(default, skip_serializing_if = "Option::is_none")]
+    pub core_power_w: Option<Figure>,
+    /// Shortest time between two estimates in ms, per method; without, the cycles at the clock.
     #[serde(default)]
     #[schemars(inner(range(min = 1e-3, max = 3.6e6)))]
     pub base_wake_up_ms: BTreeMap<EstimatorMethod, f64>,
-    /// Energy of one estimate in joules, per method.
+    /// Energy of one estimate in joules, per method; without, the cycles at a core's power.
     #[serde(default)]
     pub energy_per_execution_j: BTreeMap<EstimatorMethod, Figure>,
     /// Power of the whole board with all cores busy, in watts.
@@ -165,6 +326,54 @@ impl Platform {
             })
     }
 
+    /// Power drawn in a mode whether or not anything is estimated.
+    pub fn idle_power_w<'a>(&'a self, mode: &'a PowerMode) -> Option<&'a Figure> {
+        mode.idle_power_w.as_ref().or(self.idle.power_w.as_ref())
+    }
+
+    /// Power of one busy core above idle in a mode, with what it counts and where it is from.
+    pub fn core_power_w<'a>(
+        &'a self,
+        mode: &'a PowerMode,
+        extent: Extent,
+    ) -> Option<(f64, &'a Figure)> {
+        if let Some(stated) = &mode.core_power_w {
+            return Some((stated.at(extent), stated));
+        }
+        let core = self.cpu.as_ref()?.core.as_ref()?;
+        Some((core.at(mode.cpu_mhz, extent), &core.power_w))
+    }
+
+    /// Power of the board with so many busy cores in a mode: idle, and each core above it.
+    pub fn busy_power_w(&self, mode: &PowerMode, cores: u32) -> Option<f64> {
+        let (core_w, _) = self.core_power_w(mode, Extent::Value)?;
+        Some(self.idle_power_w(mode)?.value + f64::from(cores) * core_w)
+    }
+
+    /// What a sum counts of which these parts are counted. What is above idle adds to anything; two
+    /// parts that each hold the idle board would count it twice.
+    ///
+    /// # Errors
+    /// [`SettingsError::Value`] where there are two of those.
+    pub fn boundary_of_sum(
+        &self,
+        parts: impl IntoIterator<Item = Option<Boundary>>,
+    ) -> Result<Boundary, SettingsError> {
+        let all = parts.into_iter().flatten();
+        let mut whole = all.filter(|boundary| *boundary != Boundary::Marginal);
+        let first = whole.next();
+        if let (Some(first), Some(second)) = (first, whole.next()) {
+            let allowed = format!(
+                "a sum may hold the idle board once, here it is in a figure of boundary `{first}` \
+                 and in one of `{second}`; count one of them, or state the others above idle \
+                 (`marginal`)"
+            );
+            let file = &self.name;
+            return Err(Check { file }.error("idle.counted", self.idle.counted, &allowed));
+        }
+        Ok(first.unwrap_or(Boundary::Marginal))
+    }
+
     /// Shortest time between estimates, in seconds, of the vehicle's method in its mode.
     ///
     /// # Errors
@@ -172,10 +381,20 @@ impl Platform {
     pub fn base_wake_up_s(&self, vehicle: &Vehicle) -> Result<f64, SettingsError> {
         let mode = self.mode(&vehicle.platform, &vehicle.name)?;
         let method = vehicle.estimator.method;
-        let base_ms = mode.base_wake_up_ms.get(&method);
-        base_ms.map(|base_ms| base_ms * 1e-3).ok_or_else(|| {
-            let known = mode.base_wake_up_ms.keys();
-            let known: Vec<String> = known.map(ToString::to_string).collect();
+        let stated_s = mode.base_wake_up_ms.get(&method).map(|ms| ms * 1e-3);
+        let derived_s = || {
+            let cpu = self.cpu.as_ref()?;
+            let cycles = cpu.cycles_per_burst.value + cpu.cycles_per_execution.get(&method)?.value;
+            Some(cycles / (mode.cpu_mhz * 1e6))
+        };
+        stated_s.or_else(derived_s).ok_or_else(|| {
+            let cycles = self
+                .cpu
+                .iter()
+                .flat_map(|cpu| cpu.cycles_per_execution.keys());
+            let known: BTreeSet<&EstimatorMethod> =
+                mode.base_wake_up_ms.keys().chain(cycles).collect();
+            let known: Vec<String> = known.iter().map(ToString::to_string).collect();
             let allowed = format!(
                 "mode {} of `{}` has a base wake-up time for {} only; set `wake_up.base_ms` or \
                  `wake_up.interval_ms`",
@@ -203,10 +422,28 @@ impl Platform {
 
 impl TomlFile for Platform {
     const WHAT: &'static str = "platform";
-    const SHIPPED: &'static [(&'static str, &'static str)] = &[(
-        "jetson-agx-xavier",
-        include_str!("../../../../platforms/jetson-agx-xavier.toml"),
-    )];
+    const SHIPPED: &'static [(&'static str, &'static str)] = &[
+        (
+            "generic-x86",
+            include_str!("../../../../platforms/generic-x86.toml"),
+        ),
+        (
+            "jetson-agx-orin",
+            include_str!("../../../../platforms/jetson-agx-orin.toml"),
+        ),
+        (
+            "jetson-agx-xavier",
+            include_str!("../../../../platforms/jetson-agx-xavier.toml"),
+        ),
+        (
+            "jetson-agx-xavier-engine",
+            include_str!("../../../../platforms/jetson-agx-xavier-engine.toml"),
+        ),
+        (
+            "raspberry-pi-5",
+            include_str!("../../../../platforms/raspberry-pi-5.toml"),
+        ),
+    ];
 
     fn name(&self) -> &str {
         &self.name
@@ -222,7 +459,32 @@ impl TomlFile for Platform {
                 "each mode needs its own number",
             )?;
         }
-        Ok(())
+        let written = serde_json::to_value(self).unwrap_or_default();
+        check_ranges(&written, "", check)
+    }
+}
+
+/// Refuses a range that does not hold its value.
+fn check_ranges(value: &Json, path: &str, check: Check<'_>) -> Result<(), SettingsError> {
+    match value {
+        Json::Array(items) => items
+            .iter()
+            .enumerate()
+            .try_for_each(|(index, item)| check_ranges(item, &format!("{path}[{index}]"), check)),
+        Json::Object(table) => {
+            let number = |name: &str| table.get(name).and_then(Json::as_f64);
+            if let Some(value) = number("value") {
+                let low = number("low").unwrap_or(value);
+                let high = number("high").unwrap_or(value);
+                let inside = low <= value && value <= high;
+                let allowed = "it must lie between `low` and `high`";
+                check.that(inside, &join(path, "value"), value, allowed)?;
+            }
+            table
+                .iter()
+                .try_for_each(|(name, item)| check_ranges(item, &join(path, name), check))
+        }
+        _ => Ok(()),
     }
 }
 
@@ -256,6 +518,39 @@ mod tests {
         assert_eq!(
             Platform::from_toml(&xavier.to_toml(), "again", &Shipped).unwrap(),
             xavier
+        );
+    }
+
+    #[test]
+    fn power_of_the_busy_board_is_what_was_measured_at_the_wall() {
+        let engine = Platform::from_library("jetson-agx-xavier-engine", &Shipped).unwrap();
+        let mut compared = 0;
+        for mode in &engine.modes {
+            if let Some(measured) = &mode.full_load_power_w {
+                let modelled_w = engine.busy_power_w(mode, mode.cores).unwrap();
+                assert!(
+                    (modelled_w / measured.value - 1.0).abs() < 0.1,
+                    "{}",
+                    mode.name
+                );
+                compared += 1;
+            }
+        }
+        assert_eq!(compared, 5);
+    }
+
+    #[test]
+    fn ranges_hold_their_values() {
+        for name in Platform::names() {
+            Platform::from_library(name, &Shipped).unwrap();
+        }
+        let high = "receiver.settling_ms.high";
+        let error = xavier()
+            .with_overrides([(high, Value::Float(2.0))], &Shipped)
+            .unwrap_err();
+        assert!(
+            error.to_string().contains("receiver.settling_ms.value"),
+            "{error}"
         );
     }
 

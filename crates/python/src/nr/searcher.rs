@@ -15,7 +15,7 @@ use super::{Cell, complex_samples, rows, scan_error, subcarrier_spacing};
 /// Parameters
 /// ----------
 /// sample_rate_hz : float
-///     An integer multiple of 3.84 MHz.
+///     Any usual rate that holds an SSB: 3.84 Msps at least.
 /// centre_frequency_hz : float
 ///     Frequency that stands at 0 Hz in the samples.
 /// ssb_freq_hz : float

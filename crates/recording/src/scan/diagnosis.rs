@@ -35,6 +35,16 @@ pub enum ChannelFault {
     },
 }
 
+impl ChannelFault {
+    /// The channel that has it; none where two are exchanged.
+    pub const fn channel(&self) -> Option<usize> {
+        match self {
+            Self::Samples { channel, .. } => Some(*channel),
+            Self::Exchanged { .. } => None,
+        }
+    }
+}
+
 impl fmt::Display for ChannelFault {
     fn fmt(&self, f: &mut fmt::Formatter<'_>) -> fmt::Result {
         let (channel, fault) = match self {

@@ -5,6 +5,7 @@ mod array_view;
 mod diagnosis;
 mod error;
 mod iq_source;
+mod looked;
 mod scanner;
 mod ssb_search;
 
@@ -12,5 +13,6 @@ pub use array_view::ArraySetup;
 pub use diagnosis::ChannelFault;
 pub use error::ScanError;
 pub use iq_source::{IqSource, SampleBlock};
+pub use looked::{Looked, Places};
 pub use scanner::{Scan, ScanSettings, scan};
 pub use ssb_search::{FoundSsb, SsbSearch, SsbSearchConfig};

@@ -1,17 +1,24 @@
 //! Every SSB of a recording that nobody has said anything about.
 
 use nr_ssb::front_end::FrontEnd;
-use nr_ssb::raster::{self, RasterPoint};
+use nr_ssb::raster;
 use nr_ssb::{Complex32, SubcarrierSpacing};
 
 use super::array_view::ArraySetup;
 use super::diagnosis::{ChannelFault, ExchangeVotes, faults_of_samples};
 use super::error::ScanError;
 use super::iq_source::IqSource;
+use super::looked::{Looked, Places};
 use super::ssb_search::{BLOCK_S, FALSE_ALARM, FoundSsb, SsbSearch, SsbSearchConfig};
 
-/// Looked through for raster points, in two steps: the usual period, and the longest (TS 38.331).
-const RASTER_WINDOWS_S: [f64; 2] = [0.02, 0.16];
+/// Looked through for unknown frequencies, in two steps: the usual period, and the longest (TS
+/// 38.331).
+const WINDOWS_S: [f64; 2] = [0.02, 0.16];
+/// Off the raster, work grows with duration and with the bandwidth's square: 20 ms at 46 Msps are
+/// looked through, of narrower bands more.
+const OFF_RASTER_BUDGET: f64 = 0.02 * 46.08e6 * 46.08e6;
+
+const BOTH_SPACINGS: [SubcarrierSpacing; 2] = [SubcarrierSpacing::Khz15, SubcarrierSpacing::Khz30];
 
 /// What a scan is told; by default nothing.
 #[derive(Debug, Clone, PartialEq, Default)]
@@ -20,6 +27,9 @@ pub struct ScanSettings {
     pub ssb_freq_hz: Option<f64>,
     /// Subcarrier spacing; else both are tried.
     pub spacing: Option<SubcarrierSpacing>,
+    /// Largest offset of the oscillators, of the transmitter and of the receiver together, in parts
+    /// per million, where the frequency is given; else half a subcarrier.
+    pub cfo_ppm: Option<f64>,
     /// Centre frequency of the recording in Hz, in place of its own.
     pub centre_frequency_hz: Option<f64>,
     /// The receiving array, for angles.
@@ -33,6 +43,8 @@ pub struct Scan {
     pub ssbs: Vec<FoundSsb>,
     /// What is wrong with single channels.
     pub faults: Vec<ChannelFault>,
+    /// Where was looked.
+    pub looked: Vec<Looked>,
 }
 
 /// Finds every SSB of a recording, in order of time.
@@ -63,8 +75,34 @@ pub fn scan(source: &mut dyn IqSource, settings: &ScanSettings) -> Result<Scan, 
     };
     let mut votes = ExchangeVotes::default();
     let places = match settings.ssb_freq_hz {
-        Some(hz) => given_places(rate_hz, hz, settings.spacing),
-        None => raster_places(source, settings.spacing, centre_hz)?,
+        Some(hz) => {
+            let places = given_places(rate_hz, hz, settings.spacing);
+            let duration_s = source.length() as f64 / rate_hz;
+            found.looked.extend(places.iter().map(|place| Looked {
+                spacing: place.spacing,
+                places: Places::Given {
+                    ssb_freq_hz: hz,
+                    cfo_hz: cfo_range_hz(settings, place),
+                },
+                duration_s,
+                channels: slices.len(),
+            }));
+            places
+        }
+        None => {
+            let faulty: Vec<usize> = found
+                .faults
+                .iter()
+                .filter_map(ChannelFault::channel)
+                .collect();
+            let sound = (0..slices.len()).find(|channel| !faulty.contains(channel));
+            let search = BandSearch {
+                centre_hz: Some(centre_hz).filter(|hz| *hz > 0.0),
+                spacing: settings.spacing,
+                sound_channel: sound.unwrap_or(0),
+            };
+            search.places(source, &mut found.looked)?
+        }
     };
     // Shared among the places looked at.
     let false_alarm = FALSE_ALARM / places.len() as f64;
@@ -75,6 +113,7 @@ pub fn scan(source: &mut dyn IqSource, settings: &ScanSettings) -> Result<Scan, 
             absolute: centre_hz > 0.0 || settings.ssb_freq_hz.is_some(),
             array: settings.array.clone(),
             false_alarm,
+            cfo_range_hz: cfo_range_hz(settings, &place),
             ..SsbSearchConfig::new(
                 rate_hz,
                 centre_hz,
@@ -111,9 +150,9 @@ struct Place {
 }
 
 fn given_places(rate_hz: f64, ssb_freq_hz: f64, spacing: Option<SubcarrierSpacing>) -> Vec<Place> {
-    let both = [SubcarrierSpacing::Khz15, SubcarrierSpacing::Khz30];
     // A spacing that was asked for may fail; one that was only guessed is left out.
-    both.into_iter()
+    BOTH_SPACINGS
+        .into_iter()
         .filter(|one| spacing.map_or(one.base_rate_hz() <= rate_hz, |wanted| wanted == *one))
         .map(|spacing| Place {
             ssb_freq_hz,
@@ -122,58 +161,107 @@ fn given_places(rate_hz: f64, ssb_freq_hz: f64, spacing: Option<SubcarrierSpacin
         .collect()
 }
 
-fn raster_places(
-    source: &mut dyn IqSource,
+/// Carrier frequency offsets looked at, to either side.
+fn cfo_range_hz(settings: &ScanSettings, place: &Place) -> f64 {
+    let given = settings.cfo_ppm.filter(|_| settings.ssb_freq_hz.is_some());
+    given.map_or(0.5 * place.spacing.hz(), |ppm| {
+        1e-6 * ppm * place.ssb_freq_hz
+    })
+}
+
+/// The search for SSBs whose frequency nobody has told.
+struct BandSearch {
+    centre_hz: Option<f64>,
     spacing: Option<SubcarrierSpacing>,
-    centre_hz: f64,
-) -> Result<Vec<Place>, ScanError> {
-    let rate_hz = source.sample_rate_hz();
-    let file = source.name();
-    let failed = |error| match error {
-        raster::ScanError::FrontEnd(source) => ScanError::FrontEnd {
-            file: file.clone(),
-            source,
-        },
-        raster::ScanError::Search(source) => ScanError::Search {
-            file: file.clone(),
-            source,
-        },
-        _ => ScanError::NoCentreFrequency { file: file.clone() },
-    };
-    let suiting = |finds: Vec<raster::RasterFind>| -> Vec<Place> {
-        let suits = |find: &&raster::RasterFind| spacing.is_none_or(|it| it == find.spacing);
-        let place = |find: &raster::RasterFind| {
-            let RasterPoint { ssb_freq_hz, .. } = find.point;
-            Place {
-                ssb_freq_hz,
-                spacing: find.spacing,
-            }
+    /// A channel with nothing wrong with it.
+    sound_channel: usize,
+}
+
+impl BandSearch {
+    /// Where there are SSBs: on the raster by all channels; everywhere else, too much for that, by one.
+    fn places(
+        &self,
+        source: &mut dyn IqSource,
+        looked: &mut Vec<Looked>,
+    ) -> Result<Vec<Place>, ScanError> {
+        let rate_hz = source.sample_rate_hz();
+        let file = source.name();
+        let failed = |error| match error {
+            raster::ScanError::FrontEnd(source) => ScanError::FrontEnd {
+                file: file.clone(),
+                source,
+            },
+            raster::ScanError::Search(source) => ScanError::Search {
+                file: file.clone(),
+                source,
+            },
+            _ => ScanError::NoCentreFrequency { file: file.clone() },
         };
-        finds.iter().filter(suits).map(place).collect()
-    };
-    let centre_hz = Some(centre_hz).filter(|hz| *hz > 0.0);
-    let mut antennas = Vec::new();
-    let mut looked_at = 0;
-    for window_s in RASTER_WINDOWS_S {
-        let Some(centre_hz) = centre_hz else { break };
-        let count = source.length().min((window_s * rate_hz) as u64) as usize;
-        if count == looked_at {
-            break;
+        let mut antennas = Vec::new();
+        let mut looked_at = 0;
+        let mut places = Vec::new();
+        for window_s in WINDOWS_S {
+            let samples = |duration_s: f64| source.length().min((duration_s * rate_hz) as u64);
+            let count = samples(window_s) as usize;
+            let off_raster = samples(OFF_RASTER_BUDGET / (rate_hz * rate_hz)) as usize;
+            if count == looked_at || !places.is_empty() {
+                break;
+            }
+            looked_at = count;
+            source.read(0, count, &mut antennas)?;
+            let slices: Vec<&[Complex32]> = antennas.iter().map(Vec::as_slice).collect();
+            let mut finds = match self.centre_hz {
+                Some(hz) => raster::scan_raster(&slices, rate_hz, hz).map_err(failed)?,
+                None => Vec::new(),
+            };
+            let one = slices.get(self.sound_channel).copied().unwrap_or_default();
+            let one = [&one[..off_raster.min(one.len())]];
+            finds.extend(
+                raster::scan_off_raster(&one, rate_hz, self.centre_hz, &finds).map_err(failed)?,
+            );
+            finds.retain(|find| self.spacing.is_none_or(|it| it == find.spacing));
+            places = finds.iter().map(Place::from).collect();
+            *looked = self.looked(rate_hz, [count, one[0].len()], slices.len());
         }
-        looked_at = count;
-        source.read(0, count, &mut antennas)?;
-        let slices: Vec<&[Complex32]> = antennas.iter().map(Vec::as_slice).collect();
-        let finds = raster::scan_raster(&slices, rate_hz, centre_hz).map_err(failed)?;
-        let places = suiting(finds);
-        if !places.is_empty() {
-            return Ok(places);
+        Ok(places)
+    }
+
+    /// What looking at so many samples, on the raster and off it, comes to.
+    fn looked(&self, rate_hz: f64, samples: [usize; 2], channels: usize) -> Vec<Looked> {
+        let [on_raster_s, off_raster_s] = samples.map(|samples| samples as f64 / rate_hz);
+        let spacings = BOTH_SPACINGS.into_iter().filter(|one| {
+            self.spacing.is_none_or(|it| it == *one) && raster::reach_hz(rate_hz, *one) >= 0.0
+        });
+        let mut looked = Vec::new();
+        for spacing in spacings {
+            let centre_hz = self.centre_hz.unwrap_or(0.0);
+            let reach_hz = raster::reach_hz(rate_hz, spacing);
+            let (low_hz, high_hz) = (centre_hz - reach_hz, centre_hz + reach_hz);
+            if self.centre_hz.is_some() {
+                let points = raster::synchronization_raster(low_hz, high_hz).count();
+                looked.push(Looked {
+                    spacing,
+                    places: Places::Raster(points),
+                    duration_s: on_raster_s,
+                    channels,
+                });
+            }
+            looked.push(Looked {
+                spacing,
+                places: Places::Anywhere { low_hz, high_hz },
+                duration_s: off_raster_s,
+                channels: 1,
+            });
+        }
+        looked
+    }
+}
+
+impl From<&raster::RasterFind> for Place {
+    fn from(find: &raster::RasterFind) -> Self {
+        Self {
+            ssb_freq_hz: find.point.ssb_freq_hz,
+            spacing: find.spacing,
         }
     }
-    // Off the raster, or without a centre to count from, the whole band is looked through, for
-    // one period on one antenna.
-    let count = source.length().min((RASTER_WINDOWS_S[0] * rate_hz) as u64) as usize;
-    source.read(0, count, &mut antennas)?;
-    let first: Vec<&[Complex32]> = antennas.iter().take(1).map(Vec::as_slice).collect();
-    let finds = raster::scan_off_raster(&first, rate_hz, centre_hz).map_err(failed)?;
-    Ok(suiting(finds))
 }

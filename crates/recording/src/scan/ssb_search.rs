@@ -22,7 +22,7 @@ pub(super) const FALSE_ALARM: f64 = 1e-3;
 pub struct SsbSearchConfig {
     /// What errors call the samples.
     pub name: String,
-    /// Samples per second and antenna, an integer multiple of 3.84 MHz.
+    /// Samples per second and antenna.
     pub sample_rate_hz: f64,
     /// Frequency in Hz that stands at 0 Hz in the samples.
     pub centre_frequency_hz: f64,
@@ -39,6 +39,8 @@ pub struct SsbSearchConfig {
     pub array: ArraySetup,
     /// Probability that 20 ms of noise make a cell.
     pub false_alarm: f64,
+    /// Largest carrier frequency offset to either side, up to five subcarriers.
+    pub cfo_range_hz: f64,
 }
 
 impl SsbSearchConfig {
@@ -60,6 +62,7 @@ impl SsbSearchConfig {
             spacing,
             array: ArraySetup::default(),
             false_alarm: FALSE_ALARM,
+            cfo_range_hz: 0.5 * spacing.hz(),
         }
     }
 }
@@ -110,6 +113,7 @@ impl SsbSearch {
         let search = SearchConfig {
             ssb_freq_hz: config.absolute.then_some(config.ssb_freq_hz),
             false_alarm: config.false_alarm,
+            cfo_range_hz: config.cfo_range_hz,
             ..SearchConfig::new(spacing, config.antennas)
         };
         let nothing_to_do = rate_hz == spacing.base_rate_hz() && offset_hz == 0.0;

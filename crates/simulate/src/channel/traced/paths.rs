@@ -54,7 +54,7 @@ pub struct Paths {
     squares: HashMap<[i64; 2], Vec<usize>>,
     /// Where the paths of each head at each place begin.
     begins: Vec<usize>,
-    paths: Vec<TracedPath>,
+    all: Vec<TracedPath>,
 }
 
 #[derive(Debug, Clone, Copy)]
@@ -147,7 +147,7 @@ impl Paths {
         let link = |row: usize| of_head[row] as usize * places.len() + of_place[row] as usize;
         order.sort_by_key(|&row| link(row));
         let mut begins = vec![0; head_m.len() * places.len() + 1];
-        let mut paths = Vec::with_capacity(count);
+        let mut all = Vec::with_capacity(count);
         for row in order {
             let [head, place] = [
                 head_m[of_head[row] as usize],
@@ -164,7 +164,7 @@ impl Paths {
             let level = elevations_rad[row].cos();
             let (sin, cos) = azimuths_rad[row].sin_cos();
             begins[link(row) + 1] += 1;
-            paths.push(TracedPath {
+            all.push(TracedPath {
                 gain: gains[row],
                 excess_s: ((length_m - straight_m) / SPEED_OF_LIGHT_MPS) as f32,
                 towards: [(level * cos) as f32, (level * sin) as f32],
@@ -193,7 +193,7 @@ impl Paths {
             places,
             squares,
             begins,
-            paths,
+            all,
         })
     }
 
@@ -256,7 +256,7 @@ impl Paths {
         let number = self.place_near(place)?;
         let [x_m, y_m, _] = self.places[number];
         let link = head * self.places.len() + number;
-        let paths = self.paths.get(self.begins[link]..self.begins[link + 1])?;
+        let paths = self.all.get(self.begins[link]..self.begins[link + 1])?;
         Some((paths, [place.x_m - x_m, place.y_m - y_m]))
     }
 

@@ -1,0 +1,183 @@
+//! How an electrical angle spreads about the truth: the asymptotic variance of the method that found
+//! it, for whatever correlation of the sources and whatever averaging of the covariance.
+//!
+//! To first order an angle moves linearly with the error of the sample covariance,
+//! `d omega = tr(H dR)`, and for Gaussian snapshots `var tr(H R^) = tr(H R H R) / L`. With `w = Rs^+ a`,
+//! `Rs` the signal part of the covariance, `H` is the Hermitian part of `w v^H`, where
+//!
+//! - MUSIC and Root-MUSIC: `v = P d / (d^H P d)`, `d` the derivative of `a`, `P` the projection on the
+//!   noise (Stoica and Nehorai 1989; Rao and Hari 1989 for the roots);
+//! - ESPRIT: `v^H = -j exp(-j omega) b^H`, `b^H` being the source's row of
+//!   `A1^+ ([0 I] - exp(j omega) [I 0])`, `A1` the steering vectors without the last antenna (Rao and
+//!   Hari 1989); least squares and total least squares spread alike.
+//!
+//! An average over subarrays or over the array's symmetry is linear in `R` and becomes one of `H`.
+
+use num_complex::Complex64;
+
+use super::choice::Method;
+use crate::bound::steering_matrix;
+use crate::covariance::sample::Covariance;
+use crate::linalg::dense::{adjoint, inverse, product};
+use crate::linalg::eigen::HermitianEigen;
+use crate::linalg::matrix::{Matrix, zeros};
+use crate::list::List;
+
+/// Average over the subarrays of `M` antennas, and over the array's symmetry.
+#[derive(Debug, Clone, Copy)]
+pub(super) struct Averaging<const N: usize, const M: usize> {
+    pub(super) forward_backward: bool,
+}
+
+impl<const N: usize, const M: usize> Averaging<N, M> {
+    pub(super) fn average(self, covariance: &Covariance<N>) -> Covariance<M> {
+        let smoothed = covariance.spatially_smoothed::<M>();
+        if self.forward_backward {
+            smoothed.forward_backward()
+        } else {
+            smoothed
+        }
+    }
+
+    /// From `H` of the average to that of the covariance it was made of.
+    fn spread_out(self, of_average: &Matrix<M>) -> Matrix<N> {
+        let mut h = *of_average;
+        if self.forward_backward {
+            for i in 0..M {
+                for j in 0..M {
+                    let mirrored = of_average[M - 1 - i][M - 1 - j].conj();
+                    h[i][j] = (of_average[i][j] + mirrored) * 0.5;
+                }
+            }
+        }
+        let mut spread = zeros::<N>();
+        let scale = 1.0 / (N - M + 1) as f64;
+        for first in 0..=N - M {
+            for i in 0..M {
+                for j in 0..M {
+                    spread[first + i][first + j] += h[i][j] * scale;
+                }
+            }
+        }
+        spread
+    }
+}
+
+/// What the spread depends on.
+pub(super) struct Spread<'a, const N: usize, const M: usize> {
+    /// Of the average.
+    pub(super) eigen: &'a HermitianEigen<M>,
+    pub(super) sources: usize,
+    pub(super) noise_variance: f64,
+    pub(super) averaging: Averaging<N, M>,
+    /// What was averaged.
+    pub(super) covariance: &'a Matrix<N>,
+    pub(super) snapshots: usize,
+}
+
+impl<const N: usize, const M: usize> Spread<'_, N, M> {
+    /// Standard deviations; `None` if the steering vectors do not tell the sources apart.
+    pub(super) fn phase_sigmas_rad(&self, method: Method, phases: &[f64]) -> Option<List<f64, M>> {
+        let steering = steering_matrix::<M>(phases);
+        let rotations = match method {
+            Method::EspritLs | Method::EspritTls => Some(esprit_rows(&steering, phases)?),
+            _ => None,
+        };
+        let mut sigmas = [0.0; M];
+        for (k, sigma) in sigmas[..phases.len()].iter_mut().enumerate() {
+            let a: [Complex64; M] = std::array::from_fn(|n| steering[n][k]);
+            let v = match &rotations {
+                Some(rows) => rows[k].map(|it| it.conj()),
+                None => self.towards_noise(&a)?,
+            };
+            let w = self.of_signal(&a);
+            let h = std::array::from_fn(|i| {
+                std::array::from_fn(|j| (w[i] * v[j].conj() + v[i] * w[j].conj()) * 0.5)
+            });
+            *sigma = self.variance(&h).sqrt();
+        }
+        let determined = sigmas[..phases.len()].iter().all(|it| it.is_finite());
+        determined.then(|| List::collect(0.0, sigmas[..phases.len()].iter().copied()))
+    }
+
+    /// Share of the weakest signal eigenvector that noise mixes into it, in the mean
+    /// `sigma^2 l / (L (l - sigma^2)^2)` for each of the noise's dimensions.
+    pub(super) fn mixing(&self) -> f64 {
+        let weakest = self.eigen.values[self.sources - 1];
+        let gap = weakest - self.noise_variance;
+        let each = self.noise_variance * weakest / (self.snapshots as f64 * gap * gap);
+        each * (M - self.sources) as f64
+    }
+
+    /// `P d / (d^H P d)`.
+    fn towards_noise(&self, a: &[Complex64; M]) -> Option<[Complex64; M]> {
+        let derivative: [Complex64; M] =
+            std::array::from_fn(|n| a[n] * Complex64::new(0.0, n as f64));
+        let mut projected = [Complex64::ZERO; M];
+        for vector in &self.eigen.vectors[self.sources..] {
+            add(&mut projected, vector, dot(vector, &derivative));
+        }
+        let power = dot(&projected, &derivative).re;
+        (power > 0.0).then(|| projected.map(|it| it / power))
+    }
+
+    /// `Rs^+ a`.
+    fn of_signal(&self, a: &[Complex64; M]) -> [Complex64; M] {
+        let mut result = [Complex64::ZERO; M];
+        let eigen = self.eigen.values.iter().zip(&self.eigen.vectors);
+        for (value, vector) in eigen.take(self.sources) {
+            let signal = (value - self.noise_variance).max(f64::MIN_POSITIVE);
+            add(&mut result, vector, dot(vector, a) / signal);
+        }
+        result
+    }
+
+    /// `tr(H R H R) / L`.
+    fn variance(&self, of_average: &Matrix<M>) -> f64 {
+        let h = self.averaging.spread_out(of_average);
+        let hr = product(&h, self.covariance, [N; 3]);
+        let mut trace = 0.0;
+        for i in 0..N {
+            for j in 0..N {
+                trace += (hr[i][j] * hr[j][i]).re;
+            }
+        }
+        trace / self.snapshots as f64
+    }
+}
+
+/// ESPRIT's `-j exp(-j omega) b^H` of every source; see the module.
+fn esprit_rows<const M: usize>(
+    steering: &Matrix<M>,
+    phases: &[f64],
+) -> Option<[[Complex64; M]; M]> {
+    let sources = phases.len();
+    let adjoint_steering = adjoint(steering);
+    let gram = product(&adjoint_steering, steering, [sources, M - 1, sources]);
+    let pseudo_inverse = product(
+        &inverse(gram, sources)?,
+        &adjoint_steering,
+        [sources, sources, M - 1],
+    );
+    let mut rows = [[Complex64::ZERO; M]; M];
+    for (k, (row, phase)) in rows.iter_mut().zip(phases).enumerate() {
+        let rotation = Complex64::cis(*phase);
+        let turn = Complex64::new(0.0, -1.0) * rotation.conj();
+        for n in 0..M - 1 {
+            row[n + 1] += pseudo_inverse[k][n] * turn;
+            row[n] -= pseudo_inverse[k][n] * rotation * turn;
+        }
+    }
+    Some(rows)
+}
+
+/// `a^H b`.
+fn dot<const M: usize>(a: &[Complex64; M], b: &[Complex64; M]) -> Complex64 {
+    a.iter().zip(b).map(|(a, b)| a.conj() * b).sum()
+}
+
+fn add<const M: usize>(to: &mut [Complex64; M], vector: &[Complex64; M], scale: Complex64) {
+    for (sum, element) in to.iter_mut().zip(vector) {
+        *sum += element * scale;
+    }
+}

@@ -1,0 +1,80 @@
+//! The same work on many items, on as many threads as there are processors.
+
+use std::num::NonZero;
+use std::sync::atomic::{AtomicUsize, Ordering};
+use std::thread;
+
+/// More threads than this wait for memory, not for processors.
+const MOST_THREADS: usize = 16;
+
+/// What `work` makes of each item, in the items' order whatever the threads; each thread has a
+/// worker of its own, with its plans and buffers, from `worker`.
+///
+/// # Errors
+/// The first, in the items' order, of either.
+pub(super) fn in_parallel<T: Sync, W, R: Send, E: Send>(
+    items: &[T],
+    worker: impl Fn() -> Result<W, E> + Sync,
+    work: impl Fn(&mut W, &T) -> Result<R, E> + Sync,
+) -> Result<Vec<R>, E> {
+    let next = AtomicUsize::new(0);
+    let run = || {
+        let mut own = None;
+        let mut done = Vec::new();
+        loop {
+            let index = next.fetch_add(1, Ordering::Relaxed);
+            let Some(item) = items.get(index) else {
+                return done;
+            };
+            let made = own.take().map_or_else(&worker, Ok);
+            done.push((
+                index,
+                made.and_then(|mut it| {
+                    let result = work(&mut it, item);
+                    own = Some(it);
+                    result
+                }),
+            ));
+        }
+    };
+    let processors = thread::available_parallelism().map_or(1, NonZero::get);
+    let others = processors
+        .min(MOST_THREADS)
+        .min(items.len())
+        .saturating_sub(1);
+    let mut done = thread::scope(|scope| {
+        // Where no thread is to be had, the others and this one do its share.
+        let helpers: Vec<_> = (0..others)
+            .filter_map(|_| thread::Builder::new().spawn_scoped(scope, run).ok())
+            .collect();
+        let mut done = run();
+        for helper in helpers {
+            match helper.join() {
+                Ok(part) => done.extend(part),
+                Err(panic) => std::panic::resume_unwind(panic),
+            }
+        }
+        done
+    });
+    done.sort_unstable_by_key(|(index, _)| *index);
+    done.into_iter().map(|(_, result)| result).collect()
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    #[test]
+    fn results_come_in_order_and_the_first_error_counts() {
+        let items: Vec<u32> = (0..1000).collect();
+        let squares = in_parallel(
+            &items,
+            || Ok::<_, ()>(1),
+            |one, item| Ok(item * item * *one),
+        );
+        assert_eq!(squares, Ok(items.iter().map(|it| it * it).collect()));
+        let fails = |(): &mut (), item: &u32| if *item % 7 == 5 { Err(*item) } else { Ok(()) };
+        assert_eq!(in_parallel(&items, || Ok(()), fails), Err(5));
+        assert_eq!(in_parallel(&[0; 0], || Err(3), fails), Ok(Vec::new()));
+    }
+}

@@ -1,0 +1,240 @@
+"""Power sensors and energy counters that the kernel offers, none of them counted twice.
+
+INA3221 by ``hwmon`` (JetPack 5 and later) or ``iio`` (JetPack 4), INA238 by ``hwmon`` (Thor), RAPL
+by ``powercap`` (x86). Where a sensor holds the others, as ``VDD_IN`` holds the rails and ``psys``
+the packages, it alone is read.
+"""
+
+from __future__ import annotations
+
+from dataclasses import dataclass
+from time import sleep
+from typing import TYPE_CHECKING
+
+from access_av.errors import InputError
+
+if TYPE_CHECKING:
+    from collections.abc import Iterator
+    from pathlib import Path
+
+# Rails that hold all others of their board.
+TOTALS = ("VDD_IN", "POM_5V_IN", "VIN")
+# INA3221, SBOS576: 13 bits, 40 µV at the shunt and 8 mV at the bus.
+INA3221 = {"shunt_v": 40e-6, "bus_v": 8e-3}
+# INA238, SBOSA20: 16 bits, 5 µV at the shunt and 3.125 mV at the bus.
+INA238 = {"shunt_v": 5e-6, "bus_v": 3.125e-3}
+# Shunts of Jetson boards where the file does not say: 5 mΩ.
+USUAL_SHUNT_OHM = 5e-3
+# Voltage of a rail whose file does not say: only the size of its steps hangs on it.
+USUAL_RAIL_V = 5.0
+# The energy unit that RAPL counts in, 2^-14 J (Intel SDM, MSR_RAPL_POWER_UNIT), and how often.
+RAPL_UNIT_J = 2.0**-14
+RAPL_PERIOD_S = 1e-3
+# How often a file is read that is empty.
+READS = 50
+
+
+class SensorError(InputError):
+    """A sensor that cannot be read, or says what cannot be."""
+
+
+@dataclass(frozen=True)
+class Rail:
+    """One channel of a power monitor.
+
+    Attributes
+    ----------
+    voltage, current, power
+        Files in mV, mA and ``power_unit_w``; voltage and current where both are there, else power.
+    bus_v, current_a
+        How far what it says may be from what it sees: half a step of its converter, and the last
+        digit of the file.
+    period_s
+        Time between two conversions, where the kernel says.
+    """
+
+    label: str
+    chip: str
+    voltage: Path | None
+    current: Path | None
+    power: Path | None
+    power_unit_w: float
+    bus_v: float
+    current_a: float
+    period_s: float | None
+
+    def read_w(self) -> tuple[float, float]:
+        """Power, and how far rounding may have taken it from what was seen, in watts."""
+        if self.voltage is not None and self.current is not None:
+            volt, ampere = _number(self.voltage) * 1e-3, _number(self.current) * 1e-3
+            return volt * ampere, self.bus_v * abs(ampere) + self.current_a * abs(volt)
+        if self.power is None:
+            raise SensorError(f"{self.label} of {self.chip}: neither power nor voltage and current")
+        rounded_w = self.power_unit_w + self.current_a * USUAL_RAIL_V
+        return _number(self.power) * self.power_unit_w, rounded_w
+
+
+@dataclass(frozen=True)
+class Zone:
+    """One RAPL zone: a counter in µJ that starts again at ``range_j``."""
+
+    label: str
+    energy: Path
+    range_j: float
+
+    def read_j(self) -> float:
+        """What the counter says, in joules."""
+        return _number(self.energy) * 1e-6
+
+
+@dataclass(frozen=True)
+class Counters:
+    """What is read together and added up: either rails or zones.
+
+    Attributes
+    ----------
+    name
+        The sensors, for people.
+    """
+
+    name: str
+    rails: tuple[Rail, ...] = ()
+    zones: tuple[Zone, ...] = ()
+
+    @property
+    def period_s(self) -> float | None:
+        """Time between two values, where it is known."""
+        if self.zones:
+            return RAPL_PERIOD_S
+        known = [rail.period_s for rail in self.rails if rail.period_s is not None]
+        return max(known, default=None)
+
+
+def find(sysfs: Path) -> Counters | None:
+    """Look for the sensors of the machine whose ``/sys`` this is; ``None`` where it has none.
+
+    Raises
+    ------
+    SensorError
+        When there are some and they may not be read.
+    """
+    found = _choose([*_hwmon(sysfs), *_iio(sysfs)])
+    counters = found or _rapl(sysfs)
+    if counters is not None:
+        for rail in counters.rails:
+            rail.read_w()
+        for zone in counters.zones:
+            zone.read_j()
+    return counters
+
+
+def _choose(rails: list[Rail]) -> Counters | None:
+    """The rail that holds the others, or all of them."""
+    total = [rail for rail in rails if rail.label in TOTALS]
+    chosen = tuple(total[:1] or rails)
+    if not chosen:
+        return None
+    chips = " and ".join(sorted({rail.chip for rail in chosen}))
+    return Counters(f"{' + '.join(rail.label for rail in chosen)} ({chips})", rails=chosen)
+
+
+def _hwmon(sysfs: Path) -> Iterator[Rail]:
+    """Rails of INA3221 and INA238 by hwmon; channel 7 of an INA3221 sums the others."""
+    for chip in sorted(sysfs.glob("bus/i2c/devices/*/hwmon/hwmon*")):
+        name = _text(chip / "name")
+        if name == "ina238":
+            label = _text(chip / "in1_label") or _text(chip / "label") or "VIN"
+            yield _rail(chip, label, name, 1, "shunt_resistor", INA238)
+        elif name in ("ina3221", None):
+            for file in sorted(chip.glob("in*_label")):
+                channel, rail = int(file.name[2:-6]), _text(file)
+                if channel <= 3 and rail not in (None, "NC", ""):
+                    shunt = f"shunt{channel}_resistor"
+                    yield _rail(chip, str(rail), "ina3221", channel, shunt, INA3221)
+
+
+def _rail(
+    chip: Path, label: str, name: str, channel: int, shunt: str, steps: dict[str, float]
+) -> Rail:
+    ohm = _text(chip / shunt)
+    shunt_ohm = float(ohm) * 1e-6 if ohm and float(ohm) > 0.0 else USUAL_SHUNT_OHM
+    period_ms = _text(chip / "update_interval")
+    power = chip / "power1_input"
+    return Rail(
+        label=label,
+        chip=name,
+        voltage=chip / f"in{channel}_input",
+        current=chip / f"curr{channel}_input",
+        power=power if power.is_file() else None,
+        power_unit_w=1e-6,
+        bus_v=0.5 * steps["bus_v"] + 1e-3,
+        current_a=0.5 * steps["shunt_v"] / shunt_ohm + 1e-3,
+        period_s=float(period_ms) * 1e-3 if period_ms and float(period_ms) > 0.0 else None,
+    )
+
+
+def _iio(sysfs: Path) -> Iterator[Rail]:
+    """Rails of INA3221 by iio (JetPack 4)."""
+    for device in sorted(sysfs.glob("bus/i2c/devices/*/iio:device*")):
+        for file in sorted(device.glob("rail_name_*")):
+            number, label = file.name.removeprefix("rail_name_"), _text(file)
+            if label in (None, "NC", ""):
+                continue
+            voltage, current = (
+                device / f"in_voltage{number}_input",
+                device / f"in_current{number}_input",
+            )
+            both = voltage.is_file() and current.is_file()
+            yield Rail(
+                label=str(label),
+                chip="ina3221",
+                voltage=voltage if both else None,
+                current=current if both else None,
+                power=device / f"in_power{number}_input",
+                power_unit_w=1e-3,
+                bus_v=0.5 * INA3221["bus_v"] + 1e-3,
+                current_a=0.5 * INA3221["shunt_v"] / USUAL_SHUNT_OHM + 1e-3,
+                period_s=None,
+            )
+
+
+def _rapl(sysfs: Path) -> Counters | None:
+    """Top zones of RAPL: the platform where it is counted, else the packages."""
+    zones = []
+    for zone in sorted(sysfs.glob("class/powercap/intel-rapl:*")):
+        most = _text(zone / "max_energy_range_uj")
+        # Zones with a second number are parts of the first.
+        if zone.name.count(":") == 1 and (zone / "energy_uj").is_file() and most is not None:
+            zones.append(
+                Zone(_text(zone / "name") or zone.name, zone / "energy_uj", float(most) * 1e-6)
+            )
+    platform = [zone for zone in zones if zone.label == "psys" and zone.read_j() > 0.0]
+    chosen = tuple(platform or [zone for zone in zones if zone.label != "psys"])
+    if not chosen:
+        return None
+    return Counters(f"{' + '.join(zone.label for zone in chosen)} (RAPL)", zones=chosen)
+
+
+def _text(file: Path) -> str | None:
+    try:
+        return file.read_text(encoding="utf-8").strip()
+    except OSError:
+        return None
+
+
+def _number(file: Path) -> float:
+    try:
+        text = file.read_text(encoding="utf-8")
+        for _ in range(READS):
+            if text.strip():
+                break
+            # A file that is no kernel's may be met empty, in the middle of being written.
+            sleep(1e-3)
+            text = file.read_text(encoding="utf-8")
+        return float(text)
+    except PermissionError as error:
+        raise SensorError(f"{file}: may not be read; run as root, or allow it") from error
+    except OSError as error:
+        raise SensorError(f"{file}: the sensor stopped answering ({error.strerror})") from error
+    except ValueError as error:
+        raise SensorError(f"{file}: not a number") from error
