@@ -10,8 +10,8 @@ import numpy as np
 import polars as pl
 import pytest
 
-from access_av import Scenario, Site, channel, columns, ray_paths, simulate
-from conftest import DATA, ROOT
+from access_av import Scenario, Site, bound, channel, columns, ray_paths, simulate
+from conftest import ROOT
 
 if TYPE_CHECKING:
     from collections.abc import Callable
@@ -47,7 +47,9 @@ def test_a_drive_under_every_model_and_with_blockage() -> None:
         scenario = yard.with_overrides(
             {"channel.model": model, "channel.blockage": {"per_minute": 3.0}}
         )
-        assert simulate(scenario, seed=2).rms_error_m < 5.0
+        first, again = (simulate(scenario, seed=2, threads=threads) for threads in (1, 2))
+        assert first.steps.equals(again.steps)
+        assert np.isfinite(first.rms_error_m)
 
 
 def line_of_sight(site: Site, places_m: np.ndarray) -> pl.DataFrame:
@@ -77,15 +79,19 @@ def test_a_traced_line_of_sight_is_that_of_the_geometry(tmp_path: Path) -> None:
     found = ray_paths.import_paths(table, site, tmp_path / "los.npz", carrier_mhz=3750.0)
     assert found == {"heads": 3, "places": 161, "paths": 483}
     hall = Scenario.load(str(HALL / "scenario.toml"))
+    text = (HALL / "scenario.toml").read_text().split("[channel]")[0]
+    untraced = Scenario.from_toml(
+        f"{text}[channel]\nshadowing_std_db = 0.0\n", str(HALL / "scenario.toml")
+    )
     drawn = {"truth.draw": "none", "vehicle.lane_keeping": {"rms_m": 0.0, "wavelength_m": 60.0}}
     for fidelity in ("snapshots", "iq"):
         traced = hall.with_overrides(
             {**drawn, "channel.paths": str(tmp_path / "los.npz"), "fidelity": fidelity}
         )
-        # Without multipath and noise worth the name nothing is left but half a cell's plane wave.
-        free = hall.with_overrides(
-            {**drawn, "channel": {"model": "rician", "shadowing_std_db": 0.0}, "fidelity": fidelity}
-        ).with_overrides({"truth.site.rician_k_db": 60.0})
+        # Without multipath nothing is left between them but half a step of plane wave.
+        free = untraced.with_overrides(
+            {**drawn, "fidelity": fidelity, "truth.site.rician_k_db": 60.0}
+        )
         results = [simulate(it, seed=5, keep_trajectories=True) for it in (traced, free)]
         snrs_db = [result.steps["mean_true_snr_db"].to_numpy() for result in results]
         assert np.abs(snrs_db[0] - snrs_db[1]).max() < 0.3
@@ -105,7 +111,6 @@ def test_the_hall_comes_with_its_paths(tmp_path: Path, monkeypatch: pytest.Monke
     shipped = HALL / "paths.npz"
     assert shipped.stat().st_size < 50_000
     script = runpy.run_path(str(HALL / "trace.py"))
-    script["HERE"]  # where it writes
     (tmp_path / "site.toml").write_text((HALL / "site.toml").read_text())
     monkeypatch.setitem(script["main"].__globals__, "HERE", tmp_path)
     script["main"]()
@@ -115,6 +120,18 @@ def test_the_hall_comes_with_its_paths(tmp_path: Path, monkeypatch: pytest.Monke
             np.testing.assert_allclose(here[name], there[name], rtol=1e-5, atol=1e-9)
     result = simulate(str(HALL / "scenario.toml"), runs=2, seed=1)
     assert 0.005 < result.rms_error_m < 1.0
+
+
+def test_the_bound_has_the_paths_k(tmp_path: Path) -> None:
+    site = Site.load(str(HALL / "site.toml"))
+    table = line_of_sight(site, LANE_M)
+    ray_paths.import_paths(table, site, tmp_path / "los.npz", carrier_mhz=3750.0)
+    hall = Scenario.load(str(HALL / "scenario.toml"))
+    clear = hall.with_overrides({"channel.paths": str(tmp_path / "los.npz")})
+    traced_m, clear_m = (bound(it, map_step_m=1.0).route["bound_m"].max() for it in (hall, clear))
+    assert clear_m < 0.8 * traced_m
+    # Beyond the lane nothing is traced, and so nothing is known.
+    assert bound(hall, map_step_m=4.0).site.filter(pl.col("y_m") > 20.0)["bound_m"].is_null().all()
 
 
 def test_bad_tables_are_refused(tmp_path: Path, access_av: Callable[..., Finished]) -> None:
@@ -181,9 +198,10 @@ def test_a_scenario_refuses_paths_of_another_site(
         assert message in done.err
 
 
-@pytest.mark.skipif(not (DATA / "street").is_dir(), reason="the street is not here")
-def test_the_street_can_be_driven(tmp_path: Path) -> None:
-    street = DATA / "street"
+def test_the_street_can_be_driven(tmp_path: Path, data: Path) -> None:
+    street = data / "street"
+    if not street.is_dir():
+        pytest.skip("no ray-traced street among the reference data")
     heads = pl.read_csv(street / "landmarks.csv").rows()
     road = (street / "road.toml").read_text().split("[track]", 1)[1]
     rows = "".join(

@@ -106,7 +106,7 @@ def import_paths(
             head_pci=np.array([head["pci"] for head in heads], dtype=np.int32),
             head_ssb_index=np.array([head["ssb_index"] for head in heads], dtype=np.int32),
             head_m=np.array([head["position_m"] for head in heads], dtype=np.float64),
-            place_m=places.select(_PLACE).to_numpy().astype(np.float64),
+            place_m=np.ascontiguousarray(places.select(_PLACE).to_numpy(), dtype=np.float64),
             path_head=np.array(of_head, dtype=np.int32),
             path_place=rows["place"].to_numpy().astype(np.int32),
             gain=gain.astype(np.complex64),

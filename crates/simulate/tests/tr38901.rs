@@ -43,8 +43,11 @@ fn places(model: &str) -> Vec<Place> {
     (0..DROPS).map(place).collect()
 }
 
+/// A quantity's name, and its value in a drop.
+type Quantity = (&'static str, fn(&Drop) -> f64);
+
 /// Every quantity of the oracle's table.
-const QUANTITIES: [(&str, fn(&Drop) -> f64); 8] = [
+const QUANTITIES: [Quantity; 8] = [
     ("path_loss_db", |drop| drop.path_loss_db),
     ("shadowing_db", |drop| drop.shadowing_db),
     ("k_db", |drop| drop.k_db),

@@ -260,6 +260,19 @@ impl Paths {
         Some((paths, [place.x_m - x_m, place.y_m - y_m]))
     }
 
+    /// Rician K of a radio head of the file there: power of its line of sight by that of the other
+    /// paths. None beyond reach; 0 without a line of sight.
+    pub fn rician_k(&self, head: usize, place: Point) -> Option<f64> {
+        let (paths, _) = self.near(head, place)?;
+        let power = |direct| {
+            let such = paths.iter().filter(|path| path.direct == direct);
+            such.map(|path| f64::from(path.gain.norm_sqr()))
+                .sum::<f64>()
+        };
+        // A single path leaves rounding at most.
+        Some(power(true) / power(false).max(f64::MIN_POSITIVE))
+    }
+
     fn place_near(&self, place: Point) -> Option<usize> {
         let [column, row] = square(place);
         let around = (-1..=1).flat_map(|i| (-1..=1).map(move |j| [column + i, row + j]));

@@ -4,7 +4,7 @@ use std::fs::File;
 use std::io::Read;
 use std::path::Path;
 
-use npyz::{DType, NpyFile};
+use npyz::{DType, NpyFile, Order};
 use num_complex::Complex32;
 use zip::ZipArchive;
 
@@ -49,6 +49,7 @@ impl Arrays {
                 "array `{name}` has the shape {shape:?}; {width} to a row are needed"
             ));
         }
+        let by_column = npy.order() == Order::Fortran;
         let kind = match npy.dtype() {
             DType::Plain(kind) => kind.to_string(),
             _ => String::new(),
@@ -68,7 +69,17 @@ impl Arrays {
                 ));
             }
         };
-        values.map_err(|error| format!("array `{name}`: {error}"))
+        let values = values.map_err(|error| format!("array `{name}`: {error}"))?;
+        let width = width as usize;
+        Ok(if by_column && width > 1 {
+            let rows = values.len() / width;
+            let places = 0..rows * width;
+            places
+                .map(|place| values[place % width * rows + place / width])
+                .collect()
+        } else {
+            values
+        })
     }
 
     /// Complex numbers.
