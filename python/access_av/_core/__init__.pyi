@@ -25,6 +25,8 @@ __all__ = [
     "Vehicle",
     "__version__",
     "aoa",
+    "channel_drops",
+    "check_paths",
     "locate",
     "nr",
     "simulate",
