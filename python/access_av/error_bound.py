@@ -114,6 +114,9 @@ def bound(scenario: _core.Scenario | str, *, map_step_m: float | None = None) ->
     step_m = _round_step(low, high) if map_step_m is None else map_step_m
     if not (math.isfinite(step_m) and step_m > 0.0):
         raise InputError(f"--map-step-m {step_m}: a length above 0 is needed")
+    extent_m = float((high - low).max())
+    if step_m > extent_m:
+        raise InputError(f"--map-step-m {step_m:g}: the site is {extent_m:.0f} m across")
     cells = math.prod(np.maximum(1.0, np.ceil((high - low) / step_m)).tolist())
     if cells > MOST_MAP_CELLS:
         raise InputError(

@@ -2,6 +2,9 @@
 
 from __future__ import annotations
 
+import io
+import os
+import sys
 from contextlib import contextmanager
 from typing import TYPE_CHECKING, Any
 
@@ -36,11 +39,27 @@ console = Console(highlight=False, markup=False)
 errors = Console(stderr=True, highlight=False, markup=False)
 
 NARROW = 80
+LONGEST_MESSAGE = 500
 
 
 def is_narrow() -> bool:
     """Whether tables should leave out what can be found in the files."""
     return console.width < NARROW
+
+
+def write_what_can_be_written() -> None:
+    """Write a question mark where the terminal's encoding lacks a sign."""
+    for stream in (sys.stdout, sys.stderr):
+        if isinstance(stream, io.TextIOWrapper):
+            stream.reconfigure(errors="replace")
+
+
+def give_up_output() -> None:
+    """Write no more to a standard output that took nothing: at its end Python would try again."""
+    try:
+        sys.stdout.flush()
+    except OSError:
+        os.dup2(os.open(os.devnull, os.O_WRONLY), sys.stdout.fileno())
 
 
 @contextmanager
@@ -74,13 +93,27 @@ def show_error(error: Exception) -> None:
     else:
         message = str(error)
     errors.print("error:", style="bold red", end=" ")
-    errors.print(plain(message), soft_wrap=True)
+    errors.print(brief(plain(message)), soft_wrap=True)
 
 
 def show_warning(message: str) -> None:
     """One message for an item that was left out, or is remarkable."""
     errors.print("warning:", style="yellow", end=" ")
-    errors.print(plain(message), soft_wrap=True)
+    errors.print(brief(plain(message)), soft_wrap=True)
+
+
+def brief(text: str) -> str:
+    """A text with its middle left out where it is longer than :data:`LONGEST_MESSAGE`.
+
+    Examples
+    --------
+    >>> brief("short"), len(brief("x" * 10**6))
+    ('short', 500)
+    """
+    if len(text) <= LONGEST_MESSAGE:
+        return text
+    head = LONGEST_MESSAGE * 3 // 5
+    return f"{text[:head]} … {text[head + 3 - LONGEST_MESSAGE :]}"
 
 
 def plain(text: str) -> str:

@@ -4,6 +4,7 @@ mod bound;
 mod campaign;
 mod channel;
 mod drive;
+mod message;
 mod nr;
 mod plug_ins;
 mod recording;
@@ -53,7 +54,7 @@ mod _core {
     #[pymodule_export]
     use crate::channel::{channel_drops, check_paths};
     #[pymodule_export]
-    use crate::drive::{LocatedDrive, locate, synthesize};
+    use crate::drive::{LocatedDrive, locate, read_tum, synthesize};
     #[pymodule_export]
     use crate::plug_ins::{RadioHead, SensedSsb, Situation};
     #[pymodule_export]

@@ -143,19 +143,25 @@ impl Simulation {
     /// # Errors
     /// [`SimulationError`] of the first run that fails, or that the caller stopped it.
     pub fn campaign(&self, options: &CampaignOptions<'_>) -> Result<Campaign, SimulationError> {
+        let pool = ThreadPoolBuilder::new()
+            .num_threads(options.threads.unwrap_or(0))
+            .build()?;
+        let wave = 8 * pool.current_num_threads();
+        let at_once = if options.keep_records {
+            options.runs
+        } else {
+            options.runs.min(wave)
+        };
+        self.scenario().check_runs(at_once)?;
         let energy = EnergyModel::new(&self.scenario().vehicle, self.platform(), Extent::Value)?;
         let mut sums = vec![StepSums::default(); self.steps()];
         let mut errors = ErrorHistogram::default();
-        let mut runs = Vec::with_capacity(options.runs);
+        let mut runs = Vec::new();
         let mut integrity = Vec::new();
         let mut records = Vec::new();
         let mut errors_m = Vec::new();
         let integrity_settings = self.scenario().vehicle.integrity;
         let alert_limit_m = integrity_settings.map_or(f64::INFINITY, |it| it.alert_limit_m);
-        let pool = ThreadPoolBuilder::new()
-            .num_threads(options.threads.unwrap_or(0))
-            .build()?;
-        let wave = 8 * pool.current_num_threads();
         while runs.len() < options.runs {
             let first = options.first_run + runs.len() as u64;
             let count = wave.min(options.runs - runs.len()) as u64;

@@ -59,14 +59,7 @@ impl World {
         let check = Check {
             file: &scenario.name,
         };
-        let (site, vehicle) = scenario
-            .truth
-            .depart(&scenario.site, &scenario.vehicle, check)?;
-        let true_road = site.road.as_ref();
-        let road = match (&scenario.motion.path, true_road) {
-            (None, Some(road)) => road.build("truth.site.road", check)?,
-            _ => scenario.path(check)?,
-        };
+        let (site, vehicle, road) = scenario.actual(check)?;
         let motion = MotionProfile::new(&scenario.motion, &vehicle, road.length_m());
         Ok(Self {
             scenario: Arc::new(scenario.clone()),

@@ -29,6 +29,7 @@ __all__ = [
     "check_paths",
     "locate",
     "nr",
+    "read_tum",
     "simulate",
     "synthesize",
 ]
@@ -104,6 +105,8 @@ class Scenario:
     def site(self) -> Site: ...
     @property
     def vehicle(self) -> Vehicle: ...
+    @property
+    def size(self) -> dict[str, float]: ...
     def resolved(self, platform: Platform | None = None) -> Scenario: ...
     def __eq__(self, other: object, /) -> bool: ...
     def __ne__(self, other: object, /) -> bool: ...
@@ -275,7 +278,9 @@ def synthesize(
     duration_s: float | None = None,
     continuous: bool = False,
     datatype: str = "ci16_le",
+    progress: Callable[[float], object] | None = None,
 ) -> tuple[Path, int, int]: ...
+def read_tum(file: str | PathLike[str]) -> dict[str, NDArray[np.float64]]: ...
 def locate(
     site: Site,
     vehicle: Vehicle,

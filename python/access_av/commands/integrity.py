@@ -2,7 +2,6 @@
 
 from __future__ import annotations
 
-import json
 from typing import TYPE_CHECKING, Annotated, Any
 
 import typer
@@ -46,7 +45,7 @@ def integrity(
     """
     import polars as pl
 
-    from access_av.files import ResultsDirectory
+    from access_av.files import ResultsDirectory, json_text
     from access_av.integrity_campaign import campaign
     from access_av.report.integrity import render_integrity
 
@@ -68,7 +67,7 @@ def integrity(
     directory.write_text("report.html", render_integrity(cases, runs, seed))
     directory.write_manifest(scenario=scenario, runs=runs, seed=seed)
     if as_json:
-        print(json.dumps({"cases": records, "directory": str(directory.path)}, indent=2))
+        print(json_text({"cases": records, "directory": str(directory.path)}))
         return
     _show(records)
     console.print(f"Report: {directory.path / 'report.html'}", soft_wrap=True)

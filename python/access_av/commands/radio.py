@@ -2,7 +2,6 @@
 
 from __future__ import annotations
 
-import json
 from pathlib import Path
 from typing import Annotated
 
@@ -62,7 +61,7 @@ def plan(
     service levels the bound then allows. Writes masts.parquet, scenario.toml with the new radio
     heads, and manifest.json.
     """
-    from access_av.files import ResultsDirectory
+    from access_av.files import ResultsDirectory, json_text
     from access_av.placement import plan as plan_heads
 
     with progress("Masts") as tick:
@@ -80,7 +79,7 @@ def plan(
             "service_levels": [verdict.as_record() for verdict in found.verdicts],
             "directory": str(directory.path),
         }
-        print(json.dumps(record, indent=2))
+        print(json_text(record))
         return
     show_plan(found)
     console.print(f"Site: {directory.path / 'scenario.toml'}", soft_wrap=True)

@@ -5,6 +5,7 @@ mod faults;
 mod iq;
 mod motion;
 mod scenario_file;
+mod size;
 mod truth;
 
 pub use channel::{BlockageSettings, ChannelModel, ChannelSettings, HallSettings, ScatterModel};
@@ -12,4 +13,5 @@ pub use faults::{FaultKind, FaultSettings};
 pub use iq::IqSettings;
 pub use motion::{MotionSettings, StopSettings};
 pub use scenario_file::{Fidelity, Scenario};
+pub use size::DriveSize;
 pub use truth::{Draw, TruthSettings};

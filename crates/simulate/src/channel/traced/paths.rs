@@ -15,6 +15,8 @@ use super::read::Arrays;
 const SPEED_OF_LIGHT_MPS: f64 = 299_792_458.0;
 /// A place stands for what lies nearer to it than to any other, as far as this.
 const REACH_M: f64 = 1.0;
+/// How far a road may lead on beyond the places.
+const ENDS_M: f64 = 10.0;
 /// What a path may be shorter than the straight way by: single precision, rounded places.
 const SLACK_M: f64 = 0.3;
 /// A path that is no longer than the straight way by more than this is the line of sight.
@@ -234,12 +236,14 @@ impl Paths {
             }
         }
         let metres = road.length_m().floor() as usize;
-        for along_m in (0..=metres).map(|it| it as f64) {
-            if self.place_near(road.pose(along_m).point()).is_none() {
-                return PathsError::that(format!(
-                    "no place within {REACH_M} m of the road {along_m} m along it"
-                ));
-            }
+        let mut metres = (0..=metres).map(|it| it as f64);
+        // Nothing is heard on what leads to the first place, and on from the last.
+        let inside = ENDS_M..=road.length_m() - ENDS_M;
+        let untraced = |along_m: &f64| self.place_near(road.pose(*along_m).point()).is_none();
+        if let Some(along_m) = metres.find(|it| inside.contains(it) && untraced(it)) {
+            return PathsError::that(format!(
+                "no place within {REACH_M} m of the road {along_m} m along it"
+            ));
         }
         Ok(())
     }
