@@ -16,7 +16,9 @@ from access_av.commands import (
     designs,
     drives,
     files,
+    integrity,
     profile,
+    radio,
     recordings,
     run,
 )
@@ -51,7 +53,10 @@ def _options(
     pass
 
 
-for _room in (paper, codesign, run, bound, designs, recordings, drives, profile, balance, columns):
+for _room in (
+    *(paper, codesign, run, bound, radio, integrity, designs),
+    *(recordings, drives, profile, balance, columns),
+):
     app.add_typer(_room.app)
 for _what in ("site", "vehicle", "scenario", "platform"):
     app.add_typer(files.files_app(_what), name=_what)

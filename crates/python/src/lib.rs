@@ -2,6 +2,7 @@
 mod aoa;
 mod bound;
 mod campaign;
+mod channel;
 mod drive;
 mod message;
 mod nr;
@@ -50,6 +51,8 @@ mod _core {
     use crate::bound::ErrorBound;
     #[pymodule_export]
     use crate::campaign::{SimulationResult, Tapes, simulate};
+    #[pymodule_export]
+    use crate::channel::{channel_drops, check_paths};
     #[pymodule_export]
     use crate::drive::{LocatedDrive, locate, read_tum, synthesize};
     #[pymodule_export]

@@ -25,6 +25,8 @@ __all__ = [
     "Vehicle",
     "__version__",
     "aoa",
+    "channel_drops",
+    "check_paths",
     "locate",
     "nr",
     "read_tum",
@@ -214,6 +216,16 @@ class Bound:
     ) -> NDArray[np.float64]: ...
     def snr_db(self, x_m: NDArray[np.float64], y_m: NDArray[np.float64]) -> NDArray[np.float64]: ...
 
+def channel_drops(
+    model: str,
+    level_m: NDArray[np.float64],
+    *,
+    head_height_m: float,
+    array_height_m: float,
+    carrier_mhz: float,
+    seed: int,
+) -> dict[str, NDArray[Any]]: ...
+def check_paths(file: str) -> None: ...
 def simulate(
     scenario: Scenario,
     runs: int = 100,
