@@ -9,6 +9,7 @@ import threading
 import time
 from concurrent.futures import Executor, Future, ProcessPoolExecutor, ThreadPoolExecutor
 from concurrent.futures.process import BrokenProcessPool
+from dataclasses import replace
 from pathlib import Path
 from typing import Any
 
@@ -26,6 +27,7 @@ from access_av.designs.table import Constraints, rows_of, what_to_change
 from access_av.errors import InputError
 from access_av.parts import Parts
 from access_av.platform import Platform
+from access_av.report.designs import render_designs
 
 # Spaces.
 
@@ -285,6 +287,20 @@ def test_front_and_its_confidence() -> None:
     assert set(front(driven)) - {4} == {0, 1, 3}
     # What common random numbers cannot tell apart may be of the front; what is beaten is not.
     assert {0, 1, 3} <= set(may_be_front(driven)) <= {0, 1, 3, 4}
+
+
+def test_page_of_many_designs_draws() -> None:
+    rng = np.random.default_rng(5)
+    few = cloud(4, PAIRS)
+    driven = [
+        replace(
+            few[0], energy_j=np.full(4, energy_j), track_s=np.arange(161.0), track_m2=np.ones(161)
+        )
+        for energy_j in rng.uniform(0.1, 9.0, 300)
+    ]
+    page = render_designs(Scenario.load("paper"), driven, rows_of(driven))
+    assert "energy of a trip / J" in page
+    assert len(page) < 6_000_000
 
 
 def test_constraints_choose_the_least_energy() -> None:

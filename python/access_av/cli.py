@@ -10,12 +10,15 @@ import typer
 from access_av import interrupt
 from access_av._core import RecordingError, SettingsError, __version__
 from access_av.commands import (
+    balance,
     bound,
     columns,
     designs,
     drives,
     files,
+    integrity,
     profile,
+    radio,
     recordings,
     run,
 )
@@ -50,7 +53,10 @@ def _options(
     pass
 
 
-for _room in (paper, codesign, run, bound, designs, recordings, drives, profile, columns):
+for _room in (
+    *(paper, codesign, run, bound, radio, integrity, designs),
+    *(recordings, drives, profile, balance, columns),
+):
     app.add_typer(_room.app)
 for _what in ("site", "vehicle", "scenario", "platform"):
     app.add_typer(files.files_app(_what), name=_what)

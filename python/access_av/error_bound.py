@@ -10,7 +10,7 @@ from typing import TYPE_CHECKING, Any
 import numpy as np
 import polars as pl
 
-from access_av import _core
+from access_av import _core, service_levels
 from access_av.errors import InputError
 
 if TYPE_CHECKING:
@@ -66,7 +66,13 @@ class ErrorBound:
             "duration_s": self.route["time_s"].max(),
             "length_m": self.route["along_m"].max(),
             "heads": self.heads.to_dicts(),
+            "service_levels": [verdict.as_record() for verdict in self.verdicts],
         }
+
+    @property
+    def verdicts(self) -> list[service_levels.Verdict]:
+        """The service levels that no localizer can better on this route."""
+        return service_levels.of_bound(self.route["along_std_m"], self.route["across_std_m"])
 
 
 def bound(scenario: _core.Scenario | str, *, map_step_m: float | None = None) -> ErrorBound:

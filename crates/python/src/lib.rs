@@ -2,6 +2,7 @@
 mod aoa;
 mod bound;
 mod campaign;
+mod channel;
 mod drive;
 mod message;
 mod nr;
@@ -21,7 +22,7 @@ mod _core {
         #[pymodule_export]
         use crate::aoa::{
             AngleEstimate, calibrate, covariance, crb_rad, esprit, estimate_sources,
-            forward_backward, maximum_likelihood, music, root_music,
+            forward_backward, maximum_likelihood, music, root_music, spectrum,
         };
         use pyo3::prelude::*;
 
@@ -49,7 +50,9 @@ mod _core {
     #[pymodule_export]
     use crate::bound::ErrorBound;
     #[pymodule_export]
-    use crate::campaign::{SimulationResult, simulate};
+    use crate::campaign::{SimulationResult, Tapes, simulate};
+    #[pymodule_export]
+    use crate::channel::{channel_drops, check_paths};
     #[pymodule_export]
     use crate::drive::{LocatedDrive, locate, read_tum, synthesize};
     #[pymodule_export]

@@ -26,7 +26,8 @@ def bound(
 ) -> None:
     """Tell how well any localizer can do, before anything is built.
 
-    The posterior Cramér-Rao bound of the horizontal error: along the route and over the site.
+    The posterior Cramér-Rao bound of the horizontal error: along the route and over the site; and
+    which 3GPP service levels it allows.
     Writes bound.parquet, map.parquet, report.html, scenario.toml and manifest.json.
     """
     from access_av.error_bound import bound as error_bound
@@ -46,5 +47,5 @@ def bound(
     if as_json:
         print(json_text({**summary, "directory": str(directory.path)}))
         return
-    show_bound(summary)
+    show_bound(summary, found.verdicts)
     console.print(f"Report: {directory.path / 'report.html'}", soft_wrap=True)

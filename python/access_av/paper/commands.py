@@ -30,6 +30,9 @@ def evaluate(
     platform: PlatformOption = "jetson-agx-xavier",
     runs: Runs = 100,
     seed: Seed = 1,
+    seeds: Annotated[
+        int, typer.Option(min=1, help="Judge the claims with so many seeds, from --seed on.")
+    ] = 1,
     unknowns: Annotated[
         bool, typer.Option("--unknowns", help="Also: on what the claims hang (takes minutes).")
     ] = False,
@@ -55,6 +58,7 @@ def evaluate(
             platform,
             runs=runs,
             seed=seed,
+            seeds=seeds,
             threads=threads,
             out=out,
             parts=RESULTS / "parts" if unknowns else None,
@@ -132,7 +136,7 @@ def search(
     where it was (results/parts). The best one and its neighbours are driven again, more often.
     """
     from access_av.files import RESULTS, write_whole
-    from access_av.paper.search import as_reading, confirmed, sample
+    from access_av.paper.search import as_toml, confirmed, sample
     from access_av.paper.terminal import show_search
     from access_av.platform import Platform
 
@@ -156,8 +160,8 @@ def search(
     show_search(found, checked)
     if out is not None:
         best = checked[0].values if checked else found.values(found.best()[0])
-        write_whole(out, as_reading(best).scenario.to_toml())
-        console.print(f"Scenario: {out}", soft_wrap=True)
+        write_whole(out, as_toml(best))
+        console.print(f"Reading: {out}", soft_wrap=True)
 
 
 def _finite(value: float | None) -> float | None:

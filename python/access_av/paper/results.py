@@ -11,6 +11,7 @@ from access_av.errors import InputError
 from access_av.files import RESULTS, ResultsDirectory
 from access_av.paper.claims import as_records
 from access_av.paper.readings import SHIPPED, load_all
+from access_av.paper.report.figures import figures
 from access_av.paper.report.page import render
 from access_av.paper.study import Study, study
 from access_av.platform import Platform
@@ -28,6 +29,8 @@ def write(made: Study, directory: ResultsDirectory) -> None:
         directory.write_table(f"{name}.parquet", table)
     directory.write_json("claims.json", as_records(made.claims))
     directory.write_text("report.html", render(made))
+    for name, picture in figures(made).items():
+        directory.write_text(f"{name}.svg", picture)
     shown = made.shown
     directory.write_text("scenario.toml", shown.scenario.resolved(shown.platform.core).to_toml())
     directory.write_text("platform.toml", shown.platform.to_toml())

@@ -10,7 +10,7 @@ import altair as alt
 import numpy as np
 import polars as pl
 
-from access_av.report.chart import GREEN, GREY, ORANGE
+from access_av.report.chart import GREEN, GREY, ORANGE, thinned
 from access_av.report.page import sheet
 from access_av.report.parts import figure, source, tile
 
@@ -21,8 +21,8 @@ if TYPE_CHECKING:
     from access_av.designs.drives import Driven
     from access_av.report.chart import Spec
 
-# Designs that are drawn along the track: the front and what is nearest to it.
-MOST_TRACKS = 60
+# Designs that are drawn, and those of them along the track: the front first, then by energy.
+MOST_DESIGNS, MOST_TRACKS, POINTS_PER_TRACK = 4000, 40, 60
 
 
 def render_designs(scenario: Scenario, driven: Sequence[Driven], rows: pl.DataFrame) -> str:
@@ -49,16 +49,20 @@ def render_designs(scenario: Scenario, driven: Sequence[Driven], rows: pl.DataFr
 
 def _linked(driven: Sequence[Driven], known: pl.DataFrame) -> Spec:
     """Energy against error, above the error along the track of what is clicked."""
-    nearest = known.sort("on_front", "energy_j", descending=[True, False])["design"].to_list()
+    drawn = known.sort("on_front", "energy_j", descending=[True, False]).head(MOST_DESIGNS)
+    nearest = drawn["design"].head(MOST_TRACKS).to_list()
     tracks = pl.concat(
-        pl.DataFrame(
-            {
-                "design": index,
-                "time_s": driven[index].track_s.round(2),
-                "rms_error_m": np.sqrt(driven[index].track_m2).round(4),
-            }
+        thinned(
+            pl.DataFrame(
+                {
+                    "design": index,
+                    "time_s": driven[index].track_s,
+                    "rms_error_m": np.sqrt(driven[index].track_m2),
+                }
+            ),
+            POINTS_PER_TRACK,
         )
-        for index in nearest[:MOST_TRACKS]
+        for index in nearest
     )
     clicked = alt.selection_point(fields=["design"], value=[{"design": nearest[0]}])
     kind = (
@@ -69,7 +73,7 @@ def _linked(driven: Sequence[Driven], known: pl.DataFrame) -> Spec:
         .otherwise(alt.value(GREY))
     )
     points = (
-        alt.Chart(known)
+        alt.Chart(drawn)
         .mark_circle(size=70)
         .encode(
             x=alt.X("energy_j:Q", title="energy of a trip / J", scale=alt.Scale(type="log")),

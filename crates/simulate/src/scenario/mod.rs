@@ -8,7 +8,7 @@ mod scenario_file;
 mod size;
 mod truth;
 
-pub use channel::{ChannelSettings, ScatterModel};
+pub use channel::{BlockageSettings, ChannelModel, ChannelSettings, HallSettings, ScatterModel};
 pub use faults::{FaultKind, FaultSettings};
 pub use iq::IqSettings;
 pub use motion::{MotionSettings, StopSettings};

@@ -1,5 +1,7 @@
 //! A scenario file.
 
+use std::path::Path;
+
 use onboard::settings::{Check, Library, SettingsError, Site, TomlFile, Vehicle, check_together};
 use schemars::{JsonSchema, Schema, SchemaGenerator, json_schema};
 use serde::{Deserialize, Serialize};
@@ -11,6 +13,7 @@ use super::iq::IqSettings;
 use super::motion::MotionSettings;
 use super::size::DriveSize;
 use super::truth::TruthSettings;
+use crate::channel::{Paths, PathsError};
 use onboard::road::Road;
 
 /// Everything a simulated drive depends on, besides the seed.
@@ -134,13 +137,24 @@ impl TomlFile for Scenario {
         library: &dyn Library,
     ) -> Result<(), SettingsError> {
         hold::<Site>(table, origin, library)?;
-        hold::<Vehicle>(table, origin, library)
+        hold::<Vehicle>(table, origin, library)?;
+        let channel = table.get_mut("channel").and_then(Value::as_table_mut);
+        if let Some(Value::String(file)) = channel.and_then(|it| it.get_mut("paths")) {
+            // Written out elsewhere, the scenario still means the same file.
+            let folder = Path::new(origin).parent().unwrap_or(Path::new(""));
+            if let Ok(path) = std::path::absolute(folder.join(&*file)) {
+                *file = path.display().to_string();
+            }
+        }
+        Ok(())
     }
 
     fn check(&self, check: Check<'_>) -> Result<(), SettingsError> {
         check_together(&self.site, &self.vehicle, check)?;
         let road = self.path(check)?;
         self.check_motion(check, &road)?;
+        self.channel.check(check)?;
+        self.traced_paths(check)?;
         self.check_iq(check)?;
         let (heads, elements) = (self.site.radio_heads.len(), self.vehicle.array.elements);
         for (index, fault) in self.faults.iter().enumerate() {
@@ -190,6 +204,22 @@ impl Scenario {
                 Err(check.error("motion.path", "missing", allowed))
             }
         }
+    }
+
+    /// The traced paths, of a scenario that has them.
+    ///
+    /// # Errors
+    /// [`SettingsError::Value`] for a file that cannot be read, or is of another site.
+    pub fn traced_paths(&self, check: Check<'_>) -> Result<Option<Paths>, SettingsError> {
+        let Some(file) = &self.channel.paths else {
+            return Ok(None);
+        };
+        let refused = |why: PathsError| check.error("channel.paths", file, &why.to_string());
+        let paths = Paths::read(Path::new(file)).map_err(refused)?;
+        paths
+            .check(&self.site, &self.path(check)?)
+            .map_err(refused)?;
+        Ok(Some(paths))
     }
 
     /// What is so on average, over all runs: the site, the vehicle, and what it drives along.
