@@ -16,7 +16,7 @@ from typing import Any
 import numpy as np
 import pytest
 
-from access_av import Scenario
+from access_av import Scenario, columns
 from access_av.campaign import Campaign, CampaignError, Shard, Task, executor
 from access_av.designs import drives
 from access_av.designs.drives import Design, Driven, designs_of
@@ -301,6 +301,15 @@ def test_page_of_many_designs_draws() -> None:
     page = render_designs(Scenario.load("paper"), driven, rows_of(driven))
     assert "energy of a trip / J" in page
     assert len(page) < 6_000_000
+
+
+def test_the_table_is_what_is_said_of_it() -> None:
+    driven = cloud(4, PAIRS)
+    driven.append(replace(driven[0], energy_j=np.full(4, np.inf), square_m2=np.full(4, np.inf)))
+    rows = rows_of(driven)
+    assert rows.columns == list(columns.TABLES["designs"].columns)
+    assert rows["energy_j"].to_list()[-1] is rows["rms_error_m"].to_list()[-1] is None
+    assert rows["on_front"].to_list()[-1] is False
 
 
 def test_constraints_choose_the_least_energy() -> None:

@@ -129,5 +129,5 @@ def _show(rows: pl.DataFrame, title: str) -> None:
     made = table(["design", "energy J", "RMS m", "executions", "listened"], title=title)
     for row in rows.head(SHOWN).iter_rows(named=True):
         values = (row["energy_j"], row["rms_error_m"], row["executions"], row["listened"])
-        made.add_row(row["label"], *map(value_text, values))
+        made.add_row(row["choice"], *map(value_text, values))
     console.print(made)
