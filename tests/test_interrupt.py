@@ -8,11 +8,13 @@ import signal
 import subprocess
 import sys
 import time
-from typing import TYPE_CHECKING
+from typing import TYPE_CHECKING, Any
 
 import pytest
+import typer.main
 
 import access_av
+from access_av.cli import app
 
 if TYPE_CHECKING:
     from pathlib import Path
@@ -33,6 +35,15 @@ LONG: dict[str, list[str]] = {
     "scan": ["scan", "drive/iq.sigmf-meta"],
     "aoa": ["aoa", "drive/iq.sigmf-meta"],
     "profile": ["profile", "--out", "profiled.toml"],
+    "designs": ["designs", "paper", "--space", "space.toml", "--out", "out"],
+    "plan": ["plan", "yard", "--masts", "masts.csv", "--out", "out"],
+    "integrity": ["integrity", "yard", "--out", "out"],
+    "codesign": ["codesign"],
+    "balance": ["balance"],
+    "choose": ["choose", "nowhere"],
+    "import-paths": [
+        "import-paths", "nowhere.csv", "--site", "yard", "--carrier-mhz", "3500", "--out", "x.npz",
+    ],
     "readings": ["readings"],
     "columns": ["columns"],
     "scenario": ["scenario", "check", *access_av.Scenario.names() * 40],
@@ -49,7 +60,15 @@ PYTHON_S = 0.15
 def place(tmp_path_factory: pytest.TempPathFactory) -> Path:
     folder = tmp_path_factory.mktemp("interrupted")
     access_av.synthesize("paper-real-odometry-4", folder / "drive", duration_s=20.0)
+    masts = "".join(f"mast-{n},{20 * n},{(-1) ** n * 45},8\n" for n in range(-5, 9))
+    (folder / "masts.csv").write_text("name,x_m,y_m,z_m\n" + masts)
+    (folder / "space.toml").write_text("[vehicle.wake_up.due]\nbase_ms = [80.0, 100.0, 150.0]\n")
     return folder
+
+
+def test_every_command_is_interrupted() -> None:
+    commands: Any = typer.main.get_command(app)
+    assert commands.commands.keys() == LONG.keys()
 
 
 @pytest.mark.parametrize("command", LONG)

@@ -2,7 +2,6 @@
 
 from __future__ import annotations
 
-import json
 from dataclasses import asdict, fields
 from pathlib import Path
 from typing import Annotated
@@ -38,13 +37,14 @@ def balance(
     Low, central and high stand side by side; embodied and use apart; every item names its source.
     """
     from access_av import balance as balances
+    from access_av.files import json_text
 
     if example:
         print(balances.text(), end="")
         return
     found = balances.balance(balances.read(figures))
     if as_json:
-        print(json.dumps(asdict(found), indent=2))
+        print(json_text(asdict(found)))
         return
     made = table(["", "before", "after"], title=f"Low … central … high, in {found.currency}")
     for field in fields(found.before):

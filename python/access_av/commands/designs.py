@@ -2,7 +2,6 @@
 
 from __future__ import annotations
 
-import json
 from pathlib import Path
 from typing import TYPE_CHECKING, Annotated, Any
 
@@ -65,7 +64,7 @@ def designs(
     from access_av.designs.suggested import suggested
     from access_av.designs.table import rows_of
     from access_av.errors import InputError
-    from access_av.files import RESULTS, ResultsDirectory
+    from access_av.files import RESULTS, ResultsDirectory, json_text
     from access_av.parts import Parts
     from access_av.report.designs import render_designs
 
@@ -97,7 +96,7 @@ def designs(
     front = rows.filter("on_front").sort("energy_j")
     if as_json:
         answer = {"front": front.to_dicts(), "drives": found.drives}
-        print(json.dumps(answer, indent=2, ensure_ascii=False))
+        print(json_text(answer))
         return
     _show(front, f"{found.drives} drives of designs; of these no other is surely better")
     console.print(f"Report: {directory.path / 'report.html'}", soft_wrap=True)
@@ -122,6 +121,7 @@ def choose(
 
     from access_av.designs.table import Constraints, what_to_change
     from access_av.errors import InputError
+    from access_av.files import json_text
 
     file = results / TABLE
     if not file.is_file():
@@ -131,7 +131,7 @@ def choose(
     kept = constraints.kept(rows)
     advice = what_to_change(constraints, rows) if kept.is_empty() else []
     if as_json:
-        print(json.dumps({"kept": kept.to_dicts(), "advice": advice}, indent=2, ensure_ascii=False))
+        print(json_text({"kept": kept.to_dicts(), "advice": advice}))
     elif advice:
         console.print("No design keeps all of it. What would have to change:")
         for line in advice:
