@@ -58,7 +58,7 @@ def judge(folder: Path, command: list[str], before: set[Path], end: dict[str, An
             _table(verdict, name, pl.read_parquet(file))
         elif file.suffix in (".json", ".sigmf-meta"):
             _json(verdict, name, file.read_text(encoding="utf-8"))
-        elif file.suffix == ".tum":
+        elif file.suffix == ".tum" and file.stat().st_size:
             _finite(verdict, name, np.loadtxt(file, ndmin=2))
         elif file.suffix == ".mcap":
             _mcap(verdict, name, file)
