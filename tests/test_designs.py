@@ -16,13 +16,14 @@ from typing import Any
 import numpy as np
 import pytest
 
-from access_av import Scenario
+from access_av import Scenario, columns
 from access_av.campaign import Campaign, CampaignError, Shard, Task, executor
 from access_av.designs import drives
 from access_av.designs.drives import Design, Driven, designs_of
 from access_av.designs.front import front, may_be_front
 from access_av.designs.search import Found, rounds, search
 from access_av.designs.space import Space, sobol
+from access_av.designs.suggested import suggested
 from access_av.designs.table import Constraints, rows_of, what_to_change
 from access_av.errors import InputError
 from access_av.parts import Parts
@@ -303,6 +304,15 @@ def test_page_of_many_designs_draws() -> None:
     assert len(page) < 6_000_000
 
 
+def test_the_table_is_what_is_said_of_it() -> None:
+    driven = cloud(4, PAIRS)
+    driven.append(replace(driven[0], energy_j=np.full(4, np.inf), square_m2=np.full(4, np.inf)))
+    rows = rows_of(driven)
+    assert rows.columns == list(columns.TABLES["designs"].columns)
+    assert rows["energy_j"].to_list()[-1] is rows["rms_error_m"].to_list()[-1] is None
+    assert rows["on_front"].to_list()[-1] is False
+
+
 def test_constraints_choose_the_least_energy() -> None:
     rows = rows_of(cloud(20, PAIRS))
     assert Constraints(max_rms_m=0.25).kept(rows)["design"][0] == 1
@@ -377,6 +387,41 @@ def test_halving_finds_the_front_of_the_grid_with_a_quarter_of_the_drives(
     assert len(best) == 10
     assert best <= sure
     assert {grid.driven[index].design.label for index in front(grid.driven)} == best
+
+
+def test_optuna_suggests_the_same_designs_again(
+    tmp_path: Path, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    pytest.importorskip("optuna")
+    computed = []
+
+    def pretended(text: str, _seed: int, _first: int, runs: int) -> dict[str, np.ndarray]:
+        computed.append(text)
+        wake_up = json.loads(Scenario.from_toml(text).vehicle.to_json())["wake_up"]
+        count = np.full(runs, 80_000.0 / wake_up["interval_ms"])
+        rms_m = np.full(runs, 1e-3 * wake_up["interval_ms"] ** 0.5)
+        return {
+            "executions": count, "listened": count, "rms_error_m": rms_m, "max_error_m": rms_m,
+            "track_s": np.arange(3.0), "track_m2": np.ones(3),
+        }  # fmt: skip
+
+    monkeypatch.setattr(drives, "simulated", pretended)
+    space = Space.of(
+        {
+            "vehicle": {
+                "platform": {"name": ["jetson-agx-xavier-engine"]},
+                "wake_up": {"policy": ["fixed"], "interval_ms": {"low": 100, "high": 9000}},
+            }
+        }
+    )
+    campaign = Campaign(Parts(tmp_path))
+    tables = [
+        rows_of(suggested(campaign, Scenario.load("paper"), space, count=40, runs=2, seed=3).driven)
+        for _ in range(2)
+    ]
+    assert tables[0].equals(tables[1])
+    assert 16 < len(computed) <= 40
+    assert len(set(computed)) == len(computed)
 
 
 # The command.

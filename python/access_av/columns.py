@@ -150,6 +150,10 @@ _GLOSSARY = {
     # Wake-up and energy.
     "wake_up_time_s": ("s", "Wake-up time in force"),
     "base_wake_up_ms": ("ms", "Base wake-up time, or the fixed interval"),
+    "design": ("1", "Number of the design"),
+    "choice": ("text", "What was chosen for it, of the keys that differ between designs"),
+    "p90_max_error_m": ("m", "Largest horizontal error of a run, 90th percentile of the runs"),
+    "on_front": ("true or false", "No other design is better in energy and error with 95 %"),
     "executions": ("1", "Angle estimates in a run; of several runs their mean"),
     "listened": ("1", "SSB bursts listened to"),
     "longest_gap_s": (
@@ -464,6 +468,19 @@ TABLES: Mapping[str, Table] = {
                     ("energy_per_execution_j", "energy_j", "energy_provenance"),
                     f"{_NO_MODE}; or {_NO_FIGURE}",
                 ),
+            },
+        ),
+        Table(
+            "designs",
+            "A design of a scenario, over the runs that all designs see",
+            "`designs.parquet` of `access-av designs`; `kept` of `access-av choose --json`",
+            (
+                "design", "choice", "runs", "energy_j", "rms_error_m", "p90_max_error_m",
+                "executions", "listened", "on_front",
+            ),
+            {
+                "energy_j": _NO_FIGURE,
+                **dict.fromkeys(("rms_error_m", "p90_max_error_m"), "in some run it was not found"),
             },
         ),
         Table(

@@ -39,6 +39,9 @@ def designs(
     halving: Annotated[
         bool, typer.Option("--halving", help="Leave out early what is behind.")
     ] = False,
+    optuna: Annotated[
+        int | None, typer.Option(min=1, max=100_000, help="So many designs that Optuna suggests.")
+    ] = None,
     runs: Runs = 20,
     seed: Seed = 1,
     shard: Annotated[
@@ -59,7 +62,9 @@ def designs(
     from access_av.designs.drives import designs_of
     from access_av.designs.search import search
     from access_av.designs.space import Space
+    from access_av.designs.suggested import suggested
     from access_av.designs.table import rows_of
+    from access_av.errors import InputError
     from access_av.files import RESULTS, ResultsDirectory
     from access_av.parts import Parts
     from access_av.report.designs import render_designs
@@ -67,10 +72,20 @@ def designs(
     chosen = Scenario.load(scenario)
     read = Space.read(space)
     share = Shard.parse(shard)
-    every = designs_of(chosen, read.grid() if sobol is None else read.sobol(sobol))
+    if optuna is not None and (sobol is not None or halving or share != Shard()):
+        raise InputError("--optuna chooses by itself: not with --sobol, --halving or --shard")
+    every = []
+    if optuna is None:
+        every = designs_of(chosen, read.grid() if sobol is None else read.sobol(sobol))
     with progress("Driving") as tick, executor(dask, threads) as (pool, workers):
         campaign = Campaign(Parts(RESULTS / "parts"), pool, workers, share)
-        found = search(campaign, every, runs=runs, seed=seed, halving=halving, progress=tick)
+        found = (
+            search(campaign, every, runs=runs, seed=seed, halving=halving, progress=tick)
+            if optuna is None
+            else suggested(
+                campaign, chosen, read, count=optuna, runs=runs, seed=seed, progress=tick
+            )
+        )
     if found is None:
         console.print(f"Share {shard} is done; other shares are not: run them, then this again.")
         return
@@ -84,7 +99,7 @@ def designs(
         answer = {"front": front.to_dicts(), "drives": found.drives}
         print(json.dumps(answer, indent=2, ensure_ascii=False))
         return
-    _show(front, f"{len(every)} designs, {found.drives} drives: no other is surely better")
+    _show(front, f"{found.drives} drives of designs; of these no other is surely better")
     console.print(f"Report: {directory.path / 'report.html'}", soft_wrap=True)
     console.print(f"Ask: access-av choose {directory.path} --max-rms-m 0.1", soft_wrap=True)
 
@@ -129,5 +144,5 @@ def _show(rows: pl.DataFrame, title: str) -> None:
     made = table(["design", "energy J", "RMS m", "executions", "listened"], title=title)
     for row in rows.head(SHOWN).iter_rows(named=True):
         values = (row["energy_j"], row["rms_error_m"], row["executions"], row["listened"])
-        made.add_row(row["label"], *map(value_text, values))
+        made.add_row(row["choice"], *map(value_text, values))
     console.print(made)

@@ -24,11 +24,11 @@ def rows_of(driven: Sequence[Driven]) -> pl.DataFrame:
         [
             {
                 "design": index,
-                "label": one.design.label,
+                "choice": one.design.label,
                 "runs": one.square_m2.size,
                 "energy_j": _known(one.mean_energy_j),
                 "rms_error_m": _known(one.rms_m),
-                "worst_error_m": _known(float(np.quantile(one.worst_m, 0.9))),
+                "p90_max_error_m": _known(float(np.quantile(one.worst_m, 0.9))),
                 "executions": float(one.executions.mean()),
                 "listened": float(one.listened.mean()),
                 "on_front": index in on_front,
@@ -65,7 +65,7 @@ class Constraints:
         has = {
             "energy": (row["energy_j"], self.max_energy_j),
             "RMS error": (row["rms_error_m"], self.max_rms_m),
-            "worst error": (row["worst_error_m"], self.max_worst_m),
+            "worst error": (row["p90_max_error_m"], self.max_worst_m),
         }
         return {
             name: np.inf if value is None or bound <= 0.0 else value / bound
@@ -79,7 +79,7 @@ class Constraints:
         Examples
         --------
         >>> rows = pl.DataFrame(
-        ...     {"energy_j": [2.0, 1.0], "rms_error_m": [0.1, 0.2], "worst_error_m": [0.3, 0.6]}
+        ...     {"energy_j": [2.0, 1.0], "rms_error_m": [0.1, 0.2], "p90_max_error_m": [0.3, 0.6]}
         ... )
         >>> Constraints(max_rms_m=0.15).kept(rows)["energy_j"].to_list()
         [2.0]
@@ -106,7 +106,7 @@ def what_to_change(constraints: Constraints, rows: pl.DataFrame) -> list[str]:
     advice = []
     for name in excesses[0]:
         others = [
-            (excess[name], row["label"])
+            (excess[name], row["choice"])
             for row, excess in zip(records, excesses, strict=True)
             if all(value <= 1.0 for other, value in excess.items() if other != name)
             and np.isfinite(excess[name])
@@ -119,6 +119,6 @@ def what_to_change(constraints: Constraints, rows: pl.DataFrame) -> list[str]:
     nearest, row = min(zip(excesses, records, strict=True), key=lambda pair: max(pair[0].values()))
     factor = max(nearest.values())
     if np.isfinite(factor):
-        advice.append(f"all of them {factor:.3g} times as much: {row['label']}")
+        advice.append(f"all of them {factor:.3g} times as much: {row['choice']}")
     advice.append("else what does not vary: more radio heads, a better odometer, a surveyed road")
     return advice

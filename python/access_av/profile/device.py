@@ -257,16 +257,19 @@ def _measure(
         sleep(window_s)
     with Recording(sensors) as working:
         timing = repeat(work, window_s)
+    idle: Window | None = None
+    busy: Window | None = None
     try:
         idle, busy = recording.window(), working.window()
         energy_j = above_idle(busy, idle).scaled(1.0 / timing.executions)
+        if energy_j.low <= 0.0:
+            raise SensorError(
+                f"{energy_j.value:.3g} ± {energy_j.half_width:.3g} J is not told from idle"
+            )
     except TooShortError:
         raise
     except SensorError as error:
-        return Measured(mode, name, timing, why_not=str(error))
-    if energy_j.low <= 0.0:
-        why_not = f"{energy_j.value:.3g} ± {energy_j.half_width:.3g} J is not told from idle"
-        return Measured(mode, name, timing, why_not=why_not, idle=idle, busy=busy)
+        return Measured(mode, name, timing, None, str(error), idle, busy)
     return Measured(mode, name, timing, energy_j, None, idle, busy)
 
 

@@ -79,7 +79,7 @@ def _linked(driven: Sequence[Driven], known: pl.DataFrame) -> Spec:
             x=alt.X("energy_j:Q", title="energy of a trip / J", scale=alt.Scale(type="log")),
             y=alt.Y("rms_error_m:Q", title="RMS error / m"),
             color=kind,
-            tooltip=["label", "energy_j", "rms_error_m", "executions", "listened"],
+            tooltip=["choice", "energy_j", "rms_error_m", "executions", "listened"],
         )
         .add_params(clicked)
         .properties(width=640, height=300)
