@@ -37,7 +37,9 @@ class Worker:
         assert process.stdin is not None
         process.stdin.write(f"{kind} {number}\n".encode())
         process.stdin.flush()
-        line = self._line(process, LONGEST_S)
+        # Beside much else, everything takes as much longer as there is else.
+        busy = max(1.0, os.getloadavg()[0] / (os.cpu_count() or 1))
+        line = self._line(process, LONGEST_S * busy)
         if line:
             return dict(json.loads(line))
         hung = process.poll() is None

@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import io
 import json
 import tempfile
 from copy import deepcopy
@@ -9,7 +10,10 @@ from functools import cache
 from pathlib import Path
 from typing import TYPE_CHECKING, Any
 
+import polars as pl
+
 import access_av
+from access_av.columns import TABLES
 from access_av.toml import tomllib
 from attack import mutate
 
@@ -233,30 +237,26 @@ def road_file(random: Random, case: Case) -> list[str]:
     return case.access_av("site", "check", case.write("site.toml", site))
 
 
-@cache
-def evaluated() -> dict[str, bytes]:
-    """Files of a small evaluation."""
-    from access_av.paper import results
-
-    with tempfile.TemporaryDirectory() as folder:
-        place = Path(folder)
-        results.run(["gate"], runs=1, seed=1, out=place)
-        return {file.name: file.read_bytes() for file in place.iterdir() if file.is_file()}
+def operating_points() -> dict[str, list[Any]]:
+    """A table of operating points, as an evaluation leaves it."""
+    words = {"reading": "gate", "campaign": "adaptive", "mode_name": "MAXN", "method": "music"}
+    words |= {"energy_provenance": "fitted"}
+    columns = TABLES["operating_points"].columns
+    return {name: [words.get(name, name == "adaptive" or 1.0)] * 8 for name in columns}
 
 
 def results_folder(random: Random, case: Case) -> list[str]:
     """A folder of results that is asked."""
-    held = dict(evaluated())
-    name = random.choice([name for name in held if name != "report.html"])
+    held = operating_points()
     choice = random.random()
-    if choice < 0.3:
-        held[name] = random.choice([content for content in held.values() if len(content) < 100_000])
-    elif choice < 0.4:
-        del held[name]
-    else:
-        held[name] = mutate.data(random, held[name])
-    (case.folder / "held").mkdir()
-    for file, content in held.items():
-        if file != "report.html":
-            case.write(f"held/{file}", content)
-    return case.access_av("explore", "--results", "held", "--max-energy-j", "1000")
+    if choice < 0.5:
+        held = mutate.table(random, {name: values[0] for name, values in held.items()})
+        held = {name: [value] * 8 for name, value in held.items()}
+    file = io.BytesIO()
+    try:
+        pl.DataFrame(held, strict=False).write_parquet(file)
+    except (pl.exceptions.PolarsError, TypeError, ValueError, OverflowError):
+        file.write(b"PAR1")  # no table can hold that
+    content = file.getvalue() if choice < 0.6 else mutate.data(random, file.getvalue())
+    case.write("operating_points.parquet", content)
+    return case.access_av("explore", "--results", ".", "--max-energy-j", "1000", "--json")

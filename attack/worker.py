@@ -17,7 +17,7 @@ from pathlib import Path
 from typing import Any
 
 from access_av import InputError, RecordingError, SettingsError
-from attack import kinds
+from attack import files, kinds
 from attack.verdict import judge
 
 MEMORY_BYTES = 2 << 30
@@ -86,6 +86,7 @@ def main() -> None:
     # Tables and charts are loaded before the limit is set: it is of what a case takes.
     import access_av.report.drive  # noqa: F401
 
+    files.recorded()
     limit_memory()
     print("ready", file=answers, flush=True)
     for line in sys.stdin:

@@ -28,6 +28,7 @@ _writing: set[Path] = set()
 
 def guard() -> None:
     """From here on Ctrl-C ends the program, be it by an exception or without."""
+    sys.unraisablehook = _ignore
     told, tells = os.pipe()
     os.set_blocking(tells, False)
     signal.set_wakeup_fd(tells, warn_on_full_buffer=False)
@@ -39,6 +40,12 @@ def guard() -> None:
         end()
 
     threading.Thread(target=wait, daemon=True).start()
+
+
+def _ignore(unraisable: sys.UnraisableHookArgs) -> None:
+    """Say nothing of an interruption that came where exceptions go nowhere; the thread ends it."""
+    if not issubclass(unraisable.exc_type, KeyboardInterrupt):
+        sys.__unraisablehook__(unraisable)
 
 
 def writing(folder: Path) -> None:
