@@ -14,6 +14,7 @@ from access_av.paper.claims import (
     as_records,
     check_claims,
     evidence,
+    with_seeds,
 )
 from access_av.paper.findings import FINDINGS
 from access_av.paper.margins import margin
@@ -140,6 +141,22 @@ def test_a_verdict_near_its_bound_turns_with_the_seed(worst_m: float, turns: boo
     claim = claims["a6_modes_1_2_3_adaptive_worst_m"]
     assert claim.turns_with_seed == turns
     assert claim.interval[0] < claim.obtained < claim.interval[1]
+
+
+def test_a_verdict_that_another_seed_does_not_share_turns() -> None:
+    good, bad = (
+        check_claims(synthetic.evaluation(adaptive_worst_m=worst_m).outcome)
+        for worst_m in (0.1, 0.4)
+    )
+    assert not any(claim.turns_with_seed for claim in good)
+    claims = {claim.id: claim for claim in with_seeds({1: good, 2: bad, 3: good})}
+    a1, e2 = claims["a1_adaptive_worst_m"], claims["e2_mode0_executions"]
+    assert a1.reproduced
+    assert a1.turns_with_seed
+    assert a1.seeds_met == "2/3"
+    assert a1.met_by_seed == {1: True, 2: False, 3: True}
+    assert not e2.turns_with_seed
+    assert e2.seeds_met == ""
 
 
 def test_the_saving_of_a_day_is_of_the_trip_that_was_driven_and_of_its_duty() -> None:

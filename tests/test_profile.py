@@ -105,12 +105,29 @@ def test_jetpack_4_reads_iio(tmp_path: Path) -> None:
     assert sum(rail.read_w()[0] for rail in found.rails) == pytest.approx(5.0)
 
 
+def test_a_sensor_of_two_names_is_read_once(tmp_path: Path) -> None:
+    device = iio(tmp_path, {"VDD_IN": 3.0})
+    for other in ("bus/iio/devices", "bus/i2c/drivers/ina3221x/1-0040"):
+        (tmp_path / other).mkdir(parents=True)
+        (tmp_path / other / "iio:device0").symlink_to(device)
+    chip = hwmon(tmp_path / "five", 0, "ina3221", {1: ("VDD_CPU", 2.0)})
+    (tmp_path / "five/class/hwmon").mkdir(parents=True)
+    (tmp_path / "five/class/hwmon/hwmon0").symlink_to(chip)
+    assert labels(tmp_path) == ["VDD_IN"]
+    assert labels(tmp_path / "five") == ["VDD_CPU"]
+
+
 def test_thor_reads_the_ina238(tmp_path: Path) -> None:
     hwmon(tmp_path, 0, "ina3221", {1: ("VDD_GPU", 9.0), 2: ("VDD_CPU_SOC_MSS", 2.0)})
     thor = hwmon(tmp_path, 1, "ina238", {1: ("VIN", 30.0)})
     assert labels(tmp_path) == ["VIN"]
     (thor / "in1_label").unlink()
     assert labels(tmp_path) == ["VIN"]
+    (thor / "in1_input").unlink()
+    (thor / "power1_input").write_text("30000000")
+    found = counters.find(tmp_path)
+    assert found is not None
+    assert found.rails[0].read_w()[0] == pytest.approx(30.0)
 
 
 def test_psys_contains_the_packages_and_they_their_parts(tmp_path: Path) -> None:
@@ -411,6 +428,21 @@ def test_clocks_of_cpufreq_are_put_back(tmp_path: Path) -> None:
         board.switch(board.modes[2])
         assert (policy / "scaling_max_freq").read_text() == "600000"
     assert (policy / "scaling_max_freq").read_text().strip() == "1500000"
+
+
+def test_a_sensor_that_does_not_see_the_load_keeps_its_windows(
+    tmp_path: Path, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    hwmon(tmp_path / "sys", 0, "ina3221", {1: ("VDD_IN", 15.0)})
+    monkeypatch.setattr(device, "workloads", lambda: {"ssb-chain": lambda: time.sleep(1e-3)})
+    found = device.profile(tmp_path, window_s=1.0)
+    (each,) = found.measured
+    assert each.energy_j is None
+    assert "same, idle and busy" in str(each.why_not)
+    for window in (each.idle, each.busy):
+        assert window is not None
+        assert window.energy_j.low <= 15.0 * window.duration_s <= window.energy_j.high
+    assert found.warnings == (f"mode 0, ssb-chain: energy not measured: {each.why_not}",)
 
 
 def run(*arguments: str) -> subprocess.CompletedProcess[str]:

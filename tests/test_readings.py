@@ -3,15 +3,18 @@
 from __future__ import annotations
 
 import json
+from dataclasses import replace
 from typing import TYPE_CHECKING
 
 import pytest
 
+import synthetic
 from access_av import Scenario, SettingsError
 from access_av.errors import InputError
 from access_av.paper import ablation, readings
 from access_av.paper.drives import Driver
 from access_av.paper.evaluation import evaluate_with
+from access_av.paper.report.page import render
 from access_av.platform import Platform
 
 if TYPE_CHECKING:
@@ -54,18 +57,23 @@ def test_only_gates_wait_for_a_better_ssb() -> None:
 
 
 def test_a_controller_of_no_gain_makes_no_difference(driver: Driver) -> None:
-    """Algorithm 1 with gains of zero is the constant t_base; the ablation has to say so."""
+    """Algorithm 1 with gains of zero is the constant t_base; the report has to say so."""
     gate = readings.load("gate")
     idle = readings.Reading(
-        "idle",
+        "gate",
         "idle",
         gate.scenario.with_overrides({f"vehicle.wake_up.due.{k}": 0.0 for k in ("kp", "ki", "kd")}),
         (),
         keeps_t_max=False,
     )
-    found = ablation.ablate(driver, evaluate_with(driver, idle))
+    evaluation = evaluate_with(driver, idle)
+    found = ablation.ablate(driver, evaluation)
     assert [each.matters for each in found] == [0, 0, 0, 0]
     assert all(each.gain_m == 0.0 and each.executions == each.constant_executions for each in found)
+    study = replace(synthetic.study(), evaluations=[evaluation], ablations=found)
+    page = render(study)
+    assert "makes no difference" in page
+    assert ">helps<" not in page
 
 
 def test_behind_the_gate_algorithm_1_is_idle(driver: Driver) -> None:

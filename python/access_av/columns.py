@@ -103,6 +103,31 @@ _GLOSSARY = {
     "band_low": ("1", "Low end of the 95 % band of mean_nees of a consistent localizer"),
     "band_high": ("1", "High end of it"),
     "in_band": ("true or false", "mean_nees is within the band"),
+    "z_m": ("m", "Height, counted as the array's is"),
+    "p90_bound_m": ("m", "90th percentile along the route of the least RMS error"),
+    # Integrity campaigns.
+    "mismatch": ("text", "How the world departs from what is believed"),
+    "channel": ("text", "The channel, as the campaign was told"),
+    "heads": ("1", "Radio heads listened to"),
+    "availability": ("1", "Share of the steps in state ok"),
+    "unavailable_share": ("1", "Share of the steps in state unavailable"),
+    "exceedances": ("1", "Steps in state ok whose error lay beyond the protection level"),
+    "exceedance_share": ("1", "The same by the steps in state ok"),
+    "exceedance_share_low": ("1", "Low end of its 95 % interval, by the bootstrap over runs"),
+    "exceedance_share_high": ("1", "High end of it"),
+    "runs_with_exceedances": ("1", "Runs with at least one of them"),
+    "time_to_alert_s": ("s", "Longest time beyond the alert limit in state ok"),
+    "level_over_error": ("1", "Median of protection level by horizontal error"),
+    # Channels.
+    "line_of_sight": ("true or false", "There is a line of sight"),
+    "path_loss_db": ("dB", "Path loss, without shadowing and fading"),
+    "shadowing_db": ("dB", "Shadowing; positive is more power"),
+    "rician_k_db": ("dB", "Power of the line of sight over that of the scatter"),
+    "delay_spread_s": ("s", "Root-mean-square delay spread, as drawn"),
+    "azimuth_spread_deg": ("°", "Root-mean-square azimuth spread of arrival, as drawn"),
+    "zenith_spread_deg": ("°", "Root-mean-square zenith spread of arrival, as drawn"),
+    "paths_delay_spread_s": ("s", "Root-mean-square delay spread of the paths that came of it"),
+    "paths_azimuth_spread_deg": ("°", "Circular azimuth spread of arrival of these paths"),
     # SSBs, SNR, angles.
     "pci": ("1", "Physical cell identity"),
     "ssb_index": ("1", "Index of the SSB: the beam"),
@@ -125,6 +150,10 @@ _GLOSSARY = {
     # Wake-up and energy.
     "wake_up_time_s": ("s", "Wake-up time in force"),
     "base_wake_up_ms": ("ms", "Base wake-up time, or the fixed interval"),
+    "design": ("1", "Number of the design"),
+    "choice": ("text", "What was chosen for it, of the keys that differ between designs"),
+    "p90_max_error_m": ("m", "Largest horizontal error of a run, 90th percentile of the runs"),
+    "on_front": ("true or false", "No other design is better in energy and error with 95 %"),
     "executions": ("1", "Angle estimates in a run; of several runs their mean"),
     "listened": ("1", "SSB bursts listened to"),
     "longest_gap_s": (
@@ -387,6 +416,34 @@ TABLES: Mapping[str, Table] = {
             {"bound_m": "the radio heads leave a direction open"},
         ),
         Table(
+            "channel_drops",
+            "A link, dropped at random",
+            "`access_av.channel.drops(…)`",
+            (
+                "line_of_sight", "path_loss_db", "shadowing_db", "rician_k_db", "delay_spread_s",
+                "azimuth_spread_deg", "zenith_spread_deg", "paths_delay_spread_s",
+                "paths_azimuth_spread_deg",
+            ),
+            {"rician_k_db": "no line of sight"},
+        ),
+        Table(
+            "integrity_cases",
+            "A case of an integrity campaign",
+            "`integrity.parquet` of `access-av integrity`; `Case.as_record()`",
+            (
+                "mismatch", "channel", "heads", "runs", "availability", "unavailable_share",
+                "exceedances", "exceedance_share", "exceedance_share_low",
+                "exceedance_share_high", "runs_with_exceedances", "time_to_alert_s",
+                "level_over_error", "p90_error_m", "max_error_m",
+            ),
+        ),
+        Table(
+            "masts",
+            "A candidate mast, as the only one that is added",
+            "`masts.parquet` of `access-av plan`; `access_av.plan(…).ranking`",
+            ("name", "x_m", "y_m", "z_m", "p90_bound_m"),
+        ),
+        Table(
             "bound_heads",
             "A radio head",
             "`access-av bound --json`; `access_av.bound(…).heads`",
@@ -411,6 +468,19 @@ TABLES: Mapping[str, Table] = {
                     ("energy_per_execution_j", "energy_j", "energy_provenance"),
                     f"{_NO_MODE}; or {_NO_FIGURE}",
                 ),
+            },
+        ),
+        Table(
+            "designs",
+            "A design of a scenario, over the runs that all designs see",
+            "`designs.parquet` of `access-av designs`; `kept` of `access-av choose --json`",
+            (
+                "design", "choice", "runs", "energy_j", "rms_error_m", "p90_max_error_m",
+                "executions", "listened", "on_front",
+            ),
+            {
+                "energy_j": _NO_FIGURE,
+                **dict.fromkeys(("rms_error_m", "p90_max_error_m"), "in some run it was not found"),
             },
         ),
         Table(

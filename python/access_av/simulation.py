@@ -9,9 +9,9 @@ from typing import TYPE_CHECKING, Any
 
 import polars as pl
 
-from access_av import _core
+from access_av import _core, service_levels
 from access_av.platform import Platform
-from access_av.statistics.consistency import Consistency
+from access_av.statistics.consistency import Consistency, horizontal_error_m
 from access_av.statistics.integrity import Integrity
 
 if TYPE_CHECKING:
@@ -57,6 +57,18 @@ class Simulation:
     error_quantiles_m: Mapping[float, float]
     errors_m: NDArray[np.float32] | None = None
 
+    @classmethod
+    def of(cls, found: _core.SimulationResult) -> Simulation:
+        """What the core found, as tables."""
+        return cls(
+            steps=_table(found.steps),
+            runs=_table(found.runs),
+            trajectories=None if found.trajectories is None else _table(found.trajectories),
+            executions=None if found.executions is None else _table(found.executions),
+            error_quantiles_m=found.error_quantiles_m,
+            errors_m=found.errors_m,
+        )
+
     @property
     def integrity(self) -> Integrity | None:
         """How protection levels and errors went together; ``None`` where none were stated."""
@@ -71,6 +83,16 @@ class Simulation:
         if self.trajectories is None:
             return None
         return Consistency.of(self.trajectories, skip=min(SETTLED_STEPS, self.steps.height - 1))
+
+    @property
+    def service_levels(self) -> list[service_levels.Verdict] | None:
+        """The 3GPP service levels that the drives reach; ``None`` without trajectories."""
+        if self.trajectories is None:
+            return None
+        error_m = pl.when(~pl.col("searching")).then(horizontal_error_m())
+        errors_m = self.trajectories.sort("run", "time_s").select(error_m).to_numpy()
+        step_s = float(self.steps["time_s"][-1]) / max(1, self.steps.height - 1)
+        return service_levels.of_runs(errors_m.reshape(-1, self.steps.height), step_s)
 
     @property
     def rms_error_m(self) -> float:
@@ -166,14 +188,7 @@ def simulate(
         localizer=localizer,
         progress=progress,
     )
-    return Simulation(
-        steps=_table(found.steps),
-        runs=_table(found.runs),
-        trajectories=None if found.trajectories is None else _table(found.trajectories),
-        executions=None if found.executions is None else _table(found.executions),
-        error_quantiles_m=found.error_quantiles_m,
-        errors_m=found.errors_m,
-    )
+    return Simulation.of(found)
 
 
 def _table(columns: Mapping[str, Any]) -> pl.DataFrame:

@@ -6,17 +6,18 @@ use std::sync::atomic::AtomicBool;
 use ::simulate::scenario::Scenario as CoreScenario;
 use ::simulate::{
     Campaign, CampaignOptions, RunRecord, RunSummary, Simulation, SimulationError, Step,
-    StepStatistics,
+    StepStatistics, Tapes as CoreTapes,
 };
 use numpy::{Element, PyArray1, PyArray3, PyArrayMethods};
 use onboard::geometry::Pose;
 use onboard::localize::AngleMeasurement;
-use onboard::settings::Platform as CorePlatform;
+use onboard::settings::EstimatorMethod;
 use onboard::{BoxError, Custom, Execution};
 use pyo3::exceptions::{PyRuntimeError, PyValueError};
 use pyo3::prelude::*;
 use pyo3::types::{PyDict, PyList};
 
+use crate::message::brief;
 use crate::plug_ins::{PythonEstimator, PythonLocalizer, PythonPolicy};
 use crate::settings::{Platform, Scenario, settings_error};
 
@@ -24,6 +25,13 @@ use crate::settings::{Platform, Scenario, settings_error};
 const MOST_RUNS: usize = 1_000_000;
 /// More threads than any machine has cores for.
 const MOST_THREADS: usize = 1024;
+
+const METHODS: [EstimatorMethod; 4] = [
+    EstimatorMethod::Music,
+    EstimatorMethod::RootMusic,
+    EstimatorMethod::Esprit,
+    EstimatorMethod::MaximumLikelihood,
+];
 
 /// What a campaign found, as columns of equal length.
 #[pyclass(frozen, get_all, module = "access_av._core")]
@@ -69,23 +77,8 @@ pub fn simulate(
     localizer: Option<Py<PyAny>>,
     progress: Option<Py<PyAny>>,
 ) -> PyResult<SimulationResult> {
-    if !(1..=MOST_RUNS).contains(&runs) {
-        let message = format!("`runs` is {runs}; it must be between 1 and {MOST_RUNS}");
-        return Err(PyValueError::new_err(message));
-    }
-    if threads.is_some_and(|threads| !(1..=MOST_THREADS).contains(&threads)) {
-        let message = format!("`threads` must be between 1 and {MOST_THREADS}");
-        return Err(PyValueError::new_err(message));
-    }
-    if errors_every == Some(0) {
-        return Err(PyValueError::new_err("`errors_every` must be at least 1"));
-    }
-    let platform = match platform {
-        Some(platform) => platform.0.clone(),
-        None => recording::load::<CorePlatform>(&scenario.0.vehicle.platform.name)
-            .map_err(settings_error)?,
-    };
-    let simulation = Simulation::new(&scenario.0, platform).map_err(settings_error)?;
+    check(runs, threads, errors_every)?;
+    let simulation = simulation(scenario, platform)?;
     let plug_ins = PlugIns {
         estimator,
         policy,
@@ -100,6 +93,7 @@ pub fn simulate(
             runs,
             threads,
             keep_records: keep_trajectories,
+            quantiles: true,
             errors_every,
             custom: &|start| plug_ins.custom(&scenario.0, start),
             progress: &|done| {
@@ -118,18 +112,128 @@ pub fn simulate(
             .campaign(&options)
             .map_err(|error| raised.take().unwrap_or_else(|| python_error(error)))
     })?;
+    result(py, &campaign, keep_trajectories, errors_every)
+}
+
+fn check(runs: usize, threads: Option<usize>, errors_every: Option<usize>) -> PyResult<()> {
+    if !(1..=MOST_RUNS).contains(&runs) {
+        let message = format!("`runs` is {runs}; it must be between 1 and {MOST_RUNS}");
+        return Err(PyValueError::new_err(message));
+    }
+    if threads.is_some_and(|threads| !(1..=MOST_THREADS).contains(&threads)) {
+        let message = format!("`threads` must be between 1 and {MOST_THREADS}");
+        return Err(PyValueError::new_err(message));
+    }
+    if errors_every == Some(0) {
+        return Err(PyValueError::new_err("`errors_every` must be at least 1"));
+    }
+    Ok(())
+}
+
+/// A scenario on a platform, or on the one that it names.
+fn simulation(scenario: &Scenario, platform: Option<&Platform>) -> PyResult<Simulation> {
+    match platform {
+        Some(platform) => Simulation::new(&scenario.0, platform.0.clone()),
+        None => Simulation::on_its_platform(&scenario.0),
+    }
+    .map_err(settings_error)
+}
+
+fn result(
+    py: Python<'_>,
+    campaign: &Campaign,
+    keep_trajectories: bool,
+    errors_every: Option<usize>,
+) -> PyResult<SimulationResult> {
     Ok(SimulationResult {
-        steps: steps(py, &campaign)?,
-        runs: run_table(py, &campaign)?,
+        steps: steps(py, campaign)?,
+        runs: run_table(py, campaign)?,
         trajectories: keep_trajectories
             .then(|| trajectories(py, &campaign.records))
             .transpose()?,
         executions: keep_trajectories
             .then(|| executions(py, &campaign.records))
             .transpose()?,
-        error_quantiles_m: error_quantiles(py, &campaign)?,
-        errors_m: errors_every.map(|_| errors(py, &campaign)).transpose()?,
+        error_quantiles_m: error_quantiles(py, campaign)?,
+        errors_m: errors_every.map(|_| errors(py, campaign)).transpose()?,
     })
+}
+
+/// Runs of a scenario's world on tape: what comes to the vehicle, with the angle of every SSB.
+///
+/// Driven again with another localizer or wake-up policy they give what a campaign of its own would,
+/// to the last bit, for a small part of its computing.
+#[pyclass(frozen, module = "access_av._core")]
+pub struct Tapes(CoreTapes);
+
+#[pymethods]
+impl Tapes {
+    /// Record the first runs, with angles by each of these methods; `None` where what an SSB brings
+    /// depends on which others are listened to, or when.
+    #[staticmethod]
+    #[pyo3(signature = (scenario, runs = 100, seed = 1, *, methods, platform = None, threads = None))]
+    #[allow(clippy::needless_pass_by_value)] // as Python passes them
+    fn record(
+        py: Python<'_>,
+        scenario: &Scenario,
+        runs: usize,
+        seed: u64,
+        methods: Vec<String>,
+        platform: Option<&Platform>,
+        threads: Option<usize>,
+    ) -> PyResult<Option<Self>> {
+        check(runs, threads, None)?;
+        let simulation = simulation(scenario, platform)?;
+        let method = |name: &String| {
+            let of = |it: &EstimatorMethod| it.to_string() == *name;
+            let unknown = || PyValueError::new_err(format!("no method {name:?}"));
+            METHODS.into_iter().find(of).ok_or_else(unknown)
+        };
+        let methods = methods.iter().map(method).collect::<PyResult<Vec<_>>>()?;
+        let tapes = py.detach(|| {
+            let options = CampaignOptions {
+                seed,
+                runs,
+                threads,
+                ..CampaignOptions::default()
+            };
+            CoreTapes::record(&simulation, &methods, &options)
+        });
+        Ok(tapes.map_err(python_error)?.map(Self))
+    }
+
+    /// Whether a scenario is of the same world, and its method on the tapes.
+    #[pyo3(signature = (scenario, *, platform = None))]
+    fn serve(&self, scenario: &Scenario, platform: Option<&Platform>) -> PyResult<bool> {
+        Ok(self.0.serve(&simulation(scenario, platform)?))
+    }
+
+    /// Drive the recorded runs under a scenario that they serve; quantiles are left out.
+    #[pyo3(signature = (scenario, *, platform = None, threads = None, errors_every = None))]
+    fn simulate(
+        &self,
+        py: Python<'_>,
+        scenario: &Scenario,
+        platform: Option<&Platform>,
+        threads: Option<usize>,
+        errors_every: Option<usize>,
+    ) -> PyResult<SimulationResult> {
+        check(1, threads, errors_every)?;
+        let simulation = simulation(scenario, platform)?;
+        if !self.0.serve(&simulation) {
+            return Err(PyValueError::new_err("the scenario is of another world"));
+        }
+        let campaign = py.detach(|| {
+            let options = CampaignOptions {
+                threads,
+                quantiles: false,
+                errors_every,
+                ..CampaignOptions::default()
+            };
+            self.0.campaign(&simulation, &options)
+        });
+        result(py, &campaign.map_err(python_error)?, false, errors_every)
+    }
 }
 
 fn errors(py: Python<'_>, campaign: &Campaign) -> PyResult<Py<PyArray3<f32>>> {
@@ -144,9 +248,9 @@ fn python_error(error: SimulationError) -> PyErr {
         SimulationError::Settings(error) => settings_error(error),
         SimulationError::Custom(error) => match error.downcast::<PyErr>() {
             Ok(raised) => *raised,
-            Err(other) => PyRuntimeError::new_err(other.to_string()),
+            Err(other) => PyRuntimeError::new_err(brief(other)),
         },
-        other => PyRuntimeError::new_err(other.to_string()),
+        other => PyRuntimeError::new_err(brief(other)),
     }
 }
 

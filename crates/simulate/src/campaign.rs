@@ -4,8 +4,8 @@ use onboard::Custom;
 use onboard::energy::{Energy, EnergyModel};
 use onboard::geometry::wrap_angle;
 use onboard::settings::Extent;
-use rayon::ThreadPoolBuilder;
 use rayon::prelude::*;
+use rayon::{ThreadPool, ThreadPoolBuildError, ThreadPoolBuilder};
 
 use crate::error::SimulationError;
 use crate::histogram::ErrorHistogram;
@@ -26,6 +26,8 @@ pub struct CampaignOptions<'a> {
     pub threads: Option<usize>,
     /// Whether to keep every run's record.
     pub keep_records: bool,
+    /// Whether to find the errors' quantiles, which takes a histogram for each step.
+    pub quantiles: bool,
     /// Keeps each run's errors at every so many SSBs, which takes far less than its record.
     pub errors_every: Option<usize>,
     /// The user's own code, made anew for each run.
@@ -43,6 +45,7 @@ impl Default for CampaignOptions<'_> {
             runs: 1,
             threads: None,
             keep_records: false,
+            quantiles: true,
             errors_every: None,
             custom: &|_| Ok(Custom::default()),
             progress: &|_| true,
@@ -68,7 +71,7 @@ pub struct StepStatistics {
     pub rms_heading_error_rad: f64,
     /// Mean SNR by link budget and shadowing, in dB.
     pub mean_snr_db: f64,
-    /// Median of the horizontal error in metres.
+    /// Median of the horizontal error in metres; NaN where no quantiles are asked for.
     pub p50_error_m: f64,
     /// Its 90th percentile.
     pub p90_error_m: f64,
@@ -131,7 +134,7 @@ struct StepSums {
     nees: f64,
     heading_rad2: f64,
     snr_db: f64,
-    errors: ErrorHistogram,
+    errors: Option<ErrorHistogram>,
 }
 
 impl Simulation {
@@ -143,30 +146,43 @@ impl Simulation {
     /// # Errors
     /// [`SimulationError`] of the first run that fails, or that the caller stopped it.
     pub fn campaign(&self, options: &CampaignOptions<'_>) -> Result<Campaign, SimulationError> {
+        let (seed, first, custom) = (options.seed, options.first_run, options.custom);
+        let drive = |number| self.run(seed, first + number as u64, custom);
+        self.campaign_of(options, options.runs, drive)
+    }
+
+    /// The campaign of `count` runs, the records of which `drive` makes by their place.
+    pub(crate) fn campaign_of(
+        &self,
+        options: &CampaignOptions<'_>,
+        count: usize,
+        drive: impl Fn(usize) -> Result<RunRecord, SimulationError> + Sync,
+    ) -> Result<Campaign, SimulationError> {
+        let pool = thread_pool(options.threads)?;
+        let wave = 8 * pool.current_num_threads();
+        let at_once = if options.keep_records {
+            count
+        } else {
+            count.min(wave)
+        };
+        self.scenario().check_runs(at_once)?;
         let energy = EnergyModel::new(&self.scenario().vehicle, self.platform(), Extent::Value)?;
-        let mut sums = vec![StepSums::default(); self.steps()];
-        let mut errors = ErrorHistogram::default();
-        let mut runs = Vec::with_capacity(options.runs);
+        let mut sums = vec![StepSums::new(options.quantiles); self.steps()];
+        let mut runs = Vec::new();
         let mut integrity = Vec::new();
         let mut records = Vec::new();
         let mut errors_m = Vec::new();
         let integrity_settings = self.scenario().vehicle.integrity;
         let alert_limit_m = integrity_settings.map_or(f64::INFINITY, |it| it.alert_limit_m);
-        let pool = ThreadPoolBuilder::new()
-            .num_threads(options.threads.unwrap_or(0))
-            .build()?;
-        let wave = 8 * pool.current_num_threads();
-        while runs.len() < options.runs {
-            let first = options.first_run + runs.len() as u64;
-            let count = wave.min(options.runs - runs.len()) as u64;
-            let (seed, custom) = (options.seed, options.custom);
-            let finished: Vec<Result<RunRecord, SimulationError>> = pool.install(|| {
-                let numbers = (first..first + count).into_par_iter();
-                numbers.map(|run| self.run(seed, run, custom)).collect()
+        while runs.len() < count {
+            let first = runs.len();
+            let finished: Vec<_> = pool.install(|| {
+                let numbers = (first..count.min(first + wave)).into_par_iter();
+                numbers.map(&drive).collect()
             });
+            let finished = finished.into_iter().collect::<Result<Vec<_>, _>>()?;
+            pool.install(|| add_up(&finished, &mut sums));
             for record in finished {
-                let record = record?;
-                add_up(&record, &mut sums, &mut errors);
                 runs.push(summary(&record, energy.as_ref()));
                 integrity.extend(IntegritySummary::new(&record, alert_limit_m));
                 if let Some(every) = options.errors_every {
@@ -187,12 +203,19 @@ impl Simulation {
                 .collect(),
             steps: sums.iter().map(StepSums::statistics).collect(),
             runs,
-            errors,
+            errors: all_errors(&sums),
             integrity,
             records,
             errors_m,
         })
     }
+}
+
+/// Threads to run on: as many as asked for, or one per core.
+pub(crate) fn thread_pool(threads: Option<usize>) -> Result<ThreadPool, ThreadPoolBuildError> {
+    ThreadPoolBuilder::new()
+        .num_threads(threads.unwrap_or(0))
+        .build()
 }
 
 impl Campaign {
@@ -210,20 +233,27 @@ impl Campaign {
         };
         for record in records {
             if sums.is_empty() {
-                sums = vec![StepSums::default(); record.steps.len()];
+                sums = vec![StepSums::new(true); record.steps.len()];
                 campaign.time_s = record.steps.iter().map(|step| step.time_s).collect();
             }
-            add_up(&record, &mut sums, &mut campaign.errors);
             campaign.runs.push(summary(&record, None));
+            add_up(&[record], &mut sums);
         }
+        campaign.errors = all_errors(&sums);
         campaign.steps = sums.iter().map(StepSums::statistics).collect();
         campaign
     }
 }
 
 fn summary(record: &RunRecord, energy: Option<&EnergyModel>) -> RunSummary {
-    let located = || record.steps.iter().filter(|step| !step.searching);
-    let errors_m = || located().map(Step::error_m);
+    let located = record.steps.iter().filter(|step| !step.searching);
+    let (mut count, mut squares_m2, mut max_error_m, mut final_error_m) = (0, 0.0, 0.0, f64::NAN);
+    for error_m in located.map(Step::error_m) {
+        count += 1;
+        squares_m2 += error_m * error_m;
+        max_error_m = f64::max(max_error_m, error_m);
+        final_error_m = error_m;
+    }
     let duration_s = record.steps.last().map_or(0.0, |step| step.time_s);
     let executions = record.executions.as_slice();
     let times_s = executions.iter().map(|execution| execution.ssb.time_s);
@@ -231,7 +261,6 @@ fn summary(record: &RunRecord, energy: Option<&EnergyModel>) -> RunSummary {
         .clone()
         .zip(times_s.skip(1))
         .map(|(before, after)| after - before);
-    let squares_m2: f64 = errors_m().map(|error_m| error_m * error_m).sum();
     RunSummary {
         run: record.run,
         executions: record.executions.len(),
@@ -240,40 +269,73 @@ fn summary(record: &RunRecord, energy: Option<&EnergyModel>) -> RunSummary {
         longest_gap_s: gaps_s.fold(0.0, f64::max),
         energy: energy
             .map(|model| model.of_run(record.executions.len(), record.listened, duration_s)),
-        rms_error_m: (squares_m2 / located().count() as f64).sqrt(),
-        max_error_m: errors_m().fold(0.0, f64::max),
-        final_error_m: errors_m().next_back().unwrap_or(f64::NAN),
+        rms_error_m: (squares_m2 / f64::from(count)).sqrt(),
+        max_error_m,
+        final_error_m,
         found: record.found(),
     }
 }
 
-fn add_up(record: &RunRecord, sums: &mut [StepSums], errors: &mut ErrorHistogram) {
-    for (step, sums) in record.steps.iter().zip(sums) {
-        sums.runs += 1.0;
-        sums.snr_db += step.snr_db;
-        if step.searching {
-            continue;
+/// Steps that one thread adds up at a time.
+const CHUNK: usize = 256;
+
+/// Adds the records up in their order, step by step.
+fn add_up(records: &[RunRecord], sums: &mut [StepSums]) {
+    let chunks = sums.par_chunks_mut(CHUNK).enumerate();
+    chunks.for_each(|(number, sums)| {
+        for record in records {
+            for (step, sums) in record.steps.iter().skip(number * CHUNK).zip(&mut *sums) {
+                sums.add(step);
+            }
         }
-        sums.located += 1.0;
-        let error_m = step.error_m();
-        let heading_rad = wrap_angle(step.estimate.heading_rad - step.truth.heading_rad);
-        sums.abs_x_m += (step.estimate.x_m - step.truth.x_m).abs();
-        sums.abs_y_m += (step.estimate.y_m - step.truth.y_m).abs();
-        sums.square_m2 += error_m * error_m;
-        // A single run without makes the sum NaN, and the mean none.
-        sums.predicted_m2 += step.predicted_m2().unwrap_or(f64::NAN);
-        sums.nees += step.nees().unwrap_or(f64::NAN);
-        sums.heading_rad2 += heading_rad * heading_rad;
-        sums.errors.add(error_m);
-        errors.add(error_m);
-    }
+    });
+}
+
+/// The errors of all steps.
+fn all_errors(sums: &[StepSums]) -> ErrorHistogram {
+    let mut errors = ErrorHistogram::default();
+    let steps = sums.iter().filter_map(|step| step.errors.as_ref());
+    steps.for_each(|step| errors.merge(step));
+    errors
 }
 
 impl StepSums {
+    fn new(quantiles: bool) -> Self {
+        Self {
+            errors: quantiles.then(ErrorHistogram::default),
+            ..Self::default()
+        }
+    }
+
+    fn add(&mut self, step: &Step) {
+        self.runs += 1.0;
+        self.snr_db += step.snr_db;
+        if step.searching {
+            return;
+        }
+        self.located += 1.0;
+        let error_m = step.error_m();
+        let heading_rad = wrap_angle(step.estimate.heading_rad - step.truth.heading_rad);
+        self.abs_x_m += (step.estimate.x_m - step.truth.x_m).abs();
+        self.abs_y_m += (step.estimate.y_m - step.truth.y_m).abs();
+        self.square_m2 += error_m * error_m;
+        // A single run without makes the sum NaN, and the mean none.
+        self.predicted_m2 += step.predicted_m2().unwrap_or(f64::NAN);
+        self.nees += step.nees().unwrap_or(f64::NAN);
+        self.heading_rad2 += heading_rad * heading_rad;
+        if let Some(errors) = &mut self.errors {
+            errors.add(error_m);
+        }
+    }
+
     fn statistics(&self) -> StepStatistics {
         let count = self.located;
         let number = |value: f64| (!value.is_nan()).then_some(value);
-        let quantile_m = |probability| self.errors.quantile_m(probability).unwrap_or(f64::NAN);
+        let errors = self.errors.as_ref();
+        let quantile_m = |probability| {
+            let found_m = errors.and_then(|errors| errors.quantile_m(probability));
+            found_m.unwrap_or(f64::NAN)
+        };
         StepStatistics {
             mean_abs_error_x_m: self.abs_x_m / count,
             mean_abs_error_y_m: self.abs_y_m / count,

@@ -23,6 +23,9 @@ pub enum SimulationError {
     /// The threads asked for cannot be had.
     #[error("no threads to run on: {0}")]
     Threads(#[from] rayon::ThreadPoolBuildError),
+    /// A run or method that was not recorded.
+    #[error("not on tape")]
+    NotOnTape,
     /// The caller asked to stop.
     #[error("stopped")]
     Stopped,

@@ -20,6 +20,7 @@ mod run;
 pub mod scenario;
 mod snapshot_reception;
 mod synth;
+mod tape;
 pub mod truth;
 pub mod world;
 
@@ -32,3 +33,4 @@ pub use integrity_summary::IntegritySummary;
 pub use record::{Found, RunRecord, Step};
 pub use run::{MakeCustom, Simulation};
 pub use synth::{SynthError, SynthSettings, Synthesized, synthesize};
+pub use tape::Tapes;

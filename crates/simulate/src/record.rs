@@ -1,9 +1,9 @@
 //! What happened in one simulated drive.
 
-use onboard::Execution;
 use onboard::geometry::Pose;
 use onboard::localize::Integrity;
 use onboard::localize::tracker::Calibration;
+use onboard::{Execution, Heard};
 
 /// Truth and estimate at one SSB.
 #[derive(Debug, Clone, Copy, PartialEq)]
@@ -83,6 +83,25 @@ pub struct Found {
 }
 
 impl RunRecord {
+    /// A run of which nothing has happened yet.
+    pub(crate) fn new(run: u64, steps: usize) -> Self {
+        Self {
+            run,
+            steps: Vec::with_capacity(steps),
+            executions: Vec::with_capacity(steps),
+            listened: 0,
+            calibration: None,
+            out_of_reach: 0,
+        }
+    }
+
+    /// Adds what became of a burst.
+    pub(crate) fn add(&mut self, heard: &Heard<'_>) {
+        self.listened += usize::from(heard.listened);
+        self.executions.extend_from_slice(heard.executions);
+        self.out_of_reach += usize::from(heard.keeps_bound == Some(false));
+    }
+
     /// How the first pose came about: at once, unless it had to be searched for; `None` if it was
     /// not found.
     pub fn found(&self) -> Option<Found> {

@@ -64,6 +64,11 @@ impl Simulation {
         self
     }
 
+    /// The world.
+    pub(crate) const fn world(&self) -> &World {
+        &self.world
+    }
+
     /// The scenario.
     pub fn scenario(&self) -> &Scenario {
         self.world.scenario()
@@ -95,14 +100,7 @@ impl Simulation {
         custom: &MakeCustom<'_>,
     ) -> Result<RunRecord, SimulationError> {
         let mut drive = Drive::new(self, Streams::new(seed, run), custom)?;
-        let mut record = RunRecord {
-            run,
-            steps: Vec::with_capacity(self.steps),
-            executions: Vec::with_capacity(self.steps),
-            listened: 0,
-            calibration: None,
-            out_of_reach: 0,
-        };
+        let mut record = RunRecord::new(run, self.steps);
         for number in 0..self.steps {
             let time_s = self.time_s(number);
             let truth = drive.path.at(time_s);
@@ -261,10 +259,7 @@ impl Drive {
             &mut by_snapshots
         };
         let heard = self.onboard.hear(burst.vehicle.time_s, source);
-        let heard = heard.map_err(SimulationError::of_drive)?;
-        record.listened += usize::from(heard.listened);
-        record.executions.extend_from_slice(heard.executions);
-        record.out_of_reach += usize::from(heard.keeps_bound == Some(false));
+        record.add(&heard.map_err(SimulationError::of_drive)?);
         let mut snrs_db = burst.snrs_db;
         snrs_db.clear();
         self.spare.push(snrs_db);

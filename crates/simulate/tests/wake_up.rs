@@ -50,6 +50,34 @@ fn half_the_executions_of_the_pid_for_no_more_error() {
     }
 }
 
+/// Where the SNR of neighbouring SSBs differs, whoever senses before it chooses needs fewer angles.
+#[test]
+fn fewer_executions_where_the_snr_is_sensed_first() {
+    let paper = common::changed(
+        "paper",
+        [
+            (
+                "vehicle.localizer",
+                common::value("{ kind = 'tracker', map = false }"),
+            ),
+            ("vehicle.wake_up.policy", "uncertainty".into()),
+            ("vehicle.wake_up.base_ms", 80.0.into()),
+            ("vehicle.wake_up.least_gain_m2", 0.001.into()),
+        ],
+    );
+    let headroom = [("vehicle.wake_up.snr_headroom_db", 9.0.into())];
+    let sensing = runs(&paper.with_overrides(headroom, &Shipped).unwrap(), 8);
+    let by_budget = runs(&paper, 8);
+    let pairs = || sensing.iter().zip(&by_budget);
+    let (share, error) =
+        mean(pairs().map(|(mine, other)| mine.executions as f64 / other.executions as f64));
+    assert!(share + 4.0 * error < 0.8, "{share} ± {error}");
+    let (more_m, error_m) = mean(pairs().map(|(mine, other)| mine.rms_error_m - other.rms_error_m));
+    assert!(more_m < 4.0 * error_m, "{more_m} ± {error_m} m");
+    let listened = |runs: &[RunSummary]| runs.iter().map(|run| run.listened).sum::<usize>();
+    assert!(listened(&sensing) > listened(&by_budget), "what it costs");
+}
+
 /// The drive with four radio heads, on the bound's demand alone, SSBs coming so late.
 fn on_demand(bound_m: f64, latency_ms: f64, runs: u64) -> Vec<RunRecord> {
     let settings = UncertaintySettings {

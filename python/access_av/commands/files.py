@@ -3,12 +3,41 @@
 from __future__ import annotations
 
 import json
-from typing import Annotated, Any
+from typing import TYPE_CHECKING, Annotated, Any
 
 import typer
 
 from access_av._core import Platform, Scenario, SettingsError, Site, Vehicle
+from access_av.commands.options import AllowLarge, load_scenario
 from access_av.terminal import console, show_error, table
+
+if TYPE_CHECKING:
+    from collections.abc import Callable
+
+
+Names = Annotated[list[str], typer.Argument(help="Shipped names, or paths.")]
+
+
+def _check(names: list[str], describe: Callable[[str], str]) -> None:
+    """Describe each that is fine, say of each other one what is wrong."""
+    wrong = 0
+    for name in names:
+        try:
+            console.print(f"{name}: fine{describe(name)}", soft_wrap=True)
+        except SettingsError as error:
+            show_error(error)
+            wrong += 1
+    if wrong:
+        raise typer.Exit(2)
+
+
+def _size(scenario: Scenario) -> str:
+    """What a drive takes."""
+    size = scenario.size
+    return (
+        f"; a drive of {size['duration_s']:.0f} s, {size['looks']:.0f} SSBs, "
+        f"{size['bytes'] * 1e-6:.0f} MB"
+    )
 
 
 def files_app(what: str) -> typer.Typer:
@@ -30,21 +59,21 @@ def files_app(what: str) -> typer.Typer:
     def show(name: Annotated[str, typer.Argument(help="Shipped name, or path.")]) -> None:
         print(kind.load(name).to_toml(), end="")
 
-    @files.command(
+    command = files.command(
+        name="check",
         help=f"Check {what} files; exit code 2 where one is wrong.",
         epilog=f"Example: [bold]access-av {what} check mine.toml[/]",
     )
-    def check(names: Annotated[list[str], typer.Argument(help="Shipped names, or paths.")]) -> None:
-        wrong = 0
-        for name in names:
-            try:
-                kind.load(name)
-                console.print(f"{name}: fine", soft_wrap=True)
-            except SettingsError as error:
-                show_error(error)
-                wrong += 1
-        if wrong:
-            raise typer.Exit(2)
+    if what == "scenario":
+
+        @command
+        def check_scenarios(names: Names, allow_large: AllowLarge = False) -> None:
+            _check(names, lambda name: _size(load_scenario(name, allow_large=allow_large)))
+    else:
+
+        @command
+        def check(names: Names) -> None:
+            _check(names, lambda name: kind.load(name) and "")
 
     @files.command(help=f"Print the JSON Schema of {what} files, for editors.")
     def schema() -> None:

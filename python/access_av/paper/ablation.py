@@ -109,7 +109,11 @@ def front(driver: Driver, reading: Reading) -> list[tuple[float, Drives]]:
 def fixed(scenario: Scenario, interval_ms: float) -> Scenario:
     """The scenario with MUSIC at a fixed interval."""
     return scenario.with_overrides(
-        {"vehicle.wake_up.policy": "fixed", "vehicle.wake_up.interval_ms": interval_ms}
+        {
+            "vehicle.estimator.method": "music",
+            "vehicle.wake_up.policy": "fixed",
+            "vehicle.wake_up.interval_ms": interval_ms,
+        }
     )
 
 
@@ -135,6 +139,7 @@ def _gated(
     while constant_ms <= latest_ms:
         scenario = reading.scenario.with_overrides(
             {
+                "vehicle.estimator.method": "music",
                 "vehicle.wake_up.due.policy": "fixed",
                 "vehicle.wake_up.due.interval_ms": constant_ms,
             }

@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from dataclasses import asdict, dataclass
+from dataclasses import asdict, dataclass, field, replace
 from typing import TYPE_CHECKING, Any
 
 import numpy as np
@@ -42,9 +42,12 @@ class Claim:
     interval
         95 % interval of ``obtained`` over the runs; ``None`` where nothing is drawn, or for modes.
     turns_with_seed
-        Whether other runs may give another verdict.
+        Whether other runs may give another verdict: by its margin's spread over the runs, or
+        because another seed that was tried did.
     evidence
         One of :data:`EVIDENCE`: what the verdict is worth.
+    met_by_seed
+        Whether the claim is met by the runs of each seed, where it was judged with several.
     """
 
     reading: str
@@ -59,11 +62,18 @@ class Claim:
     turns_with_seed: bool
     evidence: str
     note: str
+    met_by_seed: Mapping[int, bool] = field(default_factory=dict)
 
     @property
     def reproduced(self) -> bool:
         """Whether the claim is met."""
         return self.verdict == REPRODUCED
+
+    @property
+    def seeds_met(self) -> str:
+        """With how many of its seeds it is met, where they disagree; else nothing."""
+        met = self.met_by_seed.values()
+        return f"{sum(met)}/{len(met)}" if 0 < sum(met) < len(met) else ""
 
 
 def evidence(entry: Mapping[str, Any], chosen: Collection[str]) -> str:
@@ -116,6 +126,17 @@ def margins(outcome: Outcome) -> dict[str, Numbers]:
         except MissingFigureError:
             continue
     return found
+
+
+def with_seeds(claims: Mapping[int, list[Claim]]) -> list[Claim]:
+    """The claims of the first seed, with the verdicts of the others; all in the same order."""
+    first, *_ = claims.values()
+    made = []
+    for index, claim in enumerate(first):
+        met = {seed: each[index].reproduced for seed, each in claims.items()}
+        turns = claim.turns_with_seed or len({*met.values()}) > 1
+        made.append(replace(claim, met_by_seed=met, turns_with_seed=turns))
+    return made
 
 
 def as_records(claims: list[Claim]) -> list[dict[str, Any]]:

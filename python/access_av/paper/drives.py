@@ -8,8 +8,10 @@ from typing import TYPE_CHECKING, Any
 import numpy as np
 import polars as pl
 
+from access_av._core import Tapes
+from access_av.paper.methods import METHODS
 from access_av.paper.outcome import EVERY, Drives, Numbers, resamples
-from access_av.simulation import simulate
+from access_av.simulation import Simulation, simulate
 
 if TYPE_CHECKING:
     from collections.abc import Callable
@@ -18,6 +20,8 @@ if TYPE_CHECKING:
     from access_av.platform import Platform
 
 RESAMPLES = 200
+# What every world is driven by: the paper's methods.
+TAPED = [method.replace("_", "-") for method in METHODS]
 
 
 @dataclass(frozen=True)
@@ -40,6 +44,7 @@ class Driver:
     progress: Callable[[int, int], None] | None = None
     planned: int = 0
     known: dict[str, Driven] = field(default_factory=dict)
+    tapes: list[Tapes] = field(default_factory=list)
 
     @property
     def trip_s(self) -> float:
@@ -62,15 +67,30 @@ class Driver:
                 self.progress(done, max(done, self.planned * self.runs))
         return self.known[key]
 
+    def _simulate(self, scenario: Scenario) -> Simulation:
+        """From tape, so that a world's angles are estimated once for all policies in it."""
+        core, threads = self.platform.core, self.threads
+        serving = [it for it in self.tapes if it.serve(scenario, platform=core)]
+        if not serving:
+            made = Tapes.record(
+                scenario, self.runs, self.seed, methods=TAPED, platform=core, threads=threads
+            )
+            serving = [it for it in [made] if it and it.serve(scenario, platform=core)]
+            self.tapes += serving
+        if not serving:
+            return simulate(
+                scenario,
+                runs=self.runs,
+                seed=self.seed,
+                platform=self.platform,
+                threads=threads,
+                errors_every=EVERY,
+            )
+        found = serving[0].simulate(scenario, platform=core, threads=threads, errors_every=EVERY)
+        return Simulation.of(found)
+
     def _drive(self, scenario: Scenario) -> Driven:
-        found = simulate(
-            scenario,
-            runs=self.runs,
-            seed=self.seed,
-            platform=self.platform,
-            threads=self.threads,
-            errors_every=EVERY,
-        )
+        found = self._simulate(scenario)
         assert found.errors_m is not None
         weights = self._weights()
         drives = Drives.of_runs(

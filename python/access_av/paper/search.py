@@ -6,6 +6,7 @@ world. A world with its controllers is one part on disk, so that a search that w
 
 from __future__ import annotations
 
+import json
 from dataclasses import dataclass
 from typing import TYPE_CHECKING, Any
 
@@ -20,6 +21,7 @@ from access_av.paper.readings import OPEN, Reading
 from access_av.paper.space import (
     CONTROLLER,
     GATE,
+    SHIPPED_WORLD,
     WORLD,
     Dimension,
     controller_changes,
@@ -103,12 +105,15 @@ def sample(
     runs
         Drives per setting.
     gates
-        Whether a gate is one of the things drawn; without, all is Algorithm 1 as written.
+        Whether a gate is one of the things drawn; without, all is Algorithm 1 as written, and the
+        first world is that of the shipped scenario.
     parts
         Directory of the parts; those that are there are not computed again.
     """
     own = (*CONTROLLER, GATE) if gates else CONTROLLER
     world_points = latin_hypercube(worlds, len(WORLD), seed)
+    if not gates:
+        world_points[0] = SHIPPED_WORLD
     own_points = latin_hypercube(worlds * controllers, len(own), seed + 1)
     own_points = own_points.reshape(worlds, controllers, len(own))
     found: list[dict[str, Any]] = []
@@ -220,13 +225,38 @@ def _side_by_side(readings: list[Drives]) -> Drives:
 
 def as_reading(values: Mapping[str, Any], name: str = "found") -> Reading:
     """What was drawn, as a reading."""
-    world = {dimension.name: values[dimension.name] for dimension in WORLD}
-    scenario = Scenario.load("paper").with_overrides(
-        world_changes(world)
-        | controller_changes(values, world["eirp_dbm"])
-        | {"name": name, "description": "Found by access-av search"}
-    )
+    scenario = Scenario.from_toml(as_toml(values, name))
     return Reading(name, "Found by the search", scenario, OPEN, keeps_t_max=True)
+
+
+def as_toml(values: Mapping[str, Any], name: str = "found") -> str:
+    """What was drawn, as a file of a reading: laid over the paper's scenario."""
+    [head] = json.loads(Scenario.load("paper").to_json())["site"]["radio_heads"]
+    tables: dict[str, dict[str, Any]] = {"site": {}, "site.radio_heads": {}, "vehicle": {}}
+    changes = world_changes(values) | controller_changes(values, values["eirp_dbm"])
+    for path, value in changes.items():
+        table, _, key = path.rpartition(".")
+        if isinstance(value, dict):
+            table, key = path, ""
+        tables.setdefault(table.replace("[0]", ""), {}).update({key: value} if key else value)
+    tables["vehicle"] = {"like": "paper", **tables["vehicle"]}
+    kept = ("name", "position_m", "pci")
+    tables["site.radio_heads"] = {it: head[it] for it in kept} | tables["site.radio_heads"]
+    lines = ['like = "paper"', f'name = "{name}"', 'description = "Found by access-av search"']
+    for table, entries in tables.items():
+        lines += ["", f"[[{table}]]" if table == "site.radio_heads" else f"[{table}]"]
+        lines += [f"{key} = {_toml(value)}" for key, value in entries.items()]
+    return "\n".join(lines) + "\n"
+
+
+def _toml(value: Any) -> str:
+    if isinstance(value, dict):
+        return "{ " + ", ".join(f"{key} = {_toml(each)}" for key, each in value.items()) + " }"
+    return json.dumps(value)
+
+
+# How many of the best are driven again: with few runs, the best of many owes some to luck.
+CANDIDATES = 8
 
 
 @dataclass(frozen=True)
@@ -236,7 +266,7 @@ class Confirmed:
     Attributes
     ----------
     label
-        The best one, or what was moved to be beside it.
+        Its place in the search, or what was moved to be beside the best one.
     held
         How many claims it meets.
     missed
@@ -258,35 +288,49 @@ def confirmed(
     seed: int,
     threads: int | None = None,
 ) -> list[Confirmed]:
-    """Drive the best reading and its neighbours again; the best of them comes first.
+    """Drive the best readings again, and then the neighbours of the one that remains the best.
 
-    A neighbour differs by a tenth of a controller's dimension, or by another choice.
+    A neighbour differs by a tenth of a controller's dimension, or by another choice. The one that
+    meets most claims comes first; of several, the one that the search had first.
     """
-    best = found.values(found.best()[0])
-    start = found.coordinates[found.best()[0]]
-    points, labels = [best], ["the best"]
+
+    def again(labelled: Mapping[str, Mapping[str, Any]]) -> list[Confirmed]:
+        [*points] = labelled.values()
+        world = {dimension.name: points[0][dimension.name] for dimension in WORLD}
+
+        def compute() -> dict[str, Numbers]:
+            return judge(platform, world, points, runs=runs, seed=seed, threads=threads)
+
+        depends_on = {**_depends_on(platform, world, points, runs, seed), "confirmed": True}
+        part = Parts(parts).get(depends_on, compute)
+        return [
+            Confirmed(
+                label=label,
+                values=values,
+                held=sum(bool(part[name][index] >= 0.0) for name in found.margins),
+                missed=[name for name in found.margins if part[name][index] < 0.0],
+            )
+            for index, (label, values) in enumerate(labelled.items())
+        ]
+
+    best = {}
+    for place, index in enumerate(found.best()[:CANDIDATES], start=1):
+        [driven] = again({f"number {place} of the search": found.values(index)})
+        best[index] = driven
+    index, first = max(best.items(), key=lambda item: item[1].held)
+    beside = again(_neighbours(found, index))
+    rest = [driven for driven in best.values() if driven is not first]
+    return [first, *sorted(beside + rest, key=lambda each: -each.held)]
+
+
+def _neighbours(found: Sample, index: int) -> dict[str, dict[str, Any]]:
+    start = found.coordinates[index]
+    neighbours = {}
     for d, dimension in enumerate(found.dimensions):
         if dimension in CONTROLLER:
             there = start.copy()
             step = 1.0 / len(dimension.choices) if dimension.choices else 0.1
             there[d] += step if start[d] < 0.5 else -step
             values = named(found.dimensions, there.tolist())
-            points.append(values)
-            labels.append(f"{dimension.label}: {values[dimension.name]}")
-    world = {dimension.name: best[dimension.name] for dimension in WORLD}
-
-    def compute() -> dict[str, Numbers]:
-        return judge(platform, world, points, runs=runs, seed=seed, threads=threads)
-
-    depends_on = {**_depends_on(platform, world, points, runs, seed), "confirmed": True}
-    part = Parts(parts).get(depends_on, compute)
-    again = [
-        Confirmed(
-            label=labels[index],
-            values=values,
-            held=sum(bool(part[name][index] >= 0.0) for name in found.margins),
-            missed=[name for name in found.margins if part[name][index] < 0.0],
-        )
-        for index, values in enumerate(points)
-    ]
-    return sorted(again, key=lambda each: -each.held)
+            neighbours[f"beside it, {dimension.label}: {values[dimension.name]}"] = values
+    return neighbours

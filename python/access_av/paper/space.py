@@ -70,6 +70,8 @@ WORLD = (
     Dimension("heading", "heading between estimates", choices=("held", "mean")),
     Dimension("snapshots", "snapshots", 10.0, 40.0),
 )
+# The world of the shipped scenario, up to its shadowing, which lasts for less than the range does.
+SHIPPED_WORLD = (0.5, 0.875, 0.25, 0.0, 0.75, 1.0 / 3.0)
 CONTROLLER = (
     Dimension("link_error_db", "link budget off by / dB", -6.0, 6.0),
     Dimension("set_point", "set point", choices=("expected", "absolute")),

@@ -139,6 +139,19 @@ def lead(study: Study) -> str:
     return " ".join(sentences)
 
 
+def seeds_text(study: Study) -> str:
+    """How the verdicts of several seeds go together; nothing where there was one."""
+    several = [claim for claim in study.claims if len(claim.met_by_seed) > 1]
+    if not several:
+        return ""
+    differ = [claim for claim in several if claim.seeds_met]
+    seeds = list(several[0].met_by_seed)
+    return (
+        f"Seeds {seeds[0]} to {seeds[-1]}: {len(several) - len(differ)} of {len(several)} verdicts "
+        f"are the same with each, {len(differ)} turn."
+    )
+
+
 def counts(claims: Sequence[Claim]) -> dict[str, tuple[int, int]]:
     """Claims met, and claims judged, by what a verdict is worth."""
     found = {}
@@ -156,18 +169,30 @@ def counts_text(claims: Sequence[Claim]) -> str:
 
 
 def ours_text(study: Study) -> str:
-    """Ours beside the paper's adaptive point."""
-    with_map = [each for each in study.ours if each.map]
-    if not with_map:
-        return ""
-    better = sum(each.is_better for each in with_map)
-    fewer = [each.papers_executions / each.executions for each in with_map]
-    worst_m, papers_m = (
-        max(getattr(each, name) for each in with_map) for name in ("rms_error_m", "papers_rms_m")
-    )
-    return (
-        f"Our tracker, which knows the road and wakes up when its own error asks for it, is better "
-        f"in error and energy at once in {better} of {len(with_map)} power modes (paired, 95 %): "
-        f"{min(fewer):.0f} to {max(fewer):.0f} times fewer executions, RMS error at most "
-        f"{worst_m:.2f} m against {papers_m:.2f} m."
-    )
+    """Ours beside the paper's adaptive point, with the road's course and without."""
+    sentences = []
+    for knows_road, who in (
+        (True, "Our tracker, which knows the road and wakes up when its own error asks for it,"),
+        (False, "Without the road's course it"),
+    ):
+        rows = [each for each in study.ours if each.map == knows_road]
+        if not rows:
+            continue
+        better = sum(each.is_better for each in rows)
+        ours, papers = (
+            [getattr(each, name) for each in rows] for name in ("executions", "papers_executions")
+        )
+        worst_m, papers_m = (
+            max(getattr(each, name) for each in rows) for name in ("rms_error_m", "papers_rms_m")
+        )
+        sentences.append(
+            f"{who} is better in error and energy at once in {better} of {len(rows)} power modes "
+            f"(paired, 95 %): {_range(ours)} executions against {_range(papers)}, RMS error at "
+            f"most {worst_m:.2f} m against {papers_m:.2f} m."
+        )
+    return " ".join(sentences)
+
+
+def _range(values: Sequence[float]) -> str:
+    low, high = round(min(values)), round(max(values))
+    return f"{low}" if low == high else f"{low} to {high}"

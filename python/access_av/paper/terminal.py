@@ -18,12 +18,13 @@ if TYPE_CHECKING:
     from access_av.paper.evaluation import Evaluation
     from access_av.paper.search import Confirmed, Sample
     from access_av.paper.study import Study
+    from access_av.paper.unknowns import Unknowns
 
 
 def mark(claim: Claim) -> str:
     """A verdict in two signs: met or not, and whether it turns with the seed."""
     sign = "–" if claim.verdict == NOT_JUDGED else "✓" if claim.reproduced else "✗"
-    return sign + ("?" if claim.turns_with_seed else "")
+    return sign + ((claim.seeds_met or "?") if claim.turns_with_seed else "")
 
 
 def show_study(study: Study) -> None:
@@ -35,6 +36,10 @@ def show_study(study: Study) -> None:
     shown = study.of(study.shown.reading.name)
     console.print(f"Claims met under “{study.shown.reading.title}”: {summary.counts_text(shown)}.")
     console.print(summary.ours_text(study))
+    if seeds := summary.seeds_text(study):
+        console.print(seeds)
+    if study.unknowns is not None:
+        _show_unknowns(study.unknowns)
     for reading, why in study.unusable.items():
         console.print(f"Not evaluated: {reading}: {why}", markup=False)
     for note in sorted({it.id + ": " + it.note for it in study.claims if it.verdict == NOT_JUDGED}):
@@ -75,7 +80,7 @@ def _show_claims(study: Study) -> None:
     columns = [each.reading.name for each in study.evaluations]
     matrix = table(
         ["claim", *(map(str, range(1, len(columns) + 1)))],
-        title="Claims by readings (✓ met, ✗ not, ? turns with the seed)",
+        title="Claims by readings (✓ met, ✗ not, ? or 3/5 turns with the seed)",
     )
     by_reading = [study.of(name) for name in columns]
     for claims in zip(*by_reading, strict=True):
@@ -83,6 +88,36 @@ def _show_claims(study: Study) -> None:
         matrix.add_row(name, *map(mark, claims))
     console.print(matrix)
     console.print(", ".join(f"{i} {name}" for i, name in enumerate(columns, start=1)))
+
+
+def _show_unknowns(found: Unknowns) -> None:
+    """On what each claim hangs that is neither arithmetic nor solved for."""
+    made = table(
+        [
+            "claim",
+            "holds in",
+            "total Sobol index of what matters, ± half its 95 % interval",
+            "rest",
+        ],
+        title=f"On what the claims hang: {found.readings} readings of {found.runs} runs",
+        text=3,
+    )
+    matter = found.matter
+    for claim in dict.fromkeys(each.claim for each in matter):
+        mine = sorted((it for it in matter if it.claim == claim), key=lambda it: -it.total)
+        made.add_row(
+            claim if not is_narrow() else claim.split("_")[0],
+            f"{found.holds[claim]:.0%}",
+            ", ".join(f"{it.dimension} {it.total:.2f} ± {it.half_width:.2f}" for it in mine),
+            f"{1.0 - found.explained[claim]:.2f}",
+        )
+    console.print(made)
+    widest = max(matter, key=lambda it: it.half_width, default=None)
+    if widest is not None:
+        console.print(
+            f"Widest of these {len(matter)} intervals: ± {widest.half_width:.3f} "
+            f"({widest.claim}, {widest.dimension})."
+        )
 
 
 def show_search(found: Sample, checked: Sequence[Confirmed]) -> None:

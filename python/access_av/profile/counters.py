@@ -30,8 +30,8 @@ USUAL_RAIL_V = 5.0
 # The energy unit that RAPL counts in, 2^-14 J (Intel SDM, MSR_RAPL_POWER_UNIT), and how often.
 RAPL_UNIT_J = 2.0**-14
 RAPL_PERIOD_S = 1e-3
-# How often a file is read that is empty.
-READS = 50
+# How often a file is read that is empty, a millisecond apart.
+READS = 500
 
 
 class SensorError(InputError):
@@ -140,7 +140,7 @@ def _choose(rails: list[Rail]) -> Counters | None:
 
 def _hwmon(sysfs: Path) -> Iterator[Rail]:
     """Rails of INA3221 and INA238 by hwmon; channel 7 of an INA3221 sums the others."""
-    for chip in sorted(sysfs.glob("bus/i2c/devices/*/hwmon/hwmon*")):
+    for chip in _places(sysfs, "bus/i2c/devices/*/hwmon/hwmon*", "class/hwmon/hwmon*"):
         name = _text(chip / "name")
         if name == "ina238":
             label = _text(chip / "in1_label") or _text(chip / "label") or "VIN"
@@ -159,12 +159,14 @@ def _rail(
     ohm = _text(chip / shunt)
     shunt_ohm = float(ohm) * 1e-6 if ohm and float(ohm) > 0.0 else USUAL_SHUNT_OHM
     period_ms = _text(chip / "update_interval")
-    power = chip / "power1_input"
+    voltage, current = chip / f"in{channel}_input", chip / f"curr{channel}_input"
+    power = chip / f"power{channel}_input"
+    both = voltage.is_file() and current.is_file()
     return Rail(
         label=label,
         chip=name,
-        voltage=chip / f"in{channel}_input",
-        current=chip / f"curr{channel}_input",
+        voltage=voltage if both or not power.is_file() else None,
+        current=current if both or not power.is_file() else None,
         power=power if power.is_file() else None,
         power_unit_w=1e-6,
         bus_v=0.5 * steps["bus_v"] + 1e-3,
@@ -175,7 +177,12 @@ def _rail(
 
 def _iio(sysfs: Path) -> Iterator[Rail]:
     """Rails of INA3221 by iio (JetPack 4)."""
-    for device in sorted(sysfs.glob("bus/i2c/devices/*/iio:device*")):
+    for device in _places(
+        sysfs,
+        "bus/i2c/devices/*/iio:device*",
+        "bus/i2c/drivers/ina3221x/*/iio:device*",
+        "bus/iio/devices/iio:device*",
+    ):
         for file in sorted(device.glob("rail_name_*")):
             number, label = file.name.removeprefix("rail_name_"), _text(file)
             if label in (None, "NC", ""):
@@ -196,6 +203,12 @@ def _iio(sysfs: Path) -> Iterator[Rail]:
                 current_a=0.5 * INA3221["shunt_v"] / USUAL_SHUNT_OHM + 1e-3,
                 period_s=None,
             )
+
+
+def _places(sysfs: Path, *patterns: str) -> list[Path]:
+    """Directories by any of their names, each once."""
+    found = {place.resolve(): place for pattern in patterns for place in sysfs.glob(pattern)}
+    return [found[place] for place in sorted(found)]
 
 
 def _rapl(sysfs: Path) -> Counters | None:
@@ -223,6 +236,7 @@ def _text(file: Path) -> str | None:
 
 
 def _number(file: Path) -> float:
+    text = ""
     try:
         text = file.read_text(encoding="utf-8")
         for _ in range(READS):
@@ -237,4 +251,4 @@ def _number(file: Path) -> float:
     except OSError as error:
         raise SensorError(f"{file}: the sensor stopped answering ({error.strerror})") from error
     except ValueError as error:
-        raise SensorError(f"{file}: not a number") from error
+        raise SensorError(f"{file}: {text.strip()!r} is not a number") from error

@@ -202,6 +202,12 @@ pub struct UncertaintySettings {
     #[serde(skip_serializing_if = "Option::is_none")]
     #[schemars(range(min = 0.0, max = 1e6))]
     pub least_gain_m2: Option<f64>,
+    /// How much stronger than by the link budget an SSB may come, in dB. With it the receiver
+    /// listens wherever an SSB as strong as that would be worth its energy, and what is sensed
+    /// decides; without it all goes by the link budget, which keeps the receiver off for longer.
+    #[serde(skip_serializing_if = "Option::is_none")]
+    #[schemars(range(min = 0.0, max = 40.0))]
+    pub snr_headroom_db: Option<f64>,
 }
 
 impl Default for UncertaintySettings {
@@ -212,6 +218,7 @@ impl Default for UncertaintySettings {
             base_ms: None,
             wake_up_cost: 0.5,
             least_gain_m2: None,
+            snr_headroom_db: None,
         }
     }
 }

@@ -12,6 +12,9 @@
 //! is made where the last angle bought everywhere takes away the same (equal marginal gains), so
 //! an angle of at least that worth, `least_gain_m2`, is taken before the bound demands it: the
 //! stretch ahead, where none is worth as much, then begins with a small error.
+//!
+//! Of what an angle says the most depends on the SNR of its SSB, which a receiver that listens knows
+//! before any angle is estimated. Given `snr_headroom_db`, an angle's worth is judged by that.
 
 use super::policy::{SAME_TIME_S, Situation, WakeUpPolicy};
 use crate::BoxError;
@@ -38,6 +41,7 @@ pub struct UncertaintyDriven {
     quantile: RadialQuantile,
     wake_up_cost: f64,
     least_gain_m2: Option<f64>,
+    snr_headroom_db: Option<f64>,
     period_s: f64,
     base_s: f64,
     last_wake_up_s: Option<f64>,
@@ -52,6 +56,7 @@ impl UncertaintyDriven {
             quantile: RadialQuantile::new(1.0 - settings.confidence),
             wake_up_cost: settings.wake_up_cost,
             least_gain_m2: settings.least_gain_m2,
+            snr_headroom_db: settings.snr_headroom_db,
             period_s: site.ssb.period_s(),
             base_s: settings.base_ms.unwrap_or(0.0) * 1e-3,
             last_wake_up_s: None,
@@ -66,8 +71,15 @@ impl UncertaintyDriven {
 
     /// The angles to take, one bit for each radio head: those worth their energy, and of the others
     /// as few as keep the bound until the next SSB. Where nothing keeps it, those worth their
-    /// energy, or all, if any price is to be paid.
-    fn choice(&self, tracker: &Tracker, time_s: f64, heads: &[RadioHead]) -> u64 {
+    /// energy, or all, if any price is to be paid. `snr_db` is what a radio head at a distance is
+    /// received with.
+    fn choice(
+        &self,
+        tracker: &Tracker,
+        time_s: f64,
+        heads: &[RadioHead],
+        snr_db: impl Fn(&RadioHead, f64) -> f64,
+    ) -> u64 {
         let mut demanded = !self.keeps(tracker, time_s);
         if !demanded && self.least_gain_m2.is_none() {
             return 0;
@@ -89,7 +101,8 @@ impl UncertaintyDriven {
             let next = (heads.iter().enumerate().take(MOST_HEADS))
                 .filter(|(index, _)| taken >> index & 1 == 0)
                 .filter_map(|(index, head)| {
-                    let thermal = |distance_m| self.thermal.variance(head, distance_m);
+                    let sigma_rad = |distance_m| self.thermal.sigma_rad(snr_db(head, distance_m));
+                    let thermal = |distance_m| sigma_rad(distance_m).powi(2);
                     let after = tracker.rehearse(&belief, ahead_m, head, thermal)?;
                     Some((index, after, spread(&after)))
                 })
@@ -155,7 +168,10 @@ impl WakeUpPolicy for UncertaintyDriven {
             return Ok(false);
         }
         let tracker = now.localizer.tracker();
-        Ok(tracker.is_none_or(|tracker| self.choice(tracker, now.now_s, now.heads) != 0))
+        let headroom_db = self.snr_headroom_db.unwrap_or(0.0);
+        let snr_db =
+            |head: &RadioHead, distance_m| now.budget.snr_db(head, distance_m) + headroom_db;
+        Ok(tracker.is_none_or(|tracker| self.choice(tracker, now.now_s, now.heads, snr_db) != 0))
     }
 
     fn decide(
@@ -169,7 +185,12 @@ impl WakeUpPolicy for UncertaintyDriven {
             chosen.fill(true);
             return Ok(self.period_s);
         };
-        let choice = self.choice(tracker, now.now_s, now.heads);
+        let snr_db = |head: &RadioHead, distance_m| {
+            let sends = |ssb: &&SensedSsb| head.sends(ssb.pci, ssb.ssb_index);
+            let ssb = (self.snr_headroom_db).and_then(|_| sensed.iter().find(sends));
+            ssb.map_or_else(|| now.budget.snr_db(head, distance_m), |ssb| ssb.snr_db)
+        };
+        let choice = self.choice(tracker, now.now_s, now.heads, snr_db);
         for (ssb, chosen) in sensed.iter().zip(chosen) {
             let sends = |head: &RadioHead| head.sends(ssb.pci, ssb.ssb_index);
             *chosen = (now.heads.iter().position(sends))

@@ -56,6 +56,7 @@ def render(study: Study) -> str:
         runs=evaluation.runs,
         readings=readings.readings(study),
         matrix=readings.matrix(study),
+        seeds=escape(summary.seeds_text(study)),
         claims=readings.claims(study),
         contribution=controller.contribution(study, specs),
         unknowns=unknowns.unknowns(study, specs),

@@ -70,6 +70,8 @@ def claims(study: Study) -> str:
     for claim in study.of(study.shown.reading.name):
         kind = "fit" if claim.verdict == NOT_JUDGED else "yes" if claim.reproduced else "no"
         turns = " " + badge("turns with the seed", "fit") if claim.turns_with_seed else ""
+        if claim.seeds_met:
+            turns += f"<small>met with {claim.seeds_met} seeds</small>"
         obtained = escape(value_text(claim.obtained))
         if isinstance(claim.interval, list):
             low, high = (value_text(end) for end in claim.interval)
@@ -102,7 +104,9 @@ def _cell(claim: Claim) -> str:
     """A claim's value and verdict in a small cell."""
     if claim.verdict == NOT_JUDGED:
         return badge("–", "fit")
-    sign = ("✓" if claim.reproduced else "✗") + (" ?" if claim.turns_with_seed else "")
+    sign = "✓" if claim.reproduced else "✗"
+    if claim.turns_with_seed:
+        sign += f" {claim.seeds_met or '?'}"
     plain = isinstance(claim.obtained, (int, float))
     value = f"<small>{escape(value_text(claim.obtained))}</small>" if plain else ""
     return badge(sign, "yes" if claim.reproduced else "no") + value

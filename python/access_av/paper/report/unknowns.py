@@ -2,12 +2,14 @@
 
 from __future__ import annotations
 
+from html import escape
 from typing import TYPE_CHECKING
 
 import altair as alt
 import polars as pl
 
 from access_av.paper.space import CONTROLLER, GATE, WORLD
+from access_av.paper.unknowns import MATTERS
 from access_av.report.chart import BLUE, GREY, finish
 from access_av.report.parts import figure, table
 
@@ -40,6 +42,7 @@ def unknowns(study: Study, specs: dict[str, Spec]) -> str:
         "total index of 0.6 means: 60 % of what the claim's margin varies by involves that one "
         "thing, by itself or together with others. Cells below "
         f"{LEAST_TOTAL:.0%} are left empty; “unexplained” is what the expansion cannot say.</p>"
+        + f"<p>{escape(_width_text(found))}</p>"
         + figure("sobol", "Total Sobol index of each claim's margin.", "On what the claims hang")
         + figure(
             "share",
@@ -47,6 +50,14 @@ def unknowns(study: Study, specs: dict[str, Spec]) -> str:
             "Share of the drawn readings in which each claim holds",
         )
         + f"<details><summary>The ranges</summary>{ranges}</details>"
+    )
+
+
+def _width_text(found: Unknowns) -> str:
+    widest = max((each.half_width for each in found.matter), default=0.0)
+    return (
+        f"Of claims that are neither arithmetic nor solved for, {len(found.matter)} total indices "
+        f"are {MATTERS:g} or more; their 95 % intervals are at most ± {widest:.3f} wide."
     )
 
 

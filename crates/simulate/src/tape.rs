@@ -1,0 +1,238 @@
+//! Drives on tape: what comes to the vehicle, to be driven again with another localizer or wake-up
+//! policy.
+//!
+//! What an SSB brings does not depend on which others were heard, its noise included
+//! ([`HeadChannel::observe`]). So the angle of every SSB is estimated once, and whoever chooses among
+//! them has the record of a drive of its own, to the last bit, for a small part of its computing.
+
+use onboard::geometry::Pose;
+use onboard::localize::AngleMeasurement;
+use onboard::observation::{OdometrySample, SensedSsb, SsbObservation};
+use onboard::settings::EstimatorMethod;
+use onboard::{BoxError, Custom, Observed, Onboard, SsbSource, estimator};
+use rayon::prelude::*;
+
+use crate::campaign::{Campaign, CampaignOptions, thread_pool};
+use crate::channel::HeadChannel;
+use crate::error::SimulationError;
+use crate::random::Streams;
+use crate::record::{RunRecord, Step};
+use crate::run::Simulation;
+use crate::world::Faults;
+
+/// Runs of a world, each on tape.
+pub struct Tapes {
+    simulation: Simulation,
+    methods: Vec<EstimatorMethod>,
+    runs: Vec<Tape>,
+}
+
+/// One run on tape.
+struct Tape {
+    run: u64,
+    told_start: Pose,
+    odometry: Vec<OdometrySample>,
+    bursts: Vec<Burst>,
+    /// What is sensed, burst by burst, as many as there are radio heads.
+    sensed: Vec<SensedSsb>,
+    /// Their angles, by method.
+    angles: Vec<Vec<Option<AngleMeasurement>>>,
+}
+
+/// A burst of SSBs, and the vehicle when it comes.
+struct Burst {
+    time_s: f64,
+    truth: Pose,
+    snr_db: f64,
+}
+
+impl Tapes {
+    /// Tapes of the first `runs` runs of a scenario, with the angles of these methods; `None` where
+    /// it matters to an SSB which others are listened to, or when.
+    ///
+    /// # Errors
+    /// [`SimulationError`] when there are no such threads, or an estimator refuses the array.
+    pub fn record(
+        simulation: &Simulation,
+        methods: &[EstimatorMethod],
+        options: &CampaignOptions<'_>,
+    ) -> Result<Option<Self>, SimulationError> {
+        if !simulation.world().is_independent_of_listening() {
+            return Ok(None);
+        }
+        let (seed, first) = (options.seed, options.first_run);
+        let numbers = first..first + options.runs as u64;
+        let runs: Vec<_> = thread_pool(options.threads)?.install(|| {
+            (numbers.into_par_iter())
+                .map(|run| Tape::record(simulation, methods, Streams::new(seed, run), run))
+                .collect()
+        });
+        Ok(Some(Self {
+            simulation: simulation.clone(),
+            methods: methods.to_vec(),
+            runs: runs.into_iter().collect::<Result<_, _>>()?,
+        }))
+    }
+
+    /// Whether a simulation is of the same world, and its method on the tapes: all may differ that
+    /// only localizer, wake-up policy and computer go by.
+    pub fn serve(&self, other: &Simulation) -> bool {
+        let method = other.scenario().vehicle.estimator.method;
+        self.methods.contains(&method) && self.simulation.world().sounds_like(other.world())
+    }
+
+    /// The campaign of a simulation that the tapes serve, over their runs.
+    ///
+    /// # Errors
+    /// [`SimulationError`], as [`Simulation::campaign`] has them.
+    pub fn campaign(
+        &self,
+        simulation: &Simulation,
+        options: &CampaignOptions<'_>,
+    ) -> Result<Campaign, SimulationError> {
+        let wanted = simulation.scenario().vehicle.estimator.method;
+        let method = self.methods.iter().position(|&method| method == wanted);
+        simulation.campaign_of(options, self.runs.len(), |number| {
+            let tape = self.runs.get(number).zip(method);
+            let (tape, method) = tape.ok_or(SimulationError::NotOnTape)?;
+            tape.drive(simulation, method)
+        })
+    }
+}
+
+impl Tape {
+    fn record(
+        simulation: &Simulation,
+        methods: &[EstimatorMethod],
+        streams: Streams,
+        run: u64,
+    ) -> Result<Self, SimulationError> {
+        let scenario = simulation.scenario();
+        let mut estimators = (methods.iter())
+            .map(|&method| {
+                let mut vehicle = scenario.vehicle.clone();
+                vehicle.estimator.method = method;
+                estimator::built_in(&vehicle).map_err(|error| SimulationError::Custom(error.into()))
+            })
+            .collect::<Result<Vec<_>, _>>()?;
+        let spacing_wavelengths = scenario.vehicle.array.spacing_wavelengths;
+        let mut truth = simulation.world().draw(streams);
+        let mut channels = HeadChannel::all(&mut truth, streams);
+        let mut faults = Faults::new(&scenario.faults);
+        let mut observation = SsbObservation::new(scenario.vehicle.array.elements.into());
+        let mut tape = Self {
+            run,
+            told_start: truth.told_start,
+            odometry: Vec::new(),
+            bursts: Vec::with_capacity(simulation.steps()),
+            sensed: Vec::with_capacity(simulation.steps() * channels.len()),
+            angles: vec![Vec::with_capacity(simulation.steps() * channels.len()); methods.len()],
+        };
+        let mut samples = 0_u32;
+        for number in 0..simulation.steps() {
+            let time_s = simulation.time_s(number);
+            loop {
+                let sample_s = f64::from(samples) * truth.odometer.period_s();
+                if sample_s > time_s {
+                    break;
+                }
+                samples += 1;
+                let sample = truth.odometer.sample(truth.path.at(sample_s));
+                tape.odometry.extend(sample.map(|it| faults.slip(it)));
+            }
+            let vehicle = truth.path.at(time_s);
+            let mut strongest_db = f64::NEG_INFINITY;
+            for (index, channel) in channels.iter_mut().enumerate() {
+                let snr_db = channel.next_snr_db(&vehicle);
+                strongest_db = strongest_db.max(snr_db);
+                let mut reception = channel.receive(&vehicle, snr_db);
+                let (head, array) = (channel.head(), channel.array());
+                faults.distort(index, head, array, &vehicle, reception.gains_mut());
+                channel.observe(number as u64, &reception, &mut observation);
+                tape.sensed.push(reception.ssb);
+                for (estimator, angles) in estimators.iter_mut().zip(&mut tape.angles) {
+                    let estimated = estimator.estimate(&observation);
+                    let estimated = estimated.map_err(SimulationError::Custom)?;
+                    // The built-in estimators all tell their standard deviation.
+                    let bound_rad = || f64::NAN;
+                    angles.push(estimated.and_then(|it| {
+                        estimator::measurement(&reception.ssb, it, spacing_wavelengths, bound_rad)
+                    }));
+                }
+            }
+            tape.bursts.push(Burst {
+                time_s,
+                truth: vehicle.pose,
+                snr_db: strongest_db,
+            });
+        }
+        Ok(tape)
+    }
+
+    fn drive(&self, simulation: &Simulation, method: usize) -> Result<RunRecord, SimulationError> {
+        let scenario = simulation.scenario();
+        let (site, vehicle) = (&scenario.site, &scenario.vehicle);
+        let platform = simulation.platform();
+        let custom = Custom::default();
+        let mut onboard = Onboard::new(site, vehicle, platform, self.told_start, custom)?;
+        let mut record = RunRecord::new(self.run, self.bursts.len());
+        let mut silence = SsbObservation::new(vehicle.array.elements.into());
+        let mut odometry = self.odometry.iter().peekable();
+        let angles = self.angles.get(method).map_or(&[][..], Vec::as_slice);
+        let heads = self.sensed.len() / self.bursts.len().max(1);
+        for (number, burst) in self.bursts.iter().enumerate() {
+            let time_s = burst.time_s;
+            while let Some(sample) = odometry.next_if(|sample| sample.time_s <= time_s) {
+                // A simulated odometer neither repeats itself nor returns NaN.
+                let _ = (onboard.odometry(sample)).map_err(SimulationError::Custom)?;
+            }
+            let here = number * heads..(number + 1) * heads;
+            let mut played = Played {
+                sensed: self.sensed.get(here.clone()).unwrap_or_default(),
+                angles: angles.get(here).unwrap_or_default(),
+                silence: &mut silence,
+            };
+            let heard = onboard.hear(time_s, &mut played);
+            record.add(&heard.map_err(SimulationError::of_drive)?);
+            let believed = onboard.pose(time_s).map_err(SimulationError::Custom)?;
+            record.steps.push(Step {
+                time_s,
+                truth: burst.truth,
+                estimate: believed.pose,
+                covariance: believed.covariance,
+                integrity: believed.integrity,
+                searching: onboard.searching().is_some(),
+                snr_db: burst.snr_db,
+            });
+        }
+        record.calibration = onboard.calibration();
+        Ok(record)
+    }
+}
+
+/// A burst from tape.
+struct Played<'a> {
+    sensed: &'a [SensedSsb],
+    angles: &'a [Option<AngleMeasurement>],
+    /// What an SSB without an angle is given as: without snapshots it has none.
+    silence: &'a mut SsbObservation,
+}
+
+impl SsbSource for Played<'_> {
+    fn sense(&mut self, sensed: &mut Vec<SensedSsb>) -> Result<(), BoxError> {
+        sensed.extend_from_slice(self.sensed);
+        Ok(())
+    }
+
+    fn observe(&mut self, index: usize) -> Result<Observed<'_>, BoxError> {
+        let found = self.sensed.get(index).zip(self.angles.get(index));
+        let (&ssb, angle) = found.ok_or("no such SSB in the burst")?;
+        Ok(match angle {
+            Some(angle) => Observed::Angle(*angle),
+            None => {
+                self.silence.restart(ssb);
+                Observed::Snapshots(self.silence)
+            }
+        })
+    }
+}
