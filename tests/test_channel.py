@@ -134,6 +134,21 @@ def test_the_bound_has_the_paths_k(tmp_path: Path) -> None:
     assert bound(hall, map_step_m=4.0).site.filter(pl.col("y_m") > 20.0)["bound_m"].is_null().all()
 
 
+def test_arrays_may_lie_by_columns(tmp_path: Path) -> None:
+    with np.load(HALL / "paths.npz") as held:
+        arrays = {name: held[name] for name in held.files}
+    by_columns = {name: np.asfortranarray(array) for name, array in arrays.items()}
+    np.savez(tmp_path / "paths.npz", **by_columns)
+    hall = Scenario.load(str(HALL / "scenario.toml"))
+    other = hall.with_overrides({"channel.paths": str(tmp_path / "paths.npz")})
+    assert simulate(other, seed=3).steps.equals(simulate(hall, seed=3).steps)
+
+
+def test_no_two_cells_of_the_yard_send_at_once() -> None:
+    heads = json.loads(Site.load("yard").to_json())["radio_heads"]
+    assert len({head["ssb_index"] for head in heads}) == len(heads)
+
+
 def test_bad_tables_are_refused(tmp_path: Path, access_av: Callable[..., Finished]) -> None:
     site = Site.load(str(HALL / "site.toml"))
     good = line_of_sight(site, LANE_M[:3])

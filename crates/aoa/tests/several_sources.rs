@@ -1,4 +1,5 @@
 //! Several sources.
+#![allow(clippy::unwrap_used, reason = "this is a test")]
 
 mod common;
 

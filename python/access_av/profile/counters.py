@@ -30,8 +30,8 @@ USUAL_RAIL_V = 5.0
 # The energy unit that RAPL counts in, 2^-14 J (Intel SDM, MSR_RAPL_POWER_UNIT), and how often.
 RAPL_UNIT_J = 2.0**-14
 RAPL_PERIOD_S = 1e-3
-# How often a file is read that is empty.
-READS = 50
+# How often a file is read that is empty, a millisecond apart.
+READS = 500
 
 
 class SensorError(InputError):
@@ -236,6 +236,7 @@ def _text(file: Path) -> str | None:
 
 
 def _number(file: Path) -> float:
+    text = ""
     try:
         text = file.read_text(encoding="utf-8")
         for _ in range(READS):
@@ -250,4 +251,4 @@ def _number(file: Path) -> float:
     except OSError as error:
         raise SensorError(f"{file}: the sensor stopped answering ({error.strerror})") from error
     except ValueError as error:
-        raise SensorError(f"{file}: not a number") from error
+        raise SensorError(f"{file}: {text.strip()!r} is not a number") from error

@@ -269,17 +269,16 @@ def energy_counted(
     period_s = max(float(np.median(gaps_s)) if gaps_s.size else duration_s, look_s)
     _refuse_short(duration_s, period_s)
     _refuse_stopped(times_s, changes, end_s)
-    # Power over stretches of ten periods, in which a counter's own beat is small.
-    edges = np.searchsorted(times_s, np.arange(times_s[0], times_s[-1], 10.0 * period_s))
-    edges = np.unique(edges)
+    # Power from every tenth new value to the next: one that comes late makes no jump.
+    edges = np.append(changes[:-10:10], changes[-1])
     total_j = np.concatenate([[0.0], np.cumsum(added_j)])
     power_w = np.diff(total_j[edges]) / np.diff(times_s[edges])
     _refuse_jumps(power_w, times_s[edges[:-1]], "W")
-    span_s = float(times_s[-1] - times_s[0])
     energy_j = float(total_j[-1])
-    # The window is longer than from first to last reading by less than two looks.
-    outside_s = duration_s - span_s
-    ends_j = float(np.max(power_w)) * (period_s + outside_s)
+    # How old a value may be at either end; and the window is a little longer than its readings.
+    age_s = float(np.max(np.diff(np.concatenate([[start_s], times_s[changes], [end_s]]))))
+    outside_s = duration_s - float(times_s[-1] - times_s[0])
+    ends_j = float(np.max(power_w)) * (age_s + outside_s)
     half_width = ends_j + RAPL_UNIT_J * counters_j.shape[1]
     value_j = energy_j + float(np.mean(power_w)) * outside_s
     return Window(start_s, duration_s, Interval(value_j, half_width), is_constant=False)

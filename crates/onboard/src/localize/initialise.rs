@@ -52,7 +52,8 @@ pub(super) fn log_likelihood(innovation: Option<Innovation>, verdict: &UpdateVer
         (Some(seen), UpdateReason::Consistent) => {
             -0.5 * (seen.mahalanobis2() + (TAU * seen.variance).ln())
         }
-        (Some(_), _) => -OUTLIER,
+        // Whoever leaves out a radio head takes its angles for outliers.
+        (_, UpdateReason::Excluded) | (Some(_), _) => -OUTLIER,
         (None, _) => 0.0,
     }
 }

@@ -125,14 +125,18 @@ impl Recovery {
             }
             return;
         };
-        let is_ahead = search.initialiser.best() - search.own > BETTER;
+        let ahead = search.initialiser.best() - search.own;
+        let is_ahead = ahead > BETTER;
+        // Led astray it may have come to agree with the angles where it now is; it is sure of itself
+        // only where no other place foretells them better.
+        let is_sure = ahead <= 0.0 && self.watch.is_sure();
         let way_m = self.tracked.tracker().driven_m() - search.since_m;
         if is_ahead && way_m < LEAST_WAY_M {
             return;
         }
         if is_ahead && let Some(found) = search.initialiser.found() {
             self.take(found, now_s);
-        } else if !is_ahead && (self.watch.is_sure() || search.initialiser.found().is_some()) {
+        } else if is_sure || (!is_ahead && search.initialiser.found().is_some()) {
             // What is found elsewhere, if anything, is no better.
             self.search = None;
             self.rests_until_s = now_s + REST_S;

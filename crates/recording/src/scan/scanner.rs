@@ -74,35 +74,29 @@ pub fn scan(source: &mut dyn IqSource, settings: &ScanSettings) -> Result<Scan, 
         ..Scan::default()
     };
     let mut votes = ExchangeVotes::default();
-    let places = match settings.ssb_freq_hz {
-        Some(hz) => {
-            let places = given_places(rate_hz, hz, settings.spacing);
-            let duration_s = source.length() as f64 / rate_hz;
-            found.looked.extend(places.iter().map(|place| Looked {
-                spacing: place.spacing,
-                places: Places::Given {
-                    ssb_freq_hz: hz,
-                    cfo_hz: cfo_range_hz(settings, place),
-                },
-                duration_s,
-                channels: slices.len(),
-            }));
-            places
-        }
-        None => {
-            let faulty: Vec<usize> = found
-                .faults
-                .iter()
-                .filter_map(ChannelFault::channel)
-                .collect();
-            let sound = (0..slices.len()).find(|channel| !faulty.contains(channel));
-            let search = BandSearch {
-                centre_hz: Some(centre_hz).filter(|hz| *hz > 0.0),
-                spacing: settings.spacing,
-                sound_channel: sound.unwrap_or(0),
-            };
-            search.places(source, &mut found.looked)?
-        }
+    let places = if let Some(hz) = settings.ssb_freq_hz {
+        let places = given_places(rate_hz, hz, settings.spacing);
+        let duration_s = source.length() as f64 / rate_hz;
+        found.looked.extend(places.iter().map(|place| Looked {
+            spacing: place.spacing,
+            places: Places::Given {
+                ssb_freq_hz: hz,
+                cfo_hz: cfo_range_hz(settings, place),
+            },
+            duration_s,
+            channels: slices.len(),
+        }));
+        places
+    } else {
+        let faults = found.faults.iter();
+        let faulty: Vec<usize> = faults.filter_map(ChannelFault::channel).collect();
+        let sound = (0..slices.len()).find(|channel| !faulty.contains(channel));
+        let search = BandSearch {
+            centre_hz: Some(centre_hz).filter(|hz| *hz > 0.0),
+            spacing: settings.spacing,
+            sound_channel: sound.unwrap_or(0),
+        };
+        search.places(source, &mut found.looked)?
     };
     // Shared among the places looked at.
     let false_alarm = FALSE_ALARM / places.len() as f64;
