@@ -100,9 +100,9 @@ def test_set_changes_one_key(access_av: Cli, tmp_path: Path) -> None:
 def test_evaluation_leaves_its_files(quick_study: Path) -> None:
     names = {path.name for path in (quick_study / "latest").iterdir()}
     assert names == {
-        "ablations.parquet", "claims.json", "errors.parquet", "fixed_front.parquet",
-        "manifest.json", "operating_points.parquet", "ours.parquet", "platform.toml", "report.html",
-        "scenario.toml", "snr.parquet",
+        "ablation.svg", "ablations.parquet", "claims.json", "errors.parquet", "fixed_front.parquet",
+        "front.svg", "manifest.json", "operating_points.parquet", "ours.parquet", "platform.toml",
+        "report.html", "scenario.toml", "snr.parquet",
     }  # fmt: skip
     claims = json.loads((quick_study / "latest/claims.json").read_text())
     assert len(claims) == 2 * 17
