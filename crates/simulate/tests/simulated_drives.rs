@@ -27,6 +27,7 @@ fn campaign(simulation: &Simulation, runs: usize, threads: usize) -> Campaign {
         threads: Some(threads),
         keep_records: true,
         errors_every: None,
+        quantiles: true,
         custom: NONE,
         progress: &|_| true,
     };
@@ -206,6 +207,7 @@ fn the_caller_can_stop() {
         threads: Some(1),
         keep_records: false,
         errors_every: None,
+        quantiles: true,
         custom: NONE,
         progress: &|_| false,
     };
