@@ -26,7 +26,7 @@ LONG: dict[str, list[str]] = {
     "search": ["search"],
     "fit": ["fit", "--runs", "100000"],
     "explore": ["explore"],
-    "bound": ["bound", "campus-handover", "--map-step-m", "2", "--out", "out"],
+    "bound": ["bound", "campus-handover", "--map-step-m", "3", "--out", "out"],
     "synth": ["synth", "paper-real-odometry-4", "--out", "out"],
     "locate": [
         "locate", "--recording", "drive/iq.sigmf-meta", "--odometry", "drive/odometry.csv",
@@ -90,7 +90,9 @@ def test_ctrl_c_ends_it_within_a_second(command: str, place: Path) -> None:
         sent_s = time.monotonic()
         _, said = process.communicate(timeout=20.0)
         took_s = time.monotonic() - sent_s
-        assert finished or process.returncode == 130, (after_s, process.returncode, said)
+        # Before and after the program itself it is the interpreter that the signal ends: 130 too.
+        ended = process.returncode in (130, -signal.SIGINT)
+        assert finished or ended, (after_s, process.returncode, said)
         assert finished or took_s < 1.0 + BUSY_S, (after_s, took_s)
         assert "Traceback" not in said, (after_s, said)
         partial = list(place.rglob("*.partial"))
