@@ -17,6 +17,7 @@ from pathlib import Path
 from typing import Any
 
 from access_av import InputError, RecordingError, SettingsError
+from access_av.terminal import plain
 from attack import files, kinds
 from attack.verdict import judge
 
@@ -46,7 +47,7 @@ def execute(command: list[str]) -> dict[str, Any]:
         code = stopped.code or 0
     except (SettingsError, RecordingError, InputError, OSError) as error:
         # A script's caller has the exception as it is; the command line makes a message of it.
-        print(f"error: {error}", file=sys.stderr)
+        print(f"error: {plain(str(error))}", file=sys.stderr)
         code = 2 if command[0] == "python" else "an error that the command line let pass"
     except BaseException:  # whatever it is, it is what this looks for
         raised = traceback.format_exc()

@@ -26,7 +26,7 @@ LONG: dict[str, list[str]] = {
     "search": ["search"],
     "fit": ["fit", "--runs", "100000"],
     "explore": ["explore"],
-    "bound": ["bound", "campus-handover", "--map-step-m", "2", "--out", "out"],
+    "bound": ["bound", "campus-handover", "--map-step-m", "3", "--out", "out"],
     "synth": ["synth", "paper-real-odometry-4", "--out", "out"],
     "locate": [
         "locate", "--recording", "drive/iq.sigmf-meta", "--odometry", "drive/odometry.csv",
@@ -52,6 +52,8 @@ LONG: dict[str, list[str]] = {
     "platform": ["platform", "check", *access_av.Platform.names() * 40],
 }  # fmt: skip
 LATEST_S = 2.0
+# What is over so soon was over when the signal was sent.
+LATE_S = 0.1
 # The interpreter starts before the program does; what Ctrl-C does then is Python's own.
 PYTHON_S = 0.15
 
@@ -90,7 +92,10 @@ def test_ctrl_c_ends_it_within_a_second(command: str, place: Path) -> None:
         sent_s = time.monotonic()
         _, said = process.communicate(timeout=20.0)
         took_s = time.monotonic() - sent_s
-        assert finished or process.returncode == 130, (after_s, process.returncode, said)
+        # Before and after the program itself it is the interpreter that the signal ends: 130 too;
+        # or it comes too late to end anything.
+        ended = process.returncode in (130, -signal.SIGINT) or took_s < LATE_S
+        assert finished or ended, (after_s, process.returncode, said)
         assert finished or took_s < 1.0 + BUSY_S, (after_s, took_s)
         assert "Traceback" not in said, (after_s, said)
         partial = list(place.rglob("*.partial"))

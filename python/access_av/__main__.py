@@ -12,10 +12,12 @@ def main() -> None:
         from access_av.cli import main as run
 
         run()
-    except KeyboardInterrupt:
-        interrupt.end()
     except SystemExit as ended:
         if ended.code == interrupt.INTERRUPTED:
+            interrupt.end()
+        raise
+    except BaseException:  # also what a library made of the interruption
+        if interrupt.came.wait(0.1):
             interrupt.end()
         raise
 

@@ -22,6 +22,9 @@ INTERRUPTED = 130
 # How long an exception may take to come up.
 GRACE_S = 0.5
 
+# Whether Ctrl-C has come.
+came = threading.Event()
+
 # Folders whose partial files are this program's.
 _writing: set[Path] = set()
 
@@ -36,6 +39,7 @@ def guard() -> None:
     def wait() -> None:
         while os.read(told, 1) != bytes([signal.SIGINT]):
             pass  # another signal
+        came.set()
         threading.Event().wait(GRACE_S)
         end()
 
