@@ -136,7 +136,7 @@ fn cells_under_a_stronger_one_have_angles_and_know_how_good_they_are() {
         for ((pci, phase_rad, _), square) in cells.iter().zip(&mut squares) {
             let cell = found.iter().find(|it| it.ssb.pci.get() == *pci).unwrap();
             let angle = cell.angle.unwrap();
-            assert!(angle.is_resolved(), "trial {trial}: {pci}");
+            assert!(angle.is_resolved(), "trial {trial}: {pci} {angle:?}");
             *square += ((angle.phase_rad - phase_rad) / angle.phase_sigma_rad).powi(2);
         }
     }

@@ -4,11 +4,15 @@
 
 use num_complex::{Complex32, Complex64};
 
+use super::base_rate::SSB_SAMPLES;
 use super::received_grid::MAX_ANTENNAS;
 use crate::numeric::hermitian::cholesky;
 
-/// The covariance is measured on every so many samples.
+/// The covariance is measured on every so many samples, in the quietest quarter of so many parts of a
+/// block: there a loaded neighbour is heard, and the SSBs that are looked for are not. Whitened too,
+/// a strong one would no longer stand before the weak ones that it covers.
 const STRIDE: usize = 4;
+const PARTS: usize = 64;
 /// Squared coherence of two antennas from which on it matters; noise has one in the number of
 /// samples.
 const COHERENT: f64 = 0.05;
@@ -17,9 +21,21 @@ const COHERENT: f64 = 0.05;
 pub(crate) type Weights = [[Complex32; MAX_ANTENNAS]; MAX_ANTENNAS];
 
 /// The inverse of the covariance's Cholesky factor, lower triangular; `None` where the antennas are
-/// independent as they are.
+/// independent as they are, and where there is little beside an SSB to tell it from.
 pub(crate) fn whitening(antennas: &[&[Complex32]]) -> Option<Weights> {
     let count = antennas.len().min(MAX_ANTENNAS);
+    let length = antennas.first()?.len();
+    if length < 2 * SSB_SAMPLES {
+        return None;
+    }
+    let part = length / PARTS;
+    let energies: [f32; PARTS] = std::array::from_fn(|number| {
+        let samples = antennas.iter().flat_map(|it| &it[number * part..][..part]);
+        samples.map(Complex32::norm_sqr).sum()
+    });
+    let mut sorted = energies;
+    sorted.sort_unstable_by(f32::total_cmp);
+    let is_quiet = |sample: &usize| energies[sample / part] <= sorted[PARTS / 4 - 1];
     let mut covariance = [[Complex64::ZERO; MAX_ANTENNAS]; MAX_ANTENNAS];
     for (i, row) in covariance.iter_mut().enumerate() {
         row[i] = Complex64::ONE;
@@ -27,8 +43,8 @@ pub(crate) fn whitening(antennas: &[&[Complex32]]) -> Option<Weights> {
     let mut coherence: f64 = 0.0;
     for i in 0..count {
         for j in 0..=i {
-            let pairs = antennas[i].iter().zip(antennas[j]).step_by(STRIDE);
-            let sum: Complex32 = pairs.map(|(a, b)| a * b.conj()).sum();
+            let places = (0..PARTS * part).step_by(STRIDE).filter(is_quiet);
+            let sum: Complex32 = places.map(|n| antennas[i][n] * antennas[j][n].conj()).sum();
             covariance[i][j] = Complex64::new(f64::from(sum.re), f64::from(sum.im));
         }
         // Channels that are copies of each other must not make the matrix singular.
