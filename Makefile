@@ -7,7 +7,7 @@ SOURCES := $(shell find crates sites vehicles scenarios platforms -type f 2>/dev
 DATA := $(abspath $(or $(ACCESS_AV_DATA),../shared/data))
 
 .DEFAULT_GOAL := help
-.PHONY: help demo test test-aarch64 lint lint-python docs figures bench clean
+.PHONY: help demo test attack test-aarch64 lint lint-python docs figures bench clean
 
 help: ## List these commands
 	@sed -n 's/^\([a-z-]*\):.*## /  make \1\t/p' $(MAKEFILE_LIST) | expand -t 20
@@ -21,6 +21,9 @@ test: .venv/installed-test ## Run every test: Rust, static checks of the Python 
 	  else echo "not tested: reference vectors and recordings; no $(DATA) (ACCESS_AV_DATA)"; fi
 	$(MAKE) --no-print-directory lint-python
 	$(BIN)/python -m pytest
+
+attack: .venv/installed-test ## Attack it with random input, drives and plug-ins; SEED=… repeats an attack
+	$(BIN)/python -m attack $(if $(SEED),--seed $(SEED)) $(ATTACK)
 
 AARCH64 := aarch64-unknown-linux-gnu
 # What the compiler of another processor needs (Debian: rustc-web cargo-web libstd-rust-web-dev:arm64

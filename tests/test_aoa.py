@@ -225,8 +225,8 @@ def test_bad_snapshots(method: Callable[..., Any], snapshots: Any, message: str)
         (aoa.music, {"sources": 4}, "4 sources asked for, allowed are 1 to 3"),
         (aoa.root_music, {"sources": 0}, "allowed are 1 to 3"),
         (aoa.maximum_likelihood, {"sources": 2}, "allowed are 1 to 1"),
-        (aoa.esprit, {"spacing_wavelengths": 0.0}, "positive number of wavelengths, not 0"),
-        (aoa.music, {"spacing_wavelengths": float("nan")}, "positive number of wavelengths"),
+        (aoa.esprit, {"spacing_wavelengths": 0.0}, "0.01 to 100 wavelengths, not 0"),
+        (aoa.music, {"spacing_wavelengths": float("nan")}, "0.01 to 100 wavelengths"),
         (aoa.music, {"grid_deg": 0.0}, "between 0.001 and 10 degrees, not 0"),
         (aoa.music, {"calibration": [1, 1]}, "one gain per antenna: 4, not 2"),
         (aoa.music, {"calibration": [1, 1, 0, 1]}, "channel 2 must be finite and not zero"),
@@ -239,7 +239,7 @@ def test_bad_options(method: Callable[..., Any], options: dict[str, Any], messag
 
 
 def test_other_bad_input() -> None:
-    with pytest.raises(ValueError, match="threads must be at least 1"):
+    with pytest.raises(ValueError, match="threads must be 1 to 256, not 0"):
         aoa.music(GOOD[None], threads=0)
     with pytest.raises(ValueError, match="'mdl' or 'aic', not 'bic'"):
         aoa.estimate_sources(GOOD, criterion="bic")  # type: ignore[arg-type]
@@ -265,3 +265,54 @@ def test_examples_in_docstrings_run(name: str | None) -> None:
     assert documented.__doc__
     example = doctest.DocTestParser().get_doctest(documented.__doc__, {}, str(name), None, 0)
     assert doctest.DocTestRunner().run(example).failed == 0
+
+
+def test_coherent_sources_are_told_apart_by_subarrays() -> None:
+    rng = np.random.default_rng(5)
+    angles = np.radians([60, 100])
+    steering = np.exp(1j * np.pi * np.cos(angles) * np.arange(6)[:, None])
+    waveform = rng.normal(size=(100, 2)) @ [1, 1j]
+    reflected = np.stack([waveform, 0.8 * waveform])  # rank one
+    noise = 0.05 * (rng.normal(size=(6, 100, 2)) @ [1, 1j])
+    samples = steering @ reflected + noise
+    for method in (aoa.music, aoa.root_music, aoa.esprit):
+        alone = method(samples, sources=2)
+        assert all("correlated" in verdict for verdict in alone.verdict)
+        found = method(samples, sources=2, subarray=4, forward_backward=True)
+        assert found.resolved.all()
+        assert (abs(found.angle_rad - angles) < 4 * found.sigma_rad).all()
+        with pytest.raises(ValueError, match="2 to 6 antennas, not 7"):
+            method(samples, subarray=7)
+
+
+def test_spectra_peak_at_the_sources() -> None:
+    rng = np.random.default_rng(6)
+    angles = np.radians([50, 110])
+    steering = np.exp(1j * np.pi * np.cos(angles) * np.arange(8)[:, None])
+    signals = rng.normal(size=(2, 200, 2)) @ [1, 1j]
+    samples = steering @ signals + 0.1 * (rng.normal(size=(8, 200, 2)) @ [1, 1j])
+    grid = np.radians(np.arange(0, 181))
+    for method in ("bartlett", "capon", "music"):
+        values = aoa.spectrum(samples, grid, method=method, sources=2)
+        inner = (values[1:-1] > values[:-2]) & (values[1:-1] > values[2:])
+        peaks = 1 + np.flatnonzero(inner)
+        strongest = sorted(peaks[np.argsort(values[peaks])[-2:]])
+        assert np.allclose(strongest, [50, 110], atol=2), method
+        batch = aoa.spectrum(np.stack([samples, samples]), grid, method=method, sources=2)
+        assert batch.shape == (2, 181)
+        assert np.array_equal(batch[1], values)
+    with pytest.raises(ValueError, match="'bartlett', 'capon' or 'music'"):
+        aoa.spectrum(samples, grid, method="esprit")  # type: ignore[arg-type]
+    with pytest.raises(ValueError, match="between 0 and pi"):
+        aoa.spectrum(samples, [-1.0])
+
+
+def test_limits_are_named() -> None:
+    samples = np.ones((4, 4), complex)
+    for call, message in (
+        (lambda: aoa.music(samples, spacing_wavelengths=1e-300), "0.01 to 100"),
+        (lambda: aoa.estimate_sources(samples), "at least 5 are needed"),
+        (lambda: aoa.music(np.ones((2, 4, 9), complex), threads=6000), "1 to 256"),
+    ):
+        with pytest.raises(ValueError, match=message):
+            call()

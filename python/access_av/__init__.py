@@ -6,6 +6,7 @@ are first used, so that importing the package takes no time.
 =====================  ============================================================================
 ``simulate``           drive a scenario many times
 ``bound``              how well any localizer can do in it
+``plan``               where to put further radio heads
 ``synthesize``         record a scenario's drive as somebody on the vehicle would have
 ``locate``             where the vehicle was in a recorded drive
 ``evaluate``           the paper's evaluation
@@ -15,9 +16,12 @@ are first used, so that importing the package takes no time.
 ``Scenario``           a site, a vehicle, and the world around them, otherwise or not
 ``Platform``           the onboard computer: power modes, energy per execution
 ``Recording``          samples on disk (SigMF, raw)
+``channel``            channels by themselves: drops of 3GPP TR 38.901
+``ray_paths``          paths of a ray tracer, for the simulator
 ``aoa``                angle of arrival with linear arrays
 ``nr``                 SSBs: find them in samples and recordings, build them
 ``recorded_angles``    angles from the annotated recording of a linear array
+``service_levels``     which of 3GPP's a site and a vehicle reach
 ``statistics``         consistency and integrity of simulated drives, intervals over runs
 ``drives``             recorded drives: errors against a truth, summary
 ``columns``            what the columns of every table are
@@ -50,11 +54,25 @@ from access_av.errors import InputError
 from access_av.lazy import attach
 
 if TYPE_CHECKING:
-    from access_av import aoa, carbon, columns, cost, drives, nr, paper, recorded_angles, statistics
+    from access_av import (
+        aoa,
+        carbon,
+        channel,
+        columns,
+        cost,
+        drives,
+        nr,
+        paper,
+        ray_paths,
+        recorded_angles,
+        service_levels,
+        statistics,
+    )
     from access_av.design_space import Query, explore
     from access_av.drives import Drive, SynthesizedDrive, locate, synthesize
     from access_av.error_bound import ErrorBound, bound
     from access_av.paper.evaluation import Evaluation, evaluate
+    from access_av.placement import Plan, plan
     from access_av.platform import Platform
     from access_av.simulation import Simulation, simulate
 
@@ -63,6 +81,7 @@ __all__ = [
     "ErrorBound",
     "Evaluation",
     "InputError",
+    "Plan",
     "Platform",
     "Query",
     "Recording",
@@ -77,6 +96,7 @@ __all__ = [
     "aoa",
     "bound",
     "carbon",
+    "channel",
     "columns",
     "cost",
     "drives",
@@ -85,7 +105,10 @@ __all__ = [
     "locate",
     "nr",
     "paper",
+    "plan",
+    "ray_paths",
     "recorded_angles",
+    "service_levels",
     "simulate",
     "statistics",
     "synthesize",
@@ -99,18 +122,22 @@ if not TYPE_CHECKING:
             "access_av.drives": ["Drive", "SynthesizedDrive", "locate", "synthesize"],
             "access_av.error_bound": ["ErrorBound", "bound"],
             "access_av.paper.evaluation": ["Evaluation", "evaluate"],
+            "access_av.placement": ["Plan", "plan"],
             "access_av.platform": ["Platform"],
             "access_av.simulation": ["Simulation", "simulate"],
         },
         modules=[
             "aoa",
             "carbon",
+            "channel",
             "columns",
             "cost",
             "drives",
             "nr",
             "paper",
+            "ray_paths",
             "recorded_angles",
+            "service_levels",
             "statistics",
         ],
     )

@@ -1,5 +1,24 @@
 """``python -m access_av`` is ``access-av``."""
 
-from access_av.cli import main
+from __future__ import annotations
 
-main()
+from access_av import interrupt
+
+
+def main() -> None:
+    """Run the command line; Ctrl-C counts from the first import on."""
+    try:
+        interrupt.guard()
+        from access_av.cli import main as run
+
+        run()
+    except KeyboardInterrupt:
+        interrupt.end()
+    except SystemExit as ended:
+        if ended.code == interrupt.INTERRUPTED:
+            interrupt.end()
+        raise
+
+
+if __name__ == "__main__":
+    main()

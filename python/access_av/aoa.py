@@ -26,6 +26,7 @@ from access_av._core.aoa import (
     maximum_likelihood,
     music,
     root_music,
+    spectrum,
 )
 
 __all__ = [
@@ -39,4 +40,5 @@ __all__ = [
     "maximum_likelihood",
     "music",
     "root_music",
+    "spectrum",
 ]

@@ -33,6 +33,14 @@ class Range:
         """All three values times a factor."""
         return Range(self.low * factor, self.central * factor, self.high * factor)
 
+    def plus(self, other: Range) -> Range:
+        """The sum, end by end."""
+        return Range(self.low + other.low, self.central + other.central, self.high + other.high)
+
+    def minus(self, other: Range) -> Range:
+        """The difference: least minus most is its low end, most minus least its high one."""
+        return Range(self.low - other.high, self.central - other.central, self.high - other.low)
+
     def times(self, other: Range) -> Range:
         """Low times low, central times central, high times high."""
         return Range(self.low * other.low, self.central * other.central, self.high * other.high)

@@ -7,11 +7,25 @@ from typing import Annotated
 
 import typer
 
+from access_av import interrupt
 from access_av._core import RecordingError, SettingsError, __version__
-from access_av.commands import bound, columns, drives, files, profile, recordings, run
+from access_av.commands import (
+    balance,
+    bound,
+    columns,
+    designs,
+    drives,
+    files,
+    integrity,
+    profile,
+    radio,
+    recordings,
+    run,
+)
 from access_av.errors import InputError
+from access_av.paper import codesign_command as codesign
 from access_av.paper import commands as paper
-from access_av.terminal import console, show_error
+from access_av.terminal import console, give_up_output, show_error, write_what_can_be_written
 
 app = typer.Typer(
     name="access-av",
@@ -39,7 +53,10 @@ def _options(
     pass
 
 
-for _room in (paper, run, bound, recordings, drives, profile, columns):
+for _room in (
+    *(paper, codesign, run, bound, radio, integrity, designs),
+    *(recordings, drives, profile, balance, columns),
+):
     app.add_typer(_room.app)
 for _what in ("site", "vehicle", "scenario", "platform"):
     app.add_typer(files.files_app(_what), name=_what)
@@ -47,11 +64,14 @@ for _what in ("site", "vehicle", "scenario", "platform"):
 
 def main() -> None:
     """Entry point: turns every bad input into one message and exit code 2."""
+    write_what_can_be_written()
     try:
-        app()
+        try:
+            app()
+        finally:
+            sys.stdout.flush()
     except (SettingsError, RecordingError, InputError, OSError) as error:
+        interrupt.clean()
         show_error(error)
+        give_up_output()
         sys.exit(2)
-    except KeyboardInterrupt:
-        show_error(InputError("interrupted; what was finished is kept"))
-        sys.exit(130)

@@ -2,9 +2,7 @@
 
 from __future__ import annotations
 
-import math
 from dataclasses import dataclass
-from pathlib import Path
 from typing import TYPE_CHECKING, Any
 
 import polars as pl
@@ -13,7 +11,8 @@ from access_av import _core
 from access_av.errors import InputError
 
 if TYPE_CHECKING:
-    from collections.abc import Mapping
+    from collections.abc import Callable, Mapping
+    from pathlib import Path
 
     from access_av._core import Scenario, Site, Vehicle
 
@@ -52,6 +51,7 @@ def synthesize(
     duration_s: float | None = None,
     continuous: bool = False,
     datatype: str = "ci16_le",
+    progress: Callable[[float], object] | None = None,
 ) -> SynthesizedDrive:
     """Record a scenario's drive as somebody on the vehicle would have.
 
@@ -72,6 +72,8 @@ def synthesize(
         Also the time between the SSB bursts, which makes the files many times larger.
     datatype
         ``ci16_le`` or ``cf32_le``.
+    progress
+        Called with the share of the drive that is recorded, from 0 to 1.
 
     Raises
     ------
@@ -99,6 +101,7 @@ def synthesize(
         duration_s=duration_s,
         continuous=continuous,
         datatype=datatype,
+        progress=progress,
     )
     return SynthesizedDrive(*made)
 
@@ -232,23 +235,10 @@ def read_tum(file: str | Path) -> pl.DataFrame:
 
     Raises
     ------
-    InputError
+    RecordingError
         When the file is no TUM trajectory.
     """
-    lines = Path(file).read_text(encoding="utf-8").splitlines()
-    rows = [line.split() for line in lines if line.strip() and not line.lstrip().startswith("#")]
-    try:
-        values = [[float(cell) for cell in row] for row in rows]
-    except ValueError as error:
-        raise InputError(f"{file}: not a TUM trajectory ({error})") from error
-    if not values or any(len(row) != 8 for row in values):
-        raise InputError(f"{file}: not a TUM trajectory (8 numbers a line)")
-    heading = [
-        math.atan2(2 * (qw * qz + qx * qy), 1 - 2 * (qy * qy + qz * qz))
-        for *_, qx, qy, qz, qw in values
-    ]
-    columns = {name: [row[i] for row in values] for i, name in enumerate(("time_s", "x_m", "y_m"))}
-    return pl.DataFrame({**columns, "heading_rad": heading}).sort("time_s")
+    return pl.DataFrame(_core.read_tum(file)).sort("time_s")
 
 
 def error_m(poses: pl.DataFrame, truth: str | Path) -> pl.DataFrame:
@@ -264,8 +254,10 @@ def error_m(poses: pl.DataFrame, truth: str | Path) -> pl.DataFrame:
 
     Raises
     ------
+    RecordingError
+        When the file is no TUM trajectory.
     InputError
-        When the file is no TUM trajectory, or shares no time with the drive.
+        When it shares no time with the drive.
     """
     known = poses.filter(~pl.col("searching")).sort("time_s")
     true = read_tum(truth).select("time_s", "x_m", "y_m")

@@ -10,7 +10,7 @@ from typing import TYPE_CHECKING, Any
 import numpy as np
 import polars as pl
 
-from access_av import _core
+from access_av import _core, service_levels
 from access_av.errors import InputError
 
 if TYPE_CHECKING:
@@ -66,7 +66,13 @@ class ErrorBound:
             "duration_s": self.route["time_s"].max(),
             "length_m": self.route["along_m"].max(),
             "heads": self.heads.to_dicts(),
+            "service_levels": [verdict.as_record() for verdict in self.verdicts],
         }
+
+    @property
+    def verdicts(self) -> list[service_levels.Verdict]:
+        """The service levels that no localizer can better on this route."""
+        return service_levels.of_bound(self.route["along_std_m"], self.route["across_std_m"])
 
 
 def bound(scenario: _core.Scenario | str, *, map_step_m: float | None = None) -> ErrorBound:
@@ -108,6 +114,9 @@ def bound(scenario: _core.Scenario | str, *, map_step_m: float | None = None) ->
     step_m = _round_step(low, high) if map_step_m is None else map_step_m
     if not (math.isfinite(step_m) and step_m > 0.0):
         raise InputError(f"--map-step-m {step_m}: a length above 0 is needed")
+    extent_m = float((high - low).max())
+    if step_m > extent_m:
+        raise InputError(f"--map-step-m {step_m:g}: the site is {extent_m:.0f} m across")
     cells = math.prod(np.maximum(1.0, np.ceil((high - low) / step_m)).tolist())
     if cells > MOST_MAP_CELLS:
         raise InputError(

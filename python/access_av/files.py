@@ -2,10 +2,14 @@
 
 from __future__ import annotations
 
+import fcntl
+import io
 import json
+import math
 import os
 import sys
 import warnings
+from contextlib import suppress
 from dataclasses import dataclass
 from datetime import datetime, timezone
 from importlib.metadata import version
@@ -14,13 +18,31 @@ from typing import TYPE_CHECKING, Any
 
 import numpy as np
 
-if TYPE_CHECKING:
-    from collections.abc import Callable
+from access_av import interrupt
+from access_av.errors import InputError
 
+if TYPE_CHECKING:
     import polars as pl
     from numpy.typing import ArrayLike
 
 RESULTS = Path("results")
+
+
+class Lock:
+    """Keeps a folder from being written by two at a time, as long as this object is there."""
+
+    def __init__(self, folder: Path):
+        self._descriptor = os.open(folder, os.O_RDONLY)
+        try:
+            fcntl.flock(self._descriptor, fcntl.LOCK_EX | fcntl.LOCK_NB)
+        except BlockingIOError as error:
+            message = f"{folder}: another run is writing here; give another --out"
+            raise InputError(message) from error
+        except OSError:
+            pass  # a file system without locks
+
+    def __del__(self) -> None:
+        os.close(self._descriptor)
 
 
 @dataclass(frozen=True)
@@ -28,17 +50,19 @@ class ResultsDirectory:
     """Where one command's results go. Files appear whole: written beside, then renamed."""
 
     path: Path
+    lock: Lock
 
     @classmethod
     def create(cls, command: str, out: Path | None = None) -> ResultsDirectory:
         """Make the directory: ``out``, or a new one under ``results/``."""
         if out is None:
-            now = datetime.now(timezone.utc).strftime("%Y-%m-%dT%H%M%S.%f")[:-3]
-            out = RESULTS / f"{now}-{command}"
+            out = _new(command)
         if out.exists() and not out.is_dir():
             raise NotADirectoryError(f"{out}: is a file; --out takes a directory")
         out.mkdir(parents=True, exist_ok=True)
-        return cls(out)
+        lock = Lock(out)
+        interrupt.writing(out)
+        return cls(out, lock)
 
     def link_latest(self) -> None:
         """Point ``results/latest`` here, wherever this directory is."""
@@ -55,29 +79,17 @@ class ResultsDirectory:
 
     def write_text(self, name: str, text: str) -> Path:
         """Write a text file."""
-        return self._whole(name, lambda partial: partial.write_text(text, encoding="utf-8"))
+        return write_whole(self.path / name, text)
 
     def write_json(self, name: str, value: object) -> Path:
         """Write a JSON file."""
-        return self.write_text(name, json.dumps(value, indent=2, ensure_ascii=False) + "\n")
+        return self.write_text(name, json_text(value) + "\n")
 
     def write_table(self, name: str, table: pl.DataFrame) -> Path:
         """Write a Parquet file."""
-        return self._whole(name, lambda file: table.write_parquet(file, compression="zstd"))
-
-    def _whole(self, name: str, write: Callable[[Path], object]) -> Path:
-        """Have a file written beside its place and put there; nothing is left of a failure."""
-        target, partial = self.path / name, self.path / f".{name}.partial"
-        try:
-            write(partial)
-            partial.replace(target)
-        except OSError as error:
-            partial.unlink(missing_ok=True)
-            raise OSError(error.errno, error.strerror or str(error), str(target)) from error
-        except BaseException:
-            partial.unlink(missing_ok=True)
-            raise
-        return target
+        held = io.BytesIO()
+        table.write_parquet(held, compression="zstd")
+        return write_whole(self.path / name, held.getbuffer())
 
     def write_manifest(self, **settings: Any) -> Path:
         """Write ``manifest.json``: the version, the command line and the settings."""
@@ -90,6 +102,53 @@ class ResultsDirectory:
                 **settings,
             },
         )
+
+
+def write_whole(target: Path, content: str | bytes | memoryview) -> Path:
+    """Write a file beside its place and put it there; nothing is left of a failure."""
+    if isinstance(content, str):
+        # What names a file may hold bytes that are no text.
+        content = content.encode("utf-8", "backslashreplace")
+    partial = target.with_name(f".{target.name}.partial")
+    try:
+        partial.write_bytes(content)
+        partial.replace(target)
+    except BaseException as error:
+        with suppress(OSError):
+            partial.unlink(missing_ok=True)
+        if isinstance(error, OSError):
+            raise OSError(error.errno, error.strerror or str(error), str(target)) from error
+        raise
+    return target
+
+
+def json_text(value: Any) -> str:
+    """JSON, with null for what is no finite number.
+
+    Examples
+    --------
+    >>> json.loads(json_text({"found_s": [1.5, float("nan")]}))
+    {'found_s': [1.5, None]}
+    """
+
+    def finite(part: Any) -> Any:
+        if isinstance(part, dict):
+            return {key: finite(item) for key, item in part.items()}
+        if isinstance(part, list | tuple):
+            return [finite(item) for item in part]
+        return None if isinstance(part, float) and not math.isfinite(part) else part
+
+    return json.dumps(finite(value), indent=2, ensure_ascii=False, allow_nan=False)
+
+
+def _new(command: str) -> Path:
+    """A folder of its own, also for runs that begin at the same time."""
+    while True:
+        now = datetime.now(timezone.utc).strftime("%Y-%m-%dT%H%M%S.%f")[:-3]
+        with suppress(FileExistsError):
+            out = RESULTS / f"{now}-{command}"
+            out.mkdir(parents=True)
+            return out
 
 
 def tum_trajectory(

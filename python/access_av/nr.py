@@ -24,7 +24,7 @@ from typing import TYPE_CHECKING, Any
 
 from access_av._core import Recording
 from access_av._core.nr import Cell, Scan, Searcher, build_burst, scan, search
-from access_av.recorded_angles import stated_calibration, stated_spacing
+from access_av.recorded_angles import stated_spacing, stated_truths
 
 if TYPE_CHECKING:
     from collections.abc import Sequence
@@ -66,19 +66,22 @@ def scan_as_recorded(
     ------
     RecordingError
         A rate, band or length that cannot be searched; samples that are not finite.
+    InputError
+        Annotations that state of the array what cannot be.
     """
     metadata = json.loads(recording.metadata_json())
+    truths = stated_truths(recording, metadata)
     if spacing_wavelengths is None:
-        stated = stated_spacing(metadata, recording.centre_frequency_hz)
+        stated = stated_spacing(truths, metadata, recording.centre_frequency_hz)
         spacing_wavelengths = 0.5 if stated is None else stated
     where["spacing_wavelengths"] = spacing_wavelengths
     found = scan(recording, calibration=calibration, **where)
     if calibration is not None or recording.channels < 2:
         return found
     stretches = [
-        (annotation["core:sample_start"], gains)
-        for annotation in metadata["annotations"]
-        if (gains := stated_calibration(annotation.get("aoa:truth", {}), None)) is not None
+        (annotation["core:sample_start"], truth.channel_phases)
+        for annotation, truth in zip(metadata["annotations"], truths, strict=True)
+        if truth.channel_phases is not None
     ]
     if not stretches:
         return found

@@ -1,7 +1,7 @@
 """Results in parts on disk, so that what was stopped goes on.
 
 A part is named after everything that it depends on, and put in place whole: a part that is there is
-right, whoever computed it and when.
+right, whoever computed it and when. Several campaigns may share a directory.
 """
 
 from __future__ import annotations
@@ -9,9 +9,13 @@ from __future__ import annotations
 import hashlib
 import json
 import os
+import warnings
+import zipfile
+import zlib
 from dataclasses import dataclass
 from importlib.metadata import version
 from typing import TYPE_CHECKING, Any
+from uuid import uuid4
 
 import numpy as np
 
@@ -51,14 +55,47 @@ class Parts:
         >>> part["x"].tolist()
         [0, 1]
         """
-        text = json.dumps([version("access-av"), depends_on], sort_keys=True)
-        target = self.path / f"{hashlib.sha256(text.encode()).hexdigest()[:32]}.npz"
-        if not target.is_file():
+        held = self.read(depends_on)
+        return self.put(depends_on, compute()) if held is None else held
+
+    def read(self, depends_on: Any) -> dict[str, NDArray[Any]] | None:
+        """A part from disk; ``None`` where there is none, or it is damaged, which is said."""
+        file = self._file(depends_on)
+        if not file.is_file():
+            return None
+        try:
+            # A file checks itself: its arrays carry their CRC-32.
+            with file.open("rb") as opened, np.load(opened) as held:
+                return {name: held[name] for name in held.files}
+        except (ValueError, EOFError, KeyError, zipfile.BadZipFile, zlib.error) as error:
+            warnings.warn(f"{file}: damaged ({error}); it is computed again", stacklevel=2)
+            return None
+
+    def put(self, depends_on: Any, made: Mapping[str, NDArray[Any]]) -> dict[str, NDArray[Any]]:
+        """Keep a part, whole or not at all.
+
+        Raises
+        ------
+        OSError
+            When it cannot be written; names the part, and leaves nothing of it.
+        """
+        target = self._file(depends_on)
+        partial = target.with_suffix(f".{uuid4().hex}.partial")
+        try:
             self.path.mkdir(parents=True, exist_ok=True)
-            made = compute()
-            partial = target.with_suffix(f".{os.getpid()}.partial")
             with partial.open("wb") as file:
                 np.savez_compressed(file, **made)  # type: ignore[arg-type]
+                file.flush()
+                os.fsync(file.fileno())
             partial.replace(target)
-        with np.load(target) as held:
-            return {name: held[name] for name in held.files}
+        except OSError as error:
+            partial.unlink(missing_ok=True)
+            raise OSError(error.errno, error.strerror or str(error), str(target)) from error
+        except BaseException:
+            partial.unlink(missing_ok=True)
+            raise
+        return dict(made)
+
+    def _file(self, depends_on: Any) -> Path:
+        text = json.dumps([version("access-av"), depends_on], sort_keys=True)
+        return self.path / f"{hashlib.sha256(text.encode()).hexdigest()[:32]}.npz"

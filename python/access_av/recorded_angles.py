@@ -17,6 +17,7 @@ import numpy as np
 
 from access_av import aoa
 from access_av._core import Recording
+from access_av.array_truth import SPACINGS, ArrayTruth
 from access_av.errors import InputError
 
 if TYPE_CHECKING:
@@ -26,6 +27,9 @@ if TYPE_CHECKING:
     from numpy.typing import NDArray
 
 SPEED_OF_LIGHT_MPS = 299_792_458.0
+
+# Longest burst that is taken for one: a tenth of a second at 100 MHz.
+MOST_SAMPLES = 10_000_000
 
 
 @dataclass(frozen=True)
@@ -94,26 +98,32 @@ def estimate_bursts(
     annotations = metadata.get("annotations", [])
     if not annotations:
         raise InputError(f"{path}: no `annotations`, so it is not known where the bursts are")
+    truths = stated_truths(recording, metadata)
     if spacing_wavelengths is None:
-        spacing_wavelengths = stated_spacing(metadata, recording.centre_frequency_hz)
+        spacing_wavelengths = stated_spacing(truths, metadata, recording.centre_frequency_hz)
     if spacing_wavelengths is None:
         raise InputError(f"{path}: the metadata states no antenna spacing; give --spacing")
 
     calibration: NDArray[np.complex128] | None = None
     bursts = []
-    for annotation in annotations:
-        start, count = annotation["core:sample_start"], annotation["core:sample_count"]
+    for annotation, truth in zip(annotations, truths, strict=True):
+        start = annotation["core:sample_start"]
+        count = annotation.get("core:sample_count", recording.length - start)
+        if not 0 < count <= MOST_SAMPLES:
+            raise InputError(
+                f"{path}: the annotation at sample {start} is of {count} samples; a burst has 1 to "
+                f"{MOST_SAMPLES}"
+            )
         snapshots = recording.read(start, count)
         label = str(annotation.get("core:label", ""))
         if label.lower().startswith("reference"):
             gains = aoa.calibrate(snapshots, math.pi / 2, spacing_wavelengths=spacing_wavelengths)
             calibration = gains / np.abs(gains)
             continue
-        truth = annotation.get("aoa:truth", {})
         found = aoa.maximum_likelihood(
             _equalised(snapshots),
             spacing_wavelengths=spacing_wavelengths,
-            calibration=stated_calibration(truth, calibration),
+            calibration=calibration if truth.channel_phases is None else truth.channel_phases,
         )
         bursts.append(
             BurstAngle(
@@ -122,7 +132,7 @@ def estimate_bursts(
                 sigma_deg=math.degrees(found.sigma_rad),
                 snr_db=found.snr_db,
                 label=label,
-                truth_deg=truth.get("azimuth_from_broadside_deg"),
+                truth_deg=truth.azimuth_from_broadside_deg,
             )
         )
     return bursts
@@ -138,32 +148,39 @@ def mean_absolute_error_deg(bursts: Sequence[BurstAngle]) -> float | None:
     return sum(errors) / len(errors) if errors else None
 
 
-def stated_spacing(metadata: dict[str, Any], frequency_hz: float | None) -> float | None:
+def stated_truths(recording: Recording, metadata: dict[str, Any]) -> list[ArrayTruth]:
+    """What each annotation of a recording states of the array.
+
+    Raises
+    ------
+    InputError
+        Naming the annotation that states what cannot be.
+    """
+    truths = []
+    for index, annotation in enumerate(metadata.get("annotations", [])):
+        try:
+            truths.append(ArrayTruth.of(annotation, recording.channels))
+        except InputError as error:
+            raise InputError(f"annotations[{index}]: {error}") from error
+    return truths
+
+
+def stated_spacing(
+    truths: Sequence[ArrayTruth], metadata: dict[str, Any], frequency_hz: float | None
+) -> float | None:
     """Spacing in wavelengths from an annotation's truth, or from the description's metres."""
-    for annotation in metadata["annotations"]:
-        spacing = annotation.get("aoa:truth", {}).get("element_spacing_wavelengths")
-        if spacing is not None:
-            return float(spacing)
+    for truth in truths:
+        if truth.element_spacing_wavelengths is not None:
+            return truth.element_spacing_wavelengths
     description = str(metadata["global"].get("core:description", ""))
     metres = re.search(r"element spacing (\d+\.\d+) m\b", description)
     if metres is None or frequency_hz is None:
         return None
-    return float(metres[1]) * frequency_hz / SPEED_OF_LIGHT_MPS
+    spacing = float(metres[1]) * frequency_hz / SPEED_OF_LIGHT_MPS
+    return spacing if SPACINGS[0] <= spacing <= SPACINGS[1] else None
 
 
 def _equalised(snapshots: NDArray[np.complex64]) -> NDArray[np.complex64]:
     """Every channel at unit mean power; a silent one stays as it is."""
     power = np.mean(np.abs(snapshots) ** 2, axis=1, keepdims=True)
     return (snapshots / np.sqrt(np.where(power > 0.0, power, 1.0))).astype(np.complex64)
-
-
-def stated_calibration(
-    truth: dict[str, Any], reference: NDArray[np.complex128] | None
-) -> NDArray[np.complex128] | None:
-    """Phases of the channels that an annotation states, else those of the ``reference``."""
-    if "channel_calibration_re" not in truth:
-        return reference
-    gains = np.array(truth["channel_calibration_re"]) + 1j * np.array(
-        truth["channel_calibration_im"]
-    )
-    return np.asarray(gains / np.abs(gains), dtype=np.complex128)

@@ -9,9 +9,9 @@ from typing import TYPE_CHECKING, Any
 
 import polars as pl
 
-from access_av import _core
+from access_av import _core, service_levels
 from access_av.platform import Platform
-from access_av.statistics.consistency import Consistency
+from access_av.statistics.consistency import Consistency, horizontal_error_m
 from access_av.statistics.integrity import Integrity
 
 if TYPE_CHECKING:
@@ -83,6 +83,16 @@ class Simulation:
         if self.trajectories is None:
             return None
         return Consistency.of(self.trajectories, skip=min(SETTLED_STEPS, self.steps.height - 1))
+
+    @property
+    def service_levels(self) -> list[service_levels.Verdict] | None:
+        """The 3GPP service levels that the drives reach; ``None`` without trajectories."""
+        if self.trajectories is None:
+            return None
+        error_m = pl.when(~pl.col("searching")).then(horizontal_error_m())
+        errors_m = self.trajectories.sort("run", "time_s").select(error_m).to_numpy()
+        step_s = float(self.steps["time_s"][-1]) / max(1, self.steps.height - 1)
+        return service_levels.of_runs(errors_m.reshape(-1, self.steps.height), step_s)
 
     @property
     def rms_error_m(self) -> float:

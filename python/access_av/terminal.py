@@ -2,6 +2,9 @@
 
 from __future__ import annotations
 
+import io
+import os
+import sys
 from contextlib import contextmanager
 from typing import TYPE_CHECKING, Any
 
@@ -26,7 +29,9 @@ if TYPE_CHECKING:
     import polars as pl
 
     from access_av.columns import Table
+    from access_av.placement import Plan
     from access_av.recorded_angles import BurstAngle
+    from access_av.service_levels import Verdict
     from access_av.simulation import Simulation
 
 # What is printed may come from files: it is text, never markup. Styles are given beside it.
@@ -34,11 +39,27 @@ console = Console(highlight=False, markup=False)
 errors = Console(stderr=True, highlight=False, markup=False)
 
 NARROW = 80
+LONGEST_MESSAGE = 500
 
 
 def is_narrow() -> bool:
     """Whether tables should leave out what can be found in the files."""
     return console.width < NARROW
+
+
+def write_what_can_be_written() -> None:
+    """Write a question mark where the terminal's encoding lacks a sign."""
+    for stream in (sys.stdout, sys.stderr):
+        if isinstance(stream, io.TextIOWrapper):
+            stream.reconfigure(errors="replace")
+
+
+def give_up_output() -> None:
+    """Write no more to a standard output that took nothing: at its end Python would try again."""
+    try:
+        sys.stdout.flush()
+    except OSError:
+        os.dup2(os.open(os.devnull, os.O_WRONLY), sys.stdout.fileno())
 
 
 @contextmanager
@@ -72,13 +93,27 @@ def show_error(error: Exception) -> None:
     else:
         message = str(error)
     errors.print("error:", style="bold red", end=" ")
-    errors.print(plain(message), soft_wrap=True)
+    errors.print(brief(plain(message)), soft_wrap=True)
 
 
 def show_warning(message: str) -> None:
     """One message for an item that was left out, or is remarkable."""
     errors.print("warning:", style="yellow", end=" ")
-    errors.print(plain(message), soft_wrap=True)
+    errors.print(brief(plain(message)), soft_wrap=True)
+
+
+def brief(text: str) -> str:
+    """A text with its middle left out where it is longer than :data:`LONGEST_MESSAGE`.
+
+    Examples
+    --------
+    >>> brief("short"), len(brief("x" * 10**6))
+    ('short', 500)
+    """
+    if len(text) <= LONGEST_MESSAGE:
+        return text
+    head = LONGEST_MESSAGE * 3 // 5
+    return f"{text[:head]} … {text[head + 3 - LONGEST_MESSAGE :]}"
 
 
 def plain(text: str) -> str:
@@ -151,9 +186,40 @@ def show_simulation(result: Simulation, title: str) -> None:
     for name, value in rows.items():
         made.add_row(name, value_text(value))
     console.print(made)
+    if result.service_levels is not None:
+        show_service_levels(result.service_levels)
 
 
-def show_bound(summary: dict[str, Any]) -> None:
+def show_service_levels(verdicts: Sequence[Verdict], title: str = "") -> None:
+    """Which 3GPP service levels are reached."""
+    head = ["3GPP service level", "error m", "needed", "reached", "at least (95 %)", ""]
+    made = table(head, title=title)
+    for verdict in verdicts:
+        made.add_row(
+            verdict.level.name,
+            f"{verdict.level.accuracy_m:g}",
+            f"{verdict.level.availability:.1%}",
+            f"{verdict.share:.2%}",
+            f"{verdict.least_share:.2%}",
+            "yes" if verdict.reached else "no",
+        )
+    console.print(made)
+
+
+def show_plan(found: Plan) -> None:
+    """The masts that were chosen, and the next best."""
+    console.print(
+        f"{found.scenario.name}: 90 % of the route within {found.before_m:.3f} m at best; with "
+        f"{', '.join(found.chosen)} within {found.after_m:.3f} m."
+    )
+    made = table(["mast", "alone: 90 % within m"])
+    for row in found.ranking.head(10).iter_rows(named=True):
+        made.add_row(row["name"], f"{row['p90_bound_m']:.3f}")
+    console.print(made)
+    show_service_levels(found.verdicts)
+
+
+def show_bound(summary: dict[str, Any], verdicts: Sequence[Verdict]) -> None:
     """The bound along the route, and how each radio head is received there."""
     made = table(["least RMS error of any localizer", "m"], title=summary["scenario"])
     for name, key in (("median of the route", "median_m"), ("90 % of it below", "p90_m")):
@@ -171,6 +237,7 @@ def show_bound(summary: dict[str, Any]) -> None:
             f"{head['visible_share']:.1%}",
         )
     console.print(made)
+    show_service_levels(verdicts)
 
 
 def show_columns(columns: Table) -> None:

@@ -2,7 +2,7 @@
 
 #![allow(clippy::unwrap_used)]
 
-use aoa::{Array, Batch, Complex64, Covariance, Method};
+use aoa::{Array, Batch, Complex64, Covariance, Method, Smoothing};
 use divan::{Bencher, black_box, counter::ItemsCount};
 
 fn main() {
@@ -102,7 +102,7 @@ fn batch<T: aoa::Real>(bencher: Bencher, data: &[num_complex::Complex<T>]) {
             batch.estimate(
                 Method::MaximumLikelihood,
                 &array,
-                false,
+                Smoothing::default(),
                 1,
                 black_box(&mut estimates),
             )

@@ -21,8 +21,8 @@ pub enum Error {
         /// The largest number allowed: one less than the antennas, or 1 for maximum likelihood.
         maximum: usize,
     },
-    /// The element spacing is not a positive finite number of wavelengths.
-    #[error("spacing must be a positive number of wavelengths, not {0}")]
+    /// The element spacing is outside what an array can have.
+    #[error("spacing must be 0.01 to 100 wavelengths, not {0}")]
     Spacing(f64),
     /// The grid step of MUSIC is outside what makes sense.
     #[error("grid_deg must be between 0.001 and 10 degrees, not {0}")]
@@ -50,6 +50,33 @@ pub enum Error {
     /// The matrix given as covariance is not Hermitian with a non-negative diagonal.
     #[error("a covariance matrix must be Hermitian with a non-negative diagonal")]
     NotHermitian,
+    /// The matrix given as covariance has a negative eigenvalue: no samples have such a covariance.
+    #[error("a covariance matrix must have no negative eigenvalue")]
+    Indefinite,
+    /// A batch's item has more samples than a memory can hold.
+    #[error("{snapshots} snapshots of {antennas} antennas are more than can be addressed")]
+    TooManySnapshots {
+        /// Snapshots of an item.
+        snapshots: usize,
+        /// Antennas of the array.
+        antennas: usize,
+    },
+    /// So few snapshots that what is asked for cannot be told from noise.
+    #[error("{snapshots} snapshots are too few: at least {needed} are needed")]
+    TooFewSnapshots {
+        /// Snapshots given.
+        snapshots: usize,
+        /// The least number.
+        needed: usize,
+    },
+    /// A subarray larger than the array, or of a single antenna.
+    #[error("a subarray has 2 to {antennas} antennas, not {subarray}")]
+    Subarray {
+        /// Antennas asked for.
+        subarray: usize,
+        /// Antennas of the array.
+        antennas: usize,
+    },
     /// The sources are so close or so coherent that the equations have no unique solution.
     #[error("the sources cannot be told apart: the equations are singular")]
     Singular,

@@ -50,7 +50,8 @@
 //! Several sources: [`estimate_several`], and [`source_count`] for how many. Coherent ones
 //! (reflections) need [`estimate_several_smoothed`].
 //! Known pilots: [`maximum_likelihood_pilots`], and [`maximum_likelihood_pilots_unequal`] where the
-//! channels' noise differs or one is dead. Many estimates in one call: [`Batch`]. Real
+//! channels' noise differs or one is dead. Many estimates in one call: [`Batch`]. A picture of all
+//! directions: [`PseudoSpectrum`]. Real
 //! receivers: [`Calibration`].
 //!
 //! # What an estimate does not know
@@ -84,7 +85,9 @@ pub use estimate::batch::{Batch, BatchError};
 pub use estimate::choice::Method;
 pub use estimate::one::estimate;
 pub use estimate::pilots::maximum_likelihood_pilots;
+pub use estimate::pseudo_spectrum::PseudoSpectrum;
 pub use estimate::several::{estimate_several, estimate_several_smoothed};
+pub use estimate::smoothing::Smoothing;
 pub use estimate::source_count::{Criterion, source_count};
 pub use estimate::unequal::maximum_likelihood_pilots_unequal;
 pub use kernel::real::Real;

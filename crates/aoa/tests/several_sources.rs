@@ -3,8 +3,8 @@
 mod common;
 
 use aoa::{
-    AngleEstimate, Array, Complex64, Covariance, Criterion, Method, Reason, Verdict, bound,
-    estimate_several, estimate_several_smoothed, source_count,
+    AngleEstimate, Array, Batch, Complex64, Covariance, Criterion, Method, PseudoSpectrum, Reason,
+    Smoothing, Verdict, bound, estimate_several, estimate_several_smoothed, source_count,
 };
 use common::{METHODS, Random, exact};
 
@@ -220,6 +220,61 @@ fn what_is_resolved_knows_how_good_it_is_whatever_the_correlation() {
             }
         }
     }
+}
+
+#[test]
+fn a_batch_is_smoothed_as_one_covariance_is() {
+    let mut random = Random::new(17);
+    let array = Array::<6>::half_wavelength();
+    let snapshots = correlated::<6>(&mut random, [-0.7, 0.9], 0.9, 40);
+    let channels: Vec<Complex64> = (0..6)
+        .flat_map(|n| snapshots.iter().map(move |snapshot| snapshot[n]))
+        .collect();
+    let batch = Batch::<f64, 6>::new(&channels, 40).unwrap();
+    let covariance = Covariance::from_snapshots(&snapshots).unwrap();
+    let smoothing = Smoothing {
+        forward_backward: true,
+        subarray: Some(4),
+    };
+    let mut found = [AngleEstimate::default(); 2];
+    for method in &METHODS[1..] {
+        batch
+            .estimate(*method, &array, smoothing, 2, &mut found)
+            .unwrap();
+        let expected = estimate_several_smoothed::<6, 4>(*method, &covariance, &array, 2, true);
+        for (found, expected) in found.iter().zip(expected.unwrap().iter()) {
+            assert!((found.phase_rad - expected.phase_rad).abs() < 1e-9);
+            assert!((found.phase_sigma_rad / expected.phase_sigma_rad - 1.0).abs() < 1e-9);
+        }
+    }
+}
+
+#[test]
+fn spectra_have_the_powers_of_the_sources() {
+    let array = Array::<8>::half_wavelength();
+    // In unit noise: 10 and 5 dB.
+    let sources = [(1.1, 10.0), (2.0, 5.0)];
+    let covariance = Covariance::from_matrix(exact(&array, &sources), 100).unwrap();
+    let angles = [1.1, 2.0, 1.55];
+    let at = |kind: PseudoSpectrum| kind.at(&covariance, &array, &angles).unwrap();
+    let bartlett = at(PseudoSpectrum::Bartlett);
+    let capon = at(PseudoSpectrum::Capon);
+    for (k, (_, snr_db)) in sources.iter().enumerate() {
+        // The noise of eight antennas adds an eighth; Bartlett also hears the other source, by its
+        // side lobe of -13 dB at most.
+        let power = 10.0_f64.powf(0.1 * snr_db) + 1.0 / 8.0;
+        assert!((capon[k] / power - 1.0).abs() < 0.02, "{capon:?}");
+        assert!((0.9..1.3).contains(&(bartlett[k] / power)), "{bartlett:?}");
+    }
+    assert!(
+        capon[2] < 0.3 && bartlett[2] < 1.5,
+        "{capon:?} {bartlett:?}"
+    );
+    let music = at(PseudoSpectrum::Music { sources: 2 });
+    assert!(
+        music[0] > 1e9 && music[1] > 1e9 && music[2] < 10.0,
+        "{music:?}"
+    );
 }
 
 #[test]

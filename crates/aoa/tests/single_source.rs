@@ -3,7 +3,8 @@
 mod common;
 
 use aoa::{
-    AngleEstimate, Array, Batch, Complex64, Covariance, Method, Reason, Verdict, bound, estimate,
+    AngleEstimate, Array, Batch, Complex64, Covariance, Method, Reason, Smoothing, Verdict, bound,
+    estimate,
 };
 use common::{METHODS, Random, exact, oracle};
 
@@ -158,10 +159,11 @@ fn a_batch_gives_what_single_calls_give() {
         for (m, method) in METHODS.into_iter().enumerate() {
             let mut batch = vec![AngleEstimate::default(); items as usize];
             let view = Batch::<f64, N>::new(&samples, count).unwrap();
-            view.estimate(method, &array, false, 1, &mut batch).unwrap();
+            view.estimate(method, &array, Smoothing::default(), 1, &mut batch)
+                .unwrap();
             let mut batch_narrow = batch.clone();
             let view = Batch::<f32, N>::new(&narrow, count).unwrap();
-            view.estimate(method, &array, false, 1, &mut batch_narrow)
+            view.estimate(method, &array, Smoothing::default(), 1, &mut batch_narrow)
                 .unwrap();
             for (item, single) in singles.iter().enumerate() {
                 let single = single[m];

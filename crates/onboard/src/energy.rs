@@ -161,13 +161,17 @@ impl Execution {
                 provenance: stated.provenance,
             });
         }
-        cycles?;
+        let projected = cycles?.provenance == Provenance::Projected;
         let (core_w, figure) = platform.core_power_w(mode, extent)?;
         Some(Self {
             energy_j: time_s * core_w,
             time_s,
             boundary: figure.boundary,
-            provenance: figure.provenance,
+            provenance: if projected {
+                Provenance::Projected
+            } else {
+                figure.provenance
+            },
         })
     }
 }

@@ -42,10 +42,13 @@ impl From<[f64; 2]> for Point {
 #[serde(default, deny_unknown_fields)]
 pub struct Pose {
     /// East in metres.
+    #[schemars(range(min = -1e7, max = 1e7))]
     pub x_m: f64,
     /// North in metres.
+    #[schemars(range(min = -1e7, max = 1e7))]
     pub y_m: f64,
     /// Counter-clockwise from +x in radians.
+    #[schemars(range(min = -100.0, max = 100.0))]
     pub heading_rad: f64,
 }
 

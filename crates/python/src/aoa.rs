@@ -3,9 +3,10 @@
 mod bounds;
 mod result;
 mod samples;
+mod spectra;
 mod statistics;
 
-use aoa::{Array, Batch, Calibration, Complex64, Method, Real};
+use aoa::{Array, Batch, Calibration, Complex64, Method, Real, Smoothing};
 use numpy::{AllowTypeChange, PyArrayLike1};
 use pyo3::exceptions::PyValueError;
 use pyo3::prelude::*;
@@ -14,6 +15,7 @@ pub use bounds::crb_rad;
 pub use result::AngleEstimate;
 use result::Estimates;
 use samples::{Samples, Visitor, value_error};
+pub use spectra::spectrum;
 pub use statistics::{calibrate, covariance, estimate_sources, forward_backward};
 
 /// What the caller asked for, besides the samples.
@@ -21,10 +23,13 @@ struct Request<'a, 'py> {
     method: Method,
     spacing_wavelengths: f64,
     sources: usize,
-    forward_backward: bool,
+    smoothing: Smoothing,
     calibration: Option<&'a Bound<'py, PyAny>>,
     threads: usize,
 }
+
+/// Threads that a batch may be spread over.
+const MOST_THREADS: usize = 256;
 
 /// Directions of arrival by MUSIC.
 ///
@@ -43,6 +48,9 @@ struct Request<'a, 'py> {
 ///     Grid step at broadside in degrees, 0.001 to 10.
 /// forward_backward : bool
 ///     Average the covariance forward and backward, which separates two coherent sources.
+/// subarray : int, optional
+///     Average the covariance over the subarrays of so many antennas, 2 to all, which separates as
+///     many coherent sources as it is short of all and one more.
 /// calibration : array_like, optional
 ///     Complex gain of each channel, see `calibrate`. Every channel is divided by its own.
 /// threads : int
@@ -71,7 +79,7 @@ struct Request<'a, 'py> {
 /// >>> found.verdict
 /// 'resolved'
 #[pyfunction]
-#[pyo3(signature = (snapshots, *, spacing_wavelengths=0.5, sources=1, grid_deg=0.1, forward_backward=false, calibration=None, threads=1))]
+#[pyo3(signature = (snapshots, *, spacing_wavelengths=0.5, sources=1, grid_deg=0.1, forward_backward=false, subarray=None, calibration=None, threads=1))]
 #[allow(clippy::too_many_arguments)]
 pub fn music(
     snapshots: &Bound<'_, PyAny>,
@@ -79,6 +87,7 @@ pub fn music(
     sources: usize,
     grid_deg: f64,
     forward_backward: bool,
+    subarray: Option<usize>,
     calibration: Option<&Bound<'_, PyAny>>,
     threads: usize,
 ) -> PyResult<AngleEstimate> {
@@ -92,7 +101,10 @@ pub fn music(
             method,
             spacing_wavelengths,
             sources,
-            forward_backward,
+            smoothing: Smoothing {
+                forward_backward,
+                subarray,
+            },
             calibration,
             threads,
         },
@@ -116,12 +128,14 @@ pub fn music(
 /// >>> np.degrees(found.angle_rad).round().tolist()
 /// [60.0, 100.0]
 #[pyfunction]
-#[pyo3(signature = (snapshots, *, spacing_wavelengths=0.5, sources=1, forward_backward=false, calibration=None, threads=1))]
+#[pyo3(signature = (snapshots, *, spacing_wavelengths=0.5, sources=1, forward_backward=false, subarray=None, calibration=None, threads=1))]
+#[allow(clippy::too_many_arguments)]
 pub fn root_music(
     snapshots: &Bound<'_, PyAny>,
     spacing_wavelengths: f64,
     sources: usize,
     forward_backward: bool,
+    subarray: Option<usize>,
     calibration: Option<&Bound<'_, PyAny>>,
     threads: usize,
 ) -> PyResult<AngleEstimate> {
@@ -132,7 +146,10 @@ pub fn root_music(
             method,
             spacing_wavelengths,
             sources,
-            forward_backward,
+            smoothing: Smoothing {
+                forward_backward,
+                subarray,
+            },
             calibration,
             threads,
         },
@@ -157,7 +174,7 @@ pub fn root_music(
 /// >>> round(float(np.degrees(found.angle_rad)), 6)
 /// 120.0
 #[pyfunction]
-#[pyo3(signature = (snapshots, *, spacing_wavelengths=0.5, sources=1, total_least_squares=true, forward_backward=false, calibration=None, threads=1))]
+#[pyo3(signature = (snapshots, *, spacing_wavelengths=0.5, sources=1, total_least_squares=true, forward_backward=false, subarray=None, calibration=None, threads=1))]
 #[allow(clippy::too_many_arguments)]
 pub fn esprit(
     snapshots: &Bound<'_, PyAny>,
@@ -165,6 +182,7 @@ pub fn esprit(
     sources: usize,
     total_least_squares: bool,
     forward_backward: bool,
+    subarray: Option<usize>,
     calibration: Option<&Bound<'_, PyAny>>,
     threads: usize,
 ) -> PyResult<AngleEstimate> {
@@ -179,7 +197,10 @@ pub fn esprit(
             method,
             spacing_wavelengths,
             sources,
-            forward_backward,
+            smoothing: Smoothing {
+                forward_backward,
+                subarray,
+            },
             calibration,
             threads,
         },
@@ -216,7 +237,10 @@ pub fn maximum_likelihood(
             method,
             spacing_wavelengths,
             sources,
-            forward_backward,
+            smoothing: Smoothing {
+                forward_backward,
+                subarray: None,
+            },
             calibration,
             threads,
         },
@@ -249,14 +273,12 @@ impl Visitor for Estimator<'_, '_> {
         let Request {
             method,
             sources,
-            forward_backward,
+            smoothing,
             threads,
             ..
         } = *self.request;
-        let mut array = Array::<N>::new(self.request.spacing_wavelengths).map_err(value_error)?;
-        if let Some(gains) = self.request.calibration {
-            array = array.with_calibration(calibration_of(gains)?);
-        }
+        let array =
+            calibrated_array::<N>(self.request.spacing_wavelengths, self.request.calibration)?;
         let maximum = method.maximum_sources::<N>();
         if !(1..=maximum).contains(&sources) {
             let error = aoa::Error::TooManySources {
@@ -266,7 +288,7 @@ impl Visitor for Estimator<'_, '_> {
             return Err(value_error(error));
         }
         let run = |batch: Batch<'_, T, N>, estimates: &mut [aoa::AngleEstimate]| {
-            batch.estimate(method, &array, forward_backward, sources, estimates)
+            batch.estimate(method, &array, smoothing, sources, estimates)
         };
         if self.samples.batch.is_none() && sources == 1 {
             let mut estimate = [aoa::AngleEstimate::default()];
@@ -274,8 +296,10 @@ impl Visitor for Estimator<'_, '_> {
             let [only] = estimate;
             return Ok(Estimates::One(only));
         }
-        if threads == 0 {
-            return Err(PyValueError::new_err("threads must be at least 1"));
+        if !(1..=MOST_THREADS).contains(&threads) {
+            return Err(PyValueError::new_err(format!(
+                "threads must be 1 to {MOST_THREADS}, not {threads}"
+            )));
         }
         let mut values = vec![aoa::AngleEstimate::default(); batch.len() * sources];
         let share = batch.len().div_ceil(threads).max(1);
@@ -305,6 +329,18 @@ impl Visitor for Estimator<'_, '_> {
             shape: self.samples.shape(axes),
         })
     }
+}
+
+/// The array that the user describes.
+fn calibrated_array<const N: usize>(
+    spacing_wavelengths: f64,
+    calibration: Option<&Bound<'_, PyAny>>,
+) -> PyResult<Array<N>> {
+    let array = Array::<N>::new(spacing_wavelengths).map_err(value_error)?;
+    Ok(match calibration {
+        Some(gains) => array.with_calibration(calibration_of(gains)?),
+        None => array,
+    })
 }
 
 /// Channel gains given by the user.

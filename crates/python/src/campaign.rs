@@ -17,6 +17,7 @@ use pyo3::exceptions::{PyRuntimeError, PyValueError};
 use pyo3::prelude::*;
 use pyo3::types::{PyDict, PyList};
 
+use crate::message::brief;
 use crate::plug_ins::{PythonEstimator, PythonLocalizer, PythonPolicy};
 use crate::settings::{Platform, Scenario, settings_error};
 
@@ -247,9 +248,9 @@ fn python_error(error: SimulationError) -> PyErr {
         SimulationError::Settings(error) => settings_error(error),
         SimulationError::Custom(error) => match error.downcast::<PyErr>() {
             Ok(raised) => *raised,
-            Err(other) => PyRuntimeError::new_err(other.to_string()),
+            Err(other) => PyRuntimeError::new_err(brief(other)),
         },
-        other => PyRuntimeError::new_err(other.to_string()),
+        other => PyRuntimeError::new_err(brief(other)),
     }
 }
 

@@ -17,6 +17,7 @@ use recording::{
 };
 use simulate::{SynthError, SynthSettings};
 
+use crate::message::brief;
 use crate::recording::{RecordingError, recording_error};
 use crate::settings::{Scenario, Site, Vehicle, settings_error};
 
@@ -39,12 +40,14 @@ use crate::settings::{Scenario, Site, Vehicle, settings_error};
 ///     Also the time between the SSB bursts, which makes the files many times larger.
 /// datatype : str
 ///     `ci16_le` or `cf32_le`.
+/// progress : callable, optional
+///     Called with the share of the drive that is recorded.
 ///
 /// Returns
 /// -------
 /// tuple of (path of the metadata, number of bursts, samples per antenna)
 #[pyfunction]
-#[pyo3(signature = (scenario, directory, *, seed = 1, run = 0, duration_s = None, continuous = false, datatype = "ci16_le"))]
+#[pyo3(signature = (scenario, directory, *, seed = 1, run = 0, duration_s = None, continuous = false, datatype = "ci16_le", progress = None))]
 #[allow(clippy::too_many_arguments, clippy::needless_pass_by_value)] // Python's keywords
 pub fn synthesize(
     py: Python<'_>,
@@ -55,6 +58,7 @@ pub fn synthesize(
     duration_s: Option<f64>,
     continuous: bool,
     datatype: &str,
+    progress: Option<Py<PyAny>>,
 ) -> PyResult<(PathBuf, usize, u64)> {
     let datatype = match datatype {
         "ci16_le" => Datatype::Ci16Le,
@@ -72,14 +76,46 @@ pub fn synthesize(
         continuous,
         datatype,
     };
+    let mut raised = None;
+    let mut tell = |share: f64| {
+        let told = Python::attach(|py| {
+            py.check_signals()?;
+            let called = progress.as_ref().map(|call| call.call1(py, (share,)));
+            called.transpose().map(drop)
+        });
+        raised = told.err();
+        raised.is_none()
+    };
     let made = py
-        .detach(|| simulate::synthesize(&scenario.0, &settings, &directory))
+        .detach(|| simulate::synthesize(&scenario.0, &settings, &directory, &mut tell))
         .map_err(|error| match error {
             SynthError::Settings(error) => settings_error(error),
             SynthError::Recording(error) => recording_error(error),
-            other => PyValueError::new_err(other.to_string()),
+            SynthError::Stopped => raised
+                .take()
+                .unwrap_or_else(|| PyValueError::new_err("stopped")),
+            other => PyValueError::new_err(brief(other)),
         })?;
     Ok((made.recording, made.bursts, made.samples))
+}
+
+/// Read a TUM trajectory, as columns `time_s`, `x_m`, `y_m`, `heading_rad`.
+///
+/// Raises
+/// ------
+/// RecordingError
+///     The line that is not eight numbers with a unit quaternion.
+#[pyfunction]
+#[allow(clippy::needless_pass_by_value)] // what extraction yields
+pub fn read_tum(py: Python<'_>, file: PathBuf) -> PyResult<Bound<'_, PyDict>> {
+    let poses = recording::read_tum(&file).map_err(recording_error)?;
+    let columns = PyDict::new(py);
+    let column = |value: fn(&TimedPose) -> f64| PyArray1::from_iter(py, poses.iter().map(value));
+    columns.set_item("time_s", column(|it| it.time_s))?;
+    columns.set_item("x_m", column(|it| it.pose.x_m))?;
+    columns.set_item("y_m", column(|it| it.pose.y_m))?;
+    columns.set_item("heading_rad", column(|it| it.pose.heading_rad))?;
+    Ok(columns)
 }
 
 /// Locate a recorded drive.
@@ -208,7 +244,7 @@ fn replay_error(error: ReplayError) -> PyErr {
     match error {
         ReplayError::Settings(error) => settings_error(error),
         ReplayError::Recording(error) => recording_error(error),
-        other => RecordingError::new_err(other.to_string()),
+        other => RecordingError::new_err(brief(other)),
     }
 }
 

@@ -2,7 +2,9 @@
 mod aoa;
 mod bound;
 mod campaign;
+mod channel;
 mod drive;
+mod message;
 mod nr;
 mod plug_ins;
 mod recording;
@@ -20,7 +22,7 @@ mod _core {
         #[pymodule_export]
         use crate::aoa::{
             AngleEstimate, calibrate, covariance, crb_rad, esprit, estimate_sources,
-            forward_backward, maximum_likelihood, music, root_music,
+            forward_backward, maximum_likelihood, music, root_music, spectrum,
         };
         use pyo3::prelude::*;
 
@@ -50,7 +52,9 @@ mod _core {
     #[pymodule_export]
     use crate::campaign::{SimulationResult, Tapes, simulate};
     #[pymodule_export]
-    use crate::drive::{LocatedDrive, locate, synthesize};
+    use crate::channel::{channel_drops, check_paths};
+    #[pymodule_export]
+    use crate::drive::{LocatedDrive, locate, read_tum, synthesize};
     #[pymodule_export]
     use crate::plug_ins::{RadioHead, SensedSsb, Situation};
     #[pymodule_export]

@@ -17,6 +17,7 @@ use recording::scan::{
     ArraySetup, FoundSsb, IqSource, SampleBlock, Scan as CoreScan, ScanError, ScanSettings,
 };
 
+use crate::message::brief;
 use crate::recording::{Recording, RecordingError};
 
 /// One SSB of a cell, as it was received.
@@ -199,7 +200,7 @@ impl Scan {
 #[pyo3(signature = (recording, *, centre_frequency_hz = None, ssb_freq_hz = None, scs_khz = None, cfo_ppm = None, spacing_wavelengths = 0.5, calibration = None))]
 pub fn scan(
     py: Python<'_>,
-    recording: &mut Recording,
+    recording: &Recording,
     centre_frequency_hz: Option<f64>,
     ssb_freq_hz: Option<f64>,
     scs_khz: Option<u32>,
@@ -217,9 +218,8 @@ pub fn scan(
             calibration,
         },
     };
-    let core = recording.core_mut();
-    let found = py
-        .detach(|| recording::scan::scan(core, &settings))
+    let found = recording
+        .with(py, |core| recording::scan::scan(core, &settings))
         .map_err(scan_error)?;
     Scan::of(py, &found)
 }
@@ -298,7 +298,7 @@ fn subcarrier_spacing(khz: u32) -> PyResult<SubcarrierSpacing> {
 
 #[allow(clippy::needless_pass_by_value)] // the shape that `map_err` wants
 fn scan_error(error: ScanError) -> PyErr {
-    RecordingError::new_err(error.to_string())
+    RecordingError::new_err(brief(error))
 }
 
 /// One or two axes of complex64, row by row; what is already so is not copied.

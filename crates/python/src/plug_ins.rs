@@ -18,6 +18,8 @@ use pyo3::prelude::*;
 use pyo3::types::PyTuple;
 use simulate::scenario::Scenario;
 
+use crate::message::brief;
+
 /// A radio head where the site has it.
 #[pyclass(frozen, get_all, module = "access_av._core")]
 pub struct RadioHead {
@@ -118,7 +120,7 @@ impl From<PlugInError> for PyErr {
     fn from(error: PlugInError) -> Self {
         match error.0.downcast::<Self>() {
             Ok(raised) => *raised,
-            Err(other) => PyValueError::new_err(other.to_string()),
+            Err(other) => PyValueError::new_err(brief(other)),
         }
     }
 }
@@ -152,9 +154,10 @@ impl PythonEstimator {
             )));
         }
         match sigma_rad {
-            Some(sigma_rad) if !(sigma_rad > 0.0 && sigma_rad.is_finite()) => {
+            Some(sigma_rad) if !(sigma_rad > 0.0 && sigma_rad <= PI) => {
                 return Err(refused(&format!(
-                    "estimator returned a standard deviation of {sigma_rad} rad; it must be above 0"
+                    "estimator returned a standard deviation of {sigma_rad} rad; it must be above 0 \
+                     and at most pi"
                 )));
             }
             None if !self.told_of_sigma.swap(true, Ordering::Relaxed) => PyErr::warn(
@@ -215,7 +218,7 @@ impl PythonEstimator {
 }
 
 fn refused(message: &str) -> PyErr {
-    PyValueError::new_err(message.to_owned())
+    PyValueError::new_err(brief(message))
 }
 
 /// Says at which SSB a plug-in failed, and keeps the exception's type.
@@ -275,11 +278,16 @@ impl WakeUpPolicy for PythonPolicy {
             if !policy.hasattr("listens")? {
                 return Ok(true);
             }
+            let what = format!("in policy.listens, at {} s", now.time_s);
             let situation = Situation::new(py, now, &[])?;
-            let found = policy.call_method1("listens", (situation,))?;
-            found
-                .extract::<bool>()
-                .map_err(|_| refused("policy.listens returned something else than True or False"))
+            let found = policy
+                .call_method1("listens", (situation,))
+                .map_err(|error| at(py, error, &what))?;
+            let listens = found.extract::<bool>();
+            listens.map_err(|_| {
+                let message = "policy.listens returned something else than True or False";
+                at(py, refused(message), &what)
+            })
         });
         Ok(listens?)
     }
@@ -316,12 +324,17 @@ impl WakeUpPolicy for PythonPolicy {
             let Some(stated) = stated else {
                 return Ok(f64::NAN);
             };
-            let time_s: f64 = stated.extract()?;
-            if time_s.is_nan() || time_s < 0.0 {
-                let message = format!("policy.wake_up_time_s is {time_s}; it must not be below 0");
-                return Err(at(py, refused(&message), &what));
+            match stated.extract::<f64>() {
+                Ok(time_s) if time_s >= 0.0 && time_s.is_finite() => Ok(time_s),
+                _ => {
+                    let message = format!(
+                        "policy.wake_up_time_s is {}; it must be a finite number of seconds, not \
+                         below 0",
+                        stated.repr()?
+                    );
+                    Err(at(py, refused(&message), &what))
+                }
             }
-            Ok(time_s)
         });
         Ok(wake_up_time_s?)
     }
@@ -418,6 +431,32 @@ impl Localizer for PythonLocalizer {
     }
 }
 
+/// Whether a matrix is finite, symmetric and positive semidefinite, each up to rounding.
+fn is_covariance(matrix: &[[f64; 3]; 3]) -> bool {
+    const ROUNDING: f64 = 1e-9;
+    let [[xx, xy, xh], [yx, yy, yh], [hx, hy, hh]] = *matrix;
+    if !matrix.iter().flatten().all(|value| value.is_finite()) || xx < 0.0 || yy < 0.0 || hh < 0.0 {
+        return false;
+    }
+    let correlation = |upper: f64, lower: f64, a: f64, b: f64| {
+        let most = a.sqrt() * b.sqrt();
+        let symmetric = (upper - lower).abs() <= ROUNDING * most;
+        let of_one = if most > 0.0 { upper / most } else { upper };
+        (symmetric && (most > 0.0 || upper == 0.0)).then_some(of_one)
+    };
+    let found = [
+        correlation(xy, yx, xx, yy),
+        correlation(xh, hx, xx, hh),
+        correlation(yh, hy, yy, hh),
+    ];
+    let [Some(a), Some(b), Some(c)] = found else {
+        return false;
+    };
+    // Minors of the matrix of correlations.
+    let whole = 1.0 + 2.0 * a * b * c - a * a - b * b - c * c;
+    [a, b, c].iter().all(|it| it.abs() <= 1.0 + ROUNDING) && whole >= -ROUNDING
+}
+
 fn pose_estimate(found: &Bound<'_, PyAny>, time_s: f64) -> PyResult<PoseEstimate> {
     let shape = || {
         refused(
@@ -445,12 +484,10 @@ fn pose_estimate(found: &Bound<'_, PyAny>, time_s: f64) -> PyResult<PoseEstimate
             let rows = found.get_item(3)?;
             let rows = rows.call_method0("tolist").unwrap_or(rows);
             let matrix: [[f64; 3]; 3] = rows.extract().map_err(|_| shape())?;
-            let finite = matrix.iter().flatten().all(|value| value.is_finite());
-            let positive = (0..3).all(|i| matrix.get(i).and_then(|row| row.get(i)) >= Some(&0.0));
-            if !finite || !positive {
+            if !is_covariance(&matrix) {
                 return Err(refused(
-                    "localizer.pose returned a covariance that is not finite, or has a negative \
-                     variance",
+                    "localizer.pose returned a covariance that is not finite, or not symmetric, or \
+                     has a negative variance or a correlation beyond one",
                 ));
             }
             Some(matrix)

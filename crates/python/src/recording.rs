@@ -1,6 +1,7 @@
 //! Recordings: `Recording` and its error.
 
 use std::path::PathBuf;
+use std::sync::{Mutex, PoisonError};
 
 use num_complex::Complex32;
 use numpy::{PyArray2, PyArrayMethods};
@@ -8,6 +9,8 @@ use pyo3::create_exception;
 use pyo3::exceptions::PyValueError;
 use pyo3::prelude::*;
 use recording::{Recording as CoreRecording, RecordingError as CoreError};
+
+use crate::message::brief;
 
 create_exception!(
     access_av._core,
@@ -19,10 +22,10 @@ create_exception!(
 /// The Python error for a core error.
 #[allow(clippy::needless_pass_by_value)] // the shape that `map_err` wants
 pub fn recording_error(error: CoreError) -> PyErr {
-    RecordingError::new_err(error.to_string())
+    RecordingError::new_err(brief(error))
 }
 
-/// A recording of one or more antennas, read piece by piece.
+/// A recording of one or more antennas, read piece by piece; by one thread at a time, the others wait.
 ///
 /// Examples
 /// --------
@@ -33,25 +36,23 @@ pub fn recording_error(error: CoreError) -> PyErr {
 /// >>> recording = Recording.open_raw([path], sample_rate_hz=7.68e6)
 /// >>> recording.read(1, 2)
 /// array([[1.+0.j, 2.+0.j]], dtype=complex64)
-#[pyclass(module = "access_av._core")]
-pub struct Recording {
-    core: CoreRecording,
-    buffer: Vec<Vec<Complex32>>,
-}
+#[pyclass(frozen, module = "access_av._core")]
+pub struct Recording(Mutex<CoreRecording>);
 
 impl From<CoreRecording> for Recording {
     fn from(core: CoreRecording) -> Self {
-        Self {
-            core,
-            buffer: Vec::new(),
-        }
+        Self(Mutex::new(core))
     }
 }
 
 impl Recording {
-    /// The core's recording.
-    pub fn core_mut(&mut self) -> &mut CoreRecording {
-        &mut self.core
+    /// What `ask` finds in the core's recording; other Python threads run meanwhile.
+    pub fn with<T: Send>(
+        &self,
+        py: Python<'_>,
+        ask: impl FnOnce(&mut CoreRecording) -> T + Send,
+    ) -> T {
+        py.detach(|| ask(&mut self.0.lock().unwrap_or_else(PoisonError::into_inner)))
     }
 }
 
@@ -100,48 +101,46 @@ impl Recording {
 
     /// Samples per second and channel.
     #[getter]
-    fn sample_rate_hz(&self) -> f64 {
-        self.core.sample_rate_hz()
+    fn sample_rate_hz(&self, py: Python<'_>) -> f64 {
+        self.with(py, |core| core.sample_rate_hz())
     }
 
     /// Centre frequency of the first capture that states one, in Hz.
     #[getter]
-    fn centre_frequency_hz(&self) -> Option<f64> {
-        self.core.centre_frequency_hz()
+    fn centre_frequency_hz(&self, py: Python<'_>) -> Option<f64> {
+        self.with(py, |core| core.centre_frequency_hz())
     }
 
     /// Number of channels.
     #[getter]
-    fn channels(&self) -> usize {
-        self.core.channels()
+    fn channels(&self, py: Python<'_>) -> usize {
+        self.with(py, |core| core.channels())
     }
 
     /// Samples per channel.
     #[getter]
-    fn length(&self) -> u64 {
-        self.core.length()
+    fn length(&self, py: Python<'_>) -> u64 {
+        self.with(py, |core| core.length())
     }
 
     /// Format of the samples in the file.
     #[getter]
-    fn datatype(&self) -> &'static str {
-        self.core.datatype().name()
+    fn datatype(&self, py: Python<'_>) -> &'static str {
+        self.with(py, |core| core.datatype().name())
     }
 
     /// What looks wrong but does not keep the recording from being read.
     #[getter]
-    fn warnings(&self) -> Vec<String> {
-        self.core
-            .warnings()
-            .iter()
-            .map(ToString::to_string)
-            .collect()
+    fn warnings(&self, py: Python<'_>) -> Vec<String> {
+        self.with(py, |core| {
+            core.warnings().iter().map(ToString::to_string).collect()
+        })
     }
 
     /// The metadata as JSON, annotations and keys of extensions included.
-    fn metadata_json(&self) -> PyResult<String> {
-        serde_json::to_string(self.core.metadata())
-            .map_err(|error| RecordingError::new_err(error.to_string()))
+    fn metadata_json(&self, py: Python<'_>) -> PyResult<String> {
+        self.with(py, |core| serde_json::to_string(core.metadata()))
+            .map_err(|error| RecordingError::new_err(brief(error)))
     }
 
     /// Read `count` samples of every channel from sample `start` on.
@@ -156,16 +155,17 @@ impl Recording {
     /// RecordingError
     ///     Samples beyond the end; a sample that is not finite.
     fn read<'py>(
-        &mut self,
+        &self,
         py: Python<'py>,
         start: u64,
         count: usize,
     ) -> PyResult<Bound<'py, PyArray2<Complex32>>> {
-        py.detach(|| self.core.read(start, count, &mut self.buffer))
+        let mut channels = Vec::new();
+        self.with(py, |core| core.read(start, count, &mut channels))
             .map_err(recording_error)?;
-        let array = PyArray2::zeros(py, [self.buffer.len(), count], false);
+        let array = PyArray2::zeros(py, [channels.len(), count], false);
         let mut writable = array.readwrite();
-        for (mut row, samples) in writable.as_array_mut().outer_iter_mut().zip(&self.buffer) {
+        for (mut row, samples) in writable.as_array_mut().outer_iter_mut().zip(&channels) {
             row.iter_mut()
                 .zip(samples)
                 .for_each(|(to, from)| *to = *from);
@@ -174,17 +174,19 @@ impl Recording {
         Ok(array)
     }
 
-    fn __len__(&self) -> usize {
-        self.core.length() as usize
+    fn __len__(&self, py: Python<'_>) -> usize {
+        self.length(py) as usize
     }
 
-    fn __repr__(&self) -> String {
-        format!(
-            "Recording({:?}, {} channels, {} samples, {} Hz)",
-            self.core.data_file().display().to_string(),
-            self.core.channels(),
-            self.core.length(),
-            self.core.sample_rate_hz(),
-        )
+    fn __repr__(&self, py: Python<'_>) -> String {
+        self.with(py, |core| {
+            format!(
+                "Recording({:?}, {} channels, {} samples, {} Hz)",
+                core.data_file().display().to_string(),
+                core.channels(),
+                core.length(),
+                core.sample_rate_hz(),
+            )
+        })
     }
 }

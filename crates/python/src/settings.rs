@@ -1,11 +1,12 @@
 //! Sites, vehicles, scenarios and platforms: reading, overriding, writing out.
 
+use std::collections::HashMap;
 use std::hash::{DefaultHasher, Hash, Hasher};
 
 use onboard::energy::EnergyModel;
 use onboard::settings::{
-    Extent, Platform as CorePlatform, SettingsError as CoreError, Site as CoreSite, TomlFile,
-    Vehicle as CoreVehicle,
+    Check, Extent, Platform as CorePlatform, SettingsError as CoreError, Site as CoreSite,
+    TomlFile, Vehicle as CoreVehicle,
 };
 use pyo3::create_exception;
 use pyo3::exceptions::{PyTypeError, PyValueError};
@@ -14,6 +15,8 @@ use pyo3::types::{PyBool, PyDict, PyFloat, PyInt, PyList, PyString, PyTuple};
 use recording::Files;
 use simulate::scenario::Scenario as CoreScenario;
 use toml::{Table, Value};
+
+use crate::message::brief;
 
 create_exception!(
     access_av._core,
@@ -26,7 +29,7 @@ create_exception!(
 /// The Python error for a core error.
 #[allow(clippy::needless_pass_by_value)] // the shape that `map_err` wants
 pub fn settings_error(error: CoreError) -> PyErr {
-    SettingsError::new_err(error.to_string())
+    SettingsError::new_err(brief(error))
 }
 
 /// A Python class for a checked TOML file of which some are shipped by name, with what is its own.
@@ -149,6 +152,21 @@ toml_file! {
     #[getter]
     fn vehicle(&self) -> Vehicle {
         Vehicle(self.0.vehicle.clone())
+    }
+
+    /// How large a drive is, from above: its duration in seconds, its SSB bursts, SSBs of all radio
+    /// heads and odometry samples, and the bytes of memory that a run takes.
+    #[getter]
+    fn size(&self) -> PyResult<HashMap<&'static str, f64>> {
+        let check = Check { file: &self.0.name };
+        let size = self.0.size(check).map_err(settings_error)?;
+        Ok(HashMap::from([
+            ("duration_s", size.duration_s),
+            ("bursts", size.bursts),
+            ("looks", size.looks),
+            ("odometry_samples", size.odometry_samples),
+            ("bytes", size.bytes(1)),
+        ]))
     }
 
     /// The scenario with the wake-up times written out that its vehicle leaves to the platform,

@@ -7,11 +7,11 @@
 
 use std::fmt;
 use std::fmt::Write as _;
-use std::fs;
 use std::path::Path;
 
 use crate::csv::Table;
 use crate::error::RecordingError;
+use crate::file as files;
 use onboard::localize::AngleMeasurement;
 use onboard::observation::SensedSsb;
 
@@ -127,9 +127,13 @@ fn angle(values: &[Option<f64>]) -> Result<LoggedAngle, String> {
     let snr_db = finite(snr_db, "snr_db")?.unwrap_or(UNSTATED_SNR_DB);
     let angle_rad = finite(angle_rad, "angle_rad")?;
     // Without a phase the deviation is that of the angle, until the array's spacing is known.
+    let positive = |value: Option<f64>, name: &str| match needed(value, name)? {
+        value if value > 0.0 => Ok(value),
+        value => Err(format!("{name} {value} is not above 0")),
+    };
     let (phase_rad, phase_sigma_rad) = match (finite(phase_rad, "phase_rad")?, angle_rad) {
-        (Some(phase_rad), _) => (phase_rad, needed(phase_sigma_rad, "phase_sigma_rad")?),
-        (None, Some(_)) => (f64::NAN, needed(angle_sigma_rad, "angle_sigma_rad")?),
+        (Some(phase_rad), _) => (phase_rad, positive(phase_sigma_rad, "phase_sigma_rad")?),
+        (None, Some(_)) => (f64::NAN, positive(angle_sigma_rad, "angle_sigma_rad")?),
         (None, None) => return Err("neither phase_rad nor angle_rad is there".to_owned()),
     };
     let angle_rad = angle_rad.unwrap_or(f64::NAN);
@@ -140,11 +144,6 @@ fn angle(values: &[Option<f64>]) -> Result<LoggedAngle, String> {
     if !whole(ssb_index, 63.0) {
         return Err(format!(
             "ssb_index {ssb_index} is not an integer from 0 to 63"
-        ));
-    }
-    if phase_sigma_rad <= 0.0 {
-        return Err(format!(
-            "its standard deviation {phase_sigma_rad} is not above 0"
         ));
     }
     let (pci, ssb_index) = (pci as u16, ssb_index as u8);
@@ -186,5 +185,5 @@ pub fn write_angle_log(file: &Path, angles: &[LoggedAngle]) -> Result<(), Record
             measured.snr_db,
         );
     }
-    fs::write(file, text).map_err(|source| RecordingError::io(file, source))
+    files::write(file, text.as_bytes())
 }

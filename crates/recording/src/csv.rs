@@ -1,9 +1,12 @@
 //! Tables of numbers with named columns, separated by commas.
 
-use std::fs;
 use std::path::Path;
 
 use crate::error::RecordingError;
+use crate::file as files;
+
+/// A day of samples at 50 Hz.
+const MOST_BYTES: u64 = 512 << 20;
 
 /// A table in memory: the wanted columns of each row, or what is wrong with the row.
 #[derive(Debug)]
@@ -26,7 +29,8 @@ impl Table {
     /// [`RecordingError`] when the file cannot be read or a required column is missing. A row that
     /// cannot be used is not an error: it says what is wrong with it.
     pub fn read(file: &Path, required: &[&str], optional: &[&str]) -> Result<Self, RecordingError> {
-        let bytes = fs::read(file).map_err(|source| RecordingError::io(file, source))?;
+        let bytes =
+            files::read(file, MOST_BYTES).map_err(|source| RecordingError::io(file, source))?;
         let text = String::from_utf8_lossy(&bytes);
         let mut lines = text.trim_start_matches('\u{feff}').lines().enumerate();
         let header: Vec<&str> = lines

@@ -16,6 +16,7 @@
 mod angle_log;
 mod csv;
 mod error;
+mod file;
 mod library;
 pub mod mcap;
 mod odometry;
@@ -28,6 +29,7 @@ mod tum;
 
 pub use angle_log::{AngleLog, AngleRemark, LoggedAngle, read_angle_log, write_angle_log};
 pub use error::RecordingError;
+pub use file::write as write_file;
 pub use library::{Files, load};
 pub use mcap::{McapWriter, read_odometry_mcap, write_drive_mcap};
 pub use odometry::{

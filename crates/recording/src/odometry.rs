@@ -2,11 +2,11 @@
 
 use std::fmt;
 use std::fmt::Write as _;
-use std::fs;
 use std::path::Path;
 
 use crate::csv::Table;
 use crate::error::RecordingError;
+use crate::file as files;
 use onboard::observation::OdometrySample;
 
 /// A step in time this many times the usual one is a gap.
@@ -19,6 +19,15 @@ pub struct OdometryLog {
     pub samples: Vec<OdometrySample>,
     /// What to know of single items.
     pub remarks: Vec<OdometryRemark>,
+}
+
+impl OdometryLog {
+    /// Whether a time is that of the drive, up to a second before it or after.
+    pub fn covers(&self, time_s: f64) -> bool {
+        let (first, last) = (self.samples.first(), self.samples.last());
+        first.is_some_and(|it| time_s >= it.time_s - 1.0)
+            && last.is_some_and(|it| time_s <= it.time_s + 1.0)
+    }
 }
 
 /// What is remarkable about one item of an odometry file.
@@ -219,5 +228,5 @@ pub fn write_odometry_csv(file: &Path, samples: &[OdometrySample]) -> Result<(),
         }
         text.push('\n');
     }
-    fs::write(file, text).map_err(|source| RecordingError::io(file, source))
+    files::write(file, text.as_bytes())
 }

@@ -1,11 +1,14 @@
 //! TUM trajectories: `t x y z qx qy qz qw` per line, single spaces, nothing else.
 
 use std::fmt::Write as _;
-use std::fs;
 use std::path::Path;
 
 use crate::error::RecordingError;
+use crate::file as files;
 use onboard::geometry::Pose;
+
+/// A day of poses at 50 Hz.
+const MOST_BYTES: u64 = 512 << 20;
 
 /// A pose and its time in seconds.
 #[derive(Debug, Clone, Copy, PartialEq)]
@@ -37,7 +40,7 @@ pub fn tum_text(poses: &[TimedPose]) -> String {
 /// # Errors
 /// [`RecordingError::Io`].
 pub fn write_tum(file: &Path, poses: &[TimedPose]) -> Result<(), RecordingError> {
-    fs::write(file, tum_text(poses)).map_err(|source| RecordingError::io(file, source))
+    files::write(file, tum_text(poses).as_bytes())
 }
 
 /// Reads a TUM trajectory; lines that begin with `#` are comments. Roll and pitch are dropped.
@@ -46,11 +49,16 @@ pub fn write_tum(file: &Path, poses: &[TimedPose]) -> Result<(), RecordingError>
 /// [`RecordingError::Io`], or [`RecordingError::Value`] naming the line that is not eight numbers
 /// with a unit quaternion.
 pub fn read_tum(file: &Path) -> Result<Vec<TimedPose>, RecordingError> {
-    let text = fs::read_to_string(file).map_err(|source| RecordingError::io(file, source))?;
-    let lines = text.lines().enumerate().filter(|(_, line)| {
-        let line = line.trim();
-        !line.is_empty() && !line.starts_with('#')
-    });
+    let bytes = files::read(file, MOST_BYTES).map_err(|source| RecordingError::io(file, source))?;
+    let text = String::from_utf8_lossy(&bytes);
+    let lines = text
+        .trim_start_matches('\u{feff}')
+        .lines()
+        .enumerate()
+        .filter(|(_, line)| {
+            let line = line.trim();
+            !line.is_empty() && !line.starts_with('#')
+        });
     lines
         .map(|(index, line)| {
             pose(line).ok_or_else(|| {

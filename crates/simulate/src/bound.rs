@@ -11,6 +11,8 @@
 //! link budget's SNR) and that of the scatter, which successive looks share as
 //! [`ArrayModel::correlation`](onboard::localize::tracker::ArrayModel::correlation) says: its spectrum at the
 //! line of sight stands for white noise, as it may where the state changes little in a wavelength.
+//! Where the scenario has traced paths, K is theirs at each place, and a radio head without a line of
+//! sight says nothing.
 
 use onboard::geometry::{Point, Pose};
 use onboard::localize::gaussian::{Gaussian, Matrix, identity, product};
@@ -23,6 +25,7 @@ use onboard::radio_head::RadioHead;
 use onboard::road::Road;
 use onboard::settings::{Check, SettingsError};
 
+use crate::channel::Paths;
 use crate::ideal_filter::IdealFilter;
 use crate::scenario::Scenario;
 use crate::world::MotionProfile;
@@ -59,6 +62,14 @@ pub struct Bound {
     thermal: ThermalNoise,
     start: InitialPose,
     period_s: f64,
+    traced: Option<Traced>,
+}
+
+/// Traced paths, and the numbers of the radio heads in their file.
+#[derive(Clone, Debug)]
+struct Traced {
+    paths: Paths,
+    heads: Vec<Option<usize>>,
 }
 
 impl Bound {
@@ -69,10 +80,19 @@ impl Bound {
     /// [`SettingsError`] when the road cannot be built.
     pub fn new(scenario: &Scenario) -> Result<Self, SettingsError> {
         let (site, vehicle) = (&scenario.site, &scenario.vehicle);
-        let road = scenario.path(Check {
+        let check = Check {
             file: &scenario.name,
-        })?;
+        };
+        let road = scenario.path(check)?;
         let start = &vehicle.start;
+        let traced = scenario.traced_paths(check)?.map(|paths| {
+            let heard = site.radio_heads.iter();
+            let heard = heard.filter(|head| vehicle.receiver.hears(head.pci));
+            Traced {
+                heads: heard.map(|head| paths.head(head)).collect(),
+                paths,
+            }
+        });
         Ok(Self {
             config: TrackerConfig::new(site, vehicle),
             map: site.road.is_some() && vehicle.follows_road(),
@@ -95,6 +115,7 @@ impl Bound {
             },
             road,
             period_s: site.ssb.period_s(),
+            traced,
         })
     }
 
@@ -207,12 +228,14 @@ impl Bound {
             belief.mean[CURVATURE] = curvature_per_m;
             Footing::PLANE
         };
-        for head in &self.heads {
+        for (number, head) in self.heads.iter().enumerate() {
             let array = &self.config.array;
             let sighting = Sighting::new(head, pose, &footing, &belief.mean, array);
-            if let Some(sighting) = sighting {
+            let fading = self.fading(number, pose.point());
+            if let Some((sighting, fading)) = sighting.zip(fading) {
                 let row = sighting.row;
-                let variance = scatter(&sighting) + self.thermal.variance(head, sighting.range_m);
+                let thermal = self.thermal.variance(head, sighting.range_m);
+                let variance = fading * scatter(&sighting) + thermal;
                 let gain = belief.update(0.0, &row, variance);
                 // (I − K H) times the transition so far.
                 let mut seen = [0.0; STATES];
@@ -228,6 +251,18 @@ impl Bound {
                 }
             }
         }
+    }
+
+    /// By how much the scatter's variance at a place is larger than at the K that is expected; none
+    /// where a radio head has no line of sight, and so says nothing of where it is.
+    fn fading(&self, head: usize, place: Point) -> Option<f64> {
+        let Some(traced) = &self.traced else {
+            return Some(1.0);
+        };
+        let number = traced.heads.get(head).copied().flatten()?;
+        let k = (traced.paths.rician_k(number, place)).filter(|k| *k > 0.0)?;
+        let array = &self.config.array;
+        Some(array.scatter_bound(k) / array.scatter_bound(self.config.rician_k))
     }
 
     fn point(&self, belief: &Belief, time_s: f64, along_m: f64) -> BoundPoint {
@@ -279,10 +314,13 @@ impl Bound {
             };
             let array = &self.config.array;
             let scatter = array.scatter_bound(self.config.rician_k);
-            for head in &self.heads {
+            for (number, head) in self.heads.iter().enumerate() {
                 let sighting = Sighting::new(head, pose, &Footing::PLANE, &[0.0; STATES], array)?;
+                let Some(fading) = self.fading(number, place) else {
+                    continue;
+                };
                 let thermal = self.thermal.variance(head, sighting.range_m);
-                belief.update(0.0, &sighting.row, (scatter + thermal) / looks);
+                belief.update(0.0, &sighting.row, (fading * scatter + thermal) / looks);
             }
             let [along, across] = [ALONG, ACROSS].map(|i| belief.covariance[i][i]);
             information += 1.0 / (along + across);

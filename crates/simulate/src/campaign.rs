@@ -158,16 +158,22 @@ impl Simulation {
         count: usize,
         drive: impl Fn(usize) -> Result<RunRecord, SimulationError> + Sync,
     ) -> Result<Campaign, SimulationError> {
+        let pool = thread_pool(options.threads)?;
+        let wave = 8 * pool.current_num_threads();
+        let at_once = if options.keep_records {
+            count
+        } else {
+            count.min(wave)
+        };
+        self.scenario().check_runs(at_once)?;
         let energy = EnergyModel::new(&self.scenario().vehicle, self.platform(), Extent::Value)?;
         let mut sums = vec![StepSums::new(options.quantiles); self.steps()];
-        let mut runs = Vec::with_capacity(count);
+        let mut runs = Vec::new();
         let mut integrity = Vec::new();
         let mut records = Vec::new();
         let mut errors_m = Vec::new();
         let integrity_settings = self.scenario().vehicle.integrity;
         let alert_limit_m = integrity_settings.map_or(f64::INFINITY, |it| it.alert_limit_m);
-        let pool = thread_pool(options.threads)?;
-        let wave = 8 * pool.current_num_threads();
         while runs.len() < count {
             let first = runs.len();
             let finished: Vec<_> = pool.install(|| {

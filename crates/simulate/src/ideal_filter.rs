@@ -70,11 +70,16 @@ impl IdealFilter {
         let mut rng = Streams::new(seed, run).generator(Purpose::Start, 1);
         let mut error = [0.0; STATES];
         self.points.iter().map(move |point| {
-            let draws = [(); STATES].map(|()| rng.sample::<f64, _>(StandardNormal));
             let mut next = [0.0; STATES];
-            for i in 0..STATES {
-                for j in 0..STATES {
-                    next[i] += point.transition[i][j] * error[j] + point.fresh[i][j] * draws[j];
+            for j in 0..STATES {
+                // A state that is switched off draws nothing.
+                let draw = if point.fresh[j][j] > 0.0 {
+                    rng.sample::<f64, _>(StandardNormal)
+                } else {
+                    0.0
+                };
+                for i in 0..STATES {
+                    next[i] += point.transition[i][j] * error[j] + point.fresh[i][j] * draw;
                 }
             }
             error = next;

@@ -34,6 +34,12 @@ pub enum Purpose {
     Array = 12,
     /// Places and powers of a radio head.
     Survey = 13,
+    /// What stops a radio head's line of sight.
+    Blockage = 14,
+    /// Large-scale parameters of a radio head's channel along the way.
+    LargeScale = 15,
+    /// Clusters of a radio head's channel.
+    Clusters = 16,
 }
 
 /// The random streams of one run.

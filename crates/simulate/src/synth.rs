@@ -10,7 +10,7 @@ use onboard::geometry::Pose;
 use onboard::receive::SSB_SAMPLES;
 use onboard::settings::{Check, SettingsError, TomlFile, Vehicle};
 use recording::{
-    Annotation, Datatype, RecordingError, RecordingWriter, TimedPose, WriterSettings,
+    Annotation, Datatype, RecordingError, RecordingWriter, TimedPose, WriterSettings, write_file,
     write_odometry_csv, write_tum,
 };
 use serde_json::{Map, json};
@@ -62,11 +62,15 @@ pub enum SynthError {
     /// An SSB cannot be built.
     #[error("samples: {0}")]
     Samples(#[from] nr_ssb::Error),
+    /// The caller asked to stop; no file of it is there.
+    #[error("stopped")]
+    Stopped,
 }
 
 /// Writes a drive into `directory`: `iq.sigmf-meta` and `iq.sigmf-data`, `odometry.csv`, what the
 /// vehicle believes in `site.toml` and `vehicle.toml`, `scenario.toml`, and the truth in
-/// `truth.tum` and the recording's annotations.
+/// `truth.tum` and the recording's annotations. `progress` is told which share of the drive is
+/// recorded; `false` stops it.
 ///
 /// # Errors
 /// [`SynthError`].
@@ -74,6 +78,7 @@ pub fn synthesize(
     scenario: &Scenario,
     settings: &SynthSettings,
     directory: &Path,
+    progress: &mut dyn FnMut(f64) -> bool,
 ) -> Result<Synthesized, SynthError> {
     scenario.check_sends_samples(Check {
         file: &scenario.name,
@@ -89,25 +94,9 @@ pub fn synthesize(
     if settings.continuous {
         air = air.continuous();
     }
-    let io = |file: &Path| {
-        let file = file.to_owned();
-        move |source| RecordingError::io(&file, source)
-    };
-    fs::create_dir_all(directory).map_err(io(directory))?;
+    fs::create_dir_all(directory).map_err(|source| RecordingError::io(directory, source))?;
 
     let told = told_vehicle(scenario, drawn.told_start, air.channel_gains());
-    let text_files = [
-        ("site.toml", scenario.site.to_toml()),
-        ("vehicle.toml", told.to_toml()),
-        ("scenario.toml", scenario.to_toml()),
-    ];
-    for (name, text) in text_files {
-        let file = directory.join(name);
-        fs::write(&file, text).map_err(io(&file))?;
-    }
-    let odometry = directory.join("odometry.csv");
-    write_odometry(scenario, &path, drawn.odometer, end_s, &odometry)?;
-
     let mut writer = RecordingWriter::create(
         &directory.join("iq"),
         WriterSettings {
@@ -150,7 +139,19 @@ pub fn synthesize(
         let antennas: Vec<_> = burst.antennas.iter().map(Vec::as_slice).collect();
         writer.write(&antennas)?;
         number += 1;
+        if !progress((time_s / end_s).min(1.0)) {
+            return Err(SynthError::Stopped);
+        }
     }
+    for (name, text) in [
+        ("site.toml", scenario.site.to_toml()),
+        ("vehicle.toml", told.to_toml()),
+        ("scenario.toml", scenario.to_toml()),
+    ] {
+        write_file(&directory.join(name), text.as_bytes())?;
+    }
+    let odometry = directory.join("odometry.csv");
+    write_odometry(scenario, &path, drawn.odometer, end_s, &odometry)?;
     write_tum(&directory.join("truth.tum"), &truth)?;
     let samples = writer.length();
     Ok(Synthesized {

@@ -12,15 +12,14 @@ use onboard::settings::{
 use rand::RngExt;
 use rand_distr::StandardNormal;
 
-use crate::channel::{Propagation, RicianPropagation};
+use crate::channel::tr38901::Environment;
+use crate::channel::{Link, Propagation, RicianPropagation, Tr38901Propagation, TracedPropagation};
 use crate::random::{Purpose, Streams};
 use crate::scenario::{Fidelity, Scenario, TruthSettings};
 use crate::world::{MotionProfile, Odometer, Path, TrueArray};
 
-/// Makes the propagation of radio head number `index` of a site to a vehicle, in the run of the
-/// streams.
-pub type PropagationMaker =
-    dyn Fn(&Site, &Vehicle, usize, Streams) -> Box<dyn Propagation> + Send + Sync;
+/// Makes the propagation over a link.
+pub type PropagationMaker = dyn Fn(&Link<'_>) -> Box<dyn Propagation> + Send + Sync;
 
 /// What is so on average, over all runs: what is believed, and how the world departs from it.
 #[derive(Clone)]
@@ -63,14 +62,7 @@ impl World {
         let check = Check {
             file: &scenario.name,
         };
-        let (site, vehicle) = scenario
-            .truth
-            .depart(&scenario.site, &scenario.vehicle, check)?;
-        let true_road = site.road.as_ref();
-        let road = match (&scenario.motion.path, true_road) {
-            (None, Some(road)) => road.build("truth.site.road", check)?,
-            _ => scenario.path(check)?,
-        };
+        let (site, vehicle, road) = scenario.actual(check)?;
         let motion = MotionProfile::new(&scenario.motion, &vehicle, road.length_m());
         Ok(Self {
             scenario: Arc::new(scenario.clone()),
@@ -78,7 +70,7 @@ impl World {
             vehicle,
             road,
             motion,
-            propagation: default_propagation(scenario),
+            propagation: default_propagation(scenario, check)?,
         })
     }
 
@@ -175,7 +167,16 @@ impl World {
             array: TrueArray::new(vehicle.array.clone(), walk),
             odometer: Odometer::new(vehicle.odometer, vehicle.gyroscope, noise, start),
             propagation: (0..site.radio_heads.len())
-                .map(|index| (self.propagation)(&site, &vehicle, index, streams))
+                .map(|head| {
+                    (self.propagation)(&Link {
+                        site: &site,
+                        vehicle: &vehicle,
+                        road: &self.road,
+                        duration_s: self.motion.duration_s(),
+                        head,
+                        streams,
+                    })
+                })
                 .collect(),
             path,
             told_start,
@@ -204,11 +205,22 @@ fn what_it_is(vehicle: &Vehicle) -> Vehicle {
 }
 
 /// The scenario's own.
-fn default_propagation(scenario: &Scenario) -> Arc<PropagationMaker> {
-    let channel = scenario.channel;
-    Arc::new(move |site, vehicle, index, streams| {
-        Box::new(RicianPropagation::new(
-            &channel, site, vehicle, index, streams,
-        ))
-    })
+fn default_propagation(
+    scenario: &Scenario,
+    check: Check<'_>,
+) -> Result<Arc<PropagationMaker>, SettingsError> {
+    let channel = scenario.channel.clone();
+    let paths = scenario.traced_paths(check)?.map(Arc::new);
+    Ok(Arc::new(move |link| {
+        let traced = (paths.clone()).and_then(|it| TracedPropagation::new(it, &channel, link));
+        if let Some(traced) = traced {
+            return Box::new(traced);
+        }
+        let carrier_ghz = 1e-3 * link.site.carrier_mhz;
+        let environment = Environment::of(channel.model, carrier_ghz, channel.hall);
+        match environment.and_then(|it| Tr38901Propagation::new(it, &channel, link)) {
+            Some(propagation) => Box::new(propagation),
+            None => Box::new(RicianPropagation::new(&channel, link)),
+        }
+    }))
 }

@@ -324,18 +324,11 @@ struct Clear {
 }
 
 impl Propagation for Clear {
-    fn next_shadowing_db(&mut self, _: f64) -> f64 {
+    fn next_gain_db(&mut self, _: &LineOfSight) -> f64 {
         -self.loss_db
     }
 
-    fn response(
-        &self,
-        sight: &LineOfSight,
-        _: f64,
-        _: f64,
-        elements: usize,
-        into: &mut [Complex64],
-    ) {
+    fn response(&self, sight: &LineOfSight, _: f64, elements: usize, into: &mut [Complex64]) {
         for gains in into.chunks_exact_mut(elements) {
             for (antenna, gain) in gains.iter_mut().enumerate() {
                 *gain = Complex64::cis(sight.phase_rad * antenna as f64);
@@ -356,8 +349,8 @@ fn a_propagation_of_ones_own_carries_snapshots_and_samples() {
                 ("site.radio_heads[1].ssb_index", 2.into()),
             ],
         );
-        let clear = simulation(&scenario).with_propagation(Arc::new(|_, _, index, _| {
-            let loss_db = 6.0 * index as f64;
+        let clear = simulation(&scenario).with_propagation(Arc::new(|link| {
+            let loss_db = 6.0 * link.head as f64;
             Box::new(Clear { loss_db })
         }));
         let record = clear.run(2, 0, NONE).unwrap();

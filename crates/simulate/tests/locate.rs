@@ -85,7 +85,7 @@ fn rms_error_m(drive: &LocatedDrive, truth: &Path) -> f64 {
 #[test]
 fn a_recorded_drive_is_located() {
     let dir = common::scratch("drive");
-    let made = synthesize(&scenario(), &SETTINGS, &dir).unwrap();
+    let made = synthesize(&scenario(), &SETTINGS, &dir, &mut |_| true).unwrap();
     let believed = believed(&dir);
     let odometry = read_odometry_csv(&dir.join("odometry.csv")).unwrap();
     let mut recording = Recording::open(&made.recording).unwrap();
@@ -148,7 +148,7 @@ fn a_recording_without_gaps_is_scanned_and_located_alike() {
         ..SETTINGS
     };
     let dir = common::scratch("continuous");
-    let made = synthesize(&scenario(), &settings, &dir).unwrap();
+    let made = synthesize(&scenario(), &settings, &dir, &mut |_| true).unwrap();
     let mut recording = Recording::open(&made.recording).unwrap();
     assert!((made.samples as f64 / 3.84e6 - 0.52).abs() < 1e-3);
 
@@ -180,7 +180,7 @@ fn what_does_not_fit_together_is_refused() {
         duration_s: Some(0.1),
         ..SETTINGS
     };
-    let made = synthesize(&scenario(), &settings, &dir).unwrap();
+    let made = synthesize(&scenario(), &settings, &dir, &mut |_| true).unwrap();
     let believed = believed(&dir);
     let mut recording = Recording::open(&made.recording).unwrap();
     let error = locate(&believed, &OdometryLog::default(), &mut recording).unwrap_err();
@@ -203,7 +203,7 @@ fn what_does_not_fit_together_is_refused() {
 
     let mut far = shipped("paper");
     far.site.ssb.subcarrier_spacing_khz = 120.0;
-    assert!(synthesize(&far, &settings, &dir).is_err());
+    assert!(synthesize(&far, &settings, &dir, &mut |_| true).is_err());
 
     // One radio head leaves several places open.
     let (mut site, mut vehicle) = believed;

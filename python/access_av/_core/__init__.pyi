@@ -25,8 +25,11 @@ __all__ = [
     "Vehicle",
     "__version__",
     "aoa",
+    "channel_drops",
+    "check_paths",
     "locate",
     "nr",
+    "read_tum",
     "simulate",
     "synthesize",
 ]
@@ -102,6 +105,8 @@ class Scenario:
     def site(self) -> Site: ...
     @property
     def vehicle(self) -> Vehicle: ...
+    @property
+    def size(self) -> dict[str, float]: ...
     def resolved(self, platform: Platform | None = None) -> Scenario: ...
     def __eq__(self, other: object, /) -> bool: ...
     def __ne__(self, other: object, /) -> bool: ...
@@ -211,6 +216,16 @@ class Bound:
     ) -> NDArray[np.float64]: ...
     def snr_db(self, x_m: NDArray[np.float64], y_m: NDArray[np.float64]) -> NDArray[np.float64]: ...
 
+def channel_drops(
+    model: str,
+    level_m: NDArray[np.float64],
+    *,
+    head_height_m: float,
+    array_height_m: float,
+    carrier_mhz: float,
+    seed: int,
+) -> dict[str, NDArray[Any]]: ...
+def check_paths(file: str) -> None: ...
 def simulate(
     scenario: Scenario,
     runs: int = 100,
@@ -285,7 +300,9 @@ def synthesize(
     duration_s: float | None = None,
     continuous: bool = False,
     datatype: str = "ci16_le",
+    progress: Callable[[float], object] | None = None,
 ) -> tuple[Path, int, int]: ...
+def read_tum(file: str | PathLike[str]) -> dict[str, NDArray[np.float64]]: ...
 def locate(
     site: Site,
     vehicle: Vehicle,

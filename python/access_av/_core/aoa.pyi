@@ -14,6 +14,7 @@ __all__ = [
     "maximum_likelihood",
     "music",
     "root_music",
+    "spectrum",
 ]
 
 _Samples = NDArray[np.complex64] | NDArray[np.complex128]
@@ -43,6 +44,7 @@ def music(
     sources: int = 1,
     grid_deg: float = 0.1,
     forward_backward: bool = False,
+    subarray: int | None = None,
     calibration: ArrayLike | None = None,
     threads: int = 1,
 ) -> AngleEstimate: ...
@@ -52,6 +54,7 @@ def root_music(
     spacing_wavelengths: float = 0.5,
     sources: int = 1,
     forward_backward: bool = False,
+    subarray: int | None = None,
     calibration: ArrayLike | None = None,
     threads: int = 1,
 ) -> AngleEstimate: ...
@@ -62,6 +65,7 @@ def esprit(
     sources: int = 1,
     total_least_squares: bool = True,
     forward_backward: bool = False,
+    subarray: int | None = None,
     calibration: ArrayLike | None = None,
     threads: int = 1,
 ) -> AngleEstimate: ...
@@ -77,6 +81,16 @@ def maximum_likelihood(
 def covariance(snapshots: _Samples) -> NDArray[np.complex128]: ...
 def forward_backward(covariance: ArrayLike) -> NDArray[np.complex128]: ...
 def estimate_sources(snapshots: _Samples, *, criterion: Literal["mdl", "aic"] = "mdl") -> Any: ...
+def spectrum(
+    snapshots: _Samples,
+    angles_rad: ArrayLike,
+    *,
+    method: Literal["bartlett", "capon", "music"] = "bartlett",
+    sources: int = 1,
+    spacing_wavelengths: float = 0.5,
+    forward_backward: bool = False,
+    calibration: ArrayLike | None = None,
+) -> NDArray[np.float64]: ...
 def calibrate(
     snapshots: _Samples, angle_rad: float, *, spacing_wavelengths: float = 0.5
 ) -> NDArray[np.complex128]: ...

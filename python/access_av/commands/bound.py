@@ -2,13 +2,12 @@
 
 from __future__ import annotations
 
-import json
 from typing import Annotated
 
 import typer
 
-from access_av.commands.options import AsJson, Out, ScenarioArgument
-from access_av.terminal import console, show_bound
+from access_av.commands.options import AllowLarge, AsJson, Out, ScenarioArgument, load_scenario
+from access_av.terminal import console, progress, show_bound
 
 app = typer.Typer()
 
@@ -19,6 +18,7 @@ app = typer.Typer()
 def bound(
     scenario: ScenarioArgument,
     out: Out = None,
+    allow_large: AllowLarge = False,
     map_step_m: Annotated[
         float | None, typer.Option(help="Side of the map's squares; else a round length that fits.")
     ] = None,
@@ -26,15 +26,18 @@ def bound(
 ) -> None:
     """Tell how well any localizer can do, before anything is built.
 
-    The posterior Cramér-Rao bound of the horizontal error: along the route and over the site.
+    The posterior Cramér-Rao bound of the horizontal error: along the route and over the site; and
+    which 3GPP service levels it allows.
     Writes bound.parquet, map.parquet, report.html, scenario.toml and manifest.json.
     """
     from access_av.error_bound import bound as error_bound
-    from access_av.files import ResultsDirectory
+    from access_av.files import ResultsDirectory, json_text
     from access_av.report.placement import render_bound
 
-    found = error_bound(scenario, map_step_m=map_step_m)
-    directory = ResultsDirectory.create(f"bound-{found.scenario.name}", out)
+    chosen = load_scenario(scenario, allow_large=allow_large)
+    directory = ResultsDirectory.create(f"bound-{chosen.name}", out)
+    with progress("Bounding"):
+        found = error_bound(chosen, map_step_m=map_step_m)
     directory.write_table("bound.parquet", found.route)
     directory.write_table("map.parquet", found.site)
     directory.write_text("report.html", render_bound(found))
@@ -42,7 +45,7 @@ def bound(
     directory.write_manifest(scenario=found.scenario.name, map_step_m=found.map_step_m)
     summary = found.summary()
     if as_json:
-        print(json.dumps({**summary, "directory": str(directory.path)}, indent=2))
+        print(json_text({**summary, "directory": str(directory.path)}))
         return
-    show_bound(summary)
+    show_bound(summary, found.verdicts)
     console.print(f"Report: {directory.path / 'report.html'}", soft_wrap=True)

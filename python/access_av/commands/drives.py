@@ -8,9 +8,9 @@ from typing import TYPE_CHECKING, Annotated
 
 import typer
 
-from access_av.commands.options import Out, ScenarioArgument
+from access_av.commands.options import AllowLarge, Out, ScenarioArgument, load_scenario
 from access_av.errors import InputError
-from access_av.terminal import console, errors, show_warning
+from access_av.terminal import console, errors, progress, show_warning
 
 if TYPE_CHECKING:
     from access_av.drives import Drive
@@ -38,6 +38,7 @@ def synth(
         bool, typer.Option("--continuous", help="Also the time between the bursts (large).")
     ] = False,
     datatype: Annotated[str, typer.Option(help="ci16_le or cf32_le.")] = "ci16_le",
+    allow_large: AllowLarge = False,
 ) -> None:
     """Record a scenario's drive: samples of all antennas, odometry, site, vehicle, truth.
 
@@ -46,16 +47,21 @@ def synth(
     each capture says where in time it belongs (core:global_index).
     """
     from access_av import drives
+    from access_av.files import ResultsDirectory
 
-    made = drives.synthesize(
-        scenario,
-        out,
-        seed=seed,
-        run=run,
-        duration_s=duration_s,
-        continuous=continuous,
-        datatype=datatype,
-    )
+    chosen = load_scenario(scenario, allow_large=allow_large)
+    directory = ResultsDirectory.create("synth", out)
+    with progress("Recording") as tick:
+        made = drives.synthesize(
+            chosen,
+            directory.path,
+            seed=seed,
+            run=run,
+            duration_s=duration_s,
+            continuous=continuous,
+            datatype=datatype,
+            progress=lambda share: tick(round(100 * share), 100),
+        )
     console.print(
         f"{made.bursts} bursts, {made.samples} samples per antenna: {made.recording}",
         soft_wrap=True,
@@ -114,21 +120,23 @@ def locate(
 
     from_scratch = start is not None and start.strip() == "scratch"
     plant, carrier = Site.load(site), Vehicle.load(vehicle)
-    drive = drives.locate(
-        plant,
-        odometry,
-        recording,
-        vehicle=carrier,
-        topic=topic,
-        start_time_s=start_time_s,
-        start=None if start is None or from_scratch else _pose(start),
-        from_scratch=from_scratch,
-        smooth=smooth,
-    )
+    pose = None if start is None or from_scratch else _pose(start)
+    directory = ResultsDirectory.create("locate", out)
+    with progress("Locating"):
+        drive = drives.locate(
+            plant,
+            odometry,
+            recording,
+            vehicle=carrier,
+            topic=topic,
+            start_time_s=start_time_s,
+            start=pose,
+            from_scratch=from_scratch,
+            smooth=smooth,
+        )
     if drive.smoothed is not None and drive.smoothed.is_empty() and not _lost(drive):
         raise InputError(f"{vehicle}: --smooth needs localizer.kind = tracker")
     numbers = drives.summary(drive, truth)
-    directory = ResultsDirectory.create("locate", out)
     drive.write_mcap(directory.path / "drive.mcap")
     drive.write_tum(directory.path / "trajectory.tum")
     directory.write_table("poses.parquet", drive.poses)

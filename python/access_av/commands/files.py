@@ -2,12 +2,42 @@
 
 from __future__ import annotations
 
-from typing import Annotated, Any
+import json
+from typing import TYPE_CHECKING, Annotated, Any
 
 import typer
 
 from access_av._core import Platform, Scenario, SettingsError, Site, Vehicle
-from access_av.terminal import console, show_error
+from access_av.commands.options import AllowLarge, load_scenario
+from access_av.terminal import console, show_error, table
+
+if TYPE_CHECKING:
+    from collections.abc import Callable
+
+
+Names = Annotated[list[str], typer.Argument(help="Shipped names, or paths.")]
+
+
+def _check(names: list[str], describe: Callable[[str], str]) -> None:
+    """Describe each that is fine, say of each other one what is wrong."""
+    wrong = 0
+    for name in names:
+        try:
+            console.print(f"{name}: fine{describe(name)}", soft_wrap=True)
+        except SettingsError as error:
+            show_error(error)
+            wrong += 1
+    if wrong:
+        raise typer.Exit(2)
+
+
+def _size(scenario: Scenario) -> str:
+    """What a drive takes."""
+    size = scenario.size
+    return (
+        f"; a drive of {size['duration_s']:.0f} s, {size['looks']:.0f} SSBs, "
+        f"{size['bytes'] * 1e-6:.0f} MB"
+    )
 
 
 def files_app(what: str) -> typer.Typer:
@@ -29,24 +59,49 @@ def files_app(what: str) -> typer.Typer:
     def show(name: Annotated[str, typer.Argument(help="Shipped name, or path.")]) -> None:
         print(kind.load(name).to_toml(), end="")
 
-    @files.command(
+    command = files.command(
+        name="check",
         help=f"Check {what} files; exit code 2 where one is wrong.",
         epilog=f"Example: [bold]access-av {what} check mine.toml[/]",
     )
-    def check(names: Annotated[list[str], typer.Argument(help="Shipped names, or paths.")]) -> None:
-        wrong = 0
-        for name in names:
-            try:
-                kind.load(name)
-                console.print(f"{name}: fine", soft_wrap=True)
-            except SettingsError as error:
-                show_error(error)
-                wrong += 1
-        if wrong:
-            raise typer.Exit(2)
+    if what == "scenario":
+
+        @command
+        def check_scenarios(names: Names, allow_large: AllowLarge = False) -> None:
+            _check(names, lambda name: _size(load_scenario(name, allow_large=allow_large)))
+    else:
+
+        @command
+        def check(names: Names) -> None:
+            _check(names, lambda name: kind.load(name) and "")
 
     @files.command(help=f"Print the JSON Schema of {what} files, for editors.")
     def schema() -> None:
         print(kind.schema_json())
 
+    if what == "platform":
+        files.command(epilog="Example: [bold]access-av platform power jetson-agx-xavier-engine[/]")(
+            power
+        )
     return files
+
+
+def power(name: Annotated[str, typer.Argument(help="Shipped name, or path.")]) -> None:
+    """Lay the modelled power of the busy board beside what was measured, mode by mode."""
+    platform = Platform.load(name)
+    made = table(["mode", "name", "cores", "MHz", "modelled W", "measured W", "off %"], text=2)
+    for index, mode in enumerate(json.loads(platform.to_json())["modes"]):
+        modelled_w = platform.busy_power_w(index, mode["cores"])
+        measured_w = mode.get("full_load_power_w", {}).get("value")
+        made.add_row(
+            str(mode["mode"]),
+            mode["name"],
+            str(mode["cores"]),
+            f"{mode['cpu_mhz']:.1f}",
+            "–" if modelled_w is None else f"{modelled_w:.2f}",
+            "–" if measured_w is None else f"{measured_w:.2f}",
+            "–"
+            if modelled_w is None or measured_w is None
+            else f"{100.0 * (modelled_w / measured_w - 1.0):+.1f}",
+        )
+    console.print(made)

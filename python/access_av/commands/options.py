@@ -2,10 +2,13 @@
 
 from __future__ import annotations
 
+import json
 from pathlib import Path
 from typing import Annotated
 
 import typer
+
+from access_av._core import Scenario
 
 ScenarioArgument = Annotated[str, typer.Argument(help="Shipped name, or path of a TOML file.")]
 ScenarioOption = Annotated[str, typer.Option(help="Shipped name, or path of a TOML file.")]
@@ -18,4 +21,15 @@ Threads = Annotated[
 Out = Annotated[
     Path | None, typer.Option(help="Directory for the files; else a new one in results/.")
 ]
+AllowLarge = Annotated[
+    bool, typer.Option("--allow-large", help="Also drives that take hours and gigabytes.")
+]
 AsJson = Annotated[bool, typer.Option("--json", help="Print JSON.")]
+
+
+def load_scenario(name: str, *, allow_large: bool) -> Scenario:
+    """A shipped scenario, or a file's; with ``allow_large`` as if the file said so itself."""
+    if not allow_large:
+        return Scenario.load(name)
+    like = str(Path(name).absolute()) if Path(name).exists() else name
+    return Scenario.from_toml(f"like = {json.dumps(like)}\nallow_large = true\n", name)

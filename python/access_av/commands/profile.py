@@ -2,7 +2,6 @@
 
 from __future__ import annotations
 
-import json
 from pathlib import Path
 from typing import Annotated
 
@@ -38,6 +37,7 @@ def profile(
     chain: wall and CPU time per execution, and the energy above idle from INA3221, INA238 or RAPL,
     as an interval. Where there is no sensor it says so. The mode that was found is put back.
     """
+    from access_av.files import json_text, write_whole
     from access_av.profile.device import profile as measure
 
     with progress("Profiling") as tick:
@@ -46,11 +46,11 @@ def profile(
     for warning in found.warnings:
         show_warning(warning)
     if out is not None:
-        out.write_text(platform.to_toml(), encoding="utf-8")
+        write_whole(out, platform.to_toml())
     if as_json:
         records = [each.record() for each in found.measured]
         report = {"machine": found.machine, "sensors": found.sensors, "measured": records}
-        print(json.dumps(report, indent=2, ensure_ascii=False))
+        print(json_text(report))
         return
     head = ["mode", "workload", "median µs", "p99 µs", "CPU µs", "energy above idle µJ"]
     made = table(head, title=found.machine, text=2)

@@ -2,7 +2,6 @@
 
 from __future__ import annotations
 
-import json
 from pathlib import Path
 from typing import Annotated
 
@@ -10,7 +9,7 @@ import typer
 
 from access_av.commands.options import AsJson
 from access_av.errors import InputError
-from access_av.terminal import console, show_bursts, show_cells, show_warning
+from access_av.terminal import console, progress, show_bursts, show_cells, show_warning
 
 app = typer.Typer()
 
@@ -68,25 +67,27 @@ def scan(
     """
     from access_av import nr
     from access_av._core import Recording
+    from access_av.files import json_text
 
     gains = None if calibration is None else _gains(calibration)
-    if sample_rate_hz is not None:
-        opened = [Recording.open_raw(recordings, sample_rate_hz=sample_rate_hz)]
-    else:
-        opened = [Recording.open(path) for path in recordings]
     found = []
-    for path, recording in zip(recordings, opened, strict=False):
+    for path in recordings[: None if sample_rate_hz is None else 1]:
+        with progress(f"Scanning {path.name}"):
+            if sample_rate_hz is None:
+                recording = Recording.open(path)
+            else:
+                recording = Recording.open_raw(recordings, sample_rate_hz=sample_rate_hz)
+            result = nr.scan_as_recorded(
+                recording,
+                spacing_wavelengths=spacing_wavelengths,
+                calibration=gains,
+                centre_frequency_hz=centre_hz,
+                ssb_freq_hz=ssb_freq_hz,
+                scs_khz=scs_khz,
+                cfo_ppm=cfo_ppm,
+            )
         for warning in recording.warnings:
             show_warning(warning)
-        result = nr.scan_as_recorded(
-            recording,
-            spacing_wavelengths=spacing_wavelengths,
-            calibration=gains,
-            centre_frequency_hz=centre_hz,
-            ssb_freq_hz=ssb_freq_hz,
-            scs_khz=scs_khz,
-            cfo_ppm=cfo_ppm,
-        )
         for fault in result.faults:
             show_warning(f"{path}: {fault}")
         cells = [nr.record(cell) for cell in result.cells]
@@ -105,7 +106,7 @@ def scan(
         if weak:
             console.print(f"{len(weak)} more without a message: --unconfirmed lists them.")
     if as_json:
-        print(json.dumps(found, indent=2))
+        print(json_text(found))
 
 
 @app.command(epilog="Example: [bold]access-av aoa captures/array1.sigmf-meta --json[/]")
@@ -122,11 +123,13 @@ def aoa(
     Reference bursts calibrate the channels, every other annotated burst is estimated. Azimuths
     are counter-clockwise from the array's broadside.
     """
+    from access_av.files import json_text
     from access_av.recorded_angles import estimate_bursts
 
-    bursts = estimate_bursts(recording, spacing_wavelengths=spacing)
+    with progress("Estimating"):
+        bursts = estimate_bursts(recording, spacing_wavelengths=spacing)
     if as_json:
-        print(json.dumps([burst.as_record() for burst in bursts], indent=2))
+        print(json_text([burst.as_record() for burst in bursts]))
     else:
         show_bursts(bursts)
 

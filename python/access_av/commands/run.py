@@ -6,7 +6,15 @@ from typing import Annotated, Any
 
 import typer
 
-from access_av.commands.options import Out, Runs, ScenarioArgument, Seed, Threads
+from access_av.commands.options import (
+    AllowLarge,
+    Out,
+    Runs,
+    ScenarioArgument,
+    Seed,
+    Threads,
+    load_scenario,
+)
 from access_av.errors import InputError
 from access_av.terminal import console, progress, show_simulation
 from access_av.toml import tomllib
@@ -23,6 +31,7 @@ def run(
     seed: Seed = 1,
     threads: Threads = None,
     out: Out = None,
+    allow_large: AllowLarge = False,
     overrides: Annotated[
         list[str] | None,
         typer.Option("--set", metavar="KEY=VALUE", help="Change one key; may be repeated."),
@@ -35,12 +44,11 @@ def run(
     """
     import polars as pl
 
-    from access_av._core import Scenario
     from access_av.files import ResultsDirectory, tum_trajectory
     from access_av.report.drive import render_drive
     from access_av.simulation import simulate
 
-    chosen = Scenario.load(scenario)
+    chosen = load_scenario(scenario, allow_large=allow_large)
     if overrides:
         chosen = chosen.with_overrides(dict(map(_override, overrides)))
     directory = ResultsDirectory.create(f"run-{chosen.name}", out)

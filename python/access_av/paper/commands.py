@@ -2,7 +2,6 @@
 
 from __future__ import annotations
 
-import json
 import math
 from pathlib import Path
 from typing import Annotated, Any
@@ -136,7 +135,7 @@ def search(
     Draws from what the paper leaves open; no gate, t_max kept. A search that was stopped goes on
     where it was (results/parts). The best one and its neighbours are driven again, more often.
     """
-    from access_av.files import RESULTS
+    from access_av.files import RESULTS, write_whole
     from access_av.paper.search import as_toml, confirmed, sample
     from access_av.paper.terminal import show_search
     from access_av.platform import Platform
@@ -161,7 +160,7 @@ def search(
     show_search(found, checked)
     if out is not None:
         best = checked[0].values if checked else found.values(found.best()[0])
-        out.write_text(as_toml(best), encoding="utf-8")
+        write_whole(out, as_toml(best))
         console.print(f"Reading: {out}", soft_wrap=True)
 
 
@@ -197,6 +196,7 @@ def explore(
     """
     from access_av.design_space import Query
     from access_av.design_space import explore as answer
+    from access_av.files import json_text
     from access_av.paper.results import operating_points
 
     with progress("No evaluation yet, driving") as tick:
@@ -206,7 +206,7 @@ def explore(
     query = Query(max_energy_j, max_rms_m, max_worst_m, max_executions, mode)
     found = answer(points, query)
     if as_json:
-        print(json.dumps(found.to_dicts(), indent=2))
+        print(json_text(found.to_dicts()))
         return
     if found.is_empty():
         console.print(f"No operating point has {query}.")
@@ -239,6 +239,7 @@ def fit(
     Simulates how often each setting executes, then solves for the energies that agree with the
     sums the paper states. This is where the shipped platform's "fitted" values come from.
     """
+    from access_av.files import write_whole
     from access_av.methods import label
     from access_av.paper import study
     from access_av.paper.energy_fit import FREE, SOLVED
@@ -255,5 +256,5 @@ def fit(
     console.print(made)
     console.print(f"{FREE} numbers were free, {SOLVED} of them solved for from stated figures.")
     if out is not None:
-        out.write_text(fitted.to_toml(), encoding="utf-8")
+        write_whole(out, fitted.to_toml())
         console.print(f"Platform file: {out}", soft_wrap=True)

@@ -202,7 +202,10 @@ def evaluate_with(driver: Driver, reading: Reading) -> Evaluation:
     return Evaluation(
         reading=reading,
         points=pl.DataFrame(
-            [_point(case, outcome, refitted) for case in wanted], infer_schema_length=None
+            [_point(case, outcome, refitted) for case in wanted],
+            infer_schema_length=None,
+            # Without a single figure there would be no type either.
+            schema_overrides={"energy_j": pl.Float64, "energy_provenance": pl.String},
         ),
         errors=pl.concat([_errors(setting, each.steps) for setting, each in driven.items()]),
         snr=reference.select("time_s", "mean_true_snr_db"),

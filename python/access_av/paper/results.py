@@ -6,6 +6,7 @@ from typing import TYPE_CHECKING, Any
 
 import polars as pl
 
+from access_av.columns import TABLES
 from access_av.errors import InputError
 from access_av.files import RESULTS, ResultsDirectory
 from access_av.paper.claims import as_records
@@ -22,9 +23,8 @@ if TYPE_CHECKING:
 POINTS_FILE = "operating_points.parquet"
 
 
-def write(made: Study, out: Path | None = None) -> ResultsDirectory:
+def write(made: Study, directory: ResultsDirectory) -> None:
     """Write tables, claims, report, scenarios, platform and manifest."""
-    directory = ResultsDirectory.create("evaluate", out)
     for name, table in made.tables().items():
         directory.write_table(f"{name}.parquet", table)
     directory.write_json("claims.json", as_records(made.claims))
@@ -43,7 +43,6 @@ def write(made: Study, out: Path | None = None) -> ResultsDirectory:
         duration_s=round(made.duration_s, 3),
     )
     directory.link_latest()
-    return directory
 
 
 def run(
@@ -56,9 +55,11 @@ def run(
     **how: Any,
 ) -> tuple[Study, ResultsDirectory]:
     """Evaluate these readings, or all that are shipped, and write the results."""
-    chosen = load_all(names)
-    made = study(chosen, Platform.load(platform), runs=runs, seed=seed, **how)
-    return made, write(made, out)
+    chosen, board = load_all(names), Platform.load(platform)
+    directory = ResultsDirectory.create("evaluate", out)
+    made = study(chosen, board, runs=runs, seed=seed, **how)
+    write(made, directory)
+    return made, directory
 
 
 def operating_points(
@@ -95,8 +96,23 @@ def operating_points(
             _, directory = run([reading], runs=100, seed=1, progress=progress)
             earlier = [directory.path / POINTS_FILE]
         file = earlier[-1]
-    points = pl.read_parquet(file)
+    points = _points(file)
     there = points["reading"].unique(maintain_order=True).to_list()
     if reading not in there:
         raise InputError(f"{file.parent}: no reading {reading} here; there are: {', '.join(there)}")
     return points.filter(pl.col("energy_j").is_not_null(), reading=reading)
+
+
+def _points(file: Path) -> pl.DataFrame:
+    """A table of operating points, with all its columns."""
+    try:
+        points = pl.read_parquet(file)
+    except pl.exceptions.PolarsError as error:
+        raise InputError(f"{file}: not a table of operating points ({error})") from error
+    words = {"reading", "campaign", "mode_name", "method", "energy_provenance"}
+    for name in TABLES["operating_points"].columns:
+        found = points.schema.get(name, pl.Unknown())
+        fine = found == pl.String if name in words else found.is_numeric() or found == pl.Boolean
+        if not fine:
+            raise InputError(f"{file}: not a table of operating points; `{name}` is {found}")
+    return points

@@ -16,9 +16,9 @@ POINTS_PER_LINE = 160
 Spec = dict[str, Any]
 
 
-def thinned(series: pl.DataFrame) -> pl.DataFrame:
+def thinned(series: pl.DataFrame, points: int = POINTS_PER_LINE) -> pl.DataFrame:
     """Enough points for a line on a screen, rounded to what can be seen."""
-    step = max(1, series.height // POINTS_PER_LINE)
+    step = max(1, series.height // points)
     return series.gather_every(step).with_columns(pl.col(pl.Float64).round(4))
 
 

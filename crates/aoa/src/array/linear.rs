@@ -23,10 +23,10 @@ impl<const N: usize> Array<N> {
     /// An ideal array with its elements `spacing_wavelengths` apart.
     ///
     /// # Errors
-    /// [`Error::Spacing`] unless the spacing is finite and positive.
+    /// [`Error::Spacing`] unless the spacing is 0.01 to 100 wavelengths.
     pub fn new(spacing_wavelengths: f64) -> Result<Self, Error> {
-        const { assert!(N >= 2, "an array has at least two antennas") };
-        if !(spacing_wavelengths.is_finite() && spacing_wavelengths > 0.0) {
+        const { assert!(N >= 2 && N <= 16, "an array has two to sixteen antennas") };
+        if !(0.01..=100.0).contains(&spacing_wavelengths) {
             return Err(Error::Spacing(spacing_wavelengths));
         }
         Ok(Self {
@@ -37,7 +37,7 @@ impl<const N: usize> Array<N> {
 
     /// The customary array: ideal elements half a wavelength apart.
     pub const fn half_wavelength() -> Self {
-        const { assert!(N >= 2, "an array has at least two antennas") };
+        const { assert!(N >= 2 && N <= 16, "an array has two to sixteen antennas") };
         Self {
             spacing_wavelengths: 0.5,
             calibration: Calibration::IDENTITY,

@@ -42,6 +42,11 @@ impl<const N: usize> Covariance<N> {
     #[must_use]
     pub fn spatially_smoothed<const M: usize>(&self) -> Covariance<M> {
         const { assert!(M >= 2 && M <= N, "a subarray has 2 to N antennas") };
+        self.over_subarrays()
+    }
+
+    /// The same for an `M` that is known to be no larger than `N` only at run time.
+    pub(crate) fn over_subarrays<const M: usize>(&self) -> Covariance<M> {
         let mut sum = zeros::<M>();
         let scale = 1.0 / (N - M + 1) as f64;
         for first in 0..=N - M {

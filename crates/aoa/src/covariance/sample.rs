@@ -4,6 +4,7 @@ use num_complex::{Complex, Complex64};
 
 use crate::error::Error;
 use crate::kernel::real::Real;
+use crate::linalg::eigen::hermitian_eigen;
 use crate::linalg::matrix::{Matrix, zeros};
 use crate::spectrum::polynomial::Spectrum;
 
@@ -68,7 +69,8 @@ impl<const N: usize> Covariance<N> {
     /// deviations of the estimates).
     ///
     /// # Errors
-    /// [`Error::NoSnapshots`], [`Error::NotFinite`], [`Error::Zero`], [`Error::NotHermitian`].
+    /// [`Error::NoSnapshots`], [`Error::NotFinite`], [`Error::Zero`], [`Error::NotHermitian`],
+    /// [`Error::Indefinite`].
     pub fn from_matrix(matrix: Matrix<N>, snapshots: usize) -> Result<Self, Error> {
         if !matrix.iter().flatten().all(|entry| entry.is_finite()) {
             return Err(Error::NotFinite);
@@ -84,11 +86,14 @@ impl<const N: usize> Covariance<N> {
             matrix[i][i].re >= 0.0
                 && (0..=i).all(|j| (matrix[i][j] - matrix[j][i].conj()).norm() <= tolerance)
         });
-        if hermitian {
-            Ok(covariance)
-        } else {
-            Err(Error::NotHermitian)
+        if !hermitian {
+            return Err(Error::NotHermitian);
         }
+        let smallest = hermitian_eigen(matrix, N).values[N - 1];
+        if smallest < -tolerance {
+            return Err(Error::Indefinite);
+        }
+        Ok(covariance)
     }
 
     /// Adds one snapshot. Bad values are noticed when an estimate is asked for.

@@ -4,7 +4,7 @@ use num_complex::Complex;
 
 use super::choice::Method;
 use super::one::estimate;
-use super::several::estimate_several;
+use super::smoothing::Smoothing;
 use crate::array::calibration::Calibration;
 use crate::array::linear::Array;
 use crate::covariance::sample::Covariance;
@@ -47,12 +47,17 @@ impl<'a, T: Real, const N: usize> Batch<'a, T, N> {
     /// A view of `samples`; what is left over beyond whole items is not part of it.
     ///
     /// # Errors
-    /// [`Error::NoSnapshots`] if `snapshots` is zero.
+    /// [`Error::NoSnapshots`] if `snapshots` is zero, [`Error::TooManySnapshots`] if those of all
+    /// antennas cannot be counted.
     pub fn new(samples: &'a [Complex<T>], snapshots: usize) -> Result<Self, Error> {
-        if snapshots == 0 {
-            Err(Error::NoSnapshots)
-        } else {
-            Ok(Self { samples, snapshots })
+        let antennas = N;
+        match snapshots.checked_mul(antennas) {
+            None => Err(Error::TooManySnapshots {
+                snapshots,
+                antennas,
+            }),
+            Some(0) => Err(Error::NoSnapshots),
+            Some(_) => Ok(Self { samples, snapshots }),
         }
     }
 
@@ -83,7 +88,7 @@ impl<'a, T: Real, const N: usize> Batch<'a, T, N> {
 
     /// Parts of `items` items each, the last one shorter.
     pub fn split(self, items: usize) -> impl Iterator<Item = Self> {
-        let part = (items * N * self.snapshots).max(1);
+        let part = items.saturating_mul(N * self.snapshots).max(1);
         self.samples
             .chunks(part)
             .map(move |samples| Self { samples, ..self })
@@ -93,35 +98,38 @@ impl<'a, T: Real, const N: usize> Batch<'a, T, N> {
     /// Stops where either ends.
     ///
     /// # Errors
-    /// Those of [`estimate_several`], with the index of the first item concerned.
+    /// Those of [`estimate_several`](crate::estimate_several), with the index of the first item concerned.
     pub fn estimate(
         self,
         method: Method,
         array: &Array<N>,
-        forward_backward: bool,
+        smoothing: Smoothing,
         sources: usize,
         estimates: &mut [AngleEstimate],
     ) -> Result<(), BatchError> {
         let many = self.len() > maximum_likelihood::BLOCK / 8;
-        if method == Method::MaximumLikelihood && sources == 1 && array.is_ideal() && many {
+        let whole = smoothing.subarray.is_none();
+        if method == Method::MaximumLikelihood && sources == 1 && array.is_ideal() && many && whole
+        {
             return self.maximum_likelihood(array, estimates);
         }
         let ideal = array.with_calibration(Calibration::IDENTITY);
         let places = estimates.chunks_exact_mut(sources.max(1));
         for (item, (covariance, places)) in self.covariances().zip(places).enumerate() {
-            let prepared = covariance.map(|covariance| {
+            let outcome = covariance.and_then(|covariance| {
                 let covariance = covariance.calibrated(array);
-                if forward_backward {
-                    covariance.forward_backward()
-                } else {
-                    covariance
+                match places {
+                    [only] if whole => {
+                        let covariance = if smoothing.forward_backward {
+                            covariance.forward_backward()
+                        } else {
+                            covariance
+                        };
+                        *only = estimate(method, &covariance, &ideal)?;
+                    }
+                    _ => smoothing.estimate(method, &covariance, &ideal, places)?,
                 }
-            });
-            let outcome = prepared.and_then(|covariance| match places {
-                [only] => estimate(method, &covariance, &ideal).map(|found| *only = found),
-                _ => estimate_several(method, &covariance, &ideal, sources).map(|found| {
-                    places.copy_from_slice(&found);
-                }),
+                Ok(())
             });
             outcome.map_err(|error| BatchError { item, error })?;
         }

@@ -50,7 +50,7 @@ pub fn estimate_several<const N: usize>(
 /// than that of as many independent ones.
 ///
 /// # Errors
-/// As [`estimate_several`] with `M` antennas.
+/// As [`estimate_several`] with `M` antennas; [`Error::Subarray`] if they are more than `N`.
 pub fn estimate_several_smoothed<const N: usize, const M: usize>(
     method: Method,
     covariance: &Covariance<N>,
@@ -58,6 +58,12 @@ pub fn estimate_several_smoothed<const N: usize, const M: usize>(
     sources: usize,
     forward_backward: bool,
 ) -> Result<AngleEstimates<M>, Error> {
+    if !(2..=N).contains(&M) {
+        return Err(Error::Subarray {
+            subarray: M,
+            antennas: N,
+        });
+    }
     let maximum = method.maximum_sources::<M>();
     if sources == 0 || sources > maximum {
         return Err(Error::TooManySources {
@@ -68,7 +74,7 @@ pub fn estimate_several_smoothed<const N: usize, const M: usize>(
     let full = covariance.calibrated(array).validated()?;
     let averaging = Averaging::<N, M> { forward_backward };
     let averaged = averaging.average(&full);
-    let array = array.subarray::<M>()?;
+    let array = Array::<M>::new(array.spacing_wavelengths())?;
     let eigen = hermitian_eigen(averaged.matrix(), M);
     let mut phases = subspace_phases(method, &eigen, sources, &array)?;
     let mut separated = phases.len() == sources;

@@ -19,15 +19,20 @@ pub enum Criterion {
 /// `k (2 N - k)` (AIC) or `k (2 N - k) ln(L) / 2` (MDL).
 ///
 /// # Errors
-/// If the covariance is empty, zero or not finite.
+/// If the covariance is empty, zero or not finite; [`Error::TooFewSnapshots`] unless they are more
+/// than the antennas: the smallest eigenvalues are zero then, and any noise looks like sources.
 pub fn source_count<const N: usize>(
     criterion: Criterion,
     covariance: &Covariance<N>,
 ) -> Result<usize, Error> {
     let covariance = covariance.validated()?;
+    if covariance.snapshots() <= N {
+        let (snapshots, needed) = (covariance.snapshots(), N + 1);
+        return Err(Error::TooFewSnapshots { snapshots, needed });
+    }
     let snapshots = covariance.snapshots() as f64;
     let values = hermitian_eigen(covariance.matrix(), N).values;
-    // Exactly zero eigenvalues (fewer snapshots than antennas) must not decide by a logarithm of 0.
+    // Exactly zero eigenvalues (signals without noise) must not decide by a logarithm of 0.
     let floor = values[0] * f64::EPSILON;
     let penalty = match criterion {
         Criterion::Aic => 1.0,

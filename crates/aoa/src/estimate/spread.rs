@@ -31,7 +31,7 @@ pub(super) struct Averaging<const N: usize, const M: usize> {
 
 impl<const N: usize, const M: usize> Averaging<N, M> {
     pub(super) fn average(self, covariance: &Covariance<N>) -> Covariance<M> {
-        let smoothed = covariance.spatially_smoothed::<M>();
+        let smoothed = covariance.over_subarrays::<M>();
         if self.forward_backward {
             smoothed.forward_backward()
         } else {

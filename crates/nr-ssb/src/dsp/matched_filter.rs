@@ -5,7 +5,8 @@
 //! `T_a = 240 |Σ p*(i) x_a(n+i)|² / Σ |x_a(n+i)|²` with `‖p‖ = 1`: in noise over the SSB's 240
 //! subcarriers exponentially distributed with mean one whatever the level (a beta distribution, to
 //! be exact, whose tail is the thinner), and about 127 × SNR where the PSS is. Antennas are summed
-//! non-coherently, so in noise the sum of `A` of them follows a gamma distribution of shape `A`.
+//! non-coherently, so in noise the sum of `A` of them follows a gamma distribution of shape `A`; where
+//! they hear the same interference they are whitened first, block by block.
 //!
 //! The PSS fills 127 of 256 bins, so its correlation is computed at half the base rate; the lags
 //! between are the sums of their neighbours, `(c(n−1) + c(n+1))/√2`, which carry noise of the same
@@ -21,6 +22,8 @@ use rustfft::{Fft, FftPlanner};
 
 use super::base_rate::SYMBOL_FFT;
 use super::pss_symbol::pss_symbol;
+use super::received_grid::MAX_ANTENNAS;
+use super::whitening::whitening;
 
 /// Length of a transform of the overlap-save scheme.
 const BLOCK: usize = 4096;
@@ -143,9 +146,17 @@ impl MatchedFilter {
         let mut start = first;
         while start < end {
             let lags = HOP.min(end - start);
-            for (antenna, samples) in antennas.iter().enumerate().take(self.spectra.len()) {
-                let window = &samples.as_ref()[start..length.min(start + BLOCK)];
-                self.load_antenna(antenna, window);
+            let mut windows: [&[Complex32]; MAX_ANTENNAS] = [&[]; MAX_ANTENNAS];
+            let count = antennas.len().min(self.spectra.len());
+            for (window, samples) in windows.iter_mut().zip(antennas) {
+                *window = &samples.as_ref()[start..length.min(start + BLOCK)];
+            }
+            let windows = &windows[..count.min(MAX_ANTENNAS)];
+            let weights = whitening(windows);
+            for antenna in 0..windows.len() {
+                let weights = weights.as_ref().map(|rows| &rows[antenna][..=antenna]);
+                self.load_block(antenna, windows, weights);
+                self.load_antenna(antenna);
             }
             for n_id_2 in 0..3 {
                 self.correlate(n_id_2);
@@ -155,11 +166,30 @@ impl MatchedFilter {
         }
     }
 
-    /// Spectrum of a block and the energy under the window at each pair of lags.
-    fn load_antenna(&mut self, antenna: usize, window: &[Complex32]) {
-        self.block[..window.len()].copy_from_slice(window);
+    /// The window of an antenna, or of the whitened channel in its place.
+    fn load_block(
+        &mut self,
+        antenna: usize,
+        windows: &[&[Complex32]],
+        weights: Option<&[Complex32]>,
+    ) {
+        let window = windows[antenna];
         self.block[window.len()..].fill(Complex32::ZERO);
+        let block = &mut self.block[..window.len()];
+        let Some(weights) = weights else {
+            block.copy_from_slice(window);
+            return;
+        };
+        block.fill(Complex32::ZERO);
+        for (window, weight) in windows.iter().zip(weights) {
+            for (sum, x) in block.iter_mut().zip(*window) {
+                *sum += x * weight;
+            }
+        }
+    }
 
+    /// Spectrum of the block and the energy under the window at each pair of lags.
+    fn load_antenna(&mut self, antenna: usize) {
         let pair_energy =
             |pair: &[Complex32; 2]| f64::from(pair[0].norm_sqr() + pair[1].norm_sqr());
         let (pairs, _) = self.block.as_chunks::<2>();

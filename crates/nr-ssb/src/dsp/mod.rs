@@ -11,3 +11,4 @@ pub(crate) mod matched_filter;
 pub(crate) mod pss_symbol;
 pub(crate) mod received_grid;
 pub(crate) mod timing;
+pub(crate) mod whitening;

@@ -6,7 +6,7 @@ use num_complex::Complex32;
 use super::detected::{DetectedSsb, ReceivedSsb, SearchCounts};
 use super::settings::SearchConfig;
 use crate::dsp::alignment::Alignment;
-use crate::dsp::base_rate::CYCLIC_PREFIX;
+use crate::dsp::base_rate::{CYCLIC_PREFIX, SSB_SAMPLES};
 use crate::dsp::cancel::Canceller;
 use crate::dsp::matched_filter::PssCandidate;
 use crate::dsp::received_grid::MAX_ANTENNAS;
@@ -20,12 +20,12 @@ use crate::standard::pci::Pci;
 
 /// Part of the threshold for a cell from which on its PBCH is decoded.
 const DECODE_FLOOR: f32 = 0.7;
-/// SNR after combining above which a PBCH always decodes (its block error rate is 1 % at −8 dB):
-/// a stronger "cell" whose PBCH does not decode is none.
+/// SNR after combining above which a PBCH always decodes (its block error rate is 1 % at −8 dB): a
+/// stronger "cell" whose PBCH does not decode, during another one's SSB, is what was left of that.
 const CERTAIN_DECODE_SNR_DB: f64 = -2.0;
 /// A cell whose PBCH does not decode, with the PSS of a cell so much stronger and so near to it in
 /// time, is taken for what was left of that one.
-const RESIDUE_DB: f64 = 25.0;
+const RESIDUE_DB: f64 = 15.0;
 const RESIDUE_SAMPLES: f64 = 1.0;
 /// Two detections of one cell closer than this, in samples, are one SSB.
 const SAME_SSB_SAMPLES: f64 = CYCLIC_PREFIX as f64;
@@ -151,7 +151,9 @@ impl Examiner {
         let mut broadcast = self.decoder.decode(&self.acquirer, &acquired);
         if broadcast.is_none() {
             let certain = 10.0_f64.powf(0.1 * CERTAIN_DECODE_SNR_DB);
-            if acquired.statistic < self.cell_threshold || self.acquirer.snr() > certain {
+            if acquired.statistic < self.cell_threshold
+                || self.acquirer.snr() > certain && self.is_overlaid(time)
+            {
                 return None;
             }
             broadcast = self.decoder.combine(&acquired, time);
@@ -175,6 +177,13 @@ impl Examiner {
         }
         self.remove(samples, &acquired.alignment);
         Some(acquired.alignment)
+    }
+
+    /// Whether an SSB that begins then overlaps in time with one that was found.
+    fn is_overlaid(&self, time: f64) -> bool {
+        let found = self.found.iter().map(|ssb| ssb.sample_start);
+        let mut starts = found.chain(self.recent.iter().map(|(_, start)| *start));
+        starts.any(|start| (start - time).abs() < SSB_SAMPLES as f64)
     }
 
     /// Whether an SSB may be what a clipped or otherwise distorted stronger one has left: with its

@@ -33,6 +33,33 @@ pub fn product<const N: usize>(left: &Matrix<N>, right: &Matrix<N>) -> Matrix<N>
     product
 }
 
+/// A covariance in other coordinates, `J P Jᵀ`. Its diagonal takes on top what rounding may have
+/// taken from its rows, so that it is positive definite (Gershgorin) also where `P` has no width.
+pub fn transformed<const N: usize>(jacobian: &Matrix<N>, covariance: &Matrix<N>) -> Matrix<N> {
+    let mut made = [[0.0; N]; N];
+    for i in 0..N {
+        for j in i..N {
+            let (mut sum, mut magnitude) = (0.0, 0.0);
+            for k in 0..N {
+                for l in 0..N {
+                    let term = jacobian[i][k] * covariance[k][l] * jacobian[j][l];
+                    sum += term;
+                    magnitude += f64::abs(term);
+                }
+            }
+            // N² terms of two products each, added up.
+            let rounding = (N * N + 2) as f64 * f64::EPSILON * magnitude;
+            made[i][j] += sum;
+            made[i][i] += rounding;
+            if i != j {
+                made[j][i] = made[i][j];
+                made[j][j] += rounding;
+            }
+        }
+    }
+    made
+}
+
 /// Mean and covariance of `N` states.
 #[derive(Clone, Copy, Debug, PartialEq)]
 pub struct Gaussian<const N: usize> {
@@ -180,6 +207,29 @@ mod tests {
             }
             let step = after[i] / variance * residual;
             assert!((belief.mean[i] - prior.mean[i] - step).abs() < 1e-12);
+        }
+    }
+
+    #[test]
+    fn a_covariance_without_width_stays_positive_in_other_coordinates() {
+        // Heading and course cancel: the third variance is nothing but rounding.
+        for curvature in [0.3, -0.07, 1e-3, 12.7] {
+            let (cos, sin) = (0.3_f64.cos(), 0.3_f64.sin());
+            let jacobian = [[cos, -sin, 0.0], [sin, cos, 0.0], [curvature, 0.0, 1.0]];
+            let along = 0.7_f64;
+            let cross = -along * curvature;
+            let inner = [
+                [along, 0.0, cross],
+                [0.0, 0.01, 0.0],
+                [cross, 0.0, -cross * curvature],
+            ];
+            let [[xx, xy, xh], [_, yy, yh], [hx, hy, hh]] = transformed(&jacobian, &inner);
+            assert!(hh > 0.0 && hh < 1e-12, "{hh}");
+            assert!((xh, yh) == (hx, hy));
+            let minor = xx * yy - xy * xy;
+            let whole =
+                xx * (yy * hh - yh * hy) - xy * (xy * hh - yh * hx) + xh * (xy * hy - yy * hx);
+            assert!(minor > 0.0 && whole > 0.0, "{minor} {whole}");
         }
     }
 

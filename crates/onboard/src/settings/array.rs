@@ -22,6 +22,7 @@ pub struct ArraySettings {
     pub rx_gain_dbi: f64,
     /// Place of its middle on the vehicle `[forward, left, up]` in metres, from the point on the
     /// ground whose motion the odometer measures.
+    #[schemars(inner(range(min = -100.0, max = 100.0)))]
     pub position_m: [f64; 3],
     /// Standard deviation of that in each of forward and left, in metres.
     #[schemars(range(min = 0.0, max = 10.0))]
@@ -47,6 +48,7 @@ pub struct ArraySettings {
     pub phase_drift_rad_per_sqrt_m: f64,
     /// Complex gain `[re, im]` of each channel, by which it is divided; ideal channels without.
     #[serde(skip_serializing_if = "Option::is_none")]
+    #[schemars(inner(inner(range(min = -1e3, max = 1e3))))]
     pub channel_gains: Option<Vec<[f64; 2]>>,
 }
 

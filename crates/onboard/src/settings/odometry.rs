@@ -33,6 +33,9 @@ pub struct OdometerSettings {
     /// Standard deviation of the distance after one metre, growing with the root of distance.
     #[schemars(range(min = 0.0, max = 10.0))]
     pub noise_m_per_sqrt_m: f64,
+    /// The same after one second of not quite standing, growing with the root of time.
+    #[schemars(range(min = 0.0, max = 10.0))]
+    pub noise_m_per_sqrt_s: f64,
     /// Standard deviation of a single reading of the speed, in m/s.
     #[schemars(range(min = 0.0, max = 10.0))]
     pub speed_noise_mps: f64,
@@ -48,6 +51,7 @@ impl Default for OdometerSettings {
             scale: 1.0,
             scale_std: 0.0,
             noise_m_per_sqrt_m: 0.0,
+            noise_m_per_sqrt_s: 0.0,
             speed_noise_mps: 0.0,
             dropout_probability: 0.0,
         }
@@ -73,9 +77,7 @@ pub struct GyroscopeSettings {
     /// Standard deviation of that in rad/s.
     #[schemars(range(min = 0.0, max = 10.0))]
     pub bias_std_radps: f64,
-    /// How the bias walks, in rad/s per root of a second; 0 is a constant bias on a road, and a
-    /// tenth of its standard deviation for a differential drive, whose wheels grip as the floor
-    /// lets them.
+    /// How the bias walks, in rad/s per root of a second; 0 is a constant bias.
     #[schemars(range(min = 0.0, max = 10.0))]
     pub bias_walk_radps_per_sqrt_s: f64,
 }

@@ -422,10 +422,28 @@ impl Platform {
 
 impl TomlFile for Platform {
     const WHAT: &'static str = "platform";
-    const SHIPPED: &'static [(&'static str, &'static str)] = &[(
-        "jetson-agx-xavier",
-        include_str!("../../../../platforms/jetson-agx-xavier.toml"),
-    )];
+    const SHIPPED: &'static [(&'static str, &'static str)] = &[
+        (
+            "generic-x86",
+            include_str!("../../../../platforms/generic-x86.toml"),
+        ),
+        (
+            "jetson-agx-orin",
+            include_str!("../../../../platforms/jetson-agx-orin.toml"),
+        ),
+        (
+            "jetson-agx-xavier",
+            include_str!("../../../../platforms/jetson-agx-xavier.toml"),
+        ),
+        (
+            "jetson-agx-xavier-engine",
+            include_str!("../../../../platforms/jetson-agx-xavier-engine.toml"),
+        ),
+        (
+            "raspberry-pi-5",
+            include_str!("../../../../platforms/raspberry-pi-5.toml"),
+        ),
+    ];
 
     fn name(&self) -> &str {
         &self.name
@@ -500,6 +518,39 @@ mod tests {
         assert_eq!(
             Platform::from_toml(&xavier.to_toml(), "again", &Shipped).unwrap(),
             xavier
+        );
+    }
+
+    #[test]
+    fn power_of_the_busy_board_is_what_was_measured_at_the_wall() {
+        let engine = Platform::from_library("jetson-agx-xavier-engine", &Shipped).unwrap();
+        let mut compared = 0;
+        for mode in &engine.modes {
+            if let Some(measured) = &mode.full_load_power_w {
+                let modelled_w = engine.busy_power_w(mode, mode.cores).unwrap();
+                assert!(
+                    (modelled_w / measured.value - 1.0).abs() < 0.1,
+                    "{}",
+                    mode.name
+                );
+                compared += 1;
+            }
+        }
+        assert_eq!(compared, 5);
+    }
+
+    #[test]
+    fn ranges_hold_their_values() {
+        for name in Platform::names() {
+            Platform::from_library(name, &Shipped).unwrap();
+        }
+        let high = "receiver.settling_ms.high";
+        let error = xavier()
+            .with_overrides([(high, Value::Float(2.0))], &Shipped)
+            .unwrap_err();
+        assert!(
+            error.to_string().contains("receiver.settling_ms.value"),
+            "{error}"
         );
     }
 

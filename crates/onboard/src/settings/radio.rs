@@ -11,6 +11,7 @@ pub struct RadioHeadSettings {
     #[serde(default)]
     pub name: String,
     /// Surveyed place `[x, y, z]` in metres; z is the height, counted as the vehicle's array's is.
+    #[schemars(inner(range(min = -1e7, max = 1e7)))]
     pub position_m: [f64; 3],
     /// Standard deviation of the survey in each of x and y, in metres.
     #[serde(default)]

@@ -1,6 +1,7 @@
 //! From TOML text to settings, with errors that name the key.
 
 use serde::de::DeserializeOwned;
+use serde_path_to_error::Segment;
 use toml::{Table, Value};
 
 use super::error::{SettingsError, nearest};
@@ -25,75 +26,92 @@ pub fn from_table<T: DeserializeOwned>(table: Table, file: &str) -> Result<T, Se
     let value = Value::Table(table);
     refuse_not_finite(&value, "", file)?;
     read::<T>(&value).map_err(|defect| {
-        let path = precise_path::<T>(&value, &defect);
+        let path = written(&precise_path::<T>(&value, &defect));
         explain(file, &path, &defect.message)
     })
 }
 
 /// What serde says is wrong, and where as far as it knows.
 struct Defect {
-    path: String,
+    path: Vec<Step>,
     message: String,
 }
 
+/// One step from a table or list into it.
+#[derive(Clone)]
+enum Step {
+    Key(String),
+    Index(usize),
+}
+
+/// Tables of more keys than any has that is meant are not searched for the offender.
+const MOST_KEYS: usize = 200;
+
 fn read<T: DeserializeOwned>(value: &Value) -> Result<T, Defect> {
-    serde_path_to_error::deserialize(value.clone()).map_err(|error| {
-        let path = error.path().to_string();
-        let message = error.inner().to_string();
-        Defect {
-            path: if path == "." { String::new() } else { path },
-            // The TOML reader adds the path on a second line, less precisely.
-            message: message.lines().next().unwrap_or_default().to_owned(),
-        }
+    serde_path_to_error::deserialize(value.clone()).map_err(|error| Defect {
+        path: error.path().iter().map_while(step).collect(),
+        // The TOML reader adds the path on a second line, less precisely.
+        message: (error.inner().to_string().lines().next())
+            .unwrap_or_default()
+            .to_owned(),
     })
+}
+
+fn step(segment: &Segment) -> Option<Step> {
+    match segment {
+        Segment::Seq { index } => Some(Step::Index(*index)),
+        Segment::Map { key } | Segment::Enum { variant: key } => Some(Step::Key(key.clone())),
+        Segment::Unknown => None,
+    }
 }
 
 /// The path of the offending key. serde's own path ends at tables with a tag, which it reads ahead
 /// as a whole; inside them the offender is the key without which this defect is gone.
-fn precise_path<T: DeserializeOwned>(value: &Value, defect: &Defect) -> String {
+fn precise_path<T: DeserializeOwned>(value: &Value, defect: &Defect) -> Vec<Step> {
     let mut path = defect.path.clone();
-    let gone = |key: &str| match read::<T>(&without(value, key)) {
-        Ok(_) => true,
-        Err(other) => {
-            other.message != defect.message && !other.message.starts_with("missing field")
-        }
-    };
     while let Some(Value::Table(table)) = at(value, &path) {
-        let candidates = table.keys().map(|key| join(&path, key));
-        let Some(offender) = candidates.into_iter().find(|candidate| gone(candidate)) else {
+        if table.len() > MOST_KEYS {
+            break;
+        }
+        let gone = |key: &&String| match read::<T>(&without(value, &path, key)) {
+            Ok(_) => true,
+            Err(other) => {
+                other.message != defect.message && !other.message.starts_with("missing field")
+            }
+        };
+        let Some(offender) = table.keys().find(gone) else {
             break;
         };
-        path = offender;
+        path.push(Step::Key(offender.clone()));
     }
     path
 }
 
-fn at<'a>(value: &'a Value, path: &str) -> Option<&'a Value> {
-    steps(path).try_fold(value, |here, step| match step.parse::<usize>() {
-        Ok(index) => here.get(index),
-        Err(_) => here.get(step),
+fn at<'a>(value: &'a Value, path: &[Step]) -> Option<&'a Value> {
+    path.iter().try_fold(value, |here, step| match step {
+        Step::Index(index) => here.get(*index),
+        Step::Key(key) => here.get(key),
     })
 }
 
-fn without(value: &Value, path: &str) -> Value {
+fn without(value: &Value, path: &[Step], key: &str) -> Value {
     let mut copy = value.clone();
-    if let Some((key, parents)) = steps(path).collect::<Vec<_>>().split_last() {
-        let table = parents
-            .iter()
-            .try_fold(&mut copy, |here, step| match step.parse::<usize>() {
-                Ok(index) => here.get_mut(index),
-                Err(_) => here.get_mut(step),
-            });
-        if let Some(table) = table.and_then(Value::as_table_mut) {
-            table.remove(*key);
-        }
+    let table = path.iter().try_fold(&mut copy, |here, step| match step {
+        Step::Index(index) => here.get_mut(*index),
+        Step::Key(key) => here.get_mut(key),
+    });
+    if let Some(table) = table.and_then(Value::as_table_mut) {
+        table.remove(key);
     }
     copy
 }
 
-/// `radio_heads[0].pci` as `radio_heads`, `0`, `pci`.
-fn steps(path: &str) -> impl Iterator<Item = &str> {
-    path.split(['.', '[', ']']).filter(|step| !step.is_empty())
+/// A path as `radio_heads[0].pci`.
+fn written(path: &[Step]) -> String {
+    path.iter().fold(String::new(), |path, step| match step {
+        Step::Index(index) => format!("{path}[{index}]"),
+        Step::Key(key) => join(&path, key),
+    })
 }
 
 /// serde says what it expected in words; put them into the error's fields.

@@ -32,6 +32,7 @@ pub struct RoadSettings {
     pub segments: Option<Vec<SegmentSettings>>,
     /// Surveyed points `[x, y]` in metres.
     #[serde(skip_serializing_if = "Option::is_none")]
+    #[schemars(inner(inner(range(min = -1e7, max = 1e7))))]
     pub polyline_m: Option<Vec<[f64; 2]>>,
     /// A CSV file with the columns `x_m`, `y_m`, or a GeoJSON `LineString` (projected onto the
     /// tangent plane of its first point), relative to the site's own place. Its points are

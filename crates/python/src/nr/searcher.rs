@@ -1,8 +1,10 @@
 //! A search whose plans and buffers are kept.
 
+use std::sync::{Mutex, PoisonError};
+
 use num_complex::Complex64;
 use pyo3::prelude::*;
-use recording::scan::{ArraySetup, FoundSsb, SsbSearch, SsbSearchConfig};
+use recording::scan::{ArraySetup, SsbSearch, SsbSearchConfig};
 
 use super::{Cell, complex_samples, rows, scan_error, subcarrier_spacing};
 
@@ -10,7 +12,7 @@ use super::{Cell, complex_samples, rows, scan_error, subcarrier_spacing};
 ///
 /// Transforms and buffers are kept between calls, and complex64 samples that lie in memory row by row
 /// are searched where they are. Other threads run meanwhile; one searcher serves one of them at a
-/// time.
+/// time, the others wait.
 ///
 /// Parameters
 /// ----------
@@ -46,8 +48,8 @@ use super::{Cell, complex_samples, rows, scan_error, subcarrier_spacing};
 /// ...     print(cell.pci, cell.ssb_index, cell.sfn)
 /// 42 1 7
 /// 42 1 8
-#[pyclass(module = "access_av._core.nr")]
-pub struct Searcher(SsbSearch);
+#[pyclass(frozen, module = "access_av._core.nr")]
+pub struct Searcher(Mutex<SsbSearch>);
 
 #[pymethods]
 impl Searcher {
@@ -75,7 +77,9 @@ impl Searcher {
                 antennas,
             )
         };
-        SsbSearch::new(config).map(Self).map_err(scan_error)
+        SsbSearch::new(config)
+            .map(|search| Self(Mutex::new(search)))
+            .map_err(scan_error)
     }
 
     /// Find every SSB in samples.
@@ -94,23 +98,28 @@ impl Searcher {
     /// ------
     /// RecordingError
     ///     Another number of antennas, less than one SSB, samples that are not finite.
-    fn search(&mut self, py: Python<'_>, samples: &Bound<'_, PyAny>) -> PyResult<Vec<Py<Cell>>> {
+    fn search(&self, py: Python<'_>, samples: &Bound<'_, PyAny>) -> PyResult<Vec<Py<Cell>>> {
         let samples = complex_samples(samples)?;
         let antennas = rows(&samples)?;
-        let found: &[FoundSsb] = py.detach(|| self.0.search(&antennas)).map_err(scan_error)?;
-        found
-            .iter()
-            .map(|ssb| Py::new(py, Cell::from(ssb)))
-            .collect()
+        let found: Vec<Cell> = py
+            .detach(|| {
+                let mut search = self.0.lock().unwrap_or_else(PoisonError::into_inner);
+                Ok(search.search(&antennas)?.iter().map(Cell::from).collect())
+            })
+            .map_err(scan_error)?;
+        found.into_iter().map(|cell| Py::new(py, cell)).collect()
     }
 
-    fn __repr__(&self) -> String {
-        let config = self.0.config();
-        format!(
-            "Searcher(ssb_freq_hz={:.0}, scs_khz={}, antennas={})",
-            config.ssb_freq_hz,
-            config.spacing.khz(),
-            config.antennas,
-        )
+    fn __repr__(&self, py: Python<'_>) -> String {
+        py.detach(|| {
+            let search = self.0.lock().unwrap_or_else(PoisonError::into_inner);
+            let config = search.config();
+            format!(
+                "Searcher(ssb_freq_hz={:.0}, scs_khz={}, antennas={})",
+                config.ssb_freq_hz,
+                config.spacing.khz(),
+                config.antennas,
+            )
+        })
     }
 }

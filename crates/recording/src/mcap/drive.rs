@@ -9,6 +9,7 @@ use mcap::McapError;
 
 use super::writer::{DiagnosticLevel, DiagnosticStatus, Frames, McapWriter, Twist};
 use crate::error::RecordingError;
+use crate::file::Partial;
 use crate::replay::{LocatedDrive, LocatedPose, Remark};
 use onboard::Execution;
 use onboard::localize::IntegrityState;
@@ -32,11 +33,12 @@ const DIAGNOSTIC_PERIOD_S: f64 = 1.0;
 /// # Errors
 /// [`RecordingError`] when the file cannot be written.
 pub fn write_drive_mcap(file: &Path, drive: &LocatedDrive) -> Result<(), RecordingError> {
-    let made = File::create(file).map_err(|source| RecordingError::io(file, source))?;
+    let (partial, made) = Partial::create(file)?;
     write(BufWriter::new(made), drive).map_err(|error| RecordingError::Write {
         file: file.display().to_string(),
         message: error.to_string(),
-    })
+    })?;
+    partial.finish()
 }
 
 fn write(file: BufWriter<File>, drive: &LocatedDrive) -> Result<(), McapError> {

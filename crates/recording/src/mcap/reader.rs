@@ -1,6 +1,5 @@
 //! Odometry out of an MCAP file.
 
-use std::fs::File;
 use std::io::BufReader;
 use std::path::Path;
 
@@ -10,6 +9,7 @@ use mcap::sans_io::LinearReaderOptions;
 use super::cdr::Decoder;
 use super::schema::ODOMETRY;
 use crate::error::RecordingError;
+use crate::file as files;
 use crate::odometry::{OdometryCollector, OdometryLog};
 use onboard::observation::OdometrySample;
 
@@ -33,7 +33,7 @@ struct Reading {
 /// [`RecordingError`] when the file is no MCAP, is cut off, or does not have exactly that topic.
 /// Single messages are only remarked upon.
 pub fn read_odometry_mcap(file: &Path, topic: Option<&str>) -> Result<OdometryLog, RecordingError> {
-    let opened = File::open(file).map_err(|source| RecordingError::io(file, source))?;
+    let opened = files::open(file).map_err(|source| RecordingError::io(file, source))?;
     let mut topics: Vec<String> = Vec::new();
     let mut collector = OdometryCollector::default();
     let mut last_place: Option<(f64, f64)> = None;

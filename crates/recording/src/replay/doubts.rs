@@ -30,12 +30,11 @@ pub fn doubts(
     angles: &[LoggedAngle],
 ) -> Result<Doubts, ReplayError> {
     let mut doubts = Doubts::new();
-    let (Some(first), Some(last)) = (odometry.samples.first(), odometry.samples.last()) else {
+    let Some(first) = odometry.samples.first() else {
         return Ok(doubts);
     };
     let start_s = first.time_s;
-    let inside =
-        |it: &&LoggedAngle| (first.time_s - 1.0..=last.time_s + 1.0).contains(&it.measured.time_s);
+    let inside = |it: &&LoggedAngle| odometry.covers(it.measured.time_s);
     let heard: Vec<&LoggedAngle> = angles.iter().filter(inside).collect();
     if let (Some(angle), true) = (angles.first(), heard.is_empty()) {
         return Err(ReplayError::Clocks {
@@ -85,7 +84,7 @@ pub fn doubts(
 
     let times_s = heard.iter().map(|it| it.measured.time_s);
     let mut before_s = start_s;
-    for time_s in times_s.chain([last.time_s]) {
+    for time_s in times_s.chain(odometry.samples.last().map(|it| it.time_s)) {
         if time_s - before_s > SILENCE_S {
             let text = format!(
                 "no angle for {:.0} s from {before_s:.1} s on",

@@ -33,6 +33,12 @@ pub enum ReplayError {
         /// Why.
         source: nr_ssb::front_end::FrontEndError,
     },
+    /// A start that is no time.
+    #[error("the recording's start time is {start_time_s} s; it must be finite")]
+    StartTime {
+        /// What was given.
+        start_time_s: f64,
+    },
     /// Angles and odometry of different times.
     #[error(
         "no angle falls into the odometry's time: odometry begins at {odometry_s} s, angles at \

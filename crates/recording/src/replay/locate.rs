@@ -58,6 +58,9 @@ pub fn locate_recording(
     start_time_s: f64,
     smooth: bool,
 ) -> Result<LocatedDrive, ReplayError> {
+    if !start_time_s.is_finite() {
+        return Err(ReplayError::StartTime { start_time_s });
+    }
     let (vehicle, start) = starting(site, vehicle, start)?;
     let mut replay = Replay::new(site, &vehicle, start, Custom::default(), odometry)?;
     for warning in recording.warnings() {
@@ -66,9 +69,19 @@ pub fn locate_recording(
     let file = recording.data_file().display().to_string();
     let mut receiver = Receiver::new(ReceiverConfig::new(site, &vehicle))
         .map_err(|source| ReplayError::Receive { file, source })?;
+    let (mut first_s, mut together) = (None, false);
     receive_recording(&mut receiver, recording, start_time_s, |ssbs| {
+        first_s = first_s.or(ssbs.first().map(|first| first.ssb.time_s));
+        together |= ssbs.iter().any(|it| odometry.covers(it.ssb.time_s));
         replay.hear(ssbs)
     })?;
+    if let (Some(angles_s), false) = (first_s, together) {
+        let odometry_s = odometry.samples.first().map_or(f64::NAN, |it| it.time_s);
+        return Err(ReplayError::Clocks {
+            odometry_s,
+            angles_s,
+        });
+    }
     finish(replay, site, &vehicle, start, odometry, smooth)
 }
 

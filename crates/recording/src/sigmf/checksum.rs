@@ -1,7 +1,6 @@
 //! SHA-512 of a data file.
 
 use std::fmt::Write;
-use std::fs::File;
 use std::io::{self, Read};
 use std::path::Path;
 
@@ -12,7 +11,7 @@ const BLOCK: usize = 1 << 16;
 
 /// SHA-512 of a file, hexadecimal, as `core:sha512` holds it.
 pub(super) fn of_file(path: &Path) -> io::Result<String> {
-    let mut file = File::open(path)?;
+    let mut file = crate::file::open(path)?;
     let mut hash = Sha512::new();
     let mut block = vec![0; BLOCK];
     loop {

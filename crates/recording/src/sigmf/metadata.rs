@@ -1,12 +1,15 @@
 //! The `.sigmf-meta` file.
 
-use std::fs;
 use std::path::Path;
 
 use serde::{Deserialize, Serialize};
 use serde_json::{Map, Value};
 
 use crate::error::RecordingError;
+use crate::file as files;
+
+/// Metadata of some hours of annotated SSBs.
+const MOST_BYTES: u64 = 512 << 20;
 
 /// Most channels a recording may have.
 const MAX_CHANNELS: usize = 1024;
@@ -131,7 +134,8 @@ impl Metadata {
     /// # Errors
     /// [`RecordingError`] naming the key where one is missing, of the wrong type or out of range.
     pub fn read(file: &Path) -> Result<Self, RecordingError> {
-        let text = fs::read(file).map_err(|source| RecordingError::io(file, source))?;
+        let text =
+            files::read(file, MOST_BYTES).map_err(|source| RecordingError::io(file, source))?;
         Self::parse(&text, file)
     }
 

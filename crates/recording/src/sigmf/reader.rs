@@ -11,6 +11,7 @@ use super::checksum;
 use super::metadata::{Annotation, Capture, Global, Metadata};
 use super::samples::Datatype;
 use crate::error::RecordingError;
+use crate::file as files;
 
 /// Bytes read from a file at once.
 const BLOCK_BYTES: usize = 1 << 18;
@@ -372,7 +373,7 @@ fn open_data(
     datatype: Datatype,
 ) -> Result<(File, u64), RecordingError> {
     let failed = |source| RecordingError::io(path, source);
-    let file = File::open(path).map_err(failed)?;
+    let file = files::open(path).map_err(failed)?;
     let bytes = file.metadata().map_err(failed)?.len();
     let frame_bytes = (channels * datatype.bytes()) as u64;
     if bytes == 0 || !bytes.is_multiple_of(frame_bytes) {

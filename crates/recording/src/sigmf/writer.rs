@@ -1,6 +1,6 @@
 //! Writing a recording: samples as they come, the metadata at the end.
 
-use std::fs::{self, File};
+use std::fs::File;
 use std::io::{BufWriter, Write};
 use std::path::{Path, PathBuf};
 
@@ -12,6 +12,7 @@ use super::checksum::hexadecimal;
 use super::metadata::{Annotation, Capture, Global, Metadata};
 use super::samples::Datatype;
 use crate::error::RecordingError;
+use crate::file::{self as files, Partial};
 
 /// Version of SigMF that is written.
 const VERSION: &str = "1.2.0";
@@ -33,12 +34,13 @@ pub struct WriterSettings {
     pub global: Map<String, Value>,
 }
 
-/// A recording being written. Without [`finish`](Self::finish) there is no metadata.
+/// A recording being written. Without [`finish`](Self::finish) nothing is left of it.
 #[derive(Debug)]
 pub struct RecordingWriter {
     settings: WriterSettings,
     meta_file: PathBuf,
     data_file: PathBuf,
+    partial: Partial,
     data: BufWriter<File>,
     hash: Sha512,
     captures: Vec<Capture>,
@@ -63,12 +65,12 @@ impl RecordingWriter {
         settings
             .metadata(String::new(), Vec::new(), Vec::new())
             .check(&meta_file)?;
-        let data =
-            File::create(&data_file).map_err(|source| RecordingError::io(&data_file, source))?;
+        let (partial, data) = Partial::create(&data_file)?;
         Ok(Self {
             settings,
             meta_file,
             data_file,
+            partial,
             data: BufWriter::new(data),
             hash: Sha512::new(),
             captures: Vec::new(),
@@ -148,9 +150,10 @@ impl RecordingWriter {
         let metadata =
             self.settings
                 .metadata(hexadecimal(self.hash), self.captures, self.annotations);
-        let failed = |source| RecordingError::io(&self.meta_file, source);
-        let text = serde_json::to_string_pretty(&metadata).map_err(|error| failed(error.into()))?;
-        fs::write(&self.meta_file, text + "\n").map_err(failed)?;
+        let text = serde_json::to_string_pretty(&metadata)
+            .map_err(|error| RecordingError::io(&self.meta_file, error.into()))?;
+        self.partial.finish()?;
+        files::write(&self.meta_file, (text + "\n").as_bytes())?;
         Ok(self.meta_file)
     }
 }

@@ -4,13 +4,13 @@
 use std::f64::consts::TAU;
 
 use num_complex::Complex64;
-use onboard::settings::{Site, Vehicle};
 use rand::RngExt;
 
+use super::blockage::Blockage;
 use super::phasor::phasor;
-use super::propagation::Propagation;
+use super::propagation::{Link, Propagation};
 use super::shadowing::Shadowing;
-use crate::random::{Purpose, Streams};
+use crate::random::Purpose;
 use crate::scenario::{ChannelSettings, ScatterModel};
 use crate::world::LineOfSight;
 
@@ -24,6 +24,7 @@ use crate::world::LineOfSight;
 #[derive(Debug, Clone)]
 pub struct RicianPropagation {
     shadowing: Shadowing,
+    blockage: Blockage,
     line_of_sight: f64,
     scatter: f64,
     wavenumber_per_m: f64,
@@ -47,14 +48,15 @@ struct Ray {
 }
 
 impl RicianPropagation {
-    /// The propagation from radio head number `head` of a site to a vehicle, as both are.
-    pub fn new(
-        settings: &ChannelSettings,
-        site: &Site,
-        vehicle: &Vehicle,
-        head: usize,
-        streams: Streams,
-    ) -> Self {
+    /// The propagation over a link.
+    pub fn new(settings: &ChannelSettings, link: &Link<'_>) -> Self {
+        let &Link {
+            site,
+            vehicle,
+            head,
+            streams,
+            ..
+        } = link;
         let mut rng = streams.generator(Purpose::Scatter, head);
         let k = 10f64.powf(0.1 * site.rician_k_db);
         let per_antenna = usize::from(settings.rays);
@@ -80,6 +82,7 @@ impl RicianPropagation {
             .collect();
         Self {
             shadowing: Shadowing::new(settings, streams, head),
+            blockage: Blockage::new(settings.blockage, link),
             line_of_sight: (k / (k + 1.0)).sqrt(),
             scatter: ((k + 1.0) * per_antenna as f64).recip().sqrt(),
             wavenumber_per_m: TAU / site.wavelength_m(),
@@ -91,20 +94,14 @@ impl RicianPropagation {
 }
 
 impl Propagation for RicianPropagation {
-    fn next_shadowing_db(&mut self, along_m: f64) -> f64 {
-        self.shadowing.next_db(along_m)
+    fn next_gain_db(&mut self, sight: &LineOfSight) -> f64 {
+        self.shadowing.next_db(sight.along_m)
     }
 
-    fn response(
-        &self,
-        sight: &LineOfSight,
-        along_m: f64,
-        step_hz: f64,
-        elements: usize,
-        into: &mut [Complex64],
-    ) {
+    fn response(&self, sight: &LineOfSight, step_hz: f64, elements: usize, into: &mut [Complex64]) {
         let turn = -self.wavenumber_per_m * sight.distance_m;
-        let direct = Complex64::from_polar(self.line_of_sight, turn);
+        let passing = self.blockage.amplitude(sight.time_s);
+        let direct = Complex64::from_polar(self.line_of_sight * passing, turn);
         let step = Complex64::cis(sight.phase_rad);
         for gains in into.chunks_exact_mut(elements) {
             let mut gain = Complex64::ONE;
@@ -122,7 +119,7 @@ impl Propagation for RicianPropagation {
             1
         };
         for (number, ray) in self.rays.iter().enumerate() {
-            let doppler = phasor(self.wavenumber_per_m * along_m * ray.cosine);
+            let doppler = phasor(self.wavenumber_per_m * sight.along_m * ray.cosine);
             let mut wave = ray.start * doppler * self.scatter;
             let mut turn = Complex64::ONE;
             if self.dispersive {
@@ -158,9 +155,12 @@ impl Propagation for RicianPropagation {
 
 #[cfg(test)]
 mod tests {
-    use onboard::settings::{Shipped, TomlFile};
+    use onboard::geometry::{Point, Pose};
+    use onboard::road::{Road, Segment};
+    use onboard::settings::{Shipped, Site, TomlFile, Vehicle};
 
     use super::*;
+    use crate::random::Streams;
 
     const ELEMENTS: usize = 4;
 
@@ -182,17 +182,39 @@ mod tests {
             delay_spread_ns,
             ..ChannelSettings::default()
         };
-        RicianPropagation::new(&settings, site, &vehicle, 0, streams)
+        let segment = Segment {
+            length_m: 10.0,
+            turn_rad: 0.0,
+            surveyed: true,
+        };
+        let road = Road::from_segments(Pose::default(), &[segment], 5.0).unwrap();
+        let link = Link {
+            site,
+            vehicle: &vehicle,
+            road: &road,
+            duration_s: 10.0,
+            head: 0,
+            streams,
+        };
+        RicianPropagation::new(&settings, &link)
+    }
+
+    fn sight(phase_rad: f64, along_m: f64) -> LineOfSight {
+        LineOfSight {
+            phase_rad,
+            distance_m: 0.0,
+            place: Point::default(),
+            axis_rad: 0.0,
+            element_rad: 0.5 * TAU,
+            along_m,
+            time_s: 0.0,
+        }
     }
 
     /// Gains at the carrier beside the radio head.
     fn gains(fading: &RicianPropagation, phase_rad: f64, along_m: f64) -> [Complex64; ELEMENTS] {
-        let sight = LineOfSight {
-            phase_rad,
-            distance_m: 0.0,
-        };
         let mut gains = [Complex64::ZERO; ELEMENTS];
-        fading.response(&sight, along_m, 0.0, ELEMENTS, &mut gains);
+        fading.response(&sight(phase_rad, along_m), 0.0, ELEMENTS, &mut gains);
         gains
     }
 
@@ -277,12 +299,12 @@ mod tests {
             let mut sums = [Complex64::ZERO; 4];
             for run in 0..runs {
                 let mut gains = [Complex64::ZERO; 4 * ELEMENTS];
-                let sight = LineOfSight {
-                    phase_rad: 0.0,
-                    distance_m: 0.0,
-                };
-                fading(&site, model, 300.0, Streams::new(5, run))
-                    .response(&sight, 3.0, step_hz, ELEMENTS, &mut gains);
+                fading(&site, model, 300.0, Streams::new(5, run)).response(
+                    &sight(0.0, 3.0),
+                    step_hz,
+                    ELEMENTS,
+                    &mut gains,
+                );
                 for (sum, there) in sums.iter_mut().zip(gains.chunks_exact(ELEMENTS)) {
                     let pairs = gains.iter().zip(there);
                     *sum += pairs.map(|(a, b)| a.conj() * b).sum::<Complex64>() / 4.0;

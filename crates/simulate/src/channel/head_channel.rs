@@ -78,13 +78,12 @@ impl HeadChannel {
         &self.array
     }
 
-    /// Mean SNR in dB of the SSB that arrives now: link budget and shadowing. To be called once for
-    /// each SSB, in order.
+    /// Mean SNR in dB of the SSB that arrives now: link budget, shadowing and further path loss. To
+    /// be called once for each SSB, in order.
     pub fn next_snr_db(&mut self, vehicle: &VehicleState) -> f64 {
         self.array.advance(vehicle.along_m);
-        let distance_m = self.array.distance_m(vehicle, &self.head);
-        let shadowing_db = self.propagation.next_shadowing_db(vehicle.along_m);
-        self.budget.snr_db(&self.head, distance_m) + shadowing_db
+        let sight = self.array.line_of_sight(vehicle, &self.head);
+        self.budget.snr_db(&self.head, sight.distance_m) + self.propagation.next_gain_db(&sight)
     }
 
     /// Gains of the antennas at frequencies `step_hz` apart around the carrier, for a mean SNR of
@@ -98,7 +97,7 @@ impl HeadChannel {
     ) {
         let elements = self.array.elements();
         let sight = self.array.line_of_sight(vehicle, &self.head);
-        (self.propagation).response(&sight, vehicle.along_m, step_hz, elements, into);
+        (self.propagation).response(&sight, step_hz, elements, into);
         let amplitude = 10f64.powf(0.05 * snr_db);
         for gains in into.chunks_exact_mut(elements) {
             for gain in gains.iter_mut() {

@@ -1,15 +1,21 @@
 //! The channel between radio heads and the vehicle's antennas, as snapshots or as samples.
 //! [`Propagation`] is the door for others.
 
+mod blockage;
 mod fading;
 mod head_channel;
 mod iq;
 mod phasor;
 mod propagation;
 mod shadowing;
+pub mod tr38901;
+mod traced;
 
+pub use blockage::Blockage;
 pub use fading::RicianPropagation;
 pub use head_channel::{HeadChannel, Reception};
 pub use iq::{IqAir, IqBurst};
-pub use propagation::Propagation;
+pub use propagation::{Link, Propagation};
 pub use shadowing::Shadowing;
+pub use tr38901::Tr38901Propagation;
+pub use traced::{Paths, PathsError, TracedPropagation};

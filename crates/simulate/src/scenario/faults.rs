@@ -35,6 +35,7 @@ pub enum FaultKind {
         /// Number of the radio head in the site, from 0.
         radio_head: usize,
         /// How far off it is, `[x, y]` in metres.
+        #[schemars(inner(range(min = -1e5, max = 1e5)))]
         by_m: [f64; 2],
     },
     /// The wheels slip: the odometer reads so many times the distance.

@@ -1,5 +1,7 @@
 //! A scenario file.
 
+use std::path::Path;
+
 use onboard::settings::{Check, Library, SettingsError, Site, TomlFile, Vehicle, check_together};
 use schemars::{JsonSchema, Schema, SchemaGenerator, json_schema};
 use serde::{Deserialize, Serialize};
@@ -9,7 +11,9 @@ use super::channel::ChannelSettings;
 use super::faults::FaultSettings;
 use super::iq::IqSettings;
 use super::motion::MotionSettings;
+use super::size::DriveSize;
 use super::truth::TruthSettings;
+use crate::channel::{Paths, PathsError};
 use onboard::road::Road;
 
 /// Everything a simulated drive depends on, besides the seed.
@@ -54,13 +58,6 @@ pub struct Scenario {
     #[schemars(length(max = 1000))]
     pub faults: Vec<FaultSettings>,
 }
-
-/// Radio heads times SSB bursts, or odometry samples, of a drive that nobody is asked about: some
-/// hours past four radio heads.
-const MOST_LOOKS: f64 = 5e6;
-/// Memory that a kept step and a kept angle take.
-const BYTES_PER_STEP: f64 = 200.0;
-const BYTES_PER_LOOK: f64 = 150.0;
 
 /// How much of the radio is simulated.
 #[derive(Debug, Clone, Copy, PartialEq, Eq, Default, Serialize, Deserialize, JsonSchema)]
@@ -140,20 +137,34 @@ impl TomlFile for Scenario {
         library: &dyn Library,
     ) -> Result<(), SettingsError> {
         hold::<Site>(table, origin, library)?;
-        hold::<Vehicle>(table, origin, library)
+        hold::<Vehicle>(table, origin, library)?;
+        let channel = table.get_mut("channel").and_then(Value::as_table_mut);
+        if let Some(Value::String(file)) = channel.and_then(|it| it.get_mut("paths")) {
+            // Written out elsewhere, the scenario still means the same file.
+            let folder = Path::new(origin).parent().unwrap_or(Path::new(""));
+            if let Ok(path) = std::path::absolute(folder.join(&*file)) {
+                *file = path.display().to_string();
+            }
+        }
+        Ok(())
     }
 
     fn check(&self, check: Check<'_>) -> Result<(), SettingsError> {
         check_together(&self.site, &self.vehicle, check)?;
         let road = self.path(check)?;
         self.check_motion(check, &road)?;
+        self.channel.check(check)?;
+        self.traced_paths(check)?;
         self.check_iq(check)?;
         let (heads, elements) = (self.site.radio_heads.len(), self.vehicle.array.elements);
         for (index, fault) in self.faults.iter().enumerate() {
             fault.check(check, index, heads, elements)?;
         }
-        let (_, vehicle) = self.truth.depart(&self.site, &self.vehicle, check)?;
-        self.check_size(check, &vehicle, &road)
+        let size = self.size(check)?;
+        if self.allow_large {
+            return Ok(());
+        }
+        size.check(check)
     }
 }
 
@@ -195,6 +206,56 @@ impl Scenario {
         }
     }
 
+    /// The traced paths, of a scenario that has them.
+    ///
+    /// # Errors
+    /// [`SettingsError::Value`] for a file that cannot be read, or is of another site.
+    pub fn traced_paths(&self, check: Check<'_>) -> Result<Option<Paths>, SettingsError> {
+        let Some(file) = &self.channel.paths else {
+            return Ok(None);
+        };
+        let refused = |why: PathsError| check.error("channel.paths", file, &why.to_string());
+        let paths = Paths::read(Path::new(file)).map_err(refused)?;
+        paths
+            .check(&self.site, &self.path(check)?)
+            .map_err(refused)?;
+        Ok(Some(paths))
+    }
+
+    /// What is so on average, over all runs: the site, the vehicle, and what it drives along.
+    ///
+    /// # Errors
+    /// [`SettingsError`] for a truth that cannot be.
+    pub fn actual(&self, check: Check<'_>) -> Result<(Site, Vehicle, Road), SettingsError> {
+        let (site, vehicle) = self.truth.depart(&self.site, &self.vehicle, check)?;
+        let road = match (&self.motion.path, &site.road) {
+            (None, Some(road)) => road.build("truth.site.road", check)?,
+            _ => self.path(check)?,
+        };
+        Ok((site, vehicle, road))
+    }
+
+    /// How large a drive is.
+    ///
+    /// # Errors
+    /// [`SettingsError`] for a truth that cannot be.
+    pub fn size(&self, check: Check<'_>) -> Result<DriveSize, SettingsError> {
+        let (site, vehicle, road) = self.actual(check)?;
+        Ok(DriveSize::new(&self.motion, &site, &vehicle, &road))
+    }
+
+    /// Refuses to hold more runs in memory than it is likely to have.
+    ///
+    /// # Errors
+    /// [`SettingsError`], unless `allow_large`.
+    pub fn check_runs(&self, runs: usize) -> Result<(), SettingsError> {
+        let check = Check { file: &self.name };
+        if self.allow_large {
+            return Ok(());
+        }
+        self.size(check)?.check_runs(runs, check)
+    }
+
     /// Refuses what cannot be sent as samples.
     ///
     /// # Errors
@@ -220,37 +281,6 @@ impl Scenario {
             )?;
         }
         Ok(())
-    }
-
-    /// Refuses a drive that would take hours and gigabytes, unless it is meant.
-    fn check_size(
-        &self,
-        check: Check<'_>,
-        vehicle: &Vehicle,
-        road: &Road,
-    ) -> Result<(), SettingsError> {
-        let top_speed_kmh = self.motion.top_speed_kmh.unwrap_or(vehicle.top_speed_kmh);
-        let acceleration_mps2 =
-            (self.motion.acceleration_mps2).unwrap_or(vehicle.acceleration_mps2);
-        let (stops, top_speed_mps) = (&self.motion.stops, top_speed_kmh / 3.6);
-        // Each leg takes one ramp more than at top speed throughout, or less if it is short.
-        let ramps_s = (1.0 + stops.len() as f64) * top_speed_mps / acceleration_mps2;
-        let dwell_s: f64 = stops.iter().map(|stop| stop.dwell_s).sum();
-        let duration_s = road.length_m() / top_speed_mps + ramps_s + dwell_s;
-        let bursts = duration_s / self.site.ssb.period_s();
-        let looks = bursts * self.site.radio_heads.len() as f64;
-        let samples = duration_s * vehicle.odometer.rate_hz;
-        let hours = duration_s / 3600.0;
-        let gigabytes = (bursts * BYTES_PER_STEP + looks * BYTES_PER_LOOK) * 1e-9;
-        check.that(
-            looks.max(samples).max(bursts) <= MOST_LOOKS || self.allow_large,
-            "motion",
-            format!("a drive of {hours:.1} h, {looks:.1e} SSBs and up to {gigabytes:.1} GB a run"),
-            &format!(
-                "at most {MOST_LOOKS:.0e} SSBs or odometry samples are driven without \
-                 allow_large = true; shorten the road or the stops, or raise top_speed_kmh"
-            ),
-        )
     }
 
     fn check_motion(&self, check: Check<'_>, road: &Road) -> Result<(), SettingsError> {

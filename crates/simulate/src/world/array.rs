@@ -28,6 +28,16 @@ pub struct LineOfSight {
     pub phase_rad: f64,
     /// Length in metres.
     pub distance_m: f64,
+    /// Where the middle of the array is.
+    pub place: Point,
+    /// Direction of its axis in the map's frame, in radians.
+    pub axis_rad: f64,
+    /// Phase in radians from antenna to antenna of a wave that comes along the axis.
+    pub element_rad: f64,
+    /// Distance driven in metres.
+    pub along_m: f64,
+    /// Time in seconds.
+    pub time_s: f64,
 }
 
 impl TrueArray {
@@ -65,18 +75,18 @@ impl TrueArray {
         let eye = self.eye(vehicle);
         let distance_m = head.distance_m(eye, self.height_m());
         let level = eye.distance_m(head.position) / distance_m;
-        let to_axis_rad =
-            eye.bearing_rad(head.position) - vehicle.pose.heading_rad - self.settings.mounting_rad;
+        let axis_rad = vehicle.pose.heading_rad + self.settings.mounting_rad;
+        let to_axis_rad = eye.bearing_rad(head.position) - axis_rad;
         let element_rad = TAU * self.settings.spacing_wavelengths;
         LineOfSight {
             phase_rad: element_rad * level * to_axis_rad.cos(),
             distance_m,
+            place: eye,
+            axis_rad,
+            element_rad,
+            along_m: vehicle.along_m,
+            time_s: vehicle.time_s,
         }
-    }
-
-    /// How far it is from a radio head, in metres.
-    pub fn distance_m(&self, vehicle: &VehicleState, head: &RadioHead) -> f64 {
-        head.distance_m(self.eye(vehicle), self.height_m())
     }
 
     /// Where its middle is.

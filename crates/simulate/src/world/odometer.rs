@@ -55,6 +55,9 @@ impl Odometer {
         if self.settings.noise_m_per_sqrt_m > 0.0 {
             step_m += self.settings.noise_m_per_sqrt_m * driven_m.sqrt() * self.normal();
         }
+        if self.settings.noise_m_per_sqrt_s > 0.0 && driven_m != 0.0 {
+            step_m += self.settings.noise_m_per_sqrt_s * duration_s.sqrt() * self.normal();
+        }
         self.measured_m += step_m;
         let yaw_rate_radps = self.gyroscope.and_then(|gyro| {
             let turn_rad = now.pose.heading_rad - self.last.pose.heading_rad

@@ -41,6 +41,9 @@ pub struct TrackerConfig {
     pub yaw_rate_bias_radps: f64,
     /// Standard deviation of that at the start (rad/s); 0 takes it as calibrated.
     pub yaw_rate_bias_std_radps: f64,
+    /// Standard deviation of the yaw rate's scale at the start: where two wheels tell the turn,
+    /// that of their distance.
+    pub yaw_rate_scale_std: f64,
     /// Standard deviation of the array's mounting angle at the start (rad); 0 takes it as known.
     pub mounting_std_rad: f64,
     /// Phase offset that calibration is known to have left (rad per element).
@@ -124,6 +127,10 @@ const USUAL_GYROSCOPE: [f64; 2] = [1e-3, 1e-3];
 const USUAL_WHEELS: [f64; 2] = [0.05, 0.05];
 const USUAL_WHEELS_TURN: [f64; 2] = [0.05, 0.01];
 
+/// Their random walk over time, and not only over the way: they start late, creep, and what they
+/// read as they stand is not always zero (m/√s).
+const USUAL_WHEELS_NOISE_M_PER_SQRT_S: f64 = 0.02;
+
 /// How far the scale of such wheels walks, as they grip as the floor lets them (per √m).
 const USUAL_SCALE_WALK_PER_SQRT_M: f64 = 0.03;
 
@@ -171,6 +178,11 @@ impl TrackerConfig {
                 stated.max(least)
             }
         };
+        let odometer_scale_std = or_usual(
+            odometer.scale_std,
+            USUAL_WHEELS[1],
+            LEAST_ODOMETER_SCALE_STD,
+        );
         let receiver = &vehicle.receiver;
         Self {
             drive: vehicle.drive,
@@ -194,6 +206,11 @@ impl TrackerConfig {
                     USUAL_WHEELS[0],
                     LEAST_ODOMETER_NOISE_M_PER_SQRT_M,
                 ),
+                odometer_m_per_sqrt_s: or_usual(
+                    odometer.noise_m_per_sqrt_s,
+                    USUAL_WHEELS_NOISE_M_PER_SQRT_S,
+                    0.0,
+                ),
                 scale_per_sqrt_m: or_usual(
                     settings.odometer_scale_walk_per_sqrt_m,
                     USUAL_SCALE_WALK_PER_SQRT_M,
@@ -205,15 +222,12 @@ impl TrackerConfig {
                 phase_rad_per_sqrt_m: array.phase_drift_rad_per_sqrt_m,
             },
             odometer_scale: odometer.scale,
-            odometer_scale_std: or_usual(
-                odometer.scale_std,
-                USUAL_WHEELS[1],
-                LEAST_ODOMETER_SCALE_STD,
-            ),
+            odometer_scale_std,
             mounting_rad: array.mounting_rad,
             yaw_noise_rad_per_sqrt_s: yaw_noise,
             yaw_rate_bias_radps: gyroscope.map_or(0.0, |gyroscope| gyroscope.bias_radps),
             yaw_rate_bias_std_radps: yaw_bias_std,
+            yaw_rate_scale_std: if wheels { odometer_scale_std } else { 0.0 },
             mounting_std_rad: or_usual(array.mounting_std_rad, USUAL_MOUNTING_STD_RAD, 0.0),
             phase_rad: array.phase_rad,
             phase_std_rad: array.phase_std_rad,

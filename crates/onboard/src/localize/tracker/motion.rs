@@ -12,6 +12,7 @@
 
 use super::state::{
     ACROSS, ALONG, Belief, CURVATURE, HEADING, MOUNTING, PHASE, SCALE, STATES, YAW_RATE_BIAS,
+    YAW_RATE_SCALE,
 };
 use crate::geometry::Pose;
 use crate::localize::gaussian::{Matrix, identity};
@@ -33,6 +34,8 @@ pub struct PathBend {
 pub struct MotionNoise {
     /// Random walk of the odometer (m per √m).
     pub odometer_m_per_sqrt_m: f64,
+    /// The same over time, unless it stands (m per √s).
+    pub odometer_m_per_sqrt_s: f64,
     /// Random walk of the odometer's scale (1 per √m).
     pub scale_per_sqrt_m: f64,
     /// Random walk of the yaw rate's bias (rad/s per √s).
@@ -205,11 +208,13 @@ impl Step {
 
     /// The step of a vehicle that turns as its yaw rate says, wherever that leads:
     /// `ψ⁺ = ψ + τ`, `p⁺ = p + l sinc(τ/2) (cos, sin)(ψ + τ/2)`, for the length l and the turn
-    /// `τ = ∫ yaw rate dt − b Δt`, b being the yaw rate's bias.
+    /// `τ = (∫ yaw rate dt − b Δt) / (1 + κ)`, b being the yaw rate's bias and κ the error of its
+    /// scale.
     pub fn turning(start: &[f64; STATES], reading_m: f64, yaw: &Yaw, walk: &MotionNoise) -> Self {
         let scale = 1.0 + start[SCALE];
         let length = reading_m / scale;
-        let turn_rad = yaw.turn_rad - start[YAW_RATE_BIAS] * yaw.duration_s;
+        let yaw_scale = 1.0 + start[YAW_RATE_SCALE];
+        let turn_rad = (yaw.turn_rad - start[YAW_RATE_BIAS] * yaw.duration_s) / yaw_scale;
         let before = Pose {
             x_m: start[ALONG],
             y_m: start[ACROSS],
@@ -226,16 +231,18 @@ impl Step {
         f[ACROSS][HEADING] = step[0];
         f[ALONG][SCALE] = -step[0] / scale;
         f[ACROSS][SCALE] = -step[1] / scale;
-        f[ALONG][YAW_RATE_BIAS] = -yaw.duration_s * by_turn[0];
-        f[ACROSS][YAW_RATE_BIAS] = -yaw.duration_s * by_turn[1];
-        f[HEADING][YAW_RATE_BIAS] = -yaw.duration_s;
+        let turned = [by_turn[0], by_turn[1], 1.0];
+        for (row, by_turn) in [ALONG, ACROSS, HEADING].into_iter().zip(turned) {
+            f[row][YAW_RATE_BIAS] = -yaw.duration_s / yaw_scale * by_turn;
+            f[row][YAW_RATE_SCALE] = -turn_rad / yaw_scale * by_turn;
+        }
 
         let distance = length.abs();
         let mut q = [[0.0; STATES]; STATES];
-        let spread = walk.odometer_m_per_sqrt_m.powi(2) * distance;
+        let spread = walk.odometer_m_per_sqrt_m.powi(2) * distance
+            + walk.odometer_m_per_sqrt_s.powi(2) * yaw.duration_s;
         let (sin, cos) = (start[HEADING] + 0.5 * turn_rad).sin_cos();
         let along = [cos, sin, 0.0];
-        let turned = [by_turn[0], by_turn[1], 1.0];
         for (i, row) in [ALONG, ACROSS, HEADING].into_iter().enumerate() {
             for (j, column) in [ALONG, ACROSS, HEADING].into_iter().enumerate() {
                 q[row][column] =

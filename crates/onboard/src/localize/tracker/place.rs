@@ -3,7 +3,12 @@
 use super::filter::Tracker;
 use super::locate::locate;
 use super::state::{Belief, SCALE};
+use crate::localize::gaussian::transformed;
 use crate::localize::pose_estimate::PoseEstimate;
+
+/// Nothing is known better than to a nanometre and a nanoradian: so much the covariance says at
+/// least, though a belief that began exactly has no width.
+const LEAST_VARIANCE: f64 = 1e-18;
 
 impl Tracker {
     /// The pose at `time_s`, carried on from the newest odometry at its speed.
@@ -54,15 +59,9 @@ impl Tracker {
             }
         }
         inner[0][0] += lag_variance;
-        let mut covariance = [[0.0; 3]; 3];
+        let mut covariance = transformed(&jacobian, &inner);
         for i in 0..3 {
-            for j in 0..3 {
-                for k in 0..3 {
-                    for l in 0..3 {
-                        covariance[i][j] += jacobian[i][k] * inner[k][l] * jacobian[j][l];
-                    }
-                }
-            }
+            covariance[i][i] += LEAST_VARIANCE;
         }
         PoseEstimate {
             time_s,

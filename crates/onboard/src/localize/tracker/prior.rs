@@ -8,7 +8,7 @@ use super::interface::InitialPose;
 use super::locate::locate;
 use super::state::{
     ACROSS, ALONG, Belief, CURVATURE, HEADING, LATENESS, MOUNTING, PHASE, SCALE, STATES,
-    YAW_RATE_BIAS,
+    YAW_RATE_BIAS, YAW_RATE_SCALE,
 };
 use crate::geometry::wrap_angle;
 use crate::radio_head::RadioHead;
@@ -20,6 +20,7 @@ impl Tracker {
         let mut sigma = [0.0; STATES];
         sigma[SCALE] = config.odometer_scale_std;
         sigma[YAW_RATE_BIAS] = config.yaw_rate_bias_std_radps;
+        sigma[YAW_RATE_SCALE] = config.yaw_rate_scale_std;
         sigma[MOUNTING] = config.mounting_std_rad;
         sigma[PHASE] = config.phase_std_rad;
         sigma[LATENESS] = config.lateness_std_s;

@@ -1,10 +1,10 @@
-//! What the tracker knows about: nine states, the same with and without a map. A state that a
+//! What the tracker knows about: ten states, the same with and without a map. A state that a
 //! setting switches off has zero variance and never moves.
 
 use crate::localize::gaussian::Gaussian;
 
 /// Number of states.
-pub const STATES: usize = 9;
+pub const STATES: usize = 10;
 
 /// The tracker's belief.
 pub type Belief = Gaussian<STATES>;
@@ -27,3 +27,5 @@ pub const MOUNTING: usize = 6;
 pub const PHASE: usize = 7;
 /// How much later angles come than their setting says (s).
 pub const LATENESS: usize = 8;
+/// Scale error κ of the yaw rate that wheels tell: it reads `(1 + κ)` times the turn.
+pub const YAW_RATE_SCALE: usize = 9;

@@ -1,0 +1,148 @@
+"""``python -m attack``: run many cases, count what is wrong with them, keep those that fail."""
+
+from __future__ import annotations
+
+import argparse
+import json
+import os
+import queue
+import secrets
+import select
+import shutil
+import subprocess
+import sys
+import tempfile
+import threading
+import time
+from collections import Counter
+from pathlib import Path
+
+from attack import kinds
+
+LONGEST_S = 20.0
+# Before the first case, what all of them need is made.
+STARTING_S = 300.0
+
+
+class Worker:
+    """A worker process, and a new one where it died."""
+
+    def __init__(self, seed: int, place: Path):
+        self.command = [sys.executable, "-m", "attack.worker", str(seed), str(place)]
+        self.process: subprocess.Popen[bytes] | None = None
+
+    def ask(self, kind: str, number: int) -> dict[str, object]:
+        """What is wrong with a case: as the worker says, or that it died or hung of it."""
+        process = self.process or self._start()
+        assert process.stdin is not None
+        process.stdin.write(f"{kind} {number}\n".encode())
+        process.stdin.flush()
+        line = self._line(process, LONGEST_S)
+        if line:
+            return dict(json.loads(line))
+        hung = process.poll() is None
+        process.kill()
+        code, self.process = process.wait(), None
+        what = (
+            f"hang: more than {LONGEST_S:.0f} s"
+            if hung
+            else f"abort: the process ended with {code}"
+        )
+        return {"findings": [what], "ok": 0, "beyond": 0}
+
+    def _start(self) -> subprocess.Popen[bytes]:
+        environment = {**os.environ, "POLARS_MAX_THREADS": "1", "RUST_BACKTRACE": "0"}
+        self.process = subprocess.Popen(
+            self.command, stdin=subprocess.PIPE, stdout=subprocess.PIPE, env=environment
+        )
+        if not self._line(self.process, STARTING_S):
+            raise RuntimeError("a worker does not start")
+        return self.process
+
+    @staticmethod
+    def _line(process: subprocess.Popen[bytes], timeout_s: float) -> bytes:
+        assert process.stdout is not None
+        ready, _, _ = select.select([process.stdout], [], [], timeout_s)
+        return process.stdout.readline() if ready else b""
+
+    def stop(self) -> None:
+        """End the process."""
+        if self.process is not None:
+            self.process.kill()
+            self.process.wait()
+
+
+def attack(
+    seed: int, cases: list[tuple[str, int]], workers: int, kept: Path
+) -> tuple[Counter[str], int, int]:
+    """Count kinds of findings, and the epochs that said ``ok`` and were beyond their level."""
+    waiting: queue.SimpleQueue[tuple[str, int]] = queue.SimpleQueue()
+    for case in cases:
+        waiting.put(case)
+    counts: Counter[str] = Counter()
+    epochs = [0, 0]
+    place = Path(tempfile.mkdtemp(prefix="attack-"))
+
+    def work() -> None:
+        worker = Worker(seed, place)
+        try:
+            while True:
+                kind, number = waiting.get_nowait()
+                found = worker.ask(kind, number)
+                epochs[0] += found["ok"]  # type: ignore[operator]
+                epochs[1] += found["beyond"]  # type: ignore[operator]
+                folder = place / f"{kind}-{number}"
+                for finding in found["findings"]:  # type: ignore[attr-defined]
+                    counts[finding.split(":")[0]] += 1
+                    print(f"  {folder.name}: {finding}", flush=True)
+                if found["findings"]:
+                    shutil.move(folder, kept / folder.name)
+                else:
+                    shutil.rmtree(folder, ignore_errors=True)
+        except queue.Empty:
+            worker.stop()
+
+    threads = [threading.Thread(target=work) for _ in range(workers)]
+    for thread in threads:
+        thread.start()
+    for thread in threads:
+        thread.join()
+    shutil.rmtree(place, ignore_errors=True)
+    return counts, epochs[0], epochs[1]
+
+
+def main() -> None:
+    """Exit code 1 where anything is wrong."""
+    options = argparse.ArgumentParser(prog="python -m attack", description=__doc__)
+    options.add_argument("--seed", type=int, help="repeat an attack; else a new one each time")
+    options.add_argument("--inputs", type=int, default=20_000, help="cases other than drives")
+    options.add_argument("--drives", type=int, default=2_000, help="random drives")
+    options.add_argument("--workers", type=int, default=os.cpu_count() or 1)
+    options.add_argument("--only", metavar="KIND-NUMBER", help="make and run one case of the seed")
+    options.add_argument(
+        "--keep", type=Path, help="where failing cases go; else results/attack-SEED"
+    )
+    chosen = options.parse_args()
+    seed = secrets.randbits(32) if chosen.seed is None else chosen.seed
+    print(f"seed {seed}", flush=True)
+    cases = [*kinds.inputs(seed, chosen.inputs), *(("drive", n) for n in range(chosen.drives))]
+    if chosen.only:
+        kind, _, number = chosen.only.rpartition("-")
+        cases = [(kind, int(number))]
+    kept = (chosen.keep or Path("results") / f"attack-{seed}").resolve()
+    kept.mkdir(parents=True, exist_ok=True)
+    began_s = time.monotonic()
+    counts, ok, beyond = attack(seed, cases, chosen.workers, kept)
+    print(f"{len(cases)} cases in {time.monotonic() - began_s:.0f} s")
+    if ok:
+        print(f"{beyond} of {ok} epochs beyond their protection level while ok: {beyond / ok:.1e}")
+    if counts:
+        print(f"findings: {dict(counts)}")
+        print(f"each in a folder of its own, to be run there by `sh command.sh`: {kept}")
+        sys.exit(1)
+    kept.rmdir()
+    print("no findings")
+
+
+if __name__ == "__main__":
+    main()

@@ -1,0 +1,87 @@
+"""Numbers and words on the command line: every option of every command."""
+
+from __future__ import annotations
+
+from functools import cache
+from typing import TYPE_CHECKING, Any
+
+import typer.main
+
+from attack import mutate
+from attack.files import recorded
+
+if TYPE_CHECKING:
+    from random import Random
+
+    from attack.case import Case
+
+# What makes a case of each command that ends soon; options in it are not drawn.
+QUICK: dict[str, list[str]] = {
+    "run": ["short.toml"],
+    "evaluate": ["--scenario", "papier"],
+    "search": ["--platform", "jetson"],
+    "fit": ["--platform", "jetson"],
+    "explore": ["--results", "nowhere"],
+    "bound": ["short.toml"],
+    "scan": ["iq.sigmf-meta", "--ssb-freq-hz", "3.5e9", "--scs-khz", "15"],
+    "aoa": ["iq.sigmf-meta"],
+    "synth": ["short.toml", "--duration-s", "0.1", "--out", "made"],
+    "locate": [
+        "--recording", "angles.csv", "--odometry", "odometry.csv", "--site", "site.toml",
+        "--vehicle", "vehicle.toml",
+    ],
+    "readings": [],
+    "columns": [],
+}  # fmt: skip
+SHORT = 'like = "paper-real-odometry-2"\nname = "short"\n[motion]\nstart_at_m = 296.0\n'
+
+
+@cache
+def options(command: str) -> list[Any]:
+    """The options of a command that change something, as the command itself has them."""
+    from access_av.cli import app
+
+    found: Any = typer.main.get_command(app)
+    parameters = found.commands[command].params
+    return [
+        it
+        for it in parameters
+        if it.opts[0].startswith("--") and not it.is_flag and it.opts[0] not in QUICK[command]
+    ]
+
+
+def arguments(random: Random, case: Case) -> list[str]:
+    """One command, one to three of its options at random."""
+    for name, content in recorded().items():
+        case.write(name, content)
+    case.write("short.toml", SHORT)
+    command = random.choice(list(QUICK))
+    words = [command, *QUICK[command]]
+    known = options(command)
+    for option in random.sample(known, min(len(known), random.choice((1, 1, 2, 3)))):
+        words += [option.opts[0], _value(random, option)]
+    if "--runs" in words and words[words.index("--runs") + 1].isdigit():
+        at = words.index("--runs") + 1  # those between few and too many only take long
+        words[at] = words[at] if int(words[at]) < 5 or int(words[at]) > 10**5 else "3"
+    if not known or random.random() < 0.1:
+        words.append(_without_nul(random.choice(mutate.TEXTS)))
+    return case.access_av(*words)
+
+
+def _value(random: Random, option: Any) -> str:
+    if option.opts[0] == "--set":
+        return _without_nul(
+            random.choice(
+                ("site.rician_k_db", "vehicle.array.elements", "name", "a[0].b", "motion")
+            )
+            + random.choice(("=", "=", ""))
+            + str(mutate.value(random, random.choice((1.0, "a", [1]))))
+        )
+    if random.random() < 0.7:
+        found = mutate.number(random)
+        return str(int(found) if random.random() < 0.6 and abs(found) < 1e30 else found)
+    return _without_nul(random.choice(mutate.TEXTS))
+
+
+def _without_nul(text: str) -> str:
+    return text.replace("\0", "")[:100_000]

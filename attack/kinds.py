@@ -1,0 +1,42 @@
+"""The kinds of cases: each a function of a random stream and a case, which gives its command."""
+
+from __future__ import annotations
+
+from random import Random
+from typing import TYPE_CHECKING
+
+from attack import arguments, drives, files, plug_ins
+from attack.case import Case
+
+if TYPE_CHECKING:
+    from collections.abc import Callable
+    from pathlib import Path
+
+# How often each kind comes in a hundred inputs; drives are counted apart.
+KINDS: dict[str, tuple[Callable[[Random, Case], list[str]], int]] = {
+    "settings-text": (files.settings_text, 15),
+    "settings-table": (files.settings_table, 30),
+    "scenario": (files.scenario, 15),
+    "limits": (files.at_the_limits, 10),
+    "plug-in": (plug_ins.plug_in, 10),
+    "recording": (files.recording, 5),
+    "odometry": (files.odometry, 3),
+    "angles": (files.angles, 3),
+    "truth": (files.truth, 2),
+    "road-file": (files.road_file, 2),
+    "results": (files.results_folder, 2),
+    "arguments": (arguments.arguments, 3),
+    "drive": (drives.drive, 0),
+}
+
+
+def inputs(seed: int, count: int) -> list[tuple[str, int]]:
+    """Kinds and numbers of so many inputs, mixed."""
+    random = Random(seed)
+    weights = [weight for _, weight in KINDS.values()]
+    return [(kind, n) for n, kind in enumerate(random.choices(list(KINDS), weights, k=count))]
+
+
+def make(seed: int, kind: str, number: int, folder: Path) -> list[str]:
+    """Write a case's files into a folder; its command."""
+    return KINDS[kind][0](Random(f"{seed}:{kind}:{number}"), Case(folder))

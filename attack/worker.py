@@ -1,0 +1,101 @@
+"""A process that runs cases one after another, within limits on memory; who asks limits the time.
+
+Reads ``kind number`` a line, answers each with a line of JSON. What a case prints goes into files:
+whatever it does to the process, the folder of the case tells.
+"""
+
+from __future__ import annotations
+
+import json
+import os
+import resource
+import runpy
+import shutil
+import sys
+import traceback
+from pathlib import Path
+from typing import Any
+
+from access_av import InputError, RecordingError, SettingsError
+from attack import kinds
+from attack.verdict import judge
+
+MEMORY_BYTES = 2 << 30
+
+
+def limit_memory() -> None:
+    """Allow so much more address space than is taken now."""
+    pages = int(Path("/proc/self/statm").read_text().split()[0])
+    taken = pages * resource.getpagesize()
+    resource.setrlimit(resource.RLIMIT_AS, (taken + MEMORY_BYTES,) * 2)
+
+
+def execute(command: list[str]) -> dict[str, Any]:
+    """Run a command in this process: exit code, and what was raised other than an exit."""
+    from access_av import cli
+
+    sys.argv = list(command)
+    raised = ""
+    code: object = 0
+    try:
+        if command[0] == "access-av":
+            cli.main()
+        else:
+            runpy.run_path(command[1], run_name="__main__")
+    except SystemExit as stopped:
+        code = stopped.code or 0
+    except (SettingsError, RecordingError, InputError, OSError) as error:
+        # A script's caller has the exception as it is; the command line makes a message of it.
+        print(f"error: {error}", file=sys.stderr)
+        code = 2 if command[0] == "python" else "an error that the command line let pass"
+    except BaseException:  # whatever it is, it is what this looks for
+        raised = traceback.format_exc()
+    sys.stdout.flush()
+    sys.stderr.flush()
+    return {"code": code, "raised": raised}
+
+
+def run(seed: int, kind: str, number: int, folder: Path) -> dict[str, Any]:
+    """Make a case in ``folder``, run it there, and judge it."""
+    folder.mkdir(parents=True)
+    command = kinds.make(seed, kind, number, folder)
+    before = set(folder.rglob("*"))
+    os.chdir(folder)
+    kept = [os.dup(1), os.dup(2)]
+    printed = [folder / "stdout", folder / "stderr"]
+    for descriptor, file in enumerate(printed, start=1):
+        to = os.open(file, os.O_WRONLY | os.O_CREAT)
+        os.dup2(to, descriptor)
+        os.close(to)
+    try:
+        end = execute(command)
+    finally:
+        for descriptor, saved in enumerate(kept, start=1):
+            os.dup2(saved, descriptor)
+            os.close(saved)
+        os.chdir(folder.parent)
+    out, err = (file.read_text(encoding="utf-8", errors="replace") for file in printed)
+    verdict = judge(folder, command, {*before, *printed}, {**end, "out": out, "err": err})
+    return vars(verdict)
+
+
+def main() -> None:
+    """Answer until there is nothing more to read."""
+    seed, place = int(sys.argv[1]), Path(sys.argv[2])
+    answers = os.fdopen(os.dup(1), "w", encoding="utf-8")
+    # Tables and charts are loaded before the limit is set: it is of what a case takes.
+    import access_av.report.drive  # noqa: F401
+
+    limit_memory()
+    print("ready", file=answers, flush=True)
+    for line in sys.stdin:
+        kind, number = line.split()
+        folder = place / f"{kind}-{number}"
+        found = run(seed, kind, int(number), folder)
+        if not found["findings"]:
+            shutil.rmtree(folder)
+        print(json.dumps(found), file=answers, flush=True)
+
+
+if __name__ == "__main__":
+    main()

@@ -1,0 +1,117 @@
+//! Antennas made independent witnesses. Of a loaded neighbour all of them hear one waveform, and what
+//! in it happens to be like a PSS is like one at every antenna; whitened over the antennas, it is so
+//! at one of them.
+
+use num_complex::{Complex32, Complex64};
+
+use super::received_grid::MAX_ANTENNAS;
+use crate::numeric::hermitian::cholesky;
+
+/// The covariance is measured on every so many samples.
+const STRIDE: usize = 4;
+/// Squared coherence of two antennas from which on it matters; noise has one in the number of
+/// samples.
+const COHERENT: f64 = 0.05;
+
+/// Rows of weights, one per whitened channel.
+pub(crate) type Weights = [[Complex32; MAX_ANTENNAS]; MAX_ANTENNAS];
+
+/// The inverse of the covariance's Cholesky factor, lower triangular; `None` where the antennas are
+/// independent as they are.
+pub(crate) fn whitening(antennas: &[&[Complex32]]) -> Option<Weights> {
+    let count = antennas.len().min(MAX_ANTENNAS);
+    let mut covariance = [[Complex64::ZERO; MAX_ANTENNAS]; MAX_ANTENNAS];
+    for (i, row) in covariance.iter_mut().enumerate() {
+        row[i] = Complex64::ONE;
+    }
+    let mut coherence: f64 = 0.0;
+    for i in 0..count {
+        for j in 0..=i {
+            let pairs = antennas[i].iter().zip(antennas[j]).step_by(STRIDE);
+            let sum: Complex32 = pairs.map(|(a, b)| a * b.conj()).sum();
+            covariance[i][j] = Complex64::new(f64::from(sum.re), f64::from(sum.im));
+        }
+        // Channels that are copies of each other must not make the matrix singular.
+        covariance[i][i] *= 1.0 + 1e-5;
+        for j in 0..i {
+            let powers = covariance[i][i].re * covariance[j][j].re;
+            coherence = coherence.max(covariance[i][j].norm_sqr() / powers.max(f64::MIN_POSITIVE));
+        }
+    }
+    if coherence < COHERENT {
+        return None;
+    }
+    let factor = cholesky(&covariance)?;
+    let mut weights = [[Complex64::ZERO; MAX_ANTENNAS]; MAX_ANTENNAS];
+    for i in 0..count {
+        for j in 0..=i {
+            let known: Complex64 = (j..i).map(|m| factor[i][m] * weights[m][j]).sum();
+            let unit = if i == j {
+                Complex64::ONE
+            } else {
+                Complex64::ZERO
+            };
+            weights[i][j] = (unit - known) * factor[i][i].re;
+        }
+    }
+    let narrow = |it: Complex64| Complex32::new(it.re as f32, it.im as f32);
+    let weights = weights.map(|row| row.map(narrow));
+    let finite = weights.iter().flatten().all(|it| it.is_finite());
+    finite.then_some(weights)
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    /// Unit waveforms without likeness to each other.
+    fn waveform(seed: u64) -> Vec<Complex32> {
+        let mut state = seed;
+        (0..4096)
+            .map(|_| {
+                state = state
+                    .wrapping_mul(6_364_136_223_846_793_005)
+                    .wrapping_add(1);
+                let turn = (state >> 40) as f32 / 16_777_216.0;
+                Complex32::cis(std::f32::consts::TAU * turn)
+            })
+            .collect()
+    }
+
+    #[test]
+    fn independent_antennas_are_left_and_others_made_so() {
+        let noise: Vec<_> = (1..4).map(waveform).collect();
+        let slices: Vec<&[Complex32]> = noise.iter().map(Vec::as_slice).collect();
+        assert!(whitening(&slices).is_none());
+        let common = waveform(9);
+        let loaded: Vec<Vec<Complex32>> = noise
+            .iter()
+            .zip([Complex32::ONE, Complex32::I, Complex32::new(-0.6, 0.8)])
+            .map(|(noise, gain)| {
+                let both = noise.iter().zip(&common);
+                both.map(|(noise, wave)| noise + wave * gain * 10.0)
+                    .collect()
+            })
+            .collect();
+        let slices: Vec<&[Complex32]> = loaded.iter().map(Vec::as_slice).collect();
+        let weights = whitening(&slices).unwrap();
+        let white: Vec<Vec<Complex32>> = (0..3)
+            .map(|i| {
+                (0..4096)
+                    .map(|n| (0..3).map(|j| loaded[j][n] * weights[i][j]).sum())
+                    .collect()
+            })
+            .collect();
+        let slices: Vec<&[Complex32]> = white.iter().map(Vec::as_slice).collect();
+        assert!(whitening(&slices).is_none());
+    }
+
+    #[test]
+    fn silence_and_copies_are_no_reason_to_fail() {
+        let (silence, wave) = (vec![Complex32::ZERO; 4096], waveform(3));
+        assert!(whitening(&[&silence, &silence]).is_none());
+        let _ = whitening(&[&wave, &silence]);
+        let copies = whitening(&[&wave, &wave]).unwrap();
+        assert!(copies.iter().flatten().all(|it| it.is_finite()));
+    }
+}

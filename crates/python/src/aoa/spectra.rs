@@ -1,0 +1,110 @@
+//! Spectra over the direction.
+
+use aoa::{Array, Batch, PseudoSpectrum, Real};
+use numpy::{AllowTypeChange, IxDyn, PyArray1, PyArrayDyn, PyArrayLike1, PyArrayMethods};
+use pyo3::exceptions::PyValueError;
+use pyo3::prelude::*;
+
+use super::calibrated_array;
+use super::samples::{Samples, Visitor, value_error};
+
+/// Spectrum over the angle of arrival, to look at or to search oneself.
+///
+/// Parameters
+/// ----------
+/// snapshots : ndarray
+///     Complex samples, `(antennas, snapshots)` or `(batch, antennas, snapshots)`.
+/// angles_rad : array_like
+///     Angles from the array's axis, 0 to pi.
+/// method : {'bartlett', 'capon', 'music'}
+///     Power of the beam, ``a^H R a / N^2``; power that nothing from elsewhere adds to,
+///     ``1 / (a^H R^-1 a)``; or ``N / (a^H En En^H a)``, no power, but infinite at exact sources.
+/// sources : int
+///     Number of sources for MUSIC, 1 to antennas - 1.
+/// spacing_wavelengths, forward_backward, calibration
+///     As for `music`.
+///
+/// Returns
+/// -------
+/// ndarray
+///     `(angles,)` or `(batch, angles)`.
+///
+/// Examples
+/// --------
+/// >>> import numpy as np
+/// >>> from access_av import aoa
+/// >>> steering = np.exp(1j * np.pi * np.cos(np.radians(60)) * np.arange(4))
+/// >>> angles = np.radians([30, 60, 90])
+/// >>> aoa.spectrum(np.outer(steering, np.ones(9)), angles).round(3).tolist()
+/// [0.171, 1.0, 0.0]
+#[pyfunction]
+#[pyo3(signature = (snapshots, angles_rad, *, method="bartlett", sources=1, spacing_wavelengths=0.5, forward_backward=false, calibration=None))]
+#[allow(clippy::too_many_arguments)]
+pub fn spectrum<'py>(
+    snapshots: &Bound<'py, PyAny>,
+    angles_rad: &Bound<'py, PyAny>,
+    method: &str,
+    sources: usize,
+    spacing_wavelengths: f64,
+    forward_backward: bool,
+    calibration: Option<&Bound<'py, PyAny>>,
+) -> PyResult<Bound<'py, PyArrayDyn<f64>>> {
+    let kind = match method {
+        "bartlett" => PseudoSpectrum::Bartlett,
+        "capon" => PseudoSpectrum::Capon,
+        "music" => PseudoSpectrum::Music { sources },
+        other => {
+            return Err(PyValueError::new_err(format!(
+                "method must be 'bartlett', 'capon' or 'music', not '{other}'"
+            )));
+        }
+    };
+    let angles_rad: PyArrayLike1<'_, f64, AllowTypeChange> = angles_rad
+        .extract()
+        .map_err(|_| PyValueError::new_err("angles_rad must be one axis of numbers"))?;
+    let angles_rad = angles_rad.as_array().to_vec();
+    let samples = Samples::of(snapshots)?;
+    let shape = samples.shape([angles_rad.len()]);
+    let values = samples.visit(Looker {
+        kind,
+        angles_rad,
+        spacing_wavelengths,
+        forward_backward,
+        calibration,
+        py: snapshots.py(),
+    })?;
+    PyArray1::from_vec(snapshots.py(), values).reshape(IxDyn(&shape))
+}
+
+struct Looker<'a, 'py> {
+    kind: PseudoSpectrum,
+    angles_rad: Vec<f64>,
+    spacing_wavelengths: f64,
+    forward_backward: bool,
+    calibration: Option<&'a Bound<'py, PyAny>>,
+    py: Python<'py>,
+}
+
+impl Visitor for Looker<'_, '_> {
+    type Output = Vec<f64>;
+
+    fn visit<T: Real, const N: usize>(self, batch: Batch<'_, T, N>) -> PyResult<Vec<f64>> {
+        let array = calibrated_array::<N>(self.spacing_wavelengths, self.calibration)?;
+        let ideal = Array::<N>::new(self.spacing_wavelengths).map_err(value_error)?;
+        let Self {
+            kind, angles_rad, ..
+        } = &self;
+        let spectra = self.py.detach(|| {
+            let mut values = Vec::with_capacity(batch.len() * angles_rad.len());
+            for covariance in batch.covariances() {
+                let mut covariance = covariance?.calibrated(&array);
+                if self.forward_backward {
+                    covariance = covariance.forward_backward();
+                }
+                values.extend(kind.at(&covariance, &ideal, angles_rad)?);
+            }
+            Ok(values)
+        });
+        spectra.map_err(|error: aoa::Error| value_error(error))
+    }
+}

@@ -1,0 +1,85 @@
+//! Channels: drops of TR 38.901, files of traced paths.
+
+use std::path::Path;
+
+use numpy::{PyArray1, PyReadonlyArray1};
+use pyo3::exceptions::PyValueError;
+use pyo3::prelude::*;
+use pyo3::types::PyDict;
+use simulate::channel::Paths;
+use simulate::channel::tr38901::{Drop, Environment, Place, draw_drops};
+use simulate::scenario::ChannelModel;
+
+use crate::settings::SettingsError;
+
+/// A column's name, and its value in a row.
+type Column = (&'static str, fn(&Drop) -> f64);
+
+const COLUMNS: [Column; 8] = [
+    ("path_loss_db", |drop| drop.path_loss_db),
+    ("shadowing_db", |drop| drop.shadowing_db),
+    ("rician_k_db", |drop| drop.k_db),
+    ("delay_spread_s", |drop| drop.delay_spread_s),
+    ("azimuth_spread_deg", |drop| drop.azimuth_spread_deg),
+    ("zenith_spread_deg", |drop| drop.zenith_spread_deg),
+    ("paths_delay_spread_s", |drop| drop.paths_delay_spread_s),
+    ("paths_azimuth_spread_deg", |drop| {
+        drop.paths_azimuth_spread_deg
+    }),
+];
+
+/// One independent link of a TR 38.901 model at each horizontal distance: columns of equal length.
+#[pyfunction]
+#[pyo3(signature = (model, level_m, *, head_height_m, array_height_m, carrier_mhz, seed))]
+#[allow(clippy::needless_pass_by_value)] // as Python passes them
+pub fn channel_drops(
+    py: Python<'_>,
+    model: &str,
+    level_m: PyReadonlyArray1<'_, f64>,
+    head_height_m: f64,
+    array_height_m: f64,
+    carrier_mhz: f64,
+    seed: u64,
+) -> PyResult<Py<PyDict>> {
+    let named = ChannelModel::named(model);
+    let environment = named.and_then(|it| Environment::of(it, 1e-3 * carrier_mhz, None));
+    let environment = environment.ok_or_else(|| {
+        PyValueError::new_err(format!(
+            "no drops of the model `{model}`; there are umi, inf-sl, inf-dl, inf-sh, inf-dh"
+        ))
+    })?;
+    let level_m = level_m.as_slice()?;
+    let numbers = [head_height_m, array_height_m, carrier_mhz];
+    let mut all = level_m.iter().chain(&numbers);
+    if !all.all(|it| it.is_finite() && *it >= 0.0) || carrier_mhz <= 0.0 {
+        return Err(PyValueError::new_err(
+            "distances, heights and the carrier must be finite and not negative",
+        ));
+    }
+    let places: Vec<Place> = level_m
+        .iter()
+        .map(|&level_m| Place {
+            level_m,
+            head_m: head_height_m,
+            array_m: array_height_m,
+        })
+        .collect();
+    let drops = py.detach(|| draw_drops(&environment, &places, seed));
+    let table = PyDict::new(py);
+    let clear = drops.iter().map(|drop| drop.line_of_sight).collect();
+    table.set_item("line_of_sight", PyArray1::from_vec(py, clear))?;
+    for (name, value) in COLUMNS {
+        let values = drops.iter().map(value).collect();
+        table.set_item(name, PyArray1::from_vec(py, values))?;
+    }
+    Ok(table.unbind())
+}
+
+/// Refuse a file of traced paths that the simulator cannot use.
+#[pyfunction]
+pub fn check_paths(file: &str) -> PyResult<()> {
+    match Paths::read(Path::new(file)) {
+        Ok(_) => Ok(()),
+        Err(error) => Err(SettingsError::new_err(format!("{file}: {error}"))),
+    }
+}

@@ -1,0 +1,18 @@
+//! What errors say, of bounded length: a file may hold anything, also in the place of a name.
+
+use std::fmt::Display;
+
+/// Longest message, in characters.
+const MOST: usize = 500;
+
+/// A message with its middle left out where it is long.
+pub fn brief(message: impl Display) -> String {
+    let text = message.to_string();
+    let length = text.chars().count();
+    if length <= MOST {
+        return text;
+    }
+    let head: String = text.chars().take(MOST * 3 / 5).collect();
+    let tail: String = text.chars().skip(length - (MOST * 2 / 5 - 3)).collect();
+    format!("{head} … {tail}")
+}

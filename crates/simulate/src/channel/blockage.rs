@@ -1,0 +1,54 @@
+//! What stands in the line of sight for a while and moves on.
+
+use rand::RngExt;
+
+use super::propagation::Link;
+use crate::random::Purpose;
+use crate::scenario::BlockageSettings;
+
+/// When the line of sight of a link is blocked: a Poisson process in time, each blocker staying
+/// exponentially long.
+#[derive(Debug, Clone)]
+pub struct Blockage {
+    /// From when until when, in seconds; in order of their beginnings.
+    times_s: Vec<[f64; 2]>,
+    amplitude: f64,
+}
+
+impl Blockage {
+    /// The blockage of a link.
+    pub fn new(settings: Option<BlockageSettings>, link: &Link<'_>) -> Self {
+        let Some(settings) = settings else {
+            return Self {
+                times_s: Vec::new(),
+                amplitude: 1.0,
+            };
+        };
+        let mut rng = link.streams.generator(Purpose::Blockage, link.head);
+        let mut exponential = |mean_s: f64| -mean_s * (1.0 - rng.random::<f64>()).ln();
+        let every_s = 60.0 / settings.per_minute;
+        let mut times_s = Vec::new();
+        let mut from_s = exponential(every_s);
+        while from_s < link.duration_s {
+            times_s.push([from_s, from_s + exponential(settings.duration_s)]);
+            from_s += exponential(every_s);
+        }
+        Self {
+            times_s,
+            amplitude: 10f64.powf(-0.05 * settings.loss_db),
+        }
+    }
+
+    /// What is left of the line of sight's amplitude.
+    pub fn amplitude(&self, time_s: f64) -> f64 {
+        let begun = self
+            .times_s
+            .partition_point(|[from_s, _]| *from_s <= time_s);
+        let begun = self.times_s.get(..begun).unwrap_or_default();
+        if begun.iter().any(|[_, until_s]| time_s < *until_s) {
+            self.amplitude
+        } else {
+            1.0
+        }
+    }
+}

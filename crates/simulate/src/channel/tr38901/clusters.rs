@@ -1,0 +1,274 @@
+//! Clusters of plane waves: steps 5 to 8 of 7.5.
+
+use std::f64::consts::TAU;
+
+use num_complex::Complex64;
+use rand::{Rng, RngExt};
+use rand_distr::StandardNormal;
+
+use super::large_scale::{LargeScale, Parameters};
+use crate::channel::phasor::phasor;
+use crate::world::LineOfSight;
+
+/// Rays of a cluster, 20 of them, about its middle in units of its spread (table 7.5-3).
+const OFFSETS: [f64; 10] = [
+    0.0447, 0.1413, 0.2492, 0.3715, 0.5129, 0.6797, 0.8844, 1.1481, 1.5195, 2.1551,
+];
+const RAYS: usize = 2 * OFFSETS.len();
+/// Clusters that are weaker than the strongest by so much are left out.
+const FLOOR: f64 = 3.162_277_660_168_379e-3;
+/// The two strongest clusters come in three parts: their delays in units of the cluster's, and their
+/// rays (table 7.5-5).
+const PARTS: [(f64, &[usize]); 3] = [
+    (0.0, &[0, 1, 2, 3, 4, 5, 6, 7, 18, 19]),
+    (1.28, &[8, 9, 10, 11, 16, 17]),
+    (2.56, &[12, 13, 14, 15]),
+];
+
+/// Scatter of unit power, as plane waves of fixed directions.
+#[derive(Debug, Clone)]
+pub struct Clusters {
+    groups: Vec<Group>,
+}
+
+/// Rays of one delay and one power.
+#[derive(Debug, Clone)]
+struct Group {
+    delay_s: f64,
+    /// Amplitude of each ray.
+    amplitude: f64,
+    rays: Vec<Ray>,
+}
+
+/// A plane wave: where it comes from, projected on the ground, and its phase at the map's origin.
+/// In single precision, as there are many.
+#[derive(Debug, Clone, Copy)]
+struct Ray {
+    east: f32,
+    north: f32,
+    phase_rad: f32,
+}
+
+impl Clusters {
+    /// Clusters at a place that sees the radio head at these angles of azimuth and zenith.
+    pub fn draw(
+        parameters: &Parameters,
+        large_scale: &LargeScale,
+        azimuth_rad: f64,
+        zenith_rad: f64,
+        rng: &mut impl Rng,
+    ) -> Self {
+        let k_db = large_scale.k_db;
+        let scale = parameters.delay_scaling * large_scale.delay_spread_s;
+        let mut delays_s: Vec<f64> = (0..parameters.clusters)
+            .map(|_| -scale * (1.0 - rng.random::<f64>()).ln())
+            .collect();
+        delays_s.sort_by(f64::total_cmp);
+        let first_s = delays_s.first().copied().unwrap_or(0.0);
+
+        // Step 6.
+        let decay_s = scale / (parameters.delay_scaling - 1.0);
+        let mut powers: Vec<f64> = delays_s
+            .iter()
+            .map(|delay_s| {
+                let shadowing_db = parameters.cluster_shadowing_db * normal(rng);
+                (-(delay_s - first_s) / decay_s).exp() * 10f64.powf(-0.1 * shadowing_db)
+            })
+            .collect();
+        let strongest = powers.iter().copied().fold(0.0, f64::max);
+        for power in &mut powers {
+            if *power < FLOOR * strongest {
+                *power = 0.0;
+            }
+        }
+        let total: f64 = powers.iter().sum();
+        for power in &mut powers {
+            *power /= total;
+        }
+
+        // With the line of sight's, angles are made of the powers (7.5-8).
+        let k = 10f64.powf(0.1 * k_db);
+        let with_direct = |(number, power): (usize, &f64)| match number {
+            0 if parameters.line_of_sight => (power + k) / (k + 1.0),
+            _ if parameters.line_of_sight => power / (k + 1.0),
+            _ => *power,
+        };
+        let of_angles: Vec<f64> = powers.iter().enumerate().map(with_direct).collect();
+        let most = of_angles.iter().copied().fold(0.0, f64::max);
+        let (delay_scale, azimuth_scale, zenith_scale) = if parameters.line_of_sight {
+            let of_k = |[a, b, c, d]: [f64; 4]| a + k_db * (b + k_db * (c + k_db * d));
+            (
+                of_k([0.7705, -0.0433, 0.0002, 0.000_017]),
+                parameters.azimuth_scaling * of_k([1.1035, -0.028, -0.002, 0.0001]),
+                parameters.zenith_scaling * of_k([1.3086, 0.0339, -0.0077, 0.0002]),
+            )
+        } else {
+            (1.0, parameters.azimuth_scaling, parameters.zenith_scaling)
+        };
+
+        // Step 7: azimuths from a wrapped Gaussian, zeniths from a Laplacian.
+        let spread = large_scale.azimuth_spread_deg;
+        let azimuths_deg = around(&of_angles, parameters.line_of_sight, rng, |power, rng| {
+            let away = 2.0 / 1.4 * spread * (-(power / most).max(1e-6).ln()).sqrt();
+            sign(rng) * away / azimuth_scale + spread / 7.0 * normal(rng)
+        });
+        let spread = large_scale.zenith_spread_deg;
+        let zeniths_deg = around(&of_angles, parameters.line_of_sight, rng, |power, rng| {
+            let away = -spread * (power / most).max(1e-6).ln();
+            sign(rng) * away / zenith_scale + spread / 7.0 * normal(rng)
+        });
+        let excess_s = parameters.excess_delay_s(normal(rng));
+
+        let mut by_power: Vec<usize> = (0..powers.len()).collect();
+        by_power.sort_by(|a, b| powers[*b].total_cmp(&powers[*a]));
+        let mut groups = Vec::new();
+        for (number, power) in powers.iter().enumerate().filter(|(_, power)| **power > 0.0) {
+            let delay_s = excess_s + (delays_s[number] - first_s) / delay_scale;
+            let parts: &[(f64, &[usize])] = if by_power.iter().take(2).any(|it| *it == number) {
+                &PARTS
+            } else {
+                &[(0.0, &ALL)]
+            };
+            for (part, rays) in parts {
+                // Step 8: azimuths and zeniths are coupled at random.
+                let mut coupled = rays.to_vec();
+                shuffle(&mut coupled, rng);
+                let rays = rays.iter().zip(&coupled).map(|(azimuth, zenith)| {
+                    let away_deg = parameters.cluster_azimuth_deg * offset(*azimuth);
+                    let azimuth_rad = azimuth_rad + (azimuths_deg[number] + away_deg).to_radians();
+                    let away_deg = parameters.cluster_zenith_deg * offset(*zenith);
+                    let zenith_rad = zenith_rad + (zeniths_deg[number] + away_deg).to_radians();
+                    // Past the zenith it would come down on the other side; its azimuth is kept.
+                    let level = zenith_rad.sin().abs();
+                    Ray {
+                        east: (level * azimuth_rad.cos()) as f32,
+                        north: (level * azimuth_rad.sin()) as f32,
+                        phase_rad: (TAU * rng.random::<f64>()) as f32,
+                    }
+                });
+                groups.push(Group {
+                    delay_s: delay_s + part * parameters.cluster_delay_s,
+                    amplitude: (power / RAYS as f64).sqrt(),
+                    rays: rays.collect(),
+                });
+            }
+        }
+        Self { groups }
+    }
+
+    /// Adds `weight` times what the antennas receive at each frequency.
+    pub fn add(
+        &self,
+        weight: Complex64,
+        sight: &LineOfSight,
+        wavenumber_per_m: f64,
+        step_hz: f64,
+        elements: usize,
+        into: &mut [Complex64],
+    ) {
+        let first_hz = -((into.len() / elements / 2) as f64) * step_hz;
+        let (sin, cos) = sight.axis_rad.sin_cos();
+        let [forward, north] = [cos, sin].map(|part| sight.element_rad * part);
+        let [x, y] = [sight.place.x_m, sight.place.y_m].map(|part_m| wavenumber_per_m * part_m);
+        let mut sum = [Complex64::ZERO; onboard::observation::MAX_ELEMENTS];
+        for group in &self.groups {
+            let Some(sum) = sum.get_mut(..elements) else {
+                return;
+            };
+            sum.fill(Complex64::ZERO);
+            for ray in &group.rays {
+                let [towards_x, towards_y] = [ray.east, ray.north].map(f64::from);
+                let mut wave = phasor(f64::from(ray.phase_rad) + x * towards_x + y * towards_y);
+                let step = phasor(forward * towards_x + north * towards_y);
+                for gain in &mut *sum {
+                    *gain += wave;
+                    wave *= step;
+                }
+            }
+            let mut turn = weight * group.amplitude * phasor(-TAU * first_hz * group.delay_s);
+            let turn_step = phasor(-TAU * step_hz * group.delay_s);
+            for gains in into.chunks_exact_mut(elements) {
+                for (gain, sum) in gains.iter_mut().zip(&*sum) {
+                    *gain += turn * sum;
+                }
+                turn *= turn_step;
+            }
+        }
+    }
+
+    /// Root-mean-square spread of the delays in seconds, a line of sight of this Rician K among
+    /// them.
+    pub fn delay_spread_s(&self, k: f64) -> f64 {
+        let scatter = 1.0 / (k + 1.0);
+        let powers = (self.groups.iter())
+            .map(|group| scatter * group.amplitude * group.amplitude * group.rays.len() as f64);
+        let delays_s = self.groups.iter().map(|group| group.delay_s);
+        let [mut first, mut second] = [0.0; 2];
+        for (power, delay_s) in powers.zip(delays_s) {
+            first += power * delay_s;
+            second += power * delay_s * delay_s;
+        }
+        (second - first * first).max(0.0).sqrt()
+    }
+
+    /// Circular spread of the azimuths in radians (annex A.1), with a line of sight from
+    /// `azimuth_rad` of this Rician K among them.
+    pub fn azimuth_spread_rad(&self, k: f64, azimuth_rad: f64) -> f64 {
+        let mut sum = Complex64::cis(azimuth_rad) * k;
+        for group in &self.groups {
+            let power = group.amplitude * group.amplitude;
+            for ray in &group.rays {
+                let towards = Complex64::new(ray.east.into(), ray.north.into());
+                sum += towards * (power / towards.norm().max(f64::MIN_POSITIVE));
+            }
+        }
+        (-2.0 * (sum.norm() / (k + 1.0)).ln()).max(0.0).sqrt()
+    }
+}
+
+const ALL: [usize; RAYS] = [
+    0, 1, 2, 3, 4, 5, 6, 7, 8, 9, 10, 11, 12, 13, 14, 15, 16, 17, 18, 19,
+];
+
+/// Angle of a ray to the middle of its cluster, in units of the cluster's spread.
+fn offset(ray: usize) -> f64 {
+    let magnitude = OFFSETS[ray / 2];
+    if ray.is_multiple_of(2) {
+        magnitude
+    } else {
+        -magnitude
+    }
+}
+
+/// Angles of the clusters to the line of sight, by their powers. Where there is a line of sight the
+/// first cluster is about it.
+fn around<R: Rng>(
+    powers: &[f64],
+    line_of_sight: bool,
+    rng: &mut R,
+    angle: impl Fn(f64, &mut R) -> f64,
+) -> Vec<f64> {
+    let mut angles: Vec<f64> = powers.iter().map(|power| angle(*power, rng)).collect();
+    if let (true, Some(&first)) = (line_of_sight, angles.first()) {
+        for angle in &mut angles {
+            *angle -= first;
+        }
+    }
+    angles
+}
+
+fn normal(rng: &mut impl Rng) -> f64 {
+    rng.sample(StandardNormal)
+}
+
+fn sign(rng: &mut impl Rng) -> f64 {
+    if rng.random::<f64>() < 0.5 { -1.0 } else { 1.0 }
+}
+
+/// Fisher and Yates.
+fn shuffle(values: &mut [usize], rng: &mut impl Rng) {
+    for last in (1..values.len()).rev() {
+        let with = (rng.random::<f64>() * (last + 1) as f64) as usize;
+        values.swap(last, with);
+    }
+}

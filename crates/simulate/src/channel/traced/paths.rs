@@ -1,0 +1,316 @@
+//! The paths between radio heads and the places of a site.
+
+use std::collections::HashMap;
+use std::f64::consts::FRAC_PI_2;
+use std::path::Path;
+
+use num_complex::Complex32;
+use onboard::geometry::Point;
+use onboard::road::Road;
+use onboard::settings::{RadioHeadSettings, Site};
+use thiserror::Error;
+
+use super::read::Arrays;
+
+const SPEED_OF_LIGHT_MPS: f64 = 299_792_458.0;
+/// A place stands for what lies nearer to it than to any other, as far as this.
+const REACH_M: f64 = 1.0;
+/// How far a road may lead on beyond the places.
+const ENDS_M: f64 = 10.0;
+/// What a path may be shorter than the straight way by: single precision, rounded places.
+const SLACK_M: f64 = 0.3;
+/// A path that is no longer than the straight way by more than this is the line of sight.
+const DIRECT_M: f64 = 0.01;
+
+/// Why a file of paths cannot be used.
+#[derive(Debug, Error)]
+#[error("{0}")]
+pub struct PathsError(String);
+
+impl PathsError {
+    fn that<T>(what: impl Into<String>) -> Result<T, Self> {
+        Err(Self(what.into()))
+    }
+}
+
+/// One path at one place.
+#[derive(Debug, Clone, Copy)]
+pub struct TracedPath {
+    /// Amplitude: its square is the gain between isotropic antennas. Phase at the place.
+    pub gain: Complex32,
+    /// How much later than straight it comes (s).
+    pub excess_s: f32,
+    /// Where it comes from, projected on the ground.
+    pub towards: [f32; 2],
+    /// Whether it is the line of sight.
+    pub direct: bool,
+}
+
+/// The paths of a site, as a ray tracer found them.
+#[derive(Debug, Clone)]
+pub struct Paths {
+    carrier_mhz: f64,
+    heads: Vec<Head>,
+    places: Vec<[f64; 3]>,
+    /// Numbers of the places in each square of the ground.
+    squares: HashMap<[i64; 2], Vec<usize>>,
+    /// Where the paths of each head at each place begin.
+    begins: Vec<usize>,
+    all: Vec<TracedPath>,
+}
+
+#[derive(Debug, Clone, Copy)]
+struct Head {
+    pci: f64,
+    ssb_index: f64,
+    position_m: [f64; 3],
+}
+
+impl Paths {
+    /// Reads an npz file with the arrays `carrier_mhz`; `head_pci`, `head_ssb_index`, `head_m` (n × 3,
+    /// the map's frame); `place_m` (n × 3); and of each path `path_head`, `path_place` (their numbers,
+    /// from 0), `gain` (complex), `delay_s`, `azimuth_rad`, `elevation_rad` (of arrival, the map's
+    /// frame).
+    ///
+    /// # Errors
+    /// [`PathsError`] naming the array and what is wrong with it.
+    pub fn read(file: &Path) -> Result<Self, PathsError> {
+        let mut arrays = Arrays::open(file).map_err(PathsError)?;
+        let mut numbers = |name: &str, width| arrays.numbers(name, width).map_err(PathsError);
+        let carrier_mhz = numbers("carrier_mhz", 1)?
+            .first()
+            .copied()
+            .unwrap_or(f64::NAN);
+        let [pcis, indices] = [numbers("head_pci", 1)?, numbers("head_ssb_index", 1)?];
+        let head_m = rows(&numbers("head_m", 3)?);
+        let places = rows(&numbers("place_m", 3)?);
+        let [of_head, of_place] = [numbers("path_head", 1)?, numbers("path_place", 1)?];
+        let [delays_s, azimuths_rad, elevations_rad] = [
+            numbers("delay_s", 1)?,
+            numbers("azimuth_rad", 1)?,
+            numbers("elevation_rad", 1)?,
+        ];
+        let gains = arrays.complex("gain").map_err(PathsError)?;
+        finite("head_m", head_m.iter().flatten())?;
+        finite("place_m", places.iter().flatten())?;
+        if pcis.len() != head_m.len() || indices.len() != head_m.len() {
+            return PathsError::that("`head_pci`, `head_ssb_index` and `head_m` must be as long");
+        }
+        for (pci, [_, _, z_m]) in pcis.iter().zip(&head_m) {
+            if *z_m < 0.0 {
+                return PathsError::that(format!(
+                    "`head_m`: radio head pci={pci} at z = {z_m} m stands under the road"
+                ));
+            }
+        }
+        let count = gains.len();
+        for (name, values) in [
+            ("path_head", &of_head),
+            ("path_place", &of_place),
+            ("delay_s", &delays_s),
+            ("azimuth_rad", &azimuths_rad),
+            ("elevation_rad", &elevations_rad),
+        ] {
+            if values.len() != count {
+                let found = values.len();
+                return PathsError::that(format!("`{name}` has {found} values, `gain` {count}"));
+            }
+            finite(name, values)?;
+        }
+        if let Some(row) = gains.iter().position(|gain| !gain.norm_sqr().is_finite()) {
+            return PathsError::that(format!("`gain` is not a number in row {row}"));
+        }
+        let within = |values: &[f64], count: usize| {
+            (values.iter()).position(|it| it.fract() != 0.0 || !(0.0..count as f64).contains(it))
+        };
+        for (name, values, of, count) in [
+            ("path_head", &of_head, "head_m", head_m.len()),
+            ("path_place", &of_place, "place_m", places.len()),
+        ] {
+            if let Some(row) = within(values, count) {
+                return PathsError::that(format!(
+                    "`{name}` is {} in row {row}; `{of}` has the rows 0 to {}",
+                    values[row],
+                    count.saturating_sub(1)
+                ));
+            }
+        }
+        if let Some(row) = elevations_rad
+            .iter()
+            .position(|it| it.abs() > FRAC_PI_2 + 1e-6)
+        {
+            return PathsError::that(format!(
+                "`elevation_rad` is {} in row {row}; it counts from the horizon, −π/2 to π/2",
+                elevations_rad[row]
+            ));
+        }
+
+        let mut order: Vec<usize> = (0..count).collect();
+        let link = |row: usize| of_head[row] as usize * places.len() + of_place[row] as usize;
+        order.sort_by_key(|&row| link(row));
+        let mut begins = vec![0; head_m.len() * places.len() + 1];
+        let mut all = Vec::with_capacity(count);
+        for row in order {
+            let [head, place] = [
+                head_m[of_head[row] as usize],
+                places[of_place[row] as usize],
+            ];
+            let straight_m = between_m(head, place);
+            let length_m = delays_s[row] * SPEED_OF_LIGHT_MPS;
+            if length_m < straight_m - SLACK_M {
+                return PathsError::that(format!(
+                    "`delay_s` in row {row}: a path of {length_m:.2} m, where `head_m` and `place_m` \
+                     lie {straight_m:.2} m apart: not in one frame"
+                ));
+            }
+            let level = elevations_rad[row].cos();
+            let (sin, cos) = azimuths_rad[row].sin_cos();
+            begins[link(row) + 1] += 1;
+            all.push(TracedPath {
+                gain: gains[row],
+                excess_s: ((length_m - straight_m) / SPEED_OF_LIGHT_MPS) as f32,
+                towards: [(level * cos) as f32, (level * sin) as f32],
+                direct: length_m - straight_m < DIRECT_M,
+            });
+        }
+        for link in 1..begins.len() {
+            begins[link] += begins[link - 1];
+        }
+        let mut squares: HashMap<_, Vec<usize>> = HashMap::new();
+        for (number, [x_m, y_m, _]) in places.iter().enumerate() {
+            squares
+                .entry(square(Point::new(*x_m, *y_m)))
+                .or_default()
+                .push(number);
+        }
+        let heads = pcis.into_iter().zip(indices).zip(head_m);
+        let head = |((pci, ssb_index), position_m)| Head {
+            pci,
+            ssb_index,
+            position_m,
+        };
+        Ok(Self {
+            carrier_mhz,
+            heads: heads.map(head).collect(),
+            places,
+            squares,
+            begins,
+            all,
+        })
+    }
+
+    /// Refuses paths of another site, carrier or road.
+    ///
+    /// # Errors
+    /// [`PathsError`].
+    pub fn check(&self, site: &Site, road: &Road) -> Result<(), PathsError> {
+        let carrier_mhz = site.carrier_mhz;
+        // Phases hold at one frequency; an SSB's place in the carrier is within a per cent.
+        let same = (self.carrier_mhz / carrier_mhz - 1.0).abs() <= 0.01;
+        if !same {
+            return PathsError::that(format!(
+                "its paths are of {} MHz, the site's carrier is {carrier_mhz} MHz",
+                self.carrier_mhz
+            ));
+        }
+        for settings in &site.radio_heads {
+            let (pci, ssb_index) = (settings.pci, settings.ssb_index);
+            let Some(number) = self.head(settings) else {
+                return PathsError::that(format!(
+                    "no radio head pci={pci} ssb_index={ssb_index} in it, as the site has one"
+                ));
+            };
+            let [x_m, y_m, _] = self.heads[number].position_m;
+            let apart_m = Point::new(x_m, y_m)
+                .distance_m(Point::new(settings.position_m[0], settings.position_m[1]));
+            if apart_m > 1.0 + 5.0 * settings.position_std_m {
+                return PathsError::that(format!(
+                    "its radio head pci={pci} stands {apart_m:.1} m from where the site has it: \
+                     another frame, or another plan"
+                ));
+            }
+            let places = self.places.len();
+            let ends = (number * places, (number + 1) * places);
+            if self.begins[ends.0] == self.begins[ends.1] {
+                return PathsError::that(format!("no path from its radio head pci={pci}"));
+            }
+        }
+        let metres = road.length_m().floor() as usize;
+        let mut metres = (0..=metres).map(|it| it as f64);
+        // Nothing is heard on what leads to the first place, and on from the last.
+        let inside = ENDS_M..=road.length_m() - ENDS_M;
+        let untraced = |along_m: &f64| self.place_near(road.pose(*along_m).point()).is_none();
+        if let Some(along_m) = metres.find(|it| inside.contains(it) && untraced(it)) {
+            return PathsError::that(format!(
+                "no place within {REACH_M} m of the road {along_m} m along it"
+            ));
+        }
+        Ok(())
+    }
+
+    /// Number of a radio head of the site in the file.
+    pub fn head(&self, head: &RadioHeadSettings) -> Option<usize> {
+        let (pci, ssb_index) = (f64::from(head.pci), f64::from(head.ssb_index));
+        (self.heads.iter()).position(|it| it.pci == pci && it.ssb_index == ssb_index)
+    }
+
+    /// The paths from a radio head of the file at the place nearest to this, and how far off in x and
+    /// y this is; none beyond reach.
+    pub fn near(&self, head: usize, place: Point) -> Option<(&[TracedPath], [f64; 2])> {
+        let number = self.place_near(place)?;
+        let [x_m, y_m, _] = self.places[number];
+        let link = head * self.places.len() + number;
+        let paths = self.all.get(self.begins[link]..self.begins[link + 1])?;
+        Some((paths, [place.x_m - x_m, place.y_m - y_m]))
+    }
+
+    /// Rician K of a radio head of the file there: power of its line of sight by that of the other
+    /// paths. None beyond reach; 0 without a line of sight.
+    pub fn rician_k(&self, head: usize, place: Point) -> Option<f64> {
+        let (paths, _) = self.near(head, place)?;
+        let power = |direct| {
+            let such = paths.iter().filter(|path| path.direct == direct);
+            such.map(|path| f64::from(path.gain.norm_sqr()))
+                .sum::<f64>()
+        };
+        // A single path leaves rounding at most.
+        Some(power(true) / power(false).max(f64::MIN_POSITIVE))
+    }
+
+    fn place_near(&self, place: Point) -> Option<usize> {
+        let [column, row] = square(place);
+        let around = (-1..=1).flat_map(|i| (-1..=1).map(move |j| [column + i, row + j]));
+        let near = around
+            .filter_map(|square| self.squares.get(&square))
+            .flatten();
+        let apart_m = |number: &usize| {
+            let [x_m, y_m, _] = self.places[*number];
+            place.distance_m(Point::new(x_m, y_m))
+        };
+        let nearest = near
+            .map(|number| (apart_m(number), *number))
+            .min_by(|a, b| a.0.total_cmp(&b.0))?;
+        (nearest.0 <= REACH_M).then_some(nearest.1)
+    }
+}
+
+/// The square of [`REACH_M`] that a place is in.
+fn square(place: Point) -> [i64; 2] {
+    [place.x_m, place.y_m].map(|part_m| (part_m / REACH_M).floor() as i64)
+}
+
+fn between_m(a: [f64; 3], b: [f64; 3]) -> f64 {
+    (a[0] - b[0]).hypot(a[1] - b[1]).hypot(a[2] - b[2])
+}
+
+fn rows(values: &[f64]) -> Vec<[f64; 3]> {
+    let rows = values.chunks_exact(3);
+    rows.filter_map(|row| row.try_into().ok()).collect()
+}
+
+fn finite<'a>(name: &str, values: impl IntoIterator<Item = &'a f64>) -> Result<(), PathsError> {
+    match values.into_iter().position(|value| !value.is_finite()) {
+        Some(row) => PathsError::that(format!("`{name}` is not a number in row {row}")),
+        None => Ok(()),
+    }
+}

@@ -1,0 +1,87 @@
+//! The channel along traced paths.
+
+use std::f64::consts::TAU;
+use std::sync::Arc;
+
+use num_complex::Complex64;
+use onboard::link_budget::LinkBudget;
+
+use super::paths::Paths;
+use crate::channel::blockage::Blockage;
+use crate::channel::phasor::phasor;
+use crate::channel::propagation::{Link, Propagation};
+use crate::scenario::ChannelSettings;
+use crate::world::LineOfSight;
+
+/// What is received where there is no path at all, in dB under free space.
+const NOTHING_DB: f64 = -200.0;
+
+/// The propagation from one radio head: the paths of the nearest place, gone on with as plane waves.
+#[derive(Debug, Clone)]
+pub struct TracedPropagation {
+    paths: Arc<Paths>,
+    head: usize,
+    budget: LinkBudget,
+    wavenumber_per_m: f64,
+    blockage: Blockage,
+}
+
+impl TracedPropagation {
+    /// The propagation over a link; none where the file has not its radio head.
+    pub fn new(paths: Arc<Paths>, settings: &ChannelSettings, link: &Link<'_>) -> Option<Self> {
+        let head = paths.head(link.site.radio_heads.get(link.head)?)?;
+        Some(Self {
+            paths,
+            head,
+            budget: LinkBudget::new(link.site, link.vehicle),
+            wavenumber_per_m: TAU / link.site.wavelength_m(),
+            blockage: Blockage::new(settings.blockage, link),
+        })
+    }
+
+    /// Total power of the paths.
+    fn power(&self, sight: &LineOfSight) -> f64 {
+        let near = self.paths.near(self.head, sight.place);
+        let paths = near.map_or(&[][..], |(paths, _)| paths).iter();
+        paths.map(|path| f64::from(path.gain.norm_sqr())).sum()
+    }
+}
+
+impl Propagation for TracedPropagation {
+    fn next_gain_db(&mut self, sight: &LineOfSight) -> f64 {
+        let gain_db = 10.0 * self.power(sight).log10();
+        (gain_db + self.budget.path_loss_db(sight.distance_m)).max(NOTHING_DB)
+    }
+
+    fn response(&self, sight: &LineOfSight, step_hz: f64, elements: usize, into: &mut [Complex64]) {
+        into.fill(Complex64::ZERO);
+        let near = self.paths.near(self.head, sight.place);
+        let Some((paths, [east_m, north_m])) = near.filter(|(paths, _)| !paths.is_empty()) else {
+            return;
+        };
+        let scale = self.power(sight).sqrt().recip();
+        let passing = self.blockage.amplitude(sight.time_s);
+        let (sin, cos) = sight.axis_rad.sin_cos();
+        let [forward, left] = [cos, sin].map(|part| sight.element_rad * part);
+        let [x, y] = [east_m, north_m].map(|part_m| self.wavenumber_per_m * part_m);
+        let first_hz = -((into.len() / elements / 2) as f64) * step_hz;
+        for path in paths {
+            let [towards_x, towards_y] = path.towards.map(f64::from);
+            let gain = Complex64::new(path.gain.re.into(), path.gain.im.into());
+            let amplitude = if path.direct { scale * passing } else { scale };
+            let mut wave = amplitude * gain * phasor(x * towards_x + y * towards_y);
+            let step = phasor(forward * towards_x + left * towards_y);
+            let excess_s = f64::from(path.excess_s);
+            wave *= phasor(-TAU * first_hz * excess_s);
+            let turn = phasor(-TAU * step_hz * excess_s);
+            for gains in into.chunks_exact_mut(elements) {
+                let mut here = wave;
+                for gain in gains {
+                    *gain += here;
+                    here *= step;
+                }
+                wave *= turn;
+            }
+        }
+    }
+}

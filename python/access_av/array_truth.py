@@ -1,0 +1,89 @@
+"""What the annotations of a recording state of its array: ``aoa:truth``, checked."""
+
+from __future__ import annotations
+
+import math
+from dataclasses import dataclass
+from typing import TYPE_CHECKING, Any
+
+import numpy as np
+
+from access_av.errors import InputError
+
+if TYPE_CHECKING:
+    from numpy.typing import NDArray
+
+# Spacings that an array may have, in wavelengths, as the command line has them.
+SPACINGS = (0.01, 10.0)
+
+
+@dataclass(frozen=True)
+class ArrayTruth:
+    """What one annotation states; ``None`` of what it does not.
+
+    Attributes
+    ----------
+    azimuth_from_broadside_deg
+        Measured azimuth, counter-clockwise from the array's broadside.
+    element_spacing_wavelengths
+        Distance between neighbouring antennas.
+    channel_phases
+        Factors of modulus one by which the channels' phases are off, of shape (channels,).
+    """
+
+    azimuth_from_broadside_deg: float | None = None
+    element_spacing_wavelengths: float | None = None
+    channel_phases: NDArray[np.complex128] | None = None
+
+    @classmethod
+    def of(cls, annotation: dict[str, Any], channels: int) -> ArrayTruth:
+        """Read an annotation.
+
+        Raises
+        ------
+        InputError
+            For a value of another type, or out of range.
+
+        Examples
+        --------
+        >>> ArrayTruth.of({"aoa:truth": {"element_spacing_wavelengths": 0.5}}, 4)
+        ... # doctest: +ELLIPSIS
+        ArrayTruth(azimuth_from_broadside_deg=None, element_spacing_wavelengths=0.5, ...)
+        """
+        truth = annotation.get("aoa:truth", {})
+        if not isinstance(truth, dict):
+            raise InputError("`aoa:truth` must be a table")
+        return cls(
+            _number(truth, "azimuth_from_broadside_deg", -360.0, 360.0),
+            _number(truth, "element_spacing_wavelengths", *SPACINGS),
+            _phases(truth, channels),
+        )
+
+
+def _number(truth: dict[str, Any], key: str, low: float, high: float) -> float | None:
+    value = truth.get(key)
+    if value is None:
+        return None
+    if isinstance(value, bool) or not isinstance(value, int | float) or not low <= value <= high:
+        raise InputError(f"`aoa:truth.{key}` is {value}; it must be a number from {low} to {high}")
+    return float(value)
+
+
+def _phases(truth: dict[str, Any], channels: int) -> NDArray[np.complex128] | None:
+    parts = [truth.get(f"channel_calibration_{part}") for part in ("re", "im")]
+    if parts == [None, None]:
+        return None
+    fine = all(
+        isinstance(part, list)
+        and len(part) == channels
+        and all(isinstance(it, int | float) and math.isfinite(it) for it in part)
+        for part in parts
+    )
+    gains = np.array(parts[0], dtype=complex) + 1j * np.array(parts[1]) if fine else np.zeros(1)
+    size = np.abs(gains)
+    if not (np.isfinite(size) & (size > 0.0)).all():
+        raise InputError(
+            "`aoa:truth.channel_calibration_re` and `_im` must each be a list of "
+            f"{channels} numbers, one of each channel, and no gain be 0"
+        )
+    return np.asarray(gains / size, dtype=np.complex128)

@@ -1,0 +1,73 @@
+"""The channels that a scenario's ``[channel]`` can name, by themselves.
+
+``umi``, ``inf-sl``, ``inf-dl``, ``inf-sh`` and ``inf-dh`` are those of 3GPP TR 38.901 (V19.2).
+"""
+
+from __future__ import annotations
+
+from typing import TYPE_CHECKING
+
+import numpy as np
+import polars as pl
+
+from access_av import _core
+
+if TYPE_CHECKING:
+    from collections.abc import Sequence
+
+    from numpy.typing import NDArray
+
+
+def drops(
+    model: str,
+    distance_m: Sequence[float] | NDArray[np.float64],
+    *,
+    head_height_m: float | None = None,
+    array_height_m: float = 1.5,
+    carrier_mhz: float = 3500.0,
+    seed: int = 1,
+) -> pl.DataFrame:
+    """Independent links of a model, as a calibration drops them.
+
+    Parameters
+    ----------
+    model
+        ``umi``, ``inf-sl``, ``inf-dl``, ``inf-sh`` or ``inf-dh``.
+    distance_m
+        Horizontal distance of each link.
+    head_height_m
+        Height of the radio head; the model's own (10 m in ``umi``, 1.5 m in ``inf-sl`` and
+        ``inf-dl``, 8 m in ``inf-sh`` and ``inf-dh``) when ``None``.
+    array_height_m
+        Height of the array.
+    carrier_mhz
+        Carrier.
+    seed
+        Same seed, same drops.
+
+    Returns
+    -------
+    polars.DataFrame
+        One row per link; columns ``channel_drops`` of :mod:`access_av.columns`.
+
+    Raises
+    ------
+    ValueError
+        For another model, or numbers that are not finite and positive.
+
+    Examples
+    --------
+    >>> table = drops("inf-sh", np.full(2000, 50.0))
+    >>> bool(abs(table["line_of_sight"].mean() - np.exp(-50.0 / 583.0)) < 0.03)
+    True
+    """
+    own_m = {"umi": 10.0, "inf-sh": 8.0, "inf-dh": 8.0}.get(model, 1.5)
+    columns = _core.channel_drops(
+        model,
+        np.ascontiguousarray(distance_m, dtype=np.float64),
+        head_height_m=own_m if head_height_m is None else head_height_m,
+        array_height_m=array_height_m,
+        carrier_mhz=carrier_mhz,
+        seed=seed,
+    )
+    return pl.DataFrame(columns).fill_nan(None)

@@ -1,0 +1,85 @@
+"""Commands about the radio of a site: ``import-paths``, ``plan``."""
+
+from __future__ import annotations
+
+from pathlib import Path
+from typing import Annotated
+
+import typer
+
+from access_av.commands.options import AsJson, Out, ScenarioArgument
+from access_av.terminal import console, progress, show_plan
+
+app = typer.Typer()
+
+
+@app.command(
+    "import-paths",
+    epilog="Example: [bold]access-av import-paths paths.parquet --site street.toml "
+    "--carrier-mhz 3750 --out street.npz[/]",
+)
+def import_paths(
+    table: Annotated[
+        Path,
+        typer.Argument(help="Parquet or CSV, one row per path: see docs/ray-tracing.md."),
+    ],
+    site: Annotated[str, typer.Option(help="Radio heads: shipped name, or TOML file.")],
+    carrier_mhz: Annotated[float, typer.Option(min=100.0, help="Frequency they were traced at.")],
+    out: Annotated[Path, typer.Option(help="npz file, for a scenario's channel.paths.")],
+) -> None:
+    """Make paths that a ray tracer found into a channel that scenarios can name.
+
+    A scenario with [bold]channel = { model = "paths", paths = "FILE.npz" }[/] then drives through
+    them, by snapshots or by samples.
+    """
+    from access_av import ray_paths
+
+    found = ray_paths.import_paths(table, site, out, carrier_mhz=carrier_mhz)
+    console.print(
+        f"{out}: {found['paths']} paths between {found['heads']} radio heads and "
+        f"{found['places']} places",
+        soft_wrap=True,
+    )
+
+
+@app.command(
+    epilog="Example: [bold]access-av plan yard --masts masts.csv --add 2[/]",
+)
+def plan(
+    scenario: ScenarioArgument,
+    masts: Annotated[Path, typer.Option(help="CSV of candidates: name, x_m, y_m, z_m.")],
+    add: Annotated[int, typer.Option(min=1, help="Radio heads to add.")] = 1,
+    eirp_dbm: Annotated[
+        float | None, typer.Option(help="What they send; else as the site's first.")
+    ] = None,
+    out: Out = None,
+    as_json: AsJson = False,
+) -> None:
+    """Choose masts for further radio heads.
+
+    By the 90th percentile along the route of the bound: each mast is tried. Prints which 3GPP
+    service levels the bound then allows. Writes masts.parquet, scenario.toml with the new radio
+    heads, and manifest.json.
+    """
+    from access_av.files import ResultsDirectory, json_text
+    from access_av.placement import plan as plan_heads
+
+    with progress("Masts") as tick:
+        found = plan_heads(scenario, masts, add=add, eirp_dbm=eirp_dbm, progress=tick)
+    directory = ResultsDirectory.create(f"plan-{found.scenario.name}", out)
+    directory.write_table("masts.parquet", found.ranking)
+    directory.write_text("scenario.toml", found.scenario.to_toml())
+    directory.write_manifest(scenario=found.scenario.name, masts=str(masts), add=add)
+    if as_json:
+        record = {
+            "scenario": found.scenario.name,
+            "before_m": found.before_m,
+            "after_m": found.after_m,
+            "chosen": found.chosen,
+            "service_levels": [verdict.as_record() for verdict in found.verdicts],
+            "directory": str(directory.path),
+        }
+        print(json_text(record))
+        return
+    show_plan(found)
+    console.print(f"Site: {directory.path / 'scenario.toml'}", soft_wrap=True)

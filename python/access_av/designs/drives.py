@@ -1,0 +1,188 @@
+"""Drives of designs: the same runs for each, so that differences are theirs and not chance's."""
+
+from __future__ import annotations
+
+import json
+from dataclasses import dataclass
+from typing import TYPE_CHECKING, Any
+
+import numpy as np
+
+from access_av import _core
+from access_av._core import Scenario, SettingsError
+from access_av.campaign import Task
+from access_av.errors import InputError
+from access_av.platform import Platform
+
+if TYPE_CHECKING:
+    from collections.abc import Callable, Mapping, Sequence
+
+    from numpy.typing import NDArray
+
+    from access_av.campaign import Campaign
+
+# Every so many SSBs, the error along the track is kept.
+TRACK_EVERY = 25
+# The computer in whose name all drive: only its energy figures would differ.
+ANY_BOARD = "jetson-agx-xavier"
+
+
+@dataclass(frozen=True)
+class Design:
+    """One choice of everything that varies.
+
+    Attributes
+    ----------
+    values
+        What was chosen, by key.
+    label
+        What of it differs from design to design, for people.
+    """
+
+    values: Mapping[str, Any]
+    label: str
+    scenario: Scenario
+    platform: Platform
+
+    @property
+    def driven(self) -> str:
+        """What decides its drives: the scenario, without the computer it has been resolved for."""
+        board = {"vehicle.platform.name": ANY_BOARD, "vehicle.platform.mode": 0}
+        return self.scenario.with_overrides(board).to_toml()
+
+
+@dataclass(frozen=True)
+class Driven:
+    """A design and what its drives found.
+
+    Attributes
+    ----------
+    square_m2, energy_j
+        Mean squared horizontal error and energy of each run, shape (runs,); infinite where the
+        vehicle was never found, or the platform has no figure.
+    worst_m
+        Largest error of each run.
+    track_s, track_m2
+        Times, and mean squared error over the runs at them.
+    """
+
+    design: Design
+    square_m2: NDArray[np.float64]
+    energy_j: NDArray[np.float64]
+    worst_m: NDArray[np.float64]
+    executions: NDArray[np.float64]
+    listened: NDArray[np.float64]
+    track_s: NDArray[np.float64]
+    track_m2: NDArray[np.float64]
+
+    @property
+    def rms_m(self) -> float:
+        """Root mean square error over track and runs."""
+        return float(np.sqrt(np.mean(self.square_m2)))
+
+    @property
+    def mean_energy_j(self) -> float:
+        """Mean energy of a trip."""
+        return float(np.mean(self.energy_j))
+
+
+def designs_of(scenario: Scenario, choices: Sequence[Mapping[str, Any]]) -> list[Design]:
+    """The scenario with each of the choices.
+
+    Raises
+    ------
+    InputError
+        When a choice cannot be: names it, the key, and what is allowed.
+    """
+    platforms: dict[str, Platform] = {}
+    found = []
+    varying = [
+        key for key in (choices[0] if choices else {}) if len({str(it[key]) for it in choices}) > 1
+    ]
+    for values in choices:
+        try:
+            # Tables first: `vehicle.wake_up` before `vehicle.wake_up.bound_m`.
+            ordered = dict(sorted(values.items()))
+            changed = scenario.with_overrides(ordered)
+            name = _platform_name(changed)
+            board = platforms.setdefault(name, Platform.load(name))
+            resolved = changed.resolved(board.core)
+            board.core.energy_j(resolved.vehicle, 0, 0, 0.0)
+        except SettingsError as error:
+            raise InputError(f"design {dict(values)}: {error}") from error
+        label = ", ".join(f"{key.rpartition('.')[2]} {_shown(values[key])}" for key in varying)
+        found.append(Design(values, label, resolved, board))
+    return found
+
+
+def drive(
+    campaign: Campaign,
+    designs: Sequence[Design],
+    *,
+    first_run: int,
+    runs: int,
+    seed: int,
+    progress: Callable[[int, int], None] | None = None,
+) -> list[dict[str, NDArray[Any]] | None]:
+    """Drive each design in the runs from ``first_run`` on; designs that drive alike do it once."""
+    texts = [design.driven for design in designs]
+    different = list(dict.fromkeys(texts))
+    tasks = [
+        Task(
+            depends_on={"drives": text, "seed": seed, "first_run": first_run, "runs": runs},
+            work=simulated,
+            arguments=(text, seed, first_run, runs),
+        )
+        for text in different
+    ]
+    parts = dict(zip(different, campaign.run(tasks, progress), strict=True))
+    return [parts[text] for text in texts]
+
+
+def simulated(scenario: str, seed: int, first_run: int, runs: int) -> dict[str, NDArray[Any]]:
+    """A part: runs of a scenario, on one thread."""
+    found = _core.simulate(Scenario.from_toml(scenario), runs, seed, first_run=first_run, threads=1)
+    columns = ("executions", "listened", "rms_error_m", "max_error_m")
+    track = slice(None, None, TRACK_EVERY)
+    return {
+        **{name: np.asarray(found.runs[name], dtype=np.float64) for name in columns},
+        "track_s": np.asarray(found.steps["time_s"], dtype=np.float64)[track],
+        "track_m2": np.asarray(found.steps["rms_error_m"], dtype=np.float64)[track] ** 2,
+    }
+
+
+def joined(design: Design, parts: Sequence[Mapping[str, NDArray[Any]]]) -> Driven:
+    """A design with all its parts, and the energy of each of its runs."""
+    executions, listened, rms_m, worst_m = (
+        np.concatenate([part[name] for part in parts])
+        for name in ("executions", "listened", "rms_error_m", "max_error_m")
+    )
+    weights = np.array([part["executions"].size for part in parts], dtype=np.float64)
+    track_s = parts[0]["track_s"]
+    track_m2 = np.average([part["track_m2"] for part in parts], axis=0, weights=weights)
+    core, vehicle = design.platform.core, design.scenario.vehicle
+    duration_s = float(track_s[-1])
+    energies = [
+        core.energy_j(vehicle, int(estimated), int(heard), duration_s)
+        for estimated, heard in zip(executions, listened, strict=True)
+    ]
+    return Driven(
+        design=design,
+        square_m2=np.nan_to_num(rms_m**2, nan=np.inf),
+        energy_j=np.array([np.inf if each is None else sum(each[:3]) for each in energies]),
+        worst_m=np.nan_to_num(worst_m, nan=np.inf),
+        executions=executions,
+        listened=listened,
+        track_s=track_s,
+        track_m2=track_m2,
+    )
+
+
+def _platform_name(scenario: Scenario) -> str:
+    return str(json.loads(scenario.vehicle.to_json())["platform"]["name"])
+
+
+def _shown(value: Any) -> str:
+    if isinstance(value, dict):
+        return " ".join(str(item) for item in value.values())
+    return f"{value:g}" if isinstance(value, float) else str(value)

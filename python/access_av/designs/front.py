@@ -1,0 +1,89 @@
+"""Which designs no other beats, and how sure that is."""
+
+from __future__ import annotations
+
+from typing import TYPE_CHECKING
+
+import numpy as np
+
+if TYPE_CHECKING:
+    from collections.abc import Sequence
+
+    from numpy.typing import NDArray
+
+    from access_av.designs.drives import Driven
+
+
+def differences(one: Driven, others: Sequence[Driven]) -> NDArray[np.float64]:
+    """Run by run, how much more energy and squared error one has than each other.
+
+    Only the runs that both have; shape (others, 2, 3): mean and the ends of its 95 % interval.
+    """
+    found = np.empty((len(others), 2, 3))
+    for row, other in enumerate(others):
+        count = min(one.square_m2.size, other.square_m2.size)
+        for column, name in enumerate(("energy_j", "square_m2")):
+            mine, its = getattr(one, name)[:count], getattr(other, name)[:count]
+            found[row, column] = _interval(mine, its)
+    return found
+
+
+def _interval(mine: NDArray[np.float64], its: NDArray[np.float64]) -> tuple[float, float, float]:
+    if not np.isfinite(mine).all() or not np.isfinite(its).all():
+        known = float(np.isfinite(its).all()), float(np.isfinite(mine).all())
+        sure = np.inf * (known[0] - known[1]) if known[0] != known[1] else 0.0
+        return sure, sure, sure
+    less = mine - its
+    mean = float(np.mean(less))
+    if less.size < 2:
+        return mean, -np.inf, np.inf
+    half = student(less.size - 1) * float(np.std(less, ddof=1)) / np.sqrt(less.size)
+    return mean, mean - half, mean + half
+
+
+def student(freedom: int) -> float:
+    """Two-sided 95 % quantile of Student's t, by Hill's expansion; exact for 1 and 2.
+
+    Examples
+    --------
+    >>> [round(student(freedom), 2) for freedom in (1, 2, 5, 19)]
+    [12.71, 4.3, 2.57, 2.09]
+    """
+    if freedom <= 2:
+        return (12.706, 4.303)[freedom - 1]
+    z, n = 1.959964, float(freedom)
+    return (
+        z
+        + (z**3 + z) / (4 * n)
+        + (5 * z**5 + 16 * z**3 + 3 * z) / (96 * n**2)
+        + (3 * z**7 + 19 * z**5 + 17 * z**3 - 15 * z) / (384 * n**3)
+    )
+
+
+def front(driven: Sequence[Driven]) -> list[int]:
+    """Designs that no other beats in mean energy and mean error, by energy."""
+    energy_j = np.array([each.mean_energy_j for each in driven])
+    square_m2 = np.array([float(np.mean(each.square_m2)) for each in driven])
+    found: list[int] = []
+    best_m2 = np.inf
+    for index in np.lexsort((square_m2, energy_j)):
+        if square_m2[index] < best_m2 and np.isfinite(energy_j[index]):
+            best_m2 = square_m2[index]
+            found.append(int(index))
+    return found
+
+
+def may_be_front(driven: Sequence[Driven]) -> list[int]:
+    """Designs that no other is better than with 95 %: the front's confidence.
+
+    One is beaten where another is surely no worse in both, and surely better in one.
+    """
+    on_front = front(driven)
+    rivals = [driven[index] for index in on_front]
+    found = []
+    for index, one in enumerate(driven):
+        low = differences(one, rivals)[:, :, 1]
+        beaten = (low >= 0.0).all(axis=1) & (low > 0.0).any(axis=1)
+        if index in on_front or not beaten.any():
+            found.append(index)
+    return found

@@ -1,0 +1,125 @@
+"""Which designs are driven how often: all of them, or fewer and fewer, ever more."""
+
+from __future__ import annotations
+
+from dataclasses import dataclass
+from typing import TYPE_CHECKING, Any
+
+import numpy as np
+
+from access_av.designs.drives import drive, joined
+from access_av.errors import InputError
+
+if TYPE_CHECKING:
+    from collections.abc import Callable, Mapping, Sequence
+
+    from numpy.typing import NDArray
+
+    from access_av.campaign import Campaign
+    from access_av.designs.drives import Design, Driven
+
+# Successive halving: of the designs left, one in so many goes on to so many times the runs.
+KEEP_ONE_IN = 3
+FIRST_RUNS = 2
+
+
+@dataclass(frozen=True)
+class Found:
+    """Designs that were driven to the end, and what it took.
+
+    Attributes
+    ----------
+    driven
+        Those that were driven in all runs.
+    drives
+        Drives in all, as if each design had driven by itself.
+    """
+
+    driven: list[Driven]
+    drives: int
+
+
+def rounds(runs: int, *, halving: bool) -> list[int]:
+    """After how many runs the designs are compared.
+
+    Examples
+    --------
+    >>> rounds(20, halving=True), rounds(20, halving=False)
+    ([2, 6, 20], [20])
+    """
+    counts, upto = [], FIRST_RUNS
+    while halving and 2 * upto <= runs:
+        counts.append(upto)
+        upto *= KEEP_ONE_IN
+    return [*counts, runs]
+
+
+def search(
+    campaign: Campaign,
+    designs: Sequence[Design],
+    *,
+    runs: int,
+    seed: int,
+    halving: bool = False,
+    progress: Callable[[int, int], None] | None = None,
+) -> Found | None:
+    """Drive the designs.
+
+    Parameters
+    ----------
+    runs
+        Drives of each design that is kept to the end.
+    halving
+        Whether designs that are behind are left out before; all see the same runs.
+
+    Returns
+    -------
+    Found
+        ``None`` where parts are missing that another shard computes.
+    """
+    if not designs:
+        raise InputError("no designs to drive")
+    left = list(range(len(designs)))
+    parts: dict[int, list[Mapping[str, NDArray[Any]]]] = {index: [] for index in left}
+    done = drives = 0
+    driven: list[Driven] = []
+    stages = rounds(runs, halving=halving)
+    for stage, upto in enumerate(stages):
+        made = drive(
+            campaign,
+            [designs[index] for index in left],
+            first_run=done,
+            runs=upto - done,
+            seed=seed,
+            progress=progress,
+        )
+        for index, part in zip(left, made, strict=True):
+            if part is None:
+                return None
+            parts[index].append(part)
+        drives += len(left) * (upto - done)
+        done = upto
+        driven = [joined(designs[index], parts[index]) for index in left]
+        if stage + 1 < len(stages):
+            ranked = ranking(driven)
+            keep = max(len(left) // KEEP_ONE_IN, 1)
+            kept = sorted(ranked[:keep])
+            left = [left[place] for place in kept]
+    return Found(driven, drives)
+
+
+def ranking(driven: Sequence[Driven]) -> list[int]:
+    """Designs in order: the front, then the front of the others, and so on."""
+    energy_j = np.array([each.mean_energy_j for each in driven])
+    square_m2 = np.array([float(np.mean(each.square_m2)) for each in driven])
+    left = np.arange(len(driven))
+    found: list[int] = []
+    while left.size:
+        order = left[np.lexsort((square_m2[left], energy_j[left]))]
+        best_m2 = np.minimum.accumulate(np.concatenate([[np.inf], square_m2[order][:-1]]))
+        on_front = order[square_m2[order] < best_m2]
+        if on_front.size == 0:
+            on_front = order
+        found += on_front.tolist()
+        left = np.setdiff1d(left, on_front)
+    return found

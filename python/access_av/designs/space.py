@@ -1,0 +1,189 @@
+"""What may be chosen: keys of a scenario, and the values each may take."""
+
+from __future__ import annotations
+
+import itertools
+import math
+from dataclasses import dataclass
+from typing import TYPE_CHECKING, Any
+
+import numpy as np
+
+from access_av.errors import InputError
+from access_av.toml import tomllib
+
+if TYPE_CHECKING:
+    from collections.abc import Mapping
+    from pathlib import Path
+
+    from numpy.typing import NDArray
+
+MOST_DESIGNS = 100_000
+BITS = 32
+# Joe and Kuo, new-joe-kuo-6.21201: polynomial and first direction numbers from dimension 2 on.
+SOBOL = (
+    (0, (1,)),
+    (1, (1, 3)),
+    (1, (1, 3, 1)),
+    (2, (1, 1, 1)),
+    (1, (1, 1, 3, 3)),
+    (4, (1, 3, 5, 13)),
+    (2, (1, 1, 5, 5, 17)),
+    (4, (1, 1, 5, 5, 5)),
+    (7, (1, 1, 7, 11, 19)),
+)
+
+
+@dataclass(frozen=True)
+class Dimension:
+    """One key and the values it may take: a list of choices, or from ``low`` to ``high``."""
+
+    key: str
+    choices: tuple[Any, ...] = ()
+    low: float = 0.0
+    high: float = 0.0
+    is_log: bool = False
+
+    def at(self, coordinate: float) -> Any:
+        """The value at a coordinate from 0 up to 1.
+
+        Examples
+        --------
+        >>> Dimension("a", low=1.0, high=100.0, is_log=True).at(0.5)
+        10.0
+        """
+        if self.choices:
+            return self.choices[min(int(coordinate * len(self.choices)), len(self.choices) - 1)]
+        if self.is_log:
+            return float(f"{self.low * (self.high / self.low) ** coordinate:.6g}")
+        return float(f"{self.low + (self.high - self.low) * coordinate:.6g}")
+
+
+@dataclass(frozen=True)
+class Space:
+    """All that may be chosen together."""
+
+    dimensions: tuple[Dimension, ...]
+
+    @classmethod
+    def read(cls, file: Path) -> Space:
+        """Read a space file.
+
+        Raises
+        ------
+        InputError
+            When it cannot be used; names the key and what is allowed.
+        """
+        try:
+            table = tomllib.loads(file.read_text(encoding="utf-8"))
+        except (tomllib.TOMLDecodeError, UnicodeDecodeError) as error:
+            raise InputError(f"{file}: {error}") from error
+        try:
+            return cls.of(table)
+        except InputError as error:
+            raise InputError(f"{file}: {error}") from error
+
+    @classmethod
+    def of(cls, table: Mapping[str, Any]) -> Space:
+        """A space from nested tables: lists are choices, ``low`` and ``high`` a range.
+
+        Examples
+        --------
+        >>> space = Space.of({"vehicle": {"platform": {"mode": [0, 2]}}})
+        >>> space.grid()
+        [{'vehicle.platform.mode': 0}, {'vehicle.platform.mode': 2}]
+        """
+        found = tuple(_dimensions(table, ""))
+        if not found:
+            raise InputError("no key with a list of choices, or with `low` and `high`")
+        return cls(found)
+
+    def grid(self) -> list[dict[str, Any]]:
+        """Every combination of the choices.
+
+        Raises
+        ------
+        InputError
+            When a key has a range instead of choices, or there are too many combinations.
+        """
+        for dimension in self.dimensions:
+            if not dimension.choices:
+                raise InputError(f"{dimension.key}: a grid needs a list of values, not a range")
+        count = math.prod(len(dimension.choices) for dimension in self.dimensions)
+        if count > MOST_DESIGNS:
+            raise InputError(f"the grid has {count} designs; at most {MOST_DESIGNS} are allowed")
+        keys = [dimension.key for dimension in self.dimensions]
+        combined = itertools.product(*(dimension.choices for dimension in self.dimensions))
+        return [dict(zip(keys, values, strict=True)) for values in combined]
+
+    def sobol(self, count: int) -> list[dict[str, Any]]:
+        """So many points spread evenly, without those that are the same design twice."""
+        points = sobol(count, len(self.dimensions))
+        found: dict[str, dict[str, Any]] = {}
+        for point in points:
+            pairs = zip(self.dimensions, point, strict=True)
+            design = {dimension.key: dimension.at(float(at)) for dimension, at in pairs}
+            found.setdefault(repr(design), design)
+        return list(found.values())
+
+
+def sobol(count: int, dimensions: int) -> NDArray[np.float64]:
+    """Points of a Sobol sequence from 0 up to 1, of shape (count, dimensions).
+
+    Examples
+    --------
+    >>> sobol(4, 2).tolist()
+    [[0.0, 0.0], [0.5, 0.5], [0.75, 0.25], [0.25, 0.75]]
+    """
+    if not 1 <= dimensions <= len(SOBOL) + 1:
+        raise InputError(f"{dimensions} keys vary; Sobol points go up to {len(SOBOL) + 1}")
+    directions = np.array([_directions(number) for number in range(dimensions)], dtype=np.uint64)
+    points = np.zeros((count, dimensions), dtype=np.uint64)
+    for index in range(1, count):
+        # Gray code: from one point to the next, the lowest zero bit of the index changes.
+        changed = (~(index - 1) & index).bit_length() - 1
+        points[index] = points[index - 1] ^ directions[:, changed]
+    return points / 2.0**BITS
+
+
+def _directions(dimension: int) -> list[int]:
+    if dimension == 0:
+        return [1 << (BITS - 1 - bit) for bit in range(BITS)]
+    polynomial, first = SOBOL[dimension - 1]
+    degree = len(first)
+    found = [number << (BITS - 1 - bit) for bit, number in enumerate(first)]
+    for bit in range(degree, BITS):
+        value = found[bit - degree] ^ (found[bit - degree] >> degree)
+        for step in range(1, degree):
+            if polynomial >> (degree - 1 - step) & 1:
+                value ^= found[bit - step]
+        found.append(value)
+    return found
+
+
+def _dimensions(table: Mapping[str, Any], path: str) -> list[Dimension]:
+    found = []
+    for name, value in table.items():
+        key = f"{path}.{name}" if path else name
+        if isinstance(value, list):
+            if not value:
+                raise InputError(f"{key}: the list is empty")
+            found.append(Dimension(key, choices=tuple(value)))
+        elif isinstance(value, dict) and {"low", "high"} <= value.keys():
+            found.append(_range(key, value))
+        elif isinstance(value, dict):
+            found += _dimensions(value, key)
+        else:
+            raise InputError(f"{key}: {value!r} is one value; write a list, or `low` and `high`")
+    return found
+
+
+def _range(key: str, table: Mapping[str, Any]) -> Dimension:
+    if unknown := table.keys() - {"low", "high", "log"}:
+        raise InputError(f"{key}.{min(unknown)}: unknown; allowed are low, high, log")
+    low, high, is_log = table["low"], table["high"], table.get("log", False)
+    if not all(isinstance(value, (int, float)) and math.isfinite(value) for value in (low, high)):
+        raise InputError(f"{key}: `low` and `high` must be numbers")
+    if not low < high or (is_log and low <= 0):
+        raise InputError(f"{key}: `low` must be below `high`, and positive where `log` is true")
+    return Dimension(key, low=float(low), high=float(high), is_log=bool(is_log))

@@ -1,0 +1,276 @@
+"""How integrity holds where the world is not as believed: mismatch by channel by radio heads."""
+
+from __future__ import annotations
+
+import itertools
+import json
+from dataclasses import dataclass
+from typing import TYPE_CHECKING, Any
+
+import numpy as np
+import polars as pl
+
+from access_av import _core
+from access_av.errors import InputError
+from access_av.parts import Parts
+from access_av.simulation import simulate
+from access_av.statistics.alarms import Alarms
+from access_av.statistics.consistency import horizontal_error_m
+from access_av.statistics.integrity import STATES, Integrity
+
+if TYPE_CHECKING:
+    from collections.abc import Callable, Mapping, Sequence
+    from pathlib import Path
+
+    from numpy.typing import NDArray
+
+Overrides = dict[str, Any]
+
+
+@dataclass(frozen=True)
+class Case:
+    """One cell of the campaign.
+
+    Attributes
+    ----------
+    mismatch, channel, heads
+        How the world departs from what is believed, the channel, and how many radio heads are
+        listened to.
+    scenario
+        All of it.
+    trajectories
+        ``run, time_s, error_x_m, error_y_m, protection_level_m, integrity`` of every step.
+    """
+
+    mismatch: str
+    channel: str
+    heads: int
+    scenario: _core.Scenario
+    trajectories: pl.DataFrame
+
+    @property
+    def alert_limit_m(self) -> float:
+        """The guard's alert limit."""
+        vehicle = json.loads(self.scenario.vehicle.to_json())
+        return float(vehicle["integrity"]["alert_limit_m"])
+
+    def as_record(self) -> dict[str, Any]:
+        """A row of the table; columns ``integrity_cases`` of :mod:`access_av.columns`."""
+        found = Integrity.of(self.trajectories)
+        alarms = Alarms.of(self.trajectories, self.alert_limit_m)
+        if found is None or alarms is None:
+            raise InputError(f"{self.scenario.name}: no step has a protection level")
+        error_m = self.trajectories["error_x_m"].abs()
+        return {
+            "mismatch": self.mismatch,
+            "channel": self.channel,
+            "heads": self.heads,
+            "runs": found.runs,
+            "availability": found.availability,
+            "unavailable_share": found.state_shares["unavailable"],
+            "exceedances": found.exceedances,
+            "exceedance_share": found.exceedance_share,
+            "exceedance_share_low": found.exceedance_interval[0],
+            "exceedance_share_high": found.exceedance_interval[1],
+            "runs_with_exceedances": found.runs_with_exceedances,
+            "time_to_alert_s": alarms.longest_silence_s,
+            "level_over_error": found.median_level_over_error,
+            "p90_error_m": error_m.quantile(0.9, "linear"),
+            "max_error_m": error_m.max(),
+        }
+
+
+def mismatches(scenario: _core.Scenario) -> dict[str, Overrides]:
+    """What can be otherwise than believed, by name: overrides of the scenario.
+
+    Every other quantity is drawn from its stated standard deviation.
+
+    Examples
+    --------
+    >>> found = mismatches(_core.Scenario.load("yard"))
+    >>> found["array 1 degree off"]
+    {'truth.vehicle.array.mounting_rad': 0.0175}
+    """
+    site = json.loads(scenario.site.to_json())
+    vehicle = json.loads(scenario.vehicle.to_json())
+    heads, odometer = site["radio_heads"], vehicle["odometer"]
+
+    def moved(count: int) -> Overrides:
+        names = [head["name"] for head in heads[:count]]
+        if not all(names) or len(set(names)) < len(names):
+            return {}
+        places = (np.add(head["position_m"], [2.0, 0.0, 0.0]) for head in heads)
+        return {
+            "truth.site.radio_heads": {
+                name: {"position_m": place.tolist()}
+                for name, place in zip(names, places, strict=False)
+            }
+        }
+
+    def whole_drive(what: Overrides) -> Overrides:
+        return {"from_s": 20.0, "until_s": 1e6, "what": what}
+
+    def hidden(count: int) -> Overrides:
+        what = {"kind": "non-line-of-sight", "bias_rad": 0.15}
+        return {
+            "faults": [whole_drive({**what, "radio_head": head}) for head in range(count)],
+        }
+
+    mounting_rad, phase_rad = vehicle["array"]["mounting_rad"], vehicle["array"]["phase_rad"]
+    cases = {
+        "none": {},
+        "array 1 degree off": {"truth.vehicle.array.mounting_rad": mounting_rad + 0.0175},
+        "phases 0.05 rad off": {"truth.vehicle.array.phase_rad": phase_rad + 0.05},
+        "odometer noise x 3": {
+            "truth.vehicle.odometer.noise_m_per_sqrt_m": 3.0 * odometer["noise_m_per_sqrt_m"]
+        },
+        "odometer scale x 3": {
+            "truth.vehicle.odometer.scale": odometer["scale"] + 3.0 * odometer["scale_std"]
+        },
+        "odometer slips 2 %": {
+            "faults": [whole_drive({"kind": "odometer-slip", "ratio": 1.02})],
+        },
+        "all heads 2 m off": moved(len(heads)),
+        "two heads 2 m off": moved(2),
+        "one head hidden": hidden(1),
+        "three heads hidden": hidden(min(3, len(heads))),
+    }
+    return {name: case for name, case in cases.items() if case or name == "none"}
+
+
+def channels(names: Sequence[str]) -> dict[str, Overrides]:
+    """Channels by name: ``as set``, ``K=dB`` for a true Rician K, or a model.
+
+    Examples
+    --------
+    >>> channels(["K=5", "inf-sh"])
+    {'K=5': {'truth.site.rician_k_db': 5.0}, 'inf-sh': {'channel': {'model': 'inf-sh'}}}
+    """
+    found: dict[str, Overrides] = {}
+    for name in names:
+        kind, _, k_db = name.partition("=")
+        if name == "as set":
+            found[name] = {}
+        elif kind == "K":
+            try:
+                found[name] = {"truth.site.rician_k_db": float(k_db)}
+            except ValueError:
+                raise InputError(f"channel {name}: write K=5 for a Rician K of 5 dB") from None
+        else:
+            found[name] = {"channel": {"model": name}}
+    return found
+
+
+def campaign(
+    scenario: _core.Scenario | str,
+    *,
+    runs: int = 20,
+    seed: int = 1,
+    only: Sequence[str] | None = None,
+    channel_names: Sequence[str] = ("as set",),
+    heads: Sequence[int] | None = None,
+    keep: Path | None = None,
+    threads: int | None = None,
+    progress: Callable[[int, int], None] | None = None,
+) -> list[Case]:
+    """Drive a guarded scenario under every mismatch, channel and number of radio heads.
+
+    Parameters
+    ----------
+    scenario
+        A scenario, or the name or path of one. A vehicle without a guard gets one.
+    runs, seed
+        Drives of each case, and their seed.
+    only
+        Names of mismatches; all of :func:`mismatches` when ``None``.
+    channel_names
+        See :func:`channels`.
+    heads
+        Numbers of radio heads listened to, the first of the site; all of them when ``None``.
+    keep
+        Directory of finished cases: what is there is not driven again.
+    threads
+        Worker threads; all cores when ``None``.
+    progress
+        Called as ``progress(done, total)`` with numbers of cases.
+
+    Returns
+    -------
+    list of Case
+        In the order mismatch, channel, heads.
+
+    Raises
+    ------
+    InputError
+        For a name or number that there is not.
+
+    Examples
+    --------
+    >>> [case] = campaign("paper-real-odometry-4", runs=1, only=["none"])
+    >>> case.as_record()["availability"] > 0.9
+    True
+    """
+    if not isinstance(scenario, _core.Scenario):
+        scenario = _core.Scenario.load(scenario)
+    if json.loads(scenario.vehicle.to_json()).get("integrity") is None:
+        scenario = scenario.with_overrides({"vehicle.integrity": {}})
+    known = mismatches(scenario)
+    for name in only or ():
+        if name not in known:
+            raise InputError(f"mismatch {name!r}: there are {', '.join(known)}")
+    cells = [head["pci"] for head in json.loads(scenario.site.to_json())["radio_heads"]]
+    for count in heads or ():
+        if not 1 <= count <= len(cells):
+            raise InputError(f"{count} radio heads: the site has {len(cells)}")
+    grid = list(
+        itertools.product(only or known, channels(channel_names).items(), heads or (len(cells),))
+    )
+    found = []
+    for done, (mismatch, (channel, over_channel), count) in enumerate(grid):
+        if progress is not None:
+            progress(done, len(grid))
+        listens = {} if count == len(cells) else {
+            "vehicle.receiver.pci_allow_list": cells[:count]
+        }  # fmt: skip
+        chosen = scenario.with_overrides({**over_channel, **known[mismatch], **listens})
+
+        def drive(chosen: _core.Scenario = chosen) -> Mapping[str, NDArray[Any]]:
+            return _drive(chosen, runs, seed, threads)
+
+        depends_on = [chosen.to_toml(), runs, seed]
+        arrays = drive() if keep is None else Parts(keep).get(depends_on, drive)
+        found.append(Case(mismatch, channel, count, chosen, _table(arrays)))
+    if progress is not None:
+        progress(len(grid), len(grid))
+    return found
+
+
+def _drive(
+    scenario: _core.Scenario, runs: int, seed: int, threads: int | None
+) -> dict[str, NDArray[Any]]:
+    """Errors, levels and states of every step, small."""
+    driven = simulate(scenario, runs=runs, seed=seed, threads=threads, keep_trajectories=True)
+    if driven.trajectories is None:  # they were asked for
+        raise RuntimeError("the simulation kept no trajectories")
+    steps = driven.trajectories.filter(pl.col("protection_level_m").is_not_null())
+    state = steps["integrity"].cast(pl.Enum(STATES)).to_physical()
+    return {
+        "run": steps["run"].to_numpy().astype(np.int32),
+        "time_s": steps["time_s"].to_numpy().astype(np.float32),
+        "error_m": steps.select(horizontal_error_m()).to_series().to_numpy().astype(np.float32),
+        "level_m": steps["protection_level_m"].to_numpy().astype(np.float32),
+        "state": state.to_numpy().astype(np.uint8),
+    }
+
+
+def _table(arrays: Mapping[str, NDArray[Any]]) -> pl.DataFrame:
+    return pl.DataFrame(
+        {
+            "run": arrays["run"],
+            "time_s": arrays["time_s"].astype(np.float64),
+            "error_x_m": arrays["error_m"].astype(np.float64),
+            "error_y_m": np.zeros(len(arrays["error_m"])),
+            "protection_level_m": arrays["level_m"].astype(np.float64),
+            "integrity": np.asarray(STATES)[arrays["state"]],
+        }
+    )

@@ -1,0 +1,185 @@
+"""Where to put the next radio heads: candidate masts, ranked by the bound."""
+
+from __future__ import annotations
+
+import json
+import math
+import os
+from concurrent.futures import ThreadPoolExecutor
+from dataclasses import dataclass
+from typing import TYPE_CHECKING, Any
+
+import polars as pl
+
+from access_av import _core, service_levels
+from access_av.errors import InputError
+
+if TYPE_CHECKING:
+    from collections.abc import Callable, Sequence
+    from pathlib import Path
+
+MOST_MASTS = 1000
+# An SSB per cell of the lowest that is free.
+CELLS = 1008
+
+
+@dataclass(frozen=True)
+class Plan:
+    """Which masts to equip.
+
+    Attributes
+    ----------
+    scenario
+        The scenario with them.
+    before_m, after_m
+        90th percentile along the route of the bound of the horizontal error, without and with them.
+    chosen
+        Names of the masts, the best one first.
+    ranking
+        One row per mast, as the only one added; columns ``masts`` of :mod:`access_av.columns`.
+    verdicts
+        Service levels that the bound allows with them.
+    """
+
+    scenario: _core.Scenario
+    before_m: float
+    after_m: float
+    chosen: list[str]
+    ranking: pl.DataFrame
+    verdicts: list[service_levels.Verdict]
+
+
+def plan(
+    scenario: _core.Scenario | str,
+    masts: pl.DataFrame | str | Path,
+    *,
+    add: int = 1,
+    eirp_dbm: float | None = None,
+    progress: Callable[[int, int], None] | None = None,
+) -> Plan:
+    """Choose masts for further radio heads, by the 90th percentile of the bound along the route.
+
+    One is chosen by trying each. Of several, each next one is the best beside those chosen before,
+    and then each is exchanged for another as long as that helps.
+
+    Parameters
+    ----------
+    scenario
+        A scenario, or the name or path of one.
+    masts
+        Candidates: a table, or the CSV file of one, with the columns ``name, x_m, y_m, z_m``.
+    add
+        How many radio heads to add.
+    eirp_dbm
+        What they send; like the site's first radio head when ``None``.
+    progress
+        Called as ``progress(done, total)`` with numbers of bounds computed for the first choice.
+
+    Returns
+    -------
+    Plan
+        The choice.
+
+    Raises
+    ------
+    InputError
+        For a table that lacks a column or a number, and more masts to choose than there are.
+    SettingsError
+        For a mast where no radio head can be.
+
+    Examples
+    --------
+    >>> masts = pl.DataFrame(
+    ...     {"name": ["near", "far"], "x_m": [60.0, 60.0], "y_m": [40.0, 400.0], "z_m": [0.0, 0.0]}
+    ... )
+    >>> found = plan("paper-real-odometry-2", masts)
+    >>> found.chosen, found.after_m < found.before_m
+    (['near'], True)
+    """
+    if not isinstance(scenario, _core.Scenario):
+        scenario = _core.Scenario.load(scenario)
+    candidates = _candidates(masts)
+    if not 1 <= add <= len(candidates):
+        raise InputError(f"--add {add}: there are {len(candidates)} masts to choose from")
+    heads = json.loads(scenario.site.to_json())["radio_heads"]
+    eirp_dbm = heads[0]["eirp_dbm"] if eirp_dbm is None else eirp_dbm
+    taken = {head["pci"] for head in heads}
+    free = [pci for pci in range(CELLS) if pci not in taken]
+
+    def equipped(chosen: Sequence[int]) -> _core.Scenario:
+        new = [
+            {
+                "name": candidates[number]["name"],
+                "position_m": [candidates[number][axis] for axis in ("x_m", "y_m", "z_m")],
+                "pci": pci,
+                "eirp_dbm": eirp_dbm,
+            }
+            for number, pci in zip(chosen, free, strict=False)
+        ]
+        return scenario.with_overrides({"site.radio_heads": [*heads, *new]}) if new else scenario
+
+    def p90_m(chosen: Sequence[int]) -> float:
+        return _p90_m(equipped(chosen))
+
+    everyone = range(len(candidates))
+    with ThreadPoolExecutor(os.cpu_count()) as pool:
+        before_m = p90_m([])
+        alone_m = []
+        for value_m in pool.map(p90_m, ([number] for number in everyone)):
+            alone_m.append(value_m)
+            if progress is not None:
+                progress(len(alone_m), len(candidates))
+        chosen = [min(everyone, key=alone_m.__getitem__)]
+        after_m = alone_m[chosen[0]]
+
+        def better(kept: list[int]) -> tuple[float, int]:
+            others = [number for number in everyone if number not in kept]
+            return min(zip(pool.map(p90_m, ([*kept, it] for it in others)), others, strict=True))
+
+        while len(chosen) < add:
+            after_m, number = better(chosen)
+            chosen.append(number)
+        exchanged = add > 1
+        while exchanged:
+            exchanged = False
+            for place in range(add):
+                kept = chosen[:place] + chosen[place + 1 :]
+                value_m, number = better(kept)
+                if value_m < after_m - 1e-9:
+                    after_m, chosen, exchanged = value_m, [*kept, number], True
+    ranking = pl.DataFrame(candidates).with_columns(p90_bound_m=pl.Series(alone_m))
+    final = equipped(chosen)
+    route = pl.DataFrame(_core.Bound(final).along_route())
+    return Plan(
+        scenario=final,
+        before_m=before_m,
+        after_m=after_m,
+        chosen=[candidates[number]["name"] for number in chosen],
+        ranking=ranking.sort("p90_bound_m", maintain_order=True),
+        verdicts=service_levels.of_bound(route["along_std_m"], route["across_std_m"]),
+    )
+
+
+def _p90_m(scenario: _core.Scenario) -> float:
+    bound_m = pl.Series(_core.Bound(scenario).along_route()["bound_m"])
+    return float(bound_m.quantile(0.9, "linear") or math.nan)
+
+
+def _candidates(masts: pl.DataFrame | str | Path) -> list[dict[str, Any]]:
+    where = "masts" if isinstance(masts, pl.DataFrame) else str(masts)
+    if not isinstance(masts, pl.DataFrame):
+        try:
+            masts = pl.read_csv(masts, schema_overrides={"name": pl.String})
+        except pl.exceptions.PolarsError as error:
+            raise InputError(f"{where}: not a table: {error}") from None
+    for name in ("name", "x_m", "y_m", "z_m"):
+        if name not in masts.columns:
+            raise InputError(f"{where}: column {name} is missing; there are {masts.columns}")
+    if not 0 < masts.height <= MOST_MASTS:
+        raise InputError(f"{where}: {masts.height} masts; from 1 to {MOST_MASTS} are allowed")
+    for name in ("x_m", "y_m", "z_m"):
+        bad = (~masts[name].cast(pl.Float64, strict=False).is_finite()).fill_null(value=True)
+        if bad.any():
+            raise InputError(f"{where}: {name} is not a number in row {bad.arg_true()[0]}")
+    numbers = [pl.col(name).cast(pl.Float64) for name in ("x_m", "y_m", "z_m")]
+    return masts.select("name", *numbers).to_dicts()

@@ -1,0 +1,63 @@
+"""The page of ``access-av integrity``: a table, and a Stanford diagram of each case."""
+
+from __future__ import annotations
+
+from html import escape
+from importlib.metadata import version
+from typing import TYPE_CHECKING
+
+from access_av.report import drive_charts as charts
+from access_av.report.page import sheet
+from access_av.report.parts import figure, number, source, table, tile
+
+if TYPE_CHECKING:
+    from collections.abc import Sequence
+
+    from access_av.integrity_campaign import Case
+
+HEAD = (
+    "World", "Channel", "Radio heads", "Available", "Beyond while ok", "95 %, up to",
+    "Runs with it", "Time to alert / s", "Level / error", "90 % of errors / m",
+)  # fmt: skip
+
+
+def render_integrity(cases: Sequence[Case], runs: int, seed: int) -> str:
+    """The campaign as an HTML page that loads nothing."""
+    records = [case.as_record() for case in cases]
+    rows = [
+        (
+            escape(one["mismatch"]),
+            escape(one["channel"]),
+            str(one["heads"]),
+            f"{one['availability']:.1%}",
+            f"{one['exceedance_share']:.1e}",
+            f"{one['exceedance_share_high']:.1e}",
+            f"{one['runs_with_exceedances']} of {one['runs']}",
+            number(one["time_to_alert_s"], 2),
+            number(one["level_over_error"], 1),
+            number(one["p90_error_m"]),
+        )
+        for one in records
+    ]
+    specs = {
+        f"case{index}": charts.stanford(case.trajectories, case.alert_limit_m)
+        for index, case in enumerate(cases)
+    }
+    titles = [f"{case.mismatch}; {case.channel}; {case.heads} radio heads" for case in cases]
+    diagrams = "".join(figure(f"case{index}", title=title) for index, title in enumerate(titles))
+    worst = max(records, key=lambda one: one["exceedance_share"])
+    least = min(records, key=lambda one: one["availability"])
+    first = cases[0].scenario
+    return sheet(
+        specs,
+        title=f"ACCESS-AV integrity: {escape(first.name)}",
+        kicker="ACCESS-AV integrity",
+        headline="What the protection level is worth where the world is otherwise",
+        lead=escape(first.description),
+        tiles=tile(f"{worst['exceedance_share']:.1e}", f"beyond while ok, {worst['mismatch']}")
+        + tile(f"{least['availability']:.1%}", f"available, {least['mismatch']}"),
+        meta=escape(f"{runs} drives of each case, seed {seed}, version {version('access-av')}."),
+        sections=f"<section><h2>Cases</h2>{table(HEAD, rows, numbers=range(2, 10))}</section>"
+        f"<section><h2>Stanford diagrams</h2>{diagrams}</section><section><h2>Provenance</h2>"
+        f"{source('Scenario of the first case', first.to_toml())}</section>",
+    )

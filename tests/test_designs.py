@@ -1,0 +1,415 @@
+"""Designs: spaces, campaigns that are stopped and go on, fronts, and what to change."""
+
+from __future__ import annotations
+
+import json
+import subprocess
+import sys
+import threading
+import time
+from concurrent.futures import Executor, Future, ProcessPoolExecutor, ThreadPoolExecutor
+from concurrent.futures.process import BrokenProcessPool
+from dataclasses import replace
+from pathlib import Path
+from typing import Any
+
+import numpy as np
+import pytest
+
+from access_av import Scenario
+from access_av.campaign import Campaign, CampaignError, Shard, Task, executor
+from access_av.designs import drives
+from access_av.designs.drives import Design, Driven, designs_of
+from access_av.designs.front import front, may_be_front
+from access_av.designs.search import Found, rounds, search
+from access_av.designs.space import Space, sobol
+from access_av.designs.table import Constraints, rows_of, what_to_change
+from access_av.errors import InputError
+from access_av.parts import Parts
+from access_av.platform import Platform
+from access_av.report.designs import render_designs
+
+# Spaces.
+
+
+def test_sobol_points_are_spread_evenly() -> None:
+    points = sobol(256, 10)
+    for column in points.T:
+        assert sorted(np.floor(column * 256).astype(int)) == list(range(256))
+    for one, other in [(0, 1), (1, 2), (3, 7)]:
+        cells = np.floor(points[:, [one, other]] * 4).astype(int)
+        counts = np.unique(cells, axis=0, return_counts=True)[1]
+        assert counts.tolist() == [16] * 16, (one, other)
+
+
+def test_space_from_tables() -> None:
+    space = Space.of({"vehicle": {"platform": {"mode": [0, 2]}, "x": {"low": 1, "high": 4}}})
+    assert [dimension.key for dimension in space.dimensions] == [
+        "vehicle.platform.mode",
+        "vehicle.x",
+    ]
+    assert space.sobol(2) == [
+        {"vehicle.platform.mode": 0, "vehicle.x": 1.0},
+        {"vehicle.platform.mode": 2, "vehicle.x": 2.5},
+    ]
+
+
+@pytest.mark.parametrize(
+    ("table", "message"),
+    [
+        ({}, "no key"),
+        ({"a": []}, "a: the list is empty"),
+        ({"a": 1}, "a: 1 is one value"),
+        ({"a": {"low": 2, "high": 1}}, "a: `low` must be below `high`"),
+        ({"a": {"low": 0, "high": 1, "log": True}}, "positive where `log`"),
+        ({"a": {"low": 0, "high": 1, "step": 2}}, "a.step: unknown"),
+    ],
+)
+def test_bad_spaces_name_the_key(table: dict[str, Any], message: str) -> None:
+    with pytest.raises(InputError, match=message):
+        Space.of(table)
+
+
+def test_a_design_that_cannot_be_names_key_and_what_is_allowed() -> None:
+    with pytest.raises(InputError, match=r"platform.mode.*has the modes 0, 1, 2"):
+        designs_of(Scenario.load("paper"), [{"vehicle.platform.mode": 9}])
+
+
+# Campaigns.
+
+
+def part(number: int, pause_s: float = 0.0) -> dict[str, np.ndarray]:
+    time.sleep(pause_s)
+    return {"x": np.random.default_rng(number).normal(size=500)}
+
+
+def tasks(count: int = 12, pause_s: float = 0.0) -> list[Task]:
+    return [Task({"number": number}, part, (number, pause_s)) for number in range(count)]
+
+
+def contents(path: Path) -> dict[str, bytes]:
+    return {file.name: file.read_bytes() for file in sorted(path.glob("*.npz"))}
+
+
+@pytest.fixture
+def whole(tmp_path: Path) -> dict[str, bytes]:
+    Campaign(Parts(tmp_path / "whole")).run(tasks())
+    return contents(tmp_path / "whole")
+
+
+def test_same_bytes_whoever_computes(tmp_path: Path, whole: dict[str, bytes]) -> None:
+    assert len(whole) == 12
+    for number, pool in enumerate([ThreadPoolExecutor(3), ProcessPoolExecutor(2)]):
+        with pool:
+            found = Campaign(Parts(tmp_path / str(number)), pool, 2).run(tasks())
+        assert contents(tmp_path / str(number)) == whole
+        assert all(np.array_equal(found[i]["x"], part(i)["x"]) for i in range(12))
+
+
+def test_shards_make_the_whole(tmp_path: Path, whole: dict[str, bytes]) -> None:
+    parts = Parts(tmp_path / "shards")
+    first = Campaign(parts, shard=Shard(1, 3)).run(tasks())
+    assert sum(each is None for each in first) == 8
+    for number in (2, 3):
+        last = Campaign(parts, shard=Shard(number, 3)).run(tasks())
+    assert None not in last
+    assert contents(parts.path) == whole
+
+
+@pytest.mark.parametrize("text", ["0/2", "3/2", "1", "a/b", "1/2/3", "-1/2"])
+def test_bad_shards_are_refused(text: str) -> None:
+    with pytest.raises(InputError, match="write I/N"):
+        Shard.parse(text)
+
+
+def test_two_campaigns_in_one_directory(tmp_path: Path, whole: dict[str, bytes]) -> None:
+    parts = Parts(tmp_path / "both")
+    both = [threading.Thread(target=Campaign(parts).run, args=(tasks(),)) for _ in range(2)]
+    for one in both:
+        one.start()
+    for one in both:
+        one.join()
+    assert contents(parts.path) == whole
+    assert not list(parts.path.glob("*.partial"))
+
+
+@pytest.mark.parametrize("damage", [b"", b"PK\x03\x04", None])
+def test_a_damaged_part_is_said_and_computed_again(
+    tmp_path: Path, whole: dict[str, bytes], damage: bytes | None
+) -> None:
+    parts = Parts(tmp_path / "whole")
+    name, text = next(iter(whole.items()))
+    bits = bytearray(text)
+    bits[len(bits) // 2] ^= 0xFF
+    (parts.path / name).write_bytes(bytes(bits) if damage is None else damage)
+    with pytest.warns(UserWarning, match=f"{name}: damaged"):
+        Campaign(parts).run(tasks())
+    assert contents(parts.path) == whole
+
+
+def test_a_full_disk_names_the_part_and_leaves_nothing(
+    tmp_path: Path, monkeypatch: pytest.MonkeyPatch, whole: dict[str, bytes]
+) -> None:
+    parts = Parts(tmp_path / "full")
+    Campaign(parts, shard=Shard(1, 2)).run(tasks())
+
+    def full(_: int) -> None:
+        raise OSError(28, "No space left on device")
+
+    with monkeypatch.context() as patch:
+        patch.setattr("access_av.parts.os.fsync", full)
+        with pytest.raises(OSError, match="No space left") as caught:
+            Campaign(parts).run(tasks())
+    assert str(caught.value.filename).startswith(str(parts.path))
+    assert not list(parts.path.glob("*.partial"))
+    assert len(contents(parts.path)) == 6
+    Campaign(parts).run(tasks())
+    assert contents(parts.path) == whole
+
+
+class Dying(Executor):
+    """Workers that are gone after so many tasks."""
+
+    def __init__(self, after: int) -> None:
+        self.left = after
+
+    def submit(self, work: Any, /, *arguments: Any, **_: Any) -> Future[Any]:
+        future: Future[Any] = Future()
+        self.left -= 1
+        if self.left >= 0:
+            future.set_result(work(*arguments))
+        else:
+            future.set_exception(BrokenProcessPool("a worker died"))
+        return future
+
+
+def test_workers_that_die_lose_nothing_that_is_finished(
+    tmp_path: Path, whole: dict[str, bytes]
+) -> None:
+    parts = Parts(tmp_path / "dying")
+    with pytest.raises(CampaignError, match=r"workers are gone.*the same command goes on"):
+        Campaign(parts, Dying(5), 1).run(tasks())
+    assert 0 < len(contents(parts.path)) <= 5
+    Campaign(parts).run(tasks())
+    assert contents(parts.path) == whole
+
+
+def test_an_error_of_the_task_is_its_own(tmp_path: Path) -> None:
+    bad = Task({"bad": 1}, int, ("not a number",))
+    with ThreadPoolExecutor(1) as pool, pytest.raises(ValueError, match="invalid literal"):
+        Campaign(Parts(tmp_path), pool, 1).run([bad])
+
+
+# Forks a campaign, kills it after each of the instants, and then lets it finish.
+KILLER = """
+import os, signal, sys, time
+from pathlib import Path
+sys.path.insert(0, {tests!r})
+from access_av.campaign import Campaign
+from access_av.parts import Parts
+from test_designs import tasks
+campaign = Campaign(Parts(Path({parts!r})))
+for instant in {instants!r}:
+    child = os.fork()
+    if child == 0:
+        campaign.run(tasks(12, 0.02))
+        os._exit(0)
+    time.sleep(instant)
+    os.kill(child, signal.SIGKILL)
+    os.waitpid(child, 0)
+campaign.run(tasks(12, 0.02))
+"""
+
+
+def test_killed_at_20_random_instants_it_finishes_with_the_same_bytes(
+    tmp_path: Path, whole: dict[str, bytes]
+) -> None:
+    instants = np.random.default_rng(3).uniform(0.0, 0.05, 20)
+    parts = tmp_path / "killed"
+    text = KILLER.format(
+        tests=str(Path(__file__).parent), parts=str(parts), instants=instants.tolist()
+    )
+    subprocess.run([sys.executable, "-c", text], check=True, capture_output=True)
+    assert contents(parts) == whole
+
+
+def test_no_scheduler_is_said() -> None:
+    pytest.importorskip("distributed")
+    with pytest.raises(InputError, match="no scheduler there"), executor("tcp://127.0.0.1:1"):
+        pass
+
+
+def test_dask_gives_the_same_bytes(tmp_path: Path, whole: dict[str, bytes]) -> None:
+    distributed = pytest.importorskip("distributed")
+    with (
+        distributed.LocalCluster(
+            n_workers=2, processes=False, dashboard_address=None, threads_per_worker=1
+        ) as cluster,
+        executor(cluster.scheduler_address) as (pool, workers),
+    ):
+        assert workers == 2
+        Campaign(Parts(tmp_path / "dask"), pool, workers).run(tasks())
+    assert contents(tmp_path / "dask") == whole
+
+
+# Fronts. Designs whose energy and error are known, with noise that all of them share.
+
+
+def known(energy_j: float, rms_m: float, noise: np.ndarray, own: np.ndarray, label: str) -> Driven:
+    design = Design({}, label, Scenario.load("paper"), Platform.load("jetson-agx-xavier"))
+    square_m2 = rms_m**2 * (1.0 + 0.5 * noise + 0.02 * own)
+    return Driven(
+        design=design,
+        square_m2=square_m2,
+        energy_j=np.full(noise.size, energy_j),
+        worst_m=3.0 * np.sqrt(square_m2),
+        executions=np.ones(noise.size),
+        listened=np.ones(noise.size),
+        track_s=np.arange(3.0),
+        track_m2=np.ones(3),
+    )
+
+
+def cloud(runs: int, pairs: list[tuple[float, float]]) -> list[Driven]:
+    rng = np.random.default_rng(4)
+    noise = rng.uniform(-1.0, 1.0, runs)
+    return [
+        known(*pair, noise, rng.uniform(-1.0, 1.0, runs), f"design {number}")
+        for number, pair in enumerate(pairs)
+    ]
+
+
+PAIRS = [(1.0, 0.4), (2.0, 0.2), (2.1, 0.35), (4.0, 0.1), (4.1, 0.1), (8.0, 0.3)]
+
+
+def test_front_and_its_confidence() -> None:
+    driven = cloud(20, PAIRS)
+    assert set(front(driven)) - {4} == {0, 1, 3}
+    # What common random numbers cannot tell apart may be of the front; what is beaten is not.
+    assert {0, 1, 3} <= set(may_be_front(driven)) <= {0, 1, 3, 4}
+
+
+def test_page_of_many_designs_draws() -> None:
+    rng = np.random.default_rng(5)
+    few = cloud(4, PAIRS)
+    driven = [
+        replace(
+            few[0], energy_j=np.full(4, energy_j), track_s=np.arange(161.0), track_m2=np.ones(161)
+        )
+        for energy_j in rng.uniform(0.1, 9.0, 300)
+    ]
+    page = render_designs(Scenario.load("paper"), driven, rows_of(driven))
+    assert "energy of a trip / J" in page
+    assert len(page) < 6_000_000
+
+
+def test_constraints_choose_the_least_energy() -> None:
+    rows = rows_of(cloud(20, PAIRS))
+    assert Constraints(max_rms_m=0.25).kept(rows)["design"][0] == 1
+    assert Constraints(max_energy_j=3.0, max_rms_m=0.15).kept(rows).is_empty()
+
+
+def test_where_nothing_fits_it_says_what_would() -> None:
+    rows = rows_of(cloud(20, PAIRS))
+    advice = what_to_change(Constraints(max_energy_j=3.0, max_rms_m=0.15), rows)
+    assert advice[0].startswith("energy allowed to be 1.33 times as much: design 3")
+    assert advice[1].startswith("RMS error allowed to be 1.")
+    assert "design 1" in advice[1]
+    advice = what_to_change(Constraints(max_energy_j=0.0, max_rms_m=0.0), rows)
+    assert advice[0].startswith("energy alone, however much is allowed, does not help")
+
+
+def test_rounds_of_halving() -> None:
+    assert rounds(20, halving=True) == [2, 6, 20]
+    assert rounds(2, halving=True) == [2]
+    assert rounds(1, halving=True) == [1]
+
+
+def by_halving(tmp_path: Path, monkeypatch: pytest.MonkeyPatch, *, halving: bool) -> Found:
+    """120 designs of which the error falls and the executions grow with ``bound``, and a cost."""
+
+    def pretended(text: str, seed: int, first_run: int, runs: int) -> dict[str, np.ndarray]:
+        wake_up = Scenario.from_toml(text)
+        settings = json.loads(wake_up.vehicle.to_json())["wake_up"]
+        interval_ms = settings["interval_ms"]
+        spoilt = json.loads(wake_up.vehicle.to_json())["receiver"]["snr_noise_db"]
+        noise = np.array([np.random.default_rng([seed, run]).normal() for run in range(99)])
+        own = np.random.default_rng(round(interval_ms * 100 + spoilt * 7)).normal(size=99)
+        rms_m = 0.1 * (1.0 + spoilt) * np.sqrt(interval_ms / 1000.0)
+        square_m2 = rms_m**2 * np.exp(0.3 * noise + 0.03 * own)
+        mine = slice(first_run, first_run + runs)
+        count = np.full(runs, 80_000.0 / interval_ms)
+        return {
+            "executions": count, "listened": count, "rms_error_m": np.sqrt(square_m2[mine]),
+            "max_error_m": 3.0 * np.sqrt(square_m2[mine]), "track_s": np.arange(3.0),
+            "track_m2": np.ones(3),
+        }  # fmt: skip
+
+    monkeypatch.setattr(drives, "simulated", pretended)
+    space = Space.of(
+        {
+            "vehicle": {
+                "platform": {"name": ["jetson-agx-xavier-engine"]},
+                "wake_up": {
+                    "policy": ["fixed"],
+                    "interval_ms": [250.0 * 1.25**k for k in range(10)],
+                },
+                "receiver": {"snr_noise_db": [0.03 * k**2 for k in range(12)]},
+            }
+        }
+    )
+    designs = designs_of(Scenario.load("paper"), space.grid())
+    assert len(designs) == 120
+    campaign = Campaign(Parts(tmp_path / str(halving)))
+    found = search(campaign, designs, runs=20, seed=1, halving=halving)
+    assert found is not None
+    return found
+
+
+def test_halving_finds_the_front_of_the_grid_with_a_quarter_of_the_drives(
+    tmp_path: Path, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    grid = by_halving(tmp_path, monkeypatch, halving=False)
+    less = by_halving(tmp_path, monkeypatch, halving=True)
+    assert less.drives <= grid.drives / 4
+    sure = {grid.driven[index].design.label for index in may_be_front(grid.driven)}
+    best = {less.driven[index].design.label for index in front(less.driven)}
+    assert len(best) == 10
+    assert best <= sure
+    assert {grid.driven[index].design.label for index in front(grid.driven)} == best
+
+
+# The command.
+
+SPACE = """
+vehicle.platform = { name = ["jetson-agx-xavier-engine"], mode = [0, 2] }
+vehicle.localizer.kind = ["tracker"]
+vehicle.wake_up.policy = ["fixed"]
+vehicle.wake_up.interval_ms = [2000.0, 8000.0]
+"""
+
+
+def run(cwd: Path, *arguments: str) -> subprocess.CompletedProcess[str]:
+    command = [sys.executable, "-m", "access_av", *arguments]
+    return subprocess.run(command, cwd=cwd, capture_output=True, text=True, check=False)
+
+
+def test_command_on_any_scenario(tmp_path: Path) -> None:
+    (tmp_path / "space.toml").write_text(SPACE)
+    asked = ("yard", "--space", "space.toml", "--runs", "2", "--json", "--out", "o")
+    done = run(tmp_path, "designs", *asked)
+    assert done.returncode == 0, done.stderr
+    assert 1 <= len(json.loads(done.stdout)["front"]) <= 4
+    # A mode that changes no drive is not driven again: two parts for four designs.
+    assert len(list((tmp_path / "results/parts").glob("*.npz"))) == 2
+    assert (tmp_path / "o/report.html").stat().st_size > 10_000
+    some = run(tmp_path, "choose", "o", "--max-rms-m", "100", "--json")
+    assert len(json.loads(some.stdout)["kept"]) == 4
+    none = run(tmp_path, "choose", "o", "--max-rms-m", "0.0001", "--json")
+    assert "times as much" in json.loads(none.stdout)["advice"][0]
+    for bad, message in (
+        (("designs", *asked, "--shard", "5/2"), "write I/N"),
+        (("choose", "nowhere"), "no designs here"),
+    ):
+        done = run(tmp_path, *bad)
+        assert (done.returncode, message in done.stderr) == (2, True)
