@@ -7,7 +7,7 @@ SOURCES := $(shell find crates sites vehicles scenarios platforms -type f 2>/dev
 DATA := $(abspath $(or $(ACCESS_AV_DATA),../shared/data))
 
 .DEFAULT_GOAL := help
-.PHONY: help demo test attack test-aarch64 lint lint-python docs bench clean
+.PHONY: help demo test attack test-aarch64 lint lint-python docs figures bench clean
 
 help: ## List these commands
 	@sed -n 's/^\([a-z-]*\):.*## /  make \1\t/p' $(MAKEFILE_LIST) | expand -t 20
@@ -53,6 +53,10 @@ lint-python: .venv/installed-test
 
 docs: .venv/installed ## Write docs/columns.md from the table of columns
 	$(BIN)/access-av columns --markdown > docs/columns.md
+
+figures: .venv/installed ## Evaluate the paper in full (some 10 minutes) and take the figures of docs/paper.md from it
+	$(BIN)/access-av evaluate --seeds 5 --unknowns --out results/paper
+	for name in ablation front sobol; do cp results/paper/$$name.svg docs/paper-$$name.svg; done
 
 bench: .venv/installed-bench ## Compare angle estimators and cell search with their peers; time the evaluation
 	$(BIN)/python benches/aoa_peers.py

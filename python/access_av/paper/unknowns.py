@@ -105,6 +105,7 @@ def sobol(sample: Sample, runs: int, *, seed: int = 0, count: int = RESAMPLES) -
     levels = [len(dimension.choices) for dimension in sample.dimensions]
     terms, basis = expansion(sample.coordinates, levels)
     fits = [Fit.of(terms, basis, margin) for margin in margins]
+    claims = [(fit, basis[:, fit.columns], it) for fit, it in zip(fits, margins, strict=True)]
     rng = np.random.default_rng(seed)
     drawn = []
     shares = []
@@ -113,14 +114,9 @@ def sobol(sample: Sample, runs: int, *, seed: int = 0, count: int = RESAMPLES) -
     held = np.stack([sample.margins[name] >= 0.0 for name in sample.margins], 1)
     for _ in range(count):
         rows = np.concatenate([rows_of[i] for i in rng.integers(0, len(worlds), len(worlds))])
-        drawn.append(
-            [
-                fit.indices(basis[rows], margin[rows])
-                for fit, margin in zip(fits, margins, strict=True)
-            ]
-        )
+        drawn.append([fit.indices(values[rows], margin[rows]) for fit, values, margin in claims])
         shares.append(held[rows].mean(axis=0))
-    of_claim = [fit.indices(basis, margin) for fit, margin in zip(fits, margins, strict=True)]
+    of_claim = [fit.indices(values, margin) for fit, values, margin in claims]
     low, high = np.quantile(drawn, (0.025, 0.975), axis=0)
     least, most = np.quantile(shares, (0.025, 0.975), axis=0)
     indices = [
@@ -236,14 +232,17 @@ class Fit:
             float(max(1.0 - left, 0.0)),
         )
 
-    def indices(self, basis: Numbers, margin: Numbers) -> Numbers:
-        """First-order and total indices in a sample, two rows, one column per dimension."""
+    def indices(self, values: Numbers, margin: Numbers) -> Numbers:
+        """First-order and total indices in a sample, two rows, one column per dimension.
+
+        ``values`` are the polynomials' at the sample's points.
+        """
         found = np.zeros((2, self.dimensions))
         if not self.terms:
             return found
         centred = margin - margin.mean()
-        design = basis[:, self.columns] - basis[:, self.columns].mean(axis=0)
-        coefficients, *_ = np.linalg.lstsq(design, centred, rcond=None)
+        design = values - values.mean(axis=0)
+        coefficients = np.linalg.solve(design.T @ design, design.T @ centred)
         rest = centred - design @ coefficients
         # Least squares explains some of any noise; that much is taken off each term's square.
         unexplained = (rest @ rest) / max(len(rest) - design.shape[1] - 1, 1)
@@ -259,4 +258,4 @@ class Fit:
 
 def _fitted(columns: Numbers, margin: Numbers) -> Numbers:
     design = columns - columns.mean(axis=0)
-    return np.asarray(design @ np.linalg.lstsq(design, margin, rcond=None)[0])
+    return np.asarray(design @ np.linalg.solve(design.T @ design, design.T @ margin))
