@@ -204,6 +204,7 @@ _GLOSSARY = {
         "not be relied on",
     ),
     "interval": ("any", "95 % interval of obtained over the runs, in its shape"),
+    "met_by_seed": ("true or false by seed", "Whether it is met with each seed"),
     "turns_with_seed": ("true or false", "Other runs may give another verdict"),
     "evidence": (
         "text",
@@ -505,7 +506,7 @@ TABLES: Mapping[str, Table] = {
             "`claims.json` of `access-av evaluate`",
             (
                 "reading", "id", "says", "where", "stated", "obtained", "interval", "unit",
-                "verdict", "turns_with_seed", "evidence", "note",
+                "verdict", "met_by_seed", "turns_with_seed", "evidence", "note",
             ),
             {
                 "obtained": "it could not be judged, or nothing is within the budget",

@@ -242,7 +242,7 @@ class Fit:
             return found
         centred = margin - margin.mean()
         design = values - values.mean(axis=0)
-        coefficients = np.linalg.solve(design.T @ design, design.T @ centred)
+        coefficients, *_ = np.linalg.lstsq(design.T @ design, design.T @ centred, rcond=None)
         rest = centred - design @ coefficients
         # Least squares explains some of any noise; that much is taken off each term's square.
         unexplained = (rest @ rest) / max(len(rest) - design.shape[1] - 1, 1)
@@ -258,4 +258,5 @@ class Fit:
 
 def _fitted(columns: Numbers, margin: Numbers) -> Numbers:
     design = columns - columns.mean(axis=0)
-    return np.asarray(design @ np.linalg.solve(design.T @ design, design.T @ margin))
+    normal = design.T @ design
+    return np.asarray(design @ np.linalg.lstsq(normal, design.T @ margin, rcond=None)[0])

@@ -44,7 +44,7 @@ impl PseudoSpectrum {
             }
             let form = quadratic.value(array.phase_from_angle(*angle_rad));
             Ok(match self {
-                Self::Bartlett => form / (n * n),
+                Self::Bartlett => form.max(0.0) / (n * n),
                 Self::Capon => form.recip(),
                 Self::Music { .. } => n / form.max(0.0),
             })

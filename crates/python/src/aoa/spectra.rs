@@ -36,7 +36,7 @@ use super::samples::{Samples, Visitor, value_error};
 /// >>> steering = np.exp(1j * np.pi * np.cos(np.radians(60)) * np.arange(4))
 /// >>> angles = np.radians([30, 60, 90])
 /// >>> aoa.spectrum(np.outer(steering, np.ones(9)), angles).round(3).tolist()
-/// [0.171, 1.0, 0.0]
+/// [0.118, 1.0, 0.0]
 #[pyfunction]
 #[pyo3(signature = (snapshots, angles_rad, *, method="bartlett", sources=1, spacing_wavelengths=0.5, forward_backward=false, calibration=None))]
 #[allow(clippy::too_many_arguments)]
