@@ -204,7 +204,7 @@ _GLOSSARY = {
         "not be relied on",
     ),
     "interval": ("any", "95 % interval of obtained over the runs, in its shape"),
-    "met_by_seed": ("true or false by seed", "Whether it is met with each seed"),
+    "met_by_seed": ("any", "With each seed whether it is met; empty where it was judged with one"),
     "turns_with_seed": ("true or false", "Other runs may give another verdict"),
     "evidence": (
         "text",
@@ -506,7 +506,7 @@ TABLES: Mapping[str, Table] = {
             "`claims.json` of `access-av evaluate`",
             (
                 "reading", "id", "says", "where", "stated", "obtained", "interval", "unit",
-                "verdict", "met_by_seed", "turns_with_seed", "evidence", "note",
+                "verdict", "turns_with_seed", "evidence", "note", "met_by_seed",
             ),
             {
                 "obtained": "it could not be judged, or nothing is within the budget",
