@@ -26,7 +26,8 @@ pub struct ErrorBound {
 #[pymethods]
 impl ErrorBound {
     #[new]
-    fn new(scenario: &Scenario) -> PyResult<Self> {
+    fn new(py: Python<'_>, scenario: &Scenario) -> PyResult<Self> {
+        crate::arrays::look_up(py)?;
         Ok(Self {
             bound: CoreBound::new(&scenario.0).map_err(settings_error)?,
             budget: LinkBudget::new(&scenario.0.site, &scenario.0.vehicle),

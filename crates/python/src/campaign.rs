@@ -78,6 +78,7 @@ pub fn simulate(
     progress: Option<Py<PyAny>>,
 ) -> PyResult<SimulationResult> {
     check(runs, threads, errors_every)?;
+    crate::arrays::look_up(py)?;
     let simulation = simulation(scenario, platform)?;
     let plug_ins = PlugIns {
         estimator,
@@ -183,6 +184,7 @@ impl Tapes {
         threads: Option<usize>,
     ) -> PyResult<Option<Self>> {
         check(runs, threads, None)?;
+        crate::arrays::look_up(py)?;
         let simulation = simulation(scenario, platform)?;
         let method = |name: &String| {
             let of = |it: &EstimatorMethod| it.to_string() == *name;

@@ -191,6 +191,7 @@ pub fn locate(
         start_time_s,
         start,
     };
+    crate::arrays::look_up(py)?;
     py.detach(|| drive.locate(&site.0, &vehicle.0, smooth))
         .map(|core| LocatedDrive { core })
         .map_err(replay_error)

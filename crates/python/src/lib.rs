@@ -1,5 +1,6 @@
 //! `access_av._core`: the bindings, nothing else. One file per room of the core.
 mod aoa;
+mod arrays;
 mod bound;
 mod campaign;
 mod channel;
@@ -64,10 +65,6 @@ mod _core {
 
     #[pymodule_init]
     fn init(module: &Bound<'_, PyModule>) -> PyResult<()> {
-        // NumPy's interface is looked up at its first use, by Python code: where a long computation is
-        // interrupted, that would be the first to hear of it, and the lookup panics.
-        module.py().import("numpy")?;
-        numpy::PyArray1::<f64>::zeros(module.py(), 0, false);
         module.add("__version__", env!("CARGO_PKG_VERSION"))
     }
 }
