@@ -16,6 +16,7 @@ from conftest import ROOT
 if TYPE_CHECKING:
     from pathlib import Path
 
+DOCS = sorted((ROOT / "docs").glob("*.md"))
 README = (ROOT / "README.md").read_text(encoding="utf-8")
 
 
@@ -58,3 +59,10 @@ def test_make_commands_exist() -> None:
 @pytest.mark.parametrize("path", ["docs/report.png", "LICENSE-MIT", "LICENSE-APACHE"])
 def test_files_it_shows_exist(path: str) -> None:
     assert (ROOT / path).stat().st_size < 300_000
+
+
+@pytest.mark.parametrize("page", ["README.md", *(f"docs/{it.name}" for it in DOCS)])
+def test_figures_exist_and_are_small(page: str) -> None:
+    place = ROOT / page
+    for name in re.findall(r"!\[[^]]*\]\(([^)]+)\)", place.read_text(encoding="utf-8")):
+        assert (place.parent / name).stat().st_size < 300_000, name
