@@ -16,8 +16,14 @@ def main() -> None:
         if ended.code == interrupt.INTERRUPTED:
             interrupt.end()
         raise
-    except BaseException:  # also what a library made of the interruption
-        if interrupt.came.wait(0.1):
+    except KeyboardInterrupt:
+        interrupt.end()
+    except BaseException:  # what a library may have made of the interruption
+        try:
+            came = interrupt.came.wait(0.1)
+        except KeyboardInterrupt:
+            came = True
+        if came:
             interrupt.end()
         raise
 

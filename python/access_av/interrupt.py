@@ -20,7 +20,7 @@ if TYPE_CHECKING:
 # What shells expect of a program that Ctrl-C ended.
 INTERRUPTED = 130
 # How long an exception may take to come up.
-GRACE_S = 0.5
+GRACE_S = 0.2
 
 # Whether Ctrl-C has come.
 came = threading.Event()

@@ -2,12 +2,10 @@
 
 from __future__ import annotations
 
-from typing import TYPE_CHECKING, Any
+from typing import Any
 
+import altair as alt
 import polars as pl
-
-if TYPE_CHECKING:
-    import altair as alt
 
 # Okabe and Ito's colours: told apart on light and dark, in print and by colour-blind readers.
 BLUE, ORANGE, GREEN, GREY, PURPLE = "#2f7ed8", "#d55e00", "#009e73", "#8a8f98", "#b48ead"
@@ -24,7 +22,9 @@ def thinned(series: pl.DataFrame, points: int = POINTS_PER_LINE) -> pl.DataFrame
 
 def finish(chart: alt.Chart | alt.LayerChart, *, height: int, description: str) -> Spec:
     """The chart as Vega-Lite, as wide as its place."""
-    spec: Spec = chart.properties(width="container", height=height).to_dict()
+    # A fine map has more points than Altair takes by default.
+    with alt.data_transformers.disable_max_rows():
+        spec: Spec = chart.properties(width="container", height=height).to_dict()
     spec["description"] = description
     spec["autosize"] = {"type": "fit-x", "contains": "padding"}
     return spec
