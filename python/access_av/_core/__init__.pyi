@@ -22,6 +22,7 @@ __all__ = [
     "SimulationResult",
     "Site",
     "Situation",
+    "Tapes",
     "Vehicle",
     "__version__",
     "aoa",
