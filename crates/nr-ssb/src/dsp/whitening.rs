@@ -8,10 +8,11 @@ use super::base_rate::SSB_SAMPLES;
 use super::received_grid::MAX_ANTENNAS;
 use crate::numeric::hermitian::cholesky;
 
-/// The covariance is measured on every so many samples, in the quietest quarter of so many parts of a
-/// block: there a loaded neighbour is heard, and the SSBs that are looked for are not. Whitened too,
-/// a strong one would no longer stand before the weak ones that it covers.
+/// The covariance is measured on every so many samples ...
 const STRIDE: usize = 4;
+/// ... in the quietest quarter of so many parts of a block: there a loaded neighbour is heard, and the
+/// SSBs that are looked for are not. Whitened too, a strong one would no longer stand before the weak
+/// ones that it covers.
 const PARTS: usize = 64;
 /// Squared coherence of two antennas from which on it matters; noise has one in the number of
 /// samples.

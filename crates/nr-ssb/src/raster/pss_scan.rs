@@ -4,6 +4,7 @@ use num_complex::Complex32;
 
 use super::error::ScanError;
 use super::parallel::in_parallel;
+use super::point_search::AT_ONCE;
 use crate::dsp::base_rate::SYMBOL_SAMPLES;
 use crate::dsp::hypotheses::cfo_hypotheses;
 use crate::dsp::matched_filter::{MatchedFilter, PssCandidate};
@@ -23,8 +24,6 @@ const PER_SUBCARRIER: f64 = 2.0;
 const NOISE_CANDIDATES: f64 = 4.0;
 /// Offsets that are worth a search at most.
 const MOST_OFFSETS: usize = 24;
-/// Offsets that the front end is tuned to at once.
-const AT_ONCE: usize = 8;
 
 /// One maximum.
 struct Seen {
