@@ -102,6 +102,17 @@ def test_ours_is_better_in_error_and_energy_in_every_mode() -> None:
         assert each.paper.listened == 4018
 
 
+def test_json_of_a_single_run_has_no_interval() -> None:
+    command = [sys.executable, "-m", "access_av", "codesign", "--runs", "1", "--json"]
+    done = subprocess.run(command, capture_output=True, text=True, check=True)
+    records = json.loads(done.stdout)
+    assert [each["mode"] for each in records] == list(range(8))
+    assert {each["is_better"] for each in records} == {False}
+    mean_m, low_m, high_m = records[0]["error_less_m"]
+    assert mean_m > 0.0
+    assert (low_m, high_m) == (None, None)
+
+
 def test_power_command() -> None:
     command = [sys.executable, "-m", "access_av", "platform", "power", ENGINE]
     done = subprocess.run(command, capture_output=True, text=True, check=True)

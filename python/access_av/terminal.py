@@ -19,6 +19,7 @@ from rich.progress import (
 )
 from rich.table import Table as RichTable
 
+from access_av._core import brief
 from access_av.methods import label
 from access_av.recorded_angles import mean_absolute_error_deg
 from access_av.report.parts import value_text
@@ -39,7 +40,6 @@ console = Console(highlight=False, markup=False)
 errors = Console(stderr=True, highlight=False, markup=False)
 
 NARROW = 80
-LONGEST_MESSAGE = 500
 
 
 def is_narrow() -> bool:
@@ -100,20 +100,6 @@ def show_warning(message: str) -> None:
     """One message for an item that was left out, or is remarkable."""
     errors.print("warning:", style="yellow", end=" ")
     errors.print(brief(plain(message)), soft_wrap=True)
-
-
-def brief(text: str) -> str:
-    """A text with its middle left out where it is longer than :data:`LONGEST_MESSAGE`.
-
-    Examples
-    --------
-    >>> brief("short"), len(brief("x" * 10**6))
-    ('short', 500)
-    """
-    if len(text) <= LONGEST_MESSAGE:
-        return text
-    head = LONGEST_MESSAGE * 3 // 5
-    return f"{text[:head]} … {text[head + 3 - LONGEST_MESSAGE :]}"
 
 
 def plain(text: str) -> str:
@@ -186,8 +172,8 @@ def show_simulation(result: Simulation, title: str) -> None:
     for name, value in rows.items():
         made.add_row(name, value_text(value))
     console.print(made)
-    if result.service_levels is not None:
-        show_service_levels(result.service_levels)
+    if levels := result.service_levels:
+        show_service_levels(levels)
 
 
 def show_service_levels(verdicts: Sequence[Verdict], title: str = "") -> None:

@@ -57,6 +57,8 @@ mod _core {
     #[pymodule_export]
     use crate::drive::{LocatedDrive, locate, read_tum, synthesize};
     #[pymodule_export]
+    use crate::message::brief_text;
+    #[pymodule_export]
     use crate::plug_ins::{RadioHead, SensedSsb, Situation};
     #[pymodule_export]
     use crate::recording::{Recording, RecordingError};

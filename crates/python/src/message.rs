@@ -2,8 +2,16 @@
 
 use std::fmt::Display;
 
+use pyo3::pyfunction;
+
 /// Longest message, in characters.
 const MOST: usize = 500;
+
+/// [`brief`] for messages that Python makes.
+#[pyfunction(name = "brief")]
+pub fn brief_text(message: &str) -> String {
+    brief(message)
+}
 
 /// A message with its middle left out where it is long.
 pub fn brief(message: impl Display) -> String {

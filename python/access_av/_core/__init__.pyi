@@ -26,6 +26,7 @@ __all__ = [
     "Vehicle",
     "__version__",
     "aoa",
+    "brief",
     "channel_drops",
     "check_paths",
     "locate",
@@ -217,11 +218,12 @@ class Bound:
     ) -> NDArray[np.float64]: ...
     def snr_db(self, x_m: NDArray[np.float64], y_m: NDArray[np.float64]) -> NDArray[np.float64]: ...
 
+def brief(message: str) -> str: ...
 def channel_drops(
     model: str,
     level_m: NDArray[np.float64],
     *,
-    head_height_m: float,
+    head_height_m: float | None = None,
     array_height_m: float,
     carrier_mhz: float,
     seed: int,

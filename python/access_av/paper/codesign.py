@@ -14,7 +14,7 @@ from typing import TYPE_CHECKING
 
 import numpy as np
 
-from access_av.paper.ours import BOUND_M
+from access_av.paper.ours import tracked
 from access_av.paper.readings import load
 from access_av.platform import Platform
 from access_av.simulation import Simulation, simulate
@@ -98,28 +98,18 @@ def compare(
     found = []
     for index, mode in enumerate(papers.modes):
         here = scenario.with_overrides({"vehicle.platform.mode": mode.number})
-        tracked = here.with_overrides(
-            {
-                "vehicle.localizer.kind": "tracker",
-                "vehicle.localizer.map": True,
-                "vehicle.wake_up": {
-                    "policy": "uncertainty",
-                    "bound_m": BOUND_M,
-                    "base_ms": mode.base_wake_up_ms["music"],
-                },
-            }
-        )
+        there = tracked(here, mode.base_wake_up_ms["music"])
         one = simulate(here, runs=runs, seed=seed, platform=papers, threads=threads)
-        other = simulate(tracked, runs=runs, seed=seed, platform=papers, threads=threads)
+        other = simulate(there, runs=runs, seed=seed, platform=papers, threads=threads)
         less_m = (one.runs["rms_error_m"] - other.runs["rms_error_m"]).to_numpy()
-        half_m = SURE * float(np.std(less_m, ddof=1)) / np.sqrt(runs) if runs > 1 else np.inf
+        half_m = SURE * float(np.std(less_m, ddof=1) / np.sqrt(runs)) if runs > 1 else float("inf")
         mean_m = float(np.mean(less_m))
         found.append(
             Compared(
                 mode=mode.number,
                 paper=_point(one, here, papers),
-                policy=_point(other, tracked, papers),
-                engine=_point(other, tracked, ours),
+                policy=_point(other, there, papers),
+                engine=_point(other, there, ours),
                 error_less_m=(mean_m, mean_m - half_m, mean_m + half_m),
             )
         )

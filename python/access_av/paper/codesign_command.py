@@ -2,7 +2,6 @@
 
 from __future__ import annotations
 
-import json
 from dataclasses import asdict
 from typing import Annotated
 
@@ -31,6 +30,7 @@ def codesign(
     costs what the paper's does; in the third its cycles at the mode's clock. A share is of the
     paper's energy, where the range is worst for us.
     """
+    from access_av.files import json_text
     from access_av.paper.codesign import compare
 
     with progress("Driving") as tick:
@@ -45,7 +45,7 @@ def codesign(
             }
             for each in found
         ]
-        print(json.dumps(records, indent=2))
+        print(json_text(records))
         return
     head = ["mode", "", "RMS m", "executions", "listened", "energy J", "share ≤"]
     made = table(head, title=f"Reading {reading}, {runs} runs, seed {seed}", text=2)
