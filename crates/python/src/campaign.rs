@@ -16,6 +16,7 @@ use onboard::{BoxError, Custom, Execution};
 use pyo3::exceptions::{PyRuntimeError, PyValueError};
 use pyo3::prelude::*;
 use pyo3::types::{PyDict, PyList};
+use toml::Value;
 
 use crate::message::brief;
 use crate::plug_ins::{PythonEstimator, PythonLocalizer, PythonPolicy};
@@ -25,13 +26,6 @@ use crate::settings::{Platform, Scenario, settings_error};
 const MOST_RUNS: usize = 1_000_000;
 /// More threads than any machine has cores for.
 const MOST_THREADS: usize = 1024;
-
-const METHODS: [EstimatorMethod; 4] = [
-    EstimatorMethod::Music,
-    EstimatorMethod::RootMusic,
-    EstimatorMethod::Esprit,
-    EstimatorMethod::MaximumLikelihood,
-];
 
 /// What a campaign found, as columns of equal length.
 #[pyclass(frozen, get_all, module = "access_av._core")]
@@ -187,9 +181,8 @@ impl Tapes {
         crate::arrays::look_up(py)?;
         let simulation = simulation(scenario, platform)?;
         let method = |name: &String| {
-            let of = |it: &EstimatorMethod| it.to_string() == *name;
-            let unknown = || PyValueError::new_err(format!("no method {name:?}"));
-            METHODS.into_iter().find(of).ok_or_else(unknown)
+            let named = Value::from(name.as_str()).try_into::<EstimatorMethod>();
+            named.map_err(|_| PyValueError::new_err(format!("no method {name:?}")))
         };
         let methods = methods.iter().map(method).collect::<PyResult<Vec<_>>>()?;
         let tapes = py.detach(|| {

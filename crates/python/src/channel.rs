@@ -28,15 +28,16 @@ const COLUMNS: [Column; 8] = [
     }),
 ];
 
-/// One independent link of a TR 38.901 model at each horizontal distance: columns of equal length.
+/// One independent link of a TR 38.901 model at each horizontal distance, the radio head at its own
+/// height without `head_height_m`: columns of equal length.
 #[pyfunction]
-#[pyo3(signature = (model, level_m, *, head_height_m, array_height_m, carrier_mhz, seed))]
+#[pyo3(signature = (model, level_m, *, head_height_m = None, array_height_m, carrier_mhz, seed))]
 #[allow(clippy::needless_pass_by_value)] // as Python passes them
 pub fn channel_drops(
     py: Python<'_>,
     model: &str,
     level_m: PyReadonlyArray1<'_, f64>,
-    head_height_m: f64,
+    head_height_m: Option<f64>,
     array_height_m: f64,
     carrier_mhz: f64,
     seed: u64,
@@ -48,6 +49,10 @@ pub fn channel_drops(
             "no drops of the model `{model}`; there are umi, inf-sl, inf-dl, inf-sh, inf-dh"
         ))
     })?;
+    let head_height_m = head_height_m.unwrap_or_else(|| {
+        let [head_height_m, _] = environment.heights_m(array_height_m, array_height_m);
+        head_height_m
+    });
     let level_m = level_m.as_slice()?;
     let numbers = [head_height_m, array_height_m, carrier_mhz];
     let mut all = level_m.iter().chain(&numbers);

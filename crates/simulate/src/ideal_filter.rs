@@ -12,6 +12,7 @@ use onboard::localize::tracker::state::{ACROSS, ALONG, STATES};
 use rand::RngExt;
 use rand_distr::StandardNormal;
 
+use crate::cholesky::cholesky;
 use crate::random::{Purpose, Streams};
 
 /// A perfectly consistent filter along a route.
@@ -89,24 +90,6 @@ impl IdealFilter {
             }
         })
     }
-}
-
-/// Lower factor `L Lᵀ` of a positive semidefinite matrix; directions that have less than a
-/// rounding error of the variance `scale` get none.
-fn cholesky(matrix: &Matrix<STATES>, scale: &Matrix<STATES>) -> Matrix<STATES> {
-    let mut factor = [[0.0; STATES]; STATES];
-    for j in 0..STATES {
-        let own = matrix[j][j] - (0..j).map(|k| factor[j][k] * factor[j][k]).sum::<f64>();
-        if own <= 1e-12 * scale[j][j] {
-            continue;
-        }
-        factor[j][j] = own.sqrt();
-        for i in j + 1..STATES {
-            let shared = (0..j).map(|k| factor[i][k] * factor[j][k]).sum::<f64>();
-            factor[i][j] = (matrix[i][j] - shared) / factor[j][j];
-        }
-    }
-    factor
 }
 
 #[cfg(test)]

@@ -7,6 +7,7 @@ mod bootstrap;
 pub mod bound;
 mod campaign;
 pub mod channel;
+mod cholesky;
 mod consistency;
 mod error;
 mod histogram;

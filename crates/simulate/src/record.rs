@@ -3,7 +3,9 @@
 use onboard::geometry::Pose;
 use onboard::localize::Integrity;
 use onboard::localize::tracker::Calibration;
-use onboard::{Execution, Heard};
+use onboard::{Execution, Heard, Onboard};
+
+use crate::error::SimulationError;
 
 /// Truth and estimate at one SSB.
 #[derive(Debug, Clone, Copy, PartialEq)]
@@ -100,6 +102,27 @@ impl RunRecord {
         self.listened += usize::from(heard.listened);
         self.executions.extend_from_slice(heard.executions);
         self.out_of_reach += usize::from(heard.keeps_bound == Some(false));
+    }
+
+    /// Adds where the vehicle is at an SSB, and where it believes to be.
+    pub(crate) fn add_step(
+        &mut self,
+        onboard: &Onboard,
+        time_s: f64,
+        truth: Pose,
+        snr_db: f64,
+    ) -> Result<(), SimulationError> {
+        let believed = onboard.pose(time_s).map_err(SimulationError::Custom)?;
+        self.steps.push(Step {
+            time_s,
+            truth,
+            estimate: believed.pose,
+            covariance: believed.covariance,
+            integrity: believed.integrity,
+            searching: onboard.searching().is_some(),
+            snr_db,
+        });
+        Ok(())
     }
 
     /// How the first pose came about: at once, unless it had to be searched for; `None` if it was

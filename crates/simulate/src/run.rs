@@ -4,7 +4,6 @@ use std::collections::VecDeque;
 use std::sync::Arc;
 
 use onboard::geometry::Pose;
-use onboard::localize::PoseEstimate;
 use onboard::settings::{Platform, SettingsError};
 use onboard::{BoxError, Custom, Onboard, SsbSource};
 
@@ -12,7 +11,7 @@ use crate::channel::HeadChannel;
 use crate::error::SimulationError;
 use crate::iq_reception::{IqBurstReception, IqReception};
 use crate::random::Streams;
-use crate::record::{RunRecord, Step};
+use crate::record::RunRecord;
 use crate::scenario::{Fidelity, Scenario};
 use crate::snapshot_reception::{SnapshotBuffers, SnapshotReception};
 use crate::truth::{PropagationMaker, World};
@@ -107,16 +106,7 @@ impl Simulation {
             drive.send(number, truth);
             drive.odometry_until(time_s, &mut record)?;
             drive.hear_until(time_s, &mut record)?;
-            let believed = drive.pose(time_s)?;
-            record.steps.push(Step {
-                time_s,
-                truth: truth.pose,
-                estimate: believed.pose,
-                covariance: believed.covariance,
-                integrity: believed.integrity,
-                searching: drive.onboard.searching().is_some(),
-                snr_db: drive.strongest_db,
-            });
+            record.add_step(&drive.onboard, time_s, truth.pose, drive.strongest_db)?;
         }
         record.calibration = drive.onboard.calibration();
         Ok(record)
@@ -128,7 +118,6 @@ struct Drive {
     onboard: Onboard,
     path: Path,
     odometer: Odometer,
-    odometry_number: u32,
     channels: Vec<HeadChannel>,
     faults: Faults,
     iq: Option<IqReception>,
@@ -172,7 +161,6 @@ impl Drive {
             channels: HeadChannel::all(&mut truth, streams),
             path: truth.path,
             odometer: truth.odometer,
-            odometry_number: 0,
             faults: Faults::new(&scenario.faults),
             iq,
             buffers: SnapshotBuffers::new(scenario.vehicle.array.elements.into()),
@@ -202,12 +190,7 @@ impl Drive {
         time_s: f64,
         record: &mut RunRecord,
     ) -> Result<(), SimulationError> {
-        loop {
-            let sample_s = f64::from(self.odometry_number) * self.odometer.period_s();
-            if sample_s > time_s {
-                return Ok(());
-            }
-            self.odometry_number += 1;
+        while let Some(sample_s) = self.odometer.next_s(time_s) {
             while let Some(burst) = self.arrived(|arrives_s| arrives_s < sample_s) {
                 self.hear(burst, record)?;
             }
@@ -219,6 +202,7 @@ impl Drive {
                     .map_err(SimulationError::Custom)?;
             }
         }
+        Ok(())
     }
 
     /// Hears what has arrived by `time_s`.
@@ -264,9 +248,5 @@ impl Drive {
         snrs_db.clear();
         self.spare.push(snrs_db);
         Ok(())
-    }
-
-    fn pose(&self, time_s: f64) -> Result<PoseEstimate, SimulationError> {
-        self.onboard.pose(time_s).map_err(SimulationError::Custom)
     }
 }

@@ -16,7 +16,7 @@ use crate::campaign::{Campaign, CampaignOptions, thread_pool};
 use crate::channel::HeadChannel;
 use crate::error::SimulationError;
 use crate::random::Streams;
-use crate::record::{RunRecord, Step};
+use crate::record::RunRecord;
 use crate::run::Simulation;
 use crate::world::Faults;
 
@@ -128,15 +128,9 @@ impl Tape {
             sensed: Vec::with_capacity(simulation.steps() * channels.len()),
             angles: vec![Vec::with_capacity(simulation.steps() * channels.len()); methods.len()],
         };
-        let mut samples = 0_u32;
         for number in 0..simulation.steps() {
             let time_s = simulation.time_s(number);
-            loop {
-                let sample_s = f64::from(samples) * truth.odometer.period_s();
-                if sample_s > time_s {
-                    break;
-                }
-                samples += 1;
+            while let Some(sample_s) = truth.odometer.next_s(time_s) {
                 let sample = truth.odometer.sample(truth.path.at(sample_s));
                 tape.odometry.extend(sample.map(|it| faults.slip(it)));
             }
@@ -194,16 +188,7 @@ impl Tape {
             };
             let heard = onboard.hear(time_s, &mut played);
             record.add(&heard.map_err(SimulationError::of_drive)?);
-            let believed = onboard.pose(time_s).map_err(SimulationError::Custom)?;
-            record.steps.push(Step {
-                time_s,
-                truth: burst.truth,
-                estimate: believed.pose,
-                covariance: believed.covariance,
-                integrity: believed.integrity,
-                searching: onboard.searching().is_some(),
-                snr_db: burst.snr_db,
-            });
+            record.add_step(&onboard, time_s, burst.truth, burst.snr_db)?;
         }
         record.calibration = onboard.calibration();
         Ok(record)

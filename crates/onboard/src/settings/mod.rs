@@ -42,7 +42,7 @@ pub use read::{from_table, parse};
 pub use receiver::{EstimatorMethod, EstimatorSettings, Pilots, ReceiverSettings};
 pub use road::{RoadSettings, SegmentSettings};
 pub use shipped::Shipped;
-pub use site::Site;
+pub use site::{SPEED_OF_LIGHT_MPS, Site};
 pub use start::StartSettings;
 pub use toml_file::{Library, NamedText, TomlFile};
 pub use vehicle::{PlatformSettings, Vehicle, check_together};

@@ -49,7 +49,7 @@ const fn fair_weather() -> f64 {
 }
 
 /// Speed of light in m/s (SI, exact).
-const SPEED_OF_LIGHT_MPS: f64 = 299_792_458.0;
+pub const SPEED_OF_LIGHT_MPS: f64 = 299_792_458.0;
 
 impl Site {
     /// Wavelength of the carrier in metres.

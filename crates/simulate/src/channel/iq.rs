@@ -11,7 +11,7 @@ use nr_ssb::{
     BchPayload, Case, Complex32, Error, Lmax, Mib, Numerology, Ofdm, Pci, SubcarrierSpacing,
 };
 use num_complex::Complex64;
-use onboard::settings::Site;
+use onboard::settings::{SPEED_OF_LIGHT_MPS, Site};
 use rand::RngExt;
 use rand_chacha::ChaCha8Rng;
 use rand_distr::StandardNormal;
@@ -21,7 +21,6 @@ use crate::random::{Purpose, Streams};
 use crate::scenario::{IqSettings, Scenario};
 use crate::world::{Faults, VehicleState};
 
-const SPEED_OF_LIGHT_MPS: f64 = 299_792_458.0;
 /// Size of the transforms: samples are made at the base rate.
 const FFT_SIZE: usize = 256;
 /// Samples before the first SSB of a burst and after the last.

@@ -17,6 +17,8 @@ pub struct Odometer {
     rng: ChaCha8Rng,
     measured_m: f64,
     last: VehicleState,
+    /// Samples that have been due.
+    due: u32,
 }
 
 impl Odometer {
@@ -33,12 +35,22 @@ impl Odometer {
             rng,
             measured_m: 0.0,
             last: start,
+            due: 0,
         }
     }
 
     /// Time between samples in seconds.
     pub fn period_s(&self) -> f64 {
         self.settings.rate_hz.recip()
+    }
+
+    /// When the next sample is due, if that is by `time_s`; it counts as the last one then.
+    pub fn next_s(&mut self, time_s: f64) -> Option<f64> {
+        let next_s = f64::from(self.due) * self.period_s();
+        (next_s <= time_s).then(|| {
+            self.due += 1;
+            next_s
+        })
     }
 
     /// The sample at `now`, later than the last one's; `None` when it is lost.

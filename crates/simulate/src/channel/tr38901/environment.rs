@@ -1,8 +1,8 @@
 //! The environments: line-of-sight probability and path loss.
 
-use crate::scenario::{ChannelModel, HallSettings};
+use onboard::settings::SPEED_OF_LIGHT_MPS;
 
-const SPEED_OF_LIGHT_MPS: f64 = 299_792_458.0;
+use crate::scenario::{ChannelModel, HallSettings};
 
 /// An environment at a carrier.
 #[derive(Debug, Clone, Copy, PartialEq)]

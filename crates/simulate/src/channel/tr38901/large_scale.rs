@@ -1,6 +1,9 @@
 //! Large-scale parameters: table 7.5-6, and how they hang together.
 
+use onboard::localize::gaussian::{Matrix, identity};
+
 use super::environment::{Environment, Kind};
+use crate::cholesky::cholesky;
 
 /// Shadowing, K, and the spreads of delay, azimuth and zenith of arrival: the order of step 4.
 /// Departure angles have no part in what one antenna of a radio head sends.
@@ -28,7 +31,7 @@ pub struct Parameters {
     /// In dB; in dB; decimal logarithms of seconds and of degrees.
     normals: [Normal; COUNT],
     /// Lower triangular root of their correlations.
-    root: [[f64; COUNT]; COUNT],
+    root: Matrix<COUNT>,
     /// Distances in metres over which they decorrelate.
     pub correlation_m: [f64; COUNT],
     /// Distance over which clusters decorrelate (table 7.6.3.1-2).
@@ -117,7 +120,7 @@ impl Parameters {
 
 fn umi(f: f64, shadowing: Normal, line_of_sight: bool) -> Parameters {
     if line_of_sight {
-        let mut correlations = uncorrelated();
+        let mut correlations = identity::<COUNT>();
         correlations[K][SHADOWING] = 0.5;
         correlations[DELAY][SHADOWING] = -0.4;
         correlations[AZIMUTH][SHADOWING] = -0.4;
@@ -133,7 +136,7 @@ fn umi(f: f64, shadowing: Normal, line_of_sight: bool) -> Parameters {
                 normal(-0.07 * f + 1.66, 0.021 * f + 0.26),
                 normal(-0.11 * f + 0.81, -0.03 * f + 0.29),
             ],
-            root: cholesky(&correlations),
+            root: cholesky(&correlations, &correlations),
             correlation_m: [10.0, 15.0, 7.0, 8.0, 12.0],
             cluster_correlation_m: 12.0,
             line_of_sight,
@@ -148,7 +151,7 @@ fn umi(f: f64, shadowing: Normal, line_of_sight: bool) -> Parameters {
             excess_delay: None,
         };
     }
-    let mut correlations = uncorrelated();
+    let mut correlations = identity::<COUNT>();
     correlations[DELAY][SHADOWING] = -0.7;
     correlations[AZIMUTH][SHADOWING] = -0.4;
     correlations[AZIMUTH][DELAY] = 0.4;
@@ -161,7 +164,7 @@ fn umi(f: f64, shadowing: Normal, line_of_sight: bool) -> Parameters {
             normal(-0.07 * f + 1.76, 0.05 * f + 0.27),
             normal(-0.03 * f + 0.92, -0.05 * f + 0.35),
         ],
-        root: cholesky(&correlations),
+        root: cholesky(&correlations, &correlations),
         correlation_m: [13.0, 15.0, 10.0, 9.0, 10.0],
         cluster_correlation_m: 15.0,
         line_of_sight,
@@ -183,7 +186,7 @@ fn factory_parameters(
     shadowing: Normal,
     line_of_sight: bool,
 ) -> Parameters {
-    let mut correlations = uncorrelated();
+    let mut correlations = identity::<COUNT>();
     if line_of_sight {
         correlations[DELAY][K] = -0.7;
     }
@@ -216,7 +219,7 @@ fn factory_parameters(
     };
     Parameters {
         normals,
-        root: cholesky(&correlations),
+        root: cholesky(&correlations, &correlations),
         correlation_m: [10.0; COUNT],
         cluster_correlation_m: 10.0,
         line_of_sight,
@@ -230,33 +233,6 @@ fn factory_parameters(
         zenith_scaling: 1.282,
         excess_delay: (!line_of_sight).then_some(normal(-7.5, 0.4)),
     }
-}
-
-const fn uncorrelated() -> [[f64; COUNT]; COUNT] {
-    let mut identity = [[0.0; COUNT]; COUNT];
-    let mut index = 0;
-    while index < COUNT {
-        identity[index][index] = 1.0;
-        index += 1;
-    }
-    identity
-}
-
-/// Lower triangular root of a correlation matrix, of which the lower triangle is read.
-fn cholesky(matrix: &[[f64; COUNT]; COUNT]) -> [[f64; COUNT]; COUNT] {
-    let mut root = [[0.0; COUNT]; COUNT];
-    for i in 0..COUNT {
-        for j in 0..=i {
-            let known: f64 = (0..j).map(|k| root[i][k] * root[j][k]).sum();
-            let left = matrix[i][j] - known;
-            root[i][j] = if i == j {
-                left.sqrt()
-            } else {
-                left / root[j][j]
-            };
-        }
-    }
-    root
 }
 
 #[cfg(test)]

@@ -63,9 +63,10 @@ impl Tr38901Propagation {
         settings: &ChannelSettings,
         link: &Link<'_>,
     ) -> Option<Self> {
-        let head = link.radio_head()?;
+        let mut head = link.radio_head()?;
         let [_, _, array_m] = link.vehicle.array.position_m;
         let [head_m, array_m] = environment.heights_m(head.height_m, array_m);
+        head.height_m = head_m;
         let length_m = link.road.length_m();
         let mut large_scale = link.streams.generator(Purpose::LargeScale, link.head);
         let state = Track::new(
@@ -77,20 +78,13 @@ impl Tr38901Propagation {
         let mut channel = |line_of_sight| {
             let parameters = Parameters::of(&environment, line_of_sight);
             let generators = [&mut large_scale, &mut clusters];
-            let head = RadioHead {
-                height_m: head_m,
-                ..head
-            };
             Channel::new(parameters, &head, array_m, link, generators)
         };
         let [clear, hidden] = [channel(true), channel(false)];
         Some(Self {
             environment,
             budget: LinkBudget::new(link.site, link.vehicle),
-            head: RadioHead {
-                height_m: head_m,
-                ..head
-            },
+            head,
             array_m,
             wavenumber_per_m: TAU / link.site.wavelength_m(),
             blockage: Blockage::new(settings.blockage, link),

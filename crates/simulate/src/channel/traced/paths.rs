@@ -7,12 +7,11 @@ use std::path::Path;
 use num_complex::Complex32;
 use onboard::geometry::Point;
 use onboard::road::Road;
-use onboard::settings::{RadioHeadSettings, Site};
+use onboard::settings::{RadioHeadSettings, SPEED_OF_LIGHT_MPS, Site};
 use thiserror::Error;
 
 use super::read::Arrays;
 
-const SPEED_OF_LIGHT_MPS: f64 = 299_792_458.0;
 /// A place stands for what lies nearer to it than to any other, as far as this.
 const REACH_M: f64 = 1.0;
 /// How far a road may lead on beyond the places.

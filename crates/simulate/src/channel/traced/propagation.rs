@@ -6,7 +6,7 @@ use std::sync::Arc;
 use num_complex::Complex64;
 use onboard::link_budget::LinkBudget;
 
-use super::paths::Paths;
+use super::paths::{Paths, TracedPath};
 use crate::channel::blockage::Blockage;
 use crate::channel::phasor::phasor;
 use crate::channel::propagation::{Link, Propagation};
@@ -38,18 +38,18 @@ impl TracedPropagation {
             blockage: Blockage::new(settings.blockage, link),
         })
     }
+}
 
-    /// Total power of the paths.
-    fn power(&self, sight: &LineOfSight) -> f64 {
-        let near = self.paths.near(self.head, sight.place);
-        let paths = near.map_or(&[][..], |(paths, _)| paths).iter();
-        paths.map(|path| f64::from(path.gain.norm_sqr())).sum()
-    }
+/// Total power of paths.
+fn power(paths: &[TracedPath]) -> f64 {
+    let powers = paths.iter().map(|path| f64::from(path.gain.norm_sqr()));
+    powers.sum()
 }
 
 impl Propagation for TracedPropagation {
     fn next_gain_db(&mut self, sight: &LineOfSight) -> f64 {
-        let gain_db = 10.0 * self.power(sight).log10();
+        let near = self.paths.near(self.head, sight.place);
+        let gain_db = 10.0 * near.map_or(0.0, |(paths, _)| power(paths)).log10();
         (gain_db + self.budget.path_loss_db(sight.distance_m)).max(NOTHING_DB)
     }
 
@@ -59,7 +59,7 @@ impl Propagation for TracedPropagation {
         let Some((paths, [east_m, north_m])) = near.filter(|(paths, _)| !paths.is_empty()) else {
             return;
         };
-        let scale = self.power(sight).sqrt().recip();
+        let scale = power(paths).sqrt().recip();
         let passing = self.blockage.amplitude(sight.time_s);
         let (sin, cos) = sight.axis_rad.sin_cos();
         let [forward, left] = [cos, sin].map(|part| sight.element_rad * part);
