@@ -158,7 +158,7 @@ def test_a_full_disk_names_the_part_and_leaves_nothing(
         raise OSError(28, "No space left on device")
 
     with monkeypatch.context() as patch:
-        patch.setattr("access_av.parts.os.fsync", full)
+        patch.setattr("access_av.files.os.fsync", full)
         with pytest.raises(OSError, match="No space left") as caught:
             Campaign(parts).run(tasks())
     assert str(caught.value.filename).startswith(str(parts.path))

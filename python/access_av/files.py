@@ -15,6 +15,7 @@ from datetime import datetime, timezone
 from importlib.metadata import version
 from pathlib import Path
 from typing import TYPE_CHECKING, Any
+from uuid import uuid4
 
 import numpy as np
 
@@ -104,14 +105,22 @@ class ResultsDirectory:
         )
 
 
-def write_whole(target: Path, content: str | bytes | memoryview) -> Path:
-    """Write a file beside its place and put it there; nothing is left of a failure."""
+def write_whole(target: Path, content: str | bytes | memoryview, *, durable: bool = False) -> Path:
+    """Write a file beside its place and put it there; nothing is left of a failure.
+
+    Several may write the same file at once: it is then that of one of them. A ``durable`` one is on
+    the disk before it is in its place.
+    """
     if isinstance(content, str):
         # What names a file may hold bytes that are no text.
         content = content.encode("utf-8", "backslashreplace")
-    partial = target.with_name(f".{target.name}.partial")
+    partial = target.with_name(f".{target.name}.{uuid4().hex[:8]}.partial")
     try:
-        partial.write_bytes(content)
+        with partial.open("wb") as file:
+            file.write(content)
+            if durable:
+                file.flush()
+                os.fsync(file.fileno())
         partial.replace(target)
     except BaseException as error:
         with suppress(OSError):

@@ -7,17 +7,18 @@ right, whoever computed it and when. Several campaigns may share a directory.
 from __future__ import annotations
 
 import hashlib
+import io
 import json
-import os
 import warnings
 import zipfile
 import zlib
 from dataclasses import dataclass
 from importlib.metadata import version
 from typing import TYPE_CHECKING, Any
-from uuid import uuid4
 
 import numpy as np
+
+from access_av.files import write_whole
 
 if TYPE_CHECKING:
     from collections.abc import Callable, Mapping
@@ -80,20 +81,10 @@ class Parts:
             When it cannot be written; names the part, and leaves nothing of it.
         """
         target = self._file(depends_on)
-        partial = target.with_suffix(f".{uuid4().hex}.partial")
-        try:
-            self.path.mkdir(parents=True, exist_ok=True)
-            with partial.open("wb") as file:
-                np.savez_compressed(file, **made)  # type: ignore[arg-type]
-                file.flush()
-                os.fsync(file.fileno())
-            partial.replace(target)
-        except OSError as error:
-            partial.unlink(missing_ok=True)
-            raise OSError(error.errno, error.strerror or str(error), str(target)) from error
-        except BaseException:
-            partial.unlink(missing_ok=True)
-            raise
+        held = io.BytesIO()
+        np.savez_compressed(held, **made)  # type: ignore[arg-type]
+        self.path.mkdir(parents=True, exist_ok=True)
+        write_whole(target, held.getbuffer(), durable=True)
         return dict(made)
 
     def _file(self, depends_on: Any) -> Path:

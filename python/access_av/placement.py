@@ -11,7 +11,7 @@ from typing import TYPE_CHECKING, Any
 
 import polars as pl
 
-from access_av import _core, service_levels
+from access_av import _core, given_tables, service_levels
 from access_av.errors import InputError
 
 if TYPE_CHECKING:
@@ -19,7 +19,7 @@ if TYPE_CHECKING:
     from pathlib import Path
 
 MOST_MASTS = 1000
-# An SSB per cell of the lowest that is free.
+# Physical cell identities (TS 38.211, 7.4.2.1); each new head gets the lowest that is free.
 CELLS = 1008
 
 
@@ -172,14 +172,8 @@ def _candidates(masts: pl.DataFrame | str | Path) -> list[dict[str, Any]]:
             masts = pl.read_csv(masts, schema_overrides={"name": pl.String})
         except pl.exceptions.PolarsError as error:
             raise InputError(f"{where}: not a table: {error}") from None
-    for name in ("name", "x_m", "y_m", "z_m"):
-        if name not in masts.columns:
-            raise InputError(f"{where}: column {name} is missing; there are {masts.columns}")
+    place = ("x_m", "y_m", "z_m")
+    given_tables.check(masts, where, numbers=place, other=["name"])
     if not 0 < masts.height <= MOST_MASTS:
         raise InputError(f"{where}: {masts.height} masts; from 1 to {MOST_MASTS} are allowed")
-    for name in ("x_m", "y_m", "z_m"):
-        bad = (~masts[name].cast(pl.Float64, strict=False).is_finite()).fill_null(value=True)
-        if bad.any():
-            raise InputError(f"{where}: {name} is not a number in row {bad.arg_true()[0]}")
-    numbers = [pl.col(name).cast(pl.Float64) for name in ("x_m", "y_m", "z_m")]
-    return masts.select("name", *numbers).to_dicts()
+    return masts.select("name", pl.col(place).cast(pl.Float64)).to_dicts()

@@ -8,6 +8,7 @@ one with Sionna RT.
 
 from __future__ import annotations
 
+import io
 import json
 from pathlib import Path
 from typing import TYPE_CHECKING
@@ -15,8 +16,9 @@ from typing import TYPE_CHECKING
 import numpy as np
 import polars as pl
 
-from access_av import _core
+from access_av import _core, given_tables
 from access_av.errors import InputError
+from access_av.files import write_whole
 
 if TYPE_CHECKING:
     from numpy.typing import NDArray
@@ -72,19 +74,12 @@ def import_paths(
     rows = table if isinstance(table, pl.DataFrame) else _read(Path(table))
     held = site if isinstance(site, _core.Site) else _core.Site.load(site)
     heads = json.loads(held.to_json())["radio_heads"]
-    needed = {*_PLACE, "pci", *_NUMBERS}
-    if lacking := sorted(needed - set(rows.columns)):
-        raise InputError(f"paths: column {lacking[0]} is missing; there are {rows.columns}")
+    given_tables.check(rows, "paths", numbers=sorted({*_PLACE, "pci", *_NUMBERS}))
     if rows.is_empty():
         raise InputError("paths: there is none")
     if "ssb_index" not in rows.columns:
         first = {head["pci"]: head["ssb_index"] for head in reversed(heads)}
         rows = rows.with_columns(ssb_index=pl.col("pci").replace_strict(first, default=0))
-    for name in sorted(needed):
-        column = rows[name].cast(pl.Float64, strict=False)
-        bad = (~column.is_finite()).fill_null(value=True).arg_true()
-        if len(bad):
-            raise InputError(f"paths: {name} is not a number in row {bad[0]}")
     keys = {(head["pci"], head["ssb_index"]): row for row, head in enumerate(heads)}
     sources = list(rows.select("pci", "ssb_index").unique(maintain_order=True).iter_rows())
     if unknown := [source for source in sources if source not in keys]:
@@ -99,21 +94,22 @@ def import_paths(
     gain = rows["gain_re"].to_numpy() + 1j * rows["gain_im"].to_numpy()
     out = Path(out)
     out.parent.mkdir(parents=True, exist_ok=True)
-    with out.open("wb") as file:
-        np.savez_compressed(
-            file,
-            carrier_mhz=np.float64(carrier_mhz),
-            head_pci=np.array([head["pci"] for head in heads], dtype=np.int32),
-            head_ssb_index=np.array([head["ssb_index"] for head in heads], dtype=np.int32),
-            head_m=np.array([head["position_m"] for head in heads], dtype=np.float64),
-            place_m=np.ascontiguousarray(places.select(_PLACE).to_numpy(), dtype=np.float64),
-            path_head=np.array(of_head, dtype=np.int32),
-            path_place=rows["place"].to_numpy().astype(np.int32),
-            gain=gain.astype(np.complex64),
-            delay_s=rows["delay_s"].to_numpy().astype(np.float64),
-            azimuth_rad=rows["azimuth_rad"].to_numpy().astype(np.float32),
-            elevation_rad=rows["elevation_rad"].to_numpy().astype(np.float32),
-        )
+    written = io.BytesIO()
+    np.savez_compressed(
+        written,
+        carrier_mhz=np.float64(carrier_mhz),
+        head_pci=np.array([head["pci"] for head in heads], dtype=np.int32),
+        head_ssb_index=np.array([head["ssb_index"] for head in heads], dtype=np.int32),
+        head_m=np.array([head["position_m"] for head in heads], dtype=np.float64),
+        place_m=np.ascontiguousarray(places.select(_PLACE).to_numpy(), dtype=np.float64),
+        path_head=np.array(of_head, dtype=np.int32),
+        path_place=rows["place"].to_numpy().astype(np.int32),
+        gain=gain.astype(np.complex64),
+        delay_s=rows["delay_s"].to_numpy().astype(np.float64),
+        azimuth_rad=rows["azimuth_rad"].to_numpy().astype(np.float32),
+        elevation_rad=rows["elevation_rad"].to_numpy().astype(np.float32),
+    )
+    write_whole(out, written.getbuffer())
     _core.check_paths(str(out))
     return {"heads": len(heads), "places": places.height, "paths": rows.height}
 
