@@ -10,9 +10,10 @@ from dataclasses import dataclass
 from importlib import resources
 from typing import TYPE_CHECKING, Any
 
+from access_av import toml
 from access_av.carbon import KWH_IN_J, Range, grids
 from access_av.errors import InputError
-from access_av.toml import shipped, tomllib
+from access_av.toml import shipped
 
 if TYPE_CHECKING:
     from collections.abc import Mapping
@@ -78,12 +79,7 @@ def read(file: Path | None) -> Mapping[str, Any]:
     InputError
         When it is no TOML.
     """
-    if file is None:
-        return shipped("facts", "balance.toml")
-    try:
-        return tomllib.loads(file.read_text(encoding="utf-8"))
-    except (tomllib.TOMLDecodeError, UnicodeDecodeError) as error:
-        raise InputError(f"{file}: {error}") from error
+    return shipped("facts", "balance.toml") if file is None else toml.read(file)
 
 
 def text() -> str:

@@ -61,11 +61,10 @@ def drops(
     >>> bool(abs(table["line_of_sight"].mean() - np.exp(-50.0 / 583.0)) < 0.03)
     True
     """
-    own_m = {"umi": 10.0, "inf-sh": 8.0, "inf-dh": 8.0}.get(model, 1.5)
     columns = _core.channel_drops(
         model,
         np.ascontiguousarray(distance_m, dtype=np.float64),
-        head_height_m=own_m if head_height_m is None else head_height_m,
+        head_height_m=head_height_m,
         array_height_m=array_height_m,
         carrier_mhz=carrier_mhz,
         seed=seed,

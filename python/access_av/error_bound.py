@@ -5,6 +5,7 @@ from __future__ import annotations
 import json
 import math
 from dataclasses import dataclass
+from functools import cached_property
 from typing import TYPE_CHECKING, Any
 
 import numpy as np
@@ -69,7 +70,7 @@ class ErrorBound:
             "service_levels": [verdict.as_record() for verdict in self.verdicts],
         }
 
-    @property
+    @cached_property
     def verdicts(self) -> list[service_levels.Verdict]:
         """The service levels that no localizer can better on this route."""
         return service_levels.of_bound(self.route["along_std_m"], self.route["across_std_m"])

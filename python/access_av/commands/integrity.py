@@ -64,7 +64,7 @@ def integrity(
         )
     records = [case.as_record() for case in cases]
     directory.write_table("integrity.parquet", pl.DataFrame(records))
-    directory.write_text("report.html", render_integrity(cases, runs, seed))
+    directory.write_text("report.html", render_integrity(cases, records, runs, seed))
     directory.write_manifest(scenario=scenario, runs=runs, seed=seed)
     if as_json:
         print(json_text({"cases": records, "directory": str(directory.path)}))

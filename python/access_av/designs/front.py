@@ -62,15 +62,24 @@ def student(freedom: int) -> float:
 
 def front(driven: Sequence[Driven]) -> list[int]:
     """Designs that no other beats in mean energy and mean error, by energy."""
-    energy_j = np.array([each.mean_energy_j for each in driven])
-    square_m2 = np.array([float(np.mean(each.square_m2)) for each in driven])
-    found: list[int] = []
-    best_m2 = np.inf
-    for index in np.lexsort((square_m2, energy_j)):
-        if square_m2[index] < best_m2 and np.isfinite(energy_j[index]):
-            best_m2 = square_m2[index]
-            found.append(int(index))
-    return found
+    energy_j, square_m2 = aims(driven)
+    found = not_beaten(energy_j, square_m2)
+    return [int(index) for index in found if np.isfinite(energy_j[index])]
+
+
+def aims(driven: Sequence[Driven]) -> tuple[NDArray[np.float64], NDArray[np.float64]]:
+    """Mean energy and mean squared error of each design."""
+    return (
+        np.array([each.mean_energy_j for each in driven]),
+        np.array([float(np.mean(each.square_m2)) for each in driven]),
+    )
+
+
+def not_beaten(energy_j: NDArray[np.float64], square_m2: NDArray[np.float64]) -> NDArray[np.intp]:
+    """Places of those that no other has less energy and less error than, by energy."""
+    order = np.lexsort((square_m2, energy_j))
+    best_m2 = np.minimum.accumulate(np.concatenate([[np.inf], square_m2[order][:-1]]))
+    return order[square_m2[order] < best_m2]
 
 
 def may_be_front(driven: Sequence[Driven]) -> list[int]:

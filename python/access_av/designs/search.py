@@ -8,6 +8,7 @@ from typing import TYPE_CHECKING, Any
 import numpy as np
 
 from access_av.designs.drives import drive, joined
+from access_av.designs.front import aims, not_beaten
 from access_av.errors import InputError
 
 if TYPE_CHECKING:
@@ -110,16 +111,13 @@ def search(
 
 def ranking(driven: Sequence[Driven]) -> list[int]:
     """Designs in order: the front, then the front of the others, and so on."""
-    energy_j = np.array([each.mean_energy_j for each in driven])
-    square_m2 = np.array([float(np.mean(each.square_m2)) for each in driven])
+    energy_j, square_m2 = aims(driven)
     left = np.arange(len(driven))
     found: list[int] = []
     while left.size:
-        order = left[np.lexsort((square_m2[left], energy_j[left]))]
-        best_m2 = np.minimum.accumulate(np.concatenate([[np.inf], square_m2[order][:-1]]))
-        on_front = order[square_m2[order] < best_m2]
+        on_front = left[not_beaten(energy_j[left], square_m2[left])]
         if on_front.size == 0:
-            on_front = order
+            on_front = left[np.argsort(energy_j[left], kind="stable")]
         found += on_front.tolist()
         left = np.setdiff1d(left, on_front)
     return found

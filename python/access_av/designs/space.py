@@ -9,8 +9,8 @@ from typing import TYPE_CHECKING, Any
 
 import numpy as np
 
+from access_av import toml
 from access_av.errors import InputError
-from access_av.toml import tomllib
 
 if TYPE_CHECKING:
     from collections.abc import Mapping
@@ -74,10 +74,7 @@ class Space:
         InputError
             When it cannot be used; names the key and what is allowed.
         """
-        try:
-            table = tomllib.loads(file.read_text(encoding="utf-8"))
-        except (tomllib.TOMLDecodeError, UnicodeDecodeError) as error:
-            raise InputError(f"{file}: {error}") from error
+        table = toml.read(file)
         try:
             return cls.of(table)
         except InputError as error:

@@ -74,14 +74,10 @@ def evaluate(
 
 
 def _claims(path: Path) -> dict[str, Any]:
+    from access_av import toml
     from access_av.errors import InputError
-    from access_av.toml import tomllib
 
-    try:
-        read = tomllib.loads(path.read_text(encoding="utf-8"))
-    except (tomllib.TOMLDecodeError, UnicodeDecodeError) as error:
-        raise InputError(f"{path}: {error}") from error
-    found = read.get("claims")
+    found = toml.read(path).get("claims")
     if not isinstance(found, dict) or not found:
         raise InputError(f"{path}: no table [claims]")
     for name, entry in found.items():

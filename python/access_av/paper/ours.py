@@ -16,6 +16,7 @@ import numpy as np
 from access_av.paper.findings import MissingFigureError, energy_j
 
 if TYPE_CHECKING:
+    from access_av._core import Scenario
     from access_av.paper.drives import Driver
     from access_av.paper.evaluation import Evaluation
     from access_av.paper.outcome import Drives, Numbers
@@ -69,19 +70,26 @@ class Comparison:
         return self.error_less_low_m > 0.0 and self.executions_less_low > 0.0
 
 
+def tracked(scenario: Scenario, base_ms: float, *, knows_road: bool = True) -> Scenario:
+    """The scenario with our tracker, waking up when its own error asks for it."""
+    return scenario.with_overrides(
+        {
+            "vehicle.localizer.kind": "tracker",
+            "vehicle.localizer.map": knows_road,
+            "vehicle.wake_up": {"policy": "uncertainty", "bound_m": BOUND_M, "base_ms": base_ms},
+        }
+    )
+
+
 def compare(driver: Driver, evaluation: Evaluation) -> list[Comparison]:
     """Ours in every power mode, with the road's course and without it."""
     found = []
     for mode in driver.platform.modes:
         for knows_road in (True, False):
-            scenario = evaluation.scenario.with_overrides(
+            base_ms = mode.base_wake_up_ms["music"]
+            scenario = tracked(evaluation.scenario, base_ms, knows_road=knows_road).with_overrides(
                 {
                     "vehicle.estimator.method": "music",
-                    "vehicle.localizer.kind": "tracker",
-                    "vehicle.localizer.map": knows_road,
-                    "vehicle.wake_up.policy": "uncertainty",
-                    "vehicle.wake_up.bound_m": BOUND_M,
-                    "vehicle.wake_up.base_ms": mode.base_wake_up_ms["music"],
                     "vehicle.wake_up.least_gain_m2": LEAST_GAIN_M2,
                     "vehicle.wake_up.snr_headroom_db": HEADROOM_DB,
                 }

@@ -20,6 +20,8 @@ if TYPE_CHECKING:
     from collections.abc import Callable, Sequence
     from pathlib import Path
 
+    from access_av.report.chart import Spec
+
 POINTS_FILE = "operating_points.parquet"
 
 
@@ -28,8 +30,9 @@ def write(made: Study, directory: ResultsDirectory) -> None:
     for name, table in made.tables().items():
         directory.write_table(f"{name}.parquet", table)
     directory.write_json("claims.json", as_records(made.claims))
-    directory.write_text("report.html", render(made))
-    for name, picture in figures(made).items():
+    specs: dict[str, Spec] = {}
+    directory.write_text("report.html", render(made, specs))
+    for name, picture in figures(specs).items():
         directory.write_text(f"{name}.svg", picture)
     shown = made.shown
     directory.write_text("scenario.toml", shown.scenario.resolved(shown.platform.core).to_toml())

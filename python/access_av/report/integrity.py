@@ -4,7 +4,7 @@ from __future__ import annotations
 
 from html import escape
 from importlib.metadata import version
-from typing import TYPE_CHECKING
+from typing import TYPE_CHECKING, Any
 
 from access_av.report import drive_charts as charts
 from access_av.report.page import sheet
@@ -21,9 +21,10 @@ HEAD = (
 )  # fmt: skip
 
 
-def render_integrity(cases: Sequence[Case], runs: int, seed: int) -> str:
-    """The campaign as an HTML page that loads nothing."""
-    records = [case.as_record() for case in cases]
+def render_integrity(
+    cases: Sequence[Case], records: Sequence[dict[str, Any]], runs: int, seed: int
+) -> str:
+    """The campaign, and its rows in the table, as an HTML page that loads nothing."""
     rows = [
         (
             escape(one["mismatch"]),

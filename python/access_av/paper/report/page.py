@@ -30,20 +30,22 @@ if TYPE_CHECKING:
 TEMPLATE = resources.files(__package__).joinpath("page.html")
 
 
-def render(study: Study) -> str:
+def render(study: Study, specs: dict[str, Spec] | None = None) -> str:
     """The whole report as HTML.
 
     Parameters
     ----------
     study
         The paper under several readings; the shown one's charts are drawn in full.
+    specs
+        Takes the charts, by name.
 
     Returns
     -------
     str
         An HTML page that loads nothing.
     """
-    specs: dict[str, Spec] = {}
+    specs = {} if specs is None else specs
     evaluation = study.shown
     return fill(
         TEMPLATE.read_text(encoding="utf-8"),
