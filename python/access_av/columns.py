@@ -577,6 +577,7 @@ TABLES: Mapping[str, Table] = {
             ),
             {
                 **dict.fromkeys(("half_frame", "sfn", "mib_bits"), _UNDECODED),
+                "lmax": "neither band nor broadcast channel tell",
                 **dict.fromkeys(("angle_deg", "azimuth_deg", "sigma_deg", "verdict"), _NO_ARRAY),
             },
         ),
