@@ -12,8 +12,8 @@ use pyo3::prelude::*;
 use pyo3::types::PyDict;
 use recording::replay::{self, ReplayError, StartChoice};
 use recording::{
-    Datatype, OdometryLog, Recording, RecordingError as CoreRecordingError, TimedPose, read_angle_log, read_odometry_csv, read_odometry_mcap,
-    write_drive_mcap, write_tum,
+    Datatype, OdometryLog, Recording, RecordingError as CoreRecordingError, TimedPose,
+    read_angle_log, read_odometry_csv, read_odometry_mcap, write_drive_mcap, write_tum,
 };
 use simulate::{SynthError, SynthSettings};
 

@@ -102,10 +102,7 @@ impl Tapes {
 
 impl Tape {
     /// The angles of a method, in order of time.
-    pub fn angles_of(
-        &self,
-        method: usize,
-    ) -> impl Iterator<Item = (SensedSsb, AngleMeasurement)> {
+    pub fn angles_of(&self, method: usize) -> impl Iterator<Item = (SensedSsb, AngleMeasurement)> {
         let angles = self.angles.get(method).into_iter().flatten();
         let heard = self.sensed.iter().zip(angles);
         heard.filter_map(|(&ssb, angle)| Some((ssb, (*angle)?)))
