@@ -101,6 +101,6 @@ def test_command(access_av: Callable[..., Finished], tmp_path: Path) -> None:
     )  # fmt: skip
     assert done.code == 0, done.err
     told = json.loads(done.out)
-    assert told["drives"] == 3 * 2 * 2 + 4
+    assert told["drives"] == 3 * 2 * 2 + 2 * (6 + 2)
     vehicle = (tmp_path / "out/vehicle.toml").read_text()
     assert f"interval_ms = {told['values']['vehicle.wake_up.interval_ms']}" in vehicle

@@ -103,6 +103,15 @@ def tune(
             f"{driven.executions.mean():.0f}",
         )
     console.print(made)
+    for name, factor in constraints.excess(
+        {
+            "energy_j": found.after.mean_energy_j,
+            "rms_error_m": found.after.rms_m,
+            "p90_max_error_m": found.after.p90_worst_m,
+        }
+    ).items():
+        if factor > 1.0:
+            console.print(f"[red]{name} is {factor:.2f} times what is allowed[/]")
     mean_j, low_j, high_j = found.less[0]
     console.print(f"Energy less by {mean_j:.3f} J (95 %: {low_j:.3f} to {high_j:.3f})")
     console.print(f"{directory.path / 'vehicle.toml'}", soft_wrap=True)
