@@ -24,9 +24,6 @@ pub enum Error {
     /// The element spacing is outside what an array can have.
     #[error("spacing must be 0.01 to 100 wavelengths, not {0}")]
     Spacing(f64),
-    /// The grid step of MUSIC is outside what makes sense.
-    #[error("grid_deg must be between 0.001 and 10 degrees, not {0}")]
-    Grid(f64),
     /// An angle from the array's axis is outside 0 to pi, or not finite.
     #[error("an angle from the array's axis lies between 0 and pi rad, not {0}")]
     Angle(f64),
