@@ -96,3 +96,7 @@ pub use list::List;
 pub use num_complex::Complex64;
 pub use result::angle::{AngleEstimate, AngleEstimates};
 pub use result::verdict::{Reason, Verdict};
+
+#[cfg(doctest)]
+#[doc = include_str!("../README.md")]
+struct ReadMe;
