@@ -163,8 +163,8 @@ impl<const N: usize, const W: usize> Hermitians<N, W> {
     pub(crate) fn principal_eigenvectors<const FUSED: bool>(&self) -> Vectors<N, W> {
         const SQUARINGS: usize = 9;
         // A matrix of unit trace whose square has the trace 1 - x has a share of x / 2 outside its
-        // largest eigenvalue, and its square one of x^2 / 4: rounding, then.
-        const REMAINDER: f64 = 1e-7;
+        // largest eigenvalue, and its square one of x^2 / 4, which is the error of the vector.
+        const REMAINDER: f64 = 1e-5;
         let traces = self.traces();
         let (mut scales, mut done) = ([0.0; W], [0.0; W]);
         for w in 0..W {
