@@ -4,6 +4,7 @@ mod bursts;
 mod doubts;
 mod drive;
 mod error;
+mod innovations;
 mod locate;
 mod located;
 mod receive;
@@ -12,6 +13,7 @@ mod stated;
 
 pub use drive::Replay;
 pub use error::ReplayError;
+pub use innovations::{Met, innovations};
 pub use locate::{locate_angles, locate_recording};
 pub use located::{LocatedDrive, LocatedPose, Remark};
 pub use receive::receive_recording;
