@@ -3,6 +3,7 @@
 pub(crate) mod batch;
 pub(crate) mod channel_gains;
 pub(crate) mod choice;
+pub(crate) mod direction_finder;
 pub(crate) mod one;
 pub(crate) mod pilots;
 pub(crate) mod pseudo_spectrum;
