@@ -88,12 +88,19 @@ def service_levels(verdicts: Iterable[Verdict]) -> str:
             f"{verdict.level.availability:.4g}",
             f"{verdict.share:.4f}",
             f"{verdict.least_share:.4f}",
-            badge("reached", "yes") if verdict.reached else badge("not reached", "no"),
+            _reached(verdict),
         )
         for verdict in verdicts
     ]
     head = ("level", "accuracy", "availability asked", "share within", "at least (95 %)", "")
     return table(head, rows, numbers=(1, 2, 3, 4))
+
+
+def _reached(verdict: Verdict) -> str:
+    if verdict.reached:
+        return badge("reached", "yes")
+    enough = verdict.share >= verdict.level.availability
+    return badge("too few drives to tell", "fit") if enough else badge("not reached", "no")
 
 
 def source(title: str, text: str) -> str:
