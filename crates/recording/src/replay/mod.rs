@@ -6,9 +6,11 @@ mod drive;
 mod error;
 mod locate;
 mod located;
+mod mistakes;
 mod receive;
 mod start;
 mod stated;
+mod suspicion;
 
 pub use drive::Replay;
 pub use error::ReplayError;
