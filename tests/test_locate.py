@@ -10,9 +10,10 @@ import polars as pl
 import pytest
 from mcap.reader import make_reader
 
-from access_av import Vehicle, drives
+from access_av import Site, Vehicle, drives
 from access_av._core import RecordingError
 from access_av.toml import tomllib
+from conftest import ROOT
 from robot import HEADS_M, RATE_HZ, TRACK_M, robot
 
 if TYPE_CHECKING:
@@ -328,10 +329,24 @@ def test_the_report_shows_what_was_found(access_av: Cli, tmp_path: Path) -> None
     drawn = {name: json.dumps(spec) for name, spec in specs.items()}
     for line in ("truth", "as driven", "smoothed", *map(str, HEADS_M)):
         assert f'"{line}"' in drawn["track"], line
-    for line in ("error", "error, smoothed", "standard deviation", "protection level"):
+    for line in ("error", "error, smoothed", "deviation", "protection level"):
         assert f'"{line}"' in drawn["error"], line
     for pci in HEADS_M:
         assert f'"{pci}"' in drawn["heads"]
     for constant in ("odometer.scale", "gyroscope.bias_radps", "array.mounting_rad"):
         assert constant in page
     assert (tmp_path / "out" / "findings.parquet").exists()
+
+
+def test_the_files_of_the_docs_can_be_used(access_av: Cli, tmp_path: Path) -> None:
+    page = (ROOT / "docs/locate.md").read_text(encoding="utf-8")
+    hall, vehicle = re.findall(r"```toml\n(.*?)```", page, re.DOTALL)
+    assert Site.from_toml(hall).to_json()
+    told = robot(60.0)
+    told.sheet = re.sub(r"^array = .*\n", "", vehicle, flags=re.MULTILINE)
+    done = access_av(*told.write(tmp_path), "--truth", tmp_path / "truth.tum")
+    assert done.code == 0, done.err
+    shown = access_av("locate", "--help", columns=200).out
+    for row in re.findall(r"^\| (?:odometry|the same|angles).*$", page, re.MULTILINE):
+        for column in re.findall(r"`(\w+_(?:s|m|mps|rad|radps|db)|pci|ssb_index)`", row):
+            assert column in shown or column == "rician_k_db", column

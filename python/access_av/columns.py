@@ -52,6 +52,13 @@ class Table:
 
 # A unit of 1 is a count, a number without a unit or an index; text and truth values say so.
 _GLOSSARY = {
+    # A survey.
+    "key": ("text", "Key in the site or vehicle file"),
+    "before": ("any", "What was believed"),
+    "std_before": ("any", "Standard deviation of that"),
+    "found": ("any", "What the drives say, together with that"),
+    "std": ("any", "Standard deviation of that"),
+    "is_learnt": ("true or false", "The standard deviation has fallen by 30 % or more"),
     # Time, run, place.
     "run": ("1", "Number of the run"),
     "runs": ("1", "How many runs the row is of"),
@@ -461,6 +468,12 @@ TABLES: Mapping[str, Table] = {
             ("name", "x_m", "y_m", "z_m", "p90_bound_m"),
         ),
         Table(
+            "survey",
+            "A number of site or vehicle that was surveyed by driving",
+            "`survey.parquet` of `access-av survey`; `access_av.survey(…).table()`",
+            ("key", "unit", "before", "std_before", "found", "std", "is_learnt"),
+        ),
+        Table(
             "bound_heads",
             "A radio head",
             "`access-av bound --json`; `access_av.bound(…).heads`",
@@ -580,6 +593,7 @@ TABLES: Mapping[str, Table] = {
             ),
             {
                 **dict.fromkeys(("half_frame", "sfn", "mib_bits"), _UNDECODED),
+                "lmax": "neither band nor broadcast channel tell",
                 **dict.fromkeys(("angle_deg", "azimuth_deg", "sigma_deg", "verdict"), _NO_ARRAY),
             },
         ),

@@ -111,6 +111,45 @@ def synthesize(
     return SynthesizedDrive(*made)
 
 
+def log_angles(
+    scenario: Scenario | str,
+    directory: str | Path,
+    *,
+    seed: int = 1,
+    run: int = 0,
+    duration_s: float | None = None,
+) -> int:
+    """Record a scenario's drive as the angles that the vehicle's receiver finds in it.
+
+    Writes ``angles.csv`` with the angle of every SSB, ``odometry.csv``, ``site.toml``,
+    ``vehicle.toml``, ``scenario.toml`` and ``truth.tum``.
+
+    Parameters
+    ----------
+    scenario, directory, seed, run, duration_s
+        As for :func:`synthesize`.
+
+    Returns
+    -------
+    int
+        Number of angles.
+
+    Raises
+    ------
+    SettingsError
+        When what an SSB brings hangs on when it is heard (samples, latency, noisy SNR).
+
+    Examples
+    --------
+    >>> import tempfile
+    >>> with tempfile.TemporaryDirectory() as drive:
+    ...     log_angles("yard", drive, duration_s=2.0)
+    404
+    """
+    chosen = _core.Scenario.load(scenario) if isinstance(scenario, str) else scenario
+    return _core.log_angles(chosen, directory, seed=seed, run=run, duration_s=duration_s)
+
+
 @dataclass(frozen=True)
 class Drive:
     """A located drive. :mod:`access_av.columns` says what each table's columns are.

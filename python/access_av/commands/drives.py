@@ -38,6 +38,10 @@ def synth(
         bool, typer.Option("--continuous", help="Also the time between the bursts (large).")
     ] = False,
     datatype: Annotated[str, typer.Option(help="ci16_le or cf32_le.")] = "ci16_le",
+    angles: Annotated[
+        bool,
+        typer.Option("--angles", help="angles.csv in place of samples: far less."),
+    ] = False,
     allow_large: AllowLarge = False,
 ) -> None:
     """Record a scenario's drive: samples of all antennas, odometry, site, vehicle, truth.
@@ -51,6 +55,10 @@ def synth(
 
     chosen = load_scenario(scenario, allow_large=allow_large)
     directory = ResultsDirectory.create("synth", out)
+    if angles:
+        count = drives.log_angles(chosen, directory.path, seed=seed, run=run, duration_s=duration_s)
+        console.print(f"{count} angles: {directory.path / 'angles.csv'}", soft_wrap=True)
+        return
     with progress("Recording") as tick:
         made = drives.synthesize(
             chosen,

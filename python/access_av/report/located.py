@@ -143,7 +143,7 @@ def _errors(
         if drive.smoothed is not None and not drive.smoothed.is_empty():
             lines["error, smoothed"] = drives.error_m(drive.smoothed, truth)
     deviation = (pl.col("covariance_xx_m2") + pl.col("covariance_yy_m2")).sqrt()
-    lines["standard deviation"] = known.select("time_s", error_m=deviation)
+    lines["deviation"] = known.select("time_s", error_m=deviation)
     if known["protection_level_m"].null_count() < known.height:
         lines["protection level"] = known.select("time_s", error_m="protection_level_m")
     return lines

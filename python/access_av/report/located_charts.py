@@ -23,7 +23,7 @@ TRACKS = {"truth": GREY, "as driven": BLUE, "smoothed": GREEN}
 ERRORS = {
     "error": BLUE,
     "error, smoothed": GREEN,
-    "standard deviation": ORANGE,
+    "deviation": ORANGE,
     "protection level": PURPLE,
 }
 

@@ -95,6 +95,9 @@ impl<'a> Replay<'a> {
         let Some(findings) = self.drive.findings else {
             return;
         };
+        if !self.drive.suspicions.is_empty() {
+            return; // found where the vehicle never was
+        }
         let time_s = self
             .drive
             .poses

@@ -47,7 +47,7 @@ pub fn locate_angles(
         replay.remark(time_s, text);
     }
     replay.hear(&angles)?;
-    suspect(&mut replay, site, &vehicle, start, odometry, logged)?;
+    suspect(&mut replay, site, &vehicle, odometry, logged)?;
     finish(replay, site, &vehicle, start, odometry, smooth)
 }
 
@@ -90,14 +90,7 @@ pub fn locate_recording(
         });
     }
     let heard: Vec<LoggedAngle> = replay.executions().iter().filter_map(as_logged).collect();
-    suspect(
-        &mut replay,
-        site,
-        &in_time(&vehicle),
-        start,
-        odometry,
-        &heard,
-    )?;
+    suspect(&mut replay, site, &in_time(&vehicle), odometry, &heard)?;
     finish(replay, site, &vehicle, start, odometry, smooth)
 }
 
@@ -106,15 +99,13 @@ fn suspect(
     replay: &mut Replay<'_>,
     site: &Site,
     vehicle: &Vehicle,
-    start: Pose,
     odometry: &OdometryLog,
     angles: &[LoggedAngle],
 ) -> Result<(), ReplayError> {
     let given = Drive {
         site: Cow::Borrowed(site),
         vehicle: Cow::Borrowed(vehicle),
-        start,
-        odometry: Cow::Borrowed(&odometry.samples),
+        odometry: Cow::Borrowed(odometry),
         angles: Cow::Borrowed(angles),
     };
     for text in suspicions(&given)? {

@@ -8,14 +8,14 @@ use onboard::observation::OdometrySample;
 use onboard::settings::{Site, Vehicle};
 
 use crate::angle_log::LoggedAngle;
+use crate::odometry::OdometryLog;
 
 /// A drive as it was given, or as it may have been meant.
 #[derive(Clone)]
 pub struct Drive<'a> {
     pub site: Cow<'a, Site>,
     pub vehicle: Cow<'a, Vehicle>,
-    pub start: Pose,
-    pub odometry: Cow<'a, [OdometrySample]>,
+    pub odometry: Cow<'a, OdometryLog>,
     /// In order of time; the electrical angle is NaN where the angle from the array's axis is given.
     pub angles: Cow<'a, [LoggedAngle]>,
 }
@@ -34,8 +34,7 @@ enum Correction {
     Odometry(fn(&mut OdometrySample)),
     Head(fn([f64; 3]) -> [f64; 3]),
     Mounting(f64),
-    Heading(f64),
-    OtherSide,
+    Start(fn(&Site, Pose) -> Pose),
 }
 
 impl Mistake {
@@ -55,15 +54,19 @@ impl Mistake {
                 let angles = drive.angles.to_mut().iter_mut();
                 angles.for_each(|angle| meant(angle, &given.vehicle));
             }
-            Correction::Odometry(meant) => drive.odometry.to_mut().iter_mut().for_each(meant),
+            Correction::Odometry(meant) => {
+                drive.odometry.to_mut().samples.iter_mut().for_each(meant);
+            }
             Correction::Head(meant) => {
                 for head in &mut drive.site.to_mut().radio_heads {
                     head.position_m = meant(head.position_m);
                 }
             }
             Correction::Mounting(by_rad) => drive.vehicle.to_mut().array.mounting_rad += by_rad,
-            Correction::Heading(by_rad) => drive.start.heading_rad += by_rad,
-            Correction::OtherSide => drive.start = other_side(&given.site, given.start),
+            Correction::Start(meant) => {
+                let start = &mut drive.vehicle.to_mut().start;
+                start.pose = start.pose.map(|pose| meant(&given.site, pose));
+            }
         }
         drive
     }
@@ -174,28 +177,35 @@ pub const MISTAKES: [Mistake; 22] = [
     Mistake::new(
         "the drive starts heading a quarter of a turn further to the left",
         "the start's heading: 0 along +x, counter-clockwise",
-        Correction::Heading(FRAC_PI_2),
+        Correction::Start(|_, pose| turned(pose, FRAC_PI_2)),
     ),
     Mistake::new(
         "the drive starts heading a quarter of a turn further to the right",
         "the start's heading: 0 along +x, counter-clockwise",
-        Correction::Heading(-FRAC_PI_2),
+        Correction::Start(|_, pose| turned(pose, -FRAC_PI_2)),
     ),
     Mistake::new(
         "the drive starts heading the other way",
         "the start's heading: 0 along +x, counter-clockwise",
-        Correction::Heading(PI),
+        Correction::Start(|_, pose| turned(pose, PI)),
     ),
     Mistake::new(
         "the drive starts on the other side of the line of radio heads",
         "the start",
-        Correction::OtherSide,
+        Correction::Start(other_side),
     ),
 ];
 
 fn scale(sample: &mut OdometrySample, factor: f64) {
     sample.distance_m *= factor;
     sample.speed_mps *= factor;
+}
+
+fn turned(pose: Pose, by_rad: f64) -> Pose {
+    Pose {
+        heading_rad: pose.heading_rad + by_rad,
+        ..pose
+    }
 }
 
 /// A pose mirrored at the line that lies closest to the radio heads (their principal axis).

@@ -7,16 +7,13 @@
 
 use std::collections::BTreeSet;
 use std::f64::consts::TAU;
-use std::sync::Arc;
 
-use onboard::localize::Tracker;
-use onboard::localize::tracker::{InitialPose, TrackerConfig};
 use onboard::radio_head::RadioHead;
-use onboard::road::Road;
-use onboard::settings::{LocalizerSettings, SettingsError};
+use onboard::settings::LocalizerSettings;
 
+use super::error::ReplayError;
+use super::innovations::{Met, innovations};
 use super::mistakes::{Drive, MISTAKES, Mistake};
-use super::stated::with_phase;
 use crate::angle_log::LoggedAngle;
 
 /// Angles by which it is judged: the first of the drive.
@@ -41,17 +38,38 @@ struct Foretold {
     refused: f64,
 }
 
+impl Foretold {
+    fn by(drive: &Drive<'_>) -> Result<Self, ReplayError> {
+        let met = innovations(
+            &drive.site,
+            &drive.vehicle,
+            &drive.odometry,
+            &drive.angles,
+            None,
+        )?;
+        let log_likelihood = |met: &Option<Met>| {
+            let gaussian = met.map_or(0.0, |met| {
+                (-0.5 * met.residual_rad.powi(2) / met.variance).exp() / (TAU * met.variance).sqrt()
+            });
+            ((1.0 - FROM_ANYWHERE) * gaussian + FROM_ANYWHERE / TAU).ln()
+        };
+        let refused = met.iter().filter(|met| met.is_none_or(|met| !met.used));
+        Ok(Self {
+            log_likelihood: met.iter().map(log_likelihood).sum(),
+            refused: refused.count() as f64 / met.len().max(1) as f64,
+        })
+    }
+}
+
 /// The usual mistakes that explain the drive's angles where it, as given, does not: one remark each.
 ///
 /// # Errors
-/// [`SettingsError`] when the site's road cannot be built.
-pub fn suspicions(given: &Drive<'_>) -> Result<Vec<String>, SettingsError> {
+/// As [`innovations`].
+pub fn suspicions(given: &Drive<'_>) -> Result<Vec<String>, ReplayError> {
     let tracks = matches!(given.vehicle.localizer, LocalizerSettings::Tracker(_));
     if !tracks || !given.vehicle.start.known {
         return Ok(Vec::new()); // there is no expectation to begin with
     }
-    let road = given.site.build_road()?;
-    let road = road.filter(|_| given.vehicle.follows_road()).map(Arc::new);
     let mut given = given.clone();
     let heads = RadioHead::heard(&given.site, &given.vehicle);
     let angles = given.angles.to_mut();
@@ -69,16 +87,18 @@ pub fn suspicions(given: &Drive<'_>) -> Result<Vec<String>, SettingsError> {
     let looks: BTreeSet<_> = angles.iter().map(look).collect();
     let independent = looks.len() as f64 / angles.len().max(1) as f64;
 
-    let as_given = foretell(&given, road.as_ref());
+    let as_given = Foretold::by(&given)?;
     if as_given.refused < MOST_REFUSED {
         return Ok(Vec::new());
     }
-    let judged = MISTAKES.iter().filter_map(|mistake| {
-        let found = foretell(&mistake.correct(&given), road.as_ref());
+    let mut judged: Vec<(f64, &Mistake, Foretold)> = Vec::new();
+    for mistake in &MISTAKES {
+        let found = Foretold::by(&mistake.correct(&given))?;
         let odds = independent * (found.log_likelihood - as_given.log_likelihood);
-        (odds > LOG_ODDS && found.refused < MOST_REFUSED).then_some((odds, mistake, found))
-    });
-    let mut judged: Vec<(f64, &Mistake, Foretold)> = judged.collect();
+        if odds > LOG_ODDS && found.refused < MOST_REFUSED {
+            judged.push((odds, mistake, found));
+        }
+    }
     judged.sort_by(|a, b| b.0.total_cmp(&a.0));
     let best = judged.first().map_or(0.0, |(odds, ..)| *odds);
     let remark = |(_, mistake, found): (f64, &Mistake, Foretold)| {
@@ -94,40 +114,4 @@ pub fn suspicions(given: &Drive<'_>) -> Result<Vec<String>, SettingsError> {
         .into_iter()
         .take_while(|(odds, ..)| best - odds < LOG_ODDS);
     Ok(named.map(remark).collect())
-}
-
-/// Tracks a drive, and sums up the log-likelihoods of its angles.
-fn foretell(drive: &Drive<'_>, road: Option<&Arc<Road>>) -> Foretold {
-    let start = InitialPose {
-        pose: drive.start,
-        position_std_m: drive.vehicle.start.position_std_m,
-        heading_std_rad: drive.vehicle.start.heading_std_rad,
-    };
-    let heads = RadioHead::heard(&drive.site, &drive.vehicle);
-    let config = TrackerConfig::new(&drive.site, &drive.vehicle);
-    let mut tracker = Tracker::new(config, road.cloned(), &heads, &start);
-    let mut odometry = drive.odometry.iter().peekable();
-    let (mut log_likelihood, mut refused) = (0.0, 0.0);
-    for logged in drive.angles.iter() {
-        let mut measured = with_phase(logged, drive.vehicle.array.spacing_wavelengths).measured;
-        measured.time_s -= drive.vehicle.receiver.lateness_s;
-        while let Some(sample) = odometry.next_if(|it| it.time_s <= measured.time_s) {
-            tracker.odometry(sample);
-        }
-        let sends = |head: &&RadioHead| head.sends(logged.ssb.pci, logged.ssb.ssb_index);
-        let Some(head) = heads.iter().find(sends) else {
-            continue;
-        };
-        let gaussian = tracker.innovation(head, &measured).map_or(0.0, |it| {
-            (-0.5 * it.mahalanobis2()).exp() / (TAU * it.variance).sqrt()
-        });
-        let likelihood = (1.0 - FROM_ANYWHERE) * gaussian + FROM_ANYWHERE / TAU;
-        log_likelihood += likelihood.ln();
-        let verdict = tracker.update(head, &measured);
-        refused += f64::from(u8::from(!verdict.accepted));
-    }
-    Foretold {
-        log_likelihood,
-        refused: refused / drive.angles.len().max(1) as f64,
-    }
 }
