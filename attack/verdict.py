@@ -72,7 +72,7 @@ def _messages(verdict: Verdict, text: str) -> None:
         verdict.says("warning", warned[0])
     if control := re.search(r"[\x00-\x08\x0b-\x1f\x7f-\x9f]", text):
         verdict.says("control-character", repr(control[0]))
-    for message in re.split(r"^(?=error: |warning: )", text, flags=re.M):
+    for message in re.split(r"^(?=error: |warning: |not to be relied on)", text, flags=re.M):
         if len(message) > LONGEST_MESSAGE + 100:
             verdict.says("long-message", f"{len(message)} characters: {message[:100]}")
 
