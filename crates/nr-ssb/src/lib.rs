@@ -156,13 +156,14 @@
 //! [`ScanError`](raster::ScanError), a [`TrackError`](track::TrackError). Nothing panics.
 
 // Each folder uses only those before it: numeric, standard; transmit, dsp; input, receive; search;
-// track, raster.
+// track, raster; receiver.
 mod dsp;
 mod error;
 mod input;
 mod numeric;
 pub mod raster;
 mod receive;
+pub mod receiver;
 pub mod search;
 mod standard;
 pub mod track;

@@ -6,7 +6,7 @@ from numpy.typing import ArrayLike, NDArray
 
 from access_av._core import Recording
 
-__all__ = ["Cell", "Scan", "Searcher", "build_burst", "scan", "search"]
+__all__ = ["Cell", "Receiver", "Scan", "Searcher", "build_burst", "scan", "search"]
 
 @final
 class Cell:
@@ -52,6 +52,10 @@ class Cell:
     def azimuth_rad(self) -> float | None: ...
     @property
     def verdict(self) -> str | None: ...
+    @property
+    def channel(self) -> NDArray[np.complex64]: ...
+    @property
+    def noise_variance(self) -> list[float]: ...
 
 @final
 class Scan:
@@ -64,6 +68,22 @@ class Scan:
     def faults(self) -> list[str]: ...
     @property
     def looked(self) -> list[str]: ...
+
+@final
+class Receiver:
+    def __new__(
+        cls,
+        sample_rate_hz: float,
+        *,
+        centre_frequency_hz: float,
+        ssb_freq_hz: float,
+        scs_khz: int,
+        antennas: int,
+        period_s: float = 0.02,
+        search_every_s: float = 1.0,
+    ) -> Receiver: ...
+    def push(self, samples: ArrayLike) -> list[Cell]: ...
+    def finish(self) -> list[Cell]: ...
 
 @final
 class Searcher:
