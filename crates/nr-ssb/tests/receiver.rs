@@ -88,7 +88,7 @@ fn every_ssb_of_a_stream_is_heard_once_with_its_channel() {
             for (h, first) in channel[antenna].iter().zip(&channel[0]) {
                 assert!((h / first - expected).norm() < 0.25);
             }
-            let power: f32 = channel[antenna].iter().map(|h| h.norm_sqr()).sum();
+            let power: f32 = channel[antenna].iter().map(Complex32::norm_sqr).sum();
             let snr_db = 10.0 * (f64::from(power) / 240.0 / noise[antenna]).log10();
             assert!((snr_db - 10.0).abs() < 1.5, "{snr_db}");
         }
