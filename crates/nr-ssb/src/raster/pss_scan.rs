@@ -13,8 +13,9 @@ use crate::standard::numerology::SubcarrierSpacing;
 
 /// The PSS is placed at multiples of this off the recording's centre.
 pub(super) const OFFSET_UNIT_HZ: f64 = 15e3;
-/// Maxima that noise may offer.
-const NOISE_CANDIDATES: f64 = 4.0;
+/// Maxima that noise may offer. Each costs a look at three SSBs' time, and four times as many make up
+/// half of what is lost by adding powers.
+const NOISE_CANDIDATES: f64 = 16.0;
 /// Offsets that are worth a search at most.
 const MOST_OFFSETS: usize = 24;
 /// Lags that a thread takes at once, at the base rate, ...

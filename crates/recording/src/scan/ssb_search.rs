@@ -235,7 +235,9 @@ impl SsbSearch {
         let found = searcher
             .push_with(samples, &mut |ssb, received| {
                 let view = view.as_ref().and_then(|view| view.view(received));
-                view.iter().for_each(|view| votes.vote(view));
+                if let Some(view) = &view {
+                    votes.vote(view);
+                }
                 seen.push(Seen {
                     pci: ssb.pci,
                     sample_start: ssb.sample_start,
