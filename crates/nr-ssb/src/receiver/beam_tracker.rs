@@ -2,7 +2,7 @@
 
 use num_complex::Complex32;
 
-use super::stream::HeardSsb;
+use super::heard::HeardSsb;
 use crate::search::{DetectedSsb, SearchConfig, SearchError};
 use crate::standard::grid::SUBCARRIERS;
 use crate::track::{TrackError, Tracker};

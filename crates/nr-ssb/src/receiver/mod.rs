@@ -30,14 +30,16 @@
 //! receiver.finish(&mut |ssb| beams.push((ssb.pci.get(), ssb.ssb_index, ssb.tracked)))?;
 //! assert_eq!(beams[..2], [(601, 1, false), (601, 6, false)]);
 //! assert_eq!(beams[2..], [(601, 1, true), (601, 6, true), (601, 1, true), (601, 6, true)]);
-//! # Ok::<(), nr_ssb::receiver::ReceiverError>(())
+//! # Ok::<(), Box<dyn std::error::Error>>(())
 //! ```
 
 mod beam_tracker;
 mod config;
 mod error;
+mod heard;
 mod stream;
 
 pub use config::ReceiverConfig;
 pub use error::ReceiverError;
-pub use stream::{HeardSsb, Receiver};
+pub use heard::HeardSsb;
+pub use stream::Receiver;
