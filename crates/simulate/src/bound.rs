@@ -185,6 +185,7 @@ impl Bound {
             let config = &self.config;
             Step::along_lane(
                 &belief.mean,
+                0.0,
                 length_m,
                 curvature_per_m,
                 &config.lane_keeping,

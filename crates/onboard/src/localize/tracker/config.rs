@@ -152,14 +152,14 @@ impl TrackerConfig {
         let keeping = vehicle.lane_keeping.process();
         let survey_std_m = site.road.as_ref().map_or(0.0, RoadSettings::survey_std_m);
         let lane_keeping = LaneKeeping {
-            rms_m: keeping.rms_m.max(LEAST_LANE_RMS_M).hypot(survey_std_m),
-            wavelength_m: if survey_std_m > 0.0 {
-                keeping.wavelength_m.min(SURVEY_WAVELENGTH_M)
-            } else {
-                keeping.wavelength_m
-            },
+            rms_m: keeping.rms_m.max(LEAST_LANE_RMS_M),
             ..keeping
-        };
+        }
+        .and(&LaneKeeping {
+            rms_m: survey_std_m,
+            wavelength_m: SURVEY_WAVELENGTH_M,
+            ..keeping
+        });
         let gyroscope = vehicle.gyroscope.as_ref();
         let wheels = vehicle.drive == DriveKind::Differential;
         let usual = if wheels {
@@ -285,6 +285,7 @@ impl TrackerConfig {
         Yaw {
             turn_rad: self.yaw_rate_bias_radps * duration_s,
             duration_s,
+            is_told: false,
             variance: UNKNOWN_TURN_RAD2_PER_M * length_m.abs()
                 + UNKNOWN_TURN_RAD2_PER_S * duration_s,
         }
