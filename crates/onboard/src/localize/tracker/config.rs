@@ -11,8 +11,8 @@ const LEAST_ODOMETER_SCALE_STD: f64 = 0.001;
 const LEAST_ODOMETER_NOISE_M_PER_SQRT_M: f64 = 0.003;
 const LEAST_LANE_RMS_M: f64 = 0.02;
 
-/// Wavelength along the road of the errors of its survey (m).
-const SURVEY_WAVELENGTH_M: f64 = 20.0;
+/// Wavelength along the road of the errors of its survey, of points every few metres (m).
+const SURVEY_WAVELENGTH_M: f64 = 15.0;
 
 /// Assumptions of the tracker, SI and radians: what site and vehicle state.
 #[derive(Clone, Copy, Debug, PartialEq)]
