@@ -314,23 +314,19 @@ impl Tracker {
             };
             return Step::turning(mean, reading_m, &straight_on, &config.noise);
         }
-        let middle_m = mean[ALONG] + 0.5 * reading_m;
-        let curvature_per_m = (self.map.as_ref()).map_or(0.0, |map| map.curvature_per_m(middle_m));
         let noise = &config.noise;
-        if self.map.is_some() && self.off_map.is_none() {
-            let keeping = &config.lane_keeping;
-            let heading_variance = belief.covariance[HEADING][HEADING];
-            Step::along_lane(
-                mean,
-                heading_variance,
-                reading_m,
-                curvature_per_m,
-                keeping,
-                noise,
-            )
-        } else {
-            Step::in_plane(mean, reading_m, curvature_per_m, &config.path_bend, noise)
+        let Some(map) = &self.map else {
+            return Step::in_plane(mean, reading_m, 0.0, &config.path_bend, noise);
+        };
+        let middle_m = mean[ALONG] + 0.5 * reading_m;
+        if self.off_map.is_some() {
+            let curvature_per_m = map.curvature_per_m(middle_m);
+            return Step::in_plane(mean, reading_m, curvature_per_m, &config.path_bend, noise);
         }
+        let variance = |state: usize| belief.covariance[state][state].max(0.0);
+        let road = map.bending(middle_m, variance(ALONG).sqrt());
+        let keeping = &config.lane_keeping;
+        Step::along_lane(mean, variance(HEADING), reading_m, &road, keeping, noise)
     }
 
     fn add_along_variance(&mut self, variance: f64) {

@@ -16,7 +16,7 @@ use super::state::{
 };
 use crate::geometry::Pose;
 use crate::localize::gaussian::{Matrix, identity};
-use crate::road::LaneKeeping;
+use crate::road::{Bending, LaneKeeping};
 
 /// How the path bends where no map tells.
 #[derive(Clone, Copy, Debug, PartialEq)]
@@ -79,13 +79,13 @@ pub struct Yaw {
 }
 
 impl Step {
-    /// The step along a lane of the given curvature, for what the odometer read. A heading known to
+    /// The step along a lane that bends as the road does, for what the odometer read. A heading known to
     /// a variance P takes from the way along the lane: `E cos ψ = e^{−P/2} cos E ψ`.
     pub fn along_lane(
         start: &[f64; STATES],
         heading_variance: f64,
         reading_m: f64,
-        curvature_per_m: f64,
+        road: &Bending,
         keeping: &LaneKeeping,
         walk: &MotionNoise,
     ) -> Self {
@@ -94,6 +94,7 @@ impl Step {
         let kept = (-0.5 * heading_variance).exp();
         let (sin, cos) = start[HEADING].sin_cos();
         let (sin, cos) = (kept * sin, kept * cos);
+        let curvature_per_m = road.mean_per_m;
         let stretch = 1.0 / (1.0 - curvature_per_m * start[ACROSS]);
         let phi = keeping.transition(length);
 
@@ -127,13 +128,15 @@ impl Step {
             turn_row[i] = f[HEADING][i] + curvature_per_m * f[ALONG][i];
         }
         turn_row[HEADING] -= 1.0;
-        turn_row[ALONG] = 0.0;
+        turn_row[ALONG] = road.slope_per_m2 * (mean[ALONG] - start[ALONG]);
         // The road turns by as much further as the odometer read too little.
         let turn_shared = std::array::from_fn(|i| q[HEADING][i] + curvature_per_m * q[ALONG][i]);
         Self {
             turn_rad: curvature_per_m * (mean[ALONG] - start[ALONG]) + mean[HEADING]
                 - start[HEADING],
-            turn_variance: turn_shared[HEADING] + curvature_per_m * turn_shared[ALONG],
+            turn_variance: turn_shared[HEADING]
+                + curvature_per_m * turn_shared[ALONG]
+                + road.variance_rad2_per_m * distance,
             mean,
             jacobian: f,
             noise: q,
