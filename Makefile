@@ -39,7 +39,7 @@ endif
 test-aarch64: ## Build what runs on the vehicle for aarch64 and test it, emulated on another processor
 	@command -v aarch64-linux-gnu-gcc >/dev/null && command -v qemu-aarch64 >/dev/null || { echo \
 	  "not tested: gcc-aarch64-linux-gnu, qemu-user, libc6:arm64, a Rust for $(AARCH64) needed"; exit 2; }
-	$(EMULATED) test --quiet --release --target $(AARCH64) -p aoa -p nr-ssb -p onboard
+	$(EMULATED) test --quiet --release --target $(AARCH64) -p aoa-array -p nr-ssb -p onboard
 
 lint: lint-python ## Check formatting and lints of both languages
 	cargo fmt --all --check

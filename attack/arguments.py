@@ -9,6 +9,7 @@ import typer.main
 
 from attack import mutate
 from attack.files import recorded
+from attack.tables import MASTS, PATHS, SHORT, SPACE
 
 if TYPE_CHECKING:
     from random import Random
@@ -30,10 +31,21 @@ QUICK: dict[str, list[str]] = {
         "--recording", "angles.csv", "--odometry", "odometry.csv", "--site", "site.toml",
         "--vehicle", "vehicle.toml",
     ],
+    "profile": ["--sysfs-root", "sysfs"],
+    "designs": ["short.toml", "--space", "space.toml", "--runs", "1"],
+    "choose": ["."],
+    "balance": [],
+    "codesign": ["--reading", "keine"],
+    "integrity": ["short.toml", "--mismatch", "keiner"],
+    "plan": ["short.toml", "--masts", "masts.csv"],
+    "import-paths": [
+        "paths.csv", "--site", "site.toml", "--carrier-mhz", "3500", "--out", "paths.npz",
+    ],
+    "survey": ["drive", "--site", "site.toml", "--vehicle", "vehicle.toml"],
+    "tune": ["short.toml", "--designs", "2", "--runs", "1", "--max-rms-m", "1"],
     "readings": [],
     "columns": [],
 }  # fmt: skip
-SHORT = 'like = "paper-real-odometry-2"\nname = "short"\n[motion]\nstart_at_m = 296.0\n'
 
 
 @cache
@@ -55,6 +67,9 @@ def arguments(random: Random, case: Case) -> list[str]:
     for name, content in recorded().items():
         case.write(name, content)
     case.write("short.toml", SHORT)
+    case.write("masts.csv", MASTS)
+    case.write("paths.csv", PATHS)
+    case.write("space.toml", SPACE)
     command = random.choice(list(QUICK))
     words = [command, *QUICK[command]]
     known = options(command)

@@ -2,7 +2,6 @@
 
 from __future__ import annotations
 
-import io
 import json
 import tempfile
 from copy import deepcopy
@@ -10,10 +9,7 @@ from functools import cache
 from pathlib import Path
 from typing import TYPE_CHECKING, Any
 
-import polars as pl
-
 import access_av
-from access_av.columns import TABLES
 from access_av.toml import tomllib
 from attack import mutate
 
@@ -235,28 +231,3 @@ def road_file(random: Random, case: Case) -> list[str]:
     site = deepcopy(settings("site", "yard"))
     site["road"] = {"file": name}
     return case.access_av("site", "check", case.write("site.toml", site))
-
-
-def operating_points() -> dict[str, list[Any]]:
-    """A table of operating points, as an evaluation leaves it."""
-    words = {"reading": "gate", "campaign": "adaptive", "mode_name": "MAXN", "method": "music"}
-    words |= {"energy_provenance": "fitted"}
-    columns = TABLES["operating_points"].columns
-    return {name: [words.get(name, name == "adaptive" or 1.0)] * 8 for name in columns}
-
-
-def results_folder(random: Random, case: Case) -> list[str]:
-    """A folder of results that is asked."""
-    held = operating_points()
-    choice = random.random()
-    if choice < 0.5:
-        held = mutate.table(random, {name: values[0] for name, values in held.items()})
-        held = {name: [value] * 8 for name, value in held.items()}
-    file = io.BytesIO()
-    try:
-        pl.DataFrame(held, strict=False).write_parquet(file)
-    except (pl.exceptions.PolarsError, TypeError, ValueError, OverflowError):
-        file.write(b"PAR1")  # no table can hold that
-    content = file.getvalue() if choice < 0.6 else mutate.data(random, file.getvalue())
-    case.write("operating_points.parquet", content)
-    return case.access_av("explore", "--results", ".", "--max-energy-j", "1000", "--json")

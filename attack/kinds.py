@@ -5,7 +5,7 @@ from __future__ import annotations
 from random import Random
 from typing import TYPE_CHECKING
 
-from attack import arguments, drives, files, plug_ins
+from attack import arguments, drives, files, plug_ins, tables
 from attack.case import Case
 
 if TYPE_CHECKING:
@@ -15,7 +15,7 @@ if TYPE_CHECKING:
 # How often each kind comes in a hundred inputs; drives are counted apart.
 KINDS: dict[str, tuple[Callable[[Random, Case], list[str]], int]] = {
     "settings-text": (files.settings_text, 15),
-    "settings-table": (files.settings_table, 30),
+    "settings-table": (files.settings_table, 26),
     "scenario": (files.scenario, 15),
     "limits": (files.at_the_limits, 10),
     "plug-in": (plug_ins.plug_in, 10),
@@ -24,7 +24,9 @@ KINDS: dict[str, tuple[Callable[[Random, Case], list[str]], int]] = {
     "angles": (files.angles, 3),
     "truth": (files.truth, 2),
     "road-file": (files.road_file, 2),
-    "results": (files.results_folder, 2),
+    "results": (tables.results, 2),
+    "tables": (tables.given, 2),
+    "figures": (tables.figures, 2),
     "arguments": (arguments.arguments, 3),
     "drive": (drives.drive, 0),
 }

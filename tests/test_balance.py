@@ -94,6 +94,7 @@ def test_no_payback_is_said() -> None:
         ("electricity_per_kwh", {"low": 2.0, "high": 3.0}, "electricity_per_kwh.central: missing"),
         ("fleet", {"vehicles": 1}, "fleet.hours_per_day: None; write a number"),
         ("before", {"energy": 1}, "before.energy: unknown; allowed are"),
+        ("before", {"onboard": 1.0}, "before.onboard: a list of tables is needed"),
         ("vehicles", 1, "vehicles: unknown"),
     ],
 )

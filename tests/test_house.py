@@ -17,12 +17,12 @@ if TYPE_CHECKING:
 
 # Each crate and what it may use of the others: arrows run one way.
 CRATES = {
-    "aoa": set(),
+    "aoa-array": set(),
     "nr-ssb": set(),
-    "onboard": {"aoa", "nr-ssb"},
-    "recording": {"onboard", "aoa", "nr-ssb"},
-    "simulate": {"recording", "onboard", "aoa", "nr-ssb"},
-    "access-av-python": {"simulate", "recording", "onboard", "aoa", "nr-ssb"},
+    "onboard": {"aoa-array", "nr-ssb"},
+    "recording": {"onboard", "aoa-array", "nr-ssb"},
+    "simulate": {"recording", "onboard", "aoa-array", "nr-ssb"},
+    "access-av-python": {"simulate", "recording", "onboard", "aoa-array", "nr-ssb"},
 }
 # What runs on the vehicle draws no random numbers, starts no threads, opens no MCAP.
 NOT_ON_BOARD = {"rand", "rand_chacha", "rand_distr", "rayon", "mcap", "polars", "pyo3", "sha2"}
@@ -44,7 +44,7 @@ def test_crates_use_only_what_is_below_them() -> None:
 def test_nothing_on_board_that_does_not_belong_there() -> None:
     tree = cargo("tree", "-p", "onboard", "-e", "normal", "--prefix", "none")
     found = {line.split()[0] for line in tree.splitlines() if line.strip()}
-    assert {"onboard", "aoa", "nr-ssb"} <= found
+    assert {"onboard", "aoa-array", "nr-ssb"} <= found
     assert not found & NOT_ON_BOARD
 
 

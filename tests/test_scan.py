@@ -117,7 +117,7 @@ def test_search_says_what_it_cannot_use() -> None:
 
 
 def test_bursts_refuse_what_no_cell_sends() -> None:
-    for wrong in ({"pci": 1008}, {"ssb_indices": [8]}, {"case": "D"}, {"lmax": 5}, {"gains": [1]},
+    for wrong in ({"pci": 1008}, {"ssb_indices": [8]}, {"case": "F"}, {"lmax": 5}, {"gains": [1]},
                   {"mib_bits": "01"}, {"sfn": 1024}, {"sample_rate_hz": 5e6}):  # fmt: skip
         with pytest.raises(ValueError, match=r".+"):
             nr.build_burst(**{"pci": 1, "ssb_indices": [0, 1], **wrong})  # type: ignore[arg-type]

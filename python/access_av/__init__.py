@@ -9,6 +9,7 @@ are first used, so that importing the package takes no time.
 ``plan``               where to put further radio heads
 ``synthesize``         record a scenario's drive as somebody on the vehicle would have
 ``locate``             where the vehicle was in a recorded drive
+``survey``             where radio heads stand, as ordinary drives show it
 ``evaluate``           the paper's evaluation
 ``explore``            operating points that meet an energy budget and an error
 ``Site``               the plant as the vehicles believe it to be: load, change, write out
@@ -74,6 +75,7 @@ if TYPE_CHECKING:
     from access_av.paper.evaluation import Evaluation, evaluate
     from access_av.placement import Plan, plan
     from access_av.platform import Platform
+    from access_av.self_survey import Survey, survey
     from access_av.simulation import Simulation, simulate
 
 __all__ = [
@@ -90,6 +92,7 @@ __all__ = [
     "SettingsError",
     "Simulation",
     "Site",
+    "Survey",
     "SynthesizedDrive",
     "Vehicle",
     "__version__",
@@ -111,6 +114,7 @@ __all__ = [
     "service_levels",
     "simulate",
     "statistics",
+    "survey",
     "synthesize",
 ]
 
@@ -124,6 +128,7 @@ if not TYPE_CHECKING:
             "access_av.paper.evaluation": ["Evaluation", "evaluate"],
             "access_av.placement": ["Plan", "plan"],
             "access_av.platform": ["Platform"],
+            "access_av.self_survey": ["Survey", "survey"],
             "access_av.simulation": ["Simulation", "simulate"],
         },
         modules=[

@@ -160,7 +160,10 @@ def _way(
     none = Range(0.0, 0.0, 0.0)
     capital = yearly = embodied_kg = onboard_w = fixed_w = none
     for place, count in (("infrastructure", 1.0), ("onboard", vehicles)):
-        for index, item in enumerate(way.get(place, [])):
+        items = way.get(place, [])
+        if not isinstance(items, list):
+            raise InputError(f"{name}.{place}: a list of tables is needed")
+        for index, item in enumerate(items):
             key = f"{name}.{place}[{index}]"
             _only(item, f"{key}.", {*ITEM, "name", "source"})
             if not item.get("source"):
@@ -198,10 +201,10 @@ def _grid(figures: Mapping[str, Any]) -> Range:
     if "grid_g_per_kwh" in figures:
         return _range(figures, "grid_g_per_kwh")
     name = figures.get("grid")
-    if name not in grids():
+    if not isinstance(name, str) or name not in grids():
         there = ", ".join(grids())
         raise InputError(f"grid: {name!r}; allowed are {there}, or give grid_g_per_kwh")
-    return Range(*[grids()[str(name)]] * 3)
+    return Range(*[grids()[name]] * 3)
 
 
 def _range(table: Mapping[str, Any], key: str) -> Range:

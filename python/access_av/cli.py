@@ -21,6 +21,8 @@ from access_av.commands import (
     radio,
     recordings,
     run,
+    survey,
+    tune,
 )
 from access_av.errors import InputError
 from access_av.paper import codesign_command as codesign
@@ -54,8 +56,8 @@ def _options(
 
 
 for _room in (
-    *(paper, codesign, run, bound, radio, integrity, designs),
-    *(recordings, drives, profile, balance, columns),
+    *(paper, codesign, run, bound, radio, integrity, designs, tune),
+    *(recordings, drives, survey, profile, balance, columns),
 ):
     app.add_typer(_room.app)
 for _what in ("site", "vehicle", "scenario", "platform"):

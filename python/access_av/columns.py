@@ -52,6 +52,13 @@ class Table:
 
 # A unit of 1 is a count, a number without a unit or an index; text and truth values say so.
 _GLOSSARY = {
+    # A survey.
+    "key": ("text", "Key in the site or vehicle file"),
+    "before": ("any", "What was believed"),
+    "std_before": ("any", "Standard deviation of that"),
+    "found": ("any", "What the drives say, together with that"),
+    "std": ("any", "Standard deviation of that"),
+    "is_learnt": ("true or false", "The standard deviation has fallen by 30 % or more"),
     # Time, run, place.
     "run": ("1", "Number of the run"),
     "runs": ("1", "How many runs the row is of"),
@@ -171,6 +178,12 @@ _GLOSSARY = {
     ),
     "found_s": ("s", "Time until the first pose was known"),
     "found_m": ("m", "Distance driven until the first pose was known"),
+    # What a drive showed of its vehicle.
+    "constant": ("text", "Key of the vehicle's file; gyroscope.scale is 1 there"),
+    "constant_unit": ("text", "Its unit"),
+    "stated_value": ("any", "What the file states"),
+    "found_value": ("any", "What was found on the way, by the end of the drive"),
+    "found_value_std": ("any", "Standard deviation of found_value"),
     # Bound.
     "bound_m": ("m", "Least root mean square of the horizontal error of any localizer"),
     "along_std_m": ("m", "Its part along the road"),
@@ -370,7 +383,11 @@ TABLES: Mapping[str, Table] = {
             "An odometry sample",
             "`odometry.csv` of `access-av synth`; `access-av locate --odometry`",
             ("time_s", "distance_m", "speed_mps", "yaw_rate_radps"),
-            {"yaw_rate_radps": "there is no gyroscope; the column is absent then"},
+            {
+                "distance_m": "absent where the speeds tell it, or left and right wheel",
+                "speed_mps": "absent where the distances tell it, or left and right wheel",
+                "yaw_rate_radps": "there is no gyroscope; the column is absent then",
+            },
         ),
         Table(
             "poses",
@@ -390,9 +407,15 @@ TABLES: Mapping[str, Table] = {
             "angles",
             "An angle, and what became of it",
             "`angles.parquet` of `access-av locate`; `access_av.locate(…).angles`. A CSV log of "
-            "angles for `access-av locate --recording` has the first seven",
+            "angles for `access-av locate --recording` has some of the first seven: docs/locate.md",
             ("time_s", "pci", "ssb_index", "snr_db", *_ANGLE, "accepted", "reason", *_COMPARED),
             {**dict.fromkeys(_ANGLE, _NO_ANGLE), **dict.fromkeys(_COMPARED, _NOT_COMPARED)},
+        ),
+        Table(
+            "findings",
+            "A constant of the vehicle that the localizer estimates",
+            "`findings.parquet` of `access-av locate`; `access_av.locate(…).findings`",
+            ("constant", "constant_unit", "stated_value", "found_value", "found_value_std"),
         ),
         Table(
             "located_errors",
@@ -443,6 +466,12 @@ TABLES: Mapping[str, Table] = {
             "A candidate mast, as the only one that is added",
             "`masts.parquet` of `access-av plan`; `access_av.plan(…).ranking`",
             ("name", "x_m", "y_m", "z_m", "p90_bound_m"),
+        ),
+        Table(
+            "survey",
+            "A number of site or vehicle that was surveyed by driving",
+            "`survey.parquet` of `access-av survey`; `access_av.survey(…).table()`",
+            ("key", "unit", "before", "std_before", "found", "std", "is_learnt"),
         ),
         Table(
             "bound_heads",
@@ -564,6 +593,7 @@ TABLES: Mapping[str, Table] = {
             ),
             {
                 **dict.fromkeys(("half_frame", "sfn", "mib_bits"), _UNDECODED),
+                "lmax": "neither band nor broadcast channel tell",
                 **dict.fromkeys(("angle_deg", "azimuth_deg", "sigma_deg", "verdict"), _NO_ARRAY),
             },
         ),

@@ -7,6 +7,7 @@ import io
 import json
 import math
 import os
+import stat
 import sys
 import warnings
 from contextlib import suppress
@@ -103,6 +104,23 @@ class ResultsDirectory:
                 **settings,
             },
         )
+
+
+def regular(path: Path, most_bytes: int) -> Path:
+    """The path of a regular file of at most so many bytes: a pipe or a device has no end.
+
+    Raises
+    ------
+    InputError
+        When it is something else.
+    OSError
+        When there is none.
+    """
+    if not stat.S_ISREG((found := path.stat()).st_mode):
+        raise InputError(f"{path}: not a regular file")
+    if found.st_size > most_bytes:
+        raise InputError(f"{path}: {found.st_size} bytes; at most {most_bytes} are allowed")
+    return path
 
 
 def write_whole(target: Path, content: str | bytes | memoryview, *, durable: bool = False) -> Path:

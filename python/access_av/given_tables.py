@@ -1,15 +1,38 @@
-"""Tables that a user gives: whether they hold what is needed of them."""
+"""Tables that a user gives: whether they can be read and hold what is needed of them."""
 
 from __future__ import annotations
 
-from typing import TYPE_CHECKING
+from typing import TYPE_CHECKING, Any
 
 import polars as pl
 
+from access_av.columns import GLOSSARY, TABLES
 from access_av.errors import InputError
+from access_av.files import regular
 
 if TYPE_CHECKING:
     from collections.abc import Iterable
+    from pathlib import Path
+
+# Bytes of a file; a year of paths through a plant has less.
+MOST_BYTES = 4 << 30
+
+
+def read(path: Path, what: str, schema: dict[str, Any] | None = None) -> pl.DataFrame:
+    """Read CSV or Parquet, by the name's ending; ``schema`` overrides the types of CSV columns.
+
+    Raises
+    ------
+    InputError
+        When the file is no table, and so not ``what``; no regular file; or too large.
+    """
+    regular(path, MOST_BYTES)
+    try:
+        if path.suffix == ".csv":
+            return pl.read_csv(path, schema_overrides=schema)
+        return pl.read_parquet(path)
+    except pl.exceptions.PolarsError as error:
+        raise InputError(f"{path}: not a {what}: {error}") from None
 
 
 def check(
@@ -38,3 +61,19 @@ def check(
         bad = (~finite).fill_null(value=True).arg_true()
         if len(bad):
             raise InputError(f"{where}: {name} is not a number in row {bad[0]}")
+
+
+def check_types(rows: pl.DataFrame, where: str, what: str) -> None:
+    """Refuse a table that lacks a column of :data:`access_av.columns.TABLES`.
+
+    Raises
+    ------
+    InputError
+        Naming the table as ``where``, and the column.
+    """
+    for name in TABLES[what].columns:
+        found = rows.schema.get(name, pl.Unknown())
+        is_text = GLOSSARY[name].unit == "text"
+        fine = found == pl.String if is_text else found.is_numeric() or found == pl.Boolean
+        if not (fine or found == pl.Null()):
+            raise InputError(f"{where}: not a table of {what}; `{name}` is {found}")

@@ -7,6 +7,7 @@ import math
 import os
 from concurrent.futures import ThreadPoolExecutor
 from dataclasses import dataclass
+from pathlib import Path
 from typing import TYPE_CHECKING, Any
 
 import polars as pl
@@ -16,7 +17,6 @@ from access_av.errors import InputError
 
 if TYPE_CHECKING:
     from collections.abc import Callable, Sequence
-    from pathlib import Path
 
 MOST_MASTS = 1000
 # Physical cell identities (TS 38.211, 7.4.2.1); each new head gets the lowest that is free.
@@ -168,10 +168,7 @@ def _p90_m(scenario: _core.Scenario) -> float:
 def _candidates(masts: pl.DataFrame | str | Path) -> list[dict[str, Any]]:
     where = "masts" if isinstance(masts, pl.DataFrame) else str(masts)
     if not isinstance(masts, pl.DataFrame):
-        try:
-            masts = pl.read_csv(masts, schema_overrides={"name": pl.String})
-        except pl.exceptions.PolarsError as error:
-            raise InputError(f"{where}: not a table: {error}") from None
+        masts = given_tables.read(Path(masts), "table of masts", {"name": pl.String})
     place = ("x_m", "y_m", "z_m")
     given_tables.check(masts, where, numbers=place, other=["name"])
     if not 0 < masts.height <= MOST_MASTS:

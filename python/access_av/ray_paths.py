@@ -71,7 +71,11 @@ def import_paths(
     ...     import_paths(table, site, f"{folder}/paths.npz", carrier_mhz=3500.0)
     {'heads': 4, 'places': 1, 'paths': 1}
     """
-    rows = table if isinstance(table, pl.DataFrame) else _read(Path(table))
+    rows = (
+        table
+        if isinstance(table, pl.DataFrame)
+        else given_tables.read(Path(table), "table of paths")
+    )
     held = site if isinstance(site, _core.Site) else _core.Site.load(site)
     heads = json.loads(held.to_json())["radio_heads"]
     given_tables.check(rows, "paths", numbers=sorted({*_PLACE, "pci", *_NUMBERS}))
@@ -161,10 +165,3 @@ def from_arrays(
             "elevation_rad": 0.5 * np.pi - zenith_rad[kept],
         }
     )
-
-
-def _read(path: Path) -> pl.DataFrame:
-    try:
-        return pl.read_csv(path) if path.suffix == ".csv" else pl.read_parquet(path)
-    except pl.exceptions.PolarsError as error:
-        raise InputError(f"{path}: not a table of paths: {error}") from None

@@ -8,6 +8,7 @@ from importlib import resources
 from typing import TYPE_CHECKING, Any
 
 from access_av.errors import InputError
+from access_av.files import regular
 
 if sys.version_info >= (3, 11):
     import tomllib
@@ -20,6 +21,8 @@ if TYPE_CHECKING:
 
 __all__ = ["read", "shipped", "tomllib"]
 
+MOST_BYTES = 4 << 20
+
 
 def read(file: Path) -> dict[str, Any]:
     """Read a TOML file.
@@ -27,10 +30,10 @@ def read(file: Path) -> dict[str, Any]:
     Raises
     ------
     InputError
-        When it is none.
+        When it is none, no regular file or larger than ``MOST_BYTES``.
     """
     try:
-        return tomllib.loads(file.read_text(encoding="utf-8"))
+        return tomllib.loads(regular(file, MOST_BYTES).read_text(encoding="utf-8"))
     except (tomllib.TOMLDecodeError, UnicodeDecodeError) as error:
         raise InputError(f"{file}: {error}") from error
 

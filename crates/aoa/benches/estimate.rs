@@ -5,6 +5,9 @@
 use aoa::{Array, Batch, Complex64, Covariance, Method, Smoothing};
 use divan::{Bencher, black_box, counter::ItemsCount};
 
+/// Items of a batch.
+const ITEMS: usize = 1024;
+
 fn main() {
     divan::main();
 }
@@ -33,23 +36,20 @@ fn samples(items: usize) -> Vec<Complex64> {
 
 const METHODS: [Method; 5] = [
     Method::MaximumLikelihood,
-    Method::Music {
-        grid_deg: 0.1,
-        refine: true,
-    },
+    Method::Music,
     Method::RootMusic,
     Method::EspritLs,
     Method::EspritTls,
 ];
 
 #[divan::bench(args = METHODS)]
-fn single(bencher: Bencher, method: &Method) {
+fn single(bencher: Bencher, method: Method) {
     let array = Array::<4>::half_wavelength();
     let data = samples(1);
     let batch = Batch::<f64, 4>::new(&data, 20).unwrap();
     bencher.bench_local(|| {
         let covariance = black_box(batch).covariances().next().unwrap().unwrap();
-        aoa::estimate(*method, &covariance, &array)
+        aoa::estimate(method, &covariance, &array)
     });
 }
 
@@ -62,8 +62,8 @@ fn covariance(bencher: Bencher) {
     });
 }
 
-#[divan::bench(args = [2, 3])]
-fn several(bencher: Bencher, sources: usize) {
+#[divan::bench(args = [Method::Music, Method::RootMusic, Method::EspritTls])]
+fn two_sources(bencher: Bencher, method: Method) {
     let array = Array::<4>::half_wavelength();
     let data = samples(1);
     let covariance = Batch::<f64, 4>::new(&data, 20)
@@ -72,39 +72,31 @@ fn several(bencher: Bencher, sources: usize) {
         .next()
         .unwrap()
         .unwrap();
-    bencher.bench_local(|| {
-        aoa::estimate_several(Method::RootMusic, black_box(&covariance), &array, sources)
-    });
+    bencher.bench_local(|| aoa::estimate_several(method, black_box(&covariance), &array, 2));
 }
 
-#[divan::bench]
-fn maximum_likelihood_batch_f64(bencher: Bencher) {
-    let data = samples(1024);
-    batch(bencher, &data);
+#[divan::bench(args = METHODS)]
+fn batch_f64(bencher: Bencher, method: Method) {
+    batch(bencher, &samples(ITEMS), method);
 }
 
-#[divan::bench]
-fn maximum_likelihood_batch_f32(bencher: Bencher) {
-    let data: Vec<_> = samples(1024)
+#[divan::bench(args = METHODS)]
+fn batch_f32(bencher: Bencher, method: Method) {
+    let data: Vec<_> = samples(ITEMS)
         .iter()
         .map(|z| num_complex::Complex::new(z.re as f32, z.im as f32))
         .collect();
-    batch(bencher, &data);
+    batch(bencher, &data, method);
 }
 
-fn batch<T: aoa::Real>(bencher: Bencher, data: &[num_complex::Complex<T>]) {
+fn batch<T: aoa::Real>(bencher: Bencher, data: &[num_complex::Complex<T>], method: Method) {
     let array = Array::<4>::half_wavelength();
     let batch = Batch::<T, 4>::new(data, 20).unwrap();
-    let mut estimates = vec![aoa::AngleEstimate::default(); 1024];
+    let mut estimates = vec![aoa::AngleEstimate::default(); ITEMS];
     bencher
-        .counter(ItemsCount::new(1024_usize))
+        .counter(ItemsCount::new(ITEMS))
         .bench_local(move || {
-            batch.estimate(
-                Method::MaximumLikelihood,
-                &array,
-                Smoothing::default(),
-                1,
-                black_box(&mut estimates),
-            )
+            let smoothing = Smoothing::default();
+            batch.estimate(method, &array, smoothing, 1, black_box(&mut estimates))
         });
 }

@@ -6,6 +6,7 @@
 use num_complex::Complex64;
 
 use crate::array::linear::Array;
+use crate::array::manifold::{Direction, Manifold, Neighbourhood};
 use crate::array::steering::{aperture, steering_vector};
 use crate::error::Error;
 use crate::linalg::dense::{adjoint, inverse, product};
@@ -52,6 +53,48 @@ pub fn angle_sigma_rad<const N: usize>(
     array: &Array<N>,
 ) -> f64 {
     phase_sigma_rad / (array.phase_at_end_fire_rad() * angle_rad.sin())
+}
+
+/// One Gaussian source of unknown power, received by any array: covariance of (azimuth, elevation) in
+/// rad^2, the inverse of `2 L q^2 / (1 + q) Re(D^H P D) / a^H a` with `q` = N snr, `D` the derivatives of
+/// the response `a` and `P` the projection on its complement (Stoica and Nehorai 1990). `snr` is the mean
+/// over the antennas. Infinite where the array does not tell directions apart, as in elevation at the
+/// horizon of a horizontal one.
+pub fn azimuth_elevation<M: Manifold<N> + ?Sized, const N: usize>(
+    manifold: &M,
+    direction: Direction,
+    snr: f64,
+    snapshots: usize,
+) -> [[f64; 2]; 2] {
+    let around = Neighbourhood::of(manifold, direction);
+    covariance_around(&around, direction, snr, snapshots, true)
+}
+
+/// [`azimuth_elevation`], or the azimuth alone where the elevation is given.
+pub(crate) fn covariance_around<const N: usize>(
+    around: &Neighbourhood<N>,
+    direction: Direction,
+    snr: f64,
+    snapshots: usize,
+    elevation_too: bool,
+) -> [[f64; 2]; 2] {
+    let ratio = N as f64 * snr;
+    let factor = 2.0 * snapshots as f64 * ratio * ratio / ((1.0 + ratio) * around.power);
+    let [[a, b], [_, c]] = around.metric.map(|row| row.map(|it| it * factor));
+    // From the great circle to the azimuth.
+    let stretch = direction.elevation_rad.cos().recip();
+    if !elevation_too {
+        return [[stretch * stretch / a, 0.0], [0.0, 0.0]];
+    }
+    let determinant = a * c - b * b;
+    if determinant <= 1e-12 * a * c || determinant.is_nan() {
+        return [[stretch * stretch / a, 0.0], [0.0, f64::INFINITY]];
+    }
+    let cross = -b / determinant * stretch;
+    [
+        [c / determinant * stretch * stretch, cross],
+        [cross, a / determinant],
+    ]
 }
 
 /// The SNR per antenna and snapshot below which an estimate is called unresolved.

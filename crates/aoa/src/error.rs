@@ -21,12 +21,29 @@ pub enum Error {
         /// The largest number allowed: one less than the antennas, or 1 for maximum likelihood.
         maximum: usize,
     },
+    /// An element of an array is too far away, or its place is not finite.
+    #[error("element {0} must be within 100 wavelengths of the origin on every axis")]
+    ElementPlace(usize),
+    /// Two elements are in one place.
+    #[error("elements {0} and {1} are in the same place")]
+    CoincidentElements(usize, usize),
+    /// All elements are on one line: only the angle from it shows.
+    #[error("elements in a row show only the angle from it: a linear array is another kind")]
+    ElementsInARow,
+    /// A table of responses that makes no manifold.
+    #[error("table of responses: {0}")]
+    ManifoldTable(&'static str),
+    /// A range of elevations that is none.
+    #[error("elevations must ascend from -pi/2 or more to pi/2 or less, not {lowest} to {highest}")]
+    Elevations {
+        /// Where the range begins.
+        lowest: f64,
+        /// Where it ends.
+        highest: f64,
+    },
     /// The element spacing is outside what an array can have.
     #[error("spacing must be 0.01 to 100 wavelengths, not {0}")]
     Spacing(f64),
-    /// The grid step of MUSIC is outside what makes sense.
-    #[error("grid_deg must be between 0.001 and 10 degrees, not {0}")]
-    Grid(f64),
     /// An angle from the array's axis is outside 0 to pi, or not finite.
     #[error("an angle from the array's axis lies between 0 and pi rad, not {0}")]
     Angle(f64),

@@ -1,4 +1,4 @@
-//! Angle of arrival with uniform linear arrays.
+//! Angle of arrival with antenna arrays.
 //!
 //! From the complex samples ("snapshots") of a few antennas in a row to the direction of a source: by
 //! maximum likelihood, MUSIC, Root-MUSIC or ESPRIT, with a standard deviation, an SNR and a verdict
@@ -52,7 +52,8 @@
 //! Known pilots: [`maximum_likelihood_pilots`], and [`maximum_likelihood_pilots_unequal`] where the
 //! channels' noise differs or one is dead. Many estimates in one call: [`Batch`]. A picture of all
 //! directions: [`PseudoSpectrum`]. Real
-//! receivers: [`Calibration`].
+//! receivers: [`Calibration`]. Elements in a circle, a plane, anywhere: [`DirectionFinder`], in azimuth
+//! and elevation.
 //!
 //! # What an estimate does not know
 //!
@@ -77,12 +78,16 @@ mod result;
 mod simd;
 mod spectrum;
 
+pub use array::arbitrary::ArbitraryArray;
 pub use array::calibration::Calibration;
 pub use array::linear::Array;
+pub use array::manifold::{Direction, Manifold};
+pub use array::measured::MeasuredManifold;
 pub use covariance::sample::Covariance;
 pub use error::Error;
 pub use estimate::batch::{Batch, BatchError};
 pub use estimate::choice::Method;
+pub use estimate::direction_finder::DirectionFinder;
 pub use estimate::one::estimate;
 pub use estimate::pilots::maximum_likelihood_pilots;
 pub use estimate::pseudo_spectrum::PseudoSpectrum;
@@ -95,4 +100,9 @@ pub use linalg::matrix::Matrix;
 pub use list::List;
 pub use num_complex::Complex64;
 pub use result::angle::{AngleEstimate, AngleEstimates};
+pub use result::azimuth_elevation::DirectionEstimate;
 pub use result::verdict::{Reason, Verdict};
+
+#[cfg(doctest)]
+#[doc = include_str!("../README.md")]
+struct ReadMe;

@@ -1,6 +1,6 @@
 //! A list that needs no heap.
 
-use std::ops::Deref;
+use std::ops::{Deref, DerefMut};
 
 /// Up to `N` values, on the stack; use it as a slice.
 #[derive(Debug, Clone, Copy, PartialEq)]
@@ -10,15 +10,27 @@ pub struct List<T, const N: usize> {
 }
 
 impl<T: Copy, const N: usize> List<T, N> {
-    /// The values of an iterator, up to the capacity. `fill` occupies the unused places.
-    pub(crate) fn collect(fill: T, values: impl IntoIterator<Item = T>) -> Self {
-        let mut list = Self {
+    /// No values. `fill` occupies the unused places.
+    pub(crate) const fn empty(fill: T) -> Self {
+        Self {
             items: [fill; N],
             len: 0,
-        };
-        for (place, value) in list.items.iter_mut().zip(values) {
+        }
+    }
+
+    /// Adds a value, unless the list is full.
+    pub(crate) fn push(&mut self, value: T) {
+        if let Some(place) = self.items.get_mut(self.len) {
             *place = value;
-            list.len += 1;
+            self.len += 1;
+        }
+    }
+
+    /// The values of an iterator, up to the capacity. `fill` occupies the unused places.
+    pub(crate) fn collect(fill: T, values: impl IntoIterator<Item = T>) -> Self {
+        let mut list = Self::empty(fill);
+        for value in values.into_iter().take(N) {
+            list.push(value);
         }
         list
     }
@@ -29,5 +41,11 @@ impl<T, const N: usize> Deref for List<T, N> {
 
     fn deref(&self) -> &[T] {
         &self.items[..self.len]
+    }
+}
+
+impl<T, const N: usize> DerefMut for List<T, N> {
+    fn deref_mut(&mut self) -> &mut [T] {
+        &mut self.items[..self.len]
     }
 }

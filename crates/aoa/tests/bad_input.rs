@@ -3,8 +3,8 @@
 mod common;
 
 use aoa::{
-    Array, Batch, Complex64, Covariance, Criterion, Error, Method, PseudoSpectrum, Smoothing,
-    bound, estimate, estimate_several, source_count,
+    Array, Batch, Complex64, Covariance, Criterion, Error, PseudoSpectrum, Smoothing, bound,
+    estimate, estimate_several, source_count,
 };
 use common::{METHODS, Random};
 
@@ -92,16 +92,6 @@ fn each_fault_has_its_error() {
     ] {
         let error = estimate_several(method, &covariance, &array, requested).unwrap_err();
         assert_eq!(error, Error::TooManySources { requested, maximum });
-    }
-    for grid_deg in [0.0, -1.0, 11.0, f64::NAN] {
-        let method = Method::Music {
-            grid_deg,
-            refine: true,
-        };
-        assert!(matches!(
-            estimate(method, &covariance, &array),
-            Err(Error::Grid(_))
-        ));
     }
     let mut streamed = Covariance::<4>::new();
     assert_eq!(

@@ -2,9 +2,11 @@
 
 mod common;
 
+use std::f64::consts::PI;
+
 use aoa::{
-    AngleEstimate, Array, Batch, Complex64, Covariance, Method, Reason, Smoothing, Verdict, bound,
-    estimate,
+    AngleEstimate, Array, Batch, Complex64, Covariance, Method, PseudoSpectrum, Reason, Smoothing,
+    Verdict, bound, estimate, estimate_several_smoothed,
 };
 use common::{METHODS, Random, exact, oracle};
 
@@ -115,23 +117,104 @@ fn constant_snapshots_are_as_good_as_random_ones() {
 }
 
 #[test]
-fn a_coarse_grid_costs_no_accuracy() {
-    let array = Array::<4>::half_wavelength();
+fn musics_peak_is_the_highest_wherever_the_source_is() {
+    // A hundred points per antenna find no higher one, whatever the number of antennas: in noise alone
+    // too, but for a peak of the same height within what the coarse search allows.
+    fn check<const N: usize>(random: &mut Random) {
+        let array = Array::<N>::half_wavelength();
+        for trial in 0..60 {
+            let snr_db = [20.0, 5.0, -5.0, -40.0][trial % 4];
+            let angle = random.uniform(0.0, 3.1);
+            let snapshots = random.snapshots(&array, &[(angle, snr_db)], 20);
+            let covariance = Covariance::from_snapshots(&snapshots).unwrap();
+            let found = estimate(Method::Music, &covariance, &array)
+                .unwrap()
+                .phase_rad;
+            let points = 100 * N as i32;
+            let mut angles: Vec<f64> = (-points..points)
+                .map(|g| array.angle_from_phase(PI * f64::from(g) / f64::from(points)))
+                .collect();
+            angles.push(array.angle_from_phase(found));
+            let music = PseudoSpectrum::Music { sources: 1 };
+            let spectrum = music.at(&covariance, &array, &angles).unwrap();
+            // The share of a^H a that lies in the signal subspace.
+            let share = |height: &f64| 1.0 - height.recip();
+            let highest = spectrum.iter().map(share).fold(0.0, f64::max);
+            let here = spectrum.last().map_or(0.0, share);
+            assert!(here > 0.96 * highest, "N = {N}: {here} of {highest}");
+            if snr_db > 0.0 {
+                assert!(
+                    here > highest * (1.0 - 1e-12),
+                    "N = {N}: {here} of {highest}"
+                );
+            }
+        }
+    }
     let mut random = Random::new(4);
-    for _ in 0..500 {
-        let angle = random.uniform(0.3, 2.8);
-        let snapshots = random.snapshots(&array, &[(angle, 20.0)], 20);
-        let covariance = Covariance::from_snapshots(&snapshots).unwrap();
-        let of = |grid_deg, refine| {
-            let method = Method::Music { grid_deg, refine };
-            estimate(method, &covariance, &array).unwrap().phase_rad
-        };
-        let exact = of(0.1, true);
-        assert!((of(1.0, true) - exact).abs() < 1e-9);
-        assert!((of(10.0, true) - exact).abs() < 1e-9);
-        // Without refinement: the nearest point of the grid.
-        let step = std::f64::consts::PI * 1_f64.to_radians();
-        assert!((of(1.0, false) - exact).abs() <= 0.51 * step);
+    check::<2>(&mut random);
+    check::<3>(&mut random);
+    check::<4>(&mut random);
+    check::<8>(&mut random);
+    check::<16>(&mut random);
+}
+
+#[test]
+fn root_music_takes_the_root_nearest_to_the_circle() {
+    fn check<const N: usize>(random: &mut Random) {
+        let array = Array::<N>::half_wavelength();
+        let mut compared = 0;
+        for trial in 0..200 {
+            let angle = random.uniform(0.3, 2.8);
+            let snr_db = f64::from(trial % 5) * 10.0;
+            let snapshots = random.snapshots(&array, &[(angle, snr_db)], 20);
+            let covariance = Covariance::from_snapshots(&snapshots).unwrap();
+            let at_the_peak = estimate(Method::RootMusic, &covariance, &array).unwrap();
+            // With subarrays as large as the array, every root is sought.
+            let of_all =
+                estimate_several_smoothed::<N, N>(Method::RootMusic, &covariance, &array, 1, false);
+            if at_the_peak.is_resolved() {
+                compared += 1;
+                let difference = at_the_peak.phase_rad - of_all.unwrap()[0].phase_rad;
+                assert!(
+                    difference.abs() < 1e-9,
+                    "N = {N}, {snr_db} dB: {difference}"
+                );
+            }
+        }
+        assert!(compared > 100, "{compared}");
+    }
+    let mut random = Random::new(9);
+    check::<2>(&mut random);
+    check::<4>(&mut random);
+    check::<5>(&mut random);
+    check::<8>(&mut random);
+    check::<16>(&mut random);
+}
+
+#[test]
+fn what_is_found_in_an_item_does_not_depend_on_its_neighbours() {
+    let array = Array::<4>::half_wavelength();
+    let mut random = Random::new(10);
+    let mut samples = Vec::new();
+    for item in 0..150 {
+        let truth = [(random.uniform(0.1, 3.0), f64::from(item % 7) * 10.0 - 20.0)];
+        let snapshots = random.snapshots(&array, &truth, 6);
+        for n in 0..4 {
+            samples.extend(snapshots.iter().map(|snapshot| snapshot[n]));
+        }
+    }
+    let batch = Batch::<f64, 4>::new(&samples, 6).unwrap();
+    for method in METHODS {
+        let mut whole = vec![AngleEstimate::default(); 150];
+        let none = Smoothing::default();
+        batch.estimate(method, &array, none, 1, &mut whole).unwrap();
+        for size in [1, 5, 37] {
+            let mut parts = vec![AngleEstimate::default(); 150];
+            for (part, places) in batch.split(size).zip(parts.chunks_mut(size)) {
+                part.estimate(method, &array, none, 1, places).unwrap();
+            }
+            assert_eq!(whole, parts, "{method:?} by {size}");
+        }
     }
 }
 

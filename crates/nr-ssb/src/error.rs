@@ -55,9 +55,14 @@ pub enum Error {
         /// The length it must have.
         expected: usize,
     },
-    /// A burst set in time for a numerology that this crate places only in the coding chain.
-    #[error("Lmax 64 belongs to FR2 (cases D and E), which have no time-domain layout here")]
-    Fr2Layout,
+    /// A burst set of a size that its pattern in time does not have.
+    #[error("case {case} does not go with Lmax {count}: A, B and C have 4 or 8 SSBs, D and E 64")]
+    BurstSet {
+        /// The SSB pattern.
+        case: &'static str,
+        /// The number of SSB indices given.
+        count: u8,
+    },
     /// The OFDM modulator's subcarrier spacing is not the burst's.
     #[error("the modulator runs at {modulator_khz} kHz, case {case} needs {case_khz} kHz")]
     Spacing {

@@ -172,6 +172,7 @@ pub use error::Error;
 pub use input::{diagnose, front_end};
 pub use num_complex::Complex32;
 pub use receive::measure;
+pub use standard::band::{self, Band};
 pub use standard::coding::{polar, rate_matching};
 pub use standard::grid::{self, SsbGrid};
 pub use standard::message::crc;

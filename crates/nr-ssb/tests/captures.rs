@@ -44,7 +44,11 @@ fn every_annotated_ssb_is_found_without_being_told_where() {
                 .unwrap_or_else(|| panic!("{name}: nothing at {start}"));
             assert_eq!(f64::from(ssb.pci.get()), number("pci"), "{name}");
             assert_eq!(f64::from(ssb.ssb_index), number("ssb_index"), "{name}");
-            assert_eq!(f64::from(ssb.lmax.count()), number("lmax"), "{name}");
+            assert_eq!(
+                f64::from(ssb.lmax.unwrap().count()),
+                number("lmax"),
+                "{name}"
+            );
             let payload = ssb
                 .payload
                 .unwrap_or_else(|| panic!("{name}: PBCH not decoded"));

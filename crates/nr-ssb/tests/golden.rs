@@ -1,19 +1,22 @@
 //! Conformity to the standard, wherever the crate is tested: vectors that `golden/make.py` wrote
 //! from the standard's text, and that agree with those of three other encoders.
-//! `golden/mutate.py` shows that each table and sequence, broken, is caught here.
+//! `golden/mutate.py`, run by hand, shows that each table and sequence, broken, is caught here.
 #![allow(clippy::unwrap_used, reason = "this is a test")]
 
 use nr_ssb::burst::ssb_grid;
 use nr_ssb::crc::crc24c;
 use nr_ssb::dmrs::{dmrs, ibar_ssb};
 use nr_ssb::grid::{dmrs_indices, pbch_indices, pss_indices, sss_indices};
+use nr_ssb::mib::{DmrsTypeAPosition, SubcarrierSpacingCommon};
 use nr_ssb::payload::scramble;
 use nr_ssb::pbch::{self, Decoder};
 use nr_ssb::pss::pss;
 use nr_ssb::raster::synchronization_raster;
 use nr_ssb::rate_matching::rate_match;
 use nr_ssb::sss::sss;
-use nr_ssb::{BchPayload, Case, Complex32, Lmax, Mib, Pci, polar};
+use nr_ssb::{
+    BchPayload, Case, Complex32, Lmax, Mib, Numerology, Pci, SubcarrierSpacing, band, polar,
+};
 
 /// The lines that begin with `name`, in fields.
 fn lines(name: &str) -> impl Iterator<Item = Vec<&'static str>> {
@@ -163,9 +166,7 @@ fn the_index_of_the_dmrs_is_that_of_its_burst_set() {
 #[test]
 fn cases_and_raster() {
     for line in lines("case") {
-        let case = [Case::A, Case::B, Case::C]
-            .into_iter()
-            .find(|case| case.name() == line[0]);
+        let case = Case::ALL.into_iter().find(|case| case.name() == line[0]);
         for (index, symbol) in (0..).zip(&line[1..]) {
             assert_eq!(
                 case.unwrap().start_symbol(index).unwrap(),
@@ -181,4 +182,73 @@ fn cases_and_raster() {
         assert_eq!(here.len(), 1, "{hz}");
         assert_eq!(here[0].gscn, Some(number(line[0])));
     }
+}
+
+/// No entry of a table is wrong by much: the outermost SSBs of a band lie inside it, at its edges.
+/// (Where spectrum is shared, n46 and n96, the first channel of 20 MHz begins further inside.)
+#[test]
+fn raster_entries_reach_from_edge_to_edge_of_their_bands() {
+    for band in band::all() {
+        let [low_hz, high_hz] = band.downlink_mhz.map(|mhz| 1e6 * mhz);
+        let points: Vec<_> = synchronization_raster(low_hz, high_hz).collect();
+        for case in band.cases() {
+            let width_hz = 240.0 * case.spacing().hz();
+            let hz = |gscn: u16| {
+                let here = points.iter().find(|point| point.gscn == Some(gscn));
+                here.unwrap().ssb_freq_hz
+            };
+            let (first, last) = (band.gscn(case).min(), band.gscn(case).max());
+            for gap_hz in [hz(first.unwrap()) - low_hz, high_hz - hz(last.unwrap())] {
+                let what = format!("n{} {}: {gap_hz}", band.number, case.name());
+                assert!(gap_hz > 0.499 * width_hz, "{what}");
+                assert!(gap_hz < 3.6 * width_hz, "{what}");
+            }
+        }
+    }
+}
+
+#[test]
+fn cyclic_prefixes() {
+    for line in lines("prefix") {
+        let spacing = SubcarrierSpacing::from_khz(number(line[0])).unwrap();
+        let numerology = Numerology::new(spacing, 256).unwrap();
+        let symbol = number(line[1]);
+        let place = (numerology.symbol_start(symbol), numerology.cp_len(symbol));
+        assert_eq!(place, (number(line[2]), number(line[3])), "{line:?}");
+    }
+}
+
+#[test]
+fn fields_of_the_mib() {
+    let mut fields = 0;
+    for line in lines("mib") {
+        let mib = Mib::from_bits(packed(line[2], 24)).unwrap();
+        let set = [
+            ("systemFrameNumber", mib.sfn_msb),
+            (
+                "subCarrierSpacingCommon",
+                u8::from(mib.subcarrier_spacing_common == SubcarrierSpacingCommon::Scs30Or120),
+            ),
+            ("ssb-SubcarrierOffset", mib.ssb_subcarrier_offset),
+            (
+                "dmrs-TypeA-Position",
+                u8::from(mib.dmrs_type_a_position == DmrsTypeAPosition::Pos3),
+            ),
+            ("controlResourceSetZero", mib.control_resource_set_zero()),
+            ("searchSpaceZero", mib.search_space_zero()),
+            ("cellBarred", u8::from(!mib.cell_barred)),
+            (
+                "intraFreqReselection",
+                u8::from(!mib.intra_freq_reselection),
+            ),
+            ("spare", u8::from(mib.spare)),
+        ];
+        for (name, value) in set {
+            let expected = if name == line[0] { number(line[1]) } else { 0 };
+            assert_eq!(value, expected, "{name} of {}", line[0]);
+        }
+        assert_eq!(mib.bits(), packed(line[2], 24));
+        fields += 1;
+    }
+    assert_eq!(fields, 9);
 }

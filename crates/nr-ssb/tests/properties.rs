@@ -243,7 +243,11 @@ fn bad_bursts_are_refused() {
         lmax: Lmax::L64,
         ..burst.clone()
     };
-    assert_eq!(fr2.iq(&mut at_30_khz), Err(Error::Fr2Layout));
+    let refused = Error::BurstSet {
+        case: "C",
+        count: 64,
+    };
+    assert_eq!(fr2.iq(&mut at_30_khz), Err(refused));
     let no_such_beam = Burst {
         beams: vec![Beam::new(8)],
         ..burst

@@ -33,7 +33,7 @@ const MOST_THREADS: usize = 256;
 
 /// Directions of arrival by MUSIC.
 ///
-/// The peaks of the pseudo-spectrum are found on a grid and then refined off the grid.
+/// The peaks of the pseudo-spectrum are found to rounding: there is no grid to choose.
 ///
 /// Parameters
 /// ----------
@@ -44,8 +44,6 @@ const MOST_THREADS: usize = 256;
 ///     Distance between neighbouring antennas in wavelengths.
 /// sources : int
 ///     Number of sources, 1 to antennas - 1.
-/// grid_deg : float
-///     Grid step at broadside in degrees, 0.001 to 10.
 /// forward_backward : bool
 ///     Average the covariance forward and backward, which separates two coherent sources.
 /// subarray : int, optional
@@ -79,22 +77,18 @@ const MOST_THREADS: usize = 256;
 /// >>> found.verdict
 /// 'resolved'
 #[pyfunction]
-#[pyo3(signature = (snapshots, *, spacing_wavelengths=0.5, sources=1, grid_deg=0.1, forward_backward=false, subarray=None, calibration=None, threads=1))]
+#[pyo3(signature = (snapshots, *, spacing_wavelengths=0.5, sources=1, forward_backward=false, subarray=None, calibration=None, threads=1))]
 #[allow(clippy::too_many_arguments)]
 pub fn music(
     snapshots: &Bound<'_, PyAny>,
     spacing_wavelengths: f64,
     sources: usize,
-    grid_deg: f64,
     forward_backward: bool,
     subarray: Option<usize>,
     calibration: Option<&Bound<'_, PyAny>>,
     threads: usize,
 ) -> PyResult<AngleEstimate> {
-    let method = Method::Music {
-        grid_deg,
-        refine: true,
-    };
+    let method = Method::Music;
     estimate(
         snapshots,
         &Request {

@@ -10,6 +10,7 @@ mod nr;
 mod plug_ins;
 mod recording;
 mod settings;
+mod survey;
 
 use pyo3::pymodule;
 
@@ -55,7 +56,7 @@ mod _core {
     #[pymodule_export]
     use crate::channel::{channel_drops, check_paths};
     #[pymodule_export]
-    use crate::drive::{LocatedDrive, locate, read_tum, synthesize};
+    use crate::drive::{LocatedDrive, locate, log_angles, read_tum, synthesize};
     #[pymodule_export]
     use crate::message::brief_text;
     #[pymodule_export]
@@ -64,6 +65,8 @@ mod _core {
     use crate::recording::{Recording, RecordingError};
     #[pymodule_export]
     use crate::settings::{Platform, Scenario, SettingsError, Site, Vehicle};
+    #[pymodule_export]
+    use crate::survey::LoggedDrive;
 
     #[pymodule_init]
     fn init(module: &Bound<'_, PyModule>) -> PyResult<()> {

@@ -7,7 +7,7 @@ pub use burst::build_burst;
 pub use searcher::Searcher;
 
 use aoa::AngleEstimate;
-use nr_ssb::SubcarrierSpacing;
+use nr_ssb::{Lmax, SubcarrierSpacing};
 use num_complex::{Complex32, Complex64};
 use numpy::{PyArrayDyn, PyArrayMethods, PyReadonlyArrayDyn, PyUntypedArrayMethods};
 use pyo3::exceptions::PyValueError;
@@ -28,8 +28,8 @@ use crate::recording::{Recording, RecordingError};
 ///     Physical cell identity, 0 to 1007.
 /// ssb_index : int
 ///     Index of the SSB in its burst, that is its beam.
-/// lmax : int
-///     SSB indices that the cell has, 4 or 8.
+/// lmax : int or None
+///     SSB indices that the cell has, 4, 8 or 64, where frequency or PBCH tell.
 /// half_frame : int or None
 ///     1 in the second half of a frame; unknown without a decoded PBCH.
 /// sfn : int or None
@@ -61,7 +61,7 @@ use crate::recording::{Recording, RecordingError};
 pub struct Cell {
     pci: u16,
     ssb_index: u8,
-    lmax: u8,
+    lmax: Option<u8>,
     half_frame: Option<u8>,
     sfn: Option<u16>,
     mib_bits: Option<String>,
@@ -90,7 +90,7 @@ impl From<&FoundSsb> for Cell {
         Self {
             pci: ssb.pci.get(),
             ssb_index: ssb.ssb_index,
-            lmax: ssb.lmax.count(),
+            lmax: ssb.lmax.map(Lmax::count),
             half_frame: ssb.half_frame.map(u8::from),
             sfn: ssb.payload.map(|payload| payload.sfn()),
             mib_bits: ssb.payload.map(|payload| payload.mib.bit_string()),
@@ -182,7 +182,7 @@ impl Scan {
 /// ssb_freq_hz : float, optional
 ///     Absolute frequency of the SSB's centre; the synchronization raster is searched without.
 /// scs_khz : int, optional
-///     Subcarrier spacing, 15 or 30; both are tried without.
+///     Subcarrier spacing, 15 or 30, above 24.25 GHz 120 or 240; both are tried without.
 /// cfo_ppm : float, optional
 ///     Largest offset of the oscillators where `ssb_freq_hz` is given, up to five subcarriers;
 ///     half a subcarrier without.
@@ -287,13 +287,9 @@ pub fn search(
 }
 
 fn subcarrier_spacing(khz: u32) -> PyResult<SubcarrierSpacing> {
-    match khz {
-        15 => Ok(SubcarrierSpacing::Khz15),
-        30 => Ok(SubcarrierSpacing::Khz30),
-        other => Err(PyValueError::new_err(format!(
-            "scs_khz is {other}; allowed: 15, 30"
-        ))),
-    }
+    SubcarrierSpacing::from_khz(khz).ok_or_else(|| {
+        PyValueError::new_err(format!("scs_khz is {khz}; allowed: 15, 30, 120, 240"))
+    })
 }
 
 #[allow(clippy::needless_pass_by_value)] // the shape that `map_err` wants

@@ -3,6 +3,7 @@
 //! A [`Scenario`](scenario::Scenario) holds what is believed of site and vehicle, and how the world
 //! departs from it; [`truth`] makes the one from the other, and nothing else does.
 
+mod angle_drive;
 mod bootstrap;
 pub mod bound;
 mod campaign;
@@ -25,6 +26,7 @@ mod tape;
 pub mod truth;
 pub mod world;
 
+pub use angle_drive::log_angles;
 pub use bootstrap::bootstrap_interval;
 pub use campaign::{Campaign, CampaignOptions, RunSummary, StepStatistics};
 pub use consistency::Consistency;

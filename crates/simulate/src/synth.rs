@@ -17,6 +17,7 @@ use serde_json::{Map, json};
 use thiserror::Error;
 
 use crate::channel::{HeadChannel, IqAir};
+use crate::error::SimulationError;
 use crate::random::Streams;
 use crate::scenario::Scenario;
 use crate::truth::World;
@@ -62,6 +63,9 @@ pub enum SynthError {
     /// An SSB cannot be built.
     #[error("samples: {0}")]
     Samples(#[from] nr_ssb::Error),
+    /// The drive cannot be driven.
+    #[error(transparent)]
+    Simulation(#[from] SimulationError),
     /// The caller asked to stop; no file of it is there.
     #[error("stopped")]
     Stopped,

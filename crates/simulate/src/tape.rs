@@ -28,10 +28,10 @@ pub struct Tapes {
 }
 
 /// One run on tape.
-struct Tape {
+pub(crate) struct Tape {
     run: u64,
-    told_start: Pose,
-    odometry: Vec<OdometrySample>,
+    pub told_start: Pose,
+    pub odometry: Vec<OdometrySample>,
     bursts: Vec<Burst>,
     /// What is sensed, burst by burst, as many as there are radio heads.
     sensed: Vec<SensedSsb>,
@@ -101,7 +101,20 @@ impl Tapes {
 }
 
 impl Tape {
-    fn record(
+    /// The angles of a method, in order of time.
+    pub fn angles_of(&self, method: usize) -> impl Iterator<Item = (SensedSsb, AngleMeasurement)> {
+        let angles = self.angles.get(method).into_iter().flatten();
+        let heard = self.sensed.iter().zip(angles);
+        heard.filter_map(|(&ssb, angle)| Some((ssb, (*angle)?)))
+    }
+
+    /// When bursts come, and where the vehicle is then.
+    pub fn truth(&self) -> impl Iterator<Item = (f64, Pose)> {
+        self.bursts.iter().map(|burst| (burst.time_s, burst.truth))
+    }
+
+    /// Puts a run on tape, with the angles of these methods.
+    pub fn record(
         simulation: &Simulation,
         methods: &[EstimatorMethod],
         streams: Streams,

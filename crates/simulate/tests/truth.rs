@@ -285,6 +285,13 @@ fn what_cannot_depart_is_refused() {
         ),
         (
             "yard",
+            "truth.vehicle.array.channel_gains",
+            toml::Value::Array(vec![]),
+            "truth.vehicle.array.channel_gains",
+            "iq.channel_phase_rad",
+        ),
+        (
+            "yard",
             "truth.vehicle.localizer.kind",
             "dead-reckoning".into(),
             "truth.vehicle.localizer",

@@ -12,6 +12,7 @@ from access_av._core import nr as nr
 __all__ = [
     "Bound",
     "LocatedDrive",
+    "LoggedDrive",
     "Platform",
     "RadioHead",
     "Recording",
@@ -30,6 +31,7 @@ __all__ = [
     "channel_drops",
     "check_paths",
     "locate",
+    "log_angles",
     "nr",
     "read_tum",
     "simulate",
@@ -305,6 +307,14 @@ def synthesize(
     datatype: str = "ci16_le",
     progress: Callable[[float], object] | None = None,
 ) -> tuple[Path, int, int]: ...
+def log_angles(
+    scenario: Scenario,
+    directory: str | PathLike[str],
+    *,
+    seed: int = 1,
+    run: int = 0,
+    duration_s: float | None = None,
+) -> int: ...
 def read_tum(file: str | PathLike[str]) -> dict[str, NDArray[np.float64]]: ...
 def locate(
     site: Site,
@@ -320,9 +330,23 @@ def locate(
 ) -> LocatedDrive: ...
 
 @final
+class LoggedDrive:
+    def __new__(cls, odometry: str | PathLike[str], angles: str | PathLike[str]) -> LoggedDrive: ...
+    @property
+    def heads(self) -> list[tuple[int, int]]: ...
+    def innovations(
+        self, site: Site, vehicle: Vehicle, used: NDArray[np.bool_] | None = None
+    ) -> tuple[NDArray[np.float64], NDArray[np.float64], NDArray[np.bool_]]: ...
+    def __len__(self) -> int: ...
+
+@final
 class LocatedDrive:
     @property
     def remarks(self) -> list[str]: ...
+    @property
+    def suspicions(self) -> list[str]: ...
+    @property
+    def findings(self) -> dict[str, Any]: ...
     @property
     def poses(self) -> dict[str, Any]: ...
     @property

@@ -42,7 +42,6 @@ def music(
     *,
     spacing_wavelengths: float = 0.5,
     sources: int = 1,
-    grid_deg: float = 0.1,
     forward_backward: bool = False,
     subarray: int | None = None,
     calibration: ArrayLike | None = None,

@@ -117,8 +117,7 @@ def choose(
 
     Where none does: what would have to change.
     """
-    import polars as pl
-
+    from access_av import given_tables
     from access_av.designs.table import Constraints, what_to_change
     from access_av.errors import InputError
     from access_av.files import json_text
@@ -126,7 +125,8 @@ def choose(
     file = results / TABLE
     if not file.is_file():
         raise InputError(f"{results}: no designs here ({TABLE} is missing)")
-    rows = pl.read_parquet(file)
+    rows = given_tables.read(file, "table of designs")
+    given_tables.check_types(rows, str(file), "designs")
     constraints = Constraints(max_energy_j, max_rms_m, max_worst_m)
     kept = constraints.kept(rows)
     advice = what_to_change(constraints, rows) if kept.is_empty() else []

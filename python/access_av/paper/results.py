@@ -6,7 +6,7 @@ from typing import TYPE_CHECKING, Any
 
 import polars as pl
 
-from access_av.columns import TABLES
+from access_av import given_tables
 from access_av.errors import InputError
 from access_av.files import RESULTS, ResultsDirectory
 from access_av.paper.claims import as_records
@@ -108,14 +108,6 @@ def operating_points(
 
 def _points(file: Path) -> pl.DataFrame:
     """A table of operating points, with all its columns."""
-    try:
-        points = pl.read_parquet(file)
-    except pl.exceptions.PolarsError as error:
-        raise InputError(f"{file}: not a table of operating points ({error})") from error
-    words = {"reading", "campaign", "mode_name", "method", "energy_provenance"}
-    for name in TABLES["operating_points"].columns:
-        found = points.schema.get(name, pl.Unknown())
-        fine = found == pl.String if name in words else found.is_numeric() or found == pl.Boolean
-        if not fine:
-            raise InputError(f"{file}: not a table of operating points; `{name}` is {found}")
+    points = given_tables.read(file, "table of operating points")
+    given_tables.check_types(points, str(file), "operating_points")
     return points

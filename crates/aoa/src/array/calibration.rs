@@ -32,6 +32,11 @@ impl<const N: usize> Calibration<N> {
         &self.gains
     }
 
+    /// What each channel is multiplied by.
+    pub(crate) fn inverse_gains(&self) -> [Complex64; N] {
+        self.gains.map(|gain| gain.inv())
+    }
+
     /// A snapshot as ideal channels would have received it.
     pub fn apply(&self, snapshot: &[Complex64; N]) -> [Complex64; N] {
         std::array::from_fn(|n| snapshot[n] / self.gains[n])

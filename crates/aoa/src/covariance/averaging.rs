@@ -13,7 +13,7 @@ impl<const N: usize> Covariance<N> {
         if array.is_ideal() {
             return *self;
         }
-        let inverse = array.calibration().gains().map(|gain| gain.inv());
+        let inverse = array.calibration().inverse_gains();
         let mut result = *self;
         for (i, row) in result.sum.iter_mut().enumerate() {
             for (j, entry) in row.iter_mut().enumerate() {

@@ -3,15 +3,18 @@
 use num_complex::Complex;
 
 use super::choice::Method;
-use super::one::estimate;
+use super::side_by_side::SideBySide;
 use super::smoothing::Smoothing;
 use crate::array::calibration::Calibration;
 use crate::array::linear::Array;
 use crate::covariance::sample::Covariance;
 use crate::error::Error;
 use crate::kernel::real::Real;
-use crate::method::maximum_likelihood;
 use crate::result::angle::AngleEstimate;
+
+/// Items that are estimated side by side: so many that the steps of some need not wait for others, and
+/// so few that all they need stays near the processor.
+const BLOCK: usize = 32;
 
 /// Samples of many estimates: items of `N` channels of `snapshots` samples each, row-major
 /// `(items, N, snapshots)`.
@@ -107,51 +110,43 @@ impl<'a, T: Real, const N: usize> Batch<'a, T, N> {
         sources: usize,
         estimates: &mut [AngleEstimate],
     ) -> Result<(), BatchError> {
-        let many = self.len() > maximum_likelihood::BLOCK / 8;
-        let whole = smoothing.subarray.is_none();
-        if method == Method::MaximumLikelihood && sources == 1 && array.is_ideal() && many && whole
-        {
-            return self.maximum_likelihood(array, estimates);
+        if sources == 1 && smoothing.subarray.is_none() {
+            let side_by_side = SideBySide {
+                method,
+                array,
+                forward_backward: smoothing.forward_backward,
+                snapshots: self.snapshots,
+            };
+            return if self.len() * 8 > BLOCK {
+                self.in_blocks::<BLOCK>(side_by_side, estimates)
+            } else {
+                self.in_blocks::<1>(side_by_side, estimates)
+            };
         }
         let ideal = array.with_calibration(Calibration::IDENTITY);
         let places = estimates.chunks_exact_mut(sources.max(1));
         for (item, (covariance, places)) in self.covariances().zip(places).enumerate() {
             let outcome = covariance.and_then(|covariance| {
-                let covariance = covariance.calibrated(array);
-                match places {
-                    [only] if whole => {
-                        let covariance = if smoothing.forward_backward {
-                            covariance.forward_backward()
-                        } else {
-                            covariance
-                        };
-                        *only = estimate(method, &covariance, &ideal)?;
-                    }
-                    _ => smoothing.estimate(method, &covariance, &ideal, places)?,
-                }
-                Ok(())
+                smoothing.estimate(method, &covariance.calibrated(array), &ideal, places)
             });
             outcome.map_err(|error| BatchError { item, error })?;
         }
         Ok(())
     }
 
-    /// Maximum likelihood for ideal channels, block by block. Forward–backward averaging would change
-    /// nothing: it leaves the sums along the diagonals as they are.
-    fn maximum_likelihood(
+    /// One source, `W` items at a time.
+    fn in_blocks<const W: usize>(
         self,
-        array: &Array<N>,
+        side_by_side: SideBySide<'_, N>,
         estimates: &mut [AngleEstimate],
     ) -> Result<(), BatchError> {
-        let places = estimates.chunks_mut(maximum_likelihood::BLOCK);
-        let blocks = self.split(maximum_likelihood::BLOCK).zip(places);
-        for (index, (block, places)) in blocks.enumerate() {
-            maximum_likelihood::block(block.samples, self.snapshots, array, places).map_err(
-                |(item, error)| BatchError {
-                    item: index * maximum_likelihood::BLOCK + item,
-                    error,
-                },
-            )?;
+        let parts = self.split(W).zip(estimates.chunks_mut(W));
+        for (index, (part, places)) in parts.enumerate() {
+            let outcome = side_by_side.of_samples::<T, W>(part.samples, places);
+            outcome.map_err(|(item, error)| BatchError {
+                item: index * W + item,
+                error,
+            })?;
         }
         Ok(())
     }

@@ -7,7 +7,7 @@ use crate::array::linear::Array;
 use crate::array::steering::steering_vector;
 use crate::covariance::sample::Covariance;
 use crate::error::Error;
-use crate::linalg::eigen::principal_eigenvector;
+use crate::linalg::hermitians::principal_eigenvector;
 
 impl<const N: usize> Calibration<N> {
     /// Estimates the gains from snapshots of one source in a known direction.
@@ -40,7 +40,7 @@ impl<const N: usize> Calibration<N> {
             return Err(Error::Angle(angle_rad));
         }
         let covariance = covariance.validated()?;
-        let (_, response) = principal_eigenvector(covariance.unscaled());
+        let response = principal_eigenvector(covariance.unscaled());
         let steering = steering_vector::<N>(array.phase_from_angle(angle_rad));
         let first = response[0] / steering[0];
         let common = Complex64::from_polar((N as f64).sqrt(), -first.arg());

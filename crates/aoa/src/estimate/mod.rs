@@ -3,10 +3,12 @@
 pub(crate) mod batch;
 pub(crate) mod channel_gains;
 pub(crate) mod choice;
+pub(crate) mod direction_finder;
 pub(crate) mod one;
 pub(crate) mod pilots;
 pub(crate) mod pseudo_spectrum;
 pub(crate) mod several;
+mod side_by_side;
 pub(crate) mod smoothing;
 pub(crate) mod source_count;
 mod spread;

@@ -3,10 +3,12 @@
 use num_complex::Complex64;
 
 use crate::array::linear::Array;
+use crate::array::manifold::{Direction, Manifold, dot};
 use crate::covariance::sample::Covariance;
 use crate::error::Error;
 use crate::linalg::dense::inverse;
 use crate::linalg::eigen::hermitian_eigen;
+use crate::linalg::matrix::{Matrix, zeros};
 use crate::spectrum::polynomial::Spectrum;
 
 /// Which spectrum, `a` being the steering vector of a direction.
@@ -36,31 +38,56 @@ impl PseudoSpectrum {
         angles_rad: &[f64],
     ) -> Result<Vec<f64>, Error> {
         let covariance = covariance.calibrated(array).validated()?;
-        let quadratic = self.quadratic_form(&covariance)?;
-        let n = N as f64;
+        let quadratic = Spectrum::of_matrix(&self.quadratic_form(&covariance)?);
         let value = |angle_rad: &f64| {
             if !(0.0..=std::f64::consts::PI).contains(angle_rad) {
                 return Err(Error::Angle(*angle_rad));
             }
             let form = quadratic.value(array.phase_from_angle(*angle_rad));
-            Ok(match self {
-                Self::Bartlett => form.max(0.0) / (n * n),
-                Self::Capon => form.recip(),
-                Self::Music { .. } => n / form.max(0.0),
-            })
+            Ok(self.value(form, N as f64))
         };
         angles_rad.iter().map(value).collect()
+    }
+
+    /// The spectrum of an array of any shape, in these directions; `a` there is the response, and
+    /// `a^H a` takes the place of N.
+    ///
+    /// # Errors
+    /// As [`PseudoSpectrum::at`], but for the angles.
+    pub fn over_directions<M: Manifold<N> + ?Sized, const N: usize>(
+        self,
+        covariance: &Covariance<N>,
+        manifold: &M,
+        directions: &[Direction],
+    ) -> Result<Vec<f64>, Error> {
+        let form = self.quadratic_form(&covariance.validated()?)?;
+        let value = |direction: &Direction| {
+            let a = manifold.response(*direction);
+            let row = |i: usize| -> Complex64 { form[i].iter().zip(&a).map(|(m, a)| m * a).sum() };
+            let value = (0..N).map(|i| (a[i].conj() * row(i)).re).sum();
+            self.value(value, dot(&a, &a).re)
+        };
+        Ok(directions.iter().map(value).collect())
+    }
+
+    /// From the value of the quadratic form and `a^H a`.
+    fn value(self, form: f64, power: f64) -> f64 {
+        match self {
+            Self::Bartlett => form.max(0.0) / (power * power),
+            Self::Capon => form.recip(),
+            Self::Music { .. } => power / form.max(0.0),
+        }
     }
 
     fn quadratic_form<const N: usize>(
         self,
         covariance: &Covariance<N>,
-    ) -> Result<Spectrum<N>, Error> {
+    ) -> Result<Matrix<N>, Error> {
         let matrix = covariance.matrix();
         Ok(match self {
-            Self::Bartlett => Spectrum::of_matrix(&matrix),
+            Self::Bartlett => matrix,
             Self::Capon if covariance.snapshots() < N => return Err(Error::Singular),
-            Self::Capon => Spectrum::of_matrix(&inverse(matrix, N).ok_or(Error::Singular)?),
+            Self::Capon => inverse(matrix, N).ok_or(Error::Singular)?,
             Self::Music { sources } => {
                 if !(1..N).contains(&sources) {
                     return Err(Error::TooManySources {
@@ -68,8 +95,16 @@ impl PseudoSpectrum {
                         maximum: N - 1,
                     });
                 }
-                let vectors: [[Complex64; N]; N] = hermitian_eigen(matrix, N).vectors;
-                Spectrum::of_subspace(&vectors[sources..])
+                let vectors = hermitian_eigen(matrix, N).vectors;
+                let mut projection = zeros::<N>();
+                for vector in &vectors[sources..] {
+                    for i in 0..N {
+                        for j in 0..N {
+                            projection[i][j] += vector[i] * vector[j].conj();
+                        }
+                    }
+                }
+                projection
             }
         })
     }

@@ -2,7 +2,7 @@
 
 use num_complex::Complex64;
 
-use super::choice::{Method, checked_grid};
+use super::choice::Method;
 use super::one::estimate;
 use super::spread::{Averaging, Spread};
 use crate::array::linear::Array;
@@ -76,11 +76,11 @@ pub fn estimate_several_smoothed<const N: usize, const M: usize>(
     let averaged = averaging.average(&full);
     let array = Array::<M>::new(array.spacing_wavelengths())?;
     let eigen = hermitian_eigen(averaged.matrix(), M);
-    let mut phases = subspace_phases(method, &eigen, sources, &array)?;
+    let mut phases = subspace_phases(method, &eigen, sources)?;
     let mut separated = phases.len() == sources;
     if !separated {
         // The spectrum has fewer peaks than sources; the roots of the same polynomial are complete.
-        phases = subspace_phases(Method::RootMusic, &eigen, sources, &array)?;
+        phases = subspace_phases(Method::RootMusic, &eigen, sources)?;
     }
     let noise_variance = noise_variance(&eigen, sources);
     let powers = source_powers(&phases, &full, noise_variance);
@@ -147,18 +147,11 @@ fn subspace_phases<const N: usize>(
     method: Method,
     eigen: &HermitianEigen<N>,
     sources: usize,
-    array: &Array<N>,
 ) -> Result<List<f64, N>, Error> {
     match method {
-        Method::Music { grid_deg, refine } => {
+        Method::Music => {
             let spectrum = music::signal_spectrum(eigen, sources);
-            Ok(music::phases(
-                &spectrum,
-                sources,
-                array,
-                checked_grid(grid_deg)?,
-                refine,
-            ))
+            Ok(music::phases(&spectrum, sources))
         }
         Method::MaximumLikelihood | Method::RootMusic => {
             let null = music::null_spectrum(eigen, sources);

@@ -84,16 +84,19 @@ pub fn maximum_likelihood_pilots_unequal<const N: usize>(
 /// from its own.
 fn strongest_side_lobe<const N: usize>(weights: &[f64; N]) -> f64 {
     let total: f64 = weights.iter().sum();
-    let power = |direction: usize| {
-        let step = std::f64::consts::PI * direction as f64 / DIRECTIONS as f64;
-        let at = |(n, weight): (usize, &f64)| Complex64::from_polar(*weight, step * n as f64);
-        let sum: Complex64 = weights.iter().enumerate().map(at).sum();
+    let turn = Complex64::cis(std::f64::consts::PI / DIRECTIONS as f64);
+    let mut step = Complex64::ONE;
+    let mut next_power = || {
+        step *= turn;
+        // Horner's scheme for sum_n w_n step^n.
+        let horner = |sum: Complex64, weight: &f64| sum * step + weight;
+        let sum = weights.iter().rev().fold(Complex64::ZERO, horner);
         sum.norm_sqr() / (total * total)
     };
     let mut last = 1.0;
     let mut worst: Option<f64> = None;
-    for direction in 1..=DIRECTIONS {
-        let here = power(direction);
+    for _ in 0..DIRECTIONS {
+        let here = next_power();
         // Down the main lobe first, then over everything beyond.
         if let Some(worst) = &mut worst {
             *worst = worst.max(here);

@@ -3,7 +3,16 @@
 use num_complex::{Complex, Complex64};
 
 use crate::linalg::matrix::{Matrix, zeros};
-use crate::spectrum::side_by_side::Spectra;
+
+/// Length of the shortest channel.
+#[inline]
+pub(super) fn shortest<T, const N: usize>(channels: &[&[T]; N]) -> usize {
+    let mut length = usize::MAX;
+    for channel in channels {
+        length = length.min(channel.len());
+    }
+    length
+}
 
 /// `sum_t x_t conj(y_t)`.
 pub(super) fn correlation<T: Copy + Into<f64>>(x: &[Complex<T>], y: &[Complex<T>]) -> Complex64 {
@@ -22,40 +31,45 @@ pub(super) fn products<T: Copy + Into<f64>, const N: usize>(
     channels: &[&[Complex<T>]; N],
 ) -> Matrix<N> {
     let mut matrix = zeros::<N>();
+    add_products(channels, 0, &mut matrix);
     for i in 0..N {
-        for j in 0..=i {
-            matrix[i][j] = correlation(channels[i], channels[j]);
+        for j in 0..i {
             matrix[j][i] = matrix[i][j].conj();
         }
     }
     matrix
 }
 
+/// Adds to the lower triangle what the samples from `start` on contribute.
+pub(super) fn add_products<T: Copy + Into<f64>, const N: usize>(
+    channels: &[&[Complex<T>]; N],
+    start: usize,
+    matrix: &mut Matrix<N>,
+) {
+    for i in 0..N {
+        for j in 0..=i {
+            matrix[i][j] += correlation(&channels[i][start..], &channels[j][start..]);
+        }
+    }
+}
+
 /// Adds to each lag what the samples from `start` on contribute.
 pub(super) fn add_lags<T: Copy + Into<f64>, const N: usize>(
-    rows: &[&[Complex<T>]; N],
+    channels: &[&[Complex<T>]; N],
     start: usize,
     lags: &mut [Complex64; N],
 ) {
     for i in 0..N {
         for j in 0..=i {
-            lags[i - j] += correlation(&rows[i][start..], &rows[j][start..]);
+            lags[i - j] += correlation(&channels[i][start..], &channels[j][start..]);
         }
     }
 }
 
-pub(super) fn spectra<T: Copy + Into<f64>, const N: usize, const W: usize>(
-    samples: &[Complex<T>],
-    snapshots: usize,
-    spectra: &mut Spectra<N, W>,
-) {
-    for (w, item) in samples.chunks_exact(N * snapshots).take(W).enumerate() {
-        let rows = std::array::from_fn(|n| &item[n * snapshots..(n + 1) * snapshots]);
-        let mut lags = [Complex64::ZERO; N];
-        add_lags(&rows, 0, &mut lags);
-        for (k, lag) in lags.iter().enumerate() {
-            spectra.re[k][w] = lag.re;
-            spectra.im[k][w] = lag.im;
-        }
-    }
+pub(super) fn lags<T: Copy + Into<f64>, const N: usize>(
+    channels: &[&[Complex<T>]; N],
+) -> [Complex64; N] {
+    let mut lags = [Complex64::ZERO; N];
+    add_lags(channels, 0, &mut lags);
+    lags
 }

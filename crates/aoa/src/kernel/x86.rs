@@ -37,8 +37,8 @@ macro_rules! kernels {
 
             use crate::kernel::x86::parts_pd;
             use crate::kernel::portable;
+            use crate::kernel::portable::shortest;
             use crate::linalg::matrix::{Matrix, zeros};
-            use crate::spectrum::side_by_side::Spectra;
 
             /// The samples from `start` on.
             #[target_feature(enable = $features)]
@@ -57,32 +57,46 @@ macro_rules! kernels {
             }
 
             #[target_feature(enable = $features)]
-            #[inline]
-            fn correlation(x: &[Complex<$real>], y: &[Complex<$real>]) -> Complex64 {
-                let length = if x.len() < y.len() { x.len() } else { y.len() };
-                let (x, y) = (&x[..length], &y[..length]);
-                let (mut direct, mut crossed) = ($zero(), $zero());
-                let mut start = 0;
-                while start + $complexes <= length {
-                    let (v, w) = (load(x, start), load(y, start));
-                    direct = $fma(v, w, direct);
-                    crossed = $fma(v, $exchange(w), crossed);
-                    start += $complexes;
-                }
-                total(direct, crossed) + portable::correlation(&x[start..], &y[start..])
-            }
-
-            #[target_feature(enable = $features)]
             pub(in crate::kernel) fn products<const N: usize>(
                 channels: &[&[Complex<$real>]; N],
             ) -> Matrix<N> {
+                let length = shortest(channels);
+                let (mut direct, mut crossed) = ([[$zero(); N]; N], [[$zero(); N]; N]);
+                let mut start = 0;
+                while start + $complexes <= length {
+                    let (mut v, mut w) = ([$zero(); N], [$zero(); N]);
+                    for n in 0..N {
+                        v[n] = load(channels[n], start);
+                        w[n] = $exchange(v[n]);
+                    }
+                    // Bounds known to the compiler keep the sums in registers.
+                    for i in 0..N {
+                        for j in 0..N {
+                            if j <= i {
+                                direct[i][j] = $fma(v[i], v[j], direct[i][j]);
+                            }
+                            if j < i {
+                                crossed[i][j] = $fma(v[i], w[j], crossed[i][j]);
+                            }
+                        }
+                    }
+                    start += $complexes;
+                }
                 let mut matrix = zeros::<N>();
                 for i in 0..N {
+                    for j in 0..N {
+                        if j <= i {
+                            matrix[i][j] = total(direct[i][j], crossed[i][j]);
+                        }
+                    }
+                }
+                if start < length {
+                    portable::add_products(channels, start, &mut matrix);
+                }
+                for i in 0..N {
                     for j in 0..i {
-                        matrix[i][j] = correlation(channels[i], channels[j]);
                         matrix[j][i] = matrix[i][j].conj();
                     }
-                    matrix[i][i].re = correlation(channels[i], channels[i]).re;
                 }
                 matrix
             }
@@ -92,12 +106,12 @@ macro_rules! kernels {
             #[inline]
             fn add_products<const N: usize>(
                 (direct, crossed): &mut ([$vector; N], [$vector; N]),
-                rows: &[&[Complex<$real>]; N],
+                channels: &[&[Complex<$real>]; N],
                 start: usize,
             ) {
                 let (mut v, mut w) = ([$zero(); N], [$zero(); N]);
                 for n in 0..N {
-                    v[n] = load(rows[n], start);
+                    v[n] = load(channels[n], start);
                     w[n] = $exchange(v[n]);
                 }
                 // The products of one k are added up first: fewer additions then wait for one
@@ -119,39 +133,25 @@ macro_rules! kernels {
             }
 
             #[target_feature(enable = $features)]
-            pub(in crate::kernel) fn spectra<const N: usize, const W: usize>(
-                samples: &[Complex<$real>],
-                snapshots: usize,
-                spectra: &mut Spectra<N, W>,
-            ) {
-                let mut rest = samples;
-                for w in 0..W {
-                    let mut rows: [&[Complex<$real>]; N] = [&[]; N];
-                    for row in &mut rows {
-                        let Some((first, others)) = rest.split_at_checked(snapshots) else {
-                            return;
-                        };
-                        (*row, rest) = (first, others);
-                    }
-                    let mut sums = ([$zero(); N], [$zero(); N]);
-                    let mut start = 0;
-                    while start + $complexes <= snapshots {
-                        add_products(&mut sums, &rows, start);
-                        start += $complexes;
-                    }
-                    let (direct, crossed) = sums;
-                    let mut lags = [Complex64::ZERO; N];
-                    for k in 0..N {
-                        lags[k] = total(direct[k], crossed[k]);
-                    }
-                    if start < snapshots {
-                        portable::add_lags(&rows, start, &mut lags);
-                    }
-                    for (k, lag) in lags.iter().enumerate() {
-                        spectra.re[k][w] = lag.re;
-                        spectra.im[k][w] = lag.im;
-                    }
+            pub(in crate::kernel) fn lags<const N: usize>(
+                channels: &[&[Complex<$real>]; N],
+            ) -> [Complex64; N] {
+                let length = shortest(channels);
+                let mut sums = ([$zero(); N], [$zero(); N]);
+                let mut start = 0;
+                while start + $complexes <= length {
+                    add_products(&mut sums, channels, start);
+                    start += $complexes;
                 }
+                let (direct, crossed) = sums;
+                let mut lags = [Complex64::ZERO; N];
+                for k in 0..N {
+                    lags[k] = total(direct[k], crossed[k]);
+                }
+                if start < length {
+                    portable::add_lags(channels, start, &mut lags);
+                }
+                lags
             }
         }
     };

@@ -2,4 +2,5 @@
 
 pub(crate) mod dense;
 pub(crate) mod eigen;
+pub(crate) mod hermitians;
 pub(crate) mod matrix;

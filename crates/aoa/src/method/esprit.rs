@@ -4,8 +4,11 @@ use num_complex::Complex64;
 
 use crate::linalg::dense::{inverse, product};
 use crate::linalg::eigen::{HermitianEigen, general_eigenvalues, hermitian_eigen};
+use crate::linalg::hermitians::Vectors;
 use crate::linalg::matrix::{Matrix, zeros};
 use crate::list::List;
+use crate::simd::math::times_plus;
+use crate::spectrum::side_by_side::Places;
 
 /// Standard deviation over the Cramér–Rao bound, one source and high SNR:
 /// `sqrt(N (N + 1) / (6 (N - 1)))` (Rao and Hari 1989). Dropping an antenna at each end costs little.
@@ -14,13 +17,22 @@ pub(crate) fn excess<const N: usize>() -> f64 {
     (n * (n + 1.0) / (6.0 * (n - 1.0))).sqrt()
 }
 
-/// One source: both kinds of least squares give the phase of `sum conj(u_n) u_(n+1)`.
-pub(crate) fn phase<const N: usize>(principal: &[Complex64; N]) -> f64 {
-    principal
-        .windows(2)
-        .map(|pair| pair[0].conj() * pair[1])
-        .sum::<Complex64>()
-        .arg()
+/// One source in each of many: both kinds of least squares give the phase of
+/// `sum conj(u_n) u_(n+1)`.
+#[inline(always)]
+pub(crate) fn places<const FUSED: bool, const N: usize, const W: usize>(
+    principal: &Vectors<N, W>,
+) -> Places<W> {
+    let (mut re, mut im) = ([0.0; W], [0.0; W]);
+    for n in 1..N {
+        for w in 0..W {
+            let (a, b) = (principal.re[n][w], principal.im[n][w]);
+            let (c, d) = (principal.re[n - 1][w], principal.im[n - 1][w]);
+            re[w] = times_plus::<FUSED>(a, c, times_plus::<FUSED>(b, d, re[w]));
+            im[w] = times_plus::<FUSED>(b, c, times_plus::<FUSED>(-a, d, im[w]));
+        }
+    }
+    Places::of_directions::<FUSED>(&re, &im)
 }
 
 /// Least squares: `Psi = (U1^H U1)^-1 U1^H U2`; its eigenvalues are `exp(j omega)`. `None` if

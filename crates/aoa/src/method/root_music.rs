@@ -6,8 +6,11 @@ use std::f64::consts::TAU;
 use num_complex::Complex64;
 
 use crate::array::steering::aperture;
+use crate::linalg::hermitians::Vectors;
 use crate::list::List;
+use crate::simd::math::times_plus;
 use crate::spectrum::polynomial::Spectrum;
+use crate::spectrum::side_by_side::{Places, Spectra};
 
 const ITERATIONS: usize = 60;
 
@@ -27,30 +30,72 @@ pub(crate) fn phases<const N: usize>(null: &Spectrum<N>, sources: usize) -> List
     )
 }
 
-/// The electrical angle of the root nearest to the unit circle, for one source with the given signal
-/// spectrum.
-pub(crate) fn phase<const N: usize>(signal: &Spectrum<N>) -> f64 {
-    let mut null = signal.negated();
-    null.lags[0] += N as f64;
-    // Without noise one root is on the circle at the source, the others lie about half way in,
-    // between the zeros of the array's pattern; noise moves them little.
-    let (peak, height) = signal.maximum();
-    let depth = ((N as f64 - height).max(0.0) / aperture::<N>()).sqrt();
-    let mut start = [Complex64::ZERO; N];
-    start[0] = Complex64::from_polar(1.0 - depth.min(0.5), peak);
-    for (i, root) in start[..N - 1].iter_mut().enumerate().skip(1) {
-        let side = TAU * (i as f64 + 0.5 - 0.5 / N as f64) / (N as f64 - 1.0 / N as f64);
-        *root = Complex64::from_polar(0.45, peak + side);
+/// One source in each of many: the root at the highest peak of the spectrum, which is the one
+/// nearest to the unit circle unless noise rules. Newton's method from above the peak, with the
+/// root's mirror image divided out.
+#[inline(always)]
+pub(crate) fn places<const FUSED: bool, const N: usize, const W: usize>(
+    principal: &Vectors<N, W>,
+) -> Places<W> {
+    const STEPS: usize = 8;
+    /// Depth of the null, over N, from which on the root cannot be told from its mirror image. The
+    /// peak between the two is the better known then, and nearer than any noise displaces it.
+    const DOUBLE: f64 = 1e-10;
+    let signal = Spectra::of_vectors::<FUSED>(principal);
+    let peaks = signal.maxima::<FUSED>();
+    let heights = signal.values::<FUSED>(&peaks);
+    let (mut re, mut im) = (peaks.cos, peaks.sin);
+    let mut free = [0.0; W];
+    for w in 0..W {
+        let depth = N as f64 - heights[w];
+        free[w] = if depth > DOUBLE * N as f64 { 1.0 } else { 0.0 };
+        // Without other roots the null is a parabola with the curvature of an exact source.
+        let inward = (depth.abs() / aperture::<N>()).sqrt();
+        let radius = 1.0 - free[w] * if inward < 0.5 { inward } else { 0.5 };
+        re[w] *= radius;
+        im[w] *= radius;
     }
-    let roots = inner_roots(&null, start);
-    let nearest = roots[..N - 1].iter().fold(Complex64::ZERO, |best, root| {
-        if root.norm_sqr() > best.norm_sqr() {
-            *root
-        } else {
-            best
+    for _ in 0..STEPS {
+        for w in 0..W {
+            let (x, y) = (re[w], im[w]);
+            // P(z) and P'(z) by Horner's scheme, the coefficients of N - f from the highest down.
+            let (mut p_re, mut p_im, mut slope_re, mut slope_im) = (0.0, 0.0, 0.0, 0.0);
+            for place in 0..2 * N - 1 {
+                let k = place.abs_diff(N - 1);
+                let c_re = if k == 0 { N as f64 } else { 0.0 } - signal.re[k][w];
+                let c_im = signal.im[k][w] * if place < N { 1.0 } else { -1.0 };
+                let next =
+                    times_plus::<FUSED>(slope_re, x, times_plus::<FUSED>(-slope_im, y, p_re));
+                slope_im = times_plus::<FUSED>(slope_re, y, times_plus::<FUSED>(slope_im, x, p_im));
+                slope_re = next;
+                let next = times_plus::<FUSED>(p_re, x, times_plus::<FUSED>(-p_im, y, c_re));
+                p_im = times_plus::<FUSED>(p_re, y, times_plus::<FUSED>(p_im, x, c_im));
+                p_re = next;
+            }
+            // step = P / (P' - P / (z - 1 / conj(z)))
+            let squared = times_plus::<FUSED>(x, x, y * y);
+            let inverse = 1.0 / (squared - 1.0);
+            let (a, b) = (x * inverse, -y * inverse);
+            let divisor_re = slope_re - (p_re * a - p_im * b);
+            let divisor_im = slope_im - (p_re * b + p_im * a);
+            let power = times_plus::<FUSED>(divisor_re, divisor_re, divisor_im * divisor_im);
+            let scale = if power > 0.0 { free[w] / power } else { 0.0 };
+            let moves = free[w] > 0.0;
+            let step_re = times_plus::<FUSED>(p_re, divisor_re, p_im * divisor_im) * scale;
+            let step_im = times_plus::<FUSED>(p_im, divisor_re, -(p_re * divisor_im)) * scale;
+            let (next_re, next_im) = (x - step_re, y - step_im);
+            let modulus = times_plus::<FUSED>(next_re, next_re, next_im * next_im);
+            let inside = if modulus > 1.0 { 1.0 / modulus } else { 1.0 };
+            re[w] = if moves { next_re * inside } else { x };
+            im[w] = if moves { next_im * inside } else { y };
+            let moved = times_plus::<FUSED>(step_re, step_re, step_im * step_im);
+            free[w] = if moved > 1e-12 { free[w] } else { 0.0 };
         }
-    });
-    settled(&null, nearest)
+        if free.iter().all(|it| *it == 0.0) {
+            break;
+        }
+    }
+    Places::of_directions::<FUSED>(&re, &im)
 }
 
 /// The phase of a root. A root on the circle is double, and rounding moves it along the circle by

@@ -1,5 +1,6 @@
 //! What an estimate says about the direction, and about itself.
 
 pub(crate) mod angle;
+pub(crate) mod azimuth_elevation;
 pub(crate) mod direction;
 pub(crate) mod verdict;

@@ -26,17 +26,20 @@ pub enum Reason {
     /// Sources that are reflections of each other, more alike than the method can tell apart: average
     /// over subarrays.
     Correlated,
+    /// At the edge of the elevations that were looked at, beyond which the source may be as well.
+    EdgeOfElevations,
 }
 
 impl Verdict {
     /// Every verdict there is.
-    pub const ALL: [Self; 6] = [
+    pub const ALL: [Self; 7] = [
         Self::Resolved,
         Self::Unresolved(Reason::ThresholdSnr),
         Self::Unresolved(Reason::NearEndFire),
         Self::Unresolved(Reason::Ambiguous),
         Self::Unresolved(Reason::SourcesNotSeparated),
         Self::Unresolved(Reason::Correlated),
+        Self::Unresolved(Reason::EdgeOfElevations),
     ];
 
     /// Its place in [`Verdict::ALL`].
@@ -48,6 +51,7 @@ impl Verdict {
             Self::Unresolved(Reason::Ambiguous) => 3,
             Self::Unresolved(Reason::SourcesNotSeparated) => 4,
             Self::Unresolved(Reason::Correlated) => 5,
+            Self::Unresolved(Reason::EdgeOfElevations) => 6,
         }
     }
 }
@@ -60,6 +64,7 @@ impl fmt::Display for Reason {
             Self::Ambiguous => "several directions fit: elements more than half a wavelength apart",
             Self::SourcesNotSeparated => "sources not separated",
             Self::Correlated => "sources too correlated: average over subarrays",
+            Self::EdgeOfElevations => "at the edge of the elevations looked at",
         })
     }
 }

@@ -34,6 +34,9 @@ impl Instructions {
     }
 }
 
+/// Whether the baseline multiplies and adds in one instruction.
+pub(crate) const BASELINE_FUSED: bool = cfg!(target_arch = "aarch64");
+
 /// Calls the variant of a function that fits the processor.
 macro_rules! dispatch {
     ($baseline:expr, $avx2:expr, $avx512:expr) => {

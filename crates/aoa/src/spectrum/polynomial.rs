@@ -6,6 +6,7 @@ use num_complex::Complex64;
 
 use super::side_by_side::Spectra;
 use crate::linalg::matrix::Matrix;
+use crate::list::List;
 
 /// Newton from a grid of eight points per antenna doubles its digits at each step.
 const NEWTON_STEPS: usize = 6;
@@ -71,12 +72,41 @@ impl<const N: usize> Spectrum<N> {
 
     /// The electrical angle at which `f` is largest, and that value.
     pub(crate) fn maximum(&self) -> (f64, f64) {
-        let peaks = Spectra::<N, 1> {
+        let single = Spectra::<N, 1> {
             re: self.lags.map(|lag| [lag.re]),
             im: self.lags.map(|lag| [lag.im]),
+        };
+        let place = single.maxima::<false>();
+        (place.phase_rad[0], single.values::<false>(&place)[0])
+    }
+
+    /// Every local maximum: electrical angle and value. A polynomial of degree N - 1 has no more than
+    /// N - 1. None is too narrow to be found: intervals are halved until bounds on the derivatives
+    /// prove that each holds one extremum or none.
+    pub(crate) fn peaks(&self) -> List<(f64, f64), N> {
+        let orders = self.lags.iter().enumerate();
+        let third = orders.map(|(k, lag)| 2.0 * (k as f64).powi(3) * lag.norm());
+        let search = PeakSearch {
+            spectrum: self,
+            third_derivative: third.sum(),
+        };
+        let mut peaks = List::empty((0.0, 0.0));
+        if search.third_derivative > 0.0 {
+            let intervals = 2 * N;
+            let phase = |i: usize| TAU * i as f64 / intervals as f64 - PI;
+            let mut low = (-PI, self.slope(-PI));
+            for i in 1..=intervals {
+                // The last end is the first, to the bit: no peak is lost between them or found twice.
+                let high = (phase(i), self.slope(phase(i % intervals)));
+                search.look_between(low, high, &mut peaks);
+                low = high;
+            }
         }
-        .maxima::<false>();
-        (peaks.phase_rad[0], peaks.value[0])
+        peaks
+    }
+
+    fn slope(&self, phase_rad: f64) -> f64 {
+        self.derivatives(Complex64::cis(-phase_rad)).1
     }
 
     /// The local maximum within `reach` of `start`, by Newton's method, in (-pi, pi].
@@ -97,6 +127,36 @@ impl<const N: usize> Spectrum<N> {
             offset = next;
         }
         wrap(start + offset)
+    }
+}
+
+/// The search for every local maximum.
+struct PeakSearch<'a, const N: usize> {
+    spectrum: &'a Spectrum<N>,
+    /// No third derivative is larger.
+    third_derivative: f64,
+}
+
+impl<const N: usize> PeakSearch<'_, N> {
+    /// Adds the maxima between two electrical angles, each given with the slope there.
+    fn look_between(&self, low: (f64, f64), high: (f64, f64), peaks: &mut List<(f64, f64), N>) {
+        // Extrema closer than this are one.
+        const CLOSEST_RAD: f64 = 1e-9;
+        let (middle, half) = (0.5 * (low.0 + high.0), 0.5 * (high.0 - low.0));
+        let (_, slope, curvature) = self.spectrum.derivatives(Complex64::cis(-middle));
+        let curvature_varies = self.third_derivative * half;
+        if slope.abs() > (curvature.abs() + 0.5 * curvature_varies) * half {
+            return;
+        }
+        if curvature.abs() > 2.0 * curvature_varies || half < CLOSEST_RAD {
+            if low.1 > 0.0 && high.1 <= 0.0 {
+                let phase_rad = self.spectrum.refined_maximum(middle, half);
+                peaks.push((phase_rad, self.spectrum.value(phase_rad)));
+            }
+            return;
+        }
+        self.look_between(low, (middle, slope), peaks);
+        self.look_between((middle, slope), high, peaks);
     }
 }
 

@@ -10,10 +10,7 @@ use rand_distr::{Distribution, StandardNormal};
 
 pub const METHODS: [aoa::Method; 5] = [
     aoa::Method::MaximumLikelihood,
-    aoa::Method::Music {
-        grid_deg: 0.1,
-        refine: true,
-    },
+    aoa::Method::Music,
     aoa::Method::RootMusic,
     aoa::Method::EspritLs,
     aoa::Method::EspritTls,

@@ -1,5 +1,6 @@
 //! Finding the SSB's frequency and subcarrier spacing: the synchronization raster of TS 38.104
-//! §5.4.3, point by point through the recorded band, at 15 and 30 kHz. Test networks place SSBs
+//! §5.4.3, point by point through the recorded band, at 15 and 30 kHz or, in frequency range 2, at 120 and
+//! 240 kHz. Test networks place SSBs
 //! elsewhere; for them, and for recordings that do not state their centre, see [`scan_off_raster`].
 
 mod error;

@@ -1,7 +1,8 @@
 //! Which frequency an SSB was placed at, where that is not known beforehand.
 //!
 //! Cells that are to be searched for lie on the synchronization raster, others anywhere on the
-//! global frequency raster (TS 38.104 §5.4.2.1): multiples of 5 kHz below 3 GHz, of 15 kHz above.
+//! global frequency raster (TS 38.104 §5.4.2.1): multiples of 5 kHz below 3 GHz, of 15 kHz above, of
+//! 60 kHz from 24.25008 GHz on.
 //! Test signals keep to neither, as one at 3500.0 MHz.
 //! What is received is that frequency plus the offset of the oscillators, and inside a symbol the
 //! two cannot be told apart. Between symbols they can: by TS 38.211 §5.4 symbol `l` carries
@@ -20,7 +21,7 @@ use crate::dsp::base_rate::SYMBOL_SAMPLES;
 use crate::dsp::cfo::carrier_reset_step;
 use crate::numeric::phasors::wrap;
 use crate::search::DetectedSsb;
-use crate::standard::numerology::SubcarrierSpacing;
+use crate::standard::numerology::{FR2_FROM_HZ, SubcarrierSpacing};
 
 /// Standard deviation of oscillators, relative to the frequency.
 const OSCILLATOR: f64 = 1e-6;
@@ -33,6 +34,16 @@ const COARSE_AT_BEST: f64 = 0.01;
 const RASTER_PREFERENCE: f64 = 16.0;
 /// Transmitters that keep to no raster are set by people, to multiples of this.
 const SET_BY_HAND_HZ: f64 = 5e3;
+
+/// Whether a frequency is one of TS 38.104 Table 5.4.2.1-1.
+fn is_on_global_raster(frequency_hz: f64) -> bool {
+    let units = match frequency_hz {
+        ..3e9 => frequency_hz / 5e3,
+        ..FR2_FROM_HZ => frequency_hz / 15e3,
+        _ => (frequency_hz - 24.25008e9) / 60e3,
+    };
+    (units - units.round()).abs() < 1e-3
+}
 
 /// Where inside `band_hz` an SSB was placed that a search around `tuned_hz` found there, `on_raster`
 /// being whether that is a point of the synchronization raster.
@@ -53,8 +64,7 @@ pub(crate) fn placed_at(
         let carrier_step = carrier_reset_step(frequency_hz, spacing.base_rate_hz());
         let disagreement_hz = wrap(step - carrier_step) / (TAU * symbol_s);
         let offset_hz = received_hz + disagreement_hz - frequency_hz;
-        let units = frequency_hz / if frequency_hz < 3e9 { 5e3 } else { 15e3 };
-        let off_raster = (units - units.round()).abs() > 1e-3;
+        let off_raster = !is_on_global_raster(frequency_hz);
         (disagreement_hz / coarse_hz).powi(2)
             + (offset_hz / (OSCILLATOR * frequency_hz)).powi(2)
             + if off_raster { RASTER_PREFERENCE } else { 0.0 }

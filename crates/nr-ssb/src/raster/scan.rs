@@ -17,10 +17,10 @@ use crate::standard::numerology::SubcarrierSpacing;
 /// Share of the probability of a false cell, 1e-3 for 20 ms, that each of two scans at each of two
 /// spacings may use up.
 const FALSE_ALARM: f64 = 0.25e-3;
-const SPACINGS: [SubcarrierSpacing; 2] = [SubcarrierSpacing::Khz15, SubcarrierSpacing::Khz30];
 
 /// All SSBs of a recording, `antennas` channels at `rate_hz` around `centre_hz` (`None`: unknown),
-/// at whatever frequency and subcarrier spacing; the frequency with the strongest SSB first:
+/// at whatever frequency, and subcarrier spacing of its frequency range (range 1 if unknown); the
+/// frequency with the strongest SSB first:
 /// [`scan_raster`], then [`scan_off_raster`] for what is beside.
 ///
 /// # Errors
@@ -58,7 +58,7 @@ pub fn scan_raster(
     centre_hz: f64,
 ) -> Result<Vec<RasterFind>, ScanError> {
     let mut finds = Vec::new();
-    for spacing in SPACINGS {
+    for spacing in SubcarrierSpacing::of_range(centre_hz) {
         let reach = reach_hz(rate_hz, spacing);
         let points: Vec<_> = synchronization_raster(centre_hz - reach, centre_hz + reach).collect();
         if points.is_empty() {
@@ -98,7 +98,7 @@ pub fn scan_raster(
 ///
 /// The PSS is looked for at steps of half a subcarrier through the whole band; the places of the
 /// strongest maxima are then searched. An SSB belongs to a point of the global frequency
-/// raster (TS 38.104 §5.4.2.1: multiples of 5 kHz below 3 GHz, of 15 kHz above), which may be nearer
+/// raster (TS 38.104 §5.4.2.1, multiples of 15 kHz from 3 GHz on), which may be nearer
 /// than its carrier frequency offset. It is the phase between symbols that tells them apart (TS
 /// 38.211 §5.4), and where that leaves a doubt the smaller offset is preferred.
 ///
@@ -119,7 +119,7 @@ pub fn scan_off_raster(
     known: &[RasterFind],
 ) -> Result<Vec<RasterFind>, ScanError> {
     let mut finds: Vec<RasterFind> = Vec::new();
-    for spacing in SPACINGS {
+    for spacing in SubcarrierSpacing::of_range(centre_hz.unwrap_or(0.0)) {
         let reach = reach_hz(rate_hz, spacing);
         if reach.is_nan() || reach < 0.0 {
             continue;

@@ -3,6 +3,7 @@
 use num_complex::Complex32;
 
 use super::acquire::{Acquired, Acquirer};
+use crate::standard::band::{LikelyLmax, likely_lmax};
 use crate::standard::coding::rate_matching::E;
 use crate::standard::grid::PBCH_LEN;
 use crate::standard::message::payload::BchPayload;
@@ -19,11 +20,12 @@ const LONGEST_HALF_FRAMES: f64 = 32.0;
 /// How far from a multiple of 5 ms a repetition may lie, samples: clock drift.
 const PERIOD_TOLERANCE: f64 = 3.0;
 
-/// What a PBCH says, and the burst set size under which its checksum held.
+/// What a PBCH says, and the burst set size that it says it for.
 #[derive(Debug, Clone, Copy)]
 pub(crate) struct Broadcast {
     pub(crate) payload: BchPayload,
-    pub(crate) lmax: Lmax,
+    /// None where the PBCH says the same under another size, and the band leaves it open.
+    pub(crate) lmax: Option<Lmax>,
     /// Its resource elements, encoded again.
     pub(crate) symbols: [Complex32; PBCH_LEN],
 }
@@ -43,9 +45,8 @@ pub(crate) struct BroadcastDecoder {
     llrs: [f32; E],
     spacing: SubcarrierSpacing,
     /// The burst set size, when told.
-    lmax: Option<Lmax>,
-    /// Burst set sizes to try, the likelier first.
-    sizes: Vec<Lmax>,
+    told: Option<Lmax>,
+    size: LikelyLmax,
     undecoded: Vec<Undecoded>,
     half_frame_samples: f64,
 }
@@ -62,8 +63,8 @@ impl BroadcastDecoder {
             decoder: Decoder::default(),
             llrs: [0.0; E],
             spacing,
-            lmax,
-            sizes: burst_set_sizes(spacing, lmax, ssb_freq_hz),
+            told: lmax,
+            size: size(spacing, lmax, ssb_freq_hz),
             undecoded: Vec::with_capacity(KEPT),
             half_frame_samples: 5e-3 * spacing.base_rate_hz(),
         }
@@ -71,7 +72,7 @@ impl BroadcastDecoder {
 
     /// Moves to an SSB at another frequency.
     pub(crate) fn tune(&mut self, ssb_freq_hz: Option<f64>) {
-        self.sizes = burst_set_sizes(self.spacing, self.lmax, ssb_freq_hz);
+        self.size = size(self.spacing, self.told, ssb_freq_hz);
         self.forget();
     }
 
@@ -80,20 +81,38 @@ impl BroadcastDecoder {
         self.undecoded.clear();
     }
 
+    /// The likelier burst set size, before any PBCH has told.
     pub(crate) fn likely_lmax(&self) -> Lmax {
-        self.sizes.first().copied().unwrap_or(Lmax::L8)
+        self.size.likely
+    }
+
+    /// The same where there can be no other.
+    pub(crate) fn certain_lmax(&self) -> Option<Lmax> {
+        self.size.certain.then_some(self.size.likely)
+    }
+
+    /// Burst set sizes to try, the likelier first.
+    fn sizes(&self) -> impl Iterator<Item = Lmax> + use<> {
+        let likely = self.size.likely;
+        let other = match likely {
+            Lmax::L4 => Some(Lmax::L8),
+            Lmax::L8 => Some(Lmax::L4),
+            Lmax::L64 => None,
+        };
+        std::iter::once(likely).chain(other.filter(|_| self.told.is_none()))
     }
 
     /// Decodes the SSB that the acquirer holds.
     pub(crate) fn decode(&mut self, acquirer: &Acquirer, acquired: &Acquired) -> Option<Broadcast> {
         let &Acquired { pci, ibar_ssb, .. } = acquired;
         acquirer.log_likelihood_ratios(pci, &acquired.alignment, &mut self.llrs);
-        self.sizes.iter().find_map(|&lmax| {
+        let certain = self.certain_lmax();
+        self.sizes().find_map(|lmax| {
             let v = lmax.index_lsb(ibar_ssb);
             let decoded = self.decoder.decode(&self.llrs, pci, v, lmax).ok()??;
             fits(&decoded.payload, lmax, ibar_ssb).then(|| Broadcast {
                 payload: decoded.payload,
-                lmax,
+                lmax: told_by(&decoded.payload, lmax, ibar_ssb, certain),
                 symbols: decoded.symbols(),
             })
         })
@@ -142,7 +161,8 @@ impl BroadcastDecoder {
             }
         });
         let elapsed = i32::from(after_first(time));
-        self.sizes.iter().find_map(|&lmax| {
+        let certain = self.certain_lmax();
+        self.sizes().find_map(|lmax| {
             let v = lmax.index_lsb(ibar_ssb);
             let decoded = self
                 .decoder
@@ -151,7 +171,7 @@ impl BroadcastDecoder {
             let payload = moved(decoded.payload, elapsed);
             fits(&payload, lmax, ibar_ssb).then(|| Broadcast {
                 payload,
-                lmax,
+                lmax: told_by(&payload, lmax, ibar_ssb, certain),
                 symbols: pbch::encode(&payload, pci, lmax),
             })
         })
@@ -164,6 +184,13 @@ impl BroadcastDecoder {
         let off = (samples - half_frames * self.half_frame_samples).abs();
         (off < PERIOD_TOLERANCE).then(|| moved(payload, half_frames as i32))
     }
+}
+
+/// The size that a PBCH tells which decoded under `lmax`, `certain` where there can be but one. Of the
+/// first four SSBs of the first half frame, burst sets of 4 and of 8 send the same.
+fn told_by(payload: &BchPayload, lmax: Lmax, ibar_ssb: u8, certain: Option<Lmax>) -> Option<Lmax> {
+    let same = lmax != Lmax::L64 && ibar_ssb < 4 && !payload.half_frame;
+    if same { certain } else { Some(lmax) }
 }
 
 /// With four SSBs the DM-RS tells the half frame, and must tell the PBCH's.
@@ -183,23 +210,11 @@ fn moved(payload: BchPayload, half_frames: i32) -> BchPayload {
     result
 }
 
-/// Burst set sizes to try, the likelier first.
-fn burst_set_sizes(
-    spacing: SubcarrierSpacing,
-    lmax: Option<Lmax>,
-    ssb_freq_hz: Option<f64>,
-) -> Vec<Lmax> {
-    match lmax {
-        Some(lmax) => vec![lmax],
-        None if four_is_usual(spacing, ssb_freq_hz) => vec![Lmax::L4, Lmax::L8],
-        None => vec![Lmax::L8, Lmax::L4],
-    }
-}
-
-/// TS 38.213 §4.1: four SSBs up to 3 GHz. Without a frequency, 15 kHz speaks for the bands below.
-fn four_is_usual(spacing: SubcarrierSpacing, ssb_freq_hz: Option<f64>) -> bool {
-    match ssb_freq_hz {
-        Some(hz) if hz > 0.0 => hz <= 3e9,
-        _ => spacing == SubcarrierSpacing::Khz15,
-    }
+/// The size of burst sets that is told, or that the bands there have.
+fn size(spacing: SubcarrierSpacing, told: Option<Lmax>, ssb_freq_hz: Option<f64>) -> LikelyLmax {
+    let told = told.map(|likely| LikelyLmax {
+        likely,
+        certain: true,
+    });
+    told.unwrap_or_else(|| likely_lmax(spacing, ssb_freq_hz))
 }

@@ -14,12 +14,15 @@ pub struct DetectedSsb {
     pub pci: Pci,
     /// ī_SSB of its DM-RS: with `lmax` the low bits of the SSB index.
     pub ibar_ssb: u8,
-    /// SSB index; without a decoded PBCH as the DM-RS tells it for the likelier `lmax`.
+    /// SSB index; without a decoded PBCH as the DM-RS tells it for the likelier `lmax`, and of Lmax 64
+    /// its three low bits only.
     pub ssb_index: u8,
     /// Second half of the frame; unknown without a decoded PBCH at Lmax 8.
     pub half_frame: Option<bool>,
-    /// Burst set size under which the PBCH decoded, else the likelier.
-    pub lmax: Lmax,
+    /// Burst set size: told, by the PBCH of one of the cell's SSBs, or the only one of the bands there
+    /// (TS 38.213 §4.1). `None` where that leaves a doubt: of the first four SSBs of a frame, sets of
+    /// 4 and 8 send the same.
+    pub lmax: Option<Lmax>,
     /// MIB, system frame number and half frame, if the checksum held.
     pub payload: Option<BchPayload>,
     /// First sample of the SSB, its cyclic prefix included, at the base rate, to a fraction of a

@@ -111,9 +111,24 @@ impl Examiner {
 
     /// The SSBs found in this block, in order of time.
     pub(super) fn found_in_order(&mut self) -> &[DetectedSsb] {
+        self.settle_lmax();
         self.found
             .sort_unstable_by(|a, b| a.sample_start.total_cmp(&b.sample_start));
         &self.found
+    }
+
+    /// One SSB of a cell tells the burst set size of all.
+    fn settle_lmax(&mut self) {
+        for index in 0..self.found.len() {
+            let DetectedSsb { pci, lmax, .. } = self.found[index];
+            if lmax.is_some() {
+                let open = |ssb: &&mut DetectedSsb| ssb.pci == pci && ssb.lmax.is_none();
+                self.found
+                    .iter_mut()
+                    .filter(open)
+                    .for_each(|ssb| ssb.lmax = lmax);
+            }
+        }
     }
 
     /// What became of the candidates in this block.
@@ -211,17 +226,20 @@ impl Examiner {
         for (slot, ((grid, channel), noise)) in measurements.iter_mut().zip(inputs) {
             *slot = measure(grid, sss_power(channel), *noise);
         }
-        let lmax = broadcast.map_or_else(|| self.decoder.likely_lmax(), |broadcast| broadcast.lmax);
+        let lmax = broadcast.map_or_else(|| self.decoder.certain_lmax(), |it| it.lmax);
         let payload = broadcast.map(|broadcast| broadcast.payload);
         let half_frame = match (payload, lmax) {
             (Some(payload), _) => Some(payload.half_frame),
-            (None, Lmax::L4) => Some(acquired.ibar_ssb >= 4),
+            (None, Some(Lmax::L4)) => Some(acquired.ibar_ssb >= 4),
             (None, _) => None,
         };
+        let by_dmrs = lmax
+            .unwrap_or(self.decoder.likely_lmax())
+            .index_lsb(acquired.ibar_ssb);
         self.found.push(DetectedSsb {
             pci: acquired.pci,
             ibar_ssb: acquired.ibar_ssb,
-            ssb_index: lmax.index_lsb(acquired.ibar_ssb),
+            ssb_index: payload.map_or(by_dmrs, |payload| payload.ssb_index),
             half_frame,
             lmax,
             payload,

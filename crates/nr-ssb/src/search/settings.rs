@@ -15,7 +15,8 @@ pub struct SearchConfig {
     /// inside the symbols only (TS 38.211 §5.4 hides the rest) and is an order less precise. Zero
     /// for signals made without that phase.
     pub ssb_freq_hz: Option<f64>,
-    /// SSBs per burst set, when known. Else the one usual for the frequency is tried first.
+    /// SSBs per burst set, when known. Else the one that the bands at the frequency have is tried
+    /// first.
     pub lmax: Option<Lmax>,
     /// Carrier frequency offset around which is searched, Hz: that of a receiver whose oscillator
     /// is known from a cell it has found.

@@ -1,5 +1,6 @@
 //! What the standard says of an SSB: identities, layout in time and frequency, sequences, coding.
 
+pub mod band;
 pub mod coding;
 pub mod grid;
 pub mod message;

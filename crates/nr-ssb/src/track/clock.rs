@@ -58,6 +58,11 @@ impl ClockLoop {
         self.last_start + samples * (1.0 + self.drift)
     }
 
+    /// How long after the last SSB, in samples of the cell's clock, one was sent that began at `start`.
+    pub(super) fn sent_after(&self, start: f64) -> f64 {
+        (start - self.last_start) / (1.0 + self.drift)
+    }
+
     /// Time since the last SSB, seconds.
     pub(super) fn elapsed_s(&self, start: f64) -> f64 {
         (start - self.last_start).abs() / self.base_rate_hz

@@ -14,6 +14,7 @@ mod clock;
 mod despread;
 mod error;
 mod frequency;
+mod index;
 mod late;
 mod tracked;
 mod tracker;

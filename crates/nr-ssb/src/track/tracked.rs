@@ -12,7 +12,7 @@ use crate::standard::pci::Pci;
 pub struct Tracked<const A: usize> {
     /// The cell.
     pub pci: Pci,
-    /// The beam: SSB index, by DM-RS.
+    /// The beam: SSB index, by DM-RS; of 64 the three high bits by when it came.
     pub ssb_index: u8,
     /// Second half of the frame: by DM-RS at Lmax 4, else by the PBCH if decoded.
     pub half_frame: Option<bool>,

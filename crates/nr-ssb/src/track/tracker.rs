@@ -9,6 +9,7 @@ use super::clock::ClockLoop;
 use super::despread::despread;
 use super::error::TrackError;
 use super::frequency::FrequencyLoop;
+use super::index::SsbIndex;
 use super::late::REACH;
 use super::tracked::Tracked;
 use crate::dsp::alignment::Alignment;
@@ -19,6 +20,7 @@ use crate::receive::acquire::{Acquired, Acquirer};
 use crate::receive::broadcast::BroadcastDecoder;
 use crate::receive::measure::measure;
 use crate::search::{DetectedSsb, SearchConfig, SearchError};
+use crate::standard::band::likely_lmax;
 use crate::standard::grid::{SUBCARRIERS, SYMBOLS, SsbGrid};
 use crate::standard::message::payload::BchPayload;
 use crate::standard::numerology::Lmax;
@@ -40,7 +42,7 @@ const PHASE_SPREAD: f64 = (TAU * 60.0 / SYMBOL_FFT as f64) * (TAU * 60.0 / SYMBO
 /// Tracker of one cell; owns all plans and buffers.
 pub struct Tracker<const A: usize> {
     pci: Pci,
-    lmax: Lmax,
+    index: SsbIndex,
     base_rate_hz: f64,
     acquirer: Acquirer,
     decoder: BroadcastDecoder,
@@ -63,12 +65,14 @@ impl<const A: usize> Tracker<A> {
         }
         let base_rate_hz = config.spacing.base_rate_hz();
         let carrier_hz = config.ssb_freq_hz;
+        let likely = likely_lmax(config.spacing, carrier_hz).likely;
+        let lmax = cell.lmax.unwrap_or(likely);
         Ok(Self {
             pci: cell.pci,
-            lmax: cell.lmax,
+            index: SsbIndex::new(lmax, config.spacing, cell.ssb_index),
             base_rate_hz,
             acquirer: Acquirer::new(base_rate_hz, carrier_hz, A, 0.0),
-            decoder: BroadcastDecoder::new(config.spacing, Some(cell.lmax), carrier_hz),
+            decoder: BroadcastDecoder::new(config.spacing, Some(lmax), carrier_hz),
             beams: Beams::new(cell.pci, A),
             frequency: FrequencyLoop::new(cell, base_rate_hz),
             clock: ClockLoop::new(cell.sample_start, cell.cfo_hz, carrier_hz, base_rate_hz),
@@ -87,6 +91,7 @@ impl<const A: usize> Tracker<A> {
     pub fn found(&mut self, cell: &DetectedSsb, samples: f64) {
         self.frequency = FrequencyLoop::new(cell, self.base_rate_hz);
         self.clock.found(cell.sample_start, samples);
+        self.index.follow(cell.ssb_index);
         self.misses = 0;
     }
 
@@ -144,6 +149,12 @@ impl<const A: usize> Tracker<A> {
         };
         self.misses = 0;
         tracked.sample_start += window_start;
+        let sent_after = self.clock.sent_after(tracked.sample_start);
+        tracked.ssb_index = match tracked.payload {
+            Some(payload) => payload.ssb_index,
+            None => self.index.of(tracked.ssb_index, sent_after),
+        };
+        self.index.follow(tracked.ssb_index);
         let elapsed_s = self.clock.elapsed_s(tracked.sample_start);
         let (blocks, noise) = (&tracked.blocks, &tracked.noise_variance);
         self.frequency.follow(elapsed_s, blocks, noise);
@@ -246,14 +257,15 @@ impl<const A: usize> Tracker<A> {
             snr += power / noise.max(1e-30) / A as f64;
             measure(&grids[antenna], power, noise)
         });
-        let half_frame = match (payload, self.lmax) {
+        let half_frame = match (payload, self.index.lmax()) {
             (Some(BchPayload { half_frame, .. }), _) => Some(half_frame),
             (None, Lmax::L4) => Some(ibar_ssb >= 4),
             (None, _) => None,
         };
         Some(Tracked {
             pci: self.pci,
-            ssb_index: self.lmax.index_lsb(ibar_ssb),
+            // Of these, `track` makes index and place in the recording.
+            ssb_index: ibar_ssb,
             half_frame,
             sample_start: alignment.first_sample(),
             cfo_hz: self.cfo_hz(),

@@ -81,7 +81,8 @@ pub struct Burst {
     pub pci: Pci,
     /// Where its SSBs lie in the half frame.
     pub case: Case,
-    /// How many SSB indices it has: [`Lmax::L4`] or [`Lmax::L8`].
+    /// How many SSB indices it has: [`Lmax::L4`] or [`Lmax::L8`] for the cases A to C,
+    /// [`Lmax::L64`] for D and E.
     pub lmax: Lmax,
     /// MIB, SFN and half frame; each beam puts its own SSB index in.
     pub payload: BchPayload,
@@ -97,7 +98,7 @@ impl Burst {
     /// not yet applied.
     ///
     /// # Errors
-    /// [`Error::Fr2Layout`] for Lmax 64, else those of [`ssb_grid`].
+    /// [`Error::BurstSet`] for an `lmax` that the case does not have, else those of [`ssb_grid`].
     pub fn grids(&self) -> Result<Vec<(usize, SsbGrid)>, Error> {
         self.beams
             .iter()
@@ -145,8 +146,11 @@ impl Burst {
     }
 
     fn placed(&self, ssb_index: u8) -> Result<(usize, SsbGrid), Error> {
-        if self.lmax == Lmax::L64 {
-            return Err(Error::Fr2Layout);
+        if (self.lmax == Lmax::L64) != (self.case.lmax() == Lmax::L64) {
+            return Err(Error::BurstSet {
+                case: self.case.name(),
+                count: self.lmax.count(),
+            });
         }
         let payload = BchPayload {
             ssb_index,

@@ -33,7 +33,11 @@ pub struct Cell {
 impl Cell {
     /// A random cell of one SSB with unit gains of random phase.
     pub fn random(rng: &mut ChaCha8Rng, spacing: SubcarrierSpacing, antennas: usize) -> Self {
-        let lmax = if rng.random() { Lmax::L4 } else { Lmax::L8 };
+        let lmax = match spacing {
+            SubcarrierSpacing::Khz120 | SubcarrierSpacing::Khz240 => Lmax::L64,
+            _ if rng.random() => Lmax::L4,
+            _ => Lmax::L8,
+        };
         Self {
             pci: rng.random_range(0..1008),
             spacing,
@@ -47,10 +51,10 @@ impl Cell {
                 cell_barred: rng.random(),
                 ..Mib::default()
             },
-            ssb_freq_hz: if lmax == Lmax::L4 {
-                2.1e9 + 50e3
-            } else {
-                3.6e9
+            ssb_freq_hz: match lmax {
+                Lmax::L4 => 2.1e9 + 50e3,
+                Lmax::L8 => 3.6e9,
+                Lmax::L64 => 24_250.08e6 + 150.0 * 17.28e6,
             },
             delay: 500.0 + rng.random_range(0.0..20_000.0),
             cfo_hz: rng.random_range(-0.5..0.5) * spacing.hz(),
@@ -64,6 +68,8 @@ impl Cell {
         match self.spacing {
             SubcarrierSpacing::Khz15 => Case::A,
             SubcarrierSpacing::Khz30 => Case::C,
+            SubcarrierSpacing::Khz120 => Case::D,
+            SubcarrierSpacing::Khz240 => Case::E,
         }
     }
 

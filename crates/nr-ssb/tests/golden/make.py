@@ -141,6 +141,46 @@ def cases():
     yield "A", [s + 14 * n for n in range(4) for s in (2, 8)]
     yield "B", [s + 28 * n for n in range(2) for s in (4, 8, 16, 20)]
     yield "C", [s + 14 * n for n in range(4) for s in (2, 8)]
+    d = (0, 1, 2, 3, 5, 6, 7, 8, 10, 11, 12, 13, 15, 16, 17, 18)
+    yield "D", [s + 28 * n for n in d for s in (4, 8, 16, 20)]
+    yield "E", [s + 56 * n for n in d[:8] for s in (8, 12, 16, 20, 32, 36, 40, 44)]
+
+
+def prefixes(khz):
+    """(start, length) of the cyclic prefixes of a subframe, in units of T_c / (64 · 2^k) with k such
+    that an OFDM symbol has 256 (TS 38.211, 5.3.1)."""
+    mu = {15: 0, 30: 1, 120: 3, 240: 4}[khz]
+    start = 0
+    for symbol in range(14 * 2**mu):
+        kappa = 64
+        length = 144 * kappa >> mu
+        if symbol in (0, 7 * 2**mu):
+            length += 16 * kappa
+        unit = 2048 * kappa // 256 >> mu  # T_c per sample
+        assert length % unit == 0 and start % unit == 0
+        yield start // unit, length // unit
+        start += length + (2048 * kappa >> mu)
+
+
+# TS 38.331, 6.2.2, in the order of the message: each field alone, at its largest.
+MIB = [
+    ("systemFrameNumber", 6),
+    ("subCarrierSpacingCommon", 1),
+    ("ssb-SubcarrierOffset", 4),
+    ("dmrs-TypeA-Position", 1),
+    ("controlResourceSetZero", 4),
+    ("searchSpaceZero", 4),
+    ("cellBarred", 1),
+    ("intraFreqReselection", 1),
+    ("spare", 1),
+]
+
+
+def mibs():
+    first = 1  # after the choice bit
+    for name, width in MIB:
+        yield name, 2**width - 1, [int(first <= i < first + width) for i in range(24)]
+        first += width
 
 
 # Cells that between them have each remainder of the PCI, each Lmax and half frame, and MIBs of
@@ -189,6 +229,14 @@ def write():
         print("raster", 3 * n + (m - 3) // 2, 1200 * n + 50 * m)
     for n in (0, 356, 14756):
         print("raster", 7499 + n, 3_000_000 + 1440 * n)
+    for n in (0, 132, 4383):
+        print("raster", 22256 + n, 24_250_080 + 17_280 * n)
+    for khz in (15, 30, 120, 240):
+        all_of_them = list(prefixes(khz))
+        for symbol in (0, 1, len(all_of_them) // 2, len(all_of_them) // 2 + 1, len(all_of_them) - 1):
+            print("prefix", khz, symbol, *all_of_them[symbol])
+    for name, value, bits in mibs():
+        print("mib", name, value, packed(bits))
 
 
 def check(directory):

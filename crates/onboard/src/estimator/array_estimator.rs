@@ -23,10 +23,7 @@ pub struct ArrayEstimator<const N: usize> {
 /// When the array is not one that the `aoa` crate accepts.
 pub fn built_in(vehicle: &Vehicle) -> Result<Box<dyn AngleEstimator>, aoa::Error> {
     let method = match vehicle.estimator.method {
-        EstimatorMethod::Music => Method::Music {
-            grid_deg: vehicle.estimator.grid_deg,
-            refine: true,
-        },
+        EstimatorMethod::Music => Method::Music,
         EstimatorMethod::RootMusic => Method::RootMusic,
         EstimatorMethod::Esprit => Method::EspritLs,
         EstimatorMethod::MaximumLikelihood => Method::MaximumLikelihood,

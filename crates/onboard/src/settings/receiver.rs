@@ -112,21 +112,17 @@ impl Pilots {
 }
 
 /// `[estimator]`
-#[derive(Debug, Clone, Copy, PartialEq, Serialize, Deserialize, JsonSchema)]
+#[derive(Debug, Clone, Copy, PartialEq, Eq, Serialize, Deserialize, JsonSchema)]
 #[serde(default, deny_unknown_fields)]
 pub struct EstimatorSettings {
     /// The method.
     pub method: EstimatorMethod,
-    /// Grid of MUSIC in degrees, from which it is refined.
-    #[schemars(range(min = 0.001, max = 10.0))]
-    pub grid_deg: f64,
 }
 
 impl Default for EstimatorSettings {
     fn default() -> Self {
         Self {
             method: EstimatorMethod::MaximumLikelihood,
-            grid_deg: 1.0,
         }
     }
 }

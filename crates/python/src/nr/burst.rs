@@ -17,9 +17,10 @@ use pyo3::prelude::*;
 /// gains : sequence of complex, optional
 ///     Amplitude of each of them; 1 without.
 /// case : str
-///     Where they lie in time (TS 38.213, 4.1): `A` (15 kHz), `B` or `C` (30 kHz).
+///     Where they lie in time (TS 38.213, 4.1): `A` (15 kHz), `B` or `C` (30 kHz), `D` (120 kHz),
+///     `E` (240 kHz).
 /// lmax : int
-///     SSB indices that the cell has, 4 or 8.
+///     SSB indices that the cell has, 4 or 8; 64 for the cases `D` and `E`.
 /// sfn : int
 ///     System frame number, 0 to 1023.
 /// half_frame : bool
@@ -58,25 +59,13 @@ pub fn build_burst<'py>(
     sample_rate_hz: f64,
 ) -> PyResult<Bound<'py, PyArray1<Complex32>>> {
     let wrong = |error: nr_ssb::Error| PyValueError::new_err(error.to_string());
-    let case = match case {
-        "A" => Case::A,
-        "B" => Case::B,
-        "C" => Case::C,
-        other => {
-            return Err(PyValueError::new_err(format!(
-                "case is {other:?}; allowed: A, B, C"
-            )));
-        }
-    };
-    let lmax = match lmax {
-        4 => Lmax::L4,
-        8 => Lmax::L8,
-        other => {
-            return Err(PyValueError::new_err(format!(
-                "lmax is {other}; allowed: 4, 8"
-            )));
-        }
-    };
+    let named = Case::ALL.into_iter().find(|it| it.name() == case);
+    let case = named.ok_or_else(|| {
+        PyValueError::new_err(format!("case is {case:?}; allowed: A, B, C, D, E"))
+    })?;
+    let sized = Lmax::ALL.into_iter().find(|it| it.count() == lmax);
+    let lmax =
+        sized.ok_or_else(|| PyValueError::new_err(format!("lmax is {lmax}; allowed: 4, 8, 64")))?;
     let gains = gains.unwrap_or_else(|| vec![Complex32::ONE; ssb_indices.len()]);
     if gains.len() != ssb_indices.len() {
         return Err(PyValueError::new_err(format!(
@@ -96,7 +85,9 @@ pub fn build_burst<'py>(
         ssb_freq_hz,
     };
     let numerology = Numerology::from_sample_rate(case.spacing(), sample_rate_hz).map_err(wrong)?;
-    let samples = burst.iq(&mut Ofdm::new(numerology)).map_err(wrong)?;
+    let samples = py
+        .detach(|| burst.iq(&mut Ofdm::new(numerology)))
+        .map_err(wrong)?;
     Ok(PyArray1::from_vec(py, samples))
 }
 

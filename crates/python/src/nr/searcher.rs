@@ -23,7 +23,7 @@ use super::{Cell, complex_samples, rows, scan_error, subcarrier_spacing};
 /// ssb_freq_hz : float
 ///     Absolute frequency of the SSB's centre.
 /// scs_khz : int
-///     Subcarrier spacing, 15 or 30.
+///     Subcarrier spacing, 15, 30, 120 or 240.
 /// antennas : int
 ///     Number of antennas, 1 to 16; angles come with 2 to 8.
 /// spacing_wavelengths : float

@@ -18,14 +18,12 @@ const WINDOWS_S: [f64; 2] = [0.02, 0.16];
 /// looked through, of narrower bands more.
 const OFF_RASTER_BUDGET: f64 = 0.02 * 46.08e6 * 46.08e6;
 
-const BOTH_SPACINGS: [SubcarrierSpacing; 2] = [SubcarrierSpacing::Khz15, SubcarrierSpacing::Khz30];
-
 /// What a scan is told; by default nothing.
 #[derive(Debug, Clone, PartialEq, Default)]
 pub struct ScanSettings {
     /// Absolute frequency of the SSB's centre in Hz; else the synchronization raster is searched.
     pub ssb_freq_hz: Option<f64>,
-    /// Subcarrier spacing; else both are tried.
+    /// Subcarrier spacing; else both of the frequency range are tried.
     pub spacing: Option<SubcarrierSpacing>,
     /// Largest offset of the oscillators, of the transmitter and of the receiver together, in parts
     /// per million, where the frequency is given; else half a subcarrier.
@@ -59,12 +57,14 @@ pub fn scan(source: &mut dyn IqSource, settings: &ScanSettings) -> Result<Scan, 
         source,
     };
     let rate_hz = source.sample_rate_hz();
-    // A rate that no numerology can use is better said before anything else.
-    FrontEnd::new(rate_hz, 0.0, SubcarrierSpacing::Khz15.hz(), 1).map_err(front_end_failed)?;
     let centre_hz = settings
         .centre_frequency_hz
-        .or(source.centre_frequency_hz())
-        .ok_or_else(|| ScanError::NoCentreFrequency { file: file.clone() })?;
+        .or(source.centre_frequency_hz());
+    // A rate that no numerology can use is better said before anything else.
+    let [lowest, _] =
+        SubcarrierSpacing::of_range(settings.ssb_freq_hz.or(centre_hz).unwrap_or(0.0));
+    FrontEnd::new(rate_hz, 0.0, lowest.hz(), 1).map_err(front_end_failed)?;
+    let centre_hz = centre_hz.ok_or_else(|| ScanError::NoCentreFrequency { file: file.clone() })?;
     let mut antennas = Vec::new();
     let first_block = source.length().min((BLOCK_S * rate_hz) as u64) as usize;
     source.read(0, first_block, &mut antennas)?;
@@ -145,14 +145,13 @@ struct Place {
 
 fn given_places(rate_hz: f64, ssb_freq_hz: f64, spacing: Option<SubcarrierSpacing>) -> Vec<Place> {
     // A spacing that was asked for may fail; one that was only guessed is left out.
-    BOTH_SPACINGS
-        .into_iter()
-        .filter(|one| spacing.map_or(one.base_rate_hz() <= rate_hz, |wanted| wanted == *one))
-        .map(|spacing| Place {
-            ssb_freq_hz,
-            spacing,
-        })
-        .collect()
+    let guessed = SubcarrierSpacing::of_range(ssb_freq_hz).into_iter();
+    let possible = guessed.filter(|one| spacing.is_none() && one.base_rate_hz() <= rate_hz);
+    let place = |spacing| Place {
+        ssb_freq_hz,
+        spacing,
+    };
+    spacing.into_iter().chain(possible).map(place).collect()
 }
 
 /// Carrier frequency offsets looked at, to either side.
@@ -223,7 +222,8 @@ impl BandSearch {
     /// What looking at so many samples, on the raster and off it, comes to.
     fn looked(&self, rate_hz: f64, samples: [usize; 2], channels: usize) -> Vec<Looked> {
         let [on_raster_s, off_raster_s] = samples.map(|samples| samples as f64 / rate_hz);
-        let spacings = BOTH_SPACINGS.into_iter().filter(|one| {
+        let range = SubcarrierSpacing::of_range(self.centre_hz.unwrap_or(0.0));
+        let spacings = range.into_iter().filter(|one| {
             self.spacing.is_none_or(|it| it == *one) && raster::reach_hz(rate_hz, *one) >= 0.0
         });
         let mut looked = Vec::new();

@@ -4,6 +4,7 @@
 
 use std::f64::consts::{FRAC_1_SQRT_2, TAU};
 
+use nr_ssb::band::likely_lmax;
 use nr_ssb::burst::ssb_grid;
 use nr_ssb::grid::SUBCARRIERS;
 use nr_ssb::ofdm::symbol_phase;
@@ -96,11 +97,7 @@ impl IqAir {
         Ok(Self {
             numerology,
             case,
-            lmax: if ssb_freq_hz <= 3e9 {
-                Lmax::L4
-            } else {
-                Lmax::L8
-            },
+            lmax: likely_lmax(spacing, Some(ssb_freq_hz)).likely,
             ofdm: Ofdm::new(numerology),
             ssb_freq_hz,
             settings,

@@ -85,6 +85,14 @@ impl TruthSettings {
         vehicle: &Vehicle,
         check: Check<'_>,
     ) -> Result<(Site, Vehicle), SettingsError> {
+        let array = self.vehicle.get("array").and_then(Value::as_table);
+        check.that(
+            array.is_none_or(|array| !array.contains_key("channel_gains")),
+            "truth.vehicle.array.channel_gains",
+            "given",
+            "the gains of simulated channels are drawn: iq.channel_gain_db, iq.channel_phase_rad; a \
+             phase that calibration left is array.phase_rad",
+        )?;
         Ok((
             depart(site, &self.site, &SITE_FACTS, check)?,
             depart(vehicle, &self.vehicle, &VEHICLE_FACTS, check)?,

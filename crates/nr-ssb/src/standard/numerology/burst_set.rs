@@ -5,15 +5,18 @@ use crate::error::Error;
 /// How many SSBs a burst set can have.
 #[derive(Debug, Clone, Copy, PartialEq, Eq, PartialOrd, Ord, Hash)]
 pub enum Lmax {
-    /// Carriers up to 3 GHz (1.88 GHz where case C is used in TDD bands).
+    /// Carriers up to 3 GHz (below 1.88 GHz where case C is used in unpaired spectrum).
     L4,
-    /// Carriers up to 6 GHz.
+    /// Other carriers of frequency range 1.
     L8,
-    /// Frequency range 2; in this crate only in the coding chain.
+    /// Frequency range 2.
     L64,
 }
 
 impl Lmax {
+    /// All of them.
+    pub const ALL: [Self; 3] = [Self::L4, Self::L8, Self::L64];
+
     /// The number of SSB indices.
     pub const fn count(self) -> u8 {
         match self {

@@ -4,7 +4,7 @@ use super::burst_set::Lmax;
 use super::spacing::SubcarrierSpacing;
 use crate::error::Error;
 
-/// SSB pattern in time (TS 38.213 §4.1), frequency range 1.
+/// SSB pattern in time (TS 38.213 §4.1).
 #[derive(Debug, Clone, Copy, PartialEq, Eq, PartialOrd, Ord, Hash)]
 pub enum Case {
     /// 15 kHz, first symbols {2, 8} + 14n.
@@ -13,14 +13,23 @@ pub enum Case {
     B,
     /// 30 kHz, first symbols {2, 8} + 14n.
     C,
+    /// 120 kHz, first symbols {4, 8, 16, 20} + 28n, every fifth n left out.
+    D,
+    /// 240 kHz, first symbols {8, 12, 16, 20, 32, 36, 40, 44} + 56n, every fifth n left out.
+    E,
 }
 
 impl Case {
+    /// All of them.
+    pub const ALL: [Self; 5] = [Self::A, Self::B, Self::C, Self::D, Self::E];
+
     /// The pattern's subcarrier spacing.
     pub const fn spacing(self) -> SubcarrierSpacing {
         match self {
             Self::A => SubcarrierSpacing::Khz15,
             Self::B | Self::C => SubcarrierSpacing::Khz30,
+            Self::D => SubcarrierSpacing::Khz120,
+            Self::E => SubcarrierSpacing::Khz240,
         }
     }
 
@@ -30,26 +39,41 @@ impl Case {
             Self::A => "A",
             Self::B => "B",
             Self::C => "C",
+            Self::D => "D",
+            Self::E => "E",
         }
     }
 
-    /// First OFDM symbol of SSB `index` (0 to 7), counted from the start of its half frame.
+    /// The largest burst set that the pattern has places for.
+    pub const fn lmax(self) -> Lmax {
+        match self {
+            Self::A | Self::B | Self::C => Lmax::L8,
+            Self::D | Self::E => Lmax::L64,
+        }
+    }
+
+    /// First OFDM symbol of SSB `index`, counted from the start of its half frame.
     ///
     /// ```
     /// use nr_ssb::Case;
     /// let symbols: Vec<usize> = (0..8).map(|i| Case::B.start_symbol(i)).collect::<Result<_, _>>()?;
     /// assert_eq!(symbols, [4, 8, 16, 20, 32, 36, 44, 48]);
+    /// assert_eq!(Case::E.start_symbol(63)?, 492);
     /// # Ok::<(), nr_ssb::Error>(())
     /// ```
     ///
     /// # Errors
-    /// [`Error::SsbIndex`] beyond 7.
+    /// [`Error::SsbIndex`] beyond 7 for the cases A to C, beyond 63 for D and E.
     pub fn start_symbol(self, index: u8) -> Result<usize, Error> {
-        Lmax::L8.check_index(index)?;
+        self.lmax().check_index(index)?;
         let i = usize::from(index);
+        // Of frequency range 2's slots in pairs, every fifth is left free for uplink.
+        let n = |per_n: usize| i / per_n + i / (4 * per_n);
         Ok(match self {
             Self::A | Self::C => 14 * (i / 2) + 2 + 6 * (i % 2),
             Self::B => 28 * (i / 4) + 12 * (i / 2 % 2) + 4 + 4 * (i % 2),
+            Self::D => 28 * n(4) + 12 * (i / 2 % 2) + 4 + 4 * (i % 2),
+            Self::E => 56 * n(8) + 24 * (i / 4 % 2) + 8 + 4 * (i % 4),
         })
     }
 }

@@ -8,4 +8,5 @@ mod spacing;
 pub use burst_set::Lmax;
 pub use case::Case;
 pub use sampling::Numerology;
+pub(crate) use spacing::FR2_FROM_HZ;
 pub use spacing::SubcarrierSpacing;

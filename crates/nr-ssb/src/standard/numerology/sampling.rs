@@ -92,10 +92,7 @@ impl Numerology {
 
     /// 16κ: 16 samples at 30.72 Msps.
     const fn long_cp_extra(self) -> usize {
-        match self.spacing {
-            SubcarrierSpacing::Khz15 => self.fft_size / 128,
-            SubcarrierSpacing::Khz30 => self.fft_size / 64,
-        }
+        self.fft_size / 128 * (self.spacing.khz() / 15) as usize
     }
 }
 
@@ -106,7 +103,7 @@ mod tests {
 
     #[test]
     fn half_frame_is_five_milliseconds_at_every_rate() {
-        for spacing in [SubcarrierSpacing::Khz15, SubcarrierSpacing::Khz30] {
+        for spacing in SubcarrierSpacing::ALL {
             for fft_size in (1..=16).map(|n| 256 * n) {
                 let numerology = Numerology::new(spacing, fft_size).unwrap();
                 let expected = 5e-3 * numerology.sample_rate_hz();
@@ -122,9 +119,9 @@ mod tests {
 
     #[test]
     fn ssb_symbols_have_the_short_prefix() {
-        for case in [Case::A, Case::B, Case::C] {
+        for case in Case::ALL {
             let numerology = Numerology::new(case.spacing(), 512).unwrap();
-            for index in 0..8 {
+            for index in 0..case.lmax().count() {
                 let start = case.start_symbol(index).unwrap();
                 for symbol in start..start + 4 {
                     assert_eq!(numerology.cp_len(symbol), numerology.ssb_cp_len());

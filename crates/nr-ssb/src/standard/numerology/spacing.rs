@@ -1,20 +1,47 @@
 //! The subcarrier spacing.
 
-/// Subcarrier spacing of the SSB in frequency range 1.
+/// Where the raster of frequency range 2 begins (TS 38.104 Table 5.4.3.1-1), Hz.
+pub(crate) const FR2_FROM_HZ: f64 = 24.25e9;
+
+/// Subcarrier spacing of the SSB (TS 38.104 §5.4.3.3): 15 and 30 kHz in frequency range 1, 120 and
+/// 240 kHz in frequency range 2.
 #[derive(Debug, Clone, Copy, PartialEq, Eq, PartialOrd, Ord, Hash)]
 pub enum SubcarrierSpacing {
     /// 15 kHz, μ = 0.
     Khz15,
     /// 30 kHz, μ = 1.
     Khz30,
+    /// 120 kHz, μ = 3.
+    Khz120,
+    /// 240 kHz, μ = 4.
+    Khz240,
 }
 
 impl SubcarrierSpacing {
+    /// All of them.
+    pub const ALL: [Self; 4] = [Self::Khz15, Self::Khz30, Self::Khz120, Self::Khz240];
+
+    /// The spacing of so many kilohertz, if an SSB can have it.
+    pub fn from_khz(khz: u32) -> Option<Self> {
+        Self::ALL.into_iter().find(|spacing| spacing.khz() == khz)
+    }
+
+    /// Those of the frequency range that `frequency_hz` lies in.
+    pub fn of_range(frequency_hz: f64) -> [Self; 2] {
+        if frequency_hz < FR2_FROM_HZ {
+            [Self::Khz15, Self::Khz30]
+        } else {
+            [Self::Khz120, Self::Khz240]
+        }
+    }
+
     /// In kilohertz.
     pub const fn khz(self) -> u32 {
         match self {
             Self::Khz15 => 15,
             Self::Khz30 => 30,
+            Self::Khz120 => 120,
+            Self::Khz240 => 240,
         }
     }
 
@@ -30,10 +57,7 @@ impl SubcarrierSpacing {
 
     /// OFDM symbols in half a millisecond; the first of them has the longer cyclic prefix.
     pub const fn symbols_per_half_ms(self) -> usize {
-        match self {
-            Self::Khz15 => 7,
-            Self::Khz30 => 14,
-        }
+        7 * (self.khz() / 15) as usize
     }
 
     /// OFDM symbols in a half frame of 5 ms.

@@ -1,0 +1,275 @@
+//! One source in azimuth and elevation, by maximum likelihood, with an array of any shape.
+
+use num_complex::Complex64;
+
+use crate::array::manifold::{Direction, Manifold, Neighbourhood, dot, evenly_spread};
+use crate::bound;
+use crate::covariance::sample::Covariance;
+use crate::error::Error;
+use crate::linalg::matrix::Matrix;
+use crate::method::maximum_likelihood::{residual_power, snr};
+use crate::result::azimuth_elevation::DirectionEstimate;
+use crate::result::verdict::{Reason, Verdict};
+
+/// Directions of the first search lie so far apart, in units of the array's resolution: from the nearest
+/// one a source is seen with at least nine tenths of its power.
+const SPACING: f64 = 0.44;
+/// How much likelier the best direction must be than another one far from it.
+const LIKELIER: f64 = 100.0;
+/// Steps of the ascent: each leaves an error of the order of the noise.
+const STEPS: usize = 40;
+/// A step of this size ends the ascent: far below what any noise displaces.
+const SETTLED_RAD: f64 = 1e-9;
+
+/// Finds directions with the manifold `M` of `N` antennas.
+///
+/// Made once for an array: it holds the responses that every search begins with.
+///
+/// ```
+/// use aoa::{ArbitraryArray, Complex64, Covariance, Direction, DirectionFinder, Manifold};
+///
+/// let array = ArbitraryArray::<5>::circular(0.4)?;
+/// let finder = DirectionFinder::new(array, [0.0, 1.5])?;
+/// let response = array.response(Direction::new(2.0, 0.3));
+/// let snapshots = [response, response.map(|it| it * Complex64::I)];
+/// let found = finder.estimate(&Covariance::from_snapshots(&snapshots)?)?;
+/// assert!((found.direction.azimuth_rad - 2.0).abs() < 1e-6);
+/// assert!((found.direction.elevation_rad - 0.3).abs() < 1e-6);
+/// # Ok::<(), aoa::Error>(())
+/// ```
+#[derive(Debug, Clone)]
+pub struct DirectionFinder<M, const N: usize> {
+    manifold: M,
+    elevations_rad: [f64; 2],
+    resolution_rad: f64,
+    /// Directions all over, and the responses there, of unit length.
+    grid: Vec<(Direction, [Complex64; N])>,
+}
+
+/// A direction while it is sought.
+struct Candidate<const N: usize> {
+    direction: Direction,
+    around: Neighbourhood<N>,
+    /// `a^H R a / a^H a`.
+    beam: f64,
+}
+
+impl<M: Manifold<N>, const N: usize> DirectionFinder<M, N> {
+    /// Looks at the elevations from the first to the second, which may be the same: then only the
+    /// azimuth is estimated. An array whose elements lie in a horizontal plane does not tell above from
+    /// below, and asks for one of both.
+    ///
+    /// # Errors
+    /// [`Error::Elevations`].
+    pub fn new(manifold: M, elevations_rad: [f64; 2]) -> Result<Self, Error> {
+        let [lowest, highest] = elevations_rad;
+        let most = std::f64::consts::FRAC_PI_2 + 1e-9;
+        if !(-most <= lowest && lowest <= highest && highest <= most) {
+            return Err(Error::Elevations { lowest, highest });
+        }
+        // As many as a megabyte or so holds, however large the array.
+        let resolution_rad = manifold.resolution_rad().clamp(0.02, 1.0);
+        let grid = evenly_spread(elevations_rad, SPACING * resolution_rad)
+            .into_iter()
+            .map(|direction| {
+                let response = manifold.response(direction);
+                let length = dot(&response, &response).re.sqrt();
+                (direction, response.map(|element| element / length))
+            })
+            .collect();
+        Ok(Self {
+            manifold,
+            elevations_rad,
+            resolution_rad,
+            grid,
+        })
+    }
+
+    /// The manifold.
+    pub const fn manifold(&self) -> &M {
+        &self.manifold
+    }
+
+    /// Direction of the strongest source: the maximum of `a^H R a / a^H a`.
+    ///
+    /// The covariance is of the snapshots as received; gains of the channels belong to the manifold.
+    ///
+    /// # Errors
+    /// If the covariance is empty, zero or not finite.
+    pub fn estimate(&self, covariance: &Covariance<N>) -> Result<DirectionEstimate, Error> {
+        let covariance = covariance.validated()?;
+        let matrix = covariance.unscaled();
+        let trace = covariance.power() * covariance.weight() * N as f64;
+        let powers: Vec<f64> = self.grid.iter().map(|(_, a)| power(matrix, a)).collect();
+        let climb_from_best = |allowed: &dyn Fn(&Direction) -> bool| {
+            let allowed = self
+                .grid
+                .iter()
+                .zip(&powers)
+                .filter(|(point, _)| allowed(&point.0));
+            let best = allowed.max_by(|a, b| a.1.total_cmp(b.1))?;
+            Some(self.climb(matrix, trace, best.0.0))
+        };
+        let mut best = climb_from_best(&|_| true).ok_or(Error::Singular)?;
+        let mut other = climb_from_best(&|direction| best.is_far_from(direction));
+        if let Some(other) = other.as_mut().filter(|other| other.beam > best.beam) {
+            std::mem::swap(&mut best, other);
+        }
+        let snapshots = covariance.snapshots();
+        let snr = snr::<N>(best.beam, residual_power::<N>(trace, best.beam));
+        let covariance = bound::covariance_around(
+            &best.around,
+            best.direction,
+            snr,
+            snapshots,
+            !self.is_level(),
+        );
+        let alike = other
+            .filter(|other| best.is_far_from(&other.direction))
+            .is_some_and(|other| {
+                log_likelihood_ratio::<N>(trace, best.beam, other.beam) * (snapshots as f64)
+                    < LIKELIER.ln()
+            });
+        let [lowest, highest] = self.elevations_rad;
+        let elevation_rad = best.direction.elevation_rad;
+        // Overhead is no edge.
+        let margin = 3.0 * covariance[1][1].sqrt();
+        let low = elevation_rad - margin < lowest && lowest > -1.57;
+        let high = elevation_rad + margin > highest && highest < 1.57;
+        let doubt = if snr < bound::resolvable_snr::<N>(snapshots) {
+            Some(Reason::ThresholdSnr)
+        } else if alike {
+            Some(Reason::Ambiguous)
+        } else if !self.is_level() && (low || high) {
+            Some(Reason::EdgeOfElevations)
+        } else {
+            None
+        };
+        Ok(DirectionEstimate {
+            direction: best.direction,
+            covariance,
+            snr_db: 10.0 * snr.log10(),
+            verdict: doubt.map_or(Verdict::Resolved, Verdict::Unresolved),
+        })
+    }
+
+    /// Whether the elevation is given.
+    fn is_level(&self) -> bool {
+        self.elevations_rad[0] == self.elevations_rad[1]
+    }
+
+    fn candidate(&self, matrix: &Matrix<N>, direction: Direction) -> Candidate<N> {
+        let around = Neighbourhood::of(&self.manifold, direction);
+        let beam = power(matrix, &around.response) / around.power;
+        Candidate {
+            direction,
+            around,
+            beam,
+        }
+    }
+
+    /// Fisher scoring: steps uphill by the slope over the curvature that an exact source would have,
+    /// halved as long as they lead down.
+    fn climb(&self, matrix: &Matrix<N>, trace: f64, start: Direction) -> Candidate<N> {
+        let mut here = self.candidate(matrix, start);
+        for _ in 0..STEPS {
+            let mut step = self.scoring_step(matrix, trace, &here);
+            let mut next = self.candidate(matrix, self.moved(here.direction, step));
+            while next.beam < here.beam && step[0].hypot(step[1]) > SETTLED_RAD {
+                step = step.map(|it| 0.5 * it);
+                next = self.candidate(matrix, self.moved(here.direction, step));
+            }
+            let moved = here.direction.step_to(&next.direction);
+            if next.beam >= here.beam {
+                here = next;
+            }
+            if moved[0].hypot(moved[1]) <= SETTLED_RAD {
+                break;
+            }
+        }
+        here
+    }
+
+    /// A step within the elevations: beyond the edge it ends half-way to it, because at the edge itself
+    /// the slope may vanish.
+    fn moved(&self, from: Direction, step: [f64; 2]) -> Direction {
+        let [lowest, highest] = self.elevations_rad;
+        let to = from.moved(step);
+        let elevation_rad = if to.elevation_rad < lowest {
+            0.5 * (from.elevation_rad + lowest)
+        } else if to.elevation_rad > highest {
+            0.5 * (from.elevation_rad + highest)
+        } else {
+            to.elevation_rad
+        };
+        Direction::new(to.azimuth_rad, elevation_rad)
+    }
+
+    fn scoring_step(&self, matrix: &Matrix<N>, trace: f64, here: &Candidate<N>) -> [f64; 2] {
+        let around = &here.around;
+        let received: [Complex64; N] = std::array::from_fn(|i| {
+            matrix[i]
+                .iter()
+                .zip(&around.response)
+                .map(|(entry, a)| entry * a)
+                .sum()
+        });
+        let slope = [0, 1].map(|i: usize| {
+            let tangent = &around.tangents[i];
+            let along = dot(tangent, &received) - dot(tangent, &around.response) * here.beam;
+            2.0 * along.re / around.power
+        });
+        let signal = here.beam - residual_power::<N>(trace, here.beam);
+        // Where there is no source the curvature is small, and so must be the step.
+        let curvature = 2.0 * signal.max(0.1 * here.beam) / around.power;
+        let [[a, b], [_, c]] = around.metric.map(|row| row.map(|it| it * curvature));
+        let longest = 0.5 * self.resolution_rad;
+        let step = if self.is_level() {
+            [slope[0] / a, 0.0]
+        } else {
+            // Where a direction changes nothing (elevation at the horizon) it is left as it is.
+            let ridge = 1e-9 * (a + c);
+            let (a, c) = (a + ridge, c + ridge);
+            let determinant = a * c - b * b;
+            [
+                (c * slope[0] - b * slope[1]) / determinant,
+                (a * slope[1] - b * slope[0]) / determinant,
+            ]
+        };
+        let length = step[0].hypot(step[1]);
+        if length.is_finite() {
+            step.map(|it| it * (longest / length.max(longest)))
+        } else {
+            [0.0; 2]
+        }
+    }
+}
+
+impl<const N: usize> Candidate<N> {
+    /// Outside the main lobe, where the response to the first order is another one.
+    fn is_far_from(&self, direction: &Direction) -> bool {
+        let [x, y] = self.direction.step_to(direction);
+        let [[a, b], [_, c]] = self.around.metric;
+        a * x * x + 2.0 * b * x * y + c * y * y > self.around.power
+    }
+}
+
+/// `a^H R a`.
+fn power<const N: usize>(matrix: &Matrix<N>, a: &[Complex64; N]) -> f64 {
+    let mut power = 0.0;
+    for i in 0..N {
+        let mut row = Complex64::ZERO;
+        for j in 0..i {
+            row += matrix[i][j] * a[j];
+        }
+        power += 2.0 * (a[i].conj() * row).re + matrix[i][i].re * a[i].norm_sqr();
+    }
+    power
+}
+
+/// Logarithm of the ratio of two directions' likelihoods, per snapshot: that of a direction is
+/// `-ln(beam) - (N - 1) ln(noise)` (Jaffer 1988, concentrated).
+fn log_likelihood_ratio<const N: usize>(trace: f64, best: f64, other: f64) -> f64 {
+    let noise = |beam: f64| (trace - beam).max(trace * 1e-15);
+    (N - 1) as f64 * (noise(other) / noise(best)).ln() - (best / other).ln()
+}

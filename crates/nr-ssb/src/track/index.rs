@@ -1,0 +1,102 @@
+//! Which SSB of its burst set one is, by the three low bits of its index and by when it comes.
+
+use crate::standard::numerology::{Case, Lmax, Numerology, SubcarrierSpacing};
+
+/// SSBs of a burst set of 64 that share their DM-RS.
+const ALIKE: u8 = 8;
+
+/// The SSB indices of one cell.
+#[derive(Debug, Clone)]
+pub(super) struct SsbIndex {
+    lmax: Lmax,
+    spacing: SubcarrierSpacing,
+    last: u8,
+}
+
+impl SsbIndex {
+    /// From the index of the SSB that the cell was found by.
+    pub(super) const fn new(lmax: Lmax, spacing: SubcarrierSpacing, last: u8) -> Self {
+        Self {
+            lmax,
+            spacing,
+            last,
+        }
+    }
+
+    pub(super) const fn lmax(&self) -> Lmax {
+        self.lmax
+    }
+
+    /// The index of an SSB that was sent `samples` after the last one. Of 64, those that share their
+    /// DM-RS are half a millisecond apart at 120 kHz, a quarter at 240.
+    pub(super) fn of(&self, ibar_ssb: u8, samples: f64) -> u8 {
+        if self.lmax != Lmax::L64 {
+            return self.lmax.index_lsb(ibar_ssb);
+        }
+        let (Some(last), Some(half_frame)) = (self.place(self.last), self.half_frame()) else {
+            return ibar_ssb;
+        };
+        let off = |index: &u8| {
+            let expected = self
+                .place(*index)
+                .map_or(f64::INFINITY, |place| place - last);
+            let periods = (samples - expected) / half_frame;
+            (periods - periods.round()).abs()
+        };
+        let alike = (0..Lmax::L64.count() / ALIKE).map(|high| high * ALIKE + ibar_ssb % ALIKE);
+        let nearest = alike.min_by(|a, b| off(a).total_cmp(&off(b)));
+        nearest.unwrap_or(ibar_ssb)
+    }
+
+    /// Takes in what an SSB turned out to be.
+    pub(super) const fn follow(&mut self, index: u8) {
+        self.last = index;
+    }
+
+    /// First sample of an SSB in its half frame.
+    fn place(&self, index: u8) -> Option<f64> {
+        let case = match self.spacing {
+            SubcarrierSpacing::Khz240 => Case::E,
+            _ => Case::D,
+        };
+        let symbol = case.start_symbol(index).ok()?;
+        Some(self.numerology()?.symbol_start(symbol) as f64)
+    }
+
+    fn half_frame(&self) -> Option<f64> {
+        Some(self.numerology()?.half_frame_len() as f64)
+    }
+
+    fn numerology(&self) -> Option<Numerology> {
+        Numerology::new(self.spacing, 256).ok()
+    }
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    #[test]
+    fn time_tells_the_high_bits_of_an_index() {
+        for (case, spacing) in [
+            (Case::D, SubcarrierSpacing::Khz120),
+            (Case::E, SubcarrierSpacing::Khz240),
+        ] {
+            let numerology = Numerology::new(spacing, 256).unwrap();
+            let start = |index| {
+                let symbol = case.start_symbol(index).unwrap();
+                numerology.symbol_start(symbol) as f64
+            };
+            let known = SsbIndex::new(Lmax::L64, spacing, 21);
+            for index in 0..64 {
+                // Three periods of 20 ms later, a tenth of a millisecond off.
+                let later = 12.0 * numerology.half_frame_len() as f64;
+                let off = 1e-4 * numerology.sample_rate_hz();
+                let samples = start(index) - start(21) + later + off;
+                assert_eq!(known.of(index % 8, samples), index);
+            }
+        }
+        let few = SsbIndex::new(Lmax::L4, SubcarrierSpacing::Khz15, 1);
+        assert_eq!(few.of(6, 0.0), 2);
+    }
+}

@@ -1,0 +1,119 @@
+//! What recorded drives say of site and vehicle.
+
+use std::path::PathBuf;
+
+use numpy::{PyArray1, PyReadonlyArray1};
+use onboard::observation::SensedSsb;
+use pyo3::exceptions::PyValueError;
+use pyo3::prelude::*;
+use pyo3::types::PyTuple;
+use recording::replay::{Met, as_stated, innovations};
+use recording::{AngleLog, OdometryLog, read_angle_log};
+
+use crate::drive::{read_odometry, replay_error};
+use crate::recording::recording_error;
+use crate::settings::{Site, Vehicle};
+
+/// A recorded drive, odometry and angles, to be driven again and again.
+///
+/// Parameters
+/// ----------
+/// odometry : path-like
+///     CSV or MCAP, as `locate` takes it.
+/// angles : path-like
+///     CSV log of angles, as `locate` takes it.
+///
+/// Raises
+/// ------
+/// RecordingError
+///     An unusable file.
+#[pyclass(frozen, module = "access_av._core")]
+pub struct LoggedDrive {
+    odometry: OdometryLog,
+    angles: AngleLog,
+}
+
+#[pymethods]
+impl LoggedDrive {
+    #[new]
+    #[allow(clippy::needless_pass_by_value)] // what extraction yields
+    fn new(py: Python<'_>, odometry: PathBuf, angles: PathBuf) -> PyResult<Self> {
+        crate::arrays::look_up(py)?;
+        py.detach(|| {
+            let mut log = read_angle_log(&angles).map_err(recording_error)?;
+            let angles = &mut log.angles;
+            angles.sort_by(|a, b| a.measured.time_s.total_cmp(&b.measured.time_s));
+            Ok(Self {
+                odometry: read_odometry(&odometry, None, None).map_err(recording_error)?,
+                angles: log,
+            })
+        })
+    }
+
+    /// Number of angles.
+    fn __len__(&self) -> usize {
+        self.angles.angles.len()
+    }
+
+    /// PCI and SSB index of each angle, in order of time.
+    #[getter]
+    fn heads(&self) -> Vec<(u16, u8)> {
+        let ssbs = self.angles.angles.iter().map(|it| &it.ssb);
+        ssbs.map(|&SensedSsb { pci, ssb_index, .. }| (pci, ssb_index))
+            .collect()
+    }
+
+    /// Drive, and tell how far each angle is from what was expected of it.
+    ///
+    /// Parameters
+    /// ----------
+    /// site, vehicle : Site, Vehicle
+    ///     What is believed; the vehicle's start is this drive's.
+    /// used : array of bool, shape (n,), optional
+    ///     Which angles count; those that the tracker's gate lets through without.
+    ///
+    /// Returns
+    /// -------
+    /// residual_rad, variance_rad2 : array of float, shape (n,)
+    ///     Innovation of the electrical angle and its variance; NaN where there is none.
+    /// used : array of bool, shape (n,)
+    ///     Which counted.
+    ///
+    /// Raises
+    /// ------
+    /// SettingsError
+    ///     A vehicle without a start.
+    #[pyo3(signature = (site, vehicle, used = None))]
+    #[allow(clippy::needless_pass_by_value)] // what extraction yields
+    fn innovations<'py>(
+        &self,
+        py: Python<'py>,
+        site: &Site,
+        vehicle: &Vehicle,
+        used: Option<PyReadonlyArray1<'_, bool>>,
+    ) -> PyResult<Bound<'py, PyTuple>> {
+        let angles = &self.angles.angles;
+        let used = used.map(|used| used.as_array().to_vec());
+        if used.as_ref().is_some_and(|used| used.len() != angles.len()) {
+            let text = format!("`used` must have shape ({},)", angles.len());
+            return Err(PyValueError::new_err(text));
+        }
+        let met = py
+            .detach(|| {
+                let (site, vehicle) = as_stated(&site.0, &vehicle.0);
+                innovations(&site, &vehicle, &self.odometry, angles, used.as_deref())
+            })
+            .map_err(replay_error)?;
+        let number = |value: fn(&Met) -> f64| {
+            let of = move |it: &Option<Met>| it.as_ref().map_or(f64::NAN, value);
+            PyArray1::from_iter(py, met.iter().map(of))
+        };
+        let used = met.iter().map(|it| it.is_some_and(|it| it.used));
+        (
+            number(|it| it.residual_rad),
+            number(|it| it.variance),
+            PyArray1::from_iter(py, used),
+        )
+            .into_pyobject(py)
+    }
+}

@@ -1,0 +1,77 @@
+//! A scenario's drive as a log of the angles that the vehicle's receiver finds in it.
+
+use std::fs;
+use std::path::Path;
+
+use onboard::localize::tracker::TrackerConfig;
+use onboard::settings::{Check, TomlFile};
+use recording::{LoggedAngle, RecordingError, TimedPose};
+use recording::{write_angle_log, write_file, write_odometry_csv, write_tum};
+
+use crate::random::Streams;
+use crate::run::Simulation;
+use crate::scenario::Scenario;
+use crate::synth::SynthError;
+use crate::tape::Tape;
+
+/// Writes run `run` of a scenario into `directory`, up to `end_s`: `angles.csv` with the angle of
+/// every SSB, `odometry.csv`, the truth in `truth.tum`, `scenario.toml`, and what the vehicle
+/// believes in `site.toml` and `vehicle.toml`. Returns the number of angles.
+///
+/// The deviation of an angle is all of its error that is believed: noise, and the site's scatter,
+/// which is another half a wavelength on. The vehicle file says that.
+///
+/// # Errors
+/// [`SynthError`].
+pub fn log_angles(
+    scenario: &Scenario,
+    seed: u64,
+    run: u64,
+    end_s: f64,
+    directory: &Path,
+) -> Result<usize, SynthError> {
+    let simulation = Simulation::on_its_platform(scenario)?;
+    let file = &scenario.name;
+    Check { file }.that(
+        simulation.world().is_independent_of_listening(),
+        "fidelity",
+        "samples, latency or noisy SNR",
+        "a log of angles takes snapshots that are there at once, with the SNR as it is",
+    )?;
+    let mut vehicle = scenario.vehicle.clone();
+    let method = vehicle.estimator.method;
+    let tape = Tape::record(&simulation, &[method], Streams::new(seed, run), run)?;
+    let config = TrackerConfig::new(&scenario.site, &vehicle);
+    let scatter = config.array.scatter_variance(config.rician_k);
+    let angles: Vec<_> = tape
+        .angles_of(0)
+        .filter(|(ssb, _)| ssb.time_s <= end_s)
+        .map(|(ssb, mut measured)| {
+            measured.phase_sigma_rad = measured.phase_sigma_rad.hypot(scatter.sqrt());
+            LoggedAngle { ssb, measured }
+        })
+        .collect();
+    vehicle.receiver.phase_bias_share = Some(1.0);
+    vehicle.receiver.phase_bias_correlation_m = 0.5 * scenario.site.wavelength_m();
+    vehicle.receiver.phase_bias_correlation_s = 1e-3; // only the way forgets
+    vehicle.start.pose = vehicle.start.known.then_some(tape.told_start);
+    let truth: Vec<_> = (tape.truth().filter(|(time_s, _)| *time_s <= end_s))
+        .map(|(time_s, pose)| TimedPose { time_s, pose })
+        .collect();
+    let odometry: Vec<_> = (tape.odometry.iter().copied())
+        .filter(|sample| sample.time_s <= end_s)
+        .collect();
+
+    fs::create_dir_all(directory).map_err(|source| RecordingError::io(directory, source))?;
+    for (name, text) in [
+        ("site.toml", scenario.site.to_toml()),
+        ("vehicle.toml", vehicle.to_toml()),
+        ("scenario.toml", scenario.to_toml()),
+    ] {
+        write_file(&directory.join(name), text.as_bytes())?;
+    }
+    write_odometry_csv(&directory.join("odometry.csv"), &odometry)?;
+    write_tum(&directory.join("truth.tum"), &truth)?;
+    write_angle_log(&directory.join("angles.csv"), &angles)?;
+    Ok(angles.len())
+}

@@ -1,0 +1,110 @@
+"""A survey of site and array by ordinary drives."""
+
+from __future__ import annotations
+
+import json
+from typing import TYPE_CHECKING
+
+import numpy as np
+import polars as pl
+import pytest
+
+from access_av import InputError, Scenario, SettingsError, Site, columns, drives, survey
+
+if TYPE_CHECKING:
+    from collections.abc import Callable
+    from pathlib import Path
+
+    from conftest import Finished
+
+GATE_OFF_M = (1.2, -1.6)
+MOUNTING_OFF_RAD = 0.0175
+# Of χ² with ten degrees of freedom, which one survey in 10,000 exceeds.
+CHI2_10 = 35.56
+
+
+@pytest.fixture(scope="module")
+def logged(tmp_path_factory: pytest.TempPathFactory) -> Path:
+    """Two drives of 40 s past the yard's first radio head, which stands elsewhere than believed."""
+    scenario = Scenario.load("yard").with_overrides(
+        {
+            "truth.site.radio_heads.gate.position_m": [
+                -40.0 + GATE_OFF_M[0],
+                45.0 + GATE_OFF_M[1],
+                0.0,
+            ],
+            "truth.vehicle.array.mounting_rad": MOUNTING_OFF_RAD,
+        }
+    )
+    folder = tmp_path_factory.mktemp("drives")
+    for run in range(2):
+        drives.log_angles(scenario, folder / str(run), run=run, duration_s=40.0)
+    return folder
+
+
+def test_a_head_and_an_array_that_are_elsewhere_are_found(logged: Path) -> None:
+    found = survey("yard", str(logged / "0/vehicle.toml"), [logged / "0", logged / "1"])
+    by_key = {it.key: it for it in found.parameters}
+    truth = np.array([it.before for it in found.parameters])
+    for key, off in (
+        ("radio_heads[0].position_m[0]", GATE_OFF_M[0]),
+        ("radio_heads[0].position_m[1]", GATE_OFF_M[1]),
+        ("array.mounting_rad", MOUNTING_OFF_RAD),
+    ):
+        truth[list(by_key).index(key)] += off
+        assert by_key[key].is_learnt
+    error = np.array([it.found for it in found.parameters]) - truth
+    assert error @ np.linalg.solve(found.covariance, error) < CHI2_10
+    assert by_key["radio_heads[0].position_m[0]"].std < 0.6
+    # The dock is 300 m away: the drives say nothing of it, and it stays where it was.
+    assert not by_key["radio_heads[2].position_m[0]"].is_learnt
+    heads = json.loads(found.site.to_json())["radio_heads"]
+    assert heads[2]["position_m"] == [310.0, 85.0, 0.0]
+    assert heads[0]["position_m"][0] == by_key["radio_heads[0].position_m[0]"].found
+    # Noise is stated with care: the innovations are no larger than believed.
+    assert 0.3 < found.nis < 1.1
+
+
+def test_what_it_writes_locates_better(
+    access_av: Callable[..., Finished], logged: Path, tmp_path: Path
+) -> None:
+    out = tmp_path / "out"
+    one, vehicle = logged / "0", logged / "0/vehicle.toml"
+    done = access_av(
+        "survey", one, logged / "1", "--site", "yard", "--vehicle", vehicle, "--out", out
+    )
+    assert done.code == 0, done.err
+    rows = pl.read_parquet(out / "survey.parquet")
+    assert tuple(rows.columns) == columns.TABLES["survey"].columns
+    assert "nothing learnt" in done.out
+
+    def rms_m(site: str) -> float:
+        start = vehicle.read_text()
+        believed = tmp_path / "vehicle.toml"
+        believed.write_text((out / "vehicle.toml").read_text() if site != "yard" else start)
+        drive = drives.locate(site, one / "odometry.csv", one / "angles.csv", vehicle=believed)
+        error_m = drives.error_m(drive.poses, one / "truth.tum")["error_m"]
+        return float(np.sqrt(np.mean(error_m.to_numpy() ** 2)))
+
+    assert rms_m(str(out / "site.toml")) < 0.5 * rms_m("yard")
+
+
+def test_what_cannot_be_surveyed_is_named(logged: Path, tmp_path: Path) -> None:
+    vehicle = str(logged / "0/vehicle.toml")
+    with pytest.raises(InputError, match=r"neither odometry.csv nor odometry.mcap"):
+        survey("yard", vehicle, [tmp_path])
+    elsewhere = Site.load("yard").with_overrides(
+        {f"radio_heads[{index}].pci": 900 + index for index in range(4)}
+    )
+    with pytest.raises(InputError, match="no angle is to a radio head of yard"):
+        survey(elsewhere, vehicle, [logged / "0"])
+    lost = tmp_path / "lost"
+    lost.mkdir()
+    for name in ("odometry.csv", "angles.csv"):
+        (lost / name).write_bytes((logged / "0" / name).read_bytes())
+    (lost / "vehicle.toml").write_text('like = "tugger"\n')
+    with pytest.raises(InputError, match=r"start.pose"):
+        survey("yard", vehicle, [lost])
+    noisy = Scenario.load("yard").with_overrides({"vehicle.receiver.snr_noise_db": 1.0})
+    with pytest.raises(SettingsError, match="fidelity"):
+        drives.log_angles(noisy, tmp_path / "noisy")
