@@ -23,7 +23,7 @@ fn road() -> Road {
 
 /// A tracker with a good gyroscope and a poor odometer at the beginning of the road, with a map of
 /// it or without.
-fn tracker(map: bool) -> Tracker {
+fn tracker(map: bool, position_std_m: f64) -> Tracker {
     let site = Site::from_library("trip-1", &Shipped).unwrap();
     let text = "name = 'tug'\n[gyroscope]\nnoise_rad_per_sqrt_s = 1e-4\n\
                 [odometer]\nrate_hz = 10.0\nnoise_m_per_sqrt_m = 0.1\n\
@@ -33,7 +33,7 @@ fn tracker(map: bool) -> Tracker {
     config.yaw_rate_bias_std_radps = 0.0;
     let start = InitialPose {
         pose: road().pose(0.0),
-        position_std_m: 0.05,
+        position_std_m,
         heading_std_rad: 0.001,
     };
     Tracker::new(config, map.then(|| Arc::new(road())), &[], &start)
@@ -41,7 +41,7 @@ fn tracker(map: bool) -> Tracker {
 
 #[test]
 fn in_a_bend_it_corrects_the_odometer() {
-    let (road, mut tracker) = (road(), tracker(true));
+    let (road, mut tracker) = (road(), tracker(true, 0.05));
     let (mut read_m, mut along_m) = (0.0, 0.0);
     for number in 0..800 {
         let time_s = PERIOD_S * f64::from(number);
@@ -71,7 +71,7 @@ fn in_a_bend_it_corrects_the_odometer() {
 #[test]
 fn the_turn_while_samples_are_lost_is_not_known() {
     for map in [true, false] {
-        let mut tracker = tracker(map);
+        let mut tracker = tracker(map, 0.05);
         // It swings by 0.05 rad within 4 s; every fifth sample is lost.
         let heading_rad = |time_s: f64| 0.05 * (TAU * time_s / 4.0).sin();
         let mut worst_sigmas = 0.0_f64;
@@ -93,5 +93,26 @@ fn the_turn_while_samples_are_lost_is_not_known() {
             worst_sigmas = worst_sigmas.max(error_rad.abs() / variance.sqrt());
         }
         assert!(worst_sigmas < 4.0, "map {map}: {worst_sigmas}");
+    }
+}
+
+#[test]
+fn where_a_bend_begins_and_ends_is_where_the_vehicle_is() {
+    for ahead_m in [-1.5, 1.5] {
+        let (road, mut tracker) = (road(), tracker(true, 1.0));
+        for number in 0..800 {
+            let driven_m = 0.1 * f64::from(number);
+            let at = |driven_m: f64| road.pose(ahead_m + driven_m);
+            let turn_rad = at(driven_m).heading_rad - at(driven_m - 0.1).heading_rad;
+            tracker.odometry(&OdometrySample {
+                time_s: PERIOD_S * f64::from(number),
+                distance_m: driven_m,
+                speed_mps: 1.0,
+                yaw_rate_radps: Some(wrap_angle(turn_rad) / PERIOD_S),
+            });
+        }
+        let truth = road.pose(ahead_m + 79.9).point();
+        let off_m = tracker.pose(79.9).pose.point().distance_m(truth);
+        assert!(off_m < 0.75, "{off_m} m off, {ahead_m} m at first");
     }
 }
