@@ -249,7 +249,7 @@ pub fn direction_spectrum<'py>(
 /// >>> from access_av import aoa
 /// >>> corner = [[0, 0], [0.5, 0], [0, 0.5]]
 /// >>> [round(it, 3) for it in aoa.direction_crb_rad(corner, 0.3, 0.8, 20)]
-/// [0.011, 0.011]
+/// [0.009, 0.011]
 #[pyfunction]
 #[pyo3(signature = (places_wavelengths, azimuth_rad, elevation_rad, snr_db, *, snapshots=20))]
 pub fn direction_crb_rad(
