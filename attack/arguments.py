@@ -42,6 +42,7 @@ QUICK: dict[str, list[str]] = {
         "paths.csv", "--site", "site.toml", "--carrier-mhz", "3500", "--out", "paths.npz",
     ],
     "survey": ["drive", "--site", "site.toml", "--vehicle", "vehicle.toml"],
+    "tune": ["short.toml", "--designs", "2", "--runs", "1", "--max-rms-m", "1"],
     "readings": [],
     "columns": [],
 }  # fmt: skip

@@ -104,6 +104,7 @@ def test_located_drives(tmp_path: Path) -> None:
     check("smoothed", drive.smoothed)
     assert drive.smoothed["protection_level_m"].is_null().all()
     check("angles", drive.angles)
+    check("findings", drive.findings)
     check("located_errors", drives.error_m(drive.poses, tmp_path / "truth.tum"))
     without_gyroscope = pl.read_csv(odometry).columns
     assert without_gyroscope == list(columns.TABLES["odometry"].columns[:3])

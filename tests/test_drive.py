@@ -60,6 +60,7 @@ def test_dead_reckoning_states_none() -> None:
 
 def test_page_has_every_chart_and_loads_nothing(guarded: Simulation) -> None:
     page = render_drive(GUARDED, guarded, seed=4)
+    assert "Service levels" in page
     specs = json.loads(page.split("const charts = ")[1].split(";\n")[0])
     places = set(re.findall(r'class="chart" id="([^"]+)"', page))
     assert set(specs) == places == {"error", "executions", "stanford"}

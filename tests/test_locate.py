@@ -10,8 +10,11 @@ import polars as pl
 import pytest
 from mcap.reader import make_reader
 
-from access_av import Vehicle, drives
+from access_av import Site, Vehicle, drives
+from access_av._core import RecordingError
 from access_av.toml import tomllib
+from conftest import ROOT
+from robot import HEADS_M, RATE_HZ, TRACK_M, robot
 
 if TYPE_CHECKING:
     from collections.abc import Callable
@@ -268,3 +271,82 @@ def test_a_recording_of_two_antennas_is_refused(
     done = access_av(*given)
     assert done.code == 2
     assert "2 channels; the vehicle's array has 4" in done.err
+
+
+@pytest.mark.parametrize("by", ["distance", "speed", "speed alone", "distance alone"])
+def test_odometry_is_taken_as_it_is(tmp_path: Path, by: str) -> None:
+    told = robot()
+    rows = told.odometry.sort("time_s")
+    turned = (rows["yaw_rate_radps"] / RATE_HZ).cum_sum()
+    yaw, distance, speed = rows["yaw_rate_radps"], rows["distance_m"], rows["speed_mps"]
+    columns = {
+        "distance": {
+            "left_m": distance - 0.5 * TRACK_M * turned,
+            "right_m": distance + 0.5 * TRACK_M * turned,
+        },
+        "speed": {
+            "left_mps": speed - 0.5 * TRACK_M * yaw,
+            "right_mps": speed + 0.5 * TRACK_M * yaw,
+        },
+        "speed alone": {"speed_mps": speed, "yaw_rate_radps": yaw},
+        "distance alone": {"distance_m": distance, "yaw_rate_radps": yaw},
+    }
+    as_rows = told.rms_error_m(told.locate(tmp_path))
+    told.odometry = rows.select("time_s", **columns[by])
+    told.sheet = told.sheet.replace("odometer = {", f"odometer = {{ track_width_m = {TRACK_M},")
+    assert told.rms_error_m(told.locate(tmp_path)) == pytest.approx(as_rows, abs=0.01)
+
+
+def test_a_track_that_is_wider_than_stated_is_found(tmp_path: Path) -> None:
+    told = robot()
+    turned = (told.odometry["yaw_rate_radps"] / RATE_HZ).cum_sum()
+    told.odometry = told.odometry.select(
+        "time_s",
+        left_m=pl.col("distance_m") - 0.5 * TRACK_M * turned,
+        right_m=pl.col("distance_m") + 0.5 * TRACK_M * turned,
+    )
+    with pytest.raises(RecordingError, match=r"odometer\.track_width_m"):
+        told.locate(tmp_path)
+    told.sheet = told.sheet.replace(
+        "odometer = {", f"odometer = {{ track_width_m = {1.08 * TRACK_M}, track_width_std_m = 0.02,"
+    )
+    drive = told.locate(tmp_path)
+    found = drive.findings.row(by_predicate=pl.col("constant") == "gyroscope.scale", named=True)
+    assert found["stated_value"] == 1.0
+    assert abs(found["found_value"] - 1 / 1.08) < 4.0 * found["found_value_std"] < 0.05
+    assert told.rms_error_m(drive) < 0.1
+
+
+def test_the_report_shows_what_was_found(access_av: Cli, tmp_path: Path) -> None:
+    told = robot(60.0)
+    told.sheet += "integrity = {}\n"
+    arguments = told.write(tmp_path)
+    done = access_av(*arguments, "--truth", tmp_path / "truth.tum", "--smooth")
+    assert done.code == 0, done.err
+    page = (tmp_path / "out" / "report.html").read_text()
+    specs = json.loads(re.search(r"const charts = (\{.*\});", page).group(1))  # type: ignore[union-attr]
+    assert specs.keys() == {"track", "error", "angles", "heads"}
+    drawn = {name: json.dumps(spec) for name, spec in specs.items()}
+    for line in ("truth", "as driven", "smoothed", *map(str, HEADS_M)):
+        assert f'"{line}"' in drawn["track"], line
+    for line in ("error", "error, smoothed", "deviation", "protection level"):
+        assert f'"{line}"' in drawn["error"], line
+    for pci in HEADS_M:
+        assert f'"{pci}"' in drawn["heads"]
+    for constant in ("odometer.scale", "gyroscope.bias_radps", "array.mounting_rad"):
+        assert constant in page
+    assert (tmp_path / "out" / "findings.parquet").exists()
+
+
+def test_the_files_of_the_docs_can_be_used(access_av: Cli, tmp_path: Path) -> None:
+    page = (ROOT / "docs/locate.md").read_text(encoding="utf-8")
+    hall, vehicle = re.findall(r"```toml\n(.*?)```", page, re.DOTALL)
+    assert Site.from_toml(hall).to_json()
+    told = robot(60.0)
+    told.sheet = re.sub(r"^array = .*\n", "", vehicle, flags=re.MULTILINE)
+    done = access_av(*told.write(tmp_path), "--truth", tmp_path / "truth.tum")
+    assert done.code == 0, done.err
+    shown = access_av("locate", "--help", columns=200).out
+    for row in re.findall(r"^\| (?:odometry|the same|angles).*$", page, re.MULTILINE):
+        for column in re.findall(r"`(\w+_(?:s|m|mps|rad|radps|db)|pci|ssb_index)`", row):
+            assert column in shown or column == "rician_k_db", column

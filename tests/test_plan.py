@@ -11,7 +11,9 @@ import polars as pl
 import pytest
 
 from access_av import InputError, Scenario, columns, plan, service_levels, simulate
-from access_av.integrity_campaign import campaign, mismatches
+from access_av.campaign import Campaign
+from access_av.integrity_campaign import drive, mismatches
+from access_av.parts import Parts
 
 if TYPE_CHECKING:
     from collections.abc import Callable
@@ -132,18 +134,20 @@ def test_an_integrity_campaign_goes_on_where_it_stopped(
     def driven_again(*_: object, **__: object) -> None:
         raise AssertionError("it was kept")
 
-    monkeypatch.setattr("access_av.integrity_campaign.simulate", driven_again)
+    monkeypatch.setattr("access_av.integrity_campaign.driven", driven_again)
     assert json.loads(access_av(*arguments).out)["cases"] == record["cases"]
 
 
-def test_every_mismatch_can_be_driven() -> None:
+def test_every_mismatch_can_be_driven(tmp_path: Path) -> None:
     known = mismatches(SHORT)
+    kept = Campaign(Parts(tmp_path))
     assert {"none", "all heads 2 m off", "three heads hidden"} <= known.keys()
-    cases = campaign(SHORT, runs=1)
+    cases = drive(kept, SHORT, runs=1)
+    assert cases is not None
     assert [case.mismatch for case in cases] == list(known)
     with pytest.raises(InputError, match="there are none"):
-        campaign(SHORT, only=["nothing"])
+        drive(kept, SHORT, only=["nothing"])
     with pytest.raises(InputError, match="the site has 4"):
-        campaign(SHORT, heads=[5])
+        drive(kept, SHORT, heads=[5])
     with pytest.raises(InputError, match="write K=5"):
-        campaign(SHORT, channel_names=["K=x"])
+        drive(kept, SHORT, channel_names=["K=x"])

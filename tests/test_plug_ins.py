@@ -3,7 +3,9 @@
 from __future__ import annotations
 
 import re
+import runpy
 import warnings
+from types import SimpleNamespace
 from typing import TYPE_CHECKING, Any
 
 import numpy as np
@@ -214,3 +216,17 @@ def test_settings_are_copied_compared_hashed_and_pickled(make: Callable[..., Any
             assert other == one
             assert hash(other) == hash(one)
     assert one != make.load("yard" if make is not access_av.Vehicle else "tugger")  # type: ignore[attr-defined]
+
+
+def test_what_is_learned_stays_above_its_ceiling() -> None:
+    learn = SimpleNamespace(**runpy.run_path(str(ROOT / "examples/learned/learn.py")))
+    random = np.random.default_rng(3)
+    network = learn.Network(random)
+    untrained = next(learn.compare(network, random, 400))[1][0]
+    network.train(random, 400)
+    snr_db, learned, likely, ceiling = next(learn.compare(network, random, 400))
+    assert snr_db == -25.0
+    assert learned[0] < untrained
+    # Less than the least there is, only by chance: five standard errors of the same draws.
+    for cost, error in (learned, likely):
+        assert cost > ceiling[0] - 5.0 * error

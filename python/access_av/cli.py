@@ -22,6 +22,7 @@ from access_av.commands import (
     recordings,
     run,
     survey,
+    tune,
 )
 from access_av.errors import InputError
 from access_av.paper import codesign_command as codesign
@@ -55,7 +56,7 @@ def _options(
 
 
 for _room in (
-    *(paper, codesign, run, bound, radio, integrity, designs),
+    *(paper, codesign, run, bound, radio, integrity, designs, tune),
     *(recordings, drives, survey, profile, balance, columns),
 ):
     app.add_typer(_room.app)

@@ -178,6 +178,12 @@ _GLOSSARY = {
     ),
     "found_s": ("s", "Time until the first pose was known"),
     "found_m": ("m", "Distance driven until the first pose was known"),
+    # What a drive showed of its vehicle.
+    "constant": ("text", "Key of the vehicle's file; gyroscope.scale is 1 there"),
+    "constant_unit": ("text", "Its unit"),
+    "stated_value": ("any", "What the file states"),
+    "found_value": ("any", "What was found on the way, by the end of the drive"),
+    "found_value_std": ("any", "Standard deviation of found_value"),
     # Bound.
     "bound_m": ("m", "Least root mean square of the horizontal error of any localizer"),
     "along_std_m": ("m", "Its part along the road"),
@@ -377,7 +383,11 @@ TABLES: Mapping[str, Table] = {
             "An odometry sample",
             "`odometry.csv` of `access-av synth`; `access-av locate --odometry`",
             ("time_s", "distance_m", "speed_mps", "yaw_rate_radps"),
-            {"yaw_rate_radps": "there is no gyroscope; the column is absent then"},
+            {
+                "distance_m": "absent where the speeds tell it, or left and right wheel",
+                "speed_mps": "absent where the distances tell it, or left and right wheel",
+                "yaw_rate_radps": "there is no gyroscope; the column is absent then",
+            },
         ),
         Table(
             "poses",
@@ -397,9 +407,15 @@ TABLES: Mapping[str, Table] = {
             "angles",
             "An angle, and what became of it",
             "`angles.parquet` of `access-av locate`; `access_av.locate(…).angles`. A CSV log of "
-            "angles for `access-av locate --recording` has the first seven",
+            "angles for `access-av locate --recording` has some of the first seven: docs/locate.md",
             ("time_s", "pci", "ssb_index", "snr_db", *_ANGLE, "accepted", "reason", *_COMPARED),
             {**dict.fromkeys(_ANGLE, _NO_ANGLE), **dict.fromkeys(_COMPARED, _NOT_COMPARED)},
+        ),
+        Table(
+            "findings",
+            "A constant of the vehicle that the localizer estimates",
+            "`findings.parquet` of `access-av locate`; `access_av.locate(…).findings`",
+            ("constant", "constant_unit", "stated_value", "found_value", "found_value_std"),
         ),
         Table(
             "located_errors",

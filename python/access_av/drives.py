@@ -20,6 +20,11 @@ if TYPE_CHECKING:
 # Longest time between two poses of the truth between which it is taken for a straight line (s).
 MOST_TRUTH_GAP_S = 1.0
 
+# Share of the time that a drive may be lost without that being its result.
+MOST_LOST = 0.2
+
+FINDINGS = {"constant": pl.String, "constant_unit": pl.String}
+
 DATATYPES = ("ci16_le", "cf32_le")
 
 
@@ -157,7 +162,14 @@ class Drive:
     angles
         One row per angle: SSB, angle, and what the localizer did with it.
     remarks
-        What was wrong with single items of the input.
+        What was wrong with the input, or remarkable about the drive; of remarks that differ in
+        numbers only the first stands for all.
+    suspicions
+        Those of the remarks that say how the input may have been meant: as given its angles come
+        from elsewhere than expected.
+    findings
+        What the drive showed of the vehicle by its end: one row per constant, as stated and as
+        found, with its standard deviation; none where the localizer does not look for it.
     smoothed
         ``poses`` as seen from the end of the drive, from the first known one on; ``None`` unless
         asked for. Protection levels are not smoothed.
@@ -166,8 +178,21 @@ class Drive:
     poses: pl.DataFrame
     angles: pl.DataFrame
     remarks: list[str]
+    suspicions: list[str]
+    findings: pl.DataFrame
     _core: _core.LocatedDrive
     smoothed: pl.DataFrame | None = None
+
+    @property
+    def lost_share(self) -> float:
+        """Share of the time that the angles came from elsewhere than expected."""
+        return float(self.poses["lost"].mean() or 0.0)  # type: ignore[arg-type]
+
+    @property
+    def is_reliable(self) -> bool:
+        """Whether it was neither lost for long nor at its end, nor contradicts what was given."""
+        ends_lost = bool(self.poses["lost"][-1])
+        return not (self.lost_share > MOST_LOST or ends_lost or self.suspicions)
 
     def write_mcap(self, path: str | Path) -> None:
         """Write poses, verdicts and diagnostics as MCAP (ROS 2); no poses while searching."""
@@ -201,8 +226,10 @@ def locate(
     site
         Radio heads and, where there is one, the road; or the name or path of a site file.
     odometry
-        CSV with the columns ``time_s``, ``distance_m``, ``speed_mps`` and, from a gyroscope or from
-        the wheels, ``yaw_rate_radps``; or an MCAP file with ``nav_msgs/msg/Odometry``.
+        CSV with the columns ``time_s``, ``distance_m`` or ``speed_mps`` or both and, from a
+        gyroscope or from the wheels, ``yaw_rate_radps``; or of left and right wheel ``left_m`` and
+        ``right_m``, or ``left_mps`` and ``right_mps``, where the vehicle states
+        ``odometer.track_width_m``; or an MCAP file with ``nav_msgs/msg/Odometry``.
     recording
         SigMF recording of the array's samples, or a CSV log of angles with the columns ``time_s``,
         ``pci`` and either ``phase_rad`` (electrical angle) with ``phase_sigma_rad``, or
@@ -261,7 +288,15 @@ def locate(
     )
     angles = pl.DataFrame(located.angles).with_columns(pl.col(pl.Float64).fill_nan(None))
     smoothed = _poses(located.smoothed) if smooth else None
-    return Drive(_poses(located.poses), angles, located.remarks, located, smoothed)
+    return Drive(
+        poses=_poses(located.poses),
+        angles=angles,
+        remarks=located.remarks,
+        suspicions=located.suspicions,
+        findings=pl.DataFrame(located.findings, schema_overrides=FINDINGS),
+        smoothed=smoothed,
+        _core=located,
+    )
 
 
 def _poses(columns: Mapping[str, Any]) -> pl.DataFrame:
@@ -280,7 +315,7 @@ def read_tum(file: str | Path) -> pl.DataFrame:
     return pl.DataFrame(_core.read_tum(file)).sort("time_s")
 
 
-def error_m(poses: pl.DataFrame, truth: str | Path) -> pl.DataFrame:
+def error_m(poses: pl.DataFrame, truth: str | Path | pl.DataFrame) -> pl.DataFrame:
     """Horizontal error at the poses' times, the truth between its own times on a straight line.
 
     Parameters
@@ -289,7 +324,7 @@ def error_m(poses: pl.DataFrame, truth: str | Path) -> pl.DataFrame:
         Poses of a located drive; those before the first known one are passed over, and those that
         are before, after or in a gap of more than a second of the truth.
     truth
-        TUM trajectory, at times of its own.
+        TUM trajectory, at times of its own, or what :func:`read_tum` made of it.
 
     Raises
     ------
@@ -299,7 +334,8 @@ def error_m(poses: pl.DataFrame, truth: str | Path) -> pl.DataFrame:
         When it shares no time with the drive.
     """
     known = poses.filter(~pl.col("searching")).sort("time_s")
-    true = read_tum(truth).select("time_s", "x_m", "y_m")
+    true = truth if isinstance(truth, pl.DataFrame) else read_tum(truth)
+    true = true.select("time_s", "x_m", "y_m")
     before = true.rename({"x_m": "x0", "y_m": "y0"}).with_columns(t0="time_s")
     after = true.rename({"x_m": "x1", "y_m": "y1"}).with_columns(t1="time_s")
     both = (
@@ -308,7 +344,8 @@ def error_m(poses: pl.DataFrame, truth: str | Path) -> pl.DataFrame:
         .filter(pl.col("t1") - pl.col("t0") <= MOST_TRUTH_GAP_S)
     )
     if both.is_empty():
-        raise InputError(f"{truth}: no time in common with the drive")
+        which = "the truth" if isinstance(truth, pl.DataFrame) else truth
+        raise InputError(f"{which}: no time in common with the drive")
     span = pl.col("t1") - pl.col("t0")
     share = pl.when(span > 0).then((pl.col("time_s") - pl.col("t0")) / span).otherwise(0.0)
     dx = pl.col("x_m") - pl.col("x0") - share * (pl.col("x1") - pl.col("x0"))

@@ -2,7 +2,6 @@
 
 from __future__ import annotations
 
-import itertools
 import json
 from dataclasses import dataclass
 from typing import TYPE_CHECKING, Any
@@ -11,20 +10,24 @@ import numpy as np
 import polars as pl
 
 from access_av import _core
+from access_av.campaign import Task
 from access_av.errors import InputError
-from access_av.parts import Parts
-from access_av.simulation import simulate
+from access_av.simulation import Simulation
 from access_av.statistics.alarms import Alarms
 from access_av.statistics.consistency import horizontal_error_m
 from access_av.statistics.integrity import STATES, Integrity
 
 if TYPE_CHECKING:
     from collections.abc import Callable, Mapping, Sequence
-    from pathlib import Path
 
     from numpy.typing import NDArray
 
+    from access_av.campaign import Campaign
+
 Overrides = dict[str, Any]
+
+# Drives of a part: what is lost when a campaign is stopped.
+PART_RUNS = 5
 
 
 @dataclass(frozen=True)
@@ -161,7 +164,8 @@ def channels(names: Sequence[str]) -> dict[str, Overrides]:
     return found
 
 
-def campaign(
+def drive(
+    campaign: Campaign,
     scenario: _core.Scenario | str,
     *,
     runs: int = 20,
@@ -169,14 +173,14 @@ def campaign(
     only: Sequence[str] | None = None,
     channel_names: Sequence[str] = ("as set",),
     heads: Sequence[int] | None = None,
-    keep: Path | None = None,
-    threads: int | None = None,
     progress: Callable[[int, int], None] | None = None,
-) -> list[Case]:
+) -> list[Case] | None:
     """Drive a guarded scenario under every mismatch, channel and number of radio heads.
 
     Parameters
     ----------
+    campaign
+        Who drives, and where drives are kept.
     scenario
         A scenario, or the name or path of one. A vehicle without a guard gets one.
     runs, seed
@@ -187,17 +191,14 @@ def campaign(
         See :func:`channels`.
     heads
         Numbers of radio heads listened to, the first of the site; all of them when ``None``.
-    keep
-        Directory of finished cases: what is there is not driven again.
-    threads
-        Worker threads; all cores when ``None``.
     progress
-        Called as ``progress(done, total)`` with numbers of cases.
+        Called as ``progress(done, total)``.
 
     Returns
     -------
     list of Case
-        In the order mismatch, channel, heads.
+        In the order mismatch, channel, heads; ``None`` where parts are missing that another shard
+        computes.
 
     Raises
     ------
@@ -206,7 +207,12 @@ def campaign(
 
     Examples
     --------
-    >>> [case] = campaign("paper-real-odometry-4", runs=1, only=["none"])
+    >>> import tempfile
+    >>> from pathlib import Path
+    >>> from access_av.campaign import Campaign
+    >>> from access_av.parts import Parts
+    >>> kept = Campaign(Parts(Path(tempfile.mkdtemp())))
+    >>> [case] = drive(kept, "paper-real-odometry-4", runs=1, only=["none"])
     >>> case.as_record()["availability"] > 0.9
     True
     """
@@ -222,37 +228,50 @@ def campaign(
     for count in heads or ():
         if not 1 <= count <= len(cells):
             raise InputError(f"{count} radio heads: the site has {len(cells)}")
-    grid = list(
-        itertools.product(only or known, channels(channel_names).items(), heads or (len(cells),))
+    grid = [
+        (mismatch, channel, count, scenario.with_overrides({**over, **known[mismatch], **listens}))
+        for mismatch in only or known
+        for channel, over in channels(channel_names).items()
+        for count in heads or (len(cells),)
+        for listens in ({"vehicle.receiver.pci_allow_list": cells[:count]},)
+    ]
+    tasks = [
+        Task(
+            depends_on={"integrity": text, "first_run": first, "runs": count, "seed": seed},
+            work=driven,
+            arguments=(text, first, count, seed),
+        )
+        for *_, chosen in grid
+        for text in (chosen.to_toml(),)
+        for first in range(0, runs, PART_RUNS)
+        for count in (min(PART_RUNS, runs - first),)
+    ]
+    parts = campaign.run(tasks, progress)
+    here = [part for part in parts if part is not None]
+    if len(here) < len(parts):
+        return None
+    each = len(parts) // len(grid)
+    return [
+        Case(*case, pl.concat(map(_table, here[number * each : (number + 1) * each])))
+        for number, case in enumerate(grid)
+    ]
+
+
+def driven(scenario: str, first_run: int, runs: int, seed: int) -> dict[str, NDArray[Any]]:
+    """A part: errors, levels and states of every step, on one thread."""
+    found = Simulation.of(
+        _core.simulate(
+            _core.Scenario.from_toml(scenario),
+            runs,
+            seed,
+            first_run=first_run,
+            threads=1,
+            keep_trajectories=True,
+        )
     )
-    found = []
-    for done, (mismatch, (channel, over_channel), count) in enumerate(grid):
-        if progress is not None:
-            progress(done, len(grid))
-        listens = {} if count == len(cells) else {
-            "vehicle.receiver.pci_allow_list": cells[:count]
-        }  # fmt: skip
-        chosen = scenario.with_overrides({**over_channel, **known[mismatch], **listens})
-
-        def drive(chosen: _core.Scenario = chosen) -> Mapping[str, NDArray[Any]]:
-            return _drive(chosen, runs, seed, threads)
-
-        depends_on = [chosen.to_toml(), runs, seed]
-        arrays = drive() if keep is None else Parts(keep).get(depends_on, drive)
-        found.append(Case(mismatch, channel, count, chosen, _table(arrays)))
-    if progress is not None:
-        progress(len(grid), len(grid))
-    return found
-
-
-def _drive(
-    scenario: _core.Scenario, runs: int, seed: int, threads: int | None
-) -> dict[str, NDArray[Any]]:
-    """Errors, levels and states of every step, small."""
-    driven = simulate(scenario, runs=runs, seed=seed, threads=threads, keep_trajectories=True)
-    if driven.trajectories is None:  # they were asked for
+    if found.trajectories is None:  # they were asked for
         raise RuntimeError("the simulation kept no trajectories")
-    steps = driven.trajectories.filter(pl.col("protection_level_m").is_not_null())
+    steps = found.trajectories.filter(pl.col("protection_level_m").is_not_null())
     state = steps["integrity"].cast(pl.Enum(STATES)).to_physical()
     return {
         "run": steps["run"].to_numpy().astype(np.int32),

@@ -313,8 +313,10 @@ impl Onboard {
 
     /// What the drive has shown of odometer, yaw rate and clock, where the localizer looks for it.
     pub fn findings(&self) -> Option<Findings> {
-        let tracker = self.localizer.localizer().tracker();
-        tracker.map(Tracker::findings)
+        let mut findings = self.localizer.localizer().tracker()?.findings();
+        findings.lateness_s.stated += self.lateness_s;
+        findings.lateness_s.found += self.lateness_s;
+        Some(findings)
     }
 
     /// Keeps from now on what smoothing takes, where the localizer is a tracker without a guard,

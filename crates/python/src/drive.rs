@@ -6,6 +6,7 @@ use numpy::PyArray1;
 use onboard::Execution;
 use onboard::geometry::Pose;
 use onboard::localize::AngleMeasurement;
+use onboard::localize::tracker::Finding;
 use onboard::settings::{Site as CoreSite, Vehicle as CoreVehicle};
 use pyo3::exceptions::PyValueError;
 use pyo3::prelude::*;
@@ -13,7 +14,7 @@ use pyo3::types::PyDict;
 use recording::replay::{self, ReplayError, StartChoice};
 use recording::{
     Datatype, OdometryLog, Recording, RecordingError as CoreRecordingError, TimedPose,
-    read_angle_log, read_odometry_csv, read_odometry_mcap, write_drive_mcap, write_tum,
+    read_angle_log, read_odometry_mcap, read_wheel_odometry_csv, write_drive_mcap, write_tum,
 };
 use simulate::{SynthError, SynthSettings};
 
@@ -239,7 +240,8 @@ impl RecordedDrive<'_> {
         vehicle: &CoreVehicle,
         smooth: bool,
     ) -> Result<replay::LocatedDrive, ReplayError> {
-        let odometry = read_odometry(self.odometry, self.topic)?;
+        let track_width_m = vehicle.odometer.track_width_m;
+        let odometry = read_odometry(self.odometry, self.topic, track_width_m)?;
         if is(self.recording, "csv") {
             let angles = read_angle_log(self.recording)?;
             let (site, vehicle) = &replay::as_stated(site, vehicle);
@@ -264,11 +266,15 @@ fn is(path: &Path, extension: &str) -> bool {
 }
 
 /// Odometry from MCAP or CSV, by the name's ending.
-pub fn read_odometry(path: &Path, topic: Option<&str>) -> Result<OdometryLog, CoreRecordingError> {
+pub fn read_odometry(
+    path: &Path,
+    topic: Option<&str>,
+    track_width_m: Option<f64>,
+) -> Result<OdometryLog, CoreRecordingError> {
     if is(path, "mcap") {
         read_odometry_mcap(path, topic)
     } else {
-        read_odometry_csv(path)
+        read_wheel_odometry_csv(path, track_width_m)
     }
 }
 
@@ -294,6 +300,41 @@ impl LocatedDrive {
     fn remarks(&self) -> Vec<String> {
         let remarks = self.core.remarks.iter();
         remarks.map(|remark| remark.text.clone()).collect()
+    }
+
+    /// What the drive showed of the vehicle by its end: columns `constant`,
+    /// `constant_unit`, `stated_value`, `found_value` and `found_value_std`; empty where the localizer does not look for it.
+    #[getter]
+    fn findings<'py>(&self, py: Python<'py>) -> PyResult<Bound<'py, PyDict>> {
+        let rows: Vec<(&str, &str, Finding)> = self.core.findings.map_or_else(Vec::new, |it| {
+            vec![
+                ("odometer.scale", "1", it.odometer_scale),
+                ("gyroscope.scale", "1", it.yaw_rate_scale),
+                ("gyroscope.bias_radps", "rad/s", it.yaw_rate_bias_radps),
+                ("array.mounting_rad", "rad", it.mounting_rad),
+                ("array.phase_rad", "rad", it.phase_rad),
+                ("receiver.lateness_s", "s", it.lateness_s),
+            ]
+        });
+        let columns = PyDict::new(py);
+        columns.set_item("constant", rows.iter().map(|it| it.0).collect::<Vec<_>>())?;
+        columns.set_item(
+            "constant_unit",
+            rows.iter().map(|it| it.1).collect::<Vec<_>>(),
+        )?;
+        let column = |value: fn(&Finding) -> f64| {
+            PyArray1::from_iter(py, rows.iter().map(|(.., finding)| value(finding)))
+        };
+        columns.set_item("stated_value", column(|it| it.stated))?;
+        columns.set_item("found_value", column(|it| it.found))?;
+        columns.set_item("found_value_std", column(|it| it.std))?;
+        Ok(columns)
+    }
+
+    /// How the input may have been meant, where its angles contradict what was given.
+    #[getter]
+    fn suspicions(&self) -> Vec<String> {
+        self.core.suspicions.clone()
     }
 
     /// One pose per odometry sample: columns `time_s`, `x_m`, `y_m`, `heading_rad`, `speed_mps`,

@@ -44,7 +44,7 @@ impl LoggedDrive {
             let angles = &mut log.angles;
             angles.sort_by(|a, b| a.measured.time_s.total_cmp(&b.measured.time_s));
             Ok(Self {
-                odometry: read_odometry(&odometry, None).map_err(recording_error)?,
+                odometry: read_odometry(&odometry, None, None).map_err(recording_error)?,
                 angles: log,
             })
         })

@@ -36,6 +36,9 @@ const OPTIONAL: [&str; 6] = [
     "snr_db",
 ];
 
+/// Standard deviation of an angle of which nothing is known, π/√3 (rad).
+const MOST_SIGMA_RAD: f64 = 1.813_799_364_234_217_8;
+
 /// SNR (dB) of an angle of which none is stated: good enough for any policy.
 const UNSTATED_SNR_DB: f64 = 20.0;
 
@@ -85,7 +88,25 @@ impl fmt::Display for AngleRemark {
 /// remarked upon.
 pub fn read_angle_log(file: &Path) -> Result<AngleLog, RecordingError> {
     let mut log = AngleLog::default();
-    for row in Table::read(file, &REQUIRED, &OPTIONAL)?.rows {
+    let table = Table::read(file, &REQUIRED, &OPTIONAL)?;
+    let told = |column, sigma| table.has(column) && table.has(sigma);
+    if !told("phase_rad", "phase_sigma_rad") && !told("angle_rad", "angle_sigma_rad") {
+        let key = if table.has("phase_rad") {
+            "phase_sigma_rad"
+        } else if table.has("angle_rad") {
+            "angle_sigma_rad"
+        } else {
+            "phase_rad"
+        };
+        return Err(RecordingError::Missing {
+            file: file.display().to_string(),
+            key: key.to_owned(),
+            allowed: "the first line must name phase_rad and phase_sigma_rad, or angle_rad and \
+                      angle_sigma_rad"
+                .to_owned(),
+        });
+    }
+    for row in table.rows {
         match row.values.and_then(|values| angle(&values)) {
             Ok(angle) => log.angles.push(angle),
             Err(message) => log.remarks.push(AngleRemark {
@@ -127,13 +148,16 @@ fn angle(values: &[Option<f64>]) -> Result<LoggedAngle, String> {
     let snr_db = finite(snr_db, "snr_db")?.unwrap_or(UNSTATED_SNR_DB);
     let angle_rad = finite(angle_rad, "angle_rad")?;
     // Without a phase the deviation is that of the angle, until the array's spacing is known.
-    let positive = |value: Option<f64>, name: &str| match needed(value, name)? {
-        value if value > 0.0 => Ok(value),
+    let deviation = |value: Option<f64>, name: &str| match needed(value, name)? {
+        value if value > 0.0 && value < MOST_SIGMA_RAD => Ok(value),
+        value if value > 0.0 => Err(format!(
+            "{name} {value} says nothing of an angle; check its unit"
+        )),
         value => Err(format!("{name} {value} is not above 0")),
     };
     let (phase_rad, phase_sigma_rad) = match (finite(phase_rad, "phase_rad")?, angle_rad) {
-        (Some(phase_rad), _) => (phase_rad, positive(phase_sigma_rad, "phase_sigma_rad")?),
-        (None, Some(_)) => (f64::NAN, positive(angle_sigma_rad, "angle_sigma_rad")?),
+        (Some(phase_rad), _) => (phase_rad, deviation(phase_sigma_rad, "phase_sigma_rad")?),
+        (None, Some(_)) => (f64::NAN, deviation(angle_sigma_rad, "angle_sigma_rad")?),
         (None, None) => return Err("neither phase_rad nor angle_rad is there".to_owned()),
     };
     let angle_rad = angle_rad.unwrap_or(f64::NAN);

@@ -12,6 +12,7 @@ const MOST_BYTES: u64 = 512 << 20;
 #[derive(Debug)]
 pub struct Table {
     pub rows: Vec<Row>,
+    header: Vec<String>,
 }
 
 #[derive(Debug)]
@@ -60,7 +61,13 @@ impl Table {
                 values: values(line, header.len(), &wanted),
             })
             .collect();
-        Ok(Self { rows })
+        let header = header.into_iter().map(str::to_owned).collect();
+        Ok(Self { rows, header })
+    }
+
+    /// Whether there is a column of this name.
+    pub fn has(&self, name: &str) -> bool {
+        self.header.iter().any(|column| column == name)
     }
 }
 

@@ -20,6 +20,7 @@ mod file;
 mod library;
 pub mod mcap;
 mod odometry;
+mod odometry_csv;
 pub mod replay;
 mod road_file;
 pub mod scan;
@@ -32,9 +33,8 @@ pub use error::RecordingError;
 pub use file::write as write_file;
 pub use library::{Files, load};
 pub use mcap::{McapWriter, read_odometry_mcap, write_drive_mcap};
-pub use odometry::{
-    OdometryIssue, OdometryLog, OdometryRemark, read_odometry_csv, write_odometry_csv,
-};
+pub use odometry::{OdometryIssue, OdometryLog, OdometryRemark};
+pub use odometry_csv::{read_odometry_csv, read_wheel_odometry_csv, write_odometry_csv};
 pub use sigmf::{
     Annotation, Capture, Datatype, Recording, RecordingWarning, RecordingWriter, WriterSettings,
 };

@@ -1,12 +1,7 @@
 //! Recorded wheel odometry, whatever file it came from.
 
 use std::fmt;
-use std::fmt::Write as _;
-use std::path::Path;
 
-use crate::csv::Table;
-use crate::error::RecordingError;
-use crate::file as files;
 use onboard::observation::OdometrySample;
 
 /// A step in time this many times the usual one is a gap.
@@ -66,12 +61,19 @@ pub enum OdometryIssue {
         /// Time since the sample before, in seconds.
         gap_s: f64,
     },
+    /// A column is not there; what it would say is made of another.
+    Derived {
+        /// The column.
+        column: &'static str,
+        /// What takes its place.
+        from: &'static str,
+    },
 }
 
 impl OdometryIssue {
     /// Whether the item was used all the same.
     pub const fn used(&self) -> bool {
-        matches!(self, Self::Gap { .. })
+        matches!(self, Self::Gap { .. } | Self::Derived { .. })
     }
 }
 
@@ -88,6 +90,9 @@ impl fmt::Display for OdometryRemark {
                 write!(f, "left out, {time_s} s comes after {before_s} s")
             }
             OdometryIssue::Gap { gap_s } => write!(f, "{gap_s:.3} s after the one before"),
+            OdometryIssue::Derived { column, from } => {
+                write!(f, "{column} is not there and taken from {from}")
+            }
         }
     }
 }
@@ -123,6 +128,17 @@ impl OdometryCollector {
         let time_s = self.last().map_or(f64::NEG_INFINITY, |last| last.time_s);
         let remark = OdometryRemark {
             item,
+            time_s,
+            issue,
+        };
+        self.log.remarks.push(remark);
+    }
+
+    /// Remarks on the file itself.
+    pub fn remark(&mut self, issue: OdometryIssue) {
+        let time_s = f64::NEG_INFINITY;
+        let remark = OdometryRemark {
+            item: 1,
             time_s,
             issue,
         };
@@ -178,55 +194,4 @@ fn is_finite(sample: &OdometrySample) -> bool {
     ]
     .iter()
     .all(|value| value.is_finite())
-}
-
-/// Reads odometry from a CSV file with the columns `time_s`, `distance_m`, `speed_mps` and, where
-/// the vehicle has a gyroscope, `yaw_rate_radps`.
-///
-/// # Errors
-/// [`RecordingError`] when the file cannot be read or lacks a column. Single rows are only remarked
-/// upon.
-pub fn read_odometry_csv(file: &Path) -> Result<OdometryLog, RecordingError> {
-    let required = ["time_s", "distance_m", "speed_mps"];
-    let table = Table::read(file, &required, &["yaw_rate_radps"])?;
-    let mut collector = OdometryCollector::default();
-    for row in table.rows {
-        let sample = row.values.map(|values| {
-            let value = |index: usize| values.get(index).copied().flatten();
-            OdometrySample {
-                time_s: value(0).unwrap_or(f64::NAN),
-                distance_m: value(1).unwrap_or(f64::NAN),
-                speed_mps: value(2).unwrap_or(f64::NAN),
-                yaw_rate_radps: value(3),
-            }
-        });
-        collector.add(row.line, sample);
-    }
-    Ok(collector.finish())
-}
-
-/// Writes odometry as [`read_odometry_csv`] reads it.
-///
-/// # Errors
-/// [`RecordingError::Io`].
-pub fn write_odometry_csv(file: &Path, samples: &[OdometrySample]) -> Result<(), RecordingError> {
-    let with_yaw = samples.iter().any(|sample| sample.yaw_rate_radps.is_some());
-    let mut text = String::from("time_s,distance_m,speed_mps");
-    text += if with_yaw { ",yaw_rate_radps\n" } else { "\n" };
-    for sample in samples {
-        // Writing into a string does not fail.
-        let _ = write!(
-            text,
-            "{},{},{}",
-            sample.time_s, sample.distance_m, sample.speed_mps
-        );
-        if with_yaw {
-            text.push(',');
-            if let Some(rate) = sample.yaw_rate_radps {
-                let _ = write!(text, "{rate}");
-            }
-        }
-        text.push('\n');
-    }
-    files::write(file, text.as_bytes())
 }

@@ -85,7 +85,7 @@ fn bad_odometry_rows_are_reported_one_by_one_and_the_rest_is_kept() {
             .all(|remark| !remark.to_string().is_empty())
     );
 
-    fs::write(&file, "time_s,speed_mps\n0,1\n").unwrap();
+    fs::write(&file, "time_s,yaw_rate_radps\n0,1\n").unwrap();
     let error = read_odometry_csv(&file).unwrap_err();
     assert!(matches!(error, RecordingError::Missing { ref key, .. } if key == "distance_m"));
     assert!(matches!(

@@ -8,7 +8,7 @@ from typing import TYPE_CHECKING, Annotated
 
 import typer
 
-from access_av.commands.options import AllowLarge, Out, ScenarioArgument, load_scenario
+from access_av.commands.options import AllowLarge, AsJson, Out, ScenarioArgument, load_scenario
 from access_av.errors import InputError
 from access_av.terminal import console, errors, progress, show_warning
 
@@ -19,8 +19,8 @@ app = typer.Typer()
 
 MOST_REMARKS = 10
 
-# Share of the time that a drive may be lost without that being its result.
-MOST_LOST = 0.2
+# Exit code of a drive that was located, but not so that it could be relied on.
+UNRELIABLE = 3
 
 
 @app.command(
@@ -84,10 +84,7 @@ def synth(
 def locate(
     recording: Annotated[
         Path,
-        typer.Option(
-            help="SigMF recording, or CSV log of angles: time_s, pci, "
-            "phase_rad and phase_sigma_rad (or angle_rad and angle_sigma_rad); docs/locate.md."
-        ),
+        typer.Option(help="SigMF recording of the array, or CSV log of angles."),
     ],
     odometry: Annotated[Path, typer.Option(help="CSV, or MCAP with nav_msgs/Odometry.")],
     site: Annotated[str, typer.Option(help="Radio heads and road: shipped name, or TOML file.")],
@@ -112,18 +109,29 @@ def locate(
     smooth: Annotated[
         bool, typer.Option("--smooth", help="Also each pose by the angles that came after it.")
     ] = False,
+    as_json: AsJson = False,
 ) -> None:
     """Locate a recorded drive.
 
     Writes drive.mcap (poses with covariance and twist, verdicts, diagnostics), trajectory.tum,
-    poses.parquet, angles.parquet and report.html. Items of the input that cannot be used are
-    named, and the rest is used. Without an initial pose, in the vehicle file or by --start, the
-    vehicle is found along the road; that takes two radio heads or more. --smooth adds
-    smoothed.tum, smoothed.parquet and the topic /access_av/smoothed.
+    poses.parquet, angles.parquet, findings.parquet, manifest.json and report.html. Items of the
+    input that cannot be used are named, and the rest is used. Without an initial pose, in the
+    vehicle file or by --start, the vehicle is found: along the road by two radio heads or more,
+    elsewhere by three. --smooth adds smoothed.tum, smoothed.parquet and the topic
+    /access_av/smoothed.
+
+    Odometry, CSV: time_s; distance_m or speed_mps or both; yaw_rate_radps where something tells
+    it. Or left_m and right_m, or left_mps and right_mps, of wheels odometer.track_width_m apart.
+
+    Angles, CSV: time_s; pci; phase_rad and phase_sigma_rad, or angle_rad and angle_sigma_rad;
+    ssb_index and snr_db where known. docs/locate.md says more.
+
+    Exit code 0: located. 2: the input cannot be used. 3: located, but lost for more than a fifth of
+    the time or at the end, or the input contradicts itself; what to check is said.
     """
     from access_av import drives
     from access_av._core import Site, Vehicle
-    from access_av.files import ResultsDirectory
+    from access_av.files import ResultsDirectory, json_text
     from access_av.report.located import render_located
 
     from_scratch = start is not None and start.strip() == "scratch"
@@ -145,22 +153,41 @@ def locate(
     if drive.smoothed is not None and drive.smoothed.is_empty() and not _lost(drive):
         raise InputError(f"{vehicle}: --smooth needs localizer.kind = tracker")
     numbers = drives.summary(drive, truth)
+    true = None if truth is None else drives.read_tum(truth)
     drive.write_mcap(directory.path / "drive.mcap")
     drive.write_tum(directory.path / "trajectory.tum")
     directory.write_table("poses.parquet", drive.poses)
     directory.write_table("angles.parquet", drive.angles)
+    directory.write_table("findings.parquet", drive.findings)
     if drive.smoothed is not None:
         directory.write_table("smoothed.parquet", drive.smoothed)
         drive.write_smoothed_tum(directory.path / "smoothed.tum")
-    directory.write_text("report.html", render_located(drive, plant, carrier, numbers))
+    directory.write_text("report.html", render_located(drive, plant, carrier, numbers, true))
     directory.write_text("site.toml", plant.to_toml())
     directory.write_text("vehicle.toml", carrier.to_toml())
-    directory.write_manifest(recording=str(recording), odometry=str(odometry), **numbers)
+    told = {
+        **numbers,
+        "lost_share": drive.lost_share,
+        "remarks": drive.remarks,
+        "suspicions": drive.suspicions,
+    }
+    directory.write_manifest(recording=str(recording), odometry=str(odometry), **told)
     directory.link_latest()
+    if as_json:
+        print(json_text({**told, "directory": str(directory.path)}))
+    else:
+        _show(drive, numbers)
+        console.print(f"Files: {directory.path}", soft_wrap=True)
+    if not drive.is_reliable:
+        errors.print(_unreliable(drive), style="red", soft_wrap=True)
+        raise typer.Exit(UNRELIABLE)
+
+
+def _show(drive: Drive, numbers: dict[str, float]) -> None:
     for remark in drive.remarks[:MOST_REMARKS]:
         show_warning(remark)
     if len(drive.remarks) > MOST_REMARKS:
-        show_warning(f"{len(drive.remarks) - MOST_REMARKS} more like these")
+        show_warning(f"{len(drive.remarks) - MOST_REMARKS} more in report.html")
     console.print(
         f"{numbers['angles']:.0f} angles, {numbers['accepted']:.0f} accepted, "
         f"in {numbers['duration_s']:.1f} s."
@@ -170,7 +197,7 @@ def locate(
             f"Found after {numbers['found_m']:.1f} m and {numbers['found_s']:.1f} s from scratch."
         )
     elif _lost(drive):
-        console.print("Not found: several places on the road fit the angles.")
+        console.print("Not found: several places fit the angles.")
     if "rms_error_m" in numbers:
         console.print(
             f"Horizontal error: RMS {numbers['rms_error_m']:.3f} m, "
@@ -178,17 +205,21 @@ def locate(
         )
     if "smoothed_rms_error_m" in numbers:
         console.print(f"Smoothed: RMS {numbers['smoothed_rms_error_m']:.3f} m.")
-    console.print(f"Files: {directory.path}", soft_wrap=True)
-    share = float(drive.poses["lost"].mean() or 0.0)  # type: ignore[arg-type]
-    if share > MOST_LOST or bool(drive.poses["lost"][-1]):
-        errors.print(
-            f"not available: for {share:.0%} of the time the angles came from elsewhere than "
-            "expected. Check, in this order: start pose, array.mounting_rad (sign, mirrored "
-            "array), places and PCIs of the radio heads, phase_rad against angle_rad, the clocks.",
-            style="red",
-            soft_wrap=True,
-        )
-        raise typer.Exit(3)
+
+
+def _unreliable(drive: Drive) -> str:
+    lost = (
+        f"for {drive.lost_share:.0%} of the time the angles came from elsewhere than expected. "
+        if drive.lost_share
+        else ""
+    )
+    check = (
+        " ".join(f"{suspicion}." for suspicion in drive.suspicions)
+        if drive.suspicions
+        else "Check, in this order: start pose, array.mounting_rad (sign, mirrored array), places "
+        "and PCIs of the radio heads, phase_rad against angle_rad, the clocks."
+    )
+    return f"not to be relied on: {lost}{check}"
 
 
 def _lost(drive: Drive) -> bool:

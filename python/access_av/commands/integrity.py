@@ -34,6 +34,10 @@ def integrity(
     heads: Annotated[
         list[int] | None, typer.Option(min=1, help="Radio heads listened to; may be repeated.")
     ] = None,
+    shard: Annotated[
+        str, typer.Option(metavar="I/N", help="Only this share of the drives.")
+    ] = "1/1",
+    dask: Annotated[str | None, typer.Option(help="Address of a Dask scheduler.")] = None,
     out: Out = None,
     as_json: AsJson = False,
 ) -> None:
@@ -45,23 +49,28 @@ def integrity(
     """
     import polars as pl
 
+    from access_av import integrity_campaign
+    from access_av.campaign import Campaign, Shard, executor
     from access_av.files import ResultsDirectory, json_text
-    from access_av.integrity_campaign import campaign
+    from access_av.parts import Parts
     from access_av.report.integrity import render_integrity
 
     directory = ResultsDirectory.create("integrity", out)
-    with progress("Cases") as tick:
-        cases = campaign(
+    share = Shard.parse(shard)
+    with progress("Driving") as tick, executor(dask, threads) as (pool, workers):
+        cases = integrity_campaign.drive(
+            Campaign(Parts(directory.path / "parts"), pool, workers, share),
             scenario,
             runs=runs,
             seed=seed,
             only=mismatch,
             channel_names=channel or ("as set",),
             heads=heads,
-            keep=directory.path / "parts",
-            threads=threads,
             progress=tick,
         )
+    if cases is None:
+        console.print(f"Share {shard} is done; other shares are not: run them, then this again.")
+        return
     records = [case.as_record() for case in cases]
     directory.write_table("integrity.parquet", pl.DataFrame(records))
     directory.write_text("report.html", render_integrity(cases, records, runs, seed))

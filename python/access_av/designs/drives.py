@@ -81,6 +81,11 @@ class Driven:
         return float(np.sqrt(np.mean(self.square_m2)))
 
     @property
+    def p90_worst_m(self) -> float:
+        """Largest error of a run, in nine of ten."""
+        return float(np.quantile(self.worst_m, 0.9))
+
+    @property
     def mean_energy_j(self) -> float:
         """Mean energy of a trip."""
         return float(np.mean(self.energy_j))

@@ -28,7 +28,7 @@ def rows_of(driven: Sequence[Driven]) -> pl.DataFrame:
                 "runs": one.square_m2.size,
                 "energy_j": _known(one.mean_energy_j),
                 "rms_error_m": _known(one.rms_m),
-                "p90_max_error_m": _known(float(np.quantile(one.worst_m, 0.9))),
+                "p90_max_error_m": _known(one.p90_worst_m),
                 "executions": float(one.executions.mean()),
                 "listened": float(one.listened.mean()),
                 "on_front": index in on_front,

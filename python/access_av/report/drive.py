@@ -10,7 +10,7 @@ from typing import TYPE_CHECKING
 from access_av.errors import InputError
 from access_av.report import drive_charts as charts
 from access_av.report.page import sheet
-from access_av.report.parts import figure, source, tile
+from access_av.report.parts import figure, service_levels, source, tile
 
 if TYPE_CHECKING:
     from access_av._core import Scenario
@@ -57,6 +57,16 @@ def render_drive(scenario: Scenario, result: Simulation, seed: int) -> str:
         specs["stanford"] = charts.stanford(result.trajectories, alert_limit_m)
         sections.append(
             _section("Integrity", _integrity_text(integrity, alert_limit_m), figure("stanford"))
+        )
+    if levels := result.service_levels:
+        sections.append(
+            _section(
+                "Service levels",
+                "Horizontal accuracy and availability of TS 22.261, 7.3.2.2, and the industrial "
+                "target of TR 38.857, over all runs. Reached is what the low end of the 95 % "
+                "interval reaches.",
+                service_levels(levels),
+            )
         )
     sections.append(
         _section(

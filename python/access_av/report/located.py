@@ -2,16 +2,17 @@
 
 from __future__ import annotations
 
+import json
 from html import escape
 from importlib.metadata import version
 from typing import TYPE_CHECKING
 
-import altair as alt
 import polars as pl
 
-from access_av.report.chart import BLUE, ORANGE, finish, thinned
+from access_av import drives
+from access_av.report import located_charts as charts
 from access_av.report.page import sheet
-from access_av.report.parts import figure, source, table, tile
+from access_av.report.parts import figure, number, source, table, tile
 
 if TYPE_CHECKING:
     from access_av._core import Site, Vehicle
@@ -19,9 +20,16 @@ if TYPE_CHECKING:
     from access_av.report.chart import Spec
 
 MOST_REMARKS = 50
+UNRELIABLE = "Not to be relied on"
 
 
-def render_located(drive: Drive, site: Site, vehicle: Vehicle, numbers: dict[str, float]) -> str:
+def render_located(
+    drive: Drive,
+    site: Site,
+    vehicle: Vehicle,
+    numbers: dict[str, float],
+    truth: pl.DataFrame | None = None,
+) -> str:
     """A located drive as an HTML page that loads nothing.
 
     Parameters
@@ -32,137 +40,179 @@ def render_located(drive: Drive, site: Site, vehicle: Vehicle, numbers: dict[str
         What was believed of both.
     numbers
         What :func:`access_av.drives.summary` returned.
+    truth
+        What :func:`access_av.drives.read_tum` returned, where the truth is known.
     """
+    specs: dict[str, Spec] = {}
+    sections = []
+    if drive.remarks:
+        sections.append(_section("Remarks", "", _list(drive.remarks)))
     known = drive.poses.filter(~pl.col("searching"))
-    lines = {"as driven": known}
-    if drive.smoothed is not None and not drive.smoothed.is_empty():
-        lines["smoothed"] = drive.smoothed
-    specs = {"track": _track(lines), "sigma": _sigma(lines)}
-    sections = [
-        _section("Track", "Where the vehicle was, in the map's frame.", figure("track")),
-        _section(
-            "Uncertainty",
-            "Standard deviation of the position by the localizer's own covariance.",
-            figure("sigma"),
-        ),
-    ]
+    if not known.is_empty():
+        specs["track"] = charts.track(_tracks(drive, known, truth), _heads(site))
+        specs["error"] = charts.error(_errors(drive, known, truth))
+        sections += [
+            _section("Track", "Where the vehicle was, in the map's frame.", figure("track")),
+            _section("Error", _error_text(drive, numbers), figure("error")),
+        ]
+    if not drive.findings.is_empty():
+        sections.append(
+            _section(
+                "Found on the way",
+                "Constants of the vehicle, by the end of the drive, beside what its file states.",
+                _findings(drive.findings),
+            )
+        )
     if not drive.angles.is_empty():
-        specs["angles"] = _angles(drive.angles)
+        compared, places = _compared(drive.angles), ""
+        if not compared.is_empty():
+            specs |= {"angles": charts.angles(compared), "heads": charts.heads(compared)}
+            places = figure("angles") + figure("heads", title="By radio head")
         sections.append(
             _section(
                 "Angles",
-                "Squared Mahalanobis distance of each angle from what was expected.",
-                figure("angles") + _reasons(drive.angles),
-            )
-        )
-    if drive.remarks:
-        listed = "\n".join(drive.remarks[:MOST_REMARKS])
-        sections.append(
-            _section(
-                "Remarks",
-                f"{len(drive.remarks)} items of the input were remarkable.",
-                source("The first of them", listed),
+                "How far each angle was from what was expected of it, in standard deviations of "
+                "the difference; nine in ten are below the dashed line where all is as stated.",
+                places + _by_head(drive.angles),
             )
         )
     believed = source("Site, all defaults written out", site.to_toml())
     believed += source("Vehicle, all defaults written out", vehicle.to_toml())
     sections.append(_section("Provenance", "", believed))
-    share = numbers["accepted"] / max(1.0, numbers["angles"])
-    tiles = [
-        tile(f"{numbers['duration_s']:.1f} s", "duration"),
-        tile(f"{numbers['angles']:,.0f}", "angles"),
-        tile(f"{share:.1%}", "of them accepted"),
-    ]
-    headline = f"{numbers['angles']:,.0f} angles in {numbers['duration_s']:.0f} s"
-    if "rms_error_m" in numbers:
-        headline = f"{numbers['p90_error_m']:.2f} m or less in nine of ten epochs"
-        tiles.append(tile(f"{numbers['rms_error_m']:.3f} m", "RMS of the horizontal error"))
-        tiles.append(tile(f"{numbers['p90_error_m']:.3f} m", "its 90th percentile"))
     return sheet(
         specs,
         title="ACCESS-AV located drive",
         kicker="ACCESS-AV located drive",
-        headline=headline,
-        lead="",
-        tiles="".join(tiles),
+        headline=_headline(drive, numbers),
+        lead=escape(drive.suspicions[0]) + "." if drive.suspicions else "",
+        tiles=_tiles(drive, numbers),
         meta=escape(f"Version {version('access-av')}."),
         sections="".join(sections),
     )
 
 
-def _section(title: str, text: str, body: str) -> str:
-    return f"<section><h2>{escape(title)}</h2><p>{escape(text)}</p>{body}</section>"
+def _headline(drive: Drive, numbers: dict[str, float]) -> str:
+    if not drive.is_reliable:
+        return UNRELIABLE
+    if "p90_error_m" in numbers:
+        return f"{numbers['p90_error_m']:.2f} m or less in nine of ten epochs"
+    return f"{numbers['angles']:,.0f} angles in {numbers['duration_s']:.0f} s"
 
 
-def _track(lines: dict[str, pl.DataFrame]) -> Spec:
-    chart = (
-        alt.Chart(_together(lines, pl.col("x_m"), pl.col("y_m")))
-        .mark_line(strokeWidth=2)
-        .encode(
-            x=alt.X("x_m:Q", title="x / m", scale=alt.Scale(zero=False)),
-            y=alt.Y("y_m:Q", title="y / m", scale=alt.Scale(zero=False)),
-            order="time_s:Q",
-            color=_line_colour(lines),
-        )
+def _tiles(drive: Drive, numbers: dict[str, float]) -> str:
+    share = numbers["accepted"] / max(1.0, numbers["angles"])
+    tiles = {
+        "duration": f"{numbers['duration_s']:.1f} s",
+        "angles": f"{numbers['angles']:,.0f}",
+        "of them accepted": f"{share:.1%}",
+    }
+    if drive.lost_share:
+        tiles["of the time lost"] = f"{drive.lost_share:.1%}"
+    for name, text in {
+        "rms_error_m": "RMS of the horizontal error",
+        "p90_error_m": "its 90th percentile",
+        "smoothed_rms_error_m": "RMS, smoothed",
+    }.items():
+        if name in numbers:
+            tiles[text] = f"{numbers[name]:.3f} m"
+    if "nees_per_axis" in numbers:
+        tiles["NEES per axis; 1 is honest"] = f"{numbers['nees_per_axis']:.2f}"
+    if "beyond_while_ok" in numbers and drive.poses["integrity"].null_count() == 0:
+        tiles["of the time ok"] = f"{numbers['ok_share']:.1%}"
+        tiles["beyond the level while ok"] = f"{numbers['beyond_while_ok']:.2%}"
+    return "".join(tile(value, text) for text, value in tiles.items())
+
+
+def _tracks(
+    drive: Drive, known: pl.DataFrame, truth: pl.DataFrame | None
+) -> dict[str, pl.DataFrame]:
+    during = pl.col("time_s").is_between(drive.poses["time_s"][0], drive.poses["time_s"][-1])
+    lines = {"truth": truth.filter(during)} if truth is not None else {}
+    lines["as driven"] = known
+    if drive.smoothed is not None and not drive.smoothed.is_empty():
+        lines["smoothed"] = drive.smoothed
+    return lines
+
+
+def _errors(
+    drive: Drive, known: pl.DataFrame, truth: pl.DataFrame | None
+) -> dict[str, pl.DataFrame]:
+    lines = {}
+    if truth is not None:
+        lines["error"] = drives.error_m(known, truth)
+        if drive.smoothed is not None and not drive.smoothed.is_empty():
+            lines["error, smoothed"] = drives.error_m(drive.smoothed, truth)
+    deviation = (pl.col("covariance_xx_m2") + pl.col("covariance_yy_m2")).sqrt()
+    lines["deviation"] = known.select("time_s", error_m=deviation)
+    if known["protection_level_m"].null_count() < known.height:
+        lines["protection level"] = known.select("time_s", error_m="protection_level_m")
+    return lines
+
+
+def _error_text(drive: Drive, numbers: dict[str, float]) -> str:
+    text = "Standard deviation of the position by the localizer's own covariance"
+    if "rms_error_m" in numbers:
+        text += ", and the error against the truth"
+    if drive.poses["integrity"].null_count() < drive.poses.height:
+        text += "; the protection level is what the error is promised to stay below while ok"
+    return text + "."
+
+
+def _heads(site: Site) -> pl.DataFrame:
+    heads = json.loads(site.to_json())["radio_heads"]
+    return pl.DataFrame(
+        [
+            {
+                "name": head.get("name") or str(head["pci"]),
+                "x_m": float(head["position_m"][0]),
+                "y_m": float(head["position_m"][1]),
+            }
+            for head in heads
+        ],
+        schema={"name": pl.String, "x_m": pl.Float64, "y_m": pl.Float64},
     )
-    return finish(chart, height=300, description="Track of the vehicle")
 
 
-def _sigma(lines: dict[str, pl.DataFrame]) -> Spec:
-    sigma_m = (pl.col("covariance_xx_m2") + pl.col("covariance_yy_m2")).sqrt().alias("sigma_m")
-    chart = (
-        alt.Chart(_together(lines, sigma_m))
-        .mark_line(strokeWidth=2)
-        .encode(
-            x=alt.X("time_s:Q", title="time / s"),
-            y=alt.Y("sigma_m:Q", title="standard deviation / m"),
-            color=_line_colour(lines),
-        )
+def _compared(angles: pl.DataFrame) -> pl.DataFrame:
+    several_beams = angles["ssb_index"].n_unique() > 1
+    head = (
+        pl.format("{}/{}", "pci", "ssb_index") if several_beams else pl.col("pci").cast(pl.String)
     )
-    return finish(chart, height=220, description="Standard deviation of the position against time")
-
-
-def _together(lines: dict[str, pl.DataFrame], *columns: pl.Expr) -> pl.DataFrame:
-    return pl.concat(
-        thinned(poses.select("time_s", *columns)).with_columns(line=pl.lit(name))
-        for name, poses in lines.items()
+    return angles.drop_nulls("mahalanobis_squared").select(
+        "time_s",
+        head=head,
+        deviations=pl.col("mahalanobis_squared").sqrt(),
+        verdict=pl.when("accepted").then(pl.lit("accepted")).otherwise(pl.lit("refused")),
     )
 
 
-def _line_colour(lines: dict[str, pl.DataFrame]) -> alt.Color:
-    scale = alt.Scale(domain=list(lines), range=[BLUE, ORANGE][: len(lines)])
-    legend = alt.Legend(title=None) if len(lines) > 1 else None
-    return alt.Color("line:N", scale=scale, legend=legend)
-
-
-def _angles(angles: pl.DataFrame) -> Spec:
-    seen = thinned(
-        angles.drop_nulls("mahalanobis_squared").select(
-            "time_s",
-            "mahalanobis_squared",
-            verdict=pl.when("accepted").then(pl.lit("accepted")).otherwise(pl.lit("refused")),
-        )
+def _by_head(angles: pl.DataFrame) -> str:
+    reasons = (
+        angles.group_by("pci", "ssb_index", "reason")
+        .agg(pl.len(), nis=pl.col("mahalanobis_squared").mean())
+        .sort("pci", "ssb_index", "reason")
     )
-    dots = (
-        alt.Chart(seen)
-        .mark_circle(size=18, opacity=0.7)
-        .encode(
-            x=alt.X("time_s:Q", title="time / s"),
-            y=alt.Y("mahalanobis_squared:Q", title="distance²", scale=alt.Scale(type="symlog")),
-            color=alt.Color(
-                "verdict:N",
-                scale=alt.Scale(domain=["accepted", "refused"], range=[BLUE, ORANGE]),
-                legend=alt.Legend(title=None),
-            ),
-        )
-    )
-    return finish(dots, height=220, description="Distance of each angle from what was expected")
-
-
-def _reasons(angles: pl.DataFrame) -> str:
-    counted = angles.group_by("pci", "ssb_index", "reason").len().sort("pci", "ssb_index", "reason")
     rows = [
-        (str(pci), str(index), escape(reason), f"{count:,}")
-        for pci, index, reason, count in counted.iter_rows()
+        (str(pci), str(index), escape(reason), f"{count:,}", number(nis, 2))
+        for pci, index, reason, count, nis in reasons.iter_rows()
     ]
-    return table(("PCI", "SSB", "Verdict", "Angles"), rows, numbers=(0, 1, 3))
+    return table(("PCI", "SSB", "Verdict", "Angles", "Mean distance²"), rows, numbers=(0, 1, 3, 4))
+
+
+def _findings(findings: pl.DataFrame) -> str:
+    rows = [
+        (escape(quantity), f"{stated:.4f}", f"{found:.4f} ± {std:.4f}", escape(unit))
+        for quantity, unit, stated, found, std in findings.iter_rows()
+    ]
+    return table(("Quantity", "Stated", "Found", "Unit"), rows, numbers=(1, 2))
+
+
+def _list(remarks: list[str]) -> str:
+    items = "".join(f"<li>{escape(remark)}</li>" for remark in remarks[:MOST_REMARKS])
+    more = len(remarks) - MOST_REMARKS
+    return f"<ul>{items}</ul>" + (f"<p>{more} more.</p>" if more > 0 else "")
+
+
+def _section(title: str, text: str, body: str) -> str:
+    lead = f"<p>{escape(text)}</p>" if text else ""
+    return f"<section><h2>{escape(title)}</h2>{lead}{body}</section>"

@@ -8,6 +8,8 @@ from typing import TYPE_CHECKING, Any
 if TYPE_CHECKING:
     from collections.abc import Iterable, Sequence
 
+    from access_av.service_levels import Verdict
+
 
 def number(value: float | None, digits: int = 3) -> str:
     """A number as a reader wants it; a dash for none."""
@@ -75,6 +77,30 @@ def table(
         f'<div class="table"><table class="{kind}"><thead><tr>{top}</tr></thead>'
         f"<tbody>{body}</tbody></table></div>"
     )
+
+
+def service_levels(verdicts: Iterable[Verdict]) -> str:
+    """A table of 3GPP's positioning service levels, and which are reached."""
+    rows = [
+        (
+            escape(verdict.level.name),
+            f"{verdict.level.accuracy_m:g} m",
+            f"{verdict.level.availability:.4g}",
+            f"{verdict.share:.4f}",
+            f"{verdict.least_share:.4f}",
+            _reached(verdict),
+        )
+        for verdict in verdicts
+    ]
+    head = ("level", "accuracy", "availability asked", "share within", "at least (95 %)", "")
+    return table(head, rows, numbers=(1, 2, 3, 4))
+
+
+def _reached(verdict: Verdict) -> str:
+    if verdict.reached:
+        return badge("reached", "yes")
+    enough = verdict.share >= verdict.level.availability
+    return badge("too few drives to tell", "fit") if enough else badge("not reached", "no")
 
 
 def source(title: str, text: str) -> str:

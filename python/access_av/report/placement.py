@@ -9,7 +9,7 @@ from typing import TYPE_CHECKING
 from access_av.error_bound import MAP_TRAVEL_M, VISIBLE_SNR_DB
 from access_av.report import drive_charts as charts
 from access_av.report.page import sheet
-from access_av.report.parts import figure, number, source, table, tile
+from access_av.report.parts import figure, number, service_levels, source, table, tile
 
 if TYPE_CHECKING:
     from access_av.error_bound import ErrorBound
@@ -45,7 +45,10 @@ def render_bound(bound: ErrorBound) -> str:
         "<section><h2>Radio heads</h2><p>By the link budget, before shadowing and fading. Visible: "
         f"share of the route’s SSBs with an SNR of {VISIBLE_SNR_DB:g} dB or more, down to which "
         f"3GPP wants SSBs detected (TS 38.133).</p>{table(head, rows, numbers=range(1, 8))}"
-        "</section><section><h2>Provenance</h2>"
+        "</section><section><h2>Service levels</h2><p>Of TS 22.261, 7.3.2.2, and TR 38.857, with "
+        "Gaussian errors as small as the bound allows: what is not reached here no localizer "
+        f"reaches.</p>{service_levels(bound.verdicts)}</section>"
+        "<section><h2>Provenance</h2>"
         f"{source('Scenario, all defaults written out', scenario.to_toml())}</section>"
     )
     return sheet(

@@ -39,6 +39,14 @@ pub struct OdometerSettings {
     /// Standard deviation of a single reading of the speed, in m/s.
     #[schemars(range(min = 0.0, max = 10.0))]
     pub speed_noise_mps: f64,
+    /// Distance of the contact points of left and right wheel in metres, where these tell the yaw
+    /// rate.
+    #[serde(skip_serializing_if = "Option::is_none")]
+    #[schemars(range(min = 0.01, max = 10.0))]
+    pub track_width_m: Option<f64>,
+    /// Standard deviation of that in metres.
+    #[schemars(range(min = 0.0, max = 1.0))]
+    pub track_width_std_m: f64,
     /// Probability that a sample is lost.
     #[schemars(range(min = 0.0, max = 0.99))]
     pub dropout_probability: f64,
@@ -53,6 +61,8 @@ impl Default for OdometerSettings {
             noise_m_per_sqrt_m: 0.0,
             noise_m_per_sqrt_s: 0.0,
             speed_noise_mps: 0.0,
+            track_width_m: None,
+            track_width_std_m: 0.0,
             dropout_probability: 0.0,
         }
     }

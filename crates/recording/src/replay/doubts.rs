@@ -4,7 +4,7 @@ use std::collections::BTreeMap;
 use std::f64::consts::TAU;
 
 use onboard::geometry::wrap_angle;
-use onboard::settings::{Site, Vehicle};
+use onboard::settings::{DriveKind, Site, Vehicle};
 
 use super::error::ReplayError;
 use crate::angle_log::LoggedAngle;
@@ -58,10 +58,28 @@ pub fn doubts(
             *unknown.entry((it.ssb.pci, it.ssb.ssb_index)).or_default() += 1;
         }
     }
+    if !angles.is_empty() && unknown.values().sum::<usize>() == angles.len() {
+        let angles = angles.len();
+        return Err(ReplayError::UnknownRadioHeads { angles });
+    }
     for ((pci, index), count) in unknown {
         let text = format!(
             "{count} angles are of pci {pci}, ssb_index {index}, which the site does not have; they \
              are not used"
+        );
+        doubts.push((start_s, text));
+    }
+
+    let turns = |it: &&LoggedAngle| {
+        let told_rad = [it.measured.phase_rad, it.measured.angle_rad];
+        told_rad.iter().any(|told_rad| told_rad.abs() > TAU)
+    };
+    let beyond = angles.iter().filter(turns).count();
+    if 10 * beyond > angles.len() {
+        let text = format!(
+            "{beyond} of {} angles are of more than a whole turn; check whether phase_rad or \
+             angle_rad, and their deviation, are in degrees",
+            angles.len()
         );
         doubts.push((start_s, text));
     }
@@ -95,6 +113,16 @@ pub fn doubts(
         before_s = before_s.max(time_s);
     }
     doubts.extend(of_odometry(odometry));
+    if vehicle.drive == DriveKind::Differential
+        && !odometry
+            .samples
+            .iter()
+            .any(|it| it.yaw_rate_radps.is_some())
+    {
+        let text = "nothing tells how a differential drive turns: add yaw_rate_radps, or left and \
+                    right wheel, to the odometry";
+        doubts.push((start_s, text.to_owned()));
+    }
     Ok(doubts)
 }
 

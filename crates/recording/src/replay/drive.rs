@@ -5,17 +5,19 @@ use onboard::localize::Recovered;
 use onboard::localize::tracker::{Findings, OdometryVerdict};
 use onboard::observation::OdometrySample;
 use onboard::settings::{Platform, Site, Vehicle};
-use onboard::{Custom, Onboard};
+use onboard::{Custom, Execution, Onboard};
 
 use super::bursts::{Burst, OfSsb, first_burst};
 use super::error::ReplayError;
-use super::located::{LocatedDrive, LocatedPose, Remark};
+use super::located::{LocatedDrive, LocatedPose, Remark, gathered};
 use crate::library::load;
 use crate::odometry::OdometryLog;
 
-/// Departures of the odometer's scale, and of the angles' lateness (s), below which nobody minds.
+/// Departures of the odometer's scale, of the angles' lateness (s) and of the array's mounting (rad),
+/// below which nobody minds.
 const LEAST_SCALE: f64 = 0.03;
 const LEAST_LATENESS_S: f64 = 0.03;
+const LEAST_MOUNTING_RAD: f64 = 0.05;
 
 /// A drive being located.
 pub struct Replay<'a> {
@@ -90,9 +92,12 @@ impl<'a> Replay<'a> {
 
     /// Remarks on what the drive showed of the vehicle that its settings do not say.
     fn remark_on_findings(&mut self) {
-        let Some(findings) = self.onboard.findings() else {
+        let Some(findings) = self.drive.findings else {
             return;
         };
+        if !self.drive.suspicions.is_empty() {
+            return; // found where the vehicle never was
+        }
         let time_s = self
             .drive
             .poses
@@ -101,6 +106,7 @@ impl<'a> Replay<'a> {
         let Findings {
             odometer_scale,
             lateness_s,
+            mounting_rad,
             ..
         } = findings;
         if odometer_scale.is_remarkable(LEAST_SCALE) {
@@ -110,10 +116,18 @@ impl<'a> Replay<'a> {
             );
             self.remark(time_s, text);
         }
+        if mounting_rad.is_remarkable(LEAST_MOUNTING_RAD) {
+            let text = format!(
+                "the array's axis is at {:.3} ± {:.3} rad, not at {:.3}; check array.mounting_rad",
+                mounting_rad.found, mounting_rad.std, mounting_rad.stated
+            );
+            self.remark(time_s, text);
+        }
         if lateness_s.is_remarkable(LEAST_LATENESS_S) {
             let text = format!(
-                "angles are {:.0} ± {:.0} ms later than stated; check receiver.lateness_s",
-                1e3 * lateness_s.found,
+                "angles are {:.0} ± {:.0} ms later than stated, by the odometry's clock; check \
+                 receiver.lateness_s, and whether the odometry is of commands",
+                1e3 * (lateness_s.found - lateness_s.stated),
                 1e3 * lateness_s.std
             );
             self.remark(time_s, text);
@@ -149,10 +163,9 @@ impl<'a> Replay<'a> {
     /// [`ReplayError::Custom`].
     pub fn finish(mut self) -> Result<LocatedDrive, ReplayError> {
         self.odometry_until(f64::INFINITY)?;
+        self.drive.findings = self.onboard.findings();
         self.remark_on_findings();
-        self.drive
-            .remarks
-            .sort_by(|a, b| a.time_s.total_cmp(&b.time_s));
+        self.drive.remarks = gathered(self.drive.remarks);
         Ok(self.drive)
     }
 
@@ -182,6 +195,19 @@ impl<'a> Replay<'a> {
     /// Remarks on something that is not the pipeline's to see.
     pub fn remark(&mut self, time_s: f64, text: String) {
         self.drive.remarks.push(Remark { time_s, text });
+    }
+
+    /// The angles so far and what became of them.
+    pub fn executions(&self) -> &[Execution] {
+        &self.drive.executions
+    }
+
+    /// Says how the input may have been meant.
+    pub fn suspect(&mut self, text: String) {
+        let first = self.drive.poses.first();
+        let time_s = first.map_or(f64::NEG_INFINITY, |first| first.estimate.time_s);
+        self.drive.suspicions.push(text.clone());
+        self.remark(time_s, text);
     }
 
     fn odometry_until(&mut self, time_s: f64) -> Result<(), ReplayError> {

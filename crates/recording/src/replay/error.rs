@@ -50,6 +50,14 @@ pub enum ReplayError {
         /// Time of the first angle (s).
         angles_s: f64,
     },
+    /// No radio head of the site is heard.
+    #[error(
+        "not one of {angles} angles is of a radio head of the site; check pci and ssb_index in both"
+    )]
+    UnknownRadioHeads {
+        /// Number of angles.
+        angles: usize,
+    },
     /// No usable odometry.
     #[error("the odometry holds no usable sample")]
     NoOdometry,

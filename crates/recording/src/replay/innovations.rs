@@ -7,7 +7,7 @@ use onboard::radio_head::RadioHead;
 use onboard::settings::{Check, Site, Vehicle};
 
 use super::error::ReplayError;
-use super::stated::with_phases;
+use super::stated::with_phase;
 use crate::angle_log::LoggedAngle;
 use crate::odometry::OdometryLog;
 
@@ -58,9 +58,9 @@ pub fn innovations(
         tracker.set_gate(f64::INFINITY);
     }
     let mut odometry = odometry.samples.iter().peekable();
-    let angles = with_phases(angles, vehicle.array.spacing_wavelengths);
+    let spacing = vehicle.array.spacing_wavelengths;
     let met = angles.iter().enumerate().map(|(index, logged)| {
-        let mut measured = logged.measured;
+        let mut measured = with_phase(logged, spacing).measured;
         measured.time_s -= vehicle.receiver.lateness_s;
         while let Some(sample) = odometry.next_if(|sample| sample.time_s <= measured.time_s) {
             tracker.odometry(sample);

@@ -1,9 +1,11 @@
 //! A recorded drive as poses.
 
+use std::borrow::Cow;
 use std::collections::BTreeMap;
 
 use onboard::geometry::Pose;
 use onboard::localize::UpdateReason;
+use onboard::observation::SensedSsb;
 use onboard::receive::{Receiver, ReceiverConfig};
 use onboard::settings::{Site, Vehicle, WakeUpSettings};
 use onboard::{Custom, Execution};
@@ -12,9 +14,11 @@ use super::doubts::doubts;
 use super::drive::Replay;
 use super::error::ReplayError;
 use super::located::{LocatedDrive, LocatedPose};
+use super::mistakes::Drive;
 use super::receive::receive_recording;
 use super::start::{StartChoice, starting};
-use super::stated::with_phases;
+use super::stated::with_phase;
+use super::suspicion::suspicions;
 use crate::angle_log::{AngleLog, LoggedAngle};
 use crate::odometry::OdometryLog;
 use crate::sigmf::Recording;
@@ -36,11 +40,14 @@ pub fn locate_angles(
     for remark in &angles.remarks {
         replay.remark(remark.time_s, remark.to_string());
     }
-    let angles = with_phases(&angles.angles, vehicle.array.spacing_wavelengths);
+    let logged = angles.angles.as_slice();
+    let spacing = vehicle.array.spacing_wavelengths;
+    let angles: Vec<LoggedAngle> = logged.iter().map(|it| with_phase(it, spacing)).collect();
     for (time_s, text) in doubts(site, &vehicle, odometry, &angles)? {
         replay.remark(time_s, text);
     }
     replay.hear(&angles)?;
+    suspect(&mut replay, site, &vehicle, odometry, logged)?;
     finish(replay, site, &vehicle, start, odometry, smooth)
 }
 
@@ -82,7 +89,46 @@ pub fn locate_recording(
             angles_s,
         });
     }
+    let heard: Vec<LoggedAngle> = replay.executions().iter().filter_map(as_logged).collect();
+    suspect(&mut replay, site, &in_time(&vehicle), odometry, &heard)?;
     finish(replay, site, &vehicle, start, odometry, smooth)
+}
+
+/// Says how a drive may have been meant.
+fn suspect(
+    replay: &mut Replay<'_>,
+    site: &Site,
+    vehicle: &Vehicle,
+    odometry: &OdometryLog,
+    angles: &[LoggedAngle],
+) -> Result<(), ReplayError> {
+    let given = Drive {
+        site: Cow::Borrowed(site),
+        vehicle: Cow::Borrowed(vehicle),
+        odometry: Cow::Borrowed(odometry),
+        angles: Cow::Borrowed(angles),
+    };
+    for text in suspicions(&given)? {
+        replay.suspect(text);
+    }
+    Ok(())
+}
+
+/// An angle as it was heard; its lateness is taken off.
+fn as_logged(execution: &Execution) -> Option<LoggedAngle> {
+    let measured = execution.measured?;
+    let ssb = SensedSsb {
+        time_s: measured.time_s,
+        ..execution.ssb
+    };
+    Some(LoggedAngle { ssb, measured })
+}
+
+/// The vehicle for angles whose lateness is taken off already.
+fn in_time(vehicle: &Vehicle) -> Vehicle {
+    let mut vehicle = vehicle.clone();
+    vehicle.receiver.lateness_s = 0.0;
+    vehicle
 }
 
 fn finish(
@@ -109,12 +155,11 @@ fn look_back(
     odometry: &OdometryLog,
     executions: &[Execution],
 ) -> Result<Vec<LocatedPose>, ReplayError> {
-    let mut unguarded = Vehicle {
+    let unguarded = Vehicle {
         integrity: None,
         wake_up: WakeUpSettings::default(), // whatever was chosen then is heard again
-        ..vehicle.clone()
+        ..in_time(vehicle)
     };
-    unguarded.receiver.lateness_s = 0.0; // taken off already
     let mut mistrusted_until_s = BTreeMap::new();
     for execution in executions {
         if execution.verdict.reason == UpdateReason::Excluded {
@@ -127,14 +172,8 @@ fn look_back(
         let until_s = mistrusted_until_s.get(&(ssb.pci, ssb.ssb_index));
         until_s.is_none_or(|until_s| ssb.time_s > *until_s)
     };
-    let logged = |execution: &Execution| {
-        let measured = execution.measured?;
-        let mut ssb = execution.ssb;
-        ssb.time_s = measured.time_s;
-        Some(LoggedAngle { ssb, measured })
-    };
     let executions = executions.iter().filter(trusted);
-    let mut angles: Vec<LoggedAngle> = executions.filter_map(logged).collect();
+    let mut angles: Vec<LoggedAngle> = executions.filter_map(as_logged).collect();
     // Nothing is late when all is known.
     angles.sort_by(|a, b| a.ssb.time_s.total_cmp(&b.ssb.time_s));
     let mut replay = Replay::new(site, &unguarded, start, Custom::default(), odometry)?;

@@ -1,8 +1,11 @@
 //! A drive that has been located.
 
+use std::collections::BTreeMap;
+use std::collections::btree_map::Entry;
+
 use onboard::Execution;
 use onboard::localize::PoseEstimate;
-use onboard::localize::tracker::Calibration;
+use onboard::localize::tracker::{Calibration, Findings};
 
 /// Where the vehicle was at one instant.
 #[derive(Debug, Clone, Copy, PartialEq)]
@@ -31,6 +34,35 @@ pub struct Remark {
     pub text: String,
 }
 
+/// Remarks in order of time; of those that differ in numbers only the first stands for all.
+pub fn gathered(mut remarks: Vec<Remark>) -> Vec<Remark> {
+    remarks.sort_by(|a, b| a.time_s.total_cmp(&b.time_s));
+    let is_of_number = |it: char| it.is_ascii_digit() || ".-".contains(it);
+    let kind = |remark: &Remark| remark.text.replace(is_of_number, "");
+    let mut first: BTreeMap<String, usize> = BTreeMap::new();
+    let mut gathered: Vec<(Remark, usize)> = Vec::new();
+    for remark in remarks {
+        match first.entry(kind(&remark)) {
+            Entry::Occupied(at) => {
+                if let Some((_, more)) = gathered.get_mut(*at.get()) {
+                    *more += 1;
+                }
+            }
+            Entry::Vacant(at) => {
+                at.insert(gathered.len());
+                gathered.push((remark, 0));
+            }
+        }
+    }
+    let told = gathered.into_iter().map(|(mut remark, more)| {
+        if more > 0 {
+            remark.text = format!("{} (and {more} more like this)", remark.text);
+        }
+        remark
+    });
+    told.collect()
+}
+
 /// A located drive.
 #[derive(Debug, Clone, PartialEq, Default)]
 pub struct LocatedDrive {
@@ -40,6 +72,33 @@ pub struct LocatedDrive {
     pub executions: Vec<Execution>,
     /// The poses as seen from the end of the drive, from the first known one on, where asked for.
     pub smoothed: Vec<LocatedPose>,
+    /// What the drive showed of the vehicle by its end, where the localizer looks for it.
+    pub findings: Option<Findings>,
     /// What was remarkable about single items of the input, in order of time.
     pub remarks: Vec<Remark>,
+    /// How the input may have been meant, where its angles contradict what was given; these are
+    /// among the remarks too.
+    pub suspicions: Vec<String>,
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    #[test]
+    fn remarks_that_differ_in_numbers_are_one() {
+        let remark = |time_s: f64, text: &str| Remark {
+            time_s,
+            text: text.to_owned(),
+        };
+        let told = gathered(vec![
+            remark(3.0, "at 3 s: off by -0.5 m"),
+            remark(2.0, "no angle"),
+            remark(1.0, "at 1.25 s: off by 2 m"),
+            remark(4.0, "at 4 s: off by 7 m"),
+        ]);
+        let texts: Vec<&str> = told.iter().map(|it| it.text.as_str()).collect();
+        let first = "at 1.25 s: off by 2 m (and 2 more like this)";
+        assert_eq!(texts, [first, "no angle"]);
+    }
 }

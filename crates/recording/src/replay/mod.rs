@@ -7,9 +7,11 @@ mod error;
 mod innovations;
 mod locate;
 mod located;
+mod mistakes;
 mod receive;
 mod start;
 mod stated;
+mod suspicion;
 
 pub use drive::Replay;
 pub use error::ReplayError;

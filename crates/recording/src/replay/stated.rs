@@ -26,20 +26,17 @@ pub fn as_stated(site: &Site, vehicle: &Vehicle) -> (Site, Vehicle) {
     (site, vehicle)
 }
 
-/// Electrical angles for those that were logged as angles from the array's axis.
-pub fn with_phases(angles: &[LoggedAngle], spacing_wavelengths: f64) -> Vec<LoggedAngle> {
+/// The electrical angle for one that was logged as the angle from the array's axis.
+pub fn with_phase(logged: &LoggedAngle, spacing_wavelengths: f64) -> LoggedAngle {
     let slope = TAU * spacing_wavelengths;
-    let with_phase = |logged: &LoggedAngle| {
-        let mut logged = *logged;
-        let measured = &mut logged.measured;
-        if measured.phase_rad.is_nan() {
-            let (sin, cos) = measured.angle_rad.sin_cos();
-            let sigma = measured.phase_sigma_rad;
-            measured.phase_rad = slope * cos;
-            // Along the axis the angle moves the phase by its square.
-            measured.phase_sigma_rad = slope * sigma * sin.abs().hypot(sigma * cos);
-        }
-        logged
-    };
-    angles.iter().map(with_phase).collect()
+    let mut logged = *logged;
+    let measured = &mut logged.measured;
+    if measured.phase_rad.is_nan() {
+        let (sin, cos) = measured.angle_rad.sin_cos();
+        let sigma = measured.phase_sigma_rad;
+        measured.phase_rad = slope * cos;
+        // Along the axis the angle moves the phase by its square.
+        measured.phase_sigma_rad = slope * sigma * sin.abs().hypot(sigma * cos);
+    }
+    logged
 }

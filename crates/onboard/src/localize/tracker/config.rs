@@ -162,7 +162,7 @@ impl TrackerConfig {
         };
         let gyroscope = vehicle.gyroscope.as_ref();
         let wheels = vehicle.drive == DriveKind::Differential;
-        let usual = if wheels {
+        let usual = if wheels || odometer.track_width_m.is_some() {
             USUAL_WHEELS_TURN
         } else {
             USUAL_GYROSCOPE
@@ -183,6 +183,9 @@ impl TrackerConfig {
             USUAL_WHEELS[1],
             LEAST_ODOMETER_SCALE_STD,
         );
+        // A track that is wider than stated turns less.
+        let track_share = |width_m| odometer.track_width_std_m / width_m;
+        let track_share = odometer.track_width_m.map_or(0.0, track_share);
         let receiver = &vehicle.receiver;
         Self {
             drive: vehicle.drive,
@@ -227,7 +230,7 @@ impl TrackerConfig {
             yaw_noise_rad_per_sqrt_s: yaw_noise,
             yaw_rate_bias_radps: gyroscope.map_or(0.0, |gyroscope| gyroscope.bias_radps),
             yaw_rate_bias_std_radps: yaw_bias_std,
-            yaw_rate_scale_std: if wheels { odometer_scale_std } else { 0.0 },
+            yaw_rate_scale_std: if wheels { odometer_scale_std } else { 0.0 }.hypot(track_share),
             mounting_std_rad: or_usual(array.mounting_std_rad, USUAL_MOUNTING_STD_RAD, 0.0),
             phase_rad: array.phase_rad,
             phase_std_rad: array.phase_std_rad,

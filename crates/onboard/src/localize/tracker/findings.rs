@@ -1,7 +1,7 @@
 //! What the drive has shown of the vehicle that its settings do not say.
 
 use super::filter::Tracker;
-use super::state::{LATENESS, SCALE, YAW_RATE_BIAS};
+use super::state::{LATENESS, MOUNTING, PHASE, SCALE, YAW_RATE_BIAS, YAW_RATE_SCALE};
 
 /// A constant as stated, and as found while driving.
 #[derive(Clone, Copy, Debug, PartialEq)]
@@ -29,6 +29,12 @@ pub struct Findings {
     pub odometer_scale: Finding,
     /// Bias of the yaw rate (rad/s).
     pub yaw_rate_bias_radps: Finding,
+    /// Radians that the yaw rate, summed up, reads per radian turned.
+    pub yaw_rate_scale: Finding,
+    /// Direction of the array's axis (rad).
+    pub mounting_rad: Finding,
+    /// Phase per antenna left by calibration (rad).
+    pub phase_rad: Finding,
     /// How much later angles come than their setting says (s).
     pub lateness_s: Finding,
 }
@@ -44,6 +50,9 @@ impl Tracker {
         Findings {
             odometer_scale: finding(SCALE, 1.0, self.config.odometer_scale),
             yaw_rate_bias_radps: finding(YAW_RATE_BIAS, 0.0, self.config.yaw_rate_bias_radps),
+            yaw_rate_scale: finding(YAW_RATE_SCALE, 1.0, 1.0),
+            mounting_rad: finding(MOUNTING, 0.0, self.config.mounting_rad),
+            phase_rad: finding(PHASE, 0.0, self.config.phase_rad),
             lateness_s: finding(LATENESS, 0.0, 0.0),
         }
     }

@@ -1,0 +1,192 @@
+//! Wheel odometry as CSV.
+//!
+//! | what | column | where that is not there |
+//! |---|---|---|
+//! | time | `time_s` | |
+//! | distance | `distance_m` | the mean of `left_m` and `right_m`; else the speed, summed up |
+//! | speed | `speed_mps` | the mean of `left_mps` and `right_mps`; else of the distance |
+//! | yaw rate | `yaw_rate_radps` | the difference of `left_mps` and `right_mps`, or of `left_m` and `right_m`, by the track width; else none |
+
+use std::fmt::Write as _;
+use std::path::Path;
+
+use onboard::observation::OdometrySample;
+
+use crate::csv::Table;
+use crate::error::RecordingError;
+use crate::file as files;
+use crate::odometry::{OdometryCollector, OdometryIssue, OdometryLog};
+
+const COLUMNS: [&str; 7] = [
+    "distance_m",
+    "speed_mps",
+    "yaw_rate_radps",
+    "left_m",
+    "right_m",
+    "left_mps",
+    "right_mps",
+];
+
+/// Reads odometry of a vehicle of which no track width is stated, see [`read_wheel_odometry_csv`].
+///
+/// # Errors
+/// As there.
+pub fn read_odometry_csv(file: &Path) -> Result<OdometryLog, RecordingError> {
+    read_wheel_odometry_csv(file, None)
+}
+
+/// Reads odometry from a CSV file with `time_s` and distance or speed, of the vehicle or of its left
+/// and right wheel, whose contact points are `track_width_m` apart.
+///
+/// # Errors
+/// [`RecordingError`] when the file cannot be read, tells neither distance nor speed, or tells of
+/// wheels where no track width is stated. Single rows are only remarked upon.
+pub fn read_wheel_odometry_csv(
+    file: &Path,
+    track_width_m: Option<f64>,
+) -> Result<OdometryLog, RecordingError> {
+    let table = Table::read(file, &["time_s"], &COLUMNS)?;
+    let missing = |key: &str, allowed: &str| RecordingError::Missing {
+        file: file.display().to_string(),
+        key: key.to_owned(),
+        allowed: allowed.to_owned(),
+    };
+    let has = |name| table.has(name);
+    let wheels_m = has("left_m") && has("right_m");
+    let wheels_mps = has("left_mps") && has("right_mps");
+    let mut collector = OdometryCollector::default();
+    let mut derived = |column, from| collector.remark(OdometryIssue::Derived { column, from });
+    match (
+        has("distance_m") || wheels_m,
+        has("speed_mps") || wheels_mps,
+    ) {
+        (true, true) => {}
+        (true, false) => derived("speed_mps", "the distances"),
+        (false, true) => derived("distance_m", "the speeds"),
+        (false, false) => {
+            return Err(missing(
+                "distance_m",
+                "the first line must name time_s and one of distance_m, speed_mps, left_m and \
+                 right_m, left_mps and right_mps",
+            ));
+        }
+    }
+    let wheels_turn = (wheels_m || wheels_mps) && !has("yaw_rate_radps");
+    if wheels_turn && track_width_m.is_none() {
+        return Err(missing(
+            "yaw_rate_radps",
+            "it is taken from left and right wheel where the vehicle states odometer.track_width_m",
+        ));
+    }
+    let mut before: Option<(Row, OdometrySample)> = None;
+    for line in &table.rows {
+        let read = line.values.as_ref().map(|values| {
+            let row = Row::new(values);
+            (row, row.sample(before.as_ref(), track_width_m))
+        });
+        let sample = read.map(|(_, sample)| sample);
+        collector.add(line.line, sample.map_err(Clone::clone));
+        // What was left out is no row to go on from.
+        before = read
+            .ok()
+            .filter(|(_, it)| collector.last() == Some(it))
+            .or(before);
+    }
+    Ok(collector.finish())
+}
+
+/// What a row tells.
+#[derive(Clone, Copy)]
+struct Row {
+    time_s: f64,
+    distance_m: Option<f64>,
+    speed_mps: Option<f64>,
+    yaw_rate_radps: Option<f64>,
+    wheels_m: Option<[f64; 2]>,
+    wheels_mps: Option<[f64; 2]>,
+}
+
+impl Row {
+    fn new(values: &[Option<f64>]) -> Self {
+        let value = |index: usize| values.get(index).copied().flatten();
+        let pair = |left, right| Some([value(left)?, value(right)?]);
+        Self {
+            time_s: value(0).unwrap_or(f64::NAN),
+            distance_m: value(1),
+            speed_mps: value(2),
+            yaw_rate_radps: value(3),
+            wheels_m: pair(4, 5),
+            wheels_mps: pair(6, 7),
+        }
+    }
+
+    /// The row as a sample, after the one before.
+    fn sample(
+        &self,
+        before: Option<&(Self, OdometrySample)>,
+        track_width_m: Option<f64>,
+    ) -> OdometrySample {
+        let mean = |[left, right]: [f64; 2]| 0.5 * (left + right);
+        let difference = |[left, right]: [f64; 2]| right - left;
+        let step_s = before.map(|(_, last)| self.time_s - last.time_s);
+        let step_s = step_s.filter(|step_s| *step_s > 0.0);
+        let rate = |now: f64, last: f64| step_s.map_or(0.0, |step_s| (now - last) / step_s);
+
+        let told_m = self.distance_m.or(self.wheels_m.map(mean));
+        let told_mps = self.speed_mps.or(self.wheels_mps.map(mean));
+        let last = before.map(|(_, last)| *last);
+        let speed_mps = told_mps.unwrap_or_else(|| {
+            let now_m = told_m.unwrap_or(f64::NAN);
+            rate(now_m, last.map_or(now_m, |last| last.distance_m))
+        });
+        let distance_m = told_m.unwrap_or_else(|| {
+            let step = |last: OdometrySample| {
+                last.distance_m + 0.5 * (last.speed_mps + speed_mps) * (self.time_s - last.time_s)
+            };
+            last.map_or(0.0, step)
+        });
+        let wheels_turn = |track_m: f64| {
+            let by_speed = self.wheels_mps.map(difference);
+            let by_distance = || {
+                let now_m = difference(self.wheels_m?);
+                let last_m = before
+                    .and_then(|(row, _)| row.wheels_m)
+                    .map_or(now_m, difference);
+                Some(rate(now_m, last_m))
+            };
+            Some(by_speed.or_else(by_distance)? / track_m)
+        };
+        OdometrySample {
+            time_s: self.time_s,
+            distance_m,
+            speed_mps,
+            yaw_rate_radps: self.yaw_rate_radps.or_else(|| wheels_turn(track_width_m?)),
+        }
+    }
+}
+
+/// Writes odometry as [`read_odometry_csv`] reads it.
+///
+/// # Errors
+/// [`RecordingError::Io`].
+pub fn write_odometry_csv(file: &Path, samples: &[OdometrySample]) -> Result<(), RecordingError> {
+    let with_yaw = samples.iter().any(|sample| sample.yaw_rate_radps.is_some());
+    let mut text = String::from("time_s,distance_m,speed_mps");
+    text += if with_yaw { ",yaw_rate_radps\n" } else { "\n" };
+    for sample in samples {
+        // Writing into a string does not fail.
+        let _ = write!(
+            text,
+            "{},{},{}",
+            sample.time_s, sample.distance_m, sample.speed_mps
+        );
+        if with_yaw {
+            text.push(',');
+            if let Some(rate) = sample.yaw_rate_radps {
+                let _ = write!(text, "{rate}");
+            }
+        }
+        text.push('\n');
+    }
+    files::write(file, text.as_bytes())
+}

@@ -1,0 +1,192 @@
+"""Gains, weights and set points of a wake-up policy for one's own road and objective.
+
+Rounds of evenly spread points, each round in a box a third as wide around the best so far; all
+points see the same runs. What is chosen by what it reached in these runs looks better in them than
+it is. So the best few are driven again in other runs, and the best of these in a third lot, beside
+what was there before.
+"""
+
+from __future__ import annotations
+
+import json
+from dataclasses import dataclass
+from typing import TYPE_CHECKING, Any
+
+import numpy as np
+
+from access_av.designs.drives import designs_of, drive, joined
+from access_av.designs.front import differences, student
+from access_av.designs.space import Dimension, Space
+from access_av.errors import InputError
+
+if TYPE_CHECKING:
+    from collections.abc import Callable
+
+    from access_av._core import Scenario
+    from access_av.campaign import Campaign
+    from access_av.designs.drives import Design, Driven
+    from access_av.designs.table import Constraints
+
+# What may be tuned of each policy: key, least, most; on a logarithmic scale where positive.
+Range = tuple[str, float, float]
+PID: list[Range] = [
+    ("kp", 0.05, 5.0),
+    ("ki", 0.005, 1.0),
+    ("kd", 0.01, 2.0),
+    ("weight_snr", 0.0, 1.0),
+    ("weight_velocity", 0.0, 1.0),
+    ("snr_scale_db", 2.0, 40.0),
+    ("integral_clamp", 0.05, 5.0),
+    ("snr_set_point.offset_db", -5.0, 12.0),
+]
+GATE: Range = ("snr_set_point.offset_db", -5.0, 9.0)
+RANGES: dict[str, list[Range]] = {
+    "fixed": [("interval_ms", 20.0, 5000.0)],
+    "pid": PID,
+    "gated": [GATE, *((f"due.{key}", low, high) for key, low, high in PID)],
+    "uncertainty": [
+        ("bound_m", 0.05, 2.0),
+        ("least_gain_m2", 1e-6, 0.1),
+        ("snr_headroom_db", 0.0, 12.0),
+    ],
+}
+ROUNDS = 3
+FINALISTS = 8
+NARROWER = 3.0
+
+
+@dataclass(frozen=True)
+class Tuned:
+    """A policy before and after, over runs that the search has not seen.
+
+    Attributes
+    ----------
+    less
+        By how much energy (J) and squared error (m²) are less, run by run: mean and the ends of
+        the 95 % interval, shape (2, 3).
+    drives
+        Drives in all.
+    """
+
+    before: Driven
+    after: Driven
+    less: Any
+    drives: int
+
+
+def space_of(scenario: Scenario) -> Space:
+    """What may be tuned of a scenario's wake-up policy.
+
+    Examples
+    --------
+    >>> from access_av import Scenario
+    >>> [dimension.key for dimension in space_of(Scenario.load("yard")).dimensions]
+    ['vehicle.wake_up.bound_m', 'vehicle.wake_up.least_gain_m2', 'vehicle.wake_up.snr_headroom_db']
+    """
+    policy = json.loads(scenario.vehicle.to_json())["wake_up"]
+    found = []
+    for key, low, high in RANGES[policy["policy"]]:
+        table: Any = policy
+        for step in key.split(".")[:-1]:
+            table = table.get(step, {})
+        # Neither a set point of another kind, nor gains of what is due at a fixed time.
+        if key.endswith("offset_db") and table.get("kind") != "expected":
+            continue
+        if key.startswith("due.") and policy["due"]["policy"] != "pid":
+            continue
+        found.append(Dimension(f"vehicle.wake_up.{key}", (), low, high, low > 0.0))
+    return Space(tuple(found))
+
+
+def tune(
+    campaign: Campaign,
+    scenario: Scenario,
+    constraints: Constraints,
+    *,
+    designs: int = 64,
+    runs: int = 20,
+    seed: int = 1,
+    progress: Callable[[int, int], None] | None = None,
+) -> Tuned:
+    """Tune a scenario's wake-up policy.
+
+    Parameters
+    ----------
+    constraints
+        What is to be kept. The objective is least energy; least error where only energy is bound.
+    designs
+        Points a round.
+    runs
+        Drives of each point, of the best few again, and of the comparison in the end.
+
+    Raises
+    ------
+    InputError
+        When nothing is to be kept, or the platform has no energy figure for the method.
+    """
+    if all(bound is None for bound in vars(constraints).values()):
+        raise InputError("nothing is to be kept: give a largest error or a largest energy")
+    space = space_of(scenario)
+    if not space.dimensions:
+        raise InputError(f"{scenario.name}: its wake-up policy has nothing to tune")
+    rank = _ranking(constraints)
+    [before] = designs_of(scenario, [{}])
+    tried: list[Driven] = []
+    done = 0
+    for _ in range(ROUNDS):
+        points = designs_of(scenario, space.sobol(designs))
+        tried += _driven(campaign, points, 0, runs, seed)
+        tried = sorted(tried, key=rank)[:FINALISTS]
+        done += runs * len(points)
+        best = tried[0].design.values
+        space = Space(tuple(_around(it, best[it.key]) for it in space.dimensions))
+        if progress is not None:
+            progress(done, ROUNDS * designs * runs)
+    if not np.isfinite(tried[0].mean_energy_j):
+        name = tried[0].design.platform.name
+        raise InputError(f"platform {name} has no energy figure for this method")
+    finalists = [it.design for it in tried]
+    chosen = min(_driven(campaign, finalists, runs, runs, seed), key=rank).design
+    old, new = _driven(campaign, [before, chosen], 2 * runs, runs, seed)
+    less = -differences(new, [old])[0][:, [0, 2, 1]]
+    return Tuned(old, new, less, done + runs * (len(finalists) + 2))
+
+
+def _ranking(constraints: Constraints) -> Callable[[Driven], tuple[float, float]]:
+    """Least first: by how far it is surely beyond the constraints, then by the objective."""
+    only_energy = constraints.max_rms_m is None and constraints.max_worst_m is None
+
+    def rank(driven: Driven) -> tuple[float, float]:
+        # The upper end of the interval: who is lucky once is not better.
+        count = driven.square_m2.size
+        spread_m2 = float(np.std(driven.square_m2, ddof=1)) if count > 1 else 0.0
+        most_m2 = driven.rms_m**2 + student(max(count - 1, 1)) * spread_m2 / np.sqrt(count)
+        row = {
+            "energy_j": driven.mean_energy_j,
+            "rms_error_m": float(np.sqrt(most_m2)),
+            "p90_max_error_m": driven.p90_worst_m,
+        }
+        beyond = max(1.0, *constraints.excess(row).values())
+        return beyond, driven.rms_m if only_energy else driven.mean_energy_j
+
+    return rank
+
+
+def _driven(
+    campaign: Campaign, points: list[Design], first_run: int, runs: int, seed: int
+) -> list[Driven]:
+    made = drive(campaign, points, first_run=first_run, runs=runs, seed=seed)
+    parts = zip(points, made, strict=True)
+    return [joined(point, [part]) for point, part in parts if part is not None]
+
+
+def _around(dimension: Dimension, value: float) -> Dimension:
+    """A range as much narrower around a value, within what it was."""
+    low, high = dimension.low, dimension.high
+    if dimension.is_log:
+        factor = (high / low) ** (0.5 / NARROWER)
+        ends = max(low, value / factor), min(high, value * factor)
+    else:
+        half = 0.5 * (high - low) / NARROWER
+        ends = max(low, value - half), min(high, value + half)
+    return Dimension(dimension.key, (), *ends, dimension.is_log)

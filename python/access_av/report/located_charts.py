@@ -1,0 +1,146 @@
+"""Charts of a located drive."""
+
+from __future__ import annotations
+
+from typing import TYPE_CHECKING
+
+import altair as alt
+import polars as pl
+
+from access_av.report.chart import BLUE, GREEN, GREY, ORANGE, PURPLE, finish, thinned
+
+if TYPE_CHECKING:
+    from access_av.report.chart import Spec
+
+MAP_WIDTH_PX = 1000
+POINTS_PER_TRACK = 1500
+# Errors below a millimetre are drawn as one.
+LEAST_M = 1e-3
+# Ninety in a hundred of what is normally distributed are nearer than so many deviations.
+P90_SIGMAS = 1.645
+
+TRACKS = {"truth": GREY, "as driven": BLUE, "smoothed": GREEN}
+ERRORS = {
+    "error": BLUE,
+    "error, smoothed": GREEN,
+    "deviation": ORANGE,
+    "protection level": PURPLE,
+}
+
+
+def track(lines: dict[str, pl.DataFrame], heads: pl.DataFrame) -> Spec:
+    """Where the vehicle was, in the map's frame, and the radio heads.
+
+    Parameters
+    ----------
+    lines
+        Poses by their name in ``TRACKS``.
+    heads
+        ``name``, ``x_m`` and ``y_m`` of each radio head.
+    """
+    table = pl.concat(
+        thinned(line.select("time_s", "x_m", "y_m"), POINTS_PER_TRACK).with_columns(
+            line=pl.lit(name)
+        )
+        for name, line in lines.items()
+    )
+    bounds = {}
+    for axis in ("x_m", "y_m"):
+        values = pl.concat([table[axis], heads[axis]])
+        low, high = float(values.min()), float(values.max())  # type: ignore[arg-type]
+        margin = max(0.5, 0.05 * (high - low))
+        bounds[axis] = (low - margin, high + margin)
+    across, upward = (
+        alt.Scale(domain=list(bounds[axis]), nice=False, zero=False) for axis in ("x_m", "y_m")
+    )
+    x = alt.X("x_m:Q", title="x / m", scale=across)
+    y = alt.Y("y_m:Q", title="y / m", scale=upward)
+    driven = (
+        alt.Chart(table)
+        .mark_line(strokeWidth=1.6)
+        .encode(x=x, y=y, order="time_s:Q", color=_colours(TRACKS, lines))
+    )
+    places = alt.Chart(heads).encode(x=x, y=y, tooltip=["name:N", "x_m:Q", "y_m:Q"])
+    marks = places.mark_point(shape="triangle-up", filled=True, size=130, color=ORANGE, opacity=1.0)
+    names = places.mark_text(dy=-13, fontSize=11).encode(text="name:N")
+    (left, right), (low, high) = bounds["x_m"], bounds["y_m"]
+    height = MAP_WIDTH_PX * (high - low) / (right - left)
+    return finish(
+        driven + marks + names,
+        height=round(min(700.0, max(220.0, height))),
+        description="Track of the vehicle, with the radio heads",
+    )
+
+
+def error(lines: dict[str, pl.DataFrame]) -> Spec:
+    """What is known of the error against time: the error, its deviation, its protection level.
+
+    Parameters
+    ----------
+    lines
+        ``time_s`` and ``error_m`` by the line's name in ``ERRORS``.
+    """
+    table = pl.concat(
+        thinned(line.select("time_s", pl.col("error_m").clip(LEAST_M)).drop_nulls()).with_columns(
+            line=pl.lit(name)
+        )
+        for name, line in lines.items()
+    )
+    chart = (
+        alt.Chart(table)
+        .mark_line(strokeWidth=1.8)
+        .encode(
+            x=alt.X("time_s:Q", title="time / s"),
+            y=alt.Y("error_m:Q", title="horizontal / m", scale=alt.Scale(type="log")),
+            color=_colours(ERRORS, lines),
+            tooltip=[
+                alt.Tooltip("line:N"),
+                alt.Tooltip("time_s:Q", title="time / s", format=".1f"),
+                alt.Tooltip("error_m:Q", title="m", format=".3f"),
+            ],
+        )
+    )
+    return finish(chart, height=260, description="Error, deviation and level against time")
+
+
+def angles(compared: pl.DataFrame) -> Spec:
+    """Normalised innovation of each angle against time: how many deviations from the expected."""
+    dots = (
+        alt.Chart(thinned(compared.select("time_s", "deviations", "verdict"), 2000))
+        .mark_circle(size=16, opacity=0.6)
+        .encode(
+            x=alt.X("time_s:Q", title="time / s"),
+            y=alt.Y("deviations:Q", title="deviations", scale=alt.Scale(type="symlog")),
+            color=alt.Color(
+                "verdict:N",
+                scale=alt.Scale(domain=["accepted", "refused"], range=[BLUE, ORANGE]),
+                legend=alt.Legend(title=None),
+            ),
+        )
+    )
+    return finish(dots, height=220, description="Normalised innovation of each angle against time")
+
+
+def heads(compared: pl.DataFrame) -> Spec:
+    """90th percentile of the normalised innovations of each radio head, and the normal one."""
+    percentiles = compared.group_by("head").agg(
+        pl.col("deviations").quantile(0.9, "linear").round(3), angles=pl.len()
+    )
+    bars = (
+        alt.Chart(percentiles)
+        .mark_bar(color=BLUE)
+        .encode(
+            x=alt.X("head:N", title="radio head", sort=alt.SortField("head")),
+            y=alt.Y("deviations:Q", title="deviations, 90th percentile"),
+            tooltip=["head:N", "deviations:Q", "angles:Q"],
+        )
+    )
+    normal = alt.Chart(pl.DataFrame({"at": [P90_SIGMAS]}))
+    line = normal.mark_rule(strokeDash=[5, 4], strokeWidth=1.5, color=ORANGE).encode(y="at:Q")
+    return finish(bars + line, height=200, description="Innovations of each radio head")
+
+
+def _colours(all_of: dict[str, str], lines: dict[str, pl.DataFrame]) -> alt.Color:
+    shown = {name: colour for name, colour in all_of.items() if name in lines}
+    scale = alt.Scale(domain=list(shown), range=list(shown.values()))
+    return alt.Color("line:N", scale=scale, legend=alt.Legend(title=None))

@@ -1,0 +1,106 @@
+"""Tuning a wake-up policy."""
+
+from __future__ import annotations
+
+import json
+from typing import TYPE_CHECKING, Any
+
+import numpy as np
+import pytest
+
+from access_av import InputError, Scenario
+from access_av.campaign import Campaign
+from access_av.designs.space import Dimension
+from access_av.designs.table import Constraints
+from access_av.designs.tune import _around, space_of, tune
+from access_av.parts import Parts
+
+if TYPE_CHECKING:
+    from collections.abc import Callable
+    from pathlib import Path
+
+    from conftest import Finished
+
+BOARD = {"vehicle.platform": {"name": "jetson-agx-xavier-engine", "mode": 0}}
+
+
+def short(wake_up: dict[str, Any]) -> Scenario:
+    changes = {**BOARD, "vehicle.wake_up": wake_up, "motion.start_at_m": 250.0}
+    return Scenario.load("paper-real-odometry-2").with_overrides(changes)
+
+
+@pytest.fixture
+def campaign(tmp_path: Path) -> Campaign:
+    return Campaign(Parts(tmp_path / "parts"))
+
+
+def test_least_energy_that_keeps_the_error(campaign: Campaign) -> None:
+    scenario = short({"policy": "fixed", "interval_ms": 20.0})
+    every = Constraints(max_rms_m=1.0)
+    found = tune(campaign, scenario, every, designs=6, runs=3)
+    assert found.after.rms_m <= 1.0
+    # An odometer drifts slowly: few angles are enough.
+    assert found.after.executions.mean() < 0.2 * found.before.executions.mean()
+    mean_j, low_j, high_j = found.less[0]
+    assert 0.0 < low_j <= mean_j <= high_j
+    paired = np.mean(found.before.energy_j - found.after.energy_j)
+    assert mean_j == pytest.approx(paired)
+
+
+def test_least_error_that_keeps_the_energy_and_drives_are_kept(campaign: Campaign) -> None:
+    scenario = short({"policy": "fixed", "interval_ms": 5000.0})
+    bound = Constraints(max_energy_j=1e6)
+    found = tune(campaign, scenario, bound, designs=6, runs=3)
+    assert found.after.rms_m < found.before.rms_m
+    parts = sorted(campaign.parts.path.iterdir())
+    again = tune(campaign, scenario, bound, designs=6, runs=3)
+    assert sorted(campaign.parts.path.iterdir()) == parts
+    assert again.after.design.values == found.after.design.values
+
+
+def test_what_is_tuned_is_what_the_policy_has() -> None:
+    gated = {dimension.key for dimension in space_of(Scenario.load("paper")).dimensions}
+    assert {"vehicle.wake_up.snr_set_point.offset_db", "vehicle.wake_up.due.kp"} <= gated
+    absolute = {"kind": "absolute", "snr_db": 10.0}
+    due = {"policy": "fixed", "interval_ms": 80.0}
+    fixed = short({"policy": "gated", "snr_set_point": absolute, "due": due})
+    assert not space_of(fixed).dimensions
+
+
+def test_a_range_narrows_within_itself() -> None:
+    narrowed = _around(Dimension("a", (), 1.0, 1000.0, is_log=True), 1.0)
+    assert (narrowed.low, narrowed.high) == (1.0, pytest.approx(10**0.5))
+    narrowed = _around(Dimension("a", (), 0.0, 9.0), 4.0)
+    assert (narrowed.low, narrowed.high) == (2.5, 5.5)
+
+
+def test_bad_questions(campaign: Campaign, access_av: Callable[..., Finished]) -> None:
+    with pytest.raises(InputError, match="nothing is to be kept"):
+        tune(campaign, short({"policy": "fixed"}), Constraints())
+    none = short({"policy": "fixed", "interval_ms": 80.0}).with_overrides(
+        {"vehicle.platform": {"name": "jetson-agx-xavier", "mode": 0}}
+    )
+    with pytest.raises(InputError, match="no energy figure"):
+        tune(campaign, none, Constraints(max_rms_m=1.0), designs=2, runs=1)
+    due = {"policy": "fixed", "interval_ms": 80.0}
+    absolute = {"kind": "absolute", "snr_db": 10.0}
+    empty = short({"policy": "gated", "snr_set_point": absolute, "due": due})
+    with pytest.raises(InputError, match="nothing to tune"):
+        tune(campaign, empty, Constraints(max_rms_m=1.0))
+    done = access_av("tune", "yard", "--max-rms-m", "-1")
+    assert done.code == 2
+
+
+def test_command(access_av: Callable[..., Finished], tmp_path: Path) -> None:
+    (tmp_path / "short.toml").write_text(
+        'like = "paper-real-odometry-2"\n[motion]\nstart_at_m = 290.0\n'
+    )
+    done = access_av(
+        "tune", tmp_path / "short.toml", "--max-rms-m", "1", "--designs", "2", "--runs", "2",
+        "--out", tmp_path / "out", "--json",
+    )  # fmt: skip
+    assert done.code == 0, done.err
+    told = json.loads(done.out)
+    assert told["drives"] == 3 * 2 * 2 + 2 * (6 + 2)
+    vehicle = (tmp_path / "out/vehicle.toml").read_text()
+    assert f"interval_ms = {told['values']['vehicle.wake_up.interval_ms']}" in vehicle
