@@ -103,6 +103,43 @@ def test_a_searcher_says_what_it_cannot_use() -> None:
         kept.search(samples)
 
 
+def test_channels_come_with_the_cells_searched_and_tracked_alike() -> None:
+    samples = array_burst()
+    [found] = nr.search(samples, RATE_HZ, centre_frequency_hz=SSB_HZ, ssb_freq_hz=SSB_HZ)
+    antennas = samples.shape[0]
+    assert found.channel.shape == (antennas, 240)
+    assert found.channel.dtype == np.complex64
+    noise = np.array(found.noise_variance)
+    snr_db = 10 * np.log10((np.abs(found.channel) ** 2).mean(axis=1) / noise)
+    np.testing.assert_allclose(snr_db.mean(), found.snr_db, atol=1)
+
+    receiver = nr.Receiver(
+        RATE_HZ, centre_frequency_hz=SSB_HZ, ssb_freq_hz=SSB_HZ, scs_khz=30, antennas=antennas
+    )
+    silence = np.zeros((antennas, round(0.02 * RATE_HZ) - samples.shape[1]), np.complex64)
+    period = np.concatenate([samples, silence], axis=1)
+    cells = receiver.push(np.tile(period, 3)) + receiver.finish()
+    assert [cell.pci for cell in cells] == 3 * [found.pci]
+    for number, cell in enumerate(cells):
+        start = found.sample_start + number * period.shape[1]
+        assert abs(cell.sample_start - start) < 0.1
+        gain = np.abs(cell.channel).mean() / np.abs(found.channel).mean()
+        assert abs(gain - 1) < 0.1
+        between = np.angle((cell.channel * cell.channel[0].conj()).mean(axis=1))
+        expected = np.angle((found.channel * found.channel[0].conj()).mean(axis=1))
+        np.testing.assert_allclose(between, expected, atol=0.1)
+
+    with pytest.raises(RecordingError, match="antennas given"):
+        receiver.push(samples[:1])
+    with pytest.raises(RecordingError, match="period_s = 1"):
+        nr.Receiver(
+            RATE_HZ, centre_frequency_hz=0, ssb_freq_hz=0, scs_khz=30, antennas=1, period_s=1
+        )
+    samples[1, 5] = np.nan
+    with pytest.raises(RecordingError, match="sample 5 of channel 1"):
+        receiver.push(samples)
+
+
 def test_search_says_what_it_cannot_use() -> None:
     samples = array_burst()
     with pytest.raises(RecordingError, match="below the 3840000 Hz"):

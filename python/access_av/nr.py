@@ -23,7 +23,7 @@ import json
 from typing import TYPE_CHECKING, Any
 
 from access_av._core import Recording
-from access_av._core.nr import Cell, Scan, Searcher, build_burst, scan, search
+from access_av._core.nr import Cell, Receiver, Scan, Searcher, build_burst, scan, search
 from access_av.recorded_angles import stated_spacing, stated_truths
 
 if TYPE_CHECKING:
@@ -31,6 +31,7 @@ if TYPE_CHECKING:
 
 __all__ = [
     "Cell",
+    "Receiver",
     "Recording",
     "Scan",
     "Searcher",

@@ -1,10 +1,11 @@
-//! Search of 20 ms and tracking of one SSB, four antennas, one thread.
+//! Search of 20 ms and tracking of one SSB, four antennas, one thread; scan of a whole band, all threads.
 #![allow(clippy::unwrap_used, clippy::print_stdout, reason = "this is a test")]
 
 #[path = "../tests/air/mod.rs"]
 mod air;
 
 use nr_ssb::SubcarrierSpacing;
+use nr_ssb::raster::scan_off_raster;
 use nr_ssb::search::{SearchConfig, Searcher};
 use nr_ssb::track::Tracker;
 
@@ -48,6 +49,25 @@ fn track_one_ssb_of_4_antennas(bencher: divan::Bencher, decode_pbch: bool) {
             .track(divan::black_box(&antennas), 0.0, start, decode_pbch)
             .unwrap()
             .is_some()
+    });
+}
+
+/// A cell off the raster at 5 dB, on one antenna at 46.08 Msps for 20 ms, nothing told.
+#[divan::bench(sample_count = 3, sample_size = 1)]
+fn scan_off_raster_20_ms_at_46_msps(bencher: divan::Bencher) {
+    let (spacing, rate_hz, centre_hz) = (SubcarrierSpacing::Khz30, 46.08e6, 3.7e9);
+    let mut rng = air::rng(2);
+    let mut cell = air::Cell::random(&mut rng, spacing, 1);
+    (cell.ssb_freq_hz, cell.ssb_indices) = (3.706e9, vec![1]);
+    let mut base = air::silence(1, 153_600);
+    cell.add_to(&mut base);
+    let mut samples = vec![air::raised(&base[0], 6, 6e6 / rate_hz)];
+    // `raised` keeps amplitudes: noise of the same density is stronger by the ratio of the rates.
+    air::add_noise(&mut samples, 5.0 - 10.0 * 6_f64.log10(), &mut rng);
+    let slices = air::slices(&samples);
+    bencher.bench_local(|| {
+        let finds = scan_off_raster(divan::black_box(&slices), rate_hz, Some(centre_hz), &[]);
+        assert_eq!(finds.unwrap()[0].ssbs[0].pci.get(), cell.pci);
     });
 }
 

@@ -6,6 +6,11 @@
 //! reference signal (DM-RS), which says the time and the master information block (MIB). This crate
 //! follows TS 38.104, 38.211 to 38.213, 38.215 and 38.331; each item names its clause.
 //!
+//! # Receive
+//! A [`Receiver`](receiver::Receiver) takes samples of any rate in blocks of any length and gives SSBs
+//! with the channel of every antenna: it searches until it has found a cell and then tracks its
+//! beams. What it is made of can be used by itself:
+//!
 //! # Search for cells
 //! A recording goes through the [front end](front_end), which brings the SSB to 0 Hz and the samples to
 //! 256 a symbol, 7.68 Msps at 30 kHz spacing. There a [`Searcher`](search::Searcher) finds every SSB
@@ -78,7 +83,7 @@
 //!
 //! # Build a burst
 //! A cell sends its SSBs, one per beam, in a half frame of 5 ms; [`Burst`] writes them at any multiple
-//! of the 256-point rate (3.84 Msps at 15 kHz, 7.68 Msps at 30 kHz).
+//! of the 256-point rate (3.84 Msps at 15 kHz, 7.68 at 30, 30.72 at 120, 61.44 at 240).
 //!
 //! ```
 //! use nr_ssb::{BchPayload, Beam, Burst, Case, Lmax, Mib, Numerology, Ofdm, Pci};
@@ -135,6 +140,7 @@
 //! # The parts
 //! | to | see |
 //! |---|---|
+//! | have all that follows in one | [`receiver`] |
 //! | find the SSBs at a known frequency | [`search`] |
 //! | look at a known cell again and again | [`track`] |
 //! | find SSBs anywhere in a band | [`raster`] |
@@ -144,6 +150,7 @@
 //! | name a cell | [`Pci`] |
 //! | lay SSBs out in time | [`Case`], [`Lmax`], [`Numerology`] |
 //! | lay them out in frequency | [`grid`] |
+//! | know a band's raster and burst set size | [`band`] |
 //! | generate sequences | [`mod@pss`], [`mod@sss`], [`mod@dmrs`], [`gold`] |
 //! | read and write the MIB | [`Mib`], [`BchPayload`] |
 //! | code and decode the PBCH | [`pbch`]; its parts [`crc`], [`polar`], [`rate_matching`] |
@@ -153,16 +160,18 @@
 //! # Errors
 //! Everything that can be wrong with an input is an [`Error`]; with a recording, a search or a cell to
 //! be tracked a [`FrontEndError`](front_end::FrontEndError), a [`SearchError`](search::SearchError), a
-//! [`ScanError`](raster::ScanError), a [`TrackError`](track::TrackError). Nothing panics.
+//! [`ScanError`](raster::ScanError), a [`TrackError`](track::TrackError), with a receiver a [`ReceiverError`](receiver::ReceiverError).
+//! Nothing panics.
 
 // Each folder uses only those before it: numeric, standard; transmit, dsp; input, receive; search;
-// track, raster.
+// track, raster; receiver.
 mod dsp;
 mod error;
 mod input;
 mod numeric;
 pub mod raster;
 mod receive;
+pub mod receiver;
 pub mod search;
 mod standard;
 pub mod track;

@@ -23,8 +23,9 @@ mod _core {
     mod aoa {
         #[pymodule_export]
         use crate::aoa::{
-            AngleEstimate, calibrate, covariance, crb_rad, esprit, estimate_sources,
-            forward_backward, maximum_likelihood, music, root_music, spectrum,
+            AngleEstimate, DirectionEstimate, calibrate, covariance, crb_rad, direction,
+            direction_crb_rad, direction_spectrum, esprit, estimate_sources, forward_backward,
+            maximum_likelihood, music, root_music, spectrum,
         };
         use pyo3::prelude::*;
 
@@ -39,7 +40,7 @@ mod _core {
     #[pymodule]
     mod nr {
         #[pymodule_export]
-        use crate::nr::{Cell, Scan, Searcher, build_burst, scan, search};
+        use crate::nr::{Cell, Receiver, Scan, Searcher, build_burst, scan, search};
         use pyo3::prelude::*;
 
         #[pymodule_init]

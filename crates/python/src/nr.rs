@@ -1,12 +1,16 @@
 //! SSBs: finding them in samples and recordings, building them. `access_av._core.nr`.
 
 mod burst;
+mod channel;
+mod receiver;
 mod searcher;
 
 pub use burst::build_burst;
+pub use receiver::Receiver;
 pub use searcher::Searcher;
 
 use aoa::AngleEstimate;
+use channel::Channel;
 use nr_ssb::{Lmax, SubcarrierSpacing};
 use num_complex::{Complex32, Complex64};
 use numpy::{PyArrayDyn, PyArrayMethods, PyReadonlyArrayDyn, PyUntypedArrayMethods};
@@ -57,6 +61,11 @@ use crate::recording::{Recording, RecordingError};
 ///     a quarter turn less `angle_rad`.
 /// verdict : str or None
 ///     `resolved`, or why the angle may not be relied on.
+/// channel : ndarray
+///     complex64, `(antennas, 240)`: the channel on the SSB's subcarriers as it was received, delay
+///     and frequency offset taken out. A tone of amplitude one has 256.
+/// noise_variance : list of float
+///     Variance of the noise on a resource element, for each antenna, in that scale squared.
 #[pyclass(frozen, get_all, module = "access_av._core.nr")]
 pub struct Cell {
     pci: u16,
@@ -80,6 +89,8 @@ pub struct Cell {
     phase_sigma_rad: Option<f64>,
     azimuth_rad: Option<f64>,
     verdict: Option<String>,
+    channel: Channel,
+    noise_variance: Vec<f64>,
 }
 
 impl From<&FoundSsb> for Cell {
@@ -109,6 +120,8 @@ impl From<&FoundSsb> for Cell {
             phase_sigma_rad: of_angle(|angle| angle.phase_sigma_rad),
             azimuth_rad: of_angle(|angle| std::f64::consts::FRAC_PI_2 - angle.angle_rad),
             verdict: found.angle.map(|angle| angle.verdict.to_string()),
+            channel: Channel(found.channel.clone()),
+            noise_variance: found.noise_variance.clone(),
         }
     }
 }

@@ -6,67 +6,124 @@ from numpy.typing import ArrayLike, NDArray
 
 from access_av._core import Recording
 
-__all__ = ["Cell", "Scan", "Searcher", "build_burst", "scan", "search"]
+__all__ = ["Cell", "Receiver", "Scan", "Searcher", "build_burst", "scan", "search"]
 
 @final
 class Cell:
+    """One SSB of a cell, as it was received."""
+
     @property
-    def pci(self) -> int: ...
+    def pci(self) -> int:
+        """Physical cell identity, 0 to 1007."""
     @property
-    def ssb_index(self) -> int: ...
+    def ssb_index(self) -> int:
+        """Index of the SSB in its burst, that is its beam."""
     @property
-    def lmax(self) -> int | None: ...
+    def lmax(self) -> int | None:
+        """SSB indices that the cell has, 4, 8 or 64, where frequency or PBCH tell."""
     @property
-    def half_frame(self) -> int | None: ...
+    def half_frame(self) -> int | None:
+        """1 in the second half of a frame, where DM-RS or PBCH tell."""
     @property
-    def sfn(self) -> int | None: ...
+    def sfn(self) -> int | None:
+        """System frame number, if the PBCH's checksum held."""
     @property
-    def mib_bits(self) -> str | None: ...
+    def mib_bits(self) -> str | None:
+        """The 24 bits of the master information block, the first sent first."""
     @property
-    def cfo_hz(self) -> float: ...
+    def cfo_hz(self) -> float:
+        """Carrier frequency offset."""
     @property
-    def snr_db(self) -> float: ...
+    def snr_db(self) -> float:
+        """SNR of a resource element, mean over the antennas."""
     @property
-    def sample_start(self) -> float: ...
+    def sample_start(self) -> float:
+        """First sample of the SSB, its cyclic prefix included, at the recording's rate."""
     @property
-    def sample_count(self) -> float: ...
+    def sample_count(self) -> float:
+        """Its length at that rate."""
     @property
-    def ssb_freq_hz(self) -> float: ...
+    def ssb_freq_hz(self) -> float:
+        """Frequency of its centre."""
     @property
-    def scs_khz(self) -> int: ...
+    def scs_khz(self) -> int:
+        """Its subcarrier spacing."""
     @property
-    def rsrp_dbfs(self) -> list[float]: ...
+    def rsrp_dbfs(self) -> list[float]:
+        """SS-RSRP of each antenna (TS 38.215)."""
     @property
-    def rsrq_db(self) -> list[float]: ...
+    def rsrq_db(self) -> list[float]:
+        """SS-RSRQ of each antenna."""
     @property
-    def sinr_db(self) -> list[float]: ...
+    def sinr_db(self) -> list[float]:
+        """SS-SINR of each antenna."""
     @property
-    def angle_rad(self) -> float | None: ...
+    def angle_rad(self) -> float | None:
+        """Angle of arrival from the array's axis; with 2 to 8 antennas."""
     @property
-    def sigma_rad(self) -> float | None: ...
+    def sigma_rad(self) -> float | None:
+        """Its standard deviation."""
     @property
-    def phase_rad(self) -> float | None: ...
+    def phase_rad(self) -> float | None:
+        """The electrical angle behind it."""
     @property
-    def phase_sigma_rad(self) -> float | None: ...
+    def phase_sigma_rad(self) -> float | None:
+        """Its standard deviation."""
     @property
-    def azimuth_rad(self) -> float | None: ...
+    def azimuth_rad(self) -> float | None:
+        """Counter-clockwise from broadside: a quarter turn less `angle_rad`."""
     @property
-    def verdict(self) -> str | None: ...
+    def verdict(self) -> str | None:
+        """`resolved`, or why the angle may not be relied on."""
+    @property
+    def channel(self) -> NDArray[np.complex64]:
+        """Channel on the subcarriers as received, complex64 `(antennas, 240)`."""
+    @property
+    def noise_variance(self) -> list[float]:
+        """Noise variance of a resource element, each antenna's, in the channel's scale squared."""
 
 @final
 class Scan:
+    """What a scan of a recording found."""
+
     def __new__(
         cls, cells: Sequence[Cell], faults: Sequence[str], looked: Sequence[str]
     ) -> Scan: ...
     @property
-    def cells(self) -> list[Cell]: ...
+    def cells(self) -> list[Cell]:
+        """The SSBs in order of time."""
     @property
-    def faults(self) -> list[str]: ...
+    def faults(self) -> list[str]:
+        """What is wrong with single channels."""
     @property
-    def looked(self) -> list[str]: ...
+    def looked(self) -> list[str]:
+        """Where was looked."""
+
+@final
+class Receiver:
+    """Receive the SSBs of one frequency from a stream: cells are searched, then tracked."""
+
+    def __new__(
+        cls,
+        sample_rate_hz: float,
+        *,
+        centre_frequency_hz: float,
+        ssb_freq_hz: float,
+        scs_khz: int,
+        antennas: int,
+        period_s: float = 0.02,
+        search_every_s: float = 1.0,
+    ) -> Receiver: ...
+    def push(self, samples: ArrayLike) -> list[Cell]:
+        """SSBs completed by the next samples, `(samples,)` or `(antennas, samples)`."""
+
+    def finish(self) -> list[Cell]:
+        """SSBs held back; the stream ends."""
 
 @final
 class Searcher:
+    """Search for the SSBs of one frequency, plans and buffers kept from call to call."""
+
     def __new__(
         cls,
         sample_rate_hz: float,
@@ -78,7 +135,8 @@ class Searcher:
         spacing_wavelengths: float = 0.5,
         calibration: Sequence[complex] | None = None,
     ) -> Searcher: ...
-    def search(self, samples: ArrayLike) -> list[Cell]: ...
+    def search(self, samples: ArrayLike) -> list[Cell]:
+        """Every SSB in samples, `(samples,)` or `(antennas, samples)`, in order of time."""
 
 def scan(
     recording: Recording,
@@ -89,7 +147,9 @@ def scan(
     cfo_ppm: float | None = None,
     spacing_wavelengths: float = 0.5,
     calibration: Sequence[complex] | None = None,
-) -> Scan: ...
+) -> Scan:
+    """Find every SSB of a recording."""
+
 def search(
     samples: ArrayLike,
     sample_rate_hz: float,
@@ -100,7 +160,9 @@ def search(
     cfo_ppm: float | None = None,
     spacing_wavelengths: float = 0.5,
     calibration: Sequence[complex] | None = None,
-) -> list[Cell]: ...
+) -> list[Cell]:
+    """Find every SSB in samples, `(samples,)` or `(antennas, samples)`, in order of time."""
+
 def build_burst(
     pci: int,
     *,
@@ -113,4 +175,5 @@ def build_burst(
     mib_bits: str | None = None,
     ssb_freq_hz: float | None = None,
     sample_rate_hz: float = 7.68e6,
-) -> NDArray[np.complex64]: ...
+) -> NDArray[np.complex64]:
+    """One burst set, complex64 of 5 ms, its centre at 0 Hz."""

@@ -8,6 +8,7 @@ pub(crate) mod channel_estimate;
 pub(crate) mod demodulate;
 pub(crate) mod hypotheses;
 pub(crate) mod matched_filter;
+pub(crate) mod pss_segments;
 pub(crate) mod pss_symbol;
 pub(crate) mod received_grid;
 pub(crate) mod timing;

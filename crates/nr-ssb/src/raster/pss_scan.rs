@@ -4,10 +4,8 @@ use num_complex::Complex32;
 
 use super::error::ScanError;
 use super::parallel::in_parallel;
-use super::point_search::AT_ONCE;
 use crate::dsp::base_rate::SYMBOL_SAMPLES;
-use crate::dsp::hypotheses::cfo_hypotheses;
-use crate::dsp::matched_filter::{MatchedFilter, PssCandidate};
+use crate::dsp::pss_segments::{HOP, SegmentFilter, TRIALS, tiles};
 use crate::input::front_end::FrontEnd;
 use crate::numeric::false_alarm::exponential_sum_threshold;
 use crate::standard::grid::SUBCARRIERS;
@@ -15,102 +13,106 @@ use crate::standard::numerology::SubcarrierSpacing;
 
 /// The PSS is placed at multiples of this off the recording's centre.
 pub(super) const OFFSET_UNIT_HZ: f64 = 15e3;
-/// Half of what one tuning of the front end shows of the band: the PSS's 127 subcarriers may lie
-/// anywhere among 240.
-const TILE_SUBCARRIERS: f64 = 55.0;
-/// Hypotheses per subcarrier: half way between two of them the PSS loses 0.9 dB.
-const PER_SUBCARRIER: f64 = 2.0;
-/// Maxima that noise may offer.
-const NOISE_CANDIDATES: f64 = 4.0;
+/// Maxima that noise may offer. Each costs a look at three SSBs' time, and four times as many make up
+/// half of what is lost by adding powers.
+const NOISE_CANDIDATES: f64 = 16.0;
 /// Offsets that are worth a search at most.
 const MOST_OFFSETS: usize = 24;
+/// Lags that a thread takes at once, at the base rate, ...
+const CHUNK: usize = 4 * HOP;
+/// ... and samples before and after, for the front end's filter and the PSS itself.
+const BEFORE: usize = 256;
+const AFTER: usize = 512;
 
-/// One maximum.
-struct Seen {
+/// Where the PSS stands out.
+pub(super) struct Seen {
     statistic: f32,
-    sample: usize,
-    offset_hz: f64,
+    /// First sample of the PSS, in the recording.
+    pub(super) sample: f64,
+    pub(super) offset_hz: f64,
 }
 
 /// Offsets from the recording's centre, multiples of 15 kHz up to `reach_hz`, where the PSS
 /// stands out, the likeliest first.
-///
-/// The band is cut into tiles as wide as the PSS can wander inside the front end's pass band.
 pub(super) fn likely_offsets(
     spacing: SubcarrierSpacing,
     rate_hz: f64,
     antennas: &[&[Complex32]],
     reach_hz: f64,
-) -> Result<Vec<f64>, ScanError> {
+) -> Result<Vec<Seen>, ScanError> {
     let scs_hz = spacing.hz();
-    let tiles = (reach_hz / (TILE_SUBCARRIERS * scs_hz)).ceil().max(1.0);
-    let half_tile_hz = reach_hz / tiles;
-    let hypotheses = cfo_hypotheses(half_tile_hz + 0.5 * scs_hz, scs_hz / PER_SUBCARRIER);
-    let centres: Vec<f64> = (0..tiles as usize)
-        .map(|tile| (2.0 * tile as f64 + 1.0) * half_tile_hz - reach_hz)
-        .collect();
-    let batches: Vec<&[f64]> = centres.chunks(AT_ONCE).collect();
-    let trials_per_sample = 3.0 * hypotheses.len() as f64 * tiles;
+    let reach = (reach_hz / scs_hz).floor() as usize;
+    let tiles = tiles(reach);
+    let tuned_hz: Vec<f64> = tiles.iter().map(|it| it.centre as f64 * scs_hz).collect();
+    let length = antennas.iter().map(|it| it.len()).min().unwrap_or(0);
+    let ratio = rate_hz / spacing.base_rate_hz();
+    let trials = length as f64 / ratio * (2 * reach + 1) as f64 * TRIALS;
+    let probability = NOISE_CANDIDATES / trials.max(NOISE_CANDIDATES);
+    let threshold = exponential_sum_threshold(3 * antennas.len(), probability) as f32;
+    let in_input = |base: usize| (base as f64 * ratio) as usize;
+    let starts: Vec<usize> = (0..length).step_by(in_input(CHUNK).max(1)).collect();
     let worker = || {
         let front_end = FrontEnd::new(rate_hz, 0.0, scs_hz, antennas.len())?;
-        let filter = MatchedFilter::new(scs_hz, &hypotheses, antennas.len());
-        Ok((
-            front_end,
-            filter,
-            vec![vec![Vec::new(); antennas.len()]; AT_ONCE],
-        ))
+        let filter = SegmentFilter::new(antennas.len());
+        let bases = vec![vec![Vec::new(); antennas.len()]; tiles.len()];
+        Ok((front_end, filter, bases))
     };
-    let seen = in_parallel(
-        &batches,
-        worker,
-        |(front_end, filter, bases), centres_hz| {
-            let bases = &mut bases[..centres_hz.len()];
-            front_end.process_at(antennas, centres_hz, bases)?;
-            let mut seen = Vec::new();
-            let mut candidates = Vec::new();
-            for (tile_hz, base) in centres_hz.iter().zip(bases) {
-                let samples = base.first().map_or(0, Vec::len);
-                let trials = samples as f64 * trials_per_sample;
-                let probability = NOISE_CANDIDATES / trials.max(NOISE_CANDIDATES);
-                let threshold = exponential_sum_threshold(antennas.len(), probability);
-                candidates.clear();
-                filter.run(base, 0, samples, threshold as f32, &mut candidates);
-                seen.extend(candidates.iter().map(|candidate: &PssCandidate| Seen {
-                    statistic: candidate.statistic,
-                    sample: candidate.sample,
-                    offset_hz: nearest_offset(tile_hz + candidate.cfo_hz, reach_hz),
-                }));
-            }
-            Ok::<_, ScanError>(seen)
-        },
-    )?;
-    Ok(strongest(seen.into_iter().flatten().collect(), scs_hz))
+    let seen = in_parallel(&starts, worker, |(front_end, filter, bases), &start| {
+        let from = start.saturating_sub(in_input(BEFORE));
+        let to = length.min(start + in_input(CHUNK + AFTER));
+        let part: Vec<&[Complex32]> = antennas.iter().map(|it| &it[from..to]).collect();
+        front_end.process_at(&part, &tuned_hz, bases)?;
+        let samples = bases.iter().flatten().map(Vec::len).min().unwrap_or(0);
+        let first = ((start - from) as f64 / ratio) as usize;
+        let end = (first + CHUNK).min(samples);
+        let mut maxima = Vec::new();
+        filter.run(&tiles, bases, (first, end), threshold, &mut maxima);
+        let seen = maxima.iter().map(|maximum| Seen {
+            statistic: maximum.statistic,
+            sample: from as f64 + maximum.sample * ratio,
+            offset_hz: nearest_offset(maximum.subcarriers * scs_hz, reach_hz),
+        });
+        Ok::<_, ScanError>(seen.collect::<Vec<_>>())
+    })?;
+    let near = SYMBOL_SAMPLES as f64 * ratio;
+    Ok(strongest(
+        seen.into_iter().flatten().collect(),
+        near,
+        scs_hz,
+    ))
 }
 
-/// Where the strongest maxima are, those left out that are but a stronger one's PSS, overlapping
-/// with itself shifted in frequency.
-fn strongest(mut seen: Vec<Seen>, scs_hz: f64) -> Vec<f64> {
+/// The strongest maxima, one for each offset, those left out that are but a stronger one's PSS,
+/// overlapping with itself shifted in frequency. `near`: samples of a symbol.
+fn strongest(mut seen: Vec<Seen>, near: f64, scs_hz: f64) -> Vec<Seen> {
     seen.sort_by(|a, b| b.statistic.total_cmp(&a.statistic));
     let width_hz = SUBCARRIERS as f64 * scs_hz;
-    let mut kept: Vec<&Seen> = Vec::new();
-    let mut offsets = Vec::new();
-    for one in &seen {
-        if offsets.len() == MOST_OFFSETS {
+    let mut kept: Vec<Seen> = Vec::new();
+    let mut likeliest: Vec<usize> = Vec::new();
+    for one in seen {
+        if likeliest.len() == MOST_OFFSETS {
             break;
         }
         let shadow = kept.iter().any(|it| {
-            it.sample.abs_diff(one.sample) < SYMBOL_SAMPLES
-                && (it.offset_hz - one.offset_hz).abs() < width_hz
+            (it.sample - one.sample).abs() < near && (it.offset_hz - one.offset_hz).abs() < width_hz
         });
         if shadow {
             continue;
         }
-        kept.push(one);
-        if !offsets.contains(&one.offset_hz) {
-            offsets.push(one.offset_hz);
+        if !likeliest
+            .iter()
+            .any(|it| kept[*it].offset_hz == one.offset_hz)
+        {
+            likeliest.push(kept.len());
         }
+        kept.push(one);
     }
-    offsets
+    let mut number = 0;
+    kept.retain(|_| {
+        number += 1;
+        likeliest.contains(&(number - 1))
+    });
+    kept
 }
 
 /// The multiple of 15 kHz nearest to `hz` inside the reach.

@@ -1,8 +1,10 @@
 //! What a search finds.
 
+use num_complex::Complex32;
+
 use crate::dsp::received_grid::{MAX_ANTENNAS, ReceivedGrid};
 use crate::receive::measure::Measurement;
-use crate::standard::grid::SsbGrid;
+use crate::standard::grid::{SUBCARRIERS, SsbGrid};
 use crate::standard::message::payload::BchPayload;
 use crate::standard::numerology::Lmax;
 use crate::standard::pci::Pci;
@@ -56,6 +58,8 @@ pub struct ReceivedSsb<'a> {
     pub elements: &'a [ReceivedGrid],
     /// The elements that are known, zero elsewhere: pilots, and the PBCH if it decoded.
     pub known: &'a SsbGrid,
+    /// The channel on the 240 subcarriers, per antenna.
+    pub channel: &'a [[Complex32; SUBCARRIERS]],
     /// Variance of the noise on a resource element, per antenna.
     pub noise_variance: &'a [f64],
 }

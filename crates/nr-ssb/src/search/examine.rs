@@ -186,6 +186,7 @@ impl Examiner {
             let received = ReceivedSsb {
                 elements: &self.acquirer.grids,
                 known: &self.acquirer.reference,
+                channel: &self.acquirer.estimate.channel,
                 noise_variance: &self.acquirer.estimate.noise_variance,
             };
             look(ssb, &received);

@@ -199,6 +199,27 @@ impl<const A: usize> Tracker<A> {
         &self.acquirer.reference
     }
 
+    /// The channel on the 240 subcarriers of every antenna, by all that is known of the last SSB, with
+    /// its `residual_delay` taken out.
+    pub fn channel(&mut self, residual_delay: f64, channel: &mut [[Complex32; SUBCARRIERS]]) {
+        let Acquirer {
+            estimate,
+            grids,
+            reference,
+            ..
+        } = &mut self.acquirer;
+        estimate.fit(grids, reference);
+        let ramp = timing::ramp(residual_delay);
+        for (slot, estimate) in channel.iter_mut().zip(&estimate.channel) {
+            *slot = std::array::from_fn(|k| estimate[k] * ramp[k]);
+        }
+    }
+
+    /// SSBs of a burst set, told or taken for the likelier.
+    pub const fn lmax(&self) -> Lmax {
+        self.index.lmax()
+    }
+
     /// Everything from the demodulated grids on.
     fn look(
         &mut self,

@@ -147,8 +147,8 @@ def cases():
 
 
 def prefixes(khz):
-    """(start, length) of the cyclic prefixes of a subframe, in units of T_c / (64 · 2^k) with k such
-    that an OFDM symbol has 256 (TS 38.211, 5.3.1)."""
+    """(start, length) of the cyclic prefixes of a subframe (TS 38.211, 5.3.1), in samples of which
+    an OFDM symbol has 256."""
     mu = {15: 0, 30: 1, 120: 3, 240: 4}[khz]
     start = 0
     for symbol in range(14 * 2**mu):
@@ -233,7 +233,13 @@ def write():
         print("raster", 22256 + n, 24_250_080 + 17_280 * n)
     for khz in (15, 30, 120, 240):
         all_of_them = list(prefixes(khz))
-        for symbol in (0, 1, len(all_of_them) // 2, len(all_of_them) // 2 + 1, len(all_of_them) - 1):
+        for symbol in (
+            0,
+            1,
+            len(all_of_them) // 2,
+            len(all_of_them) // 2 + 1,
+            len(all_of_them) - 1,
+        ):
             print("prefix", khz, symbol, *all_of_them[symbol])
     for name, value, bits in mibs():
         print("mib", name, value, packed(bits))

@@ -14,6 +14,7 @@ use onboard::settings::LocalizerSettings;
 use super::error::ReplayError;
 use super::innovations::{Met, innovations};
 use super::mistakes::{Drive, MISTAKES, Mistake};
+use super::stated::with_phase;
 use crate::angle_log::LoggedAngle;
 
 /// Angles by which it is judged: the first of the drive.
@@ -47,15 +48,22 @@ impl Foretold {
             &drive.angles,
             None,
         )?;
-        let log_likelihood = |met: &Option<Met>| {
+        let spacing = drive.vehicle.array.spacing_wavelengths;
+        // Per standard deviation of the measurement: so it does not matter in what it is told.
+        let log_likelihood = |(met, logged): (&Option<Met>, &LoggedAngle)| {
             let gaussian = met.map_or(0.0, |met| {
                 (-0.5 * met.residual_rad.powi(2) / met.variance).exp() / (TAU * met.variance).sqrt()
             });
-            ((1.0 - FROM_ANYWHERE) * gaussian + FROM_ANYWHERE / TAU).ln()
+            let sigma_rad = with_phase(logged, spacing).measured.phase_sigma_rad;
+            (sigma_rad * ((1.0 - FROM_ANYWHERE) * gaussian + FROM_ANYWHERE / TAU)).ln()
         };
         let refused = met.iter().filter(|met| met.is_none_or(|met| !met.used));
         Ok(Self {
-            log_likelihood: met.iter().map(log_likelihood).sum(),
+            log_likelihood: met
+                .iter()
+                .zip(drive.angles.iter())
+                .map(log_likelihood)
+                .sum(),
             refused: refused.count() as f64 / met.len().max(1) as f64,
         })
     }

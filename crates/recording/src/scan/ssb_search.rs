@@ -2,6 +2,7 @@
 //! the next.
 
 use nr_ssb::front_end::FrontEnd;
+use nr_ssb::grid::SUBCARRIERS;
 use nr_ssb::search::{DetectedSsb, SearchConfig, SearchError, Searcher};
 use nr_ssb::{Complex32, Pci, SubcarrierSpacing};
 
@@ -82,6 +83,19 @@ pub struct FoundSsb {
     pub spacing: SubcarrierSpacing,
     /// Angle of arrival, with two antennas and more.
     pub angle: Option<aoa::AngleEstimate>,
+    /// Per antenna the channel on the SSB's subcarriers, as received, delay and offset taken out.
+    pub channel: Vec<[Complex32; SUBCARRIERS]>,
+    /// Variance of the noise on a resource element, per antenna, in the channel's scale squared.
+    pub noise_variance: Vec<f64>,
+}
+
+/// How one SSB was seen.
+struct Seen {
+    pci: Pci,
+    sample_start: f64,
+    view: Option<View>,
+    channel: Vec<[Complex32; SUBCARRIERS]>,
+    noise_variance: Vec<f64>,
 }
 
 /// A search that can be used for one recording after another.
@@ -94,8 +108,8 @@ pub struct SsbSearch {
     searcher: Searcher,
     view: Option<Box<dyn ArrayView>>,
     base: Vec<Vec<Complex32>>,
-    /// How the array sees the SSBs of one block.
-    seen: Vec<(Pci, f64, View)>,
+    /// How the SSBs of one block were seen.
+    seen: Vec<Seen>,
     votes: ExchangeVotes,
     found: Vec<FoundSsb>,
 }
@@ -220,22 +234,37 @@ impl SsbSearch {
         seen.clear();
         let found = searcher
             .push_with(samples, &mut |ssb, received| {
-                if let Some(view) = view.as_ref().and_then(|view| view.view(received)) {
-                    votes.vote(&view);
-                    seen.push((ssb.pci, ssb.sample_start, view));
+                let view = view.as_ref().and_then(|view| view.view(received));
+                if let Some(view) = &view {
+                    votes.vote(view);
                 }
+                seen.push(Seen {
+                    pci: ssb.pci,
+                    sample_start: ssb.sample_start,
+                    view,
+                    channel: received.channel.to_vec(),
+                    noise_variance: received.noise_variance.to_vec(),
+                });
             })
             .map_err(|source| config.search_failed(source))?;
         let ratio = self.ratio;
         self.found.extend(found.iter().map(|ssb| {
-            let same =
-                |(pci, start, _): &&(Pci, f64, View)| *pci == ssb.pci && *start == ssb.sample_start;
+            let same = |it: &Seen| it.pci == ssb.pci && it.sample_start == ssb.sample_start;
+            let seen = seen
+                .iter()
+                .position(same)
+                .map(|place| seen.swap_remove(place));
+            let (view, channel, noise_variance) = seen.map_or_else(Default::default, |it| {
+                (it.view, it.channel, it.noise_variance)
+            });
             FoundSsb {
                 sample_start: ssb.sample_start * ratio,
                 sample_count: SSB_SAMPLES as f64 * ratio,
                 ssb_freq_hz: config.ssb_freq_hz,
                 spacing: config.spacing,
-                angle: seen.iter().find(same).map(|(.., view)| view.estimate),
+                angle: view.map(|view| view.estimate),
+                channel,
+                noise_variance,
                 ssb: ssb.clone(),
             }
         }));

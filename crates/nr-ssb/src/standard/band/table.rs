@@ -4,10 +4,10 @@
 //! n79 has the entries of its narrow channels, which hold those of the wide ones; so has n90.
 //! Without n263, whose SSBs may also have 480 and 960 kHz, and without bands of uplink only.
 
-use super::Spectrum::{Paired, Unpaired};
-use super::{Band, Entries, Spectrum};
+use super::operating_band::Entries::{Listed, Steps};
+use super::operating_band::Spectrum::{Paired, Unpaired};
+use super::operating_band::{Band, Entries, Spectrum};
 use crate::standard::numerology::Case::{self, A, B, C, D, E};
-use Entries::{Listed, Steps};
 
 const fn band(
     number: u16,

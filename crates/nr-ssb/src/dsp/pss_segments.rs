@@ -1,0 +1,456 @@
+//! PSS anywhere in a band, at whatever frequency.
+//!
+//! The three PSS are one m-sequence from three places on. Cut there it gives three segments of some
+//! 43 subcarriers, and each PSS holds all of them in another order. So a segment is correlated once
+//! at every subcarrier of the band, at a third of the PSS's rate, and the powers of three segments
+//! are added for each PSS at each frequency: nine times fewer samples are transformed back than by
+//! a matched filter for each PSS. (The powers added instead of the amplitudes cost 0.8 dB.)
+//!
+//! Frequencies half way between two subcarriers, and lags half way between two samples, are the sums
+//! of their neighbours over √2, as of the lags in the [matched filter](super::matched_filter): a
+//! quarter off, the most there is, 0.9 dB are lost in frequency and 0.7 dB in time.
+//!
+//! Normalised by the energy under the window in the 48 subcarriers around a segment, each is in noise
+//! exponentially distributed with mean one.
+
+use std::f64::consts::PI;
+use std::sync::Arc;
+
+use num_complex::{Complex32, Complex64};
+use rustfft::{Fft, FftPlanner};
+
+use super::base_rate::SYMBOL_FFT;
+use crate::numeric::phasors::fill_phasors;
+use crate::standard::sequence::pss::{SYNC_LEN, pss};
+
+/// Length of a transform of the overlap-save scheme, at the base rate.
+const BLOCK: usize = 2048;
+const BINS_PER_SUBCARRIER: usize = BLOCK / SYMBOL_FFT;
+/// Lags that one block yields, at the base rate.
+pub(crate) const HOP: usize = BLOCK - SYMBOL_FFT;
+/// Subcarriers around a segment that are transformed back.
+const WIDTH: usize = 48;
+const NARROW: usize = WIDTH * BINS_PER_SUBCARRIER;
+/// Samples at the base rate per narrow sample.
+const STEP: f64 = BLOCK as f64 / NARROW as f64;
+/// Lags of a block in narrow samples.
+const LAGS: usize = HOP * NARROW / BLOCK;
+/// Even and odd lags on a subcarrier, then those half a subcarrier above.
+const PLANE: usize = 4 * LAGS;
+/// First chip of each segment.
+const SEGMENTS: [usize; 3] = [0, 43, 86];
+/// The subcarrier in its middle.
+const MIDDLE: isize = 21;
+/// Subcarriers from the first of a PSS to its centre, and to its last segment's first at most.
+const TO_CENTRE: isize = 64;
+const TO_LAST: isize = 86;
+/// Segment positions that a PSS needs, and one that is being filled.
+const RING: usize = TO_LAST as usize + 2;
+/// Subcarriers from one measurement of the energy to the next: all of a segment's lie inside the
+/// nearest, so that a strong neighbour at its edge is counted too.
+const ENERGY_STEP: usize = 3;
+/// Cut to 48 subcarriers, a segment reaches out of its window: most of it this many narrow samples to
+/// either side, ...
+const BESIDE: usize = 3;
+/// ... where up to 0.6 % of its energy lie. With 48 times that much of the energy there added to
+/// the window's, a strong signal beside a window of silence makes a statistic of one at most.
+const LEAK: f32 = 0.29;
+/// The same of what lies further away, 7e-5 of a segment's energy, and of all the block's.
+const FAR_LEAK: f32 = 1.2e-5;
+
+/// Most segment positions in a tile: 192 of 43 subcarriers lie inside the front end's 240.
+const TILE_POSITIONS: usize = 192;
+
+/// First subcarriers of segments that one tuning of the front end shows.
+#[derive(Debug, Clone, Copy)]
+pub(crate) struct Tile {
+    /// Subcarrier that is tuned to 0 Hz.
+    pub(crate) centre: isize,
+    first: isize,
+    positions: usize,
+}
+
+/// Tiles that show all PSS whose centre lies up to `reach` subcarriers off the band's.
+pub(crate) fn tiles(reach: usize) -> Vec<Tile> {
+    let all = 2 * reach + TO_LAST as usize + 1;
+    let count = all.div_ceil(TILE_POSITIONS);
+    let mut first = -(reach as isize) - TO_CENTRE;
+    (0..count)
+        .map(|number| {
+            let positions = (number + 1) * all / count - number * all / count;
+            let tile = Tile {
+                centre: first + (positions / 2) as isize + MIDDLE,
+                first,
+                positions,
+            };
+            first += positions as isize;
+            tile
+        })
+        .collect()
+}
+
+/// A maximum.
+#[derive(Debug, Clone, Copy)]
+pub(crate) struct SegmentMaximum {
+    pub(crate) statistic: f32,
+    /// Where the PSS begins, without its cyclic prefix, in samples at the base rate.
+    pub(crate) sample: f64,
+    /// Subcarriers from the band's centre to the PSS's.
+    pub(crate) subcarriers: f64,
+}
+
+/// Evaluations per lag at the base rate and subcarrier.
+pub(crate) const TRIALS: f64 = 3.0 * 4.0 / STEP;
+
+/// See the module; owns its transforms and buffers.
+pub(crate) struct SegmentFilter {
+    forward: Arc<dyn Fft<f32>>,
+    inverse: Arc<dyn Fft<f32>>,
+    /// Conjugated spectrum of each segment, its middle at 0 Hz.
+    replicas: [Vec<Complex32>; 3],
+    /// Turns the correlation of the next subcarrier to that of this one, half way between them.
+    half_turns: Vec<Complex32>,
+    block: Vec<Complex32>,
+    scratch: Vec<Complex32>,
+    /// Spectrum of each antenna's block, lowest frequency first.
+    spectra: Vec<Vec<Complex32>>,
+    /// Per antenna and place of measurement: 48 / energy under the window.
+    inverse_energy: Vec<Vec<[f32; LAGS]>>,
+    /// Per antenna and segment the correlation at the last subcarrier and at this one.
+    last: Vec<[Vec<Complex32>; 3]>,
+    here: Vec<Complex32>,
+    /// Per position, modulo the ring, and segment: summed powers.
+    planes: Vec<[[f32; PLANE]; 3]>,
+}
+
+impl SegmentFilter {
+    pub(crate) fn new(antennas: usize) -> Self {
+        let mut planner = FftPlanner::new();
+        let forward = planner.plan_fft_forward(BLOCK);
+        let inverse = planner.plan_fft_inverse(NARROW);
+        let scratch = forward
+            .get_inplace_scratch_len()
+            .max(inverse.get_inplace_scratch_len());
+        let mut half_turns = vec![Complex32::ZERO; NARROW];
+        // Half a turn in the middle of the window, and one turn a symbol.
+        fill_phasors(&mut half_turns, 0.5, 1.0 / WIDTH as f64);
+        let narrow = vec![Complex32::ZERO; NARROW];
+        Self {
+            forward,
+            inverse,
+            replicas: [0, 1, 2].map(replica),
+            half_turns,
+            block: vec![Complex32::ZERO; BLOCK],
+            scratch: vec![Complex32::ZERO; scratch],
+            spectra: vec![vec![Complex32::ZERO; BLOCK]; antennas],
+            inverse_energy: vec![
+                vec![[0.0; LAGS]; TILE_POSITIONS.div_ceil(ENERGY_STEP) + 1];
+                antennas
+            ],
+            last: vec![std::array::from_fn(|_| narrow.clone()); antennas],
+            here: narrow,
+            planes: vec![[[0.0; PLANE]; 3]; RING],
+        }
+    }
+
+    /// Appends the maxima above `threshold` of PSS that begin in `first..end`, samples at the base
+    /// rate; `bases` are the antennas' as each tile shows them.
+    pub(crate) fn run(
+        &mut self,
+        tiles: &[Tile],
+        bases: &[Vec<Vec<Complex32>>],
+        (first, end): (usize, usize),
+        threshold: f32,
+        maxima: &mut Vec<SegmentMaximum>,
+    ) {
+        let mut start = first;
+        while start < end {
+            let lags = HOP.min(end - start);
+            self.run_block(tiles, bases, (start, lags), threshold, maxima);
+            start += lags;
+        }
+    }
+
+    fn run_block(
+        &mut self,
+        tiles: &[Tile],
+        bases: &[Vec<Vec<Complex32>>],
+        (start, lags): (usize, usize),
+        threshold: f32,
+        maxima: &mut Vec<SegmentMaximum>,
+    ) {
+        let Some(origin) = tiles.first().map(|tile| tile.first) else {
+            return;
+        };
+        let narrow_lags = ((lags as f64 / STEP).ceil() as usize).min(LAGS);
+        for (tile, antennas) in tiles.iter().zip(bases) {
+            for (antenna, samples) in antennas.iter().enumerate() {
+                self.load(antenna, samples.get(start..).unwrap_or_default());
+                self.measure(antenna, tile);
+            }
+            // One more, for what lies half way to it.
+            for number in 0..=tile.positions {
+                let position = tile.first + number as isize;
+                self.correlate(tile, position, number);
+                // All that a PSS needs which ends with the position before.
+                let centre = position - 1 - (TO_LAST - TO_CENTRE);
+                if number > 0 && position - 1 - origin >= TO_LAST {
+                    self.collect(centre, (start, narrow_lags), threshold, maxima);
+                }
+            }
+        }
+    }
+
+    /// Spectrum of the block that begins with `samples`.
+    fn load(&mut self, antenna: usize, samples: &[Complex32]) {
+        let length = samples.len().min(BLOCK);
+        self.block[..length].copy_from_slice(&samples[..length]);
+        self.block[length..].fill(Complex32::ZERO);
+        self.forward
+            .process_with_scratch(&mut self.block, &mut self.scratch);
+        let (negative, positive) = self.spectra[antenna].split_at_mut(BLOCK / 2);
+        positive.copy_from_slice(&self.block[..BLOCK / 2]);
+        negative.copy_from_slice(&self.block[BLOCK / 2..]);
+    }
+
+    /// Energy under the window around every so many positions of the tile.
+    fn measure(&mut self, antenna: usize, tile: &Tile) {
+        for (number, slot) in self.inverse_energy[antenna].iter_mut().enumerate() {
+            let position = tile.first + (number * ENERGY_STEP) as isize;
+            let Some(centre) = bin(tile, position) else {
+                break;
+            };
+            let bins = &self.spectra[antenna][centre - NARROW / 2..][..NARROW];
+            let (negative, positive) = bins.split_at(NARROW / 2);
+            let (low, high) = self.here.split_at_mut(NARROW / 2);
+            low.copy_from_slice(positive);
+            high.copy_from_slice(negative);
+            self.inverse
+                .process_with_scratch(&mut self.here, &mut self.scratch);
+            let powers: [f32; NARROW] = std::array::from_fn(|n| self.here[n].norm_sqr());
+            let far = FAR_LEAK * powers.iter().sum::<f32>();
+            let mut energy: f64 = powers[..WIDTH].iter().map(|it| f64::from(*it)).sum();
+            for (n, slot) in slot.iter_mut().enumerate() {
+                let beside: f32 = (0..BESIDE)
+                    .map(|i| {
+                        powers[(n + NARROW - 1 - i) % NARROW] + powers[(n + WIDTH + i) % NARROW]
+                    })
+                    .sum();
+                let all = energy as f32 + LEAK * beside;
+                // The sum over narrow samples, in samples at the base rate.
+                let scale = WIDTH as f32 / STEP as f32;
+                *slot = if all > far.max(f32::MIN_POSITIVE) {
+                    scale / all
+                } else {
+                    0.0
+                };
+                energy += f64::from(powers[n + WIDTH]) - f64::from(powers[n]);
+            }
+        }
+    }
+
+    /// Powers of the segments that begin at a position, and half a subcarrier above the one before.
+    fn correlate(&mut self, tile: &Tile, position: isize, number: usize) {
+        let Some(centre) = bin(tile, position) else {
+            return;
+        };
+        let slot = position.rem_euclid(RING as isize) as usize;
+        let slot_before = (position - 1).rem_euclid(RING as isize) as usize;
+        for antenna in 0..self.spectra.len() {
+            let bins = &self.spectra[antenna][centre - NARROW / 2..][..NARROW];
+            let nearest = |number: usize| (number + ENERGY_STEP / 2) / ENERGY_STEP;
+            for segment in 0..3 {
+                let (negative, positive) = bins.split_at(NARROW / 2);
+                let (low, high) = self.here.split_at_mut(NARROW / 2);
+                let (below, above) = self.replicas[segment].split_at(NARROW / 2);
+                multiply(low, positive, above);
+                multiply(high, negative, below);
+                self.inverse
+                    .process_with_scratch(&mut self.here, &mut self.scratch);
+                let last = &mut self.last[antenna][segment];
+                let fresh = antenna == 0;
+                if number < tile.positions {
+                    let energy = &self.inverse_energy[antenna][nearest(number)];
+                    let plane = &mut self.planes[slot][segment][..2 * LAGS];
+                    add_powers(plane, &self.here, energy, fresh);
+                }
+                if number > 0 {
+                    for ((a, b), turn) in last.iter_mut().zip(&self.here).zip(&self.half_turns) {
+                        *a = (*a + b * turn) * std::f32::consts::FRAC_1_SQRT_2;
+                    }
+                    let energy = &self.inverse_energy[antenna][nearest(number - 1)];
+                    let plane = &mut self.planes[slot_before][segment][2 * LAGS..];
+                    add_powers(plane, last, energy, fresh);
+                }
+                last.copy_from_slice(&self.here);
+            }
+        }
+    }
+
+    /// Maxima of the three PSS whose centre is on this subcarrier or half above.
+    fn collect(
+        &self,
+        centre: isize,
+        (start, lags): (usize, usize),
+        threshold: f32,
+        maxima: &mut Vec<SegmentMaximum>,
+    ) {
+        for n_id_2 in 0..3 {
+            let plane = |segment: usize| {
+                let first_chip = SEGMENTS[segment] + SYNC_LEN;
+                let after = ((first_chip - 43 * n_id_2) % SYNC_LEN) as isize;
+                let position = centre - TO_CENTRE + after;
+                &self.planes[position.rem_euclid(RING as isize) as usize][segment]
+            };
+            let (a, b, c) = (plane(0), plane(1), plane(2));
+            let mut most = [0.0_f32; 8];
+            for at in (0..PLANE).step_by(8) {
+                for lane in 0..8 {
+                    let sum = a[at + lane] + b[at + lane] + c[at + lane];
+                    most[lane] = if sum > most[lane] { sum } else { most[lane] };
+                }
+            }
+            if most.iter().all(|it| *it < threshold) {
+                continue;
+            }
+            for at in 0..PLANE {
+                let (quarter, lag) = (at / LAGS, at % LAGS);
+                let statistic = a[at] + b[at] + c[at];
+                if statistic < threshold || lag >= lags {
+                    continue;
+                }
+                let maximum = SegmentMaximum {
+                    statistic,
+                    sample: start as f64 + (lag as f64 + 0.5 * (quarter % 2) as f64) * STEP,
+                    subcarriers: centre as f64 + 0.5 * (quarter / 2) as f64,
+                };
+                let near = maxima.iter_mut().rev().take(64).find(|other| {
+                    (other.sample - maximum.sample).abs() < 3.0 * STEP
+                        && (other.subcarriers - maximum.subcarriers).abs() < 2.0
+                });
+                match near {
+                    Some(other) if other.statistic >= statistic => {}
+                    Some(other) => *other = maximum,
+                    None => maxima.push(maximum),
+                }
+            }
+        }
+    }
+}
+
+/// Bin of the middle of the segment that begins at a position, in a spectrum that begins with its
+/// lowest frequency; `None` where the segment's surroundings reach out of it.
+fn bin(tile: &Tile, position: isize) -> Option<usize> {
+    let off = (position + MIDDLE - tile.centre) * BINS_PER_SUBCARRIER as isize;
+    let centre = (BLOCK / 2).checked_add_signed(off)?;
+    (centre >= NARROW / 2 && centre + NARROW / 2 <= BLOCK).then_some(centre)
+}
+
+/// Conjugated spectrum of a segment that lasts a symbol, lowest frequency first.
+fn replica(segment: usize) -> Vec<Complex32> {
+    let end = SEGMENTS.get(segment + 1).copied().unwrap_or(SYNC_LEN);
+    let chips = &pss(0)[SEGMENTS[segment]..end];
+    // Unit energy in 256 samples, and the transforms' factors against those of the energy.
+    let scale = (SYMBOL_FFT as f64 / chips.len() as f64).sqrt();
+    (0..NARROW)
+        .map(|bin| {
+            let at = (bin as f64 - (NARROW / 2) as f64) / BINS_PER_SUBCARRIER as f64;
+            let sum: Complex64 = chips
+                .iter()
+                .enumerate()
+                .map(|(i, chip)| {
+                    let off = PI * (i as f64 - MIDDLE as f64 - at);
+                    let sinc = if off.abs() < 1e-9 {
+                        1.0
+                    } else {
+                        off.sin() / off
+                    };
+                    Complex64::cis(off) * sinc * f64::from(*chip)
+                })
+                .sum();
+            let conjugated = sum.conj() * scale;
+            Complex32::new(conjugated.re as f32, conjugated.im as f32)
+        })
+        .collect()
+}
+
+/// Elementwise product.
+fn multiply(product: &mut [Complex32], a: &[Complex32], b: &[Complex32]) {
+    for ((slot, a), b) in product.iter_mut().zip(a).zip(b) {
+        *slot = Complex32::new(a.re * b.re - a.im * b.im, a.re * b.im + a.im * b.re);
+    }
+}
+
+/// Adds the powers of a correlation at even lags and at the odd ones between; `fresh`: to nothing.
+fn add_powers(plane: &mut [f32], correlation: &[Complex32], energy: &[f32; LAGS], fresh: bool) {
+    let (even, odd) = plane.split_at_mut(LAGS);
+    let (here, next) = (&correlation[..LAGS], &correlation[1..=LAGS]);
+    let kept = if fresh { 0.0 } else { 1.0 };
+    for i in 0..LAGS {
+        let (a, b, scale) = (here[i], next[i], energy[i]);
+        let (re, im) = (a.re + b.re, a.im + b.im);
+        even[i] = even[i] * kept + (a.re * a.re + a.im * a.im) * scale;
+        odd[i] = odd[i] * kept + (re * re + im * im) * (0.5 * scale);
+    }
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+    use crate::dsp::pss_symbol::pss_symbol;
+
+    /// Each PSS, in noise 10 dB below it and anywhere in the tiles, stands out where it is.
+    #[test]
+    fn a_pss_is_seen_where_it_is() {
+        let mut filter = SegmentFilter::new(1);
+        let mut state = 1_u64;
+        let mut uniform = || {
+            state = state
+                .wrapping_mul(6_364_136_223_846_793_005)
+                .wrapping_add(1_442_695_040_888_963_407);
+            (state >> 40) as f32 / 16_777_216.0 - 0.5
+        };
+        let tiles = tiles(150);
+        assert!(tiles.len() > 1);
+        for (n_id_2, at, subcarriers) in [
+            (0, 700, 0.0),
+            (1, 1803, 20.0),
+            (2, 2900, -149.5),
+            (0, 450, 33.25),
+            (1, 1000, 75.75),
+            (2, 3217, 149.0),
+            (2, 64, -61.5),
+        ] {
+            let symbol = pss_symbol(n_id_2);
+            let noise: Vec<Complex32> = (0..6000)
+                .map(|_| Complex32::new(uniform(), uniform()) * 0.03)
+                .collect();
+            let bases: Vec<Vec<Vec<Complex32>>> = tiles
+                .iter()
+                .map(|tile| {
+                    let off = subcarriers - tile.centre as f64;
+                    let mut samples = noise.clone();
+                    // The front end shows no more.
+                    if off.abs() < 183.0 {
+                        for (n, chip) in symbol.iter().enumerate() {
+                            let turn = 2.0 * PI * off * (at + n) as f64 / 256.0;
+                            let phasor = Complex64::cis(turn);
+                            samples[at + n] +=
+                                chip * Complex32::new(phasor.re as f32, phasor.im as f32);
+                        }
+                    }
+                    vec![samples]
+                })
+                .collect();
+            let mut maxima = Vec::new();
+            filter.run(&tiles, &bases, (0, 5000), 20.0, &mut maxima);
+            let best = maxima
+                .iter()
+                .max_by(|a, b| a.statistic.total_cmp(&b.statistic));
+            let best = best.unwrap();
+            assert!((best.sample - at as f64).abs() < 3.0, "{best:?}");
+            assert!((best.subcarriers - subcarriers).abs() < 0.5, "{best:?}");
+            assert!(best.statistic > 60.0, "{best:?}");
+        }
+    }
+}

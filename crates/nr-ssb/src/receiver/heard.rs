@@ -1,0 +1,40 @@
+//! What a receiver says of one SSB.
+
+use num_complex::Complex32;
+
+use crate::receive::measure::Measurement;
+use crate::standard::grid::SUBCARRIERS;
+use crate::standard::message::payload::BchPayload;
+use crate::standard::numerology::Lmax;
+use crate::standard::pci::Pci;
+
+/// One SSB that was heard.
+#[derive(Debug, Clone, PartialEq)]
+pub struct HeardSsb {
+    /// The cell.
+    pub pci: Pci,
+    /// The beam.
+    pub ssb_index: u8,
+    /// How many of them the cell has, where frequency or PBCH tell.
+    pub lmax: Option<Lmax>,
+    /// Second half of the frame, where DM-RS or PBCH tell.
+    pub half_frame: Option<bool>,
+    /// What the PBCH says, if its checksum held.
+    pub payload: Option<BchPayload>,
+    /// First sample of the SSB, its cyclic prefix included, at the input's rate, from the first one
+    /// pushed.
+    pub sample_start: f64,
+    /// Carrier frequency offset, Hz.
+    pub cfo_hz: f64,
+    /// SNR of a resource element, mean over the antennas, dB.
+    pub snr_db: f64,
+    /// Per antenna the channel on the 240 subcarriers, delay and offset taken out, in the scale of an
+    /// unnormalised transform of 256: a tone of amplitude one has 256.
+    pub channel: Vec<[Complex32; SUBCARRIERS]>,
+    /// Variance of the noise on a resource element, per antenna, in that scale squared.
+    pub noise_variance: Vec<f64>,
+    /// SS-RSRP, SS-RSRQ and SS-SINR per antenna.
+    pub measurements: Vec<Measurement>,
+    /// Looked at where it was expected; `false` for one that a search found.
+    pub tracked: bool,
+}

@@ -1,0 +1,45 @@
+//! One receiver: samples of any rate in, SSBs with the channel of every antenna out.
+//!
+//! It wraps the [front end](crate::front_end), the [search](crate::search) and a
+//! [tracker](crate::track) for each beam that was found. Blocks may have any length. Until a cell is
+//! found, and from then on once in [`search_every_s`](ReceiverConfig::search_every_s), all samples
+//! are searched; between searches an SSB is looked at only where it is expected.
+//!
+//! ```
+//! # use nr_ssb::{BchPayload, Beam, Burst, Case, Complex32, Lmax, Mib, Numerology, Ofdm, Pci};
+//! # use nr_ssb::SubcarrierSpacing::Khz30;
+//! use nr_ssb::receiver::{Receiver, ReceiverConfig};
+//! # let beams = vec![Beam::new(1), Beam::new(6)];
+//! # let payload = BchPayload::new(Mib::default(), 784, false, 0)?;
+//! # let burst = Burst { pci: Pci::new(601)?, case: Case::C, lmax: Lmax::L8, payload, beams, ssb_freq_hz: Some(3_700.8e6) };
+//! # let mut sent = burst.iq(&mut Ofdm::new(Numerology::from_sample_rate(Khz30, 15.36e6)?))?;
+//! # sent.resize(4 * sent.len(), Complex32::ZERO);
+//! # let quarter_turn: Vec<_> = sent.iter().map(|x| x * Complex32::I).collect();
+//!
+//! // Two antennas at 15.36 Msps, the SSB at the recording's centre.
+//! let mut receiver = Receiver::new(ReceiverConfig::new(15.36e6, 3_700.8e6, 3_700.8e6, Khz30, 2))?;
+//! let mut beams = Vec::new();
+//! for _ in 0..3 {
+//!     // A period of 20 ms.
+//!     receiver.push(&[&sent, &quarter_turn], &mut |ssb| {
+//!         let turn = ssb.channel[1][120] / ssb.channel[0][120];
+//!         assert!((turn.arg().to_degrees() - 90.0).abs() < 0.1);
+//!         beams.push((ssb.pci.get(), ssb.ssb_index, ssb.tracked));
+//!     })?;
+//! }
+//! receiver.finish(&mut |ssb| beams.push((ssb.pci.get(), ssb.ssb_index, ssb.tracked)))?;
+//! assert_eq!(beams[..2], [(601, 1, false), (601, 6, false)]);
+//! assert_eq!(beams[2..], [(601, 1, true), (601, 6, true), (601, 1, true), (601, 6, true)]);
+//! # Ok::<(), Box<dyn std::error::Error>>(())
+//! ```
+
+mod beam_tracker;
+mod config;
+mod error;
+mod heard;
+mod stream;
+
+pub use config::ReceiverConfig;
+pub use error::ReceiverError;
+pub use heard::HeardSsb;
+pub use stream::Receiver;

@@ -1,0 +1,207 @@
+//! Search and tracking of a stream.
+
+use std::sync::{Mutex, PoisonError};
+
+use nr_ssb::Lmax;
+use nr_ssb::receiver::{HeardSsb, Receiver as Core, ReceiverConfig, ReceiverError};
+use num_complex::Complex32;
+use pyo3::prelude::*;
+
+use super::channel::Channel;
+use super::{Cell, complex_samples, rows, subcarrier_spacing};
+use crate::recording::RecordingError;
+
+/// Receive the SSBs of one frequency from a stream of samples, in blocks of any length.
+///
+/// Cells are searched for until one is found, and then once in `search_every_s`; between searches
+/// their beams are tracked, which takes a small part of a search's time. Other threads run meanwhile;
+/// one receiver serves one of them at a time, the others wait.
+///
+/// Parameters
+/// ----------
+/// sample_rate_hz : float
+///     Any usual rate that holds an SSB: 3.84 Msps at least.
+/// centre_frequency_hz : float
+///     Frequency that stands at 0 Hz in the samples.
+/// ssb_freq_hz : float
+///     Absolute frequency of the SSB's centre.
+/// scs_khz : int
+///     Subcarrier spacing, 15, 30, 120 or 240.
+/// antennas : int
+///     Number of antennas, 1 to 16.
+/// period_s : float
+///     From one burst set to the next, 0.005 to 0.16.
+/// search_every_s : float
+///     How often is searched for cells and beams that are not yet tracked.
+///
+/// Raises
+/// ------
+/// RecordingError
+///     A rate, band, number of antennas or setting that is not possible.
+///
+/// Examples
+/// --------
+/// >>> import numpy as np
+/// >>> from access_av import nr
+/// >>> receiver = nr.Receiver(
+/// ...     7.68e6, centre_frequency_hz=3.7008e9, ssb_freq_hz=3.7008e9, scs_khz=30, antennas=2
+/// ... )
+/// >>> cells = []
+/// >>> for sfn in (6, 8, 10):
+/// ...     burst = nr.build_burst(42, ssb_indices=[1], sfn=sfn, ssb_freq_hz=3.7008e9)
+/// ...     period = np.concatenate([burst, np.zeros(3 * burst.size, np.complex64)])
+/// ...     cells += receiver.push(np.outer([1, 1j], period))
+/// >>> cells += receiver.finish()
+/// >>> [(cell.pci, cell.ssb_index, cell.sfn, cell.channel.shape) for cell in cells]
+/// [(42, 1, 6, (2, 240)), (42, 1, 8, (2, 240)), (42, 1, 10, (2, 240))]
+/// >>> round(float(np.degrees(np.angle(cells[2].channel[1] / cells[2].channel[0]).mean())), 2)
+/// 90.0
+#[pyclass(frozen, module = "access_av._core.nr")]
+pub struct Receiver(Mutex<Core>);
+
+#[pymethods]
+impl Receiver {
+    #[new]
+    #[pyo3(signature = (sample_rate_hz, *, centre_frequency_hz, ssb_freq_hz, scs_khz, antennas, period_s = 0.02, search_every_s = 1.0))]
+    fn new(
+        sample_rate_hz: f64,
+        centre_frequency_hz: f64,
+        ssb_freq_hz: f64,
+        scs_khz: u32,
+        antennas: usize,
+        period_s: f64,
+        search_every_s: f64,
+    ) -> PyResult<Self> {
+        let config = ReceiverConfig {
+            period_s,
+            search_every_s,
+            ..ReceiverConfig::new(
+                sample_rate_hz,
+                centre_frequency_hz,
+                ssb_freq_hz,
+                subcarrier_spacing(scs_khz)?,
+                antennas,
+            )
+        };
+        Core::new(config)
+            .map(|receiver| Self(Mutex::new(receiver)))
+            .map_err(receiver_error)
+    }
+
+    /// Take the next samples.
+    ///
+    /// Parameters
+    /// ----------
+    /// samples : ndarray
+    ///     Complex samples, `(samples,)` or `(antennas, samples)`.
+    ///
+    /// Returns
+    /// -------
+    /// list of Cell
+    ///     The SSBs that are complete with them; two periods at most are held back. `sample_start`
+    ///     counts from the first sample of the stream. They have no angle.
+    ///
+    /// Raises
+    /// ------
+    /// RecordingError
+    ///     Another number of antennas, samples that are not finite.
+    fn push(&self, py: Python<'_>, samples: &Bound<'_, PyAny>) -> PyResult<Vec<Py<Cell>>> {
+        let samples = complex_samples(samples)?;
+        let antennas = rows(&samples)?;
+        self.hear(py, |receiver, take| {
+            check_finite(&antennas)?;
+            receiver.push(&antennas, take).map_err(receiver_error)
+        })
+    }
+
+    /// End the stream: the SSBs that were held back. All cells are forgotten.
+    ///
+    /// Returns
+    /// -------
+    /// list of Cell
+    ///     As of `push`.
+    fn finish(&self, py: Python<'_>) -> PyResult<Vec<Py<Cell>>> {
+        self.hear(py, |receiver, take| {
+            receiver.finish(take).map_err(receiver_error)
+        })
+    }
+
+    fn __repr__(&self, py: Python<'_>) -> String {
+        py.detach(|| {
+            let receiver = self.0.lock().unwrap_or_else(PoisonError::into_inner);
+            let search = &receiver.config().search;
+            format!(
+                "Receiver(ssb_freq_hz={:.0}, scs_khz={}, antennas={})",
+                search.ssb_freq_hz.unwrap_or_default(),
+                search.spacing.khz(),
+                search.antennas,
+            )
+        })
+    }
+}
+
+impl Receiver {
+    /// What a call on the receiver hears.
+    fn hear(
+        &self,
+        py: Python<'_>,
+        call: impl FnOnce(&mut Core, &mut dyn FnMut(&HeardSsb)) -> PyResult<()> + Send,
+    ) -> PyResult<Vec<Py<Cell>>> {
+        let cells = py.detach(|| {
+            let mut receiver = self.0.lock().unwrap_or_else(PoisonError::into_inner);
+            let search = &receiver.config().search;
+            let (ssb_freq_hz, spacing) = (search.ssb_freq_hz.unwrap_or_default(), search.spacing);
+            let base = receiver.config().sample_rate_hz / spacing.base_rate_hz();
+            let mut cells = Vec::new();
+            call(&mut receiver, &mut |ssb| {
+                cells.push(cell(ssb, ssb_freq_hz, spacing.khz(), base));
+            })?;
+            PyResult::Ok(cells)
+        })?;
+        cells.into_iter().map(|cell| Py::new(py, cell)).collect()
+    }
+}
+
+fn cell(ssb: &HeardSsb, ssb_freq_hz: f64, scs_khz: u32, samples_per_base: f64) -> Cell {
+    let measured = &ssb.measurements;
+    Cell {
+        pci: ssb.pci.get(),
+        ssb_index: ssb.ssb_index,
+        lmax: ssb.lmax.map(Lmax::count),
+        half_frame: ssb.half_frame.map(u8::from),
+        sfn: ssb.payload.map(|payload| payload.sfn()),
+        mib_bits: ssb.payload.map(|payload| payload.mib.bit_string()),
+        cfo_hz: ssb.cfo_hz,
+        snr_db: ssb.snr_db,
+        sample_start: ssb.sample_start,
+        sample_count: onboard::receive::SSB_SAMPLES as f64 * samples_per_base,
+        ssb_freq_hz,
+        scs_khz,
+        rsrp_dbfs: measured.iter().map(|it| it.ss_rsrp_dbfs).collect(),
+        rsrq_db: measured.iter().map(|it| it.ss_rsrq_db).collect(),
+        sinr_db: measured.iter().map(|it| it.ss_sinr_db).collect(),
+        angle_rad: None,
+        sigma_rad: None,
+        phase_rad: None,
+        phase_sigma_rad: None,
+        azimuth_rad: None,
+        verdict: None,
+        channel: Channel(ssb.channel.clone()),
+        noise_variance: ssb.noise_variance.clone(),
+    }
+}
+
+fn check_finite(antennas: &[&[Complex32]]) -> PyResult<()> {
+    for (channel, samples) in antennas.iter().enumerate() {
+        if let Some(sample) = samples.iter().position(|x| !x.is_finite()) {
+            let said = format!("sample {sample} of channel {channel} is not finite");
+            return Err(RecordingError::new_err(said));
+        }
+    }
+    Ok(())
+}
+
+#[allow(clippy::needless_pass_by_value)] // the shape that `map_err` wants
+fn receiver_error(error: ReceiverError) -> PyErr {
+    RecordingError::new_err(error.to_string())
+}
