@@ -36,6 +36,11 @@ LONG: dict[str, list[str]] = {
     "aoa": ["aoa", "drive/iq.sigmf-meta"],
     "profile": ["profile", "--out", "profiled.toml"],
     "designs": ["designs", "paper", "--space", "space.toml", "--out", "out"],
+    "tune": ["tune", "yard", "--max-rms-m", "0.1", "--out", "out"],
+    "survey": [
+        "survey", *["logged"] * 8, "--site", "yard", "--vehicle", "logged/vehicle.toml",
+        "--out", "out",
+    ],
     "plan": ["plan", "yard", "--masts", "masts.csv", "--out", "out"],
     "integrity": ["integrity", "yard", "--out", "out"],
     "codesign": ["codesign"],
@@ -62,6 +67,7 @@ PYTHON_S = 0.15
 def place(tmp_path_factory: pytest.TempPathFactory) -> Path:
     folder = tmp_path_factory.mktemp("interrupted")
     access_av.synthesize("paper-real-odometry-4", folder / "drive", duration_s=20.0)
+    access_av.drives.log_angles("yard", folder / "logged", duration_s=60.0)
     masts = "".join(f"mast-{n},{20 * n},{(-1) ** n * 45},8\n" for n in range(-5, 9))
     (folder / "masts.csv").write_text("name,x_m,y_m,z_m\n" + masts)
     (folder / "space.toml").write_text("[vehicle.wake_up.due]\nbase_ms = [80.0, 100.0, 150.0]\n")
