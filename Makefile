@@ -7,10 +7,10 @@ SOURCES := $(shell find crates sites vehicles scenarios platforms -type f 2>/dev
 DATA := $(abspath $(or $(ACCESS_AV_DATA),../shared/data))
 
 .DEFAULT_GOAL := help
-.PHONY: help demo test attack test-aarch64 lint lint-python docs figures bench clean
+.PHONY: help demo test attack test-aarch64 count-aarch64 lint lint-python docs figures bench clean
 
 help: ## List these commands
-	@sed -n 's/^\([a-z-]*\):.*## /  make \1\t/p' $(MAKEFILE_LIST) | expand -t 20
+	@sed -n 's/^\([a-z0-9-]*\):.*## /  make \1\t/p' $(MAKEFILE_LIST) | expand -t 20
 
 demo: .venv/installed ## Install into .venv, evaluate the paper under every reading, write results/latest/report.html
 	$(BIN)/access-av evaluate
@@ -40,6 +40,9 @@ test-aarch64: ## Build what runs on the vehicle for aarch64 and test it, emulate
 	@command -v aarch64-linux-gnu-gcc >/dev/null && command -v qemu-aarch64 >/dev/null || { echo \
 	  "not tested: gcc-aarch64-linux-gnu, qemu-user, libc6:arm64, a Rust for $(AARCH64) needed"; exit 2; }
 	$(EMULATED) test --quiet --release --target $(AARCH64) -p aoa-array -p nr-ssb -p onboard
+
+count-aarch64: ## Count the instructions per estimate on aarch64, NEON against portable code
+	$(filter-out /usr/bin/cargo cargo,$(EMULATED)) $(PYTHON) benches/aarch64_instructions.py $(lastword $(EMULATED))
 
 lint: lint-python ## Check formatting and lints of both languages
 	cargo fmt --all --check

@@ -20,6 +20,10 @@ LONGEST_MESSAGE = 500
 NONSENSE_M = 100.0
 # Least eigenvalue of a covariance in units of its own variances: what rounding takes.
 ROUNDING = -1e-9
+# Deviations by which a pose may move beyond what the odometer reads, and the most that it reads of
+# what is driven: the faults of random drives slip by half.
+LEAP_SIGMAS = 5.0
+MOST_READ = 1.6
 # Doubles at the end of a nav_msgs/msg/Odometry: pose and twist with their covariances.
 ODOMETRY_NUMBERS = 85
 
@@ -72,7 +76,7 @@ def _messages(verdict: Verdict, text: str) -> None:
         verdict.says("warning", warned[0])
     if control := re.search(r"[\x00-\x08\x0b-\x1f\x7f-\x9f]", text):
         verdict.says("control-character", repr(control[0]))
-    for message in re.split(r"^(?=error: |warning: )", text, flags=re.M):
+    for message in re.split(r"^(?=error: |warning: |not to be relied on)", text, flags=re.M):
         if len(message) > LONGEST_MESSAGE + 100:
             verdict.says("long-message", f"{len(message)} characters: {message[:100]}")
 
@@ -107,6 +111,7 @@ def _table(verdict: Verdict, name: str, table: pl.DataFrame) -> None:
         _covariances(verdict, name, table.drop_nulls("covariance_xx_m2"))
     if {"true_x_m", "integrity"} <= set(table.columns):
         _honesty(verdict, table)
+        _leaps(verdict, table.drop_nulls("covariance_xx_m2"))
 
 
 def _covariances(verdict: Verdict, name: str, table: pl.DataFrame) -> None:
@@ -135,3 +140,20 @@ def _honesty(verdict: Verdict, table: pl.DataFrame) -> None:
     verdict.ok, verdict.beyond = ok.height, int((ok["error_m"] > ok["level_m"]).sum())
     if not ok.is_empty() and float(ok["error_m"].max()) > NONSENSE_M:  # type: ignore[arg-type]
         verdict.says("nonsense", f"{ok['error_m'].max():.0f} m off while ok")
+
+
+def _leaps(verdict: Verdict, table: pl.DataFrame) -> None:
+    """No pose moves farther in one step than odometer and covariance allow."""
+    steps = np.diff(table.select("x_m", "y_m", "true_x_m", "true_y_m").to_numpy(), axis=0)
+    moved_m, driven_m = np.hypot(steps[:, 0], steps[:, 1]), np.hypot(steps[:, 2], steps[:, 3])
+    xx, xy, yy = (table[f"covariance_{axis}_m2"].to_numpy() for axis in ("xx", "xy", "yy"))
+    sigma_m = np.sqrt(0.5 * (xx + yy) + np.hypot(0.5 * (xx - yy), xy))
+    most_m = MOST_READ * driven_m + LEAP_SIGMAS * np.maximum(sigma_m[1:], sigma_m[:-1])
+    leaps = np.flatnonzero((np.diff(table["run"]) == 0) & (moved_m > most_m))
+    if leaps.size:
+        worst = leaps[np.argmax((moved_m - most_m)[leaps])]
+        verdict.says(
+            "leap",
+            f"{leaps.size} steps; {moved_m[worst]:.2f} m of {most_m[worst]:.2f} m "
+            f"at {table['time_s'][int(worst) + 1]} s",
+        )

@@ -315,3 +315,69 @@ def test_limits_are_named() -> None:
     ):
         with pytest.raises(ValueError, match=message):
             call()
+
+
+TURNS = 2 * np.pi * np.arange(5) / 5
+CIRCLE = 0.425 * np.stack([np.cos(TURNS), np.sin(TURNS)], axis=1)
+
+
+def towards(azimuth_rad: Any, elevation_rad: Any) -> Any:
+    """What the circle receives: `(batch, 5, 1)`."""
+    flat = np.stack([np.cos(azimuth_rad), np.sin(azimuth_rad)], axis=-1)
+    return np.exp(2j * np.pi * np.cos(elevation_rad)[:, None] * (flat @ CIRCLE.T))[:, :, None]
+
+
+def test_a_circle_finds_azimuth_and_elevation_at_the_bound() -> None:
+    rng = np.random.default_rng(8)
+    azimuth, elevation = rng.uniform(-np.pi, np.pi, 1000), rng.uniform(0.4, 1.2, 1000)
+    signal = 10 * gaussian(rng, 1000, 1, 20)
+    snapshots = towards(azimuth, elevation) * signal + gaussian(rng, 1000, 5, 20)
+    found = aoa.direction(snapshots, CIRCLE)
+    turned = (found.azimuth_rad - azimuth + np.pi) % (2 * np.pi) - np.pi
+    errors = np.stack([turned, found.elevation_rad - elevation], axis=1)
+    bounds = [
+        aoa.direction_crb_rad(CIRCLE, az, el, 20) for az, el in zip(azimuth, elevation, strict=True)
+    ]
+    ratio = np.sqrt(np.mean(errors**2, axis=0) / np.mean(np.square(bounds), axis=0))
+    assert ratio.max() < 1.1
+    weighted = np.linalg.solve(found.covariance, errors[:, :, None])[:, :, 0]
+    assert 1.8 < np.mean(np.sum(errors * weighted, axis=1)) < 2.2
+    assert found.resolved.mean() > 0.98
+    assert found.verdict.shape == found.azimuth_sigma_rad.shape == (1000,)
+    single = aoa.direction(snapshots[3], CIRCLE)
+    assert type(single.azimuth_rad) is float
+    assert single.azimuth_rad == found.azimuth_rad[3]
+    assert single.covariance.shape == (2, 2)
+    assert single.verdict == "resolved"
+    assert repr(single).startswith("DirectionEstimate(azimuth_rad=")
+    level = aoa.direction(snapshots[3], CIRCLE, elevations_rad=(elevation[3], elevation[3]))
+    assert (level.elevation_rad, level.elevation_sigma_rad) == (elevation[3], 0)
+
+
+def test_spectrum_over_azimuth_and_elevation() -> None:
+    snapshots = towards(np.array([1.0]), np.array([0.6]))[0] * np.ones(9)
+    azimuths, elevations = np.linspace(-3, 3, 61), np.linspace(0, 1.5, 16)
+    for method in ("bartlett", "music"):
+        look = aoa.direction_spectrum(snapshots, CIRCLE, azimuths, elevations, method=method)
+        row, column = np.unravel_index(np.argmax(look), look.shape)
+        assert (azimuths[column], elevations[row]) == pytest.approx((1.0, 0.6))
+    batch = aoa.direction_spectrum(np.stack([snapshots] * 3), CIRCLE, azimuths, elevations)
+    assert batch.shape == (3, 16, 61)
+
+
+@pytest.mark.parametrize(
+    ("places", "options", "message"),
+    [
+        (CIRCLE[:4], {}, "one row per antenna: 5, not 4"),
+        (CIRCLE[:, :1], {}, "antennas, 2 or 3"),
+        ("nowhere", {}, "antennas, 2 or 3"),
+        (CIRCLE * np.nan, {}, "element 0 must be within 100 wavelengths"),
+        (CIRCLE * [0, 1], {}, "in the same place|in a row"),
+        (CIRCLE * 0, {}, "elements 0 and 1 are in the same place"),
+        (CIRCLE, {"elevations_rad": (1.0, 0.5)}, "elevations must ascend"),
+        (CIRCLE, {"calibration": [1, 1]}, "one gain per antenna: 5, not 2"),
+    ],
+)
+def test_bad_places(places: Any, options: dict[str, Any], message: str) -> None:
+    with pytest.raises(ValueError, match=message):
+        aoa.direction(np.ones((5, 4), complex), places, **options)

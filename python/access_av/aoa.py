@@ -1,4 +1,4 @@
-"""Angle of arrival with uniform linear arrays of 2 to 8 antennas.
+"""Angle of arrival with 2 to 8 antennas: in a row, or with `direction` in any places.
 
 Angles are measured from the array's axis, in rad, 0 to pi; the electrical angle, the phase step
 from one antenna to the next, is ``2 pi (d / lambda) cos(angle)``. Snapshots are complex arrays
@@ -17,9 +17,13 @@ Examples
 
 from access_av._core.aoa import (
     AngleEstimate,
+    DirectionEstimate,
     calibrate,
     covariance,
     crb_rad,
+    direction,
+    direction_crb_rad,
+    direction_spectrum,
     esprit,
     estimate_sources,
     forward_backward,
@@ -31,9 +35,13 @@ from access_av._core.aoa import (
 
 __all__ = [
     "AngleEstimate",
+    "DirectionEstimate",
     "calibrate",
     "covariance",
     "crb_rad",
+    "direction",
+    "direction_crb_rad",
+    "direction_spectrum",
     "esprit",
     "estimate_sources",
     "forward_backward",

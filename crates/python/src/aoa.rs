@@ -1,5 +1,6 @@
 //! Bindings of the crate `aoa`: `access_av._core.aoa`, which `access_av.aoa` shows to the user.
 
+mod azimuth_elevation;
 mod bounds;
 mod result;
 mod samples;
@@ -11,6 +12,7 @@ use numpy::{AllowTypeChange, PyArrayLike1};
 use pyo3::exceptions::PyValueError;
 use pyo3::prelude::*;
 
+pub use azimuth_elevation::{DirectionEstimate, direction, direction_crb_rad, direction_spectrum};
 pub use bounds::crb_rad;
 pub use result::AngleEstimate;
 use result::Estimates;

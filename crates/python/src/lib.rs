@@ -23,8 +23,9 @@ mod _core {
     mod aoa {
         #[pymodule_export]
         use crate::aoa::{
-            AngleEstimate, calibrate, covariance, crb_rad, esprit, estimate_sources,
-            forward_backward, maximum_likelihood, music, root_music, spectrum,
+            AngleEstimate, DirectionEstimate, calibrate, covariance, crb_rad, direction,
+            direction_crb_rad, direction_spectrum, esprit, estimate_sources, forward_backward,
+            maximum_likelihood, music, root_music, spectrum,
         };
         use pyo3::prelude::*;
 

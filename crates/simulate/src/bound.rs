@@ -179,14 +179,14 @@ impl Bound {
 
     fn advance(&self, belief: &mut Belief, length_m: f64) -> Matrix<STATES> {
         let step = if self.map {
-            let curvature_per_m = self
-                .road
-                .curvature_per_m(belief.mean[ALONG] + 0.5 * length_m);
+            let middle_m = belief.mean[ALONG] + 0.5 * length_m;
+            let road = self.road.bending(middle_m, 0.0);
             let config = &self.config;
             Step::along_lane(
                 &belief.mean,
+                0.0,
                 length_m,
-                curvature_per_m,
+                &road,
                 &config.lane_keeping,
                 &config.noise,
             )

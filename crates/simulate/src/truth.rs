@@ -6,8 +6,8 @@ use onboard::geometry::Pose;
 use onboard::radio_head::RadioHead;
 use onboard::road::Road;
 use onboard::settings::{
-    Check, EstimatorMethod, EstimatorSettings, LocalizerSettings, PlatformSettings, SettingsError,
-    Site, Vehicle, WakeUpSettings,
+    Check, EstimatorSettings, LocalizerSettings, PlatformSettings, SettingsError, Site, Vehicle,
+    WakeUpSettings,
 };
 use rand::RngExt;
 use rand_distr::StandardNormal;
@@ -186,16 +186,12 @@ impl World {
     }
 }
 
-/// A vehicle without what its localizer, wake-up policy and computer are set to, and without the
-/// estimator's method.
+/// A vehicle without what its estimator, localizer, wake-up policy and computer are set to.
 fn what_it_is(vehicle: &Vehicle) -> Vehicle {
     Vehicle {
         name: String::new(),
         description: String::new(),
-        estimator: EstimatorSettings {
-            method: EstimatorMethod::default(),
-            ..vehicle.estimator
-        },
+        estimator: EstimatorSettings::default(),
         localizer: LocalizerSettings::default(),
         integrity: None,
         wake_up: WakeUpSettings::default(),

@@ -5,9 +5,13 @@ from numpy.typing import ArrayLike, NDArray
 
 __all__ = [
     "AngleEstimate",
+    "DirectionEstimate",
     "calibrate",
     "covariance",
     "crb_rad",
+    "direction",
+    "direction_crb_rad",
+    "direction_spectrum",
     "esprit",
     "estimate_sources",
     "forward_backward",
@@ -37,6 +41,51 @@ class AngleEstimate:
     @property
     def verdict(self) -> Any: ...
 
+@final
+class DirectionEstimate:
+    # Numbers for a single item, arrays for a batch.
+    @property
+    def azimuth_rad(self) -> Any: ...
+    @property
+    def elevation_rad(self) -> Any: ...
+    @property
+    def azimuth_sigma_rad(self) -> Any: ...
+    @property
+    def elevation_sigma_rad(self) -> Any: ...
+    @property
+    def covariance(self) -> NDArray[np.float64]: ...
+    @property
+    def snr_db(self) -> Any: ...
+    @property
+    def resolved(self) -> Any: ...
+    @property
+    def verdict(self) -> Any: ...
+
+def direction(
+    snapshots: _Samples,
+    places_wavelengths: ArrayLike,
+    *,
+    elevations_rad: tuple[float, float] = ...,
+    calibration: ArrayLike | None = None,
+) -> DirectionEstimate: ...
+def direction_spectrum(
+    snapshots: _Samples,
+    places_wavelengths: ArrayLike,
+    azimuths_rad: ArrayLike,
+    elevations_rad: ArrayLike,
+    *,
+    method: Literal["bartlett", "capon", "music"] = "bartlett",
+    sources: int = 1,
+    calibration: ArrayLike | None = None,
+) -> NDArray[np.float64]: ...
+def direction_crb_rad(
+    places_wavelengths: ArrayLike,
+    azimuth_rad: float,
+    elevation_rad: float,
+    snr_db: float,
+    *,
+    snapshots: int = 20,
+) -> tuple[float, float]: ...
 def music(
     snapshots: _Samples,
     *,

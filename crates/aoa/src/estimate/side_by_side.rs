@@ -19,7 +19,7 @@ use crate::method::{esprit, music, root_music};
 use crate::result::angle::AngleEstimate;
 use crate::result::direction::{direction, geometric_doubt};
 use crate::result::verdict::{Reason, Verdict};
-use crate::simd::instructions::{BASELINE_FUSED, dispatch};
+use crate::simd::instructions::dispatch;
 use crate::simd::math::{log10, times_plus};
 use crate::spectrum::side_by_side::{Places, Spectra};
 
@@ -83,7 +83,8 @@ impl<const N: usize> SideBySide<'_, N> {
         estimates: &mut [AngleEstimate],
     ) -> Result<(), (usize, Error)> {
         dispatch!(
-            self.of_moments_generic::<BASELINE_FUSED, W>(moments, estimates),
+            self.of_moments_generic::<false, W>(moments, estimates),
+            self.of_moments_generic::<true, W>(moments, estimates),
             self.of_moments_avx2(moments, estimates),
             self.of_moments_avx512(moments, estimates)
         )

@@ -1,5 +1,7 @@
 //! The inner loops over samples: portable, and for the vector instructions that a processor may have.
 
+#[cfg(target_arch = "aarch64")]
+mod neon;
 mod portable;
 pub(crate) mod real;
 #[cfg(target_arch = "x86_64")]

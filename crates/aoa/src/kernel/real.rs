@@ -2,6 +2,8 @@
 
 use num_complex::{Complex, Complex64};
 
+#[cfg(target_arch = "aarch64")]
+use super::neon;
 use super::portable;
 #[cfg(target_arch = "x86_64")]
 use super::x86;
@@ -29,12 +31,13 @@ mod sealed {
 }
 
 macro_rules! kernel {
-    ($real:ident, $avx2:ident, $avx512:ident) => {
+    ($real:ident, $neon:ident, $avx2:ident, $avx512:ident) => {
         impl sealed::Kernel for $real {
             #[inline]
             fn products<const N: usize>(channels: &[&[Complex<$real>]; N]) -> Matrix<N> {
                 dispatch!(
                     portable::products(channels),
+                    neon::$neon::products(channels),
                     x86::$avx2::products(channels),
                     x86::$avx512::products(channels)
                 )
@@ -44,6 +47,7 @@ macro_rules! kernel {
             fn lags<const N: usize>(channels: &[&[Complex<$real>]; N]) -> [Complex64; N] {
                 dispatch!(
                     portable::lags(channels),
+                    neon::$neon::lags(channels),
                     x86::$avx2::lags(channels),
                     x86::$avx512::lags(channels)
                 )
@@ -51,9 +55,9 @@ macro_rules! kernel {
         }
     };
 }
-kernel!(f64, avx2_f64, avx512_f64);
+kernel!(f64, neon_f64, avx2_f64, avx512_f64);
 // Twenty samples of f32 fill five registers of AVX2, and two and a half of AVX-512.
-kernel!(f32, avx2_f32, avx2_f32);
+kernel!(f32, neon_f32, avx2_f32, avx2_f32);
 
 #[cfg(test)]
 mod tests {

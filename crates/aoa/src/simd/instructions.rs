@@ -5,6 +5,9 @@
 pub(crate) enum Instructions {
     /// The baseline of the architecture.
     Baseline,
+    /// NEON, which every aarch64 has.
+    #[cfg(target_arch = "aarch64")]
+    Neon,
     /// AVX2 and FMA.
     #[cfg(target_arch = "x86_64")]
     Avx2,
@@ -13,36 +16,37 @@ pub(crate) enum Instructions {
     Avx512,
 }
 
-#[cfg(target_arch = "x86_64")]
 impl Instructions {
     #[inline]
     pub(crate) fn available() -> Self {
-        if !(std::is_x86_feature_detected!("avx2") && std::is_x86_feature_detected!("fma")) {
-            Self::Baseline
-        } else if std::is_x86_feature_detected!("avx512f") {
-            Self::Avx512
-        } else {
-            Self::Avx2
+        if cfg!(feature = "portable") {
+            return Self::Baseline;
         }
-    }
-}
-
-#[cfg(not(target_arch = "x86_64"))]
-impl Instructions {
-    pub(crate) const fn available() -> Self {
+        #[cfg(target_arch = "aarch64")]
+        return Self::Neon;
+        #[cfg(target_arch = "x86_64")]
+        if std::is_x86_feature_detected!("avx2") && std::is_x86_feature_detected!("fma") {
+            return if std::is_x86_feature_detected!("avx512f") {
+                Self::Avx512
+            } else {
+                Self::Avx2
+            };
+        }
+        #[cfg(not(target_arch = "aarch64"))]
         Self::Baseline
     }
 }
 
-/// Whether the baseline multiplies and adds in one instruction.
-pub(crate) const BASELINE_FUSED: bool = cfg!(target_arch = "aarch64");
-
 /// Calls the variant of a function that fits the processor.
 macro_rules! dispatch {
-    ($baseline:expr, $avx2:expr, $avx512:expr) => {
+    ($baseline:expr, $neon:expr, $avx2:expr, $avx512:expr) => {
         match $crate::simd::instructions::Instructions::available() {
             $crate::simd::instructions::Instructions::Baseline => $baseline,
             // SAFETY: the processor has the features that the function is compiled for.
+            #[cfg(target_arch = "aarch64")]
+            #[allow(unsafe_code, unused_unsafe)]
+            $crate::simd::instructions::Instructions::Neon => unsafe { $neon },
+            // SAFETY: as above.
             #[cfg(target_arch = "x86_64")]
             #[allow(unsafe_code)]
             $crate::simd::instructions::Instructions::Avx2 => unsafe { $avx2 },

@@ -30,6 +30,18 @@ pub(super) struct Piece {
     pub start: Pose,
 }
 
+/// How the road bends where it is known only to a deviation: the curvature, linearised statistically.
+#[derive(Debug, Clone, Copy, PartialEq, Default)]
+pub struct Bending {
+    /// Its mean (1/m).
+    pub mean_per_m: f64,
+    /// By how much it grows per metre along the road (1/m²).
+    pub slope_per_m2: f64,
+    /// What is not linear in the place makes of the turn: rad² per metre, as it stays for about two
+    /// deviations of the place.
+    pub variance_rad2_per_m: f64,
+}
+
 /// A point in the road's own coordinates.
 #[derive(Debug, Clone, Copy, PartialEq)]
 pub struct Projection {
@@ -94,6 +106,28 @@ impl Road {
             return 0.0;
         }
         self.piece(along_m).curvature_per_m
+    }
+
+    /// How the road bends at `along_m`, known to a standard deviation (Gauss–Hermite, three points).
+    pub fn bending(&self, along_m: f64, std_m: f64) -> Bending {
+        let here = self.curvature_per_m(along_m);
+        let aside_m = 3.0_f64.sqrt() * std_m;
+        let [before, after] = [-aside_m, aside_m].map(|by_m| self.curvature_per_m(along_m + by_m));
+        // Differences first: on a line or arc what is left is nothing, not rounding.
+        let (down, up) = (before - here, after - here);
+        let offset = (down + up) / 6.0;
+        let slope_per_m2 = if std_m > 0.0 {
+            (after - before) / (2.0 * aside_m)
+        } else {
+            0.0
+        };
+        let linear = slope_per_m2 * std_m;
+        let variance = (down * down + up * up) / 6.0 - offset * offset - linear * linear;
+        Bending {
+            mean_per_m: here + offset,
+            slope_per_m2,
+            variance_rad2_per_m: variance.max(0.0) * 2.0 * std_m,
+        }
     }
 
     /// The first stretch between `from_m` and `to_m` along the road that was not surveyed.

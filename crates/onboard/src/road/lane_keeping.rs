@@ -2,6 +2,19 @@
 
 use std::f64::consts::TAU;
 
+/// Largest damping ratio that still swings.
+const MOST_DAMPING: f64 = 0.99;
+
+/// Share of the wavelength below which a step is short.
+const SHORT: f64 = 0.05;
+
+/// Abscissas and weights of the Gauss–Legendre rule of three points on [0, 1].
+const GAUSS_LEGENDRE: [[f64; 2]; 3] = [
+    [0.112_701_665_379_258_3, 5.0 / 18.0],
+    [0.5, 4.0 / 9.0],
+    [0.887_298_334_620_741_7, 5.0 / 18.0],
+];
+
 /// The offset `d` from the middle of the lane as a damped oscillator over the distance travelled,
 /// driven by white noise: `d″ + 2ζΩ d′ + Ω² d = w`, the heading against the lane being `ψ = d′`.
 ///
@@ -54,6 +67,34 @@ impl LaneKeeping {
         (4.0 * self.damping * natural.powi(3)).sqrt() * self.rms_m
     }
 
+    /// How far the way along the lane strays from the way driven, in m² per metre, when the heading
+    /// is known to a variance P: `ψ²/2` has the variance `P²/2`, which is forgotten as the square of
+    /// the swing is, over `1/(2ζΩ)`.
+    #[must_use]
+    pub fn shortening_m2_per_m(&self, heading_variance: f64) -> f64 {
+        let natural = TAU / self.wavelength_m;
+        heading_variance * heading_variance / (4.0 * self.damping * natural)
+    }
+
+    /// The oscillator that is like this one and another together: with both their variances of
+    /// offset and heading, and the white noise of both.
+    #[must_use]
+    pub fn and(&self, other: &Self) -> Self {
+        let sum = |moment: &dyn Fn(&Self) -> f64| moment(self) + moment(other);
+        let offset = sum(&|it| it.stationary()[0]);
+        let heading = sum(&|it| it.stationary()[1]);
+        let density = sum(&|it| it.steering_rad_per_sqrt_m().powi(2));
+        if offset == 0.0 {
+            return *self;
+        }
+        let natural = (heading / offset).sqrt();
+        Self {
+            rms_m: offset.sqrt(),
+            wavelength_m: TAU / natural,
+            damping: (density / (4.0 * natural * heading)).min(MOST_DAMPING),
+        }
+    }
+
     /// Stationary deviation of the curvature with which the vehicle steers back (1/m), that of
     /// `2ζΩ ψ + Ω² d`.
     #[must_use]
@@ -62,16 +103,36 @@ impl LaneKeeping {
         natural * natural * self.rms_m * (2.0 * self.damping).hypot(1.0)
     }
 
-    /// `Q` of a step with the given `Φ`.
+    /// `Q` of a step of this length, negative backwards.
+    ///
+    /// Over a short step the difference `P∞ − Φ P∞ Φᵀ` cancels down to rounding, which need not be
+    /// a covariance. There it is `∫ Φ(s) (0, 1)ᵀ S (0, 1) Φ(s)ᵀ ds` by the Gauss–Legendre rule of
+    /// three points: a sum of positive terms, with a relative error below 1e-5.
     #[must_use]
-    pub fn noise(&self, transition: &[[f64; 2]; 2]) -> [[f64; 2]; 2] {
-        let [d, psi] = self.stationary();
-        let [[a, b], [c, e]] = *transition;
-        let cross = -(a * d * c + b * psi * e);
-        [
-            [(d - a * d * a - b * psi * b).max(0.0), cross],
-            [cross, (psi - c * d * c - e * psi * e).max(0.0)],
-        ]
+    pub fn noise(&self, length_m: f64) -> [[f64; 2]; 2] {
+        let distance_m = length_m.abs();
+        let [[d_d, d_psi], [_, psi_psi]] = if distance_m < SHORT * self.wavelength_m {
+            let density = self.steering_rad_per_sqrt_m().powi(2);
+            let mut sum = [[0.0; 2]; 2];
+            for [at, weight] in GAUSS_LEGENDRE {
+                let [[_, d], [_, psi]] = self.transition(at * distance_m);
+                let share = weight * density * distance_m;
+                sum[0][0] += share * d * d;
+                sum[0][1] += share * d * psi;
+                sum[1][1] += share * psi * psi;
+            }
+            sum
+        } else {
+            let [d, psi] = self.stationary();
+            let [[a, b], [c, e]] = self.transition(distance_m);
+            let cross = -(a * d * c + b * psi * e);
+            [
+                [d - a * d * a - b * psi * b, cross],
+                [cross, psi - c * d * c - e * psi * e],
+            ]
+        };
+        let cross = d_psi.copysign(d_psi * length_m);
+        [[d_d, cross], [cross, psi_psi]]
     }
 }
 
@@ -106,7 +167,7 @@ mod tests {
                 assert!((back[i][j] - reversed).abs() < 1e-14);
             }
         }
-        let noise = KEEPING.noise(&KEEPING.transition(-500.0));
+        let noise = KEEPING.noise(-500.0);
         assert!((noise[0][0] / variances[0] - 1.0).abs() < 1e-6);
     }
 
@@ -123,9 +184,105 @@ mod tests {
     #[test]
     fn noise_of_a_short_step_is_that_of_a_white_acceleration() {
         let l = 0.01;
-        let noise = KEEPING.noise(&KEEPING.transition(l));
+        let noise = KEEPING.noise(l);
         let density = 4.0 * 0.2 * (TAU / 60.0_f64).powi(3) * 0.01;
         assert!((noise[1][1] / (density * l) - 1.0).abs() < 1e-3);
         assert!((noise[0][1] / (density * l * l / 2.0) - 1.0).abs() < 1e-2);
+    }
+
+    #[test]
+    fn the_noise_of_any_step_is_a_covariance() {
+        for damping in [0.02, 0.2, 0.9] {
+            let keeping = LaneKeeping { damping, ..KEEPING };
+            for exponent in -60..20 {
+                let length_m = 1.7_f64.powi(exponent);
+                for length_m in [length_m, -length_m] {
+                    let [[dd, dp], [_, pp]] = keeping.noise(length_m);
+                    assert!(dd > 0.0 && dp * dp < dd * pp, "{damping} {length_m}");
+                }
+            }
+        }
+    }
+
+    #[test]
+    fn short_and_long_steps_meet() {
+        let most_m = SHORT * KEEPING.wavelength_m;
+        let (short, long) = (
+            KEEPING.noise(most_m * (1.0 - 1e-12)),
+            KEEPING.noise(most_m * (1.0 + 1e-12)),
+        );
+        for (short, long) in short.iter().flatten().zip(long.iter().flatten()) {
+            assert!((short / long - 1.0).abs() < 1e-5, "{short} {long}");
+        }
+    }
+
+    #[test]
+    fn two_together_have_the_moments_of_both() {
+        let survey = LaneKeeping {
+            rms_m: 0.02,
+            wavelength_m: 20.0,
+            damping: 0.1,
+        };
+        let both = KEEPING.and(&survey);
+        for state in 0..2 {
+            let sum = KEEPING.stationary()[state] + survey.stationary()[state];
+            assert!((both.stationary()[state] / sum - 1.0).abs() < 1e-12);
+        }
+        let noise = |it: &LaneKeeping| it.noise(0.01)[1][1];
+        assert!((noise(&both) / (noise(&KEEPING) + noise(&survey)) - 1.0).abs() < 1e-3);
+        assert_eq!(
+            KEEPING
+                .and(&LaneKeeping {
+                    rms_m: 0.0,
+                    ..survey
+                })
+                .rms_m,
+            KEEPING.rms_m
+        );
+    }
+
+    #[test]
+    fn an_unseen_swing_shortens_the_way_as_said() {
+        use rand::{RngExt, SeedableRng};
+        let mut rng = rand_chacha::ChaCha8Rng::seed_from_u64(1);
+        let mut normal = || rng.sample::<f64, _>(rand_distr::StandardNormal);
+        let keeping = LaneKeeping {
+            rms_m: 0.5,
+            wavelength_m: 15.0,
+            damping: 0.2,
+        };
+        let (step_m, steps, drives) = (0.25, 400, 400);
+        let phi = keeping.transition(step_m);
+        let noise = keeping.noise(step_m);
+        let [offset, heading] = keeping.stationary();
+        let shared = noise[0][1] / noise[1][1].sqrt();
+        let own = (noise[0][0] - shared * shared).sqrt();
+        let (mut sum, mut squares) = (0.0, 0.0);
+        for _ in 0..drives {
+            let mut state = [offset.sqrt() * normal(), heading.sqrt() * normal()];
+            let mut along_m = 0.0;
+            for _ in 0..steps {
+                along_m += step_m * state[1].cos();
+                let (common, alone) = (normal(), normal());
+                state = [
+                    phi[0][0] * state[0] + phi[0][1] * state[1] + shared * common + own * alone,
+                    phi[1][0] * state[0] + phi[1][1] * state[1] + noise[1][1].sqrt() * common,
+                ];
+            }
+            sum += along_m;
+            squares += along_m * along_m;
+        }
+        let mean_m = sum / f64::from(drives);
+        let variance_m2 = squares / f64::from(drives) - mean_m * mean_m;
+        let driven_m = step_m * f64::from(steps);
+        assert!(
+            (mean_m / (driven_m * (-0.5 * heading).exp()) - 1.0).abs() < 0.003,
+            "{mean_m}"
+        );
+        let foretold_m2 = driven_m * keeping.shortening_m2_per_m(heading);
+        assert!(
+            (0.75..1.25).contains(&(variance_m2 / foretold_m2)),
+            "{variance_m2} {foretold_m2}"
+        );
     }
 }

@@ -6,5 +6,5 @@ mod lane_keeping;
 mod smooth;
 
 pub use build::{RoadError, Segment};
-pub use course::{Gap, Projection, Road};
+pub use course::{Bending, Gap, Projection, Road};
 pub use lane_keeping::LaneKeeping;

@@ -112,19 +112,11 @@ impl Pilots {
 }
 
 /// `[estimator]`
-#[derive(Debug, Clone, Copy, PartialEq, Eq, Serialize, Deserialize, JsonSchema)]
+#[derive(Debug, Clone, Copy, PartialEq, Eq, Default, Serialize, Deserialize, JsonSchema)]
 #[serde(default, deny_unknown_fields)]
 pub struct EstimatorSettings {
     /// The method.
     pub method: EstimatorMethod,
-}
-
-impl Default for EstimatorSettings {
-    fn default() -> Self {
-        Self {
-            method: EstimatorMethod::MaximumLikelihood,
-        }
-    }
 }
 
 impl fmt::Display for EstimatorMethod {
@@ -155,7 +147,7 @@ impl fmt::Display for EstimatorMethod {
 )]
 #[serde(rename_all = "kebab-case")]
 pub enum EstimatorMethod {
-    /// Multiple signal classification, refined off the grid.
+    /// Multiple signal classification.
     Music,
     /// Its polynomial form.
     RootMusic,

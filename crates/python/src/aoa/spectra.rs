@@ -49,16 +49,7 @@ pub fn spectrum<'py>(
     forward_backward: bool,
     calibration: Option<&Bound<'py, PyAny>>,
 ) -> PyResult<Bound<'py, PyArrayDyn<f64>>> {
-    let kind = match method {
-        "bartlett" => PseudoSpectrum::Bartlett,
-        "capon" => PseudoSpectrum::Capon,
-        "music" => PseudoSpectrum::Music { sources },
-        other => {
-            return Err(PyValueError::new_err(format!(
-                "method must be 'bartlett', 'capon' or 'music', not '{other}'"
-            )));
-        }
-    };
+    let kind = kind_of(method, sources)?;
     let angles_rad: PyArrayLike1<'_, f64, AllowTypeChange> = angles_rad
         .extract()
         .map_err(|_| PyValueError::new_err("angles_rad must be one axis of numbers"))?;
@@ -74,6 +65,18 @@ pub fn spectrum<'py>(
         py: snapshots.py(),
     })?;
     PyArray1::from_vec(snapshots.py(), values).reshape(IxDyn(&shape))
+}
+
+/// The spectrum of this name.
+pub(super) fn kind_of(method: &str, sources: usize) -> PyResult<PseudoSpectrum> {
+    match method {
+        "bartlett" => Ok(PseudoSpectrum::Bartlett),
+        "capon" => Ok(PseudoSpectrum::Capon),
+        "music" => Ok(PseudoSpectrum::Music { sources }),
+        other => Err(PyValueError::new_err(format!(
+            "method must be 'bartlett', 'capon' or 'music', not '{other}'"
+        ))),
+    }
 }
 
 struct Looker<'a, 'py> {

@@ -53,7 +53,8 @@ impl Odometer {
         })
     }
 
-    /// The sample at `now`, later than the last one's; `None` when it is lost.
+    /// The sample at `now`, later than the last one's; `None` when it is lost. The first is not: it is
+    /// what makes the start of a drive, of which the initial pose tells.
     pub fn sample(&mut self, now: VehicleState) -> Option<OdometrySample> {
         let duration_s = now.time_s - self.last.time_s;
         // In the middle of the road the path is the road. Off it, the mean of both ends' speeds is
@@ -77,9 +78,10 @@ impl Odometer {
             (duration_s > 0.0).then(|| turn_rad / duration_s + gyro.bias_radps)
         });
         self.last = now;
+        let is_first = duration_s == 0.0;
         let lost = self.settings.dropout_probability > 0.0
             && self.rng.random::<f64>() < self.settings.dropout_probability;
-        (!lost).then_some(OdometrySample {
+        (is_first || !lost).then_some(OdometrySample {
             time_s: now.time_s,
             distance_m: self.measured_m,
             speed_mps: self.settings.scale * now.speed_mps,

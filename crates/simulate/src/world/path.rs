@@ -91,7 +91,7 @@ impl Wander {
             return Self { knots: Vec::new() };
         }
         let transition = keeping.transition(KNOT_M);
-        let noise = keeping.noise(&transition);
+        let noise = keeping.noise(KNOT_M);
         // Cholesky factor of the noise of one step.
         let slope_std = noise[1][1].sqrt();
         let shared = noise[0][1] / slope_std;

@@ -11,8 +11,8 @@ const LEAST_ODOMETER_SCALE_STD: f64 = 0.001;
 const LEAST_ODOMETER_NOISE_M_PER_SQRT_M: f64 = 0.003;
 const LEAST_LANE_RMS_M: f64 = 0.02;
 
-/// Wavelength along the road of the errors of its survey (m).
-const SURVEY_WAVELENGTH_M: f64 = 20.0;
+/// Wavelength along the road of the errors of its survey, of points every few metres (m).
+const SURVEY_WAVELENGTH_M: f64 = 15.0;
 
 /// Assumptions of the tracker, SI and radians: what site and vehicle state.
 #[derive(Clone, Copy, Debug, PartialEq)]
@@ -152,14 +152,14 @@ impl TrackerConfig {
         let keeping = vehicle.lane_keeping.process();
         let survey_std_m = site.road.as_ref().map_or(0.0, RoadSettings::survey_std_m);
         let lane_keeping = LaneKeeping {
-            rms_m: keeping.rms_m.max(LEAST_LANE_RMS_M).hypot(survey_std_m),
-            wavelength_m: if survey_std_m > 0.0 {
-                keeping.wavelength_m.min(SURVEY_WAVELENGTH_M)
-            } else {
-                keeping.wavelength_m
-            },
+            rms_m: keeping.rms_m.max(LEAST_LANE_RMS_M),
             ..keeping
-        };
+        }
+        .and(&LaneKeeping {
+            rms_m: survey_std_m,
+            wavelength_m: SURVEY_WAVELENGTH_M,
+            ..keeping
+        });
         let gyroscope = vehicle.gyroscope.as_ref();
         let wheels = vehicle.drive == DriveKind::Differential;
         let usual = if wheels || odometer.track_width_m.is_some() {
@@ -288,6 +288,7 @@ impl TrackerConfig {
         Yaw {
             turn_rad: self.yaw_rate_bias_radps * duration_s,
             duration_s,
+            is_told: false,
             variance: UNKNOWN_TURN_RAD2_PER_M * length_m.abs()
                 + UNKNOWN_TURN_RAD2_PER_S * duration_s,
         }

@@ -9,6 +9,7 @@ use super::interface::{InitialPose, OdometryVerdict};
 use super::locate::locate;
 use super::motion::{Step, Yaw};
 use super::off_map::OffMap;
+use super::pace::Pace;
 use super::sighting::Sighting;
 use super::speed_steps::SpeedSteps;
 use super::state::{ACROSS, ALONG, Belief, HEADING, LATENESS, SCALE, STATES, YAW_RATE_BIAS};
@@ -36,6 +37,10 @@ const TURN_GATE: f64 = 36.0;
 /// What a refused yaw rate may have hidden: that the vehicle turned by this much faster or slower
 /// than before (rad/s, a standard deviation).
 const REFUSED_RADPS: f64 = 0.5;
+
+/// How the yaw rate wanders while no sample tells of it: the density of a white angular acceleration
+/// (rad²/s³), by which it changes by 0.5 rad/s within half a second.
+const UNTOLD_TURN: f64 = 0.5;
 
 /// Most that angles can be later than stated (s).
 const MOST_LATENESS_S: f64 = 0.5;
@@ -71,6 +76,7 @@ pub struct Tracker {
     /// Where the vehicle is that the map does not tell how the road goes on.
     pub(super) off_map: Option<OffMap>,
     pub(super) journal: Option<Journal<STATES>>,
+    pub(super) pace: Pace,
     pub(super) speed_steps: SpeedSteps,
 }
 
@@ -84,6 +90,7 @@ clone_in_place!(Tracker {
     turned_rad,
     off_map,
     journal,
+    pace,
     speed_steps
 });
 
@@ -113,6 +120,7 @@ impl Tracker {
             turned_rad: 0.0,
             off_map: None,
             journal: None,
+            pace: Pace::default(),
             speed_steps: SpeedSteps::default(),
         };
         tracker.watch_the_map();
@@ -160,18 +168,30 @@ impl Tracker {
         // The vehicle turns on as before, or by anything that a moment allows.
         let rate = read_radps.filter(credible);
         let before = previous.yaw_rate_radps.filter(credible);
-        let yaw = rate.or(before.filter(|_| refused.is_some())).map(|rate| {
-            let mut yaw = self.yaw(rate, reading_m, duration_s);
-            let change_rad = (before.unwrap_or(rate) - rate) * duration_s;
+        let rate = rate.or(before.filter(|_| refused.is_some()));
+        // Where samples were lost, nothing tells of the turn until the last of them was due.
+        let told_s = self.pace.told_s(duration_s);
+        let untold_s = duration_s - told_s;
+        let mut told_m = reading_m;
+        if let (Some(rate), true) = (rate, untold_s > 0.0) {
+            told_m *= told_s / duration_s;
+            let guessed = (self.turns_as_told())
+                .then(|| self.guessed_yaw(before.unwrap_or(rate), rate, untold_s));
+            self.advance(reading_m - told_m, untold_s, guessed);
+        }
+        let yaw = rate.map(|rate| {
+            let mut yaw = self.yaw(rate, told_m, told_s);
+            let change_rad = (before.unwrap_or(rate) - rate) * told_s;
             if refused.is_some() {
-                yaw.variance += (REFUSED_RADPS * duration_s).powi(2);
+                yaw.variance += (REFUSED_RADPS * told_s).powi(2);
             } else if self.turns_as_told() {
                 // When between two samples the rate changed nobody knows: evenly distributed.
                 yaw.variance += change_rad * change_rad / 12.0;
             }
             yaw
         });
-        self.advance(reading_m, duration_s, yaw);
+        let last_s = if yaw.is_some() { told_s } else { duration_s };
+        self.advance(told_m, last_s, yaw);
         if jumped {
             self.add_along_variance(self.config.coasting_variance(duration_s));
         }
@@ -200,9 +220,24 @@ impl Tracker {
         Yaw {
             turn_rad,
             duration_s,
+            is_told: true,
             variance: config.yaw_noise_rad_per_sqrt_s.powi(2) * duration_s
                 + config.yaw_noise_rad_per_sqrt_m.powi(2) * reading_m.abs()
                 + config.yaw_noise_rad_per_sqrt_rad.powi(2) * turn_rad.abs(),
+        }
+    }
+
+    /// What is to be made of a turn between two yaw rates whose samples were lost: the mean of both,
+    /// and a Brownian bridge about it.
+    fn guessed_yaw(&self, from_radps: f64, to_radps: f64, duration_s: f64) -> Yaw {
+        let change_rad = (to_radps - from_radps) * duration_s;
+        let wander = UNTOLD_TURN * duration_s.powi(3);
+        let most_rad = self.config.top_yaw_rate_radps * duration_s;
+        Yaw {
+            turn_rad: 0.5 * (from_radps + to_radps) * duration_s,
+            duration_s,
+            is_told: false,
+            variance: ((change_rad * change_rad).max(wander) / 12.0).min(most_rad * most_rad),
         }
     }
 
@@ -218,6 +253,7 @@ impl Tracker {
             turn_rad: yaw.turn_rad * share,
             duration_s: yaw.duration_s * share,
             variance: yaw.variance * share,
+            ..yaw
         });
         for _ in 0..steps as usize {
             let step = self.next_step(reading_m * share, duration_s * share, yaw);
@@ -235,7 +271,7 @@ impl Tracker {
     fn next_step(&mut self, reading_m: f64, duration_s: f64, yaw: Option<Yaw>) -> Step {
         if self.config.drive == DriveKind::Differential {
             let turn = yaw.unwrap_or_else(|| self.config.unknown_turn(reading_m, duration_s));
-            if reading_m == 0.0 && turn.turn_rad == 0.0 && yaw.is_some() {
+            if reading_m == 0.0 && turn.turn_rad == 0.0 && turn.is_told {
                 return Step::standing(&self.belief.mean); // the wheels do
             }
             return Step::turning(&self.belief.mean, reading_m, &turn, &self.config.noise);
@@ -274,18 +310,23 @@ impl Tracker {
                 turn_rad: 0.0,
                 duration_s: 0.0,
                 variance: 0.0,
+                is_told: false,
             };
             return Step::turning(mean, reading_m, &straight_on, &config.noise);
         }
-        let middle_m = mean[ALONG] + 0.5 * reading_m;
-        let curvature_per_m = (self.map.as_ref()).map_or(0.0, |map| map.curvature_per_m(middle_m));
         let noise = &config.noise;
-        if self.map.is_some() && self.off_map.is_none() {
-            let keeping = &config.lane_keeping;
-            Step::along_lane(mean, reading_m, curvature_per_m, keeping, noise)
-        } else {
-            Step::in_plane(mean, reading_m, curvature_per_m, &config.path_bend, noise)
+        let Some(map) = &self.map else {
+            return Step::in_plane(mean, reading_m, 0.0, &config.path_bend, noise);
+        };
+        let middle_m = mean[ALONG] + 0.5 * reading_m;
+        if self.off_map.is_some() {
+            let curvature_per_m = map.curvature_per_m(middle_m);
+            return Step::in_plane(mean, reading_m, curvature_per_m, &config.path_bend, noise);
         }
+        let variance = |state: usize| belief.covariance[state][state].max(0.0);
+        let road = map.bending(middle_m, variance(ALONG).sqrt());
+        let keeping = &config.lane_keeping;
+        Step::along_lane(mean, variance(HEADING), reading_m, &road, keeping, noise)
     }
 
     fn add_along_variance(&mut self, variance: f64) {

@@ -18,6 +18,7 @@ mod locate;
 mod map_watch;
 pub mod motion;
 mod off_map;
+mod pace;
 mod place;
 mod prior;
 pub mod sighting;

@@ -16,7 +16,7 @@ use super::state::{
 };
 use crate::geometry::Pose;
 use crate::localize::gaussian::{Matrix, identity};
-use crate::road::LaneKeeping;
+use crate::road::{Bending, LaneKeeping};
 
 /// How the path bends where no map tells.
 #[derive(Clone, Copy, Debug, PartialEq)]
@@ -57,8 +57,12 @@ pub struct Step {
     pub noise: Matrix<STATES>,
     /// By how much the vehicle turns (rad) ...
     pub turn_rad: f64,
-    /// ... and how that depends on the state before the step.
+    /// ... how that depends on the state before the step ...
     pub turn_row: [f64; STATES],
+    /// ... how it varies together with what the step adds ...
+    pub turn_shared: [f64; STATES],
+    /// ... and its variance by that (rad²).
+    pub turn_variance: f64,
 }
 
 /// What a gyroscope read during a step.
@@ -70,20 +74,27 @@ pub struct Yaw {
     pub duration_s: f64,
     /// Variance of the reading (rad²).
     pub variance: f64,
+    /// Whether a reading tells of it; else it is guessed.
+    pub is_told: bool,
 }
 
 impl Step {
-    /// The step along a lane of the given curvature, for what the odometer read.
+    /// The step along a lane that bends as the road does, for what the odometer read. A heading known to
+    /// a variance P takes from the way along the lane: `E cos ψ = e^{−P/2} cos E ψ`.
     pub fn along_lane(
         start: &[f64; STATES],
+        heading_variance: f64,
         reading_m: f64,
-        curvature_per_m: f64,
+        road: &Bending,
         keeping: &LaneKeeping,
         walk: &MotionNoise,
     ) -> Self {
         let scale = 1.0 + start[SCALE];
         let length = reading_m / scale;
+        let kept = (-0.5 * heading_variance).exp();
         let (sin, cos) = start[HEADING].sin_cos();
+        let (sin, cos) = (kept * sin, kept * cos);
+        let curvature_per_m = road.mean_per_m;
         let stretch = 1.0 / (1.0 - curvature_per_m * start[ACROSS]);
         let phi = keeping.transition(length);
 
@@ -98,8 +109,9 @@ impl Step {
 
         let distance = length.abs();
         let mut q = [[0.0; STATES]; STATES];
-        q[ALONG][ALONG] = walk.odometer_m_per_sqrt_m.powi(2) * distance;
-        let wander = keeping.noise(&phi);
+        q[ALONG][ALONG] = distance
+            * (walk.odometer_m_per_sqrt_m.powi(2) + keeping.shortening_m2_per_m(heading_variance));
+        let wander = keeping.noise(length);
         for i in 0..2 {
             for j in 0..2 {
                 q[ACROSS + i][ACROSS + j] = wander[i][j];
@@ -116,14 +128,20 @@ impl Step {
             turn_row[i] = f[HEADING][i] + curvature_per_m * f[ALONG][i];
         }
         turn_row[HEADING] -= 1.0;
-        turn_row[ALONG] = 0.0;
+        turn_row[ALONG] = road.slope_per_m2 * (mean[ALONG] - start[ALONG]);
+        // The road turns by as much further as the odometer read too little.
+        let turn_shared = std::array::from_fn(|i| q[HEADING][i] + curvature_per_m * q[ALONG][i]);
         Self {
             turn_rad: curvature_per_m * (mean[ALONG] - start[ALONG]) + mean[HEADING]
                 - start[HEADING],
+            turn_variance: turn_shared[HEADING]
+                + curvature_per_m * turn_shared[ALONG]
+                + road.variance_rad2_per_m * distance,
             mean,
             jacobian: f,
             noise: q,
             turn_row,
+            turn_shared,
         }
     }
 
@@ -177,11 +195,6 @@ impl Step {
         f[CURVATURE][CURVATURE] = kept;
 
         let mut q = [[0.0; STATES]; STATES];
-        let spread = walk.odometer_m_per_sqrt_m.powi(2) * distance;
-        q[ALONG][ALONG] = spread * (cos * stretch).powi(2);
-        q[ALONG][ACROSS] = spread * cos * stretch * sin;
-        q[ACROSS][ALONG] = spread * cos * stretch * sin;
-        q[ACROSS][ACROSS] = spread * sin * sin;
         // Curvature noise and its integral, the heading (a step is short against both).
         let fresh = bend.curvature_per_m.powi(2) * (1.0 - kept * kept);
         q[CURVATURE][CURVATURE] = fresh;
@@ -189,6 +202,22 @@ impl Step {
         q[CURVATURE][HEADING] = fresh * length / 2.0;
         q[HEADING][HEADING] =
             fresh * length * length / 3.0 + bend.steering_rad_per_sqrt_m.powi(2) * distance;
+        let mut turn_shared = q[HEADING];
+        let mut turn_variance = q[HEADING][HEADING];
+        // A metre that the odometer did not read goes the same way, and turns as the path does.
+        let spread = walk.odometer_m_per_sqrt_m.powi(2) * distance;
+        let by_metre = [
+            (ALONG, cos * stretch),
+            (ACROSS, sin),
+            (HEADING, start[CURVATURE] - kappa * cos * stretch),
+        ];
+        for (i, by) in by_metre {
+            for (j, other) in by_metre {
+                q[i][j] += spread * by * other;
+            }
+            turn_shared[i] += spread * by * start[CURVATURE];
+        }
+        turn_variance += spread * start[CURVATURE] * start[CURVATURE];
         slow_states(&mut q, walk, distance);
 
         let mut mean = *start;
@@ -203,6 +232,8 @@ impl Step {
             jacobian: f,
             noise: q,
             turn_row,
+            turn_shared,
+            turn_variance,
         }
     }
 
@@ -263,6 +294,8 @@ impl Step {
             noise: q,
             turn_rad,
             turn_row: [0.0; STATES],
+            turn_shared: [0.0; STATES],
+            turn_variance: 0.0,
         }
     }
 
@@ -274,6 +307,8 @@ impl Step {
             noise: [[0.0; STATES]; STATES],
             turn_rad: 0.0,
             turn_row: [0.0; STATES],
+            turn_shared: [0.0; STATES],
+            turn_variance: 0.0,
         }
     }
 
@@ -288,19 +323,19 @@ impl Step {
         let mut row = self.turn_row;
         row[YAW_RATE_BIAS] = yaw.duration_s;
         let bias = start[YAW_RATE_BIAS] * yaw.duration_s;
-        let variance = self.noise[HEADING][HEADING] + yaw.variance;
+        let variance = self.turn_variance + yaw.variance;
         (yaw.turn_rad - self.turn_rad - bias, row, variance)
     }
 
     /// This step, its noise known in part from a gyroscope: measurement and motion share the
-    /// noise of the heading, so it is decorrelated (Anderson & Moore, Optimal Filtering, 5.5).
+    /// noise of the turn, so it is decorrelated (Anderson & Moore, Optimal Filtering, 5.5).
     #[must_use]
     pub fn informed(mut self, start: &[f64; STATES], yaw: &Yaw) -> Self {
-        let total = self.noise[HEADING][HEADING] + yaw.variance;
+        let total = self.turn_variance + yaw.variance;
         if total <= 0.0 {
             return self;
         }
-        let shared = self.noise[HEADING];
+        let shared = self.turn_shared;
         let mut row = self.turn_row;
         row[YAW_RATE_BIAS] = yaw.duration_s;
         let surprise = yaw.turn_rad - self.turn_rad - start[YAW_RATE_BIAS] * yaw.duration_s;
@@ -400,6 +435,7 @@ mod tests {
             turn_rad: 0.004,
             duration_s: 0.02,
             variance: 0.0,
+            is_told: true,
         };
         let step = |start: &[f64; STATES]| Step::turning(start, 0.1, &yaw, &MotionNoise::default());
         for by in [ALONG, ACROSS, HEADING, SCALE, YAW_RATE_BIAS] {
