@@ -56,15 +56,6 @@ def mounted(by_rad: float) -> Callable[[Robot], None]:
     return spoil
 
 
-def begun(
-    turn: Callable[[float, float, float], tuple[float, float, float]],
-) -> Callable[[Robot], None]:
-    def spoil(it: Robot) -> None:
-        it.start = turn(*it.start)
-
-    return spoil
-
-
 PHASE, SIGMA = pl.col("phase_rad"), pl.col("phase_sigma_rad")
 YAW = pl.col("yaw_rate_radps")
 DISTANCE, SPEED, TIME = pl.col("distance_m"), pl.col("speed_mps"), pl.col("time_s")
@@ -94,8 +85,6 @@ SUSPECTED = {
     "heads mirrored in x": (heads(lambda x, y: (-x, y)), "x is mirrored"),
     "heads mirrored in y": (heads(lambda x, y: (x, -y)), "y is mirrored"),
     "x and y exchanged": (heads(lambda x, y: (y, x)), "x and y are exchanged"),
-    "heading": (begun(lambda x, y, h: (x, y, h - math.pi / 2)), "further to the left"),
-    "heading the other way": (begun(lambda x, y, h: (x, y, h + math.pi)), "the other way"),
 }  # fmt: skip
 
 # ... as a remark on a drive that is located all the same ...
@@ -181,6 +170,20 @@ def test_how_it_was_meant_is_said(tmp_path: Path, kind: str) -> None:
     assert says in drive.suspicions[0]
     assert drive.suspicions[0] in drive.remarks
     assert not drive.is_reliable
+
+
+@pytest.mark.parametrize(
+    ("by_rad", "says"),
+    [(-math.pi / 2, "further to the left"), (math.pi, "heading the other way")],
+)
+def test_a_wrong_heading_is_named_and_overcome(tmp_path: Path, by_rad: float, says: str) -> None:
+    spoilt = robot()
+    x, y, heading_rad = spoilt.start
+    spoilt.start = (x, y, heading_rad + by_rad)
+    drive = spoilt.locate(tmp_path)
+    assert any(says in remark for remark in drive.remarks), drive.remarks
+    assert any("found again" in remark for remark in drive.remarks)
+    assert drive.suspicions == []
 
 
 @pytest.mark.parametrize("kind", REMARKED)

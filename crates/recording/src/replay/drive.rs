@@ -10,6 +10,7 @@ use onboard::{Custom, Execution, Onboard};
 use super::bursts::{Burst, OfSsb, first_burst};
 use super::error::ReplayError;
 use super::located::{LocatedDrive, LocatedPose, Remark, gathered};
+use super::suspicion::Suspicion;
 use crate::library::load;
 use crate::odometry::OdometryLog;
 
@@ -202,11 +203,15 @@ impl<'a> Replay<'a> {
         &self.drive.executions
     }
 
-    /// Says how the input may have been meant.
-    pub fn suspect(&mut self, text: String) {
+    /// Says how the input may have been meant. A wrong start is no more than remarkable once the
+    /// vehicle was found again.
+    pub fn suspect(&mut self, Suspicion { text, is_of_start }: Suspicion) {
         let first = self.drive.poses.first();
         let time_s = first.map_or(f64::NEG_INFINITY, |first| first.estimate.time_s);
-        self.drive.suspicions.push(text.clone());
+        let is_found = self.onboard.recovered().is_some() && !self.onboard.is_lost();
+        if !(is_of_start && is_found) {
+            self.drive.suspicions.push(text.clone());
+        }
         self.remark(time_s, text);
     }
 

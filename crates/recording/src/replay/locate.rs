@@ -108,8 +108,8 @@ fn suspect(
         odometry: Cow::Borrowed(odometry),
         angles: Cow::Borrowed(angles),
     };
-    for text in suspicions(&given)? {
-        replay.suspect(text);
+    for suspicion in suspicions(&given)? {
+        replay.suspect(suspicion);
     }
     Ok(())
 }

@@ -46,6 +46,11 @@ impl Mistake {
         }
     }
 
+    /// Whether it is one of the start, which a vehicle that is found again has overcome.
+    pub const fn is_of_start(&self) -> bool {
+        matches!(self.correction, Correction::Start(_))
+    }
+
     /// The drive as it was meant.
     pub fn correct<'a>(&self, given: &Drive<'a>) -> Drive<'a> {
         let mut drive = given.clone();

@@ -33,6 +33,14 @@ const MOST_REFUSED: f64 = 0.2;
 /// Looks at one radio head within this time count as one (s).
 const LOOK_S: f64 = 1.0;
 
+/// A mistake that explains a drive.
+pub struct Suspicion {
+    /// What speaks for it, and what to check.
+    pub text: String,
+    /// Whether it is one of the start alone.
+    pub is_of_start: bool,
+}
+
 /// How well a way of reading a drive foretells its angles.
 struct Foretold {
     log_likelihood: f64,
@@ -73,7 +81,7 @@ impl Foretold {
 ///
 /// # Errors
 /// As [`innovations`].
-pub fn suspicions(given: &Drive<'_>) -> Result<Vec<String>, ReplayError> {
+pub fn suspicions(given: &Drive<'_>) -> Result<Vec<Suspicion>, ReplayError> {
     let tracks = matches!(given.vehicle.localizer, LocalizerSettings::Tracker(_));
     if !tracks || !given.vehicle.start.known {
         return Ok(Vec::new()); // there is no expectation to begin with
@@ -109,17 +117,18 @@ pub fn suspicions(given: &Drive<'_>) -> Result<Vec<String>, ReplayError> {
     }
     judged.sort_by(|a, b| b.0.total_cmp(&a.0));
     let best = judged.first().map_or(0.0, |(odds, ..)| *odds);
-    let remark = |(_, mistake, found): (f64, &Mistake, Foretold)| {
-        format!(
+    let suspicion = |(_, mistake, found): (f64, &Mistake, Foretold)| Suspicion {
+        is_of_start: mistake.is_of_start(),
+        text: format!(
             "{:.0} % of the angles are refused, but {:.0} % if {}; check {}",
             100.0 * as_given.refused,
             100.0 * found.refused,
             mistake.meant,
             mistake.check
-        )
+        ),
     };
     let named = judged
         .into_iter()
         .take_while(|(odds, ..)| best - odds < LOG_ODDS);
-    Ok(named.map(remark).collect())
+    Ok(named.map(suspicion).collect())
 }
