@@ -225,12 +225,11 @@ impl SsbSource for Played<'_> {
     fn observe(&mut self, index: usize) -> Result<Observed<'_>, BoxError> {
         let found = self.sensed.get(index).zip(self.angles.get(index));
         let (&ssb, angle) = found.ok_or("no such SSB in the burst")?;
-        Ok(match angle {
-            Some(angle) => Observed::Angle(*angle),
-            None => {
-                self.silence.restart(ssb);
-                Observed::Snapshots(self.silence)
-            }
+        Ok(if let Some(angle) = angle {
+            Observed::Angle(*angle)
+        } else {
+            self.silence.restart(ssb);
+            Observed::Snapshots(self.silence)
         })
     }
 }
