@@ -118,6 +118,22 @@ def test_covariances_are_positive(seed: int) -> None:
     assert ((xx * yy - xy * xy) / (xx * yy)).min() >= -1e-12  # type: ignore[operator]
 
 
+def test_a_heading_that_is_given_exactly_has_a_positive_variance() -> None:
+    # In a bend it tells of the place too: rounding took its variance below zero.
+    scenario = access_av.Scenario.load("yard").with_overrides(
+        {
+            "site.road": {"segments": [{"length_m": 90.0, "turn_rad": 1.5}]},
+            "motion": {},
+            "vehicle.start.position_std_m": 0.1,
+            "vehicle.start.heading_std_rad": 0.0,
+            "vehicle.lane_keeping": {"rms_m": 0.5, "wavelength_m": 20.0},
+        }
+    )
+    found = access_av.simulate(scenario, runs=6, keep_trajectories=True)
+    assert found.trajectories is not None
+    assert found.trajectories["covariance_heading_rad2"].min() > 0.9e-12  # type: ignore[operator]
+
+
 @pytest.mark.parametrize("name", access_av.Scenario.names())
 def test_tables_hold_no_nan(name: str) -> None:
     scenario = access_av.Scenario.load(name)

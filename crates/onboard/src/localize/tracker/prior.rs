@@ -14,6 +14,10 @@ use crate::geometry::wrap_angle;
 use crate::radio_head::RadioHead;
 use crate::road::Road;
 
+/// An exact start is known to a micrometre and a microradian: what is taken as exact leaves a variance
+/// of rounding, of either sign.
+const LEAST_VARIANCE: f64 = 1e-12;
+
 impl Tracker {
     /// The belief before any measurement.
     pub fn prior(config: &TrackerConfig, map: Option<&Road>, start: &InitialPose) -> Belief {
@@ -68,7 +72,7 @@ impl Tracker {
             row[state] = 1.0;
             row[ALONG] = by_along;
             let expected = belief.mean[state] + by_along * (belief.mean[ALONG] - place.along_m);
-            belief.update(value - expected, &row, std * std);
+            belief.update(value - expected, &row, (std * std).max(LEAST_VARIANCE));
         }
         belief
     }
