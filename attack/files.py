@@ -163,11 +163,9 @@ def recorded() -> dict[str, bytes]:
 def _locate(case: Case, random: Random, *changed: str) -> list[str]:
     for name, content in recorded().items():
         if name in changed:
-            text = name.endswith((".csv", ".tum")) and random.random() < 0.7
+            is_text = name.endswith((".csv", ".tum"))
             content = (
-                mutate.lines(random, content.decode()).encode("utf-8", "surrogatepass")
-                if text
-                else mutate.data(random, content)
+                mutate.text(random, content.decode()) if is_text else mutate.data(random, content)
             )
         case.write(name, content)
     odometry = "odometry.mcap" if "odometry.mcap" in changed else "odometry.csv"

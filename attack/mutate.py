@@ -143,6 +143,13 @@ def lines(random: Random, original: str) -> str:
     return "\n".join(rows) + "\n"
 
 
+def text(random: Random, original: str) -> bytes:
+    """A text file: mostly its cells and lines are changed, sometimes its bytes."""
+    if random.random() < 0.7:
+        return lines(random, original).encode("utf-8", "surrogatepass")
+    return data(random, original.encode())
+
+
 def toml(settings: dict[str, Any]) -> str:
     """A table as TOML, a line for each of its keys."""
     return "".join(f"{_key(key)} = {_inline(item)}\n" for key, item in settings.items())

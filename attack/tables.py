@@ -79,11 +79,7 @@ def given(random: Random, case: Case) -> list[str]:
         )
     )
     text = {"masts.csv": MASTS, "paths.csv": PATHS}[name]
-    changed = (
-        mutate.lines(random, text).encode("utf-8", "surrogatepass")
-        if random.random() < 0.7
-        else mutate.data(random, text.encode())
-    )
+    changed = mutate.text(random, text)
     case.write("short.toml", SHORT)
     return case.access_av(*command, case.write(name, changed), "--out", "made.npz")
 
