@@ -4,14 +4,14 @@ use std::fs;
 use std::path::Path;
 
 use onboard::localize::tracker::TrackerConfig;
-use onboard::settings::{Check, TomlFile};
+use onboard::settings::Check;
 use recording::{LoggedAngle, RecordingError, TimedPose};
-use recording::{write_angle_log, write_file, write_odometry_csv, write_tum};
+use recording::{write_angle_log, write_odometry_csv, write_tum};
 
 use crate::random::Streams;
 use crate::run::Simulation;
 use crate::scenario::Scenario;
-use crate::synth::SynthError;
+use crate::synth::{SynthError, write_settings};
 use crate::tape::Tape;
 
 /// Writes run `run` of a scenario into `directory`, up to `end_s`: `angles.csv` with the angle of
@@ -63,13 +63,7 @@ pub fn log_angles(
         .collect();
 
     fs::create_dir_all(directory).map_err(|source| RecordingError::io(directory, source))?;
-    for (name, text) in [
-        ("site.toml", scenario.site.to_toml()),
-        ("vehicle.toml", vehicle.to_toml()),
-        ("scenario.toml", scenario.to_toml()),
-    ] {
-        write_file(&directory.join(name), text.as_bytes())?;
-    }
+    write_settings(directory, scenario, &vehicle)?;
     write_odometry_csv(&directory.join("odometry.csv"), &odometry)?;
     write_tum(&directory.join("truth.tum"), &truth)?;
     write_angle_log(&directory.join("angles.csv"), &angles)?;

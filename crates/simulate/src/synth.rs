@@ -147,13 +147,7 @@ pub fn synthesize(
             return Err(SynthError::Stopped);
         }
     }
-    for (name, text) in [
-        ("site.toml", scenario.site.to_toml()),
-        ("vehicle.toml", told.to_toml()),
-        ("scenario.toml", scenario.to_toml()),
-    ] {
-        write_file(&directory.join(name), text.as_bytes())?;
-    }
+    write_settings(directory, scenario, &told)?;
     let odometry = directory.join("odometry.csv");
     write_odometry(scenario, &path, drawn.odometer, end_s, &odometry)?;
     write_tum(&directory.join("truth.tum"), &truth)?;
@@ -163,6 +157,22 @@ pub fn synthesize(
         bursts: truth.len(),
         samples,
     })
+}
+
+/// Writes what the vehicle is told in `site.toml` and `vehicle.toml`, and `scenario.toml`.
+pub(crate) fn write_settings(
+    directory: &Path,
+    scenario: &Scenario,
+    told: &Vehicle,
+) -> Result<(), RecordingError> {
+    for (name, text) in [
+        ("site.toml", scenario.site.to_toml()),
+        ("vehicle.toml", told.to_toml()),
+        ("scenario.toml", scenario.to_toml()),
+    ] {
+        write_file(&directory.join(name), text.as_bytes())?;
+    }
+    Ok(())
 }
 
 /// The vehicle as its owner would describe it: with the start of this drive, channels as calibrated,
