@@ -267,7 +267,12 @@ _GLOSSARY = {
     "rsrq_db": ("dB", "Received quality, a value per channel"),
     "sinr_db": ("dB", "Signal to interference and noise, a value per channel"),
     "angle_deg": ("°", "Angle of arrival from the array's axis"),
-    "azimuth_deg": ("°", "Azimuth from broadside, counter-clockwise: 90° − angle_deg"),
+    "azimuth_deg": (
+        "°",
+        "Azimuth from broadside, counter-clockwise: 90° − angle_deg; of antennas not in a row from "
+        "their x axis",
+    ),
+    "elevation_deg": ("°", "Elevation from the horizontal"),
     "azimuth_from_broadside_deg": ("°", "Azimuth from broadside, counter-clockwise"),
     "sigma_deg": ("°", "Standard deviation of the angle from noise"),
     "label": ("text", "The annotation's label"),
@@ -588,18 +593,20 @@ TABLES: Mapping[str, Table] = {
             (
                 "recording", "pci", "ssb_index", "half_frame", "sfn", "cfo_hz", "snr_db",
                 "sample_start", "sample_offset", "mib_bits", "ssb_freq_hz", "scs_khz", "lmax",
-                "rsrp_dbfs", "rsrq_db", "sinr_db", "angle_deg", "azimuth_deg", "sigma_deg",
-                "verdict",
+                "rsrp_dbfs", "rsrq_db", "sinr_db", "angle_deg", "azimuth_deg", "elevation_deg",
+                "sigma_deg", "verdict",
             ),
             {
                 **dict.fromkeys(("half_frame", "sfn", "mib_bits"), _UNDECODED),
                 "lmax": "neither band nor broadcast channel tell",
-                **dict.fromkeys(("angle_deg", "azimuth_deg", "sigma_deg", "verdict"), _NO_ARRAY),
+                **dict.fromkeys(("azimuth_deg", "sigma_deg", "verdict"), _NO_ARRAY),
+                "angle_deg": f"{_NO_ARRAY}, or antennas not in a row",
+                "elevation_deg": "antennas in a row; the key is absent then",
             },
         ),
         Table(
             "bursts",
-            "An annotated burst of a linear array's recording",
+            "An annotated burst of an array's recording",
             "`access-av aoa --json`",
             (
                 "sample_start", "azimuth_from_broadside_deg", "sigma_deg", "snr_db", "label",

@@ -203,9 +203,10 @@ pub fn esprit(
     )
 }
 
-/// Direction of arrival of one source by maximum likelihood: optimal, and the fastest.
+/// Directions of arrival by maximum likelihood: optimal, the fastest for one source, and for several,
+/// which may be coherent, the most exact and the slowest (alternating projection).
 ///
-/// Parameters, result and errors as for `music`; more than one source is refused.
+/// Parameters, result and errors as for `music`.
 ///
 /// Examples
 /// --------
@@ -217,12 +218,13 @@ pub fn esprit(
 /// >>> np.degrees(found.angle_rad).round(6).tolist()
 /// [30.0, 90.0]
 #[pyfunction]
-#[pyo3(signature = (snapshots, *, spacing_wavelengths=0.5, sources=1, forward_backward=false, calibration=None, threads=1))]
+#[pyo3(signature = (snapshots, *, spacing_wavelengths=0.5, sources=1, forward_backward=false, subarray=None, calibration=None, threads=1))]
 pub fn maximum_likelihood(
     snapshots: &Bound<'_, PyAny>,
     spacing_wavelengths: f64,
     sources: usize,
     forward_backward: bool,
+    subarray: Option<usize>,
     calibration: Option<&Bound<'_, PyAny>>,
     threads: usize,
 ) -> PyResult<AngleEstimate> {
@@ -235,7 +237,7 @@ pub fn maximum_likelihood(
             sources,
             smoothing: Smoothing {
                 forward_backward,
-                subarray: None,
+                subarray,
             },
             calibration,
             threads,

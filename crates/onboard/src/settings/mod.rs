@@ -7,6 +7,7 @@
 //! and [`TomlFile`] checks them.
 
 mod array;
+mod array_shape;
 mod check;
 mod error;
 mod limits;
@@ -26,6 +27,7 @@ mod vehicle;
 mod wake_up;
 
 pub use array::ArraySettings;
+pub use array_shape::{ArrayShape, MeasuredShape};
 pub use check::Check;
 pub use error::SettingsError;
 pub use localizer::{
