@@ -12,9 +12,9 @@ import shutil
 import subprocess
 import sys
 import tempfile
-import threading
 import time
 from collections import Counter
+from concurrent.futures import ThreadPoolExecutor
 from pathlib import Path
 
 from attack import kinds
@@ -102,13 +102,13 @@ def attack(
                 else:
                     shutil.rmtree(folder, ignore_errors=True)
         except queue.Empty:
+            pass
+        finally:
             worker.stop()
 
-    threads = [threading.Thread(target=work) for _ in range(workers)]
-    for thread in threads:
-        thread.start()
-    for thread in threads:
-        thread.join()
+    with ThreadPoolExecutor(workers) as pool:
+        for done in [pool.submit(work) for _ in range(workers)]:
+            done.result()  # raises what the thread did
     shutil.rmtree(place, ignore_errors=True)
     return counts, epochs[0], epochs[1]
 
