@@ -42,14 +42,12 @@ class Worker:
         line = self._line(process, LONGEST_S * busy)
         if line:
             return dict(json.loads(line))
-        hung = process.poll() is None
-        process.kill()
-        code, self.process = process.wait(), None
-        what = (
-            f"hang: more than {LONGEST_S:.0f} s"
-            if hung
-            else f"abort: the process ended with {code}"
-        )
+        try:  # what ends closes its output a moment before it has ended
+            what = f"abort: the process ended with {process.wait(1.0)}"
+        except subprocess.TimeoutExpired:
+            what = f"hang: more than {LONGEST_S:.0f} s"
+        self.stop()
+        self.process = None
         return {"findings": [what], "ok": 0, "beyond": 0}
 
     def _start(self) -> subprocess.Popen[bytes]:

@@ -17,6 +17,7 @@ from pathlib import Path
 from typing import Any
 
 from access_av import InputError, RecordingError, SettingsError
+from access_av.report import page
 from access_av.terminal import plain
 from attack import files, kinds
 from attack.verdict import judge
@@ -85,8 +86,7 @@ def main() -> None:
     seed, place = int(sys.argv[1]), Path(sys.argv[2])
     answers = os.fdopen(os.dup(1), "w", encoding="utf-8")
     # Tables and charts are loaded before the limit is set: it is of what a case takes.
-    import access_av.report.drive  # noqa: F401
-
+    page.bundle()
     files.recorded()
     limit_memory()
     print("ready", file=answers, flush=True)
