@@ -77,7 +77,8 @@ def run(seed: int, kind: str, number: int, folder: Path) -> dict[str, Any]:
             os.close(saved)
         os.chdir(folder.parent)
     out, err = (file.read_text(encoding="utf-8", errors="replace") for file in printed)
-    verdict = judge(folder, command, {*before, *printed}, {**end, "out": out, "err": err})
+    end = {**end, "out": out, "err": err}
+    verdict = judge(folder, command, {*before, *printed}, end, odometer=kind == "drive")
     return vars(verdict)
 
 
