@@ -63,13 +63,16 @@ def test_annotated_bursts_have_azimuths_too(circle: Path) -> None:
 
 def test_the_drive_is_located(circle: Path) -> None:
     drive = drives.locate(
-        circle / "site.toml", circle / "odometry.csv", circle / "iq", vehicle=circle / "vehicle.toml"
+        circle / "site.toml",
+        circle / "odometry.csv",
+        circle / "iq",
+        vehicle=circle / "vehicle.toml",
     )
     assert drive.angles.filter(drive.angles["accepted"]).height > 200
     errors_m = drives.error_m(drive.poses, circle / "truth.tum")["error_m"]
     assert errors_m.max() < 0.5
-    least = bound(Scenario.load("paper-real-odometry-2").with_overrides(CIRCLE))
-    assert least.points["position_rms_m"].max() < 0.5
+    least = bound(Scenario.load("paper-real-odometry-2").with_overrides(CIRCLE), map_step_m=100.0)
+    assert least.route["bound_m"].max() < 0.5
 
 
 @pytest.mark.parametrize(

@@ -40,7 +40,7 @@ const MOST_THREADS: usize = 256;
 /// Parameters
 /// ----------
 /// snapshots : ndarray
-///     Complex samples, `(antennas, snapshots)` or `(batch, antennas, snapshots)`; 2 to 8
+///     Complex samples, `(antennas, snapshots)` or `(batch, antennas, snapshots)`; 2 to 16
 ///     antennas, complex64 or complex128, any strides. The mean is not removed.
 /// spacing_wavelengths : float
 ///     Distance between neighbouring antennas in wavelengths.
@@ -49,7 +49,7 @@ const MOST_THREADS: usize = 256;
 /// forward_backward : bool
 ///     Average the covariance forward and backward, which separates two coherent sources.
 /// subarray : int, optional
-///     Average the covariance over the subarrays of so many antennas, 2 to all, which separates as
+///     Average the covariance over the subarrays of so many antennas, 2 to 7 or all, which separates as
 ///     many coherent sources as it is short of all and one more.
 /// calibration : array_like, optional
 ///     Complex gain of each channel, see `calibrate`. Every channel is divided by its own.
@@ -284,6 +284,12 @@ impl Visitor for Estimator<'_, '_> {
                 maximum,
             };
             return Err(value_error(error));
+        }
+        // Of larger arrays not every subarray has been compiled.
+        if let Some(subarray) = smoothing.subarray.filter(|it| (8..N).contains(it)) {
+            return Err(PyValueError::new_err(format!(
+                "subarray is {subarray}; of {N} antennas it has 2 to 7, or all"
+            )));
         }
         let run = |batch: Batch<'_, T, N>, estimates: &mut [aoa::AngleEstimate]| {
             batch.estimate(method, &array, smoothing, sources, estimates)
