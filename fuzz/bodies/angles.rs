@@ -77,7 +77,7 @@ pub fn run(data: &[u8]) {
             }
         }
         _ => {
-            let elevations: Vec<f64> = (0..1 + many % 4).map(|_| next()).collect();
+            let elevations: Vec<f64> = (0..=many % 4).map(|_| next()).collect();
             let columns = usize::from(how % 12);
             let responses = (0..columns * elevations.len())
                 .map(|_| std::array::from_fn(|_| Complex64::new(next(), next())));
