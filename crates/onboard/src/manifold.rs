@@ -247,12 +247,12 @@ fn row_aperture(elements: u8) -> f64 {
 /// `S` of a manifold: `tᵀSt` is its sharpness `Re(dᴴPd)` in azimuth, scaled to antennas of unit gain.
 fn moments<const N: usize>(manifold: &ArrayManifold<N>) -> [[f64; 2]; 2] {
     const AZIMUTHS: u32 = 360;
+    /// Of the one snapshot whose bound is taken: so large that noise does not weigh in.
+    const SNR: f64 = 1e9;
     let [mut mean, mut even, mut odd] = [0.0; 3];
     for number in 0..AZIMUTHS {
         let azimuth_rad = std::f64::consts::TAU * f64::from(number) / f64::from(AZIMUTHS);
         let direction = Direction::new(azimuth_rad, 0.0);
-        // The bound at one snapshot of an SNR so large that noise does not weigh in.
-        const SNR: f64 = 1e9;
         let [[variance, _], _] = aoa::bound::azimuth_elevation(manifold, direction, SNR, 1);
         let sharpness = 0.5 / (SNR * variance);
         let (sin, cos) = (2.0 * azimuth_rad).sin_cos();

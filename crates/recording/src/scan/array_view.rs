@@ -119,19 +119,16 @@ impl<const A: usize> ArrayView for Looker<A> {
         let gains = self.calibration.gains().map(|gain| scale / gain);
         let despread = Despread::new(elements, ssb.known, Pilots::Ssb, 0.0).scaled(&gains);
         let blocks: Vec<[Complex64; A]> = despread.blocks().collect();
-        let angle = match &self.finder {
-            Some(finder) => {
-                let beam = |u: &_| ArrayManifold::strongest_beam(finder, u);
-                let told = line_of_sight(&despread, beam).map(|told| [told.block]);
-                let looked_at = told.as_ref().map_or(&blocks[..], |block| block);
-                FoundAngle::Direction(finder.estimate_pilots(looked_at, Some(1.0)).ok()?)
-            }
-            None => {
-                let told = line_of_sight(&despread, of_a_row).map(|told| [told.block]);
-                let looked_at = told.as_ref().map_or(&blocks[..], |block| block);
-                let found = maximum_likelihood_pilots(looked_at, Some(1.0), &self.array);
-                FoundAngle::FromRow(found.ok()?)
-            }
+        let angle = if let Some(finder) = &self.finder {
+            let beam = |u: &_| ArrayManifold::strongest_beam(finder, u);
+            let told = line_of_sight(&despread, beam).map(|told| [told.block]);
+            let looked_at = told.as_ref().map_or(&blocks[..], |block| block);
+            FoundAngle::Direction(finder.estimate_pilots(looked_at, Some(1.0)).ok()?)
+        } else {
+            let told = line_of_sight(&despread, of_a_row).map(|told| [told.block]);
+            let looked_at = told.as_ref().map_or(&blocks[..], |block| block);
+            let found = maximum_likelihood_pilots(looked_at, Some(1.0), &self.array);
+            FoundAngle::FromRow(found.ok()?)
         };
         let blocks = blocks.iter().map(|block| block.to_vec()).collect();
         Some(View { angle, blocks })
