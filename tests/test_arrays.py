@@ -17,6 +17,7 @@ if TYPE_CHECKING:
 CIRCLE = {
     "vehicle.array.elements": 5,
     "vehicle.array.shape": {"kind": "circular"},
+    "site.radio_heads[1].ssb_index": 2,  # one burst after the other
     "site.radio_heads[1].position_m": [250.0, -60.0, 30.0],
     "site.rician_k_db": 40.0,
 }
