@@ -31,6 +31,10 @@ const STEP_M: f64 = 1.0;
 const SIGMAS_OF_SLIP: f64 = 5.0;
 const MOST_SLIP: f64 = 0.3;
 
+/// Standard deviation of where along the road the vehicle takes up a new curvature (m): no vehicle does
+/// at a point, as maps of arcs draw it, but over about its own length.
+const TRANSITION_M: f64 = 0.5;
+
 /// Squared Mahalanobis distance up to which the yaw rate on a road is taken at its word: 6σ.
 const TURN_GATE: f64 = 36.0;
 
@@ -324,7 +328,7 @@ impl Tracker {
             return Step::in_plane(mean, reading_m, curvature_per_m, &config.path_bend, noise);
         }
         let variance = |state: usize| belief.covariance[state][state].max(0.0);
-        let road = map.bending(middle_m, variance(ALONG).sqrt());
+        let road = map.bending(middle_m, variance(ALONG).sqrt().max(TRANSITION_M));
         let keeping = &config.lane_keeping;
         Step::along_lane(mean, variance(HEADING), reading_m, &road, keeping, noise)
     }
