@@ -200,8 +200,8 @@ GOOD = simulate(1.0, 10)[0]
     [
         (GOOD[0], r"shape \(antennas, snapshots\) or .*not \[20\]"),
         (GOOD[None, None], "shape"),
-        (GOOD[:1], "2 to 8 antennas are allowed, not 1"),
-        (np.ones((9, 20), complex), "2 to 8 antennas are allowed, not 9"),
+        (GOOD[:1], "2 to 16 antennas are allowed, not 1"),
+        (np.ones((17, 20), complex), "2 to 16 antennas are allowed, not 17"),
         (GOOD[:, :0], "at least one snapshot"),
         (GOOD.real.copy(), "complex64 or complex128, not dtype float64"),
         ([[1j, 2], [3, 4]], "ndarray of complex64 or complex128, not <class 'list'>"),
@@ -224,7 +224,7 @@ def test_bad_snapshots(method: Callable[..., Any], snapshots: Any, message: str)
     [
         (aoa.music, {"sources": 4}, "4 sources asked for, allowed are 1 to 3"),
         (aoa.root_music, {"sources": 0}, "allowed are 1 to 3"),
-        (aoa.maximum_likelihood, {"sources": 2}, "allowed are 1 to 1"),
+        (aoa.maximum_likelihood, {"sources": 4}, "allowed are 1 to 3"),
         (aoa.esprit, {"spacing_wavelengths": 0.0}, "0.01 to 100 wavelengths, not 0"),
         (aoa.music, {"spacing_wavelengths": float("nan")}, "0.01 to 100 wavelengths"),
         (aoa.music, {"calibration": [1, 1]}, "one gain per antenna: 4, not 2"),
@@ -282,6 +282,23 @@ def test_coherent_sources_are_told_apart_by_subarrays() -> None:
         assert (abs(found.angle_rad - angles) < 4 * found.sigma_rad).all()
         with pytest.raises(ValueError, match="2 to 6 antennas, not 7"):
             method(samples, subarray=7)
+    # Maximum likelihood needs no subarrays.
+    found = aoa.maximum_likelihood(samples, sources=2)
+    assert found.resolved.all()
+    assert (abs(found.angle_rad - angles) < 4 * found.sigma_rad).all()
+
+
+@pytest.mark.parametrize("method", METHODS)
+def test_sixteen_antennas(method: Callable[..., Any]) -> None:
+    rng = np.random.default_rng(6)
+    steering = np.exp(1j * np.pi * np.cos(1.1) * np.arange(16)[:, None])
+    noise = 0.3 * (rng.normal(size=(16, 20, 2)) @ [1, 1j])
+    found = method(steering * (rng.normal(size=(20, 2)) @ [1, 1j]) + noise)
+    assert found.resolved
+    assert abs(found.angle_rad - 1.1) < 4 * found.sigma_rad
+    assert found.phase_sigma_rad < 2.0 * aoa.crb_rad(
+        1.1, found.snr_db, antennas=16, quantity="phase"
+    )
 
 
 def test_spectra_peak_at_the_sources() -> None:

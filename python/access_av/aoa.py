@@ -1,4 +1,4 @@
-"""Angle of arrival with 2 to 8 antennas: in a row, or with `direction` in any places.
+"""Angle of arrival with 2 to 16 antennas: in a row, or with `direction` in any places.
 
 Angles are measured from the array's axis, in rad, 0 to pi; the electrical angle, the phase step
 from one antenna to the next, is ``2 pi (d / lambda) cos(angle)``. Snapshots are complex arrays

@@ -25,14 +25,21 @@ class ArrayTruth:
     ----------
     azimuth_from_broadside_deg
         Measured azimuth, counter-clockwise from the array's broadside.
+    azimuth_from_axis_deg
+        Counter-clockwise from the axis of antennas that are not in a row.
     element_spacing_wavelengths
-        Distance between neighbouring antennas.
+        Distance between neighbouring antennas in a row.
+    element_places_wavelengths
+        Where antennas are that are not in a row, along the array's axis and to its left, of shape
+        (channels, 2).
     channel_phases
         Factors of modulus one by which the channels' phases are off, of shape (channels,).
     """
 
     azimuth_from_broadside_deg: float | None = None
+    azimuth_from_axis_deg: float | None = None
     element_spacing_wavelengths: float | None = None
+    element_places_wavelengths: NDArray[np.float64] | None = None
     channel_phases: NDArray[np.complex128] | None = None
 
     @classmethod
@@ -48,14 +55,16 @@ class ArrayTruth:
         --------
         >>> ArrayTruth.of({"aoa:truth": {"element_spacing_wavelengths": 0.5}}, 4)
         ... # doctest: +ELLIPSIS
-        ArrayTruth(azimuth_from_broadside_deg=None, element_spacing_wavelengths=0.5, ...)
+        ArrayTruth(..., element_spacing_wavelengths=0.5, ...)
         """
         truth = annotation.get("aoa:truth", {})
         if not isinstance(truth, dict):
             raise InputError("`aoa:truth` must be a table")
         return cls(
             _number(truth, "azimuth_from_broadside_deg", -360.0, 360.0),
+            _number(truth, "azimuth_from_axis_deg", -360.0, 360.0),
             _number(truth, "element_spacing_wavelengths", *SPACINGS),
+            _places(truth, channels),
             _phases(truth, channels),
         )
 
@@ -67,6 +76,28 @@ def _number(truth: dict[str, Any], key: str, low: float, high: float) -> float |
     if isinstance(value, bool) or not isinstance(value, int | float) or not low <= value <= high:
         raise InputError(f"`aoa:truth.{key}` is {value}; it must be a number from {low} to {high}")
     return float(value)
+
+
+def _places(truth: dict[str, Any], channels: int) -> NDArray[np.float64] | None:
+    places = truth.get("element_places_wavelengths")
+    if places is None:
+        return None
+    fine = (
+        isinstance(places, list)
+        and len(places) == channels
+        and all(
+            isinstance(place, list)
+            and len(place) == 2
+            and all(isinstance(it, int | float) and math.isfinite(it) for it in place)
+            for place in places
+        )
+    )
+    if not fine:
+        raise InputError(
+            "`aoa:truth.element_places_wavelengths` must be a list of "
+            f"{channels} places [x, y], one of each channel"
+        )
+    return np.array(places, dtype=float)
 
 
 def _phases(truth: dict[str, Any], channels: int) -> NDArray[np.complex128] | None:

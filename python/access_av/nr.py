@@ -24,7 +24,7 @@ from typing import TYPE_CHECKING, Any
 
 from access_av._core import Recording
 from access_av._core.nr import Cell, Receiver, Scan, Searcher, build_burst, scan, search
-from access_av.recorded_angles import stated_spacing, stated_truths
+from access_av.recorded_angles import stated_places, stated_spacing, stated_truths
 
 if TYPE_CHECKING:
     from collections.abc import Sequence
@@ -57,7 +57,8 @@ def scan_as_recorded(
     recording
         The recording.
     spacing_wavelengths
-        Distance between neighbouring antennas; without it the annotations', else 0.5.
+        Distance between neighbouring antennas in a row; without it what the annotations state,
+        spacing or places, else 0.5.
     calibration
         Complex gain of each channel; without it that of the annotation around each SSB, if any.
     **where
@@ -75,6 +76,8 @@ def scan_as_recorded(
     if spacing_wavelengths is None:
         stated = stated_spacing(truths, metadata, recording.centre_frequency_hz)
         spacing_wavelengths = 0.5 if stated is None else stated
+        places = stated_places(truths)
+        where["places_wavelengths"] = None if places is None else places.tolist()
     where["spacing_wavelengths"] = spacing_wavelengths
     found = scan(recording, calibration=calibration, **where)
     if calibration is not None or recording.channels < 2:
@@ -127,13 +130,15 @@ def record(cell: Cell) -> dict[str, Any]:
         "rsrq_db": [round(value, 2) for value in cell.rsrq_db],
         "sinr_db": [round(value, 2) for value in cell.sinr_db],
     }
-    if cell.angle_rad is not None and cell.sigma_rad is not None and cell.azimuth_rad is not None:
-        values |= {
-            "angle_deg": _degrees(cell.angle_rad),
-            "azimuth_deg": _degrees(cell.azimuth_rad),
-            "sigma_deg": _degrees(cell.sigma_rad),
-            "verdict": cell.verdict,
-        }
+    angles = {
+        "angle_deg": cell.angle_rad,
+        "azimuth_deg": cell.azimuth_rad,
+        "elevation_deg": cell.elevation_rad,
+        "sigma_deg": cell.sigma_rad,
+    }
+    values |= {name: _degrees(angle) for name, angle in angles.items() if angle is not None}
+    if cell.verdict is not None:
+        values["verdict"] = cell.verdict
     return values
 
 

@@ -1,4 +1,4 @@
-"""Angles of arrival from a recording of a linear array: calibrate, then estimate each burst.
+"""Angles of arrival from a recording of an array: calibrate, then estimate each burst.
 
 A recording's annotations say what is where. A burst whose label starts with ``reference`` was sent
 from broadside and calibrates the channels for the bursts after it; an annotation may also bring its
@@ -41,7 +41,8 @@ class BurstAngle:
     sample_start
         First sample of the burst.
     azimuth_from_broadside_deg
-        Counter-clockwise from the array's broadside, seen from above.
+        Counter-clockwise from the array's broadside, which is a quarter turn clockwise of its axis,
+        seen from above.
     sigma_deg
         Standard deviation by the receiver's noise alone; multipath is not in it.
     snr_db
@@ -66,6 +67,9 @@ def estimate_bursts(
     path: str | Path, *, spacing_wavelengths: float | None = None
 ) -> list[BurstAngle]:
     """Estimate the angle of every annotated burst by one-source maximum likelihood.
+
+    Where the annotations state the antennas' places they are not in a row: azimuth and elevation
+    are then estimated together.
 
     Parameters
     ----------
@@ -99,9 +103,11 @@ def estimate_bursts(
     if not annotations:
         raise InputError(f"{path}: no `annotations`, so it is not known where the bursts are")
     truths = stated_truths(recording, metadata)
+    told = spacing_wavelengths is not None
     if spacing_wavelengths is None:
         spacing_wavelengths = stated_spacing(truths, metadata, recording.centre_frequency_hz)
-    if spacing_wavelengths is None:
+    places = None if told else stated_places(truths)
+    if spacing_wavelengths is None and places is None:
         raise InputError(f"{path}: the metadata states no antenna spacing; give --spacing")
 
     calibration: NDArray[np.complex128] | None = None
@@ -116,23 +122,33 @@ def estimate_bursts(
             )
         snapshots = recording.read(start, count)
         label = str(annotation.get("core:label", ""))
-        if label.lower().startswith("reference"):
+        if label.lower().startswith("reference") and spacing_wavelengths is not None:
             gains = aoa.calibrate(snapshots, math.pi / 2, spacing_wavelengths=spacing_wavelengths)
             calibration = gains / np.abs(gains)
             continue
-        found = aoa.maximum_likelihood(
-            _equalised(snapshots),
-            spacing_wavelengths=spacing_wavelengths,
-            calibration=calibration if truth.channel_phases is None else truth.channel_phases,
-        )
+        gains = calibration if truth.channel_phases is None else truth.channel_phases
+        snapshots = _equalised(snapshots)
+        if places is not None:
+            source = aoa.direction(snapshots, places, calibration=gains)
+            azimuth_deg = _from_broadside_deg(math.degrees(source.azimuth_rad))
+            sigma_rad, snr_db = source.azimuth_sigma_rad, source.snr_db
+        elif spacing_wavelengths is not None:
+            found = aoa.maximum_likelihood(
+                snapshots, spacing_wavelengths=spacing_wavelengths, calibration=gains
+            )
+            azimuth_deg = 90.0 - math.degrees(found.angle_rad)
+            sigma_rad, snr_db = found.sigma_rad, found.snr_db
+        truth_deg = truth.azimuth_from_broadside_deg
+        if truth_deg is None and truth.azimuth_from_axis_deg is not None:
+            truth_deg = _from_broadside_deg(truth.azimuth_from_axis_deg)
         bursts.append(
             BurstAngle(
                 sample_start=start,
-                azimuth_from_broadside_deg=90.0 - math.degrees(found.angle_rad),
-                sigma_deg=math.degrees(found.sigma_rad),
-                snr_db=found.snr_db,
+                azimuth_from_broadside_deg=azimuth_deg,
+                sigma_deg=math.degrees(sigma_rad),
+                snr_db=snr_db,
                 label=label,
-                truth_deg=truth.azimuth_from_broadside_deg,
+                truth_deg=truth_deg,
             )
         )
     return bursts
@@ -141,7 +157,7 @@ def estimate_bursts(
 def mean_absolute_error_deg(bursts: Sequence[BurstAngle]) -> float | None:
     """Mean distance from the annotated truth; ``None`` where nothing is annotated."""
     errors = [
-        abs(burst.azimuth_from_broadside_deg - burst.truth_deg)
+        abs((burst.azimuth_from_broadside_deg - burst.truth_deg + 180.0) % 360.0 - 180.0)
         for burst in bursts
         if burst.truth_deg is not None
     ]
@@ -163,6 +179,17 @@ def stated_truths(recording: Recording, metadata: dict[str, Any]) -> list[ArrayT
         except InputError as error:
             raise InputError(f"annotations[{index}]: {error}") from error
     return truths
+
+
+def stated_places(truths: Sequence[ArrayTruth]) -> NDArray[np.float64] | None:
+    """Where the antennas are that are not in a row, by the first annotation that states it."""
+    places = (truth.element_places_wavelengths for truth in truths)
+    return next((it for it in places if it is not None), None)
+
+
+def _from_broadside_deg(azimuth_from_axis_deg: float) -> float:
+    """Between −180° and 180°; broadside is a quarter turn clockwise of the axis."""
+    return (azimuth_from_axis_deg + 270.0) % 360.0 - 180.0
 
 
 def stated_spacing(

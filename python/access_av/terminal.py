@@ -258,7 +258,7 @@ def show_bursts(bursts: Sequence[BurstAngle]) -> None:
 
 def show_cells(title: str, cells: Sequence[dict[str, Any]]) -> None:
     """SSBs of one recording, one a row; a narrow terminal leaves out where on the air they were."""
-    with_angles = any("angle_deg" in cell for cell in cells)
+    with_angles = any("azimuth_deg" in cell for cell in cells)
     columns = ["PCI", "SSB", "SFN", "SNR dB", "CFO Hz"]
     if with_angles:
         columns += ["azimuth °", "σ °"]

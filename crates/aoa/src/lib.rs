@@ -42,13 +42,13 @@
 //!
 //! | | sources | attains the Cramér–Rao bound |
 //! |---|---|---|
-//! | [`Method::MaximumLikelihood`] | 1 | yes, and is the fastest |
+//! | [`Method::MaximumLikelihood`] | N - 1, coherent ones too | yes; the fastest for one source, the slowest for several |
 //! | [`Method::Music`] | N - 1 | yes |
 //! | [`Method::RootMusic`] | N - 1 | yes; separates close sources best |
 //! | [`Method::EspritLs`], [`Method::EspritTls`] | N - 1 | 5 % above it with four antennas |
 //!
-//! Several sources: [`estimate_several`], and [`source_count`] for how many. Coherent ones
-//! (reflections) need [`estimate_several_smoothed`].
+//! Several sources: [`estimate_several`], and [`source_count`] for how many. Of coherent ones
+//! (reflections) all methods but maximum likelihood need [`estimate_several_smoothed`].
 //! Known pilots: [`maximum_likelihood_pilots`], and [`maximum_likelihood_pilots_unequal`] where the
 //! channels' noise differs or one is dead. Many estimates in one call: [`Batch`]. A picture of all
 //! directions: [`PseudoSpectrum`]. Real

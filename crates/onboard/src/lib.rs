@@ -17,6 +17,7 @@ pub mod estimator;
 pub mod geometry;
 pub mod link_budget;
 pub mod localize;
+pub mod manifold;
 pub mod observation;
 mod pipeline;
 pub mod radio_head;

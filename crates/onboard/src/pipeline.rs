@@ -10,6 +10,7 @@ use crate::localize::{
     self, AngleMeasurement, History, Localizer, PoseEstimate, Recovered, Tracker, UpdateReason,
     UpdateVerdict,
 };
+use crate::manifold::Measurand;
 use crate::observation::{OdometrySample, SensedSsb, SsbObservation};
 use crate::radio_head::RadioHead;
 use crate::settings::{Check, Platform, SettingsError, Site, Vehicle, check_together};
@@ -19,7 +20,7 @@ use crate::wake_up::{self, Situation, WakeUpPolicy};
 pub struct Onboard {
     surroundings: Surroundings,
     thermal: ThermalNoise,
-    spacing_wavelengths: f64,
+    measurand: Measurand,
     lateness_s: f64,
     estimator: Box<dyn AngleEstimator>,
     localizer: History,
@@ -146,12 +147,11 @@ impl Onboard {
             file: &vehicle.name,
         };
         check_together(site, vehicle, check)?;
-        let spacing_wavelengths = vehicle.array.spacing_wavelengths;
         let estimator = match custom.estimator {
             Some(estimator) => estimator,
             None => estimator::built_in(vehicle).map_err(|error| {
                 let key = "array.spacing_wavelengths";
-                check.error(key, spacing_wavelengths, &error.to_string())
+                check.error(key, vehicle.array.spacing_wavelengths, &error.to_string())
             })?,
         };
         let localizer = match custom.localizer {
@@ -166,7 +166,7 @@ impl Onboard {
         let [_, _, height_m] = vehicle.array.position_m;
         Ok(Self {
             thermal: ThermalNoise::new(site, vehicle),
-            spacing_wavelengths,
+            measurand: vehicle.array.measurand(),
             lateness_s: vehicle.receiver.lateness_s,
             estimator,
             localizer: History::new(localizer),
@@ -252,7 +252,7 @@ impl Onboard {
         let estimated = self.estimator.estimate(observation)?;
         let bound_rad = || self.thermal.sigma_rad(ssb.snr_db);
         let measured = estimated.and_then(|estimated| {
-            estimator::measurement(&ssb, estimated, self.spacing_wavelengths, bound_rad)
+            estimator::measurement(&ssb, estimated, &self.measurand, bound_rad)
         });
         self.take_in(ssb, measured)
     }

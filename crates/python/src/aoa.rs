@@ -40,7 +40,7 @@ const MOST_THREADS: usize = 256;
 /// Parameters
 /// ----------
 /// snapshots : ndarray
-///     Complex samples, `(antennas, snapshots)` or `(batch, antennas, snapshots)`; 2 to 8
+///     Complex samples, `(antennas, snapshots)` or `(batch, antennas, snapshots)`; 2 to 16
 ///     antennas, complex64 or complex128, any strides. The mean is not removed.
 /// spacing_wavelengths : float
 ///     Distance between neighbouring antennas in wavelengths.
@@ -49,7 +49,7 @@ const MOST_THREADS: usize = 256;
 /// forward_backward : bool
 ///     Average the covariance forward and backward, which separates two coherent sources.
 /// subarray : int, optional
-///     Average the covariance over the subarrays of so many antennas, 2 to all, which separates as
+///     Average the covariance over the subarrays of so many antennas, 2 to 7 or all, which separates as
 ///     many coherent sources as it is short of all and one more.
 /// calibration : array_like, optional
 ///     Complex gain of each channel, see `calibrate`. Every channel is divided by its own.
@@ -203,9 +203,10 @@ pub fn esprit(
     )
 }
 
-/// Direction of arrival of one source by maximum likelihood: optimal, and the fastest.
+/// Directions of arrival by maximum likelihood: optimal, the fastest for one source, and for several,
+/// which may be coherent, the most exact and the slowest (alternating projection).
 ///
-/// Parameters, result and errors as for `music`; more than one source is refused.
+/// Parameters, result and errors as for `music`.
 ///
 /// Examples
 /// --------
@@ -217,12 +218,13 @@ pub fn esprit(
 /// >>> np.degrees(found.angle_rad).round(6).tolist()
 /// [30.0, 90.0]
 #[pyfunction]
-#[pyo3(signature = (snapshots, *, spacing_wavelengths=0.5, sources=1, forward_backward=false, calibration=None, threads=1))]
+#[pyo3(signature = (snapshots, *, spacing_wavelengths=0.5, sources=1, forward_backward=false, subarray=None, calibration=None, threads=1))]
 pub fn maximum_likelihood(
     snapshots: &Bound<'_, PyAny>,
     spacing_wavelengths: f64,
     sources: usize,
     forward_backward: bool,
+    subarray: Option<usize>,
     calibration: Option<&Bound<'_, PyAny>>,
     threads: usize,
 ) -> PyResult<AngleEstimate> {
@@ -235,7 +237,7 @@ pub fn maximum_likelihood(
             sources,
             smoothing: Smoothing {
                 forward_backward,
-                subarray: None,
+                subarray,
             },
             calibration,
             threads,
@@ -282,6 +284,12 @@ impl Visitor for Estimator<'_, '_> {
                 maximum,
             };
             return Err(value_error(error));
+        }
+        // Of larger arrays not every subarray has been compiled.
+        if let Some(subarray) = smoothing.subarray.filter(|it| (8..N).contains(it)) {
+            return Err(PyValueError::new_err(format!(
+                "subarray is {subarray}; of {N} antennas it has 2 to 7, or all"
+            )));
         }
         let run = |batch: Batch<'_, T, N>, estimates: &mut [aoa::AngleEstimate]| {
             batch.estimate(method, &array, smoothing, sources, estimates)

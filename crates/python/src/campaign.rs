@@ -261,14 +261,10 @@ struct PlugIns {
 impl PlugIns {
     fn custom(&self, scenario: &CoreScenario, start: Pose) -> Result<Custom, BoxError> {
         Python::attach(|py| {
-            let spacing_wavelengths = scenario.vehicle.array.spacing_wavelengths;
+            let measurand = scenario.vehicle.array.measurand();
             let estimator = self.estimator.as_ref().map(|call| {
                 let told = self.told_of_sigma.clone();
-                Box::new(PythonEstimator::new(
-                    call.clone_ref(py),
-                    spacing_wavelengths,
-                    told,
-                )) as _
+                Box::new(PythonEstimator::new(call.clone_ref(py), measurand, told)) as _
             });
             let policy = self.policy.as_ref();
             let policy = policy.map(|call| Box::new(PythonPolicy::new(call.clone_ref(py))) as _);

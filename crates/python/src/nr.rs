@@ -9,16 +9,22 @@ pub use burst::build_burst;
 pub use receiver::Receiver;
 pub use searcher::Searcher;
 
-use aoa::AngleEstimate;
+use std::f64::consts::FRAC_PI_2;
+
 use channel::Channel;
+use nr_ssb::receiver::HeardSsb;
+use nr_ssb::search::DetectedSsb;
 use nr_ssb::{Lmax, SubcarrierSpacing};
 use num_complex::{Complex32, Complex64};
 use numpy::{PyArrayDyn, PyArrayMethods, PyReadonlyArrayDyn, PyUntypedArrayMethods};
+use onboard::receive::SSB_SAMPLES;
+use onboard::settings::ArrayShape;
 use pyo3::exceptions::PyValueError;
 use pyo3::prelude::*;
 use pyo3::types::PyDict;
 use recording::scan::{
-    ArraySetup, FoundSsb, IqSource, SampleBlock, Scan as CoreScan, ScanError, ScanSettings,
+    ArraySetup, FoundAngle, FoundSsb, IqSource, SampleBlock, Scan as CoreScan, ScanError,
+    ScanSettings,
 };
 
 use crate::message::brief;
@@ -53,12 +59,15 @@ use crate::recording::{Recording, RecordingError};
 /// rsrp_dbfs, rsrq_db, sinr_db : list of float
 ///     SS-RSRP, SS-RSRQ and SS-SINR of each antenna (TS 38.215).
 /// angle_rad, sigma_rad : float or None
-///     Angle of arrival from the array's axis and its standard deviation; with 2 to 8 antennas.
+///     Angle of arrival from the array's axis and its standard deviation; with 2 to 8 antennas. Where
+///     the antennas are not in a row, the deviation is that of `azimuth_rad`.
 /// phase_rad, phase_sigma_rad : float or None
-///     The electrical angle behind it.
+///     The electrical angle behind it, of antennas in a row.
 /// azimuth_rad : float or None
 ///     Counter-clockwise from broadside, for an array numbered from right to left:
-///     a quarter turn less `angle_rad`.
+///     a quarter turn less `angle_rad`. Where the antennas are not in a row, from their x axis.
+/// elevation_rad, elevation_sigma_rad : float or None
+///     From the horizontal upwards, of antennas that are not in a row.
 /// verdict : str or None
 ///     `resolved`, or why the angle may not be relied on.
 /// channel : ndarray
@@ -88,17 +97,18 @@ pub struct Cell {
     phase_rad: Option<f64>,
     phase_sigma_rad: Option<f64>,
     azimuth_rad: Option<f64>,
+    elevation_rad: Option<f64>,
+    elevation_sigma_rad: Option<f64>,
     verdict: Option<String>,
     channel: Channel,
     noise_variance: Vec<f64>,
 }
 
-impl From<&FoundSsb> for Cell {
-    fn from(found: &FoundSsb) -> Self {
-        let ssb = &found.ssb;
-        let measured = ssb.measurements();
-        let of_angle = |part: fn(&AngleEstimate) -> f64| found.angle.as_ref().map(part);
-        Self {
+/// A cell without angle, of what a search or a receiver says of an SSB; both by the same names.
+macro_rules! cell {
+    ($ssb:expr, $measurements:expr, $($given:tt)*) => {{
+        let (ssb, measured) = ($ssb, $measurements);
+        Cell {
             pci: ssb.pci.get(),
             ssb_index: ssb.ssb_index,
             lmax: ssb.lmax.map(Lmax::count),
@@ -107,22 +117,92 @@ impl From<&FoundSsb> for Cell {
             mib_bits: ssb.payload.map(|payload| payload.mib.bit_string()),
             cfo_hz: ssb.cfo_hz,
             snr_db: ssb.snr_db,
+            rsrp_dbfs: measured.iter().map(|it| it.ss_rsrp_dbfs).collect(),
+            rsrq_db: measured.iter().map(|it| it.ss_rsrq_db).collect(),
+            sinr_db: measured.iter().map(|it| it.ss_sinr_db).collect(),
+            angle_rad: None,
+            sigma_rad: None,
+            phase_rad: None,
+            phase_sigma_rad: None,
+            azimuth_rad: None,
+            elevation_rad: None,
+            elevation_sigma_rad: None,
+            verdict: None,
+            $($given)*
+        }
+    }};
+}
+
+impl Cell {
+    /// What a receiver on a frequency hears, at so many input samples per sample at the base rate.
+    fn heard(
+        ssb: &HeardSsb,
+        ssb_freq_hz: f64,
+        spacing: SubcarrierSpacing,
+        samples_per_base: f64,
+    ) -> Self {
+        cell!(ssb, &ssb.measurements,
+            sample_start: ssb.sample_start,
+            sample_count: SSB_SAMPLES as f64 * samples_per_base,
+            ssb_freq_hz,
+            scs_khz: spacing.khz(),
+            channel: Channel(ssb.channel.clone()),
+            noise_variance: ssb.noise_variance.clone(),
+        )
+    }
+
+    fn with_angle(mut self, angle: &FoundAngle) -> Self {
+        match angle {
+            FoundAngle::FromRow(found) => {
+                self.angle_rad = Some(found.angle_rad);
+                self.sigma_rad = Some(found.sigma_rad);
+                self.phase_rad = Some(found.phase_rad);
+                self.phase_sigma_rad = Some(found.phase_sigma_rad);
+                self.azimuth_rad = Some(FRAC_PI_2 - found.angle_rad);
+                self.verdict = Some(found.verdict.to_string());
+            }
+            FoundAngle::Direction(found) => {
+                self.sigma_rad = Some(found.azimuth_sigma_rad());
+                self.azimuth_rad = Some(found.direction.azimuth_rad);
+                self.elevation_rad = Some(found.direction.elevation_rad);
+                self.elevation_sigma_rad = Some(found.elevation_sigma_rad());
+                self.verdict = Some(found.verdict.to_string());
+            }
+        }
+        self
+    }
+}
+
+impl From<&FoundSsb> for Cell {
+    fn from(found: &FoundSsb) -> Self {
+        let ssb: &DetectedSsb = &found.ssb;
+        let cell = cell!(ssb, ssb.measurements(),
             sample_start: found.sample_start,
             sample_count: found.sample_count,
             ssb_freq_hz: found.ssb_freq_hz,
             scs_khz: found.spacing.khz(),
-            rsrp_dbfs: measured.iter().map(|it| it.ss_rsrp_dbfs).collect(),
-            rsrq_db: measured.iter().map(|it| it.ss_rsrq_db).collect(),
-            sinr_db: measured.iter().map(|it| it.ss_sinr_db).collect(),
-            angle_rad: of_angle(|angle| angle.angle_rad),
-            sigma_rad: of_angle(|angle| angle.sigma_rad),
-            phase_rad: of_angle(|angle| angle.phase_rad),
-            phase_sigma_rad: of_angle(|angle| angle.phase_sigma_rad),
-            azimuth_rad: of_angle(|angle| std::f64::consts::FRAC_PI_2 - angle.angle_rad),
-            verdict: found.angle.map(|angle| angle.verdict.to_string()),
             channel: Channel(found.channel.clone()),
             noise_variance: found.noise_variance.clone(),
+        );
+        match &found.angle {
+            Some(angle) => cell.with_angle(angle),
+            None => cell,
         }
+    }
+}
+
+/// The array that the user describes.
+fn array_setup(
+    spacing_wavelengths: f64,
+    places_wavelengths: Option<Vec<[f64; 2]>>,
+    calibration: Option<Vec<Complex64>>,
+) -> ArraySetup {
+    ArraySetup {
+        shape: places_wavelengths.map_or_else(ArrayShape::default, |places_wavelengths| {
+            ArrayShape::Planar { places_wavelengths }
+        }),
+        spacing_wavelengths,
+        calibration,
     }
 }
 
@@ -201,6 +281,9 @@ impl Scan {
 ///     half a subcarrier without.
 /// spacing_wavelengths : float
 ///     Distance between neighbouring antennas.
+/// places_wavelengths : list of (float, float), optional
+///     Where the antennas are in a horizontal plane, in wavelengths, if they are not in a row; the
+///     azimuth is then from the x axis.
 /// calibration : array_like, optional
 ///     Complex gain of each channel, by which it is divided.
 ///
@@ -210,7 +293,7 @@ impl Scan {
 ///     A rate, band or length that cannot be searched; samples that are not finite.
 #[pyfunction]
 #[allow(clippy::too_many_arguments)]
-#[pyo3(signature = (recording, *, centre_frequency_hz = None, ssb_freq_hz = None, scs_khz = None, cfo_ppm = None, spacing_wavelengths = 0.5, calibration = None))]
+#[pyo3(signature = (recording, *, centre_frequency_hz = None, ssb_freq_hz = None, scs_khz = None, cfo_ppm = None, spacing_wavelengths = 0.5, places_wavelengths = None, calibration = None))]
 pub fn scan(
     py: Python<'_>,
     recording: &Recording,
@@ -219,6 +302,7 @@ pub fn scan(
     scs_khz: Option<u32>,
     cfo_ppm: Option<f64>,
     spacing_wavelengths: f64,
+    places_wavelengths: Option<Vec<[f64; 2]>>,
     calibration: Option<Vec<Complex64>>,
 ) -> PyResult<Scan> {
     let settings = ScanSettings {
@@ -226,10 +310,7 @@ pub fn scan(
         spacing: scs_khz.map(subcarrier_spacing).transpose()?,
         cfo_ppm,
         centre_frequency_hz,
-        array: ArraySetup {
-            spacing_wavelengths,
-            calibration,
-        },
+        array: array_setup(spacing_wavelengths, places_wavelengths, calibration),
     };
     let found = recording
         .with(py, |core| recording::scan::scan(core, &settings))
@@ -247,7 +328,7 @@ pub fn scan(
 ///     Any usual rate that holds an SSB: 3.84 Msps at least.
 /// centre_frequency_hz : float
 ///     Frequency that stands at 0 Hz in the samples.
-/// ssb_freq_hz, scs_khz, cfo_ppm, spacing_wavelengths, calibration
+/// ssb_freq_hz, scs_khz, cfo_ppm, spacing_wavelengths, places_wavelengths, calibration
 ///     As for `scan`.
 ///
 /// Returns
@@ -263,7 +344,7 @@ pub fn scan(
 /// >>> cell.pci, cell.ssb_index, cell.sfn
 /// (42, 1, 7)
 #[pyfunction]
-#[pyo3(signature = (samples, sample_rate_hz, *, centre_frequency_hz, ssb_freq_hz = None, scs_khz = None, cfo_ppm = None, spacing_wavelengths = 0.5, calibration = None))]
+#[pyo3(signature = (samples, sample_rate_hz, *, centre_frequency_hz, ssb_freq_hz = None, scs_khz = None, cfo_ppm = None, spacing_wavelengths = 0.5, places_wavelengths = None, calibration = None))]
 #[allow(clippy::too_many_arguments)]
 pub fn search(
     py: Python<'_>,
@@ -274,6 +355,7 @@ pub fn search(
     scs_khz: Option<u32>,
     cfo_ppm: Option<f64>,
     spacing_wavelengths: f64,
+    places_wavelengths: Option<Vec<[f64; 2]>>,
     calibration: Option<Vec<Complex64>>,
 ) -> PyResult<Vec<Py<Cell>>> {
     let samples = complex_samples(samples)?;
@@ -282,10 +364,7 @@ pub fn search(
         spacing: scs_khz.map(subcarrier_spacing).transpose()?,
         cfo_ppm,
         centre_frequency_hz: None,
-        array: ArraySetup {
-            spacing_wavelengths,
-            calibration,
-        },
+        array: array_setup(spacing_wavelengths, places_wavelengths, calibration),
     };
     let mut block = SampleBlock {
         antennas: rows(&samples)?,

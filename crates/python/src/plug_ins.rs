@@ -10,6 +10,7 @@ use onboard::estimator::{AngleEstimator, EstimatedAngle};
 use onboard::geometry::Pose;
 use onboard::localize::tracker::OdometryVerdict;
 use onboard::localize::{AngleMeasurement, Localizer, PoseEstimate, UpdateReason, UpdateVerdict};
+use onboard::manifold::Measurand;
 use onboard::observation::{OdometrySample, SensedSsb as CoreSensed, SsbObservation};
 use onboard::radio_head::RadioHead as CoreHead;
 use onboard::wake_up::{Situation as CoreSituation, WakeUpPolicy};
@@ -128,16 +129,20 @@ impl From<PlugInError> for PyErr {
 /// A Python callable in place of the angle estimator.
 pub struct PythonEstimator {
     call: Py<PyAny>,
-    element_rad: f64,
+    measurand: Measurand,
     told_of_sigma: Arc<AtomicBool>,
 }
 
 impl PythonEstimator {
-    /// `call` for an array of this spacing; `told_of_sigma` is shared by all runs.
-    pub fn new(call: Py<PyAny>, spacing_wavelengths: f64, told_of_sigma: Arc<AtomicBool>) -> Self {
+    /// `call` for an array that measures this; `told_of_sigma` is shared by all runs.
+    pub const fn new(
+        call: Py<PyAny>,
+        measurand: Measurand,
+        told_of_sigma: Arc<AtomicBool>,
+    ) -> Self {
         Self {
             call,
-            element_rad: TAU * spacing_wavelengths,
+            measurand,
             told_of_sigma,
         }
     }
@@ -148,9 +153,13 @@ impl PythonEstimator {
         angle_rad: f64,
         sigma_rad: Option<f64>,
     ) -> PyResult<EstimatedAngle> {
-        if !(0.0..=PI).contains(&angle_rad) {
+        let (least, named) = match self.measurand {
+            Measurand::ElectricalAngle { .. } => (0.0, "0"),
+            Measurand::Azimuth { .. } => (-PI, "-pi"),
+        };
+        if !(least..=PI).contains(&angle_rad) {
             return Err(refused(&format!(
-                "estimator returned an angle of {angle_rad} rad; it must be between 0 and pi"
+                "estimator returned an angle of {angle_rad} rad; it must be between {named} and pi"
             )));
         }
         match sigma_rad {
@@ -169,11 +178,19 @@ impl PythonEstimator {
             )?,
             _ => {}
         }
-        let (sin, cos) = angle_rad.sin_cos();
-        // To the second order, for end-fire.
-        let spread = |sigma: f64| self.element_rad * (sin * sigma + 0.5 * sigma * sigma);
+        let spread = |sigma: f64| match self.measurand {
+            Measurand::ElectricalAngle {
+                spacing_wavelengths,
+                ..
+            } => {
+                // To the second order, for end-fire.
+                let sin = angle_rad.sin();
+                TAU * spacing_wavelengths * (sin * sigma + 0.5 * sigma * sigma)
+            }
+            Measurand::Azimuth { .. } => sigma,
+        };
         Ok(EstimatedAngle::Angle {
-            phase_rad: self.element_rad * cos,
+            phase_rad: self.measurand.value_rad(angle_rad, 1.0),
             phase_sigma_rad: sigma_rad.map(spread),
             snr_db: None,
             resolved: true,

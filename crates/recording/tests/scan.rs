@@ -105,7 +105,7 @@ fn a_built_burst_is_found_with_its_angle() {
     let numerology = Numerology::from_sample_rate(Case::C.spacing(), RATE_HZ).unwrap();
     let symbol = Case::C.start_symbol(2).unwrap();
     assert!((sample_start - numerology.symbol_start(symbol) as f64).abs() < 0.2);
-    let angle = angle.unwrap();
+    let angle = angle.unwrap().from_row().unwrap();
     assert!((angle.phase_rad - 0.7).abs() < 5.0 * angle.phase_sigma_rad);
     // 20 dB and 830 elements: sigma = 1 / sqrt(2 * 830 * 100 * 5).
     assert!((angle.phase_sigma_rad * (2.0 * 830.0 * 100.0 * 5.0_f64).sqrt() - 1.0).abs() < 0.15);
@@ -135,7 +135,7 @@ fn cells_under_a_stronger_one_have_angles_and_know_how_good_they_are() {
         assert_eq!(found.len(), cells.len(), "trial {trial}");
         for ((pci, phase_rad, _), square) in cells.iter().zip(&mut squares) {
             let cell = found.iter().find(|it| it.ssb.pci.get() == *pci).unwrap();
-            let angle = cell.angle.unwrap();
+            let angle = cell.angle.unwrap().from_row().unwrap();
             assert!(angle.is_resolved(), "trial {trial}: {pci} {angle:?}");
             *square += ((angle.phase_rad - phase_rad) / angle.phase_sigma_rad).powi(2);
         }
@@ -351,8 +351,8 @@ fn what_cannot_be_scanned_says_why() {
     }
 
     let array = ArraySetup {
-        spacing_wavelengths: 0.5,
         calibration: Some(vec![Complex64::ONE; 3]),
+        ..ArraySetup::default()
     };
     let error = scan(&mut block(&antennas), &ScanSettings { array, ..known() }).unwrap_err();
     assert!(matches!(error, ScanError::Array(_)));
@@ -452,6 +452,7 @@ fn semi_real_angles_are_as_good_as_bartlett_with_perfect_timing() {
             array: ArraySetup {
                 spacing_wavelengths,
                 calibration: Some(gains.clone()),
+                ..ArraySetup::default()
             },
             ..ScanSettings::default()
         };
@@ -459,6 +460,7 @@ fn semi_real_angles_are_as_good_as_bartlett_with_perfect_timing() {
         let near =
             |found: &&FoundSsb| (found.sample_start - annotation.sample_start as f64).abs() < 6.0;
         let angle = found.ssbs.iter().find(near).unwrap().angle.unwrap();
+        let angle = angle.from_row().unwrap();
         let azimuth_deg = 90.0 - angle.angle_rad.to_degrees();
 
         // Bartlett on the samples of the annotated SSB.

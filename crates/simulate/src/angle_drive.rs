@@ -42,7 +42,8 @@ pub fn log_angles(
     let method = vehicle.estimator.method;
     let tape = Tape::record(&simulation, &[method], Streams::new(seed, run), run)?;
     let config = TrackerConfig::new(&scenario.site, &vehicle);
-    let scatter = config.array.scatter_variance(config.rician_k);
+    let measurand = config.array.measurand;
+    let scatter = measurand.scatter_variance(config.rician_k, measurand.mean_aperture());
     let angles: Vec<_> = tape
         .angles_of(0)
         .filter(|(ssb, _)| ssb.time_s <= end_s)

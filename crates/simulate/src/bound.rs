@@ -21,6 +21,7 @@ use onboard::localize::tracker::motion::Step;
 use onboard::localize::tracker::sighting::{Footing, Sighting};
 use onboard::localize::tracker::state::{ACROSS, ALONG, Belief, CURVATURE, HEADING, SCALE, STATES};
 use onboard::localize::tracker::{InitialPose, Tracker, TrackerConfig};
+use onboard::manifold::scatter_bound;
 use onboard::radio_head::RadioHead;
 use onboard::road::Road;
 use onboard::settings::{Check, SettingsError};
@@ -121,10 +122,9 @@ impl Bound {
 
     /// The bound at each SSB of the drive, every SSB being used.
     pub fn along_route(&self) -> Vec<BoundPoint> {
-        let look = self.config.array.scatter_bound(self.config.rician_k);
-        let array = &self.config.array;
         let scatter = |travelled_m, sighting: &Sighting| {
-            look * array.correlation(travelled_m, sighting.toward)
+            scatter_bound(self.config.rician_k, sighting.aperture)
+                * (self.config.array).correlation(travelled_m, sighting.toward)
         };
         let mut points = Vec::new();
         self.walk(scatter, |_, belief, time_s, along_m| {
@@ -234,7 +234,7 @@ impl Bound {
             let fading = self.fading(number, pose.point());
             if let Some((sighting, fading)) = sighting.zip(fading) {
                 let row = sighting.row;
-                let thermal = self.thermal.variance(head, sighting.range_m);
+                let thermal = self.thermal_variance(head, &sighting);
                 let variance = fading * scatter(&sighting) + thermal;
                 let gain = belief.update(0.0, &row, variance);
                 // (I − K H) times the transition so far.
@@ -253,6 +253,12 @@ impl Bound {
         }
     }
 
+    /// Variance (rad²) of a look by thermal noise, at the sharpness that the array has there.
+    fn thermal_variance(&self, head: &RadioHead, sighting: &Sighting) -> f64 {
+        let mean = self.config.array.measurand.mean_aperture();
+        self.thermal.variance(head, sighting.range_m) * (mean / sighting.aperture)
+    }
+
     /// By how much the scatter's variance at a place is larger than at the K that is expected; none
     /// where a radio head has no line of sight, and so says nothing of where it is.
     fn fading(&self, head: usize, place: Point) -> Option<f64> {
@@ -261,8 +267,7 @@ impl Bound {
         };
         let number = traced.heads.get(head).copied().flatten()?;
         let k = (traced.paths.rician_k(number, place)).filter(|k| *k > 0.0)?;
-        let array = &self.config.array;
-        Some(array.scatter_bound(k) / array.scatter_bound(self.config.rician_k))
+        Some(self.config.rician_k / k)
     }
 
     fn point(&self, belief: &Belief, time_s: f64, along_m: f64) -> BoundPoint {
@@ -313,13 +318,13 @@ impl Bound {
                 heading_rad,
             };
             let array = &self.config.array;
-            let scatter = array.scatter_bound(self.config.rician_k);
             for (number, head) in self.heads.iter().enumerate() {
                 let sighting = Sighting::new(head, pose, &Footing::PLANE, &[0.0; STATES], array)?;
                 let Some(fading) = self.fading(number, place) else {
                     continue;
                 };
-                let thermal = self.thermal.variance(head, sighting.range_m);
+                let scatter = scatter_bound(self.config.rician_k, sighting.aperture);
+                let thermal = self.thermal_variance(head, &sighting);
                 belief.update(0.0, &sighting.row, (fading * scatter + thermal) / looks);
             }
             let [along, across] = [ALONG, ACROSS].map(|i| belief.covariance[i][i]);

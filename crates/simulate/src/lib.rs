@@ -16,6 +16,7 @@ mod ideal_campaign;
 pub mod ideal_filter;
 mod integrity_summary;
 mod iq_reception;
+mod phasor;
 pub mod random;
 mod record;
 mod run;

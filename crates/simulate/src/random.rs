@@ -40,6 +40,8 @@ pub enum Purpose {
     LargeScale = 15,
     /// Clusters of a radio head's channel.
     Clusters = 16,
+    /// Directions of a radio head's scatter around the forward axis.
+    ScatterTurn = 17,
 }
 
 /// The random streams of one run.

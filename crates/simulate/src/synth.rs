@@ -1,7 +1,6 @@
 //! A scenario as somebody on the vehicle would have recorded it: samples of all antennas, odometry,
 //! the site, and beside them the truth.
 
-use std::f64::consts::TAU;
 use std::fs;
 use std::path::{Path, PathBuf};
 
@@ -214,8 +213,8 @@ fn annotation(
     let head = channel.head();
     let ssb_freq_hz = scenario.site.carrier_mhz * 1e6;
     let scs_hz = scenario.site.ssb.subcarrier_spacing_khz * 1e3;
-    let phase_rad = channel.array().line_of_sight(vehicle, head).phase_rad;
-    let element_rad = TAU * scenario.vehicle.array.spacing_wavelengths;
+    let [along, left] = channel.array().line_of_sight(vehicle, head).towards;
+    let level = along.hypot(left);
     let ssb = json!({
         "pci": head.pci,
         "ssb_index": head.ssb_index,
@@ -224,11 +223,21 @@ fn annotation(
         "ssb_freq_hz": ssb_freq_hz,
         "ssb_first_sample_incl_cp": sample_start,
     });
-    // The array sees the angle from its axis, whichever side the wave comes from.
-    let angle = json!({
-        "angle_from_axis_deg": (phase_rad / element_rad).acos().to_degrees(),
-        "element_spacing_wavelengths": scenario.vehicle.array.spacing_wavelengths,
-    });
+    let array = &scenario.vehicle.array;
+    let angle = if array.shape.is_row() {
+        // It sees the angle from its axis, whichever side the wave comes from.
+        json!({
+            "angle_from_axis_deg": along.clamp(-1.0, 1.0).acos().to_degrees(),
+            "element_spacing_wavelengths": array.spacing_wavelengths,
+        })
+    } else {
+        json!({
+            "azimuth_from_axis_deg": left.atan2(along).to_degrees(),
+            "elevation_deg": level.min(1.0).acos().to_degrees(),
+            "element_places_wavelengths":
+                array.any_manifold().and_then(|it| it.places_wavelengths()),
+        })
+    };
     let pose = json!({
         "time_s": vehicle.time_s,
         "x_m": vehicle.pose.x_m,

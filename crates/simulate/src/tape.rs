@@ -128,7 +128,7 @@ impl Tape {
                 estimator::built_in(&vehicle).map_err(|error| SimulationError::Custom(error.into()))
             })
             .collect::<Result<Vec<_>, _>>()?;
-        let spacing_wavelengths = scenario.vehicle.array.spacing_wavelengths;
+        let measurand = scenario.vehicle.array.measurand();
         let mut truth = simulation.world().draw(streams);
         let mut channels = HeadChannel::all(&mut truth, streams);
         let mut faults = Faults::new(&scenario.faults);
@@ -163,7 +163,7 @@ impl Tape {
                     // The built-in estimators all tell their standard deviation.
                     let bound_rad = || f64::NAN;
                     angles.push(estimated.and_then(|it| {
-                        estimator::measurement(&reception.ssb, it, spacing_wavelengths, bound_rad)
+                        estimator::measurement(&reception.ssb, it, &measurand, bound_rad)
                     }));
                 }
             }

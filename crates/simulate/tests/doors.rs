@@ -20,7 +20,7 @@ use onboard::wake_up::{Situation, WakeUpPolicy};
 use onboard::{BoxError, Custom};
 use simulate::channel::Propagation;
 use simulate::scenario::Scenario;
-use simulate::world::LineOfSight;
+use simulate::world::{Antennas, LineOfSight};
 use simulate::{MakeCustom, RunRecord, SimulationError, Step};
 use toml::Value;
 
@@ -328,11 +328,10 @@ impl Propagation for Clear {
         -self.loss_db
     }
 
-    fn response(&self, sight: &LineOfSight, _: f64, elements: usize, into: &mut [Complex64]) {
-        for gains in into.chunks_exact_mut(elements) {
-            for (antenna, gain) in gains.iter_mut().enumerate() {
-                *gain = Complex64::cis(sight.phase_rad * antenna as f64);
-            }
+    fn response(&self, sight: &LineOfSight, antennas: &Antennas, _: f64, into: &mut [Complex64]) {
+        into.fill(Complex64::ZERO);
+        for gains in into.chunks_exact_mut(antennas.elements()) {
+            antennas.add(Complex64::ONE, sight.towards, gains);
         }
     }
 }
@@ -366,7 +365,7 @@ fn a_propagation_of_ones_own_carries_snapshots_and_samples() {
             let sight = truth.array.line_of_sight(&there, head);
             let snr_db = budget.snr_db(head, sight.distance_m) - 6.0 * index as f64;
             apart_db.push(ssb.snr_db - snr_db);
-            let error_rad = wrap_angle(measured.phase_rad - sight.phase_rad);
+            let error_rad = wrap_angle(measured.phase_rad - PI * sight.towards[0]);
             squares.push((error_rad / measured.phase_sigma_rad).powi(2));
         }
         // Noise alone: four deviations of a sample variance, and what the converter costs.

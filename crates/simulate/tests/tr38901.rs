@@ -8,13 +8,13 @@ use std::collections::BTreeMap;
 use num_complex::Complex64;
 use onboard::geometry::{Point, Pose};
 use onboard::road::{Road, Segment};
-use onboard::settings::{Site, Vehicle};
+use onboard::settings::{ArraySettings, Site, Vehicle};
 use rand::RngExt;
 use simulate::channel::tr38901::{Drop, Environment, Place, draw_drops};
 use simulate::channel::{Link, Propagation, Tr38901Propagation};
 use simulate::random::{Purpose, Streams};
 use simulate::scenario::{BlockageSettings, ChannelModel, ChannelSettings};
-use simulate::world::LineOfSight;
+use simulate::world::{Antennas, LineOfSight};
 
 use common::{changed, run};
 
@@ -152,13 +152,11 @@ const HEAD: Point = Point::new(1000.0, 20.0);
 fn sight(along_m: f64) -> LineOfSight {
     let place = Point::new(along_m, 0.0);
     let distance_m = place.distance_m(HEAD);
-    let element_rad = std::f64::consts::PI;
     LineOfSight {
-        phase_rad: element_rad * (HEAD.x_m - along_m) / distance_m,
+        towards: [(HEAD.x_m - along_m) / distance_m, HEAD.y_m / distance_m],
         distance_m,
         place,
         axis_rad: 0.0,
-        element_rad,
         along_m,
         time_s: along_m,
     }
@@ -166,7 +164,8 @@ fn sight(along_m: f64) -> LineOfSight {
 
 fn gains(channel: &Tr38901Propagation, along_m: f64) -> [Complex64; ELEMENTS] {
     let mut gains = [Complex64::ZERO; ELEMENTS];
-    channel.response(&sight(along_m), 0.0, ELEMENTS, &mut gains);
+    let antennas = Antennas::new(&ArraySettings::default());
+    channel.response(&sight(along_m), &antennas, 0.0, &mut gains);
     gains
 }
 

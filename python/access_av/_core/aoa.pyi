@@ -123,6 +123,7 @@ def maximum_likelihood(
     spacing_wavelengths: float = 0.5,
     sources: int = 1,
     forward_backward: bool = False,
+    subarray: int | None = None,
     calibration: ArrayLike | None = None,
     threads: int = 1,
 ) -> AngleEstimate: ...

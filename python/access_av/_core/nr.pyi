@@ -62,7 +62,7 @@ class Cell:
         """Angle of arrival from the array's axis; with 2 to 8 antennas."""
     @property
     def sigma_rad(self) -> float | None:
-        """Its standard deviation."""
+        """Its standard deviation, or that of `azimuth_rad` of antennas not in a row."""
     @property
     def phase_rad(self) -> float | None:
         """The electrical angle behind it."""
@@ -71,7 +71,13 @@ class Cell:
         """Its standard deviation."""
     @property
     def azimuth_rad(self) -> float | None:
-        """Counter-clockwise from broadside: a quarter turn less `angle_rad`."""
+        """Counter-clockwise from broadside; of antennas not in a row from their x axis."""
+    @property
+    def elevation_rad(self) -> float | None:
+        """From the horizontal upwards, of antennas that are not in a row."""
+    @property
+    def elevation_sigma_rad(self) -> float | None:
+        """Its standard deviation."""
     @property
     def verdict(self) -> str | None:
         """`resolved`, or why the angle may not be relied on."""
@@ -133,6 +139,7 @@ class Searcher:
         scs_khz: int,
         antennas: int,
         spacing_wavelengths: float = 0.5,
+        places_wavelengths: Sequence[tuple[float, float]] | None = None,
         calibration: Sequence[complex] | None = None,
     ) -> Searcher: ...
     def search(self, samples: ArrayLike) -> list[Cell]:
@@ -146,6 +153,7 @@ def scan(
     scs_khz: int | None = None,
     cfo_ppm: float | None = None,
     spacing_wavelengths: float = 0.5,
+    places_wavelengths: Sequence[tuple[float, float]] | None = None,
     calibration: Sequence[complex] | None = None,
 ) -> Scan:
     """Find every SSB of a recording."""
@@ -159,6 +167,7 @@ def search(
     scs_khz: int | None = None,
     cfo_ppm: float | None = None,
     spacing_wavelengths: float = 0.5,
+    places_wavelengths: Sequence[tuple[float, float]] | None = None,
     calibration: Sequence[complex] | None = None,
 ) -> list[Cell]:
     """Find every SSB in samples, `(samples,)` or `(antennas, samples)`, in order of time."""

@@ -235,7 +235,12 @@ _GLOSSARY = {
     "rsrq_db": ("dB", "Received quality, a value per channel"),
     "sinr_db": ("dB", "Signal to interference and noise, a value per channel"),
     "angle_deg": ("°", "Angle of arrival from the array's axis"),
-    "azimuth_deg": ("°", "Azimuth from broadside, counter-clockwise: 90° − angle_deg"),
+    "azimuth_deg": (
+        "°",
+        "Azimuth from broadside, counter-clockwise: 90° − angle_deg; of antennas not in a row from "
+        "their x axis",
+    ),
+    "elevation_deg": ("°", "Elevation from the horizontal"),
     "azimuth_from_broadside_deg": ("°", "Azimuth from broadside, counter-clockwise"),
     "sigma_deg": ("°", "Standard deviation of the angle from noise"),
     "label": ("text", "The annotation's label"),

@@ -111,10 +111,14 @@ def scan(
 
 @app.command(epilog="Example: [bold]access-av aoa captures/array1.sigmf-meta --json[/]")
 def aoa(
-    recording: Annotated[Path, typer.Argument(help="SigMF recording of a linear array.")],
+    recording: Annotated[Path, typer.Argument(help="SigMF recording of an array.")],
     spacing: Annotated[
         float | None,
-        typer.Option(min=0.01, max=10.0, help="Antenna spacing in wavelengths; else as recorded."),
+        typer.Option(
+            min=0.01,
+            max=10.0,
+            help="Antennas in a row with this spacing in wavelengths; else as recorded.",
+        ),
     ] = None,
     as_json: AsJson = False,
 ) -> None:

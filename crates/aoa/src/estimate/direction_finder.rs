@@ -2,6 +2,7 @@
 
 use num_complex::Complex64;
 
+use super::pilots::checked_noise_variance;
 use crate::array::manifold::{Direction, Manifold, Neighbourhood, dot, evenly_spread};
 use crate::bound;
 use crate::covariance::sample::Covariance;
@@ -97,7 +98,32 @@ impl<M: Manifold<N>, const N: usize> DirectionFinder<M, N> {
     /// # Errors
     /// If the covariance is empty, zero or not finite.
     pub fn estimate(&self, covariance: &Covariance<N>) -> Result<DirectionEstimate, Error> {
+        self.strongest(covariance, None)
+    }
+
+    /// Direction from despread pilots, as
+    /// [`maximum_likelihood_pilots`](crate::maximum_likelihood_pilots) finds it with a linear array: the
+    /// same maximum, its covariance and verdict by the noise variance per antenna and block where that
+    /// is known.
+    ///
+    /// # Errors
+    /// [`Error::NotPositive`] for a bad noise variance and those of [`Covariance::from_snapshots`].
+    pub fn estimate_pilots(
+        &self,
+        blocks: &[[Complex64; N]],
+        noise_variance: Option<f64>,
+    ) -> Result<DirectionEstimate, Error> {
+        let noise_variance = noise_variance.map(checked_noise_variance).transpose()?;
+        self.strongest(&Covariance::from_snapshots(blocks)?, noise_variance)
+    }
+
+    fn strongest(
+        &self,
+        covariance: &Covariance<N>,
+        noise_variance: Option<f64>,
+    ) -> Result<DirectionEstimate, Error> {
         let covariance = covariance.validated()?;
+        let noise = noise_variance.map(|variance| variance * covariance.weight());
         let matrix = covariance.unscaled();
         let trace = covariance.power() * covariance.weight() * N as f64;
         let powers: Vec<f64> = self.grid.iter().map(|(_, a)| power(matrix, a)).collect();
@@ -116,7 +142,10 @@ impl<M: Manifold<N>, const N: usize> DirectionFinder<M, N> {
             std::mem::swap(&mut best, other);
         }
         let snapshots = covariance.snapshots();
-        let snr = snr::<N>(best.beam, residual_power::<N>(trace, best.beam));
+        let snr = snr::<N>(
+            best.beam,
+            noise.unwrap_or_else(|| residual_power::<N>(trace, best.beam)),
+        );
         let covariance = bound::covariance_around(
             &best.around,
             best.direction,
@@ -127,8 +156,11 @@ impl<M: Manifold<N>, const N: usize> DirectionFinder<M, N> {
         let alike = other
             .filter(|other| best.is_far_from(&other.direction))
             .is_some_and(|other| {
-                log_likelihood_ratio::<N>(trace, best.beam, other.beam) * (snapshots as f64)
-                    < LIKELIER.ln()
+                let per_snapshot = match noise {
+                    Some(noise) => (best.beam - other.beam) / noise,
+                    None => log_likelihood_ratio::<N>(trace, best.beam, other.beam),
+                };
+                per_snapshot * (snapshots as f64) < LIKELIER.ln()
             });
         let [lowest, highest] = self.elevations_rad;
         let elevation_rad = best.direction.elevation_rad;
@@ -224,21 +256,20 @@ impl<M: Manifold<N>, const N: usize> DirectionFinder<M, N> {
         let curvature = 2.0 * signal.max(0.1 * here.beam) / around.power;
         let [[a, b], [_, c]] = around.metric.map(|row| row.map(|it| it * curvature));
         let longest = 0.5 * self.resolution_rad;
-        let step = if self.is_level() {
-            [slope[0] / a, 0.0]
+        let bounded = |step: f64| step.clamp(-longest, longest);
+        let elevation = if self.is_level() {
+            0.0
         } else {
             // Where a direction changes nothing (elevation at the horizon) it is left as it is.
             let ridge = 1e-9 * (a + c);
-            let (a, c) = (a + ridge, c + ridge);
-            let determinant = a * c - b * b;
-            [
-                (c * slope[0] - b * slope[1]) / determinant,
-                (a * slope[1] - b * slope[0]) / determinant,
-            ]
+            let determinant = (a + ridge) * (c + ridge) - b * b;
+            bounded(((a + ridge) * slope[1] - b * slope[0]) / determinant)
         };
-        let length = step[0].hypot(step[1]);
-        if length.is_finite() {
-            step.map(|it| it * (longest / length.max(longest)))
+        // With the elevation's step as it came to be: next to the horizon that may be much shorter
+        // than it would like to be, and must not shorten this one.
+        let step = [bounded((slope[0] - b * elevation) / a), elevation];
+        if step.iter().all(|it| it.is_finite()) {
+            step
         } else {
             [0.0; 2]
         }

@@ -39,13 +39,7 @@ pub fn maximum_likelihood_pilots<const N: usize>(
     let (phase_rad, value) = spectrum.maximum();
     let beam = value / N as f64;
     let noise = match noise_variance {
-        Some(value) if value.is_finite() && value > 0.0 => value * covariance.weight(),
-        Some(value) => {
-            return Err(Error::NotPositive {
-                name: "noise_variance",
-                value,
-            });
-        }
+        Some(value) => checked_noise_variance(value)? * covariance.weight(),
         None => maximum_likelihood::residual_power::<N>(spectrum.lags[0].re, beam),
     };
     let snr = maximum_likelihood::snr::<N>(beam, noise);
@@ -58,4 +52,13 @@ pub fn maximum_likelihood_pilots<const N: usize>(
         threshold.then_some(Reason::ThresholdSnr),
         array,
     ))
+}
+
+pub(super) fn checked_noise_variance(value: f64) -> Result<f64, Error> {
+    if value.is_finite() && value > 0.0 {
+        Ok(value)
+    } else {
+        let name = "noise_variance";
+        Err(Error::NotPositive { name, value })
+    }
 }

@@ -13,6 +13,7 @@ use crate::linalg::dense::{adjoint, inverse, product};
 use crate::linalg::eigen::{HermitianEigen, hermitian_eigen};
 use crate::linalg::matrix::Matrix;
 use crate::list::List;
+use crate::method::alternating_projection::{self, Fit};
 use crate::method::{esprit, music, root_music};
 use crate::result::angle::{AngleEstimate, AngleEstimates};
 use crate::result::direction::describe;
@@ -28,8 +29,8 @@ const LINEAR: f64 = 0.02;
 /// Directions of `sources` sources, by ascending angle.
 ///
 /// # Errors
-/// As [`estimate`]; [`Error::TooManySources`] unless `sources` is 1 to N - 1 (1 for maximum
-/// likelihood); [`Error::Singular`] if ESPRIT's equations have no solution.
+/// As [`estimate`]; [`Error::TooManySources`] unless `sources` is 1 to N - 1; [`Error::Singular`] if
+/// ESPRIT's equations have no solution.
 pub fn estimate_several<const N: usize>(
     method: Method,
     covariance: &Covariance<N>,
@@ -75,14 +76,27 @@ pub fn estimate_several_smoothed<const N: usize, const M: usize>(
     let averaging = Averaging::<N, M> { forward_backward };
     let averaged = averaging.average(&full);
     let array = Array::<M>::new(array.spacing_wavelengths())?;
-    let eigen = hermitian_eigen(averaged.matrix(), M);
-    let mut phases = subspace_phases(method, &eigen, sources)?;
+    let matrix = averaged.matrix();
+    let eigen = hermitian_eigen(matrix, M);
+    let mut phases = match method {
+        Method::MaximumLikelihood => {
+            alternating_projection::phases(&matrix, sources).ok_or(Error::Singular)?
+        }
+        _ => subspace_phases(method, &eigen, sources)?,
+    };
     let mut separated = phases.len() == sources;
     if !separated {
         // The spectrum has fewer peaks than sources; the roots of the same polynomial are complete.
         phases = subspace_phases(Method::RootMusic, &eigen, sources)?;
     }
-    let noise_variance = noise_variance(&eigen, sources);
+    let likelihood = match method {
+        Method::MaximumLikelihood => Fit::at(&matrix, &phases),
+        _ => None,
+    };
+    let noise_variance = match &likelihood {
+        Some(likelihood) => likelihood.noise_variance(),
+        None => noise_variance(&eigen, sources),
+    };
     let powers = source_powers(&phases, &full, noise_variance);
     let spread = Spread {
         eigen: &eigen,
@@ -92,11 +106,19 @@ pub fn estimate_several_smoothed<const N: usize, const M: usize>(
         covariance: &full.matrix(),
         snapshots: full.snapshots(),
     };
-    let sigmas = spread.phase_sigmas_rad(method, &phases);
+    let sigmas = match &likelihood {
+        Some(likelihood) => spread.of_maximum_likelihood(likelihood),
+        None => spread.phase_sigmas_rad(method, &phases),
+    };
     separated &= powers.is_some() && sigmas.is_some();
     let powers = powers.unwrap_or_default();
     let sigmas = sigmas.unwrap_or_else(|| List::collect(0.0, [std::f64::consts::PI; M]));
-    let hidden = !shows(&eigen, sources, full.snapshots()) || spread.mixing() > LINEAR;
+    let hidden = match method {
+        // Each must stand out of the noise; coherent ones share an eigenvector.
+        Method::MaximumLikelihood => (0..sources)
+            .any(|k| powers.snr(k, noise_variance) < bound::resolvable_snr::<M>(full.snapshots())),
+        _ => !shows(&eigen, sources, full.snapshots()) || spread.mixing() > LINEAR,
+    };
     // Of coherent sources only one shows at all, until the array's symmetry tells them apart.
     let averaged_again = || hermitian_eigen(full.forward_backward().matrix(), N);
     let correlated = powers.largest_correlation(sources) > CORRELATED
@@ -153,7 +175,7 @@ fn subspace_phases<const N: usize>(
             let spectrum = music::signal_spectrum(eigen, sources);
             Ok(music::phases(&spectrum, sources))
         }
-        Method::MaximumLikelihood | Method::RootMusic => {
+        Method::RootMusic | Method::MaximumLikelihood => {
             let null = music::null_spectrum(eigen, sources);
             Ok(root_music::phases(&null, sources))
         }

@@ -11,6 +11,8 @@
 //!   `A1^+ ([0 I] - exp(j omega) [I 0])`, `A1` the steering vectors without the last antenna (Rao and
 //!   Hari 1989); least squares and total least squares spread alike.
 //!
+//! Maximum likelihood has an `H` of its own, [`Fit::sensitivities`].
+//!
 //! An average over subarrays or over the array's symmetry is linear in `R` and becomes one of `H`.
 
 use num_complex::Complex64;
@@ -22,6 +24,7 @@ use crate::linalg::dense::{adjoint, inverse, product};
 use crate::linalg::eigen::HermitianEigen;
 use crate::linalg::matrix::{Matrix, zeros};
 use crate::list::List;
+use crate::method::alternating_projection::Fit;
 
 /// Average over the subarrays of `M` antennas, and over the array's symmetry.
 #[derive(Debug, Clone, Copy)]
@@ -98,6 +101,13 @@ impl<const N: usize, const M: usize> Spread<'_, N, M> {
         }
         let determined = sigmas[..phases.len()].iter().all(|it| it.is_finite());
         determined.then(|| List::collect(0.0, sigmas[..phases.len()].iter().copied()))
+    }
+
+    /// Those of maximum likelihood.
+    pub(super) fn of_maximum_likelihood(&self, likelihood: &Fit<M>) -> Option<List<f64, M>> {
+        let mut sigmas = List::empty(0.0);
+        likelihood.sensitivities(|h| sigmas.push(self.variance(h).sqrt()))?;
+        sigmas.iter().all(|it| it.is_finite()).then_some(sigmas)
     }
 
     /// Share of the weakest signal eigenvector that noise mixes into it, in the mean

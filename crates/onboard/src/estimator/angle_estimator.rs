@@ -17,12 +17,13 @@ pub trait AngleEstimator: Send {
     ) -> Result<Option<EstimatedAngle>, BoxError>;
 }
 
-/// What an estimator says of the electrical angle ω = 2π(d/λ)·cos θ between neighbouring antennas.
+/// What an estimator says of the electrical angle ω = 2π(d/λ)·cos θ between neighbours in a row, or of
+/// the azimuth from the axis of any other array ([`Measurand`](crate::manifold::Measurand)).
 #[derive(Debug, Clone, PartialEq)]
 pub enum EstimatedAngle {
     /// One angle.
     Angle {
-        /// Electrical angle in radians.
+        /// Electrical angle, or azimuth, in radians.
         phase_rad: f64,
         /// Its standard deviation from noise, in radians; without it, the Cramér–Rao bound at the
         /// SSB's SNR is taken.
@@ -33,7 +34,7 @@ pub enum EstimatedAngle {
         resolved: bool,
     },
     /// The logarithm of its likelihood, up to a constant, at equally many and equally spaced
-    /// electrical angles from −π (included) to π (not included). The localizer takes its mean and
+    /// such angles from −π (included) to π (not included). The localizer takes its mean and
     /// spread on the circle.
     LogLikelihood(Vec<f64>),
 }

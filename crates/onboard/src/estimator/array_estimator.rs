@@ -1,21 +1,26 @@
 //! The estimators of the `aoa` crate, for the vehicle's array.
 
-use aoa::{Array, Covariance, Method};
+use aoa::{Array, Covariance, DirectionFinder, Method, Reason, Verdict};
 
 use super::angle_estimator::{AngleEstimator, EstimatedAngle};
 use super::likelihood::circular_gaussian;
 use crate::BoxError;
 use crate::elements::for_elements;
 use crate::localize::AngleMeasurement;
+use crate::manifold::{ArrayManifold, Measurand};
 use crate::observation::{SensedSsb, SsbObservation};
 use crate::settings::{EstimatorMethod, Vehicle};
 
-/// A method of the `aoa` crate on an array of `N` antennas.
+/// A method of the `aoa` crate on `N` antennas in a row.
 #[derive(Debug, Clone)]
 pub struct ArrayEstimator<const N: usize> {
     array: Array<N>,
     method: Method,
 }
+
+/// Maximum likelihood in azimuth and elevation on `N` antennas that are not in a row.
+#[derive(Debug, Clone)]
+pub struct AzimuthEstimator<const N: usize>(DirectionFinder<ArrayManifold<N>, N>);
 
 /// The estimator that a vehicle's settings choose.
 ///
@@ -29,10 +34,13 @@ pub fn built_in(vehicle: &Vehicle) -> Result<Box<dyn AngleEstimator>, aoa::Error
         EstimatorMethod::MaximumLikelihood => Method::MaximumLikelihood,
     };
     let spacing = vehicle.array.spacing_wavelengths;
-    for_elements!(vehicle.array.elements, N => Ok(Box::new(ArrayEstimator::<N> {
-        array: Array::new(spacing)?,
-        method,
-    })))
+    for_elements!(vehicle.array.elements, N => Ok(match vehicle.array.manifold::<N>()? {
+        None => Box::new(ArrayEstimator::<N> {
+            array: Array::new(spacing)?,
+            method,
+        }),
+        Some(manifold) => Box::new(AzimuthEstimator(manifold.finder()?)),
+    }))
 }
 
 impl<const N: usize> AngleEstimator for ArrayEstimator<N> {
@@ -56,12 +64,37 @@ impl<const N: usize> AngleEstimator for ArrayEstimator<N> {
     }
 }
 
+impl<const N: usize> AngleEstimator for AzimuthEstimator<N> {
+    fn estimate(
+        &mut self,
+        observation: &SsbObservation,
+    ) -> Result<Option<EstimatedAngle>, BoxError> {
+        let snapshots = observation.snapshots::<N>();
+        let estimate = if observation.noise_variance.is_some() {
+            self.0
+                .estimate_pilots(snapshots, observation.noise_variance)
+        } else {
+            Covariance::from_snapshots(snapshots).and_then(|it| self.0.estimate(&it))
+        };
+        Ok(estimate.ok().map(|estimate| EstimatedAngle::Angle {
+            phase_rad: estimate.direction.azimuth_rad,
+            phase_sigma_rad: Some(estimate.azimuth_sigma_rad()),
+            snr_db: Some(estimate.snr_db),
+            // Near the horizon it is the elevation that is not known.
+            resolved: matches!(
+                estimate.verdict,
+                Verdict::Resolved | Verdict::Unresolved(Reason::EdgeOfElevations)
+            ),
+        }))
+    }
+}
+
 /// What the localizer takes of an estimate; `bound_rad` is what an estimate without standard
-/// deviation gets, `spacing_wavelengths` the array's. `None` where the estimate carries no angle.
+/// deviation gets, `measurand` what the array measures. `None` where the estimate carries no angle.
 pub fn measurement(
     ssb: &SensedSsb,
     estimated: EstimatedAngle,
-    spacing_wavelengths: f64,
+    measurand: &Measurand,
     bound_rad: impl FnOnce() -> f64,
 ) -> Option<AngleMeasurement> {
     let (phase_rad, phase_sigma_rad, snr_db, resolved) = match estimated {
@@ -81,12 +114,11 @@ pub fn measurement(
             (phase_rad, sigma_rad, ssb.snr_db, true)
         }
     };
-    let cosine = phase_rad / (std::f64::consts::TAU * spacing_wavelengths);
     Some(AngleMeasurement {
         time_s: ssb.time_s,
         phase_rad,
         phase_sigma_rad,
-        angle_rad: cosine.clamp(-1.0, 1.0).acos(),
+        angle_rad: measurand.angle_rad(phase_rad),
         snr_db,
         resolved,
     })

@@ -5,4 +5,4 @@ mod array_estimator;
 mod likelihood;
 
 pub use angle_estimator::{AngleEstimator, EstimatedAngle};
-pub use array_estimator::{ArrayEstimator, built_in, measurement};
+pub use array_estimator::{ArrayEstimator, AzimuthEstimator, built_in, measurement};

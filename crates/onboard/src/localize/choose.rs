@@ -26,7 +26,12 @@ pub fn built_in(
     if let LocalizerSettings::DeadReckoning(settings) = vehicle.localizer {
         let mounting_rad = vehicle.array.mounting_rad;
         let between = settings.heading_between;
-        return Ok(Box::new(DeadReckoning::new(start, between, mounting_rad)));
+        let localizer = DeadReckoning::new(start, between, mounting_rad);
+        return Ok(Box::new(if vehicle.array.shape.is_row() {
+            localizer
+        } else {
+            localizer.by_azimuth()
+        }));
     }
     let config = TrackerConfig::new(site, vehicle);
     let heads = RadioHead::heard(site, vehicle);

@@ -26,6 +26,7 @@ pub struct DeadReckoning {
     anchor: Point,
     heading_between: HeadingBetween,
     mounting_rad: f64,
+    in_a_row: bool,
 }
 
 impl DeadReckoning {
@@ -39,7 +40,15 @@ impl DeadReckoning {
             anchor: start.point(),
             heading_between,
             mounting_rad,
+            in_a_row: true,
         }
+    }
+
+    /// With antennas that are not in a row, whose angles are azimuths.
+    #[must_use]
+    pub const fn by_azimuth(mut self) -> Self {
+        self.in_a_row = false;
+        self
     }
 
     /// Moves on to `time_s`, along the heading held since the last angle; beyond the newest
@@ -61,10 +70,14 @@ impl DeadReckoning {
     fn take_heading(&mut self, head: &RadioHead, measured: &AngleMeasurement) -> UpdateVerdict {
         // Equation 3: AoIS = tan⁻¹(Δy/Δx), from the estimated position to the radio head.
         let aois_rad = self.pose.point().bearing_rad(head.position);
-        // A linear array does not tell left from right; the estimated pose does.
+        // Antennas in a row do not tell left from right; the estimated pose does.
         let axis_rad = self.pose.heading_rad + self.mounting_rad;
         let side = 1f64.copysign(wrap_angle(aois_rad - axis_rad));
-        let aoa_rad = side * measured.angle_rad;
+        let aoa_rad = if self.in_a_row {
+            side * measured.angle_rad
+        } else {
+            measured.angle_rad
+        };
         // Equation 4: AoH = AoIS − AoA.
         let aoh_rad = wrap_angle(aois_rad - aoa_rad - self.mounting_rad);
 

@@ -1,17 +1,16 @@
 //! What thermal noise leaves of an angle, by the link budget.
 
-use aoa::bound;
-
-use crate::elements::for_elements;
 use crate::link_budget::LinkBudget;
+use crate::manifold::Measurand;
 use crate::radio_head::RadioHead;
 use crate::settings::{Pilots, Site, Vehicle};
 
-/// Thermal noise of an electrical angle: the Cramér–Rao bound of the snapshots of one SSB.
+/// Thermal noise of an angle: the Cramér–Rao bound of the snapshots of one SSB, in the mean over all
+/// azimuths at the horizon where the array's sharpness varies.
 #[derive(Clone, Debug)]
 pub struct ThermalNoise {
     budget: LinkBudget,
-    elements: u8,
+    measurand: Measurand,
     pilots: Pilots,
     snapshots: usize,
 }
@@ -21,27 +20,26 @@ impl ThermalNoise {
     pub fn new(site: &Site, vehicle: &Vehicle) -> Self {
         Self {
             budget: LinkBudget::new(site, vehicle),
-            elements: vehicle.array.elements,
+            measurand: vehicle.array.measurand(),
             pilots: vehicle.receiver.pilots,
             snapshots: usize::from(vehicle.receiver.snapshots),
         }
     }
 
-    /// Variance (rad²) of the electrical angle to a radio head at this distance, at the SNR of the
-    /// link budget.
+    /// Variance (rad²) of the angle to a radio head at this distance, at the SNR of the link budget.
     pub fn variance(&self, head: &RadioHead, distance_m: f64) -> f64 {
         self.sigma_rad(self.budget.snr_db(head, distance_m)).powi(2)
     }
 
-    /// Standard deviation (rad) of the electrical angle at an SNR per antenna and resource element.
+    /// Standard deviation (rad) of the angle at an SNR per antenna and resource element.
     pub fn sigma_rad(&self, snr_db: f64) -> f64 {
         let snr = 10f64.powf(0.1 * snr_db);
-        for_elements!(self.elements, N => match self.pilots.per_symbol() {
-            None => bound::stochastic::<N>(snr, self.snapshots),
-            Some(symbols) => {
-                let elements: u16 = symbols.iter().sum();
-                bound::known_signal::<N>(snr * f64::from(elements))
-            }
-        })
+        let n = f64::from(self.measurand.elements());
+        // Blind, the unknown signal costs (1 + 1/(N snr)) (Stoica and Nehorai 1990).
+        let (total_snr, cost) = match self.pilots.per_symbol() {
+            None => (snr * self.snapshots as f64, 1.0 + 1.0 / (n * snr)),
+            Some(symbols) => (snr * f64::from(symbols.iter().sum::<u16>()), 1.0),
+        };
+        (cost / (2.0 * total_snr * self.measurand.mean_aperture())).sqrt()
     }
 }

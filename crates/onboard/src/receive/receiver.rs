@@ -3,6 +3,7 @@
 //! It is given windows of samples at the base rate (256 to a symbol), however they came about: cut
 //! from a recording, or made by the simulator around each burst.
 
+use aoa::DirectionFinder;
 use nr_ssb::grid::{SUBCARRIERS, SYMBOLS};
 use nr_ssb::search::{SearchConfig, SearchError, Searcher};
 use nr_ssb::track::{TrackError, Tracked, Tracker};
@@ -11,10 +12,11 @@ use num_complex::Complex64;
 use thiserror::Error;
 
 use super::despread::Despread;
-use super::wideband::line_of_sight;
+use super::wideband::{line_of_sight, of_a_row};
 use crate::elements::for_elements;
+use crate::manifold::ArrayManifold;
 use crate::observation::{SensedSsb, SsbObservation};
-use crate::settings::{Pilots, Site, Vehicle};
+use crate::settings::{ArraySettings, Pilots, Site, Vehicle};
 
 /// Samples of an SSB at the base rate: four symbols of 256 with a cyclic prefix of 18.
 pub const SSB_SAMPLES: usize = 4 * 274;
@@ -45,8 +47,8 @@ pub struct ReceiverConfig {
     pub pilots: Pilots,
     /// Snapshots of each SSB where none is known (`pilots` is blind).
     pub snapshots: usize,
-    /// Complex gain of each antenna's channel, by which it is divided: as many as antennas.
-    pub calibration: Vec<Complex64>,
+    /// The antennas, and the complex gain of each one's channel, by which it is divided.
+    pub array: ArraySettings,
     /// Cells to listen to; all without.
     pub cells: Option<Vec<u16>>,
 }
@@ -66,7 +68,7 @@ impl ReceiverConfig {
             period_s: site.ssb.period_s(),
             pilots: vehicle.receiver.pilots,
             snapshots: vehicle.receiver.snapshots.into(),
-            calibration: vehicle.array.calibration(),
+            array: vehicle.array.clone(),
             cells: Some(heads.filter(|pci| vehicle.receiver.hears(*pci)).collect()),
         }
     }
@@ -100,6 +102,9 @@ pub enum ReceiveError {
         /// Number that it was told of.
         elements: usize,
     },
+    /// Antennas that make no array.
+    #[error(transparent)]
+    Array(#[from] aoa::Error),
     /// A channel gain of zero or not finite.
     #[error("gain of channel {0} is not a finite number other than zero")]
     Calibration(usize),
@@ -114,7 +119,7 @@ impl Receiver {
     /// # Errors
     /// [`ReceiveError::Search`] or [`ReceiveError::Calibration`] for impossible settings.
     pub fn new(config: ReceiverConfig) -> Result<Self, ReceiveError> {
-        for_elements!(config.calibration.len(), A => {
+        for_elements!(config.array.elements, A => {
             Ok(Self(Box::new(ArrayReceiver::<A>::new(config)?)))
         })
     }
@@ -162,6 +167,8 @@ trait SsbReceiver: Send {
 struct ArrayReceiver<const A: usize> {
     config: ReceiverConfig,
     calibration: [Complex64; A],
+    /// Of antennas that are not in a row.
+    finder: Option<DirectionFinder<ArrayManifold<A>, A>>,
     search: SearchConfig,
     searcher: Searcher,
     cells: Vec<Cell<A>>,
@@ -204,12 +211,14 @@ impl<const A: usize> Cell<A> {
 
 impl<const A: usize> ArrayReceiver<A> {
     fn new(config: ReceiverConfig) -> Result<Self, ReceiveError> {
+        let calibration = config.array.calibration();
         let unusable = |gain: &Complex64| !gain.norm_sqr().is_normal();
-        if let Some(channel) = config.calibration.iter().position(unusable) {
+        if let Some(channel) = calibration.iter().position(unusable) {
             return Err(ReceiveError::Calibration(channel));
         }
-        let found = config.calibration.len();
-        let calibration = <[Complex64; A]>::try_from(config.calibration.as_slice());
+        let found = calibration.len();
+        let manifold = config.array.manifold::<A>()?;
+        let calibration = <[Complex64; A]>::try_from(calibration);
         let calibration = calibration.map_err(|_| ReceiveError::Antennas { found, elements: A })?;
         let search = SearchConfig {
             ssb_freq_hz: Some(config.ssb_freq_hz),
@@ -219,6 +228,7 @@ impl<const A: usize> ArrayReceiver<A> {
             searcher: Searcher::new(search.clone())?,
             search,
             calibration,
+            finder: manifold.map(ArrayManifold::finder).transpose()?,
             cells: Vec::new(),
             last_search_s: f64::NEG_INFINITY,
             searches: 0,
@@ -359,6 +369,7 @@ impl<const A: usize> SsbReceiver for ArrayReceiver<A> {
                     &mut self.observation,
                     &self.config,
                     &self.calibration,
+                    self.finder.as_ref(),
                     &cell.tracker,
                     &seen,
                     window.time_s + elapsed_s,
@@ -376,6 +387,7 @@ fn fill<const A: usize>(
     into: &mut SsbObservation,
     config: &ReceiverConfig,
     calibration: &[Complex64; A],
+    finder: Option<&DirectionFinder<ArrayManifold<A>, A>>,
     tracker: &Tracker<A>,
     seen: &Tracked<A>,
     time_s: f64,
@@ -399,7 +411,11 @@ fn fill<const A: usize>(
     into.noise_variance = Some(1.0);
     let delay = seen.residual_delay;
     let despread = Despread::new(elements, tracker.known(), config.pilots, delay).scaled(&gains);
-    if let Some(told) = line_of_sight(&despread) {
+    let told = match finder {
+        Some(finder) => line_of_sight(&despread, |u| ArrayManifold::strongest_beam(finder, u)),
+        None => line_of_sight(&despread, of_a_row),
+    };
+    if let Some(told) = told {
         into.push(&told.block);
         return;
     }

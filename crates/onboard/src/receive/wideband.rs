@@ -52,8 +52,13 @@ pub struct LineOfSight<const A: usize> {
 }
 
 /// The line of sight, where the channel varies over the band. The noise on an element has variance
-/// one and the channels are calibrated.
-pub fn line_of_sight<const A: usize>(despread: &Despread<A>) -> Option<LineOfSight<A>> {
+/// one and the channels are calibrated; `strongest_beam` is `max |aᴴu|²/aᴴa` over the array's responses
+/// `a` for what its antennas receive, `u`: [`of_a_row`], or that of a
+/// [`DirectionFinder`](aoa::DirectionFinder).
+pub fn line_of_sight<const A: usize>(
+    despread: &Despread<A>,
+    strongest_beam: impl Fn(&[Complex64; A]) -> f64,
+) -> Option<LineOfSight<A>> {
     let channel = Channel::new(despread, 0);
     // Another cell's PSS may be the same: late, it looks like a path. It is not believed alone.
     let others = Channel::new(despread, 1);
@@ -65,7 +70,10 @@ pub fn line_of_sight<const A: usize>(despread: &Despread<A>) -> Option<LineOfSig
     let excess = others.variation()?;
     let fit = |decay: f64, power: f64, delays: &mut dyn Iterator<Item = f64>| {
         let scatter = Scatter::new(&channel, decay, power)?;
-        let likelihood = |delay| (channel.likelihood(&scatter, delay), delay, decay, power);
+        let likelihood = |delay| {
+            let likelihood = channel.likelihood(&scatter, delay, &strongest_beam);
+            (likelihood, delay, decay, power)
+        };
         delays.map(likelihood).max_by(|a, b| a.0.total_cmp(&b.0))
     };
     let spacing = (LATEST - EARLIEST) / (DELAYS - 1) as f64;
@@ -203,16 +211,19 @@ impl<const A: usize> Channel<A> {
         (response, scatter.energy)
     }
 
-    fn likelihood(&self, scatter: &Scatter, delay: f64) -> f64 {
+    fn likelihood(
+        &self,
+        scatter: &Scatter,
+        delay: f64,
+        strongest_beam: impl Fn(&[Complex64; A]) -> f64,
+    ) -> f64 {
         let mut all = 0.0;
         let response = self.antennas.map(|antenna| {
             let white = scatter.whitened(&delayed(&antenna, delay));
             all += white.iter().map(Complex64::norm_sqr).sum::<f64>();
             product(&scatter.line_of_sight, &white)
         });
-        let seen = maximum_likelihood_pilots(&[response], Some(1.0), &Array::half_wavelength());
-        let beam = seen.map_or(0.0, |seen| beam_power(&response, seen.phase_rad));
-        beam / scatter.energy - all - A as f64 * scatter.log_determinant
+        strongest_beam(&response) / scatter.energy - all - A as f64 * scatter.log_determinant
     }
 }
 
@@ -295,13 +306,15 @@ fn product(a: &Band, b: &Band) -> Complex64 {
     a.iter().zip(b).map(|(a, b)| a.conj() * b).sum()
 }
 
-/// `|Σ a_n* u_n|² / N`.
-fn beam_power<const A: usize>(response: &[Complex64; A], phase_rad: f64) -> f64 {
-    let sum: Complex64 = (0..A)
-        .zip(response)
-        .map(|(n, gain)| gain * Complex64::cis(-phase_rad * n as f64))
-        .sum();
-    sum.norm_sqr() / A as f64
+/// The strongest beam of antennas in a row, `max |Σ u_n e^{−jωn}|² / N` over ω.
+pub fn of_a_row<const A: usize>(received: &[Complex64; A]) -> f64 {
+    let found = maximum_likelihood_pilots(&[*received], Some(1.0), &Array::half_wavelength());
+    found.map_or(0.0, |found| {
+        let step = Complex64::cis(-found.phase_rad);
+        // Horner's scheme.
+        let sum = (received.iter().rev()).fold(Complex64::ZERO, |sum, gain| sum * step + gain);
+        sum.norm_sqr() / A as f64
+    })
 }
 
 #[cfg(test)]
@@ -372,7 +385,7 @@ mod tests {
         for _ in 0..trials {
             // The receiver follows the delay of the most power.
             let ssb = ssb(&mut rng, snr, k, decay, -0.1);
-            let told = line_of_sight(&ssb).expect("the channel varies");
+            let told = line_of_sight(&ssb, of_a_row).expect("the channel varies");
             let seen = maximum_likelihood_pilots(&[told.block], Some(1.0), &array).unwrap();
             let blocks: Vec<_> = ssb.blocks().collect();
             let flat = maximum_likelihood_pilots(&blocks, Some(1.0), &array).unwrap();
@@ -429,7 +442,10 @@ mod tests {
         for trial in 0..2000 {
             // Noise alone, a weak line of sight, strong scatter without delays.
             let (snr, k) = [(1e-6, 1.0), (0.1, 1e6), (100.0, 3.0)][trial % 3];
-            assert_eq!(line_of_sight(&ssb(&mut rng, snr, k, 0.0, 0.0)), None);
+            assert_eq!(
+                line_of_sight(&ssb(&mut rng, snr, k, 0.0, 0.0), of_a_row),
+                None
+            );
         }
     }
 }

@@ -1,20 +1,28 @@
 //! The vehicle's antennas.
 
+use std::sync::Arc;
+
 use num_complex::Complex64;
 use schemars::JsonSchema;
 use serde::{Deserialize, Serialize};
 
+use super::array_shape::ArrayShape;
 use super::check::Check;
 use super::error::SettingsError;
+use crate::elements::for_elements;
+use crate::manifold::{AnyManifold, ArrayManifold, Measurand};
 
-/// `[array]`: a uniform linear array.
+/// `[array]`: the antennas, in a row unless `shape` says otherwise.
 #[derive(Debug, Clone, PartialEq, Serialize, Deserialize, JsonSchema)]
 #[serde(default, deny_unknown_fields)]
 pub struct ArraySettings {
     /// Number of antennas.
     #[schemars(range(min = 2, max = 8))]
     pub elements: u8,
-    /// Distance between neighbours in wavelengths.
+    /// How they stand.
+    #[serde(skip_serializing_if = "ArrayShape::is_row")]
+    pub shape: ArrayShape,
+    /// Distance between neighbours in wavelengths, in a row or around a circle.
     #[schemars(range(min = 0.05, max = 0.5))]
     pub spacing_wavelengths: f64,
     /// Antenna gain in dBi.
@@ -27,7 +35,7 @@ pub struct ArraySettings {
     /// Standard deviation of that in each of forward and left, in metres.
     #[schemars(range(min = 0.0, max = 10.0))]
     pub position_std_m: f64,
-    /// Direction of its axis from the vehicle's forward axis, counter-clockwise, in radians.
+    /// Direction of its axis, along the row, from the vehicle's forward axis, counter-clockwise, in radians.
     #[schemars(range(min = -3.2, max = 3.2))]
     pub mounting_rad: f64,
     /// Standard deviation of that direction in radians; 0 is known exactly on a road, and 0.02 for a
@@ -37,7 +45,8 @@ pub struct ArraySettings {
     /// Random walk of that direction, in radians per root of a metre driven.
     #[schemars(range(min = 0.0, max = 1.0))]
     pub mounting_drift_rad_per_sqrt_m: f64,
-    /// Phase, left by calibration, by which each antenna runs ahead of the one before, in radians.
+    /// Phase, left by calibration, by which each antenna of a row runs ahead of the one before, in
+    /// radians.
     #[schemars(range(min = -3.2, max = 3.2))]
     pub phase_rad: f64,
     /// Standard deviation of that phase in radians.
@@ -56,6 +65,7 @@ impl Default for ArraySettings {
     fn default() -> Self {
         Self {
             elements: 4,
+            shape: ArrayShape::default(),
             spacing_wavelengths: 0.5,
             rx_gain_dbi: 5.0,
             position_m: [0.0; 3],
@@ -83,7 +93,63 @@ impl ArraySettings {
         }
     }
 
+    /// The manifold of antennas that are not in a row; `None` of those that are.
+    ///
+    /// # Errors
+    /// [`aoa::Error`] for places or a table that make no array of `N` antennas.
+    pub fn manifold<const N: usize>(&self) -> Result<Option<ArrayManifold<N>>, aoa::Error> {
+        ArrayManifold::new(&self.shape, self.spacing_wavelengths)
+    }
+
+    /// [`manifold`](Self::manifold) for whatever number of antennas there is, the settings being
+    /// checked.
+    pub fn any_manifold(&self) -> Option<Arc<dyn AnyManifold>> {
+        for_elements!(self.elements, N => {
+            let manifold = self.manifold::<N>().ok()??;
+            Some(Arc::new(manifold))
+        })
+    }
+
+    /// What is measured with it, its settings being checked.
+    pub fn measurand(&self) -> Measurand {
+        self.try_measurand().unwrap_or_else(|_| self.in_a_row())
+    }
+
+    fn try_measurand(&self) -> Result<Measurand, aoa::Error> {
+        for_elements!(self.elements, N => {
+            let manifold = self.manifold::<N>()?;
+            Ok(manifold.map_or_else(|| self.in_a_row(), |it| Measurand::azimuth(&it)))
+        })
+    }
+
+    const fn in_a_row(&self) -> Measurand {
+        Measurand::ElectricalAngle {
+            elements: self.elements,
+            spacing_wavelengths: self.spacing_wavelengths,
+        }
+    }
+
     pub(super) fn check(&self, check: Check<'_>) -> Result<(), SettingsError> {
+        self.try_measurand().map_err(|error| {
+            let antennas = format!("{} antennas", self.elements);
+            check.error("array.shape", antennas, &error.to_string())
+        })?;
+        for (key, phase_rad) in [
+            ("array.phase_rad", self.phase_rad),
+            ("array.phase_std_rad", self.phase_std_rad),
+            (
+                "array.phase_drift_rad_per_sqrt_m",
+                self.phase_drift_rad_per_sqrt_m,
+            ),
+        ] {
+            let in_a_row = self.shape.is_row() || phase_rad == 0.0;
+            check.that(
+                in_a_row,
+                key,
+                phase_rad,
+                "only a row has it: use channel_gains",
+            )?;
+        }
         let Some(gains) = &self.channel_gains else {
             return Ok(());
         };

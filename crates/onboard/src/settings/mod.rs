@@ -7,6 +7,7 @@
 //! and [`TomlFile`] checks them.
 
 mod array;
+mod array_shape;
 mod check;
 mod error;
 mod figure;
@@ -28,6 +29,7 @@ mod vehicle;
 mod wake_up;
 
 pub use array::ArraySettings;
+pub use array_shape::{ArrayShape, MeasuredShape};
 pub use check::Check;
 pub use error::SettingsError;
 pub use figure::{Boundary, Extent, Figure, Provenance, Quantity};

@@ -139,6 +139,13 @@ impl TomlFile for Vehicle {
             self.estimator.method,
             "with known pilots (receiver.pilots) it must be maximum-likelihood",
         )?;
+        check.that(
+            self.array.shape.is_row()
+                || self.estimator.method == EstimatorMethod::MaximumLikelihood,
+            "estimator.method",
+            self.estimator.method,
+            "where the antennas are not in a row (array.shape) it must be maximum-likelihood",
+        )?;
         let tracks = matches!(self.localizer, LocalizerSettings::Tracker(_));
         check.that(
             tracks || self.integrity.is_none(),

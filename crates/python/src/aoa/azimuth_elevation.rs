@@ -10,7 +10,7 @@ use pyo3::exceptions::PyValueError;
 use pyo3::prelude::*;
 
 use super::calibration_of;
-use super::samples::{Samples, Visitor, antennas_error, value_error};
+use super::samples::{Samples, Visitor, for_antennas, value_error};
 
 /// Azimuth and elevation, with what is known about each.
 ///
@@ -271,18 +271,10 @@ pub fn direction_crb_rad(
     let places = places_of(places_wavelengths)?;
     let direction = Direction::new(azimuth_rad, elevation_rad);
     let snr = 10.0_f64.powf(snr_db / 10.0);
-    macro_rules! with_antennas {
-        ($($n:literal)*) => {
-            match places.len() {
-                $($n => {
-                    let array = array_of::<$n>(&places, None)?;
-                    bound::azimuth_elevation(&array, direction, snr, snapshots)
-                })*
-                other => return Err(antennas_error(other)),
-            }
-        };
-    }
-    let [[azimuth, _], [_, elevation]] = with_antennas!(2 3 4 5 6 7 8);
+    let [[azimuth, _], [_, elevation]] = for_antennas!(places.len(), N => {
+        array_of::<N>(&places, None)
+            .map(|array| bound::azimuth_elevation(&array, direction, snr, snapshots))
+    })?;
     Ok((azimuth.sqrt(), elevation.sqrt()))
 }
 

@@ -6,7 +6,7 @@ use pyo3::IntoPyObjectExt;
 use pyo3::exceptions::PyValueError;
 use pyo3::prelude::*;
 
-use super::samples::{antennas_error, value_error};
+use super::samples::{for_antennas, value_error};
 
 /// Cramér–Rao bound: the standard deviation in rad that no unbiased estimator can beat.
 ///
@@ -17,7 +17,7 @@ use super::samples::{antennas_error, value_error};
 /// snr_db : array_like
 ///     SNR per antenna and snapshot, broadcast against `angle_rad`.
 /// antennas, snapshots : int
-///     2 to 8 antennas, at least one snapshot.
+///     2 to 16 antennas, at least one snapshot.
 /// spacing_wavelengths : float
 ///     Distance between neighbouring antennas in wavelengths.
 /// model : {'stochastic', 'deterministic', 'known'}
@@ -108,16 +108,7 @@ pub fn crb_rad<'py>(
     };
     let mut sigmas = Vec::with_capacity(angles.len());
     for (angles, snrs) in angles.chunks(sources).zip(snrs.chunks(sources)) {
-        match antennas {
-            2 => setting.bound::<2>(angles, snrs, &mut sigmas)?,
-            3 => setting.bound::<3>(angles, snrs, &mut sigmas)?,
-            4 => setting.bound::<4>(angles, snrs, &mut sigmas)?,
-            5 => setting.bound::<5>(angles, snrs, &mut sigmas)?,
-            6 => setting.bound::<6>(angles, snrs, &mut sigmas)?,
-            7 => setting.bound::<7>(angles, snrs, &mut sigmas)?,
-            8 => setting.bound::<8>(angles, snrs, &mut sigmas)?,
-            other => return Err(antennas_error(other)),
-        }
+        for_antennas!(antennas, N => setting.bound::<N>(angles, snrs, &mut sigmas))?;
     }
     match (shape.as_slice(), sigmas.as_slice()) {
         ([], [only]) => only.into_bound_py_any(py),

@@ -8,6 +8,23 @@ use numpy::{
 use pyo3::exceptions::PyValueError;
 use pyo3::prelude::*;
 
+/// Evaluates `$body`, a result, with the constant `$N` equal to `$antennas`.
+macro_rules! for_antennas {
+    ($antennas:expr, $N:ident => $body:expr) => {
+        for_antennas!($antennas, $N => $body; 2 3 4 5 6 7 8 9 10 11 12 13 14 15 16)
+    };
+    ($antennas:expr, $N:ident => $body:expr; $($n:literal)*) => {
+        match $antennas {
+            $($n => {
+                const $N: usize = $n;
+                $body
+            })*
+            other => Err($crate::aoa::samples::antennas_error(other)),
+        }
+    };
+}
+pub(super) use for_antennas;
+
 /// Something done to samples of any precision and any number of antennas.
 pub(super) trait Visitor {
     type Output;
@@ -100,21 +117,9 @@ impl<'py> Samples<'py> {
         let samples = array
             .as_slice()
             .map_err(|error| PyValueError::new_err(error.to_string()))?;
-        macro_rules! with_antennas {
-            ($n:literal) => {
-                visitor.visit(Batch::<T, $n>::new(samples, self.snapshots).map_err(value_error)?)
-            };
-        }
-        match self.antennas {
-            2 => with_antennas!(2),
-            3 => with_antennas!(3),
-            4 => with_antennas!(4),
-            5 => with_antennas!(5),
-            6 => with_antennas!(6),
-            7 => with_antennas!(7),
-            8 => with_antennas!(8),
-            other => Err(antennas_error(other)),
-        }
+        for_antennas!(self.antennas, N => {
+            visitor.visit(Batch::<T, N>::new(samples, self.snapshots).map_err(value_error)?)
+        })
     }
 }
 
@@ -124,5 +129,5 @@ pub(super) fn value_error(error: impl std::fmt::Display) -> PyErr {
 }
 
 pub(super) fn antennas_error(antennas: usize) -> PyErr {
-    PyValueError::new_err(format!("2 to 8 antennas are allowed, not {antennas}"))
+    PyValueError::new_err(format!("2 to 16 antennas are allowed, not {antennas}"))
 }

@@ -35,27 +35,25 @@ pub fn covariance<'py>(
 ) -> PyResult<Bound<'py, PyArrayDyn<Complex64>>> {
     let samples = Samples::of(snapshots)?;
     let shape = samples.shape([samples.antennas; 2]);
-    let entries = samples.visit(Entries)?;
-    PyArray1::from_vec(snapshots.py(), entries).reshape(IxDyn(&shape))
+    let py = snapshots.py();
+    let entries = samples.visit(Entries(py))?;
+    PyArray1::from_vec(py, entries).reshape(IxDyn(&shape))
 }
 
-struct Entries;
+struct Entries<'py>(Python<'py>);
 
-impl Visitor for Entries {
+impl Visitor for Entries<'_> {
     type Output = Vec<Complex64>;
 
     fn visit<T: Real, const N: usize>(self, batch: Batch<'_, T, N>) -> PyResult<Vec<Complex64>> {
-        let mut entries = Vec::with_capacity(batch.len() * N * N);
-        for covariance in batch.covariances() {
-            entries.extend(
-                covariance
-                    .map_err(value_error)?
-                    .matrix()
-                    .into_iter()
-                    .flatten(),
-            );
-        }
-        Ok(entries)
+        let entries = self.0.detach(|| {
+            let mut entries = Vec::with_capacity(batch.len() * N * N);
+            for covariance in batch.covariances() {
+                entries.extend(covariance?.matrix().into_iter().flatten());
+            }
+            Ok(entries)
+        });
+        entries.map_err(|error: aoa::Error| value_error(error))
     }
 }
 
@@ -150,24 +148,27 @@ pub fn estimate_sources<'py>(
             )));
         }
     };
-    let counts = samples.visit(Counts(criterion))?;
+    let counts = samples.visit(Counts { criterion, py })?;
     match (samples.batch, counts.as_slice()) {
         (None, [only]) => only.into_bound_py_any(py),
         _ => PyArray1::from_vec(py, counts).into_bound_py_any(py),
     }
 }
 
-struct Counts(Criterion);
+struct Counts<'py> {
+    criterion: Criterion,
+    py: Python<'py>,
+}
 
-impl Visitor for Counts {
+impl Visitor for Counts<'_> {
     type Output = Vec<i64>;
 
     fn visit<T: Real, const N: usize>(self, batch: Batch<'_, T, N>) -> PyResult<Vec<i64>> {
         let count = |covariance: Result<Covariance<N>, aoa::Error>| {
-            let sources = aoa::source_count(self.0, &covariance.map_err(value_error)?);
-            sources.map(|sources| sources as i64).map_err(value_error)
+            aoa::source_count(self.criterion, &covariance?).map(|sources| sources as i64)
         };
-        batch.covariances().map(count).collect()
+        let counts = (self.py).detach(|| batch.covariances().map(count).collect::<Result<_, _>>());
+        counts.map_err(value_error)
     }
 }
 

@@ -2,12 +2,10 @@
 
 use std::sync::{Mutex, PoisonError};
 
-use nr_ssb::Lmax;
 use nr_ssb::receiver::{HeardSsb, Receiver as Core, ReceiverConfig, ReceiverError};
 use num_complex::Complex32;
 use pyo3::prelude::*;
 
-use super::channel::Channel;
 use super::{Cell, complex_samples, rows, subcarrier_spacing};
 use crate::recording::RecordingError;
 
@@ -154,40 +152,11 @@ impl Receiver {
             let base = receiver.config().sample_rate_hz / spacing.base_rate_hz();
             let mut cells = Vec::new();
             call(&mut receiver, &mut |ssb| {
-                cells.push(cell(ssb, ssb_freq_hz, spacing.khz(), base));
+                cells.push(Cell::heard(ssb, ssb_freq_hz, spacing, base));
             })?;
             PyResult::Ok(cells)
         })?;
         cells.into_iter().map(|cell| Py::new(py, cell)).collect()
-    }
-}
-
-fn cell(ssb: &HeardSsb, ssb_freq_hz: f64, scs_khz: u32, samples_per_base: f64) -> Cell {
-    let measured = &ssb.measurements;
-    Cell {
-        pci: ssb.pci.get(),
-        ssb_index: ssb.ssb_index,
-        lmax: ssb.lmax.map(Lmax::count),
-        half_frame: ssb.half_frame.map(u8::from),
-        sfn: ssb.payload.map(|payload| payload.sfn()),
-        mib_bits: ssb.payload.map(|payload| payload.mib.bit_string()),
-        cfo_hz: ssb.cfo_hz,
-        snr_db: ssb.snr_db,
-        sample_start: ssb.sample_start,
-        sample_count: onboard::receive::SSB_SAMPLES as f64 * samples_per_base,
-        ssb_freq_hz,
-        scs_khz,
-        rsrp_dbfs: measured.iter().map(|it| it.ss_rsrp_dbfs).collect(),
-        rsrq_db: measured.iter().map(|it| it.ss_rsrq_db).collect(),
-        sinr_db: measured.iter().map(|it| it.ss_sinr_db).collect(),
-        angle_rad: None,
-        sigma_rad: None,
-        phase_rad: None,
-        phase_sigma_rad: None,
-        azimuth_rad: None,
-        verdict: None,
-        channel: Channel(ssb.channel.clone()),
-        noise_variance: ssb.noise_variance.clone(),
     }
 }
 

@@ -4,9 +4,9 @@ use std::sync::{Mutex, PoisonError};
 
 use num_complex::Complex64;
 use pyo3::prelude::*;
-use recording::scan::{ArraySetup, SsbSearch, SsbSearchConfig};
+use recording::scan::{SsbSearch, SsbSearchConfig};
 
-use super::{Cell, complex_samples, rows, scan_error, subcarrier_spacing};
+use super::{Cell, array_setup, complex_samples, rows, scan_error, subcarrier_spacing};
 
 /// Search for the SSBs of one frequency, prepared once and used for one recording after another.
 ///
@@ -28,6 +28,8 @@ use super::{Cell, complex_samples, rows, scan_error, subcarrier_spacing};
 ///     Number of antennas, 1 to 16; angles come with 2 to 8.
 /// spacing_wavelengths : float
 ///     Distance between neighbouring antennas.
+/// places_wavelengths : list of (float, float), optional
+///     Where the antennas are in a horizontal plane, in wavelengths, if they are not in a row.
 /// calibration : array_like, optional
 ///     Complex gain of each channel, by which it is divided.
 ///
@@ -54,7 +56,8 @@ pub struct Searcher(Mutex<SsbSearch>);
 #[pymethods]
 impl Searcher {
     #[new]
-    #[pyo3(signature = (sample_rate_hz, *, centre_frequency_hz, ssb_freq_hz, scs_khz, antennas, spacing_wavelengths = 0.5, calibration = None))]
+    #[allow(clippy::too_many_arguments)]
+    #[pyo3(signature = (sample_rate_hz, *, centre_frequency_hz, ssb_freq_hz, scs_khz, antennas, spacing_wavelengths = 0.5, places_wavelengths = None, calibration = None))]
     fn new(
         sample_rate_hz: f64,
         centre_frequency_hz: f64,
@@ -62,13 +65,11 @@ impl Searcher {
         scs_khz: u32,
         antennas: usize,
         spacing_wavelengths: f64,
+        places_wavelengths: Option<Vec<[f64; 2]>>,
         calibration: Option<Vec<Complex64>>,
     ) -> PyResult<Self> {
         let config = SsbSearchConfig {
-            array: ArraySetup {
-                spacing_wavelengths,
-                calibration,
-            },
+            array: array_setup(spacing_wavelengths, places_wavelengths, calibration),
             ..SsbSearchConfig::new(
                 sample_rate_hz,
                 centre_frequency_hz,

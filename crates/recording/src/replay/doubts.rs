@@ -84,17 +84,17 @@ pub fn doubts(
         doubts.push((start_s, text));
     }
 
-    let slope = TAU * vehicle.array.spacing_wavelengths;
+    let measurand = vehicle.array.measurand();
     let both = angles.iter().filter(|it| it.measured.angle_rad.is_finite());
     let contradicts = |it: &&LoggedAngle| {
-        let expected = slope * it.measured.angle_rad.cos();
+        let expected = measurand.value_rad(it.measured.angle_rad, 1.0);
         wrap_angle(it.measured.phase_rad - expected).abs() > CONTRADICTION_RAD
     };
     let contradicting = both.clone().filter(contradicts).count();
     if 10 * contradicting > both.count() {
         let text = format!(
-            "{contradicting} of {} angles have a phase_rad that is not 2π d/λ cos angle_rad; \
-             phase_rad is used; check which is which, and array.spacing_wavelengths",
+            "{contradicting} of {} angles have a phase_rad that is not 2π d/λ cos angle_rad (in a row; \
+             else angle_rad itself); phase_rad is used; check which is which, and the array's settings",
             angles.len()
         );
         doubts.push((start_s, text));

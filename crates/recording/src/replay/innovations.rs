@@ -58,9 +58,9 @@ pub fn innovations(
         tracker.set_gate(f64::INFINITY);
     }
     let mut odometry = odometry.samples.iter().peekable();
-    let spacing = vehicle.array.spacing_wavelengths;
+    let measurand = vehicle.array.measurand();
     let met = angles.iter().enumerate().map(|(index, logged)| {
-        let mut measured = with_phase(logged, spacing).measured;
+        let mut measured = with_phase(logged, &measurand).measured;
         measured.time_s -= vehicle.receiver.lateness_s;
         while let Some(sample) = odometry.next_if(|sample| sample.time_s <= measured.time_s) {
             tracker.odometry(sample);

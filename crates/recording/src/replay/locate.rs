@@ -41,8 +41,8 @@ pub fn locate_angles(
         replay.remark(remark.time_s, remark.to_string());
     }
     let logged = angles.angles.as_slice();
-    let spacing = vehicle.array.spacing_wavelengths;
-    let angles: Vec<LoggedAngle> = logged.iter().map(|it| with_phase(it, spacing)).collect();
+    let measurand = vehicle.array.measurand();
+    let angles: Vec<LoggedAngle> = logged.iter().map(|it| with_phase(it, &measurand)).collect();
     for (time_s, text) in doubts(site, &vehicle, odometry, &angles)? {
         replay.remark(time_s, text);
     }

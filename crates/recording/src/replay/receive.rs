@@ -38,7 +38,7 @@ pub fn receive_recording(
         file: file.clone(),
         source,
     };
-    let elements = receiver.config().calibration.len();
+    let elements = usize::from(receiver.config().array.elements);
     let found = recording.channels();
     if found != elements {
         return Err(receive_failed(ReceiveError::Antennas { found, elements }));

@@ -2,6 +2,7 @@
 
 use std::f64::consts::TAU;
 
+use onboard::manifold::Measurand;
 use onboard::settings::{DriveKind, Site, Vehicle};
 
 use crate::angle_log::LoggedAngle;
@@ -33,17 +34,24 @@ pub fn as_stated(site: &Site, vehicle: &Vehicle) -> (Site, Vehicle) {
     (site, vehicle)
 }
 
-/// The electrical angle for one that was logged as the angle from the array's axis.
-pub fn with_phase(logged: &LoggedAngle, spacing_wavelengths: f64) -> LoggedAngle {
-    let slope = TAU * spacing_wavelengths;
+/// The electrical angle of a row for one that was logged as the angle from the array's axis; of any
+/// other array that is what is measured.
+pub fn with_phase(logged: &LoggedAngle, measurand: &Measurand) -> LoggedAngle {
     let mut logged = *logged;
     let measured = &mut logged.measured;
     if measured.phase_rad.is_nan() {
-        let (sin, cos) = measured.angle_rad.sin_cos();
-        let sigma = measured.phase_sigma_rad;
-        measured.phase_rad = slope * cos;
-        // Along the axis the angle moves the phase by its square.
-        measured.phase_sigma_rad = slope * sigma * sin.abs().hypot(sigma * cos);
+        measured.phase_rad = measurand.value_rad(measured.angle_rad, 1.0);
+        if let Measurand::ElectricalAngle {
+            spacing_wavelengths,
+            ..
+        } = measurand
+        {
+            let (sin, cos) = measured.angle_rad.sin_cos();
+            let sigma = measured.phase_sigma_rad;
+            // Along the axis the angle moves the phase by its square.
+            measured.phase_sigma_rad =
+                TAU * spacing_wavelengths * sigma * sin.abs().hypot(sigma * cos);
+        }
     }
     logged
 }

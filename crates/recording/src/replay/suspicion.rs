@@ -56,13 +56,13 @@ impl Foretold {
             &drive.angles,
             None,
         )?;
-        let spacing = drive.vehicle.array.spacing_wavelengths;
+        let measurand = drive.vehicle.array.measurand();
         // Per standard deviation of the measurement: so it does not matter in what it is told.
         let log_likelihood = |(met, logged): (&Option<Met>, &LoggedAngle)| {
             let gaussian = met.map_or(0.0, |met| {
                 (-0.5 * met.residual_rad.powi(2) / met.variance).exp() / (TAU * met.variance).sqrt()
             });
-            let sigma_rad = with_phase(logged, spacing).measured.phase_sigma_rad;
+            let sigma_rad = with_phase(logged, &measurand).measured.phase_sigma_rad;
             (sigma_rad * ((1.0 - FROM_ANYWHERE) * gaussian + FROM_ANYWHERE / TAU)).ln()
         };
         let refused = met.iter().filter(|met| met.is_none_or(|met| !met.used));

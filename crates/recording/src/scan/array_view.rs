@@ -1,17 +1,23 @@
 //! The angle of one SSB, for arrays of any number of antennas that the crates know.
 
-use aoa::{AngleEstimate, Array, Calibration, maximum_likelihood_pilots};
+use aoa::{
+    AngleEstimate, Array, Calibration, DirectionEstimate, DirectionFinder,
+    maximum_likelihood_pilots,
+};
 use nr_ssb::search::ReceivedSsb;
 use num_complex::Complex64;
 
+use onboard::manifold::ArrayManifold;
 use onboard::receive::despread::Despread;
-use onboard::receive::wideband::line_of_sight;
-use onboard::settings::Pilots;
+use onboard::receive::wideband::{line_of_sight, of_a_row};
+use onboard::settings::{ArrayShape, Pilots};
 
 /// The receiving array.
 #[derive(Debug, Clone, PartialEq)]
 pub struct ArraySetup {
-    /// Distance between neighbouring antennas in wavelengths.
+    /// How the antennas stand.
+    pub shape: ArrayShape,
+    /// Distance between neighbouring antennas in wavelengths, in a row or around a circle.
     pub spacing_wavelengths: f64,
     /// Complex gain of each channel, by which it is divided; ideal channels without.
     pub calibration: Option<Vec<Complex64>>,
@@ -20,8 +26,28 @@ pub struct ArraySetup {
 impl Default for ArraySetup {
     fn default() -> Self {
         Self {
+            shape: ArrayShape::default(),
             spacing_wavelengths: 0.5,
             calibration: None,
+        }
+    }
+}
+
+/// What an array tells of where an SSB comes from.
+#[derive(Debug, Clone, Copy, PartialEq)]
+pub enum FoundAngle {
+    /// Antennas in a row: the angle from it.
+    FromRow(AngleEstimate),
+    /// Any others: azimuth from the array's axis, and elevation.
+    Direction(DirectionEstimate),
+}
+
+impl FoundAngle {
+    /// What antennas in a row tell.
+    pub const fn from_row(self) -> Option<AngleEstimate> {
+        match self {
+            Self::FromRow(estimate) => Some(estimate),
+            Self::Direction(_) => None,
         }
     }
 }
@@ -29,7 +55,7 @@ impl Default for ArraySetup {
 /// Angle, and the array's response as it was received, calibration taken out.
 #[derive(Debug, Clone, PartialEq)]
 pub(super) struct View {
-    pub estimate: AngleEstimate,
+    pub angle: FoundAngle,
     /// One snapshot per OFDM symbol, noise power one.
     pub blocks: Vec<Vec<Complex64>>,
 }
@@ -63,6 +89,8 @@ pub(super) fn array_view(
 
 struct Looker<const A: usize> {
     array: Array<A>,
+    /// Of antennas that are not in a row.
+    finder: Option<DirectionFinder<ArrayManifold<A>, A>>,
     calibration: Calibration<A>,
 }
 
@@ -74,7 +102,9 @@ impl<const A: usize> Looker<A> {
                 .map_err(|_| aoa::Error::CalibrationGain(gains.len().min(A)))?;
             calibration = Calibration::new(gains)?;
         }
+        let manifold = ArrayManifold::new(&setup.shape, setup.spacing_wavelengths)?;
         Ok(Self {
+            finder: manifold.map(ArrayManifold::finder).transpose()?,
             array: Array::new(setup.spacing_wavelengths)?,
             calibration,
         })
@@ -89,12 +119,18 @@ impl<const A: usize> ArrayView for Looker<A> {
         let gains = self.calibration.gains().map(|gain| scale / gain);
         let despread = Despread::new(elements, ssb.known, Pilots::Ssb, 0.0).scaled(&gains);
         let blocks: Vec<[Complex64; A]> = despread.blocks().collect();
-        let told = line_of_sight(&despread);
-        let looked_at = told
-            .as_ref()
-            .map_or(&blocks[..], |told| std::slice::from_ref(&told.block));
-        let estimate = maximum_likelihood_pilots(looked_at, Some(1.0), &self.array).ok()?;
+        let angle = if let Some(finder) = &self.finder {
+            let beam = |u: &_| ArrayManifold::strongest_beam(finder, u);
+            let told = line_of_sight(&despread, beam).map(|told| [told.block]);
+            let looked_at = told.as_ref().map_or(&blocks[..], |block| block);
+            FoundAngle::Direction(finder.estimate_pilots(looked_at, Some(1.0)).ok()?)
+        } else {
+            let told = line_of_sight(&despread, of_a_row).map(|told| [told.block]);
+            let looked_at = told.as_ref().map_or(&blocks[..], |block| block);
+            let found = maximum_likelihood_pilots(looked_at, Some(1.0), &self.array);
+            FoundAngle::FromRow(found.ok()?)
+        };
         let blocks = blocks.iter().map(|block| block.to_vec()).collect();
-        Some(View { estimate, blocks })
+        Some(View { angle, blocks })
     }
 }

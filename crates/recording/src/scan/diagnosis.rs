@@ -7,7 +7,7 @@ use nr_ssb::Complex32;
 use nr_ssb::diagnose::{Fault, diagnose};
 use num_complex::Complex64;
 
-use super::array_view::View;
+use super::array_view::{FoundAngle, View};
 
 /// Channels are judged exchanged only on SSBs of at least this SNR per symbol, in dB.
 const SWAP_SNR_DB: f64 = 10.0;
@@ -101,7 +101,11 @@ pub(super) struct ExchangeVotes {
 impl ExchangeVotes {
     /// Takes the vote of an SSB as the array saw it.
     pub fn vote(&mut self, view: &View) {
-        if view.estimate.snr_db < SWAP_SNR_DB {
+        // Elsewhere than in a row exchanged antennas see a wave from elsewhere.
+        let FoundAngle::FromRow(estimate) = view.angle else {
+            return;
+        };
+        if estimate.snr_db < SWAP_SNR_DB {
             return;
         }
         let antennas = view.blocks.first().map_or(0, Vec::len);

@@ -9,7 +9,7 @@ mod looked;
 mod scanner;
 mod ssb_search;
 
-pub use array_view::ArraySetup;
+pub use array_view::{ArraySetup, FoundAngle};
 pub use diagnosis::ChannelFault;
 pub use error::ScanError;
 pub use iq_source::{IqSource, SampleBlock};

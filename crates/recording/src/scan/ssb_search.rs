@@ -6,7 +6,7 @@ use nr_ssb::grid::SUBCARRIERS;
 use nr_ssb::search::{DetectedSsb, SearchConfig, SearchError, Searcher};
 use nr_ssb::{Complex32, Pci, SubcarrierSpacing};
 
-use super::array_view::{ArraySetup, ArrayView, View, array_view};
+use super::array_view::{ArraySetup, ArrayView, FoundAngle, View, array_view};
 use super::diagnosis::ExchangeVotes;
 use super::error::ScanError;
 use super::iq_source::first_not_finite;
@@ -82,7 +82,7 @@ pub struct FoundSsb {
     /// Its subcarrier spacing.
     pub spacing: SubcarrierSpacing,
     /// Angle of arrival, with two antennas and more.
-    pub angle: Option<aoa::AngleEstimate>,
+    pub angle: Option<FoundAngle>,
     /// Per antenna the channel on the SSB's subcarriers, as received, delay and offset taken out.
     pub channel: Vec<[Complex32; SUBCARRIERS]>,
     /// Variance of the noise on a resource element, per antenna, in the channel's scale squared.
@@ -262,7 +262,7 @@ impl SsbSearch {
                 sample_count: SSB_SAMPLES as f64 * ratio,
                 ssb_freq_hz: config.ssb_freq_hz,
                 spacing: config.spacing,
-                angle: view.map(|view| view.estimate),
+                angle: view.map(|view| view.angle),
                 channel,
                 noise_variance,
                 ssb: ssb.clone(),

@@ -4,15 +4,16 @@
 use std::f64::consts::TAU;
 
 use num_complex::Complex64;
+use onboard::observation::MAX_ELEMENTS;
 use rand::RngExt;
 
 use super::blockage::Blockage;
-use super::phasor::phasor;
 use super::propagation::{Link, Propagation};
 use super::shadowing::Shadowing;
+use crate::phasor::phasor;
 use crate::random::Purpose;
 use crate::scenario::{ChannelSettings, ScatterModel};
-use crate::world::LineOfSight;
+use crate::world::{Antennas, LineOfSight};
 
 /// The propagation from one radio head in one run.
 ///
@@ -41,8 +42,8 @@ struct Ray {
     cosine: f64,
     /// Its amplitude at the start.
     start: Complex64,
-    /// Phase step from antenna to antenna.
-    step: Complex64,
+    /// Its cosine to the left.
+    left: f64,
     /// Delay after the line of sight, in seconds.
     delay_s: f64,
 }
@@ -64,17 +65,18 @@ impl RicianPropagation {
             ScatterModel::PerAntenna => per_antenna * usize::from(vehicle.array.elements),
             ScatterModel::Rays => per_antenna,
         };
-        let element_rad = TAU * vehicle.array.spacing_wavelengths;
         let spread_s = 1e-9 * settings.delay_spread_ns;
         let mut delays = streams.generator(Purpose::ScatterDelay, head);
+        let mut turns = streams.generator(Purpose::ScatterTurn, head);
         let rays = (0..count)
             .map(|_| {
                 // Uniform over the sphere is uniform in the cosine to any axis (Archimedes).
                 let cosine = 2.0 * rng.random::<f64>() - 1.0;
+                let beside = (1.0 - cosine * cosine).sqrt();
                 Ray {
                     cosine,
                     start: Complex64::cis(rng.random::<f64>() * TAU),
-                    step: Complex64::cis(element_rad * cosine),
+                    left: beside * (TAU * turns.random::<f64>()).cos(),
                     // Exponential: mean and standard deviation are the spread.
                     delay_s: -spread_s * (1.0 - delays.random::<f64>()).ln(),
                 }
@@ -98,17 +100,20 @@ impl Propagation for RicianPropagation {
         self.shadowing.next_db(sight.along_m)
     }
 
-    fn response(&self, sight: &LineOfSight, step_hz: f64, elements: usize, into: &mut [Complex64]) {
+    fn response(
+        &self,
+        sight: &LineOfSight,
+        antennas: &Antennas,
+        step_hz: f64,
+        into: &mut [Complex64],
+    ) {
+        let elements = antennas.elements();
         let turn = -self.wavenumber_per_m * sight.distance_m;
         let passing = self.blockage.amplitude(sight.time_s);
         let direct = Complex64::from_polar(self.line_of_sight * passing, turn);
-        let step = Complex64::cis(sight.phase_rad);
+        into.fill(Complex64::ZERO);
         for gains in into.chunks_exact_mut(elements) {
-            let mut gain = Complex64::ONE;
-            for into in gains {
-                *into = gain * direct;
-                gain *= step;
-            }
+            antennas.add(direct, sight.towards, gains);
         }
         let first_hz = -((into.len() / elements / 2) as f64) * step_hz;
         let per_antenna = self.rays.len() / elements;
@@ -126,6 +131,11 @@ impl Propagation for RicianPropagation {
                 wave *= phasor(-TAU * first_hz * ray.delay_s);
                 turn = phasor(-TAU * step_hz * ray.delay_s);
             }
+            let mut response = [Complex64::ZERO; MAX_ELEMENTS];
+            if let (ScatterModel::Rays, Some(response)) = (self.model, response.get_mut(..elements))
+            {
+                antennas.add(Complex64::ONE, [ray.cosine, ray.left], response);
+            }
             for gains in into.chunks_exact_mut(elements).take(count) {
                 match self.model {
                     ScatterModel::PerAntenna => {
@@ -134,10 +144,8 @@ impl Propagation for RicianPropagation {
                         }
                     }
                     ScatterModel::Rays => {
-                        let mut here = wave;
-                        for gain in gains {
-                            *gain += here;
-                            here *= ray.step;
+                        for (gain, response) in gains.iter_mut().zip(&response) {
+                            *gain += wave * response;
                         }
                     }
                 }
@@ -200,21 +208,25 @@ mod tests {
     }
 
     fn sight(phase_rad: f64, along_m: f64) -> LineOfSight {
+        let along = phase_rad / (0.5 * TAU);
         LineOfSight {
-            phase_rad,
+            towards: [along, (1.0 - along * along).sqrt()],
             distance_m: 0.0,
             place: Point::default(),
             axis_rad: 0.0,
-            element_rad: 0.5 * TAU,
             along_m,
             time_s: 0.0,
         }
     }
 
+    fn row() -> Antennas {
+        Antennas::new(&Vehicle::from_library("paper", &Shipped).unwrap().array)
+    }
+
     /// Gains at the carrier beside the radio head.
     fn gains(fading: &RicianPropagation, phase_rad: f64, along_m: f64) -> [Complex64; ELEMENTS] {
         let mut gains = [Complex64::ZERO; ELEMENTS];
-        fading.response(&sight(phase_rad, along_m), 0.0, ELEMENTS, &mut gains);
+        fading.response(&sight(phase_rad, along_m), &row(), 0.0, &mut gains);
         gains
     }
 
@@ -301,8 +313,8 @@ mod tests {
                 let mut gains = [Complex64::ZERO; 4 * ELEMENTS];
                 fading(&site, model, 300.0, Streams::new(5, run)).response(
                     &sight(0.0, 3.0),
+                    &row(),
                     step_hz,
-                    ELEMENTS,
                     &mut gains,
                 );
                 for (sum, there) in sums.iter_mut().zip(gains.chunks_exact(ELEMENTS)) {

@@ -95,11 +95,11 @@ impl HeadChannel {
         step_hz: f64,
         into: &mut [Complex64],
     ) {
-        let elements = self.array.elements();
+        let antennas = self.array.antennas();
         let sight = self.array.line_of_sight(vehicle, &self.head);
-        (self.propagation).response(&sight, step_hz, elements, into);
+        (self.propagation).response(&sight, antennas, step_hz, into);
         let amplitude = 10f64.powf(0.05 * snr_db);
-        for gains in into.chunks_exact_mut(elements) {
+        for gains in into.chunks_exact_mut(antennas.elements()) {
             for gain in gains.iter_mut() {
                 *gain *= amplitude;
             }
@@ -117,7 +117,7 @@ impl HeadChannel {
                 snr_db: 0.0,
             },
             gains: [Complex64::ZERO; MAX_ELEMENTS],
-            elements: self.array.elements(),
+            elements: self.array.antennas().elements(),
         };
         self.response(vehicle, snr_db, 0.0, reception.gains_mut());
         let gains = reception.gains();

@@ -5,7 +5,6 @@ mod blockage;
 mod fading;
 mod head_channel;
 mod iq;
-mod phasor;
 mod propagation;
 mod shadowing;
 pub mod tr38901;

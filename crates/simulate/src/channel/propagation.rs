@@ -6,7 +6,7 @@ use onboard::road::Road;
 use onboard::settings::{Site, Vehicle};
 
 use crate::random::Streams;
-use crate::world::LineOfSight;
+use crate::world::{Antennas, LineOfSight};
 
 /// How the signal of one radio head comes to the antennas, in one run. To write one, copy
 /// [`RicianPropagation`](super::RicianPropagation).
@@ -20,8 +20,14 @@ pub trait Propagation: Send {
 
     /// Gains of the antennas, of unit mean power, at frequencies `step_hz` apart, the carrier in
     /// their middle (of an even number, just above it): antenna after antenna, frequency after
-    /// frequency, into chunks of `elements`.
-    fn response(&self, sight: &LineOfSight, step_hz: f64, elements: usize, into: &mut [Complex64]);
+    /// frequency, into chunks of as many as there are antennas.
+    fn response(
+        &self,
+        sight: &LineOfSight,
+        antennas: &Antennas,
+        step_hz: f64,
+        into: &mut [Complex64],
+    );
 }
 
 /// What lies between one radio head and the vehicle in one run.

@@ -1,7 +1,5 @@
 //! How the array really sits on the vehicle, and what its phase calibration leaves.
 
-use std::f64::consts::TAU;
-
 use num_complex::Complex64;
 use onboard::geometry::Point;
 use onboard::radio_head::RadioHead;
@@ -10,6 +8,7 @@ use rand::RngExt;
 use rand_chacha::ChaCha8Rng;
 use rand_distr::StandardNormal;
 
+use super::antennas::{Antennas, steer};
 use super::path::VehicleState;
 
 /// The array of one run: as drawn at the start, then walking at random over the distance driven.
@@ -17,6 +16,7 @@ use super::path::VehicleState;
 pub struct TrueArray {
     /// As it is at the start; its standard deviations have been drawn from already.
     settings: ArraySettings,
+    antennas: Antennas,
     rng: ChaCha8Rng,
     along_m: f64,
 }
@@ -24,16 +24,14 @@ pub struct TrueArray {
 /// The line of sight from a radio head.
 #[derive(Debug, Clone, Copy, PartialEq)]
 pub struct LineOfSight {
-    /// Electrical angle in radians, not wrapped.
-    pub phase_rad: f64,
+    /// Horizontal part of the unit vector to the radio head, along the array's axis and to its left.
+    pub towards: [f64; 2],
     /// Length in metres.
     pub distance_m: f64,
     /// Where the middle of the array is.
     pub place: Point,
     /// Direction of its axis in the map's frame, in radians.
     pub axis_rad: f64,
-    /// Phase in radians from antenna to antenna of a wave that comes along the axis.
-    pub element_rad: f64,
     /// Distance driven in metres.
     pub along_m: f64,
     /// Time in seconds.
@@ -42,8 +40,9 @@ pub struct LineOfSight {
 
 impl TrueArray {
     /// An array that is so at the start; `rng` draws how it walks.
-    pub const fn new(settings: ArraySettings, rng: ChaCha8Rng) -> Self {
+    pub fn new(settings: ArraySettings, rng: ChaCha8Rng) -> Self {
         Self {
+            antennas: Antennas::new(&settings),
             settings,
             rng,
             along_m: 0.0,
@@ -55,9 +54,9 @@ impl TrueArray {
         &self.settings
     }
 
-    /// Number of antennas.
-    pub fn elements(&self) -> usize {
-        self.settings.elements.into()
+    /// Its antennas.
+    pub const fn antennas(&self) -> &Antennas {
+        &self.antennas
     }
 
     /// Moves on to this distance along the road; to be called once for each SSB, in order.
@@ -77,13 +76,12 @@ impl TrueArray {
         let level = eye.distance_m(head.position) / distance_m;
         let axis_rad = vehicle.pose.heading_rad + self.settings.mounting_rad;
         let to_axis_rad = eye.bearing_rad(head.position) - axis_rad;
-        let element_rad = TAU * self.settings.spacing_wavelengths;
+        let (left, along) = to_axis_rad.sin_cos();
         LineOfSight {
-            phase_rad: element_rad * level * to_axis_rad.cos(),
+            towards: [level * along, level * left],
             distance_m,
             place: eye,
             axis_rad,
-            element_rad,
             along_m: vehicle.along_m,
             time_s: vehicle.time_s,
         }
@@ -106,19 +104,6 @@ impl TrueArray {
     /// What the array makes of the field at its antennas: each channel runs ahead of the one before.
     pub fn turn(&self, gains: &mut [Complex64]) {
         steer(gains, self.settings.phase_rad);
-    }
-}
-
-/// Turns a wave by `phase_rad` from antenna to antenna.
-pub fn steer(gains: &mut [Complex64], phase_rad: f64) {
-    if phase_rad == 0.0 {
-        return;
-    }
-    let step = Complex64::cis(phase_rad);
-    let mut turn = Complex64::ONE;
-    for gain in gains {
-        *gain *= turn;
-        turn *= step;
     }
 }
 

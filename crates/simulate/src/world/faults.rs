@@ -4,7 +4,7 @@ use num_complex::Complex64;
 use onboard::observation::OdometrySample;
 use onboard::radio_head::RadioHead;
 
-use super::array::{TrueArray, steer};
+use super::array::TrueArray;
 use super::path::VehicleState;
 use crate::scenario::{FaultKind, FaultSettings};
 
@@ -53,13 +53,16 @@ impl Faults {
                 FaultKind::NonLineOfSight {
                     radio_head,
                     bias_rad,
-                } if radio_head == index => steer(gains, bias_rad),
+                } if radio_head == index => {
+                    let towards = array.line_of_sight(vehicle, head).towards;
+                    array.antennas().displace(towards, bias_rad, gains);
+                }
                 FaultKind::MovedHead { radio_head, by_m } if radio_head == index => {
                     let mut moved = *head;
                     moved.position.x_m += by_m[0];
                     moved.position.y_m += by_m[1];
-                    let phase_rad = |head| array.line_of_sight(vehicle, head).phase_rad;
-                    steer(gains, phase_rad(&moved) - phase_rad(head));
+                    let towards = |head| array.line_of_sight(vehicle, head).towards;
+                    (array.antennas()).redirect(towards(head), towards(&moved), gains);
                 }
                 FaultKind::StuckAntenna { antenna } => {
                     if let Some(gain) = gains.get_mut(antenna) {

@@ -1,11 +1,13 @@
 //! What moves and what measures it, as it really is.
 
+mod antennas;
 mod array;
 mod faults;
 mod motion_profile;
 mod odometer;
 mod path;
 
+pub use antennas::Antennas;
 pub use array::{LineOfSight, TrueArray};
 pub use faults::Faults;
 pub use motion_profile::{Motion, MotionProfile};

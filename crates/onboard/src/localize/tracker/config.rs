@@ -192,8 +192,7 @@ impl TrackerConfig {
         Self {
             drive: vehicle.drive,
             array: ArrayModel {
-                elements: array.elements,
-                spacing_wavelengths: array.spacing_wavelengths,
+                measurand: array.measurand(),
                 wavelength_m: site.wavelength_m(),
                 position_m: array.position_m,
                 position_std_m: array.position_std_m,
@@ -266,7 +265,7 @@ impl TrackerConfig {
     /// counts for more than one: where successive errors cancel, they do so at one spacing and for
     /// a moment.
     pub fn look_variance(&self, travelled_m: f64, sighting: &Sighting) -> f64 {
-        let scatter = self.array.scatter_variance(self.rician_k);
+        let scatter = (self.array.measurand).scatter_variance(self.rician_k, sighting.aperture);
         let correlation = self
             .array
             .correlation(travelled_m, sighting.toward)

@@ -4,6 +4,7 @@
 use super::state::{ACROSS, ALONG, HEADING, MOUNTING, PHASE, STATES};
 use crate::geometry::Pose;
 use crate::localize::gaussian::Matrix;
+use crate::manifold::Measurand;
 use crate::radio_head::RadioHead;
 
 /// Distance below which a radio head has no direction (m).
@@ -12,10 +13,8 @@ const NEAREST_M: f64 = 0.05;
 /// What the array turns an angle into.
 #[derive(Clone, Copy, Debug, PartialEq)]
 pub struct ArrayModel {
-    /// Number of antennas N.
-    pub elements: u8,
-    /// Distance between neighbours in wavelengths, `d/λ`.
-    pub spacing_wavelengths: f64,
+    /// What is measured with it.
+    pub measurand: Measurand,
     /// Wavelength λ in metres.
     pub wavelength_m: f64,
     /// Place of its middle from the odometer's point `[forward, left, up]`, in metres.
@@ -25,26 +24,6 @@ pub struct ArrayModel {
 }
 
 impl ArrayModel {
-    /// Least variance (rad²) of the electrical angle that scatter of the given Rician K (power
-    /// ratio) leaves in one look, however strong the signal: the Cramér–Rao bound of one snapshot
-    /// at an SNR of K, `6 / (K N (N² − 1))`, which is `1/(10 K)` for four antennas.
-    pub fn scatter_bound(&self, rician_k: f64) -> f64 {
-        let n = f64::from(self.elements);
-        6.0 / (rician_k * n * (n * n - 1.0))
-    }
-
-    /// Variance (rad²) that the best estimate has, to the second order in 1/K.
-    ///
-    /// The maximum of `|Σ (1 + ε_n) e^{−jωm}|²` over ω, for scatter `ε_n` of variance 1/K and the
-    /// antennas' places `m` from their middle, expanded to the third order in ε, has the variance
-    /// `(1 + (1 + κ) / (2 N K))` times the bound, with `κ = N Σm⁴/(Σm²)²`, which is
-    /// `(9 N² − 21) / (5 (N² − 1))`: 1.64 for four antennas.
-    pub fn scatter_variance(&self, rician_k: f64) -> f64 {
-        let n = f64::from(self.elements);
-        let kurtosis = (9.0 * n * n - 21.0) / (5.0 * (n * n - 1.0));
-        self.scatter_bound(rician_k) * (1.0 + (1.0 + kurtosis) / (2.0 * n * rician_k))
-    }
-
     /// How much of a look's scatter stays when looks are averaged that lie `travelled_m` apart, as
     /// a multiple of what independent looks would leave.
     ///
@@ -87,12 +66,12 @@ impl Footing {
     };
 }
 
-/// Predicted electrical angle `ω = 2π (d/λ) cos ε cos α + ω₀`, `α = β − φ − μ`, and how it changes
-/// with the state, for bearing β and elevation ε of the radio head as the array sees it, heading φ,
-/// mounting angle μ and phase offset ω₀.
+/// Predicted electrical angle `ω = 2π (d/λ) cos ε cos α + ω₀`, or azimuth α, `α = β − φ − μ`, and how
+/// it changes with the state, for bearing β and elevation ε of the radio head as the array sees it,
+/// heading φ, mounting angle μ and phase offset ω₀.
 #[derive(Clone, Copy, Debug, PartialEq)]
 pub struct Sighting {
-    /// Electrical angle (rad), not wrapped.
+    /// Electrical angle, not wrapped, or azimuth (rad).
     pub phase_rad: f64,
     /// Its derivative by each state.
     pub row: [f64; STATES],
@@ -103,13 +82,16 @@ pub struct Sighting {
     /// Variance (rad²) of the electrical angle by the surveys of radio head and array; it stays
     /// for as long as the radio head is seen from the same side.
     pub survey_variance: f64,
+    /// `A` of the Cramér–Rao bound `1/(2ρA)`; see [`Measurand::aperture`].
+    pub aperture: f64,
     /// Derivative of α by each state.
     turn: [f64; STATES],
     /// Steps of the place by each state towards the radio head and to the left of it.
     sight: [[f64; STATES]; 2],
     /// Horizontal distance of the radio head (m).
     ground_m: f64,
-    /// `2π (d/λ) cos ε` times cosine and sine of α.
+    /// First and second derivative by α, both negated: `2π (d/λ) cos ε` times sine and cosine of α
+    /// in a row.
     slopes: [f64; 2],
 }
 
@@ -142,8 +124,20 @@ impl Sighting {
         }
         let bearing = eye.bearing_rad(head.position);
         let level = ground_m / range_m; // cos ε
-        let slope = std::f64::consts::TAU * array.spacing_wavelengths;
-        let (sin, cos) = (bearing - pose.heading_rad - mean[MOUNTING]).sin_cos();
+        let azimuth = bearing - pose.heading_rad - mean[MOUNTING];
+        let value = array.measurand.value_rad(azimuth, level);
+        // By the azimuth twice, by cos ε and by the phase.
+        let (slopes, by_level, by_phase) = match array.measurand {
+            Measurand::ElectricalAngle {
+                spacing_wavelengths,
+                ..
+            } => {
+                let slope = std::f64::consts::TAU * spacing_wavelengths;
+                let (sin, cos) = azimuth.sin_cos();
+                ([slope * level * sin, slope * level * cos], slope * cos, 1.0)
+            }
+            Measurand::Azimuth { .. } => ([-1.0, 0.0], 0.0, 0.0),
+        };
         let (left, ahead) = (bearing - footing.direction_rad).sin_cos();
         // Turning on the spot moves the array.
         let (aside, along) = (bearing - pose.heading_rad).sin_cos();
@@ -164,23 +158,24 @@ impl Sighting {
         turn[HEADING] -= 1.0;
         turn[MOUNTING] = -1.0;
         // A step towards the radio head raises it: d cos ε = −sin² ε dρ/R.
-        let climb = slope * cos * (1.0 - level * level) / range_m;
-        let mut row = turn.map(|turn| -slope * level * sin * turn);
+        let climb = by_level * (1.0 - level * level) / range_m;
+        let mut row = turn.map(|turn| -slopes[0] * turn);
         for (value, step) in row.iter_mut().zip(sight[0]) {
             *value -= climb * step;
         }
-        row[PHASE] = 1.0;
+        row[PHASE] = by_phase;
         let survey_variance = head.position_std_m.powi(2) + array.position_std_m.powi(2);
         Some(Self {
-            phase_rad: slope * level * cos + mean[PHASE],
+            phase_rad: value + by_phase * mean[PHASE],
             row,
             range_m,
             toward: along * level,
-            survey_variance: (slope * sin / range_m).powi(2) * survey_variance,
+            survey_variance: (slopes[0] / ground_m).powi(2) * survey_variance,
+            aperture: array.measurand.aperture(azimuth, level),
             turn,
             sight,
             ground_m,
-            slopes: [slope * level * cos, slope * level * sin],
+            slopes,
         })
     }
 
@@ -188,8 +183,8 @@ impl Sighting {
     /// `½ tr(D P)` from its value at the mean on average, and has `½ tr(D P D P)` more variance
     /// (Jazwinski, Stochastic Processes and Filtering Theory, 9.3). With g the derivative of α, r
     /// and t the steps along and across the line of sight and R its length,
-    /// `D = −2π (d/λ) (cos α · g gᵀ − sin α / R² · (r tᵀ + t rᵀ))`. That is the plane's; of the
-    /// elevation only its cosine is taken.
+    /// `D = −2π (d/λ) (cos α · g gᵀ − sin α / R² · (r tᵀ + t rᵀ))` in a row, `−(r tᵀ + t rᵀ) / R²` of
+    /// an azimuth. That is the plane's; of the elevation only its cosine is taken.
     pub fn bend(&self, covariance: &Matrix<STATES>) -> Bend {
         let form = |left: &[f64; STATES], right: &[f64; STATES]| {
             let mut sum = 0.0;
@@ -204,8 +199,8 @@ impl Sighting {
         let (gg, gr, gt) = (form(turn, turn), form(turn, ahead), form(turn, left));
         let (rr, rt, tt) = (form(ahead, ahead), form(ahead, left), form(left, left));
         let (a, b) = (
-            -self.slopes[0],
-            self.slopes[1] / (self.ground_m * self.ground_m),
+            -self.slopes[1],
+            self.slopes[0] / (self.ground_m * self.ground_m),
         );
         Bend {
             shift_rad: 0.5 * a * gg + b * rt,
@@ -218,6 +213,7 @@ impl Sighting {
 mod tests {
     use super::*;
     use crate::geometry::Point;
+    use crate::manifold::scatter_bound;
 
     fn head(x_m: f64, y_m: f64, height_m: f64) -> RadioHead {
         RadioHead {
@@ -238,8 +234,10 @@ mod tests {
     }
 
     const ARRAY: ArrayModel = ArrayModel {
-        elements: 4,
-        spacing_wavelengths: 0.5,
+        measurand: Measurand::ElectricalAngle {
+            elements: 4,
+            spacing_wavelengths: 0.5,
+        },
         wavelength_m: 0.0857,
         position_m: [0.0; 3],
         position_std_m: 0.0,
@@ -376,9 +374,10 @@ mod tests {
 
     #[test]
     fn scatter_leaves_a_tenth_over_k_and_a_little() {
-        assert!((ARRAY.scatter_variance(1000.0) * 10.0 * 1000.0 - 1.0).abs() < 4e-4);
+        let (row, aperture) = (ARRAY.measurand, ARRAY.measurand.mean_aperture());
+        assert!((row.scatter_variance(1000.0, aperture) * 10.0 * 1000.0 - 1.0).abs() < 4e-4);
         // The mean of two million estimates at K = 10 by an independent simulation: 1.0346(11).
-        let at_10 = ARRAY.scatter_variance(10.0) / ARRAY.scatter_bound(10.0);
+        let at_10 = row.scatter_variance(10.0, aperture) / scatter_bound(10.0, aperture);
         assert!((at_10 - 1.0346).abs() < 3.0 * 0.0011, "{at_10}");
     }
 

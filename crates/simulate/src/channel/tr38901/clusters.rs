@@ -7,8 +7,8 @@ use rand::{Rng, RngExt};
 use rand_distr::StandardNormal;
 
 use super::large_scale::{LargeScale, Parameters};
-use crate::channel::phasor::phasor;
-use crate::world::LineOfSight;
+use crate::phasor::phasor;
+use crate::world::{Antennas, LineOfSight};
 
 /// Rays of a cluster, 20 of them, about its middle in units of its spread (table 7.5-3).
 const OFFSETS: [f64; 10] = [
@@ -161,14 +161,14 @@ impl Clusters {
         &self,
         weight: Complex64,
         sight: &LineOfSight,
+        antennas: &Antennas,
         wavenumber_per_m: f64,
         step_hz: f64,
-        elements: usize,
         into: &mut [Complex64],
     ) {
+        let elements = antennas.elements();
         let first_hz = -((into.len() / elements / 2) as f64) * step_hz;
         let (sin, cos) = sight.axis_rad.sin_cos();
-        let [forward, north] = [cos, sin].map(|part| sight.element_rad * part);
         let [x, y] = [sight.place.x_m, sight.place.y_m].map(|part_m| wavenumber_per_m * part_m);
         let mut sum = [Complex64::ZERO; onboard::observation::MAX_ELEMENTS];
         for group in &self.groups {
@@ -178,12 +178,10 @@ impl Clusters {
             sum.fill(Complex64::ZERO);
             for ray in &group.rays {
                 let [towards_x, towards_y] = [ray.east, ray.north].map(f64::from);
-                let mut wave = phasor(f64::from(ray.phase_rad) + x * towards_x + y * towards_y);
-                let step = phasor(forward * towards_x + north * towards_y);
-                for gain in &mut *sum {
-                    *gain += wave;
-                    wave *= step;
-                }
+                let wave = phasor(f64::from(ray.phase_rad) + x * towards_x + y * towards_y);
+                let along = cos * towards_x + sin * towards_y;
+                let left = cos * towards_y - sin * towards_x;
+                antennas.add(wave, [along, left], sum);
             }
             let mut turn = weight * group.amplitude * phasor(-TAU * first_hz * group.delay_s);
             let turn_step = phasor(-TAU * step_hz * group.delay_s);

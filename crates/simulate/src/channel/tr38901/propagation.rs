@@ -13,11 +13,11 @@ use super::large_scale::{COUNT, LargeScale, Parameters};
 use super::normal;
 use super::track::Track;
 use crate::channel::blockage::Blockage;
-use crate::channel::phasor::phasor;
 use crate::channel::propagation::{Link, Propagation};
+use crate::phasor::phasor;
 use crate::random::Purpose;
 use crate::scenario::ChannelSettings;
-use crate::world::LineOfSight;
+use crate::world::{Antennas, LineOfSight};
 
 /// Scatter that is weaker than the rest by so much is not computed.
 const NEGLIGIBLE: f64 = 1e-4;
@@ -130,17 +130,20 @@ impl Propagation for Tr38901Propagation {
         self.mix(sight).gain_db
     }
 
-    fn response(&self, sight: &LineOfSight, step_hz: f64, elements: usize, into: &mut [Complex64]) {
+    fn response(
+        &self,
+        sight: &LineOfSight,
+        antennas: &Antennas,
+        step_hz: f64,
+        into: &mut [Complex64],
+    ) {
+        let elements = antennas.elements();
         let mix = self.mix(sight);
         let turn = phasor(-self.wavenumber_per_m * sight.distance_m);
         let direct = turn * mix.direct * self.blockage.amplitude(sight.time_s);
-        let step = phasor(sight.phase_rad);
+        into.fill(Complex64::ZERO);
         for gains in into.chunks_exact_mut(elements) {
-            let mut gain = direct;
-            for into in gains {
-                *into = gain;
-                gain *= step;
-            }
+            antennas.add(direct, sight.towards, gains);
         }
         for (channel, amplitude) in [(&self.clear, mix.clear), (&self.hidden, mix.hidden)] {
             for (clusters, weight) in channel.clusters_at(sight.along_m) {
@@ -148,7 +151,7 @@ impl Propagation for Tr38901Propagation {
                 if weight * weight > NEGLIGIBLE {
                     let weight = Complex64::from(weight);
                     let k = self.wavenumber_per_m;
-                    clusters.add(weight, sight, k, step_hz, elements, into);
+                    clusters.add(weight, sight, antennas, k, step_hz, into);
                 }
             }
         }

@@ -5,13 +5,14 @@ use std::sync::Arc;
 
 use num_complex::Complex64;
 use onboard::link_budget::LinkBudget;
+use onboard::observation::MAX_ELEMENTS;
 
 use super::paths::{Paths, TracedPath};
 use crate::channel::blockage::Blockage;
-use crate::channel::phasor::phasor;
 use crate::channel::propagation::{Link, Propagation};
+use crate::phasor::phasor;
 use crate::scenario::ChannelSettings;
-use crate::world::LineOfSight;
+use crate::world::{Antennas, LineOfSight};
 
 /// What is received where there is no path at all, in dB under free space.
 const NOTHING_DB: f64 = -200.0;
@@ -53,7 +54,14 @@ impl Propagation for TracedPropagation {
         (gain_db + self.budget.path_loss_db(sight.distance_m)).max(NOTHING_DB)
     }
 
-    fn response(&self, sight: &LineOfSight, step_hz: f64, elements: usize, into: &mut [Complex64]) {
+    fn response(
+        &self,
+        sight: &LineOfSight,
+        antennas: &Antennas,
+        step_hz: f64,
+        into: &mut [Complex64],
+    ) {
+        let elements = antennas.elements();
         into.fill(Complex64::ZERO);
         let near = self.paths.near(self.head, sight.place);
         let Some((paths, [east_m, north_m])) = near.filter(|(paths, _)| !paths.is_empty()) else {
@@ -62,7 +70,6 @@ impl Propagation for TracedPropagation {
         let scale = power(paths).sqrt().recip();
         let passing = self.blockage.amplitude(sight.time_s);
         let (sin, cos) = sight.axis_rad.sin_cos();
-        let [forward, left] = [cos, sin].map(|part| sight.element_rad * part);
         let [x, y] = [east_m, north_m].map(|part_m| self.wavenumber_per_m * part_m);
         let first_hz = -((into.len() / elements / 2) as f64) * step_hz;
         for path in paths {
@@ -70,15 +77,18 @@ impl Propagation for TracedPropagation {
             let gain = Complex64::new(path.gain.re.into(), path.gain.im.into());
             let amplitude = if path.direct { scale * passing } else { scale };
             let mut wave = amplitude * gain * phasor(x * towards_x + y * towards_y);
-            let step = phasor(forward * towards_x + left * towards_y);
+            let along = cos * towards_x + sin * towards_y;
+            let left = cos * towards_y - sin * towards_x;
+            let mut response = [Complex64::ZERO; MAX_ELEMENTS];
+            if let Some(response) = response.get_mut(..elements) {
+                antennas.add(Complex64::ONE, [along, left], response);
+            }
             let excess_s = f64::from(path.excess_s);
             wave *= phasor(-TAU * first_hz * excess_s);
             let turn = phasor(-TAU * step_hz * excess_s);
             for gains in into.chunks_exact_mut(elements) {
-                let mut here = wave;
-                for gain in gains {
-                    *gain += here;
-                    here *= step;
+                for (gain, response) in gains.iter_mut().zip(&response) {
+                    *gain += wave * response;
                 }
                 wave *= turn;
             }

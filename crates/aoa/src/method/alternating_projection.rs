@@ -1,0 +1,258 @@
+//! Several sources by maximum likelihood, their waveforms unknown: the minimum over the electrical
+//! angles of `V = tr(P R)`, `P` projecting on the complement of the steering vectors.
+//!
+//! Alternating projection (Ziskind and Wax 1988) brings the angles near it: one after the other is put
+//! where most of the power is that the others leave. Scoring steps end the search (Viberg, Ottersten
+//! and Kailath 1991): with `A+` the pseudo-inverse and `D` the derivatives, slope and curvature are
+//!
+//! `V' = -2 Re diag(A+ R P D)`, `V'' = 2 Re[(D^H P D) * (A+ R A+^H)^T]`.
+//!
+//! Coherent sources need no averaging.
+
+use num_complex::Complex64;
+
+use crate::array::steering::steering_vector;
+use crate::bound::steering_matrix;
+use crate::linalg::dense::{adjoint, inverse, product};
+use crate::linalg::matrix::{Matrix, zeros};
+use crate::list::List;
+use crate::spectrum::polynomial::wrap;
+
+/// Directions on the circle that a projected beam is looked at in, for each antenna.
+const DIRECTIONS: usize = 8;
+/// Rounds of alternating projection, and scoring steps: each leaves an error of the order of the noise.
+const ROUNDS: usize = 20;
+const STEPS: usize = 40;
+/// Nearer than this, rad, alternating projection hands over.
+const NEAR_RAD: f64 = 1e-2;
+/// Relative rise of `V` that is rounding.
+const ROUNDING: f64 = 1e-12;
+/// A step of this size ends the search.
+const SETTLED_RAD: f64 = 1e-10;
+
+/// The likelihood around electrical angles.
+pub(crate) struct Fit<const N: usize> {
+    sources: usize,
+    /// `A+`, sources by antennas.
+    pseudo_inverse: Matrix<N>,
+    /// `P D`, antennas by sources.
+    projected: Matrix<N>,
+    /// `D^H P D`, `A+ R A+^H` and `(A^H A)^-1`, sources by sources.
+    metric: Matrix<N>,
+    powers: Matrix<N>,
+    gram_inverse: Matrix<N>,
+    /// `V'`.
+    slope: [f64; N],
+    /// `V`: what the sources leave.
+    residual: f64,
+}
+
+impl<const N: usize> Fit<N> {
+    /// `None` if the steering vectors do not tell the sources apart.
+    pub(crate) fn at(matrix: &Matrix<N>, phases: &[f64]) -> Option<Self> {
+        let k = phases.len();
+        let steering = steering_matrix::<N>(phases);
+        let mut derivative = steering;
+        for (n, row) in derivative.iter_mut().enumerate() {
+            for element in row {
+                *element *= Complex64::new(0.0, n as f64);
+            }
+        }
+        let steering_h = adjoint(&steering);
+        let gram_inverse = inverse(product(&steering_h, &steering, [k, N, k]), k)?;
+        let pseudo_inverse = product(&gram_inverse, &steering_h, [k, k, N]);
+        let within = product(&pseudo_inverse, &derivative, [k, N, k]);
+        let removed = product(&steering, &within, [N, k, k]);
+        let mut projected = derivative;
+        for (row, removed) in projected.iter_mut().zip(removed) {
+            for (entry, removed) in row.iter_mut().zip(removed) {
+                *entry -= removed;
+            }
+        }
+        let received = product(&pseudo_inverse, matrix, [k, N, N]);
+        let slopes = product(&received, &projected, [k, N, k]);
+        let explained = product(&received, &steering, [k, N, k]);
+        let trace: f64 = (0..N).map(|n| matrix[n][n].re).sum();
+        let explained: f64 = (0..k).map(|i| explained[i][i].re).sum();
+        Some(Self {
+            sources: k,
+            metric: product(&adjoint(&derivative), &projected, [k, N, k]),
+            powers: product(&received, &adjoint(&pseudo_inverse), [k, N, k]),
+            slope: std::array::from_fn(|i| -2.0 * slopes[i][i].re),
+            residual: (trace - explained).max(trace * 1e-15),
+            pseudo_inverse,
+            projected,
+            gram_inverse,
+        })
+    }
+
+    /// Variance of the noise per antenna.
+    pub(crate) fn noise_variance(&self) -> f64 {
+        self.residual / (N - self.sources) as f64
+    }
+
+    /// Inverse of the curvature for sources whose covariance is `A+ R A+^H` less the noise's part.
+    fn inverse_curvature(&self, noise_variance: f64) -> Option<Matrix<N>> {
+        let mut curvature = zeros::<N>();
+        for i in 0..self.sources {
+            for j in 0..self.sources {
+                let source = self.powers[j][i] - self.gram_inverse[j][i] * noise_variance;
+                curvature[i][j] = (2.0 * (self.metric[i][j] * source).re).into();
+            }
+        }
+        inverse(curvature, self.sources)
+    }
+
+    /// Visits for each source the Hermitian `H` by which its angle moves with the covariance,
+    /// `d omega = tr(H dR)`: to first order `-V''^-1 dV'`. `None` if the curvature is singular.
+    pub(crate) fn sensitivities(&self, mut visit: impl FnMut(&Matrix<N>)) -> Option<()> {
+        let inverse_curvature = self.inverse_curvature(self.noise_variance())?;
+        for k in 0..self.sources {
+            let mut weighted = zeros::<N>();
+            for s in 0..self.sources {
+                let weight = inverse_curvature[k][s];
+                for i in 0..N {
+                    for j in 0..N {
+                        weighted[i][j] += self.projected[i][s] * self.pseudo_inverse[s][j] * weight;
+                    }
+                }
+            }
+            let mirrored = adjoint(&weighted);
+            let h =
+                std::array::from_fn(|i| std::array::from_fn(|j| weighted[i][j] + mirrored[i][j]));
+            visit(&h);
+        }
+        Some(())
+    }
+}
+
+/// Electrical angles of `sources` sources; `None` for none or as many as antennas.
+pub(crate) fn phases<const N: usize>(matrix: &Matrix<N>, sources: usize) -> Option<List<f64, N>> {
+    if !(1..N).contains(&sources) {
+        return None;
+    }
+    let mut phases = [0.0; N];
+    for k in 0..sources {
+        phases[k] = Beam::beside(&phases[..k]).strongest(matrix);
+    }
+    for _ in 0..ROUNDS {
+        let mut moved = 0.0_f64;
+        for k in 0..sources {
+            let mut others = phases;
+            others[k..sources].rotate_left(1);
+            let phase = Beam::beside(&others[..sources - 1]).strongest(matrix);
+            moved = moved.max(wrap(phase - phases[k]).abs());
+            phases[k] = phase;
+        }
+        if sources == 1 || moved < NEAR_RAD {
+            break;
+        }
+    }
+    settle(matrix, &mut phases[..sources]);
+    Some(List::collect(0.0, phases[..sources].iter().copied()))
+}
+
+/// Scoring steps, halved as long as they lead up.
+fn settle<const N: usize>(matrix: &Matrix<N>, phases: &mut [f64]) {
+    let Some(mut here) = Fit::<N>::at(matrix, phases) else {
+        return;
+    };
+    for _ in 0..STEPS {
+        // With the noise in it the curvature is positive whatever the angles.
+        let Some(inverse_curvature) = here.inverse_curvature(0.0) else {
+            return;
+        };
+        let mut step = [0.0; N];
+        for (step, row) in step.iter_mut().zip(&inverse_curvature).take(phases.len()) {
+            let along = row.iter().zip(&here.slope).take(phases.len());
+            *step = -along.map(|(entry, slope)| entry.re * slope).sum::<f64>();
+        }
+        let mut longest = step
+            .iter()
+            .fold(0.0_f64, |longest, it| longest.max(it.abs()));
+        loop {
+            if longest.is_nan() || longest < SETTLED_RAD {
+                return;
+            }
+            let mut there = [0.0; N];
+            for (there, (phase, step)) in there.iter_mut().zip(phases.iter().zip(step)) {
+                *there = phase + step;
+            }
+            let next = Fit::<N>::at(matrix, &there[..phases.len()]);
+            let most = here.residual * (1.0 + ROUNDING);
+            if let Some(next) = next.filter(|next| next.residual <= most) {
+                for (phase, there) in phases.iter_mut().zip(there) {
+                    *phase = wrap(there);
+                }
+                here = next;
+                break;
+            }
+            step = step.map(|it| 0.5 * it);
+            longest *= 0.5;
+        }
+    }
+}
+
+/// A beam that does not hear some directions: orthonormal vectors that span their steering vectors.
+struct Beam<const N: usize>(List<[Complex64; N], N>);
+
+impl<const N: usize> Beam<N> {
+    fn beside(phases: &[f64]) -> Self {
+        let mut beam = Self(List::empty([Complex64::ZERO; N]));
+        for &phase in phases {
+            let (left, power) = beam.left_of(phase);
+            if power > 1e-12 {
+                beam.0.push(left.map(|element| element / power.sqrt()));
+            }
+        }
+        beam
+    }
+
+    /// What of a steering vector is left beside those directions, and its power.
+    fn left_of(&self, phase: f64) -> ([Complex64; N], f64) {
+        let mut left = steering_vector::<N>(phase);
+        for vector in self.0.iter() {
+            let along: Complex64 = vector.iter().zip(&left).map(|(q, a)| q.conj() * a).sum();
+            for (element, q) in left.iter_mut().zip(vector) {
+                *element -= q * along;
+            }
+        }
+        let power = left.iter().map(Complex64::norm_sqr).sum();
+        (left, power)
+    }
+
+    /// Power from a direction; none from one that is as good as not heard.
+    fn power(&self, matrix: &Matrix<N>, phase: f64) -> f64 {
+        let (left, power) = self.left_of(phase);
+        if power < 1e-6 * N as f64 {
+            return 0.0;
+        }
+        let mut sum = 0.0;
+        for (row, a) in matrix.iter().zip(&left) {
+            let received: Complex64 = row.iter().zip(&left).map(|(r, b)| r * b).sum();
+            sum += (a.conj() * received).re;
+        }
+        sum / power
+    }
+
+    /// The direction of the most power: the best of a grid, then between its neighbours by golden
+    /// sections.
+    fn strongest(&self, matrix: &Matrix<N>) -> f64 {
+        let spacing = std::f64::consts::TAU / (DIRECTIONS * N) as f64;
+        let power = |phase: f64| self.power(matrix, phase);
+        let grid = (0..DIRECTIONS * N).map(|i| i as f64 * spacing);
+        let best = grid.map(|phase| (power(phase), phase));
+        let (_, best) = best.fold((0.0, 0.0), |a, b| if b.0 > a.0 { b } else { a });
+        let golden = 0.5 * (5.0_f64.sqrt() - 1.0);
+        let (mut low, mut high) = (best - spacing, best + spacing);
+        while high - low > 0.1 * NEAR_RAD {
+            let inner = [high - golden * (high - low), low + golden * (high - low)];
+            if power(inner[0]) > power(inner[1]) {
+                high = inner[1];
+            } else {
+                low = inner[0];
+            }
+        }
+        wrap(0.5 * (low + high))
+    }
+}
