@@ -76,8 +76,8 @@ def scan_as_recorded(
     if spacing_wavelengths is None:
         stated = stated_spacing(truths, metadata, recording.centre_frequency_hz)
         spacing_wavelengths = 0.5 if stated is None else stated
-        places = stated_places(truths)
-        where["places_wavelengths"] = None if places is None else places.tolist()
+        antennas = stated_places(truths)
+        where["places_wavelengths"] = None if antennas is None else antennas.tolist()
     where["spacing_wavelengths"] = spacing_wavelengths
     found = scan(recording, calibration=calibration, **where)
     if calibration is not None or recording.channels < 2:

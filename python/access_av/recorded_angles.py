@@ -126,18 +126,10 @@ def estimate_bursts(
             gains = aoa.calibrate(snapshots, math.pi / 2, spacing_wavelengths=spacing_wavelengths)
             calibration = gains / np.abs(gains)
             continue
-        gains = calibration if truth.channel_phases is None else truth.channel_phases
-        snapshots = _equalised(snapshots)
-        if places is not None:
-            source = aoa.direction(snapshots, places, calibration=gains)
-            azimuth_deg = _from_broadside_deg(math.degrees(source.azimuth_rad))
-            sigma_rad, snr_db = source.azimuth_sigma_rad, source.snr_db
-        elif spacing_wavelengths is not None:
-            found = aoa.maximum_likelihood(
-                snapshots, spacing_wavelengths=spacing_wavelengths, calibration=gains
-            )
-            azimuth_deg = 90.0 - math.degrees(found.angle_rad)
-            sigma_rad, snr_db = found.sigma_rad, found.snr_db
+        phases = calibration if truth.channel_phases is None else truth.channel_phases
+        azimuth_deg, sigma_rad, snr_db = _estimate(
+            _equalised(snapshots), places, spacing_wavelengths, phases
+        )
         truth_deg = truth.azimuth_from_broadside_deg
         if truth_deg is None and truth.azimuth_from_axis_deg is not None:
             truth_deg = _from_broadside_deg(truth.azimuth_from_axis_deg)
@@ -152,6 +144,25 @@ def estimate_bursts(
             )
         )
     return bursts
+
+
+def _estimate(
+    snapshots: NDArray[np.complex64],
+    places: NDArray[np.float64] | None,
+    spacing_wavelengths: float | None,
+    phases: NDArray[np.complex128] | None,
+) -> tuple[float, float, float]:
+    """Azimuth from broadside (°), its standard deviation (rad), and the SNR (dB)."""
+    if places is not None:
+        source = aoa.direction(snapshots, places, calibration=phases)
+        azimuth_deg = _from_broadside_deg(math.degrees(source.azimuth_rad))
+        return azimuth_deg, source.azimuth_sigma_rad, source.snr_db
+    if spacing_wavelengths is None:
+        raise InputError("neither spacing nor places of the antennas are known")
+    found = aoa.maximum_likelihood(
+        snapshots, spacing_wavelengths=spacing_wavelengths, calibration=phases
+    )
+    return 90.0 - math.degrees(found.angle_rad), found.sigma_rad, found.snr_db
 
 
 def mean_absolute_error_deg(bursts: Sequence[BurstAngle]) -> float | None:
