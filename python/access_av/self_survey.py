@@ -46,7 +46,7 @@ STEP_M, STEP_RAD = 0.02, 2e-4
 
 
 @dataclass(frozen=True)
-class LoggedDrive:
+class SurveyDrive:
     """A recorded drive.
 
     Attributes
@@ -133,7 +133,7 @@ class Survey:
         return pl.DataFrame(rows)
 
 
-def read_drive(folder: str | Path) -> LoggedDrive:
+def read_drive(folder: str | Path) -> SurveyDrive:
     """Read a drive: ``odometry.csv`` or ``odometry.mcap``, ``angles.csv``, ``vehicle.toml``.
 
     The vehicle file tells the drive's start (``start.pose``).
@@ -155,7 +155,7 @@ def read_drive(folder: str | Path) -> LoggedDrive:
         raise InputError(
             f"{folder / 'vehicle.toml'}: `start.pose` is missing: where the drive starts"
         )
-    return LoggedDrive(
+    return SurveyDrive(
         name=str(folder),
         log=_core.LoggedDrive(there[0], folder / "angles.csv"),
         start_m_rad=(start["x_m"], start["y_m"], start["heading_rad"]),
@@ -165,7 +165,7 @@ def read_drive(folder: str | Path) -> LoggedDrive:
 def survey(
     site: _core.Site | str,
     vehicle: _core.Vehicle | str,
-    drives: Sequence[LoggedDrive | str | Path],
+    drives: Sequence[SurveyDrive | str | Path],
     *,
     position_std_m: float = 2.0,
     mounting_std_rad: float = 0.05,
@@ -199,7 +199,7 @@ def survey(
     """
     site = _core.Site.load(site) if isinstance(site, str) else site
     vehicle = _core.Vehicle.load(vehicle) if isinstance(vehicle, str) else vehicle
-    logged = [it if isinstance(it, LoggedDrive) else read_drive(it) for it in drives]
+    logged = [it if isinstance(it, SurveyDrive) else read_drive(it) for it in drives]
     model = _Model(site, vehicle, position_std_m, mounting_std_rad, phase_std_rad)
     heard = {head for drive in logged for head in drive.log.heads}
     if not heard & set(model.heads):
@@ -262,7 +262,7 @@ class _Problem:
     def __init__(
         self,
         model: _Model,
-        drives: list[LoggedDrive],
+        drives: list[SurveyDrive],
         pool: ThreadPoolExecutor,
         progress: Callable[[int, int], None] | None,
     ) -> None:

@@ -140,7 +140,7 @@ impl Recovery {
             // What is found elsewhere, if anything, is no better.
             self.search = None;
             self.rests_until_s = now_s + REST_S;
-            self.watch = Watch::default();
+            self.watch.reset();
         } else if !search.is_wide && now_s - search.since_s > PATIENCE_S {
             self.search = self.begin(now_s, true);
         }
@@ -186,7 +186,7 @@ impl Recovery {
             self.tracked.keep_journal();
         }
         self.search = None;
-        self.watch = Watch::default();
+        self.watch.reset();
     }
 }
 
@@ -206,7 +206,7 @@ impl Localizer for Recovery {
         let searched = self.search.is_some();
         let innovation = searched.then(|| self.tracked.tracker().innovation(head, measured));
         let verdict = self.tracked.update(head, measured);
-        self.watch.see(&verdict);
+        self.watch.see(head, &verdict);
         if let Some(search) = &mut self.search {
             search.initialiser.update(head, measured);
             search.own += log_likelihood(innovation.flatten(), &verdict);

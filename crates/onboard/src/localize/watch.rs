@@ -1,32 +1,52 @@
 //! Whether the angles still come from where they are expected.
 
 use super::measurement::{UpdateReason, UpdateVerdict};
+use crate::clone_in_place::clone_in_place;
+use crate::radio_head::RadioHead;
 
-/// Weight of the newest angle.
-const WEIGHT: f64 = 1.0 / 16.0;
+/// Weight of the newest angle of a radio head.
+const WEIGHT: f64 = 1.0 / 8.0;
 
 /// Angles before anything is said.
 const LEAST: u32 = 5;
 
-/// Share of refused angles above which the vehicle is lost, and below which it is not.
+/// Angles, of all radio heads, within which one must have been heard to have a voice.
+const RECENT: u32 = 32;
+
+/// Share of refused angles above which a radio head is not where it is expected, and below which it
+/// is.
 const LOST: f64 = 0.5;
 const SURE: f64 = 0.2;
 
-/// Mean squared Mahalanobis distance, capped at the gate, above which it is lost as well; it is 1
+/// Mean squared Mahalanobis distance, capped at the gate, above which it is not as well; it is 1
 /// where the belief is right.
 const SURPRISED: f64 = 5.0;
 
-/// A running judgement of the localizer's own expectations.
-#[derive(Clone, Copy, Debug, Default, PartialEq)]
+/// A running judgement of the localizer's own expectations, by the majority of radio heads: one that
+/// is seen by a reflection is off for metres, whatever the number of its angles.
+#[derive(Debug, Default, PartialEq)]
 pub struct Watch {
-    refused: f64,
-    surprise: f64,
+    voices: Vec<Voice>,
     angles: u32,
 }
 
+clone_in_place!(Watch { voices, angles });
+
+/// What became of a radio head's angles.
+#[derive(Clone, Copy, Debug, PartialEq)]
+struct Voice {
+    pci: u16,
+    ssb_index: u8,
+    refused: f64,
+    surprise: f64,
+    heard: u32,
+    /// Number of the last one among all angles.
+    last: u32,
+}
+
 impl Watch {
-    /// Takes in what became of an angle; such that met no expectation say nothing.
-    pub fn see(&mut self, verdict: &UpdateVerdict) {
+    /// Takes in what became of an angle to a radio head; such that met no expectation say nothing.
+    pub fn see(&mut self, head: &RadioHead, verdict: &UpdateVerdict) {
         let refused = match verdict.reason {
             UpdateReason::Consistent => 0.0,
             UpdateReason::Outlier => 1.0,
@@ -37,18 +57,47 @@ impl Watch {
         };
         let capped = distance.min(verdict.threshold.unwrap_or(distance));
         self.angles = self.angles.saturating_add(1);
-        let weight = WEIGHT.max(1.0 / f64::from(self.angles));
-        self.refused += weight * (refused - self.refused);
-        self.surprise += weight * (capped - self.surprise);
+        let (pci, ssb_index, last) = (head.pci, head.ssb_index, self.angles);
+        let is_it = |it: &&mut Voice| (it.pci, it.ssb_index) == (pci, ssb_index);
+        let Some(voice) = self.voices.iter_mut().find(is_it) else {
+            self.voices.push(Voice {
+                pci,
+                ssb_index,
+                refused,
+                surprise: capped,
+                heard: 1,
+                last,
+            });
+            return;
+        };
+        voice.last = last;
+        voice.heard = voice.heard.saturating_add(1);
+        let weight = WEIGHT.max(1.0 / f64::from(voice.heard));
+        voice.refused += weight * (refused - voice.refused);
+        voice.surprise += weight * (capped - voice.surprise);
+    }
+
+    /// Forgets all that was seen.
+    pub fn reset(&mut self) {
+        self.voices.clear();
+        self.angles = 0;
+    }
+
+    /// Share of the radio heads heard lately that are off; `None` before enough angles.
+    fn off(&self, refused: f64) -> Option<f64> {
+        let recent =
+            || (self.voices.iter()).filter(|voice| self.angles.saturating_sub(voice.last) < RECENT);
+        let off = recent().filter(|it| it.refused > refused || it.surprise > SURPRISED);
+        (self.angles >= LEAST).then(|| off.count() as f64 / recent().count().max(1) as f64)
     }
 
     /// Whether the angles come from elsewhere than expected.
     pub fn is_lost(&self) -> bool {
-        self.angles >= LEAST && (self.refused > LOST || self.surprise > SURPRISED)
+        self.off(LOST).is_some_and(|share| share > 0.5)
     }
 
     /// Whether they come from where they are expected.
     pub fn is_sure(&self) -> bool {
-        self.angles >= LEAST && self.refused < SURE && self.surprise < SURPRISED
+        self.off(SURE).is_some_and(|share| share < 0.5)
     }
 }

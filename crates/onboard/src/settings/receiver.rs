@@ -43,6 +43,11 @@ pub struct ReceiverSettings {
     #[serde(skip_serializing_if = "Option::is_none")]
     #[schemars(range(min = 0.0, max = 1.0))]
     pub phase_bias_share: Option<f64>,
+    /// Whether an error of each radio head's angles that stays over metres, as reflections make it,
+    /// is found while driving, beside what is stated; yes for logged angles on a road vehicle of
+    /// which no such error is stated, otherwise no.
+    #[serde(skip_serializing_if = "Option::is_none")]
+    pub phase_bias_adapts: Option<bool>,
     /// Time over which that error is forgotten, in seconds, provided that the vehicle moves.
     #[schemars(range(min = 1e-3, max = 1e9))]
     pub phase_bias_correlation_s: f64,
@@ -67,6 +72,7 @@ impl Default for ReceiverSettings {
             lateness_std_s: None,
             phase_bias_std_rad: 0.0,
             phase_bias_share: None,
+            phase_bias_adapts: None,
             phase_bias_correlation_s: 1.0,
             phase_bias_correlation_m: 0.3,
             pci_allow_list: None,

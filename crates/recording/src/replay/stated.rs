@@ -3,7 +3,7 @@
 use std::f64::consts::TAU;
 
 use onboard::manifold::Measurand;
-use onboard::settings::{Site, Vehicle};
+use onboard::settings::{DriveKind, Site, Vehicle};
 
 use crate::angle_log::LoggedAngle;
 
@@ -16,14 +16,21 @@ const NO_SCATTER_DB: f64 = 200.0;
 
 /// Site and vehicle for angles whose stated deviation is all of their error: the site's scatter is
 /// not added to it, and looks at one radio head within a second or a metre do not count as
-/// independent, unless the receiver's settings say otherwise.
+/// independent, unless the receiver's settings say otherwise. On a road vehicle, where nothing is stated
+/// of errors that stay, they are found while driving.
 pub fn as_stated(site: &Site, vehicle: &Vehicle) -> (Site, Vehicle) {
     let site = Site {
         rician_k_db: NO_SCATTER_DB,
         ..site.clone()
     };
     let mut vehicle = vehicle.clone();
-    vehicle.receiver.phase_bias_share.get_or_insert(USUAL_SHARE);
+    let receiver = &mut vehicle.receiver;
+    // A differential drive is as often lost as its angles are off by reflections, and would take the
+    // one for the other.
+    let is_unstated = receiver.phase_bias_share.is_none() && receiver.phase_bias_std_rad == 0.0;
+    let adapts = is_unstated && vehicle.drive == DriveKind::Road;
+    receiver.phase_bias_adapts.get_or_insert(adapts);
+    receiver.phase_bias_share.get_or_insert(USUAL_SHARE);
     (site, vehicle)
 }
 

@@ -70,6 +70,8 @@ pub struct TrackerConfig {
     pub lateness_std_s: f64,
     /// The error of an angle that stays from look to look.
     pub phase_bias: PhaseBias,
+    /// Whether errors that stay over metres are found while driving.
+    pub finds_errors: bool,
     /// Time between odometry samples above which they are reported as a gap (s).
     pub gap_s: f64,
     /// Speed that no odometry sample can exceed (m/s).
@@ -251,6 +253,7 @@ impl TrackerConfig {
                 correlation_s: receiver.phase_bias_correlation_s,
                 correlation_m: receiver.phase_bias_correlation_m,
             },
+            finds_errors: receiver.phase_bias_adapts.unwrap_or(false),
             gap_s: 5.0 / odometer.rate_hz,
             top_speed_mps: 1.5 * vehicle.top_speed_mps(),
         }

@@ -13,6 +13,7 @@ use super::pace::Pace;
 use super::sighting::Sighting;
 use super::speed_steps::SpeedSteps;
 use super::state::{ACROSS, ALONG, Belief, HEADING, LATENESS, SCALE, STATES, YAW_RATE_BIAS};
+use super::staying_error::{MOST_VARIANCE, StayingError};
 use crate::clone_in_place::clone_in_place;
 use crate::geometry::wrap_angle;
 use crate::localize::gaussian::Innovation;
@@ -36,6 +37,10 @@ const WILD: f64 = 10.0;
 /// adds to the deviation of the odometer's scale.
 const SIGMAS_OF_SLIP: f64 = 5.0;
 const MOST_SLIP: f64 = 0.3;
+
+/// Standard deviation of where along the road the vehicle takes up a new curvature (m): no vehicle does
+/// at a point, as maps of arcs draw it, but over about its own length.
+const TRANSITION_M: f64 = 0.5;
 
 /// Squared Mahalanobis distance up to which the yaw rate on a road is taken at its word: 6σ.
 const TURN_GATE: f64 = 36.0;
@@ -61,6 +66,10 @@ pub(super) struct Head {
     pub last_look_s: f64,
     /// ... and the angle turned (rad).
     pub last_look_rad: f64,
+    /// Distance driven when it was last heard, used or not (m).
+    pub heard_m: f64,
+    /// Its error that stays over metres.
+    pub error: StayingError,
 }
 
 impl Head {
@@ -115,6 +124,8 @@ impl Tracker {
             last_look_m: f64::NEG_INFINITY,
             last_look_s: f64::NEG_INFINITY,
             last_look_rad: f64::NEG_INFINITY,
+            heard_m: f64::NEG_INFINITY,
+            error: StayingError::default(),
         };
         let mut tracker = Self {
             config,
@@ -335,7 +346,7 @@ impl Tracker {
             return Step::in_plane(mean, reading_m, curvature_per_m, &config.path_bend, noise);
         }
         let variance = |state: usize| belief.covariance[state][state].max(0.0);
-        let road = map.bending(middle_m, variance(ALONG).sqrt());
+        let road = map.bending(middle_m, variance(ALONG).sqrt().max(TRANSITION_M));
         let keeping = &config.lane_keeping;
         Step::along_lane(mean, variance(HEADING), reading_m, &road, keeping, noise)
     }
@@ -363,12 +374,23 @@ impl Tracker {
             Ok(looked) => looked,
             Err(reason) => return self.verdict(reason, None),
         };
-        let mahalanobis2 = looked.innovation.mahalanobis2();
+        let mahalanobis2 = looked.mahalanobis2();
+        let known = self.heads.get(looked.head).map(|head| head.error);
+        self.learn_error(&looked);
         if mahalanobis2 > self.config.gate {
-            return self.verdict(UpdateReason::Outlier, Some(mahalanobis2));
+            // That such a radio head is off is known, and says nothing of the vehicle.
+            let is_news =
+                known.is_none_or(|error| !(looked.repetition.is_some() && error.is_large()));
+            return self.verdict(UpdateReason::Outlier, is_news.then_some(mahalanobis2));
         }
         let innovation = looked.innovation;
         let (mut residual, mut variance) = (innovation.residual, innovation.measurement_variance);
+        if let (Some(error), Some(repetition)) = (known, looked.repetition) {
+            let Some(likely) = error.equivalent(&looked.without_error(), repetition) else {
+                return self.verdict(UpdateReason::Consistent, Some(mahalanobis2));
+            };
+            (residual, variance) = likely;
+        }
         if !measured.resolved {
             let Some(likely) = doubt::equivalent(&innovation) else {
                 return self.verdict(UpdateReason::Outlier, Some(mahalanobis2));
@@ -383,6 +405,19 @@ impl Tracker {
             head.last_look_rad = self.turned_rad;
         }
         self.verdict(UpdateReason::Consistent, Some(mahalanobis2))
+    }
+
+    /// Learns of the error that stays from an angle, used or not.
+    pub(super) fn learn_error(&mut self, looked: &Look) {
+        if looked.repetition.is_none() {
+            return;
+        }
+        if let Some(head) = self.heads.get_mut(looked.head) {
+            let travelled_m = looked.place_m - head.heard_m;
+            head.heard_m = looked.place_m;
+            let seen = looked.without_error();
+            head.error.learn(travelled_m, &seen, looked.own_variance);
+        }
     }
 
     /// An odometer that reads twice or half of what is driven, or an angle older than memory, is no
@@ -434,8 +469,11 @@ impl Tracker {
         let turned_rad = self.turned_rad - head.last_look_rad;
         let moved = (travelled_m, turned_rad);
         let stated = (self.config.phase_bias).variance(sigma, elapsed_s, moved);
+        let repetition = (self.config.finds_errors).then(|| StayingError::repetition(travelled_m));
+        let error_variance = head.error.variance();
+        let stays = repetition.map_or(0.0, |repetition| repetition * error_variance);
         let measurement_variance =
-            stated + shared + sighting.row[ALONG].powi(2) * ahead_variance + bend.variance;
+            stays + stated + shared + sighting.row[ALONG].powi(2) * ahead_variance + bend.variance;
         let residual = wrap_angle(measured.phase_rad - sighting.phase_rad - bend.shift_rad);
         let innovation = (self.belief).innovation(residual, &sighting.row, measurement_variance);
         Ok(Look {
@@ -444,6 +482,9 @@ impl Tracker {
             place_m,
             row: sighting.row,
             innovation,
+            own_variance: sigma * sigma,
+            error_variance,
+            repetition,
         })
     }
 
@@ -531,4 +572,30 @@ pub(super) struct Look {
     pub place_m: f64,
     pub row: [f64; STATES],
     pub innovation: Innovation,
+    /// Variance of the angle by its own noise (rad²).
+    pub own_variance: f64,
+    /// Variance of the error that stays (rad²), and how often looks so near to each other repeat it,
+    /// where it is found while driving.
+    error_variance: f64,
+    repetition: Option<f64>,
+}
+
+impl Look {
+    /// The innovation, had the error that stays been none.
+    fn without_error(&self) -> Innovation {
+        let mut seen = self.innovation;
+        let stays = self.error_variance * self.repetition.unwrap_or_default();
+        seen.variance -= stays;
+        seen.measurement_variance -= stays;
+        seen
+    }
+
+    /// Squared Mahalanobis distance of the look by itself, its error being of any size that there is.
+    fn mahalanobis2(&self) -> f64 {
+        let mut seen = self.without_error();
+        if self.repetition.is_some() {
+            seen.variance += MOST_VARIANCE;
+        }
+        seen.mahalanobis2()
+    }
 }

@@ -4,6 +4,7 @@ use super::filter::{MOST_STEPS, Tracker};
 use super::locate::locate;
 use super::sighting::Sighting;
 use super::state::Belief;
+use super::staying_error::StayingError;
 use crate::localize::gaussian::{Innovation, principal_variances};
 use crate::localize::measurement::AngleMeasurement;
 use crate::radio_head::RadioHead;
@@ -27,6 +28,7 @@ impl Tracker {
         measured: &AngleMeasurement,
     ) -> Option<Innovation> {
         let looked = self.look(head, measured).ok()?;
+        self.learn_error(&looked);
         self.heads.get_mut(looked.head)?.last_look_m = looked.place_m;
         Some(looked.innovation)
     }
@@ -72,7 +74,12 @@ impl Tracker {
             .config
             .phase_bias
             .variance(own, f64::INFINITY, (travelled_m, 0.0))
-            + self.config.look_variance(travelled_m, &sighting);
+            + self.config.look_variance(travelled_m, &sighting)
+            + if self.config.finds_errors {
+                known.error.variance() * StayingError::repetition(travelled_m)
+            } else {
+                0.0
+            };
         let mut rehearsed = *belief;
         rehearsed.update(0.0, &sighting.row, variance);
         Some(rehearsed)

@@ -24,6 +24,7 @@ mod prior;
 pub mod sighting;
 mod speed_steps;
 pub mod state;
+mod staying_error;
 
 pub use calibration::{Calibration, Departure};
 pub use config::TrackerConfig;
