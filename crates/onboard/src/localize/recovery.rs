@@ -109,7 +109,7 @@ impl Recovery {
                 quantile: RadialQuantile::new(risk),
             }),
             tracked: Tracked::new(tracker, heads, integrity),
-            watch: Watch::default(),
+            watch: Watch::new(heads),
             search: None,
             rests_until_s: f64::NEG_INFINITY,
             recovered: None,

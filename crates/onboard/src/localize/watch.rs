@@ -24,7 +24,7 @@ const SURPRISED: f64 = 5.0;
 
 /// A running judgement of the localizer's own expectations, by the majority of radio heads: one that
 /// is seen by a reflection is off for metres, whatever the number of its angles.
-#[derive(Debug, Default, PartialEq)]
+#[derive(Debug, PartialEq)]
 pub struct Watch {
     voices: Vec<Voice>,
     angles: u32,
@@ -45,6 +45,22 @@ struct Voice {
 }
 
 impl Watch {
+    /// Nothing is known yet of what becomes of these radio heads' angles.
+    pub fn new(heads: &[RadioHead]) -> Self {
+        let voice = |head: &RadioHead| Voice {
+            pci: head.pci,
+            ssb_index: head.ssb_index,
+            refused: 0.0,
+            surprise: 0.0,
+            heard: 0,
+            last: 0,
+        };
+        Self {
+            voices: heads.iter().map(voice).collect(),
+            angles: 0,
+        }
+    }
+
     /// Takes in what became of an angle to a radio head; such that met no expectation say nothing.
     pub fn see(&mut self, head: &RadioHead, verdict: &UpdateVerdict) {
         let refused = match verdict.reason {
@@ -57,20 +73,11 @@ impl Watch {
         };
         let capped = distance.min(verdict.threshold.unwrap_or(distance));
         self.angles = self.angles.saturating_add(1);
-        let (pci, ssb_index, last) = (head.pci, head.ssb_index, self.angles);
-        let is_it = |it: &&mut Voice| (it.pci, it.ssb_index) == (pci, ssb_index);
+        let is_it = |it: &&mut Voice| (it.pci, it.ssb_index) == (head.pci, head.ssb_index);
         let Some(voice) = self.voices.iter_mut().find(is_it) else {
-            self.voices.push(Voice {
-                pci,
-                ssb_index,
-                refused,
-                surprise: capped,
-                heard: 1,
-                last,
-            });
             return;
         };
-        voice.last = last;
+        voice.last = self.angles;
         voice.heard = voice.heard.saturating_add(1);
         let weight = WEIGHT.max(1.0 / f64::from(voice.heard));
         voice.refused += weight * (refused - voice.refused);
@@ -79,14 +86,16 @@ impl Watch {
 
     /// Forgets all that was seen.
     pub fn reset(&mut self) {
-        self.voices.clear();
+        for voice in &mut self.voices {
+            voice.heard = 0;
+        }
         self.angles = 0;
     }
 
     /// Share of the radio heads heard lately that are off; `None` before enough angles.
     fn off(&self, refused: f64) -> Option<f64> {
-        let recent =
-            || (self.voices.iter()).filter(|voice| self.angles.saturating_sub(voice.last) < RECENT);
+        let is_recent = |it: &&Voice| it.heard > 0 && self.angles.saturating_sub(it.last) < RECENT;
+        let recent = || self.voices.iter().filter(is_recent);
         let off = recent().filter(|it| it.refused > refused || it.surprise > SURPRISED);
         (self.angles >= LEAST).then(|| off.count() as f64 / recent().count().max(1) as f64)
     }
