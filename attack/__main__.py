@@ -12,9 +12,9 @@ import shutil
 import subprocess
 import sys
 import tempfile
-import threading
 import time
 from collections import Counter
+from concurrent.futures import ThreadPoolExecutor
 from pathlib import Path
 
 from attack import kinds
@@ -42,14 +42,12 @@ class Worker:
         line = self._line(process, LONGEST_S * busy)
         if line:
             return dict(json.loads(line))
-        hung = process.poll() is None
-        process.kill()
-        code, self.process = process.wait(), None
-        what = (
-            f"hang: more than {LONGEST_S:.0f} s"
-            if hung
-            else f"abort: the process ended with {code}"
-        )
+        try:  # what ends closes its output a moment before it has ended
+            what = f"abort: the process ended with {process.wait(1.0)}"
+        except subprocess.TimeoutExpired:
+            what = f"hang: more than {LONGEST_S:.0f} s"
+        self.stop()
+        self.process = None
         return {"findings": [what], "ok": 0, "beyond": 0}
 
     def _start(self) -> subprocess.Popen[bytes]:
@@ -102,13 +100,13 @@ def attack(
                 else:
                     shutil.rmtree(folder, ignore_errors=True)
         except queue.Empty:
+            pass
+        finally:
             worker.stop()
 
-    threads = [threading.Thread(target=work) for _ in range(workers)]
-    for thread in threads:
-        thread.start()
-    for thread in threads:
-        thread.join()
+    with ThreadPoolExecutor(workers) as pool:
+        for done in [pool.submit(work) for _ in range(workers)]:
+            done.result()  # raises what the thread did
     shutil.rmtree(place, ignore_errors=True)
     return counts, epochs[0], epochs[1]
 

@@ -41,8 +41,14 @@ class Verdict:
         self.findings.append(f"{kind}: {str(text)[:300]}")
 
 
-def judge(folder: Path, command: list[str], before: set[Path], end: dict[str, Any]) -> Verdict:
-    """Look at how a command ended, and at the files that were not there ``before``."""
+def judge(
+    folder: Path, command: list[str], before: set[Path], end: dict[str, Any], *, odometer: bool
+) -> Verdict:
+    """Look at how a command ended, and at the files that were not there ``before``.
+
+    Only where the odometer reads no more than ``MOST_READ`` of what is driven it tells how far a
+    pose may move.
+    """
     verdict = Verdict()
     if end["raised"]:
         kind = "panic" if "PanicException" in end["raised"] else "traceback"
@@ -59,7 +65,7 @@ def judge(folder: Path, command: list[str], before: set[Path], end: dict[str, An
         if file.name.endswith(".partial"):
             verdict.says("half-written", name)
         elif file.suffix == ".parquet":
-            _table(verdict, name, pl.read_parquet(file))
+            _table(verdict, name, pl.read_parquet(file), odometer=odometer)
         elif file.suffix in (".json", ".sigmf-meta"):
             _json(verdict, name, file.read_text(encoding="utf-8"))
         elif file.suffix == ".tum" and file.stat().st_size:
@@ -103,7 +109,7 @@ def _mcap(verdict: Verdict, name: str, file: Path) -> None:
                 _finite(verdict, name, np.frombuffer(message.data[-8 * ODOMETRY_NUMBERS :], "<f8"))
 
 
-def _table(verdict: Verdict, name: str, table: pl.DataFrame) -> None:
+def _table(verdict: Verdict, name: str, table: pl.DataFrame, *, odometer: bool) -> None:
     for column in table.select(pl.col(pl.Float32, pl.Float64)):
         if not column.is_finite().all():
             verdict.says("nan", f"{name}: {column.name}")
@@ -111,7 +117,8 @@ def _table(verdict: Verdict, name: str, table: pl.DataFrame) -> None:
         _covariances(verdict, name, table.drop_nulls("covariance_xx_m2"))
     if {"true_x_m", "integrity"} <= set(table.columns):
         _honesty(verdict, table)
-        _leaps(verdict, table.drop_nulls("covariance_xx_m2"))
+        if odometer:
+            _leaps(verdict, table.drop_nulls("covariance_xx_m2"))
 
 
 def _covariances(verdict: Verdict, name: str, table: pl.DataFrame) -> None:

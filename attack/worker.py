@@ -17,6 +17,7 @@ from pathlib import Path
 from typing import Any
 
 from access_av import InputError, RecordingError, SettingsError
+from access_av.report import page
 from access_av.terminal import plain
 from attack import files, kinds
 from attack.verdict import judge
@@ -76,7 +77,8 @@ def run(seed: int, kind: str, number: int, folder: Path) -> dict[str, Any]:
             os.close(saved)
         os.chdir(folder.parent)
     out, err = (file.read_text(encoding="utf-8", errors="replace") for file in printed)
-    verdict = judge(folder, command, {*before, *printed}, {**end, "out": out, "err": err})
+    end = {**end, "out": out, "err": err}
+    verdict = judge(folder, command, {*before, *printed}, end, odometer=kind == "drive")
     return vars(verdict)
 
 
@@ -85,8 +87,7 @@ def main() -> None:
     seed, place = int(sys.argv[1]), Path(sys.argv[2])
     answers = os.fdopen(os.dup(1), "w", encoding="utf-8")
     # Tables and charts are loaded before the limit is set: it is of what a case takes.
-    import access_av.report.drive  # noqa: F401
-
+    page.bundle()
     files.recorded()
     limit_memory()
     print("ready", file=answers, flush=True)

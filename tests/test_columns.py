@@ -13,8 +13,10 @@ import polars as pl
 import pytest
 
 from access_av import Scenario, bound, columns, drives, nr, simulate, statistics
+from access_av.campaign import Campaign
 from access_av.paper.search import sample
 from access_av.paper.unknowns import sobol
+from access_av.parts import Parts
 from access_av.platform import Platform
 from conftest import ROOT
 
@@ -132,7 +134,9 @@ def test_evaluation(quick_study: Path) -> None:
 def test_unknowns() -> None:
     platform = Platform.load("jetson-agx-xavier")
     with tempfile.TemporaryDirectory() as parts:
-        drawn = sample(platform, Path(parts), worlds=2, controllers=2, runs=1, gates=True)
+        kept = Campaign(Parts(Path(parts)))
+        drawn = sample(kept, platform, worlds=2, controllers=2, runs=1, gates=True)
+    assert drawn is not None
     check("unknowns", pl.DataFrame([vars(it) for it in sobol(drawn, 1, count=3).indices]))
 
 

@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import json
+import os
 import subprocess
 import sys
 import threading
@@ -251,6 +252,67 @@ def test_dask_gives_the_same_bytes(tmp_path: Path, whole: dict[str, bytes]) -> N
         assert workers == 2
         Campaign(Parts(tmp_path / "dask"), pool, workers).run(tasks())
     assert contents(tmp_path / "dask") == whole
+
+
+# A cluster of one's own, of which one process dies once three parts are there.
+DYING = """
+import json, subprocess, sys, threading, time
+from pathlib import Path
+sys.path.insert(0, {tests!r})
+from access_av.campaign import Campaign, CampaignError, executor
+from access_av.parts import Parts
+from test_designs import tasks
+parts, file = Path({parts!r}), Path({parts!r}) / "scheduler.json"
+parts.mkdir()
+def started(program, *more):
+    usual = ["--scheduler-file", str(file), "--no-dashboard", *more]
+    return subprocess.Popen([sys.executable, "-m", f"distributed.cli.dask_{{program}}", *usual])
+alone = ["--nthreads", "1", "--no-nanny", "--death-timeout", "9"]
+scheduler = started("scheduler", "--host", "127.0.0.1", "--port", "0")
+workers = [started("worker", *alone) for _ in range(2)]
+def kill():
+    while len(list(parts.glob("*.npz"))) < 3:
+        time.sleep(0.01)
+    (scheduler if {dies!r} == "scheduler" else workers[0]).kill()
+try:
+    while not file.exists():
+        time.sleep(0.05)
+    address = json.loads(file.read_text())["address"]
+    threading.Thread(target=kill, daemon=True).start()
+    with executor(address) as (pool, count):
+        Campaign(Parts(parts), pool, count).run(tasks(12, 0.2))
+    print("finished")
+except CampaignError as error:
+    print(error)
+finally:
+    for process in [scheduler, *workers]:
+        process.kill()
+"""
+
+
+@pytest.mark.parametrize(
+    ("dies", "says"),
+    [("worker", "finished"), ("scheduler", "the workers are gone")],
+)
+def test_of_a_cluster_any_process_may_die(
+    tmp_path: Path, whole: dict[str, bytes], dies: str, says: str
+) -> None:
+    pytest.importorskip("distributed")
+    tests, parts = str(Path(__file__).parent), tmp_path / "dask"
+    text = DYING.format(tests=tests, parts=str(parts), dies=dies)
+    done = subprocess.run(
+        [sys.executable, "-c", text],
+        env={**os.environ, "PYTHONPATH": tests},
+        capture_output=True,
+        text=True,
+        timeout=60,
+        check=True,
+    )
+    assert says in done.stdout, done.stderr
+    left = contents(parts)
+    assert len(left) == 12 if dies == "worker" else 3 <= len(left) < 12
+    Campaign(Parts(parts)).run(tasks())
+    assert contents(parts) == whole
 
 
 # Fronts. Designs whose energy and error are known, with noise that all of them share.

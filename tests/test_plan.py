@@ -60,6 +60,13 @@ def test_the_best_mast_is_the_best_of_all() -> None:
     assert two.after_m < found.after_m < found.before_m
 
 
+def test_new_radio_heads_send_when_others_are_silent() -> None:
+    heads = json.loads(SHORT.site.to_json())["radio_heads"]
+    two = SHORT.with_overrides({"site.radio_heads": heads[:2]})
+    equipped = json.loads(plan(two, MASTS, add=2).scenario.site.to_json())["radio_heads"]
+    assert [head["ssb_index"] for head in equipped] == [0, 1, 2, 3]
+
+
 def test_the_command_plans_and_refuses(tmp_path: Path, access_av: Callable[..., Finished]) -> None:
     masts = tmp_path / "masts.csv"
     MASTS.write_csv(masts)

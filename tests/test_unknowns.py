@@ -9,6 +9,7 @@ import numpy as np
 import pytest
 
 from access_av import Scenario
+from access_av.campaign import Campaign, Shard
 from access_av.paper import search
 from access_av.paper.space import (
     CONTROLLER,
@@ -22,12 +23,21 @@ from access_av.paper.space import (
     world_changes,
 )
 from access_av.paper.unknowns import sobol
+from access_av.parts import Parts
 from access_av.platform import Platform
 
 if TYPE_CHECKING:
     from pathlib import Path
 
 BOARD = Platform.load("jetson-agx-xavier")
+
+
+def sample(parts: Path) -> search.Sample:
+    found = search.sample(Campaign(Parts(parts)), BOARD, **SMALL)
+    assert found is not None
+    return found
+
+
 SMALL = {"worlds": 2, "controllers": 3, "runs": 1}
 
 
@@ -88,18 +98,29 @@ def test_a_search_that_was_stopped_goes_on(tmp_path: Path, monkeypatch: pytest.M
 
     monkeypatch.setattr(search, "judge", stops)
     with pytest.raises(KeyboardInterrupt):
-        search.sample(BOARD, tmp_path, **SMALL)
+        sample(tmp_path)
     assert len(list(tmp_path.glob("*.npz"))) == 1
-    found = search.sample(BOARD, tmp_path, **SMALL)
+    found = sample(tmp_path)
     assert len(judged) == 3, "the first part is not computed again"
     assert not list(tmp_path.glob("*.partial"))
-    again = search.sample(BOARD, tmp_path, **SMALL)
+    again = sample(tmp_path)
     assert len(judged) == 3
     assert all((again.margins[name] == margin).all() for name, margin in found.margins.items())
 
 
+def test_shares_of_a_search_make_the_whole(tmp_path: Path) -> None:
+    whole = sample(tmp_path / "whole")
+    shares = Parts(tmp_path / "shares")
+    first, last = (
+        search.sample(Campaign(shares, shard=Shard(number, 2)), BOARD, **SMALL) for number in (1, 2)
+    )
+    assert first is None
+    assert last is not None
+    assert all((last.margins[name] == margin).all() for name, margin in whole.margins.items())
+
+
 def test_without_a_gate_t_max_is_kept_everywhere(tmp_path: Path) -> None:
-    found = search.sample(BOARD, tmp_path, **SMALL)
+    found = sample(tmp_path)
     assert GATE not in found.dimensions
     assert (found.longest_gap_s < 0.26).all()
     best = search.as_reading(found.values(found.best()[0]))

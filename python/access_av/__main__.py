@@ -19,11 +19,7 @@ def main() -> None:
     except KeyboardInterrupt:
         interrupt.end()
     except BaseException:  # what a library may have made of the interruption
-        try:
-            came = interrupt.came.wait(0.1)
-        except KeyboardInterrupt:
-            came = True
-        if came:
+        if interrupt.may_have_come():
             interrupt.end()
         raise
 

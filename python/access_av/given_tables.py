@@ -6,7 +6,8 @@ from typing import TYPE_CHECKING, Any
 
 import polars as pl
 
-from access_av.columns import GLOSSARY, TABLES
+from access_av.columns.glossary import GLOSSARY
+from access_av.columns.tables import TABLES
 from access_av.errors import InputError
 from access_av.files import regular
 

@@ -5,6 +5,7 @@ from __future__ import annotations
 import json
 import math
 import os
+from collections import Counter
 from concurrent.futures import ThreadPoolExecutor
 from dataclasses import dataclass
 from pathlib import Path
@@ -21,6 +22,9 @@ if TYPE_CHECKING:
 MOST_MASTS = 1000
 # Physical cell identities (TS 38.211, 7.4.2.1); each new head gets the lowest that is free.
 CELLS = 1008
+# SSB indices that a burst has at every carrier (TS 38.213, 4.1); each new head gets the least used:
+# cells that send at once drown one another.
+SSB_INDICES = range(4)
 
 
 @dataclass(frozen=True)
@@ -105,6 +109,11 @@ def plan(
     eirp_dbm = heads[0]["eirp_dbm"] if eirp_dbm is None else eirp_dbm
     taken = {head["pci"] for head in heads}
     free = [pci for pci in range(CELLS) if pci not in taken]
+    used = Counter(head["ssb_index"] for head in heads)
+    quiet = []
+    for _ in range(add):
+        quiet.append(min(SSB_INDICES, key=used.__getitem__))
+        used[quiet[-1]] += 1
 
     def equipped(chosen: Sequence[int]) -> _core.Scenario:
         new = [
@@ -112,9 +121,10 @@ def plan(
                 "name": candidates[number]["name"],
                 "position_m": [candidates[number][axis] for axis in ("x_m", "y_m", "z_m")],
                 "pci": pci,
+                "ssb_index": ssb_index,
                 "eirp_dbm": eirp_dbm,
             }
-            for number, pci in zip(chosen, free, strict=False)
+            for number, pci, ssb_index in zip(chosen, free, quiet, strict=False)
         ]
         return scenario.with_overrides({"site.radio_heads": [*heads, *new]}) if new else scenario
 

@@ -29,7 +29,7 @@ if TYPE_CHECKING:
 
     import polars as pl
 
-    from access_av.columns import Table
+    from access_av.columns.tables import Table
     from access_av.placement import Plan
     from access_av.recorded_angles import BurstAngle
     from access_av.service_levels import Verdict

@@ -116,6 +116,11 @@ impl EnergyModel {
         }))
     }
 
+    /// What listening to a burst costs, in executions; `None` where those cost nothing.
+    pub fn listening_in_executions(&self) -> Option<f64> {
+        (self.per_execution_j > 0.0).then(|| self.per_listening_j / self.per_execution_j)
+    }
+
     /// Energy of a run of so many executions, SSB bursts listened to, and seconds.
     pub fn of_run(&self, executions: usize, listened: usize, duration_s: f64) -> Energy {
         let idle_j = match self.sleep {

@@ -117,7 +117,7 @@ fn another_kind_takes_none_of_the_old_ones_keys() {
     };
     assert_eq!(
         (settings.bound_m, settings.least_gain_m2),
-        (0.1, Some(1e-4))
+        (0.1, Some(1.5e-4))
     );
     // And so does a table that names no kind.
     let told = "like = 'paper'\nwake_up.snr_set_point = { kind = 'absolute', snr_db = 5.0 }";

@@ -5,6 +5,7 @@ mod bound;
 mod campaign;
 mod channel;
 mod drive;
+mod interrupt;
 mod message;
 mod nr;
 mod plug_ins;
@@ -34,6 +35,20 @@ mod _core {
             // Makes `import access_av._core.aoa` find the submodule of a compiled module.
             let modules = module.py().import("sys")?.getattr("modules")?;
             modules.set_item("access_av._core.aoa", module)
+        }
+    }
+
+    #[pymodule]
+    mod interrupt {
+        #[pymodule_export]
+        use crate::interrupt::{came, clean, end, watch, writing};
+        use pyo3::prelude::*;
+
+        #[pymodule_init]
+        fn init(module: &Bound<'_, PyModule>) -> PyResult<()> {
+            let modules = module.py().import("sys")?.getattr("modules")?;
+            module.add("INTERRUPTED", crate::interrupt::INTERRUPTED)?;
+            modules.set_item("access_av._core.interrupt", module)
         }
     }
 

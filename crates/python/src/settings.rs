@@ -8,6 +8,7 @@ use onboard::settings::{
     Check, Extent, Platform as CorePlatform, SettingsError as CoreError, Site as CoreSite,
     TomlFile, Vehicle as CoreVehicle,
 };
+use onboard::wake_up;
 use pyo3::create_exception;
 use pyo3::exceptions::{PyTypeError, PyValueError};
 use pyo3::prelude::*;
@@ -130,7 +131,7 @@ toml_file! {
     /// A vehicle, checked: what it is built of and how it is set, as it believes.
     Vehicle(CoreVehicle), "vehicle",
 
-    /// The vehicle with the wake-up times written out that it leaves to the platform, which is
+    /// The vehicle with everything of its wake-up written out that it leaves to the platform, which is
     /// the one it names unless another is given.
     #[pyo3(signature = (platform = None))]
     fn resolved(&self, platform: Option<&Platform>) -> PyResult<Self> {
@@ -169,8 +170,8 @@ toml_file! {
         ]))
     }
 
-    /// The scenario with the wake-up times written out that its vehicle leaves to the platform,
-    /// which is the one it names unless another is given.
+    /// The scenario with everything of the wake-up written out that its vehicle leaves to the
+    /// platform, which is the one it names unless another is given.
     #[pyo3(signature = (platform = None))]
     fn resolved(&self, platform: Option<&Platform>) -> PyResult<Self> {
         let mut resolved = self.0.clone();
@@ -233,8 +234,8 @@ fn extent_of(name: &str) -> PyResult<Extent> {
 
 fn resolve(vehicle: &CoreVehicle, platform: Option<&Platform>) -> Result<CoreVehicle, CoreError> {
     match platform {
-        Some(platform) => platform.0.resolve(vehicle),
-        None => recording::load::<CorePlatform>(&vehicle.platform.name)?.resolve(vehicle),
+        Some(platform) => wake_up::resolve(vehicle, &platform.0),
+        None => wake_up::resolve(vehicle, &recording::load(&vehicle.platform.name)?),
     }
 }
 

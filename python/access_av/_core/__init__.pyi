@@ -7,6 +7,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from access_av._core import aoa as aoa
+from access_av._core import interrupt as interrupt
 from access_av._core import nr as nr
 
 __all__ = [
@@ -30,6 +31,7 @@ __all__ = [
     "brief",
     "channel_drops",
     "check_paths",
+    "interrupt",
     "locate",
     "log_angles",
     "nr",

@@ -7,7 +7,8 @@ from typing import Annotated
 
 import typer
 
-from access_av.columns import TABLES, as_json, markdown, table
+from access_av.columns.look_up import as_json, markdown, table
+from access_av.columns.tables import TABLES
 from access_av.commands.options import AsJson
 from access_av.terminal import show_columns
 

@@ -7,7 +7,17 @@ from typing import TYPE_CHECKING, Annotated, Any
 
 import typer
 
-from access_av.commands.options import AsJson, Out, Runs, ScenarioArgument, Seed, Threads
+from access_av.commands.options import (
+    OTHER_SHARES,
+    AsJson,
+    DaskOption,
+    Out,
+    Runs,
+    ScenarioArgument,
+    Seed,
+    ShardOption,
+    Threads,
+)
 from access_av.report.parts import value_text
 from access_av.terminal import console, progress, table
 
@@ -43,10 +53,8 @@ def designs(
     ] = None,
     runs: Runs = 20,
     seed: Seed = 1,
-    shard: Annotated[
-        str, typer.Option(metavar="I/N", help="Only this share of the drives.")
-    ] = "1/1",
-    dask: Annotated[str | None, typer.Option(help="Address of a Dask scheduler.")] = None,
+    shard: ShardOption = "1/1",
+    dask: DaskOption = None,
     threads: Threads = None,
     out: Out = None,
     as_json: AsJson = False,
@@ -86,7 +94,7 @@ def designs(
             )
         )
     if found is None:
-        console.print(f"Share {shard} is done; other shares are not: run them, then this again.")
+        console.print(OTHER_SHARES.format(shard))
         return
     rows = rows_of(found.driven)
     directory = ResultsDirectory.create(f"designs-{chosen.name}", out)

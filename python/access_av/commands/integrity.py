@@ -6,7 +6,17 @@ from typing import TYPE_CHECKING, Annotated, Any
 
 import typer
 
-from access_av.commands.options import AsJson, Out, Runs, ScenarioArgument, Seed, Threads
+from access_av.commands.options import (
+    OTHER_SHARES,
+    AsJson,
+    DaskOption,
+    Out,
+    Runs,
+    ScenarioArgument,
+    Seed,
+    ShardOption,
+    Threads,
+)
 from access_av.terminal import console, progress, table
 
 if TYPE_CHECKING:
@@ -34,10 +44,8 @@ def integrity(
     heads: Annotated[
         list[int] | None, typer.Option(min=1, help="Radio heads listened to; may be repeated.")
     ] = None,
-    shard: Annotated[
-        str, typer.Option(metavar="I/N", help="Only this share of the drives.")
-    ] = "1/1",
-    dask: Annotated[str | None, typer.Option(help="Address of a Dask scheduler.")] = None,
+    shard: ShardOption = "1/1",
+    dask: DaskOption = None,
     out: Out = None,
     as_json: AsJson = False,
 ) -> None:
@@ -69,7 +77,7 @@ def integrity(
             progress=tick,
         )
     if cases is None:
-        console.print(f"Share {shard} is done; other shares are not: run them, then this again.")
+        console.print(OTHER_SHARES.format(shard))
         return
     records = [case.as_record() for case in cases]
     directory.write_table("integrity.parquet", pl.DataFrame(records))

@@ -24,7 +24,12 @@ Out = Annotated[
 AllowLarge = Annotated[
     bool, typer.Option("--allow-large", help="Also drives that take hours and gigabytes.")
 ]
+ShardOption = Annotated[str, typer.Option(metavar="I/N", help="Only this share of the drives.")]
+DaskOption = Annotated[str | None, typer.Option(help="Address of a Dask scheduler.")]
 AsJson = Annotated[bool, typer.Option("--json", help="Print JSON.")]
+
+# What is said when a share of a campaign is done and others are not.
+OTHER_SHARES = "Share {} is done; other shares are not: run them, then this again."
 
 
 def load_scenario(name: str, *, allow_large: bool) -> Scenario:

@@ -6,7 +6,15 @@ from typing import Annotated
 
 import typer
 
-from access_av.commands.options import AsJson, Out, Runs, ScenarioArgument, Seed, Threads
+from access_av.commands.options import (
+    AsJson,
+    DaskOption,
+    Out,
+    Runs,
+    ScenarioArgument,
+    Seed,
+    Threads,
+)
 from access_av.terminal import console, progress, table
 
 app = typer.Typer()
@@ -35,7 +43,7 @@ def tune(
     ] = 64,
     runs: Runs = 20,
     seed: Seed = 1,
-    dask: Annotated[str | None, typer.Option(help="Address of a Dask scheduler.")] = None,
+    dask: DaskOption = None,
     threads: Threads = None,
     out: Out = None,
     as_json: AsJson = False,

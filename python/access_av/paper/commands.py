@@ -8,7 +8,17 @@ from typing import Annotated, Any
 
 import typer
 
-from access_av.commands.options import AsJson, Out, PlatformOption, Runs, Seed, Threads
+from access_av.commands.options import (
+    OTHER_SHARES,
+    AsJson,
+    DaskOption,
+    Out,
+    PlatformOption,
+    Runs,
+    Seed,
+    ShardOption,
+    Threads,
+)
 from access_av.terminal import console, progress, show_points, table
 
 app = typer.Typer()
@@ -40,6 +50,7 @@ def evaluate(
         Path | None, typer.Option(help="Claims to judge, as in paper.toml; else the paper's.")
     ] = None,
     threads: Threads = None,
+    dask: DaskOption = None,
     out: Out = None,
 ) -> None:
     """Read the paper in every way it can be, judge its claims, write the report.
@@ -47,12 +58,14 @@ def evaluate(
     Three campaigns for each reading: every method at every SSB, every method at what the computer
     manages, and adaptive MUSIC, each over all power modes. results/latest points to the files.
     """
+    from access_av.campaign import Campaign, executor
     from access_av.files import RESULTS
     from access_av.paper import results
     from access_av.paper.terminal import show_study
+    from access_av.parts import Parts
 
     names = [*(reading or []), *([scenario] if scenario else [])]
-    with progress("Driving") as tick:
+    with progress("Driving") as tick, executor(dask, threads) as (pool, workers):
         made, directory = results.run(
             names,
             platform,
@@ -61,7 +74,7 @@ def evaluate(
             seeds=seeds,
             threads=threads,
             out=out,
-            parts=RESULTS / "parts" if unknowns else None,
+            unknowns=Campaign(Parts(RESULTS / "parts"), pool, workers) if unknowns else None,
             stated=None if claims is None else _claims(claims),
             progress=tick,
         )
@@ -122,6 +135,8 @@ def search(
     ] = 200,
     seed: Seed = 1,
     threads: Threads = None,
+    shard: ShardOption = "1/1",
+    dask: DaskOption = None,
     out: Annotated[
         Path | None, typer.Option(help="Write the best reading as a scenario file.")
     ] = None,
@@ -131,28 +146,30 @@ def search(
     Draws from what the paper leaves open; no gate, t_max kept. A search that was stopped goes on
     where it was (results/parts). The best one and its neighbours are driven again, more often.
     """
+    from access_av.campaign import Campaign, Shard, executor
     from access_av.files import RESULTS, write_whole
     from access_av.paper.search import as_toml, confirmed, sample
     from access_av.paper.terminal import show_search
+    from access_av.parts import Parts
     from access_av.platform import Platform
 
     board = Platform.load(platform)
-    with progress("Readings") as tick:
+    share = Shard.parse(shard)
+    with progress("Worlds") as tick, executor(dask, threads) as (pool, workers):
+        campaign = Campaign(Parts(RESULTS / "parts"), pool, workers, share)
         found = sample(
+            campaign,
             board,
-            RESULTS / "parts",
             worlds=worlds,
             controllers=controllers,
             runs=runs,
             seed=seed,
-            threads=threads,
             progress=tick,
         )
-    checked = (
-        confirmed(board, found, RESULTS / "parts", runs=confirm, seed=seed + 1, threads=threads)
-        if confirm
-        else []
-    )
+        if found is None:
+            console.print(OTHER_SHARES.format(shard))
+            return
+        checked = confirmed(campaign, board, found, runs=confirm, seed=seed + 1) if confirm else []
     show_search(found, checked)
     if out is not None:
         best = checked[0].values if checked else found.values(found.best()[0])

@@ -23,9 +23,9 @@ if TYPE_CHECKING:
 
 # Horizontal error that it keeps with a probability of 90 %: the paper's 0.3 m.
 BOUND_M = 0.3
-# An angle is estimated before the bound demands it that takes so much variance away: chosen on this
+# A wake-up comes before the bound demands it that takes so much variance away: chosen on this
 # trip, so that without the road it keeps the bound by it alone.
-LEAST_GAIN_M2 = BOUND_M**2 / 300.0
+LEAST_GAIN_M2 = BOUND_M**2 / 200.0
 # It listens for SSBs so much stronger than the link budget says: three standard deviations of the
 # paper's fading.
 HEADROOM_DB = 9.0

@@ -7,12 +7,14 @@ world. A world with its controllers is one part on disk, so that a search that w
 from __future__ import annotations
 
 import json
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 from typing import TYPE_CHECKING, Any
 
 import numpy as np
 
+from access_av import _core
 from access_av._core import Scenario
+from access_av.campaign import Shard, Task
 from access_av.paper.claims import margins
 from access_av.paper.drives import Driver
 from access_av.paper.evaluation import Case, cases, outcome_of
@@ -30,13 +32,12 @@ from access_av.paper.space import (
     world_changes,
 )
 from access_av.paper.statements import stated_claims
-from access_av.parts import Parts
+from access_av.platform import Platform
 
 if TYPE_CHECKING:
     from collections.abc import Callable, Mapping, Sequence
-    from pathlib import Path
 
-    from access_av.platform import Platform
+    from access_av.campaign import Campaign
 
 
 @dataclass(frozen=True)
@@ -85,21 +86,22 @@ class Sample:
 
 
 def sample(
+    campaign: Campaign,
     platform: Platform,
-    parts: Path,
     *,
     worlds: int,
     controllers: int,
     runs: int,
     seed: int = 1,
     gates: bool = False,
-    threads: int | None = None,
     progress: Callable[[int, int], None] | None = None,
-) -> Sample:
+) -> Sample | None:
     """Draw readings, and judge each by the paper's claims.
 
     Parameters
     ----------
+    campaign
+        Who judges, and where each world with its controllers is kept.
     worlds, controllers
         How many worlds, and how many controllers in each.
     runs
@@ -107,8 +109,13 @@ def sample(
     gates
         Whether a gate is one of the things drawn; without, all is Algorithm 1 as written, and the
         first world is that of the shipped scenario.
-    parts
-        Directory of the parts; those that are there are not computed again.
+    progress
+        Called as ``progress(done, total)`` with numbers of worlds.
+
+    Returns
+    -------
+    Sample
+        ``None`` where parts are missing that another shard computes.
     """
     own = (*CONTROLLER, GATE) if gates else CONTROLLER
     world_points = latin_hypercube(worlds, len(WORLD), seed)
@@ -116,19 +123,20 @@ def sample(
         world_points[0] = SHIPPED_WORLD
     own_points = latin_hypercube(worlds * controllers, len(own), seed + 1)
     own_points = own_points.reshape(worlds, controllers, len(own))
-    found: list[dict[str, Any]] = []
-    store = Parts(parts)
-    for index in range(worlds):
-        world = named(WORLD, world_points[index].tolist())
-        here = [named(own, point) for point in own_points[index].tolist()]
-        depends_on = _depends_on(platform, world, here, runs, seed)
-
-        def compute(world: dict[str, Any] = world, here: list[dict[str, Any]] = here) -> Any:
-            return judge(platform, world, here, runs=runs, seed=seed, threads=threads)
-
-        found.append(store.get(depends_on, compute))
-        if progress is not None:
-            progress((index + 1) * controllers, worlds * controllers)
+    tasks = [
+        _task(
+            platform,
+            named(WORLD, world_points[index].tolist()),
+            [named(own, point) for point in own_points[index].tolist()],
+            runs,
+            seed,
+        )
+        for index in range(worlds)
+    ]
+    parts = campaign.run(tasks, progress)
+    found = [part for part in parts if part is not None]
+    if len(found) < len(parts):
+        return None
     repeated = np.repeat(world_points, controllers, axis=0)
     return Sample(
         dimensions=(*WORLD, *own),
@@ -146,23 +154,28 @@ def sample(
     )
 
 
-def _depends_on(
+def _task(
     platform: Platform,
     world: Mapping[str, Any],
     controllers: Sequence[Mapping[str, Any]],
     runs: int,
     seed: int,
-) -> dict[str, Any]:
-    """Everything that a part's numbers depend on, besides the version."""
-    return {
-        "world": world,
-        "controllers": controllers,
-        "runs": runs,
-        "seed": seed,
-        "platform": platform.to_toml(),
-        "scenario": Scenario.load("paper").to_toml(),
-        "claims": {name: _rule(entry) for name, entry in stated_claims().items()},
-    }
+) -> Task:
+    """A part: several controllers in one world."""
+    board = platform.to_toml()
+    return Task(
+        depends_on={
+            "world": world,
+            "controllers": controllers,
+            "runs": runs,
+            "seed": seed,
+            "platform": board,
+            "scenario": Scenario.load("paper").to_toml(),
+            "claims": {name: _rule(entry) for name, entry in stated_claims().items()},
+        },
+        work=judge,
+        arguments=(board, world, controllers, runs, seed),
+    )
 
 
 def _rule(entry: Mapping[str, Any]) -> dict[str, Any]:
@@ -171,16 +184,18 @@ def _rule(entry: Mapping[str, Any]) -> dict[str, Any]:
 
 
 def judge(
-    platform: Platform,
+    board: str,
     world: Mapping[str, Any],
     controllers: Sequence[Mapping[str, Any]],
-    *,
     runs: int,
     seed: int,
-    threads: int | None = None,
 ) -> dict[str, Numbers]:
-    """Margins of all claims, and the longest gap, of several controllers in one world."""
-    driver = Driver(platform, runs, seed, threads, count=0)
+    """Margins of all claims, and the longest gap, of several controllers in one world.
+
+    ``board`` is the platform as TOML: it may come from another machine. On one thread.
+    """
+    platform = Platform(_core.Platform.from_toml(board))
+    driver = Driver(platform, runs, seed, threads=1, count=0)
     paper = Scenario.load("paper").with_overrides(world_changes(world))
     scenarios = [
         paper.with_overrides(controller_changes(point, world["eirp_dbm"])) for point in controllers
@@ -280,46 +295,45 @@ class Confirmed:
 
 
 def confirmed(
-    platform: Platform,
-    found: Sample,
-    parts: Path,
-    *,
-    runs: int,
-    seed: int,
-    threads: int | None = None,
+    campaign: Campaign, platform: Platform, found: Sample, *, runs: int, seed: int
 ) -> list[Confirmed]:
     """Drive the best readings again, and then the neighbours of the one that remains the best.
 
     A neighbour differs by a tenth of a controller's dimension, or by another choice. The one that
     meets most claims comes first; of several, the one that the search had first.
     """
+    whole = replace(campaign, shard=Shard())
 
-    def again(labelled: Mapping[str, Mapping[str, Any]]) -> list[Confirmed]:
-        [*points] = labelled.values()
-        world = {dimension.name: points[0][dimension.name] for dimension in WORLD}
-
-        def compute() -> dict[str, Numbers]:
-            return judge(platform, world, points, runs=runs, seed=seed, threads=threads)
-
-        depends_on = {**_depends_on(platform, world, points, runs, seed), "confirmed": True}
-        part = Parts(parts).get(depends_on, compute)
+    def again(worlds: Sequence[Mapping[str, Mapping[str, Any]]]) -> list[list[Confirmed]]:
+        tasks = []
+        for labelled in worlds:
+            [*points] = labelled.values()
+            world = {dimension.name: points[0][dimension.name] for dimension in WORLD}
+            task = _task(platform, world, points, runs, seed)
+            tasks.append(replace(task, depends_on={**task.depends_on, "confirmed": True}))
         return [
-            Confirmed(
-                label=label,
-                values=values,
-                held=sum(bool(part[name][index] >= 0.0) for name in found.margins),
-                missed=[name for name in found.margins if part[name][index] < 0.0],
-            )
-            for index, (label, values) in enumerate(labelled.items())
+            [
+                Confirmed(
+                    label=label,
+                    values=values,
+                    held=sum(bool(part[name][index] >= 0.0) for name in found.margins),
+                    missed=[name for name in found.margins if part[name][index] < 0.0],
+                )
+                for index, (label, values) in enumerate(labelled.items())
+            ]
+            for labelled, part in zip(worlds, whole.run(tasks), strict=True)
+            if part is not None
         ]
 
-    best = {}
-    for place, index in enumerate(found.best()[:CANDIDATES], start=1):
-        [driven] = again({f"number {place} of the search": found.values(index)})
-        best[index] = driven
-    index, first = max(best.items(), key=lambda item: item[1].held)
-    beside = again(_neighbours(found, index))
-    rest = [driven for driven in best.values() if driven is not first]
+    best = found.best()[:CANDIDATES]
+    candidates = [
+        {f"number {place} of the search": found.values(index)}
+        for place, index in enumerate(best, start=1)
+    ]
+    driven = [one for [one] in again(candidates)]
+    index, first = max(zip(best, driven, strict=True), key=lambda item: item[1].held)
+    [beside] = again([_neighbours(found, index)])
+    rest = [one for one in driven if one is not first]
     return [first, *sorted(beside + rest, key=lambda each: -each.held)]
 
 

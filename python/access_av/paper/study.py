@@ -22,8 +22,8 @@ from access_av.platform import Figure, Platform
 
 if TYPE_CHECKING:
     from collections.abc import Callable, Mapping, Sequence
-    from pathlib import Path
 
+    from access_av.campaign import Campaign
     from access_av.paper.outcome import Drives
     from access_av.paper.readings import Reading
 
@@ -115,7 +115,7 @@ def study(
     seed: int,
     seeds: int = 1,
     threads: int | None = None,
-    parts: Path | None = None,
+    unknowns: Campaign | None = None,
     stated: Mapping[str, Any] | None = None,
     progress: Callable[[int, int], None] | None = None,
 ) -> Study:
@@ -125,8 +125,9 @@ def study(
     ----------
     seeds
         With how many seeds the claims are judged, from ``seed`` on; all else is of it alone.
-    parts
-        Where a sample of what the paper leaves open is kept; none is drawn without.
+    unknowns
+        Who draws a sample of what the paper leaves open, and where it is kept; none is drawn
+        without.
     stated
         Claims as ``paper.toml`` has them; its own when ``None``.
 
@@ -147,21 +148,20 @@ def study(
             unusable[reading.name] = str(error)
     if not evaluations:
         raise InputError("; ".join(unusable.values()))
-    unknowns = None
-    if parts is not None:
+    hangs_on = None
+    if unknowns is not None:
         worlds, controllers, drives = UNKNOWNS
         drawn = sample(
+            unknowns,
             platform,
-            parts,
             worlds=worlds,
             controllers=controllers,
             runs=drives,
             seed=seed,
             gates=True,
-            threads=threads,
             progress=progress,
         )
-        unknowns = sobol(drawn, drives)
+        hangs_on = None if drawn is None else sobol(drawn, drives)
     claims = {seed: judged(evaluations, stated)}
     for other in range(seed + 1, seed + seeds):
         again = Driver(platform, runs, other, threads, count=0, progress=progress, planned=planned)
@@ -172,7 +172,7 @@ def study(
         ablations=[found for each in evaluations for found in ablation.ablate(driver, each)],
         front=[],
         ours=[],
-        unknowns=unknowns,
+        unknowns=hangs_on,
         unusable=unusable,
         duration_s=0.0,
     )

@@ -38,10 +38,15 @@ def fill(template: str, specs: Mapping[str, Spec], **fields: object) -> str:
         style=_read("style.css"),
         footer=f"ACCESS-AV {version('access-av')}. This localizer is not a safety function "
         "in the sense of ISO 3691-4.",
-        bundle=vl_convert.javascript_bundle("window.vegaEmbed = vegaEmbed;"),
+        bundle=bundle(),
         specs=json.dumps(specs, separators=(",", ":")).replace("<", "\\u003c"),
         script=_read("page.js"),
     )
+
+
+def bundle() -> str:
+    """The code that draws charts; made once in a process, which takes a second or two."""
+    return vl_convert.javascript_bundle()  # type: ignore[call-arg]  # its stub errs
 
 
 def _read(name: str) -> str:

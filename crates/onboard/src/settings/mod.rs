@@ -9,11 +9,13 @@
 mod array;
 mod check;
 mod error;
+mod figure;
 mod limits;
 mod localizer;
 mod odometry;
 mod overlay;
 mod platform;
+mod power;
 mod radio;
 mod read;
 mod receiver;
@@ -28,15 +30,14 @@ mod wake_up;
 pub use array::ArraySettings;
 pub use check::Check;
 pub use error::SettingsError;
+pub use figure::{Boundary, Extent, Figure, Provenance, Quantity};
 pub use localizer::{
     DeadReckoningSettings, HeadingBetween, IntegritySettings, LocalizerSettings, TrackerSettings,
 };
 pub use odometry::{DriveKind, GyroscopeSettings, LaneKeepingSettings, OdometerSettings};
 pub use overlay::lay_over;
-pub use platform::{
-    Boundary, CorePower, CpuSettings, Extent, Figure, IdleSettings, Platform, PowerMode,
-    Provenance, Quantity, ReceiverPower, SuspendSettings,
-};
+pub use platform::Platform;
+pub use power::{CorePower, CpuSettings, IdleSettings, PowerMode, ReceiverPower, SuspendSettings};
 pub use radio::{RadioHeadSettings, SsbSettings};
 pub use read::{from_table, parse};
 pub use receiver::{EstimatorMethod, EstimatorSettings, Pilots, ReceiverSettings};

@@ -193,12 +193,15 @@ pub struct UncertaintySettings {
     #[serde(skip_serializing_if = "Option::is_none")]
     #[schemars(range(min = 0.1, max = 3.6e6))]
     pub base_ms: Option<f64>,
-    /// Energy of waking the receiver up, in executions.
-    #[schemars(range(min = 0.0, max = 1e3))]
-    pub wake_up_cost: f64,
-    /// Variance in m² that makes an execution worth its energy before the bound demands it, and
-    /// that it must take away where the bound is out of reach. Without it angles are estimated on
-    /// the bound's demand alone, and all there are where it is out of reach.
+    /// Energy of a wake-up before its first angle, in executions: the receiver's, and of receiving a
+    /// burst. Without it, what the platform says of both; where it says nothing, 0.5.
+    #[serde(skip_serializing_if = "Option::is_none")]
+    #[schemars(range(min = 0.0, max = 1e9))]
+    pub wake_up_cost: Option<f64>,
+    /// Variance in m² that makes a wake-up for one angle worth its energy before the bound demands
+    /// it, and that it must take away where the bound is out of reach; one for several angles must
+    /// take away as much more as it costs more. Without it angles are estimated on the bound's demand
+    /// alone, and all there are where it is out of reach.
     #[serde(skip_serializing_if = "Option::is_none")]
     #[schemars(range(min = 0.0, max = 1e6))]
     pub least_gain_m2: Option<f64>,
@@ -216,7 +219,7 @@ impl Default for UncertaintySettings {
             bound_m: 0.3,
             confidence: 0.9,
             base_ms: None,
-            wake_up_cost: 0.5,
+            wake_up_cost: None,
             least_gain_m2: None,
             snr_headroom_db: None,
         }

@@ -7,9 +7,14 @@ use super::fixed::FixedInterval;
 use super::gated::Gated;
 use super::policy::WakeUpPolicy;
 use super::uncertainty::UncertaintyDriven;
+use crate::energy::EnergyModel;
 use crate::settings::{
-    Check, DueSettings, PidSettings, Platform, SettingsError, Site, Vehicle, WakeUpSettings,
+    Check, DueSettings, Extent, PidSettings, Platform, SettingsError, Site, UncertaintySettings,
+    Vehicle, WakeUpSettings,
 };
+
+/// Energy of a wake-up before its first angle, in executions, where no platform knows.
+const UNKNOWN_WAKE_UP_COST: f64 = 0.5;
 
 /// The policy of a vehicle at a site, base wake-up times being the platform's where the settings
 /// leave them to it.
@@ -59,9 +64,36 @@ pub fn built_in(
             Box::new(Gated::new(due, settings.snr_set_point, latest_s))
         }
         WakeUpSettings::Uncertainty(settings) => {
-            Box::new(UncertaintyDriven::new(&settings, site, vehicle))
+            let cost = wake_up_cost(&settings, vehicle, platform)?;
+            Box::new(UncertaintyDriven::new(&settings, cost, site, vehicle))
         }
     })
+}
+
+/// The vehicle with everything written out that its wake-up leaves to the platform.
+///
+/// # Errors
+/// As [`built_in`].
+pub fn resolve(vehicle: &Vehicle, platform: &Platform) -> Result<Vehicle, SettingsError> {
+    let mut resolved = platform.resolve(vehicle)?;
+    if let WakeUpSettings::Uncertainty(settings) = &mut resolved.wake_up {
+        settings.wake_up_cost = Some(wake_up_cost(settings, vehicle, platform)?);
+    }
+    Ok(resolved)
+}
+
+/// Energy of a wake-up before its first angle, in executions.
+fn wake_up_cost(
+    settings: &UncertaintySettings,
+    vehicle: &Vehicle,
+    platform: &Platform,
+) -> Result<f64, SettingsError> {
+    if let Some(stated) = settings.wake_up_cost {
+        return Ok(stated);
+    }
+    let model = EnergyModel::new(vehicle, platform, Extent::Value)?;
+    let known = model.and_then(|model| model.listening_in_executions());
+    Ok(known.unwrap_or(UNKNOWN_WAKE_UP_COST))
 }
 
 /// Refuses a longest wake-up time below the shortest.

@@ -12,7 +12,7 @@ mod policy;
 mod uncertainty;
 
 pub use adaptive::Adaptive;
-pub use choose::built_in;
+pub use choose::{built_in, resolve};
 pub use controller::Controller;
 pub use due::Due;
 pub use fixed::FixedInterval;

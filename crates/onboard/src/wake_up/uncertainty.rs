@@ -13,6 +13,10 @@
 //! an angle of at least that worth, `least_gain_m2`, is taken before the bound demands it: the
 //! stretch ahead, where none is worth as much, then begins with a small error.
 //!
+//! A wake-up costs before its first angle: the receiver settles and is on for the burst, whatever is
+//! estimated from it. What that is in executions the platform knows; where it is many, all radio
+//! heads of a burst are heard at once and the next burst is farther off.
+//!
 //! Of what an angle says the most depends on the SNR of its SSB, which a receiver that listens knows
 //! before any angle is estimated. Given `snr_headroom_db`, an angle's worth is judged by that.
 
@@ -49,12 +53,18 @@ pub struct UncertaintyDriven {
 }
 
 impl UncertaintyDriven {
-    /// The policy for a site's SSBs.
-    pub fn new(settings: &UncertaintySettings, site: &Site, vehicle: &Vehicle) -> Self {
+    /// The policy for a site's SSBs. `wake_up_cost` is the energy of a wake-up before its first
+    /// angle, in executions.
+    pub fn new(
+        settings: &UncertaintySettings,
+        wake_up_cost: f64,
+        site: &Site,
+        vehicle: &Vehicle,
+    ) -> Self {
         Self {
             bound_m: settings.bound_m,
             quantile: RadialQuantile::new(1.0 - settings.confidence),
-            wake_up_cost: settings.wake_up_cost,
+            wake_up_cost,
             least_gain_m2: settings.least_gain_m2,
             snr_headroom_db: settings.snr_headroom_db,
             period_s: site.ssb.period_s(),
@@ -69,10 +79,10 @@ impl UncertaintyDriven {
         self.error_m(tracker, time_s + self.period_s) <= self.bound_m
     }
 
-    /// The angles to take, one bit for each radio head: those worth their energy, and of the others
-    /// as few as keep the bound until the next SSB. Where nothing keeps it, those worth their
-    /// energy, or all, if any price is to be paid. `snr_db` is what a radio head at a distance is
-    /// received with.
+    /// The angles to take, one bit for each radio head: as many as make the most of the energy of
+    /// the wake-up, if they are worth it or demanded, and more where only more keep the bound until
+    /// the next SSB. Where nothing keeps it, those worth their energy, or all, if any price is to be
+    /// paid. `snr_db` is what a radio head at a distance is received with.
     fn choice(
         &self,
         tracker: &Tracker,
@@ -80,7 +90,7 @@ impl UncertaintyDriven {
         heads: &[RadioHead],
         snr_db: impl Fn(&RadioHead, f64) -> f64,
     ) -> u64 {
-        let mut demanded = !self.keeps(tracker, time_s);
+        let demanded = !self.keeps(tracker, time_s);
         if !demanded && self.least_gain_m2.is_none() {
             return 0;
         }
@@ -95,8 +105,8 @@ impl UncertaintyDriven {
             self.quantile.radius(Tracker::principal_variances(&next)) <= self.bound_m
         };
         let before = spread(&belief);
-        let mut best_rate = self.least_gain_m2.unwrap_or(f64::INFINITY);
-        let (mut taken, mut worthwhile, mut improving) = (0u64, 0u64, true);
+        let (mut taken, mut best, mut most_m2) = (0u64, 0u64, 0.0);
+        let (mut improving, mut kept) = (true, !demanded);
         for count in 1..=heads.len().min(MOST_HEADS) {
             let next = (heads.iter().enumerate().take(MOST_HEADS))
                 .filter(|(index, _)| taken >> index & 1 == 0)
@@ -112,23 +122,26 @@ impl UncertaintyDriven {
             };
             taken |= 1 << index;
             belief = after;
-            let rate = (before - left) / (self.wake_up_cost + count as f64);
-            improving &= rate > best_rate;
+            let cost = (self.wake_up_cost + count as f64) / (self.wake_up_cost + 1.0);
+            let gain_m2 = (before - left) / cost;
+            improving &= gain_m2 > most_m2;
             if improving {
-                (worthwhile, best_rate) = (taken, rate);
+                (best, most_m2) = (taken, gain_m2);
             }
-            if demanded && keeps(&belief) {
+            if !kept && keeps(&belief) {
                 // The angles are taken in the same order for either purpose.
-                worthwhile |= taken;
-                demanded = false;
+                best |= taken;
+                kept = true;
             }
-            if !improving && !demanded {
+            if !improving && kept {
                 break;
             }
         }
         match self.least_gain_m2 {
-            None if demanded => taken,
-            _ => worthwhile,
+            _ if demanded && kept => best,
+            Some(least_m2) if most_m2 >= least_m2 => best,
+            Some(_) => 0,
+            None => taken,
         }
     }
 

@@ -26,6 +26,12 @@ use crate::settings::DriveKind;
 /// Longest step over which the road's curvature is taken as constant (m).
 const STEP_M: f64 = 1.0;
 
+/// Most steps at a time: over a kilometre without odometry nothing is known of bends.
+pub(super) const MOST_STEPS: f64 = 1000.0;
+
+/// A speed of so many times the vehicle's is none, whatever was stated; it is read as that.
+const WILD: f64 = 10.0;
+
 /// Deviations of the speed's reading from which on a step of it is slip, and the most that slip
 /// adds to the deviation of the odometer's scale.
 const SIGMAS_OF_SLIP: f64 = 5.0;
@@ -132,6 +138,11 @@ impl Tracker {
         if !sample.is_finite() {
             return OdometryVerdict::NotFinite;
         }
+        let most_mps = WILD * self.config.top_speed_mps;
+        let sample = &OdometrySample {
+            speed_mps: sample.speed_mps.clamp(-most_mps, most_mps),
+            ..*sample
+        };
         let Some(previous) = self.odometry else {
             self.odometry = Some(*sample);
             self.ask(sample.time_s);
@@ -256,7 +267,7 @@ impl Tracker {
     }
 
     fn advance(&mut self, reading_m: f64, duration_s: f64, yaw: Option<Yaw>) {
-        let steps = (reading_m.abs() / STEP_M).ceil().max(1.0);
+        let steps = (reading_m.abs() / STEP_M).ceil().clamp(1.0, MOST_STEPS);
         let share = 1.0 / steps;
         let yaw = yaw.map(|yaw| Yaw {
             turn_rad: yaw.turn_rad * share,

@@ -1,6 +1,6 @@
 //! What the belief would become: driven on, and with angles not yet heard.
 
-use super::filter::Tracker;
+use super::filter::{MOST_STEPS, Tracker};
 use super::locate::locate;
 use super::sighting::Sighting;
 use super::state::Belief;
@@ -43,7 +43,7 @@ impl Tracker {
 
     /// A belief carried on by what the odometer would read, nothing being heard.
     pub fn carry(&self, mut belief: Belief, reading_m: f64) -> Belief {
-        let steps = (reading_m.abs() / FORECAST_STEP_M).ceil();
+        let steps = (reading_m.abs() / FORECAST_STEP_M).ceil().min(MOST_STEPS);
         for _ in 0..steps as usize {
             self.step(&belief, reading_m / steps).apply(&mut belief);
         }
