@@ -56,7 +56,9 @@ pub fn built_in(
             };
             let map = road.clone().map(Arc::new);
             let tracker = Tracker::new(config, map, &heads, &start);
-            Ok(Box::new(Recovery::new(tracker, road, &heads, integrity)))
+            Ok(Box::new(Recovery::new(
+                tracker, road, &heads, integrity, None,
+            )))
         }
     }
 }

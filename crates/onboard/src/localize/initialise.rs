@@ -45,12 +45,13 @@ const FOUND_STD_RAD: f64 = 0.2;
 const HEADINGS: u32 = 12;
 const MOST_HYPOTHESES: f64 = 4000.0;
 
-/// What an angle says for the belief it met. Looks that are not independent have a variance that
-/// says so, and cost alike.
+/// What an angle says for the belief it met, beside what it would say for one without any doubt that
+/// foretold it exactly. Looks that are not independent have a variance that says so: they cost
+/// nothing, however that variance differs from place to place.
 pub(super) fn log_likelihood(innovation: Option<Innovation>, verdict: &UpdateVerdict) -> f64 {
     match (innovation, verdict.reason) {
         (Some(seen), UpdateReason::Consistent) => {
-            -0.5 * (seen.mahalanobis2() + (TAU * seen.variance).ln())
+            -0.5 * (seen.mahalanobis2() + (seen.variance / seen.measurement_variance).ln())
         }
         // Whoever leaves out a radio head takes its angles for outliers.
         (_, UpdateReason::Excluded) | (Some(_), _) => -OUTLIER,

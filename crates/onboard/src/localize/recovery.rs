@@ -92,12 +92,14 @@ struct Search {
 }
 
 impl Recovery {
-    /// A tracker of these radio heads; `road` is where it is to be searched for.
+    /// A tracker of these radio heads, that was given its place or found it at a time; `road` is
+    /// where it is to be searched for.
     pub fn new(
         tracker: Tracker,
         road: Option<Road>,
         heads: &[RadioHead],
         integrity: Option<IntegrityConfig>,
+        found_s: Option<f64>,
     ) -> Self {
         let risk = integrity.unwrap_or_default().risk;
         Self {
@@ -108,7 +110,7 @@ impl Recovery {
                 integrity,
                 quantile: RadialQuantile::new(risk),
             }),
-            tracked: Tracked::new(tracker, heads, integrity),
+            tracked: Tracked::new(tracker, heads, integrity, found_s),
             watch: Watch::new(heads),
             search: None,
             rests_until_s: f64::NEG_INFINITY,
@@ -181,7 +183,8 @@ impl Recovery {
             moved_m: from.point().distance_m(to.point()),
             turned_rad: wrap_angle(to.heading_rad - from.heading_rad),
         });
-        self.tracked = Tracked::new(found, &self.setup.heads, self.setup.integrity);
+        let setup = &self.setup;
+        self.tracked = Tracked::new(found, &setup.heads, setup.integrity, Some(now_s));
         if self.keeps_journal {
             self.tracked.keep_journal();
         }

@@ -86,8 +86,9 @@ impl Localizer for Search {
         if let Some(tracker) = self.initialiser.found() {
             let config = self.integrity.as_ref().map(|(config, _)| *config);
             let (road, heads) = (self.road.clone(), self.initialiser.heads());
+            let found_s = Some(measured.time_s);
             let mut localizer: Box<dyn Localizer> =
-                Box::new(Recovery::new(tracker, road, heads, config));
+                Box::new(Recovery::new(tracker, road, heads, config, found_s));
             if self.keeps_journal {
                 localizer.keep_journal();
             }

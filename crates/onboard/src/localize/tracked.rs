@@ -36,10 +36,15 @@ impl Clone for Tracked {
 }
 
 impl Tracked {
-    /// A tracker, guarded or not.
-    pub fn new(tracker: Tracker, heads: &[RadioHead], integrity: Option<IntegrityConfig>) -> Self {
+    /// A tracker, guarded or not, that was given its place or found it at a time.
+    pub fn new(
+        tracker: Tracker,
+        heads: &[RadioHead],
+        integrity: Option<IntegrityConfig>,
+        found_s: Option<f64>,
+    ) -> Self {
         match integrity {
-            Some(config) => Self::Guarded(Box::new(Guard::new(tracker, heads, config))),
+            Some(config) => Self::Guarded(Box::new(Guard::new(tracker, heads, config, found_s))),
             None => Self::Bare(Box::new(tracker)),
         }
     }

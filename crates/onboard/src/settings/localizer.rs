@@ -83,6 +83,14 @@ pub struct IntegritySettings {
     /// Probability with which the error may exceed the protection level.
     #[schemars(range(min = 1e-12, max = 0.5))]
     pub risk: f64,
+    /// Probability that some radio head is at fault: moved, spoofed, without line of sight. With one at
+    /// fault the error may exceed the protection level with `risk / fault_probability`.
+    #[schemars(range(min = 1e-9, max = 0.5))]
+    pub fault_probability: f64,
+    /// Probability that the odometer slips, each time that the vehicle sets off. While it does the
+    /// error may exceed the protection level with `risk / slip_probability`.
+    #[schemars(range(min = 1e-9, max = 0.5))]
+    pub slip_probability: f64,
 }
 
 impl Default for IntegritySettings {
@@ -90,6 +98,8 @@ impl Default for IntegritySettings {
         Self {
             alert_limit_m: 1.5,
             risk: 8e-4,
+            fault_probability: 0.08,
+            slip_probability: 0.003,
         }
     }
 }

@@ -2,13 +2,18 @@
 
 use crate::settings::IntegritySettings;
 
+/// However rare a fault is, under it the error is within the level more often than not.
+const MOST_CONDITIONAL: f64 = 0.49;
+
 /// What the guard is to promise.
 #[derive(Clone, Copy, Debug, PartialEq)]
 pub struct IntegrityConfig {
     /// Probability with which the error may exceed the protection level, no source being at fault.
     pub risk: f64,
-    /// The same with one source at fault, which is rare in itself.
-    pub risk_under_fault: f64,
+    /// Probability that one of the radio heads is at fault.
+    pub fault_probability: f64,
+    /// Probability that the odometer slips, each time that the vehicle sets off.
+    pub slip_probability: f64,
     /// Protection level above which the position is not to be relied on (m).
     pub alert_limit_m: f64,
     /// Statistic at which a radio head counts as faulty, in standard deviations.
@@ -19,16 +24,26 @@ pub struct IntegrityConfig {
     pub recovery_s: f64,
 }
 
+impl IntegrityConfig {
+    /// Probability with which the error may exceed the level with one radio head at fault.
+    pub fn risk_under_fault(&self) -> f64 {
+        conditional(self.risk, self.fault_probability)
+    }
+
+    /// The same with an odometer that slips.
+    pub fn risk_under_slip(&self) -> f64 {
+        conditional(self.risk, self.slip_probability)
+    }
+}
+
+/// What a hypothesis of some probability may be missed with, for the risk to hold.
+fn conditional(risk: f64, probability: f64) -> f64 {
+    (risk / probability).min(MOST_CONDITIONAL)
+}
+
 impl Default for IntegrityConfig {
     fn default() -> Self {
-        Self {
-            risk: 8e-4,
-            risk_under_fault: 1e-2,
-            alert_limit_m: 1.5,
-            detection_threshold: 5.5,
-            recovery_threshold: 3.5,
-            recovery_s: 5.0,
-        }
+        Self::from(&IntegritySettings::default())
     }
 }
 
@@ -37,7 +52,11 @@ impl From<&IntegritySettings> for IntegrityConfig {
         Self {
             alert_limit_m: settings.alert_limit_m,
             risk: settings.risk,
-            ..Self::default()
+            fault_probability: settings.fault_probability,
+            slip_probability: settings.slip_probability,
+            detection_threshold: 5.5,
+            recovery_threshold: 3.5,
+            recovery_s: 5.0,
         }
     }
 }

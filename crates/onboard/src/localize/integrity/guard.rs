@@ -4,7 +4,9 @@
 //! ([`Bank`]). If one radio head is at fault, the tracker without it is right within its own
 //! covariance, wherever the full solution may be: the protection level is the radius about the full
 //! solution that holds for each of them (solution separation, Brown and McBurney 1988, with the
-//! separation as it is and not its threshold).
+//! separation as it is and not its threshold). The same of the tracker that does not trust the
+//! odometer ([`Slip`](super::slip::Slip)). Each is given the share of the risk that its probability
+//! leaves it.
 //!
 //! A single radio head has no witness but odometry and road: the protection level then is what
 //! those two can vouch for, grows with the distance driven, and passes the alert limit unless they
@@ -28,6 +30,7 @@ pub struct Guard {
     config: IntegrityConfig,
     nominal: RadialQuantile,
     under_fault: SeparatedRadius,
+    under_slip: SeparatedRadius,
     bank: Bank,
     restarted: Option<Restarted>,
     /// Distance driven (m) when the sources could be told apart last.
@@ -46,6 +49,7 @@ clone_in_place!(Guard {
     config,
     nominal,
     under_fault,
+    under_slip,
     bank,
     restarted,
     trusted_m,
@@ -55,15 +59,27 @@ clone_in_place!(Guard {
 clone_in_place!(Restarted { bank, since_s });
 
 impl Guard {
-    /// Guards a tracker of these radio heads.
-    pub fn new(tracker: Tracker, heads: &[RadioHead], config: IntegrityConfig) -> Self {
+    /// Guards a tracker of these radio heads. One that was found by a search, and not given, is on
+    /// probation since then.
+    pub fn new(
+        tracker: Tracker,
+        heads: &[RadioHead],
+        config: IntegrityConfig,
+        found_s: Option<f64>,
+    ) -> Self {
         Self {
             nominal: RadialQuantile::new(config.risk),
-            under_fault: SeparatedRadius::new(config.risk_under_fault),
+            under_fault: SeparatedRadius::new(config.risk_under_fault()),
+            under_slip: SeparatedRadius::new(config.risk_under_slip()),
             trusted_m: tracker.driven_m(),
-            bank: Bank::new(tracker, heads, f64::NEG_INFINITY),
+            bank: Bank::new(
+                tracker,
+                heads,
+                config.slip_probability,
+                found_s.unwrap_or(f64::NEG_INFINITY),
+            ),
             restarted: None,
-            now_s: f64::NEG_INFINITY,
+            now_s: found_s.unwrap_or(f64::NEG_INFINITY),
             config,
         }
     }
@@ -129,6 +145,7 @@ impl Guard {
             bank: Bank::new(
                 main.restarted(position_std_m),
                 self.bank.heads(),
+                self.config.slip_probability,
                 self.now_s,
             ),
             since_s: self.now_s,
@@ -139,9 +156,9 @@ impl Guard {
     pub fn pose(&self, time_s: f64) -> PoseEstimate {
         let mut pose = self.bank.main().pose(time_s);
         pose.integrity = Some(self.integrity(time_s));
-        if let Some(restarted) = &self.restarted {
-            // It may take over.
-            pose.cover(&restarted.bank.main().pose(time_s));
+        let restarted = self.restarted.iter().map(|it| it.bank.main());
+        for other in self.bank.candidates(&self.config).chain(restarted) {
+            pose.cover(&other.pose(time_s));
         }
         pose
     }
@@ -151,7 +168,10 @@ impl Guard {
         let protection_level_m = self.protection_level_m(&self.bank, time_s);
         let state = if self.bank.is_outvoted(&self.config) {
             IntegrityState::Unavailable
-        } else if self.restarted.is_some() || protection_level_m > self.config.alert_limit_m {
+        } else if self.restarted.is_some()
+            || self.bank.quiet_s(self.now_s) <= self.config.recovery_s
+            || protection_level_m > self.config.alert_limit_m
+        {
             IntegrityState::Degraded
         } else {
             IntegrityState::Ok
@@ -164,11 +184,14 @@ impl Guard {
     }
 
     /// The radius that the error leaves with the stated risk, whether no source is at fault or any
-    /// one of those in use.
+    /// one of those in use, the odometer among them as long as it may slip.
     fn protection_level_m(&self, bank: &Bank, time_s: f64) -> f64 {
         let main = bank.main().pose(time_s);
         let mut level_m = self.nominal.radius(main.principal_variances());
-        for without in bank.without_one() {
+        let without_heads = bank.without_one().map(|it| (it, &self.under_fault));
+        let slipping = bank.slip().likelier_than(self.config.risk);
+        let without_odometer = slipping.map(|it| (it, &self.under_slip));
+        for (without, quantile) in without_heads.chain(without_odometer) {
             let clean = without.pose(time_s);
             let Some([[xx, xy, _], [_, yy, _], _]) = clean.covariance else {
                 continue;
@@ -178,7 +201,7 @@ impl Guard {
                 clean.pose.y_m - main.pose.y_m,
             ];
             let covariance = [[xx, xy], [xy, yy]];
-            level_m = (self.under_fault).radius(separation_m, covariance, level_m);
+            level_m = quantile.radius(separation_m, covariance, level_m);
         }
         level_m
     }

@@ -45,8 +45,8 @@ const TRANSITION_M: f64 = 0.5;
 /// Squared Mahalanobis distance up to which the yaw rate on a road is taken at its word: 6σ.
 const TURN_GATE: f64 = 36.0;
 
-/// What a refused yaw rate may have hidden: that the vehicle turned by this much faster or slower
-/// than before (rad/s, a standard deviation).
+/// What a refused yaw rate may have hidden: that the vehicle turned as fast that way as it can, or at
+/// least by this much faster or slower than before (rad/s, a standard deviation).
 const REFUSED_RADPS: f64 = 0.5;
 
 /// How the yaw rate wanders while no sample tells of it: the density of a white angular acceleration
@@ -173,8 +173,9 @@ impl Tracker {
             let usual_mps = SIGMAS_OF_SLIP * self.config.speed_noise_mps;
             let least_mps = usual_mps.max(self.config.leap_mps2 * duration_s.max(0.02));
             let leap = (self.speed_steps).leap(previous.speed_mps, sample.speed_mps, least_mps);
-            let variance = &mut self.belief.covariance[SCALE][SCALE];
-            *variance = variance.max((*variance + leap * leap).min(MOST_SLIP * MOST_SLIP));
+            let sets_off = previous.speed_mps == 0.0 && sample.speed_mps != 0.0;
+            let unseen = self.config.may_slip && sets_off;
+            self.slip(if unseen { MOST_SLIP } else { leap });
         }
         let moved_m = sample.distance_m - previous.distance_m;
         // A counter that was reset or overflowed says nothing of the distance: the speeds do.
@@ -204,8 +205,10 @@ impl Tracker {
         let yaw = rate.map(|rate| {
             let mut yaw = self.yaw(rate, told_m, told_s);
             let change_rad = (before.unwrap_or(rate) - rate) * told_s;
-            if refused.is_some() {
-                yaw.variance += (REFUSED_RADPS * told_s).powi(2);
+            if let Some(refused) = refused {
+                let top = self.config.top_yaw_rate_radps;
+                let by = (refused.clamp(-top, top) - rate).abs().max(REFUSED_RADPS);
+                yaw.variance += (by * told_s).powi(2);
             } else if self.turns_as_told() {
                 // When between two samples the rate changed nobody knows: evenly distributed.
                 yaw.variance += change_rad * change_rad / 12.0;
@@ -233,6 +236,12 @@ impl Tracker {
                 None => OdometryVerdict::Accepted,
             }
         }
+    }
+
+    /// The odometer's scale may have changed by a share.
+    fn slip(&mut self, by: f64) {
+        let variance = &mut self.belief.covariance[SCALE][SCALE];
+        *variance = variance.max((*variance + by * by).min(MOST_SLIP * MOST_SLIP));
     }
 
     /// What the yaw rate says of a step.
@@ -458,8 +467,12 @@ impl Tracker {
             .find(|(_, mine)| mine.is(head))
             .ok_or(UpdateReason::UnknownRadioHead)?;
         let (ahead_m, ahead_variance) = self.coasting(measured.time_s);
+        // From the newest odometry to the angle the vehicle has strayed on in its lane.
+        let ahead = (ahead_m != 0.0)
+            .then(|| self.step(&self.belief, ahead_m * (1.0 + self.belief.mean[SCALE])));
+        let mean = (ahead.as_ref()).map_or(&self.belief.mean, |ahead| &ahead.mean);
         let sighting = self
-            .sight(&head.known, ahead_m)
+            .sight(&head.known, mean)
             .ok_or(UpdateReason::Unusable)?;
         let bend = sighting.bend(&self.belief.covariance);
         let place_m = self.driven_m + ahead_m;
@@ -472,15 +485,18 @@ impl Tracker {
         let repetition = (self.config.finds_errors).then(|| StayingError::repetition(travelled_m));
         let error_variance = head.error.variance();
         let stays = repetition.map_or(0.0, |repetition| repetition * error_variance);
-        let measurement_variance =
-            stays + stated + shared + sighting.row[ALONG].powi(2) * ahead_variance + bend.variance;
+        let (row, strayed) = (ahead.as_ref()).map_or((sighting.row, 0.0), |ahead| {
+            ahead.seen_before(&sighting.row)
+        });
+        let coasted = sighting.row[ALONG].powi(2) * ahead_variance + strayed;
+        let measurement_variance = stays + stated + shared + coasted + bend.variance;
         let residual = wrap_angle(measured.phase_rad - sighting.phase_rad - bend.shift_rad);
-        let innovation = (self.belief).innovation(residual, &sighting.row, measurement_variance);
+        let innovation = (self.belief).innovation(residual, &row, measurement_variance);
         Ok(Look {
             head: index,
             excluded: head.excluded,
             place_m,
-            row: sighting.row,
+            row,
             innovation,
             own_variance: sigma * sigma,
             error_variance,
@@ -488,16 +504,15 @@ impl Tracker {
         })
     }
 
-    /// A radio head as it is seen `ahead_m` further on than the belief, or rather was seen when the
-    /// angle was received.
-    fn sight(&self, head: &RadioHead, ahead_m: f64) -> Option<Sighting> {
-        let (mean, map, array) = (&self.belief.mean, self.map.as_deref(), &self.config.array);
+    /// A radio head as it is seen from a state, or rather was seen when the angle was received.
+    fn sight(&self, head: &RadioHead, mean: &[f64; STATES]) -> Option<Sighting> {
+        let (map, array) = (self.map.as_deref(), &self.config.array);
         if self.config.lateness_std_s == 0.0 {
-            let (pose, footing) = locate(mean, ahead_m, map);
+            let (pose, footing) = locate(mean, 0.0, map);
             return Sighting::new(head, pose, &footing, mean, array);
         }
         let speed_mps = self.speed_mps();
-        let (mut pose, footing) = locate(mean, ahead_m - speed_mps * mean[LATENESS], map);
+        let (mut pose, footing) = locate(mean, -speed_mps * mean[LATENESS], map);
         let mut rate_radps = 0.0;
         if map.is_none() {
             let read = self.odometry.and_then(|sample| sample.yaw_rate_radps);
@@ -555,6 +570,14 @@ impl Tracker {
     /// Sets the largest squared Mahalanobis distance of an angle that is used.
     pub fn set_gate(&mut self, gate: f64) {
         self.config.gate = gate;
+    }
+
+    /// Expects slip from now on: at once, anew whenever the vehicle sets off, when nothing tells it
+    /// from the speed, and as every leap of the speed that is more than it accelerates.
+    pub(in crate::localize) fn distrust_odometer(&mut self) {
+        self.config.may_slip = true;
+        self.slip(MOST_SLIP);
+        self.config.leap_mps2 = self.config.acceleration_mps2;
     }
 
     /// Leaves the angles of a radio head unused, or uses them again.

@@ -17,7 +17,7 @@ impl Tracker {
         let journal = self.journal.iter();
         let beliefs = journal.flat_map(Journal::smoothed);
         beliefs
-            .map(|(time_s, belief)| self.pose_of(&belief, time_s, 0.0, 0.0))
+            .map(|(time_s, belief)| self.pose_of(&belief, time_s, 0.0))
             .collect()
     }
 

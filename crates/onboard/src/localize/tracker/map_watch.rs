@@ -31,6 +31,9 @@ impl Tracker {
     pub(super) fn watch_the_map(&mut self) {
         let off_map = self.off_map();
         let (was_off, is_off) = (self.off_map.is_some(), off_map.is_some());
+        if was_off && !is_off && !self.is_in_lane() {
+            return; // a lane that it is certainly not in tells nothing of where it is
+        }
         self.off_map = off_map;
         if is_off && !was_off {
             self.forget_curvature();
@@ -42,6 +45,15 @@ impl Tracker {
             self.forget_curvature();
             self.take_the_lane();
         }
+    }
+
+    /// Whether it may be in its lane, as sure as an angle must be to be used.
+    fn is_in_lane(&self) -> bool {
+        let lane = self.config.lane_keeping.stationary();
+        ([ACROSS, HEADING].into_iter().zip(lane)).all(|(state, lane_variance)| {
+            let variance = self.belief.covariance[state][state] + lane_variance;
+            self.belief.mean[state].powi(2) <= self.config.gate * variance
+        })
     }
 
     fn forget_curvature(&mut self) {

@@ -318,6 +318,19 @@ impl Step {
         belief.spread(&self.jacobian, &self.noise);
     }
 
+    /// What is seen after this step, by the state before it: the row, and the variance that the step
+    /// adds.
+    pub fn seen_before(&self, row: &[f64; STATES]) -> ([f64; STATES], f64) {
+        let (mut before, mut variance) = ([0.0; STATES], 0.0);
+        for i in 0..STATES {
+            for j in 0..STATES {
+                before[j] += row[i] * self.jacobian[i][j];
+                variance += row[i] * self.noise[i][j] * row[j];
+            }
+        }
+        (before, variance)
+    }
+
     /// What a gyroscope says of the state `start` before this step: residual, row and variance.
     pub fn turn_seen(&self, start: &[f64; STATES], yaw: &Yaw) -> (f64, [f64; STATES], f64) {
         let mut row = self.turn_row;

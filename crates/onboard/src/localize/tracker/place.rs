@@ -13,8 +13,8 @@ const LEAST_VARIANCE: f64 = 1e-18;
 impl Tracker {
     /// The pose at `time_s`, carried on from the newest odometry at its speed.
     pub fn pose(&self, time_s: f64) -> PoseEstimate {
-        let (lag_m, lag_variance) = self.coasting(time_s);
-        self.pose_of(&self.belief, time_s, lag_m, lag_variance)
+        let (_, lag_variance) = self.coasting(time_s);
+        self.pose_of(&self.forecast(time_s), time_s, lag_variance)
     }
 
     /// Distance driven since the newest odometry, and its variance.
@@ -35,16 +35,10 @@ impl Tracker {
         reading / (1.0 + self.belief.mean[SCALE])
     }
 
-    /// The pose of a belief, `lag_m` further on than it says.
-    pub(super) fn pose_of(
-        &self,
-        belief: &Belief,
-        time_s: f64,
-        lag_m: f64,
-        lag_variance: f64,
-    ) -> PoseEstimate {
+    /// The pose of a belief whose place along the way has so much more variance than it says.
+    pub(super) fn pose_of(&self, belief: &Belief, time_s: f64, lag_variance: f64) -> PoseEstimate {
         let map = self.map.as_deref();
-        let (pose, footing) = locate(&belief.mean, lag_m, map);
+        let (pose, footing) = locate(&belief.mean, 0.0, map);
         let (sin, cos) = footing.direction_rad.sin_cos();
         // (x, y, heading) by (along, across, heading).
         let jacobian = [
