@@ -7,7 +7,7 @@ mod air;
 use nr_ssb::{Complex32, Lmax, SubcarrierSpacing};
 use num_complex::Complex64;
 use onboard::receive::{Receiver, ReceiverConfig, Window};
-use onboard::settings::Pilots;
+use onboard::settings::{ArraySettings, Pilots};
 
 const PERIOD_S: f64 = 0.02;
 
@@ -52,7 +52,7 @@ impl Air {
             period_s: PERIOD_S,
             pilots: Pilots::PssSss,
             snapshots: 20,
-            calibration: vec![Complex64::ONE; 4],
+            array: ArraySettings::default(),
             cells: None,
         })
         .unwrap()
