@@ -87,10 +87,6 @@ pub struct IntegritySettings {
     /// fault the error may exceed the protection level with `risk / fault_probability`.
     #[schemars(range(min = 1e-9, max = 0.5))]
     pub fault_probability: f64,
-    /// Probability that the odometer slips, each time that the vehicle sets off. While it does the
-    /// error may exceed the protection level with `risk / slip_probability`.
-    #[schemars(range(min = 1e-9, max = 0.5))]
-    pub slip_probability: f64,
 }
 
 impl Default for IntegritySettings {
@@ -99,7 +95,6 @@ impl Default for IntegritySettings {
             alert_limit_m: 1.5,
             risk: 8e-4,
             fault_probability: 0.08,
-            slip_probability: 0.003,
         }
     }
 }

@@ -6,12 +6,9 @@
 //! agree with each other; leave out a wrong one, and the fault is still among them. And when a
 //! radio head is excluded, trackers that have never heard it are ready to take over, together with
 //! those that have heard neither it nor one of the others.
-//!
-//! One more tracker believes every radio head, but the odometer only roughly.
 
 use super::config::IntegrityConfig;
 use super::sequence_test::SequenceTest;
-use super::slip::Slip;
 use crate::clone_in_place::clone_in_place;
 use crate::localize::measurement::{AngleMeasurement, UpdateVerdict};
 use crate::localize::tracker::{OdometryVerdict, Tracker};
@@ -58,8 +55,6 @@ pub(super) struct Bank {
     /// When it was lost last (s).
     lost_s: f64,
     main: Tracker,
-    /// The same without trust in the odometer.
-    slip: Slip,
     /// First those without one radio head, in order; then those without two.
     members: Vec<Member>,
 }
@@ -70,14 +65,12 @@ clone_in_place!(Bank {
     disagreed_s,
     lost_s,
     main,
-    slip,
     members
 });
 
 impl Bank {
-    /// The trackers beside this one; nothing is known of them at `now_s`. The odometer slips with the
-    /// stated probability whenever the vehicle sets off.
-    pub fn new(tracker: Tracker, heads: &[RadioHead], slip_probability: f64, now_s: f64) -> Self {
+    /// The trackers beside this one; nothing is known of them at `now_s`.
+    pub fn new(tracker: Tracker, heads: &[RadioHead], now_s: f64) -> Self {
         let count = heads.len();
         let one = (0..count).map(|head| [head; 2]);
         // Which of two disagrees nobody can tell.
@@ -101,7 +94,6 @@ impl Bank {
             disagreed_s: vec![f64::NEG_INFINITY; count],
             lost_s: now_s,
             heads: heads.to_vec(),
-            slip: Slip::new(&tracker, slip_probability),
             main: tracker,
         }
     }
@@ -115,11 +107,6 @@ impl Bank {
     pub fn without_one(&self) -> impl Iterator<Item = &Tracker> {
         self.sound()
             .filter_map(|head| Some(&self.members.get(head)?.tracker))
-    }
-
-    /// Slip of the odometer.
-    pub const fn slip(&self) -> &Slip {
-        &self.slip
     }
 
     /// The trackers without a radio head in doubt, one of which may take over soon.
@@ -168,7 +155,6 @@ impl Bank {
         for member in &mut self.members {
             member.tracker.odometry(sample);
         }
-        self.slip.odometry(sample);
         self.main.odometry(sample)
     }
 
@@ -194,7 +180,7 @@ impl Bank {
                 }
             }
         }
-        self.slip.update(&mut self.main, head, measured)
+        self.main.update(head, measured)
     }
 
     /// Whether a source is at fault and nobody knows which, or too many are.
@@ -282,7 +268,6 @@ impl Bank {
         *faulty = true;
         if let Some(without) = self.members.get(culprit) {
             self.main = without.tracker.clone();
-            self.slip.restart(&self.main);
         }
         for number in 0..self.members.len() {
             let Some([first, second]) = self.members.get(number).map(|member| member.without)
@@ -317,9 +302,6 @@ impl Bank {
         }
         let known = self.heads.get(head);
         exclude(&mut self.main, known, false);
-        if let Some(known) = known {
-            self.slip.readmit(known);
-        }
         for member in self.members.iter_mut().filter(|member| !member.lacks(head)) {
             exclude(&mut member.tracker, known, false);
         }
@@ -400,7 +382,7 @@ mod tests {
         for &head in without {
             alone.set_excluded(&heads[head], true);
         }
-        let mut bank = Bank::new(tracker().0, &heads, 0.003, 0.0);
+        let mut bank = Bank::new(tracker().0, &heads, 0.0);
         drive(bias_rad, |odometry, head, measured| {
             if let Some(sample) = odometry {
                 bank.odometry(sample);

@@ -12,8 +12,6 @@ pub struct IntegrityConfig {
     pub risk: f64,
     /// Probability that one of the radio heads is at fault.
     pub fault_probability: f64,
-    /// Probability that the odometer slips, each time that the vehicle sets off.
-    pub slip_probability: f64,
     /// Protection level above which the position is not to be relied on (m).
     pub alert_limit_m: f64,
     /// Statistic at which a radio head counts as faulty, in standard deviations.
@@ -27,18 +25,8 @@ pub struct IntegrityConfig {
 impl IntegrityConfig {
     /// Probability with which the error may exceed the level with one radio head at fault.
     pub fn risk_under_fault(&self) -> f64 {
-        conditional(self.risk, self.fault_probability)
+        (self.risk / self.fault_probability).min(MOST_CONDITIONAL)
     }
-
-    /// The same with an odometer that slips.
-    pub fn risk_under_slip(&self) -> f64 {
-        conditional(self.risk, self.slip_probability)
-    }
-}
-
-/// What a hypothesis of some probability may be missed with, for the risk to hold.
-fn conditional(risk: f64, probability: f64) -> f64 {
-    (risk / probability).min(MOST_CONDITIONAL)
 }
 
 impl Default for IntegrityConfig {
@@ -53,7 +41,6 @@ impl From<&IntegritySettings> for IntegrityConfig {
             alert_limit_m: settings.alert_limit_m,
             risk: settings.risk,
             fault_probability: settings.fault_probability,
-            slip_probability: settings.slip_probability,
             detection_threshold: 5.5,
             recovery_threshold: 3.5,
             recovery_s: 5.0,

@@ -4,9 +4,8 @@
 //! ([`Bank`]). If one radio head is at fault, the tracker without it is right within its own
 //! covariance, wherever the full solution may be: the protection level is the radius about the full
 //! solution that holds for each of them (solution separation, Brown and McBurney 1988, with the
-//! separation as it is and not its threshold). The same of the tracker that does not trust the
-//! odometer ([`Slip`](super::slip::Slip)). Each is given the share of the risk that its probability
-//! leaves it.
+//! separation as it is and not its threshold), with the share of the risk that the fault's
+//! probability leaves it.
 //!
 //! A single radio head has no witness but odometry and road: the protection level then is what
 //! those two can vouch for, grows with the distance driven, and passes the alert limit unless they
@@ -30,7 +29,6 @@ pub struct Guard {
     config: IntegrityConfig,
     nominal: RadialQuantile,
     under_fault: SeparatedRadius,
-    under_slip: SeparatedRadius,
     bank: Bank,
     restarted: Option<Restarted>,
     /// Distance driven (m) when the sources could be told apart last.
@@ -49,7 +47,6 @@ clone_in_place!(Guard {
     config,
     nominal,
     under_fault,
-    under_slip,
     bank,
     restarted,
     trusted_m,
@@ -67,19 +64,14 @@ impl Guard {
         config: IntegrityConfig,
         found_s: Option<f64>,
     ) -> Self {
+        let found_s = found_s.unwrap_or(f64::NEG_INFINITY);
         Self {
             nominal: RadialQuantile::new(config.risk),
             under_fault: SeparatedRadius::new(config.risk_under_fault()),
-            under_slip: SeparatedRadius::new(config.risk_under_slip()),
             trusted_m: tracker.driven_m(),
-            bank: Bank::new(
-                tracker,
-                heads,
-                config.slip_probability,
-                found_s.unwrap_or(f64::NEG_INFINITY),
-            ),
+            bank: Bank::new(tracker, heads, found_s),
             restarted: None,
-            now_s: found_s.unwrap_or(f64::NEG_INFINITY),
+            now_s: found_s,
             config,
         }
     }
@@ -145,7 +137,6 @@ impl Guard {
             bank: Bank::new(
                 main.restarted(position_std_m),
                 self.bank.heads(),
-                self.config.slip_probability,
                 self.now_s,
             ),
             since_s: self.now_s,
@@ -184,14 +175,11 @@ impl Guard {
     }
 
     /// The radius that the error leaves with the stated risk, whether no source is at fault or any
-    /// one of those in use, the odometer among them as long as it may slip.
+    /// one of those in use.
     fn protection_level_m(&self, bank: &Bank, time_s: f64) -> f64 {
         let main = bank.main().pose(time_s);
         let mut level_m = self.nominal.radius(main.principal_variances());
-        let without_heads = bank.without_one().map(|it| (it, &self.under_fault));
-        let slipping = bank.slip().likelier_than(self.config.risk);
-        let without_odometer = slipping.map(|it| (it, &self.under_slip));
-        for (without, quantile) in without_heads.chain(without_odometer) {
+        for without in bank.without_one() {
             let clean = without.pose(time_s);
             let Some([[xx, xy, _], [_, yy, _], _]) = clean.covariance else {
                 continue;
@@ -201,7 +189,7 @@ impl Guard {
                 clean.pose.y_m - main.pose.y_m,
             ];
             let covariance = [[xx, xy], [xy, yy]];
-            level_m = quantile.radius(separation_m, covariance, level_m);
+            level_m = (self.under_fault).radius(separation_m, covariance, level_m);
         }
         level_m
     }

@@ -5,7 +5,6 @@ mod config;
 mod guard;
 mod separation;
 mod sequence_test;
-mod slip;
 
 pub use config::IntegrityConfig;
 pub use guard::Guard;

@@ -57,8 +57,6 @@ pub struct TrackerConfig {
     pub acceleration_mps2: f64,
     /// Acceleration that the vehicle cannot do: the odometer slipped (m/s²).
     pub leap_mps2: f64,
-    /// Whether the odometer may slip without a leap.
-    pub may_slip: bool,
     /// Standard deviation of a reading of the speed (m/s).
     pub speed_noise_mps: f64,
     /// Yaw rate that no sample can exceed (rad/s).
@@ -240,7 +238,6 @@ impl TrackerConfig {
             gate: normal_quantile(0.5 * settings.outlier_probability).powi(2),
             acceleration_mps2: 2.0 * vehicle.acceleration_mps2,
             leap_mps2: 10.0 * vehicle.acceleration_mps2,
-            may_slip: false,
             speed_noise_mps: odometer.speed_noise_mps,
             top_yaw_rate_radps: vehicle.top_yaw_rate_radps,
             yaw_noise_rad_per_sqrt_m: gyroscope.map_or(0.0, |it| it.noise_rad_per_sqrt_m),

@@ -173,9 +173,8 @@ impl Tracker {
             let usual_mps = SIGMAS_OF_SLIP * self.config.speed_noise_mps;
             let least_mps = usual_mps.max(self.config.leap_mps2 * duration_s.max(0.02));
             let leap = (self.speed_steps).leap(previous.speed_mps, sample.speed_mps, least_mps);
-            let sets_off = previous.speed_mps == 0.0 && sample.speed_mps != 0.0;
-            let unseen = self.config.may_slip && sets_off;
-            self.slip(if unseen { MOST_SLIP } else { leap });
+            let variance = &mut self.belief.covariance[SCALE][SCALE];
+            *variance = variance.max((*variance + leap * leap).min(MOST_SLIP * MOST_SLIP));
         }
         let moved_m = sample.distance_m - previous.distance_m;
         // A counter that was reset or overflowed says nothing of the distance: the speeds do.
@@ -236,12 +235,6 @@ impl Tracker {
                 None => OdometryVerdict::Accepted,
             }
         }
-    }
-
-    /// The odometer's scale may have changed by a share.
-    fn slip(&mut self, by: f64) {
-        let variance = &mut self.belief.covariance[SCALE][SCALE];
-        *variance = variance.max((*variance + by * by).min(MOST_SLIP * MOST_SLIP));
     }
 
     /// What the yaw rate says of a step.
@@ -570,14 +563,6 @@ impl Tracker {
     /// Sets the largest squared Mahalanobis distance of an angle that is used.
     pub fn set_gate(&mut self, gate: f64) {
         self.config.gate = gate;
-    }
-
-    /// Expects slip from now on: at once, anew whenever the vehicle sets off, when nothing tells it
-    /// from the speed, and as every leap of the speed that is more than it accelerates.
-    pub(in crate::localize) fn distrust_odometer(&mut self) {
-        self.config.may_slip = true;
-        self.slip(MOST_SLIP);
-        self.config.leap_mps2 = self.config.acceleration_mps2;
     }
 
     /// Leaves the angles of a radio head unused, or uses them again.
