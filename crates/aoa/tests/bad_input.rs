@@ -85,7 +85,7 @@ fn each_fault_has_its_error() {
         );
     }
     for (method, requested, maximum) in [
-        (METHODS[0], 2, 1),
+        (METHODS[0], 4, 3),
         (METHODS[1], 4, 3),
         (METHODS[2], 0, 3),
         (METHODS[4], 99, 3),
