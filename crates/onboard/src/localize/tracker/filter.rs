@@ -45,8 +45,8 @@ const TRANSITION_M: f64 = 0.5;
 /// Squared Mahalanobis distance up to which the yaw rate on a road is taken at its word: 6σ.
 const TURN_GATE: f64 = 36.0;
 
-/// What a refused yaw rate may have hidden: that the vehicle turned as fast that way as it can, or at
-/// least by this much faster or slower than before (rad/s, a standard deviation).
+/// What a refused yaw rate may have hidden: that the vehicle turned by this much faster or slower
+/// than before (rad/s, a standard deviation).
 const REFUSED_RADPS: f64 = 0.5;
 
 /// How the yaw rate wanders while no sample tells of it: the density of a white angular acceleration
@@ -204,10 +204,8 @@ impl Tracker {
         let yaw = rate.map(|rate| {
             let mut yaw = self.yaw(rate, told_m, told_s);
             let change_rad = (before.unwrap_or(rate) - rate) * told_s;
-            if let Some(refused) = refused {
-                let top = self.config.top_yaw_rate_radps;
-                let by = (refused.clamp(-top, top) - rate).abs().max(REFUSED_RADPS);
-                yaw.variance += (by * told_s).powi(2);
+            if refused.is_some() {
+                yaw.variance += (REFUSED_RADPS * told_s).powi(2);
             } else if self.turns_as_told() {
                 // When between two samples the rate changed nobody knows: evenly distributed.
                 yaw.variance += change_rad * change_rad / 12.0;
