@@ -4,7 +4,6 @@ use super::filter::{MOST_STEPS, Tracker};
 use super::locate::locate;
 use super::sighting::Sighting;
 use super::state::Belief;
-use super::staying_error::StayingError;
 use crate::localize::gaussian::{Innovation, principal_variances};
 use crate::localize::measurement::AngleMeasurement;
 use crate::radio_head::RadioHead;
@@ -70,16 +69,13 @@ impl Tracker {
         let sighting = Sighting::new(&known.known, pose, &footing, &belief.mean, array)?;
         let travelled_m = self.driven_m + ahead_m - known.last_look_m;
         let own = thermal(sighting.range_m).sqrt();
+        let repetition = self.repetition(travelled_m).unwrap_or_default();
         let variance = self
             .config
             .phase_bias
             .variance(own, f64::INFINITY, (travelled_m, 0.0))
             + self.config.look_variance(travelled_m, &sighting)
-            + if self.config.finds_errors {
-                known.error.variance() * StayingError::repetition(travelled_m)
-            } else {
-                0.0
-            };
+            + known.error.variance() * repetition;
         let mut rehearsed = *belief;
         rehearsed.update(0.0, &sighting.row, variance);
         Some(rehearsed)

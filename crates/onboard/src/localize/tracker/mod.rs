@@ -15,6 +15,7 @@ mod forecast;
 mod interface;
 mod journal;
 mod locate;
+mod look;
 mod map_watch;
 pub mod motion;
 mod off_map;

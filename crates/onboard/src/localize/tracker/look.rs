@@ -1,0 +1,149 @@
+//! An angle as the belief meets it: what is expected, and how far off and how uncertain it is.
+
+use super::filter::Tracker;
+use super::locate::locate;
+use super::sighting::Sighting;
+use super::state::{ACROSS, ALONG, HEADING, LATENESS, SCALE, STATES, YAW_RATE_BIAS};
+use super::staying_error::{MOST_VARIANCE, StayingError};
+use crate::geometry::wrap_angle;
+use crate::localize::gaussian::Innovation;
+use crate::localize::measurement::{AngleMeasurement, UpdateReason};
+use crate::radio_head::RadioHead;
+
+/// An angle as the belief meets it.
+pub(super) struct Look {
+    pub head: usize,
+    pub excluded: bool,
+    pub place_m: f64,
+    pub row: [f64; STATES],
+    pub innovation: Innovation,
+    /// Variance of the angle by its own noise (rad²).
+    pub own_variance: f64,
+    /// Variance of the error that stays (rad²), and how often looks so near to each other repeat it,
+    /// where it is found while driving.
+    error_variance: f64,
+    pub repetition: Option<f64>,
+}
+
+impl Look {
+    /// The innovation, had the error that stays been none.
+    pub fn without_error(&self) -> Innovation {
+        let mut seen = self.innovation;
+        let stays = self.error_variance * self.repetition.unwrap_or_default();
+        seen.variance -= stays;
+        seen.measurement_variance -= stays;
+        seen
+    }
+
+    /// Squared Mahalanobis distance of the look by itself, its error being of any size that there is.
+    pub fn mahalanobis2(&self) -> f64 {
+        let mut seen = self.without_error();
+        if self.repetition.is_some() {
+            seen.variance += MOST_VARIANCE;
+        }
+        seen.mahalanobis2()
+    }
+}
+
+impl Tracker {
+    /// What an angle to a radio head says beside the belief.
+    pub(super) fn look(
+        &self,
+        head: &RadioHead,
+        measured: &AngleMeasurement,
+    ) -> Result<Look, UpdateReason> {
+        let sigma = measured.phase_sigma_rad;
+        let usable = measured.time_s.is_finite()
+            && measured.phase_rad.is_finite()
+            && sigma.is_finite()
+            && sigma > 0.0;
+        if !usable {
+            return Err(UpdateReason::Unusable);
+        }
+        if measured.time_s < self.time_s() {
+            return Err(UpdateReason::TooLate);
+        }
+        let (index, head) = (self.heads.iter().enumerate())
+            .find(|(_, mine)| mine.is(head))
+            .ok_or(UpdateReason::UnknownRadioHead)?;
+        let (ahead_m, ahead_variance) = self.coasting(measured.time_s);
+        // From the newest odometry to the angle the vehicle has strayed on in its lane.
+        let ahead = (ahead_m != 0.0)
+            .then(|| self.step(&self.belief, ahead_m * (1.0 + self.belief.mean[SCALE])));
+        let mean = (ahead.as_ref()).map_or(&self.belief.mean, |ahead| &ahead.mean);
+        let sighting = self
+            .sight(&head.known, mean)
+            .ok_or(UpdateReason::Unusable)?;
+        let bend = sighting.bend(&self.belief.covariance);
+        let place_m = self.driven_m + ahead_m;
+        let travelled_m = place_m - head.last_look_m;
+        let shared = (self.config).look_variance(travelled_m, &sighting);
+        let elapsed_s = measured.time_s - head.last_look_s;
+        let turned_rad = self.turned_rad - head.last_look_rad;
+        let moved = (travelled_m, turned_rad);
+        let stated = (self.config.phase_bias).variance(sigma, elapsed_s, moved);
+        let repetition = self.repetition(travelled_m);
+        let error_variance = head.error.variance();
+        let stays = repetition.unwrap_or_default() * error_variance;
+        let (row, strayed) = (ahead.as_ref()).map_or((sighting.row, 0.0), |ahead| {
+            ahead.seen_before(&sighting.row)
+        });
+        let coasted = sighting.row[ALONG].powi(2) * ahead_variance + strayed;
+        let measurement_variance = stays + stated + shared + coasted + bend.variance;
+        let residual = wrap_angle(measured.phase_rad - sighting.phase_rad - bend.shift_rad);
+        let innovation = (self.belief).innovation(residual, &row, measurement_variance);
+        Ok(Look {
+            head: index,
+            excluded: head.excluded,
+            place_m,
+            row,
+            innovation,
+            own_variance: sigma * sigma,
+            error_variance,
+            repetition,
+        })
+    }
+
+    /// A radio head as it is seen from a state, or rather was seen when the angle was received.
+    fn sight(&self, head: &RadioHead, mean: &[f64; STATES]) -> Option<Sighting> {
+        let (map, array) = (self.map.as_deref(), &self.config.array);
+        if self.config.lateness_std_s == 0.0 {
+            let (pose, footing) = locate(mean, 0.0, map);
+            return Sighting::new(head, pose, &footing, mean, array);
+        }
+        let speed_mps = self.speed_mps();
+        let (mut pose, footing) = locate(mean, -speed_mps * mean[LATENESS], map);
+        let mut rate_radps = 0.0;
+        if map.is_none() {
+            let read = self.odometry.and_then(|sample| sample.yaw_rate_radps);
+            let top = self.config.top_yaw_rate_radps;
+            rate_radps =
+                read.filter(|rate| rate.abs() <= top).unwrap_or_default() - mean[YAW_RATE_BIAS];
+            pose.heading_rad -= rate_radps * mean[LATENESS];
+        }
+        let mut sighting = Sighting::new(head, pose, &footing, mean, array)?;
+        let (sin, cos) = (pose.heading_rad - footing.direction_rad).sin_cos();
+        let row = &mut sighting.row;
+        row[LATENESS] = -speed_mps * (row[ALONG] * cos / footing.stretch + row[ACROSS] * sin)
+            - rate_radps * row[HEADING];
+        Some(sighting)
+    }
+
+    /// How often looks repeat the error that stays, so far apart; `None` where it is not found.
+    pub(super) fn repetition(&self, travelled_m: f64) -> Option<f64> {
+        (self.config.finds_errors).then(|| StayingError::repetition(travelled_m))
+    }
+
+    /// Learns of the error that stays from an angle, used or not.
+    pub(super) fn learn_error(&mut self, looked: &Look) {
+        if looked.repetition.is_none() {
+            return;
+        }
+        if let Some(head) = self.heads.get_mut(looked.head) {
+            let travelled_m = looked.place_m - head.heard_m;
+            head.heard_m = looked.place_m;
+            let seen = looked.without_error();
+            head.error.learn(travelled_m, &seen, looked.own_variance);
+        }
+    }
+}
