@@ -53,9 +53,7 @@ impl<const N: usize> ArrayManifold<N> {
             }
         }))
     }
-}
 
-impl<const N: usize> ArrayManifold<N> {
     /// Looks from the horizon upwards: antennas in a plane do not tell above from below.
     ///
     /// # Errors

@@ -69,13 +69,8 @@ impl<const N: usize> AngleEstimator for AzimuthEstimator<N> {
         &mut self,
         observation: &SsbObservation,
     ) -> Result<Option<EstimatedAngle>, BoxError> {
-        let snapshots = observation.snapshots::<N>();
-        let estimate = if observation.noise_variance.is_some() {
-            self.0
-                .estimate_pilots(snapshots, observation.noise_variance)
-        } else {
-            Covariance::from_snapshots(snapshots).and_then(|it| self.0.estimate(&it))
-        };
+        let (snapshots, noise) = (observation.snapshots::<N>(), observation.noise_variance);
+        let estimate = self.0.estimate_pilots(snapshots, noise);
         Ok(estimate.ok().map(|estimate| EstimatedAngle::Angle {
             phase_rad: estimate.direction.azimuth_rad,
             phase_sigma_rad: Some(estimate.azimuth_sigma_rad()),

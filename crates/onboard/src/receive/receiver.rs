@@ -12,7 +12,7 @@ use num_complex::Complex64;
 use thiserror::Error;
 
 use super::despread::Despread;
-use super::wideband::{line_of_sight, of_a_row};
+use super::wideband::line_of_sight;
 use crate::elements::for_elements;
 use crate::manifold::ArrayManifold;
 use crate::observation::{SensedSsb, SsbObservation};
@@ -411,11 +411,7 @@ fn fill<const A: usize>(
     into.noise_variance = Some(1.0);
     let delay = seen.residual_delay;
     let despread = Despread::new(elements, tracker.known(), config.pilots, delay).scaled(&gains);
-    let told = match finder {
-        Some(finder) => line_of_sight(&despread, |u| ArrayManifold::strongest_beam(finder, u)),
-        None => line_of_sight(&despread, of_a_row),
-    };
-    if let Some(told) = told {
+    if let Some(told) = line_of_sight(&despread, finder) {
         into.push(&told.block);
         return;
     }

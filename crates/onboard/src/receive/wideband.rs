@@ -19,10 +19,11 @@
 
 use std::f64::consts::TAU;
 
-use aoa::{Array, maximum_likelihood_pilots};
+use aoa::{Array, DirectionFinder, maximum_likelihood_pilots};
 use num_complex::Complex64;
 
 use super::despread::{Despread, FFT_SIZE, GROUP, GROUPS};
+use crate::manifold::ArrayManifold;
 
 /// Time constants tried, in samples at the base rate.
 const DECAYS: [f64; 6] = [0.125, 0.25, 0.5, 1.0, 2.0, 4.0];
@@ -52,12 +53,10 @@ pub struct LineOfSight<const A: usize> {
 }
 
 /// The line of sight, where the channel varies over the band. The noise on an element has variance
-/// one and the channels are calibrated; `strongest_beam` is `max |aᴴu|²/aᴴa` over the array's responses
-/// `a` for what its antennas receive, `u`: [`of_a_row`], or that of a
-/// [`DirectionFinder`](aoa::DirectionFinder).
+/// one and the channels are calibrated; `finder` is of antennas that are not in a row.
 pub fn line_of_sight<const A: usize>(
     despread: &Despread<A>,
-    strongest_beam: impl Fn(&[Complex64; A]) -> f64,
+    finder: Option<&DirectionFinder<ArrayManifold<A>, A>>,
 ) -> Option<LineOfSight<A>> {
     let channel = Channel::new(despread, 0);
     // Another cell's PSS may be the same: late, it looks like a path. It is not believed alone.
@@ -71,7 +70,7 @@ pub fn line_of_sight<const A: usize>(
     let fit = |decay: f64, power: f64, delays: &mut dyn Iterator<Item = f64>| {
         let scatter = Scatter::new(&channel, decay, power)?;
         let likelihood = |delay| {
-            let likelihood = channel.likelihood(&scatter, delay, &strongest_beam);
+            let likelihood = channel.likelihood(&scatter, delay, finder);
             (likelihood, delay, decay, power)
         };
         delays.map(likelihood).max_by(|a, b| a.0.total_cmp(&b.0))
@@ -215,7 +214,7 @@ impl<const A: usize> Channel<A> {
         &self,
         scatter: &Scatter,
         delay: f64,
-        strongest_beam: impl Fn(&[Complex64; A]) -> f64,
+        finder: Option<&DirectionFinder<ArrayManifold<A>, A>>,
     ) -> f64 {
         let mut all = 0.0;
         let response = self.antennas.map(|antenna| {
@@ -223,7 +222,11 @@ impl<const A: usize> Channel<A> {
             all += white.iter().map(Complex64::norm_sqr).sum::<f64>();
             product(&scatter.line_of_sight, &white)
         });
-        strongest_beam(&response) / scatter.energy - all - A as f64 * scatter.log_determinant
+        let beam = match finder {
+            Some(finder) => ArrayManifold::strongest_beam(finder, &response),
+            None => beam_of_a_row(&response),
+        };
+        beam / scatter.energy - all - A as f64 * scatter.log_determinant
     }
 }
 
@@ -307,7 +310,7 @@ fn product(a: &Band, b: &Band) -> Complex64 {
 }
 
 /// The strongest beam of antennas in a row, `max |Σ u_n e^{−jωn}|² / N` over ω.
-pub fn of_a_row<const A: usize>(received: &[Complex64; A]) -> f64 {
+fn beam_of_a_row<const A: usize>(received: &[Complex64; A]) -> f64 {
     let found = maximum_likelihood_pilots(&[*received], Some(1.0), &Array::half_wavelength());
     found.map_or(0.0, |found| {
         let step = Complex64::cis(-found.phase_rad);
@@ -385,7 +388,7 @@ mod tests {
         for _ in 0..trials {
             // The receiver follows the delay of the most power.
             let ssb = ssb(&mut rng, snr, k, decay, -0.1);
-            let told = line_of_sight(&ssb, of_a_row).expect("the channel varies");
+            let told = line_of_sight(&ssb, None).expect("the channel varies");
             let seen = maximum_likelihood_pilots(&[told.block], Some(1.0), &array).unwrap();
             let blocks: Vec<_> = ssb.blocks().collect();
             let flat = maximum_likelihood_pilots(&blocks, Some(1.0), &array).unwrap();
@@ -442,10 +445,7 @@ mod tests {
         for trial in 0..2000 {
             // Noise alone, a weak line of sight, strong scatter without delays.
             let (snr, k) = [(1e-6, 1.0), (0.1, 1e6), (100.0, 3.0)][trial % 3];
-            assert_eq!(
-                line_of_sight(&ssb(&mut rng, snr, k, 0.0, 0.0), of_a_row),
-                None
-            );
+            assert_eq!(line_of_sight(&ssb(&mut rng, snr, k, 0.0, 0.0), None), None);
         }
     }
 }

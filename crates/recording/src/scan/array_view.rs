@@ -9,7 +9,7 @@ use num_complex::Complex64;
 
 use onboard::manifold::ArrayManifold;
 use onboard::receive::despread::Despread;
-use onboard::receive::wideband::{line_of_sight, of_a_row};
+use onboard::receive::wideband::line_of_sight;
 use onboard::settings::{ArrayShape, Pilots};
 
 /// The receiving array.
@@ -119,14 +119,12 @@ impl<const A: usize> ArrayView for Looker<A> {
         let gains = self.calibration.gains().map(|gain| scale / gain);
         let despread = Despread::new(elements, ssb.known, Pilots::Ssb, 0.0).scaled(&gains);
         let blocks: Vec<[Complex64; A]> = despread.blocks().collect();
-        let angle = if let Some(finder) = &self.finder {
-            let beam = |u: &_| ArrayManifold::strongest_beam(finder, u);
-            let told = line_of_sight(&despread, beam).map(|told| [told.block]);
-            let looked_at = told.as_ref().map_or(&blocks[..], |block| block);
+        let finder = self.finder.as_ref();
+        let told = line_of_sight(&despread, finder).map(|told| [told.block]);
+        let looked_at = told.as_ref().map_or(&blocks[..], |block| block);
+        let angle = if let Some(finder) = finder {
             FoundAngle::Direction(finder.estimate_pilots(looked_at, Some(1.0)).ok()?)
         } else {
-            let told = line_of_sight(&despread, of_a_row).map(|told| [told.block]);
-            let looked_at = told.as_ref().map_or(&blocks[..], |block| block);
             let found = maximum_likelihood_pilots(looked_at, Some(1.0), &self.array);
             FoundAngle::FromRow(found.ok()?)
         };
