@@ -1,0 +1,195 @@
+//! The ray-traced street of `$ACCESS_AV_DATA/street`.
+
+use std::f64::consts::PI;
+use std::fs;
+use std::path::Path;
+
+use onboard::geometry::{Pose, wrap_angle};
+use onboard::localize::IntegrityState;
+use onboard::observation::OdometrySample;
+use rand::{RngExt, SeedableRng};
+use rand_chacha::ChaCha8Rng;
+use rand_distr::StandardNormal;
+
+use super::{Drive, report, table};
+
+const STREET: &str = "
+name = \"car\"
+[odometer]
+scale_std = 0.003
+noise_m_per_sqrt_m = 0.01
+[gyroscope]
+noise_rad_per_sqrt_s = 0.003
+bias_std_radps = 0.002
+[start]
+position_std_m = 0.1
+heading_std_rad = 0.02
+[integrity]
+[lane_keeping]
+rms_m = 0.02
+[array]
+position_m = [0.0, 0.0, 1.5]
+";
+
+/// The street with exact angles, every kind of map and speed, and with those of the ray tracer.
+pub fn exact_and_real(folder: &Path) {
+    let base = Drive::read(folder, "angles.csv", "odometry.csv");
+    let raw = Drive::read(folder, "angles.csv", "odometry_rawspeed.csv");
+    let sparse = Drive::read(folder, "angles_every2m.csv", "odometry.csv");
+    // Exact angles: from the true pose, heads at height, at the logged times.
+    let heads = table(&folder.join("landmarks.csv"));
+    let exact = |drive: &Drive| {
+        let mut drive = drive.clone();
+        let truth = drive.clone();
+        drive.angles.angles.retain_mut(|it| {
+            let Some(pose) = truth.true_pose(it.measured.time_s) else {
+                return false;
+            };
+            let head = heads
+                .iter()
+                .find(|head| head[0] == f64::from(it.ssb.pci))
+                .unwrap();
+            let (dx, dy, dz) = (head[1] - pose.x_m, head[2] - pose.y_m, head[3] - 1.5);
+            let ground = dx.hypot(dy);
+            let level = ground / ground.hypot(dz);
+            let phase_rad = PI * level * (dy.atan2(dx) - pose.heading_rad).cos();
+            it.measured.phase_rad = phase_rad;
+            it.measured.angle_rad = (phase_rad / PI).acos();
+            true
+        });
+        drive
+    };
+    let road = fs::read_to_string(folder.join("road.toml")).unwrap();
+    let segments = road.replace("[track]", "\n[road]");
+    let polyline = |spacing_m: f64| {
+        let mut points = vec![];
+        let mut last: Option<Pose> = None;
+        for it in &base.truth {
+            if last.is_none_or(|last| last.point().distance_m(it.pose.point()) >= spacing_m) {
+                points.push([it.pose.x_m, it.pose.y_m]);
+                last = Some(it.pose);
+            }
+        }
+        let end = base.truth.last().unwrap().pose;
+        if last.unwrap().point().distance_m(end.point()) > 0.3 {
+            points.push([end.x_m, end.y_m]);
+        }
+        format!("\n[road]\nwidth_m = 4.0\npolyline_m = {points:?}\n")
+    };
+    let with_road = |drive: &Drive, road: &str| Drive {
+        site: format!("{}{road}", drive.site),
+        ..drive.clone()
+    };
+    for (speeds, drive) in [("avg", exact(&base)), ("raw", exact(&raw))] {
+        for (label, road) in [
+            ("no map", String::new()),
+            ("segments", segments.clone()),
+            ("line 1 m", polyline(1.0)),
+            ("line 2 m", polyline(2.0)),
+            ("line 5 m", polyline(5.0)),
+        ] {
+            let drive = with_road(&drive, &road);
+            report(
+                &format!("exact {speeds} {label}"),
+                &drive,
+                &drive.locate(STREET, drive.start, true),
+            );
+        }
+    }
+    for (label, drive) in [("real", &base), ("real 2 m", &sparse), ("real raw", &raw)] {
+        report(label, drive, &drive.locate(STREET, drive.start, false));
+        let mapped = with_road(drive, &segments);
+        report(
+            &format!("{label} map"),
+            &mapped,
+            &mapped.locate(STREET, drive.start, false),
+        );
+    }
+}
+
+/// The street with odometers of its data sheet, ten of them: medians and worst of RMS, and shares of
+/// all their time.
+pub fn ten_odometers(folder: &Path) {
+    let road = fs::read_to_string(folder.join("road.toml")).unwrap();
+    let road = road.replace("[track]", "\n[road]");
+    let demand = "[wake_up]\npolicy = \"uncertainty\"\nbound_m = 0.5\n";
+    for (label, angles, more) in [
+        ("every burst", "angles.csv", ""),
+        ("every 2 m", "angles_every2m.csv", ""),
+        ("on demand", "angles.csv", demand),
+    ] {
+        let base = Drive::read(folder, angles, "odometry.csv");
+        for map in [true, false] {
+            let (mut rms_m, mut shares, mut heard) = (vec![], [0.0; 4], 0);
+            for seed in 0..10 {
+                let mut drive = base.clone();
+                if map {
+                    drive.site += &road;
+                }
+                drive.odometry.samples = odometry(&base, seed);
+                let vehicle = format!("{STREET}{more}");
+                let located = drive.locate(&vehicle, drive.start, false);
+                rms_m.push(drive.rms_m(&located.poses, f64::NEG_INFINITY, f64::INFINITY));
+                heard += located.executions.len();
+                for pose in &located.poses {
+                    let Some(truth) = drive.true_pose(pose.estimate.time_s) else {
+                        continue;
+                    };
+                    let error_m = pose.estimate.pose.point().distance_m(truth.point());
+                    let within = drive.half_nees(pose).is_some_and(|it| it < 2.996);
+                    let integrity = pose.estimate.integrity;
+                    let ok = integrity.is_some_and(|it| it.state == IntegrityState::Ok);
+                    let beyond = integrity.is_some_and(|it| error_m > it.protection_level_m);
+                    let of = [true, within, ok, ok && beyond];
+                    for (share, of) in shares.iter_mut().zip(of) {
+                        *share += f64::from(u8::from(of));
+                    }
+                }
+            }
+            rms_m.sort_by(f64::total_cmp);
+            println!(
+                "street {label:12} {} rms {:.3} (worst {:.3}) in 95 % {:.3} ok {:.3} beyond while ok {:.4} angles {heard}",
+                if map { "map   " } else { "no map" },
+                0.5 * (rms_m[4] + rms_m[5]),
+                rms_m[9],
+                shares[1] / shares[0],
+                shares[2] / shares[0],
+                shares[3] / f64::max(shares[2], 1.0),
+            );
+        }
+    }
+}
+
+/// Odometry of the true drive by the street's data sheet.
+fn odometry(drive: &Drive, seed: u64) -> Vec<OdometrySample> {
+    let mut random = ChaCha8Rng::seed_from_u64(seed);
+    let mut normal = || -> f64 { random.sample(StandardNormal) };
+    let (scale, bias_radps) = (1.0 + 0.003 * normal(), 0.002 * normal());
+    let mut read_m = vec![0.0];
+    let mut samples = vec![];
+    let mut before: Option<Pose> = None;
+    for sample in &drive.odometry.samples {
+        let Some(pose) = drive.true_pose(sample.time_s) else {
+            continue;
+        };
+        let (mut yaw_rate_radps, period_s) = (0.0, 0.02);
+        let mut distance_m = read_m[read_m.len() - 1];
+        if let Some(before) = before {
+            let step_m = pose.point().distance_m(before.point());
+            distance_m += scale * step_m + 0.01 * step_m.sqrt() * normal();
+            yaw_rate_radps = wrap_angle(pose.heading_rad - before.heading_rad) / period_s;
+        }
+        yaw_rate_radps += bias_radps + 0.003 / f64::sqrt(period_s) * normal();
+        read_m.push(distance_m);
+        let earlier_m = read_m[read_m.len().saturating_sub(11)];
+        let over_s = period_s * (read_m.len() - 1).min(10) as f64;
+        samples.push(OdometrySample {
+            time_s: sample.time_s,
+            distance_m,
+            speed_mps: (distance_m - earlier_m) / over_s,
+            yaw_rate_radps: Some(yaw_rate_radps),
+        });
+        before = Some(pose);
+    }
+    samples
+}
