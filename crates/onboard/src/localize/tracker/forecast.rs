@@ -11,6 +11,18 @@ use crate::radio_head::RadioHead;
 /// Longest step of a forecast (m), where millimetres do not matter.
 const FORECAST_STEP_M: f64 = 5.0;
 
+/// An angle to a radio head that is not used.
+#[derive(Clone, Copy, Debug, PartialEq)]
+pub(in crate::localize) struct Rehearsal {
+    /// The innovation; of the angle's variance only its noise, what stays from look to look being the
+    /// belief's.
+    pub innovation: Innovation,
+    /// Variance of the noise, had nothing been heard before (rad²).
+    pub alone_variance: f64,
+    /// Distance driven, in wavelengths.
+    pub place_wavelengths: f64,
+}
+
 impl Tracker {
     /// The innovation that an angle would bring; `None` where it would bring none.
     pub fn innovation(&self, head: &RadioHead, measured: &AngleMeasurement) -> Option<Innovation> {
@@ -20,16 +32,30 @@ impl Tracker {
             .map(|looked| looked.innovation)
     }
 
-    /// The innovation that an angle to an excluded radio head would bring; it counts as a look.
+    /// What an angle to an excluded radio head would bring; it counts as a look.
     pub(in crate::localize) fn rehearse_excluded(
         &mut self,
         head: &RadioHead,
         measured: &AngleMeasurement,
-    ) -> Option<Innovation> {
+    ) -> Option<Rehearsal> {
         let looked = self.look(head, measured).ok()?;
         self.learn_error(&looked);
         self.heads.get_mut(looked.head)?.last_look_m = looked.place_m;
-        Some(looked.innovation)
+        let Innovation {
+            residual,
+            variance,
+            measurement_variance,
+        } = looked.innovation;
+        let common = variance - measurement_variance + looked.lasting_variance;
+        Some(Rehearsal {
+            innovation: Innovation {
+                residual,
+                variance: common + looked.noise_variance,
+                measurement_variance: looked.noise_variance,
+            },
+            alone_variance: looked.alone_variance,
+            place_wavelengths: looked.place_m / self.config.array.wavelength_m,
+        })
     }
 
     /// The belief at `time_s`, had the vehicle driven on at its speed and heard nothing.
