@@ -10,9 +10,10 @@ import numpy as np
 import polars as pl
 import pytest
 
-from access_av import InputError, Scenario, columns, plan, service_levels, simulate
+from access_av import InputError, Scenario, bound, columns, plan, service_levels, simulate
 from access_av.campaign import Campaign
 from access_av.integrity_campaign import drive, mismatches
+from access_av.next_level import next_level
 from access_av.parts import Parts
 
 if TYPE_CHECKING:
@@ -67,6 +68,36 @@ def test_new_radio_heads_send_when_others_are_silent() -> None:
     assert [head["ssb_index"] for head in equipped] == [0, 1, 2, 3]
 
 
+def test_the_next_level_is_reached_by_what_is_said_to_reach_it() -> None:
+    planned = plan("yard")
+    found = next_level("yard", planned)
+    assert found is not None
+    assert found.level.name == "6"
+    assert 0.0 < found.short_share < 1.0
+    assert found.cheapest is not None
+    assert found.cheapest.what == "half the odometer's errors"
+    odometer = json.loads(Scenario.load("yard").vehicle.to_json())["odometer"]
+    better = {
+        f"vehicle.odometer.{key}": 0.5 * odometer[key]
+        for key in ("scale_std", "noise_m_per_sqrt_m", "noise_m_per_sqrt_s")
+    }
+    mended = bound(Scenario.load("yard").with_overrides(better)).verdicts
+    levels = {verdict.level.name: verdict for verdict in mended}
+    assert levels["6"].reached
+    assert math.isclose(levels["6"].share, found.cheapest.share, rel_tol=1e-12)
+    shares = {change.what: change.share for change in found.changes}
+    assert all(found.share < share for share in shares.values())
+    # The plan's own verdict on its radio heads is the same.
+    told = {verdict.level.name: verdict.share for verdict in planned.verdicts}
+    assert math.isclose(shares[f"a radio head at {planned.chosen[0]}"], told["6"], rel_tol=1e-12)
+
+
+def test_a_site_at_the_highest_level_has_no_next_one() -> None:
+    exact = {"vehicle.odometer.scale_std": 0.0, "vehicle.odometer.noise_m_per_sqrt_m": 1e-4}
+    best = SHORT.with_overrides(exact)
+    assert next_level(best, plan(best)) is None
+
+
 def test_the_command_plans_and_refuses(tmp_path: Path, access_av: Callable[..., Finished]) -> None:
     masts = tmp_path / "masts.csv"
     MASTS.write_csv(masts)
@@ -78,6 +109,7 @@ def test_the_command_plans_and_refuses(tmp_path: Path, access_av: Callable[..., 
     record = json.loads(done.out)
     assert record["after_m"] < record["before_m"]
     assert len(record["service_levels"]) == len(service_levels.LEVELS)
+    assert {"level", "share", "cheapest", "changes"} <= set(record["next_level"])
     planned = Scenario.load(str(tmp_path / "plan" / "scenario.toml"))
     assert len(json.loads(planned.site.to_json())["radio_heads"]) == 5
     for text, message in (

@@ -25,6 +25,9 @@ CELLS = 1008
 # SSB indices that a burst has at every carrier (TS 38.213, 4.1); each new head gets the least used:
 # cells that send at once drown one another.
 SSB_INDICES = range(4)
+# Where no masts are given: so far from the weakest place of the route, and in so many directions.
+BESIDE_M = (15.0, 40.0)
+DIRECTIONS = 8
 
 
 @dataclass(frozen=True)
@@ -55,7 +58,7 @@ class Plan:
 
 def plan(
     scenario: _core.Scenario | str,
-    masts: pl.DataFrame | str | Path,
+    masts: pl.DataFrame | str | Path | None = None,
     *,
     add: int = 1,
     eirp_dbm: float | None = None,
@@ -71,7 +74,8 @@ def plan(
     scenario
         A scenario, or the name or path of one.
     masts
-        Candidates: a table, or the CSV file of one, with the columns ``name, x_m, y_m, z_m``.
+        Candidates: a table, or the CSV file of one, with the columns ``name, x_m, y_m, z_m``; when
+        ``None``, places beside the road round where the bound is largest.
     add
         How many radio heads to add.
     eirp_dbm
@@ -102,10 +106,11 @@ def plan(
     """
     if not isinstance(scenario, _core.Scenario):
         scenario = _core.Scenario.load(scenario)
-    candidates = _candidates(masts)
+    site = json.loads(scenario.site.to_json())
+    heads = site["radio_heads"]
+    candidates = _beside(scenario, site) if masts is None else _candidates(masts)
     if not 1 <= add <= len(candidates):
         raise InputError(f"--add {add}: there are {len(candidates)} masts to choose from")
-    heads = json.loads(scenario.site.to_json())["radio_heads"]
     eirp_dbm = heads[0]["eirp_dbm"] if eirp_dbm is None else eirp_dbm
     taken = {head["pci"] for head in heads}
     free = [pci for pci in range(CELLS) if pci not in taken]
@@ -173,6 +178,25 @@ def plan(
 def _p90_m(scenario: _core.Scenario) -> float:
     bound_m = pl.Series(_core.Bound(scenario).along_route()["bound_m"])
     return float(bound_m.quantile(0.9, "linear") or math.nan)
+
+
+def _beside(scenario: _core.Scenario, site: dict[str, Any]) -> list[dict[str, Any]]:
+    """Places round where the bound is largest, as high as the site's first radio head."""
+    route = pl.DataFrame(_core.Bound(scenario).along_route())
+    weakest = route.row(int(route["bound_m"].arg_max() or 0), named=True)
+    width_m = (site.get("road") or {}).get("width_m", 0.0)
+    z_m = site["radio_heads"][0]["position_m"][2]
+    made = []
+    for away_m in BESIDE_M:
+        for direction in range(DIRECTIONS):
+            angle_rad = 2.0 * math.pi * direction / DIRECTIONS
+            x_m = round(weakest["x_m"] + away_m * math.cos(angle_rad))
+            y_m = round(weakest["y_m"] + away_m * math.sin(angle_rad))
+            nearest_m = (((pl.col("x_m") - x_m) ** 2 + (pl.col("y_m") - y_m) ** 2) ** 0.5).min()
+            if route.select(nearest_m).item() > max(width_m, 0.5 * BESIDE_M[0]):
+                name = f"({x_m}, {y_m}) m"
+                made.append({"name": name, "x_m": float(x_m), "y_m": float(y_m), "z_m": z_m})
+    return made
 
 
 def _candidates(masts: pl.DataFrame | str | Path) -> list[dict[str, Any]]:

@@ -136,7 +136,8 @@ class Survey:
 def read_drive(folder: str | Path) -> SurveyDrive:
     """Read a drive: ``odometry.csv`` or ``odometry.mcap``, ``angles.csv``, ``vehicle.toml``.
 
-    The vehicle file tells the drive's start (``start.pose``).
+    The vehicle file tells the drive's start (``start.pose``), and how far apart the wheels are
+    (``odometer.track_width_m``) where the odometry is that of left and right wheel.
 
     Raises
     ------
@@ -150,14 +151,17 @@ def read_drive(folder: str | Path) -> SurveyDrive:
     if not there:
         raise InputError(f"{folder}: neither odometry.csv nor odometry.mcap is here")
     vehicle = _core.Vehicle.load(str(folder / "vehicle.toml"))
-    start = json.loads(vehicle.to_json()).get("start", {}).get("pose")
+    stated = json.loads(vehicle.to_json())
+    start = stated.get("start", {}).get("pose")
     if start is None:
         raise InputError(
             f"{folder / 'vehicle.toml'}: `start.pose` is missing: where the drive starts"
         )
     return SurveyDrive(
         name=str(folder),
-        log=_core.LoggedDrive(there[0], folder / "angles.csv"),
+        log=_core.LoggedDrive(
+            there[0], folder / "angles.csv", stated.get("odometer", {}).get("track_width_m")
+        ),
         start_m_rad=(start["x_m"], start["y_m"], start["heading_rad"]),
     )
 

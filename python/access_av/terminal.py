@@ -30,6 +30,7 @@ if TYPE_CHECKING:
     import polars as pl
 
     from access_av.columns.tables import Table
+    from access_av.next_level import NextLevel
     from access_av.placement import Plan
     from access_av.recorded_angles import BurstAngle
     from access_av.service_levels import Verdict
@@ -178,7 +179,7 @@ def show_simulation(result: Simulation, title: str) -> None:
 
 def show_service_levels(verdicts: Sequence[Verdict], title: str = "") -> None:
     """Which 3GPP service levels are reached."""
-    head = ["3GPP service level", "error m", "needed", "reached", "at least (95 %)", ""]
+    head = ["3GPP service level", "accuracy m", "asked", "within", "at least (95 %)", ""]
     made = table(head, title=title)
     for verdict in verdicts:
         made.add_row(
@@ -202,7 +203,22 @@ def show_plan(found: Plan) -> None:
     for row in found.ranking.head(10).iter_rows(named=True):
         made.add_row(row["name"], f"{row['p90_bound_m']:.3f}")
     console.print(made)
-    show_service_levels(found.verdicts)
+    show_service_levels(found.verdicts, title=f"with {', '.join(found.chosen)}")
+
+
+def show_next_level(found: NextLevel) -> None:
+    """Where the site falls short of the next service level, and what mends that."""
+    level = found.level
+    console.print(
+        f"As it is, the site falls short of level {level.name} on {found.short_share:.1%} of the "
+        f"route, most of all {found.weakest_along_m:.0f} m along, at "
+        f"({found.weakest_x_m:.0f}, {found.weakest_y_m:.0f}) m. The cheapest change, by the usual "
+        f"order of cost: {found.cheapest.what if found.cheapest else 'none alone is enough'}."
+    )
+    made = table([f"what would mend that (as it is {found.share:.2%})", "within", "enough"])
+    for change in found.changes:
+        made.add_row(change.what, f"{change.share:.2%}", "yes" if change.reaches else "no")
+    console.print(made)
 
 
 def show_bound(summary: dict[str, Any], verdicts: Sequence[Verdict]) -> None:

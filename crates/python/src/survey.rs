@@ -22,6 +22,8 @@ use crate::settings::{Site, Vehicle};
 ///     CSV or MCAP, as `locate` takes it.
 /// angles : path-like
 ///     CSV log of angles, as `locate` takes it.
+/// track_width_m : float, optional
+///     Distance of left and right wheel, where the odometry is theirs.
 ///
 /// Raises
 /// ------
@@ -36,15 +38,21 @@ pub struct LoggedDrive {
 #[pymethods]
 impl LoggedDrive {
     #[new]
+    #[pyo3(signature = (odometry, angles, track_width_m = None))]
     #[allow(clippy::needless_pass_by_value)] // what extraction yields
-    fn new(py: Python<'_>, odometry: PathBuf, angles: PathBuf) -> PyResult<Self> {
+    fn new(
+        py: Python<'_>,
+        odometry: PathBuf,
+        angles: PathBuf,
+        track_width_m: Option<f64>,
+    ) -> PyResult<Self> {
         crate::arrays::look_up(py)?;
         py.detach(|| {
             let mut log = read_angle_log(&angles).map_err(recording_error)?;
             let angles = &mut log.angles;
             angles.sort_by(|a, b| a.measured.time_s.total_cmp(&b.measured.time_s));
             Ok(Self {
-                odometry: read_odometry(&odometry, None, None).map_err(recording_error)?,
+                odometry: read_odometry(&odometry, None, track_width_m).map_err(recording_error)?,
                 angles: log,
             })
         })

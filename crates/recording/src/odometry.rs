@@ -17,11 +17,16 @@ pub struct OdometryLog {
 }
 
 impl OdometryLog {
+    /// Times of the first and the last sample (s).
+    pub fn interval_s(&self) -> Option<[f64; 2]> {
+        let (first, last) = (self.samples.first()?, self.samples.last()?);
+        Some([first.time_s, last.time_s])
+    }
+
     /// Whether a time is that of the drive, up to a second before it or after.
     pub fn covers(&self, time_s: f64) -> bool {
-        let (first, last) = (self.samples.first(), self.samples.last());
-        first.is_some_and(|it| time_s >= it.time_s - 1.0)
-            && last.is_some_and(|it| time_s <= it.time_s + 1.0)
+        let covers = |[first_s, last_s]: [f64; 2]| (first_s - 1.0..=last_s + 1.0).contains(&time_s);
+        self.interval_s().is_some_and(covers)
     }
 }
 

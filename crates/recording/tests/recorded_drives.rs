@@ -183,6 +183,24 @@ fn compressed_mcap_is_read_alike() {
     }
 }
 
+/// A damaged length of a name is a damaged file, not so much memory.
+#[test]
+fn mcap_names_longer_than_their_record_are_refused() {
+    let file = common::scratch("odometry-mcap-damaged").join("odo.mcap");
+    write_mcap(&file, &["/odom"], 0.02);
+    let whole = fs::read(&file).unwrap();
+    for name in ["nav_msgs/msg/Odometry", "/odom"] {
+        let start = (4..whole.len())
+            .find(|&at| whole[at..].starts_with(name.as_bytes()))
+            .unwrap();
+        let mut damaged = whole.clone();
+        damaged[start - 1] = 0xff;
+        fs::write(&file, damaged).unwrap();
+        let error = read_odometry_mcap(&file, None).unwrap_err().to_string();
+        assert!(error.contains("damaged"), "{error}");
+    }
+}
+
 #[test]
 fn mcap_files_without_the_one_topic_are_refused() {
     let file = common::scratch("odometry-mcap-bad").join("odo.mcap");

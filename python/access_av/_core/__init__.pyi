@@ -333,7 +333,12 @@ def locate(
 
 @final
 class LoggedDrive:
-    def __new__(cls, odometry: str | PathLike[str], angles: str | PathLike[str]) -> LoggedDrive: ...
+    def __new__(
+        cls,
+        odometry: str | PathLike[str],
+        angles: str | PathLike[str],
+        track_width_m: float | None = None,
+    ) -> LoggedDrive: ...
     @property
     def heads(self) -> list[tuple[int, int]]: ...
     def innovations(

@@ -48,4 +48,6 @@ def bound(
         print(json_text({**summary, "directory": str(directory.path)}))
         return
     show_bound(summary, found.verdicts)
+    if not all(verdict.reached for verdict in found.verdicts):
+        console.print(f"What brings it further: access-av plan {scenario}", soft_wrap=True)
     console.print(f"Report: {directory.path / 'report.html'}", soft_wrap=True)

@@ -8,7 +8,7 @@ from typing import Annotated
 import typer
 
 from access_av.commands.options import AsJson, Out, ScenarioArgument
-from access_av.terminal import console, progress, show_plan
+from access_av.terminal import console, progress, show_next_level, show_plan
 
 app = typer.Typer()
 
@@ -43,11 +43,18 @@ def import_paths(
 
 
 @app.command(
-    epilog="Example: [bold]access-av plan yard --masts masts.csv --add 2[/]",
+    epilog="Examples: [bold]access-av plan yard[/], "
+    "[bold]access-av plan yard --masts masts.csv --add 2[/]",
 )
 def plan(
     scenario: ScenarioArgument,
-    masts: Annotated[Path, typer.Option(help="CSV of candidates: name, x_m, y_m, z_m.")],
+    masts: Annotated[
+        Path | None,
+        typer.Option(
+            help="CSV of candidates: name, x_m, y_m, z_m; else places round the weakest of the "
+            "route."
+        ),
+    ] = None,
     add: Annotated[int, typer.Option(min=1, help="Radio heads to add.")] = 1,
     eirp_dbm: Annotated[
         float | None, typer.Option(help="What they send; else as the site's first.")
@@ -55,21 +62,24 @@ def plan(
     out: Out = None,
     as_json: AsJson = False,
 ) -> None:
-    """Choose masts for further radio heads.
+    """Tell what brings a site to the next 3GPP service level, and where to put radio heads.
 
-    By the 90th percentile along the route of the bound: each mast is tried. Prints which 3GPP
-    service levels the bound then allows. Writes masts.parquet, scenario.toml with the new radio
-    heads, and manifest.json.
+    By the 90th percentile along the route of the bound: each mast is tried. Prints which service
+    levels the bound then allows; where the site as it is falls short of the next one, and what
+    mends that: cells that send more often, a better odometer, more antennas, the radio heads.
+    Writes masts.parquet, scenario.toml with the new radio heads, and manifest.json.
     """
     from access_av.files import ResultsDirectory, json_text
+    from access_av.next_level import next_level
     from access_av.placement import plan as plan_heads
 
     with progress("Masts") as tick:
         found = plan_heads(scenario, masts, add=add, eirp_dbm=eirp_dbm, progress=tick)
+    missed = next_level(scenario, found)
     directory = ResultsDirectory.create(f"plan-{found.scenario.name}", out)
     directory.write_table("masts.parquet", found.ranking)
     directory.write_text("scenario.toml", found.scenario.to_toml())
-    directory.write_manifest(scenario=found.scenario.name, masts=str(masts), add=add)
+    directory.write_manifest(scenario=found.scenario.name, masts=masts and str(masts), add=add)
     if as_json:
         record = {
             "scenario": found.scenario.name,
@@ -77,9 +87,12 @@ def plan(
             "after_m": found.after_m,
             "chosen": found.chosen,
             "service_levels": [verdict.as_record() for verdict in found.verdicts],
+            "next_level": missed and missed.as_record(),
             "directory": str(directory.path),
         }
         print(json_text(record))
         return
     show_plan(found)
+    if missed is not None:
+        show_next_level(missed)
     console.print(f"Site: {directory.path / 'scenario.toml'}", soft_wrap=True)

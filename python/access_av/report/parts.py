@@ -92,7 +92,7 @@ def service_levels(verdicts: Iterable[Verdict]) -> str:
         )
         for verdict in verdicts
     ]
-    head = ("level", "accuracy", "availability asked", "share within", "at least (95 %)", "")
+    head = ("3GPP service level", "accuracy", "asked", "within", "at least (95 %)", "")
     return table(head, rows, numbers=(1, 2, 3, 4))
 
 

@@ -1,5 +1,7 @@
 //! The inner loops over samples: portable, and for the vector instructions that a processor may have.
 
+#[cfg(any(target_arch = "aarch64", target_arch = "x86_64"))]
+mod loops;
 #[cfg(target_arch = "aarch64")]
 mod neon;
 mod portable;

@@ -8,7 +8,7 @@ use num_complex::Complex64;
 
 use super::eigen::hermitian_eigen;
 use super::matrix::Matrix;
-use crate::simd::math::times_plus;
+use crate::simd::math::{select, times_plus};
 
 /// `W` vectors of `N` elements.
 #[derive(Debug, Clone, Copy)]
@@ -100,103 +100,97 @@ impl<const N: usize, const W: usize> Hermitians<N, W> {
         traces
     }
 
-    /// `A A = A A^H`: entry (i, j) is the product of rows i and j.
+    /// Entry (i, j) of matrix `w`, and (j, i) with it.
     #[inline(always)]
-    fn squared<const FUSED: bool>(&self) -> Self {
-        let mut full = *self;
-        for i in 0..N {
-            for j in 0..i {
-                full.re[j][i] = self.re[i][j];
-                for w in 0..W {
-                    full.im[j][i][w] = -self.im[i][j][w];
-                }
-            }
-        }
-        let mut square = Self::ZERO;
-        for i in 0..N {
-            for j in 0..=i {
-                let (mut re, mut im) = ([0.0; W], [0.0; W]);
-                for k in 0..N {
-                    for w in 0..W {
-                        let (a, b) = (full.re[i][k][w], full.im[i][k][w]);
-                        let (c, d) = (full.re[j][k][w], full.im[j][k][w]);
-                        re[w] = times_plus::<FUSED>(a, c, times_plus::<FUSED>(b, d, re[w]));
-                        if i != j {
-                            im[w] = times_plus::<FUSED>(b, c, times_plus::<FUSED>(-a, d, im[w]));
-                        }
-                    }
-                }
-                (square.re[i][j], square.im[i][j]) = (re, im);
-            }
-        }
-        square
+    fn put(&mut self, (i, j, w): (usize, usize, usize), re: f64, im: f64) {
+        (self.re[i][j][w], self.im[i][j][w]) = (re, im);
+        (self.re[j][i][w], self.im[j][i][w]) = (re, -im);
     }
 
-    /// Times `scales[w]` the matrices of `other`, but where `keep[w]` is not zero.
+    /// Of matrices with both triangles filled `A^2 / tr A^2` into `square`, and the traces; where `keep[w]`
+    /// is not zero, `A` as it is. As `A = A^H`, entry (i, j) of the square is the product of rows i and j.
     #[inline(always)]
-    fn replace(&mut self, other: &Self, scales: &[f64; W], keep: &[f64; W]) {
+    fn square_into<const FUSED: bool>(&self, square: &mut Self, keep: &[f64; W]) -> [f64; W] {
+        let (mut diagonal, mut traces) = ([[0.0; W]; N], [0.0; W]);
         for i in 0..N {
-            for j in 0..=i {
+            for w in 0..W {
+                let mut sum = 0.0;
+                for k in 0..N {
+                    let (a, b) = (self.re[i][k][w], self.im[i][k][w]);
+                    sum = times_plus::<FUSED>(a, a, times_plus::<FUSED>(b, b, sum));
+                }
+                diagonal[i][w] = sum;
+                traces[w] += sum;
+            }
+        }
+        let scales = traces.map(|trace| 1.0 / trace);
+        for i in 0..N {
+            for w in 0..W {
+                let kept = select(keep[w] == 0.0, diagonal[i][w] * scales[w], self.re[i][i][w]);
+                square.re[i][i][w] = kept;
+            }
+            for j in 0..i {
                 for w in 0..W {
-                    let (re, im) = (&mut self.re[i][j][w], &mut self.im[i][j][w]);
-                    *re = if keep[w] == 0.0 {
-                        other.re[i][j][w] * scales[w]
-                    } else {
-                        *re
-                    };
-                    *im = if keep[w] == 0.0 {
-                        other.im[i][j][w] * scales[w]
-                    } else {
-                        *im
-                    };
+                    let (mut re, mut im) = (0.0, 0.0);
+                    for k in 0..N {
+                        let (a, b) = (self.re[i][k][w], self.im[i][k][w]);
+                        let (c, d) = (self.re[j][k][w], self.im[j][k][w]);
+                        re = times_plus::<FUSED>(a, c, times_plus::<FUSED>(b, d, re));
+                        im = times_plus::<FUSED>(b, c, times_plus::<FUSED>(-a, d, im));
+                    }
+                    let on = keep[w] == 0.0;
+                    let re = select(on, re * scales[w], self.re[i][j][w]);
+                    let im = select(on, im * scales[w], self.im[i][j][w]);
+                    square.put((i, j, w), re, im);
                 }
             }
         }
+        traces
     }
 
     /// The eigenvectors (unit norm) of the largest eigenvalues of positive semidefinite matrices.
     ///
     /// Squaring a matrix squares the ratios of its eigenvalues; after a few squarings only the largest
-    /// is left. Where the two largest are nearly equal that takes too many, and Jacobi's method takes
-    /// over. A matrix that is zero has no such vector, and gets zeros.
+    /// is left, and a product with the last square makes up for one more. Where the two largest are
+    /// nearly equal that takes too many, and Jacobi's method takes over. A matrix that is zero has no
+    /// such vector, and gets zeros.
     #[inline(always)]
     pub(crate) fn principal_eigenvectors<const FUSED: bool>(&self) -> Vectors<N, W> {
         const SQUARINGS: usize = 9;
         // A matrix of unit trace whose square has the trace 1 - x has a share of x / 2 outside its
-        // largest eigenvalue, and its square one of x^2 / 4, which is the error of the vector.
-        const REMAINDER: f64 = 1e-5;
+        // largest eigenvalue, its square one of x^2 / 4, and a column of that, multiplied by it once
+        // more, one of x^4 / 16, which is the error of the vector.
+        const REMAINDER: f64 = 2e-3;
         let traces = self.traces();
         let (mut scales, mut done) = ([0.0; W], [0.0; W]);
         for w in 0..W {
-            scales[w] = if traces[w] > 0.0 {
-                1.0 / traces[w]
-            } else {
-                0.0
-            };
-            done[w] = if traces[w] > 0.0 { 0.0 } else { 1.0 };
+            let filled = traces[w] > 0.0;
+            scales[w] = select(filled, 1.0 / traces[w], 0.0);
+            done[w] = select(filled, 0.0, 1.0);
         }
-        let mut power = Self::ZERO;
-        power.replace(self, &scales, &done);
-        for _ in 0..SQUARINGS {
-            let square = power.squared::<FUSED>();
-            let traces = square.traces();
-            for w in 0..W {
-                scales[w] = 1.0 / traces[w];
+        let (mut first, mut second) = (Self::ZERO, Self::ZERO);
+        let (mut power, mut square) = (&mut first, &mut second);
+        for i in 0..N {
+            for j in 0..=i {
+                for w in 0..W {
+                    let (re, im) = (self.re[i][j][w], self.im[i][j][w]);
+                    power.put((i, j, w), re * scales[w], im * scales[w]);
+                }
             }
+        }
+        for _ in 0..SQUARINGS {
             // Whoever is done stays as it is, however long the others take.
-            power.replace(&square, &scales, &done);
+            let traces = power.square_into::<FUSED>(square, &done);
+            std::mem::swap(&mut power, &mut square);
             for w in 0..W {
-                done[w] = if traces[w] > 1.0 - REMAINDER {
-                    1.0
-                } else {
-                    done[w]
-                };
+                done[w] = select(traces[w] > 1.0 - REMAINDER, 1.0, done[w]);
             }
             if done.iter().all(|it| *it > 0.0) {
                 break;
             }
         }
-        let mut vectors = power.heaviest_columns::<FUSED>();
+        let mut vectors = power.times::<FUSED>(&power.heaviest_columns());
+        vectors.normalise::<FUSED>();
         for w in 0..W {
             if done[w] == 0.0 {
                 let vector = hermitian_eigen(self.get(w), N).vectors[0];
@@ -208,52 +202,73 @@ impl<const N: usize, const W: usize> Hermitians<N, W> {
         vectors
     }
 
-    /// Of matrices of rank one, the columns with the largest entries on the diagonal, normalised.
+    /// Of matrices with both triangles filled, the columns with the largest entries on the diagonal.
     #[inline(always)]
-    fn heaviest_columns<const FUSED: bool>(&self) -> Vectors<N, W> {
+    fn heaviest_columns(&self) -> Vectors<N, W> {
         let mut columns = Vectors {
             re: [[0.0; W]; N],
             im: [[0.0; W]; N],
         };
         let mut heaviest = [0.0; W];
         for n in 0..N {
-            for k in 0..N {
-                let (re, im, sign) = self.entries(k, n);
-                for w in 0..W {
-                    let heavier = self.re[n][n][w] > heaviest[w];
-                    let (x, y) = (&mut columns.re[k][w], &mut columns.im[k][w]);
-                    *x = if heavier { re[w] } else { *x };
-                    *y = if heavier { sign * im[w] } else { *y };
-                }
-            }
             for w in 0..W {
                 let entry = self.re[n][n][w];
-                heaviest[w] = if entry > heaviest[w] {
-                    entry
-                } else {
-                    heaviest[w]
-                };
-            }
-        }
-        let mut powers = [0.0; W];
-        for n in 0..N {
-            for w in 0..W {
-                let (re, im) = (columns.re[n][w], columns.im[n][w]);
-                powers[w] = times_plus::<FUSED>(re, re, times_plus::<FUSED>(im, im, powers[w]));
-            }
-        }
-        for n in 0..N {
-            for w in 0..W {
-                let scale = if powers[w] > 0.0 {
-                    1.0 / powers[w].sqrt()
-                } else {
-                    0.0
-                };
-                columns.re[n][w] *= scale;
-                columns.im[n][w] *= scale;
+                let heavier = entry > heaviest[w];
+                for k in 0..N {
+                    let (x, y) = (&mut columns.re[k][w], &mut columns.im[k][w]);
+                    *x = select(heavier, self.re[k][n][w], *x);
+                    *y = select(heavier, self.im[k][n][w], *y);
+                }
+                heaviest[w] = select(heavier, entry, heaviest[w]);
             }
         }
         columns
+    }
+
+    /// `A v` of matrices with both triangles filled.
+    #[inline(always)]
+    fn times<const FUSED: bool>(&self, vectors: &Vectors<N, W>) -> Vectors<N, W> {
+        let mut products = Vectors {
+            re: [[0.0; W]; N],
+            im: [[0.0; W]; N],
+        };
+        for i in 0..N {
+            for w in 0..W {
+                let (mut re, mut im) = (0.0, 0.0);
+                for k in 0..N {
+                    let (a, b) = (self.re[i][k][w], self.im[i][k][w]);
+                    let (c, d) = (vectors.re[k][w], vectors.im[k][w]);
+                    re = times_plus::<FUSED>(a, c, times_plus::<FUSED>(-b, d, re));
+                    im = times_plus::<FUSED>(a, d, times_plus::<FUSED>(b, c, im));
+                }
+                (products.re[i][w], products.im[i][w]) = (re, im);
+            }
+        }
+        products
+    }
+}
+
+impl<const N: usize, const W: usize> Vectors<N, W> {
+    /// To unit norm; zero stays zero.
+    #[inline(always)]
+    fn normalise<const FUSED: bool>(&mut self) {
+        let mut powers = [0.0; W];
+        for n in 0..N {
+            for w in 0..W {
+                let (re, im) = (self.re[n][w], self.im[n][w]);
+                powers[w] = times_plus::<FUSED>(re, re, times_plus::<FUSED>(im, im, powers[w]));
+            }
+        }
+        let mut scales = [0.0; W];
+        for w in 0..W {
+            scales[w] = select(powers[w] > 0.0, 1.0 / powers[w].sqrt(), 0.0);
+        }
+        for n in 0..N {
+            for w in 0..W {
+                self.re[n][w] *= scales[w];
+                self.im[n][w] *= scales[w];
+            }
+        }
     }
 }
 

@@ -8,6 +8,13 @@ pub(crate) fn times_plus<const FUSED: bool>(a: f64, b: f64, c: f64) -> f64 {
     if FUSED { a.mul_add(b, c) } else { a * b + c }
 }
 
+/// `a` or else `b`, without a branch: one would keep a loop from becoming vector code.
+#[inline(always)]
+pub(crate) fn select(condition: bool, a: f64, b: f64) -> f64 {
+    let mask = u64::from(condition).wrapping_neg();
+    f64::from_bits(a.to_bits() & mask | b.to_bits() & !mask)
+}
+
 /// Coefficients of `asin(s) / s` in powers of `s^2`: `c_n = c_(n-1) (2n - 1)^2 / (2n (2n + 1))`.
 const ARCSINE: [f64; 22] = {
     let mut series = [1.0; 22];

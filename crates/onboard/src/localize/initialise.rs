@@ -10,7 +10,6 @@ use std::f64::consts::TAU;
 use std::sync::Arc;
 
 use super::area::Area;
-use super::gaussian::Innovation;
 use super::measurement::{AngleMeasurement, UpdateReason, UpdateVerdict};
 use super::pose_estimate::PoseEstimate;
 use super::tracker::state::{ACROSS, ALONG, HEADING, STATES};
@@ -27,10 +26,6 @@ const SPACING_M: f64 = 1.0;
 /// Log-likelihood by which a hypothesis may fall behind the best; e^−25 is one in 10¹¹.
 const BEHIND: f64 = 25.0;
 
-/// What an angle costs a hypothesis that takes it for an outlier, `ln(2π/ε)` for outliers from all
-/// directions and a share ε of about 2 in 1000: the right one must survive a few.
-const OUTLIER: f64 = 8.0;
-
 /// Standard deviation of the position, along its ellipse's longer axis, at which it is found (m).
 /// Another place 100 m away then has a probability of less than 2 in 100 000.
 const FOUND_STD_M: f64 = 0.4;
@@ -44,20 +39,6 @@ const FOUND_STD_RAD: f64 = 0.2;
 /// Headings of the first hypotheses in each square of the plane, and the most hypotheses.
 const HEADINGS: u32 = 12;
 const MOST_HYPOTHESES: f64 = 4000.0;
-
-/// What an angle says for the belief it met, beside what it would say for one without any doubt that
-/// foretold it exactly. Looks that are not independent have a variance that says so: they cost
-/// nothing, however that variance differs from place to place.
-pub(super) fn log_likelihood(innovation: Option<Innovation>, verdict: &UpdateVerdict) -> f64 {
-    match (innovation, verdict.reason) {
-        (Some(seen), UpdateReason::Consistent) => {
-            -0.5 * (seen.mahalanobis2() + (seen.variance / seen.measurement_variance).ln())
-        }
-        // Whoever leaves out a radio head takes its angles for outliers.
-        (_, UpdateReason::Excluded) | (Some(_), _) => -OUTLIER,
-        (None, _) => 0.0,
-    }
-}
 
 /// Where the vehicle may be.
 #[derive(Clone, Debug)]
@@ -231,9 +212,8 @@ impl Initialiser {
     pub fn update(&mut self, head: &RadioHead, measured: &AngleMeasurement) -> UpdateVerdict {
         let mut first = UpdateVerdict::unused(UpdateReason::Unusable);
         for (rank, hypothesis) in self.hypotheses.iter_mut().enumerate() {
-            let innovation = hypothesis.tracker.innovation(head, measured);
+            hypothesis.log_likelihood += hypothesis.tracker.log_likelihood(head, measured);
             let verdict = hypothesis.tracker.update(head, measured);
-            hypothesis.log_likelihood += log_likelihood(innovation, &verdict);
             if rank == 0 {
                 first = verdict;
             }

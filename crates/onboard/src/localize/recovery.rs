@@ -10,7 +10,7 @@
 use std::sync::Arc;
 
 use super::area::Area;
-use super::initialise::{Initialiser, log_likelihood};
+use super::initialise::Initialiser;
 use super::integrity::IntegrityConfig;
 use super::integrity_state::IntegrityState;
 use super::localizer::{Localizer, Recovered, copy_into};
@@ -206,14 +206,12 @@ impl Localizer for Recovery {
         head: &RadioHead,
         measured: &AngleMeasurement,
     ) -> Result<UpdateVerdict, BoxError> {
-        let searched = self.search.is_some();
-        let innovation = searched.then(|| self.tracked.tracker().innovation(head, measured));
-        let verdict = self.tracked.update(head, measured);
-        self.watch.see(head, &verdict);
         if let Some(search) = &mut self.search {
             search.initialiser.update(head, measured);
-            search.own += log_likelihood(innovation.flatten(), &verdict);
+            search.own += self.tracked.tracker().log_likelihood(head, measured);
         }
+        let verdict = self.tracked.update(head, measured);
+        self.watch.see(head, &verdict);
         self.judge(measured.time_s);
         Ok(verdict)
     }

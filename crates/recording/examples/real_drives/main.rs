@@ -14,7 +14,7 @@ use std::path::{Path, PathBuf};
 use onboard::geometry::{Pose, wrap_angle};
 use onboard::localize::IntegrityState;
 use onboard::observation::OdometrySample;
-use onboard::settings::{Shipped, Site, TomlFile, Vehicle};
+use onboard::settings::{IntegritySettings, Shipped, Site, TomlFile, Vehicle};
 use recording::replay::{LocatedDrive, LocatedPose, StartChoice, as_stated, locate_angles};
 use recording::{AngleLog, OdometryLog, TimedPose, read_angle_log, read_odometry_csv, read_tum};
 
@@ -246,6 +246,30 @@ impl Drive {
     }
 }
 
+/// Why a position was not `ok`: shares of the time lost, above the alert limit, and in doubt.
+fn why_not_ok(poses: &[LocatedPose]) -> String {
+    let alert_limit_m = IntegritySettings::default().alert_limit_m;
+    let (mut lost, mut wide, mut doubted) = (0, 0, 0);
+    for pose in poses {
+        let Some(it) = pose.estimate.integrity else {
+            continue;
+        };
+        match it.state {
+            IntegrityState::Ok => {}
+            _ if pose.is_lost => lost += 1,
+            _ if it.protection_level_m > alert_limit_m => wide += 1,
+            _ => doubted += 1,
+        }
+    }
+    let share = |part: u32| f64::from(part) / poses.len().max(1) as f64;
+    format!(
+        "lost {:.3} wide {:.3} doubted {:.3}",
+        share(lost),
+        share(wide),
+        share(doubted)
+    )
+}
+
 /// The first remarks of each kind.
 fn print_remarks(located: &LocatedDrive) {
     if std::env::var_os("REMARKS").is_some() {
@@ -318,7 +342,12 @@ fn print_minutes(drive: &Drive, poses: &[LocatedPose]) {
 }
 
 fn report(label: &str, drive: &Drive, located: &LocatedDrive) {
-    println!("{:10} {label:18} {}", drive.name, drive.judge(located));
+    let why = why_not_ok(&located.poses);
+    println!(
+        "{:10} {label:18} {} {why}",
+        drive.name,
+        drive.judge(located)
+    );
     print_remarks(located);
     print_minutes(drive, &located.poses);
     print_minutes(drive, &located.smoothed);

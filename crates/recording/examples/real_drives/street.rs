@@ -11,7 +11,7 @@ use rand::{RngExt, SeedableRng};
 use rand_chacha::ChaCha8Rng;
 use rand_distr::StandardNormal;
 
-use super::{Drive, report, table};
+use super::{Drive, report, table, why_not_ok};
 
 const STREET: &str = "
 name = \"car\"
@@ -118,8 +118,12 @@ pub fn ten_odometers(folder: &Path) {
         ("every 2 m", "angles_every2m.csv", ""),
         ("on demand", "angles.csv", demand),
     ] {
+        if std::env::var("BURSTS").is_ok_and(|wanted| !label.contains(&wanted)) {
+            continue;
+        }
         let base = Drive::read(folder, angles, "odometry.csv");
         for map in [true, false] {
+            let mut poses = vec![];
             let (mut rms_m, mut shares, mut heard) = (vec![], [0.0; 4], 0);
             for seed in 0..10 {
                 let mut drive = base.clone();
@@ -131,6 +135,7 @@ pub fn ten_odometers(folder: &Path) {
                 let located = drive.locate(&vehicle, drive.start, false);
                 rms_m.push(drive.rms_m(&located.poses, f64::NEG_INFINITY, f64::INFINITY));
                 heard += located.executions.len();
+                poses.extend_from_slice(&located.poses);
                 for pose in &located.poses {
                     let Some(truth) = drive.true_pose(pose.estimate.time_s) else {
                         continue;
@@ -148,13 +153,14 @@ pub fn ten_odometers(folder: &Path) {
             }
             rms_m.sort_by(f64::total_cmp);
             println!(
-                "street {label:12} {} rms {:.3} (worst {:.3}) in 95 % {:.3} ok {:.3} beyond while ok {:.4} angles {heard}",
+                "street {label:12} {} rms {:.3} (worst {:.3}) in 95 % {:.3} ok {:.3} beyond while ok {:.4} angles {heard} {}",
                 if map { "map   " } else { "no map" },
                 0.5 * (rms_m[4] + rms_m[5]),
                 rms_m[9],
                 shares[1] / shares[0],
                 shares[2] / shares[0],
                 shares[3] / f64::max(shares[2], 1.0),
+                why_not_ok(&poses),
             );
         }
     }

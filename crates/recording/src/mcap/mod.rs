@@ -5,6 +5,7 @@
 
 mod cdr;
 mod drive;
+mod messages;
 mod reader;
 mod schema;
 mod writer;

@@ -1,20 +1,12 @@
 //! Odometry out of an MCAP file.
 
-use std::io::BufReader;
 use std::path::Path;
 
-use mcap::io::MessageReader;
-use mcap::sans_io::LinearReaderOptions;
-
 use super::cdr::Decoder;
-use super::schema::ODOMETRY;
+use super::messages::each_odometry_message;
 use crate::error::RecordingError;
-use crate::file as files;
 use crate::odometry::{OdometryCollector, OdometryLog};
 use onboard::observation::OdometrySample;
-
-/// Bytes of the longest record that is read; chunks are customarily below 10 MB.
-const LONGEST_RECORD: usize = 1 << 28;
 
 /// What is used of one `nav_msgs/msg/Odometry`.
 struct Reading {
@@ -33,35 +25,21 @@ struct Reading {
 /// [`RecordingError`] when the file is no MCAP, is cut off, or does not have exactly that topic.
 /// Single messages are only remarked upon.
 pub fn read_odometry_mcap(file: &Path, topic: Option<&str>) -> Result<OdometryLog, RecordingError> {
-    let opened = files::open(file).map_err(|source| RecordingError::io(file, source))?;
     let mut topics: Vec<String> = Vec::new();
     let mut collector = OdometryCollector::default();
     let mut last_place: Option<(f64, f64)> = None;
     let mut item = 0;
-    // A damaged length must not be taken for the memory to set aside.
-    let options = LinearReaderOptions::default().with_record_length_limit(LONGEST_RECORD);
-    for message in MessageReader::new_with_options(BufReader::new(opened), options) {
-        let message = message.map_err(|error| RecordingError::Syntax {
-            file: file.display().to_string(),
-            format: "MCAP",
-            message: error.to_string(),
-        })?;
-        let channel = &message.channel;
-        let is_odometry = channel
-            .schema
-            .as_ref()
-            .is_some_and(|it| it.name == ODOMETRY.name)
-            && channel.message_encoding == "cdr";
-        if !is_odometry || topic.is_some_and(|topic| topic != channel.topic) {
-            continue;
+    each_odometry_message(file, |message_topic, data| {
+        if topic.is_some_and(|topic| topic != message_topic) {
+            return;
         }
-        if !topics.contains(&channel.topic) {
-            topics.push(channel.topic.clone());
+        if !topics.iter().any(|topic| topic == message_topic) {
+            topics.push(message_topic.to_owned());
         }
         item += 1;
-        let Some(reading) = decode(&message.data) else {
+        let Some(reading) = decode(data) else {
             collector.add(item, Err("no complete nav_msgs/msg/Odometry".to_owned()));
-            continue;
+            return;
         };
         let place = (reading.x_m, reading.y_m);
         let step_m = last_place.map_or(0.0, |(x_m, y_m)| {
@@ -83,7 +61,7 @@ pub fn read_odometry_mcap(file: &Path, topic: Option<&str>) -> Result<OdometryLo
         if collector.last().copied() != before {
             last_place = Some(place);
         }
-    }
+    })?;
     one_topic(file, topic, &topics)?;
     let mut log = collector.finish();
     if log

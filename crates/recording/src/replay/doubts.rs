@@ -30,16 +30,20 @@ pub fn doubts(
     angles: &[LoggedAngle],
 ) -> Result<Doubts, ReplayError> {
     let mut doubts = Doubts::new();
-    let Some(first) = odometry.samples.first() else {
+    let Some(odometry_s) = odometry.interval_s() else {
         return Ok(doubts);
     };
-    let start_s = first.time_s;
+    let [start_s, _] = odometry_s;
     let inside = |it: &&LoggedAngle| odometry.covers(it.measured.time_s);
     let heard: Vec<&LoggedAngle> = angles.iter().filter(inside).collect();
-    if let (Some(angle), true) = (angles.first(), heard.is_empty()) {
+    if !angles.is_empty() && heard.is_empty() {
+        let times_s = angles.iter().map(|it| it.measured.time_s);
         return Err(ReplayError::Clocks {
-            odometry_s: first.time_s,
-            angles_s: angle.measured.time_s,
+            odometry_s,
+            angles_s: [
+                times_s.clone().fold(f64::INFINITY, f64::min),
+                times_s.fold(f64::NEG_INFINITY, f64::max),
+            ],
         });
     }
     let outside = angles.len() - heard.len();

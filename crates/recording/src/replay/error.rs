@@ -41,14 +41,15 @@ pub enum ReplayError {
     },
     /// Angles and odometry of different times.
     #[error(
-        "no angle falls into the odometry's time: odometry begins at {odometry_s} s, angles at \
-         {angles_s} s; both must be told by one clock"
+        "no angle falls into the odometry's time: odometry is from {} to {} s, angles from {} to {} s, \
+         {:.3} s apart; both must be told by one clock",
+        odometry_s[0], odometry_s[1], angles_s[0], angles_s[1], apart_s(odometry_s, angles_s)
     )]
     Clocks {
-        /// Time of the first odometry sample (s).
-        odometry_s: f64,
-        /// Time of the first angle (s).
-        angles_s: f64,
+        /// Times of the first and the last odometry sample (s).
+        odometry_s: [f64; 2],
+        /// Times of the first and the last angle (s).
+        angles_s: [f64; 2],
     },
     /// No radio head of the site is heard.
     #[error(
@@ -64,4 +65,9 @@ pub enum ReplayError {
     /// The user's own code failed.
     #[error("{0}")]
     Custom(BoxError),
+}
+
+/// Length of the gap between two intervals.
+fn apart_s(a: &[f64; 2], b: &[f64; 2]) -> f64 {
+    (a[0] - b[1]).max(b[0] - a[1]).max(0.0)
 }

@@ -76,14 +76,16 @@ pub fn locate_recording(
     let file = recording.data_file().display().to_string();
     let mut receiver = Receiver::new(ReceiverConfig::new(site, &vehicle))
         .map_err(|source| ReplayError::Receive { file, source })?;
-    let (mut first_s, mut together) = (None, false);
+    let (mut heard_s, mut together) = (None, false);
     receive_recording(&mut receiver, recording, start_time_s, |ssbs| {
-        first_s = first_s.or(ssbs.first().map(|first| first.ssb.time_s));
-        together |= ssbs.iter().any(|it| odometry.covers(it.ssb.time_s));
+        for it in ssbs {
+            let [first_s, _] = heard_s.unwrap_or([it.ssb.time_s; 2]);
+            heard_s = Some([first_s, it.ssb.time_s]);
+            together |= odometry.covers(it.ssb.time_s);
+        }
         replay.hear(ssbs)
     })?;
-    if let (Some(angles_s), false) = (first_s, together) {
-        let odometry_s = odometry.samples.first().map_or(f64::NAN, |it| it.time_s);
+    if let (Some(odometry_s), Some(angles_s), false) = (odometry.interval_s(), heard_s, together) {
         return Err(ReplayError::Clocks {
             odometry_s,
             angles_s,

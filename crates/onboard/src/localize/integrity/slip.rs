@@ -3,7 +3,7 @@
 //! A tracker that expects slip runs beside the one that trusts the odometer. How much better it
 //! foretells the angles is counted up, never below nothing, as slip may begin at any time (Page
 //! 1954). Beyond what noise brings about slip is suspected, and the level is to hold for that tracker
-//! too.
+//! too. Where errors are found that stay over metres, they are what slip would be taken for.
 
 use std::f64::consts::TAU;
 
@@ -55,6 +55,7 @@ impl Slip {
         measured: &AngleMeasurement,
     ) -> UpdateVerdict {
         if measured.resolved
+            && !sound.config().finds_errors
             && let Some(if_slipping) = self.tracker.innovation(head, measured)
             && let Some(if_sound) = sound.innovation(head, measured)
         {

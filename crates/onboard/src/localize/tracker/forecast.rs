@@ -1,15 +1,22 @@
 //! What the belief would become: driven on, and with angles not yet heard.
 
+use std::f64::consts::TAU;
+
 use super::filter::{MOST_STEPS, Tracker};
 use super::locate::locate;
 use super::sighting::Sighting;
 use super::state::Belief;
+use super::staying_error::StayingError;
 use crate::localize::gaussian::{Innovation, principal_variances};
 use crate::localize::measurement::AngleMeasurement;
 use crate::radio_head::RadioHead;
 
 /// Longest step of a forecast (m), where millimetres do not matter.
 const FORECAST_STEP_M: f64 = 5.0;
+
+/// What an outlier costs, `ln(2π/ε)` for outliers from all directions and a share ε of about 2 in 1000:
+/// the right place must survive a few.
+const OUTLIER: f64 = 8.0;
 
 /// An angle to a radio head that is not used.
 #[derive(Clone, Copy, Debug, PartialEq)]
@@ -32,7 +39,40 @@ impl Tracker {
             .map(|looked| looked.innovation)
     }
 
-    /// What an angle to an excluded radio head would bring; it counts as a look.
+    /// Log-likelihood of an angle, beside that of one that has but its own noise and is foretold exactly.
+    ///
+    /// Looks that are not independent have a variance that says so: they cost nothing, however that
+    /// variance differs from place to place. Where errors are found that stay over metres, a look counts
+    /// as the share of a stretch that it tells of. Whoever leaves out a radio head takes its angles for
+    /// outliers.
+    pub(in crate::localize) fn log_likelihood(
+        &self,
+        head: &RadioHead,
+        measured: &AngleMeasurement,
+    ) -> f64 {
+        let Ok(looked) = self.look(head, measured) else {
+            return 0.0;
+        };
+        let known = self.heads.get(looked.head);
+        if let (Some(known), true) = (known, self.config.finds_errors) {
+            let density = if looked.excluded {
+                TAU.recip()
+            } else {
+                known.error.density(&looked.without_error())
+            };
+            let exact = (TAU * looked.own_variance).sqrt().recip();
+            return StayingError::share(looked.place_m - known.heard_m) * (density / exact).ln();
+        }
+        let seen = looked.innovation;
+        if looked.excluded || seen.mahalanobis2() > self.config.gate {
+            return -OUTLIER;
+        }
+        -0.5 * (seen.mahalanobis2() + (seen.variance / seen.measurement_variance).ln())
+    }
+
+    /// What an angle to an excluded radio head would bring; it counts as a look. Where
+    /// errors are found that stay over metres there is nothing to test: a radio head that is off has a
+    /// large one, and counts little.
     pub(in crate::localize) fn rehearse_excluded(
         &mut self,
         head: &RadioHead,
@@ -41,6 +81,9 @@ impl Tracker {
         let looked = self.look(head, measured).ok()?;
         self.learn_error(&looked);
         self.heads.get_mut(looked.head)?.last_look_m = looked.place_m;
+        if looked.repetition.is_some() {
+            return None;
+        }
         let Innovation {
             residual,
             variance,

@@ -24,8 +24,8 @@ pub(super) struct Look {
     pub alone_variance: f64,
     /// ... and counted as often as looks so near to each other repeat it.
     pub noise_variance: f64,
-    /// Variance of what is off by as much in many looks (rad²), counted once: surveys, errors that
-    /// stay, odometry since its newest sample.
+    /// Variance of what is off by as much in many looks (rad²), counted once: surveys, stated
+    /// bias, odometry since its newest sample.
     pub lasting_variance: f64,
     /// Variance of the error that stays (rad²), and how often looks so near to each other repeat it,
     /// where it is found while driving.
@@ -117,7 +117,6 @@ impl Tracker {
             noise_variance: unbiased.variance(sigma, elapsed_s, moved) + scatter(travelled_m),
             lasting_variance: sighting.survey_variance
                 + bias.std_rad.powi(2)
-                + repetition.map_or(0.0, |_| error_variance)
                 + coasted
                 + bend.variance,
             error_variance,

@@ -14,8 +14,8 @@ use crate::localize::gaussian::Innovation;
 const LEVELS: usize = 4;
 const LEVELS_RAD: [f64; LEVELS] = [0.01, 0.03, 0.1, 0.3];
 
-/// Probability of each level before anything is heard: each is half as likely as the one below.
-const FIRST: [f64; LEVELS] = [8.0 / 15.0, 4.0 / 15.0, 2.0 / 15.0, 1.0 / 15.0];
+/// Probability of each level before anything is heard: any is as likely as another.
+const FIRST: f64 = 1.0 / LEVELS as f64;
 
 /// The largest variance there is (rad²).
 pub const MOST_VARIANCE: f64 = LEVELS_RAD[LEVELS - 1] * LEVELS_RAD[LEVELS - 1];
@@ -46,7 +46,7 @@ pub struct StayingError {
 impl Default for StayingError {
     fn default() -> Self {
         Self {
-            probabilities: FIRST,
+            probabilities: [FIRST; LEVELS],
             way: 0.0,
             innovations: 0.0,
             belief: 0.0,
@@ -67,9 +67,25 @@ impl StayingError {
         self.probabilities[LEVELS - 1] > 0.5
     }
 
+    /// Share of a stretch that a look tells of, `travelled_m` after the last one.
+    pub fn share(travelled_m: f64) -> f64 {
+        (travelled_m / STRETCH_M).clamp(LEAST_STEP, 1.0)
+    }
+
     /// By how much a look counts less than a stretch does, `travelled_m` after the last one.
     pub fn repetition(travelled_m: f64) -> f64 {
-        (travelled_m / STRETCH_M).clamp(LEAST_STEP, 1.0).recip()
+        Self::share(travelled_m).recip()
+    }
+
+    /// Probability density of a look whose innovation without this error is `seen` (1/rad).
+    pub fn density(&self, seen: &Innovation) -> f64 {
+        let levels = self.foretold().into_iter().zip(LEVELS_RAD);
+        let density = |(probability, level): (f64, f64)| {
+            let variance = seen.variance + level * level;
+            let square = seen.residual * seen.residual;
+            probability * (-0.5 * square / variance).exp() / (TAU * variance).sqrt()
+        };
+        levels.map(density).sum()
     }
 
     /// The Gaussian measurement, residual and variance, that gives a belief the mean and variance of
@@ -104,8 +120,8 @@ impl StayingError {
     /// The probabilities a stretch on.
     fn foretold(&self) -> [f64; LEVELS] {
         let mut foretold = self.probabilities;
-        for (share, first) in foretold.iter_mut().zip(FIRST) {
-            *share += CHANGES * (first - *share);
+        for share in &mut foretold {
+            *share += CHANGES * (FIRST - *share);
         }
         foretold
     }

@@ -1,0 +1,150 @@
+//! The loops over samples, for any vector registers.
+//!
+//! The samples of one antenna are taken into a pair of registers, and the products of two antennas'
+//! pairs are added to two sums: to `direct` the real parts of `x conj(y)`, to `crossed` the imaginary
+//! ones. How a processor lays that out in lanes is its own affair.
+
+macro_rules! kernels {
+    (
+        $module:ident, $arch:ident, $features:literal, $real:ident, $complexes:literal,
+        $vector:ident, $zero:expr, $add:ident,
+        load: $load:expr, direct: $direct:expr, crossed: $crossed:expr, total: $total:expr $(,)?
+    ) => {
+        pub(in crate::kernel) mod $module {
+            use std::arch::$arch::*;
+
+            use num_complex::{Complex, Complex64};
+
+            #[allow(unused_imports, reason = "not every processor needs help")]
+            use super::*;
+            use crate::kernel::portable;
+            use crate::kernel::portable::shortest;
+            use crate::linalg::matrix::{Matrix, zeros};
+
+            /// So many samples as are taken at once.
+            type Chunk = [Complex<$real>; $complexes];
+            type Pair = ($vector, $vector);
+
+            #[target_feature(enable = $features)]
+            #[inline]
+            fn zero() -> $vector {
+                $zero
+            }
+
+            #[target_feature(enable = $features)]
+            #[inline]
+            fn load<const N: usize>(channels: &[&[Chunk]; N], at: usize) -> [Pair; N] {
+                let mut pairs = [(zero(), zero()); N];
+                for n in 0..N {
+                    pairs[n] = $load(&channels[n][at]);
+                }
+                pairs
+            }
+
+            /// `sum` and the real parts of `x conj(y)`.
+            #[target_feature(enable = $features)]
+            #[inline]
+            fn direct(sum: $vector, x: Pair, y: Pair) -> $vector {
+                $direct(sum, x, y)
+            }
+
+            /// `sum` and the imaginary parts of `x conj(y)`.
+            #[target_feature(enable = $features)]
+            #[inline]
+            fn crossed(sum: $vector, x: Pair, y: Pair) -> $vector {
+                $crossed(sum, x, y)
+            }
+
+            /// The complex number that these sums are.
+            #[target_feature(enable = $features)]
+            #[inline]
+            fn total(direct: $vector, crossed: $vector) -> Complex64 {
+                $total(direct, crossed)
+            }
+
+            /// The whole chunks of the channels, equally many, and how many samples those are.
+            #[target_feature(enable = $features)]
+            #[inline]
+            fn chunks<'a, const N: usize>(
+                channels: &[&'a [Complex<$real>]; N],
+            ) -> ([&'a [Chunk]; N], usize) {
+                let count = shortest(channels) / $complexes;
+                let mut whole: [&[Chunk]; N] = [&[]; N];
+                for n in 0..N {
+                    whole[n] = &channels[n].as_chunks().0[..count];
+                }
+                (whole, count * $complexes)
+            }
+
+            #[target_feature(enable = $features)]
+            pub(in crate::kernel) fn products<const N: usize>(
+                channels: &[&[Complex<$real>]; N],
+            ) -> Matrix<N> {
+                let (whole, length) = chunks(channels);
+                let (mut re, mut im) = ([[zero(); N]; N], [[zero(); N]; N]);
+                for at in 0..length / $complexes {
+                    let x = load(&whole, at);
+                    // Bounds known to the compiler keep the sums in registers.
+                    for i in 0..N {
+                        for j in 0..N {
+                            if j <= i {
+                                re[i][j] = direct(re[i][j], x[i], x[j]);
+                            }
+                            if j < i {
+                                im[i][j] = crossed(im[i][j], x[i], x[j]);
+                            }
+                        }
+                    }
+                }
+                let mut matrix = zeros::<N>();
+                for i in 0..N {
+                    for j in 0..N {
+                        if j <= i {
+                            matrix[i][j] = total(re[i][j], im[i][j]);
+                        }
+                    }
+                }
+                if length < shortest(channels) {
+                    portable::add_products(channels, length, &mut matrix);
+                }
+                for i in 0..N {
+                    for j in 0..i {
+                        matrix[j][i] = matrix[i][j].conj();
+                    }
+                }
+                matrix
+            }
+
+            #[target_feature(enable = $features)]
+            pub(in crate::kernel) fn lags<const N: usize>(
+                channels: &[&[Complex<$real>]; N],
+            ) -> [Complex64; N] {
+                let (whole, length) = chunks(channels);
+                // Two sums for each: fewer additions then wait for one another.
+                let (mut re, mut im) = ([[zero(); N]; 2], [[zero(); N]; 2]);
+                for at in 0..length / $complexes {
+                    let x = load(&whole, at);
+                    for k in 0..N {
+                        for n in 0..N - k {
+                            re[n % 2][k] = direct(re[n % 2][k], x[n + k], x[n]);
+                        }
+                    }
+                    for k in 1..N {
+                        for n in 0..N - k {
+                            im[n % 2][k] = crossed(im[n % 2][k], x[n + k], x[n]);
+                        }
+                    }
+                }
+                let mut lags = [Complex64::ZERO; N];
+                for k in 0..N {
+                    lags[k] = total($add(re[0][k], re[1][k]), $add(im[0][k], im[1][k]));
+                }
+                if length < shortest(channels) {
+                    portable::add_lags(channels, length, &mut lags);
+                }
+                lags
+            }
+        }
+    };
+}
+pub(super) use kernels;
