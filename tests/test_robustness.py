@@ -221,6 +221,15 @@ def test_counts_too_large(access_av: Cli, words: list[str]) -> None:
     assert "Traceback" not in done.err
 
 
+@pytest.mark.parametrize("words", [["fit", "x" * 2000], ["x" * 2000], ["--" + "x" * 2000]])
+def test_usage_errors_are_brief(access_av: Cli, words: list[str]) -> None:
+    done = access_av(*words)
+    assert done.code == 2
+    assert "xxx" in done.err
+    assert done.err.count("x") < 500
+    assert "\x1b" not in access_av("fit", "\x1b[2J").err
+
+
 def test_too_many_radio_heads(access_av: Cli, tmp_path: Path) -> None:
     head = "[[radio_heads]]\nposition_m = [{}.0, 40.0, 8.0]\npci = {}\nssb_index = {}\n"
     heads = (head.format(n, n % 1008, n // 1008) for n in range(16_000))

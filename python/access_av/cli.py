@@ -3,12 +3,14 @@
 from __future__ import annotations
 
 import sys
-from typing import Annotated
+from contextlib import contextmanager
+from typing import TYPE_CHECKING, Annotated, Any
 
 import typer
+from typer.core import TyperGroup
 
 from access_av import interrupt
-from access_av._core import RecordingError, SettingsError, __version__
+from access_av._core import RecordingError, SettingsError, __version__, brief
 from access_av.commands import (
     balance,
     bound,
@@ -27,10 +29,44 @@ from access_av.commands import (
 from access_av.errors import InputError
 from access_av.paper import codesign_command as codesign
 from access_av.paper import commands as paper
-from access_av.terminal import console, give_up_output, show_error, write_what_can_be_written
+from access_av.terminal import (
+    console,
+    give_up_output,
+    plain,
+    show_error,
+    write_what_can_be_written,
+)
+
+if TYPE_CHECKING:
+    from collections.abc import Iterator
+
+UsageError: Any = typer.BadParameter.__mro__[1]  # Typer names it by its heir alone
+
+
+@contextmanager
+def _brief_usage_errors() -> Iterator[None]:
+    try:
+        yield
+    except UsageError as error:
+        error.message = brief(plain(error.message))
+        raise
+
+
+class _Commands(TyperGroup):
+    """Commands whose usage errors do not say back all that was typed."""
+
+    def make_context(self, *args: Any, **settings: Any) -> Any:
+        with _brief_usage_errors():
+            return super().make_context(*args, **settings)
+
+    def invoke(self, context: Any) -> Any:
+        with _brief_usage_errors():
+            return super().invoke(context)
+
 
 app = typer.Typer(
     name="access-av",
+    cls=_Commands,
     help="Localization of factory vehicles from 5G synchronization signal blocks: "
     "accuracy and energy side by side.",
     no_args_is_help=True,

@@ -228,6 +228,22 @@ impl Measurand {
         };
         scatter_bound(rician_k, aperture) * (1.0 + (1.0 + kurtosis) / (2.0 * n * rician_k))
     }
+
+    /// Probability that scatter of the given Rician K (power ratio) makes another lobe the highest, so
+    /// that the angle is any: of N beams at right angles one has the signal, `N K` above the scatter
+    /// in each (noncoherent orthogonal signalling, Proakis and Salehi, Digital Communications, 4.5):
+    /// `Σ (−1)^{n+1} C(N−1, n) e^{−n N K/(n+1)} / (n+1)` over n from 1 to N − 1. Lobes lie between
+    /// these beams too: right to a factor of two.
+    pub fn wrong_lobe_probability(&self, rician_k: f64) -> f64 {
+        let beams = f64::from(self.elements());
+        let (mut sum, mut choices) = (0.0, -1.0);
+        for n in 1..self.elements() {
+            let n = f64::from(n);
+            choices *= (n - beams) / n;
+            sum += choices * (-n / (n + 1.0) * beams * rician_k).exp() / (n + 1.0);
+        }
+        sum
+    }
 }
 
 /// Least variance (rad²) of the angle that scatter of the given Rician K (power ratio) leaves in one

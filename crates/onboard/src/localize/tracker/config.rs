@@ -23,6 +23,9 @@ pub struct TrackerConfig {
     pub array: ArrayModel,
     /// Rician K of the channel as a power ratio: what scatter adds to each angle's variance.
     pub rician_k: f64,
+    /// Probability that an angle is any, as scatter made another lobe the highest; none where the gate
+    /// refuses so many anyway.
+    pub wrong_lobe: Option<f64>,
     /// How the vehicle keeps to its lane; used with a map.
     pub lane_keeping: LaneKeeping,
     /// How the path bends; used without a map.
@@ -189,6 +192,7 @@ impl TrackerConfig {
         let track_share = |width_m| odometer.track_width_std_m / width_m;
         let track_share = odometer.track_width_m.map_or(0.0, track_share);
         let receiver = &vehicle.receiver;
+        let rician_k = 10f64.powf(0.1 * site.rician_k_db);
         Self {
             drive: vehicle.drive,
             array: ArrayModel {
@@ -197,7 +201,9 @@ impl TrackerConfig {
                 position_m: array.position_m,
                 position_std_m: array.position_std_m,
             },
-            rician_k: 10f64.powf(0.1 * site.rician_k_db),
+            rician_k,
+            wrong_lobe: Some(array.measurand().wrong_lobe_probability(rician_k))
+                .filter(|&probability| probability > settings.outlier_probability),
             lane_keeping,
             path_bend: PathBend {
                 curvature_per_m: settings.curvature_rms_per_m,

@@ -4,15 +4,19 @@ use std::f64::consts::TAU;
 
 use crate::localize::gaussian::Innovation;
 
-/// An unresolved angle is Gaussian with its stated deviation or, as likely as not, anything. The
+/// Probability that an angle which its estimator does not vouch for is wrong: as likely as not.
+pub const AS_NOT: f64 = 0.5;
+
+/// An angle is Gaussian with its stated deviation or, with the probability `wrong`, anything. The
 /// belief after it is a mixture of the belief updated and the belief as it was (probabilistic data
 /// association, Bar-Shalom and Tse 1975). This is the Gaussian measurement, residual and variance,
 /// that gives the belief the mixture's mean and variance. `None` where the mixture is wider than the
 /// belief was: such an angle says nothing.
-pub fn equivalent(innovation: &Innovation) -> Option<(f64, f64)> {
+pub fn equivalent(innovation: &Innovation, wrong: f64) -> Option<(f64, f64)> {
     let (residual, total) = (innovation.residual, innovation.variance);
     let density = (-0.5 * innovation.mahalanobis2()).exp() / (TAU * total).sqrt();
-    let holds = density / (density + TAU.recip());
+    let holds = (1.0 - wrong) * density;
+    let holds = holds / (holds + wrong / TAU);
     // With the gain K = P Hᵀ/S the mixture has the mean p K r and the covariance
     // P − p (S − (1 − p) r²) K Kᵀ, p being the probability that the angle holds.
     let narrowing = holds * (total - (1.0 - holds) * residual * residual);
@@ -52,7 +56,7 @@ mod tests {
 
             let mut belief = Gaussian::independent([0.0], [prior_variance.sqrt()]);
             let innovation = belief.innovation(measured, &[1.0], variance);
-            let (residual, variance) = equivalent(&innovation).unwrap();
+            let (residual, variance) = equivalent(&innovation, AS_NOT).unwrap();
             belief.update(residual, &[1.0], variance);
             assert!((belief.mean[0] - mean).abs() < 1e-6, "{measured}");
             assert!(
@@ -69,6 +73,6 @@ mod tests {
             variance: 0.05,
             measurement_variance: 0.01,
         };
-        assert_eq!(equivalent(&innovation), None);
+        assert_eq!(equivalent(&innovation, AS_NOT), None);
     }
 }

@@ -387,8 +387,9 @@ impl Tracker {
             };
             (residual, variance) = likely;
         }
-        if !measured.resolved {
-            let Some(likely) = doubt::equivalent(&innovation) else {
+        let unresolved = (!measured.resolved).then_some(doubt::AS_NOT);
+        if let Some(wrong) = unresolved.or(self.config.wrong_lobe) {
+            let Some(likely) = doubt::equivalent(&innovation, wrong) else {
                 return self.verdict(UpdateReason::Outlier, Some(mahalanobis2));
             };
             (residual, variance) = likely;
