@@ -9,7 +9,17 @@ import numpy as np
 import polars as pl
 import pytest
 
-from access_av import InputError, Scenario, SettingsError, Site, columns, drives, survey
+from access_av import (
+    InputError,
+    Scenario,
+    SettingsError,
+    Site,
+    Vehicle,
+    columns,
+    drives,
+    survey,
+)
+from access_av.self_survey import read_drive
 
 if TYPE_CHECKING:
     from collections.abc import Callable
@@ -108,3 +118,29 @@ def test_what_cannot_be_surveyed_is_named(logged: Path, tmp_path: Path) -> None:
     noisy = Scenario.load("yard").with_overrides({"vehicle.receiver.snr_noise_db": 1.0})
     with pytest.raises(SettingsError, match="fidelity"):
         drives.log_angles(noisy, tmp_path / "noisy")
+
+
+def test_odometry_of_two_wheels_says_the_same(logged: Path, tmp_path: Path) -> None:
+    half_track_m = 0.3
+    one = logged / "0"
+    vehicle = Vehicle.load(str(one / "vehicle.toml"))
+    paired = vehicle.with_overrides({"odometer.track_width_m": 2 * half_track_m})
+    told = pl.read_csv(one / "odometry.csv").with_columns(
+        yaw_rate_radps=0.02 * pl.col("time_s").cos()
+    )
+    off_mps = half_track_m * pl.col("yaw_rate_radps")
+    wheels = told.select(
+        "time_s",
+        "distance_m",
+        left_mps=pl.col("speed_mps") - off_mps,
+        right_mps=pl.col("speed_mps") + off_mps,
+    )
+    residuals = []
+    for name, rows in (("told", told), ("wheels", wheels)):
+        folder = tmp_path / name
+        folder.mkdir()
+        rows.write_csv(folder / "odometry.csv")
+        (folder / "angles.csv").write_bytes((one / "angles.csv").read_bytes())
+        (folder / "vehicle.toml").write_text(paired.to_toml())
+        residuals.append(read_drive(folder).log.innovations(Site.load("yard"), paired)[0])
+    np.testing.assert_allclose(residuals[1], residuals[0], atol=1e-9)

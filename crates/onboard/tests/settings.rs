@@ -210,14 +210,18 @@ fn a_site_need_not_have_a_road() {
         "{message}"
     );
 
-    // There a vehicle must know where it starts.
+    // There a vehicle must know where it starts, or hear enough to be found.
     let mut carrier = Vehicle::from_library("carrier", &Shipped).unwrap();
     let check = Check { file: "both" };
     check_together(&hall, &carrier, check).unwrap();
     carrier.start.known = false;
     let (_, key, message) = refusal(check_together(&hall, &carrier, check));
     assert_eq!(key, "vehicle.start.known");
-    assert!(message.contains("no road"), "{message}");
+    assert!(message.contains("three elsewhere"), "{message}");
+    let heads = "radio_heads = [{ pci = 1, position_m = [0.0, 0.0, 6.0] }, { pci = 2, position_m = [9.0, 0.0, 6.0] }, \
+                 { pci = 3, position_m = [0.0, 9.0, 6.0] }]";
+    let three = site(&format!("name = 'hall'\n{heads}")).unwrap();
+    check_together(&three, &carrier, check).unwrap();
 }
 
 #[test]
@@ -254,7 +258,7 @@ fn vehicle_files_are_checked() {
             "array.channel_gains[1]",
         ),
         ("channel_gains = [[1.0, 0.0]]", "array.channel_gains"),
-        ("elements = 9", "array.elements"),
+        ("elements = 17", "array.elements"),
         ("elements = 2.5", "array.elements"),
         ("position_m = [1.0, 2.0]", "array.position_m"),
         ("mounting_deg = 3", "array.mounting_deg"),
@@ -276,7 +280,7 @@ fn vehicle_files_are_checked() {
             "wake_up.policy",
         ),
         (
-            "localizer.map = false\nlocalizer.kind = 'tracker'\nstart.known = false",
+            "localizer.kind = 'dead-reckoning'\nstart.known = false",
             "start.known",
         ),
         (

@@ -3,7 +3,7 @@
 //! ```sh
 //! access-av synth yard --duration-s 2 --out drive
 //! cargo run --release -p recording --example angles_of_a_recording -- \
-//!     drive/recording.sigmf-meta drive/site.toml drive/vehicle.toml
+//!     drive/iq.sigmf-meta drive/site.toml drive/vehicle.toml
 //! ```
 
 #![allow(clippy::print_stdout)]

@@ -106,7 +106,7 @@ fn what_cannot_be_found_is_refused() {
     let tracker = [("vehicle.localizer.kind", Value::from("tracker"))];
     refused("paper", &tracker, "two radio heads");
     let no_map = [("vehicle.localizer.map", false.into())];
-    refused("paper-real-odometry-2", &no_map, "map = true");
+    refused("paper-real-odometry-2", &no_map, "three elsewhere");
 }
 
 /// Errors of the published poses in metres and in their own standard deviations.

@@ -5,7 +5,7 @@
 //! believes to be first, then wherever radio heads are, or along all of the road where there is one.
 //! What the search finds takes over only if it foretells the same angles better than the tracker
 //! did: a restart that would be worse than what it replaces never happens. Meanwhile the covariance
-//! covers both.
+//! covers both, or the search speaks alone where the tracker is refuted.
 
 use std::sync::Arc;
 
@@ -33,7 +33,7 @@ const NEARBY_M: f64 = 2.0;
 /// Most of three deviations that count as nearby (m).
 const MOST_NEARBY_M: f64 = 10.0;
 
-/// After this time without a find the search goes wide (s).
+/// After this time with angles and without a find the search goes wide (s).
 const PATIENCE_S: f64 = 20.0;
 
 /// After a find that was no better than the tracker nothing is searched for, so long (s).
@@ -42,7 +42,8 @@ const REST_S: f64 = 10.0;
 /// Way to be driven before a find is believed (m): who stands hears the same errors again and again.
 const LEAST_WAY_M: f64 = 0.5;
 
-/// Log-likelihood by which a find must foretell the angles better.
+/// Log-likelihood by which a place must foretell the angles better than another: a sequential test (Wald
+/// 1945) that is wrong once in three million.
 const BETTER: f64 = 15.0;
 
 /// Radio heads without which a place in the plane cannot be told from others.
@@ -85,10 +86,24 @@ struct Search {
     initialiser: Initialiser,
     /// Log-likelihood of the tracker by the same angles.
     own: f64,
-    since_s: f64,
-    /// Distance driven then (m).
+    /// When it heard its first angle (s).
+    since_s: Option<f64>,
+    /// Distance driven when it began (m).
     since_m: f64,
     is_wide: bool,
+}
+
+impl Search {
+    /// Log-likelihood by which its best place foretells the angles better than the tracker does.
+    fn ahead(&self) -> f64 {
+        self.initialiser.best() - self.own
+    }
+
+    /// Whether it has listened for long.
+    fn is_patient(&self, now_s: f64) -> bool {
+        self.since_s
+            .is_some_and(|since_s| now_s - since_s > PATIENCE_S)
+    }
 }
 
 impl Recovery {
@@ -127,11 +142,10 @@ impl Recovery {
             }
             return;
         };
-        let ahead = search.initialiser.best() - search.own;
-        let is_ahead = ahead > BETTER;
+        let is_ahead = search.ahead() > BETTER;
         // Led astray it may have come to agree with the angles where it now is; it is sure of itself
-        // only where no other place foretells them better.
-        let is_sure = ahead <= 0.0 && self.watch.is_sure();
+        // only where every other place foretells them worse.
+        let is_sure = search.ahead() < -BETTER && self.watch.is_sure();
         let way_m = self.tracked.tracker().driven_m() - search.since_m;
         if is_ahead && way_m < LEAST_WAY_M {
             return;
@@ -143,7 +157,7 @@ impl Recovery {
             self.search = None;
             self.rests_until_s = now_s + REST_S;
             self.watch.reset();
-        } else if !search.is_wide && now_s - search.since_s > PATIENCE_S {
+        } else if !search.is_wide && search.is_patient(now_s) {
             self.search = self.begin(now_s, true);
         }
     }
@@ -170,7 +184,7 @@ impl Recovery {
         Some(Search {
             initialiser,
             own: 0.0,
-            since_s: now_s,
+            since_s: None,
             since_m: self.tracked.tracker().driven_m(),
             is_wide,
         })
@@ -207,6 +221,7 @@ impl Localizer for Recovery {
         measured: &AngleMeasurement,
     ) -> Result<UpdateVerdict, BoxError> {
         if let Some(search) = &mut self.search {
+            search.since_s.get_or_insert(measured.time_s);
             search.initialiser.update(head, measured);
             search.own += self.tracked.tracker().log_likelihood(head, measured);
         }
@@ -219,7 +234,12 @@ impl Localizer for Recovery {
     fn pose(&self, time_s: f64) -> Result<PoseEstimate, BoxError> {
         let mut estimate = self.tracked.pose(time_s);
         if let Some(search) = &self.search {
-            estimate.cover(&search.initialiser.pose(time_s));
+            let searched = search.initialiser.pose(time_s);
+            if search.ahead() > BETTER {
+                (estimate.pose, estimate.covariance) = (searched.pose, searched.covariance);
+            } else {
+                estimate.cover(&searched);
+            }
             let level_m = self.setup.quantile.radius(estimate.principal_variances());
             if let Some(integrity) = &mut estimate.integrity {
                 integrity.state = IntegrityState::Unavailable;

@@ -9,8 +9,8 @@ use crate::geometry::Pose;
 #[derive(Debug, Clone, Copy, PartialEq, Serialize, Deserialize, JsonSchema)]
 #[serde(default, deny_unknown_fields)]
 pub struct StartSettings {
-    /// Whether it is known at all. If not, the vehicle is found along the road, by two radio heads
-    /// or more.
+    /// Whether it is known at all. If not, the vehicle is found along the road by two radio heads or
+    /// more, elsewhere by three.
     pub known: bool,
     /// Whether a vehicle that is to be found may also drive against the road's direction.
     pub either_direction: bool,

@@ -160,11 +160,10 @@ impl TomlFile for Vehicle {
             "it needs localizer.kind = \"tracker\", which knows its own error",
         )?;
         check.that(
-            self.start.known || self.follows_road(),
+            self.start.known || tracks,
             "start.known",
             false,
-            "to find the vehicle along the road takes localizer.kind = \"tracker\" with map = true, and \
-             drive = \"road\"",
+            "to find the vehicle takes localizer.kind = \"tracker\"",
         )?;
         check.that(
             self.start.known || self.start.pose.is_none(),
@@ -201,16 +200,11 @@ pub fn check_together(
         "empty",
         "leave it out to listen to all",
     )?;
+    let along_road = site.road.is_some() && vehicle.follows_road();
     check.that(
-        vehicle.start.known || site.road.is_some(),
+        vehicle.start.known || heard > if along_road { 1 } else { 2 },
         "vehicle.start.known",
         false,
-        "the site has no road to find the vehicle along",
-    )?;
-    check.that(
-        vehicle.start.known || heard > 1,
-        "vehicle.start.known",
-        false,
-        "to find the vehicle takes two radio heads or more; one leaves several places open",
+        "to find the vehicle takes two radio heads or more along a road that it follows, three elsewhere",
     )
 }
