@@ -7,7 +7,7 @@ SOURCES := $(shell find crates sites vehicles scenarios platforms -type f 2>/dev
 DATA := $(abspath $(or $(ACCESS_AV_DATA),../shared/data))
 
 .DEFAULT_GOAL := help
-.PHONY: help demo test attack test-aarch64 count-aarch64 lint lint-python docs figures bench clean
+.PHONY: help demo test attack test-aarch64 count-aarch64 package lint lint-python docs figures bench clean
 
 help: ## List these commands
 	@sed -n 's/^\([a-z0-9-]*\):.*## /  make \1\t/p' $(MAKEFILE_LIST) | expand -t 20
@@ -43,6 +43,14 @@ test-aarch64: ## Build what runs on the vehicle for aarch64 and test it, emulate
 
 count-aarch64: ## Count the instructions per estimate on aarch64, NEON against portable code
 	$(filter-out /usr/bin/cargo cargo,$(EMULATED)) $(PYTHON) benches/aarch64_instructions.py $(lastword $(EMULATED))
+
+ALONE := aoa-array nr-ssb
+package: ## Pack the crates that others may use alone, and build and test each from its package
+	cargo package --allow-dirty --no-verify $(ALONE:%=-p %)
+	folder=$$(mktemp -d) && trap 'rm -rf "$$folder"' EXIT && for crate in $(ALONE); do \
+	  tar -xf target/package/$$crate-[0-9]*.crate -C "$$folder" && \
+	  cargo test --release --quiet --target-dir target/packaged --manifest-path "$$folder"/$$crate-*/Cargo.toml || exit 2; \
+	done
 
 lint: lint-python ## Check formatting and lints of both languages
 	cargo fmt --all --check

@@ -288,6 +288,21 @@ def test_coherent_sources_are_told_apart_by_subarrays() -> None:
     assert (abs(found.angle_rad - angles) < 4 * found.sigma_rad).all()
 
 
+@pytest.mark.parametrize("subarray", range(7, 17))
+def test_subarrays_of_sixteen_antennas(subarray: int) -> None:
+    rng = np.random.default_rng(7)
+    angles = np.radians([70, 100])
+    steering = np.exp(1j * np.pi * np.cos(angles) * np.arange(16)[:, None])
+    waveform = rng.normal(size=(50, 2)) @ [1, 1j]
+    noise = 0.05 * (rng.normal(size=(16, 50, 2)) @ [1, 1j])
+    samples = steering @ np.stack([waveform, -0.8 * waveform]) + noise
+    found = aoa.root_music(samples, sources=2, subarray=subarray)
+    # All sixteen leave nothing to average over.
+    assert found.resolved.all() == (subarray < 16)
+    if subarray < 16:
+        assert (abs(found.angle_rad - angles) < 4 * found.sigma_rad).all()
+
+
 @pytest.mark.parametrize("method", METHODS)
 def test_sixteen_antennas(method: Callable[..., Any]) -> None:
     rng = np.random.default_rng(6)

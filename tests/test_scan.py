@@ -46,6 +46,18 @@ def test_raw_files_of_each_antenna_are_scanned(access_av: Cli, tmp_path: Path) -
     assert access_av("scan", *files, *options).out.count("99") >= 1
 
 
+def test_sixteen_antennas_have_an_angle() -> None:
+    sent = nr.build_burst(7, ssb_indices=[1], ssb_freq_hz=SSB_HZ)
+    steering = np.exp(1j * np.pi * np.cos(np.radians(50)) * np.arange(16))
+    noise = np.random.default_rng(4).normal(scale=6e-3, size=(16, sent.size, 2)) @ [1, 1j]
+    samples = np.outer(steering, sent) + noise
+    [cell] = nr.search(samples, RATE_HZ, centre_frequency_hz=SSB_HZ, ssb_freq_hz=SSB_HZ)
+    assert cell.verdict == "resolved"
+    assert cell.angle_rad is not None
+    assert cell.sigma_rad is not None
+    assert abs(cell.angle_rad - np.radians(50)) < 5 * cell.sigma_rad
+
+
 def searcher(**changes: object) -> nr.Searcher:
     settings: dict[str, object] = {
         "centre_frequency_hz": SSB_HZ, "ssb_freq_hz": SSB_HZ, "scs_khz": 30, "antennas": 4,

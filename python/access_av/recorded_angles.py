@@ -155,14 +155,18 @@ def _estimate(
     """Azimuth from broadside (°), its standard deviation (rad), and the SNR (dB)."""
     if places is not None:
         source = aoa.direction(snapshots, places, calibration=phases)
-        azimuth_deg = _from_broadside_deg(math.degrees(source.azimuth_rad))
-        return azimuth_deg, source.azimuth_sigma_rad, source.snr_db
+        azimuth_deg = _from_broadside_deg(math.degrees(float(source.azimuth_rad)))
+        return azimuth_deg, float(source.azimuth_sigma_rad), float(source.snr_db)
     if spacing_wavelengths is None:
         raise InputError("neither spacing nor places of the antennas are known")
     found = aoa.maximum_likelihood(
         snapshots, spacing_wavelengths=spacing_wavelengths, calibration=phases
     )
-    return 90.0 - math.degrees(found.angle_rad), found.sigma_rad, found.snr_db
+    return (
+        90.0 - math.degrees(float(found.angle_rad)),
+        float(found.sigma_rad),
+        float(found.snr_db),
+    )
 
 
 def mean_absolute_error_deg(bursts: Sequence[BurstAngle]) -> float | None:

@@ -2,35 +2,23 @@
 
 /// Evaluates `$body` with the constant `$N` equal to `$count`, which a checked vehicle has between
 /// 2 and [`MAX_ELEMENTS`](crate::observation::MAX_ELEMENTS); a larger one counts as that.
+#[macro_export]
 macro_rules! for_elements {
     ($count:expr, $N:ident => $body:expr) => {
+        $crate::for_elements!($count, $N => $body; 3 4 5 6 7 8 9 10 11 12 13 14 15)
+    };
+    ($count:expr, $N:ident => $body:expr; $($n:literal)*) => {
         match $count {
             0..=2 => {
                 const $N: usize = 2;
                 $body
             }
-            3 => {
-                const $N: usize = 3;
+            $($n => {
+                const $N: usize = $n;
                 $body
-            }
-            4 => {
-                const $N: usize = 4;
-                $body
-            }
-            5 => {
-                const $N: usize = 5;
-                $body
-            }
-            6 => {
-                const $N: usize = 6;
-                $body
-            }
-            7 => {
-                const $N: usize = 7;
-                $body
-            }
+            })*
             _ => {
-                const $N: usize = 8;
+                const $N: usize = $crate::observation::MAX_ELEMENTS;
                 $body
             }
         }

@@ -3,7 +3,7 @@
 use num_complex::Complex64;
 
 /// Most antennas of the vehicle's array.
-pub const MAX_ELEMENTS: usize = 8;
+pub const MAX_ELEMENTS: usize = 16;
 
 /// Most snapshots (or despread blocks) one observation holds.
 pub const MAX_SNAPSHOTS: usize = 64;

@@ -258,7 +258,7 @@ fn vehicle_files_are_checked() {
             "array.channel_gains[1]",
         ),
         ("channel_gains = [[1.0, 0.0]]", "array.channel_gains"),
-        ("elements = 9", "array.elements"),
+        ("elements = 17", "array.elements"),
         ("elements = 2.5", "array.elements"),
         ("position_m = [1.0, 2.0]", "array.position_m"),
         ("mounting_deg = 3", "array.mounting_deg"),

@@ -49,8 +49,8 @@ const MOST_THREADS: usize = 256;
 /// forward_backward : bool
 ///     Average the covariance forward and backward, which separates two coherent sources.
 /// subarray : int, optional
-///     Average the covariance over the subarrays of so many antennas, 2 to 7 or all, which separates as
-///     many coherent sources as it is short of all and one more.
+///     Average the covariance over the subarrays of so many antennas, which separates as many
+///     coherent sources as it is short of all and one more.
 /// calibration : array_like, optional
 ///     Complex gain of each channel, see `calibrate`. Every channel is divided by its own.
 /// threads : int
@@ -284,12 +284,6 @@ impl Visitor for Estimator<'_, '_> {
                 maximum,
             };
             return Err(value_error(error));
-        }
-        // Of larger arrays not every subarray has been compiled.
-        if let Some(subarray) = smoothing.subarray.filter(|it| (8..N).contains(it)) {
-            return Err(PyValueError::new_err(format!(
-                "subarray is {subarray}; of {N} antennas it has 2 to 7, or all"
-            )));
         }
         let run = |batch: Batch<'_, T, N>, estimates: &mut [aoa::AngleEstimate]| {
             batch.estimate(method, &array, smoothing, sources, estimates)

@@ -59,7 +59,7 @@ use crate::recording::{Recording, RecordingError};
 /// rsrp_dbfs, rsrq_db, sinr_db : list of float
 ///     SS-RSRP, SS-RSRQ and SS-SINR of each antenna (TS 38.215).
 /// angle_rad, sigma_rad : float or None
-///     Angle of arrival from the array's axis and its standard deviation; with 2 to 8 antennas. Where
+///     Angle of arrival from the array's axis and its standard deviation; with 2 antennas and more. Where
 ///     the antennas are not in a row, the deviation is that of `azimuth_rad`.
 /// phase_rad, phase_sigma_rad : float or None
 ///     The electrical angle behind it, of antennas in a row.

@@ -116,7 +116,7 @@ fn numbers_must_be_finite_and_in_range() {
         ),
         ("period_ms = 20.0", "period_ms = 21", "site.ssb.period_ms"),
         ("elements = 4", "elements = 1", "vehicle.array.elements"),
-        ("elements = 4", "elements = 9", "vehicle.array.elements"),
+        ("elements = 4", "elements = 17", "vehicle.array.elements"),
         (
             "mounting_std_rad = 0.0",
             "mounting_std_rad = -0.01",

@@ -1,4 +1,4 @@
-from typing import Any, Literal, final
+from typing import Literal, final
 
 import numpy as np
 from numpy.typing import ArrayLike, NDArray
@@ -22,44 +22,69 @@ __all__ = [
 ]
 
 _Samples = NDArray[np.complex64] | NDArray[np.complex128]
+# Numbers for a single estimate, arrays for a batch or several sources.
+_Values = float | NDArray[np.float64]
 
 @final
 class AngleEstimate:
-    # Numbers for a single estimate, arrays for a batch or several sources.
+    """Angles of arrival, each with what is known about it.
+
+    Every field is a number for a single estimate and an array for a batch or several sources.
+    """
+
     @property
-    def angle_rad(self) -> Any: ...
+    def angle_rad(self) -> _Values:
+        """Angle from the array's axis, 0 to pi."""
     @property
-    def sigma_rad(self) -> Any: ...
+    def sigma_rad(self) -> _Values:
+        """Standard deviation of `angle_rad`."""
     @property
-    def phase_rad(self) -> Any: ...
+    def phase_rad(self) -> _Values:
+        """Electrical angle, the phase step from one antenna to the next: best for a filter."""
     @property
-    def phase_sigma_rad(self) -> Any: ...
+    def phase_sigma_rad(self) -> _Values:
+        """Standard deviation of `phase_rad`."""
     @property
-    def snr_db(self) -> Any: ...
+    def snr_db(self) -> _Values:
+        """SNR per antenna and snapshot, as estimated."""
     @property
-    def resolved(self) -> Any: ...
+    def resolved(self) -> bool | NDArray[np.bool_]:
+        """Whether the estimate may be relied on."""
     @property
-    def verdict(self) -> Any: ...
+    def verdict(self) -> str | NDArray[np.str_]:
+        """`resolved`, or `unresolved: ` and the reason."""
 
 @final
 class DirectionEstimate:
-    # Numbers for a single item, arrays for a batch.
+    """Azimuth and elevation, with what is known about each.
+
+    Every field is a number for a single item and an array for a batch.
+    """
+
     @property
-    def azimuth_rad(self) -> Any: ...
+    def azimuth_rad(self) -> _Values:
+        """Azimuth from the x axis, counter-clockwise, in (-pi, pi]."""
     @property
-    def elevation_rad(self) -> Any: ...
+    def elevation_rad(self) -> _Values:
+        """Elevation from the horizontal upwards."""
     @property
-    def azimuth_sigma_rad(self) -> Any: ...
+    def azimuth_sigma_rad(self) -> _Values:
+        """Standard deviation of `azimuth_rad`."""
     @property
-    def elevation_sigma_rad(self) -> Any: ...
+    def elevation_sigma_rad(self) -> _Values:
+        """Standard deviation of `elevation_rad`; 0 where the elevation was given."""
     @property
-    def covariance(self) -> NDArray[np.float64]: ...
+    def covariance(self) -> NDArray[np.float64]:
+        """Covariance of azimuth and elevation in rad^2, `(2, 2)` or `(batch, 2, 2)`."""
     @property
-    def snr_db(self) -> Any: ...
+    def snr_db(self) -> _Values:
+        """SNR per antenna and snapshot, as estimated."""
     @property
-    def resolved(self) -> Any: ...
+    def resolved(self) -> bool | NDArray[np.bool_]:
+        """Whether the estimate may be relied on."""
     @property
-    def verdict(self) -> Any: ...
+    def verdict(self) -> str | NDArray[np.str_]:
+        """`resolved`, or `unresolved: ` and the reason."""
 
 def direction(
     snapshots: _Samples,
@@ -67,7 +92,9 @@ def direction(
     *,
     elevations_rad: tuple[float, float] = ...,
     calibration: ArrayLike | None = None,
-) -> DirectionEstimate: ...
+) -> DirectionEstimate:
+    """Azimuth and elevation of one source by maximum likelihood, antennas in any places."""
+
 def direction_spectrum(
     snapshots: _Samples,
     places_wavelengths: ArrayLike,
@@ -77,7 +104,9 @@ def direction_spectrum(
     method: Literal["bartlett", "capon", "music"] = "bartlett",
     sources: int = 1,
     calibration: ArrayLike | None = None,
-) -> NDArray[np.float64]: ...
+) -> NDArray[np.float64]:
+    """Spectrum `(elevations, azimuths)`, of a batch one for each, antennas in any places."""
+
 def direction_crb_rad(
     places_wavelengths: ArrayLike,
     azimuth_rad: float,
@@ -85,7 +114,9 @@ def direction_crb_rad(
     snr_db: float,
     *,
     snapshots: int = 20,
-) -> tuple[float, float]: ...
+) -> tuple[float, float]:
+    """Cramér–Rao bounds of azimuth and elevation: the least standard deviations."""
+
 def music(
     snapshots: _Samples,
     *,
@@ -95,7 +126,9 @@ def music(
     subarray: int | None = None,
     calibration: ArrayLike | None = None,
     threads: int = 1,
-) -> AngleEstimate: ...
+) -> AngleEstimate:
+    """Directions by MUSIC, of samples `(antennas, snapshots)` or `(batch, antennas, snapshots)`."""
+
 def root_music(
     snapshots: _Samples,
     *,
@@ -105,7 +138,9 @@ def root_music(
     subarray: int | None = None,
     calibration: ArrayLike | None = None,
     threads: int = 1,
-) -> AngleEstimate: ...
+) -> AngleEstimate:
+    """Directions by Root-MUSIC; parameters as of `music`."""
+
 def esprit(
     snapshots: _Samples,
     *,
@@ -116,7 +151,9 @@ def esprit(
     subarray: int | None = None,
     calibration: ArrayLike | None = None,
     threads: int = 1,
-) -> AngleEstimate: ...
+) -> AngleEstimate:
+    """Directions by ESPRIT; parameters as of `music`."""
+
 def maximum_likelihood(
     snapshots: _Samples,
     *,
@@ -126,10 +163,20 @@ def maximum_likelihood(
     subarray: int | None = None,
     calibration: ArrayLike | None = None,
     threads: int = 1,
-) -> AngleEstimate: ...
-def covariance(snapshots: _Samples) -> NDArray[np.complex128]: ...
-def forward_backward(covariance: ArrayLike) -> NDArray[np.complex128]: ...
-def estimate_sources(snapshots: _Samples, *, criterion: Literal["mdl", "aic"] = "mdl") -> Any: ...
+) -> AngleEstimate:
+    """Directions by maximum likelihood, coherent sources too; parameters as of `music`."""
+
+def covariance(snapshots: _Samples) -> NDArray[np.complex128]:
+    """Sample covariance of the antennas, mean not removed: `(…, antennas, antennas)`."""
+
+def forward_backward(covariance: ArrayLike) -> NDArray[np.complex128]:
+    """Forward–backward average of a covariance: `(R + J conj(R) J) / 2`."""
+
+def estimate_sources(
+    snapshots: _Samples, *, criterion: Literal["mdl", "aic"] = "mdl"
+) -> int | NDArray[np.int64]:
+    """Number of sources, from the eigenvalues of the covariance."""
+
 def spectrum(
     snapshots: _Samples,
     angles_rad: ArrayLike,
@@ -139,10 +186,14 @@ def spectrum(
     spacing_wavelengths: float = 0.5,
     forward_backward: bool = False,
     calibration: ArrayLike | None = None,
-) -> NDArray[np.float64]: ...
+) -> NDArray[np.float64]:
+    """Spectrum at the given angles, `(angles,)` or `(batch, angles)`."""
+
 def calibrate(
     snapshots: _Samples, angle_rad: float, *, spacing_wavelengths: float = 0.5
-) -> NDArray[np.complex128]: ...
+) -> NDArray[np.complex128]:
+    """Complex gains of the channels, from a burst of one source in a known direction."""
+
 def crb_rad(
     angle_rad: ArrayLike,
     snr_db: ArrayLike,
@@ -153,4 +204,5 @@ def crb_rad(
     model: Literal["stochastic", "deterministic", "known"] = "stochastic",
     quantity: Literal["angle", "phase"] = "angle",
     joint: bool = False,
-) -> Any: ...
+) -> _Values:
+    """Cramér–Rao bound: the least standard deviation of an angle, or of a phase."""

@@ -59,7 +59,7 @@ class Cell:
         """SS-SINR of each antenna."""
     @property
     def angle_rad(self) -> float | None:
-        """Angle of arrival from the array's axis; with 2 to 8 antennas."""
+        """Angle of arrival from the array's axis; with 2 antennas and more."""
     @property
     def sigma_rad(self) -> float | None:
         """Its standard deviation, or that of `azimuth_rad` of antennas not in a row."""

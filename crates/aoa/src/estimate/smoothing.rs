@@ -32,27 +32,28 @@ impl Smoothing {
                 antennas: N,
             });
         }
-        let (sources, both) = (places.len(), self.forward_backward);
-        macro_rules! with_antennas {
+        macro_rules! over {
             ($($m:literal)*) => {
                 match subarray {
-                    $($m => {
-                        let found = estimate_several_smoothed::<N, $m>(
-                            method, covariance, array, sources, both,
-                        )?;
-                        places.copy_from_slice(&found);
-                    })*
-                    _ => {
-                        let found = estimate_several_smoothed::<N, N>(
-                            method, covariance, array, sources, both,
-                        )?;
-                        places.copy_from_slice(&found);
-                    }
+                    // What no array of this size has need not be compiled.
+                    $($m if const { $m < N } => self.over::<N, $m>(method, covariance, array, places),)*
+                    _ => self.over::<N, N>(method, covariance, array, places),
                 }
             };
         }
-        // Larger ones than these leave nothing to average over in the arrays of up to eight.
-        with_antennas!(2 3 4 5 6 7);
+        over!(2 3 4 5 6 7 8 9 10 11 12 13 14 15)
+    }
+
+    fn over<const N: usize, const M: usize>(
+        self,
+        method: Method,
+        covariance: &Covariance<N>,
+        array: &Array<N>,
+        places: &mut [AngleEstimate],
+    ) -> Result<(), Error> {
+        let (sources, both) = (places.len(), self.forward_backward);
+        let found = estimate_several_smoothed::<N, M>(method, covariance, array, sources, both)?;
+        places.copy_from_slice(&found);
         Ok(())
     }
 }

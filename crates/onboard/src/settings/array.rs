@@ -17,7 +17,7 @@ use crate::manifold::{AnyManifold, ArrayManifold, Measurand};
 #[serde(default, deny_unknown_fields)]
 pub struct ArraySettings {
     /// Number of antennas.
-    #[schemars(range(min = 2, max = 8))]
+    #[schemars(range(min = 2, max = 16))]
     pub elements: u8,
     /// How they stand.
     #[serde(skip_serializing_if = "ArrayShape::is_row")]

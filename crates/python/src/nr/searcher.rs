@@ -25,7 +25,7 @@ use super::{Cell, array_setup, complex_samples, rows, scan_error, subcarrier_spa
 /// scs_khz : int
 ///     Subcarrier spacing, 15, 30, 120 or 240.
 /// antennas : int
-///     Number of antennas, 1 to 16; angles come with 2 to 8.
+///     Number of antennas, 1 to 16; angles come with 2 and more.
 /// spacing_wavelengths : float
 ///     Distance between neighbouring antennas.
 /// places_wavelengths : list of (float, float), optional

@@ -7,7 +7,9 @@ use aoa::{
 use nr_ssb::search::ReceivedSsb;
 use num_complex::Complex64;
 
+use onboard::for_elements;
 use onboard::manifold::ArrayManifold;
+use onboard::observation::MAX_ELEMENTS;
 use onboard::receive::despread::Despread;
 use onboard::receive::wideband::line_of_sight;
 use onboard::settings::{ArrayShape, Pilots};
@@ -66,7 +68,7 @@ pub(super) trait ArrayView: Send + Sync {
     fn view(&self, ssb: &ReceivedSsb<'_>) -> Option<View>;
 }
 
-/// The view of an array of so many antennas; `None` for a single antenna or more than eight.
+/// The view of an array of so many antennas; `None` for a single one.
 ///
 /// # Errors
 /// [`aoa::Error`] for an impossible spacing or gain; [`aoa::Error::CalibrationGain`] of the first
@@ -75,16 +77,10 @@ pub(super) fn array_view(
     antennas: usize,
     setup: &ArraySetup,
 ) -> Result<Option<Box<dyn ArrayView>>, aoa::Error> {
-    Ok(match antennas {
-        2 => Some(Box::new(Looker::<2>::new(setup)?)),
-        3 => Some(Box::new(Looker::<3>::new(setup)?)),
-        4 => Some(Box::new(Looker::<4>::new(setup)?)),
-        5 => Some(Box::new(Looker::<5>::new(setup)?)),
-        6 => Some(Box::new(Looker::<6>::new(setup)?)),
-        7 => Some(Box::new(Looker::<7>::new(setup)?)),
-        8 => Some(Box::new(Looker::<8>::new(setup)?)),
-        _ => None,
-    })
+    if !(2..=MAX_ELEMENTS).contains(&antennas) {
+        return Ok(None);
+    }
+    for_elements!(antennas, A => Ok(Some(Box::new(Looker::<A>::new(setup)?))))
 }
 
 struct Looker<const A: usize> {
