@@ -59,6 +59,32 @@ fn nominal_drives_are_ok_and_within_their_level() {
     assert!(ratio < 6.0 * (1.0 + chance) && ratio > 3.0, "{ratio}");
 }
 
+/// Noisier angles are no fault of a radio head: the level grows with them.
+#[test]
+fn less_k_than_believed_is_no_fault() {
+    let scenario = changed(
+        "yard",
+        [
+            ("vehicle.integrity", value("{}")),
+            (
+                "vehicle.wake_up",
+                value("{ policy = 'fixed', interval_ms = 100.0 }"),
+            ),
+            ("truth.site.rician_k_db", value("5.0")),
+        ],
+    );
+    let (mut unavailable, mut beyond, mut all) = (0, 0, 0);
+    for step in drives(&scenario, SEED, 2).iter().flat_map(|it| &it.steps) {
+        let integrity = step.integrity.unwrap();
+        let ok = integrity.state == IntegrityState::Ok;
+        all += 1;
+        unavailable += usize::from(integrity.state == IntegrityState::Unavailable);
+        beyond += usize::from(ok && step.error_m() > integrity.protection_level_m);
+    }
+    assert!(20 * unavailable < all, "{unavailable} of {all}");
+    assert!(1000 * beyond <= all, "{beyond} of {all}");
+}
+
 #[test]
 fn a_moved_radio_head_is_bounded_or_told_in_time() {
     let runs = 8;

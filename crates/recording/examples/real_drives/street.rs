@@ -112,7 +112,7 @@ pub fn exact_and_real(folder: &Path) {
 pub fn ten_odometers(folder: &Path) {
     let road = fs::read_to_string(folder.join("road.toml")).unwrap();
     let road = road.replace("[track]", "\n[road]");
-    let demand = "[wake_up]\npolicy = \"uncertainty\"\nbound_m = 0.5\n";
+    let demand = "[wake_up]\npolicy = \"uncertainty\"\nbound_m = 0.2\n";
     for (label, angles, more) in [
         ("every burst", "angles.csv", ""),
         ("every 2 m", "angles_every2m.csv", ""),

@@ -6,9 +6,13 @@
 //! agree with each other; leave out a wrong one, and the fault is still among them. And when a
 //! radio head is excluded, trackers that have never heard it are ready to take over, together with
 //! those that have heard neither it nor one of the others.
+//!
+//! One more tracker believes every radio head, but the odometer only roughly.
 
+use super::angle_noise::AngleNoise;
 use super::config::IntegrityConfig;
 use super::sequence_test::SequenceTest;
+use super::slip::Slip;
 use crate::clone_in_place::clone_in_place;
 use crate::localize::measurement::{AngleMeasurement, UpdateVerdict};
 use crate::localize::tracker::{OdometryVerdict, Tracker};
@@ -55,6 +59,9 @@ pub(super) struct Bank {
     /// When it was lost last (s).
     lost_s: f64,
     main: Tracker,
+    /// The same without trust in the odometer.
+    slip: Slip,
+    noise: AngleNoise,
     /// First those without one radio head, in order; then those without two.
     members: Vec<Member>,
 }
@@ -65,6 +72,8 @@ clone_in_place!(Bank {
     disagreed_s,
     lost_s,
     main,
+    slip,
+    noise,
     members
 });
 
@@ -94,7 +103,9 @@ impl Bank {
             disagreed_s: vec![f64::NEG_INFINITY; count],
             lost_s: now_s,
             heads: heads.to_vec(),
+            slip: Slip::new(&tracker),
             main: tracker,
+            noise: AngleNoise::new(count),
         }
     }
 
@@ -135,12 +146,26 @@ impl Bank {
         self.faulty.get(head).is_some_and(|faulty| *faulty)
     }
 
+    /// Slip of the odometer.
+    pub const fn slip(&self) -> &Slip {
+        &self.slip
+    }
+
+    /// By how much more variance the angles have than stated.
+    pub const fn noise_ratio(&self) -> f64 {
+        self.noise.ratio()
+    }
+
     /// How far the angles of a radio head are off from the tracker without it, in standard
     /// deviations.
     fn statistic(&self, head: usize) -> f64 {
-        self.members
-            .get(head)
-            .map_or(0.0, |member| member.test(head).statistic())
+        let test = self.members.get(head).map(|member| member.test(head));
+        test.map_or(0.0, |test| self.deviations(&test))
+    }
+
+    /// The statistic of a test, with the noise that there is.
+    fn deviations(&self, test: &SequenceTest) -> f64 {
+        test.statistic() / self.noise_ratio().sqrt()
     }
 
     /// Number of sound radio heads whose statistic is above a threshold.
@@ -155,6 +180,7 @@ impl Bank {
         for member in &mut self.members {
             member.tracker.odometry(sample);
         }
+        self.slip.odometry(sample);
         self.main.odometry(sample)
     }
 
@@ -167,20 +193,23 @@ impl Bank {
                     member.tracker.update(head, measured);
                     continue;
                 }
-                let Some(innovation) = member.tracker.rehearse_excluded(head, measured) else {
+                let Some(seen) = member.tracker.rehearse_excluded(head, measured) else {
                     continue;
                 };
+                if member.without == [number; 2] {
+                    self.noise.see(number, &seen);
+                }
                 // While the vehicle stands, scatter is one look however often it is seen.
-                if innovation.measurement_variance < 1.0 {
+                if seen.innovation.measurement_variance < 1.0 {
                     for (mine, test) in member.without.iter().zip(&mut member.tests) {
                         if *mine == number {
-                            test.push(&innovation);
+                            test.push(&seen.innovation);
                         }
                     }
                 }
             }
         }
-        self.main.update(head, measured)
+        self.slip.update(&mut self.main, head, measured)
     }
 
     /// Whether a source is at fault and nobody knows which, or too many are.
@@ -251,7 +280,7 @@ impl Bank {
             .filter(|member| member.without[0] != member.without[1] && member.lacks(left_out))
             .flat_map(|member| member.without.iter().zip(&member.tests))
             .filter(|(head, _)| **head != left_out && !self.is_faulty(**head))
-            .map(|(_, test)| test.statistic())
+            .map(|(_, test)| self.deviations(test))
             .fold(0.0, f64::max)
     }
 
@@ -268,6 +297,9 @@ impl Bank {
         *faulty = true;
         if let Some(without) = self.members.get(culprit) {
             self.main = without.tracker.clone();
+        }
+        if let Some(known) = self.heads.get(culprit) {
+            self.slip.set_excluded(known, true);
         }
         for number in 0..self.members.len() {
             let Some([first, second]) = self.members.get(number).map(|member| member.without)
@@ -302,6 +334,9 @@ impl Bank {
         }
         let known = self.heads.get(head);
         exclude(&mut self.main, known, false);
+        if let Some(known) = known {
+            self.slip.set_excluded(known, false);
+        }
         for member in self.members.iter_mut().filter(|member| !member.lacks(head)) {
             exclude(&mut member.tracker, known, false);
         }

@@ -5,7 +5,9 @@
 //! covariance, wherever the full solution may be: the protection level is the radius about the full
 //! solution that holds for each of them (solution separation, Brown and McBurney 1988, with the
 //! separation as it is and not its threshold), with the share of the risk that the fault's
-//! probability leaves it.
+//! probability leaves it. The same of the tracker that does not trust the odometer
+//! ([`Slip`](super::slip::Slip)), where it is suspected. All of it is of angles as noisy as
+//! they are heard to be ([`AngleNoise`](super::angle_noise::AngleNoise)).
 //!
 //! A single radio head has no witness but odometry and road: the protection level then is what
 //! those two can vouch for, grows with the distance driven, and passes the alert limit unless they
@@ -175,11 +177,14 @@ impl Guard {
     }
 
     /// The radius that the error leaves with the stated risk, whether no source is at fault or any
-    /// one of those in use.
+    /// one of those in use, the odometer among them where it is suspected.
     fn protection_level_m(&self, bank: &Bank, time_s: f64) -> f64 {
         let main = bank.main().pose(time_s);
-        let mut level_m = self.nominal.radius(main.principal_variances());
-        for without in bank.without_one() {
+        let noise_ratio = bank.noise_ratio();
+        let variances = main.principal_variances().map(|it| noise_ratio * it);
+        let mut level_m = self.nominal.radius(variances);
+        let slip = (bank.slip().is_suspected(&self.config)).then(|| bank.slip().tracker());
+        for without in bank.without_one().chain(slip) {
             let clean = without.pose(time_s);
             let Some([[xx, xy, _], [_, yy, _], _]) = clean.covariance else {
                 continue;
@@ -188,7 +193,7 @@ impl Guard {
                 clean.pose.x_m - main.pose.x_m,
                 clean.pose.y_m - main.pose.y_m,
             ];
-            let covariance = [[xx, xy], [xy, yy]];
+            let covariance = [[xx, xy], [xy, yy]].map(|row| row.map(|it| noise_ratio * it));
             level_m = (self.under_fault).radius(separation_m, covariance, level_m);
         }
         level_m

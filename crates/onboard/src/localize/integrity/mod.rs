@@ -1,10 +1,12 @@
 //! How far the estimate can be trusted.
 
+mod angle_noise;
 mod bank;
 mod config;
 mod guard;
 mod separation;
 mod sequence_test;
+mod slip;
 
 pub use config::IntegrityConfig;
 pub use guard::Guard;

@@ -60,6 +60,8 @@ pub struct TrackerConfig {
     pub acceleration_mps2: f64,
     /// Acceleration that the vehicle cannot do: the odometer slipped (m/s²).
     pub leap_mps2: f64,
+    /// Whether the odometer may slip without a leap.
+    pub may_slip: bool,
     /// Standard deviation of a reading of the speed (m/s).
     pub speed_noise_mps: f64,
     /// Yaw rate that no sample can exceed (rad/s).
@@ -244,6 +246,7 @@ impl TrackerConfig {
             gate: normal_quantile(0.5 * settings.outlier_probability).powi(2),
             acceleration_mps2: 2.0 * vehicle.acceleration_mps2,
             leap_mps2: 10.0 * vehicle.acceleration_mps2,
+            may_slip: false,
             speed_noise_mps: odometer.speed_noise_mps,
             top_yaw_rate_radps: vehicle.top_yaw_rate_radps,
             yaw_noise_rad_per_sqrt_m: gyroscope.map_or(0.0, |it| it.noise_rad_per_sqrt_m),
@@ -265,18 +268,19 @@ impl TrackerConfig {
         }
     }
 
-    /// Variance (rad²) of an angle `travelled_m` after the radio head's last one by what several
-    /// looks share: scatter, see [`ArrayModel::correlation`], and the surveys, whose errors stay
-    /// until the radio head is seen from another side, after about its distance. A look never
-    /// counts for more than one: where successive errors cancel, they do so at one spacing and for
-    /// a moment.
-    pub fn look_variance(&self, travelled_m: f64, sighting: &Sighting) -> f64 {
+    /// Variance (rad²) by scatter of an angle `travelled_m` after the radio head's last one, see
+    /// [`ArrayModel::correlation`]. A look never counts for more than one: where successive errors
+    /// cancel, they do so at one spacing and for a moment.
+    pub fn scatter_variance(&self, travelled_m: f64, sighting: &Sighting) -> f64 {
         let scatter = (self.array.measurand).scatter_variance(self.rician_k, sighting.aperture);
-        let correlation = self
-            .array
-            .correlation(travelled_m, sighting.toward)
-            .max(1.0);
-        let mut variance = scatter * correlation;
+        let correlation = self.array.correlation(travelled_m, sighting.toward);
+        scatter * correlation.max(1.0)
+    }
+
+    /// The same by all that several looks share: scatter and the surveys, whose errors stay until
+    /// the radio head is seen from another side, after about its distance.
+    pub fn look_variance(&self, travelled_m: f64, sighting: &Sighting) -> f64 {
+        let mut variance = self.scatter_variance(travelled_m, sighting);
         if sighting.survey_variance > 0.0 {
             // Standing still nothing new is learnt, but the variance must stay a number.
             let same_side = sighting.range_m / travelled_m.abs().max(1e-9);

@@ -34,6 +34,9 @@ const WILD: f64 = 10.0;
 const SIGMAS_OF_SLIP: f64 = 5.0;
 const MOST_SLIP: f64 = 0.3;
 
+/// How far the scale walks of an odometer that may slip without a leap (per √m).
+const SLIP_WALK_PER_SQRT_M: f64 = 0.1;
+
 /// Standard deviation of where along the road the vehicle takes up a new curvature (m): no vehicle does
 /// at a point, as maps of arcs draw it, but over about its own length.
 const TRANSITION_M: f64 = 0.5;
@@ -169,8 +172,9 @@ impl Tracker {
             let usual_mps = SIGMAS_OF_SLIP * self.config.speed_noise_mps;
             let least_mps = usual_mps.max(self.config.leap_mps2 * duration_s.max(0.02));
             let leap = (self.speed_steps).leap(previous.speed_mps, sample.speed_mps, least_mps);
-            let variance = &mut self.belief.covariance[SCALE][SCALE];
-            *variance = variance.max((*variance + leap * leap).min(MOST_SLIP * MOST_SLIP));
+            let sets_off = previous.speed_mps == 0.0 && sample.speed_mps != 0.0;
+            let unseen = self.config.may_slip && sets_off;
+            self.slip(if unseen { MOST_SLIP } else { leap });
         }
         let moved_m = sample.distance_m - previous.distance_m;
         // A counter that was reset or overflowed says nothing of the distance: the speeds do.
@@ -229,6 +233,12 @@ impl Tracker {
                 None => OdometryVerdict::Accepted,
             }
         }
+    }
+
+    /// The odometer's scale may have changed by a share.
+    fn slip(&mut self, by: f64) {
+        let variance = &mut self.belief.covariance[SCALE][SCALE];
+        *variance = variance.max((*variance + by * by).min(MOST_SLIP * MOST_SLIP));
     }
 
     /// What the yaw rate says of a step.
@@ -463,6 +473,19 @@ impl Tracker {
     /// Sets the largest squared Mahalanobis distance of an angle that is used.
     pub fn set_gate(&mut self, gate: f64) {
         self.config.gate = gate;
+    }
+
+    /// Expects slip from now on: at once, anew whenever the vehicle sets off, when nothing tells it
+    /// from the speed, with every leap of the speed that is more than it accelerates, and with every
+    /// metre of a differential drive, whose speed may leap.
+    pub(in crate::localize) fn distrust_odometer(&mut self) {
+        let config = &mut self.config;
+        config.may_slip = true;
+        config.leap_mps2 = config.acceleration_mps2;
+        if config.drive == DriveKind::Differential {
+            config.noise.scale_per_sqrt_m = SLIP_WALK_PER_SQRT_M;
+        }
+        self.slip(MOST_SLIP);
     }
 
     /// Leaves the angles of a radio head unused, or uses them again.

@@ -18,6 +18,18 @@ const FORECAST_STEP_M: f64 = 5.0;
 /// the right place must survive a few.
 const OUTLIER: f64 = 8.0;
 
+/// An angle to a radio head that is not used.
+#[derive(Clone, Copy, Debug, PartialEq)]
+pub(in crate::localize) struct Rehearsal {
+    /// The innovation; of the angle's variance only its noise, what stays from look to look being the
+    /// belief's.
+    pub innovation: Innovation,
+    /// Variance of the noise, had nothing been heard before (rad²).
+    pub alone_variance: f64,
+    /// Distance driven, in wavelengths.
+    pub place_wavelengths: f64,
+}
+
 impl Tracker {
     /// The innovation that an angle would bring; `None` where it would bring none.
     pub fn innovation(&self, head: &RadioHead, measured: &AngleMeasurement) -> Option<Innovation> {
@@ -58,18 +70,35 @@ impl Tracker {
         -0.5 * (seen.mahalanobis2() + (seen.variance / seen.measurement_variance).ln())
     }
 
-    /// The innovation that an angle to an excluded radio head would bring; it counts as a look. Where
+    /// What an angle to an excluded radio head would bring; it counts as a look. Where
     /// errors are found that stay over metres there is nothing to test: a radio head that is off has a
     /// large one, and counts little.
     pub(in crate::localize) fn rehearse_excluded(
         &mut self,
         head: &RadioHead,
         measured: &AngleMeasurement,
-    ) -> Option<Innovation> {
+    ) -> Option<Rehearsal> {
         let looked = self.look(head, measured).ok()?;
         self.learn_error(&looked);
         self.heads.get_mut(looked.head)?.last_look_m = looked.place_m;
-        looked.repetition.is_none().then_some(looked.innovation)
+        if looked.repetition.is_some() {
+            return None;
+        }
+        let Innovation {
+            residual,
+            variance,
+            measurement_variance,
+        } = looked.innovation;
+        let common = variance - measurement_variance + looked.lasting_variance;
+        Some(Rehearsal {
+            innovation: Innovation {
+                residual,
+                variance: common + looked.noise_variance,
+                measurement_variance: looked.noise_variance,
+            },
+            alone_variance: looked.alone_variance,
+            place_wavelengths: looked.place_m / self.config.array.wavelength_m,
+        })
     }
 
     /// The belief at `time_s`, had the vehicle driven on at its speed and heard nothing.

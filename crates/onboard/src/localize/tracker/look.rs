@@ -1,5 +1,6 @@
 //! An angle as the belief meets it: what is expected, and how far off and how uncertain it is.
 
+use super::config::PhaseBias;
 use super::filter::Tracker;
 use super::locate::locate;
 use super::sighting::Sighting;
@@ -19,6 +20,13 @@ pub(super) struct Look {
     pub innovation: Innovation,
     /// Variance of the angle by its own noise (rad²).
     pub own_variance: f64,
+    /// The same with scatter, had nothing been heard before ...
+    pub alone_variance: f64,
+    /// ... and counted as often as looks so near to each other repeat it.
+    pub noise_variance: f64,
+    /// Variance of what is off by as much in many looks (rad²), counted once: surveys, stated
+    /// bias, odometry since its newest sample.
+    pub lasting_variance: f64,
     /// Variance of the error that stays (rad²), and how often looks so near to each other repeat it,
     /// where it is found while driving.
     error_variance: f64,
@@ -81,7 +89,8 @@ impl Tracker {
         let elapsed_s = measured.time_s - head.last_look_s;
         let turned_rad = self.turned_rad - head.last_look_rad;
         let moved = (travelled_m, turned_rad);
-        let stated = (self.config.phase_bias).variance(sigma, elapsed_s, moved);
+        let bias = self.config.phase_bias;
+        let stated = bias.variance(sigma, elapsed_s, moved);
         let repetition = self.repetition(travelled_m);
         let error_variance = head.error.variance();
         let stays = repetition.unwrap_or_default() * error_variance;
@@ -90,6 +99,11 @@ impl Tracker {
         });
         let coasted = sighting.row[ALONG].powi(2) * ahead_variance + strayed;
         let measurement_variance = stays + stated + shared + coasted + bend.variance;
+        let unbiased = PhaseBias {
+            std_rad: 0.0,
+            ..bias
+        };
+        let scatter = |travelled_m| self.config.scatter_variance(travelled_m, &sighting);
         let residual = wrap_angle(measured.phase_rad - sighting.phase_rad - bend.shift_rad);
         let innovation = (self.belief).innovation(residual, &row, measurement_variance);
         Ok(Look {
@@ -99,6 +113,12 @@ impl Tracker {
             row,
             innovation,
             own_variance: sigma * sigma,
+            alone_variance: sigma * sigma + scatter(f64::INFINITY),
+            noise_variance: unbiased.variance(sigma, elapsed_s, moved) + scatter(travelled_m),
+            lasting_variance: sighting.survey_variance
+                + bias.std_rad.powi(2)
+                + coasted
+                + bend.variance,
             error_variance,
             repetition,
         })

@@ -31,6 +31,7 @@ pub use calibration::{Calibration, Departure};
 pub use config::TrackerConfig;
 pub use filter::Tracker;
 pub use findings::{Finding, Findings};
+pub(in crate::localize) use forecast::Rehearsal;
 pub use interface::{InitialPose, OdometryVerdict};
 pub use motion::{MotionNoise, PathBend};
 pub use sighting::ArrayModel;

@@ -1,0 +1,148 @@
+//! Whether the odometer slips.
+//!
+//! A tracker that expects slip runs beside the one that trusts the odometer. How much better it
+//! foretells the angles is counted up, never below nothing, as slip may begin at any time (Page
+//! 1954). Beyond what noise brings about slip is suspected, and the level is to hold for that tracker
+//! too. Where errors are found that stay over metres, they are what slip would be taken for.
+
+use std::f64::consts::TAU;
+
+use super::config::IntegrityConfig;
+use crate::clone_in_place::clone_in_place;
+use crate::localize::gaussian::Innovation;
+use crate::localize::measurement::{AngleMeasurement, UpdateVerdict};
+use crate::localize::tracker::Tracker;
+use crate::observation::OdometrySample;
+use crate::radio_head::RadioHead;
+
+/// Share of the angles that come from anywhere.
+const OUTLIERS: f64 = 2e-3;
+
+/// Largest logarithm of the likelihood ratio: what more evidence there is must be forgotten some time.
+const SURE: f64 = 30.0;
+
+/// A tracker that does not trust the odometer.
+#[derive(Debug)]
+pub(super) struct Slip {
+    tracker: Tracker,
+    /// Logarithm of the likelihood ratio.
+    evidence: f64,
+}
+
+clone_in_place!(Slip { tracker, evidence });
+
+impl Slip {
+    /// Slip of the odometer of a tracker.
+    pub fn new(tracker: &Tracker) -> Self {
+        let mut tracker = tracker.clone();
+        tracker.distrust_odometer();
+        Self {
+            tracker,
+            evidence: 0.0,
+        }
+    }
+
+    /// Moves on by an odometry sample.
+    pub fn odometry(&mut self, sample: &OdometrySample) {
+        self.tracker.odometry(sample);
+    }
+
+    /// Takes in an angle, which the tracker `sound` takes in too.
+    pub fn update(
+        &mut self,
+        sound: &mut Tracker,
+        head: &RadioHead,
+        measured: &AngleMeasurement,
+    ) -> UpdateVerdict {
+        if measured.resolved
+            && !sound.config().finds_errors
+            && let Some(if_slipping) = self.tracker.innovation(head, measured)
+            && let Some(if_sound) = sound.innovation(head, measured)
+        {
+            let evidence = (density(&if_slipping) / density(&if_sound)).ln();
+            self.evidence = (self.evidence + evidence).clamp(0.0, SURE);
+        }
+        self.tracker.update(head, measured);
+        sound.update(head, measured)
+    }
+
+    /// Whether the angles speak for it, as clearly as for a fault of a radio head.
+    pub fn is_suspected(&self, config: &IntegrityConfig) -> bool {
+        self.evidence > 0.5 * config.detection_threshold.powi(2)
+    }
+
+    /// The tracker.
+    pub const fn tracker(&self) -> &Tracker {
+        &self.tracker
+    }
+
+    /// Leaves the angles of a radio head unused, or uses them again.
+    pub fn set_excluded(&mut self, head: &RadioHead, excluded: bool) {
+        self.tracker.set_excluded(head, excluded);
+    }
+}
+
+/// Probability density of an angle (1/rad).
+fn density(seen: &Innovation) -> f64 {
+    let normal = (-0.5 * seen.mahalanobis2()).exp() / (TAU * seen.variance).sqrt();
+    OUTLIERS / TAU + (1.0 - OUTLIERS) * normal
+}
+
+#[cfg(test)]
+mod tests {
+    use std::sync::Arc;
+
+    use super::*;
+    use crate::localize::tracker::{InitialPose, TrackerConfig};
+    use crate::settings::{Shipped, Site, TomlFile, Vehicle};
+
+    /// Whether slip is suspected after half a minute of exact angles at 4 m/s, when the odometer reads
+    /// so many times the way.
+    fn is_suspected(ratio: f64) -> bool {
+        let site = Site::from_library("trip-4", &Shipped).unwrap();
+        let vehicle = Vehicle::from_library("carrier", &Shipped).unwrap();
+        let heads = RadioHead::heard(&site, &vehicle);
+        let road = site.build_road().unwrap().unwrap();
+        let start = InitialPose {
+            pose: road.pose(0.0),
+            position_std_m: 0.1,
+            heading_std_rad: 0.01,
+        };
+        let map = Some(Arc::new(road.clone()));
+        let config = TrackerConfig::new(&site, &vehicle);
+        let mut sound = Tracker::new(config, map, &heads, &start);
+        let mut slip = Slip::new(&sound);
+        for step in 1..300 {
+            let time_s = f64::from(step) * 0.1;
+            let odometry = OdometrySample {
+                time_s,
+                distance_m: 4.0 * ratio * time_s,
+                speed_mps: 4.0 * ratio,
+                yaw_rate_radps: None,
+            };
+            sound.odometry(&odometry);
+            slip.odometry(&odometry);
+            let pose = road.pose(4.0 * time_s);
+            for head in &heads {
+                let bearing_rad = pose.point().bearing_rad(head.position) - pose.heading_rad;
+                let measured = AngleMeasurement {
+                    time_s,
+                    phase_rad: std::f64::consts::PI * bearing_rad.cos(),
+                    phase_sigma_rad: 0.05,
+                    angle_rad: f64::NAN,
+                    snr_db: 20.0,
+                    resolved: true,
+                };
+                slip.update(&mut sound, head, &measured);
+            }
+        }
+        slip.is_suspected(&IntegrityConfig::default())
+    }
+
+    #[test]
+    fn slip_since_the_start_is_suspected_and_a_sound_odometer_is_not() {
+        assert!(!is_suspected(1.0));
+        assert!(is_suspected(1.2));
+        assert!(is_suspected(0.8));
+    }
+}
