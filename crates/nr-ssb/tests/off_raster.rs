@@ -6,6 +6,7 @@ mod recordings;
 
 use nr_ssb::SubcarrierSpacing;
 use nr_ssb::raster::{scan, scan_off_raster, scan_raster};
+use rand::RngExt;
 use rand_chacha::ChaCha8Rng;
 
 const RATE_HZ: f64 = 15.36e6;
@@ -151,6 +152,38 @@ fn a_weak_cell_off_the_raster_is_found_beside_a_strong_one_on_it() {
             .collect();
         assert_eq!(found, sent);
     }
+}
+
+/// How weak a cell may be, one SSB in 3 ms on one antenna, on the raster and beside it.
+#[test]
+fn off_the_raster_a_cell_may_be_nearly_as_weak() {
+    let trials = 25;
+    let mut last = [0; 2];
+    for snr_db in [-6.0, -4.0] {
+        let mut found = [0; 2];
+        for trial in 0..trials {
+            let mut rng = air::rng(4000 + trial);
+            let mut cell = air::Cell::random(&mut rng, SubcarrierSpacing::Khz30, 1);
+            cell.lmax = nr_ssb::Lmax::L8;
+            cell.ssb_indices = vec![1];
+            cell.delay = 200.0 + rng.random_range(0.0..1000.0);
+            // Within two parts in a million, as a base station and a receiver are.
+            cell.cfo_hz = rng.random_range(-7e3..7e3);
+            for (place, found) in [3_600.96e6, 3_600.675e6].into_iter().zip(&mut found) {
+                cell.ssb_freq_hz = place;
+                let offset_hz = 15e3 * 55.0;
+                let samples = on_the_air(&cell, offset_hz, snr_db, &mut rng);
+                let slices = air::slices(&samples);
+                let finds = scan(&slices, RATE_HZ, Some(place - offset_hz)).unwrap();
+                let mut ssbs = finds.iter().flat_map(|it| &it.ssbs);
+                *found += u32::from(ssbs.any(|it| it.pci.get() == cell.pci));
+            }
+        }
+        let [on, off] = found;
+        println!("{snr_db} dB: {on} of {trials} on the raster, {off} off it");
+        last = found;
+    }
+    assert!(last.iter().all(|found| *found >= 22), "{last:?}");
 }
 
 #[test]
