@@ -226,7 +226,7 @@ impl Localizer for Recovery {
             search.own += self.tracked.tracker().log_likelihood(head, measured);
         }
         let verdict = self.tracked.update(head, measured);
-        self.watch.see(head, &verdict);
+        self.watch.see(head, &verdict, self.tracked.noise_ratio());
         self.judge(measured.time_s);
         Ok(verdict)
     }

@@ -57,6 +57,14 @@ impl Tracked {
         }
     }
 
+    /// How much more the angles vary than stated, as far as anybody listens to that.
+    pub const fn noise_ratio(&self) -> f64 {
+        match self {
+            Self::Bare(_) => 1.0,
+            Self::Guarded(guard) => guard.noise_ratio(),
+        }
+    }
+
     /// Moves on by an odometry sample.
     pub fn odometry(&mut self, sample: &OdometrySample) -> OdometryVerdict {
         match self {

@@ -61,8 +61,9 @@ impl Watch {
         }
     }
 
-    /// Takes in what became of an angle to a radio head; such that met no expectation say nothing.
-    pub fn see(&mut self, head: &RadioHead, verdict: &UpdateVerdict) {
+    /// Takes in what became of an angle to a radio head, of so many times the variance that is stated;
+    /// such that met no expectation say nothing.
+    pub fn see(&mut self, head: &RadioHead, verdict: &UpdateVerdict, noise_ratio: f64) {
         let refused = match verdict.reason {
             UpdateReason::Consistent => 0.0,
             UpdateReason::Outlier => 1.0,
@@ -71,7 +72,7 @@ impl Watch {
         let Some(distance) = verdict.mahalanobis_squared else {
             return;
         };
-        let capped = distance.min(verdict.threshold.unwrap_or(distance));
+        let capped = distance.min(verdict.threshold.unwrap_or(distance)) / noise_ratio;
         self.angles = self.angles.saturating_add(1);
         let is_it = |it: &&mut Voice| (it.pci, it.ssb_index) == (head.pci, head.ssb_index);
         let Some(voice) = self.voices.iter_mut().find(is_it) else {

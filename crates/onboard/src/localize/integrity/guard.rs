@@ -83,6 +83,11 @@ impl Guard {
         self.bank.main()
     }
 
+    /// How much more the angles vary than stated.
+    pub const fn noise_ratio(&self) -> f64 {
+        self.bank.noise_ratio()
+    }
+
     /// Moves every tracker.
     pub fn odometry(&mut self, sample: &OdometrySample) -> OdometryVerdict {
         if let Some(restarted) = &mut self.restarted {
