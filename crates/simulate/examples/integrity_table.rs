@@ -13,7 +13,7 @@ use simulate::scenario::{FaultKind, FaultSettings, Scenario};
 use simulate::{IntegritySummary, bootstrap_interval};
 use toml::{Table, Value};
 
-use common::{Result, arguments, campaign, changed};
+use common::{Result, arguments, campaign, changed, fixed};
 
 fn main() -> Result<()> {
     let (runs, seeds) = arguments(40, 1)?;
@@ -71,6 +71,18 @@ fn cases() -> Result<Vec<(&'static str, Scenario)>> {
     for name in ["paper-real-odometry-2", "paper-real-odometry-4", "yard"] {
         let guarded = [("vehicle.integrity", Value::Table(Table::new()))];
         cases.push((name, changed(name, guarded)?));
+    }
+    for (name, k_db) in [
+        ("yard, K = 5 dB, not 10", 5.0),
+        ("yard, K = 3 dB, not 10", 3.0),
+    ] {
+        let guarded = [
+            ("vehicle.integrity", Value::Table(Table::new())),
+            ("truth.site.rician_k_db", k_db.into()),
+        ];
+        let [policy, interval] = fixed(100.0);
+        let scenario = changed("yard", guarded.into_iter().chain([policy, interval]))?;
+        cases.push((name, scenario));
     }
     Ok(cases)
 }

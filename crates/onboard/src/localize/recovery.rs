@@ -5,7 +5,7 @@
 //! believes to be first, then wherever radio heads are, or along all of the road where there is one.
 //! What the search finds takes over only if it foretells the same angles better than the tracker
 //! did: a restart that would be worse than what it replaces never happens. Meanwhile the covariance
-//! covers both, or the search speaks alone where the tracker is refuted.
+//! covers both; where the tracker is refuted, a search nearby speaks alone.
 
 use std::sync::Arc;
 
@@ -235,7 +235,9 @@ impl Localizer for Recovery {
         let mut estimate = self.tracked.pose(time_s);
         if let Some(search) = &self.search {
             let searched = search.initialiser.pose(time_s);
-            if search.ahead() > BETTER {
+            // Along all of a road, or far about, its best place may be anywhere.
+            let is_near = self.setup.road.is_none() && !search.is_wide;
+            if is_near && search.ahead() > BETTER {
                 (estimate.pose, estimate.covariance) = (searched.pose, searched.covariance);
             } else {
                 estimate.cover(&searched);
