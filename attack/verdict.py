@@ -83,7 +83,8 @@ def _messages(verdict: Verdict, text: str) -> None:
     if control := re.search(r"[\x00-\x08\x0b-\x1f\x7f-\x9f]", text):
         verdict.says("control-character", repr(control[0]))
     for message in re.split(r"^(?=error: |warning: |not to be relied on)", text, flags=re.M):
-        words = re.sub(r"[\s│╭╮╰╯─]+", " ", message)  # without the frame of usage errors
+        words = re.sub(r"[\s│╭╮╰╯─]+", " ", message)
+        words = re.sub(r"^Usage: .* for help\. Error ", "", words)  # a usage error's frame
         if len(words) > LONGEST_MESSAGE + 100:
             verdict.says("long-message", f"{len(words)} characters: {words[:100]}")
 
