@@ -115,6 +115,7 @@ def test_the_command_plans_and_refuses(tmp_path: Path, access_av: Callable[..., 
     for text, message in (
         ("name,x_m,y_m\na,1,2\n", "column z_m is missing"),
         ("name,x_m,y_m,z_m\na,1,nan,0\n", "y_m is not a number in row 0"),
+        ("name,x_m,y_m,z_m\n,1,2,3\n", "name is empty in row 0"),
         ("name,x_m,y_m,z_m\n", "0 masts"),
         ("name,x_m,y_m,z_m\na,-100,0,0\n", "on the road"),
     ):

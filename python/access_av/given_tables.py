@@ -32,14 +32,15 @@ def read(path: Path, what: str, schema: dict[str, Any] | None = None) -> pl.Data
         if path.suffix == ".csv":
             return pl.read_csv(path, schema_overrides=schema)
         return pl.read_parquet(path)
-    except pl.exceptions.PolarsError as error:
+    # Of some damage Polars makes a panic of its own.
+    except (pl.exceptions.PolarsError, pl.exceptions.PanicException) as error:
         raise InputError(f"{path}: not a {what}: {error}") from None
 
 
 def check(
     rows: pl.DataFrame, where: str, *, numbers: Iterable[str], other: Iterable[str] = ()
 ) -> None:
-    """Refuse a table that lacks a column, or in which one of ``numbers`` is none.
+    """Refuse a table that lacks a column, a number in ``numbers``, or anything in ``other``.
 
     Raises
     ------
@@ -53,10 +54,13 @@ def check(
         ...
     access_av.errors.InputError: masts.csv: x_m is not a number in row 1
     """
-    numbers = list(numbers)
+    numbers, other = list(numbers), list(other)
     for name in (*other, *numbers):
         if name not in rows.columns:
             raise InputError(f"{where}: column {name} is missing; there are {rows.columns}")
+    for name in other:
+        if len(empty := rows[name].is_null().arg_true()):
+            raise InputError(f"{where}: {name} is empty in row {empty[0]}")
     for name in numbers:
         finite = rows[name].cast(pl.Float64, strict=False).is_finite()
         bad = (~finite).fill_null(value=True).arg_true()

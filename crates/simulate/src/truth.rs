@@ -18,6 +18,10 @@ use crate::random::{Purpose, Streams};
 use crate::scenario::{Fidelity, Scenario, TruthSettings};
 use crate::world::{MotionProfile, Odometer, Path, TrueArray};
 
+/// What a site's file may say of a radio head's power; more is drawn of none.
+const LEAST_EIRP_DBM: f64 = -150.0;
+const MOST_EIRP_DBM: f64 = 120.0;
+
 /// Makes the propagation over a link.
 pub type PropagationMaker = dyn Fn(&Link<'_>) -> Box<dyn Propagation> + Send + Sync;
 
@@ -130,7 +134,8 @@ impl World {
             let [x_m, y_m, _] = &mut head.position_m;
             *x_m += head.position_std_m * normal();
             *y_m += head.position_std_m * normal();
-            head.eirp_dbm += head.eirp_std_db * normal();
+            let eirp_dbm = head.eirp_dbm + head.eirp_std_db * normal();
+            head.eirp_dbm = eirp_dbm.clamp(LEAST_EIRP_DBM, MOST_EIRP_DBM);
         }
         let mut walk = streams.generator(Purpose::Array, 0);
         let mut normal = || factor * walk.sample::<f64, _>(StandardNormal);
