@@ -1,6 +1,8 @@
 //! A Gaussian belief of fixed size: mean and covariance, moved by a linearised motion and
 //! corrected by scalar measurements. No allocation, no general linear algebra.
 
+use std::f64::consts::TAU;
+
 /// Square matrix, row major.
 pub type Matrix<const N: usize> = [[f64; N]; N];
 
@@ -85,6 +87,11 @@ impl Innovation {
     /// Squared Mahalanobis distance, χ² with one degree of freedom when the model holds.
     pub fn mahalanobis2(&self) -> f64 {
         self.residual * self.residual / self.variance
+    }
+
+    /// Probability density of the residual, one over its unit.
+    pub fn density(&self) -> f64 {
+        (-0.5 * self.mahalanobis2()).exp() / (TAU * self.variance).sqrt()
     }
 }
 

@@ -212,8 +212,9 @@ impl Initialiser {
     pub fn update(&mut self, head: &RadioHead, measured: &AngleMeasurement) -> UpdateVerdict {
         let mut first = UpdateVerdict::unused(UpdateReason::Unusable);
         for (rank, hypothesis) in self.hypotheses.iter_mut().enumerate() {
-            hypothesis.log_likelihood += hypothesis.tracker.log_likelihood(head, measured);
-            let verdict = hypothesis.tracker.update(head, measured);
+            let looked = hypothesis.tracker.look(head, measured);
+            hypothesis.log_likelihood += hypothesis.tracker.log_likelihood(&looked);
+            let verdict = hypothesis.tracker.take(looked, measured);
             if rank == 0 {
                 first = verdict;
             }

@@ -223,7 +223,8 @@ impl Localizer for Recovery {
         if let Some(search) = &mut self.search {
             search.since_s.get_or_insert(measured.time_s);
             search.initialiser.update(head, measured);
-            search.own += self.tracked.tracker().log_likelihood(head, measured);
+            let tracker = self.tracked.tracker();
+            search.own += tracker.log_likelihood(&tracker.look(head, measured));
         }
         let verdict = self.tracked.update(head, measured);
         self.watch.see(head, &verdict, self.tracked.noise_ratio());

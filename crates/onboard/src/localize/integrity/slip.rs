@@ -54,16 +54,18 @@ impl Slip {
         head: &RadioHead,
         measured: &AngleMeasurement,
     ) -> UpdateVerdict {
+        let if_slipping = self.tracker.look(head, measured);
+        let if_sound = sound.look(head, measured);
         if measured.resolved
             && !sound.config().finds_errors
-            && let Some(if_slipping) = self.tracker.innovation(head, measured)
-            && let Some(if_sound) = sound.innovation(head, measured)
+            && let (Ok(slipping), Ok(sound)) = (&if_slipping, &if_sound)
+            && !(slipping.excluded || sound.excluded)
         {
-            let evidence = (density(&if_slipping) / density(&if_sound)).ln();
+            let evidence = (density(&slipping.innovation) / density(&sound.innovation)).ln();
             self.evidence = (self.evidence + evidence).clamp(0.0, SURE);
         }
-        self.tracker.update(head, measured);
-        sound.update(head, measured)
+        self.tracker.take(if_slipping, measured);
+        sound.take(if_sound, measured)
     }
 
     /// Whether the angles speak for it, as clearly as for a fault of a radio head.
@@ -84,8 +86,7 @@ impl Slip {
 
 /// Probability density of an angle (1/rad).
 fn density(seen: &Innovation) -> f64 {
-    let normal = (-0.5 * seen.mahalanobis2()).exp() / (TAU * seen.variance).sqrt();
-    OUTLIERS / TAU + (1.0 - OUTLIERS) * normal
+    OUTLIERS / TAU + (1.0 - OUTLIERS) * seen.density()
 }
 
 #[cfg(test)]

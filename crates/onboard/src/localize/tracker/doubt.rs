@@ -14,8 +14,7 @@ pub const AS_NOT: f64 = 0.5;
 /// belief was: such an angle says nothing.
 pub fn equivalent(innovation: &Innovation, wrong: f64) -> Option<(f64, f64)> {
     let (residual, total) = (innovation.residual, innovation.variance);
-    let density = (-0.5 * innovation.mahalanobis2()).exp() / (TAU * total).sqrt();
-    let holds = (1.0 - wrong) * density;
+    let holds = (1.0 - wrong) * innovation.density();
     let holds = holds / (holds + wrong / TAU);
     // With the gain K = P Hᵀ/S the mixture has the mean p K r and the covariance
     // P − p (S − (1 − p) r²) K Kᵀ, p being the probability that the angle holds.

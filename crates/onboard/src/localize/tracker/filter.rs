@@ -6,6 +6,7 @@ use super::calibration::Calibration;
 use super::config::TrackerConfig;
 use super::doubt;
 use super::interface::{InitialPose, OdometryVerdict};
+use super::look::Look;
 use super::motion::{Step, Yaw};
 use super::off_map::OffMap;
 use super::pace::Pace;
@@ -373,7 +374,16 @@ impl Tracker {
 
     /// Corrects the state by one electrical angle to a radio head.
     pub fn update(&mut self, head: &RadioHead, measured: &AngleMeasurement) -> UpdateVerdict {
-        let looked = match self.look(head, measured) {
+        self.take(self.look(head, measured), measured)
+    }
+
+    /// Corrects the state by an angle that was looked at just now.
+    pub(in crate::localize) fn take(
+        &mut self,
+        looked: Result<Look, UpdateReason>,
+        measured: &AngleMeasurement,
+    ) -> UpdateVerdict {
+        let looked = match looked {
             Ok(looked) if looked.excluded => {
                 return self.verdict(UpdateReason::Excluded, None);
             }

@@ -2,13 +2,15 @@
 
 use std::f64::consts::TAU;
 
+use super::config::PhaseBias;
 use super::filter::{MOST_STEPS, Tracker};
 use super::locate::locate;
+use super::look::Look;
 use super::sighting::Sighting;
 use super::state::Belief;
 use super::staying_error::StayingError;
 use crate::localize::gaussian::{Innovation, principal_variances};
-use crate::localize::measurement::AngleMeasurement;
+use crate::localize::measurement::{AngleMeasurement, UpdateReason};
 use crate::radio_head::RadioHead;
 
 /// Longest step of a forecast (m), where millimetres do not matter.
@@ -45,12 +47,8 @@ impl Tracker {
     /// variance differs from place to place. Where errors are found that stay over metres, a look counts
     /// as the share of a stretch that it tells of. Whoever leaves out a radio head takes its angles for
     /// outliers.
-    pub(in crate::localize) fn log_likelihood(
-        &self,
-        head: &RadioHead,
-        measured: &AngleMeasurement,
-    ) -> f64 {
-        let Ok(looked) = self.look(head, measured) else {
+    pub(in crate::localize) fn log_likelihood(&self, looked: &Result<Look, UpdateReason>) -> f64 {
+        let Ok(looked) = looked else {
             return 0.0;
         };
         let known = self.heads.get(looked.head);
@@ -89,14 +87,26 @@ impl Tracker {
             variance,
             measurement_variance,
         } = looked.innovation;
-        let common = variance - measurement_variance + looked.lasting_variance;
+        let bias = self.config.phase_bias;
+        let unbiased = PhaseBias {
+            std_rad: 0.0,
+            ..bias
+        };
+        let (sigma, (travelled_m, _)) = (measured.phase_sigma_rad, looked.moved);
+        let scatter = |travelled_m| self.config.scatter_variance(travelled_m, &looked.sighting);
+        let noise = unbiased.variance(sigma, looked.elapsed_s, looked.moved) + scatter(travelled_m);
+        // What is off by as much in many looks counts once.
+        let lasting = looked.sighting.survey_variance
+            + bias.std_rad.powi(2)
+            + looked.coasted_variance
+            + looked.bend_variance;
         Some(Rehearsal {
             innovation: Innovation {
                 residual,
-                variance: common + looked.noise_variance,
-                measurement_variance: looked.noise_variance,
+                variance: variance - measurement_variance + lasting + noise,
+                measurement_variance: noise,
             },
-            alone_variance: looked.alone_variance,
+            alone_variance: looked.own_variance + scatter(f64::INFINITY),
             place_wavelengths: looked.place_m / self.config.array.wavelength_m,
         })
     }

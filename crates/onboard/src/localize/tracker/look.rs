@@ -1,6 +1,5 @@
 //! An angle as the belief meets it: what is expected, and how far off and how uncertain it is.
 
-use super::config::PhaseBias;
 use super::filter::Tracker;
 use super::locate::locate;
 use super::sighting::Sighting;
@@ -12,7 +11,7 @@ use crate::localize::measurement::{AngleMeasurement, UpdateReason};
 use crate::radio_head::RadioHead;
 
 /// An angle as the belief meets it.
-pub(super) struct Look {
+pub(in crate::localize) struct Look {
     pub head: usize,
     pub excluded: bool,
     pub place_m: f64,
@@ -20,13 +19,13 @@ pub(super) struct Look {
     pub innovation: Innovation,
     /// Variance of the angle by its own noise (rad²).
     pub own_variance: f64,
-    /// The same with scatter, had nothing been heard before ...
-    pub alone_variance: f64,
-    /// ... and counted as often as looks so near to each other repeat it.
-    pub noise_variance: f64,
-    /// Variance of what is off by as much in many looks (rad²), counted once: surveys, stated
-    /// bias, odometry since its newest sample.
-    pub lasting_variance: f64,
+    pub sighting: Sighting,
+    /// Time, way and turn since the last look that was used (s, m, rad).
+    pub elapsed_s: f64,
+    pub moved: (f64, f64),
+    /// Variance by the odometry since its newest sample, and by the bend of the prediction (rad²).
+    pub coasted_variance: f64,
+    pub bend_variance: f64,
     /// Variance of the error that stays (rad²), and how often looks so near to each other repeat it,
     /// where it is found while driving.
     error_variance: f64,
@@ -55,7 +54,7 @@ impl Look {
 
 impl Tracker {
     /// What an angle to a radio head says beside the belief.
-    pub(super) fn look(
+    pub(in crate::localize) fn look(
         &self,
         head: &RadioHead,
         measured: &AngleMeasurement,
@@ -89,8 +88,7 @@ impl Tracker {
         let elapsed_s = measured.time_s - head.last_look_s;
         let turned_rad = self.turned_rad - head.last_look_rad;
         let moved = (travelled_m, turned_rad);
-        let bias = self.config.phase_bias;
-        let stated = bias.variance(sigma, elapsed_s, moved);
+        let stated = (self.config.phase_bias).variance(sigma, elapsed_s, moved);
         let repetition = self.repetition(travelled_m);
         let error_variance = head.error.variance();
         let stays = repetition.unwrap_or_default() * error_variance;
@@ -99,11 +97,6 @@ impl Tracker {
         });
         let coasted = sighting.row[ALONG].powi(2) * ahead_variance + strayed;
         let measurement_variance = stays + stated + shared + coasted + bend.variance;
-        let unbiased = PhaseBias {
-            std_rad: 0.0,
-            ..bias
-        };
-        let scatter = |travelled_m| self.config.scatter_variance(travelled_m, &sighting);
         let residual = wrap_angle(measured.phase_rad - sighting.phase_rad - bend.shift_rad);
         let innovation = (self.belief).innovation(residual, &row, measurement_variance);
         Ok(Look {
@@ -113,12 +106,11 @@ impl Tracker {
             row,
             innovation,
             own_variance: sigma * sigma,
-            alone_variance: sigma * sigma + scatter(f64::INFINITY),
-            noise_variance: unbiased.variance(sigma, elapsed_s, moved) + scatter(travelled_m),
-            lasting_variance: sighting.survey_variance
-                + bias.std_rad.powi(2)
-                + coasted
-                + bend.variance,
+            sighting,
+            elapsed_s,
+            moved,
+            coasted_variance: coasted,
+            bend_variance: bend.variance,
             error_variance,
             repetition,
         })

@@ -81,9 +81,9 @@ impl StayingError {
     pub fn density(&self, seen: &Innovation) -> f64 {
         let levels = self.foretold().into_iter().zip(LEVELS_RAD);
         let density = |(probability, level): (f64, f64)| {
-            let variance = seen.variance + level * level;
-            let square = seen.residual * seen.residual;
-            probability * (-0.5 * square / variance).exp() / (TAU * variance).sqrt()
+            let mut seen = *seen;
+            seen.variance += level * level;
+            probability * seen.density()
         };
         levels.map(density).sum()
     }
