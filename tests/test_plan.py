@@ -87,8 +87,8 @@ def test_the_next_level_is_reached_by_what_is_said_to_reach_it() -> None:
     assert math.isclose(levels["6"].share, found.cheapest.share, rel_tol=1e-12)
     shares = {change.what: change.share for change in found.changes}
     assert all(found.share < share for share in shares.values())
-    # The plan's own verdict on its radio heads is the same.
-    told = {verdict.level.name: verdict.share for verdict in planned.verdicts}
+    # So does what the plan says of its own radio heads.
+    told = {it.level.name: it.share for it in bound(planned.scenario).verdicts}
     assert math.isclose(shares[f"a radio head at {planned.chosen[0]}"], told["6"], rel_tol=1e-12)
 
 

@@ -149,6 +149,11 @@ def bound(scenario: _core.Scenario | str, *, map_step_m: float | None = None) ->
     )
 
 
+def along_route(scenario: _core.Scenario) -> pl.DataFrame:
+    """The bound at every SSB of the drive; columns ``bound_route`` of :mod:`access_av.columns`."""
+    return pl.DataFrame(_core.Bound(scenario).along_route())
+
+
 def _heads(core: _core.Bound, settings: list[dict[str, Any]], route: pl.DataFrame) -> pl.DataFrame:
     x_m, y_m = route["x_m"].to_numpy(), route["y_m"].to_numpy()
     snrs_db = core.snr_db(x_m, y_m)

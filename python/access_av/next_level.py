@@ -7,11 +7,14 @@ from concurrent.futures import ThreadPoolExecutor
 from dataclasses import dataclass
 from typing import TYPE_CHECKING, Any
 
-import polars as pl
-
 from access_av import _core, service_levels
+from access_av.error_bound import along_route
 
 if TYPE_CHECKING:
+    import numpy as np
+    import polars as pl
+    from numpy.typing import NDArray
+
     from access_av.placement import Plan
 
 SHORTEST_PERIOD_MS = 5.0  # TS 38.331, ssb-periodicityServingCell
@@ -109,7 +112,7 @@ def next_level(scenario: _core.Scenario | str, planned: Plan) -> NextLevel | Non
     """
     if not isinstance(scenario, _core.Scenario):
         scenario = _core.Scenario.load(scenario)
-    route = _route(scenario)
+    route = along_route(scenario)
     verdicts = service_levels.of_bound(route["along_std_m"], route["across_std_m"])
     missed = next((verdict for verdict in verdicts if not verdict.reached), None)
     if missed is None:
@@ -118,16 +121,16 @@ def next_level(scenario: _core.Scenario | str, planned: Plan) -> NextLevel | Non
     tried = {
         what: scenario.with_overrides(settings) for what, settings in _settings(scenario).items()
     }
+
+    def share(one: _core.Scenario) -> float:
+        return float(_within(along_route(one), level).mean())
+
+    with ThreadPoolExecutor() as pool:
+        shares = dict(zip(tried, pool.map(share, tried.values()), strict=True))
     heads = f"a radio head at {planned.chosen[0]}"
     if len(planned.chosen) > 1:
         heads = f"radio heads at {' and '.join(planned.chosen)}"
-    tried[heads] = planned.scenario
-
-    def share(one: _core.Scenario) -> float:
-        return float(_within(_route(one), level).mean())
-
-    with ThreadPoolExecutor() as pool:
-        shares = list(pool.map(share, tried.values()))
+    shares[heads] = next(verdict.share for verdict in planned.verdicts if verdict.level == level)
     near = _within(route, level)
     weakest = route.row(int(near.argmin()), named=True)
     return NextLevel(
@@ -138,8 +141,7 @@ def next_level(scenario: _core.Scenario | str, planned: Plan) -> NextLevel | Non
         weakest_x_m=weakest["x_m"],
         weakest_y_m=weakest["y_m"],
         changes=[
-            Change(what, share, share >= level.availability)
-            for what, share in zip(tried, shares, strict=True)
+            Change(what, share, share >= level.availability) for what, share in shares.items()
         ],
     )
 
@@ -161,9 +163,5 @@ def _settings(scenario: _core.Scenario) -> dict[str, dict[str, Any]]:
     return made
 
 
-def _route(scenario: _core.Scenario) -> pl.DataFrame:
-    return pl.DataFrame(_core.Bound(scenario).along_route())
-
-
-def _within(route: pl.DataFrame, level: service_levels.Level) -> Any:
+def _within(route: pl.DataFrame, level: service_levels.Level) -> NDArray[np.float64]:
     return service_levels.within(route["along_std_m"], route["across_std_m"], level.accuracy_m)

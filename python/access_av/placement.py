@@ -14,6 +14,7 @@ from typing import TYPE_CHECKING, Any
 import polars as pl
 
 from access_av import _core, given_tables, service_levels
+from access_av.error_bound import along_route
 from access_av.errors import InputError
 
 if TYPE_CHECKING:
@@ -164,7 +165,7 @@ def plan(
                     after_m, chosen, exchanged = value_m, [*kept, number], True
     ranking = pl.DataFrame(candidates).with_columns(p90_bound_m=pl.Series(alone_m))
     final = equipped(chosen)
-    route = pl.DataFrame(_core.Bound(final).along_route())
+    route = along_route(final)
     return Plan(
         scenario=final,
         before_m=before_m,
@@ -176,13 +177,12 @@ def plan(
 
 
 def _p90_m(scenario: _core.Scenario) -> float:
-    bound_m = pl.Series(_core.Bound(scenario).along_route()["bound_m"])
-    return float(bound_m.quantile(0.9, "linear") or math.nan)
+    return float(along_route(scenario)["bound_m"].quantile(0.9, "linear") or math.nan)
 
 
 def _beside(scenario: _core.Scenario, site: dict[str, Any]) -> list[dict[str, Any]]:
     """Places round where the bound is largest, as high as the site's first radio head."""
-    route = pl.DataFrame(_core.Bound(scenario).along_route())
+    route = along_route(scenario)
     weakest = route.row(int(route["bound_m"].arg_max() or 0), named=True)
     width_m = (site.get("road") or {}).get("width_m", 0.0)
     z_m = site["radio_heads"][0]["position_m"][2]
