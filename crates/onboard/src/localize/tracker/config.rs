@@ -271,16 +271,17 @@ impl TrackerConfig {
     /// Variance (rad²) by scatter of an angle `travelled_m` after the radio head's last one, see
     /// [`ArrayModel::correlation`]. A look never counts for more than one: where successive errors
     /// cancel, they do so at one spacing and for a moment.
-    pub fn scatter_variance(&self, travelled_m: f64, sighting: &Sighting) -> f64 {
-        let scatter = (self.array.measurand).scatter_variance(self.rician_k, sighting.aperture);
-        let correlation = self.array.correlation(travelled_m, sighting.toward);
+    /// [`Sighting`] tells the aperture and the cosine `toward`.
+    pub fn scatter_variance(&self, travelled_m: f64, aperture: f64, toward: f64) -> f64 {
+        let scatter = (self.array.measurand).scatter_variance(self.rician_k, aperture);
+        let correlation = self.array.correlation(travelled_m, toward);
         scatter * correlation.max(1.0)
     }
 
     /// The same by all that several looks share: scatter and the surveys, whose errors stay until
     /// the radio head is seen from another side, after about its distance.
     pub fn look_variance(&self, travelled_m: f64, sighting: &Sighting) -> f64 {
-        let mut variance = self.scatter_variance(travelled_m, sighting);
+        let mut variance = self.scatter_variance(travelled_m, sighting.aperture, sighting.toward);
         if sighting.survey_variance > 0.0 {
             // Standing still nothing new is learnt, but the variance must stay a number.
             let same_side = sighting.range_m / travelled_m.abs().max(1e-9);

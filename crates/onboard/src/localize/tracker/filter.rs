@@ -4,17 +4,14 @@ use std::sync::Arc;
 
 use super::calibration::Calibration;
 use super::config::TrackerConfig;
-use super::doubt;
 use super::interface::{InitialPose, OdometryVerdict};
-use super::look::Look;
 use super::motion::{Step, Yaw};
 use super::off_map::OffMap;
 use super::pace::Pace;
 use super::speed_steps::SpeedSteps;
-use super::state::{ALONG, Belief, HEADING, LATENESS, SCALE, STATES, YAW_RATE_BIAS};
+use super::state::{ALONG, Belief, HEADING, SCALE, STATES, YAW_RATE_BIAS};
 use super::staying_error::StayingError;
 use crate::clone_in_place::clone_in_place;
-use crate::localize::measurement::{AngleMeasurement, UpdateReason, UpdateVerdict};
 use crate::localize::smoother::Journal;
 use crate::observation::OdometrySample;
 use crate::radio_head::RadioHead;
@@ -52,9 +49,6 @@ const REFUSED_RADPS: f64 = 0.5;
 /// How the yaw rate wanders while no sample tells of it: the density of a white angular acceleration
 /// (rad²/s³), by which it changes by 0.5 rad/s within half a second.
 const UNTOLD_TURN: f64 = 0.5;
-
-/// Most that angles can be later than stated (s).
-const MOST_LATENESS_S: f64 = 0.5;
 
 #[derive(Clone, Copy, Debug, PartialEq)]
 pub(super) struct Head {
@@ -369,76 +363,6 @@ impl Tracker {
             for j in 0..2 {
                 self.belief.covariance[i][j] += variance * direction[i] * direction[j];
             }
-        }
-    }
-
-    /// Corrects the state by one electrical angle to a radio head.
-    pub fn update(&mut self, head: &RadioHead, measured: &AngleMeasurement) -> UpdateVerdict {
-        self.take(self.look(head, measured), measured)
-    }
-
-    /// Corrects the state by an angle that was looked at just now.
-    pub(in crate::localize) fn take(
-        &mut self,
-        looked: Result<Look, UpdateReason>,
-        measured: &AngleMeasurement,
-    ) -> UpdateVerdict {
-        let looked = match looked {
-            Ok(looked) if looked.excluded => {
-                return self.verdict(UpdateReason::Excluded, None);
-            }
-            Ok(looked) => looked,
-            Err(reason) => return self.verdict(reason, None),
-        };
-        let mahalanobis2 = looked.mahalanobis2();
-        let known = self.heads.get(looked.head).map(|head| head.error);
-        self.learn_error(&looked);
-        if mahalanobis2 > self.config.gate {
-            // That such a radio head is off is known, and says nothing of the vehicle.
-            let is_news =
-                known.is_none_or(|error| !(looked.repetition.is_some() && error.is_large()));
-            return self.verdict(UpdateReason::Outlier, is_news.then_some(mahalanobis2));
-        }
-        let innovation = looked.innovation;
-        let (mut residual, mut variance) = (innovation.residual, innovation.measurement_variance);
-        if let (Some(error), Some(repetition)) = (known, looked.repetition) {
-            let Some(likely) = error.equivalent(&looked.without_error(), repetition) else {
-                return self.verdict(UpdateReason::Consistent, Some(mahalanobis2));
-            };
-            (residual, variance) = likely;
-        }
-        let unresolved = (!measured.resolved).then_some(doubt::AS_NOT);
-        if let Some(wrong) = unresolved.or(self.config.wrong_lobe) {
-            let Some(likely) = doubt::equivalent(&innovation, wrong) else {
-                return self.verdict(UpdateReason::Outlier, Some(mahalanobis2));
-            };
-            (residual, variance) = likely;
-        }
-        self.measure(residual, &looked.row, variance);
-        self.keep_bounds();
-        if let Some(head) = self.heads.get_mut(looked.head) {
-            head.last_look_m = looked.place_m;
-            head.last_look_s = measured.time_s;
-            head.last_look_rad = self.turned_rad;
-        }
-        self.verdict(UpdateReason::Consistent, Some(mahalanobis2))
-    }
-
-    /// An odometer that reads twice or half of what is driven, or an angle older than memory, is no
-    /// more believed however well it would explain the angles.
-    fn keep_bounds(&mut self) {
-        let mean = &mut self.belief.mean;
-        let scale = self.config.odometer_scale;
-        mean[SCALE] = mean[SCALE].clamp(0.5 * scale - 1.0, 2.0 * scale - 1.0);
-        mean[LATENESS] = mean[LATENESS].clamp(-MOST_LATENESS_S, MOST_LATENESS_S);
-    }
-
-    fn verdict(&self, reason: UpdateReason, mahalanobis2: Option<f64>) -> UpdateVerdict {
-        UpdateVerdict {
-            accepted: reason == UpdateReason::Consistent,
-            reason,
-            mahalanobis_squared: mahalanobis2,
-            threshold: Some(self.config.gate),
         }
     }
 

@@ -93,10 +93,11 @@ impl Tracker {
             ..bias
         };
         let (sigma, (travelled_m, _)) = (measured.phase_sigma_rad, looked.moved);
-        let scatter = |travelled_m| self.config.scatter_variance(travelled_m, &looked.sighting);
+        let (aperture, toward) = (looked.aperture, looked.toward);
+        let scatter = |travelled_m| self.config.scatter_variance(travelled_m, aperture, toward);
         let noise = unbiased.variance(sigma, looked.elapsed_s, looked.moved) + scatter(travelled_m);
         // What is off by as much in many looks counts once.
-        let lasting = looked.sighting.survey_variance
+        let lasting = looked.survey_variance
             + bias.std_rad.powi(2)
             + looked.coasted_variance
             + looked.bend_variance;

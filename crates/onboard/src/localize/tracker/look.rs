@@ -1,5 +1,7 @@
-//! An angle as the belief meets it: what is expected, and how far off and how uncertain it is.
+//! How an angle meets the belief: what is expected, how far off and how uncertain it is, and what is
+//! believed after it.
 
+use super::doubt;
 use super::filter::Tracker;
 use super::locate::locate;
 use super::sighting::Sighting;
@@ -7,8 +9,11 @@ use super::state::{ACROSS, ALONG, HEADING, LATENESS, SCALE, STATES, YAW_RATE_BIA
 use super::staying_error::{MOST_VARIANCE, StayingError};
 use crate::geometry::wrap_angle;
 use crate::localize::gaussian::Innovation;
-use crate::localize::measurement::{AngleMeasurement, UpdateReason};
+use crate::localize::measurement::{AngleMeasurement, UpdateReason, UpdateVerdict};
 use crate::radio_head::RadioHead;
+
+/// Most that angles can be later than stated (s).
+const MOST_LATENESS_S: f64 = 0.5;
 
 /// An angle as the belief meets it.
 pub(in crate::localize) struct Look {
@@ -19,7 +24,10 @@ pub(in crate::localize) struct Look {
     pub innovation: Innovation,
     /// Variance of the angle by its own noise (rad²).
     pub own_variance: f64,
-    pub sighting: Sighting,
+    /// Of the sighting; see [`Sighting`].
+    pub aperture: f64,
+    pub toward: f64,
+    pub survey_variance: f64,
     /// Time, way and turn since the last look that was used (s, m, rad).
     pub elapsed_s: f64,
     pub moved: (f64, f64),
@@ -54,6 +62,7 @@ impl Look {
 
 impl Tracker {
     /// What an angle to a radio head says beside the belief.
+    #[inline]
     pub(in crate::localize) fn look(
         &self,
         head: &RadioHead,
@@ -106,7 +115,9 @@ impl Tracker {
             row,
             innovation,
             own_variance: sigma * sigma,
-            sighting,
+            aperture: sighting.aperture,
+            toward: sighting.toward,
+            survey_variance: sighting.survey_variance,
             elapsed_s,
             moved,
             coasted_variance: coasted,
@@ -144,6 +155,77 @@ impl Tracker {
     /// How often looks repeat the error that stays, so far apart; `None` where it is not found.
     pub(super) fn repetition(&self, travelled_m: f64) -> Option<f64> {
         (self.config.finds_errors).then(|| StayingError::repetition(travelled_m))
+    }
+
+    /// Corrects the state by one electrical angle to a radio head.
+    pub fn update(&mut self, head: &RadioHead, measured: &AngleMeasurement) -> UpdateVerdict {
+        self.take(self.look(head, measured), measured)
+    }
+
+    /// Corrects the state by an angle that was looked at just now.
+    #[inline]
+    pub(in crate::localize) fn take(
+        &mut self,
+        looked: Result<Look, UpdateReason>,
+        measured: &AngleMeasurement,
+    ) -> UpdateVerdict {
+        let looked = match looked {
+            Ok(looked) if looked.excluded => {
+                return self.verdict(UpdateReason::Excluded, None);
+            }
+            Ok(looked) => looked,
+            Err(reason) => return self.verdict(reason, None),
+        };
+        let mahalanobis2 = looked.mahalanobis2();
+        let known = self.heads.get(looked.head).map(|head| head.error);
+        self.learn_error(&looked);
+        if mahalanobis2 > self.config.gate {
+            // That such a radio head is off is known, and says nothing of the vehicle.
+            let is_news =
+                known.is_none_or(|error| !(looked.repetition.is_some() && error.is_large()));
+            return self.verdict(UpdateReason::Outlier, is_news.then_some(mahalanobis2));
+        }
+        let innovation = looked.innovation;
+        let (mut residual, mut variance) = (innovation.residual, innovation.measurement_variance);
+        if let (Some(error), Some(repetition)) = (known, looked.repetition) {
+            let Some(likely) = error.equivalent(&looked.without_error(), repetition) else {
+                return self.verdict(UpdateReason::Consistent, Some(mahalanobis2));
+            };
+            (residual, variance) = likely;
+        }
+        let unresolved = (!measured.resolved).then_some(doubt::AS_NOT);
+        if let Some(wrong) = unresolved.or(self.config.wrong_lobe) {
+            let Some(likely) = doubt::equivalent(&innovation, wrong) else {
+                return self.verdict(UpdateReason::Outlier, Some(mahalanobis2));
+            };
+            (residual, variance) = likely;
+        }
+        self.measure(residual, &looked.row, variance);
+        self.keep_bounds();
+        if let Some(head) = self.heads.get_mut(looked.head) {
+            head.last_look_m = looked.place_m;
+            head.last_look_s = measured.time_s;
+            head.last_look_rad = self.turned_rad;
+        }
+        self.verdict(UpdateReason::Consistent, Some(mahalanobis2))
+    }
+
+    /// An odometer that reads twice or half of what is driven, or an angle older than memory, is no
+    /// more believed however well it would explain the angles.
+    fn keep_bounds(&mut self) {
+        let mean = &mut self.belief.mean;
+        let scale = self.config.odometer_scale;
+        mean[SCALE] = mean[SCALE].clamp(0.5 * scale - 1.0, 2.0 * scale - 1.0);
+        mean[LATENESS] = mean[LATENESS].clamp(-MOST_LATENESS_S, MOST_LATENESS_S);
+    }
+
+    fn verdict(&self, reason: UpdateReason, mahalanobis2: Option<f64>) -> UpdateVerdict {
+        UpdateVerdict {
+            accepted: reason == UpdateReason::Consistent,
+            reason,
+            mahalanobis_squared: mahalanobis2,
+            threshold: Some(self.config.gate),
+        }
     }
 
     /// Learns of the error that stays from an angle, used or not.
