@@ -178,6 +178,37 @@ def test_an_integrity_campaign_goes_on_where_it_stopped(
     assert json.loads(access_av(*arguments).out)["cases"] == record["cases"]
 
 
+def test_the_level_grows_as_less_risk_is_asked(tmp_path: Path) -> None:
+    cases = drive(
+        Campaign(Parts(tmp_path)), SHORT, runs=2, only=["none"], risks_per_hour=[0.3, 1e-2, 1e-4]
+    )
+    assert cases is not None
+    levels = [float(case.trajectories["protection_level_m"].median()) for case in cases]
+    assert levels == sorted(levels)
+    assert levels[2] > 1.3 * levels[0]
+    # Quantiles of a Gaussian grow as the root of the logarithm.
+    assert levels[2] < 2.0 * levels[0]
+
+
+@pytest.mark.parametrize(
+    ("key", "value", "told"),
+    [
+        ("risk_per_hour", "1e-5", "below integrity.risk_per_hour"),
+        ("fault_probability.array", "0.4", "below integrity.risk_per_hour"),
+        ("fault_probability.radio_head", "0.3", "add up to 1 at most"),
+        ("fault_probability.gate", "0.1", "all_radio_heads"),
+        ("risk_per_hour", "0", "between 0.000000001 and 1"),
+    ],
+)
+def test_faults_that_the_risk_cannot_bear_are_refused(
+    access_av: Callable[..., Finished], key: str, value: str, told: str
+) -> None:
+    done = access_av("run", "yard", "--runs", "1", "--set", f"vehicle.integrity.{key}={value}")
+    assert done.code == 2
+    assert "integrity" in done.err
+    assert told in done.err
+
+
 def test_every_mismatch_can_be_driven(tmp_path: Path) -> None:
     known = mismatches(SHORT)
     kept = Campaign(Parts(tmp_path))

@@ -15,6 +15,7 @@ from access_av.errors import InputError
 from access_av.simulation import Simulation
 from access_av.statistics.alarms import Alarms
 from access_av.statistics.consistency import horizontal_error_m
+from access_av.statistics.extremes import ObtainedRisk
 from access_av.statistics.integrity import STATES, Integrity
 
 if TYPE_CHECKING:
@@ -36,9 +37,9 @@ class Case:
 
     Attributes
     ----------
-    mismatch, channel, heads
-        How the world departs from what is believed, the channel, and how many radio heads are
-        listened to.
+    mismatch, channel, heads, asked_risk_per_hour
+        How the world departs from what is believed, the channel, how many radio heads are listened
+        to, and the risk that the level is to leave.
     scenario
         All of it.
     trajectories
@@ -48,14 +49,14 @@ class Case:
     mismatch: str
     channel: str
     heads: int
+    asked_risk_per_hour: float
     scenario: _core.Scenario
     trajectories: pl.DataFrame
 
     @property
     def alert_limit_m(self) -> float:
         """The guard's alert limit."""
-        vehicle = json.loads(self.scenario.vehicle.to_json())
-        return float(vehicle["integrity"]["alert_limit_m"])
+        return float(_settings(self.scenario)["alert_limit_m"])
 
     def as_record(self) -> dict[str, Any]:
         """A row of the table; columns ``integrity_cases`` of :mod:`access_av.columns`."""
@@ -64,6 +65,7 @@ class Case:
         if found is None or alarms is None:
             raise InputError(f"{self.scenario.name}: no step has a protection level")
         error_m = self.trajectories["error_x_m"].abs()
+        risk = ObtainedRisk.of(self.trajectories, _settings(self.scenario)["error_correlation_s"])
         return {
             "mismatch": self.mismatch,
             "channel": self.channel,
@@ -78,9 +80,19 @@ class Case:
             "runs_with_exceedances": found.runs_with_exceedances,
             "time_to_alert_s": alarms.longest_silence_s,
             "level_over_error": found.median_level_over_error,
+            "asked_risk_per_hour": self.asked_risk_per_hour,
+            "risk_per_hour": risk and risk.per_hour,
+            "risk_per_hour_low": risk and risk.interval[0],
+            "risk_per_hour_high": risk and risk.interval[1],
             "p90_error_m": error_m.quantile(0.9, "linear"),
             "max_error_m": error_m.max(),
         }
+
+
+def _settings(scenario: _core.Scenario) -> dict[str, Any]:
+    """``[integrity]`` of its vehicle."""
+    found: dict[str, Any] = json.loads(scenario.vehicle.to_json())["integrity"]
+    return found
 
 
 def mismatches(scenario: _core.Scenario) -> dict[str, Overrides]:
@@ -173,6 +185,7 @@ def drive(
     only: Sequence[str] | None = None,
     channel_names: Sequence[str] = ("as set",),
     heads: Sequence[int] | None = None,
+    risks_per_hour: Sequence[float] | None = None,
     progress: Callable[[int, int], None] | None = None,
 ) -> list[Case] | None:
     """Drive a guarded scenario under every mismatch, channel and number of radio heads.
@@ -191,14 +204,16 @@ def drive(
         See :func:`channels`.
     heads
         Numbers of radio heads listened to, the first of the site; all of them when ``None``.
+    risks_per_hour
+        Target integrity risks; the vehicle's own when ``None``.
     progress
         Called as ``progress(done, total)``.
 
     Returns
     -------
     list of Case
-        In the order mismatch, channel, heads; ``None`` where parts are missing that another shard
-        computes.
+        In the order mismatch, channel, heads, risk; ``None`` where parts are missing that another
+        shard computes.
 
     Raises
     ------
@@ -229,11 +244,23 @@ def drive(
         if not 1 <= count <= len(cells):
             raise InputError(f"{count} radio heads: the site has {len(cells)}")
     grid = [
-        (mismatch, channel, count, scenario.with_overrides({**over, **known[mismatch], **listens}))
+        (
+            mismatch,
+            channel,
+            count,
+            risk,
+            scenario.with_overrides({**over, **known[mismatch], **set_}),
+        )
         for mismatch in only or known
         for channel, over in channels(channel_names).items()
         for count in heads or (len(cells),)
-        for listens in ({"vehicle.receiver.pci_allow_list": cells[:count]},)
+        for risk in risks_per_hour or (_settings(scenario)["risk_per_hour"],)
+        for set_ in (
+            {
+                "vehicle.receiver.pci_allow_list": cells[:count],
+                "vehicle.integrity.risk_per_hour": risk,
+            },
+        )
     ]
     tasks = [
         Task(

@@ -44,6 +44,10 @@ def integrity(
     heads: Annotated[
         list[int] | None, typer.Option(min=1, help="Radio heads listened to; may be repeated.")
     ] = None,
+    risk: Annotated[
+        list[float] | None,
+        typer.Option(help="Target integrity risk per hour, not the vehicle's; may be repeated."),
+    ] = None,
     shard: ShardOption = "1/1",
     dask: DaskOption = None,
     out: Out = None,
@@ -74,6 +78,7 @@ def integrity(
             only=mismatch,
             channel_names=channel or ("as set",),
             heads=heads,
+            risks_per_hour=risk,
             progress=tick,
         )
     if cases is None:
@@ -90,8 +95,25 @@ def integrity(
     console.print(f"Report: {directory.path / 'report.html'}", soft_wrap=True)
 
 
+def obtained_risk(one: dict[str, Any]) -> str:
+    """Obtained risk per hour, and asked."""
+    asked = f"({one['asked_risk_per_hour']:.0e})"
+    if one["risk_per_hour"] is None:
+        return f"– {asked}"
+    return f"{one['risk_per_hour']:.0e} ≤ {one['risk_per_hour_high']:.0e} {asked}"
+
+
 def _show(records: Sequence[dict[str, Any]]) -> None:
-    head = ["world", "channel", "heads", "available", "beyond while ok", "alert s", "level/error"]
+    head = [
+        "world",
+        "channel",
+        "heads",
+        "available",
+        "beyond while ok",
+        "alert s",
+        "level/error",
+        "per hour (asked)",
+    ]
     made = table(head, text=2)
     for one in records:
         made.add_row(
@@ -102,5 +124,6 @@ def _show(records: Sequence[dict[str, Any]]) -> None:
             f"{one['exceedance_share']:.1e} (≤ {one['exceedance_share_high']:.1e})",
             f"{one['time_to_alert_s']:.2f}",
             f"{one['level_over_error']:.1f}",
+            obtained_risk(one),
         )
     console.print(made)
