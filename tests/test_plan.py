@@ -12,7 +12,8 @@ import pytest
 
 from access_av import InputError, Scenario, bound, columns, plan, service_levels, simulate
 from access_av.campaign import Campaign
-from access_av.integrity_campaign import drive, mismatches
+from access_av.hypotheses import SIZES, hypotheses, mismatches
+from access_av.integrity_campaign import drive
 from access_av.next_level import next_level
 from access_av.parts import Parts
 
@@ -176,6 +177,23 @@ def test_an_integrity_campaign_goes_on_where_it_stopped(
 
     monkeypatch.setattr("access_av.integrity_campaign.driven", driven_again)
     assert json.loads(access_av(*arguments).out)["cases"] == record["cases"]
+
+
+def test_hypotheses_are_of_three_sizes_and_can_be_driven(tmp_path: Path) -> None:
+    for name in ("yard-surveyed", "paper", "campus-handover"):
+        scenario = Scenario.load(name)
+        found = hypotheses(scenario)
+        truths = {scenario.with_overrides(case).to_toml() for case in found.values()}
+        assert len(truths) == len(found), "each is another world"
+        kinds = {key.rpartition(" x ")[0] for key in found} - {""}
+        assert {f"{kind} x {size}" for kind in kinds for size in SIZES} <= found.keys()
+    sized = [hypotheses(SHORT)[f"head height x {size}"] for size in SIZES]
+    heights = [next(iter(it["truth.site.radio_heads"].values()))["position_m"][2] for it in sized]
+    assert heights == pytest.approx([0.1, 0.3, 1.0])
+    chosen = ["two cells swapped", "map shape x 10", "growing slip x 10", "phase drift x 10"]
+    cases = drive(Campaign(Parts(tmp_path)), SHORT, runs=1, only=chosen)
+    assert cases is not None
+    assert [case.mismatch for case in cases] == chosen
 
 
 def test_the_level_grows_as_less_risk_is_asked(tmp_path: Path) -> None:

@@ -12,6 +12,7 @@ import polars as pl
 from access_av import _core
 from access_av.campaign import Task
 from access_av.errors import InputError
+from access_av.hypotheses import Overrides, hypotheses, mismatches
 from access_av.simulation import Simulation
 from access_av.statistics.alarms import Alarms
 from access_av.statistics.consistency import horizontal_error_m
@@ -24,8 +25,6 @@ if TYPE_CHECKING:
     from numpy.typing import NDArray
 
     from access_av.campaign import Campaign
-
-Overrides = dict[str, Any]
 
 # Drives of a part: what is lost when a campaign is stopped.
 PART_RUNS = 5
@@ -95,64 +94,6 @@ def _settings(scenario: _core.Scenario) -> dict[str, Any]:
     return found
 
 
-def mismatches(scenario: _core.Scenario) -> dict[str, Overrides]:
-    """What can be otherwise than believed, by name: overrides of the scenario.
-
-    Every other quantity is drawn from its stated standard deviation.
-
-    Examples
-    --------
-    >>> found = mismatches(_core.Scenario.load("yard"))
-    >>> found["array 1 degree off"]
-    {'truth.vehicle.array.mounting_rad': 0.0175}
-    """
-    site = json.loads(scenario.site.to_json())
-    vehicle = json.loads(scenario.vehicle.to_json())
-    heads, odometer = site["radio_heads"], vehicle["odometer"]
-
-    def moved(count: int) -> Overrides:
-        names = [head["name"] for head in heads[:count]]
-        if not all(names) or len(set(names)) < len(names):
-            return {}
-        places = (np.add(head["position_m"], [2.0, 0.0, 0.0]) for head in heads)
-        return {
-            "truth.site.radio_heads": {
-                name: {"position_m": place.tolist()}
-                for name, place in zip(names, places, strict=False)
-            }
-        }
-
-    def whole_drive(what: Overrides) -> Overrides:
-        return {"from_s": 20.0, "until_s": 1e6, "what": what}
-
-    def hidden(count: int) -> Overrides:
-        what = {"kind": "non-line-of-sight", "bias_rad": 0.15}
-        return {
-            "faults": [whole_drive({**what, "radio_head": head}) for head in range(count)],
-        }
-
-    mounting_rad, phase_rad = vehicle["array"]["mounting_rad"], vehicle["array"]["phase_rad"]
-    cases = {
-        "none": {},
-        "array 1 degree off": {"truth.vehicle.array.mounting_rad": mounting_rad + 0.0175},
-        "phases 0.05 rad off": {"truth.vehicle.array.phase_rad": phase_rad + 0.05},
-        "odometer noise x 3": {
-            "truth.vehicle.odometer.noise_m_per_sqrt_m": 3.0 * odometer["noise_m_per_sqrt_m"]
-        },
-        "odometer scale x 3": {
-            "truth.vehicle.odometer.scale": odometer["scale"] + 3.0 * odometer["scale_std"]
-        },
-        "odometer slips 2 %": {
-            "faults": [whole_drive({"kind": "odometer-slip", "ratio": 1.02})],
-        },
-        "all heads 2 m off": moved(len(heads)),
-        "two heads 2 m off": moved(2),
-        "one head hidden": hidden(1),
-        "three heads hidden": hidden(min(3, len(heads))),
-    }
-    return {name: case for name, case in cases.items() if case or name == "none"}
-
-
 def channels(names: Sequence[str]) -> dict[str, Overrides]:
     """Channels by name: ``as set``, ``K=dB`` for a true Rician K, or a model.
 
@@ -199,7 +140,8 @@ def drive(
     runs, seed
         Drives of each case, and their seed.
     only
-        Names of mismatches; all of :func:`mismatches` when ``None``.
+        Names out of :func:`~access_av.hypotheses.mismatches`, all of which are driven when
+        ``None``, and :func:`~access_av.hypotheses.hypotheses`.
     channel_names
         See :func:`channels`.
     heads
@@ -235,7 +177,8 @@ def drive(
         scenario = _core.Scenario.load(scenario)
     if json.loads(scenario.vehicle.to_json()).get("integrity") is None:
         scenario = scenario.with_overrides({"vehicle.integrity": {}})
-    known = mismatches(scenario)
+    usual = mismatches(scenario)
+    known = {**usual, **hypotheses(scenario)}
     for name in only or ():
         if name not in known:
             raise InputError(f"mismatch {name!r}: there are {', '.join(known)}")
@@ -251,7 +194,7 @@ def drive(
             risk,
             scenario.with_overrides({**over, **known[mismatch], **set_}),
         )
-        for mismatch in only or known
+        for mismatch in only or usual
         for channel, over in channels(channel_names).items()
         for count in heads or (len(cells),)
         for risk in risks_per_hour or (_settings(scenario)["risk_per_hour"],)

@@ -37,6 +37,9 @@ def integrity(
     mismatch: Annotated[
         list[str] | None, typer.Option(help="Only this one; may be repeated. Else all.")
     ] = None,
+    hypotheses: Annotated[
+        bool, typer.Option("--hypotheses", help="What may be wrong at a site, at three sizes.")
+    ] = False,
     channel: Annotated[
         list[str] | None,
         typer.Option(help="'as set', K=5 (a true Rician K of 5 dB), umi, inf-sl ...; repeat it."),
@@ -62,13 +65,17 @@ def integrity(
     import polars as pl
 
     from access_av import integrity_campaign
+    from access_av._core import Scenario
     from access_av.campaign import Campaign, Shard, executor
     from access_av.files import ResultsDirectory, json_text
+    from access_av.hypotheses import hypotheses as sized
     from access_av.parts import Parts
     from access_av.report.integrity import render_integrity
 
     directory = ResultsDirectory.create("integrity", out)
     share = Shard.parse(shard)
+    if hypotheses:
+        mismatch = [*(mismatch or ()), *sized(Scenario.load(scenario))]
     with progress("Driving") as tick, executor(dask, threads) as (pool, workers):
         cases = integrity_campaign.drive(
             Campaign(Parts(directory.path / "parts"), pool, workers, share),
