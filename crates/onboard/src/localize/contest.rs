@@ -3,6 +3,7 @@
 use super::initialise::Initialiser;
 use super::measurement::AngleMeasurement;
 use super::tracker::Tracker;
+use crate::clone_in_place::clone_in_place;
 use crate::radio_head::RadioHead;
 
 /// Log-likelihood by which a place must foretell the angles better than another: a sequential test (Wald
@@ -12,12 +13,15 @@ const BETTER: f64 = 15.0;
 /// Way to be driven before a find is believed (m): who stands hears the same errors again and again.
 const LEAST_WAY_M: f64 = 0.5;
 
+/// After this time with angles and without a find it has listened for long (s).
+const PATIENCE_S: f64 = 20.0;
+
 /// Looks at one radio head within this time share their errors, and who has not heard anything for so
 /// long does not listen (s).
 const LOOK_S: f64 = 1.0;
 
 /// A search, and how the tracker does meanwhile.
-#[derive(Clone, Debug)]
+#[derive(Debug)]
 pub struct Contest {
     pub initialiser: Initialiser,
     pub is_wide: bool,
@@ -39,6 +43,21 @@ pub struct Contest {
     looks: u32,
     looked_s: Vec<f64>,
 }
+
+clone_in_place!(Contest {
+    initialiser,
+    is_wide,
+    told_s,
+    speaks_alone,
+    own,
+    since_m,
+    way_m,
+    heard_s,
+    listened_s,
+    angles,
+    looks,
+    looked_s
+});
 
 impl Contest {
     /// A search that begins now.
@@ -64,7 +83,7 @@ impl Contest {
     pub fn update(&mut self, tracker: &Tracker, head: &RadioHead, measured: &AngleMeasurement) {
         self.way_m = tracker.driven_m() - self.since_m;
         let silence_s = measured.time_s - self.heard_s;
-        if silence_s < LOOK_S && !self.is_silent() {
+        if silence_s < LOOK_S {
             self.listened_s += silence_s.max(0.0);
         }
         self.heard_s = measured.time_s;
@@ -112,8 +131,13 @@ impl Contest {
         self.way_m >= LEAST_WAY_M
     }
 
-    /// For how long it has listened, since it was told of (s).
-    pub const fn listened_s(&self) -> f64 {
-        self.listened_s
+    /// Tells of it from the newest odometry on, and begins to be patient anew.
+    pub const fn tell(&mut self, odometry_s: f64) {
+        (self.told_s, self.listened_s) = (Some(odometry_s), 0.0);
+    }
+
+    /// Whether it has listened for long.
+    pub fn is_patient(&self) -> bool {
+        self.listened_s > PATIENCE_S
     }
 }

@@ -4,7 +4,7 @@
 //! do not, the position is declared unavailable, and a search runs beside the tracker: about where it
 //! believes to be first, then wherever radio heads are, or along all of the road where there is one.
 //! A place in the plane that was given is a hypothesis like others: from the first angle on a search
-//! about it runs silently, until it has found the same place or speaks against it.
+//! about it runs silently, until it has found the same place, has listened for long, or speaks against it.
 //! What the search finds takes over only if it foretells the same angles better than the tracker
 //! did: a restart that would be worse than what it replaces never happens. Meanwhile the covariance
 //! covers both; where the tracker is refuted, a search nearby speaks alone.
@@ -35,9 +35,6 @@ const NEARBY_M: f64 = 2.0;
 
 /// Most of three deviations that count as nearby (m).
 const MOST_NEARBY_M: f64 = 10.0;
-
-/// After this time with angles and without a find the search goes wide (s).
-const PATIENCE_S: f64 = 20.0;
 
 /// After a find that was no better than the tracker nothing is searched for, so long (s).
 const REST_S: f64 = 10.0;
@@ -126,7 +123,7 @@ impl Recovery {
         let is_ahead = contest.is_ahead();
         let odometry_s = self.tracked.tracker().time_s();
         if contest.is_silent() && (is_ahead && contest.has_moved() || self.watch.is_lost()) {
-            contest.told_s = Some(odometry_s);
+            contest.tell(odometry_s);
         }
         if contest.told_s == Some(odometry_s) {
             return; // before anything moves the covariance covers both
@@ -138,16 +135,17 @@ impl Recovery {
         if is_ahead && !contest.has_moved() {
             return;
         }
+        let is_over = is_sure || (contest.is_silent() && contest.is_patient());
         if is_ahead && let Some(found) = contest.initialiser.found() {
             self.take(found, now_s);
-        } else if is_sure || (!is_ahead && contest.initialiser.found().is_some()) {
+        } else if is_over || (!is_ahead && contest.initialiser.found().is_some()) {
             // What is found elsewhere, if anything, is no better.
             if !contest.is_silent() {
                 self.rests_until_s = now_s + REST_S;
                 self.watch.reset();
             }
             self.contest = None;
-        } else if !contest.is_wide && contest.listened_s() > PATIENCE_S {
+        } else if !contest.is_wide && contest.is_patient() {
             self.contest = self.begin(now_s, true);
         }
     }
