@@ -3,10 +3,9 @@
 //! Beside the tracker that uses every radio head there run trackers that do without some of them
 //! ([`Bank`]). If one radio head is at fault, the tracker without it is right within its own
 //! covariance, wherever the full solution may be: the protection level is the radius about the full
-//! solution that holds for each of them (solution separation, Brown and McBurney 1988, with the
-//! separation as it is and not its threshold), with the share of the risk that the fault's
-//! probability leaves it. The same of the tracker that does not trust the odometer
-//! ([`Slip`](super::slip::Slip)), where it is suspected. All of it is of angles as noisy as
+//! solution that holds for all of them together, each as probable as its fault
+//! ([`LevelEquation`](super::level::LevelEquation)). The same of the tracker that does not trust the
+//! odometer ([`Slip`](super::slip::Slip)), where it is suspected. All of it is of angles as noisy as
 //! they are heard to be ([`AngleNoise`](super::angle_noise::AngleNoise)).
 //!
 //! A single radio head has no witness but odometry and road: the protection level then is what
@@ -15,12 +14,11 @@
 
 use super::bank::Bank;
 use super::config::IntegrityConfig;
-use super::separation::SeparatedRadius;
+use super::level::{Hypothesis, LevelEquation, Levels};
 use crate::clone_in_place::clone_in_place;
 use crate::localize::integrity_state::{Integrity, IntegrityState};
 use crate::localize::measurement::{AngleMeasurement, UpdateVerdict};
 use crate::localize::pose_estimate::PoseEstimate;
-use crate::localize::quantile::RadialQuantile;
 use crate::localize::tracker::{OdometryVerdict, Tracker};
 use crate::observation::OdometrySample;
 use crate::radio_head::RadioHead;
@@ -29,8 +27,7 @@ use crate::radio_head::RadioHead;
 #[derive(Debug)]
 pub struct Guard {
     config: IntegrityConfig,
-    nominal: RadialQuantile,
-    under_fault: SeparatedRadius,
+    level: LevelEquation,
     bank: Bank,
     restarted: Option<Restarted>,
     /// Distance driven (m) when the sources could be told apart last.
@@ -47,8 +44,7 @@ struct Restarted {
 
 clone_in_place!(Guard {
     config,
-    nominal,
-    under_fault,
+    level,
     bank,
     restarted,
     trusted_m,
@@ -68,8 +64,7 @@ impl Guard {
     ) -> Self {
         let found_s = found_s.unwrap_or(f64::NEG_INFINITY);
         Self {
-            nominal: RadialQuantile::new(config.risk),
-            under_fault: SeparatedRadius::new(config.risk_under_fault()),
+            level: LevelEquation::new(config.risk),
             trusted_m: tracker.driven_m(),
             bank: Bank::new(tracker, heads, found_s),
             restarted: None,
@@ -130,7 +125,7 @@ impl Guard {
         } else if aged && restarted.bank.is_lost(&self.config) {
             self.restart();
         } else if restarted.bank.quiet_s(now_s) > patience_s
-            && self.protection_level_m(&restarted.bank, now_s) <= self.config.alert_limit_m
+            && self.levels(&restarted.bank, now_s).horizontal_m <= self.config.alert_limit_m
             && let Some(restarted) = self.restarted.take()
         {
             self.bank = restarted.bank;
@@ -163,44 +158,41 @@ impl Guard {
 
     /// Protection level and state at `time_s`.
     pub fn integrity(&self, time_s: f64) -> Integrity {
-        let protection_level_m = self.protection_level_m(&self.bank, time_s);
+        let levels = self.levels(&self.bank, time_s);
         let state = if self.bank.is_outvoted(&self.config) {
             IntegrityState::Unavailable
         } else if self.restarted.is_some()
             || self.bank.quiet_s(self.now_s) <= self.config.recovery_s
-            || protection_level_m > self.config.alert_limit_m
+            || levels.horizontal_m > self.config.alert_limit_m
         {
             IntegrityState::Degraded
         } else {
             IntegrityState::Ok
         };
         Integrity {
-            protection_level_m,
+            protection_level_m: levels.horizontal_m,
+            protection_level_along_m: levels.along_m,
+            protection_level_across_m: levels.across_m,
             state,
             faulty: self.bank.faulty(),
         }
     }
 
-    /// The radius that the error leaves with the stated risk, whether no source is at fault or any
-    /// one of those in use, the odometer among them where it is suspected.
-    fn protection_level_m(&self, bank: &Bank, time_s: f64) -> f64 {
-        let main = bank.main().pose(time_s);
+    /// What the error leaves with the stated risk, whether no source is at fault or any one of those
+    /// in use, the odometer among them where it is suspected.
+    fn levels(&self, bank: &Bank, time_s: f64) -> Levels {
+        let told = bank.main().pose(time_s);
         let noise_ratio = bank.noise_ratio();
-        let variances = main.principal_variances().map(|it| noise_ratio * it);
-        let mut level_m = self.nominal.radius(variances);
-        let slip = (bank.slip().is_suspected(&self.config)).then(|| bank.slip().tracker());
-        for without in bank.without_one().chain(slip) {
-            let clean = without.pose(time_s);
-            let Some([[xx, xy, _], [_, yy, _], _]) = clean.covariance else {
-                continue;
-            };
-            let separation_m = [
-                clean.pose.x_m - main.pose.x_m,
-                clean.pose.y_m - main.pose.y_m,
-            ];
-            let covariance = [[xx, xy], [xy, yy]].map(|row| row.map(|it| noise_ratio * it));
-            level_m = (self.under_fault).radius(separation_m, covariance, level_m);
-        }
-        level_m
+        let probability = &self.config.fault_probability;
+        let heads = (bank.without_one()).map(|clean| (probability.radio_head, clean));
+        let slip = (bank.slip().is_suspected(&self.config))
+            .then(|| (probability.odometer, bank.slip().tracker()));
+        let hypotheses = (std::iter::once((1.0, bank.main())))
+            .chain(heads)
+            .chain(slip)
+            .filter_map(|(probability, clean)| {
+                Hypothesis::new(probability, &clean.pose(time_s), noise_ratio, &told)
+            });
+        self.level.solve(hypotheses)
     }
 }
