@@ -3,7 +3,7 @@
 use crate::settings::IntegritySettings;
 
 /// However rare a fault is, under it the error is within the level more often than not.
-const MOST_CONDITIONAL: f64 = 0.49;
+pub const MOST_CONDITIONAL: f64 = 0.49;
 
 /// What the guard is to promise.
 #[derive(Clone, Copy, Debug, PartialEq)]

@@ -14,7 +14,7 @@
 //! are good.
 
 use super::bank::Bank;
-use super::config::IntegrityConfig;
+use super::config::{IntegrityConfig, MOST_CONDITIONAL};
 use super::separation::SeparatedRadius;
 use crate::clone_in_place::clone_in_place;
 use crate::localize::integrity_state::{Integrity, IntegrityState};
@@ -81,6 +81,25 @@ impl Guard {
     /// The tracker that uses every sound source.
     pub const fn tracker(&self) -> &Tracker {
         self.bank.main()
+    }
+
+    /// The tracker by whose uncertainty to listen: that of every sound source, unless slip, which
+    /// nothing speaks against yet, takes the level beyond the alert limit.
+    pub fn doubtful(&self) -> &Tracker {
+        let (bank, now_s) = (&self.bank, self.tracker().time_s());
+        let slips = self.risk_of_slipping(bank).is_some()
+            && self.protection_level_m(bank, now_s) > self.config.alert_limit_m;
+        if slips {
+            bank.slip().tracker()
+        } else {
+            bank.main()
+        }
+    }
+
+    /// The risk that the level leaves if the odometer slips, unless slip is as rare as that.
+    fn risk_of_slipping(&self, bank: &Bank) -> Option<f64> {
+        let risk = self.config.risk / bank.slip().probability();
+        (risk < 1.0).then_some(risk)
     }
 
     /// How much more the angles vary than stated.
@@ -188,9 +207,11 @@ impl Guard {
         let noise_ratio = bank.noise_ratio();
         let variances = main.principal_variances().map(|it| noise_ratio * it);
         let mut level_m = self.nominal.radius(variances);
-        let slip = (bank.slip().is_suspected(&self.config)).then(|| bank.slip().tracker());
-        for without in bank.without_one().chain(slip) {
-            let clean = without.pose(time_s);
+        let if_faulty = self.config.risk_under_fault();
+        let without_one = bank.without_one().map(|tracker| (tracker, if_faulty));
+        let slip = (self.risk_of_slipping(bank)).map(|risk| (bank.slip().tracker(), risk));
+        for (other, risk) in without_one.chain(slip) {
+            let clean = other.pose(time_s);
             let Some([[xx, xy, _], [_, yy, _], _]) = clean.covariance else {
                 continue;
             };
@@ -199,7 +220,8 @@ impl Guard {
                 clean.pose.y_m - main.pose.y_m,
             ];
             let covariance = [[xx, xy], [xy, yy]].map(|row| row.map(|it| noise_ratio * it));
-            level_m = (self.under_fault).radius(separation_m, covariance, level_m);
+            let risk = risk.clamp(if_faulty, MOST_CONDITIONAL);
+            level_m = (self.under_fault).radius(risk, separation_m, covariance, level_m);
         }
         level_m
     }

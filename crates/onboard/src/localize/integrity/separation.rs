@@ -18,30 +18,29 @@ const ACCURACY: f64 = 2e-3;
 /// the other estimate, as is usual, is an upper limit of it.
 #[derive(Clone, Debug)]
 pub struct SeparatedRadius {
-    risk: f64,
     about_itself: RadialQuantile,
     directions: [[f64; 2]; DIRECTIONS],
 }
 
 impl SeparatedRadius {
-    /// The radius for a risk in (0, 0.5).
-    pub fn new(risk: f64) -> Self {
+    /// The radius for risks from one in (0, 0.5) on.
+    pub fn new(least_risk: f64) -> Self {
         let mut directions = [[0.0; 2]; DIRECTIONS];
         for (number, direction) in directions.iter_mut().enumerate() {
             let (sin, cos) = (TAU * number as f64 / DIRECTIONS as f64).sin_cos();
             *direction = [cos, sin];
         }
         Self {
-            risk,
-            about_itself: RadialQuantile::new(risk),
+            about_itself: RadialQuantile::new(least_risk),
             directions,
         }
     }
 
-    /// The radius for a place of covariance `[[xx, xy], [xy, yy]]` (m²) about a point
+    /// The radius at a risk below 0.5 for a place of covariance `[[xx, xy], [xy, yy]]` (m²) about a point
     /// `separation_m` off, or `least_m` where that is larger.
     pub fn radius(
         &self,
+        risk: f64,
         separation_m: [f64; 2],
         [[xx, xy], [_, yy]]: [[f64; 2]; 2],
         least_m: f64,
@@ -49,13 +48,13 @@ impl SeparatedRadius {
         let distance_m = separation_m[0].hypot(separation_m[1]);
         let about_itself_m = (self.about_itself).radius(principal_variances(xx, xy, yy));
         // A circle holds less of a Gaussian the further its centre is off (Anderson 1955).
-        let mut low = distance_m.max(about_itself_m).max(least_m);
+        let mut low = distance_m.max(least_m);
         let mut high = distance_m + about_itself_m;
         if high <= low {
             return low;
         }
         let place = Place::new(separation_m, xx, xy, yy);
-        let excess = |radius_m| (self.exceedance(&place, radius_m) / self.risk).ln();
+        let excess = |radius_m| (self.exceedance(&place, radius_m) / risk).ln();
         let mut at_low = excess(low);
         if at_low <= 0.0 {
             return low;
@@ -131,8 +130,12 @@ mod tests {
         for risk in [1e-2, 1e-3] {
             for small in [0.0, 0.04, 0.3, 1.0] {
                 let radius = RadialQuantile::new(risk).radius([1.0, small]);
-                let separated =
-                    SeparatedRadius::new(risk).radius([1e-6, 0.0], [[1.0, 0.0], [0.0, small]], 0.0);
+                let separated = SeparatedRadius::new(risk).radius(
+                    risk,
+                    [1e-6, 0.0],
+                    [[1.0, 0.0], [0.0, small]],
+                    0.0,
+                );
                 assert!(
                     (separated / radius - 1.0).abs() < 0.01,
                     "{small} {separated} {radius}"
@@ -145,7 +148,7 @@ mod tests {
     fn far_apart_on_a_line_it_is_the_one_sided_quantile() {
         // Φ⁻¹(0.99) = 2.326.
         let radius =
-            SeparatedRadius::new(1e-2).radius([3.0, 4.0], [[0.36, 0.48], [0.48, 0.64]], 0.0);
+            SeparatedRadius::new(1e-3).radius(1e-2, [3.0, 4.0], [[0.36, 0.48], [0.48, 0.64]], 0.0);
         assert!((radius / 7.326 - 1.0).abs() < 0.005, "{radius}");
     }
 
@@ -159,7 +162,7 @@ mod tests {
             ([0.0, 1.5], [[1.0, -0.3], [-0.3, 0.1]]),
             ([0.05, 0.0], [[0.01, 0.0], [0.0, 4e-4]]),
         ] {
-            let radius = SeparatedRadius::new(1e-2).radius(separation, covariance, 0.0);
+            let radius = SeparatedRadius::new(1e-3).radius(1e-2, separation, covariance, 0.0);
             let [[xx, xy], [_, yy]] = covariance;
             let root = Place::new(separation, xx, xy, yy).root;
             let beyond = (0..draws)
@@ -179,7 +182,7 @@ mod tests {
     #[test]
     fn exact_knowledge_needs_only_the_separation() {
         let radius = |separation_m, least_m| {
-            SeparatedRadius::new(1e-2).radius(separation_m, [[0.0; 2]; 2], least_m)
+            SeparatedRadius::new(1e-2).radius(1e-2, separation_m, [[0.0; 2]; 2], least_m)
         };
         assert_eq!(radius([0.0, 0.0], 0.0), 0.0);
         assert_eq!(radius([0.3, 0.4], 0.7), 0.7);
