@@ -12,7 +12,8 @@ import pytest
 
 from access_av import InputError, Scenario, bound, columns, plan, service_levels, simulate
 from access_av.campaign import Campaign
-from access_av.integrity_campaign import drive, mismatches
+from access_av.hypotheses import SIZES, hypotheses, mismatches
+from access_av.integrity_campaign import drive
 from access_av.next_level import next_level
 from access_av.parts import Parts
 
@@ -176,6 +177,54 @@ def test_an_integrity_campaign_goes_on_where_it_stopped(
 
     monkeypatch.setattr("access_av.integrity_campaign.driven", driven_again)
     assert json.loads(access_av(*arguments).out)["cases"] == record["cases"]
+
+
+def test_hypotheses_are_of_three_sizes_and_can_be_driven(tmp_path: Path) -> None:
+    for name in ("yard-surveyed", "paper", "campus-handover"):
+        scenario = Scenario.load(name)
+        found = hypotheses(scenario)
+        truths = {scenario.with_overrides(case).to_toml() for case in found.values()}
+        assert len(truths) == len(found), "each is another world"
+        kinds = {key.rpartition(" x ")[0] for key in found} - {""}
+        assert {f"{kind} x {size}" for kind in kinds for size in SIZES} <= found.keys()
+    sized = [hypotheses(SHORT)[f"head height x {size}"] for size in SIZES]
+    heights = [next(iter(it["truth.site.radio_heads"].values()))["position_m"][2] for it in sized]
+    assert heights == pytest.approx([0.1, 0.3, 1.0])
+    chosen = ["two cells swapped", "map shape x 10", "growing slip x 10", "phase drift x 10"]
+    cases = drive(Campaign(Parts(tmp_path)), SHORT, runs=1, only=chosen)
+    assert cases is not None
+    assert [case.mismatch for case in cases] == chosen
+
+
+def test_the_level_grows_as_less_risk_is_asked(tmp_path: Path) -> None:
+    cases = drive(
+        Campaign(Parts(tmp_path)), SHORT, runs=2, only=["none"], risks_per_hour=[0.3, 1e-2, 1e-4]
+    )
+    assert cases is not None
+    levels = [float(case.trajectories["protection_level_m"].median()) for case in cases]
+    assert levels == sorted(levels)
+    assert levels[2] > 1.3 * levels[0]
+    # Quantiles of a Gaussian grow as the root of the logarithm.
+    assert levels[2] < 2.0 * levels[0]
+
+
+@pytest.mark.parametrize(
+    ("key", "value", "told"),
+    [
+        ("risk_per_hour", "1e-5", "below integrity.risk_per_hour"),
+        ("fault_probability.array", "0.4", "below integrity.risk_per_hour"),
+        ("fault_probability.radio_head", "0.3", "add up to 1 at most"),
+        ("fault_probability.gate", "0.1", "all_radio_heads"),
+        ("risk_per_hour", "0", "between 0.000000001 and 1"),
+    ],
+)
+def test_faults_that_the_risk_cannot_bear_are_refused(
+    access_av: Callable[..., Finished], key: str, value: str, told: str
+) -> None:
+    done = access_av("run", "yard", "--runs", "1", "--set", f"vehicle.integrity.{key}={value}")
+    assert done.code == 2
+    assert "integrity" in done.err
+    assert told in done.err
 
 
 def test_every_mismatch_can_be_driven(tmp_path: Path) -> None:

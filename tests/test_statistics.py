@@ -12,10 +12,12 @@ from access_av.statistics import (
     Alarms,
     Consistency,
     Integrity,
+    ObtainedRisk,
     beta_quantile,
     bootstrap_interval,
     chi_squared_quantile,
     clopper_pearson,
+    exceedance,
     mean_nees,
     nees,
     nees_band,
@@ -309,3 +311,49 @@ def test_alarms_by_hand() -> None:
     assert (twice.alarms, twice.excursions, twice.longest_silence_s) == (6, 4, 3.0)
     assert twice.per_hour(twice.early) == pytest.approx(450.0)
     assert Alarms.of(guarded((1.0, None, None)), alert_limit_m=1.5) is None
+
+
+@pytest.mark.parametrize("shape", [0.0, 0.15, 0.3])
+def test_peaks_over_a_threshold_find_known_tails(shape: float) -> None:
+    """Of 20 samples of 5000 the estimate is right on average, far beyond what can be counted."""
+    rng = np.random.default_rng(3)
+    truth = 1e-6
+    exponential = rng.exponential(size=(20, 5000))
+    grown = (lambda x: np.expm1(shape * x) / shape) if shape else (lambda x: x)
+    level = float(grown(-np.log(truth)))
+    found = [exceedance(sample, level) for sample in grown(exponential)]
+    # One sample knows it within a factor of about ten (500 peaks: ξ ± 0.05 over ln 1e5).
+    assert 0.2 < np.median(found) / truth < 5.0
+    assert max(found) < 1000.0 * truth
+
+
+def test_peaks_over_a_threshold_are_counted_where_they_can_be() -> None:
+    values = np.arange(1000) / 1000.0
+    assert exceedance(values, 0.5) == pytest.approx(0.499)
+    assert exceedance(np.zeros(1000), 0.5) == 0.0
+    assert exceedance([], 0.5) == 0.0
+
+
+def test_obtained_risk_is_that_of_a_gaussian() -> None:
+    rng = np.random.default_rng(5)
+    runs, blocks = 60, 40
+    # Two epochs in a block, the second with the error of the first: one independent error each.
+    error = np.repeat(rng.standard_normal(runs * blocks), 2)
+    steps = pl.DataFrame(
+        {
+            "run": np.repeat(np.arange(runs), 2 * blocks),
+            "time_s": np.tile(np.arange(2 * blocks) * 5.0, runs),
+            "error_x_m": error,
+            "error_y_m": np.zeros(len(error)),
+            "protection_level_m": np.full(len(error), 4.5),
+            "integrity": ["ok"] * len(error),
+        }
+    )
+    found = ObtainedRisk.of(steps, 10.0)
+    assert found is not None
+    asked = 360.0 * math.erfc(4.5 / math.sqrt(2.0))
+    low, high = found.interval
+    assert low < asked < high
+    assert high < 100.0 * asked
+    # A level that is never vouched for is not held to anything.
+    assert ObtainedRisk.of(steps.with_columns(integrity=pl.lit("degraded")), 10.0) is None

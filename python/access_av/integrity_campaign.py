@@ -12,9 +12,11 @@ import polars as pl
 from access_av import _core
 from access_av.campaign import Task
 from access_av.errors import InputError
+from access_av.hypotheses import Overrides, hypotheses, mismatches
 from access_av.simulation import Simulation
 from access_av.statistics.alarms import Alarms
 from access_av.statistics.consistency import horizontal_error_m
+from access_av.statistics.extremes import ObtainedRisk
 from access_av.statistics.integrity import STATES, Integrity
 
 if TYPE_CHECKING:
@@ -23,8 +25,6 @@ if TYPE_CHECKING:
     from numpy.typing import NDArray
 
     from access_av.campaign import Campaign
-
-Overrides = dict[str, Any]
 
 # Drives of a part: what is lost when a campaign is stopped.
 PART_RUNS = 5
@@ -36,9 +36,9 @@ class Case:
 
     Attributes
     ----------
-    mismatch, channel, heads
-        How the world departs from what is believed, the channel, and how many radio heads are
-        listened to.
+    mismatch, channel, heads, asked_risk_per_hour
+        How the world departs from what is believed, the channel, how many radio heads are listened
+        to, and the risk that the level is to leave.
     scenario
         All of it.
     trajectories
@@ -48,14 +48,14 @@ class Case:
     mismatch: str
     channel: str
     heads: int
+    asked_risk_per_hour: float
     scenario: _core.Scenario
     trajectories: pl.DataFrame
 
     @property
     def alert_limit_m(self) -> float:
         """The guard's alert limit."""
-        vehicle = json.loads(self.scenario.vehicle.to_json())
-        return float(vehicle["integrity"]["alert_limit_m"])
+        return float(_settings(self.scenario)["alert_limit_m"])
 
     def as_record(self) -> dict[str, Any]:
         """A row of the table; columns ``integrity_cases`` of :mod:`access_av.columns`."""
@@ -64,6 +64,7 @@ class Case:
         if found is None or alarms is None:
             raise InputError(f"{self.scenario.name}: no step has a protection level")
         error_m = self.trajectories["error_x_m"].abs()
+        risk = ObtainedRisk.of(self.trajectories, _settings(self.scenario)["error_correlation_s"])
         return {
             "mismatch": self.mismatch,
             "channel": self.channel,
@@ -78,67 +79,19 @@ class Case:
             "runs_with_exceedances": found.runs_with_exceedances,
             "time_to_alert_s": alarms.longest_silence_s,
             "level_over_error": found.median_level_over_error,
+            "asked_risk_per_hour": self.asked_risk_per_hour,
+            "risk_per_hour": risk and risk.per_hour,
+            "risk_per_hour_low": risk and risk.interval[0],
+            "risk_per_hour_high": risk and risk.interval[1],
             "p90_error_m": error_m.quantile(0.9, "linear"),
             "max_error_m": error_m.max(),
         }
 
 
-def mismatches(scenario: _core.Scenario) -> dict[str, Overrides]:
-    """What can be otherwise than believed, by name: overrides of the scenario.
-
-    Every other quantity is drawn from its stated standard deviation.
-
-    Examples
-    --------
-    >>> found = mismatches(_core.Scenario.load("yard"))
-    >>> found["array 1 degree off"]
-    {'truth.vehicle.array.mounting_rad': 0.0175}
-    """
-    site = json.loads(scenario.site.to_json())
-    vehicle = json.loads(scenario.vehicle.to_json())
-    heads, odometer = site["radio_heads"], vehicle["odometer"]
-
-    def moved(count: int) -> Overrides:
-        names = [head["name"] for head in heads[:count]]
-        if not all(names) or len(set(names)) < len(names):
-            return {}
-        places = (np.add(head["position_m"], [2.0, 0.0, 0.0]) for head in heads)
-        return {
-            "truth.site.radio_heads": {
-                name: {"position_m": place.tolist()}
-                for name, place in zip(names, places, strict=False)
-            }
-        }
-
-    def whole_drive(what: Overrides) -> Overrides:
-        return {"from_s": 20.0, "until_s": 1e6, "what": what}
-
-    def hidden(count: int) -> Overrides:
-        what = {"kind": "non-line-of-sight", "bias_rad": 0.15}
-        return {
-            "faults": [whole_drive({**what, "radio_head": head}) for head in range(count)],
-        }
-
-    mounting_rad, phase_rad = vehicle["array"]["mounting_rad"], vehicle["array"]["phase_rad"]
-    cases = {
-        "none": {},
-        "array 1 degree off": {"truth.vehicle.array.mounting_rad": mounting_rad + 0.0175},
-        "phases 0.05 rad off": {"truth.vehicle.array.phase_rad": phase_rad + 0.05},
-        "odometer noise x 3": {
-            "truth.vehicle.odometer.noise_m_per_sqrt_m": 3.0 * odometer["noise_m_per_sqrt_m"]
-        },
-        "odometer scale x 3": {
-            "truth.vehicle.odometer.scale": odometer["scale"] + 3.0 * odometer["scale_std"]
-        },
-        "odometer slips 2 %": {
-            "faults": [whole_drive({"kind": "odometer-slip", "ratio": 1.02})],
-        },
-        "all heads 2 m off": moved(len(heads)),
-        "two heads 2 m off": moved(2),
-        "one head hidden": hidden(1),
-        "three heads hidden": hidden(min(3, len(heads))),
-    }
-    return {name: case for name, case in cases.items() if case or name == "none"}
+def _settings(scenario: _core.Scenario) -> dict[str, Any]:
+    """``[integrity]`` of its vehicle."""
+    found: dict[str, Any] = json.loads(scenario.vehicle.to_json())["integrity"]
+    return found
 
 
 def channels(names: Sequence[str]) -> dict[str, Overrides]:
@@ -173,6 +126,7 @@ def drive(
     only: Sequence[str] | None = None,
     channel_names: Sequence[str] = ("as set",),
     heads: Sequence[int] | None = None,
+    risks_per_hour: Sequence[float] | None = None,
     progress: Callable[[int, int], None] | None = None,
 ) -> list[Case] | None:
     """Drive a guarded scenario under every mismatch, channel and number of radio heads.
@@ -186,19 +140,22 @@ def drive(
     runs, seed
         Drives of each case, and their seed.
     only
-        Names of mismatches; all of :func:`mismatches` when ``None``.
+        Names out of :func:`~access_av.hypotheses.mismatches`, all of which are driven when
+        ``None``, and :func:`~access_av.hypotheses.hypotheses`.
     channel_names
         See :func:`channels`.
     heads
         Numbers of radio heads listened to, the first of the site; all of them when ``None``.
+    risks_per_hour
+        Target integrity risks; the vehicle's own when ``None``.
     progress
         Called as ``progress(done, total)``.
 
     Returns
     -------
     list of Case
-        In the order mismatch, channel, heads; ``None`` where parts are missing that another shard
-        computes.
+        In the order mismatch, channel, heads, risk; ``None`` where parts are missing that another
+        shard computes.
 
     Raises
     ------
@@ -220,7 +177,8 @@ def drive(
         scenario = _core.Scenario.load(scenario)
     if json.loads(scenario.vehicle.to_json()).get("integrity") is None:
         scenario = scenario.with_overrides({"vehicle.integrity": {}})
-    known = mismatches(scenario)
+    usual = mismatches(scenario)
+    known = {**usual, **hypotheses(scenario)}
     for name in only or ():
         if name not in known:
             raise InputError(f"mismatch {name!r}: there are {', '.join(known)}")
@@ -229,11 +187,23 @@ def drive(
         if not 1 <= count <= len(cells):
             raise InputError(f"{count} radio heads: the site has {len(cells)}")
     grid = [
-        (mismatch, channel, count, scenario.with_overrides({**over, **known[mismatch], **listens}))
-        for mismatch in only or known
+        (
+            mismatch,
+            channel,
+            count,
+            risk,
+            scenario.with_overrides({**over, **known[mismatch], **set_}),
+        )
+        for mismatch in only or usual
         for channel, over in channels(channel_names).items()
         for count in heads or (len(cells),)
-        for listens in ({"vehicle.receiver.pci_allow_list": cells[:count]},)
+        for risk in risks_per_hour or (_settings(scenario)["risk_per_hour"],)
+        for set_ in (
+            {
+                "vehicle.receiver.pci_allow_list": cells[:count],
+                "vehicle.integrity.risk_per_hour": risk,
+            },
+        )
     ]
     tasks = [
         Task(

@@ -10,7 +10,7 @@ use ::simulate::{
 };
 use numpy::{Element, PyArray1, PyArray3, PyArrayMethods};
 use onboard::geometry::Pose;
-use onboard::localize::AngleMeasurement;
+use onboard::localize::{AngleMeasurement, Integrity};
 use onboard::settings::EstimatorMethod;
 use onboard::{BoxError, Custom, Execution};
 use pyo3::exceptions::{PyRuntimeError, PyValueError};
@@ -357,7 +357,7 @@ fn trajectories(py: Python<'_>, records: &[RunRecord]) -> PyResult<Py<PyDict>> {
         .iter()
         .flat_map(|record| record.steps.iter().map(|_| record.run));
     table.set_item("run", column(py, runs, |run| run))?;
-    let columns: [Column<Step>; 17] = [
+    let columns: [Column<Step>; 19] = [
         ("time_s", |step| step.time_s),
         ("x_m", |step| step.estimate.x_m),
         ("y_m", |step| step.estimate.y_m),
@@ -375,8 +375,13 @@ fn trajectories(py: Python<'_>, records: &[RunRecord]) -> PyResult<Py<PyDict>> {
         ("covariance_x_heading_m_rad", |step| covariance(step, 0, 2)),
         ("covariance_y_heading_m_rad", |step| covariance(step, 1, 2)),
         ("protection_level_m", |step| {
-            step.integrity
-                .map_or(f64::NAN, |integrity| integrity.protection_level_m)
+            level(step, |it| it.protection_level_m)
+        }),
+        ("protection_level_along_m", |step| {
+            level(step, |it| it.protection_level_along_m)
+        }),
+        ("protection_level_across_m", |step| {
+            level(step, |it| it.protection_level_across_m)
         }),
     ];
     for (name, value) in columns {
@@ -386,6 +391,10 @@ fn trajectories(py: Python<'_>, records: &[RunRecord]) -> PyResult<Py<PyDict>> {
     let states = rows().map(|step| step.integrity.map(|integrity| integrity.state.name()));
     table.set_item("integrity", PyList::new(py, states.collect::<Vec<_>>())?)?;
     Ok(table.unbind())
+}
+
+fn level(step: &Step, which: fn(&Integrity) -> f64) -> f64 {
+    step.integrity.as_ref().map_or(f64::NAN, which)
 }
 
 fn covariance(step: &Step, row: usize, column: usize) -> f64 {

@@ -5,8 +5,8 @@ use std::path::{Path, PathBuf};
 use numpy::PyArray1;
 use onboard::Execution;
 use onboard::geometry::Pose;
-use onboard::localize::AngleMeasurement;
 use onboard::localize::tracker::Finding;
+use onboard::localize::{AngleMeasurement, Integrity};
 use onboard::settings::{Site as CoreSite, Vehicle as CoreVehicle};
 use pyo3::exceptions::PyValueError;
 use pyo3::prelude::*;
@@ -338,8 +338,8 @@ impl LocatedDrive {
     }
 
     /// One pose per odometry sample: columns `time_s`, `x_m`, `y_m`, `heading_rad`, `speed_mps`,
-    /// `covariance_xx_m2`, `covariance_xy_m2`, `covariance_yy_m2`, `covariance_heading_rad2` and
-    /// `protection_level_m`, NaN where they are not known, `integrity`: `ok`, `degraded`,
+    /// `covariance_xx_m2`, `covariance_xy_m2`, `covariance_yy_m2`, `covariance_heading_rad2`,
+    /// `protection_level_m`, `protection_level_along_m` and `protection_level_across_m`, NaN where they are not known, `integrity`: `ok`, `degraded`,
     /// `unavailable` or None, and `searching`: whether the first pose is not yet known, and this one
     /// the mean of where the vehicle may be.
     #[getter]
@@ -438,14 +438,20 @@ fn pose_columns<'py>(
     columns.set_item("covariance_xy_m2", column(|it| covariance(it, 0, 1)))?;
     columns.set_item("covariance_yy_m2", column(|it| covariance(it, 1, 1)))?;
     columns.set_item("covariance_heading_rad2", column(|it| covariance(it, 2, 2)))?;
-    columns.set_item(
-        "protection_level_m",
-        column(|it| {
-            it.estimate
-                .integrity
-                .map_or(f64::NAN, |integrity| integrity.protection_level_m)
+    let levels: [(&str, fn(&replay::LocatedPose) -> f64); 3] = [
+        ("protection_level_m", |it| {
+            level(it, |of| of.protection_level_m)
         }),
-    )?;
+        ("protection_level_along_m", |it| {
+            level(it, |of| of.protection_level_along_m)
+        }),
+        ("protection_level_across_m", |it| {
+            level(it, |of| of.protection_level_across_m)
+        }),
+    ];
+    for (name, value) in levels {
+        columns.set_item(name, column(value))?;
+    }
     let state = |it: &replay::LocatedPose| Some(it.estimate.integrity?.state.name());
     columns.set_item("integrity", poses.iter().map(state).collect::<Vec<_>>())?;
     let searching = poses.iter().map(|it| it.searching.is_some());
@@ -453,6 +459,10 @@ fn pose_columns<'py>(
     let lost = poses.iter().map(|it| it.is_lost);
     columns.set_item("lost", PyArray1::from_iter(py, lost))?;
     Ok(columns)
+}
+
+fn level(pose: &replay::LocatedPose, which: fn(&Integrity) -> f64) -> f64 {
+    pose.estimate.integrity.as_ref().map_or(f64::NAN, which)
 }
 
 fn covariance(pose: &replay::LocatedPose, row: usize, column: usize) -> f64 {

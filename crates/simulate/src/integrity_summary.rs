@@ -129,9 +129,8 @@ mod tests {
             },
             covariance: None,
             integrity: Some(Integrity {
-                protection_level_m,
                 state,
-                faulty: 0,
+                ..Integrity::unavailable(protection_level_m)
             }),
             searching: false,
             snr_db: 0.0,

@@ -69,6 +69,8 @@ _GLOSSARY = {
     "covariance_x_heading_m_rad": ("m·rad", "Covariance of x and heading, by the localizer"),
     "covariance_y_heading_m_rad": ("m·rad", "Covariance of y and heading, by the localizer"),
     "protection_level_m": ("m", "Horizontal protection level"),
+    "protection_level_along_m": ("m", "Protection level along the vehicle's heading"),
+    "protection_level_across_m": ("m", "Protection level across it"),
     "integrity": ("text", "State of integrity: ok, degraded, unavailable"),
     "nees": (
         "1",
@@ -93,6 +95,13 @@ _GLOSSARY = {
     "runs_with_exceedances": ("1", "Runs with at least one of them"),
     "time_to_alert_s": ("s", "Longest time beyond the alert limit in state ok"),
     "level_over_error": ("1", "Median of protection level by horizontal error"),
+    "asked_risk_per_hour": ("1", "Target integrity risk: `integrity.risk_per_hour` of the vehicle"),
+    "risk_per_hour": (
+        "1",
+        "How often an hour in state ok brings an error beyond the level, by peaks over a threshold",
+    ),
+    "risk_per_hour_low": ("1", "Low end of its 95 % interval, by the bootstrap over runs"),
+    "risk_per_hour_high": ("1", "High end of it"),
     # Channels.
     "line_of_sight": ("true or false", "There is a line of sight"),
     "path_loss_db": ("dB", "Path loss, without shadowing and fading"),

@@ -49,15 +49,18 @@ _COVARIANCES = (
 )  # fmt: skip
 _ANGLE = ("phase_rad", "phase_sigma_rad", "angle_rad")
 _COMPARED = ("mahalanobis_squared", "threshold")
+_RISKS = (
+    "asked_risk_per_hour", "risk_per_hour", "risk_per_hour_low", "risk_per_hour_high",
+)  # fmt: skip
+_LEVELS = ("protection_level_m", "protection_level_along_m", "protection_level_across_m")
 _POSE = ("x_m", "y_m", "heading_rad")
 _POSES = (
     "time_s", *_POSE, "speed_mps", "covariance_xx_m2", "covariance_xy_m2", "covariance_yy_m2",
-    "covariance_heading_rad2", "protection_level_m", "integrity", "searching", "lost",
+    "covariance_heading_rad2", *_LEVELS, "integrity", "searching", "lost",
 )  # fmt: skip
 _POSES_NULL = {
     **{name: _NO_COVARIANCE for name in _POSES if name.startswith("covariance")},
-    "protection_level_m": _NOT_GUARDED,
-    "integrity": _NOT_GUARDED,
+    **dict.fromkeys((*_LEVELS, "integrity"), _NOT_GUARDED),
 }
 _ENERGIES = ("energy_j", "energy_executions_j", "energy_listening_j", "energy_idle_j")
 
@@ -93,13 +96,11 @@ TABLES: Mapping[str, Table] = {
             "`trajectories.parquet` of `access-av run`; `access_av.simulate(…).trajectories`",
             (
                 "run", "time_s", *_POSE, "true_x_m", "true_y_m", "true_heading_rad", "error_x_m",
-                "error_y_m", "true_snr_db", *_COVARIANCES, "protection_level_m", "searching",
-                "integrity",
+                "error_y_m", "true_snr_db", *_COVARIANCES, *_LEVELS, "searching", "integrity",
             ),
             {
                 **dict.fromkeys(_COVARIANCES, _NO_COVARIANCE),
-                "protection_level_m": _NOT_GUARDED,
-                "integrity": _NOT_GUARDED,
+                **dict.fromkeys((*_LEVELS, "integrity"), _NOT_GUARDED),
             },
         ),
         Table(
@@ -151,7 +152,7 @@ TABLES: Mapping[str, Table] = {
             "The same as seen from the end of the drive",
             "`smoothed.parquet` of `access-av locate --smooth`; `access_av.locate(…).smoothed`",
             _POSES,
-            {**_POSES_NULL, "protection_level_m": "always", "integrity": "always"},
+            {**_POSES_NULL, **dict.fromkeys((*_LEVELS, "integrity"), "always")},
         ),
         Table(
             "angles",
@@ -208,8 +209,9 @@ TABLES: Mapping[str, Table] = {
                 "mismatch", "channel", "heads", "runs", "availability", "unavailable_share",
                 "exceedances", "exceedance_share", "exceedance_share_low",
                 "exceedance_share_high", "runs_with_exceedances", "time_to_alert_s",
-                "level_over_error", "p90_error_m", "max_error_m",
+                "level_over_error", *_RISKS, "p90_error_m", "max_error_m",
             ),
+            dict.fromkeys(_RISKS[1:], "the drives are too short for a tail"),
         ),
         Table(
             "masts",

@@ -37,12 +37,19 @@ def integrity(
     mismatch: Annotated[
         list[str] | None, typer.Option(help="Only this one; may be repeated. Else all.")
     ] = None,
+    hypotheses: Annotated[
+        bool, typer.Option("--hypotheses", help="What may be wrong at a site, at three sizes.")
+    ] = False,
     channel: Annotated[
         list[str] | None,
         typer.Option(help="'as set', K=5 (a true Rician K of 5 dB), umi, inf-sl ...; repeat it."),
     ] = None,
     heads: Annotated[
         list[int] | None, typer.Option(min=1, help="Radio heads listened to; may be repeated.")
+    ] = None,
+    risk: Annotated[
+        list[float] | None,
+        typer.Option(help="Target integrity risk per hour, not the vehicle's; may be repeated."),
     ] = None,
     shard: ShardOption = "1/1",
     dask: DaskOption = None,
@@ -58,13 +65,17 @@ def integrity(
     import polars as pl
 
     from access_av import integrity_campaign
+    from access_av._core import Scenario
     from access_av.campaign import Campaign, Shard, executor
     from access_av.files import ResultsDirectory, json_text
+    from access_av.hypotheses import hypotheses as sized
     from access_av.parts import Parts
     from access_av.report.integrity import render_integrity
 
     directory = ResultsDirectory.create("integrity", out)
     share = Shard.parse(shard)
+    if hypotheses:
+        mismatch = [*(mismatch or ()), *sized(Scenario.load(scenario))]
     with progress("Driving") as tick, executor(dask, threads) as (pool, workers):
         cases = integrity_campaign.drive(
             Campaign(Parts(directory.path / "parts"), pool, workers, share),
@@ -74,6 +85,7 @@ def integrity(
             only=mismatch,
             channel_names=channel or ("as set",),
             heads=heads,
+            risks_per_hour=risk,
             progress=tick,
         )
     if cases is None:
@@ -90,8 +102,25 @@ def integrity(
     console.print(f"Report: {directory.path / 'report.html'}", soft_wrap=True)
 
 
+def obtained_risk(one: dict[str, Any]) -> str:
+    """Obtained risk per hour, and asked."""
+    asked = f"({one['asked_risk_per_hour']:.0e})"
+    if one["risk_per_hour"] is None:
+        return f"– {asked}"
+    return f"{one['risk_per_hour']:.0e} ≤ {one['risk_per_hour_high']:.0e} {asked}"
+
+
 def _show(records: Sequence[dict[str, Any]]) -> None:
-    head = ["world", "channel", "heads", "available", "beyond while ok", "alert s", "level/error"]
+    head = [
+        "world",
+        "channel",
+        "heads",
+        "available",
+        "beyond while ok",
+        "alert s",
+        "level/error",
+        "per hour (asked)",
+    ]
     made = table(head, text=2)
     for one in records:
         made.add_row(
@@ -102,5 +131,6 @@ def _show(records: Sequence[dict[str, Any]]) -> None:
             f"{one['exceedance_share']:.1e} (≤ {one['exceedance_share_high']:.1e})",
             f"{one['time_to_alert_s']:.2f}",
             f"{one['level_over_error']:.1f}",
+            obtained_risk(one),
         )
     console.print(made)

@@ -18,6 +18,7 @@ if TYPE_CHECKING:
 HEAD = (
     "World", "Channel", "Radio heads", "Available", "Beyond while ok", "95 %, up to",
     "Runs with it", "Time to alert / s", "Level / error", "90 % of errors / m",
+    "Risk per hour: asked", "Obtained", "95 %, up to",
 )  # fmt: skip
 
 
@@ -37,6 +38,10 @@ def render_integrity(
             number(one["time_to_alert_s"], 2),
             number(one["level_over_error"], 1),
             number(one["p90_error_m"]),
+            *(
+                "–" if one[name] is None else f"{one[name]:.1e}"
+                for name in ("asked_risk_per_hour", "risk_per_hour", "risk_per_hour_high")
+            ),
         )
         for one in records
     ]
@@ -58,7 +63,7 @@ def render_integrity(
         tiles=tile(f"{worst['exceedance_share']:.1e}", f"beyond while ok, {worst['mismatch']}")
         + tile(f"{least['availability']:.1%}", f"available, {least['mismatch']}"),
         meta=escape(f"{runs} drives of each case, seed {seed}, version {version('access-av')}."),
-        sections=f"<section><h2>Cases</h2>{table(HEAD, rows, numbers=range(2, 10))}</section>"
+        sections=f"<section><h2>Cases</h2>{table(HEAD, rows, numbers=range(2, 13))}</section>"
         f"<section><h2>Stanford diagrams</h2>{diagrams}</section><section><h2>Provenance</h2>"
         f"{source('Scenario of the first case', first.to_toml())}</section>",
     )

@@ -20,6 +20,7 @@ from access_av.statistics.consistency import (
     nees_band,
 )
 from access_av.statistics.distributions import beta_quantile, chi_squared_quantile
+from access_av.statistics.extremes import ObtainedRisk, exceedance
 from access_av.statistics.integrity import Integrity, stanford_counts
 from access_av.statistics.proportions import clopper_pearson, wilson
 
@@ -27,10 +28,12 @@ __all__ = [
     "Alarms",
     "Consistency",
     "Integrity",
+    "ObtainedRisk",
     "beta_quantile",
     "bootstrap_interval",
     "chi_squared_quantile",
     "clopper_pearson",
+    "exceedance",
     "horizontal_error_m",
     "mean_nees",
     "nees",

@@ -246,7 +246,7 @@ impl Localizer for Recovery {
             let level_m = self.setup.quantile.radius(estimate.principal_variances());
             if let Some(integrity) = &mut estimate.integrity {
                 integrity.state = IntegrityState::Unavailable;
-                integrity.protection_level_m = integrity.protection_level_m.max(level_m);
+                integrity.raise(level_m);
             }
         }
         Ok(estimate)

@@ -2,7 +2,7 @@
 
 use super::initialise::Initialiser;
 use super::integrity::IntegrityConfig;
-use super::integrity_state::{Integrity, IntegrityState};
+use super::integrity_state::Integrity;
 use super::localizer::{Localizer, Recovered, copy_into};
 use super::measurement::{AngleMeasurement, UpdateVerdict};
 use super::pose_estimate::PoseEstimate;
@@ -103,11 +103,8 @@ impl Localizer for Search {
         }
         let mut estimate = self.initialiser.pose(time_s);
         let variances = estimate.principal_variances();
-        estimate.integrity = self.integrity.as_ref().map(|(_, quantile)| Integrity {
-            protection_level_m: quantile.radius(variances),
-            state: IntegrityState::Unavailable,
-            faulty: 0,
-        });
+        estimate.integrity = (self.integrity.as_ref())
+            .map(|(_, quantile)| Integrity::unavailable(quantile.radius(variances)));
         Ok(estimate)
     }
 

@@ -71,30 +71,3 @@ impl Default for TrackerSettings {
         }
     }
 }
-
-/// `[integrity]`: the tracker mistrusts its sources and states a protection level. Without this
-/// table it does not.
-#[derive(Debug, Clone, Copy, PartialEq, Serialize, Deserialize, JsonSchema)]
-#[serde(default, deny_unknown_fields)]
-pub struct IntegritySettings {
-    /// Protection level in metres above which the position is not to be relied on.
-    #[schemars(range(min = 0.01, max = 1000.0))]
-    pub alert_limit_m: f64,
-    /// Probability with which the error may exceed the protection level.
-    #[schemars(range(min = 1e-12, max = 0.5))]
-    pub risk: f64,
-    /// Probability that some radio head is at fault: moved, spoofed, without line of sight. With one at
-    /// fault the error may exceed the protection level with `risk / fault_probability`.
-    #[schemars(range(min = 1e-9, max = 0.5))]
-    pub fault_probability: f64,
-}
-
-impl Default for IntegritySettings {
-    fn default() -> Self {
-        Self {
-            alert_limit_m: 1.5,
-            risk: 8e-4,
-            fault_probability: 0.08,
-        }
-    }
-}

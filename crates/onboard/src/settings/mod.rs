@@ -11,6 +11,7 @@ mod array_shape;
 mod check;
 mod error;
 mod figure;
+mod integrity;
 mod limits;
 mod localizer;
 mod odometry;
@@ -33,9 +34,8 @@ pub use array_shape::{ArrayShape, MeasuredShape};
 pub use check::Check;
 pub use error::SettingsError;
 pub use figure::{Boundary, Extent, Figure, Provenance, Quantity};
-pub use localizer::{
-    DeadReckoningSettings, HeadingBetween, IntegritySettings, LocalizerSettings, TrackerSettings,
-};
+pub use integrity::{FaultProbability, IntegritySettings};
+pub use localizer::{DeadReckoningSettings, HeadingBetween, LocalizerSettings, TrackerSettings};
 pub use odometry::{DriveKind, GyroscopeSettings, LaneKeepingSettings, OdometerSettings};
 pub use overlay::lay_over;
 pub use platform::Platform;

@@ -6,7 +6,8 @@ use serde::{Deserialize, Serialize};
 use super::array::ArraySettings;
 use super::check::Check;
 use super::error::SettingsError;
-use super::localizer::{IntegritySettings, LocalizerSettings};
+use super::integrity::IntegritySettings;
+use super::localizer::LocalizerSettings;
 use super::odometry::{DriveKind, GyroscopeSettings, LaneKeepingSettings, OdometerSettings};
 use super::receiver::{EstimatorMethod, EstimatorSettings, Pilots, ReceiverSettings};
 use super::site::Site;
@@ -171,6 +172,9 @@ impl TomlFile for Vehicle {
             false,
             "there is a start.pose",
         )?;
+        if let Some(integrity) = &self.integrity {
+            integrity.check(check)?;
+        }
         self.wake_up.check(check)
     }
 }
@@ -200,6 +204,9 @@ pub fn check_together(
         "empty",
         "leave it out to listen to all",
     )?;
+    if let Some(integrity) = &vehicle.integrity {
+        integrity.check_sum(heard, check)?;
+    }
     let along_road = site.road.is_some() && vehicle.follows_road();
     check.that(
         vehicle.start.known || heard > if along_road { 1 } else { 2 },

@@ -115,7 +115,7 @@ impl Bank {
     }
 
     /// The trackers that do without one of the sound radio heads.
-    pub fn without_one(&self) -> impl Iterator<Item = &Tracker> {
+    pub fn without_one(&self) -> impl Iterator<Item = &Tracker> + Clone {
         self.sound()
             .filter_map(|head| Some(&self.members.get(head)?.tracker))
     }
@@ -127,7 +127,7 @@ impl Bank {
         doubtful.filter_map(|head| Some(&self.members.get(head)?.tracker))
     }
 
-    fn sound(&self) -> impl Iterator<Item = usize> {
+    fn sound(&self) -> impl Iterator<Item = usize> + Clone {
         let faulty = self.faulty.iter().enumerate();
         faulty.filter_map(|(head, faulty)| (!faulty).then_some(head))
     }

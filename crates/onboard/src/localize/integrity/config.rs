@@ -1,17 +1,17 @@
 //! What the guard is to promise.
 
-use crate::settings::IntegritySettings;
+use crate::settings::{FaultProbability, IntegritySettings};
 
 /// However rare a fault is, under it the error is within the level more often than not.
-pub const MOST_CONDITIONAL: f64 = 0.49;
+const MOST_CONDITIONAL: f64 = 0.49;
 
 /// What the guard is to promise.
 #[derive(Clone, Copy, Debug, PartialEq)]
 pub struct IntegrityConfig {
-    /// Probability with which the error may exceed the protection level, no source being at fault.
+    /// Probability with which the error of an independent epoch may exceed the protection level.
     pub risk: f64,
-    /// Probability that one of the radio heads is at fault.
-    pub fault_probability: f64,
+    /// How probable each fault is.
+    pub fault_probability: FaultProbability,
     /// Protection level above which the position is not to be relied on (m).
     pub alert_limit_m: f64,
     /// Statistic at which a radio head counts as faulty, in standard deviations.
@@ -23,9 +23,9 @@ pub struct IntegrityConfig {
 }
 
 impl IntegrityConfig {
-    /// Probability with which the error may exceed the level with one radio head at fault.
+    /// Probability with which the error may exceed the level with a radio head at fault.
     pub fn risk_under_fault(&self) -> f64 {
-        (self.risk / self.fault_probability).min(MOST_CONDITIONAL)
+        (self.risk / self.fault_probability.radio_head).min(MOST_CONDITIONAL)
     }
 }
 
@@ -39,7 +39,7 @@ impl From<&IntegritySettings> for IntegrityConfig {
     fn from(settings: &IntegritySettings) -> Self {
         Self {
             alert_limit_m: settings.alert_limit_m,
-            risk: settings.risk,
+            risk: settings.risk_per_epoch(),
             fault_probability: settings.fault_probability,
             detection_threshold: 5.5,
             recovery_threshold: 3.5,

@@ -3,10 +3,9 @@
 //! Beside the tracker that uses every radio head there run trackers that do without some of them
 //! ([`Bank`]). If one radio head is at fault, the tracker without it is right within its own
 //! covariance, wherever the full solution may be: the protection level is the radius about the full
-//! solution that holds for each of them (solution separation, Brown and McBurney 1988, with the
-//! separation as it is and not its threshold), with the share of the risk that the fault's
-//! probability leaves it. The same of the tracker that does not trust the odometer
-//! ([`Slip`](super::slip::Slip)), where it is suspected. All of it is of angles as noisy as
+//! solution that holds for all of them together, each as probable as its fault
+//! ([`LevelEquation`](super::level::LevelEquation)). The same of the tracker that does not trust the
+//! odometer ([`Slip`](super::slip::Slip)), as probable as the angles leave it. All of it is of angles as noisy as
 //! they are heard to be ([`AngleNoise`](super::angle_noise::AngleNoise)).
 //!
 //! A single radio head has no witness but odometry and road: the protection level then is what
@@ -14,23 +13,24 @@
 //! are good.
 
 use super::bank::Bank;
-use super::config::{IntegrityConfig, MOST_CONDITIONAL};
-use super::separation::SeparatedRadius;
+use super::config::IntegrityConfig;
+use super::level::{Hypothesis, LevelEquation, Levels};
 use crate::clone_in_place::clone_in_place;
 use crate::localize::integrity_state::{Integrity, IntegrityState};
 use crate::localize::measurement::{AngleMeasurement, UpdateVerdict};
 use crate::localize::pose_estimate::PoseEstimate;
-use crate::localize::quantile::RadialQuantile;
 use crate::localize::tracker::{OdometryVerdict, Tracker};
 use crate::observation::OdometrySample;
 use crate::radio_head::RadioHead;
+
+/// Share of the risk that is not worth the effort.
+const NEGLIGIBLE: f64 = 0.1;
 
 /// A tracker with its witnesses.
 #[derive(Debug)]
 pub struct Guard {
     config: IntegrityConfig,
-    nominal: RadialQuantile,
-    under_fault: SeparatedRadius,
+    level: LevelEquation,
     bank: Bank,
     restarted: Option<Restarted>,
     /// Distance driven (m) when the sources could be told apart last.
@@ -47,8 +47,7 @@ struct Restarted {
 
 clone_in_place!(Guard {
     config,
-    nominal,
-    under_fault,
+    level,
     bank,
     restarted,
     trusted_m,
@@ -68,8 +67,7 @@ impl Guard {
     ) -> Self {
         let found_s = found_s.unwrap_or(f64::NEG_INFINITY);
         Self {
-            nominal: RadialQuantile::new(config.risk),
-            under_fault: SeparatedRadius::new(config.risk_under_fault()),
+            level: LevelEquation::new(config.risk),
             trusted_m: tracker.driven_m(),
             bank: Bank::new(tracker, heads, found_s),
             restarted: None,
@@ -83,23 +81,21 @@ impl Guard {
         self.bank.main()
     }
 
-    /// The tracker by whose uncertainty to listen: that of every sound source, unless slip, which
-    /// nothing speaks against yet, takes the level beyond the alert limit.
+    /// The tracker by whose uncertainty to listen: that of every sound source, unless slip, which too
+    /// little speaks against yet, takes the level beyond the alert limit.
     pub fn doubtful(&self) -> &Tracker {
         let (bank, now_s) = (&self.bank, self.tracker().time_s());
-        let slips = self.risk_of_slipping(bank).is_some()
-            && self.protection_level_m(bank, now_s) > self.config.alert_limit_m;
-        if slips {
+        let is_doubted = self.slip_probability(bank) > self.config.risk
+            && self.levels(bank, now_s).horizontal_m > self.config.alert_limit_m;
+        if is_doubted {
             bank.slip().tracker()
         } else {
             bank.main()
         }
     }
 
-    /// The risk that the level leaves if the odometer slips, unless slip is as rare as that.
-    fn risk_of_slipping(&self, bank: &Bank) -> Option<f64> {
-        let risk = self.config.risk / bank.slip().probability();
-        (risk < 1.0).then_some(risk)
+    fn slip_probability(&self, bank: &Bank) -> f64 {
+        (bank.slip()).probability(self.config.fault_probability.odometer)
     }
 
     /// How much more the angles vary than stated.
@@ -149,7 +145,7 @@ impl Guard {
         } else if aged && restarted.bank.is_lost(&self.config) {
             self.restart();
         } else if restarted.bank.quiet_s(now_s) > patience_s
-            && self.protection_level_m(&restarted.bank, now_s) <= self.config.alert_limit_m
+            && self.levels(&restarted.bank, now_s).horizontal_m <= self.config.alert_limit_m
             && let Some(restarted) = self.restarted.take()
         {
             self.bank = restarted.bank;
@@ -182,47 +178,40 @@ impl Guard {
 
     /// Protection level and state at `time_s`.
     pub fn integrity(&self, time_s: f64) -> Integrity {
-        let protection_level_m = self.protection_level_m(&self.bank, time_s);
+        let levels = self.levels(&self.bank, time_s);
         let state = if self.bank.is_outvoted(&self.config) {
             IntegrityState::Unavailable
         } else if self.restarted.is_some()
             || self.bank.quiet_s(self.now_s) <= self.config.recovery_s
-            || protection_level_m > self.config.alert_limit_m
+            || levels.horizontal_m > self.config.alert_limit_m
         {
             IntegrityState::Degraded
         } else {
             IntegrityState::Ok
         };
         Integrity {
-            protection_level_m,
+            protection_level_m: levels.horizontal_m,
+            protection_level_along_m: levels.along_m,
+            protection_level_across_m: levels.across_m,
             state,
             faulty: self.bank.faulty(),
         }
     }
 
-    /// The radius that the error leaves with the stated risk, whether no source is at fault or any
-    /// one of those in use, the odometer among them where it is suspected.
-    fn protection_level_m(&self, bank: &Bank, time_s: f64) -> f64 {
-        let main = bank.main().pose(time_s);
+    /// What the error leaves with the stated risk, whether no source is at fault or any one of those
+    /// in use, the odometer among them.
+    fn levels(&self, bank: &Bank, time_s: f64) -> Levels {
+        let told = bank.main().pose(time_s);
         let noise_ratio = bank.noise_ratio();
-        let variances = main.principal_variances().map(|it| noise_ratio * it);
-        let mut level_m = self.nominal.radius(variances);
-        let if_faulty = self.config.risk_under_fault();
-        let without_one = bank.without_one().map(|tracker| (tracker, if_faulty));
-        let slip = (self.risk_of_slipping(bank)).map(|risk| (bank.slip().tracker(), risk));
-        for (other, risk) in without_one.chain(slip) {
-            let clean = other.pose(time_s);
-            let Some([[xx, xy, _], [_, yy, _], _]) = clean.covariance else {
-                continue;
-            };
-            let separation_m = [
-                clean.pose.x_m - main.pose.x_m,
-                clean.pose.y_m - main.pose.y_m,
-            ];
-            let covariance = [[xx, xy], [xy, yy]].map(|row| row.map(|it| noise_ratio * it));
-            let risk = risk.clamp(if_faulty, MOST_CONDITIONAL);
-            level_m = (self.under_fault).radius(risk, separation_m, covariance, level_m);
-        }
-        level_m
+        let head_probability = self.config.fault_probability.radio_head;
+        let heads = (bank.without_one()).map(|clean| (head_probability, clean));
+        let hypotheses = (std::iter::once((1.0, bank.main())))
+            .chain(heads)
+            .chain([(self.slip_probability(bank), bank.slip().tracker())])
+            .filter(|(probability, _)| *probability > NEGLIGIBLE * self.config.risk)
+            .filter_map(|(probability, clean)| {
+                Hypothesis::new(probability, &clean.pose(time_s), noise_ratio, &told)
+            });
+        self.level.solve(hypotheses)
     }
 }

@@ -4,11 +4,11 @@ mod angle_noise;
 mod bank;
 mod config;
 mod guard;
-mod separation;
+mod level;
 mod sequence_test;
 mod slip;
 
 pub use config::IntegrityConfig;
 pub use guard::Guard;
-pub use separation::SeparatedRadius;
+pub use level::{Hypothesis, LevelEquation, Levels};
 pub use sequence_test::SequenceTest;

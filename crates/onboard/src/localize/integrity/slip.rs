@@ -18,25 +18,22 @@ use crate::radio_head::RadioHead;
 /// Share of the angles that come from anywhere.
 const OUTLIERS: f64 = 2e-3;
 
-/// Largest logarithm of the odds, for or against, as clear as a fault of a radio head is found: what more
-/// evidence there is must be forgotten some time.
+/// Largest logarithm of the likelihood ratio, for or against, as clear as a fault of a radio head is
+/// found: what more evidence there is must be forgotten some time.
 const SURE: f64 = 15.0;
-
-/// Probability that it slips since it set off, before an angle tells.
-const SETTING_OFF: f64 = 3e-3;
 
 /// A tracker that does not trust the odometer.
 #[derive(Debug)]
 pub(super) struct Slip {
     tracker: Tracker,
-    /// Logarithm of the odds that the odometer slips.
-    log_odds: f64,
+    /// Logarithm of the likelihood ratio since it set off.
+    evidence: f64,
     stands: bool,
 }
 
 clone_in_place!(Slip {
     tracker,
-    log_odds,
+    evidence,
     stands
 });
 
@@ -47,7 +44,7 @@ impl Slip {
         tracker.distrust_odometer();
         Self {
             tracker,
-            log_odds: -SURE,
+            evidence: -SURE,
             stands: true,
         }
     }
@@ -57,8 +54,7 @@ impl Slip {
         let stood = std::mem::replace(&mut self.stands, sample.speed_mps == 0.0);
         let sets_off = stood && !self.stands;
         if sets_off && !self.tracker.config().finds_errors {
-            let odds = SETTING_OFF / (1.0 - SETTING_OFF);
-            self.log_odds = self.log_odds.max(odds.ln());
+            self.evidence = self.evidence.max(0.0);
         }
         self.tracker.odometry(sample);
     }
@@ -82,15 +78,16 @@ impl Slip {
             let [slips, holds] = [slipping, sound].map(|seen| density(&seen.alone(noise_ratio)));
             // What is seen again and again speaks once.
             let evidence = sound.share() * (slips / holds).ln();
-            self.log_odds = (self.log_odds + evidence).clamp(-SURE, SURE);
+            self.evidence = (self.evidence + evidence).clamp(-SURE, SURE);
         }
         self.tracker.take(if_slipping, measured);
         sound.take(if_sound, measured)
     }
 
-    /// Probability that the odometer slips.
-    pub fn probability(&self) -> f64 {
-        (1.0 + (-self.log_odds).exp()).recip()
+    /// Probability that the odometer slips, of one that slips with the probability `prior` whenever it
+    /// sets off.
+    pub fn probability(&self, prior: f64) -> f64 {
+        (1.0 + (prior.recip() - 1.0) * (-self.evidence).exp()).recip()
     }
 
     /// The tracker.
@@ -117,8 +114,8 @@ mod tests {
     use crate::localize::tracker::{InitialPose, TrackerConfig};
     use crate::settings::{Shipped, Site, TomlFile, Vehicle};
 
-    /// Probability of slip after half a minute of exact angles at 4 m/s, when the odometer reads so many
-    /// times the way.
+    /// Probability of slip, of 0.01 before, after half a minute of exact angles at 4 m/s, when the odometer
+    /// reads so many times the way.
     fn probability(ratio: f64) -> f64 {
         let site = Site::from_library("trip-4", &Shipped).unwrap();
         let vehicle = Vehicle::from_library("carrier", &Shipped).unwrap();
@@ -157,12 +154,12 @@ mod tests {
                 slip.update(&mut sound, 1.0, head, &measured);
             }
         }
-        slip.probability()
+        slip.probability(1e-2)
     }
 
     #[test]
     fn slip_since_the_start_is_suspected_and_a_sound_odometer_is_not() {
-        assert!(probability(1.0) < 1e-4);
+        assert!(probability(1.0) < 1e-3);
         assert!(probability(1.2) > 0.99);
         assert!(probability(0.8) > 0.99);
     }

@@ -1,0 +1,151 @@
+//! Whom the tracker mistrusts, and the risk that is left.
+
+use schemars::JsonSchema;
+use serde::{Deserialize, Serialize};
+
+use super::check::Check;
+use super::error::SettingsError;
+
+/// `[integrity]`: the tracker mistrusts its sources and states a protection level. Without this
+/// table it does not.
+#[derive(Debug, Clone, Copy, PartialEq, Serialize, Deserialize, JsonSchema)]
+#[serde(default, deny_unknown_fields)]
+pub struct IntegritySettings {
+    /// Protection level in metres above which the position is not to be relied on.
+    #[schemars(range(min = 0.01, max = 1000.0))]
+    pub alert_limit_m: f64,
+    /// Target integrity risk: how often in an hour the error may come to exceed the protection
+    /// level without an alarm.
+    #[schemars(range(min = 1e-9, max = 1.0))]
+    pub risk_per_hour: f64,
+    /// Time in seconds after which the error is another one: so many epochs of an hour are
+    /// independent.
+    #[schemars(range(min = 0.01, max = 600.0))]
+    pub error_correlation_s: f64,
+    /// How probable each fault is, at any time.
+    pub fault_probability: FaultProbability,
+}
+
+/// `[integrity.fault_probability]`: probabilities of being at fault, at any time. What is wrong within
+/// the standard deviations of site and vehicle is no fault.
+#[derive(Debug, Clone, Copy, PartialEq, Serialize, Deserialize, JsonSchema)]
+#[serde(default, deny_unknown_fields)]
+pub struct FaultProbability {
+    /// Of each radio head: moved, spoofed, without line of sight. A tracker does without it.
+    #[schemars(range(min = 1e-9, max = 0.5))]
+    pub radio_head: f64,
+    /// Of the odometer: it slips, each time that the vehicle sets off. A tracker that expects it counts
+    /// until the angles have spoken against it.
+    #[schemars(range(min = 1e-9, max = 0.5))]
+    pub odometer: f64,
+    /// Of all radio heads at once, as by a wrong datum. Nobody watches it: it comes off the risk.
+    #[schemars(range(min = 0.0, max = 0.5))]
+    pub all_radio_heads: f64,
+    /// Of the array: its mounting or its phases. Nobody watches it: it comes off the risk.
+    #[schemars(range(min = 0.0, max = 0.5))]
+    pub array: f64,
+}
+
+impl Default for IntegritySettings {
+    fn default() -> Self {
+        Self {
+            alert_limit_m: 1.5,
+            risk_per_hour: 0.3,
+            error_correlation_s: 10.0,
+            fault_probability: FaultProbability::default(),
+        }
+    }
+}
+
+impl Default for FaultProbability {
+    fn default() -> Self {
+        Self {
+            radio_head: 0.08,
+            odometer: 3e-3,
+            all_radio_heads: 1e-5,
+            array: 1e-5,
+        }
+    }
+}
+
+impl FaultProbability {
+    /// That of some fault against which there is no tracker.
+    fn unmonitored(&self) -> f64 {
+        self.all_radio_heads + self.array
+    }
+}
+
+impl IntegritySettings {
+    /// Probability with which an independent epoch may exceed the protection level: what faults that
+    /// nobody watches leave of the hour's risk, by the epochs of an hour that are independent
+    /// (Blanch, Walter, Enge, Lee, Pervan, Rippl, Spletter and Kropp, IEEE Transactions on Aerospace
+    /// and Electronic Systems 51, 2015).
+    pub fn risk_per_epoch(&self) -> f64 {
+        let monitored = self.risk_per_hour - self.fault_probability.unmonitored();
+        monitored * self.error_correlation_s / 3600.0
+    }
+
+    /// Refuses faults that are likelier than the risk can bear, or than certain.
+    ///
+    /// # Errors
+    /// [`SettingsError::Value`].
+    pub fn check(&self, check: Check<'_>) -> Result<(), SettingsError> {
+        let unmonitored = self.fault_probability.unmonitored();
+        check.that(
+            unmonitored < self.risk_per_hour,
+            "integrity.fault_probability",
+            format_args!("all_radio_heads + array = {unmonitored}"),
+            &format!(
+                "nobody watches them: together they must be below integrity.risk_per_hour, {}",
+                self.risk_per_hour
+            ),
+        )
+    }
+
+    /// Refuses probabilities that make more than 1 with so many radio heads.
+    ///
+    /// # Errors
+    /// [`SettingsError::Value`].
+    pub fn check_sum(&self, radio_heads: usize, check: Check<'_>) -> Result<(), SettingsError> {
+        let each = &self.fault_probability;
+        let sum = radio_heads as f64 * each.radio_head + each.odometer + each.unmonitored();
+        check.that(
+            sum <= 1.0,
+            "vehicle.integrity.fault_probability",
+            format_args!("{radio_heads} * radio_head + odometer + all_radio_heads + array = {sum}"),
+            "probabilities add up to 1 at most",
+        )
+    }
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    #[test]
+    fn an_hour_is_as_many_epochs_as_are_independent() {
+        let mut settings = IntegritySettings {
+            risk_per_hour: 1e-3,
+            error_correlation_s: 36.0,
+            ..IntegritySettings::default()
+        };
+        settings.fault_probability.array = 4e-4;
+        settings.fault_probability.all_radio_heads = 1e-4;
+        assert!((settings.risk_per_epoch() / 5e-6 - 1.0).abs() < 1e-12);
+    }
+
+    #[test]
+    fn faults_that_the_risk_cannot_bear_are_refused_by_key() {
+        let check = Check { file: "cart.toml" };
+        let mut settings = IntegritySettings::default();
+        assert!(settings.check(check).is_ok() && settings.check_sum(12, check).is_ok());
+        let told = settings.check_sum(13, check).unwrap_err().to_string();
+        assert!(
+            told.contains("vehicle.integrity.fault_probability"),
+            "{told}"
+        );
+        settings.fault_probability.array = 0.3;
+        let told = settings.check(check).unwrap_err().to_string();
+        assert!(told.contains("integrity.fault_probability"), "{told}");
+    }
+}

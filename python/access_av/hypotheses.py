@@ -1,0 +1,214 @@
+"""How the world may be otherwise than believed: overrides of a scenario, by name."""
+
+from __future__ import annotations
+
+import json
+from typing import TYPE_CHECKING, Any
+
+import numpy as np
+
+if TYPE_CHECKING:
+    from collections.abc import Iterable
+
+    from access_av import _core
+
+Overrides = dict[str, Any]
+
+# Multiples of what is stated.
+SIZES = (1, 3, 10)
+
+# One deviation where none is stated: what a survey, a calibration and a data sheet usually leave.
+PLACE_STD_M = 0.1
+ROAD_STD_M = 0.03
+MOUNTING_STD_RAD = 0.01
+PHASE_STD_RAD = 0.03
+SCALE_STD = 0.003
+# And how far one leaves an electrical angle off where a radio head is behind something.
+HIDDEN_RAD = 0.05
+
+# Slip grows, and a phase drifts, to their size over so long.
+GROWS_S = 300.0
+DRIFTS_M = 1000.0
+
+# Bursts: so long, so often.
+HIDDEN_S = 5.0
+HIDDEN_EVERY_S = 20.0
+LONGEST_S = 600.0
+
+
+def mismatches(scenario: _core.Scenario) -> dict[str, Overrides]:
+    """What can be otherwise than believed, by name: overrides of the scenario.
+
+    Every other quantity is drawn from its stated standard deviation.
+
+    Examples
+    --------
+    >>> from access_av import _core
+    >>> found = mismatches(_core.Scenario.load("yard"))
+    >>> found["array 1 degree off"]
+    {'truth.vehicle.array.mounting_rad': 0.0175}
+    """
+    site = json.loads(scenario.site.to_json())
+    vehicle = json.loads(scenario.vehicle.to_json())
+    heads, odometer = site["radio_heads"], vehicle["odometer"]
+
+    def moved(count: int) -> Overrides:
+        return _moved(heads[:count], [[2.0, 0.0, 0.0]] * count)
+
+    def whole_drive(what: Overrides) -> Overrides:
+        return {"from_s": 20.0, "until_s": 1e6, "what": what}
+
+    def hidden(count: int) -> Overrides:
+        what = {"kind": "non-line-of-sight", "bias_rad": 0.15}
+        return {
+            "faults": [whole_drive({**what, "radio_head": head}) for head in range(count)],
+        }
+
+    mounting_rad, phase_rad = vehicle["array"]["mounting_rad"], vehicle["array"]["phase_rad"]
+    cases = {
+        "none": {},
+        "array 1 degree off": {"truth.vehicle.array.mounting_rad": mounting_rad + 0.0175},
+        "phases 0.05 rad off": {"truth.vehicle.array.phase_rad": phase_rad + 0.05},
+        "odometer noise x 3": {
+            "truth.vehicle.odometer.noise_m_per_sqrt_m": 3.0 * odometer["noise_m_per_sqrt_m"]
+        },
+        "odometer scale x 3": {
+            "truth.vehicle.odometer.scale": odometer["scale"] + 3.0 * odometer["scale_std"]
+        },
+        "odometer slips 2 %": {
+            "faults": [whole_drive({"kind": "odometer-slip", "ratio": 1.02})],
+        },
+        "all heads 2 m off": moved(len(heads)),
+        "two heads 2 m off": moved(2),
+        "one head hidden": hidden(1),
+        "three heads hidden": hidden(min(3, len(heads))),
+    }
+    return {name: case for name, case in cases.items() if case or name == "none"}
+
+
+def hypotheses(scenario: _core.Scenario) -> dict[str, Overrides]:
+    """What may be wrong at a site, at three sizes each: 1, 3 and 10 times what is stated of it.
+
+    Where no deviation is stated, one is what surveys, calibration and data sheets usually leave.
+    Every other quantity is drawn from its stated standard deviation.
+
+    Examples
+    --------
+    >>> from access_av import _core
+    >>> found = hypotheses(_core.Scenario.load("yard-surveyed"))
+    >>> found["array mounting x 3"]
+    {'truth.vehicle.array.mounting_rad': 0.03}
+    """
+    site = json.loads(scenario.site.to_json())
+    vehicle = json.loads(scenario.vehicle.to_json())
+    found: dict[str, Overrides] = {}
+    for size in SIZES:
+        for name, case in _of_size(site, vehicle, size).items():
+            found[f"{name} x {size}"] = case
+    swapped = _swapped(site["radio_heads"])
+    return found | ({"two cells swapped": swapped} if swapped else {})
+
+
+def _of_size(site: Overrides, vehicle: Overrides, size: float) -> dict[str, Overrides]:
+    heads, array, odometer = site["radio_heads"], vehicle["array"], vehicle["odometer"]
+    scale = size * (odometer["scale_std"] or SCALE_STD)
+    mounting = size * (array["mounting_std_rad"] or MOUNTING_STD_RAD)
+    phase = size * (array["phase_std_rad"] or PHASE_STD_RAD)
+    noise = size * odometer["noise_m_per_sqrt_m"]
+    one = heads[len(heads) // 2 :][:1]
+
+    def off(some: list[Overrides], axes: tuple[int, int, int]) -> Overrides:
+        return _moved(
+            some,
+            [
+                size * (head["position_std_m"] or PLACE_STD_M) * np.asarray(axes, dtype=np.float64)
+                for head in some
+            ],
+        )
+
+    turned = {"truth.vehicle.array.mounting_rad": array["mounting_rad"] + mounting}
+    cases = {
+        "head place": off(one, (1, -1, 0)),
+        "head height": off(one, (0, 0, 1)),
+        "all heads": off(heads, (1, -1, 0)) if len(heads) > 1 else {},
+        "array mounting": turned,
+        "array phase": {"truth.vehicle.array.phase_rad": array["phase_rad"] + phase},
+        "phase drift": {
+            "truth.vehicle.array.phase_drift_rad_per_sqrt_m": phase / DRIFTS_M**0.5,
+        },
+        "odometer scale": {"truth.vehicle.odometer.scale": odometer["scale"] + scale},
+        "odometer noise": {"truth.vehicle.odometer.noise_m_per_sqrt_m": noise} if noise else {},
+        "growing slip": {"faults": list(_growing_slip(scale))},
+        "map shape": _bent(site, size),
+        "one head hidden in bursts": _hidden_in_bursts(1, size),
+        "two heads hidden in bursts": _hidden_in_bursts(2, size) if len(heads) > 1 else {},
+        "most heads hidden in bursts": _hidden_in_bursts(len(heads) - 1, size)
+        if len(heads) > 3
+        else {},
+        "head place and array mounting": {**off(one, (1, -1, 0)), **turned},
+    }
+    return {name: case for name, case in cases.items() if case}
+
+
+def _moved(heads: list[Overrides], by_m: Iterable[Any]) -> Overrides:
+    """Radio heads elsewhere; none where they have no names to tell them apart by."""
+    names = [head["name"] for head in heads]
+    if not all(names) or len(set(names)) < len(names):
+        return {}
+    return {
+        "truth.site.radio_heads": {
+            name: {"position_m": np.add(head["position_m"], by).tolist()}
+            for name, head, by in zip(names, heads, by_m, strict=True)
+        }
+    }
+
+
+def _swapped(heads: list[Overrides]) -> Overrides:
+    """A wrong plan of cells: the first two radio heads send what the other should."""
+    if len(heads) < 2 or not _moved(heads[:2], np.zeros((2, 3))):
+        return {}
+    first, second = heads[:2]
+    sends = ("pci", "ssb_index")
+    return {
+        "truth.site.radio_heads": {
+            first["name"]: {key: second[key] for key in sends},
+            second["name"]: {key: first[key] for key in sends},
+        }
+    }
+
+
+def _bent(site: Overrides, size: float) -> Overrides:
+    """A road whose corners lie to one side and the other of where the map has them."""
+    road = site.get("road") or {}
+    if not road.get("polyline_m"):
+        return {}
+    points = np.asarray(road["polyline_m"])
+    by_m = size * (road["position_std_m"] or ROAD_STD_M)
+    signs = np.where(np.arange(len(points)) % 2, 1.0, -1.0)
+    return {"truth.site.road.polyline_m": (points + by_m * signs[:, None]).tolist()}
+
+
+def _growing_slip(scale: float) -> Iterable[Overrides]:
+    steps = 30
+    ends = [*np.linspace(0.0, GROWS_S, steps + 1)[1:-1].tolist(), LONGEST_S]
+    for step, (from_s, until_s) in enumerate(zip([0.0, *ends], ends, strict=False), 1):
+        what = {"kind": "odometer-slip", "ratio": 1.0 + scale * step / steps}
+        yield {"from_s": from_s, "until_s": until_s, "what": what}
+
+
+def _hidden_in_bursts(count: int, size: float) -> Overrides:
+    return {
+        "faults": [
+            {
+                "from_s": from_s,
+                "until_s": from_s + HIDDEN_S,
+                "what": {
+                    "kind": "non-line-of-sight",
+                    "radio_head": head,
+                    "bias_rad": size * HIDDEN_RAD,
+                },
+            }
+            for from_s in np.arange(HIDDEN_EVERY_S, LONGEST_S, HIDDEN_EVERY_S).tolist()
+            for head in range(count)
+        ]
+    }
