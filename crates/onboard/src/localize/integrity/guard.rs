@@ -212,6 +212,6 @@ impl Guard {
             .filter_map(|(probability, clean)| {
                 Hypothesis::new(probability, &clean.pose(time_s), noise_ratio, &told)
             });
-        self.level.solve(hypotheses)
+        self.level.solve(&hypotheses)
     }
 }
