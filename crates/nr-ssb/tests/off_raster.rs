@@ -5,7 +5,7 @@ mod air;
 mod recordings;
 
 use nr_ssb::SubcarrierSpacing;
-use nr_ssb::raster::{scan, scan_off_raster, scan_raster};
+use nr_ssb::raster::{RasterFind, scan, scan_off_raster, scan_raster};
 use rand::RngExt;
 use rand_chacha::ChaCha8Rng;
 
@@ -113,6 +113,52 @@ fn a_centre_between_all_rasters_gives_the_right_frequency_and_offset() {
         assert_eq!((finds.len(), find.spacing), (1, spacing));
         assert!((found_hz - ssb_freq_hz).abs() < 0.1, "{found_hz}");
         assert!((cfo_hz - cell.cfo_hz).abs() < 20.0, "{cfo_hz}");
+    }
+}
+
+/// Far more of an offset than the frequency can be told from: the cell is found all the same, at a
+/// frequency whose phases between symbols agree with what was received.
+#[test]
+fn an_oscillator_of_20_ppm_hides_no_cell() {
+    let mut rng = air::rng(6);
+    for spacing in [SubcarrierSpacing::Khz15, SubcarrierSpacing::Khz30] {
+        for ssb_freq_hz in [3_600.96e6, 3_625.175e6, 3_465.626e6, 2_100.235e6] {
+            for cfo_ppm in [-20.0, -10.0, -5.0, 5.0, 10.0, 20.0] {
+                let mut cell = air::Cell::random(&mut rng, spacing, 1);
+                (cell.ssb_freq_hz, cell.ssb_indices) = (ssb_freq_hz, vec![1]);
+                cell.delay = 200.3;
+                cell.cfo_hz = 1e-6 * cfo_ppm * ssb_freq_hz;
+                let samples = on_the_air(&cell, 1.5e6, 10.0, &mut rng);
+                for centre_hz in [Some(ssb_freq_hz - 1.5e6), None] {
+                    let what = format!("{spacing:?} {ssb_freq_hz} {cfo_ppm} {centre_hz:?}");
+                    let finds = scan(&air::slices(&samples), RATE_HZ, centre_hz).unwrap();
+                    // What is not decoded may be noise, in one of a thousand recordings of 20 ms.
+                    let decoded = |find: &&RasterFind| find.ssbs[0].payload.is_some();
+                    let decoded: Vec<_> = finds.iter().filter(decoded).collect();
+                    assert_eq!(decoded.len(), 1, "{what}");
+                    let ssb = &decoded[0].ssbs[0];
+                    assert_eq!((ssb.pci.get(), ssb.ssb_index), (cell.pci, 1), "{what}");
+                    assert_eq!(ssb.payload.unwrap().sfn(), cell.sfn, "{what}");
+                    let received_hz = decoded[0].point.ssb_freq_hz + ssb.cfo_hz;
+                    let transmitted_hz = 1.5e6 + centre_hz.unwrap_or(0.0) + cell.cfo_hz;
+                    let error_hz = received_hz - transmitted_hz;
+                    assert!(error_hz.abs() < 0.1 * spacing.hz(), "{what}: {error_hz}");
+                }
+            }
+        }
+    }
+}
+
+/// PSS and SSS, shifted in frequency, look like another cell's; on the raster such a shadow may be
+/// found before the cell itself.
+#[test]
+fn a_cell_off_the_raster_casts_no_shadow_on_it() {
+    for seed in 1020..1040 {
+        let (cell, samples) = off_raster(SubcarrierSpacing::Khz30, 15e3 * 55.0, seed);
+        let centre_hz = cell.ssb_freq_hz - 15e3 * 55.0;
+        let finds = scan(&air::slices(&samples), RATE_HZ, Some(centre_hz)).unwrap();
+        let pcis: Vec<_> = finds.iter().map(|find| find.ssbs[0].pci.get()).collect();
+        assert_eq!(pcis, [cell.pci], "seed {seed}");
     }
 }
 

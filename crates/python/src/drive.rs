@@ -438,20 +438,12 @@ fn pose_columns<'py>(
     columns.set_item("covariance_xy_m2", column(|it| covariance(it, 0, 1)))?;
     columns.set_item("covariance_yy_m2", column(|it| covariance(it, 1, 1)))?;
     columns.set_item("covariance_heading_rad2", column(|it| covariance(it, 2, 2)))?;
-    let levels: [(&str, fn(&replay::LocatedPose) -> f64); 3] = [
-        ("protection_level_m", |it| {
-            level(it, |of| of.protection_level_m)
-        }),
-        ("protection_level_along_m", |it| {
-            level(it, |of| of.protection_level_along_m)
-        }),
-        ("protection_level_across_m", |it| {
-            level(it, |of| of.protection_level_across_m)
-        }),
-    ];
-    for (name, value) in levels {
-        columns.set_item(name, column(value))?;
-    }
+    let along = |it: &replay::LocatedPose| level(it, |of| of.protection_level_along_m);
+    let across = |it: &replay::LocatedPose| level(it, |of| of.protection_level_across_m);
+    let horizontal = |it: &replay::LocatedPose| level(it, |of| of.protection_level_m);
+    columns.set_item("protection_level_m", column(horizontal))?;
+    columns.set_item("protection_level_along_m", column(along))?;
+    columns.set_item("protection_level_across_m", column(across))?;
     let state = |it: &replay::LocatedPose| Some(it.estimate.integrity?.state.name());
     columns.set_item("integrity", poses.iter().map(state).collect::<Vec<_>>())?;
     let searching = poses.iter().map(|it| it.searching.is_some());

@@ -52,7 +52,10 @@ fn nominal_drives_are_ok_and_within_their_level() {
         .count();
     assert!(affected <= most_affected(runs, 1e-3), "{affected}");
     let total = IntegritySummary::sum(&summaries);
-    assert_eq!(total.alarms, 0);
+    // Before the angles have told that the wheels do not slip as it sets off, once in each.
+    assert!(total.alarms <= runs, "{}", total.alarms);
+    let ok = total.ok as f64 / total.epochs as f64;
+    assert!(ok > 0.99, "{ok}");
     // The median over a run wanders by a third of itself; over n runs by that over √n.
     let ratio = total.median_ratio();
     let chance = 4.0 * 0.33 / (runs as f64).sqrt();
@@ -166,7 +169,8 @@ fn led_astray_it_says_so_and_finds_back() {
 }
 
 /// Without a second radio head odometry and road are the only witnesses: what they can vouch for
-/// grows with the distance, until it is told that it is too much.
+/// grows with the distance, once the angles have told that the wheels did not slip as it set off, until
+/// it is told that it is too much.
 #[test]
 fn one_radio_head_is_trusted_as_far_as_odometry_goes() {
     let alone = |faults| Scenario {
@@ -183,7 +187,7 @@ fn one_radio_head_is_trusted_as_far_as_odometry_goes() {
                 .unwrap();
             step.integrity.unwrap().protection_level_m
         };
-        assert!(level_m(10.0) < level_m(30.0) && level_m(30.0) < level_m(70.0));
+        assert!(level_m(25.0) < level_m(45.0) && level_m(45.0) < level_m(70.0));
     }
     let what = FaultKind::MovedHead {
         radio_head: 0,

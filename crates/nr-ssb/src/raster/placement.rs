@@ -70,8 +70,9 @@ pub(crate) fn placed_at(
             + if off_raster { RASTER_PREFERENCE } else { 0.0 }
     };
     let nearest = (received_hz / SET_BY_HAND_HZ).round();
-    // All that an offset of up to half a subcarrier, rounded up to a raster point, may hide.
-    let reach = (0.5 * spacing.hz() / 15e3).ceil() * 3.0;
+    // So many that with some of them the phases agree, whatever the offset: 5 kHz and a turn per
+    // symbol, some 14 times 1 kHz at 15 kHz spacing, have little in common.
+    let reach = (0.5 * spacing.hz() / 1e3).floor();
     let best = (0..=2 * reach as usize)
         .map(|i| (nearest - reach + i as f64) * SET_BY_HAND_HZ)
         .filter(|hz| band_hz.contains(hz))

@@ -41,14 +41,16 @@ impl PointSearch {
     }
 
     /// The SSBs at one point, its frequency absolute or, where that of the recording's centre is not
-    /// known, relative to it.
+    /// known, relative to it, and around a carrier frequency offset.
     pub(crate) fn search(
         &mut self,
         antennas: &[&[Complex32]],
         point: RasterPoint,
         centre_hz: Option<f64>,
+        cfo_centre_hz: f64,
     ) -> Result<Option<RasterFind>, ScanError> {
         self.tune(antennas, &[point.ssb_freq_hz - centre_hz.unwrap_or(0.0)])?;
+        self.searcher.centre(cfo_centre_hz)?;
         self.look(0, point, centre_hz.is_some())
     }
 
@@ -62,6 +64,7 @@ impl PointSearch {
         let mut finds = Vec::new();
         let offsets_hz = points.iter().map(|point| point.ssb_freq_hz - centre_hz);
         self.tune(antennas, &offsets_hz.collect::<Vec<_>>())?;
+        self.searcher.centre(0.0)?;
         for (index, point) in points.iter().enumerate() {
             finds.extend(self.look(index, *point, true)?);
         }

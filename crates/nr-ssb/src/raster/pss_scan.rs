@@ -29,11 +29,14 @@ pub(super) struct Seen {
     statistic: f32,
     /// First sample of the PSS, in the recording.
     pub(super) sample: f64,
-    pub(super) offset_hz: f64,
+    /// Offset from the recording's centre, in steps of half a subcarrier, ...
+    pub(super) received_hz: f64,
+    /// ... and the multiple of 15 kHz nearest to it.
+    offset_hz: f64,
 }
 
-/// Offsets from the recording's centre, multiples of 15 kHz up to `reach_hz`, where the PSS
-/// stands out, the likeliest first.
+/// Where the PSS stands out up to `reach_hz` from the recording's centre, the likeliest first, one
+/// for each multiple of 15 kHz.
 pub(super) fn likely_offsets(
     spacing: SubcarrierSpacing,
     rate_hz: f64,
@@ -67,10 +70,14 @@ pub(super) fn likely_offsets(
         let end = (first + CHUNK).min(samples);
         let mut maxima = Vec::new();
         filter.run(&tiles, bases, (first, end), threshold, &mut maxima);
-        let seen = maxima.iter().map(|maximum| Seen {
-            statistic: maximum.statistic,
-            sample: from as f64 + maximum.sample * ratio,
-            offset_hz: nearest_offset(maximum.subcarriers * scs_hz, reach_hz),
+        let seen = maxima.iter().map(|maximum| {
+            let received_hz = maximum.subcarriers * scs_hz;
+            Seen {
+                statistic: maximum.statistic,
+                sample: from as f64 + maximum.sample * ratio,
+                received_hz: received_hz.clamp(-reach_hz, reach_hz),
+                offset_hz: nearest_offset(received_hz, reach_hz),
+            }
         });
         Ok::<_, ScanError>(seen.collect::<Vec<_>>())
     })?;

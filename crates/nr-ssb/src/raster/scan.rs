@@ -37,8 +37,7 @@ pub fn scan(
     };
     let beside = scan_off_raster(antennas, rate_hz, centre_hz, &finds)?;
     finds.extend(beside);
-    sort(&mut finds);
-    Ok(finds)
+    Ok(without_shadows(finds))
 }
 
 /// The SSBs on the points of the synchronization raster, the point with the strongest first.
@@ -73,14 +72,16 @@ pub fn scan_raster(
                 // What the point's neighbours on the global frequency raster hold shows here too.
                 let at = find.point;
                 let band_hz = band(centre_hz, reach);
-                let placed_hz = find.strongest().map_or(at.ssb_freq_hz, |ssb| {
-                    placed_at(at.ssb_freq_hz, true, ssb, spacing, band_hz)
-                });
+                let Some(ssb) = find.strongest() else {
+                    return Ok(find);
+                };
+                let placed_hz = placed_at(at.ssb_freq_hz, true, ssb, spacing, band_hz);
                 if placed_hz == at.ssb_freq_hz {
                     return Ok(find);
                 }
-                let there =
-                    at_point.search(antennas, RasterPoint::off(placed_hz), Some(centre_hz))?;
+                let cfo_hz = at.ssb_freq_hz + ssb.coarse_cfo_hz - placed_hz;
+                let point = RasterPoint::off(placed_hz);
+                let there = at_point.search(antennas, point, Some(centre_hz), cfo_hz)?;
                 Ok(there.unwrap_or(find))
             };
             let finds = at_point.search_all(antennas, points, centre_hz)?;
@@ -91,8 +92,7 @@ pub fn scan_raster(
         })?;
         finds.extend(found.into_iter().flatten());
     }
-    sort(&mut finds);
-    Ok(finds)
+    Ok(without_shadows(finds))
 }
 
 /// The SSBs anywhere in the band but where `known` ones are.
@@ -130,21 +130,24 @@ pub fn scan_off_raster(
         let mut at_point =
             PointSearch::new(spacing, rate_hz, antennas.len(), FALSE_ALARM / all as f64)?;
         let same = known.iter().filter(|find| find.spacing == spacing);
-        let mut found_hz: Vec<f64> = same
-            .map(|find| find.point.ssb_freq_hz - centre_hz.unwrap_or(0.0))
-            .collect();
+        let received_hz = |find: &RasterFind| {
+            let cfo_hz = find.strongest().map_or(0.0, |ssb| ssb.cfo_hz);
+            find.point.ssb_freq_hz - centre_hz.unwrap_or(0.0) + cfo_hz
+        };
+        let mut found_hz: Vec<f64> = same.map(received_hz).collect();
         for seen in likely_offsets(spacing, rate_hz, antennas, reach)? {
-            let offset_hz = seen.offset_hz;
+            let offset_hz = seen.received_hz;
             // What is there shows a subcarrier beside as well.
             let same_place = |hz: &f64| (hz - offset_hz).abs() < 1.5 * spacing.hz();
             if found_hz.iter().any(same_place) {
                 continue;
             }
             let around = around(antennas, seen.sample, rate_hz / spacing.base_rate_hz());
-            let first = at_point.search(&around, RasterPoint::off(offset_hz), None)?;
+            let first = at_point.search(&around, RasterPoint::off(offset_hz), None, 0.0)?;
             let Some(strongest) = first.as_ref().and_then(RasterFind::strongest) else {
                 continue;
             };
+            let received_hz = offset_hz + strongest.coarse_cfo_hz;
             // A wrong frequency would be taken for an offset (TS 38.211 §5.4).
             let offset_hz = match centre_hz {
                 Some(centre_hz) => {
@@ -154,14 +157,13 @@ pub fn scan_off_raster(
                 }
                 None => nearest_offset(offset_hz + strongest.cfo_hz, reach),
             };
-            found_hz.push(offset_hz);
+            found_hz.push(received_hz);
             let point = RasterPoint::off(centre_hz.unwrap_or(0.0) + offset_hz);
-            let find = at_point.search(antennas, point, centre_hz)?;
-            finds.extend(find.filter(|find| !known.iter().chain(&finds).any(|it| it.casts(find))));
+            let find = at_point.search(antennas, point, centre_hz, received_hz - offset_hz)?;
+            finds.extend(find.filter(|find| !known.iter().any(|it| it.casts(find))));
         }
     }
-    sort(&mut finds);
-    Ok(finds)
+    Ok(without_shadows(finds))
 }
 
 /// The samples around an SSB whose PSS was seen at `sample`, `ratio` of them for one at the base rate.
@@ -184,7 +186,15 @@ fn band(centre_hz: f64, reach_hz: f64) -> RangeInclusive<f64> {
     centre_hz - reach_hz..=centre_hz + reach_hz
 }
 
-fn sort(finds: &mut [RasterFind]) {
+/// Those that none of the others casts, the strongest first.
+fn without_shadows(mut finds: Vec<RasterFind>) -> Vec<RasterFind> {
     let snr_db = |find: &RasterFind| find.strongest().map_or(f64::NEG_INFINITY, |it| it.snr_db);
     finds.sort_by(|a, b| snr_db(b).total_cmp(&snr_db(a)));
+    let mut kept: Vec<RasterFind> = Vec::new();
+    for find in finds {
+        if !kept.iter().any(|it| it.casts(&find)) {
+            kept.push(find);
+        }
+    }
+    kept
 }

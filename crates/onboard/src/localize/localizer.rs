@@ -73,6 +73,12 @@ pub trait Localizer: Any + Send {
         None
     }
 
+    /// The tracker by whose uncertainty to listen: that of the fault that nothing speaks against yet, if
+    /// there is one.
+    fn doubtful(&self) -> Option<&Tracker> {
+        self.tracker()
+    }
+
     /// Keeps from now on what smoothing takes, if it can be smoothed.
     fn keep_journal(&mut self) {}
 }

@@ -253,6 +253,10 @@ impl Localizer for Recovery {
         Some(self.tracked.tracker())
     }
 
+    fn doubtful(&self) -> Option<&Tracker> {
+        Some(self.tracked.doubtful())
+    }
+
     fn keep_journal(&mut self) {
         self.keeps_journal = true;
         self.tracked.keep_journal();

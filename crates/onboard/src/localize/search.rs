@@ -128,6 +128,10 @@ impl Localizer for Search {
         self.found.as_ref()?.tracker()
     }
 
+    fn doubtful(&self) -> Option<&Tracker> {
+        self.found.as_ref()?.doubtful()
+    }
+
     fn keep_journal(&mut self) {
         self.keeps_journal = true;
         if let Some(localizer) = &mut self.found {

@@ -57,6 +57,14 @@ impl Tracked {
         }
     }
 
+    /// The tracker by whose uncertainty to listen.
+    pub fn doubtful(&self) -> &Tracker {
+        match self {
+            Self::Bare(tracker) => tracker,
+            Self::Guarded(guard) => guard.doubtful(),
+        }
+    }
+
     /// How much more the angles vary than stated, as far as anybody listens to that.
     pub const fn noise_ratio(&self) -> f64 {
         match self {

@@ -34,7 +34,8 @@ pub struct FaultProbability {
     /// Of each radio head: moved, spoofed, without line of sight. A tracker does without it.
     #[schemars(range(min = 1e-9, max = 0.5))]
     pub radio_head: f64,
-    /// Of the odometer: it slips. A tracker that expects it counts once the angles speak for it.
+    /// Of the odometer: it slips, each time that the vehicle sets off. A tracker that expects it counts
+    /// until the angles have spoken against it.
     #[schemars(range(min = 1e-9, max = 0.5))]
     pub odometer: f64,
     /// Of all radio heads at once, as by a wrong datum. Nobody watches it: it comes off the risk.
@@ -60,7 +61,7 @@ impl Default for FaultProbability {
     fn default() -> Self {
         Self {
             radio_head: 0.08,
-            odometer: 0.08,
+            odometer: 3e-3,
             all_radio_heads: 1e-5,
             array: 1e-5,
         }
@@ -137,8 +138,8 @@ mod tests {
     fn faults_that_the_risk_cannot_bear_are_refused_by_key() {
         let check = Check { file: "cart.toml" };
         let mut settings = IntegritySettings::default();
-        assert!(settings.check(check).is_ok() && settings.check_sum(11, check).is_ok());
-        let told = settings.check_sum(12, check).unwrap_err().to_string();
+        assert!(settings.check(check).is_ok() && settings.check_sum(12, check).is_ok());
+        let told = settings.check_sum(13, check).unwrap_err().to_string();
         assert!(
             told.contains("vehicle.integrity.fault_probability"),
             "{told}"

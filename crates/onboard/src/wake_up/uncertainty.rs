@@ -180,7 +180,7 @@ impl WakeUpPolicy for UncertaintyDriven {
         if !self.last_wake_up_s.is_none_or(is_free) {
             return Ok(false);
         }
-        let tracker = now.localizer.tracker();
+        let tracker = now.localizer.doubtful();
         let headroom_db = self.snr_headroom_db.unwrap_or(0.0);
         let snr_db =
             |head: &RadioHead, distance_m| now.budget.snr_db(head, distance_m) + headroom_db;
@@ -194,7 +194,7 @@ impl WakeUpPolicy for UncertaintyDriven {
         chosen: &mut [bool],
     ) -> Result<f64, BoxError> {
         self.last_wake_up_s = Some(now.time_s);
-        let Some(tracker) = now.localizer.tracker() else {
+        let Some(tracker) = now.localizer.doubtful() else {
             chosen.fill(true);
             return Ok(self.period_s);
         };

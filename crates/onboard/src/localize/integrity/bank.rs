@@ -209,7 +209,8 @@ impl Bank {
                 }
             }
         }
-        self.slip.update(&mut self.main, head, measured)
+        let noise_ratio = self.noise_ratio();
+        (self.slip).update(&mut self.main, noise_ratio, head, measured)
     }
 
     /// Whether a source is at fault and nobody knows which, or too many are.

@@ -5,7 +5,7 @@
 //! covariance, wherever the full solution may be: the protection level is the radius about the full
 //! solution that holds for all of them together, each as probable as its fault
 //! ([`LevelEquation`](super::level::LevelEquation)). The same of the tracker that does not trust the
-//! odometer ([`Slip`](super::slip::Slip)), where it is suspected. All of it is of angles as noisy as
+//! odometer ([`Slip`](super::slip::Slip)), as probable as the angles leave it. All of it is of angles as noisy as
 //! they are heard to be ([`AngleNoise`](super::angle_noise::AngleNoise)).
 //!
 //! A single radio head has no witness but odometry and road: the protection level then is what
@@ -22,6 +22,9 @@ use crate::localize::pose_estimate::PoseEstimate;
 use crate::localize::tracker::{OdometryVerdict, Tracker};
 use crate::observation::OdometrySample;
 use crate::radio_head::RadioHead;
+
+/// Share of the risk that is not worth the effort.
+const NEGLIGIBLE: f64 = 0.1;
 
 /// A tracker with its witnesses.
 #[derive(Debug)]
@@ -76,6 +79,23 @@ impl Guard {
     /// The tracker that uses every sound source.
     pub const fn tracker(&self) -> &Tracker {
         self.bank.main()
+    }
+
+    /// The tracker by whose uncertainty to listen: that of every sound source, unless slip, which too
+    /// little speaks against yet, takes the level beyond the alert limit.
+    pub fn doubtful(&self) -> &Tracker {
+        let (bank, now_s) = (&self.bank, self.tracker().time_s());
+        let is_doubted = self.slip_probability(bank) > self.config.risk
+            && self.levels(bank, now_s).horizontal_m > self.config.alert_limit_m;
+        if is_doubted {
+            bank.slip().tracker()
+        } else {
+            bank.main()
+        }
+    }
+
+    fn slip_probability(&self, bank: &Bank) -> f64 {
+        (bank.slip()).probability(self.config.fault_probability.odometer)
     }
 
     /// How much more the angles vary than stated.
@@ -179,20 +199,19 @@ impl Guard {
     }
 
     /// What the error leaves with the stated risk, whether no source is at fault or any one of those
-    /// in use, the odometer among them where it is suspected.
+    /// in use, the odometer among them.
     fn levels(&self, bank: &Bank, time_s: f64) -> Levels {
         let told = bank.main().pose(time_s);
         let noise_ratio = bank.noise_ratio();
-        let probability = &self.config.fault_probability;
-        let heads = (bank.without_one()).map(|clean| (probability.radio_head, clean));
-        let slip = (bank.slip().is_suspected(&self.config))
-            .then(|| (probability.odometer, bank.slip().tracker()));
+        let head_probability = self.config.fault_probability.radio_head;
+        let heads = (bank.without_one()).map(|clean| (head_probability, clean));
         let hypotheses = (std::iter::once((1.0, bank.main())))
             .chain(heads)
-            .chain(slip)
+            .chain([(self.slip_probability(bank), bank.slip().tracker())])
+            .filter(|(probability, _)| *probability > NEGLIGIBLE * self.config.risk)
             .filter_map(|(probability, clean)| {
                 Hypothesis::new(probability, &clean.pose(time_s), noise_ratio, &told)
             });
-        self.level.solve(hypotheses)
+        self.level.solve(&hypotheses)
     }
 }

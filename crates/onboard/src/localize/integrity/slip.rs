@@ -1,13 +1,13 @@
 //! Whether the odometer slips.
 //!
-//! A tracker that expects slip runs beside the one that trusts the odometer. How much better it
-//! foretells the angles is counted up, never below nothing, as slip may begin at any time (Page
-//! 1954). Beyond what noise brings about slip is suspected, and the level is to hold for that tracker
-//! too. Where errors are found that stay over metres, they are what slip would be taken for.
+//! A tracker that expects slip runs beside the one that trusts the odometer. Whenever the vehicle sets
+//! off its wheels may slip, and no leap of the speed tells; from then on each angle speaks for it or
+//! against it, as the one tracker or the other foretells it better. Until the angles have spoken against
+//! it, the level is to hold for that tracker too. Where errors are found that stay over metres, they are
+//! what slip would be taken for.
 
 use std::f64::consts::TAU;
 
-use super::config::IntegrityConfig;
 use crate::clone_in_place::clone_in_place;
 use crate::localize::gaussian::Innovation;
 use crate::localize::measurement::{AngleMeasurement, UpdateVerdict};
@@ -18,18 +18,24 @@ use crate::radio_head::RadioHead;
 /// Share of the angles that come from anywhere.
 const OUTLIERS: f64 = 2e-3;
 
-/// Largest logarithm of the likelihood ratio: what more evidence there is must be forgotten some time.
-const SURE: f64 = 30.0;
+/// Largest logarithm of the likelihood ratio, for or against, as clear as a fault of a radio head is
+/// found: what more evidence there is must be forgotten some time.
+const SURE: f64 = 15.0;
 
 /// A tracker that does not trust the odometer.
 #[derive(Debug)]
 pub(super) struct Slip {
     tracker: Tracker,
-    /// Logarithm of the likelihood ratio.
+    /// Logarithm of the likelihood ratio since it set off.
     evidence: f64,
+    stands: bool,
 }
 
-clone_in_place!(Slip { tracker, evidence });
+clone_in_place!(Slip {
+    tracker,
+    evidence,
+    stands
+});
 
 impl Slip {
     /// Slip of the odometer of a tracker.
@@ -38,19 +44,27 @@ impl Slip {
         tracker.distrust_odometer();
         Self {
             tracker,
-            evidence: 0.0,
+            evidence: -SURE,
+            stands: true,
         }
     }
 
     /// Moves on by an odometry sample.
     pub fn odometry(&mut self, sample: &OdometrySample) {
+        let stood = std::mem::replace(&mut self.stands, sample.speed_mps == 0.0);
+        let sets_off = stood && !self.stands;
+        if sets_off && !self.tracker.config().finds_errors {
+            self.evidence = self.evidence.max(0.0);
+        }
         self.tracker.odometry(sample);
     }
 
-    /// Takes in an angle, which the tracker `sound` takes in too.
+    /// Takes in an angle, which the tracker `sound` takes in too, of so many times the variance that is
+    /// stated.
     pub fn update(
         &mut self,
         sound: &mut Tracker,
+        noise_ratio: f64,
         head: &RadioHead,
         measured: &AngleMeasurement,
     ) -> UpdateVerdict {
@@ -61,16 +75,19 @@ impl Slip {
             && let (Ok(slipping), Ok(sound)) = (&if_slipping, &if_sound)
             && !(slipping.excluded || sound.excluded)
         {
-            let evidence = (density(&slipping.innovation) / density(&sound.innovation)).ln();
-            self.evidence = (self.evidence + evidence).clamp(0.0, SURE);
+            let [slips, holds] = [slipping, sound].map(|seen| density(&seen.alone(noise_ratio)));
+            // What is seen again and again speaks once.
+            let evidence = sound.share() * (slips / holds).ln();
+            self.evidence = (self.evidence + evidence).clamp(-SURE, SURE);
         }
         self.tracker.take(if_slipping, measured);
         sound.take(if_sound, measured)
     }
 
-    /// Whether the angles speak for it, as clearly as for a fault of a radio head.
-    pub fn is_suspected(&self, config: &IntegrityConfig) -> bool {
-        self.evidence > 0.5 * config.detection_threshold.powi(2)
+    /// Probability that the odometer slips, of one that slips with the probability `prior` whenever it
+    /// sets off.
+    pub fn probability(&self, prior: f64) -> f64 {
+        (1.0 + (prior.recip() - 1.0) * (-self.evidence).exp()).recip()
     }
 
     /// The tracker.
@@ -97,9 +114,9 @@ mod tests {
     use crate::localize::tracker::{InitialPose, TrackerConfig};
     use crate::settings::{Shipped, Site, TomlFile, Vehicle};
 
-    /// Whether slip is suspected after half a minute of exact angles at 4 m/s, when the odometer reads
-    /// so many times the way.
-    fn is_suspected(ratio: f64) -> bool {
+    /// Probability of slip, of 0.01 before, after half a minute of exact angles at 4 m/s, when the odometer
+    /// reads so many times the way.
+    fn probability(ratio: f64) -> f64 {
         let site = Site::from_library("trip-4", &Shipped).unwrap();
         let vehicle = Vehicle::from_library("carrier", &Shipped).unwrap();
         let heads = RadioHead::heard(&site, &vehicle);
@@ -134,16 +151,16 @@ mod tests {
                     snr_db: 20.0,
                     resolved: true,
                 };
-                slip.update(&mut sound, head, &measured);
+                slip.update(&mut sound, 1.0, head, &measured);
             }
         }
-        slip.is_suspected(&IntegrityConfig::default())
+        slip.probability(1e-2)
     }
 
     #[test]
     fn slip_since_the_start_is_suspected_and_a_sound_odometer_is_not() {
-        assert!(!is_suspected(1.0));
-        assert!(is_suspected(1.2));
-        assert!(is_suspected(0.8));
+        assert!(probability(1.0) < 1e-3);
+        assert!(probability(1.2) > 0.99);
+        assert!(probability(0.8) > 0.99);
     }
 }
