@@ -29,20 +29,28 @@ const OSCILLATOR: f64 = 1e-6;
 const COARSE_AT_0_DB: f64 = 0.04;
 /// ... and however strong the SSB, echoes reaching over the cyclic prefix.
 const COARSE_AT_BEST: f64 = 0.01;
-/// What must speak against a point of the synchronization raster, and against one of the global
-/// frequency raster, in squared standard deviations.
+/// What must speak against a point of the synchronization raster, against one of the global frequency
+/// raster, and again against a multiple of 5 kHz, in squared standard deviations.
 const RASTER_PREFERENCE: f64 = 16.0;
-/// Transmitters that keep to no raster are set by people, to multiples of this.
+/// Transmitters that keep to no raster are set by people, to multiples of this, ...
 const SET_BY_HAND_HZ: f64 = 5e3;
+/// ... or, less likely again, of this.
+const FINEST_HZ: f64 = 1e3;
 
-/// Whether a frequency is one of TS 38.104 Table 5.4.2.1-1.
-fn is_on_global_raster(frequency_hz: f64) -> bool {
-    let units = match frequency_hz {
+/// What speaks against a frequency beforehand, in squared standard deviations: nothing if it is one of
+/// TS 38.104 Table 5.4.2.1-1.
+fn oddness(frequency_hz: f64) -> f64 {
+    let is_whole = |units: f64| (units - units.round()).abs() < 1e-3;
+    let on_global_raster = is_whole(match frequency_hz {
         ..3e9 => frequency_hz / 5e3,
         ..FR2_FROM_HZ => frequency_hz / 15e3,
         _ => (frequency_hz - 24.25008e9) / 60e3,
-    };
-    (units - units.round()).abs() < 1e-3
+    });
+    match frequency_hz {
+        _ if on_global_raster => 0.0,
+        _ if is_whole(frequency_hz / SET_BY_HAND_HZ) => RASTER_PREFERENCE,
+        _ => 2.0 * RASTER_PREFERENCE,
+    }
 }
 
 /// Where inside `band_hz` an SSB was placed that a search around `tuned_hz` found there, `on_raster`
@@ -64,17 +72,16 @@ pub(crate) fn placed_at(
         let carrier_step = carrier_reset_step(frequency_hz, spacing.base_rate_hz());
         let disagreement_hz = wrap(step - carrier_step) / (TAU * symbol_s);
         let offset_hz = received_hz + disagreement_hz - frequency_hz;
-        let off_raster = !is_on_global_raster(frequency_hz);
         (disagreement_hz / coarse_hz).powi(2)
             + (offset_hz / (OSCILLATOR * frequency_hz)).powi(2)
-            + if off_raster { RASTER_PREFERENCE } else { 0.0 }
+            + oddness(frequency_hz)
     };
-    let nearest = (received_hz / SET_BY_HAND_HZ).round();
-    // So many that with some of them the phases agree, whatever the offset: 5 kHz and a turn per
-    // symbol, some 14 times 1 kHz at 15 kHz spacing, have little in common.
-    let reach = (0.5 * spacing.hz() / 1e3).floor();
+    let nearest = (received_hz / FINEST_HZ).round();
+    // As far as multiples of 5 kHz must go for the phases to agree with some of them, whatever the
+    // offset: these and a turn per symbol, some 14 times 1 kHz at 15 kHz spacing, have little in common.
+    let reach = (2.5e-3 * spacing.hz()).floor();
     let best = (0..=2 * reach as usize)
-        .map(|i| (nearest - reach + i as f64) * SET_BY_HAND_HZ)
+        .map(|i| (nearest - reach + i as f64) * FINEST_HZ)
         .filter(|hz| band_hz.contains(hz))
         .min_by(|a, b| cost(*a).total_cmp(&cost(*b)));
     match best {
