@@ -14,6 +14,7 @@ use super::measurement::{AngleMeasurement, UpdateReason, UpdateVerdict};
 use super::pose_estimate::PoseEstimate;
 use super::tracker::state::{ACROSS, ALONG, HEADING, STATES};
 use super::tracker::{InitialPose, OdometryVerdict, Tracker, TrackerConfig};
+use crate::clone_in_place::clone_in_place;
 use crate::geometry::{Pose, wrap_angle};
 use crate::observation::OdometrySample;
 use crate::radio_head::RadioHead;
@@ -48,13 +49,19 @@ enum Ground {
 }
 
 /// A hypothesis of where the vehicle is.
-#[derive(Clone, Debug)]
+#[derive(Debug)]
 struct Hypothesis {
     /// Number of the road it drives on; 0 in the plane.
     road: usize,
     tracker: Tracker,
     log_likelihood: f64,
 }
+
+clone_in_place!(Hypothesis {
+    road,
+    tracker,
+    log_likelihood
+});
 
 impl Hypothesis {
     /// Distance along its road, and the standard deviation of that (m).
@@ -103,13 +110,20 @@ impl Hypothesis {
 }
 
 /// The search for the first pose.
-#[derive(Clone, Debug)]
+#[derive(Debug)]
 pub struct Initialiser {
     config: TrackerConfig,
     ground: Ground,
     heads: Vec<RadioHead>,
     hypotheses: Vec<Hypothesis>,
 }
+
+clone_in_place!(Initialiser {
+    config,
+    ground,
+    heads,
+    hypotheses
+});
 
 impl Initialiser {
     /// The vehicle may be anywhere on `road`, driving along it or, where `either_direction`, also
@@ -291,7 +305,18 @@ impl Initialiser {
 
     /// One tracker for all hypotheses that are left, once they know the position.
     pub fn found(&self) -> Option<Tracker> {
-        let spread = self.pose(f64::NEG_INFINITY).principal_variances();
+        let all = self.pose(f64::NEG_INFINITY);
+        let is_placed = all.principal_variances()[0] < FOUND_STD_M * FOUND_STD_M;
+        let heading_known = match self.ground {
+            Ground::Roads(_) => true,
+            Ground::Plane(_) => {
+                let [.., [.., variance]] = all.covariance.unwrap_or_default();
+                variance < FOUND_STD_RAD * FOUND_STD_RAD
+            }
+        };
+        if !(is_placed && heading_known) {
+            return None;
+        }
         let mut one = self.hypotheses.first()?.clone();
         let best = one.log_likelihood;
         let mut other_way = 0.0;
@@ -302,10 +327,7 @@ impl Initialiser {
                 other_way += (hypothesis.log_likelihood - best).exp();
             }
         }
-        let heading_known = matches!(self.ground, Ground::Roads(_))
-            || one.tracker.belief().covariance[HEADING][HEADING] < FOUND_STD_RAD * FOUND_STD_RAD;
-        let placed = spread[0] < FOUND_STD_M * FOUND_STD_M;
-        (placed && heading_known && other_way < OTHER_WAY).then_some(one.tracker)
+        (other_way < OTHER_WAY).then_some(one.tracker)
     }
 
     /// Mean and covariance over all hypotheses, each weighed by its likelihood: where the vehicle

@@ -3,6 +3,7 @@
 
 mod area;
 mod choose;
+mod contest;
 mod dead_reckoning;
 pub mod gaussian;
 mod history;

@@ -3,6 +3,8 @@
 //! As long as angles come from where the tracker expects them, this only watches. When most of them
 //! do not, the position is declared unavailable, and a search runs beside the tracker: about where it
 //! believes to be first, then wherever radio heads are, or along all of the road where there is one.
+//! A place in the plane that was given is a hypothesis like others: from the first angle on a search
+//! about it runs silently, until it has found the same place, has listened for long, or speaks against it.
 //! What the search finds takes over only if it foretells the same angles better than the tracker
 //! did: a restart that would be worse than what it replaces never happens. Meanwhile the covariance
 //! covers both; where the tracker is refuted, a search nearby speaks alone.
@@ -10,6 +12,7 @@
 use std::sync::Arc;
 
 use super::area::Area;
+use super::contest::Contest;
 use super::initialise::Initialiser;
 use super::integrity::IntegrityConfig;
 use super::integrity_state::IntegrityState;
@@ -33,18 +36,8 @@ const NEARBY_M: f64 = 2.0;
 /// Most of three deviations that count as nearby (m).
 const MOST_NEARBY_M: f64 = 10.0;
 
-/// After this time with angles and without a find the search goes wide (s).
-const PATIENCE_S: f64 = 20.0;
-
 /// After a find that was no better than the tracker nothing is searched for, so long (s).
 const REST_S: f64 = 10.0;
-
-/// Way to be driven before a find is believed (m): who stands hears the same errors again and again.
-const LEAST_WAY_M: f64 = 0.5;
-
-/// Log-likelihood by which a place must foretell the angles better than another: a sequential test (Wald
-/// 1945) that is wrong once in three million.
-const BETTER: f64 = 15.0;
 
 /// Radio heads without which a place in the plane cannot be told from others.
 const LEAST_HEADS: usize = 3;
@@ -65,7 +58,9 @@ pub struct Recovery {
     setup: Arc<Setup>,
     tracked: Tracked,
     watch: Watch,
-    search: Option<Search>,
+    contest: Option<Contest>,
+    /// Whether the first angle is to begin the search that confirms the place that was given.
+    is_to_confirm: bool,
     rests_until_s: f64,
     recovered: Option<Recovered>,
     keeps_journal: bool,
@@ -75,36 +70,12 @@ clone_in_place!(Recovery {
     setup,
     tracked,
     watch,
-    search,
+    contest,
+    is_to_confirm,
     rests_until_s,
     recovered,
     keeps_journal
 });
-
-#[derive(Clone, Debug)]
-struct Search {
-    initialiser: Initialiser,
-    /// Log-likelihood of the tracker by the same angles.
-    own: f64,
-    /// When it heard its first angle (s).
-    since_s: Option<f64>,
-    /// Distance driven when it began (m).
-    since_m: f64,
-    is_wide: bool,
-}
-
-impl Search {
-    /// Log-likelihood by which its best place foretells the angles better than the tracker does.
-    fn ahead(&self) -> f64 {
-        self.initialiser.best() - self.own
-    }
-
-    /// Whether it has listened for long.
-    fn is_patient(&self, now_s: f64) -> bool {
-        self.since_s
-            .is_some_and(|since_s| now_s - since_s > PATIENCE_S)
-    }
-}
 
 impl Recovery {
     /// A tracker of these radio heads, that was given its place or found it at a time; `road` is
@@ -117,6 +88,7 @@ impl Recovery {
         found_s: Option<f64>,
     ) -> Self {
         let risk = integrity.unwrap_or_default().risk;
+        let is_to_confirm = found_s.is_none() && road.is_none();
         Self {
             setup: Arc::new(Setup {
                 config: *tracker.config(),
@@ -127,43 +99,59 @@ impl Recovery {
             }),
             tracked: Tracked::new(tracker, heads, integrity, found_s),
             watch: Watch::new(heads),
-            search: None,
+            contest: None,
+            is_to_confirm,
             rests_until_s: f64::NEG_INFINITY,
             recovered: None,
             keeps_journal: false,
         }
     }
 
+    /// The search that is told of.
+    fn told(&self) -> Option<&Contest> {
+        self.contest.as_ref().filter(|it| !it.is_silent())
+    }
+
     /// Begins to search, ends it, or goes on.
     fn judge(&mut self, now_s: f64) {
-        let Some(search) = &self.search else {
+        let Some(contest) = &mut self.contest else {
             if self.watch.is_lost() && now_s >= self.rests_until_s {
-                self.search = self.begin(now_s, false);
+                self.contest = self.begin(now_s, false);
             }
             return;
         };
-        let is_ahead = search.ahead() > BETTER;
+        let is_ahead = contest.is_ahead();
+        let odometry_s = self.tracked.tracker().time_s();
+        if contest.is_silent() && (is_ahead && contest.has_moved() || self.watch.is_lost()) {
+            contest.tell(odometry_s);
+        }
+        if contest.told_s == Some(odometry_s) {
+            return; // before anything moves the covariance covers both
+        }
+        contest.speaks_alone = is_ahead;
         // Led astray it may have come to agree with the angles where it now is; it is sure of itself
         // only where every other place foretells them worse.
-        let is_sure = search.ahead() < -BETTER && self.watch.is_sure();
-        let way_m = self.tracked.tracker().driven_m() - search.since_m;
-        if is_ahead && way_m < LEAST_WAY_M {
+        let is_sure = contest.is_behind() && self.watch.is_sure();
+        if is_ahead && !contest.has_moved() {
             return;
         }
-        if is_ahead && let Some(found) = search.initialiser.found() {
+        let is_over = is_sure || (contest.is_silent() && contest.is_patient());
+        if is_ahead && let Some(found) = contest.initialiser.found() {
             self.take(found, now_s);
-        } else if is_sure || (!is_ahead && search.initialiser.found().is_some()) {
+        } else if is_over || (!is_ahead && contest.initialiser.found().is_some()) {
             // What is found elsewhere, if anything, is no better.
-            self.search = None;
-            self.rests_until_s = now_s + REST_S;
-            self.watch.reset();
-        } else if !search.is_wide && search.is_patient(now_s) {
-            self.search = self.begin(now_s, true);
+            if !contest.is_silent() {
+                self.rests_until_s = now_s + REST_S;
+                self.watch.reset();
+            }
+            self.contest = None;
+        } else if !contest.is_wide && contest.is_patient() {
+            self.contest = self.begin(now_s, true);
         }
     }
 
     /// A search nearby, or wherever radio heads are: at once where that is no more to look at.
-    fn begin(&self, now_s: f64, is_wide: bool) -> Option<Search> {
+    fn begin(&self, now_s: f64, is_wide: bool) -> Option<Contest> {
         let setup = &self.setup;
         let (config, heads) = (setup.config, setup.heads.as_slice());
         let mut initialiser = match &setup.road {
@@ -181,13 +169,7 @@ impl Recovery {
             }
         };
         initialiser.resume(self.tracked.tracker());
-        Some(Search {
-            initialiser,
-            own: 0.0,
-            since_s: None,
-            since_m: self.tracked.tracker().driven_m(),
-            is_wide,
-        })
+        Some(Contest::new(initialiser, self.tracked.tracker(), is_wide))
     }
 
     fn take(&mut self, found: Tracker, now_s: f64) {
@@ -202,15 +184,15 @@ impl Recovery {
         if self.keeps_journal {
             self.tracked.keep_journal();
         }
-        self.search = None;
+        self.contest = None;
         self.watch.reset();
     }
 }
 
 impl Localizer for Recovery {
     fn odometry(&mut self, sample: &OdometrySample) -> Result<OdometryVerdict, BoxError> {
-        if let Some(search) = &mut self.search {
-            search.initialiser.odometry(sample);
+        if let Some(contest) = &mut self.contest {
+            contest.initialiser.odometry(sample);
         }
         Ok(self.tracked.odometry(sample))
     }
@@ -220,11 +202,14 @@ impl Localizer for Recovery {
         head: &RadioHead,
         measured: &AngleMeasurement,
     ) -> Result<UpdateVerdict, BoxError> {
-        if let Some(search) = &mut self.search {
-            search.since_s.get_or_insert(measured.time_s);
-            search.initialiser.update(head, measured);
-            let tracker = self.tracked.tracker();
-            search.own += tracker.log_likelihood(&tracker.look(head, measured));
+        if std::mem::take(&mut self.is_to_confirm) {
+            self.contest = self.begin(measured.time_s, false);
+            if let Some(contest) = &mut self.contest {
+                contest.told_s = None;
+            }
+        }
+        if let Some(contest) = &mut self.contest {
+            contest.update(self.tracked.tracker(), head, measured);
         }
         let verdict = self.tracked.update(head, measured);
         self.watch.see(head, &verdict, self.tracked.noise_ratio());
@@ -234,11 +219,11 @@ impl Localizer for Recovery {
 
     fn pose(&self, time_s: f64) -> Result<PoseEstimate, BoxError> {
         let mut estimate = self.tracked.pose(time_s);
-        if let Some(search) = &self.search {
-            let searched = search.initialiser.pose(time_s);
+        if let Some(contest) = self.told() {
+            let searched = contest.initialiser.pose(time_s);
             // Along all of a road, or far about, its best place may be anywhere.
-            let is_near = self.setup.road.is_none() && !search.is_wide;
-            if is_near && search.ahead() > BETTER {
+            let is_near = self.setup.road.is_none() && !contest.is_wide;
+            if is_near && contest.speaks_alone {
                 (estimate.pose, estimate.covariance) = (searched.pose, searched.covariance);
             } else {
                 estimate.cover(&searched);
@@ -257,7 +242,7 @@ impl Localizer for Recovery {
     }
 
     fn is_lost(&self) -> bool {
-        self.search.is_some()
+        self.told().is_some()
     }
 
     fn recovered(&self) -> Option<Recovered> {

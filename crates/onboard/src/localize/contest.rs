@@ -1,0 +1,143 @@
+//! A search beside a tracker: which of the two foretells the same angles better.
+
+use super::initialise::Initialiser;
+use super::measurement::AngleMeasurement;
+use super::tracker::Tracker;
+use crate::clone_in_place::clone_in_place;
+use crate::radio_head::RadioHead;
+
+/// Log-likelihood by which a place must foretell the angles better than another: a sequential test (Wald
+/// 1945) that is wrong once in three million.
+const BETTER: f64 = 15.0;
+
+/// Way to be driven before a find is believed (m): who stands hears the same errors again and again.
+const LEAST_WAY_M: f64 = 0.5;
+
+/// After this time with angles and without a find it has listened for long (s).
+const PATIENCE_S: f64 = 20.0;
+
+/// Looks at one radio head within this time share their errors, and who has not heard anything for so
+/// long does not listen (s).
+const LOOK_S: f64 = 1.0;
+
+/// A search, and how the tracker does meanwhile.
+#[derive(Debug)]
+pub struct Contest {
+    pub initialiser: Initialiser,
+    pub is_wide: bool,
+    /// Time of the newest odometry (s) when it was told of; nobody is as long as nothing speaks against
+    /// the tracker.
+    pub told_s: Option<f64>,
+    /// Whether the tracker is refuted, so that its place is no longer told beside the search's.
+    pub speaks_alone: bool,
+    /// Log-likelihood of the tracker by the same angles.
+    own: f64,
+    /// Distance driven when it began, and driven since (m).
+    since_m: f64,
+    way_m: f64,
+    /// When the last angle was heard (s), and for how long it has listened without silence (s).
+    heard_s: f64,
+    listened_s: f64,
+    /// Angles, how many of them are looks of their own, and when each radio head had its last such look (s).
+    angles: u32,
+    looks: u32,
+    looked_s: Vec<f64>,
+}
+
+clone_in_place!(Contest {
+    initialiser,
+    is_wide,
+    told_s,
+    speaks_alone,
+    own,
+    since_m,
+    way_m,
+    heard_s,
+    listened_s,
+    angles,
+    looks,
+    looked_s
+});
+
+impl Contest {
+    /// A search that begins now.
+    pub fn new(initialiser: Initialiser, tracker: &Tracker, is_wide: bool) -> Self {
+        let heads = initialiser.heads().len();
+        Self {
+            initialiser,
+            is_wide,
+            told_s: Some(tracker.time_s()),
+            speaks_alone: false,
+            own: 0.0,
+            since_m: tracker.driven_m(),
+            way_m: 0.0,
+            heard_s: f64::NEG_INFINITY,
+            listened_s: 0.0,
+            angles: 0,
+            looks: 0,
+            looked_s: vec![f64::NEG_INFINITY; heads],
+        }
+    }
+
+    /// Lets both foretell an angle, before the tracker takes it in.
+    pub fn update(&mut self, tracker: &Tracker, head: &RadioHead, measured: &AngleMeasurement) {
+        self.way_m = tracker.driven_m() - self.since_m;
+        let silence_s = measured.time_s - self.heard_s;
+        if silence_s < LOOK_S {
+            self.listened_s += silence_s.max(0.0);
+        }
+        self.heard_s = measured.time_s;
+        let is_it = |mine: &RadioHead| mine.sends(head.pci, head.ssb_index);
+        let number = self.initialiser.heads().iter().position(is_it);
+        if let Some(looked_s) = number.and_then(|number| self.looked_s.get_mut(number)) {
+            self.angles = self.angles.saturating_add(1);
+            if measured.time_s - *looked_s >= LOOK_S {
+                *looked_s = measured.time_s;
+                self.looks = self.looks.saturating_add(1);
+            }
+        }
+        self.own += tracker.log_likelihood(&tracker.look(head, measured));
+        self.initialiser.update(head, measured);
+    }
+
+    /// Log-likelihood by which the search's best place foretells the angles better than the tracker does.
+    /// Against a tracker that nothing else speaks against only looks of their own count.
+    fn lead(&self) -> f64 {
+        let lead = self.initialiser.best() - self.own;
+        if self.is_silent() {
+            lead * f64::from(self.looks) / f64::from(self.angles.max(1))
+        } else {
+            lead
+        }
+    }
+
+    /// Whether nobody is told of it.
+    pub const fn is_silent(&self) -> bool {
+        self.told_s.is_none()
+    }
+
+    /// Whether the search's best place is better than the tracker's.
+    pub fn is_ahead(&self) -> bool {
+        self.lead() > BETTER
+    }
+
+    /// Whether it is worse.
+    pub fn is_behind(&self) -> bool {
+        self.lead() < -BETTER
+    }
+
+    /// Whether enough way was driven to believe it.
+    pub fn has_moved(&self) -> bool {
+        self.way_m >= LEAST_WAY_M
+    }
+
+    /// Tells of it from the newest odometry on, and begins to be patient anew.
+    pub const fn tell(&mut self, odometry_s: f64) {
+        (self.told_s, self.listened_s) = (Some(odometry_s), 0.0);
+    }
+
+    /// Whether it has listened for long.
+    pub fn is_patient(&self) -> bool {
+        self.listened_s > PATIENCE_S
+    }
+}
