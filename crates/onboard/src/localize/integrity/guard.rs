@@ -33,6 +33,8 @@ pub struct Guard {
     level: LevelEquation,
     bank: Bank,
     restarted: Option<Restarted>,
+    /// Whether it was found by a search, and nothing has confirmed it yet.
+    is_found: bool,
     /// Distance driven (m) when the sources could be told apart last.
     trusted_m: f64,
     now_s: f64,
@@ -50,6 +52,7 @@ clone_in_place!(Guard {
     level,
     bank,
     restarted,
+    is_found,
     trusted_m,
     now_s
 });
@@ -65,12 +68,14 @@ impl Guard {
         config: IntegrityConfig,
         found_s: Option<f64>,
     ) -> Self {
+        let is_found = found_s.is_some();
         let found_s = found_s.unwrap_or(f64::NEG_INFINITY);
         Self {
             level: LevelEquation::new(config.risk),
             trusted_m: tracker.driven_m(),
             bank: Bank::new(tracker, heads, found_s),
             restarted: None,
+            is_found,
             now_s: found_s,
             config,
         }
@@ -127,12 +132,13 @@ impl Guard {
     /// Where the sources cannot be told apart, the trackers may have been led astray, so far that
     /// they refuse the good angles as outliers. Others then start from a pose as vague as what may
     /// have happened meanwhile, and take over once nothing contradicts them. Until then, or until
-    /// the old ones are at peace again, nothing is `ok`.
+    /// the old ones are at peace again, nothing is `ok`. What a search found by angles that may have
+    /// been at fault is confirmed the same way.
     fn recover(&mut self) {
         let (now_s, patience_s) = (self.now_s, self.config.recovery_s);
         let lost = self.bank.is_lost(&self.config);
         let Some(restarted) = &self.restarted else {
-            if lost {
+            if lost || self.is_found {
                 self.restart();
             } else {
                 self.trusted_m = self.bank.main().driven_m();
@@ -140,7 +146,7 @@ impl Guard {
             return;
         };
         let aged = now_s - restarted.since_s > patience_s;
-        if !lost && self.bank.quiet_s(now_s) > patience_s {
+        if !lost && !self.is_found && self.bank.quiet_s(now_s) > patience_s {
             self.restarted = None;
         } else if aged && restarted.bank.is_lost(&self.config) {
             self.restart();
@@ -149,6 +155,7 @@ impl Guard {
             && let Some(restarted) = self.restarted.take()
         {
             self.bank = restarted.bank;
+            self.is_found = false;
         }
     }
 
