@@ -96,7 +96,6 @@ fn a_centre_between_all_rasters_gives_the_right_frequency_and_offset() {
         // On no raster at all.
         (Khz15, 3_500.0e6, 0.0, 0.6),
         (Khz30, 3_500.0e6, 4.3e3, -0.8),
-        (Khz15, 3_615.599e6, 4.3e3, 0.1),
     ] {
         let mut cell = air::Cell::random(&mut rng, spacing, 1);
         cell.ssb_freq_hz = ssb_freq_hz;
@@ -140,6 +139,7 @@ fn an_oscillator_of_20_ppm_hides_no_cell() {
                     let ssb = &decoded[0].ssbs[0];
                     assert_eq!((ssb.pci.get(), ssb.ssb_index), (cell.pci, 1), "{what}");
                     assert_eq!(ssb.payload.unwrap().sfn(), cell.sfn, "{what}");
+                    assert!((ssb.snr_db - 10.0).abs() < 1.0, "{what}: {} dB", ssb.snr_db);
                     let received_hz = decoded[0].point.ssb_freq_hz + ssb.cfo_hz;
                     let transmitted_hz = 1.5e6 + centre_hz.unwrap_or(0.0) + cell.cfo_hz;
                     let error_hz = received_hz - transmitted_hz;

@@ -26,8 +26,8 @@ pub struct IntegritySettings {
     pub fault_probability: FaultProbability,
 }
 
-/// `[integrity.fault_probability]`: probabilities of being at fault, at any time. What is wrong within
-/// the standard deviations of site and vehicle is no fault.
+/// `[integrity.fault_probability]`: probabilities of being at fault, at any time, each independently of
+/// the others. What is wrong within the standard deviations of site and vehicle is no fault.
 #[derive(Debug, Clone, Copy, PartialEq, Serialize, Deserialize, JsonSchema)]
 #[serde(default, deny_unknown_fields)]
 pub struct FaultProbability {
@@ -85,7 +85,7 @@ impl IntegritySettings {
         monitored * self.error_correlation_s / 3600.0
     }
 
-    /// Refuses faults that are likelier than the risk can bear, or than certain.
+    /// Refuses faults that are likelier than the risk can bear.
     ///
     /// # Errors
     /// [`SettingsError::Value`].
@@ -99,21 +99,6 @@ impl IntegritySettings {
                 "nobody watches them: together they must be below integrity.risk_per_hour, {}",
                 self.risk_per_hour
             ),
-        )
-    }
-
-    /// Refuses probabilities that make more than 1 with so many radio heads.
-    ///
-    /// # Errors
-    /// [`SettingsError::Value`].
-    pub fn check_sum(&self, radio_heads: usize, check: Check<'_>) -> Result<(), SettingsError> {
-        let each = &self.fault_probability;
-        let sum = radio_heads as f64 * each.radio_head + each.odometer + each.unmonitored();
-        check.that(
-            sum <= 1.0,
-            "vehicle.integrity.fault_probability",
-            format_args!("{radio_heads} * radio_head + odometer + all_radio_heads + array = {sum}"),
-            "probabilities add up to 1 at most",
         )
     }
 }
@@ -138,12 +123,7 @@ mod tests {
     fn faults_that_the_risk_cannot_bear_are_refused_by_key() {
         let check = Check { file: "cart.toml" };
         let mut settings = IntegritySettings::default();
-        assert!(settings.check(check).is_ok() && settings.check_sum(12, check).is_ok());
-        let told = settings.check_sum(13, check).unwrap_err().to_string();
-        assert!(
-            told.contains("vehicle.integrity.fault_probability"),
-            "{told}"
-        );
+        assert!(settings.check(check).is_ok());
         settings.fault_probability.array = 0.3;
         let told = settings.check(check).unwrap_err().to_string();
         assert!(told.contains("integrity.fault_probability"), "{told}");

@@ -204,9 +204,6 @@ pub fn check_together(
         "empty",
         "leave it out to listen to all",
     )?;
-    if let Some(integrity) = &vehicle.integrity {
-        integrity.check_sum(heard, check)?;
-    }
     let along_road = site.road.is_some() && vehicle.follows_road();
     check.that(
         vehicle.start.known || heard > if along_road { 1 } else { 2 },
