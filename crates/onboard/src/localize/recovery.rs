@@ -128,7 +128,7 @@ impl Recovery {
         if contest.told_s == Some(odometry_s) {
             return; // before anything moves the covariance covers both
         }
-        contest.speaks_alone = is_ahead;
+        contest.speaks_alone = is_ahead && contest.has_moved();
         // Led astray it may have come to agree with the angles where it now is; it is sure of itself
         // only where every other place foretells them worse.
         let is_sure = contest.is_behind() && self.watch.is_sure();
