@@ -204,8 +204,8 @@ def test_the_level_grows_as_less_risk_is_asked(tmp_path: Path) -> None:
     levels = [float(case.trajectories["protection_level_m"].median()) for case in cases]
     assert levels == sorted(levels)
     assert levels[2] > 1.3 * levels[0]
-    # Quantiles of a Gaussian grow as the root of the logarithm, here to 1.45 times; slip, negligible
-    # beside the larger risk, counts beside the smaller.
+    # Quantiles of a Gaussian grow as the root of the logarithm, here to 1.45 times; slip, that is
+    # negligible beside the larger risk, counts beside the smaller.
     assert levels[2] < 3.0 * levels[0]
 
 
