@@ -1,6 +1,7 @@
 from __future__ import annotations
 
 import json
+import os
 import re
 from typing import TYPE_CHECKING
 
@@ -8,7 +9,7 @@ import numpy as np
 import polars as pl
 import pytest
 
-from access_av.files import ResultsDirectory, tum_trajectory
+from access_av.files import ResultsDirectory, tum_trajectory, write_whole
 
 if TYPE_CHECKING:
     from pathlib import Path
@@ -61,3 +62,21 @@ def test_a_file_in_the_way_is_named(tmp_path: Path) -> None:
     (tmp_path / "file").write_text("")
     with pytest.raises(NotADirectoryError, match="--out takes a directory"):
         ResultsDirectory.create("run", tmp_path / "file")
+
+
+def test_a_pipe_or_a_link_is_written_to_and_not_replaced(tmp_path: Path) -> None:
+    pipe, link, file = tmp_path / "pipe", tmp_path / "link", tmp_path / "file"
+    os.mkfifo(pipe)
+    reader = os.open(pipe, os.O_RDONLY | os.O_NONBLOCK)
+    try:
+        write_whole(pipe, "a = 1\n")
+        assert os.read(reader, 100) == b"a = 1\n"
+    finally:
+        os.close(reader)
+    assert pipe.is_fifo()
+    file.write_text("a = 0\n", encoding="utf-8")
+    link.symlink_to(file)
+    assert write_whole(link, "a = 2\n") == link
+    assert link.is_symlink()
+    assert file.read_text(encoding="utf-8") == "a = 2\n"
+    assert sorted(it.name for it in tmp_path.iterdir()) == ["file", "link", "pipe"]

@@ -127,19 +127,24 @@ def write_whole(target: Path, content: str | bytes | memoryview, *, durable: boo
     """Write a file beside its place and put it there; nothing is left of a failure.
 
     Several may write the same file at once: it is then that of one of them. A ``durable`` one is on
-    the disk before it is in its place.
+    the disk before it is in its place. Devices and pipes are written to: a file put in the place of
+    one would be its end, and it may be ``/dev/null``.
     """
     if isinstance(content, str):
         # What names a file may hold bytes that are no text.
         content = content.encode("utf-8", "backslashreplace")
-    partial = target.with_name(f".{target.name}.{uuid4().hex[:8]}.partial")
+    place = target.resolve() if target.is_symlink() else target
+    if place.exists() and not place.is_file():
+        place.write_bytes(content)
+        return target
+    partial = place.with_name(f".{place.name}.{uuid4().hex[:8]}.partial")
     try:
         with partial.open("wb") as file:
             file.write(content)
             if durable:
                 file.flush()
                 os.fsync(file.fileno())
-        partial.replace(target)
+        partial.replace(place)
     except BaseException as error:
         with suppress(OSError):
             partial.unlink(missing_ok=True)
