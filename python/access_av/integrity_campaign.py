@@ -178,7 +178,7 @@ def drive(
     if json.loads(scenario.vehicle.to_json()).get("integrity") is None:
         scenario = scenario.with_overrides({"vehicle.integrity": {}})
     usual = mismatches(scenario)
-    known = {**usual, **hypotheses(scenario)}
+    known = {**usual, **hypotheses(scenario)} if only else usual
     for name in only or ():
         if name not in known:
             raise InputError(f"mismatch {name!r}: there are {', '.join(known)}")
@@ -192,18 +192,19 @@ def drive(
             channel,
             count,
             risk,
-            scenario.with_overrides({**over, **known[mismatch], **set_}),
+            scenario.with_overrides(
+                {
+                    **over,
+                    **known[mismatch],
+                    "vehicle.receiver.pci_allow_list": cells[:count],
+                    "vehicle.integrity.risk_per_hour": risk,
+                }
+            ),
         )
         for mismatch in only or usual
         for channel, over in channels(channel_names).items()
         for count in heads or (len(cells),)
         for risk in risks_per_hour or (_settings(scenario)["risk_per_hour"],)
-        for set_ in (
-            {
-                "vehicle.receiver.pci_allow_list": cells[:count],
-                "vehicle.integrity.risk_per_hour": risk,
-            },
-        )
     ]
     tasks = [
         Task(
