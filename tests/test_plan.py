@@ -177,6 +177,13 @@ def test_an_integrity_campaign_goes_on_where_it_stopped(
 
     monkeypatch.setattr("access_av.integrity_campaign.driven", driven_again)
     assert json.loads(access_av(*arguments).out)["cases"] == record["cases"]
+    for wide, last in ((80, "risk/h   ≤"), (60, "beyond       ≤"), (120, "level/error")):
+        shown = access_av(*arguments[:-1], columns=wide)
+        lines = shown.out.splitlines()
+        [head] = [line for line in lines if line.startswith(" world")]
+        assert head.rstrip().endswith(last)
+        assert sum(line.startswith(" array 1 degree off ") for line in lines) == 2
+        assert max(map(len, lines[1:-1])) <= wide
 
 
 def test_hypotheses_are_of_three_sizes_and_can_be_driven(tmp_path: Path) -> None:
@@ -190,7 +197,12 @@ def test_hypotheses_are_of_three_sizes_and_can_be_driven(tmp_path: Path) -> None
     sized = [hypotheses(SHORT)[f"head height x {size}"] for size in SIZES]
     heights = [next(iter(it["truth.site.radio_heads"].values()))["position_m"][2] for it in sized]
     assert heights == pytest.approx([0.1, 0.3, 1.0])
+    late = SHORT.with_overrides({"vehicle.receiver.lateness_std_s": 0.02})
+    assert [
+        next(iter(hypotheses(late)[f"clock late x {size}"].values())) for size in SIZES
+    ] == pytest.approx([0.02, 0.06, 0.2])
     chosen = ["two cells swapped", "map shape x 10", "growing slip x 10", "phase drift x 10"]
+    chosen += ["clock late x 10", "gain drift x 10"]
     cases = drive(Campaign(Parts(tmp_path)), SHORT, runs=1, only=chosen)
     assert cases is not None
     assert [case.mismatch for case in cases] == chosen

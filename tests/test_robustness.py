@@ -12,7 +12,7 @@ kind  what went wrong                                 test
 4     start times and answers that cannot be          test_start_times_that_cannot_be, test_plug_ins
 5     finite nonsense                                 test_numbers_beyond_physics
 6     drives of any size                              test_drives_too_large
-7     threads, runs and seeds of any size             test_counts_too_large
+7     threads, runs and seeds of any size             test_counts_too_large, test_threads_…
 8     very many radio heads                           test_too_many_radio_heads
 9     files without end                               test_files_without_end
 10    loops that do not end                           test_what_would_never_end
@@ -219,6 +219,29 @@ def test_counts_too_large(access_av: Cli, words: list[str]) -> None:
     done = access_av("run", "paper", *words)
     assert done.code == 2, done.err
     assert "Traceback" not in done.err
+
+
+LITTLE_MEMORY = """
+import resource
+import numpy as np
+from access_av import aoa, simulate
+batch = np.exp(1j * np.arange(4 * 20 * 256)).reshape(256, 4, 20)
+alone = aoa.music(batch)
+pages = int(open("/proc/self/statm").read().split()[0])
+resource.setrlimit(resource.RLIMIT_AS, (pages * resource.getpagesize() + (100 << 20),) * 2)
+assert np.array_equal(aoa.music(batch, threads=256).angle_rad, alone.angle_rad)
+try:
+    simulate("paper", threads=1000)
+except OSError as error:
+    print(error)
+"""
+
+
+def test_threads_that_are_not_to_be_had() -> None:
+    done = subprocess.run(
+        [sys.executable, "-c", LITTLE_MEMORY], capture_output=True, text=True, check=True
+    )
+    assert "no threads" in done.stdout
 
 
 @pytest.mark.parametrize("words", [["fit", "x" * 2000], ["x" * 2000], ["--" + "x" * 2000]])

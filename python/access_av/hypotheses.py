@@ -23,10 +23,14 @@ ROAD_STD_M = 0.03
 MOUNTING_STD_RAD = 0.01
 PHASE_STD_RAD = 0.03
 SCALE_STD = 0.003
+GAIN_STD_DB = 0.5
+LATE_S = 0.01
+# No file may say that an angle is older.
+LATEST_S = 0.4
 # And how far one leaves an electrical angle off where a radio head is behind something.
 HIDDEN_RAD = 0.05
 
-# Slip grows, and a phase drifts, to their size over so long.
+# Slip grows, and phase and gain drift, to their size over so long.
 GROWS_S = 300.0
 DRIFTS_M = 1000.0
 
@@ -111,6 +115,8 @@ def hypotheses(scenario: _core.Scenario) -> dict[str, Overrides]:
 
 def _of_size(site: Overrides, vehicle: Overrides, size: float) -> dict[str, Overrides]:
     heads, array, odometer = site["radio_heads"], vehicle["array"], vehicle["odometer"]
+    receiver = vehicle["receiver"]
+    late_s = receiver["lateness_s"] + size * (receiver.get("lateness_std_s") or LATE_S)
     scale = size * (odometer["scale_std"] or SCALE_STD)
     mounting = size * (array["mounting_std_rad"] or MOUNTING_STD_RAD)
     phase = size * (array["phase_std_rad"] or PHASE_STD_RAD)
@@ -136,6 +142,10 @@ def _of_size(site: Overrides, vehicle: Overrides, size: float) -> dict[str, Over
         "phase drift": {
             "truth.vehicle.array.phase_drift_rad_per_sqrt_m": phase / DRIFTS_M**0.5,
         },
+        "gain drift": {
+            "truth.vehicle.array.gain_drift_db_per_sqrt_m": size * GAIN_STD_DB / DRIFTS_M**0.5,
+        },
+        "clock late": {"truth.vehicle.receiver.lateness_s": min(late_s, LATEST_S)},
         "odometer scale": {"truth.vehicle.odometer.scale": odometer["scale"] + scale},
         "odometer noise": {"truth.vehicle.odometer.noise_m_per_sqrt_m": noise} if noise else {},
         "growing slip": {"faults": list(_growing_slip(scale))},

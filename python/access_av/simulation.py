@@ -168,6 +168,8 @@ def simulate(
         When the scenario cannot be used; names the key and what is allowed.
     ValueError
         When an estimator, policy or localizer returns what it must not; names the call.
+    OSError
+        When the system does not give so many threads.
 
     Examples
     --------

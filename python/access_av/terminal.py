@@ -87,6 +87,12 @@ def table(head: Sequence[str], *, title: str = "", text: int = 1) -> RichTable:
     return made
 
 
+def width(made: RichTable) -> int:
+    """Columns of the terminal that a table takes when no cell is wrapped."""
+    unbounded = console.options.update(max_width=10_000)
+    return console.measure(made, options=unbounded).maximum
+
+
 def show_error(error: Exception) -> None:
     """One message for a bad input."""
     if isinstance(error, OSError) and error.filename is not None:

@@ -7,6 +7,10 @@ mod samples;
 mod spectra;
 mod statistics;
 
+use std::panic::resume_unwind;
+use std::sync::{Mutex, PoisonError};
+use std::thread;
+
 use aoa::{Array, Batch, Calibration, Complex64, Method, Real, Smoothing};
 use numpy::{AllowTypeChange, PyArrayLike1};
 use pyo3::exceptions::PyValueError;
@@ -301,26 +305,36 @@ impl Visitor for Estimator<'_, '_> {
         }
         let mut values = vec![aoa::AngleEstimate::default(); batch.len() * sources];
         let share = batch.len().div_ceil(threads).max(1);
-        let outcome = self.py.detach(|| {
-            std::thread::scope(|scope| {
-                let mut parts = batch.split(share).zip(values.chunks_mut(share * sources));
-                let first = parts.next();
-                let workers: Vec<_> = parts
-                    .map(|(part, places)| scope.spawn(move || run(part, places)))
+        let parts = batch.split(share).zip(values.chunks_mut(share * sources));
+        let parts = Mutex::new(parts.enumerate());
+        let take_part = || parts.lock().unwrap_or_else(PoisonError::into_inner).next();
+        let work = || {
+            while let Some((index, (part, places))) = take_part() {
+                run(part, places).map_err(|error| error.shifted(index * share))?;
+            }
+            Ok(())
+        };
+        let outcomes = self.py.detach(|| {
+            thread::scope(|scope| {
+                // Where no thread is to be had, the others and this one do its share.
+                let helpers: Vec<_> = (share..batch.len())
+                    .step_by(share)
+                    .filter_map(|_| thread::Builder::new().spawn_scoped(scope, work).ok())
                     .collect();
-                first.map_or(Ok(()), |(part, places)| run(part, places))?;
-                for (index, worker) in workers.into_iter().enumerate() {
-                    if let Ok(outcome) = worker.join() {
-                        outcome.map_err(|error| error.shifted((index + 1) * share))?;
-                    }
+                let mut outcomes = vec![work()];
+                for helper in helpers {
+                    outcomes.push(helper.join().unwrap_or_else(|it| resume_unwind(it)));
                 }
-                Ok(())
+                outcomes
             })
         });
-        outcome.map_err(|error: aoa::BatchError| match self.samples.batch {
-            Some(_) => value_error(error),
-            None => value_error(error.error),
-        })?;
+        let errors = outcomes.into_iter().filter_map(Result::err);
+        if let Some(first) = errors.min_by_key(|error: &aoa::BatchError| error.item) {
+            return Err(match self.samples.batch {
+                Some(_) => value_error(first),
+                None => value_error(first.error),
+            });
+        }
         let axes = (sources > 1).then_some(sources);
         Ok(Estimates::Many {
             values,

@@ -13,7 +13,7 @@ use onboard::geometry::Pose;
 use onboard::localize::{AngleMeasurement, Integrity};
 use onboard::settings::EstimatorMethod;
 use onboard::{BoxError, Custom, Execution};
-use pyo3::exceptions::{PyRuntimeError, PyValueError};
+use pyo3::exceptions::{PyOSError, PyRuntimeError, PyValueError};
 use pyo3::prelude::*;
 use pyo3::types::{PyDict, PyList};
 use toml::Value;
@@ -245,6 +245,8 @@ fn python_error(error: SimulationError) -> PyErr {
             Ok(raised) => *raised,
             Err(other) => PyRuntimeError::new_err(brief(other)),
         },
+        // As Python's own: what the system does not give.
+        error @ SimulationError::Threads(_) => PyOSError::new_err(brief(error)),
         other => PyRuntimeError::new_err(brief(other)),
     }
 }

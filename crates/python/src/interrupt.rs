@@ -28,7 +28,7 @@ static WRITING: Mutex<BTreeSet<PathBuf>> = Mutex::new(BTreeSet::new());
 #[pyfunction]
 pub fn watch() -> PyResult<i32> {
     let (mut told, tells) = std::io::pipe()?;
-    thread::spawn(move || {
+    thread::Builder::new().spawn(move || {
         let mut signal = [0];
         while told.read_exact(&mut signal).is_ok() {
             if signal == [SIGINT] {
@@ -37,7 +37,7 @@ pub fn watch() -> PyResult<i32> {
                 end();
             }
         }
-    });
+    })?;
     Ok(tells.into_raw_fd())
 }
 

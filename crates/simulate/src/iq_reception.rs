@@ -8,7 +8,7 @@ use crate::channel::{HeadChannel, IqAir};
 use crate::error::SimulationError;
 use crate::random::Streams;
 use crate::scenario::Scenario;
-use crate::world::Path;
+use crate::world::{Path, VehicleState};
 
 /// Air and receiver of one run.
 pub struct IqReception {
@@ -25,6 +25,8 @@ pub struct IqBurstReception<'a> {
     pub number: u64,
     /// Where the vehicle drives.
     pub path: &'a Path,
+    /// How much earlier than its time stamp an SSB is received, in seconds.
+    pub lateness_s: f64,
     /// Channels of the radio heads, and the mean SNR of each (dB).
     pub channels: &'a [HeadChannel],
     /// See `channels`.
@@ -48,11 +50,10 @@ impl IqReception {
     fn receive(
         &mut self,
         number: u64,
-        path: &Path,
+        state: impl Fn(f64) -> VehicleState,
         channels: &[HeadChannel],
         snrs_db: &[f64],
     ) -> Result<(), SimulationError> {
-        let state = |time_s| path.at(time_s);
         let burst = self.air.receive(number, state, channels, snrs_db)?;
         let antennas: Vec<_> = burst.antennas.iter().map(Vec::as_slice).collect();
         let window = Window {
@@ -72,8 +73,9 @@ impl IqReception {
 
 impl SsbSource for IqBurstReception<'_> {
     fn sense(&mut self, sensed: &mut Vec<SensedSsb>) -> Result<(), BoxError> {
+        let state = |time_s| self.path.heard_at(time_s, self.lateness_s);
         self.reception
-            .receive(self.number, self.path, self.channels, self.snrs_db)?;
+            .receive(self.number, state, self.channels, self.snrs_db)?;
         sensed.extend(self.reception.observations.iter().map(|it| it.ssb));
         Ok(())
     }

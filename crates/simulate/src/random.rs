@@ -42,6 +42,8 @@ pub enum Purpose {
     Clusters = 16,
     /// Directions of a radio head's scatter around the forward axis.
     ScatterTurn = 17,
+    /// Lateness of the receiver's clock.
+    Clock = 18,
 }
 
 /// The random streams of one run.

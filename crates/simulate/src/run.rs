@@ -103,7 +103,7 @@ impl Simulation {
         for number in 0..self.steps {
             let time_s = self.time_s(number);
             let truth = drive.path.at(time_s);
-            drive.send(number, truth);
+            drive.send(number, time_s);
             drive.odometry_until(time_s, &mut record)?;
             drive.hear_until(time_s, &mut record)?;
             record.add_step(&drive.onboard, time_s, truth.pose, drive.strongest_db)?;
@@ -127,6 +127,7 @@ struct Drive {
     /// Buffers of bursts that have been heard.
     spare: Vec<Vec<f64>>,
     latency_s: f64,
+    lateness_s: f64,
     strongest_db: f64,
 }
 
@@ -167,12 +168,14 @@ impl Drive {
             on_the_way: VecDeque::new(),
             spare: Vec::new(),
             latency_s: 1e-3 * scenario.ssb_latency_ms,
+            lateness_s: truth.vehicle.receiver.lateness_s,
             strongest_db: f64::NEG_INFINITY,
         })
     }
 
-    /// Sends burst number `number` to the vehicle at `vehicle`.
-    fn send(&mut self, number: usize, vehicle: VehicleState) {
+    /// Sends burst number `number`, which gets the time stamp `time_s`.
+    fn send(&mut self, number: usize, time_s: f64) {
+        let vehicle = self.path.heard_at(time_s, self.lateness_s);
         let mut snrs_db = self.spare.pop().unwrap_or_default();
         let next_snr_db = |channel: &mut HeadChannel| channel.next_snr_db(&vehicle);
         snrs_db.extend(self.channels.iter_mut().map(next_snr_db));
@@ -227,6 +230,7 @@ impl Drive {
                 reception,
                 number: burst.number,
                 path: &self.path,
+                lateness_s: self.lateness_s,
                 channels: &self.channels,
                 snrs_db: &burst.snrs_db,
             };

@@ -90,6 +90,7 @@ pub fn synthesize(
     let mut drawn = World::new(scenario)?.draw(streams);
     let mut channels = HeadChannel::all(&mut drawn, streams);
     let path = drawn.path;
+    let heard_at = |time_s| path.heard_at(time_s, drawn.vehicle.receiver.lateness_s);
     let end_s = path
         .duration_s()
         .min(settings.duration_s.unwrap_or(f64::INFINITY));
@@ -123,15 +124,15 @@ pub fn synthesize(
         if time_s > end_s {
             break;
         }
-        let here = path.at(time_s);
         truth.push(TimedPose {
             time_s,
-            pose: here.pose,
+            pose: path.at(time_s).pose,
         });
+        let here = heard_at(time_s);
         for (head, snr_db) in channels.iter_mut().zip(&mut snrs_db) {
             *snr_db = head.next_snr_db(&here);
         }
-        let burst = air.receive(number, |time_s| path.at(time_s), &channels, &snrs_db)?;
+        let burst = air.receive(number, heard_at, &channels, &snrs_db)?;
         if !settings.continuous || number == 0 {
             writer.begin_capture(burst.start);
         }

@@ -147,7 +147,9 @@ impl Tape {
                 let sample = truth.odometer.sample(truth.path.at(sample_s));
                 tape.odometry.extend(sample.map(|it| faults.slip(it)));
             }
-            let vehicle = truth.path.at(time_s);
+            let vehicle = truth
+                .path
+                .heard_at(time_s, truth.vehicle.receiver.lateness_s);
             let mut strongest_db = f64::NEG_INFINITY;
             for (index, channel) in channels.iter_mut().enumerate() {
                 let snr_db = channel.next_snr_db(&vehicle);
@@ -169,7 +171,7 @@ impl Tape {
             }
             tape.bursts.push(Burst {
                 time_s,
-                truth: vehicle.pose,
+                truth: truth.path.at(time_s).pose,
                 snr_db: strongest_db,
             });
         }

@@ -6,8 +6,8 @@ use onboard::geometry::Pose;
 use onboard::radio_head::RadioHead;
 use onboard::road::Road;
 use onboard::settings::{
-    Check, EstimatorSettings, LocalizerSettings, PlatformSettings, SettingsError, Site, Vehicle,
-    WakeUpSettings,
+    Check, EstimatorSettings, LocalizerSettings, PlatformSettings, RadioHeadSettings,
+    SettingsError, Site, Vehicle, WakeUpSettings,
 };
 use rand::RngExt;
 use rand_distr::StandardNormal;
@@ -17,10 +17,6 @@ use crate::channel::{Link, Propagation, RicianPropagation, Tr38901Propagation, T
 use crate::random::{Purpose, Streams};
 use crate::scenario::{Fidelity, Scenario, TruthSettings};
 use crate::world::{MotionProfile, Odometer, Path, TrueArray};
-
-/// What a site's file may say of a radio head's power; more is drawn of none.
-const LEAST_EIRP_DBM: f64 = -150.0;
-const MOST_EIRP_DBM: f64 = 120.0;
 
 /// Makes the propagation over a link.
 pub type PropagationMaker = dyn Fn(&Link<'_>) -> Box<dyn Propagation> + Send + Sync;
@@ -135,7 +131,12 @@ impl World {
             *x_m += head.position_std_m * normal();
             *y_m += head.position_std_m * normal();
             let eirp_dbm = head.eirp_dbm + head.eirp_std_db * normal();
-            head.eirp_dbm = eirp_dbm.clamp(LEAST_EIRP_DBM, MOST_EIRP_DBM);
+            // More than a site's file may say is drawn of none.
+            let (least, most) = (
+                RadioHeadSettings::LEAST_EIRP_DBM,
+                RadioHeadSettings::MOST_EIRP_DBM,
+            );
+            head.eirp_dbm = eirp_dbm.clamp(least, most);
         }
         let mut walk = streams.generator(Purpose::Array, 0);
         let mut normal = || factor * walk.sample::<f64, _>(StandardNormal);
@@ -155,6 +156,10 @@ impl World {
         if let Some(gyroscope) = &mut vehicle.gyroscope {
             gyroscope.bias_radps += gyroscope.bias_std_radps * bias;
         }
+        let mut clock = streams.generator(Purpose::Clock, 0);
+        let receiver = &mut vehicle.receiver;
+        let lateness_std_s = factor * receiver.lateness_std_s.unwrap_or_default();
+        receiver.lateness_s += lateness_std_s * clock.sample::<f64, _>(StandardNormal);
 
         let keeping = vehicle.lane_keeping.process();
         let path = Path::new(self.road.clone(), self.motion.clone(), keeping, streams);

@@ -138,6 +138,11 @@ fn numbers_must_be_finite_and_in_range() {
             "vehicle.array.phase_drift_rad_per_sqrt_m",
         ),
         (
+            "gain_drift_db_per_sqrt_m = 0.0",
+            "gain_drift_db_per_sqrt_m = -0.1",
+            "vehicle.array.gain_drift_db_per_sqrt_m",
+        ),
+        (
             "snapshots = 20",
             "snapshots = 65",
             "vehicle.receiver.snapshots",

@@ -3,6 +3,9 @@
 
 mod common;
 
+use std::f64::consts::PI;
+
+use onboard::geometry::wrap_angle;
 use onboard::settings::{SettingsError, Shipped, TomlFile};
 use simulate::random::Streams;
 use simulate::scenario::Scenario;
@@ -23,6 +26,7 @@ fn uncertain(more: &[(&'static str, Value)]) -> Scenario {
         ("vehicle.array.phase_std_rad", 0.1),
         ("vehicle.array.position_std_m", 0.05),
         ("vehicle.odometer.scale_std", 0.004),
+        ("vehicle.receiver.lateness_std_s", 0.02),
         ("vehicle.start.position_std_m", 0.5),
         ("vehicle.start.heading_std_rad", 0.05),
     ]
@@ -69,6 +73,11 @@ fn departures(scenario: &Scenario, truth: &Truth) -> Vec<(&'static str, f64, f64
             "gyroscope",
             gyroscopes.0.bias_radps - gyroscopes.1.bias_radps,
             1e-3,
+        ),
+        (
+            "clock",
+            truth.vehicle.receiver.lateness_s - vehicle.receiver.lateness_s,
+            0.02,
         ),
         ("start, x", truth.told_start.x_m - at_start.x_m, 0.5),
         ("start, y", truth.told_start.y_m - at_start.y_m, 0.5),
@@ -168,6 +177,7 @@ fn a_value_that_is_given_is_so_in_every_run() {
         ("truth.site.radio_heads", value(heads)),
         ("truth.vehicle.array.mounting_rad", 0.1.into()),
         ("truth.vehicle.odometer.scale", 1.05.into()),
+        ("truth.vehicle.receiver.lateness_s", 0.03.into()),
     ]);
     for run in 0..20 {
         let Truth { site, vehicle, .. } = draw(&scenario, run);
@@ -180,6 +190,7 @@ fn a_value_that_is_given_is_so_in_every_run() {
             (vehicle.array.mounting_rad, vehicle.odometer.scale),
             (0.1, 1.05)
         );
+        assert_eq!(vehicle.receiver.lateness_s, 0.03);
         // What is not given is drawn as ever.
         assert_ne!(second.position_m, scenario.site.radio_heads[1].position_m);
         assert_ne!(vehicle.array.phase_rad, 0.0);
@@ -224,6 +235,9 @@ fn departures_act_in_the_world() {
     let sample = truth.odometer.sample(there).unwrap();
     assert!((sample.distance_m - 1.1 * there.along_m).abs() < 1e-9);
     assert!((sample.speed_mps - 1.1 * there.speed_mps).abs() < 1e-9);
+    let heard = truth.path.heard_at(50.0, 0.2);
+    assert!((there.along_m - heard.along_m - 0.2 * there.speed_mps).abs() < 1e-9);
+    assert_eq!(heard.time_s, 50.0);
     let sight = truth.array.line_of_sight(&there, &truth.heads[0]);
     let eye = there.pose.beside(2.0, 0.0);
     assert!((sight.distance_m - eye.distance_m(truth.heads[0].position)).abs() < 1e-9);
@@ -236,6 +250,53 @@ fn departures_act_in_the_world() {
     assert_eq!(shorter.site, shipped("paper-real-odometry-2").site);
     let end = draw(&shorter, 0).path.at(1e3);
     assert!((end.along_m - 120.0).abs() < 1e-9);
+}
+
+#[test]
+fn angles_of_a_late_clock_are_of_where_the_vehicle_was() {
+    const LATE_S: f64 = 0.2;
+    for fidelity in ["snapshots", "iq"] {
+        for told_s in [0.0, LATE_S] {
+            let scenario = changed(
+                "paper-real-odometry-2",
+                [
+                    ("fidelity", fidelity.into()),
+                    ("site.road.segments", value("[{ length_m = 60.0 }]")),
+                    ("site.rician_k_db", 90.0.into()),
+                    // At a time of its own.
+                    ("site.radio_heads[1].ssb_index", 2.into()),
+                    ("vehicle.receiver.lateness_s", told_s.into()),
+                    ("truth.vehicle.receiver.lateness_s", LATE_S.into()),
+                ],
+            );
+            let truth = draw(&scenario, 0);
+            let [mut sum, mut information] = [0.0; 2];
+            for execution in &common::run(&scenario, 9, 0).executions {
+                let measured = execution.measured.unwrap();
+                // What the vehicle is told of, it takes off.
+                assert_eq!(measured.time_s, execution.ssb.time_s - told_s);
+                let head = truth.heads.iter().find(|it| it.pci == execution.ssb.pci);
+                let phase_at = |time_s| {
+                    let there = truth.path.at(time_s);
+                    let sight = truth.array.line_of_sight(&there, head.unwrap());
+                    PI * sight.towards[0]
+                };
+                let expected_rad = phase_at(measured.time_s);
+                let rate_radps = (expected_rad - phase_at(measured.time_s - LATE_S)) / LATE_S;
+                let error_rad = wrap_angle(measured.phase_rad - expected_rad);
+                let weight = measured.phase_sigma_rad.powi(-2);
+                sum -= weight * rate_radps * error_rad;
+                information += weight * rate_radps * rate_radps;
+            }
+            // Least squares, and their standard deviation.
+            let (found_s, std_s) = (sum / information, information.sqrt().recip());
+            assert!(std_s < 0.05 * LATE_S, "{fidelity}: {std_s}");
+            assert!(
+                (found_s - (LATE_S - told_s)).abs() < 4.0 * std_s,
+                "{fidelity}, told {told_s}: {found_s} ± {std_s}"
+            );
+        }
+    }
 }
 
 #[test]
@@ -275,6 +336,27 @@ fn what_cannot_depart_is_refused() {
             4.0.into(),
             "truth.vehicle.array.mounting_rad",
             "it must be between -3.2 and 3.2",
+        ),
+        (
+            "yard",
+            "truth.vehicle.receiver.lateness_s",
+            0.5.into(),
+            "truth.vehicle.receiver.lateness_s",
+            "it must be between -1 and 0.4",
+        ),
+        (
+            "yard",
+            "truth.vehicle.receiver.lateness_std_s",
+            (-0.1).into(),
+            "truth.vehicle.receiver.lateness_std_s",
+            "it must be between 0 and 0.5",
+        ),
+        (
+            "yard",
+            "truth.vehicle.array.gain_drift_db_per_sqrt_m",
+            11.0.into(),
+            "truth.vehicle.array.gain_drift_db_per_sqrt_m",
+            "it must be between 0 and 10",
         ),
         (
             "yard",

@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+from collections.abc import Callable
 from typing import TYPE_CHECKING, Annotated, Any
 
 import typer
@@ -17,7 +18,7 @@ from access_av.commands.options import (
     ShardOption,
     Threads,
 )
-from access_av.terminal import console, progress, table
+from access_av.terminal import console, progress, table, width
 
 if TYPE_CHECKING:
     from collections.abc import Sequence
@@ -60,6 +61,9 @@ def integrity(
 
     Array turned or badly calibrated, odometer worse than stated, radio heads elsewhere or hidden:
     by channel, by number of radio heads. With --out a stopped campaign goes on where it stopped.
+    Prints the share of the time that is ok, the share of that with an error beyond the level, the
+    longest time beyond the alert limit without an alarm, the integrity risk per hour, and level by
+    error; ≤ is the end of a 95 % interval. In a narrow terminal the last of them are left out.
     Writes integrity.parquet, report.html (table and Stanford diagrams), parts/ and manifest.json.
     """
     import polars as pl
@@ -102,35 +106,49 @@ def integrity(
     console.print(f"Report: {directory.path / 'report.html'}", soft_wrap=True)
 
 
-def obtained_risk(one: dict[str, Any]) -> str:
-    """Obtained risk per hour, and asked."""
-    asked = f"({one['asked_risk_per_hour']:.0e})"
-    if one["risk_per_hour"] is None:
-        return f"– {asked}"
-    return f"{one['risk_per_hour']:.0e} ≤ {one['risk_per_hour_high']:.0e} {asked}"
+Cell = Callable[[dict[str, Any]], str]
+
+
+def _power_of_ten(key: str) -> Cell:
+    return lambda one: "–" if one[key] is None else f"{one[key]:.0e}"
+
+
+# Cells of a case. What all cases have in common stands above the table.
+_SETTINGS: tuple[tuple[str, Cell], ...] = (
+    ("channel", lambda one: one["channel"]),
+    ("heads", lambda one: str(one["heads"])),
+    ("asked/h", _power_of_ten("asked_risk_per_hour")),
+)
+# Most important first; "≤" is the end of the 95 % interval of what stands before it.
+_FOUND: tuple[tuple[str, Cell], ...] = (
+    ("ok %", lambda one: f"{100.0 * one['availability']:.1f}"),
+    ("beyond", _power_of_ten("exceedance_share")),
+    ("≤", _power_of_ten("exceedance_share_high")),
+    ("alert s", lambda one: f"{one['time_to_alert_s']:.1f}"),
+    ("risk/h", _power_of_ten("risk_per_hour")),
+    ("≤", _power_of_ten("risk_per_hour_high")),
+    ("level/error", lambda one: f"{one['level_over_error']:.1f}"),
+)
 
 
 def _show(records: Sequence[dict[str, Any]]) -> None:
-    head = [
-        "world",
-        "channel",
-        "heads",
-        "available",
-        "beyond while ok",
-        "alert s",
-        "level/error",
-        "per hour (asked)",
+    """Print a row for each case, in as many columns as the terminal has room for."""
+    common = [
+        f"{name} {cell(records[0])}"
+        for name, cell in _SETTINGS
+        if len({cell(one) for one in records}) == 1
     ]
-    made = table(head, text=2)
-    for one in records:
-        made.add_row(
-            one["mismatch"],
-            one["channel"],
-            str(one["heads"]),
-            f"{one['availability']:.1%}",
-            f"{one['exceedance_share']:.1e} (≤ {one['exceedance_share_high']:.1e})",
-            f"{one['time_to_alert_s']:.2f}",
-            f"{one['level_over_error']:.1f}",
-            obtained_risk(one),
-        )
+    columns: list[tuple[str, Cell]] = [
+        ("world", lambda one: one["mismatch"]),
+        *((name, cell) for name, cell in _SETTINGS if len({cell(one) for one in records}) > 1),
+        *_FOUND,
+    ]
+    console.print(", ".join([f"{records[0]['runs']} drives each", *common]), soft_wrap=True)
+    while True:
+        made = table([name for name, _ in columns])
+        for one in records:
+            made.add_row(*(cell(one) for _, cell in columns))
+        if width(made) <= console.width or len(columns) == 2:
+            break
+        columns.pop()
     console.print(made)

@@ -41,6 +41,10 @@ const FOUND_STD_RAD: f64 = 0.2;
 const HEADINGS: u32 = 12;
 const MOST_HYPOTHESES: f64 = 4000.0;
 
+/// Least weight beside the best, in the covariance that is told, of a hypothesis that is left: the next
+/// angles may make it the best, and where it is is then five deviations away at most.
+const LEAST_WEIGHT: f64 = 0.05;
+
 /// Where the vehicle may be.
 #[derive(Clone, Debug)]
 enum Ground {
@@ -305,7 +309,7 @@ impl Initialiser {
 
     /// One tracker for all hypotheses that are left, once they know the position.
     pub fn found(&self) -> Option<Tracker> {
-        let all = self.pose(f64::NEG_INFINITY);
+        let all = self.mixture(f64::NEG_INFINITY, 0.0);
         let is_placed = all.principal_variances()[0] < FOUND_STD_M * FOUND_STD_M;
         let heading_known = match self.ground {
             Ground::Roads(_) => true,
@@ -330,9 +334,15 @@ impl Initialiser {
         (other_way < OTHER_WAY).then_some(one.tracker)
     }
 
-    /// Mean and covariance over all hypotheses, each weighed by its likelihood: where the vehicle
-    /// may be, which is far from Gaussian as long as several are left.
+    /// Mean over all hypotheses, each weighed by its likelihood, and a covariance that covers what each of
+    /// them may come to: where the vehicle may be, which is far from Gaussian as long as several are left.
     pub fn pose(&self, time_s: f64) -> PoseEstimate {
+        self.mixture(time_s, LEAST_WEIGHT)
+    }
+
+    /// Mean and covariance over all hypotheses, none of them weighing less than so much of the best in the
+    /// latter.
+    fn mixture(&self, time_s: f64, least_weight: f64) -> PoseEstimate {
         let best = self
             .hypotheses
             .iter()
@@ -359,7 +369,10 @@ impl Initialiser {
             heading_rad: sin.atan2(cos),
         };
         let mut covariance = [[0.0; 3]; 3];
+        let mut total = 0.0;
         for (weight, estimate) in weighed() {
+            let weight = weight.max(least_weight);
+            total += weight;
             let pose = estimate.pose;
             let off = [
                 pose.x_m - mean.x_m,
@@ -369,10 +382,11 @@ impl Initialiser {
             let own = estimate.covariance.unwrap_or_default();
             for (row, (own, a)) in covariance.iter_mut().zip(own.iter().zip(off)) {
                 for (value, (own, b)) in row.iter_mut().zip(own.iter().zip(off)) {
-                    *value += weight / total * (own + a * b);
+                    *value += weight * (own + a * b);
                 }
             }
         }
+        let covariance = covariance.map(|row| row.map(|value| value / total));
         PoseEstimate {
             time_s,
             pose: mean,

@@ -16,6 +16,9 @@ pub struct Segment {
     pub surveyed: bool,
 }
 
+/// No vehicle drives farther; who mistakes the order of latitude and longitude does (m).
+const LONGEST_M: f64 = 1e6;
+
 /// Why a road cannot be built.
 #[derive(Debug, Clone, Copy, PartialEq, Error)]
 pub enum RoadError {
@@ -47,6 +50,12 @@ pub enum RoadError {
         /// Index of the first of the two.
         index: usize,
     },
+    /// Farther than any vehicle drives.
+    #[error("the road is {length_m:.0} m long; the longest allowed is 1000 km")]
+    TooLong {
+        /// Its length in metres.
+        length_m: f64,
+    },
     /// A polyline that turns back on itself.
     #[error("the polyline turns back on itself at point {index}")]
     Reversal {
@@ -55,11 +64,21 @@ pub enum RoadError {
     },
 }
 
+impl RoadError {
+    /// Whether a road of this length can be.
+    pub(super) fn check_length(length_m: f64) -> Result<(), Self> {
+        if length_m > LONGEST_M {
+            return Err(Self::TooLong { length_m });
+        }
+        Ok(())
+    }
+}
+
 impl Road {
     /// A road of lines and arcs that join without a kink.
     ///
     /// # Errors
-    /// [`RoadError`] when there is no segment or a length is not positive.
+    /// [`RoadError`] when there is no segment, or a length is not positive or too large.
     pub fn from_segments(
         start: Pose,
         segments: &[Segment],
@@ -102,6 +121,7 @@ impl Road {
         if pieces.is_empty() {
             return Err(RoadError::Empty);
         }
+        RoadError::check_length(length_m)?;
         Ok(Self {
             pieces,
             gaps,
@@ -114,7 +134,7 @@ impl Road {
     /// radius `corner_radius_m`, or by as large a one as half of the shorter neighbour permits.
     ///
     /// # Errors
-    /// [`RoadError`] when points repeat or the line turns back on itself.
+    /// [`RoadError`] when points repeat, the line turns back on itself, or is too long.
     pub fn from_polyline(
         points: &[Point],
         corner_radius_m: f64,
@@ -338,6 +358,10 @@ mod tests {
             Road::from_polyline(&back, 1.0, 5.0),
             Err(RoadError::Reversal { index: 1 })
         );
+        let far = [[0.0, 0.0], [9e6, 0.0]].map(Point::from);
+        let too_long = Err(RoadError::TooLong { length_m: 9e6 });
+        assert_eq!(Road::from_polyline(&far, 1.0, 5.0), too_long);
+        assert_eq!(Road::through_points(&far, 0.1, 5.0), too_long);
     }
 
     proptest! {

@@ -36,7 +36,7 @@ impl Road {
     /// A road of continuous curvature through points that were surveyed to `position_std_m`.
     ///
     /// # Errors
-    /// [`RoadError`] when points repeat or the line turns back on itself.
+    /// [`RoadError`] when points repeat, the line turns back on itself, or is too long.
     pub fn through_points(
         points: &[Point],
         position_std_m: f64,
@@ -96,6 +96,7 @@ fn legs(points: &[Point]) -> Vec<(f64, f64)> {
 /// The points, each corner as points of an arc.
 fn with_round_corners(points: &[Point]) -> Result<Vec<Point>, RoadError> {
     let legs = legs(points);
+    RoadError::check_length(legs.iter().map(|leg| leg.0).sum())?;
     if let Some(index) = legs.iter().position(|leg| leg.0 <= 0.0) {
         return Err(RoadError::RepeatedPoint { index });
     }

@@ -55,6 +55,10 @@ pub struct ArraySettings {
     /// Random walk of that phase, in radians per root of a metre driven.
     #[schemars(range(min = 0.0, max = 1.0))]
     pub phase_drift_rad_per_sqrt_m: f64,
+    /// Random walk of each antenna's gain, in dB per root of a metre driven. It turns no angle of a
+    /// wave that comes alone, so that only simulations reckon with it.
+    #[schemars(range(min = 0.0, max = 10.0))]
+    pub gain_drift_db_per_sqrt_m: f64,
     /// Complex gain `[re, im]` of each channel, by which it is divided; ideal channels without.
     #[serde(skip_serializing_if = "Option::is_none")]
     #[schemars(inner(inner(range(min = -1e3, max = 1e3))))]
@@ -76,6 +80,7 @@ impl Default for ArraySettings {
             phase_rad: 0.0,
             phase_std_rad: 0.0,
             phase_drift_rad_per_sqrt_m: 0.0,
+            gain_drift_db_per_sqrt_m: 0.0,
             channel_gains: None,
         }
     }

@@ -27,12 +27,19 @@ pub struct RadioHeadSettings {
     pub ssb_index: u8,
     /// Transmit power and antenna gain together (EIRP), in dBm.
     #[serde(default = "small_cell")]
-    #[schemars(range(min = -150.0, max = 120.0))]
+    #[schemars(range(min = Self::LEAST_EIRP_DBM, max = Self::MOST_EIRP_DBM))]
     pub eirp_dbm: f64,
     /// Standard deviation of that, in dB.
     #[serde(default)]
     #[schemars(range(min = 0.0, max = 40.0))]
     pub eirp_std_db: f64,
+}
+
+impl RadioHeadSettings {
+    /// Least that a radio head transmits (dBm).
+    pub const LEAST_EIRP_DBM: f64 = -150.0;
+    /// Most that it transmits (dBm).
+    pub const MOST_EIRP_DBM: f64 = 120.0;
 }
 
 const fn small_cell() -> f64 {

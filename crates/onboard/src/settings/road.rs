@@ -162,6 +162,7 @@ impl RoadSettings {
                 RoadError::RepeatedPoint { index } | RoadError::Reversal { index } => {
                     (format!("[{index}]"), "not passable".to_owned())
                 }
+                RoadError::TooLong { length_m } => (String::new(), format!("{length_m:.0} m")),
                 RoadError::Empty => (String::new(), "too short".to_owned()),
             };
             check.error(&format!("{key}.{shape}{at}"), value, &error.to_string())

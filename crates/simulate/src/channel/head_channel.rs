@@ -103,7 +103,7 @@ impl HeadChannel {
             for gain in gains.iter_mut() {
                 *gain *= amplitude;
             }
-            self.array.turn(gains);
+            self.array.distort(gains);
         }
     }
 

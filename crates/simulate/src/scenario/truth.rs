@@ -65,13 +65,14 @@ const VEHICLE_FACTS: [&str; 7] = [
 ];
 
 /// Values and the standard deviations they are drawn from.
-const DRAWN: [(&str, &str); 6] = [
+const DRAWN: [(&str, &str); 7] = [
     ("position_m", "position_std_m"),
     ("eirp_dbm", "eirp_std_db"),
     ("mounting_rad", "mounting_std_rad"),
     ("phase_rad", "phase_std_rad"),
     ("scale", "scale_std"),
     ("bias_radps", "bias_std_radps"),
+    ("lateness_s", "lateness_std_s"),
 ];
 
 impl TruthSettings {
@@ -120,9 +121,9 @@ fn depart<T: TomlFile + Clone>(
     let path = format!("truth.{}", T::WHAT);
     let mut table = Table::try_from(believed).unwrap_or_default();
     let base = table.clone();
-    let mut over = over.clone();
-    not_drawn(&mut over);
-    lay_over(&mut table, over.clone(), &path, check)?;
+    let mut laid = over.clone();
+    not_drawn(&mut laid);
+    lay_over(&mut table, laid, &path, check)?;
     // Whatever it reads is already in the table.
     let library: &dyn Library = &Shipped;
     let departed =
@@ -138,7 +139,7 @@ fn depart<T: TomlFile + Clone>(
         )?;
     }
     let departed = departed?;
-    believed_in(&base, &over, &path, check)?;
+    believed_in(&base, over, &path, check)?;
     Ok(departed)
 }
 

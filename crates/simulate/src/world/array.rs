@@ -2,6 +2,7 @@
 
 use num_complex::Complex64;
 use onboard::geometry::Point;
+use onboard::observation::MAX_ELEMENTS;
 use onboard::radio_head::RadioHead;
 use onboard::settings::ArraySettings;
 use rand::RngExt;
@@ -18,6 +19,9 @@ pub struct TrueArray {
     settings: ArraySettings,
     antennas: Antennas,
     rng: ChaCha8Rng,
+    /// What drift has made of the amplitude of each antenna.
+    amplitudes: [f64; MAX_ELEMENTS],
+    amplitude_rng: ChaCha8Rng,
     along_m: f64,
 }
 
@@ -41,10 +45,15 @@ pub struct LineOfSight {
 impl TrueArray {
     /// An array that is so at the start; `rng` draws how it walks.
     pub fn new(settings: ArraySettings, rng: ChaCha8Rng) -> Self {
+        // Numbers of their own, so that gains that drift leave all else as it was.
+        let mut amplitude_rng = rng.clone();
+        amplitude_rng.set_stream(1);
         Self {
             antennas: Antennas::new(&settings),
             settings,
             rng,
+            amplitudes: [1.0; MAX_ELEMENTS],
+            amplitude_rng,
             along_m: 0.0,
         }
     }
@@ -67,6 +76,13 @@ impl TrueArray {
         let array = &mut self.settings;
         array.mounting_rad += array.mounting_drift_rad_per_sqrt_m * root_m * normal();
         array.phase_rad += array.phase_drift_rad_per_sqrt_m * root_m * normal();
+        let gain_std_db = array.gain_drift_db_per_sqrt_m * root_m;
+        if gain_std_db > 0.0 {
+            for amplitude in self.amplitudes.iter_mut().take(array.elements.into()) {
+                let by_db = gain_std_db * self.amplitude_rng.sample::<f64, _>(StandardNormal);
+                *amplitude *= 10f64.powf(0.05 * by_db);
+            }
+        }
     }
 
     /// How it sees a radio head.
@@ -101,9 +117,13 @@ impl TrueArray {
         up_m
     }
 
-    /// What the array makes of the field at its antennas: each channel runs ahead of the one before.
-    pub fn turn(&self, gains: &mut [Complex64]) {
+    /// What the array makes of the field at its antennas: each channel runs ahead of the one before,
+    /// and amplifies as it does by now.
+    pub fn distort(&self, gains: &mut [Complex64]) {
         steer(gains, self.settings.phase_rad);
+        for (gain, amplitude) in gains.iter_mut().zip(self.amplitudes) {
+            *gain *= amplitude;
+        }
     }
 }
 
@@ -141,12 +161,62 @@ mod tests {
     }
 
     #[test]
+    fn gains_drift_apart_by_their_spread_and_leave_the_phase_as_it_was() {
+        let settings = ArraySettings {
+            phase_drift_rad_per_sqrt_m: 0.01,
+            gain_drift_db_per_sqrt_m: 0.2,
+            ..ArraySettings::default()
+        };
+        let runs = 2000;
+        let mut sums = [[0.0; 2]; 2];
+        for run in 0..runs {
+            let rng = Streams::new(1, run).generator(Purpose::Array, 0);
+            let steady = ArraySettings {
+                gain_drift_db_per_sqrt_m: 0.0,
+                ..settings.clone()
+            };
+            let [mut array, mut other] =
+                [&settings, &steady].map(|it| TrueArray::new(it.clone(), rng.clone()));
+            for step in 1..=100 {
+                array.advance(0.25 * f64::from(step));
+                other.advance(0.25 * f64::from(step));
+            }
+            assert_eq!(array.settings.phase_rad, other.settings.phase_rad);
+            let [mut gains, mut of_other] = [[Complex64::ONE; 4]; 2];
+            array.distort(&mut gains);
+            other.distort(&mut of_other);
+            let [first_db, second_db, ..] = [0, 1, 2, 3].map(|antenna| {
+                assert!((gains[antenna] / of_other[antenna]).arg().abs() < 1e-12);
+                20.0 * (gains[antenna].norm() / of_other[antenna].norm()).log10()
+            });
+            for (row, a_db) in sums.iter_mut().zip([first_db, second_db]) {
+                for (sum, b_db) in row.iter_mut().zip([first_db, second_db]) {
+                    *sum += a_db * b_db / runs as f64;
+                }
+            }
+        }
+        // (0.2 dB)² · 25 m, each antenna by itself; four deviations of a sample variance, and of a
+        // sample covariance.
+        let [[first, both], [_, second]] = sums;
+        let deviation = (runs as f64).sqrt().recip();
+        assert!(
+            (first - 1.0).abs() < 4.0 * 2f64.sqrt() * deviation,
+            "{first}"
+        );
+        assert!(
+            (second - 1.0).abs() < 4.0 * 2f64.sqrt() * deviation,
+            "{second}"
+        );
+        assert!(both.abs() < 4.0 * deviation, "{both}");
+    }
+
+    #[test]
     fn an_array_without_phase_errors_passes_the_field_on() {
         let rng = Streams::new(1, 0).generator(Purpose::Array, 0);
         let mut array = TrueArray::new(ArraySettings::default(), rng);
         array.advance(50.0);
         let mut gains = [Complex64::new(1.0, 2.0); 4];
-        array.turn(&mut gains);
+        array.distort(&mut gains);
         assert_eq!(gains, [Complex64::new(1.0, 2.0); 4]);
     }
 }

@@ -47,6 +47,14 @@ impl Path {
         self.motion.duration_s()
     }
 
+    /// The vehicle as it was when a signal was received whose time stamp, `time_s`, is so much later.
+    pub fn heard_at(&self, time_s: f64, lateness_s: f64) -> VehicleState {
+        VehicleState {
+            time_s,
+            ..self.at(time_s - lateness_s)
+        }
+    }
+
     /// The truth at `time_s`.
     pub fn at(&self, time_s: f64) -> VehicleState {
         let motion = self.motion.at(time_s);

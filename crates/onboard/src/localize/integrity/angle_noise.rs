@@ -52,7 +52,7 @@ impl AngleNoise {
         *slot = Some(*now);
         let seen = now.innovation;
         let belief = seen.variance - seen.measurement_variance;
-        let expected = before.alone_variance + now.alone_variance + belief;
+        let expected = before.first_variance + now.first_variance + belief;
         let difference = wrap_angle(seen.residual - before.innovation.residual);
         let square = difference * difference / expected;
         self.differences = self.differences.saturating_add(1);
@@ -84,7 +84,7 @@ mod tests {
                         variance: 0.01,
                         measurement_variance: 0.01,
                     },
-                    alone_variance: 0.01,
+                    first_variance: 0.01,
                     place_wavelengths: apart_wavelengths * f64::from(number),
                 },
             );

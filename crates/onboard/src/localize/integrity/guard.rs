@@ -5,8 +5,8 @@
 //! covariance, wherever the full solution may be: the protection level is the radius about the full
 //! solution that holds for all of them together, each as probable as its fault
 //! ([`LevelEquation`](super::level::LevelEquation)). The same of the tracker that does not trust the
-//! odometer ([`Slip`](super::slip::Slip)), as probable as the angles leave it. All of it is of angles as noisy as
-//! they are heard to be ([`AngleNoise`](super::angle_noise::AngleNoise)).
+//! odometer ([`Slip`](super::slip::Slip)), as probable as the angles leave it. All of it is of angles
+//! as noisy as they are heard to be ([`AngleNoise`](super::angle_noise::AngleNoise)).
 //!
 //! A single radio head has no witness but odometry and road: the protection level then is what
 //! those two can vouch for, grows with the distance driven, and passes the alert limit unless they
@@ -14,7 +14,7 @@
 
 use super::bank::Bank;
 use super::config::IntegrityConfig;
-use super::level::{Hypothesis, LevelEquation, Levels};
+use super::level::{Hypothesis, LevelEquation};
 use crate::clone_in_place::clone_in_place;
 use crate::localize::integrity_state::{Integrity, IntegrityState};
 use crate::localize::measurement::{AngleMeasurement, UpdateVerdict};
@@ -90,8 +90,8 @@ impl Guard {
     /// little speaks against yet, takes the level beyond the alert limit.
     pub fn doubtful(&self) -> &Tracker {
         let (bank, now_s) = (&self.bank, self.tracker().time_s());
-        let is_doubted = self.slip_probability(bank) > self.config.risk
-            && self.levels(bank, now_s).horizontal_m > self.config.alert_limit_m;
+        let is_doubted =
+            self.slip_probability(bank) > self.config.risk && !self.is_near(bank, now_s);
         if is_doubted {
             bank.slip().tracker()
         } else {
@@ -151,7 +151,7 @@ impl Guard {
         } else if aged && restarted.bank.is_lost(&self.config) {
             self.restart();
         } else if restarted.bank.quiet_s(now_s) > patience_s
-            && self.levels(&restarted.bank, now_s).horizontal_m <= self.config.alert_limit_m
+            && self.is_near(&restarted.bank, now_s)
             && let Some(restarted) = self.restarted.take()
         {
             self.bank = restarted.bank;
@@ -185,7 +185,7 @@ impl Guard {
 
     /// Protection level and state at `time_s`.
     pub fn integrity(&self, time_s: f64) -> Integrity {
-        let levels = self.levels(&self.bank, time_s);
+        let levels = self.level.solve(&self.hypotheses(&self.bank, time_s));
         let state = if self.bank.is_outvoted(&self.config) {
             IntegrityState::Unavailable
         } else if self.restarted.is_some()
@@ -205,20 +205,25 @@ impl Guard {
         }
     }
 
-    /// What the error leaves with the stated risk, whether no source is at fault or any one of those
-    /// in use, the odometer among them.
-    fn levels(&self, bank: &Bank, time_s: f64) -> Levels {
+    /// Whether the error is within the alert limit but for the risk.
+    fn is_near(&self, bank: &Bank, time_s: f64) -> bool {
+        let hypotheses = self.hypotheses(bank, time_s);
+        self.level.holds(self.config.alert_limit_m, hypotheses)
+    }
+
+    /// That no source is at fault, or any one of those in use, the odometer among them.
+    fn hypotheses(&self, bank: &Bank, time_s: f64) -> impl Iterator<Item = Hypothesis> + Clone {
         let told = bank.main().pose(time_s);
         let noise_ratio = bank.noise_ratio();
         let head_probability = self.config.fault_probability.radio_head;
-        let heads = (bank.without_one()).map(|clean| (head_probability, clean));
-        let hypotheses = (std::iter::once((1.0, bank.main())))
+        let heads = (bank.without_one()).map(move |clean| (head_probability, clean));
+        let negligible = NEGLIGIBLE * self.config.risk;
+        (std::iter::once((1.0, bank.main())))
             .chain(heads)
             .chain([(self.slip_probability(bank), bank.slip().tracker())])
-            .filter(|(probability, _)| *probability > NEGLIGIBLE * self.config.risk)
-            .filter_map(|(probability, clean)| {
+            .filter(move |(probability, _)| *probability > negligible)
+            .filter_map(move |(probability, clean)| {
                 Hypothesis::new(probability, &clean.pose(time_s), noise_ratio, &told)
-            });
-        self.level.solve(&hypotheses)
+            })
     }
 }

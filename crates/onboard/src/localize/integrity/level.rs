@@ -147,6 +147,14 @@ impl LevelEquation {
         Self { risk, directions }
     }
 
+    /// Whether such a level holds for all of the hypotheses together, which is far less work than to
+    /// solve for the least that does.
+    pub fn holds(&self, level_m: f64, hypotheses: impl Iterator<Item = Hypothesis>) -> bool {
+        let beyond =
+            hypotheses.map(|it| it.probability * it.beyond_circle(&self.directions, level_m));
+        beyond.sum::<f64>() <= self.risk
+    }
+
     /// The levels that hold for all of the hypotheses together.
     pub fn solve(&self, hypotheses: &(impl Iterator<Item = Hypothesis> + Clone)) -> Levels {
         let total: f64 = hypotheses.clone().map(|it| it.probability).sum();
@@ -312,6 +320,9 @@ mod tests {
                 hypothesis(fault, separation_m, wide),
             ];
             let found = levels(risk, &all);
+            let equation = LevelEquation::new(risk);
+            assert!(equation.holds(found.horizontal_m, all.into_iter()));
+            assert!(!equation.holds(0.99 * found.horizontal_m, all.into_iter()));
             let mut beyond = [0; 3];
             for _ in 0..draws {
                 let one = all[usize::from(rng.random::<f64>() < fault)];

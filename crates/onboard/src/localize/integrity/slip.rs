@@ -9,9 +9,8 @@
 use std::f64::consts::TAU;
 
 use crate::clone_in_place::clone_in_place;
-use crate::localize::gaussian::Innovation;
 use crate::localize::measurement::{AngleMeasurement, UpdateVerdict};
-use crate::localize::tracker::Tracker;
+use crate::localize::tracker::{Look, Tracker};
 use crate::observation::OdometrySample;
 use crate::radio_head::RadioHead;
 
@@ -72,13 +71,15 @@ impl Slip {
         let if_sound = sound.look(head, measured);
         if measured.resolved
             && !sound.config().finds_errors
-            && let (Ok(slipping), Ok(sound)) = (&if_slipping, &if_sound)
-            && !(slipping.excluded || sound.excluded)
+            && let (Ok(slips), Ok(holds)) = (&if_slipping, &if_sound)
+            && !(slips.excluded || holds.excluded)
         {
-            let [slips, holds] = [slipping, sound].map(|seen| density(&seen.alone(noise_ratio)));
+            let at_first = |by: &Tracker, seen| by.first_variance(seen) + by.lasting_variance(seen);
+            let ratio = density(slips, noise_ratio * at_first(&self.tracker, slips))
+                / density(holds, noise_ratio * at_first(sound, holds));
             // What is seen again and again speaks once.
-            let evidence = sound.share() * (slips / holds).ln();
-            self.evidence = (self.evidence + evidence).clamp(-SURE, SURE);
+            let share = at_first(sound, holds) / holds.innovation.measurement_variance;
+            self.evidence = (self.evidence + share * ratio.ln()).clamp(-SURE, SURE);
         }
         self.tracker.take(if_slipping, measured);
         sound.take(if_sound, measured)
@@ -101,8 +102,10 @@ impl Slip {
     }
 }
 
-/// Probability density of an angle (1/rad).
-fn density(seen: &Innovation) -> f64 {
+/// Probability density of an angle (1/rad), were its variance by all but the belief this one.
+fn density(looked: &Look, measurement_variance: f64) -> f64 {
+    let mut seen = looked.innovation;
+    seen.variance += measurement_variance - seen.measurement_variance;
     OUTLIERS / TAU + (1.0 - OUTLIERS) * seen.density()
 }
 

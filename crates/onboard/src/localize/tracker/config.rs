@@ -102,8 +102,9 @@ pub struct PhaseBias {
 
 impl PhaseBias {
     /// Variance (rad²) of an angle of the stated deviation, so long and so far after the radio head's
-    /// last one, as if looks were independent: with the correlation `ρ = e^{−Δ}` between neighbours the mean of many looks
-    /// has `(1 + ρ)/(1 − ρ) = coth Δ/2` times the variance that independent ones would leave it.
+    /// last one, as if looks were independent: with the correlation `ρ = e^{−Δ}` between neighbours
+    /// the mean of many looks has `(1 + ρ)/(1 − ρ) = coth Δ/2` times the variance that independent
+    /// ones would leave it.
     pub fn variance(&self, sigma_rad: f64, elapsed_s: f64, moved: (f64, f64)) -> f64 {
         let own = sigma_rad * sigma_rad;
         let (stays, shared) = (self.std_rad * self.std_rad, self.share * own);

@@ -27,7 +27,7 @@ pub(in crate::localize) struct Rehearsal {
     /// belief's.
     pub innovation: Innovation,
     /// Variance of the noise, had nothing been heard before (rad²).
-    pub alone_variance: f64,
+    pub first_variance: f64,
     /// Distance driven, in wavelengths.
     pub place_wavelengths: f64,
 }
@@ -94,20 +94,17 @@ impl Tracker {
         };
         let (sigma, (travelled_m, _)) = (measured.phase_sigma_rad, looked.moved);
         let (aperture, toward) = (looked.aperture, looked.toward);
-        let scatter = |travelled_m| self.config.scatter_variance(travelled_m, aperture, toward);
-        let noise = unbiased.variance(sigma, looked.elapsed_s, looked.moved) + scatter(travelled_m);
+        let noise = unbiased.variance(sigma, looked.elapsed_s, looked.moved)
+            + (self.config).scatter_variance(travelled_m, aperture, toward);
         // What is off by as much in many looks counts once.
-        let lasting = looked.survey_variance
-            + bias.std_rad.powi(2)
-            + looked.coasted_variance
-            + looked.bend_variance;
+        let lasting = self.lasting_variance(&looked);
         Some(Rehearsal {
             innovation: Innovation {
                 residual,
                 variance: variance - measurement_variance + lasting + noise,
                 measurement_variance: noise,
             },
-            alone_variance: looked.own_variance + scatter(f64::INFINITY),
+            first_variance: self.first_variance(&looked),
             place_wavelengths: looked.place_m / self.config.array.wavelength_m,
         })
     }

@@ -22,10 +22,8 @@ pub(in crate::localize) struct Look {
     pub place_m: f64,
     pub row: [f64; STATES],
     pub innovation: Innovation,
-    /// Variance of the angle by its own noise (rad²) ...
+    /// Variance of the angle by its own noise (rad²).
     pub own_variance: f64,
-    /// ... and by all that is not the belief's, had the radio head not been heard before.
-    alone_variance: f64,
     /// Of the sighting; see [`Sighting`].
     pub aperture: f64,
     pub toward: f64,
@@ -43,27 +41,6 @@ pub(in crate::localize) struct Look {
 }
 
 impl Look {
-    /// What share of an independent look it is.
-    pub fn share(&self) -> f64 {
-        self.alone_variance / self.innovation.measurement_variance
-    }
-
-    /// The innovation, had the radio head not been heard before, of so many times the variance that is
-    /// stated.
-    pub fn alone(&self, noise_ratio: f64) -> Innovation {
-        let Innovation {
-            residual,
-            variance,
-            measurement_variance,
-        } = self.innovation;
-        let alone = noise_ratio * self.alone_variance;
-        Innovation {
-            residual,
-            variance: variance - measurement_variance + alone,
-            measurement_variance: alone,
-        }
-    }
-
     /// The innovation, had the error that stays been none.
     pub fn without_error(&self) -> Innovation {
         let mut seen = self.innovation;
@@ -129,11 +106,6 @@ impl Tracker {
         });
         let coasted = sighting.row[ALONG].powi(2) * ahead_variance + strayed;
         let measurement_variance = stays + stated + shared + coasted + bend.variance;
-        let anew = (f64::INFINITY, f64::INFINITY);
-        let alone_variance = (self.config.phase_bias).variance(sigma, anew.0, anew)
-            + (self.config).look_variance(anew.0, &sighting)
-            + coasted
-            + bend.variance;
         let residual = wrap_angle(measured.phase_rad - sighting.phase_rad - bend.shift_rad);
         let innovation = (self.belief).innovation(residual, &row, measurement_variance);
         Ok(Look {
@@ -143,7 +115,6 @@ impl Tracker {
             row,
             innovation,
             own_variance: sigma * sigma,
-            alone_variance,
             aperture: sighting.aperture,
             toward: sighting.toward,
             survey_variance: sighting.survey_variance,
@@ -154,6 +125,19 @@ impl Tracker {
             error_variance,
             repetition,
         })
+    }
+
+    /// Variance of a look's noise, had the radio head not been heard before (rad²).
+    pub(in crate::localize) fn first_variance(&self, looked: &Look) -> f64 {
+        let config = &self.config;
+        let scatter = config.scatter_variance(f64::INFINITY, looked.aperture, looked.toward);
+        looked.own_variance + scatter
+    }
+
+    /// Variance of what a look is off by that is neither noise nor the belief's (rad²).
+    pub(in crate::localize) fn lasting_variance(&self, looked: &Look) -> f64 {
+        let bias = self.config.phase_bias.std_rad;
+        looked.survey_variance + bias * bias + looked.coasted_variance + looked.bend_variance
     }
 
     /// A radio head as it is seen from a state, or rather was seen when the angle was received.

@@ -33,5 +33,6 @@ pub use filter::Tracker;
 pub use findings::{Finding, Findings};
 pub(in crate::localize) use forecast::Rehearsal;
 pub use interface::{InitialPose, OdometryVerdict};
+pub(in crate::localize) use look::Look;
 pub use motion::{MotionNoise, PathBend};
 pub use sighting::ArrayModel;
