@@ -238,7 +238,7 @@ def test_bad_options(method: Callable[..., Any], options: dict[str, Any], messag
 
 
 def test_other_bad_input() -> None:
-    with pytest.raises(ValueError, match="threads must be 1 to 256, not 0"):
+    with pytest.raises(ValueError, match="`threads` is 0; it must be between 1 and 1024"):
         aoa.music(GOOD[None], threads=0)
     with pytest.raises(ValueError, match="'mdl' or 'aic', not 'bic'"):
         aoa.estimate_sources(GOOD, criterion="bic")  # type: ignore[arg-type]

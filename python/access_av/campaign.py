@@ -182,7 +182,8 @@ def executor(dask: str | None = None, threads: int | None = None) -> Iterator[tu
         When there is no scheduler there, or no Dask.
     """
     if dask is None:
-        count = threads or os.cpu_count() or 1
+        cores = os.cpu_count() or 1
+        count = min(threads or cores, cores)
         with ThreadPoolExecutor(count) as pool:
             yield pool, count
         return

@@ -24,6 +24,8 @@ use samples::{Samples, Visitor, value_error};
 pub use spectra::spectrum;
 pub use statistics::{calibrate, covariance, estimate_sources, forward_backward};
 
+use crate::threads::at_most_one_per_core;
+
 /// What the caller asked for, besides the samples.
 struct Request<'a, 'py> {
     method: Method,
@@ -33,9 +35,6 @@ struct Request<'a, 'py> {
     calibration: Option<&'a Bound<'py, PyAny>>,
     threads: usize,
 }
-
-/// Threads that a batch may be spread over.
-const MOST_THREADS: usize = 256;
 
 /// Directions of arrival by MUSIC.
 ///
@@ -58,7 +57,7 @@ const MOST_THREADS: usize = 256;
 /// calibration : array_like, optional
 ///     Complex gain of each channel, see `calibrate`. Every channel is divided by its own.
 /// threads : int
-///     Threads to spread a batch over.
+///     Threads to spread a batch over; one per core at most.
 ///
 /// Returns
 /// -------
@@ -298,11 +297,7 @@ impl Visitor for Estimator<'_, '_> {
             let [only] = estimate;
             return Ok(Estimates::One(only));
         }
-        if !(1..=MOST_THREADS).contains(&threads) {
-            return Err(PyValueError::new_err(format!(
-                "threads must be 1 to {MOST_THREADS}, not {threads}"
-            )));
-        }
+        let threads = at_most_one_per_core(threads)?;
         let mut values = vec![aoa::AngleEstimate::default(); batch.len() * sources];
         let share = batch.len().div_ceil(threads).max(1);
         let parts = batch.split(share).zip(values.chunks_mut(share * sources));

@@ -21,11 +21,10 @@ use toml::Value;
 use crate::message::brief;
 use crate::plug_ins::{PythonEstimator, PythonLocalizer, PythonPolicy};
 use crate::settings::{Platform, Scenario, settings_error};
+use crate::threads::at_most_one_per_core;
 
 /// A campaign of more is better made of several.
 const MOST_RUNS: usize = 1_000_000;
-/// More threads than any machine has cores for.
-const MOST_THREADS: usize = 1024;
 
 /// What a campaign found, as columns of equal length.
 #[pyclass(frozen, get_all, module = "access_av._core")]
@@ -71,7 +70,7 @@ pub fn simulate(
     localizer: Option<Py<PyAny>>,
     progress: Option<Py<PyAny>>,
 ) -> PyResult<SimulationResult> {
-    check(runs, threads, errors_every)?;
+    let threads = check(runs, threads, errors_every)?;
     crate::arrays::look_up(py)?;
     let simulation = simulation(scenario, platform)?;
     let plug_ins = PlugIns {
@@ -110,19 +109,20 @@ pub fn simulate(
     result(py, &campaign, keep_trajectories, errors_every)
 }
 
-fn check(runs: usize, threads: Option<usize>, errors_every: Option<usize>) -> PyResult<()> {
+/// How many threads there will be, where it is for the caller to say.
+fn check(
+    runs: usize,
+    threads: Option<usize>,
+    errors_every: Option<usize>,
+) -> PyResult<Option<usize>> {
     if !(1..=MOST_RUNS).contains(&runs) {
         let message = format!("`runs` is {runs}; it must be between 1 and {MOST_RUNS}");
-        return Err(PyValueError::new_err(message));
-    }
-    if threads.is_some_and(|threads| !(1..=MOST_THREADS).contains(&threads)) {
-        let message = format!("`threads` must be between 1 and {MOST_THREADS}");
         return Err(PyValueError::new_err(message));
     }
     if errors_every == Some(0) {
         return Err(PyValueError::new_err("`errors_every` must be at least 1"));
     }
-    Ok(())
+    threads.map(at_most_one_per_core).transpose()
 }
 
 /// A scenario on a platform, or on the one that it names.
@@ -177,7 +177,7 @@ impl Tapes {
         platform: Option<&Platform>,
         threads: Option<usize>,
     ) -> PyResult<Option<Self>> {
-        check(runs, threads, None)?;
+        let threads = check(runs, threads, None)?;
         crate::arrays::look_up(py)?;
         let simulation = simulation(scenario, platform)?;
         let method = |name: &String| {
@@ -213,7 +213,7 @@ impl Tapes {
         threads: Option<usize>,
         errors_every: Option<usize>,
     ) -> PyResult<SimulationResult> {
-        check(1, threads, errors_every)?;
+        let threads = check(1, threads, errors_every)?;
         let simulation = simulation(scenario, platform)?;
         if !self.0.serve(&simulation) {
             return Err(PyValueError::new_err("the scenario is of another world"));

@@ -12,6 +12,7 @@ mod plug_ins;
 mod recording;
 mod settings;
 mod survey;
+mod threads;
 
 use pyo3::pymodule;
 
