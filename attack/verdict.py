@@ -65,7 +65,7 @@ def judge(
         if file.name.endswith(".partial"):
             verdict.says("half-written", name)
         elif file.suffix == ".parquet":
-            _table(verdict, name, pl.read_parquet(file), odometer=odometer)
+            _table(verdict, name, pl.read_parquet(file, glob=False), odometer=odometer)
         elif file.suffix in (".json", ".sigmf-meta"):
             _json(verdict, name, file.read_text(encoding="utf-8"))
         elif file.suffix == ".tum" and file.stat().st_size:

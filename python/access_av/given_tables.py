@@ -30,8 +30,8 @@ def read(path: Path, what: str, schema: dict[str, Any] | None = None) -> pl.Data
     regular(path, MOST_BYTES)
     try:
         if path.suffix == ".csv":
-            return pl.read_csv(path, schema_overrides=schema)
-        return pl.read_parquet(path)
+            return pl.read_csv(path, schema_overrides=schema, glob=False)
+        return pl.read_parquet(path, glob=False)
     # Of some damage Polars makes a panic of its own.
     except (pl.exceptions.PolarsError, pl.exceptions.PanicException) as error:
         raise InputError(f"{path}: not a {what}: {error}") from None

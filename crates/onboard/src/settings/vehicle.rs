@@ -35,7 +35,8 @@ pub struct Vehicle {
     #[serde(default = "gentle")]
     #[schemars(range(min = 0.01, max = 20.0))]
     pub acceleration_mps2: f64,
-    /// Yaw rate in rad/s that it cannot exceed; what is read beyond is refused.
+    /// Yaw rate in rad/s that it cannot exceed, unless its lane keeping says so; what is read beyond
+    /// is refused.
     #[serde(default = "half_a_turn")]
     #[schemars(range(min = 0.01, max = 100.0))]
     pub top_yaw_rate_radps: f64,

@@ -14,7 +14,7 @@ const BURST_S: f64 = 4.9e-3;
 #[derive(Debug, Clone, Copy, PartialEq)]
 pub struct FixedInterval {
     interval_s: f64,
-    served: u64,
+    served: f64,
     served_at_s: f64,
 }
 
@@ -23,15 +23,14 @@ impl FixedInterval {
     pub const fn new(interval_s: f64) -> Self {
         Self {
             interval_s,
-            served: 0,
+            served: 0.0,
             served_at_s: f64::NEG_INFINITY,
         }
     }
 
     /// Whether an estimate is due by `time_s`.
     pub fn is_due(&self, time_s: f64) -> bool {
-        time_s + SAME_TIME_S >= self.served as f64 * self.interval_s
-            || time_s < self.served_at_s + BURST_S
+        time_s + SAME_TIME_S >= self.served * self.interval_s || time_s < self.served_at_s + BURST_S
     }
 
     /// Takes the SSB at `time_s` if an estimate is due.
@@ -39,7 +38,7 @@ impl FixedInterval {
         let due = self.is_due(time_s);
         if due {
             // One SSB serves every due time up to it.
-            let served = ((time_s + SAME_TIME_S) / self.interval_s).floor() as u64 + 1;
+            let served = ((time_s + SAME_TIME_S) / self.interval_s).floor() + 1.0;
             if served > self.served {
                 (self.served, self.served_at_s) = (served, time_s);
             }

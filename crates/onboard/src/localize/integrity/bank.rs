@@ -180,8 +180,9 @@ impl Bank {
         for member in &mut self.members {
             member.tracker.odometry(sample);
         }
-        self.slip.odometry(sample);
-        self.main.odometry(sample)
+        let verdict = self.main.odometry(sample);
+        self.slip.odometry(&self.main, sample);
+        verdict
     }
 
     /// Takes in an angle: a test of its radio head, and information for whoever uses that.

@@ -1,8 +1,8 @@
 //! Whether the odometer slips.
 //!
 //! A tracker that expects slip runs beside the one that trusts the odometer. Whenever the vehicle sets
-//! off its wheels may slip, and no leap of the speed tells; from then on each angle speaks for it or
-//! against it, as the one tracker or the other foretells it better. Until the angles have spoken against
+//! off its wheels may slip, and no leap of the speed tells; so they may whenever one does. From then on
+//! each angle speaks for it or against it, as the one tracker or the other foretells it better. Until the angles have spoken against
 //! it, the level is to hold for that tracker too. Where errors are found that stay over metres, they are
 //! what slip would be taken for.
 
@@ -10,7 +10,7 @@ use std::f64::consts::TAU;
 
 use crate::clone_in_place::clone_in_place;
 use crate::localize::measurement::{AngleMeasurement, UpdateVerdict};
-use crate::localize::tracker::{Look, Tracker};
+use crate::localize::tracker::{Look, MOST_SLIP, Tracker};
 use crate::observation::OdometrySample;
 use crate::radio_head::RadioHead;
 
@@ -21,11 +21,14 @@ const OUTLIERS: f64 = 2e-3;
 /// found: what more evidence there is must be forgotten some time.
 const SURE: f64 = 15.0;
 
+/// That of a leap of the speed that no vehicle can do: slip, unless a reading is wild.
+const LEAP: f64 = 6.0;
+
 /// A tracker that does not trust the odometer.
 #[derive(Debug)]
 pub(super) struct Slip {
     tracker: Tracker,
-    /// Logarithm of the likelihood ratio since it set off.
+    /// Logarithm of the likelihood ratio since it may have begun.
     evidence: f64,
     stands: bool,
 }
@@ -40,7 +43,7 @@ impl Slip {
     /// Slip of the odometer of a tracker.
     pub fn new(tracker: &Tracker) -> Self {
         let mut tracker = tracker.clone();
-        tracker.distrust_odometer();
+        tracker.distrust_odometer(MOST_SLIP);
         Self {
             tracker,
             evidence: -SURE,
@@ -48,14 +51,23 @@ impl Slip {
         }
     }
 
-    /// Moves on by an odometry sample.
-    pub fn odometry(&mut self, sample: &OdometrySample) {
+    /// Moves on by an odometry sample, by which the tracker `sound` has moved on.
+    pub fn odometry(&mut self, sound: &Tracker, sample: &OdometrySample) {
+        self.tracker.odometry(sample);
         let stood = std::mem::replace(&mut self.stands, sample.speed_mps == 0.0);
         let sets_off = stood && !self.stands;
-        if sets_off && !self.tracker.config().finds_errors {
-            self.evidence = self.evidence.max(0.0);
+        let leapt = self.tracker.leapt();
+        if sound.config().finds_errors || !(sets_off || leapt > 0.0) {
+            return;
         }
-        self.tracker.odometry(sample);
+        if self.evidence < 0.0 {
+            // What spoke against slip until now says nothing of one that begins.
+            self.tracker.clone_from(sound);
+            self.tracker
+                .distrust_odometer(if sets_off { MOST_SLIP } else { leapt });
+        }
+        let speaks_for_it = if leapt > 0.0 { LEAP } else { 0.0 };
+        self.evidence = self.evidence.max(speaks_for_it);
     }
 
     /// Takes in an angle, which the tracker `sound` takes in too, of so many times the variance that is
@@ -142,7 +154,7 @@ mod tests {
                 yaw_rate_radps: None,
             };
             sound.odometry(&odometry);
-            slip.odometry(&odometry);
+            slip.odometry(&sound, &odometry);
             let pose = road.pose(4.0 * time_s);
             for head in &heads {
                 let bearing_rad = pose.point().bearing_rad(head.position) - pose.heading_rad;

@@ -11,6 +11,9 @@ const LEAST_ODOMETER_SCALE_STD: f64 = 0.001;
 const LEAST_ODOMETER_NOISE_M_PER_SQRT_M: f64 = 0.003;
 const LEAST_LANE_RMS_M: f64 = 0.02;
 
+/// It turns back to the middle of the lane with a yaw rate within so many deviations.
+const SIGMAS_OF_SWING: f64 = 5.0;
+
 /// Wavelength along the road of the errors of its survey, of points every few metres (m).
 const SURVEY_WAVELENGTH_M: f64 = 15.0;
 
@@ -64,7 +67,7 @@ pub struct TrackerConfig {
     pub may_slip: bool,
     /// Standard deviation of a reading of the speed (m/s).
     pub speed_noise_mps: f64,
-    /// Yaw rate that no sample can exceed (rad/s).
+    /// Yaw rate that no sample can exceed (rad/s), nor the vehicle as it keeps its lane.
     pub top_yaw_rate_radps: f64,
     /// Random walk of the heading by what tells the yaw rate, per distance (rad/√m) and per angle
     /// turned (rad/√rad).
@@ -249,7 +252,9 @@ impl TrackerConfig {
             leap_mps2: 10.0 * vehicle.acceleration_mps2,
             may_slip: false,
             speed_noise_mps: odometer.speed_noise_mps,
-            top_yaw_rate_radps: vehicle.top_yaw_rate_radps,
+            // A vehicle that is said to swing fast does so, whatever else it is said not to exceed.
+            top_yaw_rate_radps: (vehicle.top_yaw_rate_radps)
+                .max(SIGMAS_OF_SWING * keeping.pull_per_m() * vehicle.top_speed_mps()),
             yaw_noise_rad_per_sqrt_m: gyroscope.map_or(0.0, |it| it.noise_rad_per_sqrt_m),
             yaw_noise_rad_per_sqrt_rad: gyroscope.map_or(0.0, |it| it.noise_rad_per_sqrt_rad),
             lateness_std_s: receiver.lateness_std_s.unwrap_or(if wheels {

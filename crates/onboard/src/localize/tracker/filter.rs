@@ -30,7 +30,7 @@ const WILD: f64 = 10.0;
 /// Deviations of the speed's reading from which on a step of it is slip, and the most that slip
 /// adds to the deviation of the odometer's scale.
 const SIGMAS_OF_SLIP: f64 = 5.0;
-const MOST_SLIP: f64 = 0.3;
+pub(in crate::localize) const MOST_SLIP: f64 = 0.3;
 
 /// How far the scale walks of an odometer that may slip without a leap (per √m).
 const SLIP_WALK_PER_SQRT_M: f64 = 0.1;
@@ -166,10 +166,14 @@ impl Tracker {
         if self.config.drive == DriveKind::Road {
             let usual_mps = SIGMAS_OF_SLIP * self.config.speed_noise_mps;
             let least_mps = usual_mps.max(self.config.leap_mps2 * duration_s.max(0.02));
-            let leap = (self.speed_steps).leap(previous.speed_mps, sample.speed_mps, least_mps);
+            (self.speed_steps).step(previous.speed_mps, sample.speed_mps, least_mps);
             let sets_off = previous.speed_mps == 0.0 && sample.speed_mps != 0.0;
             let unseen = self.config.may_slip && sets_off;
-            self.slip(if unseen { MOST_SLIP } else { leap });
+            self.slip(if unseen {
+                MOST_SLIP
+            } else {
+                self.speed_steps.leapt()
+            });
         }
         let moved_m = sample.distance_m - previous.distance_m;
         // A counter that was reset or overflowed says nothing of the distance: the speeds do.
@@ -409,17 +413,22 @@ impl Tracker {
         self.config.gate = gate;
     }
 
-    /// Expects slip from now on: at once, anew whenever the vehicle sets off, when nothing tells it
+    /// Expects slip from now on: by so much at once, anew whenever the vehicle sets off, when nothing tells it
     /// from the speed, with every leap of the speed that is more than it accelerates, and with every
     /// metre of a differential drive, whose speed may leap.
-    pub(in crate::localize) fn distrust_odometer(&mut self) {
+    pub(in crate::localize) fn distrust_odometer(&mut self, by: f64) {
         let config = &mut self.config;
         config.may_slip = true;
         config.leap_mps2 = config.acceleration_mps2;
         if config.drive == DriveKind::Differential {
             config.noise.scale_per_sqrt_m = SLIP_WALK_PER_SQRT_M;
         }
-        self.slip(MOST_SLIP);
+        self.slip(by);
+    }
+
+    /// By which share the speed leapt with the newest odometry, as no vehicle can do; 0 otherwise.
+    pub(in crate::localize) const fn leapt(&self) -> f64 {
+        self.speed_steps.leapt()
     }
 
     /// Leaves the angles of a radio head unused, or uses them again.

@@ -29,6 +29,7 @@ mod staying_error;
 
 pub use calibration::{Calibration, Departure};
 pub use config::TrackerConfig;
+pub(in crate::localize) use filter::MOST_SLIP;
 pub use filter::Tracker;
 pub use findings::{Finding, Findings};
 pub(in crate::localize) use forecast::Rehearsal;
