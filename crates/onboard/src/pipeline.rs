@@ -7,8 +7,8 @@ use crate::link_budget::LinkBudget;
 use crate::localize::thermal::ThermalNoise;
 use crate::localize::tracker::{Calibration, Findings, OdometryVerdict};
 use crate::localize::{
-    self, AngleMeasurement, History, Localizer, PoseEstimate, Recovered, Tracker, UpdateReason,
-    UpdateVerdict,
+    self, AngleMeasurement, History, Localizer, PoseEstimate, Recovered, Sighted, Tracker,
+    UpdateReason, UpdateVerdict,
 };
 use crate::manifold::Measurand;
 use crate::observation::{OdometrySample, SensedSsb, SsbObservation};
@@ -30,6 +30,8 @@ pub struct Onboard {
     sensed: Vec<SensedSsb>,
     chosen: Vec<bool>,
     executions: Vec<Execution>,
+    /// Those of them that are for the localizer.
+    burst: Vec<Sighted>,
 }
 
 /// What does not change during a drive.
@@ -176,6 +178,7 @@ impl Onboard {
             sensed: Vec::with_capacity(heads.len()),
             chosen: Vec::with_capacity(heads.len()),
             executions: Vec::with_capacity(heads.len()),
+            burst: Vec::with_capacity(heads.len()),
             surroundings: Surroundings {
                 heads,
                 budget: LinkBudget::new(site, vehicle),
@@ -214,6 +217,7 @@ impl Onboard {
     pub fn hear(&mut self, time_s: f64, source: &mut dyn SsbSource) -> Result<Heard<'_>, BoxError> {
         self.sensed.clear();
         self.executions.clear();
+        self.burst.clear();
         let now = self.surroundings.at(time_s, self.odometry, &self.localizer);
         // As long as the first pose is searched for, every angle helps.
         let searching = now.localizer.hypotheses().is_some() || now.localizer.is_lost();
@@ -231,11 +235,16 @@ impl Onboard {
                 else {
                     continue;
                 };
-                let execution = match source.observe(index)? {
+                match source.observe(index)? {
                     Observed::Snapshots(observation) => self.estimate(observation)?,
-                    Observed::Angle(measured) => self.take_in(ssb, Some(measured))?,
-                };
-                self.executions.push(execution);
+                    Observed::Angle(measured) => self.collect(ssb, Some(measured)),
+                }
+            }
+            self.localizer.update(&mut self.burst)?;
+            for sighted in &self.burst {
+                if let Some(execution) = self.executions.get_mut(sighted.number) {
+                    execution.verdict = sighted.verdict;
+                }
             }
         }
         let now = self.surroundings.at(time_s, self.odometry, &self.localizer);
@@ -246,39 +255,45 @@ impl Onboard {
         })
     }
 
-    /// Estimates the angle of an SSB and lets the localizer have it.
-    fn estimate(&mut self, observation: &SsbObservation) -> Result<Execution, BoxError> {
+    /// Estimates the angle of an SSB for the localizer.
+    fn estimate(&mut self, observation: &SsbObservation) -> Result<(), BoxError> {
         let ssb = observation.ssb;
         let estimated = self.estimator.estimate(observation)?;
         let bound_rad = || self.thermal.sigma_rad(ssb.snr_db);
         let measured = estimated.and_then(|estimated| {
             estimator::measurement(&ssb, estimated, &self.measurand, bound_rad)
         });
-        self.take_in(ssb, measured)
+        self.collect(ssb, measured);
+        Ok(())
     }
 
-    fn take_in(
-        &mut self,
-        ssb: SensedSsb,
-        measured: Option<AngleMeasurement>,
-    ) -> Result<Execution, BoxError> {
+    /// Remembers an SSB's angle for the localizer, which has those of a burst together.
+    fn collect(&mut self, ssb: SensedSsb, measured: Option<AngleMeasurement>) {
         let measured = measured.map(|measured| AngleMeasurement {
             time_s: measured.time_s - self.lateness_s,
             ..measured
         });
         let mut heads = self.surroundings.heads.iter();
         let head = heads.find(|head| head.sends(ssb.pci, ssb.ssb_index));
-        let verdict = match (head, &measured) {
-            (None, _) => UpdateVerdict::unused(UpdateReason::UnknownRadioHead),
-            (_, None) => UpdateVerdict::unused(UpdateReason::Unusable),
-            (Some(head), Some(measured)) => self.localizer.update(head, measured)?,
+        let reason = match head {
+            None => UpdateReason::UnknownRadioHead,
+            Some(_) => UpdateReason::Unusable,
         };
-        Ok(Execution {
+        let verdict = UpdateVerdict::unused(reason);
+        if let (Some(&head), Some(measured)) = (head, measured) {
+            self.burst.push(Sighted {
+                number: self.executions.len(),
+                head,
+                measured,
+                verdict,
+            });
+        }
+        self.executions.push(Execution {
             ssb,
             measured,
             verdict,
             wake_up_time_s: self.wake_up_time_s,
-        })
+        });
     }
 
     /// Number of places the vehicle may be at while it searches for its first pose; `None` once

@@ -5,7 +5,9 @@ use std::f64::consts::PI;
 use std::fmt::Write as _;
 
 use onboard::geometry::Pose;
-use onboard::localize::{AngleMeasurement, History, built_in};
+use onboard::localize::{
+    AngleMeasurement, History, Sighted, UpdateReason, UpdateVerdict, built_in,
+};
 use onboard::observation::OdometrySample;
 use onboard::radio_head::RadioHead;
 use onboard::settings::{Shipped, Site, TomlFile, Vehicle};
@@ -77,6 +79,7 @@ fn drive(seed: u64) {
         if !(gap_from..gap_to).contains(&step) {
             localizer.odometry(&sample).unwrap();
         }
+        let mut burst = Vec::new();
         for head in &heads {
             if !rng.random_bool(0.2) {
                 continue;
@@ -99,8 +102,14 @@ fn drive(seed: u64) {
                 snr_db: 20.0,
                 resolved: true,
             };
-            localizer.update(head, &measured).unwrap();
+            burst.push(Sighted {
+                number: burst.len(),
+                head: *head,
+                measured,
+                verdict: UpdateVerdict::unused(UpdateReason::Unusable),
+            });
         }
+        localizer.update(&mut burst).unwrap();
         let estimate = localizer.localizer().pose(time_s).unwrap();
         let (pose, covariance) = (estimate.pose, estimate.covariance.unwrap());
         assert!(pose.x_m.is_finite() && pose.y_m.is_finite() && pose.heading_rad.is_finite());

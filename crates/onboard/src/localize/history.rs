@@ -2,8 +2,9 @@
 //!
 //! An SSB has its own time, and arrives after newer odometry: on a vehicle always. So copies of the
 //! localizer are kept at intervals, with everything it was given since. A late angle is put where it
-//! belongs: the newest copy from before it is taken, and what came after is given to it again. The
-//! result is that of an angle in time, to the last bit. Once warm nothing is allocated.
+//! belongs: the newest copy from before it is taken, and what came after is given to it again, once
+//! for all angles of a burst. The result is that of angles in time, to the last bit. Once warm nothing
+//! is allocated.
 
 use std::collections::VecDeque;
 
@@ -45,17 +46,31 @@ pub struct History {
     newest_s: f64,
 }
 
+/// An angle, and what the localizer did with it.
+#[derive(Debug, Clone, Copy)]
+pub struct Sighted {
+    /// Number by which its giver knows it.
+    pub number: usize,
+    /// The radio head it is to.
+    pub head: RadioHead,
+    /// The angle.
+    pub measured: AngleMeasurement,
+    /// What the localizer did with it.
+    pub verdict: UpdateVerdict,
+}
+
 #[derive(Clone, Copy)]
 enum Event {
     Odometry(OdometrySample),
-    Angle(RadioHead, AngleMeasurement),
+    /// An angle, and its number in its burst as long as that waits to hear what became of it.
+    Angle(RadioHead, AngleMeasurement, Option<usize>),
 }
 
 impl Event {
     const fn time_s(&self) -> f64 {
         match self {
             Self::Odometry(sample) => sample.time_s,
-            Self::Angle(_, measured) => measured.time_s,
+            Self::Angle(_, measured, _) => measured.time_s,
         }
     }
 }
@@ -105,43 +120,47 @@ impl History {
         Ok(verdict)
     }
 
-    /// Takes in an angle, wherever in time it belongs.
+    /// Takes in the angles of a burst, wherever in time they belong, and writes down what it did with
+    /// each.
     ///
     /// # Errors
     /// Whatever the localizer fails with.
-    pub fn update(
-        &mut self,
-        head: &RadioHead,
-        measured: &AngleMeasurement,
-    ) -> Result<UpdateVerdict, BoxError> {
-        // Between the same odometry samples angles can be taken in any order, if need be. A time that
-        // is no number is for the localizer to refuse.
-        let is_late =
-            measured.time_s < self.now_s || (self.copies > 0 && measured.time_s < self.newest_s);
-        if is_late {
-            return self.update_late(head, measured);
+    pub fn update(&mut self, burst: &mut [Sighted]) -> Result<(), BoxError> {
+        for number in 0..burst.len() {
+            let (_, rest) = burst.split_at_mut(number);
+            let Some(sighted) = rest.first_mut() else {
+                break;
+            };
+            // Between the same odometry samples angles can be taken in any order, if need be. A time
+            // that is no number is for the localizer to refuse.
+            let time_s = sighted.measured.time_s;
+            if time_s < self.now_s || (self.copies > 0 && time_s < self.newest_s) {
+                return self.update_late(rest);
+            }
+            sighted.verdict = self.localizer.update(&sighted.head, &sighted.measured)?;
+            self.remember(Event::Angle(sighted.head, sighted.measured, None));
         }
-        let verdict = self.localizer.update(head, measured)?;
-        self.remember(Event::Angle(*head, *measured));
-        Ok(verdict)
+        Ok(())
     }
 
-    fn update_late(
-        &mut self,
-        head: &RadioHead,
-        measured: &AngleMeasurement,
-    ) -> Result<UpdateVerdict, BoxError> {
-        let is_before = |copy: &&Checkpoint| copy.time_s <= measured.time_s;
-        let from = self.kept.iter().take(self.copies).take_while(is_before);
-        let from = from.count();
+    fn update_late(&mut self, burst: &mut [Sighted]) -> Result<(), BoxError> {
+        for sighted in &mut *burst {
+            let reason = if sighted.measured.time_s.is_nan() {
+                UpdateReason::Unusable
+            } else {
+                UpdateReason::TooLate
+            };
+            sighted.verdict = UpdateVerdict::unused(reason);
+        }
+        let copies = self.kept.iter().take(self.copies);
+        let oldest_s = (copies.clone().next()).map_or(f64::INFINITY, |copy| copy.time_s);
+        let in_memory = |sighted: &&Sighted| sighted.measured.time_s >= oldest_s;
+        let times_s = burst.iter().filter(in_memory).map(|it| it.measured.time_s);
+        let first_s = times_s.fold(f64::INFINITY, f64::min);
+        let from = copies.take_while(|copy| copy.time_s <= first_s).count();
         let Some(copy) = from.checked_sub(1).and_then(|from| self.kept.get(from)) else {
-            return Ok(UpdateVerdict::unused(UpdateReason::TooLate));
+            return Ok(());
         };
-        // In time it would have come before the first that is later.
-        let is_later = |event: &Event| event.time_s() > measured.time_s;
-        let place = (self.events.iter().skip(copy.events))
-            .position(is_later)
-            .map_or(self.events.len(), |place| copy.events + place);
         let taken_in = copy.events;
         if let Some(saved) = &copy.localizer {
             saved.copy_to(&mut self.spare);
@@ -149,27 +168,35 @@ impl History {
         if let Some(spare) = &mut self.spare {
             std::mem::swap(spare, &mut self.localizer);
         }
-        self.events.insert(place, Event::Angle(*head, *measured));
+        for (number, sighted) in burst.iter().enumerate().filter(|(_, it)| in_memory(it)) {
+            // In time it would have come before the first that is later.
+            let is_later = |event: &Event| event.time_s() > sighted.measured.time_s;
+            let place = (self.events.iter().skip(taken_in))
+                .position(is_later)
+                .map_or(self.events.len(), |place| taken_in + place);
+            let event = Event::Angle(sighted.head, sighted.measured, Some(number));
+            self.events.insert(place, event);
+        }
         // Copies made after it have not heard it.
         self.copies = from;
-        let mut verdict = UpdateVerdict::unused(UpdateReason::TooLate);
         for index in taken_in..self.events.len() {
-            match self.events.get(index).copied() {
+            match self.events.get_mut(index) {
                 Some(Event::Odometry(sample)) => {
+                    let sample = *sample;
                     self.localizer.odometry(&sample)?;
                     self.keep_copy_if_due(sample.time_s, index + 1);
                 }
-                Some(Event::Angle(head, measured)) => {
-                    let told = self.localizer.update(&head, &measured)?;
-                    if index == place {
-                        verdict = told;
+                Some(Event::Angle(head, measured, waits)) => {
+                    let verdict = self.localizer.update(head, measured)?;
+                    if let Some(sighted) = waits.take().and_then(|number| burst.get_mut(number)) {
+                        sighted.verdict = verdict;
                     }
                 }
                 None => {}
             }
         }
         self.forget();
-        Ok(verdict)
+        Ok(())
     }
 
     fn remember(&mut self, event: Event) {

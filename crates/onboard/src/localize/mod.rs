@@ -25,7 +25,7 @@ mod watch;
 pub use area::Area;
 pub use choose::built_in;
 pub use dead_reckoning::DeadReckoning;
-pub use history::{HISTORY_S, History};
+pub use history::{HISTORY_S, History, Sighted};
 pub use initialise::Initialiser;
 pub use integrity_state::{Integrity, IntegrityState};
 pub use localizer::{Localizer, Recovered, copy_into};
