@@ -129,9 +129,10 @@ mod tests {
     use crate::localize::tracker::{InitialPose, TrackerConfig};
     use crate::settings::{Shipped, Site, TomlFile, Vehicle};
 
-    /// Probability of slip, of 0.01 before, after half a minute of exact angles at 4 m/s, when the odometer
-    /// reads so many times the way.
-    fn probability(ratio: f64) -> f64 {
+    /// Half a minute at 4 m/s, of which the odometer reads so many times the way from a time on. Angles
+    /// are exact, and heard until a time. Probability of slip, of 0.01 before, the tracker that expects
+    /// it, and how far off that is at the end.
+    fn drive(ratio: f64, slips_from_s: f64, heard_until_s: f64) -> (f64, Slip, f64) {
         let site = Site::from_library("trip-4", &Shipped).unwrap();
         let vehicle = Vehicle::from_library("carrier", &Shipped).unwrap();
         let heads = RadioHead::heard(&site, &vehicle);
@@ -145,16 +146,23 @@ mod tests {
         let config = TrackerConfig::new(&site, &vehicle);
         let mut sound = Tracker::new(config, map, &heads, &start);
         let mut slip = Slip::new(&sound);
+        let mut distance_m = 0.0;
+        let mut time_s = 0.0;
         for step in 1..300 {
-            let time_s = f64::from(step) * 0.1;
+            time_s = f64::from(step) * 0.1;
+            let reads = if time_s > slips_from_s { ratio } else { 1.0 };
+            distance_m += 0.4 * reads;
             let odometry = OdometrySample {
                 time_s,
-                distance_m: 4.0 * ratio * time_s,
-                speed_mps: 4.0 * ratio,
+                distance_m,
+                speed_mps: 4.0 * reads,
                 yaw_rate_radps: None,
             };
             sound.odometry(&odometry);
             slip.odometry(&sound, &odometry);
+            if time_s > heard_until_s {
+                continue;
+            }
             let pose = road.pose(4.0 * time_s);
             for head in &heads {
                 let bearing_rad = pose.point().bearing_rad(head.position) - pose.heading_rad;
@@ -169,13 +177,28 @@ mod tests {
                 slip.update(&mut sound, 1.0, head, &measured);
             }
         }
-        slip.probability(1e-2)
+        let off_m = (slip.tracker().pose(time_s).pose.point())
+            .distance_m(road.pose(4.0 * time_s).point());
+        (slip.probability(1e-2), slip, off_m)
     }
 
     #[test]
     fn slip_since_the_start_is_suspected_and_a_sound_odometer_is_not() {
+        let probability = |ratio| drive(ratio, 0.0, f64::INFINITY).0;
         assert!(probability(1.0) < 1e-3);
         assert!(probability(1.2) > 0.99);
         assert!(probability(0.8) > 0.99);
+    }
+
+    #[test]
+    fn a_leap_of_the_speed_counts_as_slip_before_any_angle_tells() {
+        for ratio in [0.9, 1.1] {
+            let (probability, slip, off_m) = drive(ratio, 20.0, 20.0);
+            assert!(probability > 0.5);
+            let covariance = slip.tracker().pose(29.9).covariance.unwrap();
+            let std_m = (covariance[0][0] + covariance[1][1]).sqrt();
+            // Slip by the leap is one deviation of what is expected.
+            assert!((off_m / std_m - 1.0).abs() < 0.3, "{off_m} of {std_m}");
+        }
     }
 }

@@ -9,7 +9,7 @@ use super::motion::{Step, Yaw};
 use super::off_map::OffMap;
 use super::pace::Pace;
 use super::speed_steps::SpeedSteps;
-use super::state::{ALONG, Belief, HEADING, SCALE, STATES, YAW_RATE_BIAS};
+use super::state::{ACROSS, ALONG, Belief, HEADING, SCALE, STATES, YAW_RATE_BIAS};
 use super::staying_error::StayingError;
 use crate::clone_in_place::clone_in_place;
 use crate::localize::smoother::Journal;
@@ -31,6 +31,9 @@ const WILD: f64 = 10.0;
 /// adds to the deviation of the odometer's scale.
 const SIGMAS_OF_SLIP: f64 = 5.0;
 pub(in crate::localize) const MOST_SLIP: f64 = 0.3;
+
+/// Deviations within which the place is known where a bend may begin.
+const SIGMAS_OF_BEND: f64 = 3.0;
 
 /// How far the scale walks of an odometer that may slip without a leap (per √m).
 const SLIP_WALK_PER_SQRT_M: f64 = 0.1;
@@ -165,7 +168,10 @@ impl Tracker {
         // differential drive's wheels may obey at once.
         if self.config.drive == DriveKind::Road {
             let usual_mps = SIGMAS_OF_SLIP * self.config.speed_noise_mps;
-            let least_mps = usual_mps.max(self.config.leap_mps2 * duration_s.max(0.02));
+            let mut least_mps = usual_mps.max(self.config.leap_mps2 * duration_s.max(0.02));
+            if (sample.speed_mps - previous.speed_mps).abs() > least_mps {
+                least_mps += self.bend_mps(sample.speed_mps, duration_s);
+            }
             (self.speed_steps).step(previous.speed_mps, sample.speed_mps, least_mps);
             let sets_off = previous.speed_mps == 0.0 && sample.speed_mps != 0.0;
             let unseen = self.config.may_slip && sets_off;
@@ -232,6 +238,18 @@ impl Tracker {
                 None => OdometryVerdict::Accepted,
             }
         }
+    }
+
+    /// By how much a bend that begins or ends here changes the speed: its inner side is the shorter.
+    fn bend_mps(&self, speed_mps: f64, duration_s: f64) -> f64 {
+        let Some(map) = &self.map else {
+            return 0.0;
+        };
+        let (mean, covariance) = (&self.belief.mean, &self.belief.covariance);
+        let reach_m = SIGMAS_OF_BEND * covariance[ALONG][ALONG].sqrt() + speed_mps.abs() * duration_s;
+        let aside_m = mean[ACROSS].abs() + SIGMAS_OF_BEND * covariance[ACROSS][ACROSS].sqrt();
+        let [before, after] = [-reach_m, reach_m].map(|by| map.curvature_per_m(mean[ALONG] + by));
+        (after - before).abs() * aside_m * speed_mps.abs()
     }
 
     /// The odometer's scale may have changed by a share.
