@@ -186,6 +186,7 @@ impl Bound {
                 &belief.mean,
                 0.0,
                 length_m,
+                length_m,
                 &road,
                 &config.lane_keeping,
                 &config.noise,

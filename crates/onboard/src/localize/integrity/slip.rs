@@ -177,8 +177,8 @@ mod tests {
                 slip.update(&mut sound, 1.0, head, &measured);
             }
         }
-        let off_m = (slip.tracker().pose(time_s).pose.point())
-            .distance_m(road.pose(4.0 * time_s).point());
+        let off_m =
+            (slip.tracker().pose(time_s).pose.point()).distance_m(road.pose(4.0 * time_s).point());
         (slip.probability(1e-2), slip, off_m)
     }
 

@@ -32,6 +32,9 @@ const WILD: f64 = 10.0;
 const SIGMAS_OF_SLIP: f64 = 5.0;
 pub(in crate::localize) const MOST_SLIP: f64 = 0.3;
 
+/// Speeds that tell of a smaller share of what is read are not relied on for that.
+const LEAST_DRIVEN: f64 = 0.5;
+
 /// Deviations within which the place is known where a bend may begin.
 const SIGMAS_OF_BEND: f64 = 3.0;
 
@@ -90,6 +93,10 @@ pub struct Tracker {
     pub(super) journal: Option<Journal<STATES>>,
     pub(super) pace: Pace,
     pub(super) speed_steps: SpeedSteps,
+    /// What the speeds say was driven (m) since the odometer last moved ...
+    pub(super) unread_m: f64,
+    /// ... by what it then reads, in the step that is being taken.
+    pub(super) driven_by_read: f64,
 }
 
 clone_in_place!(Tracker {
@@ -103,7 +110,9 @@ clone_in_place!(Tracker {
     off_map,
     journal,
     pace,
-    speed_steps
+    speed_steps,
+    unread_m,
+    driven_by_read
 });
 
 impl Tracker {
@@ -136,6 +145,8 @@ impl Tracker {
             journal: None,
             pace: Pace::default(),
             speed_steps: SpeedSteps::default(),
+            unread_m: 0.0,
+            driven_by_read: 1.0,
         };
         tracker.watch_the_map();
         tracker
@@ -189,6 +200,8 @@ impl Tracker {
         } else {
             moved_m
         };
+        let mean_mps = 0.5 * (previous.speed_mps + sample.speed_mps);
+        self.driven_by_read = self.driven_by(reading_m, mean_mps * duration_s);
         let read_radps = sample.yaw_rate_radps;
         let credible = |rate: &f64| rate.abs() <= self.config.top_yaw_rate_radps;
         let refused = read_radps.filter(|rate| !credible(rate));
@@ -219,6 +232,7 @@ impl Tracker {
         });
         let last_s = if yaw.is_some() { told_s } else { duration_s };
         self.advance(told_m, last_s, yaw);
+        self.driven_by_read = 1.0;
         if jumped {
             self.add_along_variance(self.config.coasting_variance(duration_s));
         }
@@ -240,13 +254,29 @@ impl Tracker {
         }
     }
 
+    /// What was driven, by what is read of it. A reading that is short by chance, or by the steps in
+    /// which wheels count, is no better for that: were its noise taken for less, the odometer would win
+    /// against the yaw rate wherever it reads too little, and lose wherever it reads too much.
+    fn driven_by(&mut self, reading_m: f64, driven_m: f64) -> f64 {
+        self.unread_m += driven_m;
+        if reading_m == 0.0 {
+            return 1.0;
+        }
+        let share = std::mem::take(&mut self.unread_m) / reading_m;
+        if share == 0.0 {
+            return 1.0; // no speed is told
+        }
+        share.abs().max(LEAST_DRIVEN).copysign(share)
+    }
+
     /// By how much a bend that begins or ends here changes the speed: its inner side is the shorter.
     fn bend_mps(&self, speed_mps: f64, duration_s: f64) -> f64 {
         let Some(map) = &self.map else {
             return 0.0;
         };
         let (mean, covariance) = (&self.belief.mean, &self.belief.covariance);
-        let reach_m = SIGMAS_OF_BEND * covariance[ALONG][ALONG].sqrt() + speed_mps.abs() * duration_s;
+        let reach_m =
+            SIGMAS_OF_BEND * covariance[ALONG][ALONG].sqrt() + speed_mps.abs() * duration_s;
         let aside_m = mean[ACROSS].abs() + SIGMAS_OF_BEND * covariance[ACROSS][ACROSS].sqrt();
         let [before, after] = [-reach_m, reach_m].map(|by| map.curvature_per_m(mean[ALONG] + by));
         (after - before).abs() * aside_m * speed_mps.abs()
@@ -371,7 +401,17 @@ impl Tracker {
         let variance = |state: usize| belief.covariance[state][state].max(0.0);
         let road = map.bending(middle_m, variance(ALONG).sqrt().max(TRANSITION_M));
         let keeping = &config.lane_keeping;
-        Step::along_lane(mean, variance(HEADING), reading_m, &road, keeping, noise)
+        let driven_m = reading_m * self.driven_by_read;
+        let heading_variance = variance(HEADING);
+        Step::along_lane(
+            mean,
+            heading_variance,
+            reading_m,
+            driven_m,
+            &road,
+            keeping,
+            noise,
+        )
     }
 
     fn add_along_variance(&mut self, variance: f64) {

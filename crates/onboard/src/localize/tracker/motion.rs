@@ -79,24 +79,26 @@ pub struct Yaw {
 }
 
 impl Step {
-    /// The step along a lane that bends as the road does, for what the odometer read. A heading known to
-    /// a variance P takes from the way along the lane: `E cos ψ = e^{−P/2} cos E ψ`.
+    /// The step along a lane that bends as the road does, for what the odometer read where so much was
+    /// driven, of which all noise is. A heading known to a variance P takes from the way along the
+    /// lane: `E cos ψ = e^{−P/2} cos E ψ`.
     pub fn along_lane(
         start: &[f64; STATES],
         heading_variance: f64,
         reading_m: f64,
+        driven_m: f64,
         road: &Bending,
         keeping: &LaneKeeping,
         walk: &MotionNoise,
     ) -> Self {
         let scale = 1.0 + start[SCALE];
-        let length = reading_m / scale;
+        let (length, driven) = (reading_m / scale, driven_m / scale);
         let kept = (-0.5 * heading_variance).exp();
         let (sin, cos) = start[HEADING].sin_cos();
         let (sin, cos) = (kept * sin, kept * cos);
         let curvature_per_m = road.mean_per_m;
         let stretch = 1.0 / (1.0 - curvature_per_m * start[ACROSS]);
-        let phi = keeping.transition(length);
+        let phi = keeping.transition(driven);
 
         let mut f = identity();
         f[ALONG][ACROSS] = length * cos * curvature_per_m * stretch * stretch;
@@ -107,11 +109,11 @@ impl Step {
         f[HEADING][ACROSS] = phi[1][0];
         f[HEADING][HEADING] = phi[1][1];
 
-        let distance = length.abs();
+        let distance = driven.abs();
         let mut q = [[0.0; STATES]; STATES];
         q[ALONG][ALONG] = distance
             * (walk.odometer_m_per_sqrt_m.powi(2) + keeping.shortening_m2_per_m(heading_variance));
-        let wander = keeping.noise(length);
+        let wander = keeping.noise(driven);
         for i in 0..2 {
             for j in 0..2 {
                 q[ACROSS + i][ACROSS + j] = wander[i][j];
