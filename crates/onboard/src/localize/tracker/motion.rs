@@ -101,9 +101,11 @@ impl Step {
         let phi = keeping.transition(driven);
 
         let mut f = identity();
-        f[ALONG][ACROSS] = length * cos * curvature_per_m * stretch * stretch;
-        f[ALONG][HEADING] = -length * sin * stretch;
-        f[ALONG][SCALE] = -length * cos * stretch / scale;
+        // What was driven, too: a reading's noise is in what the yaw rate is compared with, and must
+        // not be in what that is weighed by.
+        f[ALONG][ACROSS] = driven * cos * curvature_per_m * stretch * stretch;
+        f[ALONG][HEADING] = -driven * sin * stretch;
+        f[ALONG][SCALE] = -driven * cos * stretch / scale;
         f[ACROSS][ACROSS] = phi[0][0];
         f[ACROSS][HEADING] = phi[0][1];
         f[HEADING][ACROSS] = phi[1][0];
@@ -130,7 +132,7 @@ impl Step {
             turn_row[i] = f[HEADING][i] + curvature_per_m * f[ALONG][i];
         }
         turn_row[HEADING] -= 1.0;
-        turn_row[ALONG] = road.slope_per_m2 * (mean[ALONG] - start[ALONG]);
+        turn_row[ALONG] = road.slope_per_m2 * driven * cos * stretch;
         // The road turns by as much further as the odometer read too little.
         let turn_shared = std::array::from_fn(|i| q[HEADING][i] + curvature_per_m * q[ALONG][i]);
         Self {
