@@ -11,7 +11,7 @@ use simulate::truth::World;
 use simulate::{Campaign, Consistency, RunRecord, Simulation, Step};
 use toml::Value;
 
-use common::{NONE, campaign, changed, drives, shipped, simulation};
+use common::{NONE, campaign, changed, drives, shipped, simulation, value};
 
 const SEED: u64 = 11;
 
@@ -335,4 +335,46 @@ fn a_gyroscope_helps_as_much_as_it_says() {
             "map {map}: {found} of {predicted} ± {deviation}"
         );
     }
+}
+
+#[test]
+fn an_odometer_that_reads_noise_by_noise_does_not_win_against_the_yaw_rate() {
+    // Each reading is off by half of the step: what is read too little must not count for less noise,
+    // nor noise for a reason to believe in an offset.
+    let scenario = changed(
+        "yard",
+        [
+            ("motion", value("{}")),
+            (
+                "site.road",
+                value("{ segments = [{ length_m = 40.0, turn_rad = -1.33 }] }"),
+            ),
+            ("vehicle.top_speed_kmh", value("3.0")),
+            ("vehicle.lane_keeping.rms_m", value("0.1")),
+            ("vehicle.lane_keeping.wavelength_m", value("120.0")),
+            (
+                "vehicle.odometer",
+                value("{ rate_hz = 100.0, scale_std = 0.02, noise_m_per_sqrt_m = 0.05 }"),
+            ),
+            (
+                "vehicle.gyroscope",
+                value("{ noise_rad_per_sqrt_s = 1e-4, bias_std_radps = 1e-3 }"),
+            ),
+            (
+                "vehicle.wake_up",
+                value("{ policy = \"fixed\", interval_ms = 60000.0 }"),
+            ),
+        ],
+    );
+    let runs = 12;
+    let squares = drives(&scenario, SEED, runs).into_iter().map(|record| {
+        let step = record.steps.last().unwrap();
+        let error_m = step.estimate.point().distance_m(step.truth.point());
+        let [[xx, ..], [_, yy, _], _] = step.covariance.unwrap();
+        error_m * error_m / (xx + yy)
+    });
+    // The place is known by the bend's direction, so along the road alone: χ² of one degree of freedom
+    // each, their sum below its quantile of 1e-4.
+    let sum: f64 = squares.sum();
+    assert!(sum < 39.1, "{sum} of {runs} runs");
 }
