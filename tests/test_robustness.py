@@ -243,8 +243,8 @@ def test_threads_that_no_core_is_for() -> None:
     done = subprocess.run(
         [sys.executable, "-c", THREADS], capture_output=True, text=True, check=True
     )
-    # Workers, one a core, and the thread that asked for them.
-    assert 2 <= int(done.stdout) <= (os.cpu_count() or 1) + 1
+    # Workers, one a core, the thread that asked for them, and a few of libraries; not a thousand.
+    assert 2 <= int(done.stdout) <= (os.cpu_count() or 1) + 16
 
 
 @pytest.mark.parametrize("words", [["fit", "x" * 2000], ["x" * 2000], ["--" + "x" * 2000]])
