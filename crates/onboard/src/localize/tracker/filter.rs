@@ -32,8 +32,8 @@ const WILD: f64 = 10.0;
 const SIGMAS_OF_SLIP: f64 = 5.0;
 pub(in crate::localize) const MOST_SLIP: f64 = 0.3;
 
-/// Speeds that tell of a smaller share of what is read are not relied on for that.
-const LEAST_DRIVEN: f64 = 0.5;
+/// What was driven is taken from the speeds where it is within these shares of what is read.
+const DRIVEN_BY_READ: [f64; 2] = [0.5, 1e3];
 
 /// Deviations within which the place is known where a bend may begin.
 const SIGMAS_OF_BEND: f64 = 3.0;
@@ -263,10 +263,11 @@ impl Tracker {
             return 1.0;
         }
         let share = std::mem::take(&mut self.unread_m) / reading_m;
-        if share == 0.0 {
-            return 1.0; // no speed is told
+        if share == 0.0 || !share.is_finite() {
+            return 1.0; // no speed is told, or no time
         }
-        share.abs().max(LEAST_DRIVEN).copysign(share)
+        let [least, most] = DRIVEN_BY_READ;
+        share.abs().clamp(least, most).copysign(share)
     }
 
     /// By how much a bend that begins or ends here changes the speed: its inner side is the shorter.
