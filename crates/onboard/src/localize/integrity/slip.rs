@@ -2,9 +2,9 @@
 //!
 //! A tracker that expects slip runs beside the one that trusts the odometer. Whenever the vehicle sets
 //! off its wheels may slip, and no leap of the speed tells; so they may whenever one does. From then on
-//! each angle speaks for it or against it, as the one tracker or the other foretells it better. Until the angles have spoken against
-//! it, the level is to hold for that tracker too. Where errors are found that stay over metres, they are
-//! what slip would be taken for.
+//! each angle speaks for it or against it, as the one tracker or the other foretells it better. Until
+//! the angles have spoken against it, the level is to hold for that tracker too. Where errors are found
+//! that stay over metres, they are what slip would be taken for.
 
 use std::f64::consts::TAU;
 
