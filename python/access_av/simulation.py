@@ -129,7 +129,7 @@ def simulate(
     platform
         The onboard computer; the one the scenario names when ``None``.
     threads
-        Worker threads; all cores when ``None``. Results do not depend on it.
+        Worker threads, one per core at most and when ``None``. Results do not depend on it.
     keep_trajectories
         Whether to keep every drive's trajectory and executions, not only their statistics.
     errors_every

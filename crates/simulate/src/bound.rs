@@ -17,7 +17,7 @@
 use onboard::geometry::{Point, Pose};
 use onboard::localize::gaussian::{Gaussian, Matrix, identity, product};
 use onboard::localize::thermal::ThermalNoise;
-use onboard::localize::tracker::motion::Step;
+use onboard::localize::tracker::motion::{Reading, Step};
 use onboard::localize::tracker::sighting::{Footing, Sighting};
 use onboard::localize::tracker::state::{ACROSS, ALONG, Belief, CURVATURE, HEADING, SCALE, STATES};
 use onboard::localize::tracker::{InitialPose, Tracker, TrackerConfig};
@@ -185,8 +185,7 @@ impl Bound {
             Step::along_lane(
                 &belief.mean,
                 0.0,
-                length_m,
-                length_m,
+                &Reading::exact(length_m),
                 &road,
                 &config.lane_keeping,
                 &config.noise,

@@ -156,7 +156,7 @@ def evaluate(
     seed
         Seed of all random streams.
     threads
-        Worker threads; all cores when ``None``. Results do not depend on it.
+        Worker threads, one per core at most and when ``None``. Results do not depend on it.
     progress
         Called as ``progress(done, total)`` with numbers of drives.
 

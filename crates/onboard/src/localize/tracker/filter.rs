@@ -5,7 +5,7 @@ use std::sync::Arc;
 use super::calibration::Calibration;
 use super::config::TrackerConfig;
 use super::interface::{InitialPose, OdometryVerdict};
-use super::motion::{Step, Yaw};
+use super::motion::{Reading, Step, Yaw};
 use super::off_map::OffMap;
 use super::pace::Pace;
 use super::speed_steps::SpeedSteps;
@@ -93,10 +93,8 @@ pub struct Tracker {
     pub(super) journal: Option<Journal<STATES>>,
     pub(super) pace: Pace,
     pub(super) speed_steps: SpeedSteps,
-    /// What the speeds say was driven (m) since the odometer last moved ...
+    /// What the speeds say was driven (m) since the odometer last moved.
     pub(super) unread_m: f64,
-    /// ... by what it then reads, in the step that is being taken.
-    pub(super) driven_by_read: f64,
 }
 
 clone_in_place!(Tracker {
@@ -111,8 +109,7 @@ clone_in_place!(Tracker {
     journal,
     pace,
     speed_steps,
-    unread_m,
-    driven_by_read
+    unread_m
 });
 
 impl Tracker {
@@ -146,7 +143,6 @@ impl Tracker {
             pace: Pace::default(),
             speed_steps: SpeedSteps::default(),
             unread_m: 0.0,
-            driven_by_read: 1.0,
         };
         tracker.watch_the_map();
         tracker
@@ -201,7 +197,7 @@ impl Tracker {
             moved_m
         };
         let mean_mps = 0.5 * (previous.speed_mps + sample.speed_mps);
-        self.driven_by_read = self.driven_by(reading_m, mean_mps * duration_s);
+        let reading = self.reading(reading_m, mean_mps * duration_s);
         let read_radps = sample.yaw_rate_radps;
         let credible = |rate: &f64| rate.abs() <= self.config.top_yaw_rate_radps;
         let refused = read_radps.filter(|rate| !credible(rate));
@@ -212,15 +208,15 @@ impl Tracker {
         // Where samples were lost, nothing tells of the turn until the last of them was due.
         let told_s = self.pace.told_s(duration_s);
         let untold_s = duration_s - told_s;
-        let mut told_m = reading_m;
+        let mut told = reading;
         if let (Some(rate), true) = (rate, untold_s > 0.0) {
-            told_m *= told_s / duration_s;
+            told = reading.share(told_s / duration_s);
             let guessed = (self.turns_as_told())
                 .then(|| self.guessed_yaw(before.unwrap_or(rate), rate, untold_s));
-            self.advance(reading_m - told_m, untold_s, guessed);
+            self.advance(reading.share(untold_s / duration_s), untold_s, guessed);
         }
         let yaw = rate.map(|rate| {
-            let mut yaw = self.yaw(rate, told_m, told_s);
+            let mut yaw = self.yaw(rate, told.read_m, told_s);
             let change_rad = (before.unwrap_or(rate) - rate) * told_s;
             if refused.is_some() {
                 yaw.variance += (REFUSED_RADPS * told_s).powi(2);
@@ -231,8 +227,7 @@ impl Tracker {
             yaw
         });
         let last_s = if yaw.is_some() { told_s } else { duration_s };
-        self.advance(told_m, last_s, yaw);
-        self.driven_by_read = 1.0;
+        self.advance(told, last_s, yaw);
         if jumped {
             self.add_along_variance(self.config.coasting_variance(duration_s));
         }
@@ -254,20 +249,21 @@ impl Tracker {
         }
     }
 
-    /// What was driven, by what is read of it. A reading that is short by chance, or by the steps in
+    /// What is read, and what was driven of it by the speeds. A reading that is short by chance, or by the steps in
     /// which wheels count, is no better for that: were its noise taken for less, the odometer would win
     /// against the yaw rate wherever it reads too little, and lose wherever it reads too much.
-    fn driven_by(&mut self, reading_m: f64, driven_m: f64) -> f64 {
+    fn reading(&mut self, read_m: f64, driven_m: f64) -> Reading {
         self.unread_m += driven_m;
-        if reading_m == 0.0 {
-            return 1.0;
+        if read_m == 0.0 {
+            return Reading::exact(read_m);
         }
-        let share = std::mem::take(&mut self.unread_m) / reading_m;
+        let share = std::mem::take(&mut self.unread_m) / read_m;
         if share == 0.0 || !share.is_finite() {
-            return 1.0; // no speed is told, or no time
+            return Reading::exact(read_m); // no speed is told, or no time
         }
         let [least, most] = DRIVEN_BY_READ;
-        share.abs().clamp(least, most).copysign(share)
+        let driven_m = read_m * share.abs().clamp(least, most).copysign(share);
+        Reading { read_m, driven_m }
     }
 
     /// By how much a bend that begins or ends here changes the speed: its inner side is the shorter.
@@ -322,8 +318,10 @@ impl Tracker {
         self.config.drive == DriveKind::Differential || self.map.is_none()
     }
 
-    fn advance(&mut self, reading_m: f64, duration_s: f64, yaw: Option<Yaw>) {
-        let steps = (reading_m.abs() / STEP_M).ceil().clamp(1.0, MOST_STEPS);
+    fn advance(&mut self, reading: Reading, duration_s: f64, yaw: Option<Yaw>) {
+        let steps = (reading.read_m.abs() / STEP_M)
+            .ceil()
+            .clamp(1.0, MOST_STEPS);
         let share = 1.0 / steps;
         let yaw = yaw.map(|yaw| Yaw {
             turn_rad: yaw.turn_rad * share,
@@ -332,29 +330,30 @@ impl Tracker {
             ..yaw
         });
         for _ in 0..steps as usize {
-            let step = self.next_step(reading_m * share, duration_s * share, yaw);
+            let step = self.next_step(reading.share(share), duration_s * share, yaw);
             if let Some(journal) = &mut self.journal {
                 journal.moved(&step.jacobian);
             }
             step.apply(&mut self.belief);
         }
         self.turned_rad += yaw.map_or(0.0, |yaw| yaw.turn_rad.abs()) * steps;
-        self.driven_m += reading_m.abs() / (1.0 + self.belief.mean[SCALE]);
+        self.driven_m += reading.read_m.abs() / (1.0 + self.belief.mean[SCALE]);
         self.watch_the_map();
     }
 
     /// The step that odometry tells of; a gyroscope's word on the present state is taken in.
-    fn next_step(&mut self, reading_m: f64, duration_s: f64, yaw: Option<Yaw>) -> Step {
+    fn next_step(&mut self, reading: Reading, duration_s: f64, yaw: Option<Yaw>) -> Step {
+        let read_m = reading.read_m;
         if self.config.drive == DriveKind::Differential {
-            let turn = yaw.unwrap_or_else(|| self.config.unknown_turn(reading_m, duration_s));
-            if reading_m == 0.0 && turn.turn_rad == 0.0 && turn.is_told {
+            let turn = yaw.unwrap_or_else(|| self.config.unknown_turn(read_m, duration_s));
+            if read_m == 0.0 && turn.turn_rad == 0.0 && turn.is_told {
                 return Step::standing(&self.belief.mean); // the wheels do
             }
-            return Step::turning(&self.belief.mean, reading_m, &turn, &self.config.noise);
+            return Step::turning(&self.belief.mean, read_m, &turn, &self.config.noise);
         }
         if let (None, Some(yaw)) = (&self.map, yaw) {
-            if reading_m != 0.0 {
-                return Step::turning(&self.belief.mean, reading_m, &yaw, &self.config.noise);
+            if read_m != 0.0 {
+                return Step::turning(&self.belief.mean, read_m, &yaw, &self.config.noise);
             }
             // Steered wheels that stand do not turn: what is read is the bias.
             let mut row = [0.0; STATES];
@@ -363,7 +362,7 @@ impl Tracker {
             self.measure(yaw.turn_rad - expected, &row, yaw.variance);
             return Step::standing(&self.belief.mean);
         }
-        let step = self.step(&self.belief, reading_m);
+        let step = self.step(&self.belief, &reading);
         let Some(yaw) = yaw else {
             return step;
         };
@@ -374,13 +373,13 @@ impl Tracker {
             variance += residual * residual / TURN_GATE - surprise.variance;
         }
         self.measure(residual, &row, variance);
-        self.step(&self.belief, reading_m)
+        self.step(&self.belief, &reading)
             .informed(&self.belief.mean, &yaw)
     }
 
     /// The step that is to be expected over what the odometer would read.
-    pub(super) fn step(&self, belief: &Belief, reading_m: f64) -> Step {
-        let (mean, config) = (&belief.mean, &self.config);
+    pub(super) fn step(&self, belief: &Belief, reading: &Reading) -> Step {
+        let (mean, config, read_m) = (&belief.mean, &self.config, reading.read_m);
         if config.drive == DriveKind::Differential {
             let straight_on = Yaw {
                 turn_rad: 0.0,
@@ -388,31 +387,21 @@ impl Tracker {
                 variance: 0.0,
                 is_told: false,
             };
-            return Step::turning(mean, reading_m, &straight_on, &config.noise);
+            return Step::turning(mean, read_m, &straight_on, &config.noise);
         }
         let noise = &config.noise;
         let Some(map) = &self.map else {
-            return Step::in_plane(mean, reading_m, 0.0, &config.path_bend, noise);
+            return Step::in_plane(mean, read_m, 0.0, &config.path_bend, noise);
         };
-        let middle_m = mean[ALONG] + 0.5 * reading_m;
+        let middle_m = mean[ALONG] + 0.5 * read_m;
         if self.off_map.is_some() {
             let curvature_per_m = map.curvature_per_m(middle_m);
-            return Step::in_plane(mean, reading_m, curvature_per_m, &config.path_bend, noise);
+            return Step::in_plane(mean, read_m, curvature_per_m, &config.path_bend, noise);
         }
         let variance = |state: usize| belief.covariance[state][state].max(0.0);
         let road = map.bending(middle_m, variance(ALONG).sqrt().max(TRANSITION_M));
         let keeping = &config.lane_keeping;
-        let driven_m = reading_m * self.driven_by_read;
-        let heading_variance = variance(HEADING);
-        Step::along_lane(
-            mean,
-            heading_variance,
-            reading_m,
-            driven_m,
-            &road,
-            keeping,
-            noise,
-        )
+        Step::along_lane(mean, variance(HEADING), reading, &road, keeping, noise)
     }
 
     fn add_along_variance(&mut self, variance: f64) {
@@ -472,8 +461,8 @@ impl Tracker {
         self.config.gate = gate;
     }
 
-    /// Expects slip from now on: by so much at once, anew whenever the vehicle sets off, when nothing tells it
-    /// from the speed, with every leap of the speed that is more than it accelerates, and with every
+    /// Expects slip from now on: by so much at once, anew whenever the vehicle sets off, when nothing
+    /// tells it from the speed, with every leap of the speed that is more than it accelerates, and with every
     /// metre of a differential drive, whose speed may leap.
     pub(in crate::localize) fn distrust_odometer(&mut self, by: f64) {
         let config = &mut self.config;

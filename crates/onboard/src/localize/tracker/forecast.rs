@@ -6,6 +6,7 @@ use super::config::PhaseBias;
 use super::filter::{MOST_STEPS, Tracker};
 use super::locate::locate;
 use super::look::Look;
+use super::motion::Reading;
 use super::sighting::Sighting;
 use super::state::Belief;
 use super::staying_error::StayingError;
@@ -123,7 +124,8 @@ impl Tracker {
     pub fn carry(&self, mut belief: Belief, reading_m: f64) -> Belief {
         let steps = (reading_m.abs() / FORECAST_STEP_M).ceil().min(MOST_STEPS);
         for _ in 0..steps as usize {
-            self.step(&belief, reading_m / steps).apply(&mut belief);
+            let reading = Reading::exact(reading_m / steps);
+            self.step(&belief, &reading).apply(&mut belief);
         }
         belief
     }

@@ -4,6 +4,7 @@
 use super::doubt;
 use super::filter::Tracker;
 use super::locate::locate;
+use super::motion::Reading;
 use super::sighting::Sighting;
 use super::state::{ACROSS, ALONG, HEADING, LATENESS, SCALE, STATES, YAW_RATE_BIAS};
 use super::staying_error::{MOST_VARIANCE, StayingError};
@@ -85,7 +86,8 @@ impl Tracker {
         let (ahead_m, ahead_variance) = self.coasting(measured.time_s);
         // From the newest odometry to the angle the vehicle has strayed on in its lane.
         let ahead = (ahead_m != 0.0)
-            .then(|| self.step(&self.belief, ahead_m * (1.0 + self.belief.mean[SCALE])));
+            .then(|| Reading::exact(ahead_m * (1.0 + self.belief.mean[SCALE])))
+            .map(|reading| self.step(&self.belief, &reading));
         let mean = (ahead.as_ref()).map_or(&self.belief.mean, |ahead| &ahead.mean);
         let sighting = self
             .sight(&head.known, mean)

@@ -46,6 +46,34 @@ pub struct MotionNoise {
     pub phase_rad_per_sqrt_m: f64,
 }
 
+/// What the odometer reads of a step.
+#[derive(Clone, Copy, Debug, PartialEq)]
+pub struct Reading {
+    /// Distance that it reads (m).
+    pub read_m: f64,
+    /// What was driven, of which its noise is (m).
+    pub driven_m: f64,
+}
+
+impl Reading {
+    /// One that is as long as the way driven.
+    pub const fn exact(read_m: f64) -> Self {
+        Self {
+            read_m,
+            driven_m: read_m,
+        }
+    }
+
+    /// The same of a share of the step.
+    #[must_use]
+    pub fn share(&self, by: f64) -> Self {
+        Self {
+            read_m: self.read_m * by,
+            driven_m: self.driven_m * by,
+        }
+    }
+}
+
 /// One step of the motion, linearised at the mean it starts from.
 #[derive(Clone, Copy, Debug)]
 pub struct Step {
@@ -79,20 +107,18 @@ pub struct Yaw {
 }
 
 impl Step {
-    /// The step along a lane that bends as the road does, for what the odometer read where so much was
-    /// driven, of which all noise is. A heading known to a variance P takes from the way along the
+    /// The step along a lane that bends as the road does, for what the odometer read. A heading known to a variance P takes from the way along the
     /// lane: `E cos ψ = e^{−P/2} cos E ψ`.
     pub fn along_lane(
         start: &[f64; STATES],
         heading_variance: f64,
-        reading_m: f64,
-        driven_m: f64,
+        reading: &Reading,
         road: &Bending,
         keeping: &LaneKeeping,
         walk: &MotionNoise,
     ) -> Self {
         let scale = 1.0 + start[SCALE];
-        let (length, driven) = (reading_m / scale, driven_m / scale);
+        let (length, driven) = (reading.read_m / scale, reading.driven_m / scale);
         let kept = (-0.5 * heading_variance).exp();
         let (sin, cos) = start[HEADING].sin_cos();
         let (sin, cos) = (kept * sin, kept * cos);
