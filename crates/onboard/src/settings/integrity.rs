@@ -31,9 +31,12 @@ pub struct IntegritySettings {
 #[derive(Debug, Clone, Copy, PartialEq, Serialize, Deserialize, JsonSchema)]
 #[serde(default, deny_unknown_fields)]
 pub struct FaultProbability {
-    /// Of each radio head: moved, spoofed, without line of sight. A tracker does without it.
+    /// Of each radio head: moved, spoofed, without line of sight. A tracker does without it. 0.08 if not
+    /// given, and 1e-3 where errors that stay over metres are found while driving
+    /// (`receiver.phase_bias_adapts`): what hides a radio head is found there.
+    #[serde(skip_serializing_if = "Option::is_none")]
     #[schemars(range(min = 1e-9, max = 0.5))]
-    pub radio_head: f64,
+    pub radio_head: Option<f64>,
     /// Of the odometer: it slips, each time that the vehicle sets off. A tracker that expects it counts
     /// until the angles have spoken against it.
     #[schemars(range(min = 1e-9, max = 0.5))]
@@ -60,7 +63,7 @@ impl Default for IntegritySettings {
 impl Default for FaultProbability {
     fn default() -> Self {
         Self {
-            radio_head: 0.08,
+            radio_head: None,
             odometer: 3e-3,
             all_radio_heads: 1e-5,
             array: 1e-5,
@@ -69,6 +72,12 @@ impl Default for FaultProbability {
 }
 
 impl FaultProbability {
+    /// That of each radio head, where errors that stay are found while driving or are not.
+    pub fn of_radio_head(&self, finds_errors: bool) -> f64 {
+        self.radio_head
+            .unwrap_or(if finds_errors { 1e-3 } else { 0.08 })
+    }
+
     /// That of some fault against which there is no tracker.
     fn unmonitored(&self) -> f64 {
         self.all_radio_heads + self.array

@@ -97,12 +97,12 @@ pub fn exact_and_real(folder: &Path) {
         }
     }
     for (label, drive) in [("real", &base), ("real 2 m", &sparse), ("real raw", &raw)] {
-        report(label, drive, &drive.locate(STREET, drive.start, false));
+        report(label, drive, &drive.locate(STREET, drive.start, true));
         let mapped = with_road(drive, &segments);
         report(
             &format!("{label} map"),
             &mapped,
-            &mapped.locate(STREET, drive.start, false),
+            &mapped.locate(STREET, drive.start, true),
         );
     }
 }
@@ -153,7 +153,7 @@ pub fn ten_odometers(folder: &Path) {
             }
             rms_m.sort_by(f64::total_cmp);
             println!(
-                "street {label:12} {} rms {:.3} (worst {:.3}) in 95 % {:.3} ok {:.3} beyond while ok {:.4} angles {heard} {}",
+                "street {label:12} {} rms {:.3} (worst {:.3}) in 95 % {:.3} ok {:.3} beyond while ok {:.1e} angles {heard} {}",
                 if map { "map   " } else { "no map" },
                 0.5 * (rms_m[4] + rms_m[5]),
                 rms_m[9],

@@ -23,9 +23,10 @@ pub struct IntegrityConfig {
 }
 
 impl IntegrityConfig {
-    /// Probability with which the error may exceed the level with a radio head at fault.
+    /// Probability with which the error may exceed the level with a radio head at fault, of those that
+    /// are tested for it: where errors that stay are found none is.
     pub fn risk_under_fault(&self) -> f64 {
-        (self.risk / self.fault_probability.radio_head).min(MOST_CONDITIONAL)
+        (self.risk / self.fault_probability.of_radio_head(false)).min(MOST_CONDITIONAL)
     }
 }
 

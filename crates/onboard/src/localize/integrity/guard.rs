@@ -215,7 +215,8 @@ impl Guard {
     fn hypotheses(&self, bank: &Bank, time_s: f64) -> impl Iterator<Item = Hypothesis> + Clone {
         let told = bank.main().pose(time_s);
         let noise_ratio = bank.noise_ratio();
-        let head_probability = self.config.fault_probability.radio_head;
+        let finds_errors = bank.main().config().finds_errors;
+        let head_probability = (self.config.fault_probability).of_radio_head(finds_errors);
         let heads = (bank.without_one()).map(move |clean| (head_probability, clean));
         let negligible = NEGLIGIBLE * self.config.risk;
         (std::iter::once((1.0, bank.main())))

@@ -10,7 +10,7 @@ use super::off_map::OffMap;
 use super::pace::Pace;
 use super::speed_steps::SpeedSteps;
 use super::state::{ACROSS, ALONG, Belief, HEADING, SCALE, STATES, YAW_RATE_BIAS};
-use super::staying_error::StayingError;
+use super::staying_errors::StayingErrors;
 use crate::clone_in_place::clone_in_place;
 use crate::localize::smoother::Journal;
 use crate::observation::OdometrySample;
@@ -66,10 +66,6 @@ pub(super) struct Head {
     pub last_look_s: f64,
     /// ... and the angle turned (rad).
     pub last_look_rad: f64,
-    /// Distance driven when it was last heard, used or not (m).
-    pub heard_m: f64,
-    /// Its error that stays over metres.
-    pub error: StayingError,
 }
 
 impl Head {
@@ -85,6 +81,8 @@ pub struct Tracker {
     pub(super) map: Option<Arc<Road>>,
     pub(super) heads: Vec<Head>,
     pub(super) belief: Belief,
+    /// What the radio heads' angles are off by over metres.
+    pub(super) errors: StayingErrors,
     pub(super) odometry: Option<OdometrySample>,
     pub(super) driven_m: f64,
     pub(super) turned_rad: f64,
@@ -102,6 +100,7 @@ clone_in_place!(Tracker {
     map,
     heads,
     belief,
+    errors,
     odometry,
     driven_m,
     turned_rad,
@@ -127,14 +126,13 @@ impl Tracker {
             last_look_m: f64::NEG_INFINITY,
             last_look_s: f64::NEG_INFINITY,
             last_look_rad: f64::NEG_INFINITY,
-            heard_m: f64::NEG_INFINITY,
-            error: StayingError::default(),
         };
         let mut tracker = Self {
             config,
             map,
             heads: heads.iter().map(head).collect(),
             belief,
+            errors: StayingErrors::new(if config.finds_errors { heads.len() } else { 0 }),
             odometry: None,
             driven_m: 0.0,
             turned_rad: 0.0,
@@ -335,6 +333,7 @@ impl Tracker {
                 journal.moved(&step.jacobian);
             }
             step.apply(&mut self.belief);
+            self.errors.moved(&step.jacobian);
         }
         self.turned_rad += yaw.map_or(0.0, |yaw| yaw.turn_rad.abs()) * steps;
         self.driven_m += reading.read_m.abs() / (1.0 + self.belief.mean[SCALE]);
@@ -419,10 +418,19 @@ impl Tracker {
     }
 
     pub(super) fn measure(&mut self, residual: f64, row: &[f64; STATES], variance: f64) {
-        if let Some(journal) = &mut self.journal {
-            journal.measured(&self.belief, residual, row, variance);
+        let (gain, total) = if self.errors.is_empty() {
+            let foretold = self.belief.variance_along(row);
+            (
+                self.belief.update(residual, row, variance),
+                foretold + variance,
+            )
+        } else {
+            (self.errors).update(&mut self.belief, residual, row, variance)
+        };
+        if let (Some(journal), true) = (&mut self.journal, total > 0.0) {
+            let gains = gain.into_iter().chain(self.errors.gains(total));
+            journal.measured(row, None, gains, residual, total);
         }
-        self.belief.update(residual, row, variance);
     }
 
     /// Time of the newest odometry (s).
@@ -437,8 +445,9 @@ impl Tracker {
     }
 
     /// Replaces the state and its covariance, where several trackers become one.
-    pub(in crate::localize) const fn set_belief(&mut self, belief: &Belief) {
+    pub(in crate::localize) fn set_belief(&mut self, belief: &Belief) {
         self.belief = *belief;
+        self.errors.part();
     }
 
     /// What the tracker assumes.

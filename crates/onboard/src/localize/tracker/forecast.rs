@@ -9,7 +9,6 @@ use super::look::Look;
 use super::motion::Reading;
 use super::sighting::Sighting;
 use super::state::Belief;
-use super::staying_error::StayingError;
 use crate::localize::gaussian::{Innovation, principal_variances};
 use crate::localize::measurement::{AngleMeasurement, UpdateReason};
 use crate::radio_head::RadioHead;
@@ -52,15 +51,14 @@ impl Tracker {
         let Ok(looked) = looked else {
             return 0.0;
         };
-        let known = self.heads.get(looked.head);
-        if let (Some(known), true) = (known, self.config.finds_errors) {
+        if let Some(pasts) = &looked.pasts {
             let density = if looked.excluded {
                 TAU.recip()
             } else {
-                known.error.density(&looked.without_error())
+                pasts.density
             };
             let exact = (TAU * looked.own_variance).sqrt().recip();
-            return StayingError::share(looked.place_m - known.heard_m) * (density / exact).ln();
+            return looked.independent_share() * (density / exact).ln();
         }
         let seen = looked.innovation;
         if looked.excluded || seen.mahalanobis2() > self.config.gate {
@@ -78,9 +76,8 @@ impl Tracker {
         measured: &AngleMeasurement,
     ) -> Option<Rehearsal> {
         let looked = self.look(head, measured).ok()?;
-        self.learn_error(&looked);
         self.heads.get_mut(looked.head)?.last_look_m = looked.place_m;
-        if looked.repetition.is_some() {
+        if looked.pasts.is_some() {
             return None;
         }
         let Innovation {
@@ -131,7 +128,7 @@ impl Tracker {
     }
 
     /// What an angle of thermal variance `thermal(distance)` to `head` would make of a belief
-    /// `ahead_m` further on than the newest odometry.
+    /// `ahead_m` further on than the newest odometry; `None` of a radio head that is not used, or has nothing new to say.
     pub fn rehearse(
         &self,
         belief: &Belief,
@@ -139,7 +136,7 @@ impl Tracker {
         head: &RadioHead,
         thermal: impl Fn(f64) -> f64,
     ) -> Option<Belief> {
-        let known = self.heads.iter().find(|mine| mine.is(head))?;
+        let (number, known) = (self.heads.iter().enumerate()).find(|(_, mine)| mine.is(head))?;
         if known.excluded {
             return None;
         }
@@ -147,14 +144,17 @@ impl Tracker {
         let array = &self.config.array;
         let sighting = Sighting::new(&known.known, pose, &footing, &belief.mean, array)?;
         let travelled_m = self.driven_m + ahead_m - known.last_look_m;
+        if self.errors.repeats(travelled_m) {
+            return None;
+        }
         let own = thermal(sighting.range_m).sqrt();
-        let repetition = self.repetition(travelled_m).unwrap_or_default();
         let variance = self
             .config
             .phase_bias
             .variance(own, f64::INFINITY, (travelled_m, 0.0))
-            + self.config.look_variance(travelled_m, &sighting)
-            + known.error.variance() * repetition;
+            + self.config.look_variance(travelled_m, &sighting);
+        let foretold = belief.variance_along(&sighting.row) + variance;
+        let variance = variance + self.errors.variance(number, travelled_m, foretold);
         let mut rehearsed = *belief;
         rehearsed.update(0.0, &sighting.row, variance);
         Some(rehearsed)

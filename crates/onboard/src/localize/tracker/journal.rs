@@ -23,7 +23,7 @@ impl Tracker {
 
     pub(super) fn ask(&mut self, time_s: f64) {
         if let Some(journal) = &mut self.journal {
-            journal.asked(time_s, &self.belief);
+            journal.asked(time_s, &self.belief, self.errors.with_state());
         }
     }
 }

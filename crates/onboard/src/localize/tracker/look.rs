@@ -7,7 +7,7 @@ use super::locate::locate;
 use super::motion::Reading;
 use super::sighting::Sighting;
 use super::state::{ACROSS, ALONG, HEADING, LATENESS, SCALE, STATES, YAW_RATE_BIAS};
-use super::staying_error::{MOST_VARIANCE, StayingError};
+use super::staying_error::{self, MOST_VARIANCE, Pasts};
 use crate::geometry::wrap_angle;
 use crate::localize::gaussian::Innovation;
 use crate::localize::measurement::{AngleMeasurement, UpdateReason, UpdateVerdict};
@@ -35,26 +35,21 @@ pub(in crate::localize) struct Look {
     /// Variance by the odometry since its newest sample, and by the bend of the prediction (rad²).
     pub coasted_variance: f64,
     pub bend_variance: f64,
-    /// Variance of the error that stays (rad²), and how often looks so near to each other repeat it,
-    /// where it is found while driving.
-    error_variance: f64,
-    pub repetition: Option<f64>,
+    /// How its error may have come about since then, where it is found while driving; the innovation is
+    /// without it.
+    pub pasts: Option<Pasts>,
 }
 
 impl Look {
-    /// The innovation, had the error that stays been none.
-    pub fn without_error(&self) -> Innovation {
-        let mut seen = self.innovation;
-        let stays = self.error_variance * self.repetition.unwrap_or_default();
-        seen.variance -= stays;
-        seen.measurement_variance -= stays;
-        seen
+    /// Share of it that is independent of the last one, where errors that stay are found.
+    pub fn independent_share(&self) -> f64 {
+        staying_error::independent(self.moved.0.abs())
     }
 
     /// Squared Mahalanobis distance of the look by itself, its error being of any size that there is.
     pub fn mahalanobis2(&self) -> f64 {
-        let mut seen = self.without_error();
-        if self.repetition.is_some() {
+        let mut seen = self.innovation;
+        if self.pasts.is_some() {
             seen.variance += MOST_VARIANCE;
         }
         seen.mahalanobis2()
@@ -100,14 +95,11 @@ impl Tracker {
         let turned_rad = self.turned_rad - head.last_look_rad;
         let moved = (travelled_m, turned_rad);
         let stated = (self.config.phase_bias).variance(sigma, elapsed_s, moved);
-        let repetition = self.repetition(travelled_m);
-        let error_variance = head.error.variance();
-        let stays = repetition.unwrap_or_default() * error_variance;
         let (row, strayed) = (ahead.as_ref()).map_or((sighting.row, 0.0), |ahead| {
             ahead.seen_before(&sighting.row)
         });
         let coasted = sighting.row[ALONG].powi(2) * ahead_variance + strayed;
-        let measurement_variance = stays + stated + shared + coasted + bend.variance;
+        let measurement_variance = stated + shared + coasted + bend.variance;
         let residual = wrap_angle(measured.phase_rad - sighting.phase_rad - bend.shift_rad);
         let innovation = (self.belief).innovation(residual, &row, measurement_variance);
         Ok(Look {
@@ -124,8 +116,7 @@ impl Tracker {
             moved,
             coasted_variance: coasted,
             bend_variance: bend.variance,
-            error_variance,
-            repetition,
+            pasts: (self.errors).weigh(index, travelled_m.abs(), &innovation, &row),
         })
     }
 
@@ -167,11 +158,6 @@ impl Tracker {
         Some(sighting)
     }
 
-    /// How often looks repeat the error that stays, so far apart; `None` where it is not found.
-    pub(super) fn repetition(&self, travelled_m: f64) -> Option<f64> {
-        (self.config.finds_errors).then(|| StayingError::repetition(travelled_m))
-    }
-
     /// Corrects the state by one electrical angle to a radio head.
     pub fn update(&mut self, head: &RadioHead, measured: &AngleMeasurement) -> UpdateVerdict {
         self.take(self.look(head, measured), measured)
@@ -192,37 +178,60 @@ impl Tracker {
             Err(reason) => return self.verdict(reason, None),
         };
         let mahalanobis2 = looked.mahalanobis2();
-        let known = self.heads.get(looked.head).map(|head| head.error);
-        self.learn_error(&looked);
+        if let Some(pasts) = &looked.pasts {
+            return self.take_with_error(&looked, pasts, measured);
+        }
         if mahalanobis2 > self.config.gate {
-            // That such a radio head is off is known, and says nothing of the vehicle.
-            let is_news =
-                known.is_none_or(|error| !(looked.repetition.is_some() && error.is_large()));
-            return self.verdict(UpdateReason::Outlier, is_news.then_some(mahalanobis2));
+            return self.verdict(UpdateReason::Outlier, Some(mahalanobis2));
         }
-        let innovation = looked.innovation;
-        let (mut residual, mut variance) = (innovation.residual, innovation.measurement_variance);
-        if let (Some(error), Some(repetition)) = (known, looked.repetition) {
-            let Some(likely) = error.equivalent(&looked.without_error(), repetition) else {
-                return self.verdict(UpdateReason::Consistent, Some(mahalanobis2));
-            };
-            (residual, variance) = likely;
-        }
+        let seen = looked.innovation;
+        let (mut residual, mut variance) = (seen.residual, seen.measurement_variance);
         let unresolved = (!measured.resolved).then_some(doubt::AS_NOT);
         if let Some(wrong) = unresolved.or(self.config.wrong_lobe) {
-            let Some(likely) = doubt::equivalent(&innovation, wrong) else {
+            let Some(likely) = doubt::equivalent(&seen, wrong) else {
                 return self.verdict(UpdateReason::Outlier, Some(mahalanobis2));
             };
             (residual, variance) = likely;
         }
         self.measure(residual, &looked.row, variance);
+        self.looked_at(&looked, measured);
+        self.verdict(UpdateReason::Consistent, Some(mahalanobis2))
+    }
+
+    /// Takes in an angle whose error is found: whatever that is, it is no more believed than it deserves.
+    /// One that is far off is called an outlier; of a radio head known as off that is no news of the vehicle.
+    fn take_with_error(
+        &mut self,
+        looked: &Look,
+        pasts: &Pasts,
+        measured: &AngleMeasurement,
+    ) -> UpdateVerdict {
+        let mahalanobis2 = looked.mahalanobis2();
+        let is_known = self.errors.is_large(looked.head);
+        let (way_m, journal) = (looked.moved.0.abs(), self.journal.as_mut());
+        (self.errors).take(
+            &mut self.belief,
+            looked.head,
+            way_m,
+            &looked.row,
+            pasts,
+            journal,
+        );
+        self.looked_at(looked, measured);
+        if mahalanobis2 > self.config.gate {
+            return self.verdict(UpdateReason::Outlier, (!is_known).then_some(mahalanobis2));
+        }
+        self.verdict(UpdateReason::Consistent, Some(mahalanobis2))
+    }
+
+    /// Remembers when and where a radio head was looked at.
+    fn looked_at(&mut self, looked: &Look, measured: &AngleMeasurement) {
         self.keep_bounds();
         if let Some(head) = self.heads.get_mut(looked.head) {
             head.last_look_m = looked.place_m;
             head.last_look_s = measured.time_s;
             head.last_look_rad = self.turned_rad;
         }
-        self.verdict(UpdateReason::Consistent, Some(mahalanobis2))
     }
 
     /// An odometer that reads twice or half of what is driven, or an angle older than memory, is no
@@ -240,19 +249,6 @@ impl Tracker {
             reason,
             mahalanobis_squared: mahalanobis2,
             threshold: Some(self.config.gate),
-        }
-    }
-
-    /// Learns of the error that stays from an angle, used or not.
-    pub(super) fn learn_error(&mut self, looked: &Look) {
-        if looked.repetition.is_none() {
-            return;
-        }
-        if let Some(head) = self.heads.get_mut(looked.head) {
-            let travelled_m = looked.place_m - head.heard_m;
-            head.heard_m = looked.place_m;
-            let seen = looked.without_error();
-            head.error.learn(travelled_m, &seen, looked.own_variance);
         }
     }
 }

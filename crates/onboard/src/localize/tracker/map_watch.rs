@@ -64,6 +64,7 @@ impl Tracker {
         }
         self.belief.mean[CURVATURE] = 0.0;
         self.belief.spread(&forget, &[[0.0; STATES]; STATES]);
+        self.errors.moved(&forget);
     }
 
     /// Takes in that the vehicle is in its lane. What the belief knows already may come from the

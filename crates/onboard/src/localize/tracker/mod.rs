@@ -26,6 +26,7 @@ pub mod sighting;
 mod speed_steps;
 pub mod state;
 mod staying_error;
+mod staying_errors;
 
 pub use calibration::{Calibration, Departure};
 pub use config::TrackerConfig;

@@ -1,199 +1,205 @@
-//! The error of a radio head's angles that stays over metres, found as the vehicle drives.
+//! The error of a radio head's angles that stays over metres, and how large it is.
 //!
-//! Where paths are few, what reflections add to an angle is nearly the same a wavelength on, and how
-//! large it is differs from radio head to radio head and along the way: a jump Markov process, whose
-//! deviation is one of a few levels and may change from one stretch of way to the next. Which one it is,
-//! the mean innovation of each stretch tells (Bayes). By way and not by time: who stands learns nothing.
-
-use std::f64::consts::TAU;
+//! What reflections add to an angle stays much the same for about a metre and is another one then; how
+//! large it is differs from radio head to radio head and along the way. So it is a jump process: a value
+//! that is kept, or drawn anew from one of a few levels, and the level is another one after some way (a
+//! hidden Markov model). Besides, a look is off by as much again that is soon forgotten. By way and not by
+//! time: who stands sees the same error again. The value is estimated with the state, see
+//! [`StayingErrors`](super::staying_errors::StayingErrors); here it is weighed which of its pasts an angle
+//! speaks for, by Bayes.
 
 use crate::localize::gaussian::Innovation;
 
-/// How many levels there are, and their deviations (rad): from what calibration leaves of the best
-/// arrays to what leaves hardly more than a side.
-const LEVELS: usize = 4;
-const LEVELS_RAD: [f64; LEVELS] = [0.01, 0.03, 0.1, 0.3];
+/// How many levels there are, and their deviations (rad): from what calibration leaves to no more than a side.
+pub(super) const LEVELS: usize = 4;
+pub(super) const LEVELS_RAD: [f64; LEVELS] = [0.02, 0.1, 0.3, 1.0];
+
+/// Their variances (rad²).
+pub(super) const VARIANCES: [f64; LEVELS] = {
+    let [a, b, c, d] = LEVELS_RAD;
+    [a * a, b * b, c * c, d * d]
+};
 
 /// Probability of each level before anything is heard: any is as likely as another.
-const FIRST: f64 = 1.0 / LEVELS as f64;
+pub(super) const FIRST: f64 = 1.0 / LEVELS as f64;
 
-/// The largest variance there is (rad²).
-pub const MOST_VARIANCE: f64 = LEVELS_RAD[LEVELS - 1] * LEVELS_RAD[LEVELS - 1];
+/// From this level on a radio head says next to nothing, and an angle beyond it is an outlier.
+const LARGE: usize = 2;
+pub const MOST_VARIANCE: f64 = VARIANCES[LARGE];
 
-/// Way of one stretch (m).
-const STRETCH_M: f64 = 2.0;
+/// Way over which the value, and the level, is kept (m).
+pub(super) const VALUE_M: f64 = 1.0;
+pub(super) const LEVEL_M: f64 = 20.0;
 
-/// Probability that a stretch on the level is drawn anew.
-const CHANGES: f64 = 0.1;
+/// Way that the other part of it stays (m).
+pub(super) const SOON_M: f64 = 0.3;
 
-/// The least way between two looks, in stretches: who stands learns nothing, but a variance must stay a
-/// number.
-const LEAST_STEP: f64 = 1e-5;
+/// The least way between two looks, as a share of that in which they repeat each other: who stands learns
+/// nothing, but a variance must stay a number.
+const LEAST_SHARE: f64 = 1e-5;
 
-/// One radio head's error.
+/// Share of a look that is independent of the last one, `travelled_m` after it: independent is one in twice
+/// the way that a value is kept.
+pub fn independent(travelled_m: f64) -> f64 {
+    (0.5 * travelled_m / VALUE_M).clamp(0.0, 1.0)
+}
+
+/// The same of what is soon forgotten.
+pub(super) fn share(travelled_m: f64) -> f64 {
+    (travelled_m / SOON_M).clamp(LEAST_SHARE, 1.0)
+}
+
+/// How large a radio head's error is: the probability of each level.
 #[derive(Clone, Copy, Debug, PartialEq)]
 pub struct StayingError {
-    /// Probability of each level.
-    probabilities: [f64; LEVELS],
-    /// Of the present stretch, weighed by way in stretches: way, innovations, and the variances of the
-    /// belief and of the angles' own noise.
-    way: f64,
-    innovations: f64,
-    belief: f64,
-    own: f64,
+    pub(super) levels: [f64; LEVELS],
 }
 
 impl Default for StayingError {
     fn default() -> Self {
         Self {
-            probabilities: [FIRST; LEVELS],
-            way: 0.0,
-            innovations: 0.0,
-            belief: 0.0,
-            own: 0.0,
+            levels: [FIRST; LEVELS],
         }
     }
 }
 
+/// How an angle may have come about: with the value kept, or drawn anew.
+#[derive(Clone, Copy, Debug, Default)]
+pub struct Past {
+    /// Its probability.
+    pub share: f64,
+    /// Residual `r` (rad), and over the levels `E 1/S` and `E 1/S − r² Var 1/S` of the variance of that
+    /// (1/rad²): the gain is `P Hᵀ E 1/S`, and `P − P Hᵀ (E 1/S − r² Var 1/S) H P` is the covariance.
+    pub residual: f64,
+    pub gain: f64,
+    pub narrowing: f64,
+}
+
+/// How an angle's error may have come about.
+pub struct Pasts {
+    /// Probability density of the angle (1/rad).
+    pub density: f64,
+    pub kept: Past,
+    pub anew: Past,
+    /// Probability of each level by this angle, and by the way alone.
+    levels: [f64; LEVELS],
+    foretold: [f64; LEVELS],
+    /// A value drawn anew: its mean (rad), its variance (rad²), and how it varies with the state by the
+    /// state's covariance with the angle.
+    pub mean_rad: f64,
+    pub variance: f64,
+    pub narrowing: f64,
+}
+
+/// Mean and variance over the levels.
+fn moments(weights: &[f64; LEVELS], values: &[f64; LEVELS]) -> (f64, f64) {
+    let mean = covariance(weights, values, &[1.0; LEVELS]).1;
+    (mean, covariance(weights, values, values).0)
+}
+
+/// Covariance of two values over the levels, and the mean of their product.
+fn covariance(weights: &[f64; LEVELS], one: &[f64; LEVELS], other: &[f64; LEVELS]) -> (f64, f64) {
+    let (mut total, mut means, mut product) = (0.0, [0.0; 2], 0.0);
+    for ((weight, one), other) in weights.iter().zip(one).zip(other) {
+        total += weight;
+        means = [means[0] + weight * one, means[1] + weight * other];
+        product += weight * one * other;
+    }
+    if total <= 0.0 {
+        return (0.0, 0.0);
+    }
+    product /= total;
+    (product - means[0] * means[1] / (total * total), product)
+}
+
 impl StayingError {
-    /// Expected variance of the error in one look (rad²).
-    pub fn variance(&self) -> f64 {
-        let levels = self.probabilities.iter().zip(LEVELS_RAD);
-        levels.map(|(share, level)| share * level * level).sum()
+    /// The probabilities of the levels, so much further on.
+    fn foretold(&self, travelled_m: f64) -> [f64; LEVELS] {
+        let changes = -(-travelled_m / LEVEL_M).exp_m1();
+        self.levels.map(|level| level + changes * (FIRST - level))
     }
 
     /// Whether it is probably so large that the radio head says next to nothing.
     pub fn is_large(&self) -> bool {
-        self.probabilities[LEVELS - 1] > 0.5
+        self.levels.iter().skip(LARGE).sum::<f64>() > 0.5
     }
 
-    /// Share of a stretch that a look tells of, `travelled_m` after the last one.
-    pub fn share(travelled_m: f64) -> f64 {
-        (travelled_m / STRETCH_M).clamp(LEAST_STEP, 1.0)
-    }
-
-    /// By how much a look counts less than a stretch does, `travelled_m` after the last one.
-    pub fn repetition(travelled_m: f64) -> f64 {
-        Self::share(travelled_m).recip()
-    }
-
-    /// Probability density of a look whose innovation without this error is `seen` (1/rad).
-    pub fn density(&self, seen: &Innovation) -> f64 {
-        let levels = self.foretold().into_iter().zip(LEVELS_RAD);
-        let density = |(probability, level): (f64, f64)| {
-            let mut seen = *seen;
-            seen.variance += level * level;
-            probability * seen.density()
+    /// How an angle may have come about, `travelled_m` after the one before, whose innovation would be
+    /// `seen` without the error. The value's mean was `value_rad`, and `known` is what its variance and its
+    /// covariance with the rest add to the innovation's.
+    pub fn weigh(&self, travelled_m: f64, seen: &Innovation, value_rad: f64, known: f64) -> Pasts {
+        let foretold = self.foretold(travelled_m);
+        let stays = (-travelled_m / VALUE_M).exp();
+        let repetition = share(travelled_m).recip();
+        let (kept_residual, anew_residual) = (seen.residual - value_rad, seen.residual);
+        let mut weights = [[0.0; LEVELS]; 2];
+        // One over the variance of an angle, and what of that is of a value drawn anew.
+        let (mut inverse, mut of_value) = ([[0.0; LEVELS]; 2], [0.0; LEVELS]);
+        let mut left = [0.0; LEVELS];
+        for (level, value) in VARIANCES.into_iter().enumerate() {
+            for (past, share, residual, variance) in [
+                (0, stays, kept_residual, known),
+                (1, 1.0 - stays, anew_residual, value),
+            ] {
+                let once = Innovation {
+                    residual,
+                    variance: seen.variance + variance + value,
+                    ..*seen
+                };
+                weights[past][level] = share * foretold[level] * once.density();
+                inverse[past][level] = (seen.variance + variance + value * repetition).recip();
+            }
+            of_value[level] = value * inverse[1][level];
+            left[level] = value - value * of_value[level];
+        }
+        let [kept, anew] = [0, 1].map(|past| weights[past].iter().sum::<f64>());
+        let density = kept + anew;
+        let total = density.max(f64::MIN_POSITIVE);
+        let past = |past: usize, share: f64, residual: f64| {
+            let (gain, variance) = moments(&weights[past], &inverse[past]);
+            Past {
+                share: share / total,
+                residual,
+                gain,
+                narrowing: gain - residual * residual * variance,
+            }
         };
-        levels.map(density).sum()
-    }
-
-    /// The Gaussian measurement, residual and variance, that gives a belief the mean and variance of
-    /// the mixture over the levels; `None` where the mixture is wider than the belief was. `seen` is
-    /// an innovation without this error.
-    pub fn equivalent(&self, seen: &Innovation, repetition: f64) -> Option<(f64, f64)> {
-        let square = seen.residual * seen.residual;
-        let (mut total, mut mean, mut mean_square) = (0.0, 0.0, 0.0);
-        for (probability, level) in self.foretold().into_iter().zip(LEVELS_RAD) {
-            let error = level * level;
-            let once = seen.variance + error;
-            let weight = probability * (-0.5 * square / once).exp() / once.sqrt();
-            let inverse = (seen.variance + error * repetition).recip();
-            total += weight;
-            mean += weight * inverse;
-            mean_square += weight * inverse * inverse;
+        let square = anew_residual * anew_residual;
+        let (of_value_mean, of_value_variance) = moments(&weights[1], &of_value);
+        let together = covariance(&weights[1], &inverse[1], &of_value).0;
+        let mut levels = foretold;
+        if density > 0.0 {
+            for (level, (kept, anew)) in levels.iter_mut().zip(weights[0].iter().zip(weights[1])) {
+                *level = (kept + anew) / total;
+            }
         }
-        if total <= 0.0 {
-            return None;
-        }
-        (mean, mean_square) = (mean / total, mean_square / total);
-        // With gains K = P Hᵀ/S the mixture has the mean P Hᵀ E[1/S] r and the covariance
-        // P − P Hᵀ (E[1/S] − r² Var[1/S]) H P.
-        let narrowing = mean - square * (mean_square - mean * mean);
-        let belief = seen.variance - seen.measurement_variance;
-        (narrowing > 0.0).then(|| {
-            let variance = narrowing.recip();
-            (seen.residual * mean * variance, variance - belief)
-        })
-    }
-
-    /// The probabilities a stretch on.
-    fn foretold(&self) -> [f64; LEVELS] {
-        let mut foretold = self.probabilities;
-        for share in &mut foretold {
-            *share += CHANGES * (FIRST - *share);
-        }
-        foretold
-    }
-
-    /// Learns from an innovation without this error, `travelled_m` after the one before; `own` is the
-    /// variance of the angle's noise.
-    pub fn learn(&mut self, travelled_m: f64, seen: &Innovation, own: f64) {
-        let weight = (travelled_m / STRETCH_M).clamp(0.0, 1.0);
-        self.way += weight;
-        self.innovations += weight * seen.residual;
-        self.belief += weight * (seen.variance - seen.measurement_variance).max(0.0);
-        self.own += weight * weight * own;
-        if self.way < 1.0 {
-            return;
-        }
-        let mean = self.innovations / self.way;
-        let other = self.belief / self.way + self.own / (self.way * self.way);
-        let mut likely = self.foretold();
-        for (probability, level) in likely.iter_mut().zip(LEVELS_RAD) {
-            let variance = level * level + other;
-            *probability *= (-0.5 * mean * mean / variance).exp() / (TAU * variance).sqrt();
-        }
-        let total: f64 = likely.iter().sum();
-        if total > 0.0 {
-            self.probabilities = likely.map(|probability| probability / total);
-        }
-        (self.way, self.innovations, self.belief, self.own) = (0.0, 0.0, 0.0, 0.0);
-    }
-}
-
-#[cfg(test)]
-mod tests {
-    use super::*;
-
-    fn innovation(residual: f64) -> Innovation {
-        Innovation {
-            residual,
-            variance: 5e-4,
-            measurement_variance: 1e-4,
+        Pasts {
+            density,
+            kept: past(0, kept, kept_residual),
+            anew: past(1, anew, anew_residual),
+            levels,
+            foretold,
+            mean_rad: anew_residual * of_value_mean,
+            variance: moments(&weights[1], &left).0 + square * of_value_variance,
+            narrowing: of_value_mean - square * together,
         }
     }
 
-    /// Looks every 0.1 m with an error of so many radians.
-    fn after(looks: u32, error_rad: f64) -> StayingError {
-        let mut error = StayingError::default();
-        for _ in 0..looks {
-            error.learn(0.1, &innovation(error_rad), 1e-4);
+    /// Learns from an angle that may have come about so, `travelled_m` after the one before.
+    pub fn learn(&mut self, travelled_m: f64, pasts: &Pasts) {
+        let by_way_and_angle = pasts.foretold.into_iter().zip(pasts.levels);
+        for (level, (by_way, by_angle)) in self.levels.iter_mut().zip(by_way_and_angle) {
+            *level = by_way + share(travelled_m) * (by_angle - by_way);
         }
-        error
     }
 
-    #[test]
-    fn its_size_is_found_within_metres_and_found_anew_where_it_changes() {
-        let mut error = after(100, 0.0);
-        let small = error.variance();
-        assert!(small < 0.05 * 0.05, "{small}");
-        for _ in 0..60 {
-            error.learn(0.1, &innovation(0.4), 1e-4);
-        }
-        assert!(error.is_large());
-        assert!(error.variance() > 0.25 * 0.25);
-        // The measurement that is made of such an angle hardly moves the belief.
-        let (_, variance) = error.equivalent(&innovation(0.4), 20.0).unwrap();
-        assert!(variance > 0.3 * 0.3, "{variance}");
-    }
-
-    #[test]
-    fn who_stands_learns_nothing() {
-        let (moving, mut standing) = (after(100, 0.02), after(100, 0.02));
-        for _ in 0..10_000 {
-            standing.learn(0.0, &innovation(0.4), 1e-4);
-        }
-        assert_eq!(standing.variance(), moving.variance());
+    /// Variance of an angle so far after the radio head's last one (rad²), which it does not repeat, that
+    /// tells as much of the state as is to be expected, where the state foretells it with a variance.
+    pub fn variance(&self, travelled_m: f64, foretold: f64) -> f64 {
+        let levels = self.foretold(travelled_m).into_iter().zip(VARIANCES);
+        let told: f64 = levels
+            .map(|(level, variance)| level / (foretold + 2.0 * variance))
+            .sum();
+        (told.recip() - foretold).max(0.0)
     }
 }
