@@ -91,9 +91,11 @@ fn samples_to_angle(bencher: divan::Bencher, pilots: &str) {
     bencher.bench_local(next);
 }
 
-#[divan::bench(args = [true, false])]
-fn angle_to_pose(bencher: divan::Bencher, map: bool) {
-    let (site, vehicle) = believed("trip-2");
+/// With and without a map, and where errors that stay over metres are found.
+#[divan::bench(args = [(true, false), (false, false), (true, true)])]
+fn angle_to_pose(bencher: divan::Bencher, (map, finds_errors): (bool, bool)) {
+    let (site, mut vehicle) = believed("trip-2");
+    vehicle.receiver.phase_bias_adapts = Some(finds_errors);
     let road = site.build_road().unwrap().unwrap();
     let heads = RadioHead::heard(&site, &vehicle);
     let config = TrackerConfig::new(&site, &vehicle);

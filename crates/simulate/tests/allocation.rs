@@ -27,6 +27,7 @@ fn the_counter_counts() {
 #[test]
 fn a_drive_under_way_allocates_nothing() {
     let guarded = || ("vehicle.integrity", value("{}"));
+    let adapts = ("vehicle.receiver.phase_bias_adapts", value("true"));
     // A bound that every angle is demanded for.
     let mut demanding = shipped("yard");
     demanding.vehicle.wake_up = WakeUpSettings::Uncertainty(UncertaintySettings {
@@ -36,6 +37,7 @@ fn a_drive_under_way_allocates_nothing() {
     for (scenario, least_accepted) in [
         (shipped("paper-real-odometry-4"), 2000),
         (changed("paper-real-odometry-4", [guarded()]), 2000),
+        (changed("paper-real-odometry-4", [guarded(), adapts]), 2000),
         (demanding, 2000),
         (shipped("yard"), 20),
         (shipped("paper"), 200),
