@@ -51,7 +51,7 @@ impl Tracker {
         let Ok(looked) = looked else {
             return 0.0;
         };
-        if let Some(pasts) = &looked.pasts {
+        if let Some(pasts) = self.pasts(looked) {
             let density = if looked.excluded {
                 TAU.recip()
             } else {
@@ -77,7 +77,7 @@ impl Tracker {
     ) -> Option<Rehearsal> {
         let looked = self.look(head, measured).ok()?;
         self.heads.get_mut(looked.head)?.last_look_m = looked.place_m;
-        if looked.pasts.is_some() {
+        if looked.finds_error {
             return None;
         }
         let Innovation {

@@ -35,9 +35,8 @@ pub(in crate::localize) struct Look {
     /// Variance by the odometry since its newest sample, and by the bend of the prediction (rad²).
     pub coasted_variance: f64,
     pub bend_variance: f64,
-    /// How its error may have come about since then, where it is found while driving; the innovation is
-    /// without it.
-    pub pasts: Option<Pasts>,
+    /// Whether its error is found while driving; the innovation is without it.
+    pub finds_error: bool,
 }
 
 impl Look {
@@ -49,7 +48,7 @@ impl Look {
     /// Squared Mahalanobis distance of the look by itself, its error being of any size that there is.
     pub fn mahalanobis2(&self) -> f64 {
         let mut seen = self.innovation;
-        if self.pasts.is_some() {
+        if self.finds_error {
             seen.variance += MOST_VARIANCE;
         }
         seen.mahalanobis2()
@@ -116,7 +115,7 @@ impl Tracker {
             moved,
             coasted_variance: coasted,
             bend_variance: bend.variance,
-            pasts: (self.errors).weigh(index, travelled_m.abs(), &innovation, &row),
+            finds_error: !self.errors.is_empty(),
         })
     }
 
@@ -178,8 +177,8 @@ impl Tracker {
             Err(reason) => return self.verdict(reason, None),
         };
         let mahalanobis2 = looked.mahalanobis2();
-        if let Some(pasts) = &looked.pasts {
-            return self.take_with_error(&looked, pasts, measured);
+        if let Some(pasts) = self.pasts(&looked) {
+            return self.take_with_error(&looked, &pasts, measured);
         }
         if mahalanobis2 > self.config.gate {
             return self.verdict(UpdateReason::Outlier, Some(mahalanobis2));
@@ -196,6 +195,12 @@ impl Tracker {
         self.measure(residual, &looked.row, variance);
         self.looked_at(&looked, measured);
         self.verdict(UpdateReason::Consistent, Some(mahalanobis2))
+    }
+
+    /// How the error of an angle may have come about, where it is found while driving.
+    pub(super) fn pasts(&self, looked: &Look) -> Option<Pasts> {
+        let way_m = looked.moved.0.abs();
+        (self.errors).weigh(looked.head, way_m, &looked.innovation, &looked.row)
     }
 
     /// Takes in an angle whose error is found: whatever that is, it is no more believed than it deserves.
