@@ -133,7 +133,7 @@ impl<const N: usize> Gaussian<N> {
     }
 
     /// `P Hᵀ` for one measurement row.
-    fn cross(&self, row: &[f64; N]) -> [f64; N] {
+    pub fn cross(&self, row: &[f64; N]) -> [f64; N] {
         let mut cross = [0.0; N];
         for i in 0..N {
             for j in 0..N {

@@ -418,16 +418,13 @@ impl Tracker {
     }
 
     pub(super) fn measure(&mut self, residual: f64, row: &[f64; STATES], variance: f64) {
-        let (gain, total) = if self.errors.is_empty() {
-            let foretold = self.belief.variance_along(row);
-            (
-                self.belief.update(residual, row, variance),
-                foretold + variance,
-            )
-        } else {
-            (self.errors).update(&mut self.belief, residual, row, variance)
-        };
-        if let (Some(journal), true) = (&mut self.journal, total > 0.0) {
+        let journal = self.journal.as_mut();
+        let told = journal.map(|journal| (journal, self.belief.variance_along(row) + variance));
+        self.errors.update(&self.belief, residual, row, variance);
+        let gain = self.belief.update(residual, row, variance);
+        if let Some((journal, total)) = told
+            && total > 0.0
+        {
             let gains = gain.into_iter().chain(self.errors.gains(total));
             journal.measured(row, None, gains, residual, total);
         }

@@ -77,7 +77,7 @@ impl Tracker {
     ) -> Option<Rehearsal> {
         let looked = self.look(head, measured).ok()?;
         self.heads.get_mut(looked.head)?.last_look_m = looked.place_m;
-        if looked.finds_error {
+        if self.config.finds_errors {
             return None;
         }
         let Innovation {
@@ -148,13 +148,15 @@ impl Tracker {
             return None;
         }
         let own = thermal(sighting.range_m).sqrt();
-        let variance = self
+        let mut variance = self
             .config
             .phase_bias
             .variance(own, f64::INFINITY, (travelled_m, 0.0))
             + self.config.look_variance(travelled_m, &sighting);
-        let foretold = belief.variance_along(&sighting.row) + variance;
-        let variance = variance + self.errors.variance(number, travelled_m, foretold);
+        if self.config.finds_errors {
+            let foretold = belief.variance_along(&sighting.row) + variance;
+            variance += self.errors.variance(number, travelled_m, foretold);
+        }
         let mut rehearsed = *belief;
         rehearsed.update(0.0, &sighting.row, variance);
         Some(rehearsed)

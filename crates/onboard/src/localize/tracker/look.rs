@@ -22,6 +22,7 @@ pub(in crate::localize) struct Look {
     pub excluded: bool,
     pub place_m: f64,
     pub row: [f64; STATES],
+    /// Without the error that stays, where that is found while driving.
     pub innovation: Innovation,
     /// Variance of the angle by its own noise (rad²).
     pub own_variance: f64,
@@ -35,23 +36,12 @@ pub(in crate::localize) struct Look {
     /// Variance by the odometry since its newest sample, and by the bend of the prediction (rad²).
     pub coasted_variance: f64,
     pub bend_variance: f64,
-    /// Whether its error is found while driving; the innovation is without it.
-    pub finds_error: bool,
 }
 
 impl Look {
     /// Share of it that is independent of the last one, where errors that stay are found.
     pub fn independent_share(&self) -> f64 {
         staying_error::independent(self.moved.0.abs())
-    }
-
-    /// Squared Mahalanobis distance of the look by itself, its error being of any size that there is.
-    pub fn mahalanobis2(&self) -> f64 {
-        let mut seen = self.innovation;
-        if self.finds_error {
-            seen.variance += MOST_VARIANCE;
-        }
-        seen.mahalanobis2()
     }
 }
 
@@ -115,7 +105,6 @@ impl Tracker {
             moved,
             coasted_variance: coasted,
             bend_variance: bend.variance,
-            finds_error: !self.errors.is_empty(),
         })
     }
 
@@ -176,14 +165,14 @@ impl Tracker {
             Ok(looked) => looked,
             Err(reason) => return self.verdict(reason, None),
         };
-        let mahalanobis2 = looked.mahalanobis2();
         if let Some(pasts) = self.pasts(&looked) {
             return self.take_with_error(&looked, &pasts, measured);
         }
+        let seen = looked.innovation;
+        let mahalanobis2 = seen.mahalanobis2();
         if mahalanobis2 > self.config.gate {
             return self.verdict(UpdateReason::Outlier, Some(mahalanobis2));
         }
-        let seen = looked.innovation;
         let (mut residual, mut variance) = (seen.residual, seen.measurement_variance);
         let unresolved = (!measured.resolved).then_some(doubt::AS_NOT);
         if let Some(wrong) = unresolved.or(self.config.wrong_lobe) {
@@ -211,7 +200,10 @@ impl Tracker {
         pasts: &Pasts,
         measured: &AngleMeasurement,
     ) -> UpdateVerdict {
-        let mahalanobis2 = looked.mahalanobis2();
+        // By itself, its error being of any size that there is.
+        let mut seen = looked.innovation;
+        seen.variance += MOST_VARIANCE;
+        let mahalanobis2 = seen.mahalanobis2();
         let is_known = self.errors.is_large(looked.head);
         let (way_m, journal) = (looked.moved.0.abs(), self.journal.as_mut());
         (self.errors).take(

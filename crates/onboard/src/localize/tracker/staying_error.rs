@@ -64,7 +64,7 @@ impl Default for StayingError {
 }
 
 /// How an angle may have come about: with the value kept, or drawn anew.
-#[derive(Clone, Copy, Debug, Default)]
+#[derive(Clone, Copy, Debug)]
 pub struct Past {
     /// Its probability.
     pub share: f64,

@@ -129,7 +129,7 @@ impl StayingErrors {
         if pasts.density <= 0.0 {
             return; // as good as impossible
         }
-        let foretold = cross(belief, row);
+        let foretold = belief.cross(row);
         let with_angle: [WithAngle; STATES] =
             std::array::from_fn(|i| [foretold[i] + error.with_state[i], foretold[i]]);
         let change = Change::new(pasts, error);
@@ -236,20 +236,17 @@ impl StayingErrors {
         }
     }
 
-    /// Corrects state and errors by a scalar measurement of the state: a Kalman update. Returns the
-    /// innovation's variance and the gains of the state; those of the values are [`gains`](Self::gains).
-    pub fn update(
-        &mut self,
-        belief: &mut Belief,
-        residual: f64,
-        row: &[f64; STATES],
-        variance: f64,
-    ) -> ([f64; STATES], f64) {
-        let cross = cross(belief, row);
-        self.sees(row, None);
+    /// Corrects the errors by a scalar measurement of the state, which `belief` is about to be corrected by:
+    /// the rest of a Kalman update.
+    pub fn update(&mut self, belief: &Belief, residual: f64, row: &[f64; STATES], variance: f64) {
+        if self.is_empty() {
+            return;
+        }
+        let cross = belief.cross(row);
         let total = dot(row, &cross).max(0.0) + variance;
+        self.sees(row, None);
         if total <= 0.0 {
-            return ([0.0; STATES], total); // nothing to learn
+            return; // nothing to learn
         }
         for head in &mut self.heads {
             let gain = head.with_angle[1] / total;
@@ -267,7 +264,6 @@ impl StayingErrors {
         for (covariance, product) in self.among.iter_mut().zip(pairs) {
             *covariance -= product / total;
         }
-        (belief.update(residual, row, variance), total)
     }
 
     /// Gains of the values in the newest [`update`](Self::update), whose innovation had this variance.
@@ -358,14 +354,6 @@ fn dot(left: &[f64; STATES], right: &[f64; STATES]) -> f64 {
         .zip(right)
         .map(|(left, right)| left * right)
         .sum()
-}
-
-/// `P Hᵀ` of the state.
-fn cross(belief: &Belief, row: &[f64; STATES]) -> [f64; STATES] {
-    belief
-        .covariance
-        .each_ref()
-        .map(|covariance| dot(covariance, row))
 }
 
 #[cfg(test)]
@@ -512,7 +500,9 @@ mod tests {
             let mut whole_row = [0.0; ALL];
             whole_row[0] = 1.0;
             let whole_gain = expected.update(0.1, &whole_row, 0.3);
-            let (gain, total) = errors.update(&mut belief, 0.1, &row(), 0.3);
+            let total = belief.variance_along(&row()) + 0.3;
+            errors.update(&belief, 0.1, &row(), 0.3);
+            let gain = belief.update(0.1, &row(), 0.3);
             assert_same(&whole(&belief, &errors), &expected);
             for (gain, expected) in gain.into_iter().chain(errors.gains(total)).zip(whole_gain) {
                 assert!((gain - expected).abs() < 1e-12);
