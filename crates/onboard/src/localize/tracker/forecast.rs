@@ -128,7 +128,8 @@ impl Tracker {
     }
 
     /// What an angle of thermal variance `thermal(distance)` to `head` would make of a belief
-    /// `ahead_m` further on than the newest odometry; `None` of a radio head that is not used, or has nothing new to say.
+    /// `ahead_m` further on than the newest odometry; `None` of a radio head that is not used, or would
+    /// rather repeat itself.
     pub fn rehearse(
         &self,
         belief: &Belief,

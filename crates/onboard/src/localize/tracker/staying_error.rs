@@ -44,7 +44,12 @@ pub fn independent(travelled_m: f64) -> f64 {
     (0.5 * travelled_m / VALUE_M).clamp(0.0, 1.0)
 }
 
-/// The same of what is soon forgotten.
+/// Probability that the value is the same one so much further on.
+pub(super) fn kept(travelled_m: f64) -> f64 {
+    (-travelled_m / VALUE_M).exp()
+}
+
+/// The share that is independent of what is soon forgotten.
 pub(super) fn share(travelled_m: f64) -> f64 {
     (travelled_m / SOON_M).clamp(LEAST_SHARE, 1.0)
 }
@@ -129,7 +134,7 @@ impl StayingError {
     /// covariance with the rest add to the innovation's.
     pub fn weigh(&self, travelled_m: f64, seen: &Innovation, value_rad: f64, known: f64) -> Pasts {
         let foretold = self.foretold(travelled_m);
-        let stays = (-travelled_m / VALUE_M).exp();
+        let stays = kept(travelled_m);
         let repetition = share(travelled_m).recip();
         let (kept_residual, anew_residual) = (seen.residual - value_rad, seen.residual);
         let mut weights = [[0.0; LEVELS]; 2];

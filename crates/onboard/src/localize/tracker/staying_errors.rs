@@ -70,9 +70,9 @@ impl StayingErrors {
         })
     }
 
-    /// Whether a radio head has nothing new to say yet, so far after it was heard last.
+    /// Whether a radio head rather repeats itself, so far after it was heard last, than says anything new.
     pub fn repeats(&self, travelled_m: f64) -> bool {
-        !self.is_empty() && staying_error::independent(travelled_m) < 1.0
+        !self.is_empty() && staying_error::kept(travelled_m) > 0.5
     }
 
     /// What errors are expected to add to the variance of an angle; see [`StayingError::variance`].
