@@ -86,17 +86,23 @@ impl Guard {
         self.bank.main()
     }
 
-    /// The tracker by whose uncertainty to listen: that of every sound source, unless slip, which too
-    /// little speaks against yet, takes the level beyond the alert limit.
+    /// The tracker by whose uncertainty to listen: where the level is beyond the alert limit, that of the
+    /// hypothesis by which it mostly is; else that of every sound source.
     pub fn doubtful(&self) -> &Tracker {
         let (bank, now_s) = (&self.bank, self.tracker().time_s());
-        let is_doubted =
-            self.slip_probability(bank) > self.config.risk && !self.is_near(bank, now_s);
-        if is_doubted {
-            bank.slip().tracker()
-        } else {
-            bank.main()
+        if self.is_near(bank, now_s) {
+            return bank.main();
         }
+        let told = bank.main().pose(now_s);
+        let noise_ratio = bank.noise_ratio();
+        let beyond = |&(probability, clean): &(f64, &Tracker)| {
+            Hypothesis::new(probability, &clean.pose(now_s), noise_ratio, &told).map_or(0.0, |it| {
+                self.level.share_beyond(self.config.alert_limit_m, &it)
+            })
+        };
+        (self.suspects(bank))
+            .max_by(|one, other| beyond(one).total_cmp(&beyond(other)))
+            .map_or(bank.main(), |(_, clean)| clean)
     }
 
     fn slip_probability(&self, bank: &Bank) -> f64 {
@@ -211,10 +217,9 @@ impl Guard {
         self.level.holds(self.config.alert_limit_m, hypotheses)
     }
 
-    /// That no source is at fault, or any one of those in use, the odometer among them.
-    fn hypotheses(&self, bank: &Bank, time_s: f64) -> impl Iterator<Item = Hypothesis> + Clone {
-        let told = bank.main().pose(time_s);
-        let noise_ratio = bank.noise_ratio();
+    /// That no source is at fault, or any one of those in use, the odometer among them: how probable that
+    /// is, and the tracker that is right then.
+    fn suspects<'a>(&self, bank: &'a Bank) -> impl Iterator<Item = (f64, &'a Tracker)> + Clone {
         let finds_errors = bank.main().config().finds_errors;
         let head_probability = (self.config.fault_probability).of_radio_head(finds_errors);
         let heads = (bank.without_one()).map(move |clean| (head_probability, clean));
@@ -223,8 +228,14 @@ impl Guard {
             .chain(heads)
             .chain([(self.slip_probability(bank), bank.slip().tracker())])
             .filter(move |(probability, _)| *probability > negligible)
-            .filter_map(move |(probability, clean)| {
-                Hypothesis::new(probability, &clean.pose(time_s), noise_ratio, &told)
-            })
+    }
+
+    /// Where the vehicle then is.
+    fn hypotheses(&self, bank: &Bank, time_s: f64) -> impl Iterator<Item = Hypothesis> + Clone {
+        let told = bank.main().pose(time_s);
+        let noise_ratio = bank.noise_ratio();
+        (self.suspects(bank)).filter_map(move |(probability, clean)| {
+            Hypothesis::new(probability, &clean.pose(time_s), noise_ratio, &told)
+        })
     }
 }

@@ -150,9 +150,13 @@ impl LevelEquation {
     /// Whether such a level holds for all of the hypotheses together, which is far less work than to
     /// solve for the least that does.
     pub fn holds(&self, level_m: f64, hypotheses: impl Iterator<Item = Hypothesis>) -> bool {
-        let beyond =
-            hypotheses.map(|it| it.probability * it.beyond_circle(&self.directions, level_m));
+        let beyond = hypotheses.map(|it| self.share_beyond(level_m, &it));
         beyond.sum::<f64>() <= self.risk
+    }
+
+    /// What a hypothesis adds to the probability of being further away than a level.
+    pub fn share_beyond(&self, level_m: f64, hypothesis: &Hypothesis) -> f64 {
+        hypothesis.probability * hypothesis.beyond_circle(&self.directions, level_m)
     }
 
     /// The levels that hold for all of the hypotheses together.
