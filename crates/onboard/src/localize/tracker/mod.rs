@@ -25,6 +25,7 @@ mod prior;
 pub mod sighting;
 mod speed_steps;
 pub mod state;
+mod staying_change;
 mod staying_error;
 mod staying_errors;
 

@@ -7,13 +7,11 @@
 //! state's. So every covariance after an angle is a form of these two vectors.
 
 use super::state::{Belief, STATES};
+use super::staying_change::{Change, WithAngle};
 use super::staying_error::{self, MOST_VARIANCE, Pasts, StayingError};
 use crate::clone_in_place::clone_in_place;
 use crate::localize::gaussian::{Innovation, Matrix};
 use crate::localize::smoother::Journal;
-
-/// How something varies with an angle: with the value of its radio head, and without.
-type WithAngle = [f64; 2];
 
 /// One radio head's error.
 #[derive(Clone, Copy, Debug, Default, PartialEq)]
@@ -132,7 +130,7 @@ impl StayingErrors {
         let foretold = belief.cross(row);
         let with_angle: [WithAngle; STATES] =
             std::array::from_fn(|i| [foretold[i] + error.with_state[i], foretold[i]]);
-        let change = Change::new(pasts, error);
+        let change = Change::new(pasts, error.mean_rad, error.with_angle[0]);
         error.mean_rad = change.value_mean();
         for (covariance, with_angle) in error.with_state.iter_mut().zip(with_angle) {
             *covariance = change.with_value(*covariance, with_angle);
@@ -276,76 +274,6 @@ impl StayingErrors {
     /// Covariances of each value with the state.
     pub fn with_state(&self) -> impl Iterator<Item = [f64; STATES]> {
         self.heads.iter().map(|head| head.with_state)
-    }
-}
-
-/// What an angle makes of means and covariances.
-struct Change<'a> {
-    pasts: &'a Pasts,
-    /// By how much each past moves what varies with the angle, and both on average.
-    steps: [f64; 2],
-    means: [f64; 2],
-    /// What covariances grow by, by both vectors: the squares, and the product.
-    squares: [f64; 2],
-    product: f64,
-    /// How the value varies with the angle, what it is where it is kept, and by how much it is another one
-    /// where it is not.
-    with_angle: f64,
-    kept_rad: f64,
-    apart_rad: f64,
-}
-
-impl<'a> Change<'a> {
-    fn new(pasts: &'a Pasts, error: &HeadError) -> Self {
-        let all = [&pasts.kept, &pasts.anew];
-        let steps = all.map(|past| past.residual * past.gain);
-        // The mixture's covariance is that of its parts and of their means.
-        let both = pasts.kept.share * pasts.anew.share;
-        let square = |of: usize| both * steps[of] * steps[of] - all[of].share * all[of].narrowing;
-        let kept_rad = error.mean_rad + steps[0] * error.with_angle[0];
-        Self {
-            pasts,
-            steps,
-            means: [all[0].share * steps[0], all[1].share * steps[1]],
-            squares: [square(0), square(1)],
-            product: -both * steps[0] * steps[1],
-            with_angle: error.with_angle[0],
-            kept_rad,
-            apart_rad: kept_rad - pasts.mean_rad,
-        }
-    }
-
-    fn step(&self, with: WithAngle) -> f64 {
-        self.means[0] * with[0] + self.means[1] * with[1]
-    }
-
-    /// By how much the covariance grows of what varies so and so with the angle.
-    fn more(&self, one: WithAngle, other: WithAngle) -> f64 {
-        self.squares[0] * one[0] * other[0]
-            + self.squares[1] * one[1] * other[1]
-            + self.product * (one[0] * other[1] + one[1] * other[0])
-    }
-
-    /// The covariance of the value with anything else.
-    fn with_value(&self, before: f64, with: WithAngle) -> f64 {
-        let (kept, anew) = (&self.pasts.kept, &self.pasts.anew);
-        kept.share * (before - kept.narrowing * self.with_angle * with[0])
-            - anew.share * self.pasts.narrowing * with[1]
-            + kept.share
-                * anew.share
-                * self.apart_rad
-                * (self.steps[0] * with[0] - self.steps[1] * with[1])
-    }
-
-    fn value_mean(&self) -> f64 {
-        self.pasts.kept.share * self.kept_rad + self.pasts.anew.share * self.pasts.mean_rad
-    }
-
-    fn value_variance(&self, before: f64) -> f64 {
-        let (kept, anew) = (&self.pasts.kept, &self.pasts.anew);
-        kept.share * (before - kept.narrowing * self.with_angle * self.with_angle)
-            + anew.share * self.pasts.variance
-            + kept.share * anew.share * self.apart_rad * self.apart_rad
     }
 }
 
