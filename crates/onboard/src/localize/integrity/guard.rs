@@ -93,15 +93,12 @@ impl Guard {
         if self.is_near(bank, now_s) {
             return bank.main();
         }
-        let told = bank.main().pose(now_s);
-        let noise_ratio = bank.noise_ratio();
-        let beyond = |&(probability, clean): &(f64, &Tracker)| {
-            Hypothesis::new(probability, &clean.pose(now_s), noise_ratio, &told).map_or(0.0, |it| {
-                self.level.share_beyond(self.config.alert_limit_m, &it)
-            })
+        let beyond = |(clean, hypothesis)| {
+            let alert_limit_m = self.config.alert_limit_m;
+            (self.level.share_beyond(alert_limit_m, &hypothesis), clean)
         };
-        (self.suspects(bank))
-            .max_by(|one, other| beyond(one).total_cmp(&beyond(other)))
+        (self.suspects(bank, now_s).map(beyond))
+            .max_by(|(one, _), (other, _)| one.total_cmp(other))
             .map_or(bank.main(), |(_, clean)| clean)
     }
 
@@ -217,9 +214,15 @@ impl Guard {
         self.level.holds(self.config.alert_limit_m, hypotheses)
     }
 
-    /// That no source is at fault, or any one of those in use, the odometer among them: how probable that
-    /// is, and the tracker that is right then.
-    fn suspects<'a>(&self, bank: &'a Bank) -> impl Iterator<Item = (f64, &'a Tracker)> + Clone {
+    /// That no source is at fault, or any one of those in use, the odometer among them; and the tracker that
+    /// is right then.
+    fn suspects<'a>(
+        &self,
+        bank: &'a Bank,
+        time_s: f64,
+    ) -> impl Iterator<Item = (&'a Tracker, Hypothesis)> + Clone {
+        let told = bank.main().pose(time_s);
+        let noise_ratio = bank.noise_ratio();
         let finds_errors = bank.main().config().finds_errors;
         let head_probability = (self.config.fault_probability).of_radio_head(finds_errors);
         let heads = (bank.without_one()).map(move |clean| (head_probability, clean));
@@ -228,14 +231,14 @@ impl Guard {
             .chain(heads)
             .chain([(self.slip_probability(bank), bank.slip().tracker())])
             .filter(move |(probability, _)| *probability > negligible)
+            .filter_map(move |(probability, clean)| {
+                let right = clean.pose(time_s);
+                let hypothesis = Hypothesis::new(probability, &right, noise_ratio, &told);
+                hypothesis.map(|it| (clean, it))
+            })
     }
 
-    /// Where the vehicle then is.
     fn hypotheses(&self, bank: &Bank, time_s: f64) -> impl Iterator<Item = Hypothesis> + Clone {
-        let told = bank.main().pose(time_s);
-        let noise_ratio = bank.noise_ratio();
-        (self.suspects(bank)).filter_map(move |(probability, clean)| {
-            Hypothesis::new(probability, &clean.pose(time_s), noise_ratio, &told)
-        })
+        (self.suspects(bank, time_s)).map(|(_, hypothesis)| hypothesis)
     }
 }
