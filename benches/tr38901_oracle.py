@@ -3,7 +3,7 @@
 Needs ``pip install sionna-no-rt`` (Apache-2.0; it brings torch, so it is in no extra). Writes the
 table that ``crates/simulate/tests/tr38901.rs`` reads::
 
-    python benches/tr38901_oracle.py > crates/simulate/tests/data/tr38901_sionna.txt
+    python benches/tr38901_oracle.py > crates/simulate/tests/all/data/tr38901_sionna.txt
 """
 
 from __future__ import annotations

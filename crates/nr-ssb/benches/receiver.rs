@@ -1,7 +1,7 @@
 //! Search of 20 ms and tracking of one SSB, four antennas, one thread; scan of a whole band, all threads.
 #![allow(clippy::unwrap_used, clippy::print_stdout, reason = "this is a test")]
 
-#[path = "../tests/air/mod.rs"]
+#[path = "../tests/all/air/mod.rs"]
 mod air;
 
 use nr_ssb::SubcarrierSpacing;

@@ -7,9 +7,9 @@
     reason = "a program"
 )]
 
-#[path = "../tests/air/mod.rs"]
+#[path = "../tests/all/air/mod.rs"]
 mod air;
-#[path = "../tests/noise_only/mod.rs"]
+#[path = "../tests/all/noise_only/mod.rs"]
 mod noise_only;
 
 use noise_only::{Tally, search_noise, upper_limit};

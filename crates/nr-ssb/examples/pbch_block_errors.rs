@@ -7,7 +7,7 @@
     reason = "a program"
 )]
 
-#[path = "../tests/noisy/mod.rs"]
+#[path = "../tests/all/noisy/mod.rs"]
 mod noisy;
 
 use std::time::Instant;

@@ -28,7 +28,7 @@ const DECODE_FLOOR: f32 = 0.7;
 const CERTAIN_DECODE_SNR_DB: f64 = -2.0;
 /// A cell whose PBCH does not decode, with the PSS of a cell so much stronger and so near to it in
 /// time, is taken for what was left of that one. Clipped at 0.3 to 1.5 times its RMS amplitude, a cell
-/// leaves what looks like another 15.4 to 31 dB below it (`tests/distorted.rs`).
+/// leaves what looks like another 15.4 to 31 dB below it (`tests/all/distorted.rs`).
 const RESIDUE_DB: f64 = 15.0;
 const RESIDUE_SAMPLES: f64 = 1.0;
 /// Two detections of one cell closer than this, in samples, are one SSB.

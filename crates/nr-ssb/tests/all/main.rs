@@ -1,0 +1,24 @@
+//! The SSB chain, as whoever uses the crate meets it.
+
+mod air;
+mod allocation;
+mod burst_sets;
+mod captures;
+mod clocks;
+mod common;
+mod counting;
+mod detection;
+mod distorted;
+mod estimates;
+mod golden;
+mod loaded;
+mod noise_only;
+mod noisy;
+mod off_raster;
+mod pbch;
+mod properties;
+mod receiver;
+mod recordings;
+mod stream;
+mod track;
+mod vectors;

@@ -1,0 +1,134 @@
+//! The receiver as a whole: a stream of samples in blocks of any length, SSBs out.
+#![allow(clippy::unwrap_used, reason = "this is a test")]
+
+use crate::air::{Cell, add_noise, raised, rng, silence};
+use nr_ssb::receiver::{HeardSsb, Receiver, ReceiverConfig};
+use nr_ssb::{Complex32, Lmax, SubcarrierSpacing};
+
+const SPACING: SubcarrierSpacing = SubcarrierSpacing::Khz30;
+const RATE_HZ: f64 = 15.36e6;
+const PERIODS: usize = 8;
+
+/// Eight periods of two beams, the second of which is silent from the fourth to the sixth.
+fn cell_and_samples() -> (Cell, Vec<Vec<Complex32>>) {
+    let mut cell = Cell::random(&mut rng(4), SPACING, 3);
+    (cell.lmax, cell.ssb_indices, cell.ssb_freq_hz) = (Lmax::L8, vec![2, 5], 3.6e9);
+    cell.cfo_hz = 3000.0;
+    let period = 0.02 * SPACING.base_rate_hz();
+    let mut base = silence(3, PERIODS * period as usize);
+    for number in 0..PERIODS {
+        let ssb_indices = if (3..6).contains(&number) {
+            vec![2]
+        } else {
+            vec![2, 5]
+        };
+        let burst = Cell {
+            ssb_indices,
+            sfn: (cell.sfn + 2 * number as u16) % 1024,
+            delay: cell.delay + number as f64 * period,
+            ..cell.clone()
+        };
+        burst.add_to(&mut base);
+    }
+    add_noise(&mut base, 10.0, &mut rng(5));
+    // The SSB lies 2 MHz above the recording's centre.
+    let samples = base.iter().map(|it| raised(it, 2, 2e6 / RATE_HZ)).collect();
+    (cell, samples)
+}
+
+fn heard(config: ReceiverConfig, samples: &[Vec<Complex32>], block: usize) -> Vec<HeardSsb> {
+    let mut receiver = Receiver::new(config).unwrap();
+    let mut heard = Vec::new();
+    for first in (0..samples[0].len()).step_by(block) {
+        let end = samples[0].len().min(first + block);
+        let slices: Vec<&[Complex32]> = samples.iter().map(|it| &it[first..end]).collect();
+        receiver
+            .push(&slices, &mut |ssb| heard.push(ssb.clone()))
+            .unwrap();
+    }
+    receiver.finish(&mut |ssb| heard.push(ssb.clone())).unwrap();
+    assert_eq!(receiver.tracked(), 0);
+    heard
+}
+
+#[test]
+fn every_ssb_of_a_stream_is_heard_once_with_its_channel() {
+    let (cell, samples) = cell_and_samples();
+    let config = ReceiverConfig::new(
+        RATE_HZ,
+        cell.ssb_freq_hz - 2e6,
+        cell.ssb_freq_hz,
+        SPACING,
+        3,
+    );
+    let all = heard(config.clone(), &samples, 1_000_000_000);
+    let beams: Vec<u8> = all.iter().map(|ssb| ssb.ssb_index).collect();
+    assert_eq!(beams, [2, 5, 2, 5, 2, 5, 2, 2, 2, 2, 5, 2, 5]);
+    assert!(all.iter().skip(2).all(|ssb| ssb.tracked), "one search");
+    for ssb in &all {
+        assert_eq!((ssb.pci.get(), ssb.lmax), (cell.pci, Some(Lmax::L8)));
+        let payload = ssb.payload.unwrap();
+        let number = ((ssb.sample_start / RATE_HZ - 1e-3) / 0.02).round();
+        assert_eq!(payload.sfn(), (cell.sfn + 2 * number as u16) % 1024);
+        let sent = 2.0 * (cell.ssb_start(ssb.ssb_index) + number * 0.02 * SPACING.base_rate_hz());
+        assert!((ssb.sample_start - sent).abs() < 0.2);
+        // Four standard deviations of the phase from PSS to SSS, 127 elements at three antennas.
+        assert!((ssb.cfo_hz - cell.cfo_hz).abs() < 150.0, "{}", ssb.cfo_hz);
+        assert!((ssb.snr_db - 10.0).abs() < 1.0, "{}", ssb.snr_db);
+        let (channel, noise) = (&ssb.channel, &ssb.noise_variance);
+        assert_eq!(
+            (channel.len(), noise.len(), ssb.measurements.len()),
+            (3, 3, 3)
+        );
+        for antenna in 0..3 {
+            // One path: between antennas the same on every subcarrier, with the power that the SNR says.
+            let expected = cell.gains[antenna] / cell.gains[0];
+            for (h, first) in channel[antenna].iter().zip(&channel[0]) {
+                assert!((h / first - expected).norm() < 0.25);
+            }
+            let power: f32 = channel[antenna].iter().map(Complex32::norm_sqr).sum();
+            let snr_db = 10.0 * (f64::from(power) / 240.0 / noise[antenna]).log10();
+            assert!((snr_db - 10.0).abs() < 1.5, "{snr_db}");
+        }
+    }
+    // The same wherever the blocks end.
+    for block in [1000, 76_800, 500_001] {
+        assert_eq!(heard(config.clone(), &samples, block), all, "{block}");
+    }
+}
+
+#[test]
+fn settings_that_cannot_be_are_refused() {
+    let config = ReceiverConfig::new(RATE_HZ, 3.6e9, 3.6e9, SPACING, 2);
+    for (name, wrong) in [
+        (
+            "period_s",
+            ReceiverConfig {
+                period_s: 0.0,
+                ..config.clone()
+            },
+        ),
+        (
+            "search_every_s",
+            ReceiverConfig {
+                search_every_s: f64::NAN,
+                ..config.clone()
+            },
+        ),
+        (
+            "lost_after_s",
+            ReceiverConfig {
+                lost_after_s: -1.0,
+                ..config.clone()
+            },
+        ),
+    ] {
+        let error = Receiver::new(wrong).err().unwrap().to_string();
+        assert!(error.starts_with(name), "{error}");
+    }
+    let many = ReceiverConfig::new(RATE_HZ, 3.6e9, 3.6e9, SPACING, 17);
+    assert!(Receiver::new(many).is_err());
+    let mut receiver = Receiver::new(config).unwrap();
+    let one: &[Complex32] = &[];
+    assert!(receiver.push(&[one], &mut |_| {}).is_err());
+}

@@ -1,0 +1,167 @@
+//! The receiver over seconds: clocks that differ, sleep, beams that vanish and return.
+#![allow(clippy::unwrap_used, clippy::print_stdout, reason = "this is a test")]
+
+use crate::air;
+use nr_ssb::{Complex32, Lmax, SubcarrierSpacing};
+use num_complex::Complex64;
+use onboard::receive::{Receiver, ReceiverConfig, Window};
+use onboard::settings::{ArraySettings, Pilots};
+
+const PERIOD_S: f64 = 0.02;
+
+/// A cell with eight beams, heard by four antennas through a clock that is too fast.
+struct Air {
+    cell: air::Cell,
+    ppm: f64,
+    snr_db: f64,
+    half_frame: Vec<Complex32>,
+    sending: Vec<u8>,
+}
+
+impl Air {
+    fn new(spacing: SubcarrierSpacing, ppm: f64, snr_db: f64, seed: u64) -> Self {
+        let mut cell = air::Cell::random(&mut air::rng(seed), spacing, 4);
+        cell.lmax = Lmax::L8;
+        cell.ssb_freq_hz = 3.6e9;
+        cell.cfo_hz = -1e-6 * ppm * cell.ssb_freq_hz;
+        let mut air = Self {
+            cell,
+            ppm,
+            snr_db,
+            half_frame: Vec::new(),
+            sending: Vec::new(),
+        };
+        air.send((0..8).collect());
+        air
+    }
+
+    fn send(&mut self, beams: Vec<u8>) {
+        if beams != self.sending {
+            self.cell.ssb_indices.clone_from(&beams);
+            self.half_frame = self.cell.half_frame_samples();
+            self.sending = beams;
+        }
+    }
+
+    fn receiver(&self) -> Receiver {
+        Receiver::new(ReceiverConfig {
+            ssb_freq_hz: self.cell.ssb_freq_hz,
+            spacing: self.cell.spacing,
+            period_s: PERIOD_S,
+            pilots: Pilots::PssSss,
+            snapshots: 20,
+            array: ArraySettings::default(),
+            cells: None,
+        })
+        .unwrap()
+    }
+
+    /// Beams that the receiver reports of burst `number`.
+    fn heard(&self, receiver: &mut Receiver, number: u32) -> Vec<u8> {
+        let rate_hz = self.cell.spacing.base_rate_hz();
+        let begin = (1000.0 + f64::from(number) * PERIOD_S * rate_hz) * (1.0 + 1e-6 * self.ppm);
+        let start = begin.floor() - 200.0;
+        let late = air::delayed(&self.half_frame, begin.fract());
+        let step = std::f64::consts::TAU * (self.cell.cfo_hz / rate_hz);
+        let turned: Vec<Complex32> = late
+            .iter()
+            .enumerate()
+            .map(|(n, x)| {
+                let turn = Complex64::cis(step * (start + 200.0 + n as f64));
+                x * Complex32::new(turn.re as f32, turn.im as f32)
+            })
+            .collect();
+        let mut antennas = air::silence(4, self.half_frame.len() + 400);
+        for (antenna, gain) in antennas.iter_mut().zip(&self.cell.gains) {
+            for (sample, x) in antenna[200..].iter_mut().zip(&turned) {
+                *sample = x * gain;
+            }
+        }
+        air::add_noise(
+            &mut antennas,
+            self.snr_db,
+            &mut air::rng(7_000 + u64::from(number)),
+        );
+        let window = Window {
+            start: start as u64,
+            time_s: start / rate_hz,
+            antennas: &air::slices(&antennas),
+        };
+        let mut beams = Vec::new();
+        receiver
+            .receive(&window, |it| beams.push(it.ssb.ssb_index))
+            .unwrap();
+        beams.sort_unstable();
+        beams
+    }
+}
+
+#[test]
+fn a_beam_that_vanishes_costs_nothing_and_is_heard_again_when_it_returns() {
+    let mut air = Air::new(SubcarrierSpacing::Khz30, 3.0, 8.0, 1);
+    let mut receiver = air.receiver();
+    let all: Vec<u8> = (0..8).collect();
+    let others: Vec<u8> = all.iter().copied().filter(|beam| *beam != 3).collect();
+    for number in 0..50 {
+        assert_eq!(air.heard(&mut receiver, number), all, "burst {number}");
+    }
+    // Gone for three seconds.
+    air.send(others.clone());
+    let before = receiver.searches();
+    for number in 50..200 {
+        assert_eq!(air.heard(&mut receiver, number), others, "burst {number}");
+    }
+    assert!(
+        receiver.searches() - before <= 3,
+        "{}",
+        receiver.searches() - before
+    );
+    assert_eq!(receiver.tracked(), 7);
+    // Back within the second that passes between two searches.
+    air.send(all.clone());
+    let back = (200..252).find(|number| air.heard(&mut receiver, *number) == all);
+    println!("heard again in burst {back:?}");
+    let back = back.unwrap();
+    for number in back + 1..back + 20 {
+        assert_eq!(air.heard(&mut receiver, number), all, "burst {number}");
+    }
+}
+
+#[test]
+fn a_beam_that_is_hidden_for_a_moment_is_not_searched_for() {
+    let mut air = Air::new(SubcarrierSpacing::Khz30, -5.0, 8.0, 2);
+    let mut receiver = air.receiver();
+    let all: Vec<u8> = (0..8).collect();
+    for number in 0..10 {
+        assert_eq!(air.heard(&mut receiver, number), all);
+    }
+    air.send(vec![0, 7]);
+    for number in 10..30 {
+        assert_eq!(air.heard(&mut receiver, number), [0, 7]);
+    }
+    air.send(all.clone());
+    assert_eq!(air.heard(&mut receiver, 30), all);
+    assert_eq!(receiver.searches(), 1);
+}
+
+#[test]
+fn any_oscillator_is_found_from_cold_and_sleep_is_bridged() {
+    for spacing in [SubcarrierSpacing::Khz15, SubcarrierSpacing::Khz30] {
+        for ppm in [-20.0, -2.0, 7.0, 20.0, 45.0] {
+            let air = Air::new(spacing, ppm, 5.0, 3);
+            let mut receiver = air.receiver();
+            let all: Vec<u8> = (0..8).collect();
+            let first = (0..30).find(|number| air.heard(&mut receiver, *number) == all);
+            let first = first.unwrap();
+            println!("{spacing:?} {ppm} ppm: found in burst {first}");
+            for number in first + 1..first + 6 {
+                assert_eq!(air.heard(&mut receiver, number), all);
+            }
+            // Awake for one burst in a second and in ten; what is searched then is not needed.
+            for asleep in [50, 500, 1000] {
+                let heard = air.heard(&mut receiver, first + 6 + asleep);
+                assert_eq!(heard, all, "{spacing:?} {ppm} ppm, {asleep}");
+            }
+        }
+    }
+}

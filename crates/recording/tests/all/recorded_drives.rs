@@ -1,0 +1,336 @@
+//! Odometry, angles and trajectories: what is written is read again; bad items are reported one by
+//! one and the rest is kept.
+#![allow(clippy::unwrap_used, clippy::print_stdout, reason = "this is a test")]
+
+use crate::common;
+use std::fs::{self, File};
+use std::path::Path;
+
+use mcap::{Compression, MessageStream, WriteOptions};
+use proptest::prelude::*;
+
+use onboard::geometry::Pose;
+use onboard::localize::{AngleMeasurement, PoseEstimate};
+use onboard::observation::{OdometrySample, SensedSsb};
+use recording::mcap::{Frames, Twist};
+use recording::{
+    LoggedAngle, McapWriter, OdometryIssue, RecordingError, TimedPose, read_angle_log,
+    read_odometry_csv, read_odometry_mcap, read_tum, write_angle_log, write_odometry_csv,
+    write_tum,
+};
+
+fn sample(time_s: f64) -> OdometrySample {
+    OdometrySample {
+        time_s,
+        distance_m: 4.0 * time_s,
+        speed_mps: 4.0,
+        yaw_rate_radps: Some(0.01),
+    }
+}
+
+#[test]
+fn odometry_csv_comes_back_to_the_bit() {
+    let file = common::scratch("odometry").join("odo.csv");
+    let mut samples: Vec<_> = (0..50).map(|k| sample(f64::from(k) * 0.02)).collect();
+    write_odometry_csv(&file, &samples).unwrap();
+    let log = read_odometry_csv(&file).unwrap();
+    assert_eq!((log.samples, log.remarks.len()), (samples.clone(), 0));
+    for sample in &mut samples {
+        sample.yaw_rate_radps = None;
+    }
+    write_odometry_csv(&file, &samples).unwrap();
+    assert_eq!(read_odometry_csv(&file).unwrap().samples, samples);
+}
+
+#[test]
+fn bad_odometry_rows_are_reported_one_by_one_and_the_rest_is_kept() {
+    let file = common::scratch("odometry-bad").join("odo.csv");
+    let rows = [
+        "note,time_s,distance_m,speed_mps,yaw_rate_radps", // other columns do not disturb
+        "a,0.00,0.0,4.0,",
+        "b,0.02,0.08,4.0,0.1",
+        "c,0.02,0.08,4.0,0.1", // line 4: duplicate
+        "d,0.01,0.04,4.0,0.1", // line 5: backwards
+        "e,0.04,NaN,4.0,0.1",  // line 6: not finite
+        "f,0.04,zero,4.0,0.1", // line 7: no number
+        "g,0.04,0.16",         // line 8: too few fields
+        "h,0.04,0.16,4.0,0.1",
+        "",
+        "i,0.06,0.24,4.0,0.1",
+        "j,1.06,4.24,4.0,0.1", // line 12: gap, used
+    ];
+    fs::write(&file, rows.join("\n")).unwrap();
+    let log = read_odometry_csv(&file).unwrap();
+    let times: Vec<f64> = log.samples.iter().map(|sample| sample.time_s).collect();
+    assert_eq!(times, [0.0, 0.02, 0.04, 0.06, 1.06]);
+    assert_eq!(log.samples[0].yaw_rate_radps, None);
+    let lines: Vec<usize> = log.remarks.iter().map(|remark| remark.item).collect();
+    assert_eq!(lines, [4, 5, 6, 7, 8, 12]);
+    let issues: Vec<_> = log.remarks.iter().map(|remark| &remark.issue).collect();
+    assert!(matches!(
+        issues[..],
+        [
+            OdometryIssue::Duplicate { .. },
+            OdometryIssue::TimeReversed { .. },
+            OdometryIssue::NotFinite,
+            OdometryIssue::Malformed(_),
+            OdometryIssue::Malformed(_),
+            OdometryIssue::Gap { .. },
+        ]
+    ));
+    assert!(
+        log.remarks
+            .iter()
+            .all(|remark| !remark.to_string().is_empty())
+    );
+
+    fs::write(&file, "time_s,yaw_rate_radps\n0,1\n").unwrap();
+    let error = read_odometry_csv(&file).unwrap_err();
+    assert!(matches!(error, RecordingError::Missing { ref key, .. } if key == "distance_m"));
+    assert!(matches!(
+        read_odometry_csv(Path::new("/no/such.csv")),
+        Err(RecordingError::Io { .. })
+    ));
+}
+
+fn estimate(time_s: f64) -> PoseEstimate {
+    let pose = Pose {
+        x_m: 4.0 * time_s,
+        y_m: -1.0,
+        heading_rad: 0.0,
+    };
+    let covariance = Some([[0.04, 0.0, 0.0], [0.0, 0.09, 0.0], [0.0, 0.0, 1e-4]]);
+    PoseEstimate {
+        time_s,
+        pose,
+        covariance,
+        integrity: None,
+    }
+}
+
+fn write_mcap(file: &Path, topics: &[&str], yaw_rate_radps: f64) {
+    let mut writer = McapWriter::new(File::create(file).unwrap()).unwrap();
+    let twist = Twist {
+        speed_mps: 4.0,
+        speed_variance: 0.01,
+        yaw_rate: Some((yaw_rate_radps, 1e-4)),
+    };
+    for k in 0..20 {
+        for topic in topics {
+            let estimate = estimate(f64::from(k) * 0.25);
+            writer
+                .odometry(topic, Frames::ODOM, &estimate, &twist)
+                .unwrap();
+        }
+    }
+    writer.finish().unwrap();
+}
+
+#[test]
+fn odometry_is_read_from_mcap() {
+    let file = common::scratch("odometry-mcap").join("odo.mcap");
+    write_mcap(&file, &["/odom"], 0.02);
+    let log = read_odometry_mcap(&file, None).unwrap();
+    assert_eq!((log.samples.len(), log.remarks.len()), (20, 0));
+    for (k, sample) in log.samples.iter().enumerate() {
+        assert!((sample.time_s - k as f64 * 0.25).abs() < 1e-9);
+        assert!((sample.distance_m - k as f64).abs() < 1e-9);
+        assert_eq!((sample.speed_mps, sample.yaw_rate_radps), (4.0, Some(0.02)));
+    }
+    // A yaw rate of zero throughout is the lack of a gyroscope.
+    write_mcap(&file, &["/odom"], 0.0);
+    let log = read_odometry_mcap(&file, Some("/odom")).unwrap();
+    assert!(
+        log.samples
+            .iter()
+            .all(|sample| sample.yaw_rate_radps.is_none())
+    );
+}
+
+/// The same messages in compressed chunks, as most recorders write them.
+fn compress(file: &Path, compression: Compression) {
+    let whole = fs::read(file).unwrap();
+    let options = WriteOptions::new()
+        .compression(Some(compression))
+        .chunk_size(Some(4096));
+    let mut writer = options.create(File::create(file).unwrap()).unwrap();
+    for message in MessageStream::new(&whole).unwrap() {
+        writer.write(&message.unwrap()).unwrap();
+    }
+    writer.finish().unwrap();
+}
+
+#[test]
+fn compressed_mcap_is_read_alike() {
+    let dir = common::scratch("odometry-mcap-compressed");
+    let plain = dir.join("plain.mcap");
+    write_mcap(&plain, &["/odom"], 0.02);
+    let expected = read_odometry_mcap(&plain, None).unwrap();
+    for compression in [Compression::Lz4, Compression::Zstd] {
+        let file = dir.join("odo.mcap");
+        fs::copy(&plain, &file).unwrap();
+        compress(&file, compression);
+        assert!(fs::metadata(&file).unwrap().len() < fs::metadata(&plain).unwrap().len());
+        assert_eq!(read_odometry_mcap(&file, None).unwrap(), expected);
+        let whole = fs::read(&file).unwrap();
+        fs::write(&file, &whole[..whole.len() / 3]).unwrap();
+        let error = read_odometry_mcap(&file, None).unwrap_err();
+        assert!(matches!(
+            error,
+            RecordingError::Syntax { format: "MCAP", .. }
+        ));
+    }
+}
+
+/// A damaged length of a name is a damaged file, not so much memory.
+#[test]
+fn mcap_names_longer_than_their_record_are_refused() {
+    let file = common::scratch("odometry-mcap-damaged").join("odo.mcap");
+    write_mcap(&file, &["/odom"], 0.02);
+    let whole = fs::read(&file).unwrap();
+    for name in ["nav_msgs/msg/Odometry", "/odom"] {
+        let start = (4..whole.len())
+            .find(|&at| whole[at..].starts_with(name.as_bytes()))
+            .unwrap();
+        let mut damaged = whole.clone();
+        damaged[start - 1] = 0xff;
+        fs::write(&file, damaged).unwrap();
+        let error = read_odometry_mcap(&file, None).unwrap_err().to_string();
+        assert!(error.contains("damaged"), "{error}");
+    }
+}
+
+#[test]
+fn mcap_files_without_the_one_topic_are_refused() {
+    let file = common::scratch("odometry-mcap-bad").join("odo.mcap");
+    write_mcap(&file, &["/a", "/b"], 0.0);
+    assert!(matches!(
+        read_odometry_mcap(&file, None),
+        Err(RecordingError::Value { .. })
+    ));
+    assert_eq!(
+        read_odometry_mcap(&file, Some("/b")).unwrap().samples.len(),
+        20
+    );
+    assert!(matches!(
+        read_odometry_mcap(&file, Some("/c")),
+        Err(RecordingError::Missing { .. })
+    ));
+    let whole = fs::read(&file).unwrap();
+    for length in [0, 5, 100, whole.len() / 2, whole.len() - 1] {
+        fs::write(&file, &whole[..length]).unwrap();
+        let error = read_odometry_mcap(&file, Some("/a")).unwrap_err();
+        assert!(
+            matches!(error, RecordingError::Syntax { format: "MCAP", .. }),
+            "{length}"
+        );
+    }
+}
+
+#[test]
+fn angle_logs_come_back_and_bad_lines_are_left_out() {
+    let file = common::scratch("angles").join("angles.csv");
+    let angle = |time_s: f64| LoggedAngle {
+        ssb: SensedSsb {
+            pci: 7,
+            ssb_index: 2,
+            time_s,
+            snr_db: 12.5,
+        },
+        measured: AngleMeasurement {
+            time_s,
+            phase_rad: 0.1,
+            phase_sigma_rad: 0.02,
+            angle_rad: 1.5,
+            snr_db: 12.5,
+            resolved: true,
+        },
+    };
+    let angles = [angle(0.0), angle(0.02)];
+    write_angle_log(&file, &angles).unwrap();
+    assert_eq!(read_angle_log(&file).unwrap().angles, angles);
+
+    let good = fs::read_to_string(&file).unwrap();
+    let bad = "0.04,1008,0,0,0.1,1,0\n0.04,1,-1,0,0.1,1,0\n0.04,1,0,0,-0.1,1,0\n0.04,1,0,0,0,1,0\n\
+               0.04,1,0,NaN,0.1,1,0\n0.04,1,0,0,inf,1,0\n0.04,1,0,,0.1,1,0\n0.04,1.5,0,0,0.1,1,0\n";
+    fs::write(&file, good + bad).unwrap();
+    let log = read_angle_log(&file).unwrap();
+    assert_eq!(log.angles, angles);
+    let lines: Vec<usize> = log.remarks.iter().map(|remark| remark.line).collect();
+    assert_eq!(lines, (4..12).collect::<Vec<_>>());
+}
+
+#[test]
+fn tum_has_eight_fields_and_comes_back() {
+    let file = common::scratch("tum").join("drive.tum");
+    let poses: Vec<_> = (0..40)
+        .map(|k| TimedPose {
+            time_s: 1_700_000_000.25 + f64::from(k) * 0.02,
+            pose: Pose {
+                x_m: f64::from(k),
+                y_m: -0.5,
+                heading_rad: -3.0 + 0.15 * f64::from(k),
+            },
+        })
+        .collect();
+    write_tum(&file, &poses).unwrap();
+    let text = fs::read_to_string(&file).unwrap();
+    assert!(
+        text.lines()
+            .all(|line| line.split(' ').count() == 8 && line == line.trim())
+    );
+    assert!(text.starts_with("1700000000.250000000 "));
+    for (read, written) in read_tum(&file).unwrap().iter().zip(&poses) {
+        assert!((read.time_s - written.time_s).abs() < 1e-6);
+        assert!(read.pose.point().distance_m(written.pose.point()) < 1e-8);
+        assert!((read.pose.heading_rad - written.pose.heading_rad).abs() < 1e-9);
+    }
+    for line in [
+        "1 2 3",
+        "1 2 3 4 5 6 7 8 9",
+        "1 x 0 0 0 0 0 1",
+        "1 2 3 0 0 0 0 0",
+    ] {
+        fs::write(&file, format!("# comment\n{line}\n")).unwrap();
+        let error = read_tum(&file).unwrap_err();
+        assert!(matches!(error, RecordingError::Value { ref key, .. } if key == "line 2"));
+    }
+}
+
+proptest! {
+    #![proptest_config(ProptestConfig::with_cases(400))]
+
+    /// Any damage to a file gives an error or what is left of it, never a panic.
+    #[test]
+    fn damage_never_panics(
+        changes in prop::collection::vec((any::<prop::sample::Index>(), any::<u8>()), 1..8),
+        cut in prop::option::of(any::<prop::sample::Index>()),
+        kind in 0..5usize,
+    ) {
+        let dir = common::scratch("damage");
+        let file = dir.join("file");
+        match kind {
+            0 => write_mcap(&file, &["/odom"], 0.1),
+            1 | 2 => {
+                write_mcap(&file, &["/odom"], 0.1);
+                let compressions = [Compression::Lz4, Compression::Zstd];
+                compress(&file, compressions[kind - 1]);
+            }
+            3 => write_odometry_csv(&file, &[sample(0.0), sample(0.1)]).unwrap(),
+            _ => write_tum(&file, &[TimedPose { time_s: 0.5, pose: Pose::default() }]).unwrap(),
+        }
+        let mut bytes = fs::read(&file).unwrap();
+        for (place, value) in changes {
+            let place = place.index(bytes.len());
+            bytes[place] = value;
+        }
+        if let Some(cut) = cut {
+            bytes.truncate(cut.index(bytes.len()));
+        }
+        fs::write(&file, bytes).unwrap();
+        let _ = read_odometry_mcap(&file, None);
+        let _ = read_odometry_csv(&file);
+        let _ = read_angle_log(&file);
+        let _ = read_tum(&file);
+    }
+}

@@ -1,0 +1,274 @@
+//! SSBs that arrive after newer odometry: on a vehicle always.
+#![allow(clippy::unwrap_used, reason = "this is a test")]
+
+use crate::common;
+use onboard::geometry::Pose;
+use onboard::localize::{PoseEstimate, UpdateReason};
+use onboard::observation::{OdometrySample, SensedSsb};
+use onboard::settings::WakeUpSettings;
+use onboard::wake_up::{Situation, WakeUpPolicy};
+use onboard::{BoxError, Custom, Onboard};
+use recording::LoggedAngle;
+use simulate::scenario::Scenario;
+use simulate::{RunRecord, Step};
+use toml::Value;
+
+use crate::common::{Burst, changed, shipped, simulation, value};
+use crate::counting::allocations;
+
+/// When the last SSB is sent before the end of a drive, in seconds.
+const SILENCE_S: f64 = 1.0;
+
+/// The beginning of a drive, with an angle to every radio head in every burst.
+struct Drive {
+    scenario: Scenario,
+    until_s: f64,
+    start: Pose,
+    odometry: Vec<OdometrySample>,
+    bursts: Vec<Vec<LoggedAngle>>,
+}
+
+impl Drive {
+    fn new(mut scenario: Scenario, until_s: f64) -> Self {
+        scenario.vehicle.wake_up = WakeUpSettings::default();
+        let (odometry, angles, record) = common::logs(&scenario, 6);
+        let same_burst = |a: &LoggedAngle, b: &LoggedAngle| a.ssb.time_s == b.ssb.time_s;
+        let bursts = angles.angles.chunk_by(same_burst).map(<[_]>::to_vec);
+        let mut odometry = odometry.samples;
+        odometry.retain(|sample| sample.time_s <= until_s);
+        Self {
+            bursts: bursts
+                .filter(|burst| burst[0].ssb.time_s < until_s - SILENCE_S)
+                .collect(),
+            start: record.steps[0].truth,
+            odometry,
+            until_s,
+            scenario,
+        }
+    }
+
+    fn onboard(&self) -> Onboard {
+        let simulation = simulation(&self.scenario);
+        let (site, vehicle) = (&self.scenario.site, &self.scenario.vehicle);
+        let platform = simulation.platform();
+        Onboard::new(site, vehicle, platform, self.start, Custom::default()).unwrap()
+    }
+
+    /// What comes in, in order: at equal times odometry before bursts.
+    fn arrivals(&self, lateness_s: impl Fn(usize) -> f64) -> Vec<Arrival<'_>> {
+        let odometry = self.odometry.iter();
+        let odometry = odometry.map(|it| (it.time_s, Arrival::Odometry(it)));
+        let bursts = self.bursts.iter().enumerate().map(|(number, burst)| {
+            let arrives_s = burst[0].ssb.time_s + lateness_s(number);
+            (arrives_s, Arrival::Burst(burst))
+        });
+        let mut all: Vec<_> = odometry.chain(bursts).collect();
+        all.sort_by(|a, b| a.0.total_cmp(&b.0));
+        all.into_iter().map(|(_, arrival)| arrival).collect()
+    }
+
+    /// The poses at all odometry from the arrival of the last SSB on.
+    fn poses(&self, lateness_s: impl Fn(usize) -> f64) -> Vec<PoseEstimate> {
+        let mut onboard = self.onboard();
+        let mut poses = Vec::new();
+        for arrival in self.arrivals(lateness_s) {
+            take(&mut onboard, &arrival);
+            if let Arrival::Odometry(sample) = arrival
+                && sample.time_s > self.until_s - SILENCE_S + 0.5
+            {
+                poses.push(onboard.pose(sample.time_s).unwrap());
+            }
+        }
+        assert!(poses.len() > 3 && onboard.searching().is_none());
+        poses
+    }
+}
+
+enum Arrival<'a> {
+    Odometry(&'a OdometrySample),
+    Burst(&'a [LoggedAngle]),
+}
+
+/// Number of angles accepted.
+fn take(onboard: &mut Onboard, arrival: &Arrival<'_>) -> usize {
+    match arrival {
+        Arrival::Odometry(sample) => {
+            onboard.odometry(sample).unwrap().unwrap();
+            0
+        }
+        Arrival::Burst(burst) => {
+            let time_s = burst[0].ssb.time_s;
+            let heard = onboard.hear(time_s, &mut Burst(burst)).unwrap();
+            let executions = heard.executions.iter();
+            executions.filter(|it| it.verdict.accepted).count()
+        }
+    }
+}
+
+fn assert_same(found: &[PoseEstimate], expected: &[PoseEstimate], what: &str) {
+    assert_eq!(found.len(), expected.len());
+    for (found, expected) in found.iter().zip(expected) {
+        let numbers = |it: &PoseEstimate| {
+            let Pose {
+                x_m,
+                y_m,
+                heading_rad,
+            } = it.pose;
+            let level_m = it.integrity.map_or(0.0, |it| it.protection_level_m);
+            let covariance = it.covariance.unwrap_or_default();
+            let mut all = vec![x_m, y_m, heading_rad, level_m];
+            all.extend(covariance.as_flattened());
+            all
+        };
+        for (found, expected) in numbers(found).iter().zip(numbers(expected)) {
+            assert!(
+                (found - expected).abs() < 1e-9,
+                "{what}: {found} {expected}"
+            );
+        }
+        let state = |it: &PoseEstimate| it.integrity.map(|it| (it.state, it.faulty));
+        assert_eq!(state(found), state(expected), "{what}");
+    }
+}
+
+fn drives() -> Vec<Drive> {
+    let mut guarded = changed("yard", [("vehicle.integrity", value("{}"))]);
+    // A radio head that is found faulty, and trusted again.
+    guarded.faults = shipped("nlos-and-faults").faults;
+    guarded.faults.truncate(1);
+    guarded.faults[0].from_s = 3.0;
+    guarded.faults[0].until_s = 6.0;
+    let no_map = [("vehicle.localizer.map", false.into())];
+    let searching = [("vehicle.start.known", false.into())];
+    vec![
+        Drive::new(shipped("paper-real-odometry-2"), 20.0),
+        Drive::new(changed("paper-real-odometry-2", no_map), 20.0),
+        Drive::new(changed("paper-real-odometry-2", searching), 30.0),
+        Drive::new(guarded, 12.0),
+        Drive::new(shipped("paper"), 20.0),
+    ]
+}
+
+#[test]
+fn late_ssbs_leave_the_pose_that_they_would_have_left_in_time() {
+    for mut drive in drives() {
+        let name = drive.scenario.name.clone();
+        for odometry_every in [1, 5] {
+            // At 50 Hz, as often as SSBs come, and at 10 Hz.
+            let mut number = 0;
+            drive.odometry.retain(|_| {
+                number += 1;
+                (number - 1) % odometry_every == 0
+            });
+            let in_time = drive.poses(|_| 0.0);
+            for late_s in [0.03, 0.1, 0.4] {
+                let every = drive.poses(|_| late_s);
+                assert_same(&every, &in_time, &format!("{name}, all {late_s} s late"));
+                let some = drive.poses(|number| if number % 10 == 0 { late_s } else { 0.0 });
+                assert_same(&some, &in_time, &format!("{name}, some {late_s} s late"));
+            }
+            let mixed = drive.poses(|number| [0.0, 0.03, 0.1, 0.4][7 * number % 4]);
+            assert_same(&mixed, &in_time, &format!("{name}, in any order"));
+        }
+    }
+}
+
+#[test]
+fn what_is_older_than_the_history_is_too_late_and_changes_nothing() {
+    for drive in drives() {
+        let mut onboard = drive.onboard();
+        let mut late = Vec::new();
+        for arrival in drive.arrivals(|number| if number == 400 { 1.0 } else { 0.0 }) {
+            match arrival {
+                Arrival::Burst(burst) if burst[0] == drive.bursts[400][0] => {
+                    let now_s = burst[0].ssb.time_s + 1.0;
+                    let before = onboard.pose(now_s).unwrap();
+                    let heard = onboard.hear(burst[0].ssb.time_s, &mut Burst(burst));
+                    let executions = heard.unwrap().executions.iter();
+                    late.extend(executions.map(|it| (it.verdict.accepted, it.verdict.reason)));
+                    assert_eq!(onboard.pose(now_s).unwrap(), before);
+                }
+                other => {
+                    take(&mut onboard, &other);
+                }
+            }
+        }
+        let expected = vec![(false, UpdateReason::TooLate); drive.bursts[400].len()];
+        assert_eq!(late, expected, "{}", drive.scenario.name);
+    }
+}
+
+#[test]
+fn late_ssbs_cost_no_allocation_once_warm() {
+    for drive in drives() {
+        let mut onboard = drive.onboard();
+        let arrivals = drive.arrivals(|number| [0.03, 0.1, 0.4][number % 3]);
+        let (warming, warm) = arrivals.split_at(arrivals.len() / 2);
+        for arrival in warming {
+            take(&mut onboard, arrival);
+        }
+        let mut accepted = 0;
+        let count = allocations(|| {
+            for arrival in warm {
+                accepted += take(&mut onboard, arrival);
+            }
+        });
+        assert_eq!(count, 0, "{}", drive.scenario.name);
+        assert!(accepted > 300, "{}: {accepted}", drive.scenario.name);
+    }
+}
+
+/// Takes every angle of the bursts sent up to a time.
+struct Until(f64);
+
+impl WakeUpPolicy for Until {
+    fn listens(&mut self, now: &Situation<'_>) -> Result<bool, BoxError> {
+        Ok(now.time_s < self.0)
+    }
+
+    fn decide(
+        &mut self,
+        _: &Situation<'_>,
+        _: &[SensedSsb],
+        chosen: &mut [bool],
+    ) -> Result<f64, BoxError> {
+        chosen.fill(true);
+        Ok(0.02)
+    }
+}
+
+#[test]
+fn a_drive_whose_ssbs_are_all_late_ends_where_it_would() {
+    for name in ["paper-real-odometry-2", "paper"] {
+        let drive = |latency_ms: f64| -> RunRecord {
+            let scenario = changed(name, [("ssb_latency_ms", Value::from(latency_ms))]);
+            let until = |_| {
+                Ok(Custom {
+                    policy: Some(Box::new(Until(30.0))),
+                    ..Custom::default()
+                })
+            };
+            simulation(&scenario).run(4, 0, &until).unwrap()
+        };
+        let in_time = drive(0.0);
+        for latency_ms in [100.0, 400.0] {
+            let late = drive(latency_ms);
+            assert_eq!(late.executions.len(), in_time.executions.len());
+            let arrived_s = 30.0 + 1e-3 * latency_ms;
+            let estimates = |record: &RunRecord| -> Vec<PoseEstimate> {
+                let after = |step: &&Step| step.time_s > arrived_s;
+                let estimate = |step: &Step| PoseEstimate {
+                    time_s: step.time_s,
+                    pose: step.estimate,
+                    covariance: step.covariance,
+                    integrity: step.integrity,
+                };
+                record.steps.iter().filter(after).map(estimate).collect()
+            };
+            let what = format!("{name}, {latency_ms} ms");
+            assert_same(&estimates(&late), &estimates(&in_time), &what);
+            // Meanwhile it knows less.
+            assert_ne!(late.steps[1000].estimate, in_time.steps[1000].estimate);
+        }
+    }
+}

@@ -1,0 +1,24 @@
+//! Simulated drives, from outside.
+
+mod allocation;
+mod arrays;
+mod bad_drives;
+mod bad_scenarios;
+mod common;
+#[path = "../../../nr-ssb/tests/all/counting/mod.rs"]
+mod counting;
+mod doors;
+mod gap;
+mod integrity;
+mod iq_fidelity;
+mod late;
+mod locate;
+mod simulated_drives;
+mod smoother;
+mod space;
+mod start;
+mod tape;
+mod tr38901;
+mod tracker;
+mod truth;
+mod wake_up;

@@ -1,0 +1,67 @@
+//! Radio heads high up and an array off the odometer's point: the tracker sees them where they are.
+#![allow(clippy::unwrap_used, clippy::print_stdout, reason = "this is a test")]
+
+use onboard::settings::{Shipped, TomlFile};
+use simulate::Consistency;
+use simulate::scenario::Scenario;
+use toml::Value;
+
+use crate::common::{campaign, changed, shipped, value};
+
+/// Heads 8 m high, and an array 1.2 m up and 0.8 m before the odometer's point.
+fn high() -> Scenario {
+    let mut changes: Vec<(String, Value)> = Vec::new();
+    for (index, head) in shipped("paper-real-odometry-4")
+        .site
+        .radio_heads
+        .iter()
+        .enumerate()
+    {
+        let [x_m, y_m, _] = head.position_m;
+        let position = value(&format!("[{x_m:?}, {y_m:?}, 8.0]"));
+        changes.push((format!("site.radio_heads[{index}].position_m"), position));
+    }
+    changes.push((
+        "vehicle.array.position_m".to_owned(),
+        value("[0.8, 0.0, 1.2]"),
+    ));
+    let changes = changes
+        .iter()
+        .map(|(key, value)| (key.as_str(), value.clone()));
+    changed("paper-real-odometry-4", changes)
+}
+
+fn drive(scenario: &Scenario) -> Consistency {
+    let found = campaign(scenario, 21, 60).consistency(50);
+    println!("{found:?}");
+    found
+}
+
+#[test]
+fn heights_and_lever_arm_are_believed_as_they_are() {
+    let high = high();
+    let found = drive(&high);
+    assert!((0.8..1.2).contains(&(found.mean_nees / 2.0)), "{found:?}");
+
+    // The same world, believed flat.
+    let (site, vehicle) = (high.site, high.vehicle);
+    let heads = site.radio_heads.iter();
+    let places = heads.map(|head| format!("{}.position_m = {:?}", head.name, head.position_m));
+    let places: Vec<String> = places.collect();
+    let truth = format!("{{ radio_heads = {{ {} }} }}", places.join(", "));
+    let flat = shipped("paper-real-odometry-4")
+        .with_overrides(
+            [
+                ("truth.site", value(&truth)),
+                (
+                    "truth.vehicle.array.position_m",
+                    value(&format!("{:?}", vehicle.array.position_m)),
+                ),
+            ],
+            &Shipped,
+        )
+        .unwrap();
+    let mistaken = drive(&flat);
+    assert!(mistaken.mean_nees > 2.0 * found.mean_nees, "{mistaken:?}");
+    assert!(mistaken.rms_m > 1.5 * found.rms_m, "{mistaken:?}");
+}

@@ -1,0 +1,172 @@
+//! Starts from scratch: the vehicle is somewhere on its road and finds out where.
+#![allow(clippy::unwrap_used, clippy::print_stdout, reason = "this is a test")]
+
+use crate::common;
+use onboard::localize::IntegrityState;
+use onboard::localize::gaussian::principal_variances;
+use onboard::settings::{Check, SettingsError, Shipped, TomlFile};
+use rand::Rng as _;
+use recording::replay::{LocatedDrive, StartChoice, locate_angles};
+use recording::{read_odometry_mcap, write_drive_mcap};
+use simulate::RunRecord;
+use simulate::random::{Purpose, Streams};
+use simulate::scenario::Scenario;
+use toml::Value;
+
+use crate::common::{changed, logs, run, shipped, value};
+
+fn unknown(name: &str) -> Scenario {
+    changed(name, [("vehicle.start.known", false.into())])
+}
+
+/// A run that begins anywhere on the road but its last 60 m.
+fn run_from_anywhere(scenario: &Scenario, seed: u64, number: u64) -> RunRecord {
+    let mut random = Streams::new(seed, number).generator(Purpose::Start, 1);
+    let share = f64::from(random.next_u32()) / f64::from(u32::MAX);
+    let road = scenario.path(Check { file: "test" }).unwrap();
+    let start_m = share * (road.length_m() - 60.0);
+    let there = [("motion.start_at_m", Value::Float(start_m))];
+    let there = scenario.with_overrides(there, &Shipped).unwrap();
+    run(&there, seed, number)
+}
+
+/// Within 2 m of the truth, and within four standard deviations.
+fn is_right(record: &RunRecord) -> bool {
+    record.found().is_some_and(|found| {
+        let (truth, estimate) = (found.step.truth.point(), found.step.estimate.point());
+        let [[xx, xy, _], [_, yy, _], _] = found.step.covariance.unwrap();
+        let [larger, _] = principal_variances(xx, xy, yy);
+        let error_m = truth.distance_m(estimate);
+        error_m < 2.0 && error_m < 4.0 * larger.sqrt()
+    })
+}
+
+#[test]
+fn a_vehicle_anywhere_on_its_road_is_found() {
+    let starts = 20;
+    let mut right = 0;
+    for name in ["paper-real-odometry-2", "yard"] {
+        let scenario = unknown(name);
+        let records = (0..starts).map(|number| run_from_anywhere(&scenario, 11, number));
+        right += records.filter(is_right).count();
+    }
+    // If 99 of 100 are right, 37 or fewer of 40 are with a probability of 0.7 %.
+    assert!(right > 37, "{right} of {}", 2 * starts);
+}
+
+#[test]
+fn while_it_searches_it_listens_always_and_vouches_for_nothing() {
+    let road = value("[{ length_m = 60.0, turn_rad = 0.05 }]");
+    let scenario = changed(
+        "paper-real-odometry-2",
+        [
+            ("vehicle.start.known", false.into()),
+            ("vehicle.integrity", value("{}")),
+            ("vehicle.wake_up.policy", "uncertainty".into()),
+            ("site.road.segments", road),
+        ],
+    );
+    let record = run(&scenario, 3, 0);
+    let found = record.found().unwrap();
+    let until = record
+        .steps
+        .iter()
+        .position(|step| !step.searching)
+        .unwrap();
+    assert!(found.step.time_s > 0.0 && until > 10, "{found:?}");
+    // Both radio heads at each SSB, whatever the policy.
+    let looked = |step: &&onboard::Execution| step.ssb.time_s < found.step.time_s;
+    assert_eq!(record.executions.iter().filter(looked).count(), 2 * until);
+    for step in &record.steps[..until] {
+        let integrity = step.integrity.unwrap();
+        assert_eq!(integrity.state, IntegrityState::Unavailable);
+        let error_m = step.truth.point().distance_m(step.estimate.point());
+        assert!(error_m < integrity.protection_level_m, "{step:?}");
+    }
+    assert!(record.steps[until..].iter().all(|step| !step.searching));
+    // Afterwards the policy decides, which does not always listen.
+    assert!(record.listened < record.steps.len());
+}
+
+#[test]
+fn what_cannot_be_found_is_refused() {
+    let refused = |name: &str, changes: &[(&str, Value)], why: &str| {
+        let changes = changes.iter().cloned();
+        let unknown = changes.chain([("vehicle.start.known", false.into())]);
+        match shipped(name).with_overrides(unknown, &Shipped) {
+            Err(SettingsError::Value { key, allowed, .. }) => {
+                assert_eq!(key, "vehicle.start.known");
+                assert!(allowed.contains(why), "{allowed}");
+            }
+            other => panic!("{other:?}"),
+        }
+    };
+    refused("paper", &[], "tracker");
+    let tracker = [("vehicle.localizer.kind", Value::from("tracker"))];
+    refused("paper", &tracker, "two radio heads");
+    let no_map = [("vehicle.localizer.map", false.into())];
+    refused("paper-real-odometry-2", &no_map, "three elsewhere");
+}
+
+/// Errors of the published poses in metres and in their own standard deviations.
+fn errors(drive: &LocatedDrive, record: &RunRecord) -> Vec<(f64, f64)> {
+    let both = drive.poses.iter().zip(&record.steps);
+    both.filter(|(pose, _)| pose.searching.is_none())
+        .map(|(pose, step)| {
+            let error_m = pose.estimate.pose.point().distance_m(step.truth.point());
+            let [larger, _] = pose.estimate.principal_variances();
+            (error_m, error_m / larger.sqrt())
+        })
+        .collect()
+}
+
+#[test]
+fn a_recorded_drive_either_way_needs_no_initial_pose() {
+    // The paper's road driven from its end to its beginning, which the site does not know.
+    let mut scenario = unknown("paper-real-odometry-2");
+    let road = scenario.path(Check { file: "test" }).unwrap();
+    let end = Value::try_from(road.reversed().pose(0.0)).unwrap();
+    let segments = value("[{ length_m = 300.0, turn_rad = -0.25 }]");
+    let against = [("site.road.start", end), ("site.road.segments", segments)];
+    let (odometry, angles, record) = logs(&changed("paper-real-odometry-2", against), 5);
+
+    scenario.vehicle.start.either_direction = true;
+    let locate = |scenario: &Scenario| {
+        let (site, vehicle) = (&scenario.site, &scenario.vehicle);
+        locate_angles(site, vehicle, StartChoice::AsSet, &odometry, &angles, false).unwrap()
+    };
+    assert_eq!(scenario.vehicle.start.pose, None);
+    let drive = locate(&scenario);
+    let errors = errors(&drive, &record);
+    // Found within a few metres of 300, and from then on as good as the tracker says.
+    assert!(
+        errors.len() * 10 > drive.poses.len() * 8,
+        "{}",
+        errors.len()
+    );
+    let worst = errors
+        .iter()
+        .fold(0.0, |most: f64, error| most.max(error.1));
+    assert!(worst < 4.5, "{worst}");
+    let rms_m =
+        (errors.iter().map(|error| error.0.powi(2)).sum::<f64>() / errors.len() as f64).sqrt();
+    println!(
+        "found after {} epochs, RMS {rms_m:.3} m from there",
+        drive.poses.len() - errors.len()
+    );
+
+    // Who takes the road for one-way cannot find the vehicle there, and says so; who is right is
+    // sure of it to the end.
+    assert!(!drive.poses.last().unwrap().is_lost);
+    scenario.vehicle.start.either_direction = false;
+    let misled = locate(&scenario);
+    let lost = misled.poses.iter().filter(|it| it.is_lost).count();
+    println!("{lost} poses of {} known to be lost", misled.poses.len());
+    assert!(lost * 20 > misled.poses.len());
+
+    // No pose is published before there is one.
+    let dir = common::scratch("start-mcap");
+    write_drive_mcap(&dir.join("drive.mcap"), &drive).unwrap();
+    let published = read_odometry_mcap(&dir.join("drive.mcap"), None).unwrap();
+    assert_eq!(published.samples.len(), errors.len());
+}
