@@ -1,7 +1,5 @@
 //! Arrays of any shape: azimuth and elevation, their bound, measured manifolds.
 
-#![allow(clippy::unwrap_used, clippy::print_stdout, reason = "this is a test")]
-
 use std::f64::consts::{FRAC_PI_2, PI, TAU};
 
 use crate::common::Random;

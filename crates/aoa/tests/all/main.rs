@@ -1,4 +1,5 @@
 //! The estimators, as whoever uses the crate meets them.
+#![allow(clippy::print_stdout, clippy::unwrap_used, reason = "these are tests")]
 
 mod arrays;
 mod bad_input;

@@ -1,5 +1,4 @@
 //! Several sources.
-#![allow(clippy::unwrap_used, reason = "this is a test")]
 
 use crate::common::{METHODS, Random, exact};
 use aoa::{

@@ -1,5 +1,4 @@
 //! Channels whose noise differs, or that are dead.
-#![allow(clippy::unwrap_used, reason = "this is a test")]
 
 use crate::common::Random;
 use aoa::{

@@ -1,5 +1,4 @@
 //! A receiver that runs for years allocates nothing once its buffers have grown.
-#![allow(clippy::unwrap_used, reason = "this is a test")]
 
 use crate::air;
 use nr_ssb::search::{SearchConfig, Searcher};

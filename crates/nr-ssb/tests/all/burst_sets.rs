@@ -1,5 +1,4 @@
 //! How many SSBs a cell has, and which of them one is: Lmax 4, 8 and 64.
-#![allow(clippy::unwrap_used, reason = "this is a test")]
 
 use crate::air::{Cell, add_noise, raised, rng, silence, slices};
 use nr_ssb::raster::scan_raster;

@@ -1,5 +1,4 @@
 //! Real recordings: the raster point, the spacing and every cell that independent receivers found.
-#![allow(clippy::unwrap_used, clippy::print_stdout, reason = "this is a test")]
 
 use crate::recordings;
 use nr_ssb::raster::scan;

@@ -1,6 +1,5 @@
 //! Clocks that differ: over every burst period and spacing, up to 20 ppm, the beam that is named
 //! is the beam that was sent, its SNR is told right, and no search is needed once it is tracked.
-#![allow(clippy::unwrap_used, clippy::print_stdout, reason = "this is a test")]
 
 use crate::air;
 use nr_ssb::search::{SearchConfig, Searcher};

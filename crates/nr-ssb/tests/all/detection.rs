@@ -1,5 +1,4 @@
 //! How often SSBs are found and decoded in noise, and how often noise is taken for one.
-#![allow(clippy::unwrap_used, clippy::print_stdout, reason = "this is a test")]
 
 use crate::air;
 use crate::noise_only;

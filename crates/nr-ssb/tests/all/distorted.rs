@@ -1,5 +1,4 @@
 //! Strong cells that come distorted, or with a stronger PSS, leave nothing that looks like another cell.
-#![allow(clippy::unwrap_used, clippy::print_stdout, reason = "this is a test")]
 
 use crate::air;
 use std::f32::consts::SQRT_2;

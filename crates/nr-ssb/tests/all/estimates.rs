@@ -1,5 +1,4 @@
 //! How exact the search's estimates are, and what it says to bad input.
-#![allow(clippy::unwrap_used, clippy::print_stdout, reason = "this is a test")]
 
 use crate::air;
 use std::f64::consts::TAU;

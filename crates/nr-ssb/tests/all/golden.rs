@@ -1,7 +1,6 @@
 //! Conformity to the standard, wherever the crate is tested: vectors that `golden/make.py` wrote
 //! from the standard's text, and that agree with those of three other encoders.
 //! `golden/mutate.py`, run by hand, shows that each table and sequence, broken, is caught here.
-#![allow(clippy::unwrap_used, reason = "this is a test")]
 
 use nr_ssb::burst::ssb_grid;
 use nr_ssb::crc::crc24c;

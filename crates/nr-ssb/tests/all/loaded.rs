@@ -1,5 +1,4 @@
 //! Cells beside a loaded neighbour, and strong ones whose message is spoilt.
-#![allow(clippy::unwrap_used, clippy::print_stdout, reason = "this is a test")]
 
 use crate::air;
 use nr_ssb::search::{SearchConfig, Searcher};

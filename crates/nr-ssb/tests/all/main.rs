@@ -1,4 +1,10 @@
 //! The SSB chain, as whoever uses the crate meets it.
+#![allow(
+    clippy::expect_used,
+    clippy::print_stdout,
+    clippy::unwrap_used,
+    reason = "these are tests"
+)]
 
 mod air;
 mod allocation;

@@ -1,5 +1,4 @@
 //! SSBs off the synchronization raster, and recordings that do not state their centre.
-#![allow(clippy::unwrap_used, clippy::print_stdout, reason = "this is a test")]
 
 use crate::air;
 use crate::recordings;

@@ -1,12 +1,5 @@
 //! Statistics of PBCH decoding in noise.
 
-#![allow(
-    clippy::unwrap_used,
-    clippy::expect_used,
-    clippy::print_stdout,
-    reason = "a test"
-)]
-
 use crate::noisy::{block_errors, noisy_llr, random_payload};
 use nr_ssb::pbch::{self, Decoder, Period};
 use nr_ssb::{Lmax, Pci};

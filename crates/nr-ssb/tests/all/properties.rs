@@ -1,7 +1,5 @@
 //! Properties over random cells, and decoding of rubbish.
 
-#![allow(clippy::unwrap_used, reason = "a test")]
-
 use nr_ssb::burst::ssb_grid;
 use nr_ssb::grid::{dmrs_indices, pbch_indices};
 use nr_ssb::pbch::{self, Decoder, Period};

@@ -1,5 +1,4 @@
 //! The receiver as a whole: a stream of samples in blocks of any length, SSBs out.
-#![allow(clippy::unwrap_used, reason = "this is a test")]
 
 use crate::air::{Cell, add_noise, raised, rng, silence};
 use nr_ssb::receiver::{HeardSsb, Receiver, ReceiverConfig};

@@ -1,5 +1,4 @@
 //! Streams: SSBs across block borders, several cells on one point, periods combined.
-#![allow(clippy::unwrap_used, clippy::print_stdout, reason = "this is a test")]
 
 use crate::air;
 use nr_ssb::SubcarrierSpacing;

@@ -1,5 +1,4 @@
 //! Tracking a known cell: timing, frequency, beams, despread pilots, loss and reacquisition.
-#![allow(clippy::unwrap_used, clippy::print_stdout, reason = "this is a test")]
 
 use crate::air;
 use nr_ssb::search::{DetectedSsb, SearchConfig, SearchError, Searcher};

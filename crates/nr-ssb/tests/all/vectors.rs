@@ -2,8 +2,6 @@
 //! They lie beside the project, so that these tests run on demand (`--include-ignored`); what must
 //! hold everywhere is in `golden.rs`.
 
-#![allow(clippy::unwrap_used, clippy::expect_used, reason = "a test")]
-
 use crate::common;
 use crate::common::{Vectors, cells, pack};
 use nr_ssb::burst::ssb_grid;

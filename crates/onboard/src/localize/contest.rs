@@ -16,6 +16,9 @@ const LEAST_WAY_M: f64 = 0.5;
 /// After this time with angles and without a find it has listened for long (s).
 const PATIENCE_S: f64 = 20.0;
 
+/// After this way a silent search beside a tracker that hears now and then has listened for long (m).
+const LONG_WAY_M: f64 = 100.0;
+
 /// Looks at one radio head within this time share their errors, and who has not heard anything for so
 /// long does not listen (s).
 const LOOK_S: f64 = 1.0;
@@ -129,6 +132,11 @@ impl Contest {
     /// Whether enough way was driven to believe it.
     pub fn has_moved(&self) -> bool {
         self.way_m >= LEAST_WAY_M
+    }
+
+    /// Whether it was a long way.
+    pub fn has_moved_far(&self) -> bool {
+        self.way_m > LONG_WAY_M
     }
 
     /// Tells of it from the newest odometry on, and begins to be patient anew.

@@ -3,6 +3,8 @@
 //! As long as angles come from where the tracker expects them, this only watches. When most of them
 //! do not, the position is declared unavailable, and a search runs beside the tracker: about where it
 //! believes to be first, then wherever radio heads are, or along all of the road where there is one.
+//! Where errors that stay are found but rare, the first angles of one are off as if it were lost: there the
+//! search runs silently.
 //! A place in the plane that was given is a hypothesis like others: from the first angle on a search
 //! about it runs silently, until it has found the same place, has listened for long, or speaks against it.
 //! What the search finds takes over only if it foretells the same angles better than the tracker
@@ -114,15 +116,17 @@ impl Recovery {
 
     /// Begins to search, ends it, or goes on.
     fn judge(&mut self, now_s: f64) {
+        let is_silent = self.setup.config.may_be_misled();
         let Some(contest) = &mut self.contest else {
             if self.watch.is_lost() && now_s >= self.rests_until_s {
-                self.contest = self.begin(now_s, false);
+                self.contest = self.begin(now_s, false, is_silent);
             }
             return;
         };
         let is_ahead = contest.is_ahead();
         let odometry_s = self.tracked.tracker().time_s();
-        if contest.is_silent() && (is_ahead && contest.has_moved() || self.watch.is_lost()) {
+        let is_refuted = self.watch.is_lost() && !is_silent;
+        if contest.is_silent() && (is_ahead && contest.has_moved() || is_refuted) {
             contest.tell(odometry_s);
         }
         if contest.told_s == Some(odometry_s) {
@@ -135,23 +139,25 @@ impl Recovery {
         if is_ahead && !contest.has_moved() {
             return;
         }
-        let is_over = is_sure || (contest.is_silent() && contest.is_patient());
+        let is_long = contest.is_patient() || (is_silent && contest.has_moved_far());
+        let is_over = is_sure || (contest.is_silent() && is_long);
         if is_ahead && let Some(found) = contest.initialiser.found() {
             self.take(found, now_s);
         } else if is_over || (!is_ahead && contest.initialiser.found().is_some()) {
             // What is found elsewhere, if anything, is no better.
-            if !contest.is_silent() {
+            if !contest.is_silent() || is_silent {
                 self.rests_until_s = now_s + REST_S;
                 self.watch.reset();
             }
             self.contest = None;
         } else if !contest.is_wide && contest.is_patient() {
-            self.contest = self.begin(now_s, true);
+            self.contest = self.begin(now_s, true, false);
         }
     }
 
-    /// A search nearby, or wherever radio heads are: at once where that is no more to look at.
-    fn begin(&self, now_s: f64, is_wide: bool) -> Option<Contest> {
+    /// A search nearby, or wherever radio heads are: at once where that is no more to look at. Of a
+    /// silent one nobody is told.
+    fn begin(&self, now_s: f64, is_wide: bool, is_silent: bool) -> Option<Contest> {
         let setup = &self.setup;
         let (config, heads) = (setup.config, setup.heads.as_slice());
         let mut initialiser = match &setup.road {
@@ -169,7 +175,11 @@ impl Recovery {
             }
         };
         initialiser.resume(self.tracked.tracker());
-        Some(Contest::new(initialiser, self.tracked.tracker(), is_wide))
+        let mut contest = Contest::new(initialiser, self.tracked.tracker(), is_wide);
+        if is_silent {
+            contest.told_s = None;
+        }
+        Some(contest)
     }
 
     fn take(&mut self, found: Tracker, now_s: f64) {
@@ -203,10 +213,7 @@ impl Localizer for Recovery {
         measured: &AngleMeasurement,
     ) -> Result<UpdateVerdict, BoxError> {
         if std::mem::take(&mut self.is_to_confirm) {
-            self.contest = self.begin(measured.time_s, false);
-            if let Some(contest) = &mut self.contest {
-                contest.told_s = None;
-            }
+            self.contest = self.begin(measured.time_s, false, true);
         }
         if let Some(contest) = &mut self.contest {
             contest.update(self.tracked.tracker(), head, measured);

@@ -33,7 +33,7 @@ pub struct IntegritySettings {
 pub struct FaultProbability {
     /// Of each radio head: moved, spoofed, without line of sight. A tracker does without it. 0.02 if not
     /// given, and 1e-3 where errors that stay over metres are found while driving
-    /// (`receiver.phase_bias_adapts`): what hides a radio head is found there.
+    /// (`receiver.phase_bias_probability`): what hides a radio head is found there.
     #[serde(skip_serializing_if = "Option::is_none")]
     #[schemars(range(min = 1e-9, max = 0.5))]
     pub radio_head: Option<f64>,

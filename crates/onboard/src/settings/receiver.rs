@@ -43,11 +43,13 @@ pub struct ReceiverSettings {
     #[serde(skip_serializing_if = "Option::is_none")]
     #[schemars(range(min = 0.0, max = 1.0))]
     pub phase_bias_share: Option<f64>,
-    /// Whether an error of each radio head's angles that stays over metres, as reflections make it,
-    /// is found while driving, beside what is stated; yes for logged angles on a road vehicle of
-    /// which no such error is stated, otherwise no.
+    /// How probable it is that a radio head's angles are off by an error that stays over metres, as
+    /// reflections make it, before any is heard; it is then found while driving, beside what is stated.
+    /// 0.75 for logged angles on a road vehicle of which no such error is stated; otherwise 0, and
+    /// none is found.
     #[serde(skip_serializing_if = "Option::is_none")]
-    pub phase_bias_adapts: Option<bool>,
+    #[schemars(range(min = 0.0, max = 1.0))]
+    pub phase_bias_probability: Option<f64>,
     /// Time over which that error is forgotten, in seconds, provided that the vehicle moves.
     #[schemars(range(min = 1e-3, max = 1e9))]
     pub phase_bias_correlation_s: f64,
@@ -72,7 +74,7 @@ impl Default for ReceiverSettings {
             lateness_std_s: None,
             phase_bias_std_rad: 0.0,
             phase_bias_share: None,
-            phase_bias_adapts: None,
+            phase_bias_probability: None,
             phase_bias_correlation_s: 1.0,
             phase_bias_correlation_m: 0.3,
             pci_allow_list: None,

@@ -96,13 +96,11 @@ impl UncertaintyDriven {
         }
         let mut belief = tracker.forecast(time_s);
         let ahead_m = tracker.speed_mps() * (time_s - tracker.time_s()).max(0.0);
-        let spread = |belief: &Belief| {
-            let later = tracker.carry(*belief, LOOK_AHEAD_M);
-            Tracker::principal_variances(&later).iter().sum::<f64>()
-        };
+        let ahead = tracker.transition(&belief, LOOK_AHEAD_M);
+        let spread = |belief: &Belief| ahead.principal_variances(belief).iter().sum::<f64>();
+        let next = tracker.transition(&belief, tracker.speed_mps() * self.period_s);
         let keeps = |belief: &Belief| {
-            let next = tracker.carry(*belief, tracker.speed_mps() * self.period_s);
-            self.quantile.radius(Tracker::principal_variances(&next)) <= self.bound_m
+            self.quantile.radius(next.principal_variances(belief)) <= self.bound_m
         };
         let before = spread(&belief);
         let (mut taken, mut best, mut most_m2) = (0u64, 0u64, 0.0);

@@ -1,5 +1,4 @@
 //! A vehicle with two driven wheels.
-#![allow(clippy::unwrap_used, reason = "this is a test")]
 
 use onboard::geometry::Pose;
 use onboard::localize::built_in;

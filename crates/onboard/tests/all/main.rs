@@ -1,4 +1,5 @@
 //! What runs on the vehicle, from outside.
+#![allow(clippy::print_stdout, clippy::unwrap_used, reason = "these are tests")]
 
 #[path = "../../../nr-ssb/tests/all/air/mod.rs"]
 mod air;

@@ -1,5 +1,4 @@
 //! Random drives of any kind: no number is lost, no variance negative, no position leaps.
-#![allow(clippy::unwrap_used, reason = "this is a test")]
 
 use std::f64::consts::PI;
 use std::fmt::Write as _;

@@ -1,5 +1,4 @@
 //! The receiver over seconds: clocks that differ, sleep, beams that vanish and return.
-#![allow(clippy::unwrap_used, clippy::print_stdout, reason = "this is a test")]
 
 use crate::air;
 use nr_ssb::{Complex32, Lmax, SubcarrierSpacing};

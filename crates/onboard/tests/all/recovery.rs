@@ -1,5 +1,4 @@
 //! A vehicle that was told wrongly where it starts finds back.
-#![allow(clippy::unwrap_used, reason = "this is a test")]
 
 use std::f64::consts::{FRAC_PI_2, PI};
 

@@ -1,5 +1,4 @@
 //! Sites and vehicles as files: what they may be like, what is laid over what, and what is refused.
-#![allow(clippy::unwrap_used, reason = "this is a test")]
 
 use onboard::receive::ReceiverConfig;
 use onboard::settings::{

@@ -1,5 +1,4 @@
 //! The tracker on input that no drive should bring.
-#![allow(clippy::unwrap_used, reason = "this is a test")]
 
 use std::sync::Arc;
 
@@ -200,4 +199,18 @@ fn a_gap_loses_time_and_a_jump_loses_certainty() {
     assert!((jump.pose(2.1).pose.x_m - 8.4).abs() < 0.05);
     let variance = |tracker: &Tracker| tracker.pose(2.1).principal_variances()[0];
     assert!(variance(&jump) > variance(&gap) + 1.0);
+}
+
+#[test]
+fn a_transition_makes_of_a_covariance_what_driving_on_makes_of_it() {
+    let (tracker, _) = tracker();
+    let belief = *tracker.belief();
+    for way_m in [0.0, 0.2, 4.0, 30.0] {
+        let found = (tracker.transition(&belief, way_m)).principal_variances(&belief);
+        let expected = Tracker::principal_variances(&tracker.carry(belief, way_m));
+        for (found, expected) in found.into_iter().zip(expected) {
+            let ratio = found / expected;
+            assert!((ratio - 1.0).abs() < 1e-9, "{way_m} m: {ratio}");
+        }
+    }
 }

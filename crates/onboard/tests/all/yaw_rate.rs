@@ -1,5 +1,4 @@
 //! What a good gyroscope tells: in bends, and where its samples are lost.
-#![allow(clippy::unwrap_used, reason = "this is a test")]
 
 use std::f64::consts::TAU;
 use std::sync::Arc;

@@ -11,6 +11,9 @@ use crate::angle_log::LoggedAngle;
 /// cameras and a laser, whose data sheets are cautious, it is 0.08 to 0.2.
 const USUAL_SHARE: f64 = 0.25;
 
+/// Probability that errors stay over metres where nobody knows of scatter.
+const UNKNOWN: f64 = 0.75;
+
 /// Rician K (dB) of no scatter.
 const NO_SCATTER_DB: f64 = 200.0;
 
@@ -28,8 +31,8 @@ pub fn as_stated(site: &Site, vehicle: &Vehicle) -> (Site, Vehicle) {
     // A differential drive is as often lost as its angles are off by reflections, and would take the
     // one for the other.
     let is_unstated = receiver.phase_bias_share.is_none() && receiver.phase_bias_std_rad == 0.0;
-    let adapts = is_unstated && vehicle.drive == DriveKind::Road;
-    receiver.phase_bias_adapts.get_or_insert(adapts);
+    let may_be_found = is_unstated && vehicle.drive == DriveKind::Road;
+    (receiver.phase_bias_probability).get_or_insert(if may_be_found { UNKNOWN } else { 0.0 });
     receiver.phase_bias_share.get_or_insert(USUAL_SHARE);
     (site, vehicle)
 }

@@ -1,4 +1,5 @@
 //! Recordings and recorded drives, from outside.
+#![allow(clippy::print_stdout, clippy::unwrap_used, reason = "these are tests")]
 
 mod common;
 mod recorded_drives;

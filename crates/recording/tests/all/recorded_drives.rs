@@ -1,6 +1,5 @@
 //! Odometry, angles and trajectories: what is written is read again; bad items are reported one by
 //! one and the rest is kept.
-#![allow(clippy::unwrap_used, clippy::print_stdout, reason = "this is a test")]
 
 use crate::common;
 use std::fs::{self, File};

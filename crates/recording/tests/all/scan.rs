@@ -1,5 +1,4 @@
 //! Scanning recordings: the real ones, and every kind of unsuitable one.
-#![allow(clippy::unwrap_used, clippy::print_stdout, reason = "this is a test")]
 
 use crate::common;
 use nr_ssb::diagnose::Fault;

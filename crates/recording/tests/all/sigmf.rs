@@ -1,5 +1,4 @@
 //! SigMF: what is written is read again; every kind of damage has its own error; nothing panics.
-#![allow(clippy::unwrap_used, clippy::print_stdout, reason = "this is a test")]
 
 use crate::common;
 use std::fs;

@@ -1,5 +1,4 @@
 //! A vehicle that drives for years allocates nothing once under way.
-#![allow(clippy::unwrap_used, clippy::print_stdout, reason = "this is a test")]
 
 use std::f64::consts::PI;
 
@@ -23,7 +22,7 @@ fn the_counter_counts() {
 #[test]
 fn a_drive_under_way_allocates_nothing() {
     let guarded = || ("vehicle.integrity", value("{}"));
-    let adapts = ("vehicle.receiver.phase_bias_adapts", value("true"));
+    let adapts = ("vehicle.receiver.phase_bias_probability", value("0.1"));
     // A bound that every angle is demanded for.
     let mut demanding = shipped("yard");
     demanding.vehicle.wake_up = WakeUpSettings::Uncertainty(UncertaintySettings {

@@ -1,5 +1,4 @@
 //! Arrays that are not in a row, through the whole chain.
-#![allow(clippy::unwrap_used, clippy::print_stdout, reason = "this is a test")]
 
 use num_complex::Complex64;
 use onboard::geometry::wrap_angle;

@@ -1,6 +1,5 @@
 //! Recorded drives with something wrong in them: each item is named in what comes out, and the pose
 //! goes on as if it had not been there.
-#![allow(clippy::unwrap_used, clippy::print_stdout, reason = "this is a test")]
 
 use crate::common;
 use std::fs;

@@ -1,5 +1,4 @@
 //! Every kind of unusable scenario: which error, which key, and what it says is allowed.
-#![allow(clippy::unwrap_used, reason = "this is a test")]
 
 use onboard::settings::{SettingsError, Shipped, TomlFile};
 use recording::{Files, load};

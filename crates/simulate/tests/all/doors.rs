@@ -1,5 +1,4 @@
 //! The user's own code in place of parts of the pipeline and of the world, and arrays of other sizes.
-#![allow(clippy::unwrap_used, clippy::print_stdout, reason = "this is a test")]
 
 use crate::common;
 use std::f64::consts::{PI, TAU};

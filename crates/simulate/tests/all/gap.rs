@@ -1,6 +1,5 @@
 //! A drive through a stretch of road that was not surveyed: what the map gives there is a guess,
 //! and the road leaves it by metres.
-#![allow(clippy::unwrap_used, reason = "this is a test")]
 
 use crate::common;
 use onboard::settings::{Shipped, TomlFile};

@@ -4,7 +4,6 @@
 //! `cargo run --release -p simulate --example integrity_table` counts them over millions. Here a
 //! few runs are held to what chance allows for their number: the epochs of a run hang together over
 //! tens of seconds, a run being worth about eight of them.
-#![allow(clippy::unwrap_used, reason = "this is a test")]
 
 use crate::common;
 use onboard::localize::IntegrityState;

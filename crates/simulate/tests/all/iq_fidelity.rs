@@ -1,5 +1,4 @@
 //! `fidelity = "iq"` agrees with `fidelity = "snapshots"`, and its receiver keeps the cells.
-#![allow(clippy::unwrap_used, clippy::print_stdout, reason = "this is a test")]
 
 use crate::common;
 use std::f64::consts::TAU;

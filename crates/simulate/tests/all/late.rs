@@ -1,5 +1,4 @@
 //! SSBs that arrive after newer odometry: on a vehicle always.
-#![allow(clippy::unwrap_used, reason = "this is a test")]
 
 use crate::common;
 use onboard::geometry::Pose;

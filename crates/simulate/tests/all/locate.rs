@@ -1,5 +1,4 @@
 //! From a scenario to a recorded drive and back to where the vehicle was.
-#![allow(clippy::unwrap_used, clippy::print_stdout, reason = "this is a test")]
 
 use crate::common;
 use std::path::Path;

@@ -1,4 +1,10 @@
 //! Simulated drives, from outside.
+#![allow(
+    clippy::expect_used,
+    clippy::print_stdout,
+    clippy::unwrap_used,
+    reason = "these are tests"
+)]
 
 mod allocation;
 mod arrays;

@@ -1,6 +1,5 @@
 //! Whole simulated drives: what they cost, that they repeat to the bit, and that the user's own code
 //! takes part in them.
-#![allow(clippy::unwrap_used, reason = "this is a test")]
 
 use crate::common;
 use std::f64::consts::PI;

@@ -1,5 +1,4 @@
 //! The smoother on simulated drives: better than the filter, and as good as it says.
-#![allow(clippy::unwrap_used, clippy::print_stdout, reason = "this is a test")]
 
 use onboard::localize::PoseEstimate;
 use recording::replay::{LocatedDrive, StartChoice, locate_angles};

@@ -1,5 +1,4 @@
 //! Radio heads high up and an array off the odometer's point: the tracker sees them where they are.
-#![allow(clippy::unwrap_used, clippy::print_stdout, reason = "this is a test")]
 
 use onboard::settings::{Shipped, TomlFile};
 use simulate::Consistency;

@@ -1,5 +1,4 @@
 //! Starts from scratch: the vehicle is somewhere on its road and finds out where.
-#![allow(clippy::unwrap_used, clippy::print_stdout, reason = "this is a test")]
 
 use crate::common;
 use onboard::localize::IntegrityState;

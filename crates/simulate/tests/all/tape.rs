@@ -1,5 +1,4 @@
 //! Drives from tape are the drives themselves, to the last bit.
-#![allow(clippy::unwrap_used, clippy::expect_used, reason = "this is a test")]
 
 use onboard::settings::{EstimatorMethod, TomlFile};
 use recording::Files;

@@ -1,5 +1,4 @@
 //! The channels of TR 38.901: against another implementation's, along a drive, and as samples.
-#![allow(clippy::unwrap_used, clippy::print_stdout, reason = "this is a test")]
 
 use crate::common;
 use std::collections::BTreeMap;

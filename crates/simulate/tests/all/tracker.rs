@@ -1,5 +1,4 @@
 //! The tracker on simulated drives.
-#![allow(clippy::unwrap_used, reason = "this is a test")]
 
 use onboard::localize::tracker::Calibration;
 use onboard::settings::{ArraySettings, GyroscopeSettings};

@@ -1,5 +1,4 @@
 //! How the world departs from what is believed of it.
-#![allow(clippy::unwrap_used, reason = "this is a test")]
 
 use crate::common;
 use std::f64::consts::PI;

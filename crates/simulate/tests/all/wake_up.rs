@@ -1,5 +1,4 @@
 //! The uncertainty-driven wake-up on simulated drives: what it saves, and that it keeps its bound.
-#![allow(clippy::unwrap_used, reason = "this is a test")]
 
 use crate::common;
 use onboard::localize::RadialQuantile;

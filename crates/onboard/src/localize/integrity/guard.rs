@@ -223,7 +223,7 @@ impl Guard {
     ) -> impl Iterator<Item = (&'a Tracker, Hypothesis)> + Clone {
         let told = bank.main().pose(time_s);
         let noise_ratio = bank.noise_ratio();
-        let finds_errors = bank.main().config().finds_errors;
+        let finds_errors = bank.main().config().finds_errors();
         let head_probability = (self.config.fault_probability).of_radio_head(finds_errors);
         let heads = (bank.without_one()).map(move |clean| (head_probability, clean));
         let negligible = NEGLIGIBLE * self.config.risk;

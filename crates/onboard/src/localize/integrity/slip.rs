@@ -4,7 +4,7 @@
 //! off its wheels may slip, and no leap of the speed tells; so they may whenever one does. From then on
 //! each angle speaks for it or against it, as the one tracker or the other foretells it better. Until
 //! the angles have spoken against it, the level is to hold for that tracker too. Where errors are found
-//! that stay over metres, they are what slip would be taken for.
+//! that stay over metres, an angle speaks as the errors that either tracker has found foretell it.
 
 use std::f64::consts::TAU;
 
@@ -57,7 +57,7 @@ impl Slip {
         let stood = std::mem::replace(&mut self.stands, sample.speed_mps == 0.0);
         let sets_off = stood && !self.stands;
         let leapt = self.tracker.leapt();
-        if sound.config().finds_errors || !(sets_off || leapt > 0.0) {
+        if !(sets_off || leapt > 0.0) {
             return;
         }
         if self.evidence < 0.0 {
@@ -82,16 +82,24 @@ impl Slip {
         let if_slipping = self.tracker.look(head, measured);
         let if_sound = sound.look(head, measured);
         if measured.resolved
-            && !sound.config().finds_errors
             && let (Ok(slips), Ok(holds)) = (&if_slipping, &if_sound)
             && !(slips.excluded || holds.excluded)
         {
-            let at_first = |by: &Tracker, seen| by.first_variance(seen) + by.lasting_variance(seen);
-            let ratio = density(slips, noise_ratio * at_first(&self.tracker, slips))
-                / density(holds, noise_ratio * at_first(sound, holds));
-            // What is seen again and again speaks once.
-            let share = at_first(sound, holds) / holds.innovation.measurement_variance;
-            self.evidence = (self.evidence + share * ratio.ln()).clamp(-SURE, SURE);
+            let for_slip = if let (Some(slips), Some(holds)) =
+                (self.tracker.pasts(slips), sound.pasts(holds))
+            {
+                // They know of each other what repeats itself.
+                (or_outlier(slips.density) / or_outlier(holds.density)).ln()
+            } else {
+                let at_first =
+                    |by: &Tracker, seen| by.first_variance(seen) + by.lasting_variance(seen);
+                let ratio = density(slips, noise_ratio * at_first(&self.tracker, slips))
+                    / density(holds, noise_ratio * at_first(sound, holds));
+                // What is seen again and again speaks once.
+                let share = at_first(sound, holds) / holds.innovation.measurement_variance;
+                share * ratio.ln()
+            };
+            self.evidence = (self.evidence + for_slip).clamp(-SURE, SURE);
         }
         self.tracker.take(if_slipping, measured);
         sound.take(if_sound, measured)
@@ -118,7 +126,12 @@ impl Slip {
 fn density(looked: &Look, measurement_variance: f64) -> f64 {
     let mut seen = looked.innovation;
     seen.variance += measurement_variance - seen.measurement_variance;
-    OUTLIERS / TAU + (1.0 - OUTLIERS) * seen.density()
+    or_outlier(seen.density())
+}
+
+/// The same of an angle that may be an outlier.
+fn or_outlier(density: f64) -> f64 {
+    OUTLIERS / TAU + (1.0 - OUTLIERS) * density
 }
 
 #[cfg(test)]

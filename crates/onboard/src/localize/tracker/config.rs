@@ -78,8 +78,8 @@ pub struct TrackerConfig {
     pub lateness_std_s: f64,
     /// The error of an angle that stays from look to look.
     pub phase_bias: PhaseBias,
-    /// Whether errors that stay over metres are found while driving.
-    pub finds_errors: bool,
+    /// How probable an error is that stays over metres, and is found while driving; 0 where none is.
+    pub error_probability: f64,
     /// Time between odometry samples above which they are reported as a gap (s).
     pub gap_s: f64,
     /// Speed that no odometry sample can exceed (m/s).
@@ -268,10 +268,21 @@ impl TrackerConfig {
                 correlation_s: receiver.phase_bias_correlation_s,
                 correlation_m: receiver.phase_bias_correlation_m,
             },
-            finds_errors: receiver.phase_bias_adapts.unwrap_or(false),
+            error_probability: receiver.phase_bias_probability.unwrap_or(0.0),
             gap_s: 5.0 / odometer.rate_hz,
             top_speed_mps: 1.5 * vehicle.top_speed_mps(),
         }
+    }
+
+    /// Whether errors that stay over metres are found while driving.
+    pub const fn finds_errors(&self) -> bool {
+        self.error_probability > 0.0
+    }
+
+    /// Whether an error that stays is found, but so rare that its first angles are off as if the vehicle
+    /// were lost.
+    pub fn may_be_misled(&self) -> bool {
+        self.finds_errors() && self.error_probability < 0.5
     }
 
     /// Variance (rad²) by scatter of an angle `travelled_m` after the radio head's last one, see

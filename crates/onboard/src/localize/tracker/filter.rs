@@ -132,7 +132,7 @@ impl Tracker {
             map,
             heads: heads.iter().map(head).collect(),
             belief,
-            errors: StayingErrors::new(if config.finds_errors { heads.len() } else { 0 }),
+            errors: StayingErrors::new(heads.len(), config.error_probability),
             odometry: None,
             driven_m: 0.0,
             turned_rad: 0.0,

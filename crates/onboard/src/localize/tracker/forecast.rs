@@ -8,8 +8,9 @@ use super::locate::locate;
 use super::look::Look;
 use super::motion::Reading;
 use super::sighting::Sighting;
-use super::state::Belief;
-use crate::localize::gaussian::{Innovation, principal_variances};
+use super::state::{Belief, STATES};
+use super::staying_error;
+use crate::localize::gaussian::{Innovation, Matrix, identity, principal_variances, product};
 use crate::localize::measurement::{AngleMeasurement, UpdateReason};
 use crate::radio_head::RadioHead;
 
@@ -30,6 +31,29 @@ pub(in crate::localize) struct Rehearsal {
     pub first_variance: f64,
     /// Distance driven, in wavelengths.
     pub place_wavelengths: f64,
+}
+
+/// How driving on, nothing being heard, makes a covariance `Φ P Φᵀ + Q`.
+#[derive(Clone, Debug)]
+pub struct Transition {
+    jacobian: Matrix<STATES>,
+    noise: Matrix<STATES>,
+}
+
+impl Transition {
+    /// Variances of a belief's horizontal error after it, along the principal axes, larger first (m²).
+    pub fn principal_variances(&self, belief: &Belief) -> [f64; 2] {
+        let [first, second] = [self.jacobian[0], self.jacobian[1]];
+        let with_second = belief.cross(&second);
+        let along = |row: &[f64; STATES], cross: &[f64; STATES]| -> f64 {
+            row.iter().zip(cross).map(|(a, b)| a * b).sum()
+        };
+        principal_variances(
+            belief.variance_along(&first) + self.noise[0][0],
+            along(&first, &with_second) + self.noise[0][1],
+            along(&second, &with_second) + self.noise[1][1],
+        )
+    }
 }
 
 impl Tracker {
@@ -77,7 +101,7 @@ impl Tracker {
     ) -> Option<Rehearsal> {
         let looked = self.look(head, measured).ok()?;
         self.heads.get_mut(looked.head)?.last_look_m = looked.place_m;
-        if self.config.finds_errors {
+        if self.config.finds_errors() {
             return None;
         }
         let Innovation {
@@ -127,6 +151,24 @@ impl Tracker {
         belief
     }
 
+    /// What carrying a belief on by what the odometer would read makes of covariances near its own.
+    pub fn transition(&self, belief: &Belief, reading_m: f64) -> Transition {
+        let mut carried = *belief;
+        let mut jacobian = identity();
+        let mut noise = Belief::independent(belief.mean, [0.0; STATES]);
+        let steps = (reading_m.abs() / FORECAST_STEP_M).ceil().min(MOST_STEPS);
+        for _ in 0..steps as usize {
+            let step = self.step(&carried, &Reading::exact(reading_m / steps));
+            step.apply(&mut carried);
+            step.apply(&mut noise);
+            jacobian = product(&step.jacobian, &jacobian);
+        }
+        Transition {
+            jacobian,
+            noise: noise.covariance,
+        }
+    }
+
     /// What an angle of thermal variance `thermal(distance)` to `head` would make of a belief
     /// `ahead_m` further on than the newest odometry; `None` of a radio head that is not used, or would
     /// rather repeat itself.
@@ -145,18 +187,19 @@ impl Tracker {
         let array = &self.config.array;
         let sighting = Sighting::new(&known.known, pose, &footing, &belief.mean, array)?;
         let travelled_m = self.driven_m + ahead_m - known.last_look_m;
-        if self.errors.repeats(travelled_m) {
-            return None;
-        }
         let own = thermal(sighting.range_m).sqrt();
         let mut variance = self
             .config
             .phase_bias
             .variance(own, f64::INFINITY, (travelled_m, 0.0))
             + self.config.look_variance(travelled_m, &sighting);
-        if self.config.finds_errors {
+        if self.config.finds_errors() {
             let foretold = belief.variance_along(&sighting.row) + variance;
-            variance += self.errors.variance(number, travelled_m, foretold);
+            let staying = self.errors.variance(number, travelled_m, foretold);
+            if staying_error::repeats(travelled_m) && staying > variance {
+                return None;
+            }
+            variance += staying;
         }
         let mut rehearsed = *belief;
         rehearsed.update(0.0, &sighting.row, variance);

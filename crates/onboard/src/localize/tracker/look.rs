@@ -187,7 +187,7 @@ impl Tracker {
     }
 
     /// How the error of an angle may have come about, where it is found while driving.
-    pub(super) fn pasts(&self, looked: &Look) -> Option<Pasts> {
+    pub(in crate::localize) fn pasts(&self, looked: &Look) -> Option<Pasts> {
         let way_m = looked.moved.0.abs();
         (self.errors).weigh(looked.head, way_m, &looked.innovation, &looked.row)
     }

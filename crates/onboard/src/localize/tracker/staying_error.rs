@@ -20,9 +20,6 @@ pub(super) const VARIANCES: [f64; LEVELS] = {
     [a * a, b * b, c * c, d * d]
 };
 
-/// Probability of each level before anything is heard: any is as likely as another.
-pub(super) const FIRST: f64 = 1.0 / LEVELS as f64;
-
 /// From this level on a radio head says next to nothing, and an angle beyond it is an outlier.
 const LARGE: usize = 2;
 pub const MOST_VARIANCE: f64 = VARIANCES[LARGE];
@@ -49,23 +46,21 @@ pub(super) fn kept(travelled_m: f64) -> f64 {
     (-travelled_m / VALUE_M).exp()
 }
 
+/// Whether the value is rather the same one so much further on than another.
+pub fn repeats(travelled_m: f64) -> bool {
+    kept(travelled_m) > 0.5
+}
+
 /// The share that is independent of what is soon forgotten.
 pub(super) fn share(travelled_m: f64) -> f64 {
     (travelled_m / SOON_M).clamp(LEAST_SHARE, 1.0)
 }
 
-/// How large a radio head's error is: the probability of each level.
+/// How large a radio head's error is: the probability of each level, and before anything is heard.
 #[derive(Clone, Copy, Debug, PartialEq)]
 pub struct StayingError {
     pub(super) levels: [f64; LEVELS],
-}
-
-impl Default for StayingError {
-    fn default() -> Self {
-        Self {
-            levels: [FIRST; LEVELS],
-        }
-    }
+    first: [f64; LEVELS],
 }
 
 /// How an angle may have come about: with the value kept, or drawn anew.
@@ -118,10 +113,26 @@ fn covariance(weights: &[f64; LEVELS], one: &[f64; LEVELS], other: &[f64; LEVELS
 }
 
 impl StayingError {
+    /// One of which nothing is known but how probable it is; where there is one, any size is as likely as
+    /// another.
+    pub fn new(probability: f64) -> Self {
+        let mut first = [probability / (LEVELS - 1) as f64; LEVELS];
+        first[0] = 1.0 - probability;
+        Self {
+            levels: first,
+            first,
+        }
+    }
+
     /// The probabilities of the levels, so much further on.
     fn foretold(&self, travelled_m: f64) -> [f64; LEVELS] {
         let changes = -(-travelled_m / LEVEL_M).exp_m1();
-        self.levels.map(|level| level + changes * (FIRST - level))
+        let levels = self.levels.into_iter().zip(self.first);
+        let mut foretold = [0.0; LEVELS];
+        for (foretold, (level, first)) in foretold.iter_mut().zip(levels) {
+            *foretold = level + changes * (first - level);
+        }
+        foretold
     }
 
     /// Whether it is probably so large that the radio head says next to nothing.

@@ -8,13 +8,13 @@
 
 use super::state::{Belief, STATES};
 use super::staying_change::{Change, WithAngle};
-use super::staying_error::{self, MOST_VARIANCE, Pasts, StayingError};
+use super::staying_error::{MOST_VARIANCE, Pasts, StayingError};
 use crate::clone_in_place::clone_in_place;
 use crate::localize::gaussian::{Innovation, Matrix};
 use crate::localize::smoother::Journal;
 
 /// One radio head's error.
-#[derive(Clone, Copy, Debug, Default, PartialEq)]
+#[derive(Clone, Copy, Debug, PartialEq)]
 struct HeadError {
     size: StayingError,
     /// The value (rad), and its covariance with the state.
@@ -41,10 +41,18 @@ pub struct StayingErrors {
 clone_in_place!(StayingErrors { heads, among });
 
 impl StayingErrors {
-    /// Those of so many radio heads, of which nothing is known.
-    pub fn new(count: usize) -> Self {
+    /// Those of so many radio heads, of which nothing is known but how probable they are; none where they
+    /// are impossible.
+    pub fn new(radio_heads: usize, probability: f64) -> Self {
+        let count = if probability > 0.0 { radio_heads } else { 0 };
+        let unknown = HeadError {
+            size: StayingError::new(probability),
+            mean_rad: 0.0,
+            with_state: [0.0; STATES],
+            with_angle: WithAngle::default(),
+        };
         Self {
-            heads: vec![HeadError::default(); count],
+            heads: vec![unknown; count],
             among: vec![0.0; count * count],
         }
     }
@@ -66,11 +74,6 @@ impl StayingErrors {
         self.heads.get(head).is_some_and(|error| {
             error.size.is_large() || error.mean_rad * error.mean_rad > MOST_VARIANCE
         })
-    }
-
-    /// Whether a radio head rather repeats itself, so far after it was heard last, than says anything new.
-    pub fn repeats(&self, travelled_m: f64) -> bool {
-        !self.is_empty() && staying_error::kept(travelled_m) > 0.5
     }
 
     /// What errors are expected to add to the variance of an angle; see [`StayingError::variance`].
@@ -291,12 +294,15 @@ mod tests {
     use rand_distr::StandardNormal;
 
     use super::super::staying_error::{
-        FIRST, LEVEL_M, LEVELS, LEVELS_RAD, SOON_M, VALUE_M, VARIANCES, share,
+        LEVEL_M, LEVELS, LEVELS_RAD, SOON_M, VALUE_M, VARIANCES, share,
     };
     use super::*;
     use crate::localize::gaussian::{Gaussian, identity};
 
     const OWN_VARIANCE: f64 = 1e-4;
+
+    /// With this probability of any, every level is as probable as another.
+    const EVEN: f64 = 0.75;
 
     /// A state of which angles tell the first component, known to one radian.
     fn unknown() -> Belief {
@@ -364,7 +370,7 @@ mod tests {
         let stays = (-way_m / VALUE_M).exp();
         let mut parts = vec![];
         for (level, value) in levels.into_iter().zip(VARIANCES) {
-            let probability = level + changes * (FIRST - level);
+            let probability = level + changes * (1.0 / LEVELS as f64 - level);
             let mut anew = *before;
             anew.mean[STATES + head] = 0.0;
             for i in 0..ALL {
@@ -401,7 +407,7 @@ mod tests {
 
     #[test]
     fn state_and_errors_have_the_moments_of_the_mixture() {
-        let (mut errors, mut belief) = (StayingErrors::new(2), unknown());
+        let (mut errors, mut belief) = (StayingErrors::new(2, EVEN), unknown());
         let mut motion = identity::<STATES>();
         (motion[0][1], motion[1][1]) = (0.3, 0.9);
         let mut whole_motion = identity::<ALL>();
@@ -469,7 +475,7 @@ mod tests {
         for (way_m, bound_m) in [(2.0, 0.3), (20.0, 0.1)] {
             let (mut nees, mut square, mut within) = (0.0, 0.0, 0);
             for _ in 0..RUNS {
-                let (mut errors, mut belief) = (StayingErrors::new(2), unknown());
+                let (mut errors, mut belief) = (StayingErrors::new(2, EVEN), unknown());
                 let truth: f64 = random.sample(StandardNormal);
                 let mut drawn = [0, 1].map(|_| Drawn {
                     level: LEVELS_RAD[random.random_range(0..LEVELS)],
@@ -501,7 +507,7 @@ mod tests {
 
     #[test]
     fn its_size_is_found_within_metres_and_found_anew_where_it_changes() {
-        let (mut errors, mut belief) = (StayingErrors::new(1), unknown());
+        let (mut errors, mut belief) = (StayingErrors::new(1, EVEN), unknown());
         belief.covariance[0][0] = 1e-6;
         for look in 0..300 {
             let error_rad = 0.01 * f64::from(look % 7 - 3);
@@ -521,7 +527,7 @@ mod tests {
 
     #[test]
     fn who_stands_learns_nothing() {
-        let (mut errors, mut belief) = (StayingErrors::new(1), unknown());
+        let (mut errors, mut belief) = (StayingErrors::new(1, EVEN), unknown());
         for _ in 0..30 {
             take(&mut errors, &mut belief, 0, 0.1, 0.02);
         }
