@@ -1,7 +1,7 @@
 """Quantiles of TR 38.901 drops by Sionna, to hold the simulator's against.
 
 Needs ``pip install sionna-no-rt`` (Apache-2.0; it brings torch, so it is in no extra). Writes the
-table that ``crates/simulate/tests/tr38901.rs`` reads::
+table that ``crates/simulate/tests/all/tr38901.rs`` reads::
 
     python benches/tr38901_oracle.py > crates/simulate/tests/all/data/tr38901_sionna.txt
 """

@@ -6,6 +6,15 @@ use nr_ssb::{Lmax, Pci};
 use rand::{RngExt, SeedableRng};
 use rand_chacha::ChaCha8Rng;
 
+/// Periods that lie so many half frames apart.
+fn every(half_frames: u16, llrs: &[[f32; 864]]) -> Vec<Period<'_>> {
+    let at = |(llr, n)| Period {
+        llr,
+        half_frames: half_frames * n,
+    };
+    llrs.iter().zip(0..).map(at).collect()
+}
+
 /// The requirement is at most 0.01. So few errors that 0.01 or more is refuted with 95 %.
 #[test]
 fn few_block_errors_at_minus_8_db() {
@@ -66,14 +75,7 @@ fn combining_four_periods_gains_about_6_db() {
                 noisy_llr(&pbch::encode(&payload, pci, lmax), snr_db, &mut rng)
             })
             .collect();
-        let periods: Vec<_> = llrs
-            .iter()
-            .zip(0..)
-            .map(|(llr, n)| Period {
-                llr,
-                half_frames: 4 * n,
-            })
-            .collect();
+        let periods = every(4, &llrs);
         alone += usize::from(decoder.decode(&llrs[0], pci, v, lmax).unwrap().is_some());
         if let Some(decoded) = decoder.combine(&periods, pci, v, lmax).unwrap() {
             assert_eq!(decoded.payload, first);
@@ -106,14 +108,7 @@ fn periods_of_any_spacing_combine() {
                     noisy_llr(&pbch::encode(&payload, pci, lmax), 0.0, &mut rng)
                 })
                 .collect();
-            let periods: Vec<_> = llrs
-                .iter()
-                .zip(0..)
-                .map(|(llr, n)| Period {
-                    llr,
-                    half_frames: n * spacing,
-                })
-                .collect();
+            let periods = every(spacing, &llrs);
             let decoded = decoder.combine(&periods, pci, v, lmax).unwrap().unwrap();
             assert_eq!(
                 decoded.payload, first,

@@ -2,8 +2,7 @@
 //! They lie beside the project, so that these tests run on demand (`--include-ignored`); what must
 //! hold everywhere is in `golden.rs`.
 
-use crate::common;
-use crate::common::{Vectors, cells, pack};
+use crate::common::{self, Vectors, cells, pack};
 use nr_ssb::burst::ssb_grid;
 use nr_ssb::crc::crc24c;
 use nr_ssb::dmrs::{dmrs, ibar_ssb};

@@ -63,13 +63,18 @@ clone_in_place!(Contest {
 });
 
 impl Contest {
-    /// A search that begins now.
-    pub fn new(initialiser: Initialiser, tracker: &Tracker, is_wide: bool) -> Self {
+    /// A search that begins now; of a silent one nobody is told.
+    pub fn new(
+        initialiser: Initialiser,
+        tracker: &Tracker,
+        is_wide: bool,
+        is_silent: bool,
+    ) -> Self {
         let heads = initialiser.heads().len();
         Self {
             initialiser,
             is_wide,
-            told_s: Some(tracker.time_s()),
+            told_s: (!is_silent).then(|| tracker.time_s()),
             speaks_alone: false,
             own: 0.0,
             since_m: tracker.driven_m(),

@@ -22,6 +22,14 @@ pub fn identity<const N: usize>() -> Matrix<N> {
     matrix
 }
 
+/// Inner product.
+pub fn dot<const N: usize>(left: &[f64; N], right: &[f64; N]) -> f64 {
+    left.iter()
+        .zip(right)
+        .map(|(left, right)| left * right)
+        .sum()
+}
+
 /// Matrix product.
 pub fn product<const N: usize>(left: &Matrix<N>, right: &Matrix<N>) -> Matrix<N> {
     let mut product = [[0.0; N]; N];
@@ -145,8 +153,7 @@ impl<const N: usize> Gaussian<N> {
 
     /// Variance of `H x` under the belief.
     pub fn variance_along(&self, row: &[f64; N]) -> f64 {
-        let cross = self.cross(row);
-        (0..N).map(|i| row[i] * cross[i]).sum::<f64>().max(0.0)
+        dot(row, &self.cross(row)).max(0.0)
     }
 
     /// The innovation a measurement would bring, without applying it.

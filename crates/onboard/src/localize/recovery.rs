@@ -116,16 +116,16 @@ impl Recovery {
 
     /// Begins to search, ends it, or goes on.
     fn judge(&mut self, now_s: f64) {
-        let is_silent = self.setup.config.may_be_misled();
+        let may_be_misled = self.setup.config.may_be_misled();
         let Some(contest) = &mut self.contest else {
             if self.watch.is_lost() && now_s >= self.rests_until_s {
-                self.contest = self.begin(now_s, false, is_silent);
+                self.contest = self.begin(now_s, false, may_be_misled);
             }
             return;
         };
         let is_ahead = contest.is_ahead();
         let odometry_s = self.tracked.tracker().time_s();
-        let is_refuted = self.watch.is_lost() && !is_silent;
+        let is_refuted = self.watch.is_lost() && !may_be_misled;
         if contest.is_silent() && (is_ahead && contest.has_moved() || is_refuted) {
             contest.tell(odometry_s);
         }
@@ -139,13 +139,13 @@ impl Recovery {
         if is_ahead && !contest.has_moved() {
             return;
         }
-        let is_long = contest.is_patient() || (is_silent && contest.has_moved_far());
+        let is_long = contest.is_patient() || (may_be_misled && contest.has_moved_far());
         let is_over = is_sure || (contest.is_silent() && is_long);
         if is_ahead && let Some(found) = contest.initialiser.found() {
             self.take(found, now_s);
         } else if is_over || (!is_ahead && contest.initialiser.found().is_some()) {
             // What is found elsewhere, if anything, is no better.
-            if !contest.is_silent() || is_silent {
+            if !contest.is_silent() || may_be_misled {
                 self.rests_until_s = now_s + REST_S;
                 self.watch.reset();
             }
@@ -175,11 +175,8 @@ impl Recovery {
             }
         };
         initialiser.resume(self.tracked.tracker());
-        let mut contest = Contest::new(initialiser, self.tracked.tracker(), is_wide);
-        if is_silent {
-            contest.told_s = None;
-        }
-        Some(contest)
+        let tracker = self.tracked.tracker();
+        Some(Contest::new(initialiser, tracker, is_wide, is_silent))
     }
 
     fn take(&mut self, found: Tracker, now_s: f64) {

@@ -1,5 +1,4 @@
 //! Simulated snapshots and a naive oracle.
-#![allow(dead_code)]
 
 use std::f64::consts::PI;
 

@@ -1,7 +1,5 @@
 //! Reads the reference vectors, which lie beside the project.
 
-#![allow(dead_code, reason = "each test uses its part")]
-
 use std::fs::File;
 use std::io::Read;
 use std::path::PathBuf;
@@ -10,7 +8,7 @@ use npyz::{Deserialize, NpyFile};
 use nr_ssb::{BchPayload, Lmax, Mib, Pci};
 
 /// The directory of reference data: `ACCESS_AV_DATA`, or `../shared/data` beside the project.
-fn data_dir() -> PathBuf {
+pub fn data_dir() -> PathBuf {
     std::env::var_os("ACCESS_AV_DATA").map_or_else(
         || PathBuf::from(env!("CARGO_MANIFEST_DIR")).join("../../../shared/data"),
         PathBuf::from,

@@ -1,10 +1,11 @@
 //! Reading of the recordings that the tests use: cf32_le SigMF, channels interleaved.
-#![allow(dead_code)]
 
 use std::path::{Path, PathBuf};
 
 use nr_ssb::Complex32;
 use serde_json::Value;
+
+use crate::common::data_dir;
 
 /// A recording, its samples by channel, and its annotations.
 pub struct Recording {
@@ -21,19 +22,11 @@ impl Recording {
     }
 }
 
-/// Where the reference data is.
-fn data_dir() -> PathBuf {
-    let dir = std::env::var_os("ACCESS_AV_DATA").map_or_else(
-        || Path::new(env!("CARGO_MANIFEST_DIR")).join("../../../shared/data"),
-        PathBuf::from,
-    );
-    assert!(dir.is_dir(), "no recordings at {}", dir.display());
-    dir
-}
-
 /// All recordings with an `nr:ssb` annotation.
 pub fn annotated() -> Vec<Recording> {
-    let mut paths: Vec<PathBuf> = std::fs::read_dir(data_dir().join("captures"))
+    let dir = data_dir();
+    assert!(dir.is_dir(), "no recordings at {}", dir.display());
+    let mut paths: Vec<PathBuf> = std::fs::read_dir(dir.join("captures"))
         .unwrap()
         .map(|entry| entry.unwrap().path())
         .filter(|path| {

@@ -85,9 +85,7 @@ impl Slip {
             && let (Ok(slips), Ok(holds)) = (&if_slipping, &if_sound)
             && !(slips.excluded || holds.excluded)
         {
-            let for_slip = if let (Some(slips), Some(holds)) =
-                (self.tracker.pasts(slips), sound.pasts(holds))
-            {
+            let for_slip = if let (Some(slips), Some(holds)) = (&slips.pasts, &holds.pasts) {
                 // They know of each other what repeats itself.
                 (or_outlier(slips.density) / or_outlier(holds.density)).ln()
             } else {

@@ -6,11 +6,11 @@ use super::config::PhaseBias;
 use super::filter::{MOST_STEPS, Tracker};
 use super::locate::locate;
 use super::look::Look;
-use super::motion::Reading;
+use super::motion::{Reading, Step};
 use super::sighting::Sighting;
 use super::state::{Belief, STATES};
 use super::staying_error;
-use crate::localize::gaussian::{Innovation, Matrix, identity, principal_variances, product};
+use crate::localize::gaussian::{Innovation, Matrix, dot, identity, principal_variances, product};
 use crate::localize::measurement::{AngleMeasurement, UpdateReason};
 use crate::radio_head::RadioHead;
 
@@ -45,13 +45,10 @@ impl Transition {
     pub fn principal_variances(&self, belief: &Belief) -> [f64; 2] {
         let [first, second] = [self.jacobian[0], self.jacobian[1]];
         let with_second = belief.cross(&second);
-        let along = |row: &[f64; STATES], cross: &[f64; STATES]| -> f64 {
-            row.iter().zip(cross).map(|(a, b)| a * b).sum()
-        };
         principal_variances(
             belief.variance_along(&first) + self.noise[0][0],
-            along(&first, &with_second) + self.noise[0][1],
-            along(&second, &with_second) + self.noise[1][1],
+            dot(&first, &with_second) + self.noise[0][1],
+            dot(&second, &with_second) + self.noise[1][1],
         )
     }
 }
@@ -75,12 +72,8 @@ impl Tracker {
         let Ok(looked) = looked else {
             return 0.0;
         };
-        if let Some(pasts) = self.pasts(looked) {
-            let density = if looked.excluded {
-                TAU.recip()
-            } else {
-                pasts.density
-            };
+        if self.config.finds_errors() {
+            let density = (looked.pasts.as_ref()).map_or(TAU.recip(), |pasts| pasts.density);
             let exact = (TAU * looked.own_variance).sqrt().recip();
             return looked.independent_share() * (density / exact).ln();
         }
@@ -142,27 +135,29 @@ impl Tracker {
     }
 
     /// A belief carried on by what the odometer would read, nothing being heard.
-    pub fn carry(&self, mut belief: Belief, reading_m: f64) -> Belief {
+    pub fn carry(&self, belief: Belief, reading_m: f64) -> Belief {
+        self.carry_by(belief, reading_m, |_| ())
+    }
+
+    /// The same, step by step.
+    fn carry_by(&self, mut belief: Belief, reading_m: f64, mut by: impl FnMut(&Step)) -> Belief {
         let steps = (reading_m.abs() / FORECAST_STEP_M).ceil().min(MOST_STEPS);
         for _ in 0..steps as usize {
-            let reading = Reading::exact(reading_m / steps);
-            self.step(&belief, &reading).apply(&mut belief);
+            let step = self.step(&belief, &Reading::exact(reading_m / steps));
+            step.apply(&mut belief);
+            by(&step);
         }
         belief
     }
 
     /// What carrying a belief on by what the odometer would read makes of covariances near its own.
     pub fn transition(&self, belief: &Belief, reading_m: f64) -> Transition {
-        let mut carried = *belief;
         let mut jacobian = identity();
         let mut noise = Belief::independent(belief.mean, [0.0; STATES]);
-        let steps = (reading_m.abs() / FORECAST_STEP_M).ceil().min(MOST_STEPS);
-        for _ in 0..steps as usize {
-            let step = self.step(&carried, &Reading::exact(reading_m / steps));
-            step.apply(&mut carried);
+        self.carry_by(*belief, reading_m, |step| {
             step.apply(&mut noise);
             jacobian = product(&step.jacobian, &jacobian);
-        }
+        });
         Transition {
             jacobian,
             noise: noise.covariance,

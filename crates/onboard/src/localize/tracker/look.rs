@@ -36,6 +36,9 @@ pub(in crate::localize) struct Look {
     /// Variance by the odometry since its newest sample, and by the bend of the prediction (rad²).
     pub coasted_variance: f64,
     pub bend_variance: f64,
+    /// How the error that stays may have come about, where it is found while driving and the radio head is
+    /// used.
+    pub pasts: Option<Pasts>,
 }
 
 impl Look {
@@ -91,6 +94,11 @@ impl Tracker {
         let measurement_variance = stated + shared + coasted + bend.variance;
         let residual = wrap_angle(measured.phase_rad - sighting.phase_rad - bend.shift_rad);
         let innovation = (self.belief).innovation(residual, &row, measurement_variance);
+        let pasts = if head.excluded {
+            None
+        } else {
+            (self.errors).weigh(index, travelled_m.abs(), &innovation, &row)
+        };
         Ok(Look {
             head: index,
             excluded: head.excluded,
@@ -105,6 +113,7 @@ impl Tracker {
             moved,
             coasted_variance: coasted,
             bend_variance: bend.variance,
+            pasts,
         })
     }
 
@@ -165,8 +174,8 @@ impl Tracker {
             Ok(looked) => looked,
             Err(reason) => return self.verdict(reason, None),
         };
-        if let Some(pasts) = self.pasts(&looked) {
-            return self.take_with_error(&looked, &pasts, measured);
+        if let Some(pasts) = &looked.pasts {
+            return self.take_with_error(&looked, pasts, measured);
         }
         let seen = looked.innovation;
         let mahalanobis2 = seen.mahalanobis2();
@@ -184,12 +193,6 @@ impl Tracker {
         self.measure(residual, &looked.row, variance);
         self.looked_at(&looked, measured);
         self.verdict(UpdateReason::Consistent, Some(mahalanobis2))
-    }
-
-    /// How the error of an angle may have come about, where it is found while driving.
-    pub(in crate::localize) fn pasts(&self, looked: &Look) -> Option<Pasts> {
-        let way_m = looked.moved.0.abs();
-        (self.errors).weigh(looked.head, way_m, &looked.innovation, &looked.row)
     }
 
     /// Takes in an angle whose error is found: whatever that is, it is no more believed than it deserves.

@@ -10,7 +10,7 @@ use super::state::{Belief, STATES};
 use super::staying_change::{Change, WithAngle};
 use super::staying_error::{MOST_VARIANCE, Pasts, StayingError};
 use crate::clone_in_place::clone_in_place;
-use crate::localize::gaussian::{Innovation, Matrix};
+use crate::localize::gaussian::{Innovation, Matrix, dot};
 use crate::localize::smoother::Journal;
 
 /// One radio head's error.
@@ -278,13 +278,6 @@ impl StayingErrors {
     pub fn with_state(&self) -> impl Iterator<Item = [f64; STATES]> {
         self.heads.iter().map(|head| head.with_state)
     }
-}
-
-fn dot(left: &[f64; STATES], right: &[f64; STATES]) -> f64 {
-    left.iter()
-        .zip(right)
-        .map(|(left, right)| left * right)
-        .sum()
 }
 
 #[cfg(test)]
