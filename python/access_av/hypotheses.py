@@ -118,8 +118,8 @@ def _of_size(site: Overrides, vehicle: Overrides, size: float) -> dict[str, Over
     receiver = vehicle["receiver"]
     late_s = receiver["lateness_s"] + size * (receiver.get("lateness_std_s") or LATE_S)
     scale = size * (odometer["scale_std"] or SCALE_STD)
-    mounting = size * (array["mounting_std_rad"] or MOUNTING_STD_RAD)
-    phase = size * (array["phase_std_rad"] or PHASE_STD_RAD)
+    mounting = size * (array.get("mounting_std_rad") or MOUNTING_STD_RAD)
+    phase = size * (array.get("phase_std_rad") or PHASE_STD_RAD)
     noise = size * odometer["noise_m_per_sqrt_m"]
     one = heads[len(heads) // 2 :][:1]
 

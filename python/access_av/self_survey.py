@@ -237,7 +237,7 @@ class _Model:
         for name, default in (("mounting", mounting_std_rad), ("phase", phase_std_rad)):
             keys.append(f"array.{name}_rad")
             before.append(array[f"{name}_rad"])
-            stds.append(array[f"{name}_std_rad"] or default)
+            stds.append(array.get(f"{name}_std_rad") or default)
         self.keys = keys
         self.before, self.stds_before = np.array(before), np.array(stds)
         self.steps = np.where(np.arange(len(keys)) < 2 * len(heads), STEP_M, STEP_RAD)

@@ -95,7 +95,7 @@ fn samples_to_angle(bencher: divan::Bencher, pilots: &str) {
 #[divan::bench(args = [(true, false), (false, false), (true, true)])]
 fn angle_to_pose(bencher: divan::Bencher, (map, finds_errors): (bool, bool)) {
     let (site, mut vehicle) = believed("trip-2");
-    vehicle.receiver.phase_bias_probability = Some(if finds_errors { 0.1 } else { 0.0 });
+    vehicle.receiver.phase_bias_probability = Some(if finds_errors { 0.75 } else { 0.0 });
     let road = site.build_road().unwrap().unwrap();
     let heads = RadioHead::heard(&site, &vehicle);
     let config = TrackerConfig::new(&site, &vehicle);

@@ -141,8 +141,8 @@ impl World {
         let mut walk = streams.generator(Purpose::Array, 0);
         let mut normal = || factor * walk.sample::<f64, _>(StandardNormal);
         let array = &mut vehicle.array;
-        array.mounting_rad += array.mounting_std_rad * normal();
-        array.phase_rad += array.phase_std_rad * normal();
+        array.mounting_rad += array.mounting_std_rad.unwrap_or(0.0) * normal();
+        array.phase_rad += array.phase_std_rad.unwrap_or(0.0) * normal();
         let mut place = streams.generator(Purpose::Array, 1);
         let mut normal = || factor * place.sample::<f64, _>(StandardNormal);
         let [forward_m, left_m, _] = &mut array.position_m;

@@ -19,6 +19,24 @@ pub struct PoseEstimate {
 }
 
 impl PoseEstimate {
+    /// The covariance about this estimate where one of several others is right, each with a probability.
+    pub fn mix(&mut self, others: impl Iterator<Item = (f64, Self)>) {
+        let mut mixed = [[0.0; 3]; 3];
+        for (probability, other) in others {
+            let mut alone = Self {
+                covariance: Some([[0.0; 3]; 3]),
+                ..*self
+            };
+            alone.cover(&other);
+            for (sum, row) in mixed.iter_mut().zip(alone.covariance.unwrap_or_default()) {
+                for (sum, value) in sum.iter_mut().zip(row) {
+                    *sum += probability * value;
+                }
+            }
+        }
+        self.covariance = Some(mixed);
+    }
+
     /// Widens the covariance by another estimate that may be the right one.
     pub fn cover(&mut self, other: &Self) {
         let apart = [

@@ -23,7 +23,7 @@ use super::measurement::{AngleMeasurement, UpdateVerdict};
 use super::pose_estimate::PoseEstimate;
 use super::quantile::RadialQuantile;
 use super::tracked::Tracked;
-use super::tracker::{OdometryVerdict, Tracker, TrackerConfig};
+use super::tracker::{OdometryVerdict, Tracker};
 use super::watch::Watch;
 use crate::BoxError;
 use crate::clone_in_place::clone_in_place;
@@ -47,7 +47,6 @@ const LEAST_HEADS: usize = 3;
 /// What does not change on the way.
 #[derive(Debug)]
 struct Setup {
-    config: TrackerConfig,
     road: Option<Road>,
     heads: Vec<RadioHead>,
     integrity: Option<IntegrityConfig>,
@@ -93,7 +92,6 @@ impl Recovery {
         let is_to_confirm = found_s.is_none() && road.is_none();
         Self {
             setup: Arc::new(Setup {
-                config: *tracker.config(),
                 road,
                 heads: heads.to_vec(),
                 integrity,
@@ -116,7 +114,7 @@ impl Recovery {
 
     /// Begins to search, ends it, or goes on.
     fn judge(&mut self, now_s: f64) {
-        let may_be_misled = self.setup.config.may_be_misled();
+        let may_be_misled = self.tracked.tracker().config().may_be_misled();
         let Some(contest) = &mut self.contest else {
             if self.watch.is_lost() && now_s >= self.rests_until_s {
                 self.contest = self.begin(now_s, false, may_be_misled);
@@ -159,7 +157,8 @@ impl Recovery {
     /// silent one nobody is told.
     fn begin(&self, now_s: f64, is_wide: bool, is_silent: bool) -> Option<Contest> {
         let setup = &self.setup;
-        let (config, heads) = (setup.config, setup.heads.as_slice());
+        let (tracker, heads) = (self.tracked.tracker(), setup.heads.as_slice());
+        let config = *tracker.config();
         let mut initialiser = match &setup.road {
             Some(road) => Initialiser::new(config, road.clone(), true, heads),
             None if heads.len() < LEAST_HEADS => return None,
@@ -174,8 +173,7 @@ impl Recovery {
                 Initialiser::in_plane(config, area, heads)
             }
         };
-        initialiser.resume(self.tracked.tracker());
-        let tracker = self.tracked.tracker();
+        initialiser.resume(tracker);
         Some(Contest::new(initialiser, tracker, is_wide, is_silent))
     }
 
@@ -210,6 +208,11 @@ impl Localizer for Recovery {
         measured: &AngleMeasurement,
     ) -> Result<UpdateVerdict, BoxError> {
         if std::mem::take(&mut self.is_to_confirm) {
+            self.contest = self.begin(measured.time_s, false, true);
+        }
+        // A search is of places as the tracker that it is compared with foretells angles there.
+        let finds_errors = self.tracked.tracker().config().finds_errors();
+        if (self.contest.as_ref()).is_some_and(|it| it.finds_errors != finds_errors) {
             self.contest = self.begin(measured.time_s, false, true);
         }
         if let Some(contest) = &mut self.contest {

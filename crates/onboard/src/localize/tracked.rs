@@ -44,13 +44,13 @@ impl Tracked {
         found_s: Option<f64>,
     ) -> Self {
         match integrity {
-            Some(config) => Self::Guarded(Box::new(Guard::new(tracker, heads, config, found_s))),
+            Some(config) => Self::Guarded(Box::new(Guard::new(&tracker, heads, config, found_s))),
             None => Self::Bare(Box::new(tracker)),
         }
     }
 
     /// The tracker that uses every sound source.
-    pub const fn tracker(&self) -> &Tracker {
+    pub fn tracker(&self) -> &Tracker {
         match self {
             Self::Bare(tracker) => tracker,
             Self::Guarded(guard) => guard.tracker(),

@@ -38,10 +38,11 @@ pub struct ArraySettings {
     /// Direction of its axis, along the row, from the vehicle's forward axis, counter-clockwise, in radians.
     #[schemars(range(min = -3.2, max = 3.2))]
     pub mounting_rad: f64,
-    /// Standard deviation of that direction in radians; 0 is known exactly on a road, and 0.02 for a
-    /// differential drive.
+    /// Standard deviation of that direction in radians; 0 is known exactly. Where it is not stated it
+    /// is taken as exact until angles speak against it, and as 0.005 then; 0.02 on a differential drive.
+    #[serde(skip_serializing_if = "Option::is_none")]
     #[schemars(range(min = 0.0, max = 3.2))]
-    pub mounting_std_rad: f64,
+    pub mounting_std_rad: Option<f64>,
     /// Random walk of that direction, in radians per root of a metre driven.
     #[schemars(range(min = 0.0, max = 1.0))]
     pub mounting_drift_rad_per_sqrt_m: f64,
@@ -49,9 +50,11 @@ pub struct ArraySettings {
     /// radians.
     #[schemars(range(min = -3.2, max = 3.2))]
     pub phase_rad: f64,
-    /// Standard deviation of that phase in radians.
+    /// Standard deviation of that phase in radians; 0 is known exactly. Where it is not stated it is taken
+    /// as exact until angles speak against it, and as 0.02 then.
+    #[serde(skip_serializing_if = "Option::is_none")]
     #[schemars(range(min = 0.0, max = 3.2))]
-    pub phase_std_rad: f64,
+    pub phase_std_rad: Option<f64>,
     /// Random walk of that phase, in radians per root of a metre driven.
     #[schemars(range(min = 0.0, max = 1.0))]
     pub phase_drift_rad_per_sqrt_m: f64,
@@ -75,10 +78,10 @@ impl Default for ArraySettings {
             position_m: [0.0; 3],
             position_std_m: 0.0,
             mounting_rad: 0.0,
-            mounting_std_rad: 0.0,
+            mounting_std_rad: None,
             mounting_drift_rad_per_sqrt_m: 0.0,
             phase_rad: 0.0,
-            phase_std_rad: 0.0,
+            phase_std_rad: None,
             phase_drift_rad_per_sqrt_m: 0.0,
             gain_drift_db_per_sqrt_m: 0.0,
             channel_gains: None,
@@ -141,7 +144,7 @@ impl ArraySettings {
         })?;
         for (key, phase_rad) in [
             ("array.phase_rad", self.phase_rad),
-            ("array.phase_std_rad", self.phase_std_rad),
+            ("array.phase_std_rad", self.phase_std_rad.unwrap_or(0.0)),
             (
                 "array.phase_drift_rad_per_sqrt_m",
                 self.phase_drift_rad_per_sqrt_m,

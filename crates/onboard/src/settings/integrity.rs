@@ -31,7 +31,7 @@ pub struct IntegritySettings {
 #[derive(Debug, Clone, Copy, PartialEq, Serialize, Deserialize, JsonSchema)]
 #[serde(default, deny_unknown_fields)]
 pub struct FaultProbability {
-    /// Of each radio head: moved, spoofed, without line of sight. A tracker does without it. 0.02 if not
+    /// Of each radio head: moved, spoofed, without line of sight. A tracker does without it. 0.01 if not
     /// given, and 1e-3 where errors that stay over metres are found while driving
     /// (`receiver.phase_bias_probability`): what hides a radio head is found there.
     #[serde(skip_serializing_if = "Option::is_none")]
@@ -75,7 +75,7 @@ impl FaultProbability {
     /// That of each radio head, where errors that stay are found while driving or are not.
     pub fn of_radio_head(&self, finds_errors: bool) -> f64 {
         self.radio_head
-            .unwrap_or(if finds_errors { 1e-3 } else { 0.02 })
+            .unwrap_or(if finds_errors { 1e-3 } else { 0.01 })
     }
 
     /// That of some fault against which there is no tracker.

@@ -115,8 +115,8 @@ fn numbers_must_be_finite_and_in_range() {
         ("elements = 4", "elements = 1", "vehicle.array.elements"),
         ("elements = 4", "elements = 17", "vehicle.array.elements"),
         (
-            "mounting_std_rad = 0.0",
-            "mounting_std_rad = -0.01",
+            "mounting_rad = 0.0",
+            "mounting_rad = 0.0\nmounting_std_rad = -0.01",
             "vehicle.array.mounting_std_rad",
         ),
         (
@@ -125,8 +125,8 @@ fn numbers_must_be_finite_and_in_range() {
             "vehicle.array.mounting_drift_rad_per_sqrt_m",
         ),
         (
-            "phase_std_rad = 0.0",
-            "phase_std_rad = -0.1",
+            "phase_rad = 0.0",
+            "phase_rad = 0.0\nphase_std_rad = -0.1",
             "vehicle.array.phase_std_rad",
         ),
         (

@@ -123,7 +123,16 @@ fn the_last_pose_is_the_filters() {
         let drive = locate(&scenario, &logs, true);
         let (last, smoothed) = (drive.poses.last().unwrap(), drive.smoothed.last().unwrap());
         assert_eq!(last.estimate.pose, smoothed.estimate.pose);
-        assert_eq!(last.estimate.covariance, smoothed.estimate.covariance);
+        // What a guard tells covers what may be otherwise, too, which at this drive's end is hardly probable.
+        let [told, own] = [last, smoothed].map(|it| it.estimate.covariance.unwrap());
+        for (told, own) in told.as_flattened().iter().zip(own.as_flattened()) {
+            let most = if scenario.vehicle.integrity.is_some() {
+                0.01 * own.abs() + 1e-5
+            } else {
+                0.0
+            };
+            assert!((told - own).abs() <= most, "{told} {own}");
+        }
         let unasked = locate(&scenario, &logs, false);
         assert_eq!(unasked.poses, drive.poses);
         assert!(unasked.smoothed.is_empty());

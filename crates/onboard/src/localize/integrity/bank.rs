@@ -7,12 +7,12 @@
 //! radio head is excluded, trackers that have never heard it are ready to take over, together with
 //! those that have heard neither it nor one of the others.
 //!
-//! One more tracker believes every radio head, but the odometer only roughly.
+//! And what else may be otherwise than stated has trackers of its own ([`Otherwise`]).
 
 use super::angle_noise::AngleNoise;
 use super::config::IntegrityConfig;
+use super::otherwise::Otherwise;
 use super::sequence_test::SequenceTest;
-use super::slip::Slip;
 use crate::clone_in_place::clone_in_place;
 use crate::localize::measurement::{AngleMeasurement, UpdateVerdict};
 use crate::localize::tracker::{OdometryVerdict, Tracker};
@@ -59,8 +59,8 @@ pub(super) struct Bank {
     /// When it was lost last (s).
     lost_s: f64,
     main: Tracker,
-    /// The same without trust in the odometer.
-    slip: Slip,
+    /// What may be otherwise than it believes.
+    otherwise: Otherwise,
     noise: AngleNoise,
     /// First those without one radio head, in order; then those without two.
     members: Vec<Member>,
@@ -72,14 +72,16 @@ clone_in_place!(Bank {
     disagreed_s,
     lost_s,
     main,
-    slip,
+    otherwise,
     noise,
     members
 });
 
 impl Bank {
-    /// The trackers beside this one; nothing is known of them at `now_s`.
-    pub fn new(tracker: Tracker, heads: &[RadioHead], now_s: f64) -> Self {
+    /// The trackers beside this one, and what may be otherwise than it believes; nothing is known of them at
+    /// `now_s`.
+    pub fn new(tracker: &Tracker, heads: &[RadioHead], otherwise: Otherwise, now_s: f64) -> Self {
+        let tracker = tracker.as_stated();
         let count = heads.len();
         let one = (0..count).map(|head| [head; 2]);
         // Which of two disagrees nobody can tell.
@@ -103,7 +105,7 @@ impl Bank {
             disagreed_s: vec![f64::NEG_INFINITY; count],
             lost_s: now_s,
             heads: heads.to_vec(),
-            slip: Slip::new(&tracker),
+            otherwise,
             main: tracker,
             noise: AngleNoise::new(count),
         }
@@ -114,10 +116,53 @@ impl Bank {
         &self.main
     }
 
-    /// The trackers that do without one of the sound radio heads.
-    pub fn without_one(&self) -> impl Iterator<Item = &Tracker> + Clone {
-        self.sound()
-            .filter_map(|head| Some(&self.members.get(head)?.tracker))
+    /// The same begun anew from a vague pose, of which nothing is known at `now_s`.
+    pub fn restarted(&self, position_std_m: f64, now_s: f64) -> Self {
+        let start = self.leader().restarted(position_std_m);
+        Self::new(&start, &self.heads, self.otherwise.beside(&start), now_s)
+    }
+
+    /// The same of an array that is not exact, once that is sure and nothing else may be; nothing is known of
+    /// it at `now_s`.
+    pub fn of_inexact(&self, now_s: f64, config: &IntegrityConfig) -> Option<Self> {
+        let inexact = self.otherwise.inexact()?;
+        let is_quiet = self.faulty() == 0
+            && self.doubtful(config.recovery_threshold) == 0
+            && self.quiet_s(now_s) > config.recovery_s;
+        is_quiet.then(|| Self::new(inexact, &self.heads, self.otherwise.anew(inexact), now_s))
+    }
+
+    /// The tracker that is most probably right: the one of every sound radio head, unless something is otherwise.
+    pub fn leader(&self) -> &Tracker {
+        self.otherwise.leader().unwrap_or(&self.main)
+    }
+
+    /// What may be otherwise than stated.
+    pub const fn otherwise(&self) -> &Otherwise {
+        &self.otherwise
+    }
+
+    /// What may be, how probable it is and the tracker that is right then: all is as stated, or something is
+    /// otherwise; or, as far as the odometer does not slip and errors do not stay, one
+    /// or two of the sound radio heads are at fault, of which each has the probability `head`.
+    pub fn suspects(&self, head: f64) -> impl Iterator<Item = (f64, &Tracker)> + Clone {
+        let trusted = self.otherwise.trusted();
+        let heads = (self.members.iter())
+            .filter(|member| !member.without.iter().any(|&it| self.is_faulty(it)))
+            .map(move |member| {
+                let [one, other] = member.without;
+                let both = if one == other { 1.0 } else { head };
+                (trusted * head * both, &member.tracker)
+            });
+        self.beliefs().chain(heads)
+    }
+
+    /// How probable it is that all is as stated, and that something is otherwise; and the tracker that is right
+    /// then.
+    pub fn beliefs(&self) -> impl Iterator<Item = (f64, &Tracker)> + Clone {
+        let total = self.otherwise.total_odds();
+        let odds = std::iter::once((1.0, &self.main)).chain(self.otherwise.odds());
+        odds.map(move |(odds, tracker)| (odds / total, tracker))
     }
 
     /// The trackers without a radio head in doubt, one of which may take over soon.
@@ -132,11 +177,6 @@ impl Bank {
         faulty.filter_map(|(head, faulty)| (!faulty).then_some(head))
     }
 
-    /// The radio heads.
-    pub fn heads(&self) -> &[RadioHead] {
-        &self.heads
-    }
-
     /// Number of radio heads found faulty.
     pub fn faulty(&self) -> usize {
         self.faulty.iter().filter(|faulty| **faulty).count()
@@ -144,11 +184,6 @@ impl Bank {
 
     fn is_faulty(&self, head: usize) -> bool {
         self.faulty.get(head).is_some_and(|faulty| *faulty)
-    }
-
-    /// Slip of the odometer.
-    pub const fn slip(&self) -> &Slip {
-        &self.slip
     }
 
     /// By how much more variance the angles have than stated.
@@ -181,7 +216,7 @@ impl Bank {
             member.tracker.odometry(sample);
         }
         let verdict = self.main.odometry(sample);
-        self.slip.odometry(&self.main, sample);
+        self.otherwise.odometry(&self.main, sample);
         verdict
     }
 
@@ -211,7 +246,10 @@ impl Bank {
             }
         }
         let noise_ratio = self.noise_ratio();
-        (self.slip).update(&mut self.main, noise_ratio, head, measured)
+        let looked = self.main.look(head, measured);
+        let if_staying = (self.otherwise).update(&self.main, &looked, noise_ratio, head, measured);
+        let verdict = self.main.take(looked, measured);
+        if_staying.unwrap_or(verdict)
     }
 
     /// Whether a source is at fault and nobody knows which, or too many are.
@@ -301,7 +339,7 @@ impl Bank {
             self.main = without.tracker.clone();
         }
         if let Some(known) = self.heads.get(culprit) {
-            self.slip.set_excluded(known, true);
+            self.otherwise.exclude(&self.main, known);
         }
         for number in 0..self.members.len() {
             let Some([first, second]) = self.members.get(number).map(|member| member.without)
@@ -337,7 +375,7 @@ impl Bank {
         let known = self.heads.get(head);
         exclude(&mut self.main, known, false);
         if let Some(known) = known {
-            self.slip.set_excluded(known, false);
+            self.otherwise.readmit(known);
         }
         for member in self.members.iter_mut().filter(|member| !member.lacks(head)) {
             exclude(&mut member.tracker, known, false);
@@ -419,7 +457,12 @@ mod tests {
         for &head in without {
             alone.set_excluded(&heads[head], true);
         }
-        let mut bank = Bank::new(tracker().0, &heads, 0.0);
+        let mut bank = Bank::new(
+            &tracker().0,
+            &heads,
+            Otherwise::new(&tracker().0, 1e-3),
+            0.0,
+        );
         drive(bias_rad, |odometry, head, measured| {
             if let Some(sample) = odometry {
                 bank.odometry(sample);

@@ -4,9 +4,10 @@
 //! ([`Bank`]). If one radio head is at fault, the tracker without it is right within its own
 //! covariance, wherever the full solution may be: the protection level is the radius about the full
 //! solution that holds for all of them together, each as probable as its fault
-//! ([`LevelEquation`](super::level::LevelEquation)). The same of the tracker that does not trust the
-//! odometer ([`Slip`](super::slip::Slip)), as probable as the angles leave it. All of it is of angles
-//! as noisy as they are heard to be ([`AngleNoise`](super::angle_noise::AngleNoise)).
+//! ([`LevelEquation`](super::level::LevelEquation)). The same of trackers that believe otherwise of odometer,
+//! array and reflections ([`Otherwise`]), as probable as the angles leave it; if one of them becomes more
+//! probable than what is stated, the position is its own, and not `ok` where something is at fault. All of
+//! it is of angles as noisy as they are heard to be ([`AngleNoise`](super::angle_noise::AngleNoise)).
 //!
 //! A single radio head has no witness but odometry and road: the protection level then is what
 //! those two can vouch for, grows with the distance driven, and passes the alert limit unless they
@@ -15,6 +16,7 @@
 use super::bank::Bank;
 use super::config::IntegrityConfig;
 use super::level::{Hypothesis, LevelEquation};
+use super::otherwise::Otherwise;
 use crate::clone_in_place::clone_in_place;
 use crate::localize::integrity_state::{Integrity, IntegrityState};
 use crate::localize::measurement::{AngleMeasurement, UpdateVerdict};
@@ -63,17 +65,18 @@ impl Guard {
     /// Guards a tracker of these radio heads. One that was found by a search, and not given, is on
     /// probation since then.
     pub fn new(
-        tracker: Tracker,
+        tracker: &Tracker,
         heads: &[RadioHead],
         config: IntegrityConfig,
         found_s: Option<f64>,
     ) -> Self {
         let is_found = found_s.is_some();
         let found_s = found_s.unwrap_or(f64::NEG_INFINITY);
+        let otherwise = Otherwise::new(tracker, config.fault_probability.odometer);
         Self {
             level: LevelEquation::new(config.risk),
             trusted_m: tracker.driven_m(),
-            bank: Bank::new(tracker, heads, found_s),
+            bank: Bank::new(tracker, heads, otherwise, found_s),
             restarted: None,
             is_found,
             now_s: found_s,
@@ -82,8 +85,8 @@ impl Guard {
     }
 
     /// The tracker that uses every sound source.
-    pub const fn tracker(&self) -> &Tracker {
-        self.bank.main()
+    pub fn tracker(&self) -> &Tracker {
+        self.bank.leader()
     }
 
     /// The tracker by whose uncertainty to listen: where the level is beyond the alert limit, that of the
@@ -91,7 +94,7 @@ impl Guard {
     pub fn doubtful(&self) -> &Tracker {
         let (bank, now_s) = (&self.bank, self.tracker().time_s());
         if self.is_near(bank, now_s) {
-            return bank.main();
+            return bank.leader();
         }
         let beyond = |(clean, hypothesis)| {
             let alert_limit_m = self.config.alert_limit_m;
@@ -99,11 +102,7 @@ impl Guard {
         };
         (self.suspects(bank, now_s).map(beyond))
             .max_by(|(one, _), (other, _)| one.total_cmp(other))
-            .map_or(bank.main(), |(_, clean)| clean)
-    }
-
-    fn slip_probability(&self, bank: &Bank) -> f64 {
-        (bank.slip()).probability(self.config.fault_probability.odometer)
+            .map_or(bank.leader(), |(_, clean)| clean)
     }
 
     /// How much more the angles vary than stated.
@@ -124,6 +123,9 @@ impl Guard {
         self.now_s = self.now_s.max(measured.time_s);
         let verdict = self.bank.update(head, measured);
         self.bank.judge(self.now_s, &self.config);
+        if let Some(bank) = self.bank.of_inexact(self.now_s, &self.config) {
+            (self.bank, self.restarted) = (bank, None);
+        }
         if let Some(restarted) = &mut self.restarted {
             restarted.bank.update(head, measured);
             restarted.bank.judge(self.now_s, &self.config);
@@ -154,6 +156,7 @@ impl Guard {
         } else if aged && restarted.bank.is_lost(&self.config) {
             self.restart();
         } else if restarted.bank.quiet_s(now_s) > patience_s
+            && !restarted.bank.otherwise().is_fault()
             && self.is_near(&restarted.bank, now_s)
             && let Some(restarted) = self.restarted.take()
         {
@@ -163,22 +166,29 @@ impl Guard {
     }
 
     fn restart(&mut self) {
-        let main = self.bank.main();
-        let position_std_m = self.config.alert_limit_m + main.driven_m() - self.trusted_m;
+        let strayed_m = if self.bank.otherwise().errors_stay() {
+            0.0
+        } else {
+            self.bank.main().driven_m() - self.trusted_m
+        };
+        let position_std_m = self.config.alert_limit_m + strayed_m;
         self.restarted = Some(Restarted {
-            bank: Bank::new(
-                main.restarted(position_std_m),
-                self.bank.heads(),
-                self.now_s,
-            ),
+            bank: self.bank.restarted(position_std_m, self.now_s),
             since_s: self.now_s,
         });
     }
 
     /// The pose at `time_s`.
     pub fn pose(&self, time_s: f64) -> PoseEstimate {
-        let mut pose = self.bank.main().pose(time_s);
+        let mut pose = self.bank.leader().pose(time_s);
+        if !self.bank.main().config().finds_errors() {
+            let beliefs = self.bank.beliefs();
+            pose.mix(beliefs.map(|(probability, right)| (probability, right.pose(time_s))));
+        }
         pose.integrity = Some(self.integrity(time_s));
+        if self.bank.otherwise().errors_stay() {
+            return pose;
+        }
         let restarted = self.restarted.iter().map(|it| it.bank.main());
         for other in self.bank.candidates(&self.config).chain(restarted) {
             pose.cover(&other.pose(time_s));
@@ -189,9 +199,11 @@ impl Guard {
     /// Protection level and state at `time_s`.
     pub fn integrity(&self, time_s: f64) -> Integrity {
         let levels = self.level.solve(&self.hypotheses(&self.bank, time_s));
-        let state = if self.bank.is_outvoted(&self.config) {
+        let otherwise = self.bank.otherwise();
+        let state = if self.bank.is_outvoted(&self.config) && !otherwise.errors_stay() {
             IntegrityState::Unavailable
-        } else if self.restarted.is_some()
+        } else if otherwise.is_fault()
+            || self.restarted.is_some()
             || self.bank.quiet_s(self.now_s) <= self.config.recovery_s
             || levels.horizontal_m > self.config.alert_limit_m
         {
@@ -214,27 +226,23 @@ impl Guard {
         self.level.holds(self.config.alert_limit_m, hypotheses)
     }
 
-    /// That no source is at fault, or any one of those in use, the odometer among them; and the tracker that
-    /// is right then.
+    /// What may be and is not too improbable, and the tracker that is right then.
     fn suspects<'a>(
         &self,
         bank: &'a Bank,
         time_s: f64,
     ) -> impl Iterator<Item = (&'a Tracker, Hypothesis)> + Clone {
-        let told = bank.main().pose(time_s);
+        let told = bank.leader().pose(time_s);
         let noise_ratio = bank.noise_ratio();
         let finds_errors = bank.main().config().finds_errors();
         let head_probability = (self.config.fault_probability).of_radio_head(finds_errors);
-        let heads = (bank.without_one()).map(move |clean| (head_probability, clean));
         let negligible = NEGLIGIBLE * self.config.risk;
-        (std::iter::once((1.0, bank.main())))
-            .chain(heads)
-            .chain([(self.slip_probability(bank), bank.slip().tracker())])
+        (bank.suspects(head_probability))
             .filter(move |(probability, _)| *probability > negligible)
-            .filter_map(move |(probability, clean)| {
-                let right = clean.pose(time_s);
-                let hypothesis = Hypothesis::new(probability, &right, noise_ratio, &told);
-                hypothesis.map(|it| (clean, it))
+            .filter_map(move |(probability, right)| {
+                let pose = right.pose(time_s);
+                let hypothesis = Hypothesis::new(probability, &pose, noise_ratio, &told);
+                hypothesis.map(|it| (right, it))
             })
     }
 

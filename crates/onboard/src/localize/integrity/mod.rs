@@ -1,10 +1,13 @@
 //! How far the estimate can be trusted.
 
+mod alternative;
 mod angle_noise;
 mod bank;
 mod config;
+mod evidence;
 mod guard;
 mod level;
+mod otherwise;
 mod sequence_test;
 mod slip;
 

@@ -6,20 +6,12 @@
 //! the angles have spoken against it, the level is to hold for that tracker too. Where errors are found
 //! that stay over metres, an angle speaks as the errors that either tracker has found foretell it.
 
-use std::f64::consts::TAU;
-
+use super::evidence::Evidence;
 use crate::clone_in_place::clone_in_place;
-use crate::localize::measurement::{AngleMeasurement, UpdateVerdict};
+use crate::localize::measurement::{AngleMeasurement, UpdateReason};
 use crate::localize::tracker::{Look, MOST_SLIP, Tracker};
 use crate::observation::OdometrySample;
 use crate::radio_head::RadioHead;
-
-/// Share of the angles that come from anywhere.
-const OUTLIERS: f64 = 2e-3;
-
-/// Largest logarithm of the likelihood ratio, for or against, as clear as a fault of a radio head is
-/// found: what more evidence there is must be forgotten some time.
-const SURE: f64 = 15.0;
 
 /// That of a leap of the speed that no vehicle can do: slip, unless a reading is wild.
 const LEAP: f64 = 6.0;
@@ -28,25 +20,28 @@ const LEAP: f64 = 6.0;
 #[derive(Debug)]
 pub(super) struct Slip {
     tracker: Tracker,
-    /// Logarithm of the likelihood ratio since it may have begun.
-    evidence: f64,
+    /// For slip, since it may have begun.
+    evidence: Evidence,
+    prior: f64,
     stands: bool,
 }
 
 clone_in_place!(Slip {
     tracker,
     evidence,
+    prior,
     stands
 });
 
 impl Slip {
-    /// Slip of the odometer of a tracker.
-    pub fn new(tracker: &Tracker) -> Self {
+    /// Slip of the odometer of a tracker, with the probability `prior` whenever it sets off.
+    pub fn new(tracker: &Tracker, prior: f64) -> Self {
         let mut tracker = tracker.clone();
         tracker.distrust_odometer(MOST_SLIP);
         Self {
             tracker,
-            evidence: -SURE,
+            evidence: Evidence::NONE,
+            prior,
             stands: true,
         }
     }
@@ -60,53 +55,45 @@ impl Slip {
         if !(sets_off || leapt > 0.0) {
             return;
         }
-        if self.evidence < 0.0 {
+        if self.evidence.is_against() {
             // What spoke against slip until now says nothing of one that begins.
             self.tracker.clone_from(sound);
             self.tracker
                 .distrust_odometer(if sets_off { MOST_SLIP } else { leapt });
         }
         let speaks_for_it = if leapt > 0.0 { LEAP } else { 0.0 };
-        self.evidence = self.evidence.max(speaks_for_it);
+        self.evidence.is_at_least(speaks_for_it);
     }
 
-    /// Takes in an angle, which the tracker `sound` takes in too, of so many times the variance that is
-    /// stated.
+    /// Takes in an angle, which the tracker `sound` foretells so; angles have so many times the variance
+    /// that is stated.
     pub fn update(
         &mut self,
-        sound: &mut Tracker,
+        sound: &Tracker,
+        if_sound: &Result<Look, UpdateReason>,
         noise_ratio: f64,
         head: &RadioHead,
         measured: &AngleMeasurement,
-    ) -> UpdateVerdict {
+    ) {
         let if_slipping = self.tracker.look(head, measured);
-        let if_sound = sound.look(head, measured);
-        if measured.resolved
-            && let (Ok(slips), Ok(holds)) = (&if_slipping, &if_sound)
-            && !(slips.excluded || holds.excluded)
-        {
-            let for_slip = if let (Some(slips), Some(holds)) = (&slips.pasts, &holds.pasts) {
-                // They know of each other what repeats itself.
-                (or_outlier(slips.density) / or_outlier(holds.density)).ln()
-            } else {
-                let at_first =
-                    |by: &Tracker, seen| by.first_variance(seen) + by.lasting_variance(seen);
-                let ratio = density(slips, noise_ratio * at_first(&self.tracker, slips))
-                    / density(holds, noise_ratio * at_first(sound, holds));
-                // What is seen again and again speaks once.
-                let share = at_first(sound, holds) / holds.innovation.measurement_variance;
-                share * ratio.ln()
-            };
-            self.evidence = (self.evidence + for_slip).clamp(-SURE, SURE);
+        if measured.resolved {
+            (self.evidence).see(
+                [&self.tracker, sound],
+                [&if_slipping, if_sound],
+                noise_ratio,
+            );
         }
         self.tracker.take(if_slipping, measured);
-        sound.take(if_sound, measured)
     }
 
-    /// Probability that the odometer slips, of one that slips with the probability `prior` whenever it
-    /// sets off.
-    pub fn probability(&self, prior: f64) -> f64 {
-        (1.0 + (prior.recip() - 1.0) * (-self.evidence).exp()).recip()
+    /// How many times as probable it is that the odometer slips as that it does not.
+    pub fn odds(&self) -> f64 {
+        self.evidence.odds(self.prior)
+    }
+
+    /// That before anything speaks for it or against it.
+    pub const fn prior(&self) -> f64 {
+        self.prior
     }
 
     /// The tracker.
@@ -118,18 +105,6 @@ impl Slip {
     pub fn set_excluded(&mut self, head: &RadioHead, excluded: bool) {
         self.tracker.set_excluded(head, excluded);
     }
-}
-
-/// Probability density of an angle (1/rad), were its variance by all but the belief this one.
-fn density(looked: &Look, measurement_variance: f64) -> f64 {
-    let mut seen = looked.innovation;
-    seen.variance += measurement_variance - seen.measurement_variance;
-    or_outlier(seen.density())
-}
-
-/// The same of an angle that may be an outlier.
-fn or_outlier(density: f64) -> f64 {
-    OUTLIERS / TAU + (1.0 - OUTLIERS) * density
 }
 
 #[cfg(test)]
@@ -156,7 +131,7 @@ mod tests {
         let map = Some(Arc::new(road.clone()));
         let config = TrackerConfig::new(&site, &vehicle);
         let mut sound = Tracker::new(config, map, &heads, &start);
-        let mut slip = Slip::new(&sound);
+        let mut slip = Slip::new(&sound, 1e-2);
         let mut distance_m = 0.0;
         let mut time_s = 0.0;
         for step in 1..300 {
@@ -185,12 +160,14 @@ mod tests {
                     snr_db: 20.0,
                     resolved: true,
                 };
-                slip.update(&mut sound, 1.0, head, &measured);
+                let if_sound = sound.look(head, &measured);
+                slip.update(&sound, &if_sound, 1.0, head, &measured);
+                sound.take(if_sound, &measured);
             }
         }
         let off_m =
             (slip.tracker().pose(time_s).pose.point()).distance_m(road.pose(4.0 * time_s).point());
-        (slip.probability(1e-2), slip, off_m)
+        (1.0 / (1.0 + slip.odds().recip()), slip, off_m)
     }
 
     #[test]

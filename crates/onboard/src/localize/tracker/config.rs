@@ -57,6 +57,9 @@ pub struct TrackerConfig {
     /// Standard deviation of that at the start (rad per element); 0 takes the array
     /// as calibrated.
     pub phase_std_rad: f64,
+    /// What mounting angle (rad) and phase (rad per element) may be off by that are taken as exact only because
+    /// nothing is stated: standard deviations.
+    pub unstated_array_std_rad: [f64; 2],
     /// Largest squared Mahalanobis distance of an innovation that is used (χ², one degree).
     pub gate: f64,
     /// Acceleration to reckon with where odometry is missing (m/s²).
@@ -80,6 +83,8 @@ pub struct TrackerConfig {
     pub phase_bias: PhaseBias,
     /// How probable an error is that stays over metres, and is found while driving; 0 where none is.
     pub error_probability: f64,
+    /// The same of one so rare that only a tracker beside finds it; 0 where there is none.
+    pub rare_error_probability: f64,
     /// Time between odometry samples above which they are reported as a gap (s).
     pub gap_s: f64,
     /// Speed that no odometry sample can exceed (m/s).
@@ -148,9 +153,19 @@ const USUAL_SCALE_WALK_PER_SQRT_M: f64 = 0.03;
 /// Mounting angle of an array on such a vehicle, where no deviation is stated (rad).
 const USUAL_MOUNTING_STD_RAD: f64 = 0.02;
 
+/// An array of which nothing is stated: mounting angle (rad) and phase (rad per element).
+const UNSTATED_MOUNTING_STD_RAD: f64 = 0.005;
+const UNSTATED_PHASE_STD_RAD: f64 = 0.02;
+
 /// Lateness of angles on a differential drive, where nothing is stated (s): at walking pace its
 /// turns show it.
 const USUAL_LATENESS_STD_S: f64 = 0.1;
+
+/// Probability that errors of a radio head's angles stay over metres, where nothing is stated of it: on a
+/// road, as a differential drive is as often lost, and would take the one for the other. And from which on
+/// it is usual, so that every tracker is to find them.
+const UNKNOWN_ERROR_PROBABILITY: f64 = 0.1;
+const LEAST_USUAL_ERROR_PROBABILITY: f64 = 0.5;
 
 impl TrackerConfig {
     /// What a tracker on a vehicle assumes at a site.
@@ -197,7 +212,22 @@ impl TrackerConfig {
         // A track that is wider than stated turns less.
         let track_share = |width_m| odometer.track_width_std_m / width_m;
         let track_share = odometer.track_width_m.map_or(0.0, track_share);
+        let mounting_is_unstated = array.mounting_std_rad.is_none() && !wheels;
+        let phase_is_unstated = array.phase_std_rad.is_none() && array.shape.is_row();
+        let unstated = [
+            (mounting_is_unstated, UNSTATED_MOUNTING_STD_RAD),
+            (phase_is_unstated, UNSTATED_PHASE_STD_RAD),
+        ]
+        .map(|(is_unstated, std_rad)| if is_unstated { std_rad } else { 0.0 });
         let receiver = &vehicle.receiver;
+        let error_probability = (receiver.phase_bias_probability).unwrap_or(if wheels {
+            0.0
+        } else {
+            UNKNOWN_ERROR_PROBABILITY
+        });
+        // Without a guard there is no tracker beside this one.
+        let is_alone = vehicle.integrity.is_none() && receiver.phase_bias_probability.is_some();
+        let is_usual = is_alone || error_probability >= LEAST_USUAL_ERROR_PROBABILITY;
         let rician_k = 10f64.powf(0.1 * site.rician_k_db);
         Self {
             drive: vehicle.drive,
@@ -244,9 +274,14 @@ impl TrackerConfig {
             yaw_rate_bias_radps: gyroscope.map_or(0.0, |gyroscope| gyroscope.bias_radps),
             yaw_rate_bias_std_radps: yaw_bias_std,
             yaw_rate_scale_std: if wheels { odometer_scale_std } else { 0.0 }.hypot(track_share),
-            mounting_std_rad: or_usual(array.mounting_std_rad, USUAL_MOUNTING_STD_RAD, 0.0),
+            mounting_std_rad: array.mounting_std_rad.unwrap_or(if wheels {
+                USUAL_MOUNTING_STD_RAD
+            } else {
+                0.0
+            }),
             phase_rad: array.phase_rad,
-            phase_std_rad: array.phase_std_rad,
+            phase_std_rad: array.phase_std_rad.unwrap_or(0.0),
+            unstated_array_std_rad: unstated,
             gate: normal_quantile(0.5 * settings.outlier_probability).powi(2),
             acceleration_mps2: 2.0 * vehicle.acceleration_mps2,
             leap_mps2: 10.0 * vehicle.acceleration_mps2,
@@ -268,7 +303,8 @@ impl TrackerConfig {
                 correlation_s: receiver.phase_bias_correlation_s,
                 correlation_m: receiver.phase_bias_correlation_m,
             },
-            error_probability: receiver.phase_bias_probability.unwrap_or(0.0),
+            error_probability: if is_usual { error_probability } else { 0.0 },
+            rare_error_probability: if is_usual { 0.0 } else { error_probability },
             gap_s: 5.0 / odometer.rate_hz,
             top_speed_mps: 1.5 * vehicle.top_speed_mps(),
         }
@@ -282,7 +318,7 @@ impl TrackerConfig {
     /// Whether an error that stays is found, but so rare that its first angles are off as if the vehicle
     /// were lost.
     pub fn may_be_misled(&self) -> bool {
-        self.finds_errors() && self.error_probability < 0.5
+        self.finds_errors() && self.error_probability < LEAST_USUAL_ERROR_PROBABILITY
     }
 
     /// Variance (rad²) by scatter of an angle `travelled_m` after the radio head's last one, see

@@ -10,6 +10,7 @@ use super::state::{
     ACROSS, ALONG, Belief, CURVATURE, HEADING, LATENESS, MOUNTING, PHASE, SCALE, STATES,
     YAW_RATE_BIAS, YAW_RATE_SCALE,
 };
+use super::staying_errors::StayingErrors;
 use crate::geometry::wrap_angle;
 use crate::radio_head::RadioHead;
 use crate::road::Road;
@@ -81,6 +82,46 @@ impl Tracker {
     pub(in crate::localize) fn resume(&mut self, other: &Self) {
         self.odometry = other.odometry;
         self.driven_m = other.driven_m;
+    }
+
+    /// The same tracker, by which errors that stay have this probability and are not known yet.
+    pub(in crate::localize) fn finding_errors(&self, probability: f64) -> Self {
+        let mut tracker = self.clone();
+        tracker.config.error_probability = probability;
+        tracker.errors = StayingErrors::new(self.heads.len(), probability);
+        tracker
+    }
+
+    /// The same tracker as what is stated has it: errors that stay are found by none where they are rare.
+    pub(in crate::localize) fn as_stated(&self) -> Self {
+        if self.config.rare_error_probability > 0.0 {
+            self.finding_errors(0.0)
+        } else {
+            self.clone()
+        }
+    }
+
+    /// The same tracker of an array of which nothing is taken as exact that is not stated; `None` where all of
+    /// it is.
+    pub(in crate::localize) fn inexact(&self) -> Option<Self> {
+        let stds_rad = self.config.unstated_array_std_rad;
+        if stds_rad == [0.0; 2] {
+            return None;
+        }
+        let mut tracker = self.clone();
+        let config = &mut tracker.config;
+        config.unstated_array_std_rad = [0.0; 2];
+        for ((std, state), std_rad) in [
+            (&mut config.mounting_std_rad, MOUNTING),
+            (&mut config.phase_std_rad, PHASE),
+        ]
+        .into_iter()
+        .zip(stds_rad)
+        {
+            *std = std.hypot(std_rad);
+            tracker.belief.covariance[state][state] += std_rad * std_rad;
+        }
+        Some(tracker)
     }
 
     /// The same tracker begun anew where it is, every source in use, its place known to

@@ -108,8 +108,9 @@ fn covariance(weights: &[f64; LEVELS], one: &[f64; LEVELS], other: &[f64; LEVELS
     if total <= 0.0 {
         return (0.0, 0.0);
     }
+    // However little they weigh together, as a value does that was kept for long.
     product /= total;
-    (product - means[0] * means[1] / (total * total), product)
+    (product - means[0] / total * (means[1] / total), product)
 }
 
 impl StayingError {
@@ -217,5 +218,17 @@ impl StayingError {
             .map(|(level, variance)| level / (foretold + 2.0 * variance))
             .sum();
         (told.recip() - foretold).max(0.0)
+    }
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    #[test]
+    fn a_value_as_good_as_forgotten_has_moments() {
+        let weights = [1e-230, 2e-230, 1e-230, 0.0];
+        let (mean, variance) = moments(&weights, &[1.0, 2.0, 3.0, 9.0]);
+        assert!((mean - 2.0).abs() < 1e-12 && (variance - 0.5).abs() < 1e-12);
     }
 }

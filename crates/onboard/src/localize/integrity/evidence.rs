@@ -1,0 +1,83 @@
+//! Which of two trackers foretells the angles better.
+
+use std::f64::consts::TAU;
+
+use crate::localize::measurement::UpdateReason;
+use crate::localize::tracker::{Look, Tracker};
+
+/// Share of the angles that come from anywhere.
+const OUTLIERS: f64 = 2e-3;
+
+/// Largest logarithm of the likelihood ratio, for or against, as clear as a fault of a radio head is
+/// found: what more evidence there is must be forgotten some time.
+const SURE: f64 = 15.0;
+
+/// Logarithm of a likelihood ratio.
+#[derive(Clone, Copy, Debug, PartialEq)]
+pub(super) struct Evidence(f64);
+
+impl Evidence {
+    /// None either way.
+    pub const NONE: Self = Self(0.0);
+
+    /// Whether it rather speaks against than for.
+    pub const fn is_against(self) -> bool {
+        self.0 < 0.0
+    }
+
+    /// From now on it is at least so much.
+    pub const fn is_at_least(&mut self, evidence: f64) {
+        self.0 = self.0.max(evidence);
+    }
+
+    /// Takes in how the tracker for which it would speak, and the other, foretell an angle that has so many
+    /// times the variance that is stated.
+    pub fn see(
+        &mut self,
+        [of_it, of_other]: [&Tracker; 2],
+        [it, other]: [&Result<Look, UpdateReason>; 2],
+        noise_ratio: f64,
+    ) {
+        if let (Ok(it), Ok(other)) = (it, other)
+            && !(it.excluded || other.excluded)
+        {
+            let ratio = density(of_it, it, noise_ratio) / density(of_other, other, noise_ratio);
+            let share = independent_share(of_it, it).min(independent_share(of_other, other));
+            self.0 = (self.0 + share * ratio.ln()).clamp(-SURE, SURE);
+        }
+    }
+
+    /// How many times as probable it is as not, where its probability was `prior` before.
+    pub fn odds(self, prior: f64) -> f64 {
+        prior / (1.0 - prior) * self.0.exp()
+    }
+}
+
+/// Variance (rad²) of an angle by all but the belief, were the radio head not heard before.
+fn at_first(tracker: &Tracker, seen: &Look) -> f64 {
+    tracker.first_variance(seen) + tracker.lasting_variance(seen)
+}
+
+/// What is seen again and again speaks once; where errors that stay are found, it is known what repeats
+/// itself.
+fn independent_share(tracker: &Tracker, seen: &Look) -> f64 {
+    if seen.pasts.is_some() {
+        return 1.0;
+    }
+    at_first(tracker, seen) / seen.innovation.measurement_variance
+}
+
+/// Probability density of an angle (1/rad), which may be an outlier.
+fn density(tracker: &Tracker, seen: &Look, noise_ratio: f64) -> f64 {
+    let inlier = seen.pasts.as_ref().map_or_else(
+        || {
+            // Who stands hears the same again, of a measurement variance that drowns the belief's.
+            let mut alone = seen.innovation;
+            let belief = (alone.variance - alone.measurement_variance).max(0.0);
+            alone.variance = belief + noise_ratio * at_first(tracker, seen);
+            alone.density()
+        },
+        |pasts| pasts.density,
+    );
+    OUTLIERS / TAU + (1.0 - OUTLIERS) * inlier
+}
