@@ -1,8 +1,8 @@
 //! A tracker that believes otherwise, beside one that trusts what is stated.
 //!
-//! Two of them run. One finds errors of the angles that stay over metres, where that is rare: an error
+//! Three of them run. One expects slip ([`Slip`](super::slip::Slip)). One finds errors of the angles that stay over metres, where that is rare: an error
 //! that stays and a radio head at fault explain the same angles, so it says where the vehicle is, and not
-//! that all is well. The other takes nothing of the array as exact that is not stated. Each angle speaks for
+//! that all is well. One takes nothing of the array as exact that is not stated. Each angle speaks for
 //! it or against it, as the one tracker or the other foretells it better.
 
 use super::evidence::Evidence;
@@ -18,9 +18,9 @@ const INEXACT: f64 = 0.1;
 /// A tracker that believes otherwise.
 #[derive(Debug)]
 pub(super) struct Alternative {
-    tracker: Tracker,
-    evidence: Evidence,
-    prior: f64,
+    pub tracker: Tracker,
+    pub evidence: Evidence,
+    pub prior: f64,
 }
 
 clone_in_place!(Alternative {
@@ -30,7 +30,8 @@ clone_in_place!(Alternative {
 });
 
 impl Alternative {
-    const fn new(tracker: Tracker, prior: f64) -> Self {
+    /// One that has the probability `prior`.
+    pub const fn new(tracker: Tracker, prior: f64) -> Self {
         Self {
             tracker,
             evidence: Evidence::NONE,
@@ -85,18 +86,8 @@ impl Alternative {
         self.tracker.take(looked, measured)
     }
 
-    /// Uses a radio head again.
-    pub fn readmit(&mut self, head: &RadioHead) {
-        self.tracker.set_excluded(head, false);
-    }
-
     /// How many times as probable it is as what is stated.
     pub fn odds(&self) -> f64 {
         self.evidence.odds(self.prior)
-    }
-
-    /// The tracker.
-    pub const fn tracker(&self) -> &Tracker {
-        &self.tracker
     }
 }

@@ -5,7 +5,7 @@
 //! covariance, wherever the full solution may be: the protection level is the radius about the full
 //! solution that holds for all of them together, each as probable as its fault
 //! ([`LevelEquation`](super::level::LevelEquation)). The same of trackers that believe otherwise of odometer,
-//! array and reflections ([`Otherwise`]), as probable as the angles leave it; if one of them becomes more
+//! array and reflections ([`Otherwise`]), as probable as the angles leave it; if one of them becomes far more
 //! probable than what is stated, the position is its own, and not `ok` where something is at fault. All of
 //! it is of angles as noisy as they are heard to be ([`AngleNoise`](super::angle_noise::AngleNoise)).
 //!

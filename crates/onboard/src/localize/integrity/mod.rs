@@ -10,6 +10,8 @@ mod level;
 mod otherwise;
 mod sequence_test;
 mod slip;
+#[cfg(test)]
+mod trip;
 
 pub use config::IntegrityConfig;
 pub use guard::Guard;

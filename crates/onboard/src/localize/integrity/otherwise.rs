@@ -36,16 +36,17 @@ impl Otherwise {
     /// Beside a tracker that trusts what is stated, or the one itself that finds errors that stay; the odometer slips
     /// with this probability whenever the vehicle sets off.
     pub fn new(tracker: &Tracker, slips: f64) -> Self {
+        let stated = tracker.as_stated();
         Self {
-            slip: Slip::new(&tracker.as_stated(), slips),
-            inexact: Alternative::inexact(&tracker.as_stated()),
+            slip: Slip::new(&stated, slips),
+            inexact: Alternative::inexact(&stated),
             multipath: Alternative::multipath(tracker),
         }
     }
 
     /// The same beside another tracker.
     pub fn anew(&self, tracker: &Tracker) -> Self {
-        Self::new(tracker, self.slip.prior())
+        Self::new(tracker, self.slip.alternative.prior)
     }
 
     /// The same, but who expects errors that stay goes on.
@@ -62,16 +63,15 @@ impl Otherwise {
 
     /// How many times as probable each of it is as that all is as stated, and the tracker that is right then.
     pub fn odds(&self) -> impl Iterator<Item = (f64, &Tracker)> + Clone {
-        let alternatives = self.inexact.iter().chain(&self.multipath);
-        [(self.slip.odds(), self.slip.tracker())]
-            .into_iter()
-            .chain(alternatives.map(|it| (it.odds(), it.tracker())))
+        let all = [&self.slip.alternative].into_iter();
+        let all = all.chain(&self.inexact).chain(&self.multipath);
+        all.map(|it| (it.odds(), &it.tracker))
     }
 
     /// The tracker that is right, if something is clearly more probable than that all is as stated. Where errors that
     /// stay are usual they explain the same, and nobody leads.
     pub fn leader(&self) -> Option<&Tracker> {
-        let is_usual = self.slip.tracker().config().finds_errors();
+        let is_usual = self.slip.alternative.tracker.config().finds_errors();
         let likely = self
             .odds()
             .filter(|(odds, _)| *odds > LEAST_ODDS && !is_usual);
@@ -85,12 +85,12 @@ impl Otherwise {
 
     /// Whether errors stay, as far as is known.
     pub fn errors_stay(&self) -> bool {
-        (self.multipath.as_ref()).is_some_and(|it| self.leads(it.tracker()))
+        (self.multipath.as_ref()).is_some_and(|it| self.leads(&it.tracker))
     }
 
     /// Whether errors stay or the odometer slips, as far as is known.
     pub fn is_fault(&self) -> bool {
-        self.errors_stay() || self.leads(self.slip.tracker())
+        self.errors_stay() || self.leads(&self.slip.alternative.tracker)
     }
 
     /// The odds of all that may be, that all is as stated among them.
@@ -107,7 +107,7 @@ impl Otherwise {
     /// The tracker of an array that is not exact, once that is sure.
     pub fn inexact(&self) -> Option<&Tracker> {
         let inexact = self.inexact.as_ref()?;
-        (inexact.odds() > SURE_ODDS && self.leads(inexact.tracker())).then_some(inexact.tracker())
+        (inexact.odds() > SURE_ODDS && self.leads(&inexact.tracker)).then_some(&inexact.tracker)
     }
 
     /// Moves on by an odometry sample, by which the tracker `stated` has moved on.
@@ -127,10 +127,11 @@ impl Otherwise {
         head: &RadioHead,
         measured: &AngleMeasurement,
     ) -> Option<UpdateVerdict> {
-        self.slip
-            .update(stated, looked, noise_ratio, head, measured);
-        if let Some(inexact) = &mut self.inexact {
-            inexact.update(stated, looked, noise_ratio, head, measured);
+        for alternative in [&mut self.slip.alternative]
+            .into_iter()
+            .chain(&mut self.inexact)
+        {
+            alternative.update(stated, looked, noise_ratio, head, measured);
         }
         let multipath = self.multipath.as_mut()?;
         let verdict = multipath.update(stated, looked, noise_ratio, head, measured);
@@ -139,7 +140,7 @@ impl Otherwise {
 
     /// Leaves a radio head out, as `stated` does, that has never heard it. Errors that stay are no reason to.
     pub fn exclude(&mut self, stated: &Tracker, head: &RadioHead) {
-        self.slip.set_excluded(head, true);
+        self.slip.alternative.tracker.set_excluded(head, true);
         self.inexact = Alternative::inexact(stated);
         if let Some(multipath) = &mut self.multipath {
             multipath.forget(); // it spoke against another tracker
@@ -148,9 +149,11 @@ impl Otherwise {
 
     /// Uses a radio head again.
     pub fn readmit(&mut self, head: &RadioHead) {
-        self.slip.set_excluded(head, false);
-        if let Some(inexact) = &mut self.inexact {
-            inexact.readmit(head);
+        for alternative in [&mut self.slip.alternative]
+            .into_iter()
+            .chain(&mut self.inexact)
+        {
+            alternative.tracker.set_excluded(head, false);
         }
     }
 }
@@ -158,35 +161,21 @@ impl Otherwise {
 #[cfg(test)]
 mod tests {
     use std::f64::consts::PI;
-    use std::sync::Arc;
 
     use rand::{RngExt, SeedableRng};
     use rand_chacha::ChaCha8Rng;
     use rand_distr::StandardNormal;
 
     use super::*;
-    use crate::localize::tracker::{InitialPose, TrackerConfig};
-    use crate::settings::{Shipped, Site, TomlFile, Vehicle};
-
-    const SIGMA_RAD: f64 = 0.05;
+    use crate::localize::integrity::trip::{SIGMA_RAD, angle, trip};
 
     /// A minute past four radio heads, whose bearings are off by `turned_rad` and the angles by `off_rad` after so
     /// many metres: what is believed otherwise then, and how far off the tracker is that leads.
     fn drive(turned_rad: f64, off_rad: impl Fn(usize, f64) -> f64) -> (Otherwise, f64) {
-        let site = Site::from_library("trip-4", &Shipped).unwrap();
-        let vehicle = Vehicle::from_library("carrier", &Shipped).unwrap();
-        let heads = RadioHead::heard(&site, &vehicle);
-        let road = site.build_road().unwrap().unwrap();
-        let start = InitialPose {
-            pose: road.pose(0.0),
-            position_std_m: 0.1,
-            heading_std_rad: 0.01,
-        };
-        let config = TrackerConfig::new(&site, &vehicle);
-        let mut stated = Tracker::new(config, Some(Arc::new(road.clone())), &heads, &start);
+        let (heads, road, mut stated) = trip();
         let mut otherwise = Otherwise::new(&stated, 1e-3);
         let mut noise = ChaCha8Rng::seed_from_u64(1);
-        let mut truth = start.pose;
+        let mut truth = road.pose(0.0);
         for step in 1..600 {
             let time_s = f64::from(step) * 0.1;
             let way_m = 4.0 * time_s;
@@ -202,16 +191,8 @@ mod tests {
             for (number, head) in heads.iter().enumerate() {
                 let bearing_rad = truth.point().bearing_rad(head.position) - truth.heading_rad;
                 let own_rad = SIGMA_RAD * noise.sample::<f64, _>(StandardNormal);
-                let measured = AngleMeasurement {
-                    time_s,
-                    phase_rad: PI * (bearing_rad - turned_rad).cos()
-                        + off_rad(number, way_m)
-                        + own_rad,
-                    phase_sigma_rad: SIGMA_RAD,
-                    angle_rad: f64::NAN,
-                    snr_db: 20.0,
-                    resolved: true,
-                };
+                let phase_rad = PI * (bearing_rad - turned_rad).cos();
+                let measured = angle(time_s, phase_rad + off_rad(number, way_m) + own_rad);
                 let looked = stated.look(head, &measured);
                 otherwise.update(&stated, &looked, 1.0, head, &measured);
                 stated.take(looked, &measured);

@@ -6,30 +6,23 @@
 //! the angles have spoken against it, the level is to hold for that tracker too. Where errors are found
 //! that stay over metres, an angle speaks as the errors that either tracker has found foretell it.
 
-use super::evidence::Evidence;
+use super::alternative::Alternative;
 use crate::clone_in_place::clone_in_place;
-use crate::localize::measurement::{AngleMeasurement, UpdateReason};
-use crate::localize::tracker::{Look, MOST_SLIP, Tracker};
+use crate::localize::tracker::{MOST_SLIP, Tracker};
 use crate::observation::OdometrySample;
-use crate::radio_head::RadioHead;
 
 /// That of a leap of the speed that no vehicle can do: slip, unless a reading is wild.
 const LEAP: f64 = 6.0;
 
-/// A tracker that does not trust the odometer.
+/// A tracker that does not trust the odometer. What speaks for slip counts since it may have begun.
 #[derive(Debug)]
 pub(super) struct Slip {
-    tracker: Tracker,
-    /// For slip, since it may have begun.
-    evidence: Evidence,
-    prior: f64,
+    pub alternative: Alternative,
     stands: bool,
 }
 
 clone_in_place!(Slip {
-    tracker,
-    evidence,
-    prior,
+    alternative,
     stands
 });
 
@@ -39,98 +32,42 @@ impl Slip {
         let mut tracker = tracker.clone();
         tracker.distrust_odometer(MOST_SLIP);
         Self {
-            tracker,
-            evidence: Evidence::NONE,
-            prior,
+            alternative: Alternative::new(tracker, prior),
             stands: true,
         }
     }
 
     /// Moves on by an odometry sample, by which the tracker `sound` has moved on.
     pub fn odometry(&mut self, sound: &Tracker, sample: &OdometrySample) {
-        self.tracker.odometry(sample);
+        let Alternative {
+            tracker, evidence, ..
+        } = &mut self.alternative;
+        tracker.odometry(sample);
         let stood = std::mem::replace(&mut self.stands, sample.speed_mps == 0.0);
         let sets_off = stood && !self.stands;
-        let leapt = self.tracker.leapt();
+        let leapt = tracker.leapt();
         if !(sets_off || leapt > 0.0) {
             return;
         }
-        if self.evidence.is_against() {
+        if evidence.is_against() {
             // What spoke against slip until now says nothing of one that begins.
-            self.tracker.clone_from(sound);
-            self.tracker
-                .distrust_odometer(if sets_off { MOST_SLIP } else { leapt });
+            tracker.clone_from(sound);
+            tracker.distrust_odometer(if sets_off { MOST_SLIP } else { leapt });
         }
-        let speaks_for_it = if leapt > 0.0 { LEAP } else { 0.0 };
-        self.evidence.is_at_least(speaks_for_it);
-    }
-
-    /// Takes in an angle, which the tracker `sound` foretells so; angles have so many times the variance
-    /// that is stated.
-    pub fn update(
-        &mut self,
-        sound: &Tracker,
-        if_sound: &Result<Look, UpdateReason>,
-        noise_ratio: f64,
-        head: &RadioHead,
-        measured: &AngleMeasurement,
-    ) {
-        let if_slipping = self.tracker.look(head, measured);
-        if measured.resolved {
-            (self.evidence).see(
-                [&self.tracker, sound],
-                [&if_slipping, if_sound],
-                noise_ratio,
-            );
-        }
-        self.tracker.take(if_slipping, measured);
-    }
-
-    /// How many times as probable it is that the odometer slips as that it does not.
-    pub fn odds(&self) -> f64 {
-        self.evidence.odds(self.prior)
-    }
-
-    /// That before anything speaks for it or against it.
-    pub const fn prior(&self) -> f64 {
-        self.prior
-    }
-
-    /// The tracker.
-    pub const fn tracker(&self) -> &Tracker {
-        &self.tracker
-    }
-
-    /// Leaves the angles of a radio head unused, or uses them again.
-    pub fn set_excluded(&mut self, head: &RadioHead, excluded: bool) {
-        self.tracker.set_excluded(head, excluded);
+        evidence.is_at_least(if leapt > 0.0 { LEAP } else { 0.0 });
     }
 }
 
 #[cfg(test)]
 mod tests {
-    use std::sync::Arc;
-
     use super::*;
-    use crate::localize::tracker::{InitialPose, TrackerConfig};
-    use crate::settings::{Shipped, Site, TomlFile, Vehicle};
+    use crate::localize::integrity::trip::{angle, trip};
 
     /// Half a minute at 4 m/s, of which the odometer reads so many times the way from a time on. Angles
     /// are exact, and heard until a time. Probability of slip, of 0.01 before, the tracker that expects
     /// it, and how far off that is at the end.
     fn drive(ratio: f64, slips_from_s: f64, heard_until_s: f64) -> (f64, Slip, f64) {
-        let site = Site::from_library("trip-4", &Shipped).unwrap();
-        let vehicle = Vehicle::from_library("carrier", &Shipped).unwrap();
-        let heads = RadioHead::heard(&site, &vehicle);
-        let road = site.build_road().unwrap().unwrap();
-        let start = InitialPose {
-            pose: road.pose(0.0),
-            position_std_m: 0.1,
-            heading_std_rad: 0.01,
-        };
-        let map = Some(Arc::new(road.clone()));
-        let config = TrackerConfig::new(&site, &vehicle);
-        let mut sound = Tracker::new(config, map, &heads, &start);
+        let (heads, road, mut sound) = trip();
         let mut slip = Slip::new(&sound, 1e-2);
         let mut distance_m = 0.0;
         let mut time_s = 0.0;
@@ -152,22 +89,15 @@ mod tests {
             let pose = road.pose(4.0 * time_s);
             for head in &heads {
                 let bearing_rad = pose.point().bearing_rad(head.position) - pose.heading_rad;
-                let measured = AngleMeasurement {
-                    time_s,
-                    phase_rad: std::f64::consts::PI * bearing_rad.cos(),
-                    phase_sigma_rad: 0.05,
-                    angle_rad: f64::NAN,
-                    snr_db: 20.0,
-                    resolved: true,
-                };
+                let measured = angle(time_s, std::f64::consts::PI * bearing_rad.cos());
                 let if_sound = sound.look(head, &measured);
-                slip.update(&sound, &if_sound, 1.0, head, &measured);
+                (slip.alternative).update(&sound, &if_sound, 1.0, head, &measured);
                 sound.take(if_sound, &measured);
             }
         }
-        let off_m =
-            (slip.tracker().pose(time_s).pose.point()).distance_m(road.pose(4.0 * time_s).point());
-        (1.0 / (1.0 + slip.odds().recip()), slip, off_m)
+        let off_m = (slip.alternative.tracker.pose(time_s).pose.point())
+            .distance_m(road.pose(4.0 * time_s).point());
+        (1.0 / (1.0 + slip.alternative.odds().recip()), slip, off_m)
     }
 
     #[test]
@@ -183,7 +113,7 @@ mod tests {
         for ratio in [0.9, 1.1] {
             let (probability, slip, off_m) = drive(ratio, 20.0, 20.0);
             assert!(probability > 0.5);
-            let covariance = slip.tracker().pose(29.9).covariance.unwrap();
+            let covariance = slip.alternative.tracker.pose(29.9).covariance.unwrap();
             let std_m = (covariance[0][0] + covariance[1][1]).sqrt();
             // Slip by the leap is one deviation of what is expected.
             assert!((off_m / std_m - 1.0).abs() < 0.3, "{off_m} of {std_m}");
