@@ -20,6 +20,12 @@ impl Point {
         Self { x_m, y_m }
     }
 
+    /// The point so far east and north of it.
+    #[must_use]
+    pub fn moved(self, [east_m, north_m]: [f64; 2]) -> Self {
+        Self::new(self.x_m + east_m, self.y_m + north_m)
+    }
+
     /// Distance to another point in metres.
     pub fn distance_m(self, other: Self) -> f64 {
         (other.x_m - self.x_m).hypot(other.y_m - self.y_m)

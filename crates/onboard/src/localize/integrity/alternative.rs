@@ -1,19 +1,24 @@
 //! A tracker that believes otherwise, beside one that trusts what is stated.
 //!
-//! Three of them run. One expects slip ([`Slip`](super::slip::Slip)). One finds errors of the angles that stay over metres, where that is rare: an error
-//! that stays and a radio head at fault explain the same angles, so it says where the vehicle is, and not
-//! that all is well. One takes nothing of the array as exact that is not stated. Each angle speaks for
-//! it or against it, as the one tracker or the other foretells it better.
+//! Each angle speaks for it or against it, as the one tracker or the other foretells it better. A fault is what
+//! might as well be another one, or is none of what the vehicle was told: such a tracker says where
+//! the vehicle is, and not that all is well.
 
 use super::evidence::Evidence;
 use crate::clone_in_place::clone_in_place;
 use crate::localize::measurement::{AngleMeasurement, UpdateReason, UpdateVerdict};
 use crate::localize::tracker::{Look, Tracker};
-use crate::observation::OdometrySample;
 use crate::radio_head::RadioHead;
+use crate::settings::DriveKind;
 
 /// Probability that an array is off of which nothing is stated.
 const INEXACT: f64 = 0.1;
+
+/// How many times as noisy as stated an odometer is that is noisier.
+const NOISIER: f64 = 3.0;
+
+/// How far a site plan is off as a whole, if it is: standard deviation in x and y (m).
+const DATUM_STD_M: f64 = 1.5;
 
 /// A tracker that believes otherwise.
 #[derive(Debug)]
@@ -21,25 +26,37 @@ pub(super) struct Alternative {
     pub tracker: Tracker,
     pub evidence: Evidence,
     pub prior: f64,
+    pub is_fault: bool,
 }
 
 clone_in_place!(Alternative {
     tracker,
     evidence,
-    prior
+    prior,
+    is_fault
 });
 
 impl Alternative {
-    /// One that has the probability `prior`.
-    pub const fn new(tracker: Tracker, prior: f64) -> Self {
+    /// A fault that has the probability `prior`.
+    pub const fn fault(tracker: Tracker, prior: f64) -> Self {
         Self {
             tracker,
             evidence: Evidence::NONE,
             prior,
+            is_fault: true,
         }
     }
 
-    /// Errors that stay; `None` where they are impossible, or so usual that every tracker finds them.
+    /// Something that is otherwise with the probability `prior`, and no fault.
+    fn sound(tracker: Tracker, prior: f64) -> Self {
+        Self {
+            is_fault: false,
+            ..Self::fault(tracker, prior)
+        }
+    }
+
+    /// Errors that stay over metres, where that is rare: one that stays and a radio head at fault explain the same angles.
+    /// `None` where they are impossible, or so usual that every tracker finds them.
     pub fn multipath(tracker: &Tracker) -> Option<Self> {
         let prior = tracker.config().rare_error_probability;
         let finds = tracker.config().finds_errors();
@@ -49,7 +66,7 @@ impl Alternative {
             } else {
                 tracker.finding_errors(prior)
             };
-            Self::new(tracker, prior)
+            Self::fault(tracker, prior)
         })
     }
 
@@ -57,17 +74,29 @@ impl Alternative {
     pub fn inexact(tracker: &Tracker) -> Option<Self> {
         let inexact = tracker.inexact();
         let inexact = inexact.filter(|it| !it.config().finds_errors());
-        inexact.map(|tracker| Self::new(tracker, INEXACT))
+        inexact.map(|tracker| Self::sound(tracker, INEXACT))
+    }
+
+    /// An odometer that is noisier than stated with the probability `prior`, of an array that may not be exact; `None`
+    /// on a differential drive, whose wheels slip a little with every metre, or where errors that stay explain the same.
+    pub fn noisier(tracker: &Tracker, prior: f64) -> Option<Self> {
+        let config = tracker.config();
+        let is_watched = config.drive == DriveKind::Road && !config.finds_errors();
+        let tracker = is_watched.then(|| tracker.doubting_array().noisier(NOISIER));
+        tracker.map(|it| Self::sound(it, prior))
+    }
+
+    /// A site plan that is off from the map as a whole with the probability `prior`, of an array that may not be exact;
+    /// `None` where that is none, the radio heads are all the map there is, or errors that stay explain the same.
+    pub fn displaced(tracker: &Tracker, prior: f64) -> Option<Self> {
+        let is_watched = prior > 0.0 && tracker.has_map() && !tracker.config().finds_errors();
+        let tracker = is_watched.then(|| tracker.doubting_array().displaced(DATUM_STD_M));
+        tracker.map(|it| Self::fault(it, prior))
     }
 
     /// Forgets what spoke for it or against it.
     pub const fn forget(&mut self) {
         self.evidence = Evidence::NONE;
-    }
-
-    /// Moves on by an odometry sample.
-    pub fn odometry(&mut self, sample: &OdometrySample) {
-        self.tracker.odometry(sample);
     }
 
     /// Takes in an angle, which the tracker `sound` foretells so.

@@ -129,7 +129,7 @@ impl Bank {
         let is_quiet = self.faulty() == 0
             && self.doubtful(config.recovery_threshold) == 0
             && self.quiet_s(now_s) > config.recovery_s;
-        is_quiet.then(|| Self::new(inexact, &self.heads, self.otherwise.anew(inexact), now_s))
+        is_quiet.then(|| Self::new(inexact, &self.heads, self.otherwise.beside_inexact(), now_s))
     }
 
     /// The tracker that is most probably right: the one of every sound radio head, unless something is otherwise.
@@ -396,7 +396,7 @@ mod tests {
     use super::*;
     use crate::geometry::Pose;
     use crate::localize::tracker::{InitialPose, TrackerConfig};
-    use crate::settings::{Shipped, Site, TomlFile, Vehicle};
+    use crate::settings::{FaultProbability, Shipped, Site, TomlFile, Vehicle};
 
     /// A minute of driving past four radio heads, of which number 2 is off by `bias_rad`; what was
     /// measured goes to `sinks`.
@@ -460,7 +460,7 @@ mod tests {
         let mut bank = Bank::new(
             &tracker().0,
             &heads,
-            Otherwise::new(&tracker().0, 1e-3),
+            Otherwise::new(&tracker().0, FaultProbability::default()),
             0.0,
         );
         drive(bias_rad, |odometry, head, measured| {

@@ -20,6 +20,11 @@ impl Evidence {
     /// None either way.
     pub const NONE: Self = Self(0.0);
 
+    /// What of it is left beside what speaks for another one.
+    pub const fn beside(self, other: Self) -> Self {
+        Self((self.0 - other.0).clamp(-SURE, SURE))
+    }
+
     /// Whether it rather speaks against than for.
     pub const fn is_against(self) -> bool {
         self.0 < 0.0

@@ -5,9 +5,10 @@
 //! covariance, wherever the full solution may be: the protection level is the radius about the full
 //! solution that holds for all of them together, each as probable as its fault
 //! ([`LevelEquation`](super::level::LevelEquation)). The same of trackers that believe otherwise of odometer,
-//! array and reflections ([`Otherwise`]), as probable as the angles leave it; if one of them becomes far more
-//! probable than what is stated, the position is its own, and not `ok` where something is at fault. All of
-//! it is of angles as noisy as they are heard to be ([`AngleNoise`](super::angle_noise::AngleNoise)).
+//! array, site plan and reflections ([`Otherwise`]), as probable as the angles leave it; if one of them becomes far
+//! more probable than what is stated, the position is its own, and not `ok` where something is at fault, nor where
+//! the odometer's scale is certainly not what is stated. All of it is of angles as noisy as they are heard to
+//! be ([`AngleNoise`](super::angle_noise::AngleNoise)).
 //!
 //! A single radio head has no witness but odometry and road: the protection level then is what
 //! those two can vouch for, grows with the distance driven, and passes the alert limit unless they
@@ -72,7 +73,7 @@ impl Guard {
     ) -> Self {
         let is_found = found_s.is_some();
         let found_s = found_s.unwrap_or(f64::NEG_INFINITY);
-        let otherwise = Otherwise::new(tracker, config.fault_probability.odometer);
+        let otherwise = Otherwise::new(tracker, config.fault_probability);
         Self {
             level: LevelEquation::new(config.risk),
             trusted_m: tracker.driven_m(),
@@ -203,6 +204,7 @@ impl Guard {
         let state = if self.bank.is_outvoted(&self.config) && !otherwise.errors_stay() {
             IntegrityState::Unavailable
         } else if otherwise.is_fault()
+            || self.bank.main().odometer_departs()
             || self.restarted.is_some()
             || self.bank.quiet_s(self.now_s) <= self.config.recovery_s
             || levels.horizontal_m > self.config.alert_limit_m

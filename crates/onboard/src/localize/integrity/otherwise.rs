@@ -7,6 +7,7 @@ use crate::localize::measurement::{AngleMeasurement, UpdateReason, UpdateVerdict
 use crate::localize::tracker::{Look, Tracker};
 use crate::observation::OdometrySample;
 use crate::radio_head::RadioHead;
+use crate::settings::FaultProbability;
 
 /// How many times as probable as what is stated something else must be to lead: about as probable, one takes
 /// turns with the other.
@@ -18,38 +19,43 @@ const SURE_ODDS: f64 = 100.0;
 /// Trackers that believe otherwise than the one beside which they run.
 #[derive(Debug)]
 pub(super) struct Otherwise {
+    probability: FaultProbability,
     /// The odometer slips.
     slip: Slip,
     /// The array is not exact.
-    inexact: Option<Alternative>,
+    array: Option<Alternative>,
+    /// The odometer is noisier.
+    noise: Option<Alternative>,
+    /// The site plan is off as a whole.
+    datum: Option<Alternative>,
     /// Errors of the angles stay over metres.
     multipath: Option<Alternative>,
 }
 
 clone_in_place!(Otherwise {
+    probability,
     slip,
-    inexact,
+    array,
+    noise,
+    datum,
     multipath
 });
 
 impl Otherwise {
-    /// Beside a tracker that trusts what is stated, or the one itself that finds errors that stay; the odometer slips
-    /// with this probability whenever the vehicle sets off.
-    pub fn new(tracker: &Tracker, slips: f64) -> Self {
+    /// Beside a tracker that trusts what is stated, or the one itself that finds errors that stay.
+    pub fn new(tracker: &Tracker, probability: FaultProbability) -> Self {
         let stated = tracker.as_stated();
         Self {
-            slip: Slip::new(&stated, slips),
-            inexact: Alternative::inexact(&stated),
+            probability,
+            slip: Slip::new(&stated, probability.odometer),
+            array: Alternative::inexact(&stated),
+            noise: Alternative::noisier(&stated, probability.odometer),
+            datum: Alternative::displaced(&stated, probability.all_radio_heads),
             multipath: Alternative::multipath(tracker),
         }
     }
 
-    /// The same beside another tracker.
-    pub fn anew(&self, tracker: &Tracker) -> Self {
-        Self::new(tracker, self.slip.alternative.prior)
-    }
-
-    /// The same, but who expects errors that stay goes on.
+    /// The same beside another tracker, but who expects errors that stay goes on.
     pub fn beside(&self, tracker: &Tracker) -> Self {
         let mut multipath = self.multipath.clone();
         if let Some(multipath) = &mut multipath {
@@ -57,40 +63,67 @@ impl Otherwise {
         }
         Self {
             multipath,
-            ..self.anew(tracker)
+            ..Self::new(tracker, self.probability)
         }
+    }
+
+    /// The same beside the tracker of an array that is not exact: as probable as it was beside that one before, slip
+    /// begun anew unless it was likely.
+    pub fn beside_inexact(&self) -> Self {
+        let mut beside = self.clone();
+        if let Some(array) = beside.array.take() {
+            for it in beside.all_mut() {
+                it.evidence = it.evidence.beside(array.evidence);
+            }
+            if beside.slip.alternative.evidence.is_against() {
+                beside.slip = Slip::new(&array.tracker, self.probability.odometer);
+            }
+        }
+        beside
+    }
+
+    fn all(&self) -> impl Iterator<Item = &Alternative> + Clone {
+        let slip = std::iter::once(&self.slip.alternative);
+        (slip.chain(&self.array).chain(&self.noise)).chain(self.datum.iter().chain(&self.multipath))
+    }
+
+    fn all_mut(&mut self) -> impl Iterator<Item = &mut Alternative> {
+        let slip = std::iter::once(&mut self.slip.alternative);
+        (slip.chain(&mut self.array).chain(&mut self.noise))
+            .chain(self.datum.iter_mut().chain(&mut self.multipath))
     }
 
     /// How many times as probable each of it is as that all is as stated, and the tracker that is right then.
     pub fn odds(&self) -> impl Iterator<Item = (f64, &Tracker)> + Clone {
-        let all = [&self.slip.alternative].into_iter();
-        let all = all.chain(&self.inexact).chain(&self.multipath);
-        all.map(|it| (it.odds(), &it.tracker))
+        self.all().map(|it| (it.odds(), &it.tracker))
     }
 
-    /// The tracker that is right, if something is clearly more probable than that all is as stated. Where errors that
-    /// stay are usual they explain the same, and nobody leads.
-    pub fn leader(&self) -> Option<&Tracker> {
+    /// What is clearly more probable than that all is as stated. Where errors that stay are usual they explain the
+    /// same, and nobody leads.
+    fn leading(&self) -> Option<&Alternative> {
         let is_usual = self.slip.alternative.tracker.config().finds_errors();
-        let likely = self
-            .odds()
-            .filter(|(odds, _)| *odds > LEAST_ODDS && !is_usual);
-        let most = likely.max_by(|(one, _), (other, _)| one.total_cmp(other));
-        most.map(|(_, tracker)| tracker)
+        let most = (self.all()).max_by(|one, other| one.odds().total_cmp(&other.odds()));
+        most.filter(|it| it.odds() > LEAST_ODDS && !is_usual)
     }
 
-    fn leads(&self, tracker: &Tracker) -> bool {
-        self.leader().is_some_and(|it| std::ptr::eq(it, tracker))
+    /// The tracker that is right then.
+    pub fn leader(&self) -> Option<&Tracker> {
+        self.leading().map(|it| &it.tracker)
+    }
+
+    fn leads(&self, alternative: &Alternative) -> bool {
+        self.leading()
+            .is_some_and(|it| std::ptr::eq(it, alternative))
     }
 
     /// Whether errors stay, as far as is known.
     pub fn errors_stay(&self) -> bool {
-        (self.multipath.as_ref()).is_some_and(|it| self.leads(&it.tracker))
+        (self.multipath.as_ref()).is_some_and(|it| self.leads(it))
     }
 
-    /// Whether errors stay or the odometer slips, as far as is known.
+    /// Whether something is at fault, as far as is known.
     pub fn is_fault(&self) -> bool {
-        self.errors_stay() || self.leads(&self.slip.alternative.tracker)
+        self.leading().is_some_and(|it| it.is_fault)
     }
 
     /// The odds of all that may be, that all is as stated among them.
@@ -98,24 +131,26 @@ impl Otherwise {
         1.0 + self.odds().map(|(odds, _)| odds).sum::<f64>()
     }
 
-    /// Probability that the odometer does not slip and errors do not stay.
+    /// Probability that nothing of it is at fault.
     pub fn trusted(&self) -> f64 {
-        let inexact = self.inexact.as_ref().map_or(0.0, Alternative::odds);
-        (1.0 + inexact) / self.total_odds()
+        let faults: f64 = (self.all().filter(|it| it.is_fault))
+            .map(Alternative::odds)
+            .sum();
+        1.0 - faults / self.total_odds()
     }
 
     /// The tracker of an array that is not exact, once that is sure.
     pub fn inexact(&self) -> Option<&Tracker> {
-        let inexact = self.inexact.as_ref()?;
-        (inexact.odds() > SURE_ODDS && self.leads(&inexact.tracker)).then_some(&inexact.tracker)
+        let array = self.array.as_ref()?;
+        (array.odds() > SURE_ODDS && self.leads(array)).then_some(&array.tracker)
     }
 
     /// Moves on by an odometry sample, by which the tracker `stated` has moved on.
     pub fn odometry(&mut self, stated: &Tracker, sample: &OdometrySample) {
-        self.slip.odometry(stated, sample);
-        for alternative in self.inexact.iter_mut().chain(&mut self.multipath) {
-            alternative.odometry(sample);
+        for alternative in self.all_mut() {
+            alternative.tracker.odometry(sample);
         }
+        self.slip.watch(stated, sample);
     }
 
     /// Takes in an angle, which the tracker `stated` foretells so; what became of it, where errors stay.
@@ -127,21 +162,20 @@ impl Otherwise {
         head: &RadioHead,
         measured: &AngleMeasurement,
     ) -> Option<UpdateVerdict> {
-        for alternative in [&mut self.slip.alternative]
-            .into_iter()
-            .chain(&mut self.inexact)
-        {
-            alternative.update(stated, looked, noise_ratio, head, measured);
+        let mut verdict = None;
+        for alternative in self.all_mut() {
+            verdict = Some(alternative.update(stated, looked, noise_ratio, head, measured));
         }
-        let multipath = self.multipath.as_mut()?;
-        let verdict = multipath.update(stated, looked, noise_ratio, head, measured);
-        self.errors_stay().then_some(verdict)
+        // Who finds errors that stay comes last.
+        verdict.filter(|_| self.errors_stay())
     }
 
     /// Leaves a radio head out, as `stated` does, that has never heard it. Errors that stay are no reason to.
     pub fn exclude(&mut self, stated: &Tracker, head: &RadioHead) {
         self.slip.alternative.tracker.set_excluded(head, true);
-        self.inexact = Alternative::inexact(stated);
+        self.array = Alternative::inexact(stated);
+        self.noise = Alternative::noisier(stated, self.probability.odometer);
+        self.datum = Alternative::displaced(stated, self.probability.all_radio_heads);
         if let Some(multipath) = &mut self.multipath {
             multipath.forget(); // it spoke against another tracker
         }
@@ -149,10 +183,7 @@ impl Otherwise {
 
     /// Uses a radio head again.
     pub fn readmit(&mut self, head: &RadioHead) {
-        for alternative in [&mut self.slip.alternative]
-            .into_iter()
-            .chain(&mut self.inexact)
-        {
+        for alternative in self.all_mut() {
             alternative.tracker.set_excluded(head, false);
         }
     }
@@ -168,12 +199,24 @@ mod tests {
 
     use super::*;
     use crate::localize::integrity::trip::{SIGMA_RAD, angle, trip};
+    use crate::localize::tracker::state::{ALONG, DATUM};
 
-    /// A minute past four radio heads, whose bearings are off by `turned_rad` and the angles by `off_rad` after so
-    /// many metres: what is believed otherwise then, and how far off the tracker is that leads.
-    fn drive(turned_rad: f64, off_rad: impl Fn(usize, f64) -> f64) -> (Otherwise, f64) {
+    /// What is otherwise than stated.
+    #[derive(Default)]
+    struct World {
+        /// The array is turned by so much (rad).
+        turned_rad: f64,
+        /// All radio heads stand so far off (m).
+        moved_m: [f64; 2],
+        /// The odometer reads so much more, as a share.
+        scale: f64,
+    }
+
+    /// A minute past four radio heads in this world, whose angles are off by `off_rad` after so many metres: what is
+    /// believed otherwise then, the tracker as stated, and how far off the one is that leads.
+    fn drive(world: &World, off_rad: impl Fn(usize, f64) -> f64) -> (Otherwise, Tracker, f64) {
         let (heads, road, mut stated) = trip();
-        let mut otherwise = Otherwise::new(&stated, 1e-3);
+        let mut otherwise = Otherwise::new(&stated, FaultProbability::default());
         let mut noise = ChaCha8Rng::seed_from_u64(1);
         let mut truth = road.pose(0.0);
         for step in 1..600 {
@@ -181,7 +224,7 @@ mod tests {
             let way_m = 4.0 * time_s;
             let odometry = OdometrySample {
                 time_s,
-                distance_m: way_m,
+                distance_m: way_m * (1.0 + world.scale),
                 speed_mps: 4.0,
                 yaw_rate_radps: None,
             };
@@ -189,9 +232,10 @@ mod tests {
             otherwise.odometry(&stated, &odometry);
             truth = road.pose(way_m);
             for (number, head) in heads.iter().enumerate() {
-                let bearing_rad = truth.point().bearing_rad(head.position) - truth.heading_rad;
+                let place = head.position.moved(world.moved_m);
+                let bearing_rad = truth.point().bearing_rad(place) - truth.heading_rad;
                 let own_rad = SIGMA_RAD * noise.sample::<f64, _>(StandardNormal);
-                let phase_rad = PI * (bearing_rad - turned_rad).cos();
+                let phase_rad = PI * (bearing_rad - world.turned_rad).cos();
                 let measured = angle(time_s, phase_rad + off_rad(number, way_m) + own_rad);
                 let looked = stated.look(head, &measured);
                 otherwise.update(&stated, &looked, 1.0, head, &measured);
@@ -200,21 +244,84 @@ mod tests {
         }
         let leader = otherwise.leader().unwrap_or(&stated);
         let off_m = leader.pose(59.9).pose.point().distance_m(truth.point());
-        (otherwise, off_m)
+        (otherwise, stated, off_m)
     }
 
     #[test]
     fn nothing_is_otherwise_where_all_is_as_stated() {
-        let (otherwise, off_m) = drive(0.0, |_, _| 0.0);
+        let (otherwise, stated, off_m) = drive(&World::default(), |_, _| 0.0);
         assert!(otherwise.leader().is_none() && off_m < 0.3, "{off_m}");
         assert!(otherwise.odds().all(|(odds, _)| odds < 0.1));
+        assert!(!stated.odometer_departs());
     }
 
     #[test]
     fn a_turned_array_is_found_and_no_fault() {
-        let (otherwise, off_m) = drive(0.02, |_, _| 0.0);
+        let world = World {
+            turned_rad: 0.02,
+            ..World::default()
+        };
+        let (otherwise, _, off_m) = drive(&world, |_, _| 0.0);
         assert!(otherwise.inexact().is_some() && !otherwise.is_fault());
         assert!(off_m < 0.3, "{off_m}");
+        // Beside the tracker of such an array all is as stated.
+        let beside = otherwise.beside_inexact();
+        assert!(beside.leader().is_none() && beside.array.is_none());
+    }
+
+    #[test]
+    fn a_site_plan_that_is_off_as_a_whole_is_found_and_a_fault() {
+        let world = World {
+            moved_m: [1.2, -1.6],
+            ..World::default()
+        };
+        let (otherwise, _, off_m) = drive(&world, |_, _| 0.0);
+        let datum = otherwise.datum.as_ref().unwrap();
+        assert!(otherwise.leads(datum) && otherwise.is_fault());
+        let [[xx, ..], [_, yy, _], _] = datum.tracker.pose(59.9).covariance.unwrap();
+        assert!(off_m < 3.0 * (xx + yy).sqrt(), "{off_m}");
+        let found = datum.tracker.belief();
+        for (state, moved_m) in DATUM.into_iter().zip(world.moved_m) {
+            let by_m = found.mean[state] - moved_m;
+            let std_m = found.covariance[state][state].sqrt();
+            assert!(std_m < 0.3 && by_m.abs() < 4.0 * std_m, "{by_m} of {std_m}");
+        }
+    }
+
+    #[test]
+    fn an_odometer_that_is_noisier_leaves_nine_times_its_variance() {
+        let (_, _, mut stated) = trip();
+        let mut otherwise = Otherwise::new(&stated, FaultProbability::default());
+        for step in 0..=100 {
+            let odometry = OdometrySample {
+                time_s: f64::from(step) * 0.1,
+                distance_m: f64::from(step) * 0.4,
+                speed_mps: 4.0,
+                yaw_rate_radps: None,
+            };
+            stated.odometry(&odometry);
+            otherwise.odometry(&stated, &odometry);
+        }
+        let own_variance = 40.0 * stated.config().noise.odometer_m_per_sqrt_m.powi(2);
+        let variance = |tracker: &Tracker| tracker.belief().covariance[ALONG][ALONG];
+        let noise = otherwise.noise.as_ref().unwrap();
+        let more = variance(&noise.tracker) - variance(&stated);
+        assert!((more / (8.0 * own_variance) - 1.0).abs() < 0.01, "{more}");
+        assert!(!noise.is_fault);
+    }
+
+    #[test]
+    fn an_odometer_far_beyond_its_scale_departs() {
+        let (_, _, stated) = trip();
+        for (deviations, departs) in [(1.0, false), (20.0, true)] {
+            let scale = deviations * stated.config().odometer_scale_std;
+            let world = World {
+                scale,
+                ..World::default()
+            };
+            let (_, stated, _) = drive(&world, |_, _| 0.0);
+            assert_eq!(stated.odometer_departs(), departs, "{deviations}");
+        }
     }
 
     #[test]
@@ -224,7 +331,7 @@ mod tests {
             let number = (way_m / 3.0).floor() as u64 * 4 + head as u64;
             0.3 * ChaCha8Rng::seed_from_u64(number).sample::<f64, _>(StandardNormal)
         };
-        let (otherwise, off_m) = drive(0.0, error_rad);
+        let (otherwise, _, off_m) = drive(&World::default(), error_rad);
         assert!(otherwise.errors_stay() && otherwise.is_fault());
         assert!(off_m < 1.0, "{off_m}");
     }

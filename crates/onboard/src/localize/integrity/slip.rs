@@ -32,17 +32,16 @@ impl Slip {
         let mut tracker = tracker.clone();
         tracker.distrust_odometer(MOST_SLIP);
         Self {
-            alternative: Alternative::new(tracker, prior),
+            alternative: Alternative::fault(tracker, prior),
             stands: true,
         }
     }
 
-    /// Moves on by an odometry sample, by which the tracker `sound` has moved on.
-    pub fn odometry(&mut self, sound: &Tracker, sample: &OdometrySample) {
+    /// Watches an odometry sample, by which its tracker and the tracker `sound` have moved on.
+    pub fn watch(&mut self, sound: &Tracker, sample: &OdometrySample) {
         let Alternative {
             tracker, evidence, ..
         } = &mut self.alternative;
-        tracker.odometry(sample);
         let stood = std::mem::replace(&mut self.stands, sample.speed_mps == 0.0);
         let sets_off = stood && !self.stands;
         let leapt = tracker.leapt();
@@ -82,7 +81,8 @@ mod tests {
                 yaw_rate_radps: None,
             };
             sound.odometry(&odometry);
-            slip.odometry(&sound, &odometry);
+            slip.alternative.tracker.odometry(&odometry);
+            slip.watch(&sound, &odometry);
             if time_s > heard_until_s {
                 continue;
             }

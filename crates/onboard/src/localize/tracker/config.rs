@@ -60,6 +60,8 @@ pub struct TrackerConfig {
     /// What mounting angle (rad) and phase (rad per element) may be off by that are taken as exact only because
     /// nothing is stated: standard deviations.
     pub unstated_array_std_rad: [f64; 2],
+    /// Standard deviation of how far the site plan as a whole is off, in x and y (m); 0 takes it as exact.
+    pub datum_std_m: f64,
     /// Largest squared Mahalanobis distance of an innovation that is used (χ², one degree).
     pub gate: f64,
     /// Acceleration to reckon with where odometry is missing (m/s²).
@@ -282,6 +284,7 @@ impl TrackerConfig {
             phase_rad: array.phase_rad,
             phase_std_rad: array.phase_std_rad.unwrap_or(0.0),
             unstated_array_std_rad: unstated,
+            datum_std_m: 0.0,
             gate: normal_quantile(0.5 * settings.outlier_probability).powi(2),
             acceleration_mps2: 2.0 * vehicle.acceleration_mps2,
             leap_mps2: 10.0 * vehicle.acceleration_mps2,

@@ -2,7 +2,7 @@
 
 use std::sync::Arc;
 
-use super::calibration::Calibration;
+use super::calibration::{Calibration, departs};
 use super::config::TrackerConfig;
 use super::interface::{InitialPose, OdometryVerdict};
 use super::motion::{Reading, Step, Yaw};
@@ -455,6 +455,20 @@ impl Tracker {
     /// How far the array has come from its survey.
     pub fn calibration(&self) -> Calibration {
         Calibration::new(&self.config, &self.belief)
+    }
+
+    /// Whether a map tells how the road goes.
+    pub(in crate::localize) const fn has_map(&self) -> bool {
+        self.map.is_some()
+    }
+
+    /// Whether the odometer's scale is certainly not what is stated.
+    pub(in crate::localize) fn odometer_departs(&self) -> bool {
+        let config = &self.config;
+        let by = self.belief.mean[SCALE] - (config.odometer_scale - 1.0);
+        let walked = config.noise.scale_per_sqrt_m * self.driven_m.sqrt();
+        let stated_std = config.odometer_scale_std.hypot(walked);
+        departs(by, self.belief.covariance[SCALE][SCALE].sqrt(), stated_std)
     }
 
     /// Distance driven since the start (m).

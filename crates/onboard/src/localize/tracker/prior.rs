@@ -7,7 +7,7 @@ use super::filter::Tracker;
 use super::interface::InitialPose;
 use super::locate::locate;
 use super::state::{
-    ACROSS, ALONG, Belief, CURVATURE, HEADING, LATENESS, MOUNTING, PHASE, SCALE, STATES,
+    ACROSS, ALONG, Belief, CURVATURE, DATUM, HEADING, LATENESS, MOUNTING, PHASE, SCALE, STATES,
     YAW_RATE_BIAS, YAW_RATE_SCALE,
 };
 use super::staying_errors::StayingErrors;
@@ -28,6 +28,9 @@ impl Tracker {
         sigma[YAW_RATE_SCALE] = config.yaw_rate_scale_std;
         sigma[MOUNTING] = config.mounting_std_rad;
         sigma[PHASE] = config.phase_std_rad;
+        for state in DATUM {
+            sigma[state] = config.datum_std_m;
+        }
         sigma[LATENESS] = config.lateness_std_s;
         let mut mean = [0.0; STATES];
         mean[SCALE] = config.odometer_scale - 1.0;
@@ -122,6 +125,30 @@ impl Tracker {
             tracker.belief.covariance[state][state] += std_rad * std_rad;
         }
         Some(tracker)
+    }
+
+    /// The same tracker of a site plan that is off as a whole, by `std_m` in x and y.
+    pub(in crate::localize) fn displaced(&self, std_m: f64) -> Self {
+        let mut tracker = self.clone();
+        for state in DATUM {
+            tracker.belief.covariance[state][state] += std_m * std_m;
+        }
+        tracker.config.datum_std_m = tracker.config.datum_std_m.hypot(std_m);
+        tracker
+    }
+
+    /// The same where not all of the array is stated.
+    pub(in crate::localize) fn doubting_array(&self) -> Self {
+        self.inexact().unwrap_or_else(|| self.clone())
+    }
+
+    /// The same tracker of an odometer that is so many times as noisy.
+    pub(in crate::localize) fn noisier(&self, times: f64) -> Self {
+        let mut tracker = self.clone();
+        let noise = &mut tracker.config.noise;
+        noise.odometer_m_per_sqrt_m *= times;
+        noise.odometer_m_per_sqrt_s *= times;
+        tracker
     }
 
     /// The same tracker begun anew where it is, every source in use, its place known to

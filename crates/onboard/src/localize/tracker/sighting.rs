@@ -1,7 +1,7 @@
 //! Seen from the vehicle: the electrical angle at which a radio head appears, and how it changes
 //! with the state.
 
-use super::state::{ACROSS, ALONG, HEADING, MOUNTING, PHASE, STATES};
+use super::state::{ACROSS, ALONG, DATUM, HEADING, MOUNTING, PHASE, STATES};
 use crate::geometry::Pose;
 use crate::localize::gaussian::Matrix;
 use crate::manifold::Measurand;
@@ -117,12 +117,13 @@ impl Sighting {
     ) -> Option<Self> {
         let [forward_m, left_m, up_m] = array.position_m;
         let eye = pose.beside(forward_m, left_m);
-        let ground_m = eye.distance_m(head.position);
+        let place = head.position.moved(DATUM.map(|state| mean[state]));
+        let ground_m = eye.distance_m(place);
         let range_m = ground_m.hypot(head.height_m - up_m);
         if range_m < NEAREST_M || ground_m < NEAREST_M {
             return None;
         }
-        let bearing = eye.bearing_rad(head.position);
+        let bearing = eye.bearing_rad(place);
         let level = ground_m / range_m; // cos ε
         let azimuth = bearing - pose.heading_rad - mean[MOUNTING];
         let value = array.measurand.value_rad(azimuth, level);
@@ -164,6 +165,11 @@ impl Sighting {
             *value -= climb * step;
         }
         row[PHASE] = by_phase;
+        // The radio head's own step east, and north, is the vehicle's back.
+        let (north, east) = bearing.sin_cos();
+        for (state, away, left) in [(DATUM[0], east, -north), (DATUM[1], north, east)] {
+            row[state] = climb * away - slopes[0] * left / ground_m;
+        }
         let survey_variance = head.position_std_m.powi(2) + array.position_std_m.powi(2);
         Some(Self {
             phase_rad: value + by_phase * mean[PHASE],
@@ -270,17 +276,18 @@ mod tests {
                 position_m,
                 ..ARRAY
             };
-            let see = |x: [f64; 5]| {
+            let see = |x: [f64; 7]| {
                 let (pose, footing) = on_circle(x[0], x[1], x[2], kappa);
                 let head = head(70.0, 40.0, height_m);
-                Sighting::new(&head, pose, &footing, &mean(x[3], x[4]), &array).unwrap()
+                let mut mean = mean(x[3], x[4]);
+                (mean[DATUM[0]], mean[DATUM[1]]) = (x[5], x[6]);
+                Sighting::new(&head, pose, &footing, &mean, &array).unwrap()
             };
-            let x = [30.0, 0.8, 0.05, 0.02, 0.1];
+            let x = [30.0, 0.8, 0.05, 0.02, 0.1, 1.5, -0.7];
             let sighting = see(x);
-            for (i, state) in [ALONG, ACROSS, HEADING, MOUNTING, PHASE]
-                .into_iter()
-                .enumerate()
-            {
+            let [east, north] = DATUM;
+            let states = [ALONG, ACROSS, HEADING, MOUNTING, PHASE, east, north];
+            for (i, state) in states.into_iter().enumerate() {
                 let (mut up, mut down) = (x, x);
                 up[i] += 1e-5;
                 down[i] -= 1e-5;

@@ -1,10 +1,10 @@
-//! What the tracker knows about: ten states, the same with and without a map. A state that a
+//! What the tracker knows about: twelve states, the same with and without a map. A state that a
 //! setting switches off has zero variance and never moves.
 
 use crate::localize::gaussian::Gaussian;
 
 /// Number of states.
-pub const STATES: usize = 10;
+pub const STATES: usize = 12;
 
 /// The tracker's belief.
 pub type Belief = Gaussian<STATES>;
@@ -29,3 +29,5 @@ pub const PHASE: usize = 7;
 pub const LATENESS: usize = 8;
 /// Scale error κ of the yaw rate that wheels tell: it reads `(1 + κ)` times the turn.
 pub const YAW_RATE_SCALE: usize = 9;
+/// How far all radio heads stand from where the site plan has them, in x and in y (m).
+pub const DATUM: [usize; 2] = [10, 11];
