@@ -1,8 +1,8 @@
 //! A tracker that believes otherwise, beside one that trusts what is stated.
 //!
-//! Each angle speaks for it or against it, as the one tracker or the other foretells it better. A fault is what
-//! might as well be another one, or is none of what the vehicle was told: such a tracker says where
-//! the vehicle is, and not that all is well.
+//! Each angle speaks for it or against it, as the one tracker or the other foretells it better. One that believes in
+//! a fault says where the vehicle is, and not that all is well: a radio head at fault might explain the
+//! same angles.
 
 use super::evidence::Evidence;
 use crate::clone_in_place::clone_in_place;
