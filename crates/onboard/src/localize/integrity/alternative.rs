@@ -55,8 +55,8 @@ impl Alternative {
         }
     }
 
-    /// Errors that stay over metres, where that is rare: one that stays and a radio head at fault explain the same angles.
-    /// `None` where they are impossible, or so usual that every tracker finds them.
+    /// Errors that stay over metres, where that is rare; `None` where they are impossible, or so usual that every
+    /// tracker finds them.
     pub fn multipath(tracker: &Tracker) -> Option<Self> {
         let prior = tracker.config().rare_error_probability;
         let finds = tracker.config().finds_errors();
@@ -77,8 +77,9 @@ impl Alternative {
         inexact.map(|tracker| Self::sound(tracker, INEXACT))
     }
 
-    /// An odometer that is noisier than stated with the probability `prior`, of an array that may not be exact; `None`
-    /// on a differential drive, whose wheels slip a little with every metre, or where errors that stay explain the same.
+    /// An odometer that is noisier than stated with the probability `prior`, of an array that may not be exact;
+    /// `None` on a differential drive, whose wheels slip a little with every metre, or where errors that stay explain
+    /// the same.
     pub fn noisier(tracker: &Tracker, prior: f64) -> Option<Self> {
         let config = tracker.config();
         let is_watched = config.drive == DriveKind::Road && !config.finds_errors();
