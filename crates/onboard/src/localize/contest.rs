@@ -28,8 +28,6 @@ const LOOK_S: f64 = 1.0;
 pub struct Contest {
     pub initialiser: Initialiser,
     pub is_wide: bool,
-    /// Whether errors that stay are found at the places that it compares.
-    pub finds_errors: bool,
     /// Time of the newest odometry (s) when it was told of; nobody is as long as nothing speaks against
     /// the tracker.
     pub told_s: Option<f64>,
@@ -52,7 +50,6 @@ pub struct Contest {
 clone_in_place!(Contest {
     initialiser,
     is_wide,
-    finds_errors,
     told_s,
     speaks_alone,
     own,
@@ -77,7 +74,6 @@ impl Contest {
         Self {
             initialiser,
             is_wide,
-            finds_errors: tracker.config().finds_errors(),
             told_s: (!is_silent).then(|| tracker.time_s()),
             speaks_alone: false,
             own: 0.0,

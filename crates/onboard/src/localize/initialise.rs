@@ -153,6 +153,11 @@ impl Initialiser {
         area.spacing_m(MOST_HYPOTHESES / f64::from(HEADINGS), SPACING_M) <= SPACING_M
     }
 
+    /// Whether errors that stay are found at the places that are compared.
+    pub const fn finds_errors(&self) -> bool {
+        self.config.finds_errors()
+    }
+
     fn on(config: &TrackerConfig, ground: Ground, heads: &[RadioHead]) -> Self {
         let mut made = Self {
             config: *config,

@@ -212,7 +212,7 @@ impl Localizer for Recovery {
         }
         // A search is of places as the tracker that it is compared with foretells angles there.
         let finds_errors = self.tracked.tracker().config().finds_errors();
-        if (self.contest.as_ref()).is_some_and(|it| it.finds_errors != finds_errors) {
+        if (self.contest.as_ref()).is_some_and(|it| it.initialiser.finds_errors() != finds_errors) {
             self.contest = self.begin(measured.time_s, false, true);
         }
         if let Some(contest) = &mut self.contest {

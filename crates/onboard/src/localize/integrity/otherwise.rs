@@ -55,7 +55,7 @@ impl Otherwise {
         }
     }
 
-    /// The same beside another tracker, but who expects errors that stay goes on.
+    /// The same beside another tracker; who expects errors that stay goes on, without what spoke against this one.
     pub fn beside(&self, tracker: &Tracker) -> Self {
         let mut multipath = self.multipath.clone();
         if let Some(multipath) = &mut multipath {
@@ -170,15 +170,15 @@ impl Otherwise {
         verdict.filter(|_| self.errors_stay())
     }
 
-    /// Leaves a radio head out, as `stated` does, that has never heard it. Errors that stay are no reason to.
+    /// Leaves a radio head out, as `stated` does, that has never heard it: slip is what it was, and errors that stay are
+    /// no reason to, but spoke against another tracker.
     pub fn exclude(&mut self, stated: &Tracker, head: &RadioHead) {
-        self.slip.alternative.tracker.set_excluded(head, true);
-        self.array = Alternative::inexact(stated);
-        self.noise = Alternative::noisier(stated, self.probability.odometer);
-        self.datum = Alternative::displaced(stated, self.probability.all_radio_heads);
-        if let Some(multipath) = &mut self.multipath {
-            multipath.forget(); // it spoke against another tracker
-        }
+        let mut slip = self.slip.clone();
+        slip.alternative.tracker.set_excluded(head, true);
+        *self = Self {
+            slip,
+            ..self.beside(stated)
+        };
     }
 
     /// Uses a radio head again.

@@ -6,6 +6,12 @@ use super::state::{Belief, MOUNTING, PHASE};
 /// Departures count from this many standard deviations on.
 const SIGMAS: f64 = 3.0;
 
+/// Whether a constant is certainly not what it was stated to be: its departure is beyond three standard deviations of
+/// what is stated by three of its own. Of what is stated rightly, fewer than 0.27 % of the drives see this.
+pub(super) fn departs(by: f64, std: f64, stated_std: f64) -> bool {
+    by.abs() > SIGMAS * (stated_std + std)
+}
+
 /// A constant of the array, as found while driving.
 #[derive(Clone, Copy, Debug, PartialEq)]
 pub struct Departure {
@@ -15,12 +21,6 @@ pub struct Departure {
     pub std_rad: f64,
     /// ... and the standard deviation that the survey was said to have.
     pub surveyed_std_rad: f64,
-}
-
-/// Whether a constant is certainly not what it was stated to be: its departure is beyond three standard deviations of
-/// what is stated by three of its own. Of what is stated rightly, fewer than 0.27 % of the drives see this.
-pub(super) fn departs(by: f64, std: f64, stated_std: f64) -> bool {
-    by.abs() > SIGMAS * (stated_std + std)
 }
 
 impl Departure {
