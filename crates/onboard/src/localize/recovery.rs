@@ -9,7 +9,8 @@
 //! about it runs silently, until it has found the same place, has listened for long, or speaks against it.
 //! What the search finds takes over only if it foretells the same angles better than the tracker
 //! did: a restart that would be worse than what it replaces never happens. Meanwhile the covariance
-//! covers both; where the tracker is refuted, a search nearby speaks alone.
+//! covers both; where the tracker is refuted, a search nearby speaks alone. A guard that has begun anew
+//! by itself meanwhile is searched for no more.
 
 use std::sync::Arc;
 
@@ -218,7 +219,13 @@ impl Localizer for Recovery {
         if let Some(contest) = &mut self.contest {
             contest.update(self.tracked.tracker(), head, measured);
         }
+        let begun_s = self.tracked.begun_s();
         let verdict = self.tracked.update(head, measured);
+        if self.tracked.begun_s() > begun_s && self.is_lost() {
+            // The tracker that was lost is no more.
+            self.contest = None;
+            self.watch.reset();
+        }
         self.watch.see(head, &verdict, self.tracked.noise_ratio());
         self.judge(measured.time_s);
         Ok(verdict)

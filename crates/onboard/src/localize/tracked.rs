@@ -65,6 +65,14 @@ impl Tracked {
         }
     }
 
+    /// When it began anew last by itself (s), if ever.
+    pub const fn begun_s(&self) -> f64 {
+        match self {
+            Self::Bare(_) => f64::NEG_INFINITY,
+            Self::Guarded(guard) => guard.begun_s(),
+        }
+    }
+
     /// How much more the angles vary than stated, as far as anybody listens to that.
     pub const fn noise_ratio(&self) -> f64 {
         match self {

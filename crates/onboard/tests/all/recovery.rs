@@ -3,7 +3,7 @@
 use std::f64::consts::{FRAC_PI_2, PI};
 
 use onboard::geometry::Pose;
-use onboard::localize::{AngleMeasurement, built_in};
+use onboard::localize::{AngleMeasurement, Localizer, built_in};
 use onboard::observation::OdometrySample;
 use onboard::radio_head::RadioHead;
 use onboard::settings::{Shipped, Site, TomlFile, Vehicle};
@@ -37,46 +37,95 @@ bias_std_radps = 0.002
 phase_bias_share = 0.25
 ";
 
-/// Ninety seconds of winding about the hall: the worst error from the sixtieth on, and whether it
-/// was found anew.
-fn drive(told: Pose) -> (f64, bool) {
-    let site = Site::from_toml(SITE, "hall", &Shipped).unwrap();
-    let vehicle = Vehicle::from_toml(VEHICLE, "robot", &Shipped).unwrap();
-    let heads = RadioHead::heard(&site, &vehicle);
-    let mut localizer = built_in(&site, &vehicle, told).unwrap();
-    let mut rng = ChaCha8Rng::seed_from_u64(1);
-    let mut normal = || rng.sample::<f64, _>(StandardNormal);
-    let (mut truth, mut worst_m) = (Pose::default(), 0.0);
-    for step in 1..=1800 {
-        let time_s = 0.05 * f64::from(step);
-        let rate_radps = 0.4 * (0.3 * time_s).cos();
-        truth = truth.along_chord(0.05 * 0.3, 0.05 * rate_radps);
+/// Time from one odometry sample to the next (s).
+const STEP_S: f64 = 0.05;
+
+/// A vehicle in the hall.
+struct Drive {
+    heads: Vec<RadioHead>,
+    localizer: Box<dyn Localizer>,
+    rng: ChaCha8Rng,
+    truth: Pose,
+    steps: u32,
+    way_m: f64,
+}
+
+impl Drive {
+    /// At the origin, and told to be elsewhere.
+    fn new(told: Pose) -> Self {
+        let site = Site::from_toml(SITE, "hall", &Shipped).unwrap();
+        let vehicle = Vehicle::from_toml(VEHICLE, "robot", &Shipped).unwrap();
+        Self {
+            heads: RadioHead::heard(&site, &vehicle),
+            localizer: built_in(&site, &vehicle, told).unwrap(),
+            rng: ChaCha8Rng::seed_from_u64(1),
+            truth: Pose::default(),
+            steps: 0,
+            way_m: 0.0,
+        }
+    }
+
+    fn normal(&mut self) -> f64 {
+        self.rng.sample(StandardNormal)
+    }
+
+    fn time_s(&self) -> f64 {
+        STEP_S * f64::from(self.steps)
+    }
+
+    /// One step on; every fifth hears all radio heads.
+    fn step(&mut self, speed_mps: f64, rate_radps: f64) {
+        self.steps += 1;
+        self.way_m += STEP_S * speed_mps;
+        self.truth = (self.truth).along_chord(STEP_S * speed_mps, STEP_S * rate_radps);
         let sample = OdometrySample {
-            time_s,
-            distance_m: 0.3 * time_s,
-            speed_mps: 0.3,
-            yaw_rate_radps: Some(rate_radps + 0.02 * normal() / 0.05_f64.sqrt()),
+            time_s: self.time_s(),
+            distance_m: self.way_m,
+            speed_mps,
+            yaw_rate_radps: Some(rate_radps + 0.02 * self.normal() / STEP_S.sqrt()),
         };
-        localizer.odometry(&sample).unwrap();
-        for head in heads.iter().filter(|_| step % 5 == 0) {
-            let bearing_rad = truth.point().bearing_rad(head.position) - truth.heading_rad;
+        self.localizer.odometry(&sample).unwrap();
+        if !self.steps.is_multiple_of(5) {
+            return;
+        }
+        for head in self.heads.clone() {
+            let bearing_rad = self.truth.point().bearing_rad(head.position);
             let measured = AngleMeasurement {
-                time_s,
-                phase_rad: PI * bearing_rad.cos() + 0.05 * normal(),
+                time_s: self.time_s(),
+                phase_rad: PI * (bearing_rad - self.truth.heading_rad).cos() + 0.05 * self.normal(),
                 phase_sigma_rad: 0.05,
                 angle_rad: f64::NAN,
                 snr_db: 20.0,
                 resolved: true,
             };
-            localizer.update(head, &measured).unwrap();
-        }
-        let estimate = localizer.pose(time_s).unwrap();
-        if time_s > 60.0 {
-            let error_m = estimate.pose.point().distance_m(truth.point());
-            worst_m = error_m.max(worst_m);
+            self.localizer.update(&head, &measured).unwrap();
         }
     }
-    (worst_m, localizer.recovered().is_some())
+
+    /// Winds about until a time: the worst error from another one on (m).
+    fn wind(&mut self, until_s: f64, from_s: f64) -> f64 {
+        let mut worst_m: f64 = 0.0;
+        while self.time_s() < until_s {
+            self.step(0.3, 0.4 * (0.3 * self.time_s()).cos());
+            if self.time_s() > from_s {
+                worst_m = worst_m.max(self.error_m());
+            }
+        }
+        worst_m
+    }
+
+    fn error_m(&self) -> f64 {
+        let estimate = self.localizer.pose(self.time_s()).unwrap();
+        estimate.pose.point().distance_m(self.truth.point())
+    }
+}
+
+/// Ninety seconds of winding about the hall: the worst error from the sixtieth on, and whether it
+/// was found anew.
+fn drive(told: Pose) -> (f64, bool) {
+    let mut drive = Drive::new(told);
+    let worst_m = drive.wind(90.0, 60.0);
+    (worst_m, drive.localizer.recovered().is_some())
 }
 
 #[test]
@@ -101,4 +150,26 @@ fn a_wrong_start_is_noticed_and_left() {
             "{told:?}: {wrong_m}"
         );
     }
+}
+
+#[test]
+fn who_has_begun_anew_is_searched_for_no_more() {
+    let mut drive = Drive::new(Pose::default());
+    // On the spot a search believes nothing that it finds.
+    let mut lost_s = |seconds: f64| {
+        let until_s = drive.time_s() + seconds;
+        let mut lost_s = 0.0;
+        while drive.time_s() < until_s {
+            drive.step(0.0, 0.8);
+            lost_s += STEP_S * f64::from(u8::from(drive.localizer.is_lost()));
+        }
+        drive.truth.heading_rad += 0.7; // nothing tells of the push
+        lost_s
+    };
+    let (before_s, after_s) = (lost_s(10.0), lost_s(30.0));
+    assert!(
+        before_s == 0.0 && (1.0..10.0).contains(&after_s),
+        "{after_s}"
+    );
+    assert!(drive.localizer.recovered().is_none() && drive.error_m() < 0.1);
 }

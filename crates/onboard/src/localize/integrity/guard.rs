@@ -40,6 +40,8 @@ pub struct Guard {
     is_found: bool,
     /// Distance driven (m) when the sources could be told apart last.
     trusted_m: f64,
+    /// When its trackers began anew last (s).
+    begun_s: f64,
     now_s: f64,
 }
 
@@ -57,6 +59,7 @@ clone_in_place!(Guard {
     restarted,
     is_found,
     trusted_m,
+    begun_s,
     now_s
 });
 
@@ -80,6 +83,7 @@ impl Guard {
             bank: Bank::new(tracker, heads, otherwise, found_s),
             restarted: None,
             is_found,
+            begun_s: found_s,
             now_s: found_s,
             config,
         }
@@ -104,6 +108,11 @@ impl Guard {
         (self.suspects(bank, now_s).map(beyond))
             .max_by(|(one, _), (other, _)| one.total_cmp(other))
             .map_or(bank.leader(), |(_, clean)| clean)
+    }
+
+    /// When its trackers began anew last (s), by angles that nothing contradicted.
+    pub const fn begun_s(&self) -> f64 {
+        self.begun_s
     }
 
     /// How much more the angles vary than stated.
@@ -163,6 +172,7 @@ impl Guard {
         {
             self.bank = restarted.bank;
             self.is_found = false;
+            self.begun_s = now_s;
         }
     }
 
