@@ -3,7 +3,7 @@
 
 use super::state::{ACROSS, ALONG, DATUM, HEADING, MOUNTING, PHASE, STATES};
 use crate::geometry::Pose;
-use crate::localize::gaussian::Matrix;
+use crate::localize::gaussian::{Matrix, dot};
 use crate::manifold::Measurand;
 use crate::radio_head::RadioHead;
 
@@ -192,18 +192,21 @@ impl Sighting {
     /// `D = −2π (d/λ) (cos α · g gᵀ − sin α / R² · (r tᵀ + t rᵀ))` in a row, `−(r tᵀ + t rᵀ) / R²` of
     /// an azimuth. That is the plane's; of the elevation only its cosine is taken.
     pub fn bend(&self, covariance: &Matrix<STATES>) -> Bend {
-        let form = |left: &[f64; STATES], right: &[f64; STATES]| {
-            let mut sum = 0.0;
-            for i in [ALONG, ACROSS, HEADING, MOUNTING] {
-                for j in [ALONG, ACROSS, HEADING, MOUNTING] {
-                    sum += left[i] * covariance[i][j] * right[j];
-                }
-            }
-            sum
-        };
-        let (turn, [ahead, left]) = (&self.turn, &self.sight);
-        let (gg, gr, gt) = (form(turn, turn), form(turn, ahead), form(turn, left));
-        let (rr, rt, tt) = (form(ahead, ahead), form(ahead, left), form(left, left));
+        const BENT: [usize; 4] = [ALONG, ACROSS, HEADING, MOUNTING];
+        let bent = |row: &[f64; STATES]| BENT.map(|state| row[state]);
+        let (turn, [ahead, left]) = (bent(&self.turn), self.sight.each_ref().map(bent));
+        let with = |row: [f64; 4]| BENT.map(|state| dot(&bent(&covariance[state]), &row));
+        let (with_turn, with_ahead, with_left) = (with(turn), with(ahead), with(left));
+        let (gg, gr, gt) = (
+            dot(&turn, &with_turn),
+            dot(&ahead, &with_turn),
+            dot(&left, &with_turn),
+        );
+        let (rr, rt, tt) = (
+            dot(&ahead, &with_ahead),
+            dot(&left, &with_ahead),
+            dot(&left, &with_left),
+        );
         let (a, b) = (
             -self.slopes[1],
             self.slopes[0] / (self.ground_m * self.ground_m),
