@@ -14,7 +14,8 @@ use crate::settings::DriveKind;
 /// Probability that an array is off of which nothing is stated.
 const INEXACT: f64 = 0.1;
 
-/// How many times as noisy as stated an odometer is that is noisier.
+/// Probability that an odometer is noisier than stated, and how many times as noisy it is then.
+const NOISY: f64 = 0.03;
 const NOISIER: f64 = 3.0;
 
 /// How far a site plan is off as a whole, if it is: standard deviation in x and y (m).
@@ -77,14 +78,13 @@ impl Alternative {
         inexact.map(|tracker| Self::sound(tracker, INEXACT))
     }
 
-    /// An odometer that is noisier than stated with the probability `prior`, of an array that may not be exact;
-    /// `None` on a differential drive, whose wheels slip a little with every metre, or where errors that stay explain
+    /// An odometer that is noisier than stated, of an array that may not be exact; `None` on a differential drive, whose wheels slip a little with every metre, or where errors that stay explain
     /// the same.
-    pub fn noisier(tracker: &Tracker, prior: f64) -> Option<Self> {
+    pub fn noisier(tracker: &Tracker) -> Option<Self> {
         let config = tracker.config();
         let is_watched = config.drive == DriveKind::Road && !config.finds_errors();
         let tracker = is_watched.then(|| tracker.doubting_array().noisier(NOISIER));
-        tracker.map(|it| Self::sound(it, prior))
+        tracker.map(|it| Self::sound(it, NOISY))
     }
 
     /// A site plan that is off from the map as a whole with the probability `prior`, of an array that may not be exact;
