@@ -6,9 +6,9 @@
 //! solution that holds for all of them together, each as probable as its fault
 //! ([`LevelEquation`](super::level::LevelEquation)). The same of trackers that believe otherwise of odometer,
 //! array, site plan and reflections ([`Otherwise`]), as probable as the angles leave it; if one of them becomes far
-//! more probable than what is stated, the position is its own, and not `ok` where something is at fault, nor where
-//! the odometer's scale is certainly not what is stated. All of it is of angles as noisy as they are heard to
-//! be ([`AngleNoise`](super::angle_noise::AngleNoise)).
+//! more probable than what is stated, the position is its own, and not `ok` where something is at fault or was a moment
+//! ago, nor where the odometer's scale is certainly not what is stated, or was and has not been found to be since. All
+//! of it is of angles as noisy as they are heard to be ([`AngleNoise`](super::angle_noise::AngleNoise)).
 //!
 //! A single radio head has no witness but odometry and road: the protection level then is what
 //! those two can vouch for, grows with the distance driven, and passes the alert limit unless they
@@ -42,6 +42,10 @@ pub struct Guard {
     trusted_m: f64,
     /// When its trackers began anew last (s).
     begun_s: f64,
+    /// Whether the odometer's scale was certainly not what is stated, and has not been found to be since.
+    has_departed: bool,
+    /// When something was at fault last (s), as far as is known.
+    fault_s: f64,
     now_s: f64,
 }
 
@@ -60,6 +64,8 @@ clone_in_place!(Guard {
     is_found,
     trusted_m,
     begun_s,
+    has_departed,
+    fault_s,
     now_s
 });
 
@@ -84,6 +90,8 @@ impl Guard {
             restarted: None,
             is_found,
             begun_s: found_s,
+            has_departed: false,
+            fault_s: f64::NEG_INFINITY,
             now_s: found_s,
             config,
         }
@@ -141,7 +149,19 @@ impl Guard {
             restarted.bank.judge(self.now_s, &self.config);
         }
         self.recover();
+        self.watch_faults();
         verdict
+    }
+
+    /// Which of several is most probable may change from angle to angle, and who has begun anew knows nothing of the
+    /// odometer yet.
+    fn watch_faults(&mut self) {
+        if self.bank.otherwise().is_fault() {
+            self.fault_s = self.now_s;
+        }
+        let main = self.bank.main();
+        self.has_departed =
+            main.odometer_departs() || (self.has_departed && !main.knows_odometer());
     }
 
     /// Where the sources cannot be told apart, the trackers may have been led astray, so far that
@@ -213,8 +233,8 @@ impl Guard {
         let otherwise = self.bank.otherwise();
         let state = if self.bank.is_outvoted(&self.config) && !otherwise.errors_stay() {
             IntegrityState::Unavailable
-        } else if otherwise.is_fault()
-            || self.bank.main().odometer_departs()
+        } else if self.now_s - self.fault_s <= self.config.recovery_s
+            || self.has_departed
             || self.restarted.is_some()
             || self.bank.quiet_s(self.now_s) <= self.config.recovery_s
             || levels.horizontal_m > self.config.alert_limit_m

@@ -471,6 +471,11 @@ impl Tracker {
         departs(by, self.belief.covariance[SCALE][SCALE].sqrt(), stated_std)
     }
 
+    /// Whether the angles tell more of the odometer's scale than what is stated.
+    pub(in crate::localize) fn knows_odometer(&self) -> bool {
+        self.belief.covariance[SCALE][SCALE] < 0.5 * self.config.odometer_scale_std.powi(2)
+    }
+
     /// Distance driven since the start (m).
     pub const fn driven_m(&self) -> f64 {
         self.driven_m
