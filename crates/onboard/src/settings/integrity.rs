@@ -37,8 +37,8 @@ pub struct FaultProbability {
     #[serde(skip_serializing_if = "Option::is_none")]
     #[schemars(range(min = 1e-9, max = 0.5))]
     pub radio_head: Option<f64>,
-    /// Of the odometer: it slips, each time that the vehicle sets off. A tracker that expects it counts as probable as
-    /// the angles leave it.
+    /// Of the odometer: it slips, each time that the vehicle sets off; that it is noisier than stated is thirty times as
+    /// probable. Trackers that expect it count as probable as the angles leave it.
     #[schemars(range(min = 1e-9, max = 0.5))]
     pub odometer: f64,
     /// Of all radio heads at once: their plan is off from the map as a whole. A tracker expects it, and counts as

@@ -14,9 +14,13 @@ use crate::settings::DriveKind;
 /// Probability that an array is off of which nothing is stated.
 const INEXACT: f64 = 0.1;
 
-/// Probability that an odometer is noisier than stated, and how many times as noisy it is then.
-const NOISY: f64 = 0.03;
+/// That an odometer is noisier than stated is so many times as probable as that it slips; and how many times as noisy it
+/// is then.
+const NOISY: f64 = 30.0;
 const NOISIER: f64 = 3.0;
+
+/// However probable something is, it is no more so than not.
+const MOST_PROBABLE: f64 = 0.5;
 
 /// How far a site plan is off as a whole, if it is: standard deviation in x and y (m).
 const DATUM_STD_M: f64 = 1.5;
@@ -78,13 +82,14 @@ impl Alternative {
         inexact.map(|tracker| Self::sound(tracker, INEXACT))
     }
 
-    /// An odometer that is noisier than stated, of an array that may not be exact; `None` on a differential drive, whose wheels slip a little with every metre, or where errors that stay explain
-    /// the same.
-    pub fn noisier(tracker: &Tracker) -> Option<Self> {
+    /// An odometer that is noisier than stated, where it slips with the probability `slip`, of an array that may not
+    /// be exact; `None` on a differential drive, whose wheels slip a little with every metre, or where errors that stay
+    /// explain the same.
+    pub fn noisier(tracker: &Tracker, slip: f64) -> Option<Self> {
         let config = tracker.config();
         let is_watched = config.drive == DriveKind::Road && !config.finds_errors();
         let tracker = is_watched.then(|| tracker.doubting_array().noisier(NOISIER));
-        tracker.map(|it| Self::sound(it, NOISY))
+        tracker.map(|it| Self::sound(it, (NOISY * slip).min(MOST_PROBABLE)))
     }
 
     /// A site plan that is off from the map as a whole with the probability `prior`, of an array that may not be exact;

@@ -49,7 +49,7 @@ impl Otherwise {
             probability,
             slip: Slip::new(&stated, probability.odometer),
             array: Alternative::inexact(&stated),
-            noise: Alternative::noisier(&stated),
+            noise: Alternative::noisier(&stated, probability.odometer),
             datum: Alternative::displaced(&stated, probability.all_radio_heads),
             multipath: Alternative::multipath(tracker),
         }
