@@ -110,7 +110,8 @@ fn smoothed_drives_are_better_and_as_good_as_they_say() {
 #[test]
 fn the_last_pose_is_the_filters() {
     let yaw = value("{ noise_rad_per_sqrt_s = 1e-3 }");
-    // What a guard tells covers what may be otherwise, too: as good as nothing, and an odometer that may be noisier.
+    // What a guard tells covers what may be otherwise, too: as good as nothing, what is hardly probable at this drive's
+    // end, and an odometer that may be noisier.
     let sure = [
         ("vehicle.array.mounting_std_rad", 0.0.into()),
         ("vehicle.array.phase_std_rad", 0.0.into()),
@@ -120,11 +121,13 @@ fn the_last_pose_is_the_filters() {
             value("{ fault_probability = { odometer = 1e-9, all_radio_heads = 0 } }"),
         ),
     ];
+    let rarely_noisy = value("{ fault_probability = { odometer = 3e-5 } }");
     for (changes, covered) in [
         (vec![], 0.0),
         (vec![("vehicle.gyroscope", yaw)], 0.0),
         (vec![("vehicle.localizer.map", Value::from(false))], 0.0),
         (sure.to_vec(), 1e-6),
+        (vec![("vehicle.integrity", rarely_noisy)], 0.01),
         (vec![("vehicle.integrity", value("{}"))], 1.0),
     ] {
         let scenario = changed("paper-real-odometry-2", changes);
