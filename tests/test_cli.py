@@ -2,6 +2,7 @@ from __future__ import annotations
 
 import json
 import re
+from itertools import pairwise
 from typing import TYPE_CHECKING
 
 import polars as pl
@@ -53,6 +54,15 @@ def test_help_of_each_command_has_an_example(access_av: Cli, command: str) -> No
     assert f"access-av {command}" in done.out
     assert "Example:" in done.out
     assert max(map(len, done.out.splitlines())) <= 60
+
+
+def test_help_breaks_a_line_only_where_the_next_word_has_no_room(access_av: Cli) -> None:
+    prose, _, _ = access_av("locate", "--help", columns=60).out.partition("╭")
+    _, _, prose = prose.partition("Locate a recorded drive.")
+    lines = [line.rstrip() for line in prose.splitlines()]
+    for line, following in pairwise(lines):
+        if line.strip() and following.strip():
+            assert len(line) + len(f" {following.split()[0]}") >= 59, line
 
 
 def test_run_writes_what_it_promises(access_av: Cli, tmp_path: Path) -> None:

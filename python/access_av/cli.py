@@ -2,6 +2,8 @@
 
 from __future__ import annotations
 
+import inspect
+import re
 import sys
 from contextlib import contextmanager
 from typing import TYPE_CHECKING, Annotated, Any
@@ -53,7 +55,13 @@ def _brief_usage_errors() -> Iterator[None]:
 
 
 class _Commands(TyperGroup):
-    """Commands whose usage errors do not say back all that was typed."""
+    """Commands whose usage errors do not repeat all that was typed, and whose help is filled."""
+
+    def get_command(self, context: Any, name: str) -> Any:
+        command = super().get_command(context, name)
+        if command and command.help:  # A line break of the source is none of the paragraph.
+            command.help = re.sub(r"(?<=\S)\n(?=\S)", " ", inspect.cleandoc(command.help))
+        return command
 
     def make_context(self, *args: Any, **settings: Any) -> Any:
         with _brief_usage_errors():
