@@ -16,9 +16,9 @@ pub struct IntegritySettings {
     pub alert_limit_m: f64,
     /// Target integrity risk: how often in an hour the error may come to exceed the protection
     /// level without an alarm.
-    #[schemars(range(min = 1e-9, max = 1.0))]
+    #[schemars(range(min = 1e-9, max = 10.0))]
     pub risk_per_hour: f64,
-    /// Time in seconds after which the error is another one: so many epochs of an hour are
+    /// Time in seconds after which the error may be beyond the level anew: so many epochs of an hour are
     /// independent.
     #[schemars(range(min = 0.01, max = 600.0))]
     pub error_correlation_s: f64,
@@ -55,8 +55,8 @@ impl Default for IntegritySettings {
     fn default() -> Self {
         Self {
             alert_limit_m: 1.5,
-            risk_per_hour: 0.3,
-            error_correlation_s: 10.0,
+            risk_per_hour: 1.0,
+            error_correlation_s: 3.0,
             fault_probability: FaultProbability::default(),
         }
     }
@@ -129,7 +129,7 @@ mod tests {
         let check = Check { file: "cart.toml" };
         let mut settings = IntegritySettings::default();
         assert!(settings.check(check).is_ok());
-        settings.fault_probability.array = 0.3;
+        (settings.risk_per_hour, settings.fault_probability.array) = (0.3, 0.3);
         let told = settings.check(check).unwrap_err().to_string();
         assert!(told.contains("integrity.fault_probability"), "{told}");
     }
