@@ -225,15 +225,18 @@ def test_the_level_grows_as_less_risk_is_asked(tmp_path: Path) -> None:
     ("key", "value", "told"),
     [
         ("risk_per_hour", "1e-5", "below integrity.risk_per_hour"),
+        ("fault_probability.array", "0.4", "below integrity.risk_per_hour"),
         ("fault_probability.radio_head", "0.6", "between 0.000000001 and 0.5"),
         ("fault_probability.gate", "0.1", "all_radio_heads"),
-        ("risk_per_hour", "0", "between 0.000000001 and 10"),
+        ("risk_per_hour", "0", "between 0.000000001 and 1"),
     ],
 )
 def test_faults_that_the_risk_cannot_bear_are_refused(
     access_av: Callable[..., Finished], key: str, value: str, told: str
 ) -> None:
-    done = access_av("run", "yard", "--runs", "1", "--set", f"vehicle.integrity.{key}={value}")
+    less_risk = ["--set", "vehicle.integrity.risk_per_hour=0.3"]
+    change = ["--set", f"vehicle.integrity.{key}={value}"]
+    done = access_av("run", "yard", "--runs", "1", *less_risk, *change)
     assert done.code == 2
     assert "integrity" in done.err
     assert told in done.err

@@ -16,7 +16,7 @@ pub struct IntegritySettings {
     pub alert_limit_m: f64,
     /// Target integrity risk: how often in an hour the error may come to exceed the protection
     /// level without an alarm.
-    #[schemars(range(min = 1e-9, max = 10.0))]
+    #[schemars(range(min = 1e-9, max = 1.0))]
     pub risk_per_hour: f64,
     /// Time in seconds after which the error may be beyond the level anew: so many epochs of an hour are
     /// independent.
