@@ -11,8 +11,9 @@ use crate::localize::tracker::{Look, Tracker};
 use crate::radio_head::RadioHead;
 use crate::settings::DriveKind;
 
-/// Probability that an array is off of which nothing is stated.
+/// Probability that an array is off of which nothing is stated, and that angles are noisier than stated.
 const INEXACT: f64 = 0.1;
+const LOUD: f64 = 0.1;
 
 /// That an odometer is noisier than stated is so many times as probable as that it slips; and how many times as noisy it
 /// is then.
@@ -92,6 +93,16 @@ impl Alternative {
         tracker.map(|it| Self::sound(it, (NOISY * slip).min(MOST_PROBABLE)))
     }
 
+    /// Angles that are noisier than stated, as noisy as they are heard to be; `None` where errors that stay explain the
+    /// same.
+    pub fn loud(tracker: &Tracker) -> Option<Self> {
+        (!tracker.config().finds_errors()).then(|| {
+            let mut tracker = tracker.clone();
+            tracker.hear_noise(Some(1.0));
+            Self::sound(tracker, LOUD)
+        })
+    }
+
     /// A site plan that is off from the map as a whole with the probability `prior`, of an array that may not be exact;
     /// `None` where that is none, the radio heads are all the map there is, or errors that stay explain the same.
     pub fn displaced(tracker: &Tracker, prior: f64) -> Option<Self> {
@@ -110,13 +121,12 @@ impl Alternative {
         &mut self,
         sound: &Tracker,
         if_sound: &Result<Look, UpdateReason>,
-        noise_ratio: f64,
         head: &RadioHead,
         measured: &AngleMeasurement,
     ) -> UpdateVerdict {
         let looked = self.tracker.look(head, measured);
         if measured.resolved {
-            (self.evidence).see([&self.tracker, sound], [&looked, if_sound], noise_ratio);
+            (self.evidence).see([&self.tracker, sound], [&looked, if_sound]);
         }
         self.tracker.take(looked, measured)
     }

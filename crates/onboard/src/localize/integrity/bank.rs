@@ -119,7 +119,10 @@ impl Bank {
     /// The same begun anew from a vague pose, of which nothing is known at `now_s`.
     pub fn restarted(&self, position_std_m: f64, now_s: f64) -> Self {
         let start = self.leader().restarted(position_std_m);
-        Self::new(&start, &self.heads, self.otherwise.beside(&start), now_s)
+        Self {
+            noise: self.noise.resumed(),
+            ..Self::new(&start, &self.heads, self.otherwise.beside(&start), now_s)
+        }
     }
 
     /// The same of an array that is not exact, once that is sure and nothing else may be; nothing is known of
@@ -129,7 +132,10 @@ impl Bank {
         let is_quiet = self.faulty() == 0
             && self.doubtful(config.recovery_threshold) == 0
             && self.quiet_s(now_s) > config.recovery_s;
-        is_quiet.then(|| Self::new(inexact, &self.heads, self.otherwise.beside_inexact(), now_s))
+        is_quiet.then(|| Self {
+            noise: self.noise.resumed(),
+            ..Self::new(inexact, &self.heads, self.otherwise.beside_inexact(), now_s)
+        })
     }
 
     /// The tracker that is most probably right: the one of every sound radio head, unless something is otherwise.
@@ -245,7 +251,7 @@ impl Bank {
                 }
             }
         }
-        let noise_ratio = self.noise_ratio();
+        let noise_ratio = self.noise.core_ratio();
         let looked = self.main.look(head, measured);
         let if_staying = (self.otherwise).update(&self.main, &looked, noise_ratio, head, measured);
         let verdict = self.main.take(looked, measured);

@@ -5,7 +5,7 @@ use std::f64::consts::TAU;
 use crate::localize::measurement::UpdateReason;
 use crate::localize::tracker::{Look, Tracker};
 
-/// Share of the angles that come from anywhere.
+/// Share of the angles that come from anywhere, where scatter makes no more of them.
 const OUTLIERS: f64 = 2e-3;
 
 /// Largest logarithm of the likelihood ratio, for or against, as clear as a fault of a radio head is
@@ -35,21 +35,30 @@ impl Evidence {
         self.0 = self.0.max(evidence);
     }
 
-    /// Takes in how the tracker for which it would speak, and the other, foretell an angle that has so many
-    /// times the variance that is stated.
+    /// Takes in how the tracker for which it would speak, and the other, foretell an angle.
     pub fn see(
         &mut self,
         [of_it, of_other]: [&Tracker; 2],
         [it, other]: [&Result<Look, UpdateReason>; 2],
-        noise_ratio: f64,
     ) {
         if let (Ok(it), Ok(other)) = (it, other)
             && !(it.excluded || other.excluded)
         {
-            let ratio = density(of_it, it, noise_ratio) / density(of_other, other, noise_ratio);
+            let ratio = density(of_it, it) / density(of_other, other);
             let share = independent_share(of_it, it).min(independent_share(of_other, other));
-            self.0 = (self.0 + share * ratio.ln()).clamp(-SURE, SURE);
+            self.0 = (self.0 + share * ratio.ln()).max(-SURE);
         }
+    }
+
+    /// The larger of the two.
+    pub const fn or_more(self, other: Self) -> Self {
+        Self(self.0.max(other.0))
+    }
+
+    /// What is left of it where that which most speaks for is no more than sure: the others, and what is stated,
+    /// come up to it.
+    pub const fn beside_most(&mut self, most: Self) {
+        self.0 = (self.0 - (most.0 - SURE).max(0.0)).max(-SURE);
     }
 
     /// How many times as probable it is as not, where its probability was `prior` before.
@@ -73,16 +82,17 @@ fn independent_share(tracker: &Tracker, seen: &Look) -> f64 {
 }
 
 /// Probability density of an angle (1/rad), which may be an outlier.
-fn density(tracker: &Tracker, seen: &Look, noise_ratio: f64) -> f64 {
+fn density(tracker: &Tracker, seen: &Look) -> f64 {
     let inlier = seen.pasts.as_ref().map_or_else(
         || {
             // Who stands hears the same again, of a measurement variance that drowns the belief's.
             let mut alone = seen.innovation;
             let belief = (alone.variance - alone.measurement_variance).max(0.0);
-            alone.variance = belief + noise_ratio * at_first(tracker, seen);
+            alone.variance = belief + at_first(tracker, seen);
             alone.density()
         },
         |pasts| pasts.density,
     );
-    OUTLIERS / TAU + (1.0 - OUTLIERS) * inlier
+    let outliers = tracker.config().wrong_lobe.unwrap_or(OUTLIERS);
+    outliers / TAU + (1.0 - outliers) * inlier
 }

@@ -265,7 +265,7 @@ impl Guard {
         time_s: f64,
     ) -> impl Iterator<Item = (&'a Tracker, Hypothesis)> + Clone {
         let told = bank.leader().pose(time_s);
-        let noise_ratio = bank.noise_ratio();
+        let heard_noise = bank.noise_ratio();
         let finds_errors = bank.main().config().finds_errors();
         let head_probability = (self.config.fault_probability).of_radio_head(finds_errors);
         let negligible = NEGLIGIBLE * self.config.risk;
@@ -273,6 +273,7 @@ impl Guard {
             .filter(move |(probability, _)| *probability > negligible)
             .filter_map(move |(probability, right)| {
                 let pose = right.pose(time_s);
+                let noise_ratio = right.unexpected_noise(heard_noise);
                 let hypothesis = Hypothesis::new(probability, &pose, noise_ratio, &told);
                 hypothesis.map(|it| (right, it))
             })

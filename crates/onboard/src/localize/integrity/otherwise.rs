@@ -1,6 +1,7 @@
 //! What may be otherwise than stated, radio heads apart, and who is right then.
 
 use super::alternative::Alternative;
+use super::evidence::Evidence;
 use super::slip::Slip;
 use crate::clone_in_place::clone_in_place;
 use crate::localize::measurement::{AngleMeasurement, UpdateReason, UpdateVerdict};
@@ -28,6 +29,8 @@ pub(super) struct Otherwise {
     noise: Option<Alternative>,
     /// The site plan is off as a whole.
     datum: Option<Alternative>,
+    /// The angles are noisier.
+    loud: Option<Alternative>,
     /// Errors of the angles stay over metres.
     multipath: Option<Alternative>,
 }
@@ -38,6 +41,7 @@ clone_in_place!(Otherwise {
     array,
     noise,
     datum,
+    loud,
     multipath
 });
 
@@ -51,6 +55,7 @@ impl Otherwise {
             array: Alternative::inexact(&stated),
             noise: Alternative::noisier(&stated, probability.odometer),
             datum: Alternative::displaced(&stated, probability.all_radio_heads),
+            loud: Alternative::loud(&stated),
             multipath: Alternative::multipath(tracker),
         }
     }
@@ -67,14 +72,15 @@ impl Otherwise {
         }
     }
 
-    /// The same beside the tracker of an array that is not exact: as probable as it was beside that one before, slip
-    /// begun anew unless it was likely.
+    /// The same beside the tracker of an array that is not exact: as probable as it was beside that one before, noisier
+    /// angles begun anew, and slip unless it was likely.
     pub fn beside_inexact(&self) -> Self {
         let mut beside = self.clone();
         if let Some(array) = beside.array.take() {
             for it in beside.all_mut() {
                 it.evidence = it.evidence.beside(array.evidence);
             }
+            beside.loud = Alternative::loud(&array.tracker);
             if beside.slip.alternative.evidence.is_against() {
                 beside.slip = Slip::new(&array.tracker, self.probability.odometer);
             }
@@ -84,13 +90,14 @@ impl Otherwise {
 
     fn all(&self) -> impl Iterator<Item = &Alternative> + Clone {
         let slip = std::iter::once(&self.slip.alternative);
-        (slip.chain(&self.array).chain(&self.noise)).chain(self.datum.iter().chain(&self.multipath))
+        (slip.chain(&self.array).chain(&self.noise))
+            .chain((self.datum.iter().chain(&self.loud)).chain(&self.multipath))
     }
 
     fn all_mut(&mut self) -> impl Iterator<Item = &mut Alternative> {
         let slip = std::iter::once(&mut self.slip.alternative);
         (slip.chain(&mut self.array).chain(&mut self.noise))
-            .chain(self.datum.iter_mut().chain(&mut self.multipath))
+            .chain((self.datum.iter_mut().chain(&mut self.loud)).chain(&mut self.multipath))
     }
 
     /// How many times as probable each of it is as that all is as stated, and the tracker that is right then.
@@ -116,9 +123,10 @@ impl Otherwise {
             .is_some_and(|it| std::ptr::eq(it, alternative))
     }
 
-    /// Whether errors stay, as far as is known.
+    /// Whether errors that stay explain the angles clearly better than what is stated does, whatever explains them
+    /// best.
     pub fn errors_stay(&self) -> bool {
-        (self.multipath.as_ref()).is_some_and(|it| self.leads(it))
+        (self.multipath.as_ref()).is_some_and(|it| it.odds() > LEAST_ODDS)
     }
 
     /// Whether something is at fault, as far as is known.
@@ -153,7 +161,8 @@ impl Otherwise {
         self.slip.watch(stated, sample);
     }
 
-    /// Takes in an angle, which the tracker `stated` foretells so; what became of it, where errors stay.
+    /// Takes in an angle, which the tracker `stated` foretells so, where angles are heard to have so many times the
+    /// variance that is stated; what became of it, where errors stay.
     pub fn update(
         &mut self,
         stated: &Tracker,
@@ -162,9 +171,16 @@ impl Otherwise {
         head: &RadioHead,
         measured: &AngleMeasurement,
     ) -> Option<UpdateVerdict> {
+        if let Some(loud) = &mut self.loud {
+            loud.tracker.hear_noise(Some(noise_ratio));
+        }
         let mut verdict = None;
         for alternative in self.all_mut() {
-            verdict = Some(alternative.update(stated, looked, noise_ratio, head, measured));
+            verdict = Some(alternative.update(stated, looked, head, measured));
+        }
+        let most = (self.all()).fold(Evidence::NONE, |most, it| most.or_more(it.evidence));
+        for alternative in self.all_mut() {
+            alternative.evidence.beside_most(most);
         }
         // Who finds errors that stay comes last.
         verdict.filter(|_| self.errors_stay())
@@ -210,6 +226,10 @@ mod tests {
         moved_m: [f64; 2],
         /// The odometer reads so much more, as a share.
         scale: f64,
+        /// The angles have so many times the variance that is stated besides their own ...
+        noise: f64,
+        /// ... and are heard to have so many times more than that.
+        heard_noise: f64,
     }
 
     /// A minute past four radio heads in this world, whose angles are off by `off_rad` after so many metres: what is
@@ -234,11 +254,16 @@ mod tests {
             for (number, head) in heads.iter().enumerate() {
                 let place = head.position.moved(world.moved_m);
                 let bearing_rad = truth.point().bearing_rad(place) - truth.heading_rad;
-                let own_rad = SIGMA_RAD * noise.sample::<f64, _>(StandardNormal);
                 let phase_rad = PI * (bearing_rad - world.turned_rad).cos();
+                let exact = angle(time_s, phase_rad);
+                let seen = stated
+                    .look(head, &exact)
+                    .map(|it| stated.first_variance(&it));
+                let variance = SIGMA_RAD * SIGMA_RAD + world.noise * seen.unwrap_or(0.0);
+                let own_rad = variance.sqrt() * noise.sample::<f64, _>(StandardNormal);
                 let measured = angle(time_s, phase_rad + off_rad(number, way_m) + own_rad);
                 let looked = stated.look(head, &measured);
-                otherwise.update(&stated, &looked, 1.0, head, &measured);
+                otherwise.update(&stated, &looked, 1.0 + world.heard_noise, head, &measured);
                 stated.take(looked, &measured);
             }
         }
@@ -251,7 +276,11 @@ mod tests {
     fn nothing_is_otherwise_where_all_is_as_stated() {
         let (otherwise, stated, off_m) = drive(&World::default(), |_, _| 0.0);
         assert!(otherwise.leader().is_none() && off_m < 0.3, "{off_m}");
-        assert!(otherwise.odds().all(|(odds, _)| odds < 0.1));
+        let loud = otherwise.loud.as_ref().unwrap();
+        let others = otherwise.all().filter(|it| !std::ptr::eq(*it, loud));
+        assert!(others.map(Alternative::odds).all(|odds| odds < 0.1));
+        // Angles that are heard to be no noisier are as stated.
+        assert_eq!(loud.tracker.belief(), stated.belief());
         assert!(!stated.odometer_departs());
     }
 
@@ -286,6 +315,22 @@ mod tests {
             let std_m = found.covariance[state][state].sqrt();
             assert!(std_m < 0.3 && by_m.abs() < 4.0 * std_m, "{by_m} of {std_m}");
         }
+    }
+
+    #[test]
+    fn angles_that_are_noisier_are_found_and_no_fault() {
+        let world = World {
+            noise: 3.0,
+            heard_noise: 2.2,
+            ..World::default()
+        };
+        let (otherwise, stated, off_m) = drive(&world, |_, _| 0.0);
+        let loud = otherwise.loud.as_ref().unwrap();
+        let odds: Vec<f64> = otherwise.all().map(Alternative::odds).collect();
+        assert!(otherwise.leads(loud) && !otherwise.is_fault(), "{odds:?}");
+        let variance = |tracker: &Tracker| tracker.belief().covariance[ALONG][ALONG];
+        assert!(variance(&loud.tracker) > 2.0 * variance(&stated));
+        assert!(off_m < 4.0 * variance(&loud.tracker).sqrt(), "{off_m}");
     }
 
     #[test]
@@ -331,8 +376,15 @@ mod tests {
             let number = (way_m / 3.0).floor() as u64 * 4 + head as u64;
             0.3 * ChaCha8Rng::seed_from_u64(number).sample::<f64, _>(StandardNormal)
         };
-        let (otherwise, _, off_m) = drive(&World::default(), error_rad);
-        assert!(otherwise.errors_stay() && otherwise.is_fault());
-        assert!(off_m < 1.0, "{off_m}");
+        // What differs from stretch to stretch may be heard as noise.
+        for heard_noise in [0.0, 10.0] {
+            let world = World {
+                heard_noise,
+                ..World::default()
+            };
+            let (otherwise, _, off_m) = drive(&world, error_rad);
+            assert!(otherwise.errors_stay() && otherwise.is_fault());
+            assert!(off_m < 1.0, "{off_m}");
+        }
     }
 }

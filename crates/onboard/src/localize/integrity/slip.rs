@@ -91,7 +91,7 @@ mod tests {
                 let bearing_rad = pose.point().bearing_rad(head.position) - pose.heading_rad;
                 let measured = angle(time_s, std::f64::consts::PI * bearing_rad.cos());
                 let if_sound = sound.look(head, &measured);
-                (slip.alternative).update(&sound, &if_sound, 1.0, head, &measured);
+                (slip.alternative).update(&sound, &if_sound, head, &measured);
                 sound.take(if_sound, &measured);
             }
         }

@@ -29,6 +29,10 @@ pub struct TrackerConfig {
     /// Probability that an angle is any, as scatter made another lobe the highest; none where the gate
     /// refuses so many anyway.
     pub wrong_lobe: Option<f64>,
+    /// How many sound angles the gate refuses, as a share.
+    pub outlier_probability: f64,
+    /// How many times the variance that is stated the angles are heard to have, where that is believed.
+    pub heard_noise: Option<f64>,
     /// How the vehicle keeps to its lane; used with a map.
     pub lane_keeping: LaneKeeping,
     /// How the path bends; used without a map.
@@ -230,8 +234,7 @@ impl TrackerConfig {
         // Without a guard there is no tracker beside this one.
         let is_alone = vehicle.integrity.is_none() && receiver.phase_bias_probability.is_some();
         let is_usual = is_alone || error_probability >= LEAST_USUAL_ERROR_PROBABILITY;
-        let rician_k = 10f64.powf(0.1 * site.rician_k_db);
-        Self {
+        let mut config = Self {
             drive: vehicle.drive,
             array: ArrayModel {
                 measurand: array.measurand(),
@@ -239,9 +242,10 @@ impl TrackerConfig {
                 position_m: array.position_m,
                 position_std_m: array.position_std_m,
             },
-            rician_k,
-            wrong_lobe: Some(array.measurand().wrong_lobe_probability(rician_k))
-                .filter(|&probability| probability > settings.outlier_probability),
+            rician_k: 10f64.powf(0.1 * site.rician_k_db),
+            wrong_lobe: None,
+            outlier_probability: settings.outlier_probability,
+            heard_noise: None,
             lane_keeping,
             path_bend: PathBend {
                 curvature_per_m: settings.curvature_rms_per_m,
@@ -310,7 +314,23 @@ impl TrackerConfig {
             rare_error_probability: if is_usual { 0.0 } else { error_probability },
             gap_s: 5.0 / odometer.rate_hz,
             top_speed_mps: 1.5 * vehicle.top_speed_mps(),
-        }
+        };
+        config.hear_noise(None);
+        config
+    }
+
+    /// How many times the variance that is stated the angles are taken to have.
+    pub fn noise_ratio(&self) -> f64 {
+        self.heard_noise.unwrap_or(1.0)
+    }
+
+    /// Believes that the angles have so many times the variance that is stated, as of less Rician K; or what is
+    /// stated.
+    pub fn hear_noise(&mut self, ratio: Option<f64>) {
+        self.heard_noise = ratio;
+        let rician_k = self.rician_k / self.noise_ratio();
+        let wrong_lobe = (self.array.measurand).wrong_lobe_probability(rician_k);
+        self.wrong_lobe = Some(wrong_lobe).filter(|&it| it > self.outlier_probability);
     }
 
     /// Whether errors that stay over metres are found while driving.
@@ -331,7 +351,7 @@ impl TrackerConfig {
     pub fn scatter_variance(&self, travelled_m: f64, aperture: f64, toward: f64) -> f64 {
         let scatter = (self.array.measurand).scatter_variance(self.rician_k, aperture);
         let correlation = self.array.correlation(travelled_m, toward);
-        scatter * correlation.max(1.0)
+        self.noise_ratio() * scatter * correlation.max(1.0)
     }
 
     /// The same by all that several looks share: scatter and the surveys, whose errors stay until

@@ -476,6 +476,18 @@ impl Tracker {
         self.belief.covariance[SCALE][SCALE] < 0.5 * self.config.odometer_scale_std.powi(2)
     }
 
+    /// Expects angles of so many times the variance that is stated, or what is stated.
+    pub(in crate::localize) fn hear_noise(&mut self, ratio: Option<f64>) {
+        self.config.hear_noise(ratio);
+    }
+
+    /// How many times the variance that it expects angles have that are heard to have so many times what is
+    /// stated. Who finds errors that stay finds out by itself.
+    pub(in crate::localize) fn unexpected_noise(&self, heard: f64) -> f64 {
+        let knows = self.config.heard_noise.is_some() || self.config.finds_errors();
+        if knows { 1.0 } else { heard }
+    }
+
     /// Distance driven since the start (m).
     pub const fn driven_m(&self) -> f64 {
         self.driven_m

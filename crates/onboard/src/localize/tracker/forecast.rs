@@ -107,7 +107,7 @@ impl Tracker {
             std_rad: 0.0,
             ..bias
         };
-        let (sigma, (travelled_m, _)) = (measured.phase_sigma_rad, looked.moved);
+        let (sigma, (travelled_m, _)) = (looked.own_variance.sqrt(), looked.moved);
         let (aperture, toward) = (looked.aperture, looked.toward);
         let noise = unbiased.variance(sigma, looked.elapsed_s, looked.moved)
             + (self.config).scatter_variance(travelled_m, aperture, toward);
@@ -182,7 +182,7 @@ impl Tracker {
         let array = &self.config.array;
         let sighting = Sighting::new(&known.known, pose, &footing, &belief.mean, array)?;
         let travelled_m = self.driven_m + ahead_m - known.last_look_m;
-        let own = thermal(sighting.range_m).sqrt();
+        let own = (self.config.noise_ratio() * thermal(sighting.range_m)).sqrt();
         let mut variance = self
             .config
             .phase_bias

@@ -56,7 +56,7 @@ impl Tracker {
         head: &RadioHead,
         measured: &AngleMeasurement,
     ) -> Result<Look, UpdateReason> {
-        let sigma = measured.phase_sigma_rad;
+        let sigma = measured.phase_sigma_rad * self.config.noise_ratio().sqrt();
         let usable = measured.time_s.is_finite()
             && measured.phase_rad.is_finite()
             && sigma.is_finite()

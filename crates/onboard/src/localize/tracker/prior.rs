@@ -95,13 +95,16 @@ impl Tracker {
         tracker
     }
 
-    /// The same tracker as what is stated has it: errors that stay are found by none where they are rare.
+    /// The same tracker as what is stated has it: angles are as noisy as that, and errors that stay are found by
+    /// none where they are rare.
     pub(in crate::localize) fn as_stated(&self) -> Self {
-        if self.config.rare_error_probability > 0.0 {
+        let mut tracker = if self.config.rare_error_probability > 0.0 {
             self.finding_errors(0.0)
         } else {
             self.clone()
-        }
+        };
+        tracker.hear_noise(None);
+        tracker
     }
 
     /// The same tracker of an array of which nothing is taken as exact that is not stated; `None` where all of
