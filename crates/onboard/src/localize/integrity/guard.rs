@@ -16,6 +16,7 @@
 
 use super::bank::Bank;
 use super::config::IntegrityConfig;
+use super::former::Former;
 use super::level::{Hypothesis, LevelEquation};
 use super::otherwise::Otherwise;
 use crate::clone_in_place::clone_in_place;
@@ -36,6 +37,8 @@ pub struct Guard {
     level: LevelEquation,
     bank: Bank,
     restarted: Option<Restarted>,
+    /// Who told the position before, where that was another one.
+    former: Option<Former>,
     /// Whether it was found by a search, and nothing has confirmed it yet.
     is_found: bool,
     /// Distance driven (m) when the sources could be told apart last.
@@ -61,6 +64,7 @@ clone_in_place!(Guard {
     level,
     bank,
     restarted,
+    former,
     is_found,
     trusted_m,
     begun_s,
@@ -88,6 +92,7 @@ impl Guard {
             trusted_m: tracker.driven_m(),
             bank: Bank::new(tracker, heads, otherwise, found_s),
             restarted: None,
+            former: None,
             is_found,
             begun_s: found_s,
             has_departed: false,
@@ -139,6 +144,8 @@ impl Guard {
     /// Takes in an angle: a test of its radio head, and information for whoever trusts that.
     pub fn update(&mut self, head: &RadioHead, measured: &AngleMeasurement) -> UpdateVerdict {
         self.now_s = self.now_s.max(measured.time_s);
+        let odometry_s = self.tracker().time_s();
+        let (teller, told) = (self.teller(), self.tracker().pose(odometry_s));
         let verdict = self.bank.update(head, measured);
         self.bank.judge(self.now_s, &self.config);
         if let Some(bank) = self.bank.of_inexact(self.now_s, &self.config) {
@@ -150,7 +157,17 @@ impl Guard {
         }
         self.recover();
         self.watch_faults();
+        if self.teller() != teller {
+            let former = Former::new(&told, &self.tracker().pose(odometry_s));
+            self.former = former.or(self.former);
+        }
         verdict
+    }
+
+    /// By what to know that another one tells the position.
+    fn teller(&self) -> (*const Tracker, usize, f64) {
+        let leader = std::ptr::from_ref(self.bank.leader());
+        (leader, self.bank.faulty(), self.begun_s)
     }
 
     /// Which of several is most probable may change from angle to angle, and who has begun anew knows nothing of the
@@ -217,6 +234,10 @@ impl Guard {
             pose.mix(beliefs.map(|(probability, right)| (probability, right.pose(time_s))));
         }
         pose.integrity = Some(self.integrity(time_s));
+        let former = self.former.as_ref();
+        if let Some(former) = former.and_then(|it| it.beside(&pose, self.config.recovery_s)) {
+            pose.cover(&former);
+        }
         if self.bank.otherwise().errors_stay() {
             return pose;
         }
@@ -281,5 +302,51 @@ impl Guard {
 
     fn hypotheses(&self, bank: &Bank, time_s: f64) -> impl Iterator<Item = Hypothesis> + Clone {
         (self.suspects(bank, time_s)).map(|(_, hypothesis)| hypothesis)
+    }
+}
+
+#[cfg(test)]
+mod tests {
+    use std::f64::consts::PI;
+
+    use super::*;
+    use crate::localize::integrity::trip::{angle, trip};
+
+    /// Deviations by which a position may be another one at one angle.
+    const MOST_DEVIATIONS: f64 = 5.0;
+
+    #[test]
+    fn whoever_takes_over_covers_who_told_the_position_before() {
+        // A radio head that is off by so much that the position is metres off before it is excluded.
+        const OFF_RAD: f64 = 0.2;
+        let (heads, road, tracker) = trip();
+        let mut guard = Guard::new(&tracker, &heads, IntegrityConfig::default(), None);
+        let mut farthest_m: f64 = 0.0;
+        let mut last = guard.pose(0.0);
+        for step in 1..150 {
+            let time_s = f64::from(step) * 0.1;
+            guard.odometry(&OdometrySample {
+                time_s,
+                distance_m: 4.0 * time_s,
+                speed_mps: 4.0,
+                yaw_rate_radps: None,
+            });
+            let truth = road.pose(4.0 * time_s);
+            for (number, head) in heads.iter().enumerate() {
+                let bearing_rad = truth.point().bearing_rad(head.position) - truth.heading_rad;
+                let off_rad = if number == 1 { OFF_RAD } else { 0.0 };
+                let before = guard.pose(time_s);
+                guard.update(head, &angle(time_s, PI * bearing_rad.cos() + off_rad));
+                last = guard.pose(time_s);
+                let moved_m = last.pose.point().distance_m(before.pose.point());
+                let [before_m2, now_m2] = [&before, &last].map(|it| it.principal_variances()[0]);
+                let std_m = before_m2.max(now_m2).sqrt();
+                assert!(moved_m < MOST_DEVIATIONS * std_m, "{moved_m} of {std_m} m");
+                farthest_m = farthest_m.max(moved_m);
+            }
+        }
+        assert!(farthest_m > 5.0, "{farthest_m}");
+        // Not for ever.
+        assert!(last.principal_variances()[0] < 1.0);
     }
 }

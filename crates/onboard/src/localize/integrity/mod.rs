@@ -5,6 +5,7 @@ mod angle_noise;
 mod bank;
 mod config;
 mod evidence;
+mod former;
 mod guard;
 mod level;
 mod otherwise;
