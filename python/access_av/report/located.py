@@ -21,6 +21,7 @@ if TYPE_CHECKING:
 
 MOST_REMARKS = 50
 UNRELIABLE = "Not to be relied on"
+TRACK_TEXT = "Where the vehicle was, in the map's frame; drawn to scale on a wide screen."
 
 
 def render_located(
@@ -52,7 +53,7 @@ def render_located(
         specs["track"] = charts.track(_tracks(drive, known, truth), _heads(site))
         specs["error"] = charts.error(_errors(drive, known, truth))
         sections += [
-            _section("Track", "Where the vehicle was, in the map's frame.", figure("track")),
+            _section("Track", TRACK_TEXT, figure("track")),
             _section("Error", _error_text(drive, numbers), figure("error")),
         ]
     if not drive.findings.is_empty():
@@ -180,6 +181,8 @@ def _compared(angles: pl.DataFrame) -> pl.DataFrame:
     )
     return angles.drop_nulls("mahalanobis_squared").select(
         "time_s",
+        "pci",
+        "ssb_index",
         head=head,
         deviations=pl.col("mahalanobis_squared").sqrt(),
         verdict=pl.when("accepted").then(pl.lit("accepted")).otherwise(pl.lit("refused")),
@@ -196,12 +199,18 @@ def _by_head(angles: pl.DataFrame) -> str:
         (str(pci), str(index), escape(reason), f"{count:,}", number(nis, 2))
         for pci, index, reason, count, nis in reasons.iter_rows()
     ]
-    return table(("PCI", "SSB", "Verdict", "Angles", "Mean distance²"), rows, numbers=(0, 1, 3, 4))
+    head = ("PCI", "SSB", "Verdict", "Angles", "Mean squared deviations")
+    return table(head, rows, numbers=(0, 1, 3, 4))
 
 
 def _findings(findings: pl.DataFrame) -> str:
     rows = [
-        (escape(quantity), f"{stated:.4f}", f"{found:.4f} ± {std:.4f}", escape(unit))
+        (
+            escape(quantity),
+            f"{stated:.4f}",
+            f"{found:.4f} ± {std:.4f}" if std else "taken as exact",
+            escape(unit),
+        )
         for quantity, unit, stated, found, std in findings.iter_rows()
     ]
     return table(("Quantity", "Stated", "Found", "Unit"), rows, numbers=(1, 2))
