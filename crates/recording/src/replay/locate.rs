@@ -37,6 +37,10 @@ pub fn locate_angles(
 ) -> Result<LocatedDrive, ReplayError> {
     let (vehicle, start) = starting(site, vehicle, start)?;
     let mut replay = Replay::new(site, &vehicle, start, Custom::default(), odometry)?;
+    if angles.angles.is_empty() {
+        let why = angles.remarks.first().map(ToString::to_string);
+        return Err(ReplayError::NoAngle { why });
+    }
     for remark in &angles.remarks {
         replay.remark(remark.time_s, remark.to_string());
     }
