@@ -254,5 +254,15 @@ def test_the_street_can_be_driven(tmp_path: Path, data: Path) -> None:
         '[vehicle.wake_up]\npolicy = "fixed"\ninterval_ms = 500.0\n'
         '[channel]\nmodel = "paths"\npaths = "street.npz"\n'
     )
-    result = simulate(str(tmp_path / "drive.toml"), runs=2, seed=1)
+    result = simulate(str(tmp_path / "drive.toml"), runs=2, seed=1, keep_trajectories=True)
     assert 0.02 < result.rms_error_m < 1.0
+    # The road goes on where nothing was traced: nothing is heard there, and the vehicle not lost.
+    assert result.executions is not None
+    assert result.executions["snr_db"].is_finite().all()
+    every = Scenario.load(str(tmp_path / "drive.toml")).with_overrides(
+        {"vehicle.wake_up.interval_ms": 20.0}
+    )
+    result = simulate(every, seed=1, keep_trajectories=True)
+    assert result.steps["mean_abs_error_x_m"].max() < 3.0
+    assert result.executions is not None
+    assert result.executions["time_s"].max() < result.steps["time_s"].max() - 3.0
