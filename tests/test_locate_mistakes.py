@@ -190,6 +190,19 @@ def test_how_it_was_meant_is_said(tmp_path: Path, kind: str) -> None:
     assert not drive.is_reliable
 
 
+def test_wheels_in_millimetres_are_not_relied_on(tmp_path: Path) -> None:
+    """With so much of an odometer every angle fits."""
+    whole = robot(30.0)
+    whole.sheet = whole.sheet.replace("odometer = {", "odometer = { track_width_m = 0.26,")
+    turned = 0.13 * (YAW * 0.05).cum_sum()
+    whole.odometry = whole.odometry.select(
+        "time_s", left_m=1e3 * (DISTANCE - turned), right_m=1e3 * (DISTANCE + turned)
+    )
+    drive = whole.locate(tmp_path)
+    assert not drive.is_reliable
+    assert ["top_speed_kmh is 15; check the units" in it for it in drive.suspicions] == [True]
+
+
 @pytest.mark.parametrize(
     ("by_rad", "says"),
     [(-math.pi / 2, "further to the left"), (math.pi, "heading the other way")],

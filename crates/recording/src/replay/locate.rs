@@ -18,7 +18,7 @@ use super::mistakes::Drive;
 use super::receive::receive_recording;
 use super::start::{StartChoice, starting};
 use super::stated::with_phase;
-use super::suspicion::suspicions;
+use super::suspicion::{suspicions, too_fast};
 use crate::angle_log::{AngleLog, LoggedAngle};
 use crate::odometry::OdometryLog;
 use crate::sigmf::Recording;
@@ -114,7 +114,11 @@ fn suspect(
         odometry: Cow::Borrowed(odometry),
         angles: Cow::Borrowed(angles),
     };
-    for suspicion in suspicions(&given)? {
+    let mut found = suspicions(&given)?;
+    if found.is_empty() {
+        found.extend(too_fast(vehicle, odometry));
+    }
+    for suspicion in found {
         replay.suspect(suspicion);
     }
     Ok(())
