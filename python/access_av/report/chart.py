@@ -10,6 +10,8 @@ import polars as pl
 # Okabe and Ito's colours: told apart on light and dark, in print and by colour-blind readers.
 BLUE, ORANGE, GREEN, GREY, PURPLE = "#2f7ed8", "#d55e00", "#009e73", "#8a8f98", "#b48ead"
 POINTS_PER_LINE = 160
+# Errors below a millimetre are drawn as one.
+LEAST_M = 1e-3
 # Size of a map on a wide screen.
 MAP_WIDTH_PX, LEAST_HEIGHT_PX = 1000.0, 220.0
 

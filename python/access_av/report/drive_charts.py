@@ -8,7 +8,7 @@ from typing import TYPE_CHECKING
 import altair as alt
 import polars as pl
 
-from access_av.report.chart import BLUE, GREEN, ORANGE, finish, thinned, to_scale
+from access_av.report.chart import BLUE, GREEN, LEAST_M, ORANGE, finish, thinned, to_scale
 from access_av.statistics.consistency import horizontal_error_m
 
 if TYPE_CHECKING:
@@ -17,8 +17,6 @@ if TYPE_CHECKING:
 
 # Bins of the Stanford diagram per factor of ten: 12 % wide.
 BINS_PER_DECADE = 20
-# Errors below a millimetre are drawn as one.
-LEAST_M = 1e-3
 TALLEST_MAP_PX = 900.0
 ROAD_STEP_M = 2.0
 

@@ -7,15 +7,23 @@ from typing import TYPE_CHECKING
 import altair as alt
 import polars as pl
 
-from access_av.report.chart import BLUE, GREEN, GREY, ORANGE, PURPLE, finish, thinned, to_scale
+from access_av.report.chart import (
+    BLUE,
+    GREEN,
+    GREY,
+    LEAST_M,
+    ORANGE,
+    PURPLE,
+    finish,
+    thinned,
+    to_scale,
+)
 
 if TYPE_CHECKING:
     from access_av.report.chart import Spec
 
 TALLEST_MAP_PX = 700.0
 POINTS_PER_TRACK = 1500
-# Errors below a millimetre are drawn as one.
-LEAST_M = 1e-3
 # Ninety in a hundred of what is normally distributed are nearer than so many deviations.
 P90_SIGMAS = 1.645
 

@@ -100,6 +100,12 @@ def service_levels(verdicts: Iterable[Verdict]) -> str:
     return table(head, rows, numbers=(1, 2, 3, 4))
 
 
+def section(title: str, text: str, body: str) -> str:
+    """A part of the page, with a heading and a paragraph where there is text."""
+    lead = f"<p>{escape(text)}</p>" if text else ""
+    return f"<section><h2>{escape(title)}</h2>{lead}{body}</section>"
+
+
 def source(title: str, text: str) -> str:
     """A file to unfold."""
     return f"<details><summary>{escape(title)}</summary><pre>{escape(text)}</pre></details>"
