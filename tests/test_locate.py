@@ -6,6 +6,7 @@ import subprocess
 import sys
 from typing import TYPE_CHECKING, Any
 
+import numpy as np
 import polars as pl
 import pytest
 from mcap.reader import make_reader
@@ -139,6 +140,22 @@ def test_mcap_odometry_and_bad_items_are_taken_in(
     done = access_av(*given)
     assert done.code == 0, done.err
     assert done.err.count("left out") == 3
+
+
+def test_samples_without_an_ssb_are_refused(drive: Path, tmp_path: Path) -> None:
+    meta = json.loads((drive / "iq.sigmf-meta").read_text())
+    del meta["global"]["core:sha512"]
+    (tmp_path / "iq.sigmf-meta").write_text(json.dumps(meta))
+    size = (drive / "iq.sigmf-data").stat().st_size
+    noise = np.random.default_rng(1).integers(-100, 100, size // 2, dtype=np.int16)
+    (tmp_path / "iq.sigmf-data").write_bytes(noise.tobytes())
+    with pytest.raises(RecordingError, match=r"iq.sigmf-data: no SSB of a radio head of the site"):
+        drives.locate(
+            drive / "site.toml",
+            drive / "odometry.csv",
+            tmp_path / "iq",
+            vehicle=drive / "vehicle.toml",
+        )
 
 
 def test_integrity_comes_with_the_poses_where_the_vehicle_asks_for_it(

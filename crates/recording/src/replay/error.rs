@@ -65,6 +65,15 @@ pub enum ReplayError {
         /// What is wrong with the first that cannot be used.
         why: Option<String>,
     },
+    /// No SSB in the recording.
+    #[error(
+        "{file}: no SSB of a radio head of the site is in it; check the carrier, the band, and \
+         pci and ssb_index; `access-av scan` tells which cells there are"
+    )]
+    NoSsb {
+        /// The recording.
+        file: String,
+    },
     /// No usable angle.
     #[error("the angle log holds no usable angle{}", because(why.as_ref()))]
     NoAngle {

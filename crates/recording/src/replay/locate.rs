@@ -78,8 +78,12 @@ pub fn locate_recording(
         replay.remark(f64::NEG_INFINITY, warning.to_string());
     }
     let file = recording.data_file().display().to_string();
-    let mut receiver = Receiver::new(ReceiverConfig::new(site, &vehicle))
-        .map_err(|source| ReplayError::Receive { file, source })?;
+    let mut receiver = Receiver::new(ReceiverConfig::new(site, &vehicle)).map_err(|source| {
+        ReplayError::Receive {
+            file: file.clone(),
+            source,
+        }
+    })?;
     let (mut heard_s, mut together) = (None, false);
     receive_recording(&mut receiver, recording, start_time_s, |ssbs| {
         for it in ssbs {
@@ -94,6 +98,9 @@ pub fn locate_recording(
             odometry_s,
             angles_s,
         });
+    }
+    if heard_s.is_none() {
+        return Err(ReplayError::NoSsb { file });
     }
     let heard: Vec<LoggedAngle> = replay.executions().iter().filter_map(as_logged).collect();
     suspect(&mut replay, site, &in_time(&vehicle), odometry, &heard)?;
