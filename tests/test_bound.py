@@ -107,11 +107,19 @@ def test_command_writes_what_it_promises(
     assert "least RMS error" in done.out
     assert "dock" in done.out
     names = {path.name for path in (tmp_path / "b").iterdir()}
+    said = " ".join(done.out.split())
+    assert "falls short of level 6 on 35.7% of the route" in said
+    assert "The cheapest change, by the usual order of cost: half the odometer's errors." in said
+    page = (tmp_path / "b" / "report.html").read_text()
+    assert "falls short of level 6" in page
     assert names == {
         "bound.parquet", "map.parquet", "report.html", "scenario.toml", "manifest.json",
     }  # fmt: skip
+    narrow = access_av("bound", "yard", "--out", tmp_path / "b", columns=60).out
+    assert re.search(r"^ 6 +0\.3 +99\.9% .* not reached", narrow, re.MULTILINE)
     route = pl.read_parquet(tmp_path / "b/bound.parquet")
     told = json.loads(access_av("bound", "yard", "--json", "--out", tmp_path / "b").out)
+    assert told["next_level"]["cheapest"] == "half the odometer's errors"
     assert told["median_m"] == route["bound_m"].median()
     assert told["median_m"] < told["p90_m"] < told["max_m"]
     assert [head["pci"] for head in told["heads"]] == [11, 12, 13, 14]

@@ -153,17 +153,20 @@ def test_bad_tables_are_refused(tmp_path: Path, access_av: Callable[..., Finishe
     site = Site.load(str(HALL / "site.toml"))
     good = line_of_sight(site, LANE_M[:3])
 
-    def refused(table: pl.DataFrame) -> str:
+    def refused(table: pl.DataFrame, carrier_mhz: float = 3750.0) -> str:
         table.write_parquet(tmp_path / "paths.parquet")
         done = access_av(
             "import-paths", tmp_path / "paths.parquet", "--site", HALL / "site.toml",
-            "--carrier-mhz", "3750", "--out", tmp_path / "paths.npz",
+            "--carrier-mhz", carrier_mhz, "--out", tmp_path / "paths.npz",
         )  # fmt: skip
         assert done.code == 2
-        return " ".join(done.err.split())
+        assert not list(tmp_path.glob("*.npz"))
+        said = " ".join(done.err.split())
+        assert f"{tmp_path / 'paths.parquet'}: " in said
+        return said
 
     assert "gain_im is missing" in refused(good.drop("gain_im"))
-    assert "there is none" in refused(good.clear())
+    assert "there is no path in it" in refused(good.clear())
     gap = pl.when(pl.int_range(pl.len()) == 4).then(None).otherwise(pl.col("delay_s"))
     assert "delay_s is not a number in row 4" in refused(good.with_columns(delay_s=gap))
     nan = pl.lit(float("nan"))
@@ -172,6 +175,16 @@ def test_bad_tables_are_refused(tmp_path: Path, access_av: Callable[..., Finishe
     moved = good.with_columns(x_m=pl.col("x_m") + 30.0)
     assert "not in one frame" in refused(moved)
     assert "from the horizon" in refused(good.with_columns(elevation_rad=pl.lit(2.0)))
+    departing = good.with_columns(azimuth_rad=pl.col("azimuth_rad") + np.pi)
+    assert "they are of arrival" in refused(departing)
+    in_ns = good.with_columns(delay_s=1e9 * pl.col("delay_s"))
+    assert "it is in seconds" in refused(in_ns)
+    in_db = good.with_columns(gain_re=pl.lit(-80.0), gain_im=pl.lit(0.0))
+    assert "an amplitude between isotropic antennas" in refused(in_db)
+    assert "no radio head pci=1.5" in refused(good.with_columns(pci=pl.col("pci") + 0.5))
+    assert "the site's carrier is 3750 MHz" in refused(good, carrier_mhz=3500.0)
+    named = good.with_columns(pl.col("pci").cast(pl.String))
+    assert ray_paths.import_paths(named, site, tmp_path / "text.npz", carrier_mhz=3750.0)
     (tmp_path / "paths.csv").write_text("nothing")
     done = access_av(
         "import-paths", tmp_path / "paths.csv", "--site", HALL / "site.toml",
@@ -194,8 +207,9 @@ def test_a_scenario_refuses_paths_of_another_site(
         return " ".join(done.err.split())
 
     table = line_of_sight(site, LANE_M)
-    assert "channel.paths" in refused(table, carrier_mhz=3500.0)
-    assert "of 3500 MHz" in refused(table, carrier_mhz=3500.0)
+    other = site.with_overrides({"carrier_mhz": 3500.0})
+    assert "channel.paths" in refused(table, other, carrier_mhz=3500.0)
+    assert "of 3500 MHz" in refused(table, other, carrier_mhz=3500.0)
     assert "no place within 1 m of the road" in refused(line_of_sight(site, LANE_M[:100]))
     of = site.with_overrides({"radio_heads[1].position_m": [10.0, 21.0, 7.0]})
     assert "another frame, or another plan" in refused(line_of_sight(of, LANE_M), of)
@@ -240,5 +254,15 @@ def test_the_street_can_be_driven(tmp_path: Path, data: Path) -> None:
         '[vehicle.wake_up]\npolicy = "fixed"\ninterval_ms = 500.0\n'
         '[channel]\nmodel = "paths"\npaths = "street.npz"\n'
     )
-    result = simulate(str(tmp_path / "drive.toml"), runs=2, seed=1)
+    result = simulate(str(tmp_path / "drive.toml"), runs=2, seed=1, keep_trajectories=True)
     assert 0.02 < result.rms_error_m < 1.0
+    # The road goes on where nothing was traced: nothing is heard there, and the vehicle not lost.
+    assert result.executions is not None
+    assert result.executions["snr_db"].is_finite().all()
+    every = Scenario.load(str(tmp_path / "drive.toml")).with_overrides(
+        {"vehicle.wake_up.interval_ms": 20.0}
+    )
+    result = simulate(every, seed=1, keep_trajectories=True)
+    assert result.steps["mean_abs_error_x_m"].max() < 3.0
+    assert result.executions is not None
+    assert result.executions["time_s"].max() < result.steps["time_s"].max() - 3.0

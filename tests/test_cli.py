@@ -56,9 +56,12 @@ def test_help_of_each_command_has_an_example(access_av: Cli, command: str) -> No
     assert max(map(len, done.out.splitlines())) <= 60
 
 
-def test_help_breaks_a_line_only_where_the_next_word_has_no_room(access_av: Cli) -> None:
-    prose, _, _ = access_av("locate", "--help", columns=60).out.partition("╭")
-    _, _, prose = prose.partition("Locate a recorded drive.")
+@pytest.mark.parametrize("command", ["locate", "platform power"])
+def test_help_breaks_a_line_only_where_the_next_word_has_no_room(
+    access_av: Cli, command: str
+) -> None:
+    prose, _, _ = access_av(*command.split(), "--help", columns=60).out.partition("╭")
+    _, _, prose = prose.partition(f"{command} [OPTIONS]")
     lines = [line.rstrip() for line in prose.splitlines()]
     for line, following in pairwise(lines):
         if line.strip() and following.strip():

@@ -67,6 +67,8 @@ def test_page_has_every_chart_and_loads_nothing(guarded: Simulation) -> None:
     markup = re.sub(r"(<script>).*?(</script>)", r"\1\2", page, flags=re.DOTALL)
     assert not re.search(r"<(link|img|iframe|script)[^>]*\b(src|href)=", markup)
     assert not re.search(r"@import|url\(|https?:", markup)
+    # Bars between two times stand on zero and on each other.
+    assert specs["executions"]["encoding"]["x"]["bin"] == "binned"
     counted = specs["stanford"]["datasets"].values()
     assert guarded.trajectories is not None
     epochs = sum(row.get("epochs", 0) for rows in counted for row in rows)

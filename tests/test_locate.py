@@ -6,6 +6,7 @@ import subprocess
 import sys
 from typing import TYPE_CHECKING, Any
 
+import numpy as np
 import polars as pl
 import pytest
 from mcap.reader import make_reader
@@ -141,6 +142,22 @@ def test_mcap_odometry_and_bad_items_are_taken_in(
     assert done.err.count("left out") == 3
 
 
+def test_samples_without_an_ssb_are_refused(drive: Path, tmp_path: Path) -> None:
+    meta = json.loads((drive / "iq.sigmf-meta").read_text())
+    del meta["global"]["core:sha512"]
+    (tmp_path / "iq.sigmf-meta").write_text(json.dumps(meta))
+    size = (drive / "iq.sigmf-data").stat().st_size
+    noise = np.random.default_rng(1).integers(-100, 100, size // 2, dtype=np.int16)
+    (tmp_path / "iq.sigmf-data").write_bytes(noise.tobytes())
+    with pytest.raises(RecordingError, match=r"iq.sigmf-data: no SSB of a radio head of the site"):
+        drives.locate(
+            drive / "site.toml",
+            drive / "odometry.csv",
+            tmp_path / "iq",
+            vehicle=drive / "vehicle.toml",
+        )
+
+
 def test_integrity_comes_with_the_poses_where_the_vehicle_asks_for_it(
     drive: Path, tmp_path: Path
 ) -> None:
@@ -219,7 +236,7 @@ def test_the_start_may_be_given_with_the_command(
     assert told.equals(given)
     searched = arguments(drive, tmp_path / "out")
     assert "Found after" in access_av(*searched, "--start", "scratch").out
-    for bad in ("1,2", "1,2,x", "1,2,inf"):
+    for bad in ("1,2", "1,2,x", "1,2,inf", "1,2,-95.8"):
         done = access_av(*searched, "--start", bad)
         assert done.code == 2
         assert "--start" in done.err
@@ -340,8 +357,17 @@ def test_the_report_shows_what_was_found(access_av: Cli, tmp_path: Path) -> None
 
 def test_the_files_of_the_docs_can_be_used(access_av: Cli, tmp_path: Path) -> None:
     page = (ROOT / "docs/locate.md").read_text(encoding="utf-8")
-    hall, vehicle = re.findall(r"```toml\n(.*?)```", page, re.DOTALL)
+    hall, road, vehicle = re.findall(r"```toml\n(.*?)```", page, re.DOTALL)
     assert Site.from_toml(hall).to_json()
+    (tmp_path / "road.csv").write_text("x_m,y_m\n0,0\n50,0\n90,20\n")
+    line = '{"type": "LineString", "coordinates": [[8.0, 60.0], [8.001, 60.0], [8.002, 60.001]]}'
+    (tmp_path / "road.geojson").write_text(line)
+    width = road[: road.index("polyline_m")]
+    ways = re.findall(r"# or: (file = \S+|segments = .*?\])  ", road)
+    assert len(ways) == 3
+    for shape in (road, *(width + way for way in ways)):
+        (tmp_path / "site.toml").write_text(hall + shape)
+        assert access_av("site", "check", tmp_path / "site.toml").code == 0
     told = robot(60.0)
     told.sheet = re.sub(r"^array = .*\n", "", vehicle, flags=re.MULTILINE)
     done = access_av(*told.write(tmp_path), "--truth", tmp_path / "truth.tum")

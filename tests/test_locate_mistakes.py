@@ -115,9 +115,13 @@ REMARKED = {
         lambda it: setattr(it, "odometry", it.odometry.drop("distance_m")),
         "distance_m is not there",
     ),
+    "half of the yaw rates": (
+        odometry(yaw_rate_radps=OTHERS.then(YAW).otherwise(None)),
+        "yaw_rate_radps is empty in 900 of 1800 samples",
+    ),
     "one wild yaw rate": (
         odometry(yaw_rate_radps=pl.when(pl.int_range(pl.len()) == 600).then(20.0).otherwise(YAW)),
-        "no vehicle turns by 20 rad/s",
+        "no vehicle turns by 20.0 rad/s",
     ),
     "angles late": (angles(time_s=TIME + 0.1), "later than stated, by the odometry's clock"),
     "twice as far": (
@@ -136,6 +140,20 @@ REMARKED = {
 
 # ... or as an error.
 REFUSED = {
+    "no usable angle": (angles(pci=pl.format("cell {}", "pci")), "line 2: left out, pci `cell 11`"),
+    "all angles NaN": (angles(phase_rad=pl.lit(math.nan)), "no usable angle; .* phase_rad"),
+    "no angle at all": (
+        lambda it: setattr(it, "angles", it.angles.clear()),
+        "no usable angle$",
+    ),
+    "time backwards": (
+        lambda it: setattr(it, "odometry", it.odometry.reverse()),
+        "fewer than two usable samples; odometry line 3: left out, .* comes after",
+    ),
+    "all yaw rates NaN": (
+        odometry(yaw_rate_radps=pl.lit(math.nan)),
+        "fewer than two usable samples; odometry line 2: left out, yaw_rate_radps is missing",
+    ),
     "clocks": (angles(time_s=TIME + 1e9), "must be told by one clock"),
     "no radio head": (angles(pci=pl.lit(999)), "check pci and ssb_index"),
     "no deviation": (
@@ -172,6 +190,19 @@ def test_how_it_was_meant_is_said(tmp_path: Path, kind: str) -> None:
     assert not drive.is_reliable
 
 
+def test_wheels_in_millimetres_are_not_relied_on(tmp_path: Path) -> None:
+    """With so much of an odometer every angle fits."""
+    whole = robot(30.0)
+    whole.sheet = whole.sheet.replace("odometer = {", "odometer = { track_width_m = 0.26,")
+    turned = 0.13 * (YAW * 0.05).cum_sum()
+    whole.odometry = whole.odometry.select(
+        "time_s", left_m=1e3 * (DISTANCE - turned), right_m=1e3 * (DISTANCE + turned)
+    )
+    drive = whole.locate(tmp_path)
+    assert not drive.is_reliable
+    assert ["top_speed_kmh is 15; check the units" in it for it in drive.suspicions] == [True]
+
+
 @pytest.mark.parametrize(
     ("by_rad", "says"),
     [(-math.pi / 2, "further to the left"), (math.pi, "heading the other way")],
@@ -206,6 +237,18 @@ def test_it_is_refused(tmp_path: Path, kind: str) -> None:
         spoilt.locate(tmp_path)
 
 
+def test_a_truth_of_another_time_is_refused(access_av: Cli, tmp_path: Path) -> None:
+    whole = robot(5.0)
+    whole.truth = whole.truth.with_columns(time_s=TIME + 1e9)
+    arguments = [*whole.write(tmp_path), "--truth", tmp_path / "truth.tum"]
+    done = access_av(*arguments)
+    assert done.code == 2
+    assert "it is from 1000000000.000 to 1000000004.950 s, the drive from 0.000 to" in done.err
+    (tmp_path / "truth.tum").write_text("# time x y z qx qy qz qw\n")
+    done = access_av(*arguments)
+    assert (done.code, "truth.tum: holds no pose" in done.err) == (2, True)
+
+
 def test_exit_codes(access_av: Cli, tmp_path: Path) -> None:
     whole = robot(25.0)
     arguments = whole.write(tmp_path)
@@ -214,6 +257,7 @@ def test_exit_codes(access_av: Cli, tmp_path: Path) -> None:
     whole.write(tmp_path)
     done = access_av(*arguments)
     assert done.code == 3
+    assert done.err.count("x is mirrored") == 1  # in the verdict, not among the remarks too
     for said in (done.err, (tmp_path / "out" / "report.html").read_text()):
         assert "x is mirrored" in " ".join(said.split()).replace("&#x27;", "'")
     again = [*arguments[:-1], tmp_path / "again"]

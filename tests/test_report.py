@@ -1,8 +1,11 @@
 from __future__ import annotations
 
+import json
 import re
 from dataclasses import replace
+from typing import TYPE_CHECKING
 
+import polars as pl
 import pytest
 
 import synthetic
@@ -10,6 +13,13 @@ from access_av.paper import summary
 from access_av.paper.report.page import render
 from access_av.paper.report.readings import readings
 from access_av.report.parts import value_text
+from robot import HEADS_M, robot
+
+if TYPE_CHECKING:
+    from collections.abc import Callable
+    from pathlib import Path
+
+    from conftest import Finished
 
 
 @pytest.fixture(scope="module")
@@ -81,3 +91,19 @@ def test_values_of_every_shape_can_be_shown() -> None:
     assert value_text({"music": 627.22, "root_music": None}) == "music 627.2, root music none"
     assert value_text([]) == "none"
     assert value_text(52000.0) == "52,000"
+
+
+def test_the_map_is_drawn_to_scale_and_heads_in_their_order(
+    access_av: Callable[..., Finished], tmp_path: Path
+) -> None:
+    whole = robot(10.0)
+    whole.heads_m = {pci - 4: place for pci, place in HEADS_M.items()}
+    whole.angles = whole.angles.with_columns(pci=pl.col("pci") - 4)
+    assert access_av(*whole.write(tmp_path)).code == 0
+    page = (tmp_path / "out" / "report.html").read_text()
+    specs = json.loads(page.split("const charts = ")[1].split(";\n")[0])
+    track, heads = specs["track"], specs["heads"]
+    x, y = (track["layer"][0]["encoding"][axis]["scale"]["domain"] for axis in "xy")
+    assert (x[1] - x[0]) / 1000.0 == pytest.approx((y[1] - y[0]) / track["height"], rel=1e-2)
+    order = heads["layer"][0]["encoding"]["x"]["sort"]
+    assert order == ["7", "8", "9", "10", "11", "12"]

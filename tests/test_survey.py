@@ -120,6 +120,30 @@ def test_what_cannot_be_surveyed_is_named(logged: Path, tmp_path: Path) -> None:
         drives.log_angles(noisy, tmp_path / "noisy")
 
 
+def test_the_command_tells_what_was_not_learnt_and_does_not_fit(
+    access_av: Callable[..., Finished], logged: Path, tmp_path: Path
+) -> None:
+    short = tmp_path / "short"
+    short.mkdir()
+    for name in ("odometry.csv", "angles.csv", "vehicle.toml"):
+        lines = (logged / "0" / name).read_text().splitlines(keepends=True)
+        (short / name).write_text("".join(lines if name == "vehicle.toml" else lines[:80]))
+    arguments = ("survey", short, "--vehicle", short / "vehicle.toml", "--out", tmp_path / "out")
+    done = access_av(*arguments, "--site", "yard")
+    assert done.code == 0, done.err
+    rows = [line.split() for line in done.out.splitlines() if line.startswith(" radio_heads")]
+    assert rows
+    assert all(row[1] == "m" and row[3:] == ["–", "nothing", "learnt"] for row in rows)
+    twice = access_av(*arguments, short, "--site", "yard")
+    assert (twice.code, "given twice" in twice.err) == (2, True)
+    turned = Vehicle.load(str(short / "vehicle.toml")).with_overrides(
+        {"array.mounting_rad": 1.57, "array.mounting_std_rad": 0.01}
+    )
+    (tmp_path / "turned.toml").write_text(turned.to_toml())
+    done = access_av(*arguments[:2], "--site", "yard", "--vehicle", tmp_path / "turned.toml")
+    assert "do not fit, and were left out" in done.err
+
+
 def test_odometry_of_two_wheels_says_the_same(logged: Path, tmp_path: Path) -> None:
     half_track_m = 0.3
     one = logged / "0"

@@ -105,7 +105,7 @@ for _room in (
 ):
     app.add_typer(_room.app)
 for _what in ("site", "vehicle", "scenario", "platform"):
-    app.add_typer(files.files_app(_what), name=_what)
+    app.add_typer(files.files_app(_what), name=_what, cls=_Commands)
 
 
 def main() -> None:

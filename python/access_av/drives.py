@@ -345,12 +345,21 @@ def error_m(poses: pl.DataFrame, truth: str | Path | pl.DataFrame) -> pl.DataFra
     )
     if both.is_empty():
         which = "the truth" if isinstance(truth, pl.DataFrame) else truth
-        raise InputError(f"{which}: no time in common with the drive")
+        if true.is_empty():
+            raise InputError(f"{which}: holds no pose")
+        raise InputError(
+            f"{which}: no time in common with the drive: it is from {_interval_s(true)}, the drive "
+            f"from {_interval_s(known)}; both must be told by one clock, in seconds"
+        )
     span = pl.col("t1") - pl.col("t0")
     share = pl.when(span > 0).then((pl.col("time_s") - pl.col("t0")) / span).otherwise(0.0)
     dx = pl.col("x_m") - pl.col("x0") - share * (pl.col("x1") - pl.col("x0"))
     dy = pl.col("y_m") - pl.col("y0") - share * (pl.col("y1") - pl.col("y0"))
     return both.select("time_s", error_m=(dx**2 + dy**2).sqrt(), error_x_m=dx, error_y_m=dy)
+
+
+def _interval_s(of: pl.DataFrame) -> str:
+    return f"{of['time_s'][0]:.3f} to {of['time_s'][-1]:.3f} s"
 
 
 def summary(drive: Drive, truth: str | Path | None = None) -> dict[str, float]:

@@ -71,6 +71,16 @@ class NextLevel:
         """The first change that is enough by itself."""
         return next((change for change in self.changes if change.reaches), None)
 
+    def in_words(self) -> str:
+        """Where it falls short, and the cheapest change."""
+        cheapest = self.cheapest.what if self.cheapest else "none alone is enough"
+        return (
+            f"As it is, the site falls short of level {self.level.name} on {self.short_share:.1%} "
+            f"of the route, most of all {self.weakest_along_m:.0f} m along, at "
+            f"({self.weakest_x_m:.0f}, {self.weakest_y_m:.0f}) m. The cheapest change, by the "
+            f"usual order of cost: {cheapest}."
+        )
+
     def as_record(self) -> dict[str, Any]:
         """Plain values for JSON."""
         return {
@@ -84,12 +94,12 @@ class NextLevel:
         }
 
 
-def next_level(scenario: _core.Scenario | str, planned: Plan) -> NextLevel | None:
+def next_level(scenario: _core.Scenario | str, planned: Plan | None = None) -> NextLevel | None:
     """What would bring a scenario to the next service level.
 
     Tried are, each by itself: SSBs twice as often, an odometer with half the errors, twice the
-    antennas, and the radio heads of a plan. The order is that of their usual cost, which is
-    assumed.
+    antennas, and the radio heads of a plan where there is one. The order is that of their usual
+    cost, which is assumed.
 
     Parameters
     ----------
@@ -127,10 +137,12 @@ def next_level(scenario: _core.Scenario | str, planned: Plan) -> NextLevel | Non
 
     with ThreadPoolExecutor() as pool:
         shares = dict(zip(tried, pool.map(share, tried.values()), strict=True))
-    heads = f"a radio head at {planned.chosen[0]}"
-    if len(planned.chosen) > 1:
-        heads = f"radio heads at {' and '.join(planned.chosen)}"
-    shares[heads] = next(verdict.share for verdict in planned.verdicts if verdict.level == level)
+    if planned is not None:
+        heads = f"a radio head at {planned.chosen[0]}"
+        if len(planned.chosen) > 1:
+            heads = f"radio heads at {' and '.join(planned.chosen)}"
+        with_heads = (verdict.share for verdict in planned.verdicts if verdict.level == level)
+        shares[heads] = next(with_heads)
     near = _within(route, level)
     weakest = route.row(int(near.argmin()), named=True)
     return NextLevel(

@@ -10,6 +10,7 @@ from __future__ import annotations
 
 import io
 import json
+import tempfile
 from pathlib import Path
 from typing import TYPE_CHECKING
 
@@ -25,6 +26,9 @@ if TYPE_CHECKING:
 
 _NUMBERS = ("gain_re", "gain_im", "delay_s", "azimuth_rad", "elevation_rad")
 _PLACE = ("x_m", "y_m", "z_m")
+
+# Phases hold at one frequency; an SSB's place in the carrier is within so much of it.
+_SAME_CARRIER = 0.01
 
 
 def import_paths(
@@ -51,9 +55,9 @@ def import_paths(
     Raises
     ------
     InputError
-        For a table that lacks a column, a number or a radio head; names it and the row.
-    SettingsError
-        For paths that cannot be of this site, such as ones shorter than the straight way.
+        For a table that lacks a column, a number or a radio head, names it and the row; for
+        another carrier than the site's; for paths that cannot be of this site, such as ones shorter
+        than the straight way. Nothing is written then.
 
     Examples
     --------
@@ -77,20 +81,31 @@ def import_paths(
         else given_tables.read(Path(table), "table of paths")
     )
     held = site if isinstance(site, _core.Site) else _core.Site.load(site)
-    heads = json.loads(held.to_json())["radio_heads"]
-    given_tables.check(rows, "paths", numbers=sorted({*_PLACE, "pci", *_NUMBERS}))
+    of_site = json.loads(held.to_json())
+    heads, site_mhz = of_site["radio_heads"], of_site["carrier_mhz"]
+    where = "paths" if isinstance(table, pl.DataFrame) else str(table)
+    indices = {"ssb_index"} & set(rows.columns)
+    needed = sorted({*_PLACE, "pci", *_NUMBERS, *indices})
+    given_tables.check(rows, where, numbers=needed)
+    rows = rows.with_columns(pl.col(needed).cast(pl.Float64))
     if rows.is_empty():
-        raise InputError("paths: there is none")
+        raise InputError(f"{where}: there is no path in it")
+    if not abs(carrier_mhz / site_mhz - 1.0) <= _SAME_CARRIER:
+        raise InputError(
+            f"{where}: traced at {carrier_mhz:g} MHz; the site's carrier is {site_mhz:g} MHz"
+        )
     if "ssb_index" not in rows.columns:
         first = {head["pci"]: head["ssb_index"] for head in reversed(heads)}
-        rows = rows.with_columns(ssb_index=pl.col("pci").replace_strict(first, default=0))
+        rows = rows.with_columns(
+            ssb_index=pl.col("pci").replace_strict(first, default=0, return_dtype=pl.Float64)
+        )
     keys = {(head["pci"], head["ssb_index"]): row for row, head in enumerate(heads)}
     sources = list(rows.select("pci", "ssb_index").unique(maintain_order=True).iter_rows())
     if unknown := [source for source in sources if source not in keys]:
         pci, ssb_index = unknown[0]
+        has = ", ".join(f"pci={p} ssb_index={i}" for p, i in keys)
         raise InputError(
-            f"paths: the site has no radio head pci={pci} ssb_index={ssb_index}; "
-            f"it has {', '.join(f'{p} {i}' for p, i in keys)}"
+            f"{where}: the site has no radio head pci={pci:g} ssb_index={ssb_index:g}; it has {has}"
         )
     places = rows.select(_PLACE).unique(maintain_order=True).with_row_index("place")
     rows = rows.join(places, on=_PLACE, how="left", maintain_order="left")
@@ -113,8 +128,14 @@ def import_paths(
         azimuth_rad=rows["azimuth_rad"].to_numpy().astype(np.float32),
         elevation_rad=rows["elevation_rad"].to_numpy().astype(np.float32),
     )
+    with tempfile.TemporaryDirectory(dir=out.parent) as folder:
+        unchecked = Path(folder) / out.name
+        unchecked.write_bytes(written.getbuffer())
+        try:
+            _core.check_paths(str(unchecked))
+        except _core.SettingsError as error:
+            raise InputError(str(error).replace(str(unchecked), where)) from None
     write_whole(out, written.getbuffer())
-    _core.check_paths(str(out))
     return {"heads": len(heads), "places": places.height, "paths": rows.height}
 
 

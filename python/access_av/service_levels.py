@@ -67,6 +67,14 @@ class Verdict:
         """Whether the level is reached, at 95 % confidence."""
         return self.least_share >= self.level.availability
 
+    @property
+    def outcome(self) -> str:
+        """Whether it is reached, or why that is not said."""
+        if self.reached:
+            return "reached"
+        enough = self.share >= self.level.availability
+        return "too few drives" if enough else "not reached"
+
     def as_record(self) -> dict[str, Any]:
         """Plain values for JSON."""
         return {

@@ -185,7 +185,9 @@ def show_simulation(result: Simulation, title: str) -> None:
 
 def show_service_levels(verdicts: Sequence[Verdict], title: str = "") -> None:
     """Which 3GPP service levels are reached."""
-    head = ["3GPP service level", "accuracy m", "asked", "within", "at least (95 %)", ""]
+    head = ["3GPP level", "accuracy m", "asked", "within", "at least (95 %)", ""]
+    if is_narrow():
+        head = ["level", "m", "asked", "within", "at least", ""]
     made = table(head, title=title)
     for verdict in verdicts:
         made.add_row(
@@ -194,7 +196,7 @@ def show_service_levels(verdicts: Sequence[Verdict], title: str = "") -> None:
             f"{verdict.level.availability:.1%}",
             f"{verdict.share:.2%}",
             f"{verdict.least_share:.2%}",
-            "yes" if verdict.reached else "no",
+            verdict.outcome,
         )
     console.print(made)
 
@@ -214,13 +216,7 @@ def show_plan(found: Plan) -> None:
 
 def show_next_level(found: NextLevel) -> None:
     """Where the site falls short of the next service level, and what mends that."""
-    level = found.level
-    console.print(
-        f"As it is, the site falls short of level {level.name} on {found.short_share:.1%} of the "
-        f"route, most of all {found.weakest_along_m:.0f} m along, at "
-        f"({found.weakest_x_m:.0f}, {found.weakest_y_m:.0f}) m. The cheapest change, by the usual "
-        f"order of cost: {found.cheapest.what if found.cheapest else 'none alone is enough'}."
-    )
+    console.print(found.in_words())
     made = table([f"what would mend that (as it is {found.share:.2%})", "within", "enough"])
     for change in found.changes:
         made.add_row(change.what, f"{change.share:.2%}", "yes" if change.reaches else "no")

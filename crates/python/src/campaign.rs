@@ -10,7 +10,7 @@ use ::simulate::{
 };
 use numpy::{Element, PyArray1, PyArray3, PyArrayMethods};
 use onboard::geometry::Pose;
-use onboard::localize::{AngleMeasurement, Integrity};
+use onboard::localize::AngleMeasurement;
 use onboard::settings::EstimatorMethod;
 use onboard::{BoxError, Custom, Execution};
 use pyo3::exceptions::{PyOSError, PyRuntimeError, PyValueError};
@@ -19,6 +19,7 @@ use pyo3::types::{PyDict, PyList};
 use toml::Value;
 
 use crate::message::brief;
+use crate::own_error::{covariance, level};
 use crate::plug_ins::{PythonEstimator, PythonLocalizer, PythonPolicy};
 use crate::settings::{Platform, Scenario, settings_error};
 use crate::threads::at_most_one_per_core;
@@ -393,17 +394,6 @@ fn trajectories(py: Python<'_>, records: &[RunRecord]) -> PyResult<Py<PyDict>> {
     let states = rows().map(|step| step.integrity.map(|integrity| integrity.state.name()));
     table.set_item("integrity", PyList::new(py, states.collect::<Vec<_>>())?)?;
     Ok(table.unbind())
-}
-
-fn level(step: &Step, which: fn(&Integrity) -> f64) -> f64 {
-    step.integrity.as_ref().map_or(f64::NAN, which)
-}
-
-fn covariance(step: &Step, row: usize, column: usize) -> f64 {
-    let matrix = step.covariance.as_ref();
-    matrix
-        .and_then(|m| m.get(row)?.get(column).copied())
-        .unwrap_or(f64::NAN)
 }
 
 /// Angles are NaN where the snapshots carried none.

@@ -5,8 +5,8 @@ use std::path::{Path, PathBuf};
 use numpy::PyArray1;
 use onboard::Execution;
 use onboard::geometry::Pose;
+use onboard::localize::AngleMeasurement;
 use onboard::localize::tracker::Finding;
-use onboard::localize::{AngleMeasurement, Integrity};
 use onboard::settings::{Site as CoreSite, Vehicle as CoreVehicle};
 use pyo3::exceptions::PyValueError;
 use pyo3::prelude::*;
@@ -19,6 +19,7 @@ use recording::{
 use simulate::{SynthError, SynthSettings};
 
 use crate::message::brief;
+use crate::own_error::{covariance, level};
 use crate::recording::{RecordingError, recording_error};
 use crate::settings::{Scenario, Site, Vehicle, settings_error};
 
@@ -451,16 +452,4 @@ fn pose_columns<'py>(
     let lost = poses.iter().map(|it| it.is_lost);
     columns.set_item("lost", PyArray1::from_iter(py, lost))?;
     Ok(columns)
-}
-
-fn level(pose: &replay::LocatedPose, which: fn(&Integrity) -> f64) -> f64 {
-    pose.estimate.integrity.as_ref().map_or(f64::NAN, which)
-}
-
-fn covariance(pose: &replay::LocatedPose, row: usize, column: usize) -> f64 {
-    let known = pose.estimate.covariance.as_ref();
-    known
-        .and_then(|it| it.get(row)?.get(column))
-        .copied()
-        .unwrap_or(f64::NAN)
 }

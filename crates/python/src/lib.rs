@@ -8,6 +8,7 @@ mod drive;
 mod interrupt;
 mod message;
 mod nr;
+mod own_error;
 mod plug_ins;
 mod recording;
 mod settings;

@@ -9,9 +9,9 @@ use std::fmt;
 use std::fmt::Write as _;
 use std::path::Path;
 
-use crate::csv::Table;
 use crate::error::RecordingError;
 use crate::file as files;
+use crate::table::Table;
 use onboard::localize::AngleMeasurement;
 use onboard::observation::SensedSsb;
 
@@ -98,13 +98,9 @@ pub fn read_angle_log(file: &Path) -> Result<AngleLog, RecordingError> {
         } else {
             "phase_rad"
         };
-        return Err(RecordingError::Missing {
-            file: file.display().to_string(),
-            key: key.to_owned(),
-            allowed: "the first line must name phase_rad and phase_sigma_rad, or angle_rad and \
-                      angle_sigma_rad"
-                .to_owned(),
-        });
+        let allowed = "the first line must name phase_rad and phase_sigma_rad, or angle_rad and \
+                       angle_sigma_rad";
+        return Err(table.missing(key, allowed));
     }
     for row in table.rows {
         match row.values.and_then(|values| angle(&values)) {

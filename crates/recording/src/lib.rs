@@ -14,7 +14,6 @@
 //! and reported beside what was read.
 
 mod angle_log;
-mod csv;
 mod error;
 mod file;
 mod library;
@@ -25,6 +24,7 @@ pub mod replay;
 mod road_file;
 pub mod scan;
 pub mod sigmf;
+mod table;
 mod text;
 mod tum;
 

@@ -35,6 +35,8 @@ impl OdometryLog {
 pub struct OdometryRemark {
     /// Line of the CSV file or number of the MCAP message, from 1.
     pub item: usize,
+    /// What it is the number of: "line" or "message".
+    pub kind: &'static str,
     /// Time of the last usable sample before it, or its own if it is used, in seconds.
     pub time_s: f64,
     /// What it is.
@@ -47,8 +49,11 @@ pub struct OdometryRemark {
 pub enum OdometryIssue {
     /// It cannot be read.
     Malformed(String),
-    /// A value is NaN or infinite.
-    NotFinite,
+    /// A value is missing, NaN or infinite.
+    NotFinite {
+        /// Its column.
+        column: &'static str,
+    },
     /// The time of the sample before.
     Duplicate {
         /// That time in seconds.
@@ -84,10 +89,15 @@ impl OdometryIssue {
 
 impl fmt::Display for OdometryRemark {
     fn fmt(&self, f: &mut fmt::Formatter<'_>) -> fmt::Result {
-        write!(f, "odometry item {}: ", self.item)?;
+        match self.issue {
+            OdometryIssue::Derived { .. } => f.write_str("odometry: ")?,
+            _ => write!(f, "odometry {} {}: ", self.kind, self.item)?,
+        }
         match &self.issue {
             OdometryIssue::Malformed(message) => write!(f, "left out, {message}"),
-            OdometryIssue::NotFinite => f.write_str("left out, a value is not finite"),
+            OdometryIssue::NotFinite { column } => {
+                write!(f, "left out, {column} is missing or not finite")
+            }
             OdometryIssue::Duplicate { time_s } => {
                 write!(f, "left out, a second sample at {time_s} s")
             }
@@ -103,23 +113,33 @@ impl fmt::Display for OdometryRemark {
 }
 
 /// Takes items one by one and keeps the usable ones.
-#[derive(Debug, Default)]
+#[derive(Debug)]
 pub struct OdometryCollector {
     log: OdometryLog,
+    kind: &'static str,
     /// Item of each sample.
     items: Vec<usize>,
 }
 
 impl OdometryCollector {
+    /// Of items of a kind: "line" or "message".
+    pub fn of(kind: &'static str) -> Self {
+        Self {
+            log: OdometryLog::default(),
+            kind,
+            items: Vec::new(),
+        }
+    }
+
     pub fn add(&mut self, item: usize, sample: Result<OdometrySample, String>) {
         let issue = match sample {
             Err(message) => OdometryIssue::Malformed(message),
-            Ok(sample) if !is_finite(&sample) => OdometryIssue::NotFinite,
-            Ok(sample) => match self.log.samples.last() {
-                Some(last) if sample.time_s == last.time_s => OdometryIssue::Duplicate {
+            Ok(sample) => match (not_finite(&sample), self.log.samples.last()) {
+                (Some(column), _) => OdometryIssue::NotFinite { column },
+                (None, Some(last)) if sample.time_s == last.time_s => OdometryIssue::Duplicate {
                     time_s: sample.time_s,
                 },
-                Some(last) if sample.time_s < last.time_s => OdometryIssue::TimeReversed {
+                (None, Some(last)) if sample.time_s < last.time_s => OdometryIssue::TimeReversed {
                     time_s: sample.time_s,
                     before_s: last.time_s,
                 },
@@ -133,6 +153,7 @@ impl OdometryCollector {
         let time_s = self.last().map_or(f64::NEG_INFINITY, |last| last.time_s);
         let remark = OdometryRemark {
             item,
+            kind: self.kind,
             time_s,
             issue,
         };
@@ -144,6 +165,7 @@ impl OdometryCollector {
         let time_s = f64::NEG_INFINITY;
         let remark = OdometryRemark {
             item: 1,
+            kind: self.kind,
             time_s,
             issue,
         };
@@ -179,6 +201,7 @@ impl OdometryCollector {
             .filter(|(gap_s, _)| **gap_s > GAP_STEPS * usual_s)
             .map(|(&gap_s, (sample, &item))| OdometryRemark {
                 item,
+                kind: self.kind,
                 time_s: sample.time_s,
                 issue: OdometryIssue::Gap { gap_s },
             })
@@ -189,14 +212,14 @@ impl OdometryCollector {
     }
 }
 
-fn is_finite(sample: &OdometrySample) -> bool {
-    let yaw_rate_radps = sample.yaw_rate_radps.unwrap_or(0.0);
-    [
-        sample.time_s,
-        sample.distance_m,
-        sample.speed_mps,
-        yaw_rate_radps,
-    ]
-    .iter()
-    .all(|value| value.is_finite())
+/// A column whose value is none.
+fn not_finite(sample: &OdometrySample) -> Option<&'static str> {
+    let values = [
+        ("time_s", sample.time_s),
+        ("distance_m", sample.distance_m),
+        ("speed_mps", sample.speed_mps),
+        ("yaw_rate_radps", sample.yaw_rate_radps.unwrap_or(0.0)),
+    ];
+    let mut wrong = values.iter().filter(|(_, value)| !value.is_finite());
+    wrong.next().map(|(column, _)| *column)
 }

@@ -12,10 +12,10 @@ use std::path::Path;
 
 use onboard::observation::OdometrySample;
 
-use crate::csv::Table;
 use crate::error::RecordingError;
 use crate::file as files;
 use crate::odometry::{OdometryCollector, OdometryIssue, OdometryLog};
+use crate::table::Table;
 
 const COLUMNS: [&str; 7] = [
     "distance_m",
@@ -46,15 +46,10 @@ pub fn read_wheel_odometry_csv(
     track_width_m: Option<f64>,
 ) -> Result<OdometryLog, RecordingError> {
     let table = Table::read(file, &["time_s"], &COLUMNS)?;
-    let missing = |key: &str, allowed: &str| RecordingError::Missing {
-        file: file.display().to_string(),
-        key: key.to_owned(),
-        allowed: allowed.to_owned(),
-    };
     let has = |name| table.has(name);
     let wheels_m = has("left_m") && has("right_m");
     let wheels_mps = has("left_mps") && has("right_mps");
-    let mut collector = OdometryCollector::default();
+    let mut collector = OdometryCollector::of("line");
     let mut derived = |column, from| collector.remark(OdometryIssue::Derived { column, from });
     match (
         has("distance_m") || wheels_m,
@@ -64,7 +59,7 @@ pub fn read_wheel_odometry_csv(
         (true, false) => derived("speed_mps", "the distances"),
         (false, true) => derived("distance_m", "the speeds"),
         (false, false) => {
-            return Err(missing(
+            return Err(table.missing(
                 "distance_m",
                 "the first line must name time_s and one of distance_m, speed_mps, left_m and \
                  right_m, left_mps and right_mps",
@@ -73,7 +68,7 @@ pub fn read_wheel_odometry_csv(
     }
     let wheels_turn = (wheels_m || wheels_mps) && !has("yaw_rate_radps");
     if wheels_turn && track_width_m.is_none() {
-        return Err(missing(
+        return Err(table.missing(
             "yaw_rate_radps",
             "it is taken from left and right wheel where the vehicle states odometer.track_width_m",
         ));

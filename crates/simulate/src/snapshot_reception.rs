@@ -24,7 +24,8 @@ pub struct SnapshotReception<'a> {
 
 /// What one burst after the other is received in.
 pub struct SnapshotBuffers {
-    receptions: Vec<Reception>,
+    /// Of each SSB that is heard the number of its channel.
+    receptions: Vec<(usize, Reception)>,
     observation: SsbObservation,
 }
 
@@ -46,16 +47,19 @@ impl SsbSource for SnapshotReception<'_> {
             let (head, array) = (channel.head(), channel.array());
             self.faults
                 .distort(index, head, array, self.vehicle, reception.gains_mut());
-            sensed.push(reception.ssb);
-            self.buffers.receptions.push(reception);
+            if reception.is_heard() {
+                sensed.push(reception.ssb);
+                self.buffers.receptions.push((index, reception));
+            }
         }
         Ok(())
     }
 
     fn observe(&mut self, index: usize) -> Result<Observed<'_>, BoxError> {
-        let channel = self.channels.get_mut(index);
-        let reception = self.buffers.receptions.get(index);
-        let (channel, reception) = channel.zip(reception).ok_or("no such SSB in the burst")?;
+        let heard = self.buffers.receptions.get(index);
+        let (number, reception) = heard.ok_or("no such SSB in the burst")?;
+        let channel = self.channels.get_mut(*number);
+        let channel = channel.ok_or("no such channel")?;
         let observation = &mut self.buffers.observation;
         channel.observe(self.number, reception, observation);
         Ok(Observed::Snapshots(observation))

@@ -33,7 +33,7 @@ pub(crate) struct Tape {
     pub told_start: Pose,
     pub odometry: Vec<OdometrySample>,
     bursts: Vec<Burst>,
-    /// What is sensed, burst by burst, as many as there are radio heads.
+    /// What is sensed, burst by burst.
     sensed: Vec<SensedSsb>,
     /// Their angles, by method.
     angles: Vec<Vec<Option<AngleMeasurement>>>,
@@ -44,6 +44,8 @@ struct Burst {
     time_s: f64,
     truth: Pose,
     snr_db: f64,
+    /// Where its SSBs end among all that are sensed.
+    end: usize,
 }
 
 impl Tapes {
@@ -157,6 +159,9 @@ impl Tape {
                 let mut reception = channel.receive(&vehicle, snr_db);
                 let (head, array) = (channel.head(), channel.array());
                 faults.distort(index, head, array, &vehicle, reception.gains_mut());
+                if !reception.is_heard() {
+                    continue;
+                }
                 channel.observe(number as u64, &reception, &mut observation);
                 tape.sensed.push(reception.ssb);
                 for (estimator, angles) in estimators.iter_mut().zip(&mut tape.angles) {
@@ -173,6 +178,7 @@ impl Tape {
                 time_s,
                 truth: truth.path.at(time_s).pose,
                 snr_db: strongest_db,
+                end: tape.sensed.len(),
             });
         }
         Ok(tape)
@@ -188,14 +194,15 @@ impl Tape {
         let mut silence = SsbObservation::new(vehicle.array.elements.into());
         let mut odometry = self.odometry.iter().peekable();
         let angles = self.angles.get(method).map_or(&[][..], Vec::as_slice);
-        let heads = self.sensed.len() / self.bursts.len().max(1);
-        for (number, burst) in self.bursts.iter().enumerate() {
+        let mut end = 0;
+        for burst in &self.bursts {
             let time_s = burst.time_s;
             while let Some(sample) = odometry.next_if(|sample| sample.time_s <= time_s) {
                 // A simulated odometer neither repeats itself nor returns NaN.
                 let _ = (onboard.odometry(sample)).map_err(SimulationError::Custom)?;
             }
-            let here = number * heads..(number + 1) * heads;
+            let here = end..burst.end;
+            end = burst.end;
             let mut played = Played {
                 sensed: self.sensed.get(here.clone()).unwrap_or_default(),
                 angles: angles.get(here).unwrap_or_default(),

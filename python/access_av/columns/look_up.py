@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+from textwrap import fill
 from typing import Any
 
 from access_av.columns.tables import TABLES, Table
@@ -43,6 +44,9 @@ def markdown() -> str:
             for one in table.records()
         ]
         head = "| column | unit | meaning | null when |\n|---|---|---|---|"
-        parts += [f"## {table.name}", f"Row: {table.row[0].lower()}{table.row[1:]}. {table.where}."]
+        row = f"Row: {table.row[0].lower()}{table.row[1:]}. {table.where}."
+        parts += [f"## {table.name}", row]
         parts.append("\n".join([head, *rows]))
-    return "\n\n".join(parts) + "\n"
+    # A line of a table cannot be broken.
+    filled = (it if it.startswith("|") else fill(it, 120, break_on_hyphens=False) for it in parts)
+    return "\n\n".join(filled) + "\n"

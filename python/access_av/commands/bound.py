@@ -26,28 +26,34 @@ def bound(
 ) -> None:
     """Tell how well any localizer can do, before anything is built.
 
-    The posterior Cramér-Rao bound of the horizontal error: along the route and over the site; and
-    which 3GPP service levels it allows.
+    The posterior Cramér-Rao bound of the horizontal error: along the route and over the site; which
+    3GPP service levels it allows, where it falls short of the next, and the cheapest change that
+    mends that.
+
     Writes bound.parquet, map.parquet, report.html, scenario.toml and manifest.json.
     """
     from access_av.error_bound import bound as error_bound
     from access_av.files import ResultsDirectory, json_text
+    from access_av.next_level import next_level
     from access_av.report.placement import render_bound
 
     chosen = load_scenario(scenario, allow_large=allow_large)
     directory = ResultsDirectory.create(f"bound-{chosen.name}", out)
     with progress("Bounding"):
         found = error_bound(chosen, map_step_m=map_step_m)
+        missed = next_level(chosen)
     directory.write_table("bound.parquet", found.route)
     directory.write_table("map.parquet", found.site)
-    directory.write_text("report.html", render_bound(found))
+    directory.write_text("report.html", render_bound(found, missed))
     directory.write_text("scenario.toml", found.scenario.to_toml())
     directory.write_manifest(scenario=found.scenario.name, map_step_m=found.map_step_m)
     summary = found.summary()
     if as_json:
-        print(json_text({**summary, "directory": str(directory.path)}))
+        record = {**summary, "next_level": missed and missed.as_record()}
+        print(json_text({**record, "directory": str(directory.path)}))
         return
     show_bound(summary, found.verdicts)
-    if not all(verdict.reached for verdict in found.verdicts):
-        console.print(f"What brings it further: access-av plan {scenario}", soft_wrap=True)
+    if missed is not None:
+        console.print(missed.in_words())
+        console.print(f"Further radio heads: access-av plan {scenario}", soft_wrap=True)
     console.print(f"Report: {directory.path / 'report.html'}", soft_wrap=True)

@@ -92,9 +92,7 @@ def locate(
         str, typer.Option(help="Array, odometer, localizer: shipped name, or TOML file.")
     ] = "default",
     out: Out = None,
-    truth: Annotated[
-        Path | None, typer.Option(help="TUM trajectory to compare with, where there is one.")
-    ] = None,
+    truth: Annotated[Path | None, typer.Option(help="TUM trajectory to compare with.")] = None,
     topic: Annotated[str | None, typer.Option(help="Topic of the odometry in the MCAP.")] = None,
     start_time_s: Annotated[
         float, typer.Option(help="Time of the first sample by the odometry's clock.")
@@ -123,8 +121,15 @@ def locate(
     Odometry, CSV: time_s; distance_m or speed_mps or both; yaw_rate_radps where something tells
     it. Or left_m and right_m, or left_mps and right_mps, of wheels odometer.track_width_m apart.
 
-    Angles, CSV: time_s; pci; phase_rad and phase_sigma_rad, or angle_rad and angle_sigma_rad;
-    ssb_index and snr_db where known. docs/locate.md says more.
+    Angles, CSV: time_s; pci; phase_rad (electrical) and phase_sigma_rad, or angle_rad (from the
+    array's axis) and angle_sigma_rad; ssb_index and snr_db where known.
+
+    Truth, TUM: t x y z qx qy qz qw a line, at times of its own; a line that begins with # is a
+    comment.
+
+    Site, TOML: radio_heads, of each its pci and position_m; road only where there is one, by its
+    polyline_m, segments, or file (GeoJSON or CSV). docs/locate.md has examples of sites and
+    vehicles.
 
     Exit code 0: located. 2: the input cannot be used. 3: located, but lost for more than a fifth of
     the time or at the end, or the input contradicts itself; what to check is said.
@@ -184,10 +189,12 @@ def locate(
 
 
 def _show(drive: Drive, numbers: dict[str, float]) -> None:
-    for remark in drive.remarks[:MOST_REMARKS]:
+    # The verdict ends with the suspicions.
+    remarks = [remark for remark in drive.remarks if remark not in drive.suspicions]
+    for remark in remarks[:MOST_REMARKS]:
         show_warning(remark)
-    if len(drive.remarks) > MOST_REMARKS:
-        show_warning(f"{len(drive.remarks) - MOST_REMARKS} more in report.html")
+    if len(remarks) > MOST_REMARKS:
+        show_warning(f"{len(remarks) - MOST_REMARKS} more in report.html")
     console.print(
         f"{numbers['angles']:.0f} angles, {numbers['accepted']:.0f} accepted, "
         f"in {numbers['duration_s']:.1f} s."
@@ -208,8 +215,10 @@ def _show(drive: Drive, numbers: dict[str, float]) -> None:
 
 
 def _unreliable(drive: Drive) -> str:
+    at_end = ", the end included," if drive.poses["lost"][-1] else ""
     lost = (
-        f"for {drive.lost_share:.0%} of the time the angles came from elsewhere than expected. "
+        f"for {drive.lost_share:.0%} of the time{at_end} the angles came from elsewhere than "
+        "expected. "
         if drive.lost_share
         else ""
     )
@@ -217,7 +226,7 @@ def _unreliable(drive: Drive) -> str:
         " ".join(f"{suspicion}." for suspicion in drive.suspicions)
         if drive.suspicions
         else "Check, in this order: start pose, array.mounting_rad (sign, mirrored array), places "
-        "and PCIs of the radio heads, phase_rad against angle_rad, the clocks."
+        "and PCIs of the radio heads, phase_rad against angle_rad, the clocks, odometer.scale."
     )
     return f"not to be relied on: {lost}{check}"
 
@@ -236,4 +245,6 @@ def _pose(text: str) -> tuple[float, float, float]:
         ) from error
     if not all(map(math.isfinite, (x_m, y_m, heading_rad))):
         raise InputError(f"--start {text}: the numbers must be finite")
+    if abs(heading_rad) > math.tau:
+        raise InputError(f"--start {text}: the heading is beyond a whole turn; write it in radians")
     return x_m, y_m, heading_rad

@@ -47,7 +47,11 @@ def files_app(what: str) -> typer.Typer:
     files = typer.Typer(no_args_is_help=True, help=f"Show, check and describe {what} files.")
     example = kind.names()[0]
 
-    @files.command("list", help=f"Names of the shipped {what}s.")
+    @files.command(
+        "list",
+        help=f"Names of the shipped {what}s.",
+        epilog=f"Example: [bold]access-av {what} list[/]",
+    )
     def list_names() -> None:
         for name in kind.names():
             console.print(name)
@@ -75,7 +79,10 @@ def files_app(what: str) -> typer.Typer:
         def check(names: Names) -> None:
             _check(names, lambda name: kind.load(name) and "")
 
-    @files.command(help=f"Print the JSON Schema of {what} files, for editors.")
+    @files.command(
+        help=f"Print the JSON Schema of {what} files, for editors.",
+        epilog=f"Example: [bold]access-av {what} schema > {what}.schema.json[/]",
+    )
     def schema() -> None:
         print(kind.schema_json())
 
@@ -87,7 +94,11 @@ def files_app(what: str) -> typer.Typer:
 
 
 def power(name: Annotated[str, typer.Argument(help="Shipped name, or path.")]) -> None:
-    """Lay the modelled power of the busy board beside what was measured, mode by mode."""
+    """Lay the modelled power of the busy board beside what was measured, mode by mode.
+
+    Of every power mode in the platform's file, all its cores at work; a dash where nothing is
+    modelled or was measured.
+    """
     platform = Platform.load(name)
     made = table(["mode", "name", "cores", "MHz", "modelled W", "measured W", "off %"], text=2)
     for index, mode in enumerate(json.loads(platform.to_json())["modes"]):

@@ -21,7 +21,7 @@ app = typer.Typer()
 def import_paths(
     table: Annotated[
         Path,
-        typer.Argument(help="Parquet or CSV, one row per path: see docs/ray-tracing.md."),
+        typer.Argument(help="Parquet or CSV, one row per path."),
     ],
     site: Annotated[str, typer.Option(help="Radio heads: shipped name, or TOML file.")],
     carrier_mhz: Annotated[float, typer.Option(min=100.0, help="Frequency they were traced at.")],
@@ -31,6 +31,10 @@ def import_paths(
 
     A scenario with [bold]channel = { model = "paths", paths = "FILE.npz" }[/] then drives through
     them, by snapshots or by samples.
+
+    One row is one path, all in the map's frame: x_m, y_m, z_m (of the array); pci; gain_re, gain_im
+    (amplitude between isotropic antennas); delay_s (from radio head to array); azimuth_rad,
+    elevation_rad (of arrival, from the horizon up); ssb_index where a cell has several radio heads.
     """
     from access_av import ray_paths
 

@@ -71,6 +71,8 @@ def run(
     directory.link_latest()
 
     show_simulation(result, title=f"{chosen.name}: {runs} runs, seed {seed}")
+    if (levels := result.service_levels) and not all(verdict.reached for verdict in levels):
+        console.print(f"What brings it further: access-av plan {scenario}", soft_wrap=True)
     console.print(f"Report: {directory.path / 'report.html'}", soft_wrap=True)
 
 

@@ -8,7 +8,8 @@ from typing import Annotated
 import typer
 
 from access_av.commands.options import AsJson, Out, Threads
-from access_av.terminal import console, progress, table
+from access_av.errors import InputError
+from access_av.terminal import console, progress, show_warning, table
 
 app = typer.Typer()
 
@@ -50,6 +51,9 @@ def survey(
     from access_av import self_survey
     from access_av.files import ResultsDirectory, json_text
 
+    for number, folder in enumerate(drives):
+        if folder.resolve() in (earlier.resolve() for earlier in drives[:number]):
+            raise InputError(f"{folder}: given twice; a drive counts once")
     logged = [self_survey.read_drive(folder) for folder in drives]
     with progress("Replays") as tick:
         found = self_survey.survey(
@@ -75,11 +79,16 @@ def survey(
         figures = {"angles": found.angles, "used": found.used, "nis": found.nis}
         print(json_text({**figures, "parameters": rows.to_dicts(), "directory": directory.path}))
         return
-    made = table(["", "before", "found", "deviation"], title="Surveyed by driving")
+    made = table(["", "unit", "before", "found", "deviation"], title="Surveyed by driving", text=2)
     for it in found.parameters:
-        deviation = f"{it.std:.4f} {it.unit}" if it.is_learnt else "nothing learnt"
-        made.add_row(it.key, f"{it.before:.4f}", f"{it.found:.4f}", deviation)
+        learnt = (f"{it.found:.4f}", f"{it.std:.4f}") if it.is_learnt else ("–", "nothing learnt")
+        made.add_row(it.key, it.unit, f"{it.before:.4f}", *learnt)
     console.print(made)
+    if found.used < 0.5 * found.angles:
+        show_warning(
+            f"{found.angles - found.used} of {found.angles} angles do not fit, and were left out; "
+            "check site, vehicle and the drives' starts"
+        )
     for it in found.parameters:
         if not it.is_as_believed:
             console.print(

@@ -10,6 +10,10 @@ import polars as pl
 # Okabe and Ito's colours: told apart on light and dark, in print and by colour-blind readers.
 BLUE, ORANGE, GREEN, GREY, PURPLE = "#2f7ed8", "#d55e00", "#009e73", "#8a8f98", "#b48ead"
 POINTS_PER_LINE = 160
+# Errors below a millimetre are drawn as one.
+LEAST_M = 1e-3
+# Size of a map on a wide screen.
+MAP_WIDTH_PX, LEAST_HEIGHT_PX = 1000.0, 220.0
 
 Spec = dict[str, Any]
 
@@ -18,6 +22,38 @@ def thinned(series: pl.DataFrame, points: int = POINTS_PER_LINE) -> pl.DataFrame
     """Enough points for a line on a screen, rounded to what can be seen."""
     step = max(1, series.height // points)
     return series.gather_every(step).with_columns(pl.col(pl.Float64).round(4))
+
+
+def to_scale(
+    x_m: tuple[float, float], y_m: tuple[float, float], tallest_px: float
+) -> tuple[list[float], list[float], int]:
+    """Domains of a map's axes and its height, a metre being as long on both on a wide screen.
+
+    What does not fill its place is shown with more of its surroundings.
+
+    Parameters
+    ----------
+    x_m, y_m
+        From where to where is to be shown at least.
+    tallest_px
+        Greatest height of the map.
+
+    Examples
+    --------
+    >>> to_scale((0.0, 100.0), (0.0, 50.0), 700.0)
+    ([0.0, 100.0], [0.0, 50.0], 500)
+    >>> to_scale((0.0, 10.0), (0.0, 14.0), 700.0)
+    ([-5.0, 15.0], [0.0, 14.0], 700)
+    """
+    across_m, upward_m = x_m[1] - x_m[0], y_m[1] - y_m[0]
+    metre_px = min(MAP_WIDTH_PX / across_m, tallest_px / upward_m)
+    height_px = max(LEAST_HEIGHT_PX, metre_px * upward_m)
+    more_m = MAP_WIDTH_PX / metre_px - across_m, height_px / metre_px - upward_m
+    x, y = (
+        [low - 0.5 * more, high + 0.5 * more]
+        for (low, high), more in zip((x_m, y_m), more_m, strict=True)
+    )
+    return x, y, round(height_px)
 
 
 def finish(chart: alt.Chart | alt.LayerChart, *, height: int, description: str) -> Spec:

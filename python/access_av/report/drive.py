@@ -10,7 +10,7 @@ from typing import TYPE_CHECKING
 from access_av.errors import InputError
 from access_av.report import drive_charts as charts
 from access_av.report.page import sheet
-from access_av.report.parts import figure, service_levels, source, tile
+from access_av.report.parts import figure, section, service_levels, source, tile
 
 if TYPE_CHECKING:
     from access_av._core import Scenario
@@ -36,7 +36,7 @@ def render_drive(scenario: Scenario, result: Simulation, seed: int) -> str:
     runs, duration_s = result.runs.height, float(result.steps["time_s"][-1])
     specs: dict[str, Spec] = {"error": charts.error_against_time(result.steps)}
     sections = [
-        _section(
+        section(
             "Error",
             "Distance between estimate and truth at each SSB, over the runs.",
             figure("error"),
@@ -45,7 +45,7 @@ def render_drive(scenario: Scenario, result: Simulation, seed: int) -> str:
     if not result.executions.is_empty():
         specs["executions"] = charts.executions_against_time(result.executions, runs, duration_s)
         sections.append(
-            _section(
+            section(
                 "Executions",
                 "Angle estimates per second, mean over the runs.",
                 figure("executions"),
@@ -56,11 +56,11 @@ def render_drive(scenario: Scenario, result: Simulation, seed: int) -> str:
         alert_limit_m = json.loads(scenario.vehicle.to_json())["integrity"]["alert_limit_m"]
         specs["stanford"] = charts.stanford(result.trajectories, alert_limit_m)
         sections.append(
-            _section("Integrity", _integrity_text(integrity, alert_limit_m), figure("stanford"))
+            section("Integrity", _integrity_text(integrity, alert_limit_m), figure("stanford"))
         )
     if levels := result.service_levels:
         sections.append(
-            _section(
+            section(
                 "Service levels",
                 "Horizontal accuracy and availability of TS 22.261, 7.3.2.2, and the industrial "
                 "target of TR 38.857, over all runs. Reached is what the low end of the 95 % "
@@ -69,7 +69,7 @@ def render_drive(scenario: Scenario, result: Simulation, seed: int) -> str:
             )
         )
     sections.append(
-        _section(
+        section(
             "Provenance",
             "Simulated by this version from the scenario below and the seed above.",
             source("Scenario, all defaults written out", scenario.to_toml()),
@@ -108,7 +108,3 @@ def _integrity_text(integrity: Integrity, alert_limit_m: float) -> str:
         f"beyond the protection level {integrity.exceedances} times; the level is "
         f"{integrity.median_level_over_error:.1f} times the error in the median."
     )
-
-
-def _section(title: str, text: str, body: str) -> str:
-    return f"<section><h2>{escape(title)}</h2><p>{escape(text)}</p>{body}</section>"

@@ -8,7 +8,7 @@ from typing import TYPE_CHECKING
 import altair as alt
 import polars as pl
 
-from access_av.report.chart import BLUE, GREEN, ORANGE, finish, thinned
+from access_av.report.chart import BLUE, GREEN, LEAST_M, ORANGE, finish, thinned, to_scale
 from access_av.statistics.consistency import horizontal_error_m
 
 if TYPE_CHECKING:
@@ -17,9 +17,7 @@ if TYPE_CHECKING:
 
 # Bins of the Stanford diagram per factor of ten: 12 % wide.
 BINS_PER_DECADE = 20
-# Errors below a millimetre are drawn as one.
-LEAST_M = 1e-3
-MAP_WIDTH_PX = 1000
+TALLEST_MAP_PX = 900.0
 ROAD_STEP_M = 2.0
 
 
@@ -52,7 +50,12 @@ def executions_against_time(executions: pl.DataFrame, runs: int, duration_s: flo
         alt.Chart(rates)
         .mark_bar()
         .encode(
-            x=alt.X("start_s:Q", title="time / s"),
+            x=alt.X(
+                "start_s:Q",
+                title="time / s",
+                bin="binned",
+                scale=alt.Scale(domain=[0.0, math.ceil(duration_s / bar_s) * bar_s]),
+            ),
             x2="end_s:Q",
             y=alt.Y("per_second:Q", title="executions per second"),
             color=alt.Color("head:N", legend=alt.Legend(title=None)),
@@ -152,8 +155,8 @@ def bound_over_site(bound: ErrorBound) -> Spec:
     places, half = bound.site.select("x_m", "y_m").to_numpy(), 0.5 * step_m
     left_m, low_m = (places.min(axis=0) - half).tolist()
     right_m, high_m = (places.max(axis=0) + half).tolist()
-    across = alt.Scale(domain=[left_m, right_m], nice=False)
-    upward = alt.Scale(domain=[low_m, high_m], nice=False)
+    *domains, height = to_scale((left_m, right_m), (low_m, high_m), TALLEST_MAP_PX)
+    across, upward = (alt.Scale(domain=it, nice=False) for it in domains)
     heat = (
         alt.Chart(squares)
         .mark_rect()
@@ -186,11 +189,10 @@ def bound_over_site(bound: ErrorBound) -> Spec:
         shape="triangle-up", filled=True, size=170, color=ORANGE, stroke="#ffffff", opacity=1.0
     ).encode(tooltip=["name:N", "pci:Q"])
     names = heads.mark_text(dy=-14, fontSize=12, fontWeight="bold").encode(text="name:N")
-    height = MAP_WIDTH_PX * (high_m - low_m) / (right_m - left_m)
     drawn = road + marks + names
     return finish(
         drawn if squares.is_empty() else heat + drawn,
-        height=round(min(900.0, max(220.0, height))),
+        height=height,
         description="Map of the least RMS error over the site, with the road and the radio heads",
     )
 

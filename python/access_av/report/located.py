@@ -12,7 +12,7 @@ import polars as pl
 from access_av import drives
 from access_av.report import located_charts as charts
 from access_av.report.page import sheet
-from access_av.report.parts import figure, number, source, table, tile
+from access_av.report.parts import figure, number, section, source, table, tile
 
 if TYPE_CHECKING:
     from access_av._core import Site, Vehicle
@@ -21,6 +21,7 @@ if TYPE_CHECKING:
 
 MOST_REMARKS = 50
 UNRELIABLE = "Not to be relied on"
+TRACK_TEXT = "Where the vehicle was, in the map's frame; drawn to scale on a wide screen."
 
 
 def render_located(
@@ -46,18 +47,18 @@ def render_located(
     specs: dict[str, Spec] = {}
     sections = []
     if drive.remarks:
-        sections.append(_section("Remarks", "", _list(drive.remarks)))
+        sections.append(section("Remarks", "", _list(drive.remarks)))
     known = drive.poses.filter(~pl.col("searching"))
     if not known.is_empty():
         specs["track"] = charts.track(_tracks(drive, known, truth), _heads(site))
         specs["error"] = charts.error(_errors(drive, known, truth))
         sections += [
-            _section("Track", "Where the vehicle was, in the map's frame.", figure("track")),
-            _section("Error", _error_text(drive, numbers), figure("error")),
+            section("Track", TRACK_TEXT, figure("track")),
+            section("Error", _error_text(drive, numbers), figure("error")),
         ]
     if not drive.findings.is_empty():
         sections.append(
-            _section(
+            section(
                 "Found on the way",
                 "Constants of the vehicle, by the end of the drive, beside what its file states.",
                 _findings(drive.findings),
@@ -69,7 +70,7 @@ def render_located(
             specs |= {"angles": charts.angles(compared), "heads": charts.heads(compared)}
             places = figure("angles") + figure("heads", title="By radio head")
         sections.append(
-            _section(
+            section(
                 "Angles",
                 "How far each angle was from what was expected of it, in standard deviations of "
                 "the difference; nine in ten are below the dashed line where all is as stated.",
@@ -78,7 +79,7 @@ def render_located(
         )
     believed = source("Site, all defaults written out", site.to_toml())
     believed += source("Vehicle, all defaults written out", vehicle.to_toml())
-    sections.append(_section("Provenance", "", believed))
+    sections.append(section("Provenance", "", believed))
     return sheet(
         specs,
         title="ACCESS-AV located drive",
@@ -180,6 +181,8 @@ def _compared(angles: pl.DataFrame) -> pl.DataFrame:
     )
     return angles.drop_nulls("mahalanobis_squared").select(
         "time_s",
+        "pci",
+        "ssb_index",
         head=head,
         deviations=pl.col("mahalanobis_squared").sqrt(),
         verdict=pl.when("accepted").then(pl.lit("accepted")).otherwise(pl.lit("refused")),
@@ -196,12 +199,18 @@ def _by_head(angles: pl.DataFrame) -> str:
         (str(pci), str(index), escape(reason), f"{count:,}", number(nis, 2))
         for pci, index, reason, count, nis in reasons.iter_rows()
     ]
-    return table(("PCI", "SSB", "Verdict", "Angles", "Mean distance²"), rows, numbers=(0, 1, 3, 4))
+    head = ("PCI", "SSB", "Verdict", "Angles", "Mean squared deviations")
+    return table(head, rows, numbers=(0, 1, 3, 4))
 
 
 def _findings(findings: pl.DataFrame) -> str:
     rows = [
-        (escape(quantity), f"{stated:.4f}", f"{found:.4f} ± {std:.4f}", escape(unit))
+        (
+            escape(quantity),
+            f"{stated:.4f}",
+            f"{found:.4f} ± {std:.4f}" if std else "taken as exact",
+            escape(unit),
+        )
         for quantity, unit, stated, found, std in findings.iter_rows()
     ]
     return table(("Quantity", "Stated", "Found", "Unit"), rows, numbers=(1, 2))
@@ -211,8 +220,3 @@ def _list(remarks: list[str]) -> str:
     items = "".join(f"<li>{escape(remark)}</li>" for remark in remarks[:MOST_REMARKS])
     more = len(remarks) - MOST_REMARKS
     return f"<ul>{items}</ul>" + (f"<p>{more} more.</p>" if more > 0 else "")
-
-
-def _section(title: str, text: str, body: str) -> str:
-    lead = f"<p>{escape(text)}</p>" if text else ""
-    return f"<section><h2>{escape(title)}</h2>{lead}{body}</section>"

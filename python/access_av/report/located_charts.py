@@ -7,15 +7,23 @@ from typing import TYPE_CHECKING
 import altair as alt
 import polars as pl
 
-from access_av.report.chart import BLUE, GREEN, GREY, ORANGE, PURPLE, finish, thinned
+from access_av.report.chart import (
+    BLUE,
+    GREEN,
+    GREY,
+    LEAST_M,
+    ORANGE,
+    PURPLE,
+    finish,
+    thinned,
+    to_scale,
+)
 
 if TYPE_CHECKING:
     from access_av.report.chart import Spec
 
-MAP_WIDTH_PX = 1000
+TALLEST_MAP_PX = 700.0
 POINTS_PER_TRACK = 1500
-# Errors below a millimetre are drawn as one.
-LEAST_M = 1e-3
 # Ninety in a hundred of what is normally distributed are nearer than so many deviations.
 P90_SIGMAS = 1.645
 
@@ -50,9 +58,8 @@ def track(lines: dict[str, pl.DataFrame], heads: pl.DataFrame) -> Spec:
         low, high = float(values.min()), float(values.max())  # type: ignore[arg-type]
         margin = max(0.5, 0.05 * (high - low))
         bounds[axis] = (low - margin, high + margin)
-    across, upward = (
-        alt.Scale(domain=list(bounds[axis]), nice=False, zero=False) for axis in ("x_m", "y_m")
-    )
+    *domains, height = to_scale(bounds["x_m"], bounds["y_m"], TALLEST_MAP_PX)
+    across, upward = (alt.Scale(domain=it, nice=False, zero=False) for it in domains)
     x = alt.X("x_m:Q", title="x / m", scale=across)
     y = alt.Y("y_m:Q", title="y / m", scale=upward)
     driven = (
@@ -63,11 +70,9 @@ def track(lines: dict[str, pl.DataFrame], heads: pl.DataFrame) -> Spec:
     places = alt.Chart(heads).encode(x=x, y=y, tooltip=["name:N", "x_m:Q", "y_m:Q"])
     marks = places.mark_point(shape="triangle-up", filled=True, size=130, color=ORANGE, opacity=1.0)
     names = places.mark_text(dy=-13, fontSize=11).encode(text="name:N")
-    (left, right), (low, high) = bounds["x_m"], bounds["y_m"]
-    height = MAP_WIDTH_PX * (high - low) / (right - left)
     return finish(
         driven + marks + names,
-        height=round(min(700.0, max(220.0, height))),
+        height=height,
         description="Track of the vehicle, with the radio heads",
     )
 
@@ -123,6 +128,7 @@ def angles(compared: pl.DataFrame) -> Spec:
 
 def heads(compared: pl.DataFrame) -> Spec:
     """90th percentile of the normalised innovations of each radio head, and the normal one."""
+    order = compared.sort("pci", "ssb_index")["head"].unique(maintain_order=True).to_list()
     percentiles = compared.group_by("head").agg(
         pl.col("deviations").quantile(0.9, "linear").round(3), angles=pl.len()
     )
@@ -130,7 +136,12 @@ def heads(compared: pl.DataFrame) -> Spec:
         alt.Chart(percentiles)
         .mark_bar(color=BLUE)
         .encode(
-            x=alt.X("head:N", title="radio head", sort=alt.SortField("head")),
+            x=alt.X(
+                "head:N",
+                title="radio head: PCI, or PCI/SSB index",
+                sort=order,
+                axis=alt.Axis(labelAngle=0, labelOverlap=True),
+            ),
             y=alt.Y("deviations:Q", title="deviations, 90th percentile"),
             tooltip=["head:N", "deviations:Q", "angles:Q"],
         )

@@ -11,6 +11,10 @@ if TYPE_CHECKING:
     from access_av.service_levels import Verdict
 
 
+# Kind of badge by how a service level was judged.
+OUTCOMES = {"reached": "yes", "too few drives": "fit", "not reached": "no"}
+
+
 def number(value: float | None, digits: int = 3) -> str:
     """A number as a reader wants it; a dash for none."""
     return "–" if value is None else f"{value:,.{digits}f}"
@@ -85,10 +89,10 @@ def service_levels(verdicts: Iterable[Verdict]) -> str:
         (
             escape(verdict.level.name),
             f"{verdict.level.accuracy_m:g} m",
-            f"{verdict.level.availability:.4g}",
-            f"{verdict.share:.4f}",
-            f"{verdict.least_share:.4f}",
-            _reached(verdict),
+            f"{verdict.level.availability:.1%}",
+            f"{verdict.share:.2%}",
+            f"{verdict.least_share:.2%}",
+            badge(verdict.outcome, OUTCOMES[verdict.outcome]),
         )
         for verdict in verdicts
     ]
@@ -96,11 +100,10 @@ def service_levels(verdicts: Iterable[Verdict]) -> str:
     return table(head, rows, numbers=(1, 2, 3, 4))
 
 
-def _reached(verdict: Verdict) -> str:
-    if verdict.reached:
-        return badge("reached", "yes")
-    enough = verdict.share >= verdict.level.availability
-    return badge("too few drives to tell", "fit") if enough else badge("not reached", "no")
+def section(title: str, text: str, body: str) -> str:
+    """A part of the page, with a heading and a paragraph where there is text."""
+    lead = f"<p>{escape(text)}</p>" if text else ""
+    return f"<section><h2>{escape(title)}</h2>{lead}{body}</section>"
 
 
 def source(title: str, text: str) -> str:

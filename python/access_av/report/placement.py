@@ -9,14 +9,25 @@ from typing import TYPE_CHECKING
 from access_av.error_bound import MAP_TRAVEL_M, VISIBLE_SNR_DB
 from access_av.report import drive_charts as charts
 from access_av.report.page import sheet
-from access_av.report.parts import figure, number, service_levels, source, table, tile
+from access_av.report.parts import badge, figure, number, service_levels, source, table, tile
 
 if TYPE_CHECKING:
     from access_av.error_bound import ErrorBound
+    from access_av.next_level import NextLevel
+
+_ENOUGH = {True: ("enough", "yes"), False: ("not enough", "no")}
 
 
-def render_bound(bound: ErrorBound) -> str:
-    """The bound of one scenario as an HTML page that loads nothing."""
+def render_bound(bound: ErrorBound, missed: NextLevel | None = None) -> str:
+    """The bound of one scenario as an HTML page that loads nothing.
+
+    Parameters
+    ----------
+    bound
+        What :func:`access_av.bound` returned.
+    missed
+        The next service level, which it falls short of.
+    """
     summary = bound.summary()
     scenario = bound.scenario
     specs = {
@@ -47,7 +58,7 @@ def render_bound(bound: ErrorBound) -> str:
         f"3GPP wants SSBs detected (TS 38.133).</p>{table(head, rows, numbers=range(1, 8))}"
         "</section><section><h2>Service levels</h2><p>Of TS 22.261, 7.3.2.2, and TR 38.857, with "
         "Gaussian errors as small as the bound allows: what is not reached here no localizer "
-        f"reaches.</p>{service_levels(bound.verdicts)}</section>"
+        f"reaches.</p>{service_levels(bound.verdicts)}{_missed(missed)}</section>"
         "<section><h2>Provenance</h2>"
         f"{source('Scenario, all defaults written out', scenario.to_toml())}</section>"
     )
@@ -68,6 +79,17 @@ def render_bound(bound: ErrorBound) -> str:
         meta=escape(f"Scenario “{scenario.name}”, version {version('access-av')}."),
         sections=sections,
     )
+
+
+def _missed(level: NextLevel | None) -> str:
+    """Where it falls short, and what each change by itself would make of that."""
+    if level is None:
+        return ""
+    rows = [
+        (escape(it.what), f"{it.share:.2%}", badge(*_ENOUGH[it.reaches])) for it in level.changes
+    ]
+    head = (f"Change, for level {escape(level.level.name)}", "within", "")
+    return f"<p>{escape(level.in_words())}</p>{table(head, rows, numbers=(1,))}"
 
 
 def _map_text(bound: ErrorBound) -> str:

@@ -26,7 +26,7 @@ struct Reading {
 /// Single messages are only remarked upon.
 pub fn read_odometry_mcap(file: &Path, topic: Option<&str>) -> Result<OdometryLog, RecordingError> {
     let mut topics: Vec<String> = Vec::new();
-    let mut collector = OdometryCollector::default();
+    let mut collector = OdometryCollector::of("message");
     let mut last_place: Option<(f64, f64)> = None;
     let mut item = 0;
     each_odometry_message(file, |message_topic, data| {

@@ -117,12 +117,18 @@ pub fn doubts(
         before_s = before_s.max(time_s);
     }
     doubts.extend(of_odometry(odometry));
-    if vehicle.drive == DriveKind::Differential
-        && !odometry
-            .samples
-            .iter()
-            .any(|it| it.yaw_rate_radps.is_some())
-    {
+    let samples = &odometry.samples;
+    let turning = samples.iter().filter(|it| it.yaw_rate_radps.is_some());
+    let (turning, all) = (turning.count(), samples.len());
+    if 0 < turning && turning < all {
+        let text = format!(
+            "odometry: yaw_rate_radps is empty in {} of {all} samples; nothing tells how the vehicle \
+             turns there",
+            all - turning
+        );
+        doubts.push((start_s, text));
+    }
+    if vehicle.drive == DriveKind::Differential && turning == 0 {
         let text = "nothing tells how a differential drive turns: add yaw_rate_radps, or left and \
                     right wheel, to the odometry";
         doubts.push((start_s, text.to_owned()));
@@ -146,7 +152,7 @@ fn of_odometry(odometry: &OdometryLog) -> Option<(f64, String)> {
     (by_speed_m > 1.0 && !(0.7..1.5).contains(&ratio)).then(|| {
         let text = format!(
             "odometry: distances add up to {by_distance_m:.1} m, speeds to {by_speed_m:.1} m; check \
-             the units of distance_m and speed_mps"
+             the units of distance_m, speed_mps and time_s"
         );
         (start_s, text)
     })

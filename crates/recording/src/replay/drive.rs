@@ -46,8 +46,10 @@ impl<'a> Replay<'a> {
         custom: Custom,
         odometry: &'a OdometryLog,
     ) -> Result<Self, ReplayError> {
-        if odometry.samples.is_empty() {
-            return Err(ReplayError::NoOdometry);
+        if odometry.samples.len() < 2 {
+            let mut unused = odometry.remarks.iter().filter(|it| !it.issue.used());
+            let why = unused.next().map(ToString::to_string);
+            return Err(ReplayError::NoOdometry { why });
         }
         let platform: Platform = load(&vehicle.platform.name)?;
         let onboard = Onboard::new(site, vehicle, &platform, start, custom)?;
@@ -230,7 +232,7 @@ impl<'a> Replay<'a> {
                 Ok(OdometryVerdict::YawRateRefused { radps }) => self.remark(
                     at_s,
                     format!(
-                        "odometry at {at_s} s: no vehicle turns by {radps} rad/s, its yaw rate was \
+                        "odometry at {at_s} s: no vehicle turns by {radps:.1} rad/s, its yaw rate was \
                          refused; check its unit, or vehicle.top_yaw_rate_radps"
                     ),
                 ),

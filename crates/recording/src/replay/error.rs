@@ -59,12 +59,34 @@ pub enum ReplayError {
         /// Number of angles.
         angles: usize,
     },
-    /// No usable odometry.
-    #[error("the odometry holds no usable sample")]
-    NoOdometry,
+    /// Less than two usable samples of odometry.
+    #[error("the odometry holds fewer than two usable samples{}", because(why.as_ref()))]
+    NoOdometry {
+        /// What is wrong with the first that cannot be used.
+        why: Option<String>,
+    },
+    /// No SSB in the recording.
+    #[error(
+        "{file}: no SSB of a radio head of the site is in it; check the carrier, the band, and \
+         pci and ssb_index; `access-av scan` tells which cells there are"
+    )]
+    NoSsb {
+        /// The recording.
+        file: String,
+    },
+    /// No usable angle.
+    #[error("the angle log holds no usable angle{}", because(why.as_ref()))]
+    NoAngle {
+        /// What is wrong with the first that cannot be used.
+        why: Option<String>,
+    },
     /// The user's own code failed.
     #[error("{0}")]
     Custom(BoxError),
+}
+
+fn because(why: Option<&String>) -> String {
+    why.map(|why| format!("; {why}")).unwrap_or_default()
 }
 
 /// Length of the gap between two intervals.

@@ -18,7 +18,7 @@ use super::mistakes::Drive;
 use super::receive::receive_recording;
 use super::start::{StartChoice, starting};
 use super::stated::with_phase;
-use super::suspicion::suspicions;
+use super::suspicion::{suspicions, too_fast};
 use crate::angle_log::{AngleLog, LoggedAngle};
 use crate::odometry::OdometryLog;
 use crate::sigmf::Recording;
@@ -37,6 +37,10 @@ pub fn locate_angles(
 ) -> Result<LocatedDrive, ReplayError> {
     let (vehicle, start) = starting(site, vehicle, start)?;
     let mut replay = Replay::new(site, &vehicle, start, Custom::default(), odometry)?;
+    if angles.angles.is_empty() {
+        let why = angles.remarks.first().map(ToString::to_string);
+        return Err(ReplayError::NoAngle { why });
+    }
     for remark in &angles.remarks {
         replay.remark(remark.time_s, remark.to_string());
     }
@@ -74,8 +78,12 @@ pub fn locate_recording(
         replay.remark(f64::NEG_INFINITY, warning.to_string());
     }
     let file = recording.data_file().display().to_string();
-    let mut receiver = Receiver::new(ReceiverConfig::new(site, &vehicle))
-        .map_err(|source| ReplayError::Receive { file, source })?;
+    let mut receiver = Receiver::new(ReceiverConfig::new(site, &vehicle)).map_err(|source| {
+        ReplayError::Receive {
+            file: file.clone(),
+            source,
+        }
+    })?;
     let (mut heard_s, mut together) = (None, false);
     receive_recording(&mut receiver, recording, start_time_s, |ssbs| {
         for it in ssbs {
@@ -90,6 +98,9 @@ pub fn locate_recording(
             odometry_s,
             angles_s,
         });
+    }
+    if heard_s.is_none() {
+        return Err(ReplayError::NoSsb { file });
     }
     let heard: Vec<LoggedAngle> = replay.executions().iter().filter_map(as_logged).collect();
     suspect(&mut replay, site, &in_time(&vehicle), odometry, &heard)?;
@@ -110,7 +121,11 @@ fn suspect(
         odometry: Cow::Borrowed(odometry),
         angles: Cow::Borrowed(angles),
     };
-    for suspicion in suspicions(&given)? {
+    let mut found = suspicions(&given)?;
+    if found.is_empty() {
+        found.extend(too_fast(vehicle, odometry));
+    }
+    for suspicion in found {
         replay.suspect(suspicion);
     }
     Ok(())

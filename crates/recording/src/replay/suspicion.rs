@@ -9,13 +9,14 @@ use std::collections::BTreeSet;
 use std::f64::consts::TAU;
 
 use onboard::radio_head::RadioHead;
-use onboard::settings::LocalizerSettings;
+use onboard::settings::{LocalizerSettings, Vehicle};
 
 use super::error::ReplayError;
 use super::innovations::{Met, innovations};
 use super::mistakes::{Drive, MISTAKES, Mistake};
 use super::stated::with_phase;
 use crate::angle_log::LoggedAngle;
+use crate::odometry::OdometryLog;
 
 /// Angles by which it is judged: the first of the drive.
 const FIRST_ANGLES: usize = 3000;
@@ -32,6 +33,9 @@ const MOST_REFUSED: f64 = 0.2;
 
 /// Looks at one radio head within this time count as one (s).
 const LOOK_S: f64 = 1.0;
+
+/// A speed of so many times the vehicle's is in another unit.
+const WILD: f64 = 10.0;
 
 /// A mistake that explains a drive.
 pub struct Suspicion {
@@ -75,6 +79,22 @@ impl Foretold {
             refused: refused.count() as f64 / met.len().max(1) as f64,
         })
     }
+}
+
+/// Speeds that no such vehicle has. Angles refuse nothing where an odometer says so much.
+pub fn too_fast(vehicle: &Vehicle, odometry: &OdometryLog) -> Option<Suspicion> {
+    let speeds_mps = odometry.samples.iter().map(|it| it.speed_mps.abs());
+    let mut moving_mps: Vec<f64> = speeds_mps.filter(|it| *it > 0.0).collect();
+    moving_mps.sort_by(f64::total_cmp);
+    let median_mps = *moving_mps.get(moving_mps.len() / 2)?;
+    (median_mps > WILD * vehicle.top_speed_mps()).then(|| Suspicion {
+        is_of_start: false,
+        text: format!(
+            "the odometry says {median_mps:.1} m/s in the median while it moves, where \
+             top_speed_kmh is {}; check the units of distances, speeds and time_s",
+            vehicle.top_speed_kmh
+        ),
+    })
 }
 
 /// The usual mistakes that explain the drive's angles where it, as given, does not: one remark each.

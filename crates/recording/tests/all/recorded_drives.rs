@@ -71,7 +71,9 @@ fn bad_odometry_rows_are_reported_one_by_one_and_the_rest_is_kept() {
         [
             OdometryIssue::Duplicate { .. },
             OdometryIssue::TimeReversed { .. },
-            OdometryIssue::NotFinite,
+            OdometryIssue::NotFinite {
+                column: "distance_m"
+            },
             OdometryIssue::Malformed(_),
             OdometryIssue::Malformed(_),
             OdometryIssue::Gap { .. },
@@ -83,6 +85,12 @@ fn bad_odometry_rows_are_reported_one_by_one_and_the_rest_is_kept() {
             .all(|remark| !remark.to_string().is_empty())
     );
 
+    let said = log.remarks[2].to_string();
+    assert_eq!(
+        said,
+        "odometry line 6: left out, distance_m is missing or not finite"
+    );
+
     fs::write(&file, "time_s,yaw_rate_radps\n0,1\n").unwrap();
     let error = read_odometry_csv(&file).unwrap_err();
     assert!(matches!(error, RecordingError::Missing { ref key, .. } if key == "distance_m"));
@@ -90,6 +98,58 @@ fn bad_odometry_rows_are_reported_one_by_one_and_the_rest_is_kept() {
         read_odometry_csv(Path::new("/no/such.csv")),
         Err(RecordingError::Io { .. })
     ));
+}
+
+/// As spreadsheets, other languages and careful people write it.
+#[test]
+fn odometry_csv_of_any_kind_is_read() {
+    let file = common::scratch("odometry-kinds").join("odo.csv");
+    let samples: Vec<_> = (0..5).map(|k| sample(f64::from(k) * 0.02)).collect();
+    write_odometry_csv(&file, &samples).unwrap();
+    let plain = fs::read_to_string(&file).unwrap();
+    for text in [
+        plain.replace(',', ";"),
+        plain.replace(',', "\t"),
+        plain.replace(',', " , "),
+        plain.replace('\n', "\r\n"),
+        plain.replace('\n', "\r"),
+        plain.replace('\n', "\n\n"),
+        format!("\u{feff}{}", plain.replace("speed_mps", "\"speed_mps\"")),
+        format!("\n# of robot 3, left; right\n{plain}\n  \n"),
+        plain
+            .replace("time_s", "\"where, when\",time_s")
+            .replace("\n0", "\n\"a, b\",0"),
+    ] {
+        fs::write(&file, &text).unwrap();
+        let log = read_odometry_csv(&file).unwrap();
+        assert_eq!(
+            (log.samples, log.remarks.len()),
+            (samples.clone(), 0),
+            "{text}"
+        );
+    }
+}
+
+#[test]
+fn what_a_csv_names_is_said_where_it_is_not_enough() {
+    let file = common::scratch("odometry-named").join("odo.csv");
+    for (text, said) in [
+        (
+            "",
+            "`time_s` is missing; the first line must name the columns time_s; the file is empty",
+        ),
+        ("t|v\n0|1\n", "it names t|v"),
+        ("Time,speed_mps\n0,1\n", "it names Time, speed_mps"),
+        ("time_s,heading\n0,1\n", "it names time_s, heading"),
+        (
+            "time_s,speed_mps,speed_mps\n0,1,2\n",
+            "`speed_mps` is there twice",
+        ),
+    ] {
+        fs::write(&file, text).unwrap();
+        let error = read_odometry_csv(&file).unwrap_err().to_string();
+        assert!(error.contains(said), "{error}");
+    }
 }
 
 fn estimate(time_s: f64) -> PoseEstimate {

@@ -37,6 +37,11 @@ pub struct Reception {
 }
 
 impl Reception {
+    /// Whether anything of it arrives: where a ray tracer found no path there is nothing to sense.
+    pub fn is_heard(&self) -> bool {
+        self.ssb.snr_db > f64::NEG_INFINITY
+    }
+
     /// Gains of the antennas, relative to unit noise power.
     pub fn gains(&self) -> &[Complex64] {
         self.gains.get(..self.elements).unwrap_or_default()

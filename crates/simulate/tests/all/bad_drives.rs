@@ -122,13 +122,13 @@ fn bad_odometry_is_named_and_passed_over() {
     let located = drive.locate();
     let texts: Vec<&str> = located.remarks.iter().map(|it| it.text.as_str()).collect();
     let expected = [
-        "item 200: left out, a value is not finite".to_owned(),
+        "line 200: left out, distance_m is missing or not finite".to_owned(),
         format!(
-            "item 203: left out, a second sample at {} s",
+            "line 203: left out, a second sample at {} s",
             time_s(&duplicate)
         ),
-        format!("item 253: left out, {} s comes after", time_s(&earlier)),
-        "item 304: left out, distance_m `zero` is not a number".to_owned(),
+        format!("line 253: left out, {} s comes after", time_s(&earlier)),
+        "line 304: left out, distance_m `zero` is not a number".to_owned(),
     ];
     assert_eq!(texts.len(), expected.len(), "{texts:?}");
     let told = drive.diagnoses(&located);
@@ -164,7 +164,7 @@ fn a_gap_and_a_jump_of_the_odometer_are_named_and_bridged() {
     assert_eq!(texts.len(), 2, "{texts:?}");
     assert!(texts[0].contains("the distance jumps by -") && texts[0].contains("speed was used"));
     assert!(
-        texts[1].contains("item 501: 1.020 s after the one before"),
+        texts[1].contains("line 501: 1.020 s after the one before"),
         "{}",
         texts[1]
     );
@@ -222,17 +222,21 @@ fn bad_angles_are_named_and_passed_over() {
 #[test]
 fn a_measurement_without_a_variance_is_unusable_whoever_made_it() {
     let mut drive = Drive::new("drive-variance");
-    drive.angles.truncate(1);
+    drive.angles.truncate(2);
     let odometry = {
         drive.locate();
         read_odometry_csv(&drive.dir.join("odometry.csv")).unwrap()
     };
     let (_, mut angles, _) = common::logs(&shipped("paper-real-odometry-2"), 4);
-    angles.angles.truncate(4);
-    for (angle, sigma_rad) in angles
-        .angles
-        .iter_mut()
-        .zip([f64::NAN, -0.1, 0.0, f64::INFINITY])
+    angles.angles.truncate(5);
+    let mut sound = angles.clone();
+    sound.angles.truncate(1);
+    for (angle, sigma_rad) in
+        angles
+            .angles
+            .iter_mut()
+            .skip(1)
+            .zip([f64::NAN, -0.1, 0.0, f64::INFINITY])
     {
         angle.measured.phase_sigma_rad = sigma_rad;
     }
@@ -242,6 +246,7 @@ fn a_measurement_without_a_variance_is_unusable_whoever_made_it() {
         .iter()
         .map(|it| it.verdict.reason)
         .collect();
-    assert_eq!(reasons, [UpdateReason::Unusable; 4]);
-    assert_eq!(located.poses, drive.locate().poses);
+    assert_eq!(reasons[1..], [UpdateReason::Unusable; 4]);
+    let sound = drive.locate_these(&odometry, &sound);
+    assert_eq!(located.poses, sound.poses);
 }

@@ -182,7 +182,7 @@ fn what_does_not_fit_together_is_refused() {
     let believed = believed(&dir);
     let mut recording = Recording::open(&made.recording).unwrap();
     let error = locate(&believed, &OdometryLog::default(), &mut recording).unwrap_err();
-    assert!(matches!(error, ReplayError::NoOdometry));
+    assert!(matches!(error, ReplayError::NoOdometry { why: None }));
 
     let odometry = read_odometry_csv(&dir.join("odometry.csv")).unwrap();
     let mut elsewhere = believed.clone();

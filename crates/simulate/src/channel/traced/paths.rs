@@ -18,8 +18,12 @@ const REACH_M: f64 = 1.0;
 const ENDS_M: f64 = 10.0;
 /// What a path may be shorter than the straight way by: single precision, rounded places.
 const SLACK_M: f64 = 0.3;
+/// A path is shorter than this; one that is longer is in another unit.
+const LONGEST_M: f64 = 1e5;
 /// A path that is no longer than the straight way by more than this is the line of sight.
 const DIRECT_M: f64 = 0.01;
+/// Least cosine between the line of sight and where it is said to come from.
+const LEAST_COSINE: f64 = 0.9;
 
 /// Why a file of paths cannot be used.
 #[derive(Debug, Error)]
@@ -119,6 +123,12 @@ impl Paths {
         if let Some(row) = gains.iter().position(|gain| !gain.norm_sqr().is_finite()) {
             return PathsError::that(format!("`gain` is not a number in row {row}"));
         }
+        if let Some(row) = gains.iter().position(|gain| gain.norm_sqr() > 1.0) {
+            return PathsError::that(format!(
+                "`gain` is {} in row {row}; it is an amplitude between isotropic antennas, not above 1",
+                gains[row]
+            ));
+        }
         let within = |values: &[f64], count: usize| {
             (values.iter()).position(|it| it.fract() != 0.0 || !(0.0..count as f64).contains(it))
         };
@@ -162,14 +172,32 @@ impl Paths {
                      lie {straight_m:.2} m apart: not in one frame"
                 ));
             }
-            let level = elevations_rad[row].cos();
+            if length_m > LONGEST_M {
+                return PathsError::that(format!(
+                    "`delay_s` is {} in row {row}: a path of {:.0} km; it is in seconds",
+                    delays_s[row],
+                    1e-3 * length_m
+                ));
+            }
+            let (up, level) = elevations_rad[row].sin_cos();
             let (sin, cos) = azimuths_rad[row].sin_cos();
+            let direct = length_m - straight_m < DIRECT_M;
+            let along_m = (head[0] - place[0]) * level * cos
+                + (head[1] - place[1]) * level * sin
+                + (head[2] - place[2]) * up;
+            let is_sight = (length_m - straight_m).abs() < DIRECT_M && straight_m > REACH_M;
+            if is_sight && along_m < LEAST_COSINE * straight_m {
+                return PathsError::that(format!(
+                    "`azimuth_rad`, `elevation_rad` in row {row}: the line of sight does not come from \
+                     the radio head; they are of arrival, in the map's frame"
+                ));
+            }
             begins[link(row) + 1] += 1;
             all.push(TracedPath {
                 gain: gains[row],
                 excess_s: ((length_m - straight_m) / SPEED_OF_LIGHT_MPS) as f32,
                 towards: [(level * cos) as f32, (level * sin) as f32],
-                direct: length_m - straight_m < DIRECT_M,
+                direct,
             });
         }
         for link in 1..begins.len() {

@@ -1,0 +1,143 @@
+//! Tables of numbers with named columns, separated by commas, semicolons or tabs.
+
+use std::path::Path;
+
+use csv::{ReaderBuilder, StringRecord, Trim};
+
+use crate::error::RecordingError;
+use crate::file as files;
+
+/// A day of samples at 50 Hz.
+const MOST_BYTES: u64 = 512 << 20;
+
+/// What may stand between two columns.
+const SEPARATORS: [char; 3] = [',', ';', '\t'];
+
+/// A table in memory: the wanted columns of each row, or what is wrong with the row.
+#[derive(Debug)]
+pub struct Table {
+    pub rows: Vec<Row>,
+    file: String,
+    header: StringRecord,
+}
+
+#[derive(Debug)]
+pub struct Row {
+    /// Line in the file, from 1.
+    pub line: usize,
+    /// One value per wanted column, `None` where an optional one is absent or empty.
+    pub values: Result<Vec<Option<f64>>, String>,
+}
+
+impl Table {
+    /// Reads the columns `required` and `optional`; others are ignored, as are lines that begin with
+    /// `#`.
+    ///
+    /// # Errors
+    /// [`RecordingError`] when the file cannot be read, a required column is missing or a wanted one
+    /// is there twice. A row that cannot be used is not an error: it says what is wrong with it.
+    pub fn read(file: &Path, required: &[&str], optional: &[&str]) -> Result<Self, RecordingError> {
+        let bytes =
+            files::read(file, MOST_BYTES).map_err(|source| RecordingError::io(file, source))?;
+        let text = String::from_utf8_lossy(&bytes);
+        let mut reader = ReaderBuilder::new()
+            .delimiter(separator(&text) as u8)
+            .comment(Some(b'#'))
+            .flexible(true)
+            .trim(Trim::All)
+            .from_reader(text.as_bytes());
+        let invalid = |error: csv::Error| RecordingError::Syntax {
+            file: file.display().to_string(),
+            format: "CSV",
+            message: error.to_string(),
+        };
+        let mut table = Self {
+            rows: Vec::new(),
+            file: file.display().to_string(),
+            header: reader.headers().map_err(invalid)?.clone(),
+        };
+        let mut wanted: Vec<(&str, Option<usize>, bool)> = Vec::new();
+        let names = required.iter().map(|name| (name, true));
+        for (name, is_required) in names.chain(optional.iter().map(|name| (name, false))) {
+            let named = table.header.iter().enumerate();
+            let mut places = named.filter(|(_, column)| column == name).map(|(it, _)| it);
+            let place = places.next();
+            if places.next().is_some() {
+                let once = "each column may be there once";
+                return Err(RecordingError::value(file, *name, "there twice", once));
+            }
+            if is_required && place.is_none() {
+                let allowed = format!(
+                    "the first line must name the columns {}",
+                    required.join(", ")
+                );
+                return Err(table.missing(name, &allowed));
+            }
+            wanted.push((name, place, is_required));
+        }
+        for record in reader.records() {
+            let record = record.map_err(invalid)?;
+            let line = record.position().map_or(0, csv::Position::line) as usize;
+            if record.iter().eq([""]) {
+                continue; // blanks
+            }
+            let values = values(&record, table.header.len(), &wanted);
+            table.rows.push(Row { line, values });
+        }
+        Ok(table)
+    }
+
+    /// Whether there is a column of this name.
+    pub fn has(&self, name: &str) -> bool {
+        self.header.iter().any(|column| column == name)
+    }
+
+    /// That a column is not there, what should be, and what is.
+    pub fn missing(&self, column: &str, allowed: &str) -> RecordingError {
+        let named: Vec<&str> = self.header.iter().collect();
+        let named = if named.is_empty() {
+            "the file is empty".to_owned()
+        } else {
+            format!("it names {}", named.join(", "))
+        };
+        RecordingError::Missing {
+            file: self.file.clone(),
+            key: column.to_owned(),
+            allowed: format!("{allowed}; {named}"),
+        }
+    }
+}
+
+/// What separates the columns: whichever the first line has most of.
+fn separator(text: &str) -> char {
+    let mut lines = text.trim_start_matches('\u{feff}').lines();
+    let is_header = |line: &&str| !line.trim().is_empty() && !line.starts_with('#');
+    let header = lines.find(is_header).unwrap_or_default();
+    let count = |it: &char| header.chars().filter(|sign| sign == it).count();
+    // Of equally many the last is found: the comma where there is none.
+    let most = SEPARATORS.into_iter().rev().max_by_key(count);
+    most.unwrap_or(',')
+}
+
+fn values(
+    record: &StringRecord,
+    columns: usize,
+    wanted: &[(&str, Option<usize>, bool)],
+) -> Result<Vec<Option<f64>>, String> {
+    if record.len() != columns {
+        return Err(format!("{} fields instead of {columns}", record.len()));
+    }
+    let value = |(name, place, required): &(&str, Option<usize>, bool)| {
+        let field = place
+            .and_then(|place| record.get(place))
+            .unwrap_or_default();
+        if field.is_empty() && !required {
+            return Ok(None);
+        }
+        let number = field
+            .parse()
+            .map_err(|_| format!("{name} `{field}` is not a number"))?;
+        Ok(Some(number))
+    };
+    wanted.iter().map(value).collect()
+}
