@@ -121,7 +121,7 @@ fn the_last_pose_is_the_filters() {
             value("{ fault_probability = { odometer = 1e-9, all_radio_heads = 0 } }"),
         ),
     ];
-    let rarely_noisy = value("{ fault_probability = { odometer = 3e-5 } }");
+    let rarely_noisy = value("{ fault_probability = { odometer = 3e-5, all_radio_heads = 0 } }");
     for (changes, covered) in [
         (vec![], 0.0),
         (vec![("vehicle.gyroscope", yaw)], 0.0),

@@ -174,7 +174,10 @@ mod tests {
             }
             if outliers == 0.0 {
                 // Twice the deviation, by either.
-                assert!((with_tails - 4.0).abs() < 0.15 && (core - 4.0).abs() < 0.15, "{with_tails} {core}");
+                assert!(
+                    (with_tails - 4.0).abs() < 0.15 && (core - 4.0).abs() < 0.15,
+                    "{with_tails} {core}"
+                );
             }
         }
         // Nearly one difference in twelve has an outlier: each adds the square at which it is cut off.
