@@ -11,9 +11,10 @@ use crate::localize::tracker::{Look, Tracker};
 use crate::radio_head::RadioHead;
 use crate::settings::DriveKind;
 
-/// Probability that an array is off of which nothing is stated, and that angles are noisier than stated.
+/// Probability that an array is off of which nothing is stated, and that angles are noisier than stated. The angles
+/// soon speak louder.
 const INEXACT: f64 = 0.1;
-const LOUD: f64 = 0.1;
+const LOUD: f64 = 0.02;
 
 /// That an odometer is noisier than stated is so many times as probable as that it slips; and how many times as noisy it
 /// is then.
