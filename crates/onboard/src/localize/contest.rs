@@ -19,9 +19,11 @@ const PATIENCE_S: f64 = 20.0;
 /// After this way a silent search beside a tracker that hears now and then has listened for long (m).
 const LONG_WAY_M: f64 = 100.0;
 
-/// Looks at one radio head within this time share their errors, and who has not heard anything for so
-/// long does not listen (s).
-const LOOK_S: f64 = 1.0;
+/// Looks at one radio head within this way share their errors: clusters keep an angle wrong for so long (m).
+const LOOK_M: f64 = 10.0;
+
+/// Who has not heard anything for so long does not listen (s).
+const SILENCE_S: f64 = 1.0;
 
 /// A search, and how the tracker does meanwhile.
 #[derive(Debug)]
@@ -33,6 +35,8 @@ pub struct Contest {
     pub told_s: Option<f64>,
     /// Whether the tracker is refuted, so that its place is no longer told beside the search's.
     pub speaks_alone: bool,
+    /// Whether angles may be off as if the tracker were lost.
+    is_misled: bool,
     /// Log-likelihood of the tracker by the same angles.
     own: f64,
     /// Distance driven when it began, and driven since (m).
@@ -41,10 +45,10 @@ pub struct Contest {
     /// When the last angle was heard (s), and for how long it has listened without silence (s).
     heard_s: f64,
     listened_s: f64,
-    /// Angles, how many of them are looks of their own, and when each radio head had its last such look (s).
+    /// Angles, how many of them are looks of their own, and after which way each radio head had its last such look (m).
     angles: u32,
     looks: u32,
-    looked_s: Vec<f64>,
+    looked_m: Vec<f64>,
 }
 
 clone_in_place!(Contest {
@@ -52,6 +56,7 @@ clone_in_place!(Contest {
     is_wide,
     told_s,
     speaks_alone,
+    is_misled,
     own,
     since_m,
     way_m,
@@ -59,7 +64,7 @@ clone_in_place!(Contest {
     listened_s,
     angles,
     looks,
-    looked_s
+    looked_m
 });
 
 impl Contest {
@@ -76,6 +81,7 @@ impl Contest {
             is_wide,
             told_s: (!is_silent).then(|| tracker.time_s()),
             speaks_alone: false,
+            is_misled: tracker.config().may_be_misled(),
             own: 0.0,
             since_m: tracker.driven_m(),
             way_m: 0.0,
@@ -83,7 +89,7 @@ impl Contest {
             listened_s: 0.0,
             angles: 0,
             looks: 0,
-            looked_s: vec![f64::NEG_INFINITY; heads],
+            looked_m: vec![f64::NEG_INFINITY; heads],
         }
     }
 
@@ -91,16 +97,16 @@ impl Contest {
     pub fn update(&mut self, tracker: &Tracker, head: &RadioHead, measured: &AngleMeasurement) {
         self.way_m = tracker.driven_m() - self.since_m;
         let silence_s = measured.time_s - self.heard_s;
-        if silence_s < LOOK_S {
+        if silence_s < SILENCE_S {
             self.listened_s += silence_s.max(0.0);
         }
         self.heard_s = measured.time_s;
         let is_it = |mine: &RadioHead| mine.sends(head.pci, head.ssb_index);
         let number = self.initialiser.heads().iter().position(is_it);
-        if let Some(looked_s) = number.and_then(|number| self.looked_s.get_mut(number)) {
+        if let Some(looked_m) = number.and_then(|number| self.looked_m.get_mut(number)) {
             self.angles = self.angles.saturating_add(1);
-            if measured.time_s - *looked_s >= LOOK_S {
-                *looked_s = measured.time_s;
+            if self.way_m - *looked_m >= LOOK_M {
+                *looked_m = self.way_m;
                 self.looks = self.looks.saturating_add(1);
             }
         }
@@ -109,10 +115,10 @@ impl Contest {
     }
 
     /// Log-likelihood by which the search's best place foretells the angles better than the tracker does.
-    /// Against a tracker that nothing else speaks against only looks of their own count.
+    /// Against a tracker that nothing else speaks against, or that may be misled, only looks of their own count.
     fn lead(&self) -> f64 {
         let lead = self.initialiser.best() - self.own;
-        if self.is_silent() {
+        if self.is_silent() || self.is_misled {
             lead * f64::from(self.looks) / f64::from(self.angles.max(1))
         } else {
             lead
@@ -136,7 +142,8 @@ impl Contest {
 
     /// Whether enough way was driven to believe it.
     pub fn has_moved(&self) -> bool {
-        self.way_m >= LEAST_WAY_M
+        let least_m = if self.is_misled { LOOK_M } else { LEAST_WAY_M };
+        self.way_m >= least_m
     }
 
     /// Whether it was a long way.

@@ -159,7 +159,10 @@ impl Recovery {
     fn begin(&self, now_s: f64, is_wide: bool, is_silent: bool) -> Option<Contest> {
         let setup = &self.setup;
         let (tracker, heads) = (self.tracked.tracker(), setup.heads.as_slice());
-        let config = *tracker.config();
+        let mut config = *tracker.config();
+        if config.heard_noise.is_some() {
+            config.hear_noise(Some(self.tracked.noise_ratio()));
+        }
         let mut initialiser = match &setup.road {
             Some(road) => Initialiser::new(config, road.clone(), true, heads),
             None if heads.len() < LEAST_HEADS => return None,

@@ -84,13 +84,12 @@ impl Alternative {
         inexact.map(|tracker| Self::sound(tracker, INEXACT))
     }
 
-    /// An odometer that is noisier than stated, where it slips with the probability `slip`, of an array that may not
-    /// be exact; `None` on a differential drive, whose wheels slip a little with every metre, or where errors that stay
-    /// explain the same.
+    /// An odometer that is noisier than stated, where it slips with the probability `slip`; `None` on a
+    /// differential drive, whose wheels slip a little with every metre, or where errors that stay explain the same.
     pub fn noisier(tracker: &Tracker, slip: f64) -> Option<Self> {
         let config = tracker.config();
         let is_watched = config.drive == DriveKind::Road && !config.finds_errors();
-        let tracker = is_watched.then(|| tracker.doubting_array().noisier(NOISIER));
+        let tracker = is_watched.then(|| tracker.noisier(NOISIER));
         tracker.map(|it| Self::sound(it, (NOISY * slip).min(MOST_PROBABLE)))
     }
 

@@ -17,103 +17,121 @@ const CORE: f64 = 1.5;
 const OF_CORE: f64 = 0.778_465;
 
 /// Mean squared difference between successive innovations of a radio head, over what it ought to be
-/// (von Neumann 1941). What is off by as much each time, as a fault makes it, does not show in it.
+/// (von Neumann 1941); that of each, and of all. What is off by as much each time, as a fault makes it, does not show
+/// in it.
 #[derive(Debug, PartialEq)]
 pub struct AngleNoise {
-    /// The last look at each radio head that is compared with.
-    last: Vec<Option<Rehearsal>>,
-    differences: u32,
-    with_tails: Mean,
-    core: Mean,
+    heads: Vec<Heard>,
+    of_all: Ratio,
 }
 
-/// A mean of squares, cut off where they are too large.
+clone_in_place!(AngleNoise { heads, of_all });
+
+/// What was heard of a radio head.
 #[derive(Clone, Copy, Debug, PartialEq)]
-struct Mean {
-    most: f64,
-    kept: f64,
-    value: f64,
+struct Heard {
+    /// The last look that is compared with.
+    last: Option<Rehearsal>,
+    ratio: Ratio,
 }
 
-impl Mean {
+/// Variance by what is stated, with tails and beside outliers.
+#[derive(Clone, Copy, Debug, PartialEq)]
+struct Ratio {
+    differences: u32,
+    with_tails: f64,
+    core: f64,
+}
+
+impl Ratio {
     /// Before anything is seen.
-    const fn new(most: f64, kept: f64) -> Self {
-        Self {
-            most,
-            kept,
-            value: 1.0,
-        }
-    }
+    const STATED: Self = Self {
+        differences: 0,
+        with_tails: 1.0,
+        core: 1.0,
+    };
 
-    fn see(&mut self, square: f64, weight: f64) {
-        let most = self.most * self.most * self.value;
-        self.value += weight * (square.min(most) / self.kept - self.value);
-    }
-
-    /// Not less than what is stated.
-    const fn ratio(&self) -> f64 {
-        self.value.max(1.0)
+    /// Takes in a squared difference over what is expected.
+    fn see(&mut self, square: f64) {
+        self.differences = self.differences.saturating_add(1);
+        let weight = LEAST_WEIGHT.max(f64::from(STATED + self.differences).recip());
+        let mean = |value: &mut f64, most: f64, of_most: f64| {
+            *value += weight * (square.min(most * most * *value) / of_most - *value);
+        };
+        mean(&mut self.with_tails, MOST, OF_MOST);
+        mean(&mut self.core, CORE, OF_CORE);
     }
 }
-
-clone_in_place!(AngleNoise {
-    last,
-    differences,
-    with_tails,
-    core
-});
 
 impl AngleNoise {
     /// As stated, of so many radio heads.
     pub fn new(heads: usize) -> Self {
+        let heard = Heard {
+            last: None,
+            ratio: Ratio::STATED,
+        };
         Self {
-            last: vec![None; heads],
-            differences: 0,
-            with_tails: Mean::new(MOST, OF_MOST),
-            core: Mean::new(CORE, OF_CORE),
+            heads: vec![heard; heads],
+            of_all: Ratio::STATED,
         }
     }
 
     /// As noisy as they were found to be, of trackers begun anew.
     pub fn resumed(&self) -> Self {
-        Self {
-            last: vec![None; self.last.len()],
-            ..*self
+        let mut heads = self.heads.clone();
+        for head in &mut heads {
+            head.last = None;
         }
+        Self { heads, ..*self }
     }
 
     /// Takes in an angle to radio head number `head`. Within a wavelength scatter is the same.
     pub fn see(&mut self, head: usize, now: &Rehearsal) {
-        let Some(slot) = self.last.get_mut(head) else {
+        let Some(heard) = self.heads.get_mut(head) else {
             return;
         };
-        let Some(before) = *slot else {
-            *slot = Some(*now);
+        let Some(before) = heard.last else {
+            heard.last = Some(*now);
             return;
         };
         if now.place_wavelengths - before.place_wavelengths < 1.0 {
             return;
         }
-        *slot = Some(*now);
+        heard.last = Some(*now);
         let seen = now.innovation;
         let belief = seen.variance - seen.measurement_variance;
         let expected = before.first_variance + now.first_variance + belief;
         let difference = wrap_angle(seen.residual - before.innovation.residual);
         let square = difference * difference / expected;
-        self.differences = self.differences.saturating_add(1);
-        let weight = LEAST_WEIGHT.max(f64::from(STATED + self.differences).recip());
-        self.with_tails.see(square, weight);
-        self.core.see(square, weight);
+        if heard.ratio.differences == 0 {
+            // Until it is heard itself it is as noisy as the others.
+            heard.ratio = Ratio {
+                differences: 0,
+                ..self.of_all
+            };
+        }
+        heard.ratio.see(square);
+        self.of_all.see(square);
     }
 
-    /// Their variance by what is stated, not less than that.
+    /// Variance of the angles by what is stated, not less than that.
     pub const fn ratio(&self) -> f64 {
-        self.with_tails.ratio()
+        self.of_all.with_tails.max(1.0)
     }
 
-    /// The same beside outliers.
-    pub const fn core_ratio(&self) -> f64 {
-        self.core.ratio()
+    fn of(&self, head: usize) -> Ratio {
+        let heard = self.heads.get(head).map(|it| it.ratio);
+        heard.filter(|it| it.differences > 0).unwrap_or(self.of_all)
+    }
+
+    /// That of a radio head.
+    pub fn ratio_of(&self, head: usize) -> f64 {
+        self.of(head).with_tails.max(1.0)
+    }
+
+    /// That of a radio head beside outliers.
+    pub fn core_ratio_of(&self, head: usize) -> f64 {
+        self.of(head).core.max(1.0)
     }
 }
 
@@ -126,22 +144,25 @@ mod tests {
     use super::*;
     use crate::localize::gaussian::Innovation;
 
-    /// Looks of 0.1 rad of stated deviation, so many wavelengths apart, with these residuals.
+    /// A look of 0.1 rad of stated deviation.
+    fn look(place_wavelengths: f64, residual: f64) -> Rehearsal {
+        Rehearsal {
+            innovation: Innovation {
+                residual,
+                variance: 0.01,
+                measurement_variance: 0.01,
+            },
+            first_variance: 0.01,
+            place_wavelengths,
+        }
+    }
+
+    /// Looks so many wavelengths apart, with these residuals.
     fn heard(apart_wavelengths: f64, mut residual_rad: impl FnMut(i32) -> f64) -> AngleNoise {
         let mut noise = AngleNoise::new(1);
         for number in 0..2000 {
-            noise.see(
-                0,
-                &Rehearsal {
-                    innovation: Innovation {
-                        residual: residual_rad(number),
-                        variance: 0.01,
-                        measurement_variance: 0.01,
-                    },
-                    first_variance: 0.01,
-                    place_wavelengths: apart_wavelengths * f64::from(number),
-                },
-            );
+            let place_wavelengths = apart_wavelengths * f64::from(number);
+            noise.see(0, &look(place_wavelengths, residual_rad(number)));
         }
         noise
     }
@@ -170,7 +191,7 @@ mod tests {
                     }
                 });
                 with_tails += noise.ratio() / f64::from(drives);
-                core += noise.core_ratio() / f64::from(drives);
+                core += noise.core_ratio_of(0) / f64::from(drives);
             }
             if outliers == 0.0 {
                 // Twice the deviation, by either.
@@ -195,5 +216,23 @@ mod tests {
         assert!((ratio - 8.0).abs() < 0.5, "{ratio}");
         // Who hardly moves hears the same scatter again.
         assert_eq!(after(0.0, 0.2, 1e-3), 1.0);
+    }
+
+    #[test]
+    fn each_radio_head_is_as_noisy_as_it_is_heard_to_be() {
+        let mut noise = AngleNoise::new(3);
+        for number in 0..2000 {
+            let sign = f64::from(1 - 2 * (number % 2));
+            let place_wavelengths = 2.0 * f64::from(number);
+            noise.see(0, &look(place_wavelengths, 0.2 * sign));
+            noise.see(1, &look(place_wavelengths, 0.05 * sign));
+        }
+        assert!((noise.ratio_of(0) - 8.0).abs() < 0.5);
+        assert_eq!(noise.ratio_of(1), 1.0);
+        // One that was not heard is as noisy as all of them.
+        assert_eq!(noise.ratio_of(2), noise.ratio());
+        assert!(noise.ratio() > 2.0);
+        // Begun anew it is what it was.
+        assert_eq!(noise.resumed().ratio_of(0), noise.ratio_of(0));
     }
 }

@@ -201,12 +201,12 @@ impl Bank {
     /// deviations.
     fn statistic(&self, head: usize) -> f64 {
         let test = self.members.get(head).map(|member| member.test(head));
-        test.map_or(0.0, |test| self.deviations(&test))
+        test.map_or(0.0, |test| self.deviations(head, &test))
     }
 
-    /// The statistic of a test, with the noise that there is.
-    fn deviations(&self, test: &SequenceTest) -> f64 {
-        test.statistic() / self.noise_ratio().sqrt()
+    /// The statistic of a test of a radio head, with the noise that there is.
+    fn deviations(&self, head: usize, test: &SequenceTest) -> f64 {
+        test.statistic() / self.noise.ratio_of(head).sqrt()
     }
 
     /// Number of sound radio heads whose statistic is above a threshold.
@@ -229,7 +229,8 @@ impl Bank {
     /// Takes in an angle: a test of its radio head, and information for whoever uses that.
     pub fn update(&mut self, head: &RadioHead, measured: &AngleMeasurement) -> UpdateVerdict {
         let is_it = |mine: &RadioHead| mine.sends(head.pci, head.ssb_index);
-        if let Some(number) = self.heads.iter().position(is_it) {
+        let number = self.heads.iter().position(is_it);
+        if let Some(number) = number {
             for member in &mut self.members {
                 if !member.lacks(number) {
                     member.tracker.update(head, measured);
@@ -251,7 +252,7 @@ impl Bank {
                 }
             }
         }
-        let noise_ratio = self.noise.core_ratio();
+        let noise_ratio = number.map_or(1.0, |number| self.noise.core_ratio_of(number));
         let looked = self.main.look(head, measured);
         let if_staying = (self.otherwise).update(&self.main, &looked, noise_ratio, head, measured);
         let verdict = self.main.take(looked, measured);
@@ -326,7 +327,7 @@ impl Bank {
             .filter(|member| member.without[0] != member.without[1] && member.lacks(left_out))
             .flat_map(|member| member.without.iter().zip(&member.tests))
             .filter(|(head, _)| **head != left_out && !self.is_faulty(**head))
-            .map(|(_, test)| self.deviations(test))
+            .map(|(head, test)| self.deviations(*head, test))
             .fold(0.0, f64::max)
     }
 

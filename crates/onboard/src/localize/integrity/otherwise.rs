@@ -72,8 +72,8 @@ impl Otherwise {
         }
     }
 
-    /// The same beside the tracker of an array that is not exact: as probable as it was beside that one before, noisier
-    /// angles begun anew, and slip unless it was likely.
+    /// The same beside the tracker of an array that is not exact: as probable as it was beside that one before, a noisier
+    /// odometer and noisier angles begun anew, and slip unless it was likely.
     pub fn beside_inexact(&self) -> Self {
         let mut beside = self.clone();
         if let Some(array) = beside.array.take() {
@@ -81,6 +81,7 @@ impl Otherwise {
                 it.evidence = it.evidence.beside(array.evidence);
             }
             beside.loud = Alternative::loud(&array.tracker);
+            beside.noise = Alternative::noisier(&array.tracker, self.probability.odometer);
             if beside.slip.alternative.evidence.is_against() {
                 beside.slip = Slip::new(&array.tracker, self.probability.odometer);
             }
@@ -186,13 +187,14 @@ impl Otherwise {
         verdict.filter(|_| self.errors_stay())
     }
 
-    /// Leaves a radio head out, as `stated` does, that has never heard it: slip is what it was, and errors that stay are
-    /// no reason to, but spoke against another tracker.
+    /// Leaves a radio head out, as `stated` does, that has never heard it: slip is what it was; a plan that is off is
+    /// no reason to, and explains the same; nor are errors that stay, which spoke against another tracker.
     pub fn exclude(&mut self, stated: &Tracker, head: &RadioHead) {
         let mut slip = self.slip.clone();
         slip.alternative.tracker.set_excluded(head, true);
         *self = Self {
             slip,
+            datum: self.datum.take(),
             ..self.beside(stated)
         };
     }
@@ -303,7 +305,7 @@ mod tests {
             moved_m: [1.2, -1.6],
             ..World::default()
         };
-        let (otherwise, _, off_m) = drive(&world, |_, _| 0.0);
+        let (mut otherwise, stated, off_m) = drive(&world, |_, _| 0.0);
         let datum = otherwise.datum.as_ref().unwrap();
         assert!(otherwise.leads(datum) && otherwise.is_fault());
         let [[xx, ..], [_, yy, _], _] = datum.tracker.pose(59.9).covariance.unwrap();
@@ -314,6 +316,12 @@ mod tests {
             let std_m = found.covariance[state][state].sqrt();
             assert!(std_m < 0.3 && by_m.abs() < 4.0 * std_m, "{by_m} of {std_m}");
         }
+        // Of a radio head that is left out the plan says nothing.
+        let before = *datum.tracker.belief();
+        let (heads, ..) = trip();
+        otherwise.exclude(&stated, &heads[0]);
+        let datum = otherwise.datum.as_ref().unwrap();
+        assert!(otherwise.leads(datum) && *datum.tracker.belief() == before);
     }
 
     #[test]

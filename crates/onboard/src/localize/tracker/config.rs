@@ -338,10 +338,11 @@ impl TrackerConfig {
         self.error_probability > 0.0
     }
 
-    /// Whether an error that stays is found, but so rare that its first angles are off as if the vehicle
-    /// were lost.
+    /// Whether angles may be off as if the vehicle were lost: those of an error that stays, where that is found but
+    /// rare, or such as are heard to be noisier than stated.
     pub fn may_be_misled(&self) -> bool {
-        self.finds_errors() && self.error_probability < LEAST_USUAL_ERROR_PROBABILITY
+        let is_rare = self.error_probability < LEAST_USUAL_ERROR_PROBABILITY;
+        self.heard_noise.is_some() || (self.finds_errors() && is_rare)
     }
 
     /// Variance (rad²) by scatter of an angle `travelled_m` after the radio head's last one, see
