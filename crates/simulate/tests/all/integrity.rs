@@ -9,6 +9,7 @@ use crate::common;
 use onboard::localize::IntegrityState;
 use simulate::scenario::{FaultKind, FaultSettings, Scenario};
 use simulate::{IntegritySummary, Step};
+use toml::Value;
 
 use crate::common::{changed, drives, shipped, value};
 
@@ -32,6 +33,19 @@ fn fault(from_s: f64, until_s: f64, what: FaultKind) -> FaultSettings {
 
 fn summaries(scenario: &Scenario, runs: usize) -> Vec<IntegritySummary> {
     common::campaign(scenario, SEED, runs).integrity
+}
+
+/// The yard of a guarded vehicle that listens every 100 ms, and this otherwise.
+fn yard_every_100_ms(key: &str, otherwise: Value) -> Scenario {
+    let often = value("{ policy = 'fixed', interval_ms = 100.0 }");
+    changed(
+        "yard",
+        [
+            ("vehicle.integrity", value("{}")),
+            ("vehicle.wake_up", often),
+            (key, otherwise),
+        ],
+    )
 }
 
 /// Most runs of `runs` that may leave the protection level at all where the risk is `risk`: of 8
@@ -63,17 +77,7 @@ fn nominal_drives_are_ok_and_within_their_level() {
 /// Noisier angles are no fault of a radio head: the level grows with them.
 #[test]
 fn less_k_than_believed_is_no_fault() {
-    let scenario = changed(
-        "yard",
-        [
-            ("vehicle.integrity", value("{}")),
-            (
-                "vehicle.wake_up",
-                value("{ policy = 'fixed', interval_ms = 100.0 }"),
-            ),
-            ("truth.site.rician_k_db", value("5.0")),
-        ],
-    );
+    let scenario = yard_every_100_ms("truth.site.rician_k_db", value("5.0"));
     let (mut unavailable, mut beyond, mut all) = (0, 0, 0);
     for step in drives(&scenario, SEED, 2).iter().flat_map(|it| &it.steps) {
         let integrity = step.integrity.unwrap();
@@ -90,17 +94,7 @@ fn less_k_than_believed_is_no_fault() {
 /// before, and the place at hand is not left for one that explains a few angles better.
 #[test]
 fn reflections_do_not_take_the_vehicle_elsewhere() {
-    let scenario = changed(
-        "yard",
-        [
-            ("vehicle.integrity", value("{}")),
-            (
-                "vehicle.wake_up",
-                value("{ policy = 'fixed', interval_ms = 100.0 }"),
-            ),
-            ("channel", value("{ model = 'inf-sh' }")),
-        ],
-    );
+    let scenario = yard_every_100_ms("channel", value("{ model = 'inf-sh' }"));
     let errors_m = drives(&scenario, 1, 1);
     let errors_m = (errors_m.iter().flat_map(|it| &it.steps)).map(Step::error_m);
     let farthest_m = errors_m.fold(0.0, f64::max);

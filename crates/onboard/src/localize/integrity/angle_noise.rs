@@ -32,7 +32,8 @@ clone_in_place!(AngleNoise { heads, of_all });
 struct Heard {
     /// The last look that is compared with.
     last: Option<Rehearsal>,
-    ratio: Ratio,
+    /// None until it is heard: it is as noisy as all of them then.
+    ratio: Option<Ratio>,
 }
 
 /// Variance by what is stated, with tails and beside outliers.
@@ -68,7 +69,7 @@ impl AngleNoise {
     pub fn new(heads: usize) -> Self {
         let heard = Heard {
             last: None,
-            ratio: Ratio::STATED,
+            ratio: None,
         };
         Self {
             heads: vec![heard; heads],
@@ -103,14 +104,11 @@ impl AngleNoise {
         let expected = before.first_variance + now.first_variance + belief;
         let difference = wrap_angle(seen.residual - before.innovation.residual);
         let square = difference * difference / expected;
-        if heard.ratio.differences == 0 {
-            // Until it is heard itself it is as noisy as the others.
-            heard.ratio = Ratio {
-                differences: 0,
-                ..self.of_all
-            };
-        }
-        heard.ratio.see(square);
+        let as_all = Ratio {
+            differences: 0,
+            ..self.of_all
+        };
+        heard.ratio.get_or_insert(as_all).see(square);
         self.of_all.see(square);
     }
 
@@ -120,8 +118,8 @@ impl AngleNoise {
     }
 
     fn of(&self, head: usize) -> Ratio {
-        let heard = self.heads.get(head).map(|it| it.ratio);
-        heard.filter(|it| it.differences > 0).unwrap_or(self.of_all)
+        let heard = self.heads.get(head).and_then(|it| it.ratio);
+        heard.unwrap_or(self.of_all)
     }
 
     /// That of a radio head.
