@@ -7,11 +7,13 @@ from typing import TYPE_CHECKING
 
 import polars as pl
 import pytest
+import vl_convert
 
 import synthetic
 from access_av.paper import summary
 from access_av.paper.report.page import render
 from access_av.paper.report.readings import readings
+from access_av.report import located_charts
 from access_av.report.parts import value_text
 from robot import HEADS_M, robot
 
@@ -107,3 +109,14 @@ def test_the_map_is_drawn_to_scale_and_heads_in_their_order(
     assert (x[1] - x[0]) / 1000.0 == pytest.approx((y[1] - y[0]) / track["height"], rel=1e-2)
     order = heads["layer"][0]["encoding"]["x"]["sort"]
     assert order == ["7", "8", "9", "10", "11", "12"]
+
+
+def test_time_axes_start_with_the_data() -> None:
+    """A clock that counts from 1970 would press a drive into one line beside the origin."""
+    time_s = pl.Series("time_s", [1.7e9, 1.7e9 + 5.0, 1.7e9 + 10.0])
+    compared = pl.DataFrame([time_s]).with_columns(deviations=1.0, verdict=pl.lit("accepted"))
+    errors = {"error": pl.DataFrame([time_s]).with_columns(error_m=0.1)}
+    for spec in (located_charts.angles(compared), located_charts.error(errors)):
+        (axis,) = [it for it in vl_convert.vegalite_to_vega(spec)["scales"] if it["name"] == "x"]
+        assert axis["zero"] is False
+        assert axis["domain"]["field"] == "time_s"

@@ -56,6 +56,11 @@ def to_scale(
     return x, y, round(height_px)
 
 
+def time_axis(column: str = "time_s") -> alt.X:
+    """Time from the first of the data to the last: a recording's clock may count from 1970."""
+    return alt.X(f"{column}:Q", title="time / s", scale=alt.Scale(zero=False, nice=False))
+
+
 def finish(chart: alt.Chart | alt.LayerChart, *, height: int, description: str) -> Spec:
     """The chart as Vega-Lite, as wide as its place."""
     # A fine map has more points than Altair takes by default.

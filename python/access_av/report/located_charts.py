@@ -16,6 +16,7 @@ from access_av.report.chart import (
     PURPLE,
     finish,
     thinned,
+    time_axis,
     to_scale,
 )
 
@@ -95,7 +96,7 @@ def error(lines: dict[str, pl.DataFrame]) -> Spec:
         alt.Chart(table)
         .mark_line(strokeWidth=1.8)
         .encode(
-            x=alt.X("time_s:Q", title="time / s"),
+            x=time_axis(),
             y=alt.Y("error_m:Q", title="horizontal / m", scale=alt.Scale(type="log")),
             color=_colours(ERRORS, lines),
             tooltip=[
@@ -114,7 +115,7 @@ def angles(compared: pl.DataFrame) -> Spec:
         alt.Chart(thinned(compared.select("time_s", "deviations", "verdict"), 2000))
         .mark_circle(size=16, opacity=0.6)
         .encode(
-            x=alt.X("time_s:Q", title="time / s"),
+            x=time_axis(),
             y=alt.Y("deviations:Q", title="deviations", scale=alt.Scale(type="symlog")),
             color=alt.Color(
                 "verdict:N",
