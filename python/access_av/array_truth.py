@@ -24,9 +24,10 @@ class ArrayTruth:
     Attributes
     ----------
     azimuth_from_broadside_deg
-        Measured azimuth, counter-clockwise from the array's broadside.
-    azimuth_from_axis_deg
-        Counter-clockwise from the axis of antennas that are not in a row.
+        Measured azimuth, counter-clockwise from the array's broadside, a quarter turn clockwise of
+        its axis; of a row, which does not tell elevation from azimuth, 90° less the angle from its
+        axis. Recordings that state ``angle_from_axis_deg`` (of a row) or ``azimuth_from_axis_deg``
+        (counter-clockwise from the axis) instead are understood.
     element_spacing_wavelengths
         Distance between neighbouring antennas in a row.
     element_places_wavelengths
@@ -37,7 +38,6 @@ class ArrayTruth:
     """
 
     azimuth_from_broadside_deg: float | None = None
-    azimuth_from_axis_deg: float | None = None
     element_spacing_wavelengths: float | None = None
     element_places_wavelengths: NDArray[np.float64] | None = None
     channel_phases: NDArray[np.complex128] | None = None
@@ -61,12 +61,33 @@ class ArrayTruth:
         if not isinstance(truth, dict):
             raise InputError("`aoa:truth` must be a table")
         return cls(
-            _number(truth, "azimuth_from_broadside_deg", -360.0, 360.0),
-            _number(truth, "azimuth_from_axis_deg", -360.0, 360.0),
+            _azimuth(truth),
             _number(truth, "element_spacing_wavelengths", *SPACINGS),
             _places(truth, channels),
             _phases(truth, channels),
         )
+
+
+def from_broadside_deg(azimuth_from_axis_deg: float) -> float:
+    """Between −180° and 180°; broadside is a quarter turn clockwise of the axis.
+
+    Examples
+    --------
+    >>> from_broadside_deg(-90.0), from_broadside_deg(0.0), from_broadside_deg(100.0)
+    (0.0, 90.0, -170.0)
+    """
+    return (azimuth_from_axis_deg + 270.0) % 360.0 - 180.0
+
+
+def _azimuth(truth: dict[str, Any]) -> float | None:
+    azimuth_deg = _number(truth, "azimuth_from_broadside_deg", -360.0, 360.0)
+    angle_deg = _number(truth, "angle_from_axis_deg", 0.0, 180.0)
+    from_axis_deg = _number(truth, "azimuth_from_axis_deg", -360.0, 360.0)
+    if azimuth_deg is not None:
+        return azimuth_deg
+    if angle_deg is not None:
+        return 90.0 - angle_deg
+    return None if from_axis_deg is None else from_broadside_deg(from_axis_deg)
 
 
 def _number(truth: dict[str, Any], key: str, low: float, high: float) -> float | None:

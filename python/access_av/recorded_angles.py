@@ -17,7 +17,7 @@ import numpy as np
 
 from access_av import aoa
 from access_av._core import Recording
-from access_av.array_truth import SPACINGS, ArrayTruth
+from access_av.array_truth import SPACINGS, ArrayTruth, from_broadside_deg
 from access_av.errors import InputError
 
 if TYPE_CHECKING:
@@ -130,9 +130,6 @@ def estimate_bursts(
         azimuth_deg, sigma_rad, snr_db = _estimate(
             _equalised(snapshots), places, spacing_wavelengths, phases
         )
-        truth_deg = truth.azimuth_from_broadside_deg
-        if truth_deg is None and truth.azimuth_from_axis_deg is not None:
-            truth_deg = _from_broadside_deg(truth.azimuth_from_axis_deg)
         bursts.append(
             BurstAngle(
                 sample_start=start,
@@ -140,7 +137,7 @@ def estimate_bursts(
                 sigma_deg=math.degrees(sigma_rad),
                 snr_db=snr_db,
                 label=label,
-                truth_deg=truth_deg,
+                truth_deg=truth.azimuth_from_broadside_deg,
             )
         )
     return bursts
@@ -155,7 +152,7 @@ def _estimate(
     """Azimuth from broadside (°), its standard deviation (rad), and the SNR (dB)."""
     if places is not None:
         source = aoa.direction(snapshots, places, calibration=phases)
-        azimuth_deg = _from_broadside_deg(math.degrees(float(source.azimuth_rad)))
+        azimuth_deg = from_broadside_deg(math.degrees(float(source.azimuth_rad)))
         return azimuth_deg, float(source.azimuth_sigma_rad), float(source.snr_db)
     if spacing_wavelengths is None:
         raise InputError("neither spacing nor places of the antennas are known")
@@ -200,11 +197,6 @@ def stated_places(truths: Sequence[ArrayTruth]) -> NDArray[np.float64] | None:
     """Where the antennas are that are not in a row, by the first annotation that states it."""
     places = (truth.element_places_wavelengths for truth in truths)
     return next((it for it in places if it is not None), None)
-
-
-def _from_broadside_deg(azimuth_from_axis_deg: float) -> float:
-    """Between −180° and 180°; broadside is a quarter turn clockwise of the axis."""
-    return (azimuth_from_axis_deg + 270.0) % 360.0 - 180.0
 
 
 def stated_spacing(

@@ -1,11 +1,12 @@
 //! A scenario as somebody on the vehicle would have recorded it: samples of all antennas, odometry,
 //! the site, and beside them the truth.
 
+use std::f64::consts::FRAC_PI_2;
 use std::fs;
 use std::path::{Path, PathBuf};
 
 use num_complex::Complex64;
-use onboard::geometry::Pose;
+use onboard::geometry::{Pose, wrap_angle};
 use onboard::receive::SSB_SAMPLES;
 use onboard::settings::{Check, SettingsError, TomlFile, Vehicle};
 use recording::{
@@ -226,14 +227,15 @@ fn annotation(
     });
     let array = &scenario.vehicle.array;
     let angle = if array.shape.is_row() {
-        // It sees the angle from its axis, whichever side the wave comes from.
+        // It sees the angle from its axis, whichever side the wave comes from, and from above or not.
         json!({
-            "angle_from_axis_deg": along.clamp(-1.0, 1.0).acos().to_degrees(),
+            "azimuth_from_broadside_deg": along.clamp(-1.0, 1.0).asin().to_degrees(),
             "element_spacing_wavelengths": array.spacing_wavelengths,
         })
     } else {
+        // Broadside is a quarter of a turn clockwise of the axis.
         json!({
-            "azimuth_from_axis_deg": left.atan2(along).to_degrees(),
+            "azimuth_from_broadside_deg": wrap_angle(left.atan2(along) + FRAC_PI_2).to_degrees(),
             "elevation_deg": level.min(1.0).acos().to_degrees(),
             "element_places_wavelengths":
                 array.any_manifold().and_then(|it| it.places_wavelengths()),
