@@ -156,6 +156,7 @@ def recorded() -> dict[str, bytes]:
             "snr_db",
         ]
         drive.angles.select(columns).write_csv(place / "angles.csv")
+        drive.angles.select(columns).write_parquet(place / "angles.parquet")
         drive.poses.select("x_m", "y_m").write_csv(place / "road.csv")
         return {file.name: file.read_bytes() for file in place.iterdir()}
 
@@ -169,9 +170,19 @@ def _locate(case: Case, random: Random, *changed: str) -> list[str]:
             )
         case.write(name, content)
     odometry = "odometry.mcap" if "odometry.mcap" in changed else "odometry.csv"
+    if odometry == "odometry.mcap" and random.random() < 0.5:
+        # As a bag of two files, of which one is as it was, or neither.
+        (case.folder / "bag").mkdir()
+        second = random.choice((recorded()[odometry], mutate.data(random, recorded()[odometry])))
+        case.write("bag/a.mcap", second)
+        case.write("bag/b.mcap", (case.folder / odometry).read_bytes())
+        listed = mutate.data(random, b"relative_file_paths:\n  - a.mcap\n  - b.mcap\n")
+        case.write("bag/metadata.yaml", listed)
+        odometry = "bag"
+    angles = "angles.parquet" if "angles.parquet" in changed else "angles.csv"
     options = random.choice(([], [], ["--smooth"], ["--start", "scratch"], ["--start", "0,0,0"]))
     return case.access_av(
-        "locate", "--recording", "angles.csv", "--odometry", odometry,
+        "locate", "--recording", angles, "--odometry", odometry,
         "--site", "site.toml", "--vehicle", "vehicle.toml", "--truth", "truth.tum", "--out", "out",
         *options,
     )  # fmt: skip
@@ -184,7 +195,7 @@ def odometry(random: Random, case: Case) -> list[str]:
 
 def angles(random: Random, case: Case) -> list[str]:
     """A log of angles."""
-    return _locate(case, random, "angles.csv")
+    return _locate(case, random, random.choice(("angles.csv", "angles.csv", "angles.parquet")))
 
 
 def truth(random: Random, case: Case) -> list[str]:
@@ -204,12 +215,14 @@ def recording(random: Random, case: Case) -> list[str]:
         held["iq.sigmf-meta"] = json.dumps(metadata).encode("utf-8", "surrogatepass")
     for name, content in held.items():
         case.write(name, content)
-    command = random.choice(("scan", "aoa", "aoa", "locate"))
+    command = random.choice(("scan", "aoa", "aoa", "locate", "angles"))
+    settings_of = ("--site", "site.toml", "--vehicle", "vehicle.toml", "--out", "out")
+    if command == "angles":
+        return case.access_av("angles", "iq.sigmf-meta", *settings_of)
     if command == "locate":
         return case.access_av(
-            "locate", "--recording", "iq.sigmf-meta", "--odometry", "odometry.csv",
-            "--site", "site.toml", "--vehicle", "vehicle.toml", "--out", "out",
-        )  # fmt: skip
+            "locate", "--recording", "iq.sigmf-meta", "--odometry", "odometry.csv", *settings_of
+        )
     quick = ["--ssb-freq-hz", "3.5e9", "--scs-khz", "15"] if command == "scan" else []
     return case.access_av(command, "iq.sigmf-meta", *quick, *random.choice(([], ["--json"])))
 

@@ -12,7 +12,16 @@ import numpy as np
 import polars as pl
 import pytest
 
-from access_av import Scenario, bound, columns, drives, nr, simulate, statistics
+from access_av import (
+    Scenario,
+    bound,
+    columns,
+    drives,
+    estimate_angles,
+    nr,
+    simulate,
+    statistics,
+)
 from access_av.campaign import Campaign
 from access_av.paper.search import sample
 from access_av.paper.unknowns import sobol
@@ -107,6 +116,8 @@ def test_located_drives(tmp_path: Path) -> None:
     assert drive.smoothed["protection_level_m"].is_null().all()
     check("angles", drive.angles)
     check("findings", drive.findings)
+    found = estimate_angles(site, tmp_path / "iq", vehicle=vehicle)
+    check("recorded_angles", found.angles)
     check("located_errors", drives.error_m(drive.poses, tmp_path / "truth.tum"))
     without_gyroscope = pl.read_csv(odometry).columns
     assert without_gyroscope == list(columns.TABLES["odometry"].columns[:3])

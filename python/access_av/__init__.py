@@ -8,6 +8,7 @@ are first used, so that importing the package takes no time.
 ``bound``              how well any localizer can do in it
 ``plan``               where to put further radio heads
 ``synthesize``         record a scenario's drive as somebody on the vehicle would have
+``estimate_angles``    a recording's angles, for ``locate``
 ``locate``             where the vehicle was in a recorded drive
 ``survey``             where radio heads stand, as ordinary drives show it
 ``evaluate``           the paper's evaluation
@@ -69,6 +70,7 @@ if TYPE_CHECKING:
         service_levels,
         statistics,
     )
+    from access_av.angle_log import AngleLog, estimate_angles
     from access_av.design_space import Query, explore
     from access_av.drives import Drive, SynthesizedDrive, locate, synthesize
     from access_av.error_bound import ErrorBound, bound
@@ -79,6 +81,7 @@ if TYPE_CHECKING:
     from access_av.simulation import Simulation, simulate
 
 __all__ = [
+    "AngleLog",
     "Drive",
     "ErrorBound",
     "Evaluation",
@@ -103,6 +106,7 @@ __all__ = [
     "columns",
     "cost",
     "drives",
+    "estimate_angles",
     "evaluate",
     "explore",
     "locate",
@@ -122,6 +126,7 @@ if not TYPE_CHECKING:
     __getattr__, __dir__ = attach(
         __name__,
         {
+            "access_av.angle_log": ["AngleLog", "estimate_angles"],
             "access_av.design_space": ["Query", "explore"],
             "access_av.drives": ["Drive", "SynthesizedDrive", "locate", "synthesize"],
             "access_av.error_bound": ["ErrorBound", "bound"],

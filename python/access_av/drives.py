@@ -7,7 +7,7 @@ from typing import TYPE_CHECKING, Any
 
 import polars as pl
 
-from access_av import _core
+from access_av import _core, angle_log
 from access_av.errors import InputError
 
 if TYPE_CHECKING:
@@ -214,6 +214,7 @@ def locate(
     *,
     vehicle: Vehicle | str | Path = "default",
     topic: str | None = None,
+    imu_topic: str | None = None,
     start_time_s: float = 0.0,
     start: tuple[float, float, float] | None = None,
     from_scratch: bool = False,
@@ -229,10 +230,12 @@ def locate(
         CSV with the columns ``time_s``, ``distance_m`` or ``speed_mps`` or both and, from a
         gyroscope or from the wheels, ``yaw_rate_radps``; or of left and right wheel ``left_m`` and
         ``right_m``, or ``left_mps`` and ``right_mps``, where the vehicle states
-        ``odometer.track_width_m``; or an MCAP file with ``nav_msgs/msg/Odometry``.
+        ``odometer.track_width_m``; or an MCAP file or a rosbag2 folder with
+        ``nav_msgs/msg/Odometry``. Where the twist of that tells no yaw rate, it is taken from a
+        ``sensor_msgs/msg/Imu`` beside it, or of the pose's orientation; the remarks say which.
     recording
-        SigMF recording of the array's samples, or a CSV log of angles with the columns ``time_s``,
-        ``pci`` and either ``phase_rad`` (electrical angle) with ``phase_sigma_rad``, or
+        SigMF recording of the array's samples, or a log of angles, CSV or Parquet, with the columns
+        ``time_s``, ``pci`` and either ``phase_rad`` (electrical angle) with ``phase_sigma_rad``, or
         ``angle_rad`` (from the array's axis) with ``angle_sigma_rad``; ``ssb_index`` and ``snr_db``
         may be there.
         What is stated as the deviation is taken for all of the error: the site's ``rician_k_db``
@@ -241,7 +244,9 @@ def locate(
         Array, odometer, and how the vehicle locates itself; or the name or path of a vehicle
         file. Its wake-up policy is honoured.
     topic
-        Topic of the odometry in an MCAP file with several.
+        Topic of the odometry in a bag with several.
+    imu_topic
+        Topic of the IMU that tells the yaw rate, also where the odometry does.
     start_time_s
         Time of the recording's first sample by the odometry's clock.
     start
@@ -280,7 +285,9 @@ def locate(
         vehicle if isinstance(vehicle, _core.Vehicle) else _core.Vehicle.load(str(vehicle)),
         odometry,
         recording,
+        angles=angle_log.columns_of(recording),
         topic=topic,
+        imu_topic=imu_topic,
         start_time_s=start_time_s,
         start=start,
         from_scratch=from_scratch,

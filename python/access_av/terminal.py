@@ -29,6 +29,7 @@ if TYPE_CHECKING:
 
     import polars as pl
 
+    from access_av.angle_log import AngleLog
     from access_av.columns.tables import Table
     from access_av.next_level import NextLevel
     from access_av.placement import Plan
@@ -255,9 +256,18 @@ def show_columns(columns: Table) -> None:
     console.print(made)
 
 
+def show_angles(log: AngleLog) -> None:
+    """Angles of a recording by SSB, in the median."""
+    made = table(["PCI", "SSB", "angles", "resolved", "SNR dB", "σ rad", "σ noise rad"], text=0)
+    for row in log.by_ssb().iter_rows():
+        *counts, snr_db, sigma_rad, noise_rad = row
+        made.add_row(*map(str, counts), f"{snr_db:.1f}", f"{sigma_rad:.4f}", f"{noise_rad:.4f}")
+    console.print(made)
+
+
 def show_bursts(bursts: Sequence[BurstAngle]) -> None:
     """Angles of a recording's bursts, with their errors where the truth is known."""
-    made = table(["sample", "azimuth °", "σ °", "SNR dB", "truth °", "error °"], text=0)
+    made = table(["sample", "azimuth °", "σ noise °", "SNR dB", "truth °", "error °"], text=0)
     for burst in bursts:
         azimuth_deg, truth_deg = burst.azimuth_from_broadside_deg, burst.truth_deg
         made.add_row(
@@ -279,7 +289,7 @@ def show_cells(title: str, cells: Sequence[dict[str, Any]]) -> None:
     with_angles = any("azimuth_deg" in cell for cell in cells)
     columns = ["PCI", "SSB", "SFN", "SNR dB", "CFO Hz"]
     if with_angles:
-        columns += ["azimuth °", "σ °"]
+        columns += ["azimuth °", "σ noise °"]
     if not is_narrow():
         columns += ["sample", "MHz", "kHz"]
     made = table(columns, title=title, text=0)
@@ -291,7 +301,7 @@ def show_cells(title: str, cells: Sequence[dict[str, Any]]) -> None:
             "SNR dB": f"{cell['snr_db']:.1f}",
             "CFO Hz": f"{cell['cfo_hz']:.1f}",
             "azimuth °": f"{cell['azimuth_deg']:.2f}" if "azimuth_deg" in cell else "–",
-            "σ °": f"{cell['sigma_deg']:.3f}" if "sigma_deg" in cell else "–",
+            "σ noise °": f"{cell['sigma_deg']:.3f}" if "sigma_deg" in cell else "–",
             "sample": str(cell["sample_start"]),
             "MHz": f"{cell['ssb_freq_hz'] / 1e6:.3f}",
             "kHz": str(cell["scs_khz"]),

@@ -1,8 +1,9 @@
 //! Recorded drives: writing them from a scenario, locating them.
 
+use std::collections::BTreeMap;
 use std::path::{Path, PathBuf};
 
-use numpy::PyArray1;
+use numpy::{PyArray1, PyReadonlyArray1};
 use onboard::Execution;
 use onboard::geometry::Pose;
 use onboard::localize::AngleMeasurement;
@@ -13,8 +14,8 @@ use pyo3::prelude::*;
 use pyo3::types::PyDict;
 use recording::replay::{self, ReplayError, StartChoice};
 use recording::{
-    Datatype, OdometryLog, Recording, RecordingError as CoreRecordingError, TimedPose,
-    read_angle_log, read_odometry_mcap, read_wheel_odometry_csv, write_drive_mcap, write_tum,
+    Datatype, LoggedAngle, OdometryChoice, Recording, TimedPose, angle_log_of_columns,
+    read_angle_log, read_odometry, write_drive_mcap, write_tum,
 };
 use simulate::{SynthError, SynthSettings};
 
@@ -156,11 +157,14 @@ pub fn read_tum(py: Python<'_>, file: PathBuf) -> PyResult<Bound<'_, PyDict>> {
 ///     Array, odometer, and how the vehicle locates itself.
 /// odometry : path-like
 ///     CSV with the columns `time_s`, `distance_m`, `speed_mps` and, with a gyroscope,
-///     `yaw_rate_radps`; or an MCAP file with `nav_msgs/msg/Odometry`.
+///     `yaw_rate_radps`; or an MCAP file or a rosbag2 folder with `nav_msgs/msg/Odometry`.
 /// recording : path-like
 ///     SigMF recording of the array's samples, or a CSV log of angles.
-/// topic : str, optional
-///     Topic of the odometry in an MCAP file with several.
+/// angles : dict of ndarray, optional
+///     The columns of a log of angles that was read from `recording`, float64, NaN where a value is
+///     missing.
+/// topic, imu_topic : str, optional
+///     Topic of the odometry in a bag with several, and of the IMU that tells the yaw rate.
 /// start_time_s : float
 ///     Time of the recording's first sample by the odometry's clock.
 /// start : tuple of float, optional
@@ -176,8 +180,8 @@ pub fn read_tum(py: Python<'_>, file: PathBuf) -> PyResult<Bound<'_, PyDict>> {
 ///     An unusable recording or odometry; a vehicle that cannot serve at the site.
 #[pyfunction]
 #[pyo3(signature = (
-    site, vehicle, odometry, recording, *, topic = None, start_time_s = 0.0, start = None,
-    from_scratch = false, smooth = false
+    site, vehicle, odometry, recording, *, angles = None, topic = None, imu_topic = None,
+    start_time_s = 0.0, start = None, from_scratch = false, smooth = false
 ))]
 #[allow(clippy::too_many_arguments, clippy::needless_pass_by_value)] // Python's keywords
 pub fn locate(
@@ -186,7 +190,9 @@ pub fn locate(
     vehicle: &Vehicle,
     odometry: PathBuf,
     recording: PathBuf,
+    angles: Option<BTreeMap<String, PyReadonlyArray1<'_, f64>>>,
     topic: Option<&str>,
+    imu_topic: Option<&str>,
     start_time_s: f64,
     start: Option<[f64; 3]>,
     from_scratch: bool,
@@ -212,10 +218,22 @@ pub fn locate(
         None if from_scratch => StartChoice::Unknown,
         None => StartChoice::AsSet,
     };
+    let owned = |it: &PyReadonlyArray1<'_, f64>| it.as_array().to_vec();
+    let angles = angles.map(|columns| {
+        let columns = columns.iter();
+        columns
+            .map(|(name, it)| (name.clone(), owned(it)))
+            .collect()
+    });
     let drive = RecordedDrive {
         odometry: &odometry,
         recording: &recording,
-        topic,
+        angles,
+        choice: OdometryChoice {
+            topic,
+            imu_topic,
+            track_width_m: vehicle.0.odometer.track_width_m,
+        },
         start_time_s,
         start,
     };
@@ -229,7 +247,9 @@ pub fn locate(
 struct RecordedDrive<'a> {
     odometry: &'a Path,
     recording: &'a Path,
-    topic: Option<&'a str>,
+    /// Its columns where it is a log of angles that was read elsewhere.
+    angles: Option<BTreeMap<String, Vec<f64>>>,
+    choice: OdometryChoice<'a>,
     start_time_s: f64,
     start: StartChoice,
 }
@@ -241,10 +261,13 @@ impl RecordedDrive<'_> {
         vehicle: &CoreVehicle,
         smooth: bool,
     ) -> Result<replay::LocatedDrive, ReplayError> {
-        let track_width_m = vehicle.odometer.track_width_m;
-        let odometry = read_odometry(self.odometry, self.topic, track_width_m)?;
-        if is(self.recording, "csv") {
-            let angles = read_angle_log(self.recording)?;
+        let odometry = read_odometry(self.odometry, &self.choice)?;
+        let angles = match &self.angles {
+            Some(columns) => Some(angle_log_of_columns(self.recording, columns)?),
+            None if is(self.recording, "csv") => Some(read_angle_log(self.recording)?),
+            None => None,
+        };
+        if let Some(angles) = angles {
             let (site, vehicle) = &replay::as_stated(site, vehicle);
             replay::locate_angles(site, vehicle, self.start, &odometry, &angles, smooth)
         } else {
@@ -266,17 +289,70 @@ fn is(path: &Path, extension: &str) -> bool {
         .is_some_and(|it| it.eq_ignore_ascii_case(extension))
 }
 
-/// Odometry from MCAP or CSV, by the name's ending.
-pub fn read_odometry(
-    path: &Path,
-    topic: Option<&str>,
-    track_width_m: Option<f64>,
-) -> Result<OdometryLog, CoreRecordingError> {
-    if is(path, "mcap") {
-        read_odometry_mcap(path, topic)
-    } else {
-        read_wheel_odometry_csv(path, track_width_m)
-    }
+/// Estimate the angles of a recording as the vehicle's receiver finds them.
+///
+/// Parameters
+/// ----------
+/// site : Site
+///     Whose radio heads are listened to.
+/// vehicle : Vehicle
+///     Array, receiver and estimator.
+/// recording : path-like
+///     SigMF recording of the array's samples.
+/// start_time_s : float
+///     Time of its first sample.
+///
+/// Returns
+/// -------
+/// tuple
+///     Columns `time_s`, `pci`, `ssb_index`, `snr_db`, `phase_rad`, `phase_sigma_rad` (receiver noise
+///     and the site's scatter), `phase_noise_sigma_rad` (receiver noise alone), `angle_rad` and
+///     `resolved` (1 or 0); the vehicle whose receiver takes these deviations for all of the error; and
+///     what is wrong with the recording.
+///
+/// Raises
+/// ------
+/// RecordingError, SettingsError
+///     An unusable recording, or one without an SSB of the site; a vehicle that cannot serve there.
+#[pyfunction]
+#[pyo3(signature = (site, vehicle, recording, *, start_time_s = 0.0))]
+#[allow(clippy::needless_pass_by_value)] // what extraction yields
+pub fn estimate_angles<'py>(
+    py: Python<'py>,
+    site: &Site,
+    vehicle: &Vehicle,
+    recording: PathBuf,
+    start_time_s: f64,
+) -> PyResult<(Bound<'py, PyDict>, Vehicle, Vec<String>)> {
+    crate::arrays::look_up(py)?;
+    let (found, warnings) = py
+        .detach(|| {
+            let mut opened = Recording::open(&recording)?;
+            let warnings = opened.warnings().iter().map(ToString::to_string).collect();
+            let found = replay::estimate_angles(&site.0, &vehicle.0, &mut opened, start_time_s)?;
+            Ok((found, warnings))
+        })
+        .map_err(replay_error)?;
+    let columns = PyDict::new(py);
+    let angles = || found.angles.iter();
+    let column = |value: fn(&LoggedAngle) -> f64| PyArray1::from_iter(py, angles().map(value));
+    columns.set_item("time_s", column(|it| it.ssb.time_s))?;
+    columns.set_item(
+        "pci",
+        PyArray1::from_iter(py, angles().map(|it| it.ssb.pci)),
+    )?;
+    let indices = angles().map(|it| it.ssb.ssb_index);
+    columns.set_item("ssb_index", PyArray1::from_iter(py, indices))?;
+    columns.set_item("snr_db", column(|it| it.measured.snr_db))?;
+    columns.set_item("phase_rad", column(|it| it.measured.phase_rad))?;
+    columns.set_item("phase_sigma_rad", column(|it| it.measured.phase_sigma_rad))?;
+    let noise = PyArray1::from_slice(py, &found.noise_sigma_rad);
+    columns.set_item("phase_noise_sigma_rad", noise)?;
+    columns.set_item("angle_rad", column(|it| it.measured.angle_rad))?;
+    let resolved = angles().map(|it| u8::from(it.measured.resolved));
+    columns.set_item("resolved", PyArray1::from_iter(py, resolved))?;
+    let vehicle = Vehicle(replay::all_of_error(&site.0, &vehicle.0));
+    Ok((columns, vehicle, warnings))
 }
 
 #[allow(clippy::needless_pass_by_value)] // the shape that `map_err` wants

@@ -74,7 +74,7 @@ mod _core {
     #[pymodule_export]
     use crate::channel::{channel_drops, check_paths};
     #[pymodule_export]
-    use crate::drive::{LocatedDrive, locate, log_angles, read_tum, synthesize};
+    use crate::drive::{LocatedDrive, estimate_angles, locate, log_angles, read_tum, synthesize};
     #[pymodule_export]
     use crate::message::brief_text;
     #[pymodule_export]

@@ -8,9 +8,9 @@ use pyo3::exceptions::PyValueError;
 use pyo3::prelude::*;
 use pyo3::types::PyTuple;
 use recording::replay::{Met, as_stated, innovations};
-use recording::{AngleLog, OdometryLog, read_angle_log};
+use recording::{AngleLog, OdometryChoice, OdometryLog, read_angle_log, read_odometry};
 
-use crate::drive::{read_odometry, replay_error};
+use crate::drive::replay_error;
 use crate::recording::recording_error;
 use crate::settings::{Site, Vehicle};
 
@@ -51,8 +51,12 @@ impl LoggedDrive {
             let mut log = read_angle_log(&angles).map_err(recording_error)?;
             let angles = &mut log.angles;
             angles.sort_by(|a, b| a.measured.time_s.total_cmp(&b.measured.time_s));
+            let choice = OdometryChoice {
+                track_width_m,
+                ..OdometryChoice::default()
+            };
             Ok(Self {
-                odometry: read_odometry(&odometry, None, track_width_m).map_err(recording_error)?,
+                odometry: read_odometry(&odometry, &choice).map_err(recording_error)?,
                 angles: log,
             })
         })

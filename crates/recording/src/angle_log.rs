@@ -3,8 +3,9 @@
 //! Columns: `time_s`, `pci` and either `phase_rad` (electrical angle ω = 2π(d/λ)·cos θ) with its
 //! standard deviation `phase_sigma_rad`, or `angle_rad` (θ from the array's axis) with
 //! `angle_sigma_rad`; where both are given the former counts. `ssb_index` (0 without) and `snr_db`
-//! need not be there.
+//! need not be there, nor `resolved` (1, or 0 of an angle that is in doubt; 1 without). The deviation is taken for all of the angle's error.
 
+use std::collections::BTreeMap;
 use std::fmt;
 use std::fmt::Write as _;
 use std::path::Path;
@@ -27,14 +28,23 @@ const COLUMNS: [&str; 7] = [
 
 /// Columns that every log has, and those of which some may be missing.
 const REQUIRED: [&str; 2] = ["time_s", "pci"];
-const OPTIONAL: [&str; 6] = [
+const OPTIONAL: [&str; 7] = [
     "ssb_index",
     "phase_rad",
     "phase_sigma_rad",
     "angle_rad",
     "angle_sigma_rad",
     "snr_db",
+    "resolved",
 ];
+
+/// What the deviations need.
+const NEEDED: &str = "there must be phase_rad and phase_sigma_rad, or angle_rad and \
+                      angle_sigma_rad";
+
+/// What is said of the deviations where a log is written.
+const DEVIATIONS: &str = "# phase_sigma_rad: all of the error that is believed, receiver noise and the site's \
+                          scatter (rician_k_db); mounting and calibration of the array are not in it\n";
 
 /// Standard deviation of an angle of which nothing is known, π/√3 (rad).
 const MOST_SIGMA_RAD: f64 = 1.813_799_364_234_217_8;
@@ -87,35 +97,78 @@ impl fmt::Display for AngleRemark {
 /// [`RecordingError`] when the file cannot be read or lacks a column. Single lines are only
 /// remarked upon.
 pub fn read_angle_log(file: &Path) -> Result<AngleLog, RecordingError> {
-    let mut log = AngleLog::default();
     let table = Table::read(file, &REQUIRED, &OPTIONAL)?;
-    let told = |column, sigma| table.has(column) && table.has(sigma);
-    if !told("phase_rad", "phase_sigma_rad") && !told("angle_rad", "angle_sigma_rad") {
-        let key = if table.has("phase_rad") {
-            "phase_sigma_rad"
-        } else if table.has("angle_rad") {
-            "angle_sigma_rad"
-        } else {
-            "phase_rad"
-        };
-        let allowed = "the first line must name phase_rad and phase_sigma_rad, or angle_rad and \
-                       angle_sigma_rad";
-        return Err(table.missing(key, allowed));
+    if let Some(key) = untold(|name| table.has(name)) {
+        return Err(table.missing(key, NEEDED));
     }
+    let mut log = AngleLog::default();
     for row in table.rows {
-        match row.values.and_then(|values| angle(&values)) {
-            Ok(angle) => log.angles.push(angle),
-            Err(message) => log.remarks.push(AngleRemark {
-                line: row.line,
-                time_s: log
-                    .angles
-                    .last()
-                    .map_or(f64::NEG_INFINITY, |last| last.measured.time_s),
-                message,
-            }),
-        }
+        log.add(row.line, row.values.and_then(|values| angle(&values)));
     }
     Ok(log)
+}
+
+/// Takes an angle log out of the columns of a table that was read from `file`, NaN where a value is
+/// missing. Rows are counted from 1.
+///
+/// # Errors
+/// [`RecordingError`] when a column is missing. Single rows are only remarked upon.
+pub fn angle_log_of_columns(
+    file: &Path,
+    columns: &BTreeMap<String, Vec<f64>>,
+) -> Result<AngleLog, RecordingError> {
+    let missing = |key: &str, allowed: &str| RecordingError::Missing {
+        file: file.display().to_string(),
+        key: key.to_owned(),
+        allowed: allowed.to_owned(),
+    };
+    if let Some(key) = REQUIRED.into_iter().find(|it| !columns.contains_key(*it)) {
+        return Err(missing(key, "there must be time_s and pci"));
+    }
+    if let Some(key) = untold(|name| columns.contains_key(name)) {
+        return Err(missing(key, NEEDED));
+    }
+    let wanted = REQUIRED.into_iter().chain(OPTIONAL);
+    let wanted: Vec<Option<&Vec<f64>>> = wanted.map(|name| columns.get(name)).collect();
+    let rows = wanted.iter().flatten().map(|it| it.len()).max();
+    let mut log = AngleLog::default();
+    for row in 0..rows.unwrap_or(0) {
+        let value = |column: &Option<&Vec<f64>>| column.as_ref()?.get(row).copied();
+        let known = wanted.iter().map(|it| value(it).filter(|it| !it.is_nan()));
+        log.add(row + 1, angle(&known.collect::<Vec<_>>()));
+    }
+    Ok(log)
+}
+
+/// The column that is missing for a log to tell angles and their deviations.
+fn untold(has: impl Fn(&str) -> bool) -> Option<&'static str> {
+    let told = |column, sigma| has(column) && has(sigma);
+    if told("phase_rad", "phase_sigma_rad") || told("angle_rad", "angle_sigma_rad") {
+        None
+    } else if has("phase_rad") {
+        Some("phase_sigma_rad")
+    } else if has("angle_rad") {
+        Some("angle_sigma_rad")
+    } else {
+        Some("phase_rad")
+    }
+}
+
+impl AngleLog {
+    /// Takes in a line, or remarks on why it is left out.
+    fn add(&mut self, line: usize, read: Result<LoggedAngle, String>) {
+        match read {
+            Ok(angle) => self.angles.push(angle),
+            Err(message) => {
+                let last = self.angles.last();
+                self.remarks.push(AngleRemark {
+                    line,
+                    time_s: last.map_or(f64::NEG_INFINITY, |last| last.measured.time_s),
+                    message,
+                });
+            }
+        }
+    }
 }
 
 fn angle(values: &[Option<f64>]) -> Result<LoggedAngle, String> {
@@ -128,6 +181,7 @@ fn angle(values: &[Option<f64>]) -> Result<LoggedAngle, String> {
         angle_rad,
         angle_sigma_rad,
         snr_db,
+        resolved,
     ] = values
     else {
         return Err("too few columns".to_owned());
@@ -143,6 +197,11 @@ fn angle(values: &[Option<f64>]) -> Result<LoggedAngle, String> {
     let ssb_index = finite(ssb_index, "ssb_index")?.unwrap_or(0.0);
     let snr_db = finite(snr_db, "snr_db")?.unwrap_or(UNSTATED_SNR_DB);
     let angle_rad = finite(angle_rad, "angle_rad")?;
+    let resolved = match resolved {
+        None | Some(1.0) => true,
+        Some(0.0) => false,
+        Some(value) => return Err(format!("resolved {value} is neither 1 nor 0")),
+    };
     // Without a phase the deviation is that of the angle, until the array's spacing is known.
     let deviation = |value: Option<f64>, name: &str| match needed(value, name)? {
         value if value > 0.0 && value < MOST_SIGMA_RAD => Ok(value),
@@ -180,7 +239,7 @@ fn angle(values: &[Option<f64>]) -> Result<LoggedAngle, String> {
             phase_sigma_rad,
             angle_rad,
             snr_db,
-            resolved: true,
+            resolved,
         },
     })
 }
@@ -190,7 +249,7 @@ fn angle(values: &[Option<f64>]) -> Result<LoggedAngle, String> {
 /// # Errors
 /// [`RecordingError::Io`].
 pub fn write_angle_log(file: &Path, angles: &[LoggedAngle]) -> Result<(), RecordingError> {
-    let mut text = COLUMNS.join(",") + "\n";
+    let mut text = DEVIATIONS.to_owned() + &COLUMNS.join(",") + "\n";
     for LoggedAngle { ssb, measured } in angles {
         // Writing into a string does not fail.
         let _ = writeln!(

@@ -5,7 +5,7 @@
 //! |---|---|---|
 //! | IQ of one or more antennas | [SigMF](sigmf); one raw file per antenna | read, written; read |
 //! | angles of arrival | [CSV](read_angle_log) | read, written |
-//! | odometry | [CSV](read_odometry_csv); [MCAP](mcap) | read, written |
+//! | odometry, IMU | [CSV](read_odometry_csv); [MCAP, rosbag2](mcap) | read; odometry written |
 //! | trajectories | [TUM](write_tum) | read, written |
 //! | poses, verdicts, diagnoses | [MCAP](mcap) | written |
 //! | sites, vehicles, scenarios, platforms | [TOML](Files) | read |
@@ -20,6 +20,7 @@ mod library;
 pub mod mcap;
 mod odometry;
 mod odometry_csv;
+mod odometry_file;
 pub mod replay;
 mod road_file;
 pub mod scan;
@@ -28,13 +29,16 @@ mod table;
 mod text;
 mod tum;
 
-pub use angle_log::{AngleLog, AngleRemark, LoggedAngle, read_angle_log, write_angle_log};
+pub use angle_log::{
+    AngleLog, AngleRemark, LoggedAngle, angle_log_of_columns, read_angle_log, write_angle_log,
+};
 pub use error::RecordingError;
 pub use file::write as write_file;
 pub use library::{Files, load};
 pub use mcap::{McapWriter, read_odometry_mcap, write_drive_mcap};
 pub use odometry::{OdometryIssue, OdometryLog, OdometryRemark};
 pub use odometry_csv::{read_odometry_csv, read_wheel_odometry_csv, write_odometry_csv};
+pub use odometry_file::{OdometryChoice, read_odometry};
 pub use sigmf::{
     Annotation, Capture, Datatype, Recording, RecordingWarning, RecordingWriter, WriterSettings,
 };

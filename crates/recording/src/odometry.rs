@@ -71,26 +71,50 @@ pub enum OdometryIssue {
         /// Time since the sample before, in seconds.
         gap_s: f64,
     },
-    /// A column is not there; what it would say is made of another.
+    /// A column is made of something else.
     Derived {
         /// The column.
         column: &'static str,
-        /// What takes its place.
-        from: &'static str,
+        /// What it is taken from.
+        from: String,
     },
+    /// Something else that could have told, and cannot.
+    Unused {
+        /// What it is.
+        source: String,
+        /// Why not.
+        why: String,
+    },
+}
+
+impl OdometryRemark {
+    /// A remark on the file itself, of items of a kind.
+    pub(crate) fn of_file(kind: &'static str, issue: OdometryIssue) -> Self {
+        Self {
+            item: 1,
+            kind,
+            time_s: f64::NEG_INFINITY,
+            issue,
+        }
+    }
 }
 
 impl OdometryIssue {
     /// Whether the item was used all the same.
     pub const fn used(&self) -> bool {
-        matches!(self, Self::Gap { .. } | Self::Derived { .. })
+        matches!(
+            self,
+            Self::Gap { .. } | Self::Derived { .. } | Self::Unused { .. }
+        )
     }
 }
 
 impl fmt::Display for OdometryRemark {
     fn fmt(&self, f: &mut fmt::Formatter<'_>) -> fmt::Result {
         match self.issue {
-            OdometryIssue::Derived { .. } => f.write_str("odometry: ")?,
+            OdometryIssue::Derived { .. } | OdometryIssue::Unused { .. } => {
+                f.write_str("odometry: ")?;
+            }
             _ => write!(f, "odometry {} {}: ", self.kind, self.item)?,
         }
         match &self.issue {
@@ -106,7 +130,10 @@ impl fmt::Display for OdometryRemark {
             }
             OdometryIssue::Gap { gap_s } => write!(f, "{gap_s:.3} s after the one before"),
             OdometryIssue::Derived { column, from } => {
-                write!(f, "{column} is not there and taken from {from}")
+                write!(f, "{column} is taken from {from}")
+            }
+            OdometryIssue::Unused { source, why } => {
+                write!(f, "{source} is not used, it is {why}")
             }
         }
     }
@@ -162,13 +189,7 @@ impl OdometryCollector {
 
     /// Remarks on the file itself.
     pub fn remark(&mut self, issue: OdometryIssue) {
-        let time_s = f64::NEG_INFINITY;
-        let remark = OdometryRemark {
-            item: 1,
-            kind: self.kind,
-            time_s,
-            issue,
-        };
+        let remark = OdometryRemark::of_file(self.kind, issue);
         self.log.remarks.push(remark);
     }
 

@@ -50,7 +50,10 @@ pub fn read_wheel_odometry_csv(
     let wheels_m = has("left_m") && has("right_m");
     let wheels_mps = has("left_mps") && has("right_mps");
     let mut collector = OdometryCollector::of("line");
-    let mut derived = |column, from| collector.remark(OdometryIssue::Derived { column, from });
+    let mut derived = |column, from| {
+        let from = String::from(from);
+        collector.remark(OdometryIssue::Derived { column, from });
+    };
     match (
         has("distance_m") || wheels_m,
         has("speed_mps") || wheels_mps,

@@ -3,8 +3,8 @@
 use std::fs;
 use std::path::Path;
 
-use onboard::localize::tracker::TrackerConfig;
 use onboard::settings::Check;
+use recording::replay::{all_of_error, scatter_sigma_rad};
 use recording::{LoggedAngle, RecordingError, TimedPose};
 use recording::{write_angle_log, write_odometry_csv, write_tum};
 
@@ -38,23 +38,18 @@ pub fn log_angles(
         "samples, latency or noisy SNR",
         "a log of angles takes snapshots that are there at once, with the SNR as it is",
     )?;
-    let mut vehicle = scenario.vehicle.clone();
-    let method = vehicle.estimator.method;
+    let method = scenario.vehicle.estimator.method;
     let tape = Tape::record(&simulation, &[method], Streams::new(seed, run), run)?;
-    let config = TrackerConfig::new(&scenario.site, &vehicle);
-    let measurand = config.array.measurand;
-    let scatter = measurand.scatter_variance(config.rician_k, measurand.mean_aperture());
+    let scatter_rad = scatter_sigma_rad(&scenario.site, &scenario.vehicle);
     let angles: Vec<_> = tape
         .angles_of(0)
         .filter(|(ssb, _)| ssb.time_s <= end_s)
         .map(|(ssb, mut measured)| {
-            measured.phase_sigma_rad = measured.phase_sigma_rad.hypot(scatter.sqrt());
+            measured.phase_sigma_rad = measured.phase_sigma_rad.hypot(scatter_rad);
             LoggedAngle { ssb, measured }
         })
         .collect();
-    vehicle.receiver.phase_bias_share = Some(1.0);
-    vehicle.receiver.phase_bias_correlation_m = 0.5 * scenario.site.wavelength_m();
-    vehicle.receiver.phase_bias_correlation_s = 1e-3; // only the way forgets
+    let mut vehicle = all_of_error(&scenario.site, &scenario.vehicle);
     vehicle.start.pose = vehicle.start.known.then_some(tape.told_start);
     let truth: Vec<_> = (tape.truth().filter(|(time_s, _)| *time_s <= end_s))
         .map(|(time_s, pose)| TimedPose { time_s, pose })

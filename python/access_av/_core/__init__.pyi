@@ -1,4 +1,4 @@
-from collections.abc import Callable, Sequence
+from collections.abc import Callable, Mapping, Sequence
 from os import PathLike
 from pathlib import Path
 from typing import Any, final
@@ -31,6 +31,7 @@ __all__ = [
     "brief",
     "channel_drops",
     "check_paths",
+    "estimate_angles",
     "interrupt",
     "locate",
     "log_angles",
@@ -318,13 +319,22 @@ def log_angles(
     duration_s: float | None = None,
 ) -> int: ...
 def read_tum(file: str | PathLike[str]) -> dict[str, NDArray[np.float64]]: ...
+def estimate_angles(
+    site: Site,
+    vehicle: Vehicle,
+    recording: str | PathLike[str],
+    *,
+    start_time_s: float = 0.0,
+) -> tuple[dict[str, NDArray[Any]], Vehicle, list[str]]: ...
 def locate(
     site: Site,
     vehicle: Vehicle,
     odometry: str | PathLike[str],
     recording: str | PathLike[str],
     *,
+    angles: Mapping[str, NDArray[np.float64]] | None = None,
     topic: str | None = None,
+    imu_topic: str | None = None,
     start_time_s: float = 0.0,
     start: tuple[float, float, float] | None = None,
     from_scratch: bool = False,

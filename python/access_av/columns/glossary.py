@@ -120,7 +120,12 @@ _GLOSSARY = {
     "true_snr_db": ("dB", "SNR of the strongest radio head by link budget and shadowing"),
     "mean_true_snr_db": ("dB", "Mean over the runs of true_snr_db"),
     "phase_rad": ("rad", "Electrical angle ω = 2π(d/λ)·cos θ between neighbouring antennas"),
-    "phase_sigma_rad": ("rad", "Standard deviation of phase_rad from noise"),
+    "phase_sigma_rad": (
+        "rad",
+        "Standard deviation of phase_rad by the receiver's noise alone; in a log of angles all of "
+        "the error, noise and the site's scatter",
+    ),
+    "phase_noise_sigma_rad": ("rad", "The part of phase_sigma_rad by the receiver's noise alone"),
     "angle_rad": ("rad", "Angle of arrival θ from the array's axis"),
     "resolved": ("true or false", "The estimator vouches for the angle's standard deviation"),
     "accepted": ("true or false", "The localizer used the angle"),
@@ -251,7 +256,11 @@ _GLOSSARY = {
     ),
     "elevation_deg": ("°", "Elevation from the horizontal"),
     "azimuth_from_broadside_deg": ("°", "Azimuth from broadside, counter-clockwise"),
-    "sigma_deg": ("°", "Standard deviation of the angle from noise"),
+    "sigma_deg": (
+        "°",
+        "Standard deviation of the angle by the receiver's noise alone; neither scatter nor the "
+        "array's own errors are in it",
+    ),
     "label": ("text", "The annotation's label"),
     "truth_deg": ("°", "Annotated azimuth from broadside"),
 }

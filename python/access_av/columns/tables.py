@@ -163,6 +163,13 @@ TABLES: Mapping[str, Table] = {
             {**dict.fromkeys(_ANGLE, _NO_ANGLE), **dict.fromkeys(_COMPARED, _NOT_COMPARED)},
         ),
         Table(
+            "recorded_angles",
+            "An angle of a recording, not located yet",
+            "`angles.csv` and `angles.parquet` of `access-av angles`; "
+            "`access_av.estimate_angles(…).angles`; `access-av locate --recording`",
+            ("time_s", "pci", "ssb_index", "snr_db", *_ANGLE, "phase_noise_sigma_rad", "resolved"),
+        ),
+        Table(
             "findings",
             "A constant of the vehicle that the localizer estimates",
             "`findings.parquet` of `access-av locate`; `access_av.locate(…).findings`",

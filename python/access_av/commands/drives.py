@@ -84,16 +84,22 @@ def synth(
 def locate(
     recording: Annotated[
         Path,
-        typer.Option(help="SigMF recording of the array, or CSV log of angles."),
+        typer.Option(help="SigMF recording of the array, or log of angles, CSV or Parquet."),
     ],
-    odometry: Annotated[Path, typer.Option(help="CSV, or MCAP with nav_msgs/Odometry.")],
+    odometry: Annotated[
+        Path, typer.Option(help="CSV; MCAP or rosbag2 folder with nav_msgs/Odometry.")
+    ],
     site: Annotated[str, typer.Option(help="Radio heads and road: shipped name, or TOML file.")],
     vehicle: Annotated[
         str, typer.Option(help="Array, odometer, localizer: shipped name, or TOML file.")
     ] = "default",
     out: Out = None,
     truth: Annotated[Path | None, typer.Option(help="TUM trajectory to compare with.")] = None,
-    topic: Annotated[str | None, typer.Option(help="Topic of the odometry in the MCAP.")] = None,
+    topic: Annotated[str | None, typer.Option(help="Topic of the odometry in the bag.")] = None,
+    imu_topic: Annotated[
+        str | None,
+        typer.Option(help="Topic of the IMU for the yaw rate, in place of the odometry's own."),
+    ] = None,
     start_time_s: Annotated[
         float, typer.Option(help="Time of the first sample by the odometry's clock.")
     ] = 0.0,
@@ -121,8 +127,11 @@ def locate(
     Odometry, CSV: time_s; distance_m or speed_mps or both; yaw_rate_radps where something tells
     it. Or left_m and right_m, or left_mps and right_mps, of wheels odometer.track_width_m apart.
 
-    Angles, CSV: time_s; pci; phase_rad (electrical) and phase_sigma_rad, or angle_rad (from the
-    array's axis) and angle_sigma_rad; ssb_index and snr_db where known.
+    Odometry, MCAP or rosbag2: nav_msgs/Odometry; where its twist tells no yaw rate, that of a
+    sensor_msgs/Imu (z axis up) or of the turning of the pose's orientation.
+
+    Angles, CSV or Parquet: time_s; pci; phase_rad (electrical) and phase_sigma_rad, or angle_rad
+    (from the array's axis) and angle_sigma_rad; ssb_index and snr_db where known.
 
     Truth, TUM: t x y z qx qy qz qw a line, at times of its own; a line that begins with # is a
     comment.
@@ -150,6 +159,7 @@ def locate(
             recording,
             vehicle=carrier,
             topic=topic,
+            imu_topic=imu_topic,
             start_time_s=start_time_s,
             start=pose,
             from_scratch=from_scratch,

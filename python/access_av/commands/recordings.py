@@ -1,4 +1,4 @@
-"""Commands that look into recordings: ``scan``, ``aoa``."""
+"""Commands that look into recordings: ``scan``, ``aoa``, ``angles``."""
 
 from __future__ import annotations
 
@@ -7,9 +7,16 @@ from typing import Annotated
 
 import typer
 
-from access_av.commands.options import AsJson
+from access_av.commands.options import AsJson, Out
 from access_av.errors import InputError
-from access_av.terminal import console, progress, show_bursts, show_cells, show_warning
+from access_av.terminal import (
+    console,
+    progress,
+    show_angles,
+    show_bursts,
+    show_cells,
+    show_warning,
+)
 
 app = typer.Typer()
 
@@ -62,8 +69,8 @@ def scan(
     """Find every SSB in recordings of cells that nobody has described.
 
     Prints cell, beam, time, frequency offset, strength and message of each SSB whose message passes
-    its checksum, and with several channels the angle it arrives from. Channels that are clipped,
-    silent or exchanged are named.
+    its checksum, and with several channels the angle it arrives from, its standard deviation by the
+    receiver's noise alone. Channels that are clipped, silent or exchanged are named.
     """
     from access_av import nr
     from access_av._core import Recording
@@ -125,7 +132,8 @@ def aoa(
     """Estimate angles of arrival from a multi-antenna recording.
 
     Reference bursts calibrate the channels, every other annotated burst is estimated. Azimuths
-    are counter-clockwise from the array's broadside.
+    are counter-clockwise from the array's broadside, standard deviations by the receiver's noise
+    alone.
     """
     from access_av.files import json_text
     from access_av.recorded_angles import estimate_bursts
@@ -136,6 +144,58 @@ def aoa(
         print(json_text([burst.as_record() for burst in bursts]))
     else:
         show_bursts(bursts)
+
+
+@app.command(
+    epilog="Example: [bold]access-av angles drive/iq.sigmf-meta --site drive/site.toml "
+    "--vehicle drive/vehicle.toml --out angles[/]",
+)
+def angles(
+    recording: Annotated[Path, typer.Argument(help="SigMF recording of the array.")],
+    site: Annotated[str, typer.Option(help="Radio heads: shipped name, or TOML file.")],
+    vehicle: Annotated[
+        str, typer.Option(help="Array, receiver, estimator: shipped name, or TOML file.")
+    ] = "default",
+    start_time_s: Annotated[
+        float, typer.Option(help="Time of the first sample by the odometry's clock.")
+    ] = 0.0,
+    out: Out = None,
+    as_json: AsJson = False,
+) -> None:
+    """Make a log of angles of a recording's samples, for locate.
+
+    Every SSB of the site's radio heads, as the vehicle's receiver and estimator find it. Writes
+    angles.csv and angles.parquet, either of which [bold]access-av locate --recording[/] takes, with
+    site.toml and vehicle.toml beside them.
+
+    phase_sigma_rad is all of the error that is believed, the receiver's noise and the site's
+    scatter (rician_k_db); phase_noise_sigma_rad is the noise alone. The array's mounting and
+    calibration are in neither: the vehicle's file states them, and locate reckons with them.
+    """
+    from access_av.angle_log import estimate_angles
+    from access_av.files import ResultsDirectory, json_text
+
+    with progress("Estimating"):
+        found = estimate_angles(site, recording, vehicle=vehicle, start_time_s=start_time_s)
+    directory = ResultsDirectory.create("angles", out)
+    directory.write_text("angles.csv", found.csv())
+    directory.write_table("angles.parquet", found.angles)
+    directory.write_text("site.toml", found.site.to_toml())
+    directory.write_text("vehicle.toml", found.vehicle.to_toml())
+    told = {
+        "angles": found.angles.height,
+        "resolved": int(found.angles["resolved"].sum()),
+        "warnings": found.warnings,
+    }
+    directory.write_manifest(recording=str(recording), start_time_s=start_time_s, **told)
+    directory.link_latest()
+    if as_json:
+        print(json_text({**told, "directory": str(directory.path)}))
+        return
+    for warning in found.warnings:
+        show_warning(warning)
+    show_angles(found)
+    console.print(f"Files: {directory.path}", soft_wrap=True)
 
 
 def _gains(text: str) -> list[complex]:

@@ -1,7 +1,8 @@
-//! The records of an MCAP file that carry odometry.
+//! The messages of an MCAP file that tell of the vehicle's motion.
 
-use std::collections::{HashMap, HashSet};
+use std::collections::HashMap;
 use std::io::{BufReader, ErrorKind, Read};
+use std::ops::ControlFlow;
 use std::path::Path;
 
 use mcap::records::op;
@@ -13,17 +14,56 @@ use crate::file as files;
 
 /// Bytes of the longest record that is read; chunks are customarily below 10 MB.
 const LONGEST_RECORD: usize = 1 << 28;
-/// Of a message record, between channel and data: sequence number and two times.
-const SEQUENCE_AND_TIMES_BYTES: usize = 4 + 8 + 8;
+/// Of a message record, between channel and times.
+const SEQUENCE_BYTES: usize = 4;
+/// Of the two times of a message record.
+const TIMES_BYTES: usize = 8 + 8;
 
-/// Hands every CDR message of type `nav_msgs/msg/Odometry` to `take`, with its topic, in the order
-/// of the file.
+/// The types of message that are read.
+#[derive(Debug, Clone, Copy, PartialEq, Eq)]
+pub enum Kind {
+    /// `nav_msgs/msg/Odometry`.
+    Odometry,
+    /// `sensor_msgs/msg/Imu`.
+    Imu,
+}
+
+/// Hands every CDR message of a [`Kind`] to `take`, with its topic, in the order of the file.
 ///
 /// # Errors
 /// [`RecordingError`] when the file is no MCAP, or is cut off or damaged.
-pub fn each_odometry_message(
+pub fn each_message(
     file: &Path,
-    mut take: impl FnMut(&str, &[u8]),
+    mut take: impl FnMut(Kind, &str, &[u8]),
+) -> Result<(), RecordingError> {
+    let mut channels = Channels::default();
+    each_record(file, |opcode, data| {
+        channels.record(opcode, data, &mut take)?;
+        Some(ControlFlow::Continue(()))
+    })
+}
+
+/// When the first message of a file was logged, in nanoseconds; `None` where it has none.
+///
+/// # Errors
+/// As [`each_message`].
+pub fn first_time_ns(file: &Path) -> Result<Option<u64>, RecordingError> {
+    let mut time_ns = None;
+    each_record(file, |opcode, body| {
+        if opcode != op::MESSAGE {
+            return Some(ControlFlow::Continue(()));
+        }
+        let (_, times) = body.split_at_checked(size_of::<u16>() + SEQUENCE_BYTES)?;
+        time_ns = Some(u64::from_le_bytes(*times.first_chunk()?));
+        Some(ControlFlow::Break(()))
+    })?;
+    Ok(time_ns)
+}
+
+/// Hands records to `take` until it has enough; it returns `None` for one that is damaged.
+fn each_record(
+    file: &Path,
+    mut take: impl FnMut(u8, &[u8]) -> Option<ControlFlow<()>>,
 ) -> Result<(), RecordingError> {
     let syntax = |message: String| RecordingError::Syntax {
         file: file.display().to_string(),
@@ -35,17 +75,22 @@ pub fn each_odometry_message(
     // A damaged length must not be taken for the memory to set aside.
     let options = LinearReaderOptions::default().with_record_length_limit(LONGEST_RECORD);
     let mut reader = LinearReader::new_with_options(options);
-    let mut channels = Channels::default();
     while let Some(event) = reader.next_event() {
-        match event.map_err(|error| syntax(error.to_string()))? {
+        match event
+            .map_err(|error| syntax(format!("{error}; `mcap recover` keeps what is whole")))?
+        {
             LinearReadEvent::ReadRequest(need) => match source.read(reader.insert(need)) {
                 Ok(read) => reader.notify_read(read),
                 Err(error) if error.kind() == ErrorKind::Interrupted => {}
                 Err(error) => return Err(RecordingError::io(file, error)),
             },
-            LinearReadEvent::Record { opcode, data } => channels
-                .record(opcode, data, &mut take)
-                .ok_or_else(|| syntax(format!("a record of type {opcode} is damaged")))?,
+            LinearReadEvent::Record { opcode, data } => {
+                let taken = take(opcode, data)
+                    .ok_or_else(|| syntax(format!("a record of type {opcode} is damaged")))?;
+                if taken.is_break() {
+                    break;
+                }
+            }
         }
     }
     Ok(())
@@ -54,10 +99,10 @@ pub fn each_odometry_message(
 /// What the file has said of its channels so far.
 #[derive(Default)]
 struct Channels {
-    /// Schemas of odometry.
-    schemas: HashSet<u16>,
-    /// Topic of each channel that carries odometry in CDR; `None` for the others.
-    topics: HashMap<u16, Option<String>>,
+    /// Schemas of what is read.
+    schemas: HashMap<u16, Kind>,
+    /// Kind and topic of each channel that carries such in CDR; `None` for the others.
+    topics: HashMap<u16, Option<(Kind, String)>>,
 }
 
 impl Channels {
@@ -67,26 +112,30 @@ impl Channels {
         &mut self,
         opcode: u8,
         mut body: &[u8],
-        take: &mut impl FnMut(&str, &[u8]),
+        take: &mut impl FnMut(Kind, &str, &[u8]),
     ) -> Option<()> {
         match opcode {
             op::SCHEMA => {
                 let id = u16(&mut body)?;
-                if string(&mut body)? == ODOMETRY.name.as_bytes() {
-                    self.schemas.insert(id);
+                let name = string(&mut body)?;
+                if name == ODOMETRY.name.as_bytes() {
+                    self.schemas.insert(id, Kind::Odometry);
+                } else if name == b"sensor_msgs/msg/Imu" {
+                    self.schemas.insert(id, Kind::Imu);
                 }
             }
             op::CHANNEL => {
                 let (id, schema) = (u16(&mut body)?, u16(&mut body)?);
                 let topic = String::from_utf8(string(&mut body)?.to_vec()).ok()?;
-                let is_odometry = string(&mut body)? == b"cdr" && self.schemas.contains(&schema);
-                self.topics.insert(id, is_odometry.then_some(topic));
+                let is_cdr = string(&mut body)? == b"cdr";
+                let kind = self.schemas.get(&schema).filter(|_| is_cdr);
+                self.topics.insert(id, kind.map(|kind| (*kind, topic)));
             }
             op::MESSAGE => {
                 let channel = u16(&mut body)?;
-                let (_, data) = body.split_at_checked(SEQUENCE_AND_TIMES_BYTES)?;
-                if let Some(topic) = self.topics.get(&channel)? {
-                    take(topic, data);
+                let (_, data) = body.split_at_checked(SEQUENCE_BYTES + TIMES_BYTES)?;
+                if let Some((kind, topic)) = self.topics.get(&channel)? {
+                    take(*kind, topic, data);
                 }
             }
             _ => {}

@@ -1,13 +1,16 @@
 //! MCAP as ROS 2 tools write and read it: profile `ros2`, messages in CDR, schemas in `ros2msg`.
 //!
 //! Written are `nav_msgs/msg/Odometry` with covariance and twist, `diagnostic_msgs/msg/
-//! DiagnosticArray` and [`access_av_msgs/msg/AngleVerdict`](McapWriter::verdict); read is odometry.
+//! DiagnosticArray` and [`access_av_msgs/msg/AngleVerdict`](McapWriter::verdict); read are odometry and
+//! `sensor_msgs/msg/Imu`, of one file or of the files of a rosbag2 folder.
 
+mod bag;
 mod cdr;
 mod drive;
 mod messages;
 mod reader;
 mod schema;
+mod turn_rate;
 mod writer;
 
 pub use drive::write_drive_mcap;

@@ -1,12 +1,20 @@
-//! Odometry out of an MCAP file.
+//! Odometry out of MCAP files.
 
+use std::collections::BTreeMap;
 use std::path::Path;
 
-use super::cdr::Decoder;
-use super::messages::each_odometry_message;
-use crate::error::RecordingError;
-use crate::odometry::{OdometryCollector, OdometryLog};
 use onboard::observation::OdometrySample;
+
+use super::bag::files_of;
+use super::cdr::Decoder;
+use super::messages::{Kind, each_message};
+use super::schema::UNOBSERVED;
+use super::turn_rate::{Gyroscope, rates_of_headings, yaw_rad};
+use crate::error::RecordingError;
+use crate::odometry::{OdometryCollector, OdometryIssue, OdometryLog, OdometryRemark};
+
+/// What items are called.
+const KIND: &str = "message";
 
 /// What is used of one `nav_msgs/msg/Odometry`.
 struct Reading {
@@ -14,22 +22,53 @@ struct Reading {
     x_m: f64,
     y_m: f64,
     speed_mps: f64,
-    yaw_rate_radps: f64,
+    turn: Turn,
 }
 
-/// Reads the `nav_msgs/msg/Odometry` messages of one topic; of the only such topic where none is
-/// named. The distance is the length of the path of their poses, backwards where the speed is
-/// negative. Where the yaw rate is zero throughout there is no gyroscope.
+/// What a message tells of the vehicle's turning.
+#[derive(Clone, Copy)]
+struct Turn {
+    yaw_rate_radps: Option<f64>,
+    heading_rad: Option<f64>,
+}
+
+/// Reads the `nav_msgs/msg/Odometry` messages of one topic of an MCAP file or a rosbag2 folder; of the
+/// only such topic where none is named. The distance is the length of the path of their poses,
+/// backwards where the speed is negative.
+///
+/// The yaw rate is that of the twist. Where it is unknown there, or zero throughout, or `imu_topic` is
+/// named, it is `angular_velocity.z` of a `sensor_msgs/msg/Imu`, whose z axis is taken for up
+/// (REP-103); where there is none, it is how the orientation of the pose turns; else there is none.
+/// Each is the mean over the step before its sample, by the stamps of the headers. What was taken is
+/// remarked upon.
 ///
 /// # Errors
-/// [`RecordingError`] when the file is no MCAP, is cut off, or does not have exactly that topic.
+/// [`RecordingError`] when a file is no MCAP, is cut off or damaged, when the bag does not have exactly
+/// that topic, or several that tell the yaw rate and none is named, or when the named one does not.
 /// Single messages are only remarked upon.
-pub fn read_odometry_mcap(file: &Path, topic: Option<&str>) -> Result<OdometryLog, RecordingError> {
+pub fn read_odometry_mcap(
+    bag: &Path,
+    topic: Option<&str>,
+    imu_topic: Option<&str>,
+) -> Result<OdometryLog, RecordingError> {
     let mut topics: Vec<String> = Vec::new();
-    let mut collector = OdometryCollector::of("message");
+    let mut collector = OdometryCollector::of(KIND);
+    let mut turns: Vec<Turn> = Vec::new();
+    let mut imus: BTreeMap<String, Gyroscope> = BTreeMap::new();
     let mut last_place: Option<(f64, f64)> = None;
     let mut item = 0;
-    each_odometry_message(file, |message_topic, data| {
+    let mut take = |kind, message_topic: &str, data: &[u8]| {
+        if kind == Kind::Imu {
+            if imu_topic.is_none_or(|topic| topic == message_topic) {
+                if !imus.contains_key(message_topic) {
+                    imus.insert(message_topic.to_owned(), Gyroscope::default());
+                }
+                if let Some(gyroscope) = imus.get_mut(message_topic) {
+                    gyroscope.add(decode_imu(data));
+                }
+            }
+            return;
+        }
         if topic.is_some_and(|topic| topic != message_topic) {
             return;
         }
@@ -37,7 +76,7 @@ pub fn read_odometry_mcap(file: &Path, topic: Option<&str>) -> Result<OdometryLo
             topics.push(message_topic.to_owned());
         }
         item += 1;
-        let Some(reading) = decode(data) else {
+        let Some(reading) = decode_odometry(data) else {
             collector.add(item, Err("no complete nav_msgs/msg/Odometry".to_owned()));
             return;
         };
@@ -54,40 +93,46 @@ pub fn read_odometry_mcap(file: &Path, topic: Option<&str>) -> Result<OdometryLo
                 time_s: reading.time_s,
                 distance_m: driven_m + step_m,
                 speed_mps: reading.speed_mps,
-                yaw_rate_radps: Some(reading.yaw_rate_radps),
+                yaw_rate_radps: None,
             }),
         );
         // A sample that was left out must not move the place from which the next step counts.
         if collector.last().copied() != before {
             last_place = Some(place);
+            turns.push(reading.turn);
         }
-    })?;
-    one_topic(file, topic, &topics)?;
-    let mut log = collector.finish();
-    if log
-        .samples
-        .iter()
-        .all(|sample| sample.yaw_rate_radps == Some(0.0))
-    {
-        log.samples
-            .iter_mut()
-            .for_each(|sample| sample.yaw_rate_radps = None);
+    };
+    for file in files_of(bag)? {
+        each_message(&file, &mut take)?;
     }
+    let topic = one_topic(bag, topic, &topics)?;
+    let mut log = collector.finish();
+    Turning {
+        bag,
+        topic,
+        turns: &turns,
+        imus: &imus,
+    }
+    .tell(&mut log, imu_topic)?;
     Ok(log)
 }
 
-fn one_topic(file: &Path, wanted: Option<&str>, found: &[String]) -> Result<(), RecordingError> {
+fn one_topic<'a>(
+    bag: &Path,
+    wanted: Option<&str>,
+    found: &'a [String],
+) -> Result<&'a str, RecordingError> {
     match (found, wanted) {
-        ([_], _) => Ok(()),
+        ([topic], _) => Ok(topic),
         ([], _) => Err(RecordingError::Missing {
-            file: file.display().to_string(),
+            file: bag.display().to_string(),
             key: wanted
                 .unwrap_or("a topic of nav_msgs/msg/Odometry")
                 .to_owned(),
-            allowed: "the file must hold nav_msgs/msg/Odometry in CDR on it".to_owned(),
+            allowed: "there must be nav_msgs/msg/Odometry in CDR on it".to_owned(),
         }),
         (several, _) => Err(RecordingError::value(
-            file,
+            bag,
             "topic",
             "not given",
             format!(
@@ -98,21 +143,195 @@ fn one_topic(file: &Path, wanted: Option<&str>, found: &[String]) -> Result<(), 
     }
 }
 
-fn decode(message: &[u8]) -> Option<Reading> {
+/// All that a bag tells of the vehicle's turning.
+struct Turning<'a> {
+    bag: &'a Path,
+    /// Topic of the odometry.
+    topic: &'a str,
+    /// Of each sample of it.
+    turns: &'a [Turn],
+    imus: &'a BTreeMap<String, Gyroscope>,
+}
+
+impl Turning<'_> {
+    /// Gives the samples their yaw rate, and remarks on where it is from.
+    fn tell(&self, log: &mut OdometryLog, asked: Option<&str>) -> Result<(), RecordingError> {
+        let times_s: Vec<f64> = log.samples.iter().map(|sample| sample.time_s).collect();
+        let by_twist: Vec<Option<f64>> = self.turns.iter().map(|it| it.yaw_rate_radps).collect();
+        let twist_tells = by_twist.iter().flatten().any(|rate| *rate != 0.0);
+        let mut remarks = Vec::new();
+        let mut told = None;
+        if let Some((imu, gyroscope)) = self.imu(asked, twist_tells, &mut remarks)? {
+            let rates = gyroscope.rates(&times_s);
+            let source = format!("angular_velocity.z of {imu}");
+            if rates.iter().any(Option::is_some) {
+                let but = match gyroscope.left_out {
+                    0 => String::new(),
+                    count => format!("; {count} of its messages are left out"),
+                };
+                told = Some((
+                    rates,
+                    format!("{source}, whose z axis is taken for up{but}"),
+                ));
+            } else {
+                let why = self.apart(&times_s, gyroscope);
+                if asked.is_some() {
+                    let allowed = "both must be stamped by one clock, in their headers";
+                    return Err(RecordingError::value(self.bag, imu, why, allowed));
+                }
+                remarks.push(OdometryIssue::Unused { source, why });
+            }
+        }
+        if told.is_none() && twist_tells {
+            // Only where there was a choice is there something to say.
+            let others: Vec<&str> = self.imus.keys().map(String::as_str).collect();
+            let said = format!(
+                "twist.angular.z of {}; --imu-topic takes that of {}",
+                self.topic,
+                others.join(" or ")
+            );
+            let said = if others.is_empty() {
+                String::new()
+            } else {
+                said
+            };
+            told = Some((by_twist, said));
+        }
+        if told.is_none() {
+            let headings: Vec<Option<f64>> = self.turns.iter().map(|it| it.heading_rad).collect();
+            let rates = rates_of_headings(&times_s, &headings);
+            if rates.iter().any(Option::is_some) {
+                told = Some((rates, format!("pose.orientation of {}", self.topic)));
+            }
+        }
+        if let Some((rates, from)) = told {
+            for (sample, rate) in log.samples.iter_mut().zip(rates) {
+                sample.yaw_rate_radps = rate;
+            }
+            if !from.is_empty() {
+                let column = "yaw_rate_radps";
+                remarks.push(OdometryIssue::Derived { column, from });
+            }
+        }
+        let remarks = remarks.into_iter();
+        let of_file = remarks.map(|issue| OdometryRemark::of_file(KIND, issue));
+        log.remarks.splice(0..0, of_file);
+        Ok(())
+    }
+
+    /// The IMU that is asked for or needed, with its topic; what cannot be used is remarked upon.
+    fn imu(
+        &self,
+        asked: Option<&str>,
+        twist_tells: bool,
+        remarks: &mut Vec<OdometryIssue>,
+    ) -> Result<Option<(&str, &Gyroscope)>, RecordingError> {
+        if let Some(asked) = asked {
+            let Some((topic, gyroscope)) = self.imus.get_key_value(asked) else {
+                return Err(RecordingError::Missing {
+                    file: self.bag.display().to_string(),
+                    key: asked.to_owned(),
+                    allowed: "there must be sensor_msgs/msg/Imu in CDR on it".to_owned(),
+                });
+            };
+            if let Some(why) = says_nothing(gyroscope) {
+                let allowed = "an IMU that tells its angular velocity must be on it";
+                return Err(RecordingError::value(self.bag, asked, why, allowed));
+            }
+            return Ok(Some((topic, gyroscope)));
+        }
+        if twist_tells {
+            return Ok(None);
+        }
+        let mut usable = Vec::new();
+        for (topic, gyroscope) in self.imus {
+            if let Some(why) = says_nothing(gyroscope) {
+                let source = topic.clone();
+                let why = why.to_owned();
+                remarks.push(OdometryIssue::Unused { source, why });
+            } else {
+                usable.push((topic.as_str(), gyroscope));
+            }
+        }
+        match usable.as_slice() {
+            [] => Ok(None),
+            [one] => Ok(Some(*one)),
+            several => {
+                let topics: Vec<&str> = several.iter().map(|(topic, _)| *topic).collect();
+                Err(RecordingError::value(
+                    self.bag,
+                    "imu_topic",
+                    "not given",
+                    format!(
+                        "the odometry tells no yaw rate and several IMUs do, choose one of {}",
+                        topics.join(", ")
+                    ),
+                ))
+            }
+        }
+    }
+
+    /// That odometry and gyroscope have no time in common.
+    fn apart(&self, times_s: &[f64], gyroscope: &Gyroscope) -> String {
+        let from_to = |[from_s, to_s]: [f64; 2]| format!("{from_s:.3} to {to_s:.3} s");
+        let of_imu = gyroscope.interval_s().map_or_else(String::new, from_to);
+        let ends = times_s.first().zip(times_s.last());
+        let of_odometry = ends.map_or_else(String::new, |(from, to)| from_to([*from, *to]));
+        format!("stamped {of_imu}, {} {of_odometry}", self.topic)
+    }
+}
+
+/// Why a gyroscope tells nothing, if so.
+fn says_nothing(gyroscope: &Gyroscope) -> Option<&'static str> {
+    if gyroscope.len() < 2 {
+        Some("without an angular velocity that is known, finite and in order of time")
+    } else if gyroscope.is_silent() {
+        Some("zero in every angular velocity")
+    } else {
+        None
+    }
+}
+
+fn decode_odometry(message: &[u8]) -> Option<Reading> {
     let mut decoder = Decoder::new(message)?;
-    let (seconds, nanoseconds) = (decoder.i32()?, decoder.u32()?);
-    decoder.skip_string()?;
-    decoder.skip_string()?;
+    let time_s = stamp_s(&mut decoder)?;
+    decoder.skip_string()?; // frame of the pose
+    decoder.skip_string()?; // frame of the twist
     let [x_m, y_m, _z_m] = decoder.f64s()?;
-    let _orientation: [f64; 4] = decoder.f64s()?;
+    let orientation: [f64; 4] = decoder.f64s()?;
     let _covariance: [f64; 36] = decoder.f64s()?;
     let [speed_mps, _, _] = decoder.f64s()?;
     let [_, _, yaw_rate_radps] = decoder.f64s()?;
+    let covariance: [f64; 36] = decoder.f64s()?;
+    let variance = covariance[35];
+    let is_told = yaw_rate_radps.is_finite() && !(variance < 0.0 || variance >= UNOBSERVED);
     Some(Reading {
-        time_s: f64::from(seconds) + 1e-9 * f64::from(nanoseconds),
+        time_s,
         x_m,
         y_m,
         speed_mps,
-        yaw_rate_radps,
+        turn: Turn {
+            yaw_rate_radps: is_told.then_some(yaw_rate_radps),
+            heading_rad: yaw_rad(orientation),
+        },
     })
+}
+
+/// Time (s) and yaw rate (rad/s) of a `sensor_msgs/msg/Imu`; `None` where its angular velocity is
+/// marked as unknown by a first element of −1 in its covariance, and of a message that is cut off.
+fn decode_imu(message: &[u8]) -> Option<(f64, f64)> {
+    let mut decoder = Decoder::new(message)?;
+    let time_s = stamp_s(&mut decoder)?;
+    decoder.skip_string()?;
+    let _orientation: [f64; 4] = decoder.f64s()?;
+    let _covariance: [f64; 9] = decoder.f64s()?;
+    let [_, _, yaw_rate_radps] = decoder.f64s()?;
+    let [first, ..]: [f64; 9] = decoder.f64s()?;
+    let _acceleration_and_covariance: [f64; 12] = decoder.f64s()?;
+    (first != -1.0).then_some((time_s, yaw_rate_radps))
+}
+
+fn stamp_s(decoder: &mut Decoder<'_>) -> Option<f64> {
+    let (seconds, nanoseconds) = (decoder.i32()?, decoder.u32()?);
+    Some(f64::from(seconds) + 1e-9 * f64::from(nanoseconds))
 }

@@ -6,6 +6,9 @@ pub struct Schema {
     pub definition: &'static str,
 }
 
+/// Variance of what is not observed: large, finite (an infinite one breaks filters downstream).
+pub const UNOBSERVED: f64 = 1e6;
+
 /// See its definition.
 pub const ODOMETRY: Schema = Schema {
     name: "nav_msgs/msg/Odometry",

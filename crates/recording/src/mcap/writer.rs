@@ -7,12 +7,10 @@ use mcap::records::MessageHeader;
 use mcap::{McapError, WriteOptions, Writer};
 
 use super::cdr::Encoder;
-use super::schema::{DIAGNOSTICS, ODOMETRY, Schema, VERDICT};
+use super::schema::{DIAGNOSTICS, ODOMETRY, Schema, UNOBSERVED, VERDICT};
 use onboard::Execution;
 use onboard::localize::PoseEstimate;
 
-/// Variance of what is not observed: large, finite (an infinite one breaks filters downstream).
-const UNOBSERVED: f64 = 1e6;
 /// Indices of x, y and yaw among x, y, z, roll, pitch, yaw.
 const PLANE: [usize; 3] = [0, 1, 5];
 

@@ -1,5 +1,6 @@
 //! A recorded drive through the pipeline: odometry and SSBs, or angles, in order of time.
 
+mod angles;
 mod bursts;
 mod doubts;
 mod drive;
@@ -13,6 +14,7 @@ mod start;
 mod stated;
 mod suspicion;
 
+pub use angles::{RecordedAngles, all_of_error, estimate_angles, scatter_sigma_rad};
 pub use drive::Replay;
 pub use error::ReplayError;
 pub use innovations::{Met, innovations};

@@ -189,7 +189,7 @@ fn write_mcap(file: &Path, topics: &[&str], yaw_rate_radps: f64) {
 fn odometry_is_read_from_mcap() {
     let file = common::scratch("odometry-mcap").join("odo.mcap");
     write_mcap(&file, &["/odom"], 0.02);
-    let log = read_odometry_mcap(&file, None).unwrap();
+    let log = read_odometry_mcap(&file, None, None).unwrap();
     assert_eq!((log.samples.len(), log.remarks.len()), (20, 0));
     for (k, sample) in log.samples.iter().enumerate() {
         assert!((sample.time_s - k as f64 * 0.25).abs() < 1e-9);
@@ -198,7 +198,7 @@ fn odometry_is_read_from_mcap() {
     }
     // A yaw rate of zero throughout is the lack of a gyroscope.
     write_mcap(&file, &["/odom"], 0.0);
-    let log = read_odometry_mcap(&file, Some("/odom")).unwrap();
+    let log = read_odometry_mcap(&file, Some("/odom"), None).unwrap();
     assert!(
         log.samples
             .iter()
@@ -224,16 +224,16 @@ fn compressed_mcap_is_read_alike() {
     let dir = common::scratch("odometry-mcap-compressed");
     let plain = dir.join("plain.mcap");
     write_mcap(&plain, &["/odom"], 0.02);
-    let expected = read_odometry_mcap(&plain, None).unwrap();
+    let expected = read_odometry_mcap(&plain, None, None).unwrap();
     for compression in [Compression::Lz4, Compression::Zstd] {
         let file = dir.join("odo.mcap");
         fs::copy(&plain, &file).unwrap();
         compress(&file, compression);
         assert!(fs::metadata(&file).unwrap().len() < fs::metadata(&plain).unwrap().len());
-        assert_eq!(read_odometry_mcap(&file, None).unwrap(), expected);
+        assert_eq!(read_odometry_mcap(&file, None, None).unwrap(), expected);
         let whole = fs::read(&file).unwrap();
         fs::write(&file, &whole[..whole.len() / 3]).unwrap();
-        let error = read_odometry_mcap(&file, None).unwrap_err();
+        let error = read_odometry_mcap(&file, None, None).unwrap_err();
         assert!(matches!(
             error,
             RecordingError::Syntax { format: "MCAP", .. }
@@ -254,7 +254,9 @@ fn mcap_names_longer_than_their_record_are_refused() {
         let mut damaged = whole.clone();
         damaged[start - 1] = 0xff;
         fs::write(&file, damaged).unwrap();
-        let error = read_odometry_mcap(&file, None).unwrap_err().to_string();
+        let error = read_odometry_mcap(&file, None, None)
+            .unwrap_err()
+            .to_string();
         assert!(error.contains("damaged"), "{error}");
     }
 }
@@ -264,21 +266,24 @@ fn mcap_files_without_the_one_topic_are_refused() {
     let file = common::scratch("odometry-mcap-bad").join("odo.mcap");
     write_mcap(&file, &["/a", "/b"], 0.0);
     assert!(matches!(
-        read_odometry_mcap(&file, None),
+        read_odometry_mcap(&file, None, None),
         Err(RecordingError::Value { .. })
     ));
     assert_eq!(
-        read_odometry_mcap(&file, Some("/b")).unwrap().samples.len(),
+        read_odometry_mcap(&file, Some("/b"), None)
+            .unwrap()
+            .samples
+            .len(),
         20
     );
     assert!(matches!(
-        read_odometry_mcap(&file, Some("/c")),
+        read_odometry_mcap(&file, Some("/c"), None),
         Err(RecordingError::Missing { .. })
     ));
     let whole = fs::read(&file).unwrap();
     for length in [0, 5, 100, whole.len() / 2, whole.len() - 1] {
         fs::write(&file, &whole[..length]).unwrap();
-        let error = read_odometry_mcap(&file, Some("/a")).unwrap_err();
+        let error = read_odometry_mcap(&file, Some("/a"), None).unwrap_err();
         assert!(
             matches!(error, RecordingError::Syntax { format: "MCAP", .. }),
             "{length}"
@@ -387,7 +392,7 @@ proptest! {
             bytes.truncate(cut.index(bytes.len()));
         }
         fs::write(&file, bytes).unwrap();
-        let _ = read_odometry_mcap(&file, None);
+        let _ = read_odometry_mcap(&file, None, None);
         let _ = read_odometry_csv(&file);
         let _ = read_angle_log(&file);
         let _ = read_tum(&file);

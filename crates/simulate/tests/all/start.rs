@@ -166,6 +166,6 @@ fn a_recorded_drive_either_way_needs_no_initial_pose() {
     // No pose is published before there is one.
     let dir = common::scratch("start-mcap");
     write_drive_mcap(&dir.join("drive.mcap"), &drive).unwrap();
-    let published = read_odometry_mcap(&dir.join("drive.mcap"), None).unwrap();
+    let published = read_odometry_mcap(&dir.join("drive.mcap"), None, None).unwrap();
     assert_eq!(published.samples.len(), errors.len());
 }

@@ -1,0 +1,111 @@
+//! The MCAP files that a path stands for: one, or those of a rosbag2 folder.
+
+use std::fs;
+use std::path::{Path, PathBuf};
+
+use super::messages::first_time_ns;
+use crate::error::RecordingError;
+use crate::file as files;
+
+/// A bag of many thousand files has a shorter `metadata.yaml`.
+const MOST_METADATA_BYTES: u64 = 16 << 20;
+
+/// The MCAP files of a bag in order of time; a file is a bag by itself.
+///
+/// What a folder holds is read, whether or not its recorder lived to write `metadata.yaml`; a file that
+/// is named there has to be here.
+///
+/// # Errors
+/// [`RecordingError`] when the folder cannot be read, lacks a file, or holds no MCAP.
+pub fn files_of(bag: &Path) -> Result<Vec<PathBuf>, RecordingError> {
+    let io = |source| RecordingError::io(bag, source);
+    if ends_with(bag, "db3") {
+        return Err(not_mcap(bag));
+    }
+    if !bag.is_dir() {
+        return Ok(vec![bag.to_owned()]);
+    }
+    let (mut found, mut other) = (Vec::new(), None);
+    for entry in fs::read_dir(bag).map_err(io)? {
+        let file = entry.map_err(io)?.path();
+        if ends_with(&file, "mcap") {
+            found.push(file);
+        } else if ends_with(&file, "db3") || ends_with(&file, "zstd") {
+            other = Some(file);
+        }
+    }
+    if found.is_empty() {
+        return Err(other.map_or_else(|| empty(bag), |file| not_mcap(&file)));
+    }
+    for name in announced(bag)? {
+        if !bag.join(&name).is_file() {
+            return Err(RecordingError::Missing {
+                file: bag.join("metadata.yaml").display().to_string(),
+                key: name,
+                allowed:
+                    "a file that it names must be in the folder; to read another alone, give that \
+                          file in place of the folder"
+                        .to_owned(),
+            });
+        }
+    }
+    if found.len() == 1 {
+        return Ok(found);
+    }
+    let mut timed = Vec::with_capacity(found.len());
+    for file in found {
+        // A file without messages stands anywhere.
+        timed.push((first_time_ns(&file)?.unwrap_or(u64::MAX), file));
+    }
+    timed.sort();
+    Ok(timed.into_iter().map(|(_, file)| file).collect())
+}
+
+fn ends_with(file: &Path, extension: &str) -> bool {
+    let found = file.extension();
+    found.is_some_and(|it| it.eq_ignore_ascii_case(extension))
+}
+
+/// Names of MCAP files that stand in a list of `metadata.yaml`, without the folders before them, as
+/// old versions write them.
+fn announced(bag: &Path) -> Result<Vec<String>, RecordingError> {
+    let file = bag.join("metadata.yaml");
+    if !file.exists() {
+        return Ok(Vec::new());
+    }
+    let bytes = files::read(&file, MOST_METADATA_BYTES)
+        .map_err(|source| RecordingError::io(&file, source))?;
+    let text = String::from_utf8_lossy(&bytes);
+    let items = text.lines().filter_map(|line| {
+        let item = line.trim().strip_prefix("- ")?.trim();
+        let path = item.strip_prefix("path:").unwrap_or(item).trim();
+        let path = Path::new(path.trim_matches(['"', '\'']));
+        let name = ends_with(path, "mcap").then(|| path.file_name())??;
+        Some(name.to_string_lossy().into_owned())
+    });
+    Ok(items.collect())
+}
+
+fn not_mcap(file: &Path) -> RecordingError {
+    let (storage, remedy) = if ends_with(file, "db3") {
+        (
+            "sqlite3",
+            "MCAP is read: `ros2 bag convert -i BAG -o mcap.yaml` writes it, with `output_bags: \
+             [{uri: NEW, storage_id: mcap, all: true}]` in mcap.yaml",
+        )
+    } else {
+        (
+            "compressed as a whole",
+            "MCAP is read, also with compressed chunks in it: `zstd -d FILE` unpacks it",
+        )
+    };
+    RecordingError::value(file, "storage", storage, remedy)
+}
+
+fn empty(bag: &Path) -> RecordingError {
+    RecordingError::Missing {
+        file: bag.display().to_string(),
+        key: "*.mcap".to_owned(),
+        allowed: "a rosbag2 folder holds one MCAP file or several".to_owned(),
+    }
+}
