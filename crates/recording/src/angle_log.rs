@@ -49,6 +49,9 @@ const DEVIATIONS: &str = "# phase_sigma_rad: all of the error that is believed, 
 /// Standard deviation of an angle of which nothing is known, π/√3 (rad).
 const MOST_SIGMA_RAD: f64 = 1.813_799_364_234_217_8;
 
+/// No clock of seconds tells more, be it from 1970 on; milliseconds do since 1973.
+const MOST_TIME_S: f64 = 1e11;
+
 /// SNR (dB) of an angle of which none is stated: good enough for any policy.
 const UNSTATED_SNR_DB: f64 = 20.0;
 
@@ -133,8 +136,8 @@ pub fn angle_log_of_columns(
     let rows = wanted.iter().flatten().map(|it| it.len()).max();
     let mut log = AngleLog::default();
     for row in 0..rows.unwrap_or(0) {
-        let value = |column: &Option<&Vec<f64>>| column.as_ref()?.get(row).copied();
-        let known = wanted.iter().map(|it| value(it).filter(|it| !it.is_nan()));
+        let value = |column: Option<&Vec<f64>>| column?.get(row).copied();
+        let known = wanted.iter().map(|it| value(*it).filter(|it| !it.is_nan()));
         log.add(row + 1, angle(&known.collect::<Vec<_>>()));
     }
     Ok(log)
@@ -194,6 +197,11 @@ fn angle(values: &[Option<f64>]) -> Result<LoggedAngle, String> {
         finite(value, name)?.ok_or_else(|| format!("{name} is missing"))
     };
     let (time_s, pci) = (needed(time_s, "time_s")?, needed(pci, "pci")?);
+    if time_s.abs() > MOST_TIME_S {
+        return Err(format!(
+            "time_s {time_s} is no time of a drive; it must be seconds"
+        ));
+    }
     let ssb_index = finite(ssb_index, "ssb_index")?.unwrap_or(0.0);
     let snr_db = finite(snr_db, "snr_db")?.unwrap_or(UNSTATED_SNR_DB);
     let angle_rad = finite(angle_rad, "angle_rad")?;

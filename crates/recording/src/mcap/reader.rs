@@ -304,7 +304,8 @@ fn decode_odometry(message: &[u8]) -> Option<Reading> {
     let [_, _, yaw_rate_radps] = decoder.f64s()?;
     let covariance: [f64; 36] = decoder.f64s()?;
     let variance = covariance[35];
-    let is_told = yaw_rate_radps.is_finite() && !(variance < 0.0 || variance >= UNOBSERVED);
+    let is_observed = variance.is_nan() || (0.0..UNOBSERVED).contains(&variance);
+    let is_told = yaw_rate_radps.is_finite() && is_observed;
     Some(Reading {
         time_s,
         x_m,

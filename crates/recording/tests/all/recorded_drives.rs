@@ -316,12 +316,16 @@ fn angle_logs_come_back_and_bad_lines_are_left_out() {
 
     let good = fs::read_to_string(&file).unwrap();
     let bad = "0.04,1008,0,0,0.1,1,0\n0.04,1,-1,0,0.1,1,0\n0.04,1,0,0,-0.1,1,0\n0.04,1,0,0,0,1,0\n\
-               0.04,1,0,NaN,0.1,1,0\n0.04,1,0,0,inf,1,0\n0.04,1,0,,0.1,1,0\n0.04,1.5,0,0,0.1,1,0\n";
+               0.04,1,0,NaN,0.1,1,0\n0.04,1,0,0,inf,1,0\n0.04,1,0,,0.1,1,0\n0.04,1.5,0,0,0.1,1,0\n\
+               1.7e18,1,0,0,0.1,1,0\n";
     fs::write(&file, good + bad).unwrap();
     let log = read_angle_log(&file).unwrap();
     assert_eq!(log.angles, angles);
     let lines: Vec<usize> = log.remarks.iter().map(|remark| remark.line).collect();
-    assert_eq!(lines, (4..12).collect::<Vec<_>>());
+    // After a comment, the header and two good ones.
+    assert_eq!(lines, (5..14).collect::<Vec<_>>());
+    let nanoseconds = log.remarks.last().unwrap().to_string();
+    assert!(nanoseconds.contains("it must be seconds"), "{nanoseconds}");
 }
 
 #[test]
