@@ -84,7 +84,7 @@ def cases(platform: Platform) -> list[Case]:
     return every_ssb + fixed + adaptive
 
 
-@dataclass(frozen=True)
+@dataclass(frozen=True, eq=False, repr=False)
 class Evaluation:
     """All results of one reading.
 
@@ -112,6 +112,9 @@ class Evaluation:
     seed: int
     refitted: bool
     duration_s: float = 0.0
+
+    def __repr__(self) -> str:
+        return f"Evaluation({self.reading.name}, {self.runs} runs, {self.points.height} points)"
 
     @property
     def scenario(self) -> Scenario:
