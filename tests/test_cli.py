@@ -132,8 +132,12 @@ def test_explore_answers_from_the_last_evaluation(
     done = access_av("explore", "--max-energy-j", "1000", "--json")
     assert len(json.loads(done.out)) == 8
     assert access_av("explore", "--max-energy-j", "1000", "--fixed", columns=60).code == 0
+    asked = ("explore", "--max-error-m", "9", "--percentile", "90", "--json")
+    found = json.loads(access_av(*asked).out)
+    assert all(each["p90_error_low_m"] <= each["p90_error_m"] for each in found)
+    assert access_av("explore", "--max-error-m", "1", "--percentile", "12").code == 2
     none = access_av("explore", "--max-energy-j", "1")
-    assert none.code == 0
+    assert none.code == 3
     assert "No operating point has energy ≤ 1 J" in none.out
 
 

@@ -62,8 +62,7 @@ _IN_THE_WORST = (
     "choice", "world", "runs", "energy_j", "rms_error_m", *_PERCENTILES, "p90_max_error_m",
     "executions", "listened",
 )  # fmt: skip
-_IN_THE_WORST_NULL = {
-    **dict.fromkeys(("rms_error_m", "p90_max_error_m"), "in some run it was not found"),
+_PERCENTILES_NULL = {
     **dict.fromkeys(
         (name for name in _PERCENTILES if "low" not in name),
         "for so much of the time the place is not known",
@@ -72,6 +71,10 @@ _IN_THE_WORST_NULL = {
         (name for name in _PERCENTILES if "low" in name or "high" in name),
         "one run has no interval; or the drives are too few to say",
     ),
+}
+_IN_THE_WORST_NULL = {
+    **dict.fromkeys(("rms_error_m", "p90_max_error_m"), "in some run it was not found"),
+    **_PERCENTILES_NULL,
 }
 _POSE = ("x_m", "y_m", "heading_rad")
 _POSES = (
@@ -262,7 +265,7 @@ TABLES: Mapping[str, Table] = {
             (
                 "reading", "campaign", "mode", "mode_name", "method", "adaptive", "base_wake_up_ms",
                 "executions", "worst_error_x_m", "worst_error_y_m", "rms_error_m",
-                "energy_per_execution_j", "energy_j", "energy_provenance",
+                "energy_per_execution_j", "energy_j", "energy_provenance", *_PERCENTILES,
             ),
             {
                 **dict.fromkeys(("mode", "mode_name"), _NO_MODE),
@@ -270,6 +273,7 @@ TABLES: Mapping[str, Table] = {
                     ("energy_per_execution_j", "energy_j", "energy_provenance"),
                     f"{_NO_MODE}; or {_NO_FIGURE}",
                 ),
+                **_PERCENTILES_NULL,
             },
         ),
         Table(

@@ -202,7 +202,7 @@ def choose(
 
 def _show(rows: pl.DataFrame, title: str, percent: float = 99.0) -> None:
     """Designs as a table, in as many columns as the terminal has room for."""
-    from access_av.statistics.percentiles import column
+    from access_av.statistics.percentiles import column, ends_text
 
     name = column(percent)
     low, high = (name.replace("_error_m", f"_error_{end}_m") for end in ("low", "high"))
@@ -211,7 +211,7 @@ def _show(rows: pl.DataFrame, title: str, percent: float = 99.0) -> None:
         *([("worst in", lambda row: row["world"])] if (rows["world"] != "").any() else []),
         ("energy J", lambda row: _known(row["energy_j"])),
         (f"{percent:g} % m", lambda row: _known(row[name])),
-        ("(95 %)", lambda row: _between(row[low], row[high])),
+        ("(95 %)", lambda row: ends_text(row[low], row[high])),
         ("RMS m", lambda row: _known(row["rms_error_m"])),
         ("median m", lambda row: _known(row["p50_error_m"])),
         ("executions", lambda row: _known(row["executions"])),
@@ -236,9 +236,3 @@ def _show(rows: pl.DataFrame, title: str, percent: float = 99.0) -> None:
 
 def _known(value: float | None) -> str:
     return "–" if value is None else value_text(value)
-
-
-def _between(low: float | None, high: float | None) -> str:
-    if low is None:
-        return "–"
-    return f"above {low:.3g}" if high is None else f"{low:.3g} to {high:.3g}"

@@ -11,13 +11,15 @@ import polars as pl
 
 from access_av.designs.front import may_be_front
 from access_av.errors import InputError
-from access_av.statistics.percentiles import PERCENTS, as_columns, column
+from access_av.statistics.percentiles import PERCENTS, as_columns, column, ends_text, names
 
 if TYPE_CHECKING:
     from collections.abc import Mapping, Sequence
 
     from access_av.designs.drives import Driven
 
+# Columns that may hold nothing known.
+NUMBERS = dict.fromkeys(("energy_j", "rms_error_m", "p90_max_error_m", *names()), pl.Float64)
 ENERGY = "energy"
 # Of the error that is bound, where none is given: what 3GPP's levels 2, 3 and 5 ask for.
 USUAL_PERCENT = 99.0
@@ -37,6 +39,7 @@ def rows_of(driven: Sequence[Driven]) -> pl.DataFrame:
             for index, one in enumerate(driven)
         ],
         infer_schema_length=None,
+        schema_overrides=NUMBERS,
     )
 
 
@@ -49,6 +52,7 @@ def rows_of_worlds(driven: Sequence[Driven]) -> pl.DataFrame:
             for world in one.worlds
         ],
         infer_schema_length=None,
+        schema_overrides=NUMBERS,
     )
 
 
@@ -144,7 +148,7 @@ class Constraints:
         --------
         >>> row = {"p99_error_m": 0.286, "p99_error_low_m": 0.21, "p99_error_high_m": 0.34}
         >>> Constraints(max_error_m=0.3).in_words(row)
-        ['99 % of errors within 0.286 m (95 %: 0.21 to 0.34 m), asked 0.3 m: too few drives to say']
+        ['99 % of errors within 0.286 m (95 %: 0.21 to 0.34), asked 0.3 m: too few drives to say']
         """
         told = []
         for name, (value, bound) in self._judged(row).items():
@@ -156,9 +160,7 @@ class Constraints:
                 low_m, high_m = _ends(row, self.percent)
                 if (high_m is None and verdict == "kept") or (high_m or 0.0) > bound >= value:
                     verdict = "too few drives to say"
-                if low_m is not None:
-                    to = "more than was seen" if high_m is None else f"{high_m:.3g} m"
-                    had += f" (95 %: {low_m:.3g} to {to})"
+                had += f" (95 %: {ends_text(low_m, high_m)})"
             told.append(f"{name} {had}, asked {bound:g} {unit}: {verdict}")
         return told
 

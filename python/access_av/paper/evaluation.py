@@ -27,6 +27,7 @@ from access_av.paper.outcome import Drives, Outcome
 from access_av.paper.readings import SHIPPED, Reading, load
 from access_av.paper.statements import paper_numbers
 from access_av.platform import Platform
+from access_av.statistics.percentiles import as_columns, names
 
 if TYPE_CHECKING:
     from collections.abc import Callable, Mapping, Sequence
@@ -202,13 +203,17 @@ def evaluate_with(driver: Driver, reading: Reading) -> Evaluation:
     outcome, refitted = outcome_of(
         [(case, driven[case.setting].drives) for case in wanted], platform, driver.trip_s
     )
+    errors = {setting: as_columns(each.percentiles()) for setting, each in driven.items()}
     return Evaluation(
         reading=reading,
         points=pl.DataFrame(
-            [_point(case, outcome, refitted) for case in wanted],
+            [_point(case, outcome, refitted) | errors[case.setting] for case in wanted],
             infer_schema_length=None,
             # Without a single figure there would be no type either.
-            schema_overrides={"energy_j": pl.Float64, "energy_provenance": pl.String},
+            schema_overrides={
+                **dict.fromkeys(("energy_j", *names()), pl.Float64),
+                "energy_provenance": pl.String,
+            },
         ),
         errors=pl.concat([_errors(setting, each.steps) for setting, each in driven.items()]),
         snr=reference.select("time_s", "mean_true_snr_db"),

@@ -13,6 +13,7 @@ import polars as pl
 from access_av.report.chart import GREEN, GREY, ORANGE, finish, thinned
 from access_av.report.page import sheet
 from access_av.report.parts import badge, figure, number, section, source, table, tile, value_text
+from access_av.statistics.percentiles import ends_text
 
 if TYPE_CHECKING:
     from collections.abc import Sequence
@@ -116,7 +117,7 @@ def _table(rows: pl.DataFrame) -> str:
                 *([escape(row["world"])] if worlds else []),
                 number(row["energy_j"], 2),
                 *(number(row[f"p{percent}_error_m"]) for percent in (50, 90, 99)),
-                _interval(row["p99_error_low_m"], row["p99_error_high_m"]),
+                ends_text(row["p99_error_low_m"], row["p99_error_high_m"]),
                 number(row["rms_error_m"]),
                 number(row["executions"], 0),
                 *([badge("yes", "yes") if row["on_front"] else ""] if judged else []),
@@ -125,12 +126,6 @@ def _table(rows: pl.DataFrame) -> str:
     more = rows.height - MOST_ROWS
     below = f'<p class="note">{more} more are in the Parquet file beside this page.</p>'
     return table(head, cells, numbers=numbers) + (below if more > 0 else "")
-
-
-def _interval(low_m: float | None, high_m: float | None) -> str:
-    if low_m is None:
-        return "–"
-    return f"above {low_m:.3f}" if high_m is None else f"{low_m:.3f} to {high_m:.3f}"
 
 
 def _energy_against_error(drawn: pl.DataFrame) -> Spec:

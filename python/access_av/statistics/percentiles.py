@@ -44,10 +44,20 @@ class Percentile:
     @property
     def interval(self) -> str:
         """The interval in words."""
-        if self.low is None or self.high is None:
-            return "not known of one drive"
-        high = f"{self.high:.3g}" if math.isfinite(self.high) else "more than was seen"
-        return f"{self.low:.3g} to {high}"
+        return ends_text(self.low, self.high)
+
+
+def ends_text(low: float | None, high: float | None) -> str:
+    """An interval in words; without a high end where more may be than was seen.
+
+    Examples
+    --------
+    >>> ends_text(0.21, 0.34), ends_text(0.21, math.inf), ends_text(None, None)
+    ('0.21 to 0.34', 'above 0.21', 'not known of one drive')
+    """
+    if low is None:
+        return "not known of one drive"
+    return f"above {low:.3g}" if high is None or math.isinf(high) else f"{low:.3g} to {high:.3g}"
 
 
 def column(percent: float) -> str:
@@ -70,6 +80,12 @@ def as_columns(percentiles: Sequence[Percentile]) -> dict[str, float | None]:
         for end in ("low", "high"):
             found[name.replace("_error_m", f"_error_{end}_m")] = _finite(getattr(each, end))
     return found
+
+
+def names() -> list[str]:
+    """Names of all columns that :func:`as_columns` may give."""
+    every = [Percentile(percent, 0.0, 0.0, 0.0) for percent in PERCENTS]
+    return list(as_columns(every))
 
 
 def _finite(value: float | None) -> float | None:
