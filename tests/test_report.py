@@ -87,6 +87,12 @@ def test_sentences_are_made_from_what_was_obtained() -> None:
     )
 
 
+def test_an_evaluation_is_told_in_a_line() -> None:
+    evaluation = synthetic.evaluation()
+    assert len(repr(evaluation)) < 100
+    assert len({evaluation, evaluation}) == 1
+
+
 def test_no_zero_has_a_sign() -> None:
     assert (number(-0.0001, 2), value_text(-0.0), unsigned_zero("+0.00")) == ("0.00", "0", "0.00")
     assert (number(-0.01, 2), value_text(-1.5), unsigned_zero("+0.01")) == (
