@@ -109,7 +109,7 @@ def test_command_writes_what_it_promises(
     names = {path.name for path in (tmp_path / "b").iterdir()}
     said = " ".join(done.out.split())
     assert "falls short of level 6 on 35.7% of the route" in said
-    assert "The cheapest change, by the usual order of cost: half the odometer's errors." in said
+    assert "What mends that and is usually the cheapest: half the odometer's errors." in said
     page = (tmp_path / "b" / "report.html").read_text()
     assert "falls short of level 6" in page
     assert names == {

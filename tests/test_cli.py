@@ -2,11 +2,14 @@ from __future__ import annotations
 
 import json
 import re
+import time
 from itertools import pairwise
 from typing import TYPE_CHECKING
 
 import polars as pl
 import pytest
+
+from access_av import terminal
 
 if TYPE_CHECKING:
     from collections.abc import Callable
@@ -129,8 +132,12 @@ def test_explore_answers_from_the_last_evaluation(
     done = access_av("explore", "--max-energy-j", "1000", "--json")
     assert len(json.loads(done.out)) == 8
     assert access_av("explore", "--max-energy-j", "1000", "--fixed", columns=60).code == 0
+    asked = ("explore", "--max-error-m", "9", "--percentile", "90", "--json")
+    found = json.loads(access_av(*asked).out)
+    assert all(each["p90_error_low_m"] <= each["p90_error_m"] for each in found)
+    assert access_av("explore", "--max-error-m", "1", "--percentile", "12").code == 2
     none = access_av("explore", "--max-energy-j", "1")
-    assert none.code == 0
+    assert none.code == 3
     assert "No operating point has energy ≤ 1 J" in none.out
 
 
@@ -241,3 +248,18 @@ def test_out_that_is_a_file(access_av: Cli, tmp_path: Path) -> None:
     done = access_av("run", "paper", "--out", str(tmp_path / "taken"))
     assert done.code == 2
     assert "--out takes a directory" in done.err
+
+
+def test_in_a_pipe_progress_is_told_in_lines(
+    monkeypatch: pytest.MonkeyPatch, capsys: pytest.CaptureFixture[str]
+) -> None:
+    monkeypatch.setattr("access_av.terminal.FIRST_LINE_S", 0.05)
+    with terminal.progress("Driving") as tick:
+        tick(3, 12)
+        time.sleep(0.2)
+    lines = capsys.readouterr().err.splitlines()
+    assert lines
+    assert all(line.startswith("Driving: 3 of 12, 0 s, about ") for line in lines)
+    with terminal.progress("Soon over") as tick:
+        tick(1, 2)
+    assert capsys.readouterr().err == ""

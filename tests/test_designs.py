@@ -4,6 +4,8 @@ from __future__ import annotations
 
 import json
 import os
+import shlex
+import shutil
 import subprocess
 import sys
 import threading
@@ -20,12 +22,12 @@ import pytest
 from access_av import Scenario, columns
 from access_av.campaign import Campaign, CampaignError, Shard, Task, executor
 from access_av.designs import drives
-from access_av.designs.drives import Design, Driven, designs_of
+from access_av.designs.drives import Design, Driven, designs_of, in_worlds
 from access_av.designs.front import front, may_be_front
 from access_av.designs.search import Found, rounds, search
 from access_av.designs.space import Space, sobol
 from access_av.designs.suggested import suggested
-from access_av.designs.table import Constraints, rows_of, what_to_change
+from access_av.designs.table import Constraints, rows_of, rows_of_worlds, what_to_change
 from access_av.errors import InputError
 from access_av.parts import Parts
 from access_av.platform import Platform
@@ -65,6 +67,10 @@ def test_space_from_tables() -> None:
         ({"a": {"low": 2, "high": 1}}, "a: `low` must be below `high`"),
         ({"a": {"low": 0, "high": 1, "log": True}}, "positive where `log`"),
         ({"a": {"low": 0, "high": 1, "step": 2}}, "a.step: unknown"),
+        ({"site": {"rician_k_db": [5.0, 9.0]}}, r"nobody chooses that; write \[world\]"),
+        ({"channel": {"model": ["umi"]}}, "channel.model: nobody chooses that"),
+        ({"a": [1], "world": {"b": {"low": 0, "high": 1}}}, "world.b: a grid needs a list"),
+        ({"a": [1], "world": {}}, "world: no key with a list"),
     ],
 )
 def test_bad_spaces_name_the_key(table: dict[str, Any], message: str) -> None:
@@ -326,6 +332,7 @@ def known(energy_j: float, rms_m: float, noise: np.ndarray, own: np.ndarray, lab
         square_m2=square_m2,
         energy_j=np.full(noise.size, energy_j),
         worst_m=3.0 * np.sqrt(square_m2),
+        error_m=np.sqrt(square_m2)[:, None] * np.linspace(0.1, 2.0, 40, dtype=np.float32),
         executions=np.ones(noise.size),
         listened=np.ones(noise.size),
         track_s=np.arange(3.0),
@@ -361,7 +368,7 @@ def test_page_of_many_designs_draws() -> None:
         )
         for energy_j in rng.uniform(0.1, 9.0, 300)
     ]
-    page = render_designs(Scenario.load("paper"), driven, rows_of(driven))
+    page = render_designs(Scenario.load("paper"), driven, rows_of(driven), rows_of_worlds(driven))
     assert "energy of a trip / J" in page
     assert len(page) < 6_000_000
 
@@ -384,11 +391,68 @@ def test_constraints_choose_the_least_energy() -> None:
 def test_where_nothing_fits_it_says_what_would() -> None:
     rows = rows_of(cloud(20, PAIRS))
     advice = what_to_change(Constraints(max_energy_j=3.0, max_rms_m=0.15), rows)
-    assert advice[0].startswith("energy allowed to be 1.33 times as much: design 3")
-    assert advice[1].startswith("RMS error allowed to be 1.")
+    assert advice[0].startswith("energy 4 J instead of 3 J: design 3")
+    assert advice[1].startswith("RMS error 0.2")
+    assert " m instead of 0.15 m: " in advice[1]
     assert "design 1" in advice[1]
     advice = what_to_change(Constraints(max_energy_j=0.0, max_rms_m=0.0), rows)
     assert advice[0].startswith("energy alone, however much is allowed, does not help")
+
+
+def test_a_design_is_judged_in_the_worst_of_its_worlds(
+    tmp_path: Path, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    """One design is better in one world and much worse in the other."""
+
+    def pretended(text: str, _seed: int, _first: int, runs: int) -> dict[str, np.ndarray]:
+        scenario = json.loads(Scenario.from_toml(text).to_json())
+        bold = scenario["vehicle"]["wake_up"]["interval_ms"] == 8000.0
+        scattered = scenario["site"]["rician_k_db"] < 10.0
+        rms_m = np.full(runs, (0.9 if scattered else 0.05) if bold else 0.2)
+        count = np.full(runs, 10.0 if bold else 40.0)
+        return {
+            "executions": count, "listened": count, "rms_error_m": rms_m, "max_error_m": rms_m,
+            "error_m": np.repeat(rms_m[:, None], 900, axis=1).astype(np.float32),
+            "track_s": np.arange(0.0, 9001.0, 10.0), "track_m2": np.ones(901),
+        }  # fmt: skip
+
+    monkeypatch.setattr(drives, "simulated", pretended)
+    space = Space.of(
+        {
+            "vehicle": {
+                "platform": {"name": ["jetson-agx-xavier-engine"]},
+                "wake_up": {"policy": ["fixed"], "interval_ms": [2000.0, 8000.0]},
+            },
+            "world": {"site": {"rician_k_db": [5.0, 15.0]}},
+        }
+    )
+    assert list(space.worlds) == ["rician_k_db 5", "rician_k_db 15"]
+    designs = in_worlds(Scenario.load("paper"), space.grid(), space.worlds)
+    found = search(Campaign(Parts(tmp_path)), designs, runs=3, seed=1)
+    assert found is not None
+    assert found.drives == 2 * 2 * 3
+    rows, of_worlds = rows_of(found.driven), rows_of_worlds(found.driven)
+    assert rows["p99_error_m"].to_list() == pytest.approx([0.2, 0.9])
+    assert rows["world"][1] == "rician_k_db 5"
+    assert of_worlds["p99_error_m"].to_list() == pytest.approx([0.2, 0.2, 0.9, 0.05])
+    kept = Constraints(max_error_m=0.3).kept(rows)
+    assert kept["choice"].to_list() == ["interval_ms 2000"]
+    page = render_designs(Scenario.load("paper"), found.driven, rows, of_worlds)
+    assert "Worst world" in page
+    assert "In each world" in page
+
+
+def test_what_too_few_drives_say_is_not_called_kept() -> None:
+    row = {"p99_error_m": 0.28, "p99_error_low_m": 0.2, "p99_error_high_m": 0.4}
+    bound = Constraints(max_error_m=0.3, percentile=99.0)
+    assert bound.keeps(row)
+    assert not bound.keeps_surely(row)
+    assert "too few drives to say" in bound.in_words(row)[0]
+    assert bound.in_words({**row, "p99_error_high_m": 0.29})[0].endswith("kept")
+    assert bound.in_words({**row, "p99_error_m": 0.31})[0].endswith("missed")
+    assert bound.in_words({**row, "p99_error_high_m": None})[0].endswith("too few drives to say")
+    with pytest.raises(InputError, match=r"percentile 42: it can be 50, 90, 95, 99, 99\.9"):
+        Constraints(max_error_m=0.3, percentile=42.0)
 
 
 def test_rounds_of_halving() -> None:
@@ -414,6 +478,7 @@ def by_halving(tmp_path: Path, monkeypatch: pytest.MonkeyPatch, *, halving: bool
         return {
             "executions": count, "listened": count, "rms_error_m": np.sqrt(square_m2[mine]),
             "max_error_m": 3.0 * np.sqrt(square_m2[mine]), "track_s": np.arange(3.0),
+            "error_m": np.sqrt(square_m2[mine])[:, None] * np.ones((1, 4), dtype=np.float32),
             "track_m2": np.ones(3),
         }  # fmt: skip
 
@@ -430,7 +495,7 @@ def by_halving(tmp_path: Path, monkeypatch: pytest.MonkeyPatch, *, halving: bool
             }
         }
     )
-    designs = designs_of(Scenario.load("paper"), space.grid())
+    designs = in_worlds(Scenario.load("paper"), space.grid(), space.worlds)
     assert len(designs) == 120
     campaign = Campaign(Parts(tmp_path / str(halving)))
     found = search(campaign, designs, runs=20, seed=1, halving=halving)
@@ -464,7 +529,7 @@ def test_optuna_suggests_the_same_designs_again(
         rms_m = np.full(runs, 1e-3 * wake_up["interval_ms"] ** 0.5)
         return {
             "executions": count, "listened": count, "rms_error_m": rms_m, "max_error_m": rms_m,
-            "track_s": np.arange(3.0), "track_m2": np.ones(3),
+            "error_m": rms_m[:, None], "track_s": np.arange(3.0), "track_m2": np.ones(3),
         }  # fmt: skip
 
     monkeypatch.setattr(drives, "simulated", pretended)
@@ -513,7 +578,17 @@ def test_command_on_any_scenario(tmp_path: Path) -> None:
     some = run(tmp_path, "choose", "o", "--max-rms-m", "100", "--json")
     assert len(json.loads(some.stdout)["kept"]) == 4
     none = run(tmp_path, "choose", "o", "--max-rms-m", "0.0001", "--json")
-    assert "times as much" in json.loads(none.stdout)["advice"][0]
+    assert "m instead of 0.0001 m" in json.loads(none.stdout)["advice"][0]
+    assert (some.returncode, none.returncode) == (0, 3)
+    told = json.loads((tmp_path / "o/manifest.json").read_text())
+    assert told["space"]["keys"]["vehicle.wake_up.interval_ms"] == [2000.0, 8000.0]
+    # What is to be typed in the directory asks for the same drives, and gives the same again.
+    shutil.copytree(tmp_path / "results", tmp_path / "o/results")
+    before = (tmp_path / "o/designs.parquet").read_bytes()
+    again = run(tmp_path / "o", *shlex.split(told["repeat"])[1:], "--out", "again")
+    assert again.returncode == 0, again.stderr
+    assert (tmp_path / "o/again/designs.parquet").read_bytes() == before
+    assert len(list((tmp_path / "o/results/parts").glob("*.npz"))) == 2
     for bad, message in (
         (("designs", *asked, "--shard", "5/2"), "write I/N"),
         (("choose", "nowhere"), "no designs here"),

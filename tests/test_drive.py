@@ -13,6 +13,8 @@ import pytest
 from access_av import Scenario, simulate
 from access_av.errors import InputError
 from access_av.report.drive import render_drive
+from access_av.report.operation import Operation
+from access_av.statistics import horizontal_error_m
 
 if TYPE_CHECKING:
     from collections.abc import Callable
@@ -87,9 +89,58 @@ def test_run_tells_percentiles_and_integrity(
         "run", "paper-real-odometry-2", "--set", "vehicle.integrity={}", "--out", tmp_path,
     )  # fmt: skip
     assert done.code == 0, done.err
-    for text in ("50% below", "90% below", "99% below", "protection level / error", "epochs ok"):
-        assert text in done.out
-    assert "stanford" in (tmp_path / "report.html").read_text()
+    told = " ".join(done.out.split())
+    for text in ("50 % of errors within", "protection level / error", "may rely on its position"):
+        assert text in told
+    page = (tmp_path / "report.html").read_text()
+    assert "stanford" in page
+    assert "may rely on its position" in page
+    manifest = json.loads((tmp_path / "manifest.json").read_text())
+    assert manifest["repeat"] == "access-av run scenario.toml --runs 1 --seed 1"
+    again = access_av("run", tmp_path / "scenario.toml", "--seed", "1", "--out", tmp_path / "again")
+    assert again.code == 0, again.err
+    name = "trajectories.parquet"
+    assert (tmp_path / "again" / name).read_bytes() == (tmp_path / name).read_bytes()
+
+
+def test_percentiles_are_those_of_the_trajectories() -> None:
+    result = simulate("paper-real-odometry-4", runs=3, keep_trajectories=True)
+    assert result.trajectories is not None
+    assert result.percentiles is not None
+    error_m = result.trajectories.select(horizontal_error_m()).to_series()
+    for each in result.percentiles:
+        share = (error_m <= each.value).mean()
+        assert each.percent / 100.0 <= share <= each.percent / 100.0 + 1.0 / error_m.len()
+    assert result.mean_error_m == pytest.approx(error_m.mean())
+
+
+def test_a_simulation_is_told_in_a_line_and_can_be_kept_in_a_set() -> None:
+    result = simulate("paper", runs=2)
+    assert len(repr(result)) < 100
+    assert result == result
+    assert len({result, result}) == 1
+    assert "rms_error_m" in result._repr_html_()
+    assert result.scenario == Scenario.load("paper")
+
+
+def test_what_is_not_relied_on_has_a_reason_each() -> None:
+    rng = np.random.default_rng(7)
+    steps = pl.DataFrame(
+        {
+            "integrity": rng.choice(["ok", "degraded", "unavailable"], 1000),
+            "protection_level_m": rng.uniform(0.1, 3.0, 1000),
+            "searching": rng.random(1000) < 0.1,
+        }
+    )
+    found = Operation.of(steps, 1.5)
+    assert found is not None
+    assert len(found.reasons) == 4
+    assert found.reliable + sum(found.reasons.values()) == pytest.approx(1.0)
+    ok = steps.filter(~pl.col("searching"), integrity="ok")
+    assert found.reliable == pytest.approx(ok.height / 1000)
+    assert found.level_m == ok["protection_level_m"].median()
+    unwatched = steps.with_columns(integrity=pl.lit(None, dtype=pl.String))
+    assert Operation.of(unwatched, 1.5) is None
 
 
 def test_a_start_from_scratch_says_when_it_was_found(

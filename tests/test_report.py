@@ -14,7 +14,7 @@ from access_av.paper import summary
 from access_av.paper.report.page import render
 from access_av.paper.report.readings import readings
 from access_av.report import located_charts
-from access_av.report.parts import value_text
+from access_av.report.parts import number, unsigned_zero, value_text
 from robot import HEADS_M, robot
 
 if TYPE_CHECKING:
@@ -86,6 +86,21 @@ def test_sentences_are_made_from_what_was_obtained() -> None:
     without = [replace(claim, reading="every-ssb") for claim in met.values()]
     assert "under Algorithm 1 as written" in summary.headline(
         replace(study, claims=[*without, *study.of("gate")])
+    )
+
+
+def test_an_evaluation_is_told_in_a_line() -> None:
+    evaluation = synthetic.evaluation()
+    assert len(repr(evaluation)) < 100
+    assert len({evaluation, evaluation}) == 1
+
+
+def test_no_zero_has_a_sign() -> None:
+    assert (number(-0.0001, 2), value_text(-0.0), unsigned_zero("+0.00")) == ("0.00", "0", "0.00")
+    assert (number(-0.01, 2), value_text(-1.5), unsigned_zero("+0.01")) == (
+        "-0.01",
+        "-1.5",
+        "+0.01",
     )
 
 

@@ -21,6 +21,7 @@ from access_av.statistics import (
     mean_nees,
     nees,
     nees_band,
+    percentiles,
     stanford_counts,
     wilson,
 )
@@ -357,3 +358,57 @@ def test_obtained_risk_is_that_of_a_gaussian() -> None:
     assert high < 100.0 * asked
     # A level that is never vouched for is not held to anything.
     assert ObtainedRisk.of(steps.with_columns(integrity=pl.lit("degraded")), 10.0) is None
+
+
+# Percentiles.
+
+
+def test_percentiles_are_those_of_all_and_their_intervals_of_whole_runs() -> None:
+    """Against the definition, run by run; one run is not heard for half of its time."""
+    rng = np.random.default_rng(3)
+    errors = np.abs(rng.standard_normal((7, 60))) * rng.lognormal(0.0, 0.5, (7, 1))
+    errors[2, 30:] = np.nan
+    found = percentiles(errors, [50.0, 90.0, 99.0], resamples=200, seed=5)
+    drawn = np.random.default_rng(5).multinomial(7, np.full(7, 1.0 / 7.0), size=200)
+    for each in found:
+
+        def of(rows: np.ndarray, percent: float = each.percent) -> float:
+            return float(np.nanquantile(rows, percent / 100.0, method="inverted_cdf"))
+
+        assert each.value == of(errors)
+        repeated = sorted(of(np.repeat(errors, times, axis=0)) for times in drawn)
+        outside = repeated.index(each.low)
+        assert repeated[-1 - outside] == each.high
+        assert outside < 0.025 * 200
+
+
+def test_intervals_of_percentiles_hold_what_they_are_of() -> None:
+    """With forty runs; that of the 99th percentile is known to be short where runs differ."""
+    rng = np.random.default_rng(11)
+    many = np.abs(rng.standard_normal((4000, 60))) * rng.lognormal(0.0, 0.5, (4000, 1))
+    true = dict(zip((50.0, 90.0), np.quantile(many, (0.5, 0.9)), strict=True))
+    held = dict.fromkeys(true, 0)
+    trials = 150
+    for _ in range(trials):
+        errors = np.abs(rng.standard_normal((40, 60))) * rng.lognormal(0.0, 0.5, (40, 1))
+        for each in percentiles(errors, list(true), resamples=200):
+            assert each.low is not None
+            assert each.high is not None
+            held[each.percent] += each.low <= true[each.percent] <= each.high
+    # Of 150 intervals of 95 %, 142.5 ± 2.7 hold.
+    assert min(held.values()) >= 142.5 - 4.0 * 2.7
+
+
+def test_what_was_seen_too_seldom_has_no_high_end() -> None:
+    errors = np.abs(np.random.default_rng(2).standard_normal((20, 100)))
+    few, enough = (percentiles(errors, [99.0], independent=it)[0] for it in (300, 2000))
+    # 367 errors that are all within tell with 97.5 % that 99 % are: 0.99**367 < 0.025.
+    assert few.high == np.inf
+    assert enough.high is not None
+    assert few.value == enough.value < enough.high < np.inf
+    [alone] = percentiles(errors[:1], [99.0])
+    assert (alone.low, alone.high) == (None, None)
+    unknown = np.where(np.arange(100) < 98, errors, np.inf)
+    assert percentiles(unknown, [99.0])[0].value == np.inf
+    with pytest.raises(ValueError, match="percentile 0"):
+        percentiles(errors, [0.0])

@@ -7,6 +7,9 @@ from typing import TYPE_CHECKING
 
 import polars as pl
 
+from access_av.errors import InputError
+from access_av.statistics.percentiles import PERCENTS, column
+
 if TYPE_CHECKING:
     from collections.abc import Sequence
 
@@ -27,6 +30,8 @@ class Query:
         Angle estimates in one trip.
     modes
         Power modes to choose from.
+    max_error_m, percentile
+        So many percent of the horizontal errors are to be no larger than this.
     """
 
     max_energy_j: float | None = None
@@ -34,6 +39,13 @@ class Query:
     max_worst_m: float | None = None
     max_executions: float | None = None
     modes: Sequence[int] | None = None
+    max_error_m: float | None = None
+    percentile: float = 99.0
+
+    def __post_init__(self) -> None:
+        if self.percentile not in PERCENTS:
+            allowed = ", ".join(f"{percent:g}" for percent in PERCENTS)
+            raise InputError(f"percentile {self.percentile:g}: it can be {allowed}")
 
     def __str__(self) -> str:
         parts = [
@@ -41,6 +53,7 @@ class Query:
             for name, bound, unit in (
                 ("energy", self.max_energy_j, "J"),
                 ("RMS error", self.max_rms_m, "m"),
+                (f"{self.percentile:g} % of errors", self.max_error_m, "m"),
                 ("worst error", self.max_worst_m, "m"),
                 ("executions", self.max_executions, ""),
             )
@@ -77,14 +90,15 @@ def explore(points: pl.DataFrame, query: Query) -> pl.DataFrame:
     bounds = {
         "energy_j": query.max_energy_j,
         "rms_error_m": query.max_rms_m,
+        column(query.percentile): query.max_error_m,
         "worst_error_x_m": query.max_worst_m,
         "worst_error_y_m": query.max_worst_m,
         "executions": query.max_executions,
     }
     kept = points.filter(pl.col("energy_j").is_not_null())
-    for column, bound in bounds.items():
+    for name, bound in bounds.items():
         if bound is not None:
-            kept = kept.filter(pl.col(column) <= bound)
+            kept = kept.filter(pl.col(name) <= bound)
     if query.modes is not None:
         kept = kept.filter(pl.col("mode").is_in(list(query.modes)))
     return kept.sort("energy_j", "rms_error_m", "mode")

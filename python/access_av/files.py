@@ -7,7 +7,9 @@ import io
 import json
 import math
 import os
+import shlex
 import stat
+import subprocess
 import sys
 import warnings
 from contextlib import suppress
@@ -24,6 +26,8 @@ from access_av import interrupt
 from access_av.errors import InputError
 
 if TYPE_CHECKING:
+    from collections.abc import Sequence
+
     import polars as pl
     from numpy.typing import ArrayLike
 
@@ -93,17 +97,39 @@ class ResultsDirectory:
         table.write_parquet(held, compression="zstd")
         return write_whole(self.path / name, held.getbuffer())
 
-    def write_manifest(self, **settings: Any) -> Path:
-        """Write ``manifest.json``: the version, the command line and the settings."""
+    def write_manifest(self, *, repeat: Sequence[object] = (), **settings: Any) -> Path:
+        """Write ``manifest.json``: version, commit where it is known, command, settings.
+
+        ``command`` is what was typed; ``repeat``, where a command gives it, is what is to be typed
+        in this directory, so that what it was given is still what it was.
+        """
         return self.write_json(
             "manifest.json",
             {
                 "version": version("access-av"),
+                "commit": commit(),
                 "command": ["access-av", *sys.argv[1:]],
                 "written": datetime.now(timezone.utc).isoformat(timespec="seconds"),
+                **({"repeat": _typed(repeat)} if repeat else {}),
                 **settings,
             },
         )
+
+
+def _typed(command: Sequence[object]) -> str:
+    return shlex.join(["access-av", *map(str, command)])
+
+
+def commit() -> str | None:
+    """The commit of a checkout that runs where it lies, ``-dirty`` where it was changed since."""
+    root = Path(__file__).resolve().parents[2]
+    if not (root / ".git").exists() or not (root / "crates").is_dir():
+        return None
+    command = ["git", "-C", str(root), "describe", "--always", "--dirty", "--abbrev=40"]
+    with suppress(OSError, subprocess.SubprocessError):
+        done = subprocess.run(command, capture_output=True, text=True, timeout=10, check=True)
+        return done.stdout.strip()
+    return None
 
 
 def regular(path: Path, most_bytes: int) -> Path:

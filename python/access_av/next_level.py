@@ -77,8 +77,8 @@ class NextLevel:
         return (
             f"As it is, the site falls short of level {self.level.name} on {self.short_share:.1%} "
             f"of the route, most of all {self.weakest_along_m:.0f} m along, at "
-            f"({self.weakest_x_m:.0f}, {self.weakest_y_m:.0f}) m. The cheapest change, by the "
-            f"usual order of cost: {cheapest}."
+            f"({self.weakest_x_m:.0f}, {self.weakest_y_m:.0f}) m. What mends that and is usually "
+            f"the cheapest: {cheapest}."
         )
 
     def as_record(self) -> dict[str, Any]:

@@ -5,7 +5,9 @@ from __future__ import annotations
 import io
 import os
 import sys
+import time
 from contextlib import contextmanager
+from threading import Event, Thread
 from typing import TYPE_CHECKING, Any
 
 from rich import box
@@ -22,7 +24,7 @@ from rich.table import Table as RichTable
 from access_av._core import brief
 from access_av.methods import label
 from access_av.recorded_angles import mean_absolute_error_deg
-from access_av.report.parts import value_text
+from access_av.report.parts import unsigned_zero, value_text
 
 if TYPE_CHECKING:
     from collections.abc import Callable, Iterator, Sequence
@@ -42,6 +44,8 @@ console = Console(highlight=False, markup=False)
 errors = Console(stderr=True, highlight=False, markup=False)
 
 NARROW = 80
+# Where there is no terminal: how long nothing is said of what goes on, at first and at most.
+FIRST_LINE_S, MOST_SILENT_S = 2.0, 60.0
 
 
 def is_narrow() -> bool:
@@ -66,7 +70,14 @@ def give_up_output() -> None:
 
 @contextmanager
 def progress(title: str) -> Iterator[Callable[[int, int], None]]:
-    """Show a bar on the error stream; gives the function that moves it."""
+    """Show a bar on the error stream; gives the function that moves it.
+
+    Where that is no terminal: a line after two seconds, and then ever more seldom.
+    """
+    if not errors.is_terminal:
+        with _lines(title) as tick:
+            yield tick
+        return
     bar = Progress(
         TextColumn("{task.description}"),
         BarColumn(bar_width=None if not is_narrow() else 12),
@@ -78,6 +89,33 @@ def progress(title: str) -> Iterator[Callable[[int, int], None]]:
     with bar:
         task = bar.add_task(title, total=None)
         yield lambda done, total: bar.update(task, completed=done, total=total)
+
+
+@contextmanager
+def _lines(title: str) -> Iterator[Callable[[int, int], None]]:
+    """Progress as lines, for logs: each after half as much time again as has passed."""
+    known: list[tuple[int, int]] = []
+    ended, begun_s = Event(), time.monotonic()
+
+    def tell() -> None:
+        wait_s = FIRST_LINE_S
+        while not ended.wait(wait_s):
+            passed_s = time.monotonic() - begun_s
+            line = f"{title}: {passed_s:.0f} s"
+            if known and known[-1][1]:
+                done, total = known[-1]
+                left_s = f", about {passed_s * (total - done) / done:.0f} s left" if done else ""
+                line = f"{title}: {done:,} of {total:,}, {passed_s:.0f} s{left_s}"
+            errors.print(line, soft_wrap=True)
+            wait_s = min(0.5 * passed_s, MOST_SILENT_S)
+
+    thread = Thread(target=tell, daemon=True)
+    thread.start()
+    try:
+        yield lambda done, total: known.append((done, total))
+    finally:
+        ended.set()
+        thread.join()
 
 
 def table(head: Sequence[str], *, title: str = "", text: int = 1) -> RichTable:
@@ -147,39 +185,40 @@ def show_points(points: pl.DataFrame, title: str = "") -> None:
 def show_simulation(result: Simulation, title: str) -> None:
     """Errors and executions of many drives, in one table."""
     steps, runs = result.steps, result.runs
-    made = table(["", "value"], title=title)
-    rows = {
-        "worst mean error along the track, X / m": steps["mean_abs_error_x_m"].max(),
-        "worst mean error along the track, Y / m": steps["mean_abs_error_y_m"].max(),
-        "RMS error / m": result.rms_error_m,
-        **{
-            f"horizontal error, {share:.0%} below / m": result.error_quantiles_m[share]
-            for share in (0.5, 0.9, 0.99)
-        },
-        "duration / s": steps["time_s"].max(),
-        "executions": runs["executions"].mean(),
-        "energy / J": runs["energy_j"].mean(),
+    made = table(["", "value", "95 % interval"], title=title)
+    rows: dict[str, tuple[Any, str]] = {
+        "RMS error / m": (result.rms_error_m, ""),
+        "mean error / m": (result.mean_error_m, ""),
+    }
+    for each in result.percentiles or ():
+        rows[f"{each.percent:g} % of errors within / m"] = each.value, each.interval
+    rows |= {
+        "worst mean error along the track, X / m": (steps["mean_abs_error_x_m"].max(), ""),
+        "worst mean error along the track, Y / m": (steps["mean_abs_error_y_m"].max(), ""),
+        "duration / s": (steps["time_s"].max(), ""),
+        "executions (angles estimated)": (runs["executions"].mean(), ""),
+        "energy / J": (runs["energy_j"].mean(), ""),
     }
     if runs["found_s"].fill_null(1.0).max() != 0.0:
-        rows["runs in which the vehicle was found"] = runs.height - runs["found_s"].null_count()
-        rows["driven until found, median / m"] = runs["found_m"].median()
-        rows["driven until found, most / m"] = runs["found_m"].max()
+        found = runs.height - runs["found_s"].null_count()
+        rows["runs in which the vehicle was found"] = found, ""
+        rows["driven until found, median / m"] = runs["found_m"].median(), ""
+        rows["driven until found, most / m"] = runs["found_m"].max(), ""
     consistency = result.consistency
     if consistency is not None and consistency.anees is not None:
-        rows["NEES / 2, 1 if as wrong as it says"] = consistency.anees
-        if consistency.anees_interval is not None and runs.height > 1:
-            low, high = consistency.anees_interval
-            rows |= {"its 95 % interval, from": low, "to": high}
+        interval = consistency.anees_interval if runs.height > 1 else None
+        rows["NEES per axis (1: errors as large as stated)"] = (
+            consistency.anees,
+            "" if interval is None else f"{interval[0]:.3g} to {interval[1]:.3g}",
+        )
     integrity = result.integrity
     if integrity is not None:
-        rows["protection level / error, median"] = integrity.median_level_over_error
-        rows |= {
-            f"epochs {state} / %": 100.0 * share for state, share in integrity.state_shares.items()
-        }
-        rows["errors beyond the level while ok"] = integrity.exceedances
-    for name, value in rows.items():
-        made.add_row(name, value_text(value))
+        rows["protection level / error, median"] = integrity.median_level_over_error, ""
+    for name, (value, interval_text) in rows.items():
+        made.add_row(name, value_text(value), interval_text)
     console.print(made)
+    if (operation := result.operation) is not None:
+        console.print(f"{operation.in_words()} {operation.what_helps()}".strip())
     if levels := result.service_levels:
         show_service_levels(levels)
 
@@ -272,11 +311,11 @@ def show_bursts(bursts: Sequence[BurstAngle]) -> None:
         azimuth_deg, truth_deg = burst.azimuth_from_broadside_deg, burst.truth_deg
         made.add_row(
             str(burst.sample_start),
-            f"{azimuth_deg:.2f}",
+            unsigned_zero(f"{azimuth_deg:.2f}"),
             f"{burst.sigma_deg:.3f}",
             f"{burst.snr_db:.1f}",
             "" if truth_deg is None else f"{truth_deg:.2f}",
-            "" if truth_deg is None else f"{azimuth_deg - truth_deg:+.2f}",
+            "" if truth_deg is None else unsigned_zero(f"{azimuth_deg - truth_deg:+.2f}"),
         )
     console.print(made)
     error_deg = mean_absolute_error_deg(bursts)
@@ -299,8 +338,10 @@ def show_cells(title: str, cells: Sequence[dict[str, Any]]) -> None:
             "SSB": str(cell["ssb_index"]),
             "SFN": "–" if cell["sfn"] is None else str(cell["sfn"]),
             "SNR dB": f"{cell['snr_db']:.1f}",
-            "CFO Hz": f"{cell['cfo_hz']:.1f}",
-            "azimuth °": f"{cell['azimuth_deg']:.2f}" if "azimuth_deg" in cell else "–",
+            "CFO Hz": unsigned_zero(f"{cell['cfo_hz']:.1f}"),
+            "azimuth °": unsigned_zero(f"{cell['azimuth_deg']:.2f}")
+            if "azimuth_deg" in cell
+            else "–",
             "σ noise °": f"{cell['sigma_deg']:.3f}" if "sigma_deg" in cell else "–",
             "sample": str(cell["sample_start"]),
             "MHz": f"{cell['ssb_freq_hz'] / 1e6:.3f}",

@@ -28,7 +28,9 @@ pub enum Error {
     #[error("elements {0} and {1} are in the same place")]
     CoincidentElements(usize, usize),
     /// All elements are on one line: only the angle from it shows.
-    #[error("elements in a row show only the angle from it: a linear array is another kind")]
+    #[error(
+        "all elements are on one line, which shows only the angle from it: describe it as a linear array"
+    )]
     ElementsInARow,
     /// A table of responses that makes no manifold.
     #[error("table of responses: {0}")]

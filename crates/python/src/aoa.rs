@@ -52,8 +52,8 @@ struct Request<'a, 'py> {
 /// forward_backward : bool
 ///     Average the covariance forward and backward, which separates two coherent sources.
 /// subarray : int, optional
-///     Average the covariance over the subarrays of so many antennas, which separates as many
-///     coherent sources as it is short of all and one more.
+///     Average the covariance over the subarrays of so many antennas, which separates up to
+///     ``antennas - subarray + 1`` coherent sources.
 /// calibration : array_like, optional
 ///     Complex gain of each channel, see `calibrate`. Every channel is divided by its own.
 /// threads : int

@@ -28,11 +28,11 @@ pub struct RadioHead {
     pci: u16,
     /// Index of its SSB in the burst.
     ssb_index: u8,
-    /// Place in metres ...
+    /// Place in the map's frame, x in metres.
     x_m: f64,
-    /// ... and ...
+    /// Place in the map's frame, y in metres.
     y_m: f64,
-    /// ... height.
+    /// Height in metres, counted as the array's is.
     z_m: f64,
 }
 
@@ -69,11 +69,11 @@ pub struct Situation {
     time_s: f64,
     /// Speed by the odometer in m/s.
     speed_mps: f64,
-    /// Where the vehicle believes to be, in metres ...
+    /// Where the vehicle believes to be, x in metres.
     x_m: f64,
-    /// ... and ...
+    /// Where the vehicle believes to be, y in metres.
     y_m: f64,
-    /// ... its heading in radians.
+    /// The heading that it believes to have, in radians, counter-clockwise from +x.
     heading_rad: f64,
     /// Covariance of (x, y, heading), where the localizer has one.
     covariance: Option<[[f64; 3]; 3]>,

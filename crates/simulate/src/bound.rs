@@ -42,9 +42,9 @@ pub struct BoundPoint {
     pub pose: Pose,
     /// Least root mean square of the horizontal error (m).
     pub position_rms_m: f64,
-    /// Least standard deviation along the road (m) ...
+    /// Least standard deviation along the road (m).
     pub along_std_m: f64,
-    /// ... and across it.
+    /// Least standard deviation across the road (m).
     pub across_std_m: f64,
     /// Least standard deviation of the heading (rad).
     pub heading_std_rad: f64,

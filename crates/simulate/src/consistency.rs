@@ -8,9 +8,9 @@ const BAND: f64 = 1.959_964;
 /// A campaign's errors beside their own prediction.
 #[derive(Debug, Clone, Copy, PartialEq)]
 pub struct Consistency {
-    /// Root mean square of the horizontal error in metres ...
+    /// Root mean square of the horizontal error in metres.
     pub rms_m: f64,
-    /// ... and what the localizer's covariances made of it; NaN where it has none.
+    /// What the localizer's covariances say that it is; NaN where it has none.
     pub predicted_rms_m: f64,
     /// 90th percentile of the horizontal error in metres.
     pub p90_m: f64,

@@ -18,12 +18,12 @@ pub struct IntegritySummary {
     pub ok: usize,
     /// Those whose state was `ok` although the error was beyond the protection level.
     pub beyond: usize,
-    /// Times at which the state left `ok` ...
+    /// Alarms: times at which the state left `ok`.
     pub alarms: usize,
-    /// ... those of them at which the error was within the alert limit ...
+    /// Alarms at which the error was within the alert limit.
     pub early_alarms: usize,
-    /// ... and those of these at which the protection level was within it too: a source was
-    /// suspected, nominally a false alarm.
+    /// Alarms at which error and protection level were both within it: a source was suspected,
+    /// nominally a false alarm.
     pub suspicions: usize,
     /// Times at which the error passed the alert limit.
     pub excursions: usize,

@@ -27,8 +27,11 @@ pub struct Step {
 }
 
 impl Step {
-    /// Estimate minus truth in x and in y, in metres.
+    /// Estimate minus truth in x and in y, in metres; NaN as long as the first pose is not known.
     pub fn error_xy_m(&self) -> [f32; 2] {
+        if self.searching {
+            return [f32::NAN; 2];
+        }
         let (estimate, truth) = (self.estimate, self.truth);
         [estimate.x_m - truth.x_m, estimate.y_m - truth.y_m].map(|error_m| error_m as f32)
     }

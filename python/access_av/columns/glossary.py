@@ -54,12 +54,26 @@ _GLOSSARY = {
     "mean_abs_error_y_m": ("m", "Mean over the runs of the absolute error in y"),
     "worst_error_x_m": ("m", "Largest mean_abs_error_x_m along the track"),
     "worst_error_y_m": ("m", "Largest mean_abs_error_y_m along the track"),
-    "rms_error_m": ("m", "Root mean square of the horizontal error over all the row stands for"),
+    "rms_error_m": (
+        "m",
+        "Root mean square of the horizontal error, over all runs and times of the row",
+    ),
     "max_error_m": ("m", "Largest horizontal error"),
     "final_error_m": ("m", "Horizontal error at the end"),
-    "p50_error_m": ("m", "Median of the horizontal error over the runs"),
-    "p90_error_m": ("m", "90th percentile of the horizontal error over the runs"),
-    "p99_error_m": ("m", "99th percentile of the horizontal error over the runs"),
+    "p50_error_m": ("m", "Median of the horizontal error, over all runs and times of the row"),
+    **{
+        f"p{percent.replace('.', '_')}_error_m": ("m", f"{percent}th percentile of the same")
+        for percent in ("90", "95", "99", "99.9")
+    },
+    **{
+        f"p{percent}_error_{end}_m": (
+            "m",
+            f"{end.capitalize()} end of the 95 % interval of `p{percent}_error_m`, by the "
+            "bootstrap over whole runs",
+        )
+        for percent in ("50", "90", "95", "99", "99_9")
+        for end in ("low", "high")
+    },
     "rms_heading_error_rad": ("rad", "Root mean square of the heading error over the runs"),
     # What the localizer says of its own error.
     "covariance_xx_m2": ("m²", "Variance of x, by the localizer"),
@@ -141,6 +155,10 @@ _GLOSSARY = {
     "base_wake_up_ms": ("ms", "Base wake-up time, or the fixed interval"),
     "design": ("1", "Number of the design"),
     "choice": ("text", "What was chosen for it, of the keys that differ between designs"),
+    "world": (
+        "text",
+        "World in which it was driven; of several, the one in which its RMS error is largest",
+    ),
     "p90_max_error_m": ("m", "Largest horizontal error of a run, 90th percentile of the runs"),
     "on_front": ("true or false", "No other design is better in energy and error with 95 %"),
     "executions": ("1", "Angle estimates in a run; of several runs their mean"),

@@ -53,6 +53,29 @@ _RISKS = (
     "asked_risk_per_hour", "risk_per_hour", "risk_per_hour_low", "risk_per_hour_high",
 )  # fmt: skip
 _LEVELS = ("protection_level_m", "protection_level_along_m", "protection_level_across_m")
+_PERCENTILES = tuple(
+    f"p{percent}_error{end}_m"
+    for percent in ("50", "90", "95", "99", "99_9")
+    for end in ("", "_low", "_high")
+)
+_IN_THE_WORST = (
+    "choice", "world", "runs", "energy_j", "rms_error_m", *_PERCENTILES, "p90_max_error_m",
+    "executions", "listened",
+)  # fmt: skip
+_PERCENTILES_NULL = {
+    **dict.fromkeys(
+        (name for name in _PERCENTILES if "low" not in name),
+        "for so much of the time the place is not known",
+    ),
+    **dict.fromkeys(
+        (name for name in _PERCENTILES if "low" in name or "high" in name),
+        "one run has no interval; or the drives are too few to say",
+    ),
+}
+_IN_THE_WORST_NULL = {
+    **dict.fromkeys(("rms_error_m", "p90_max_error_m"), "in some run it was not found"),
+    **_PERCENTILES_NULL,
+}
 _POSE = ("x_m", "y_m", "heading_rad")
 _POSES = (
     "time_s", *_POSE, "speed_mps", "covariance_xx_m2", "covariance_xy_m2", "covariance_yy_m2",
@@ -249,7 +272,7 @@ TABLES: Mapping[str, Table] = {
             (
                 "reading", "campaign", "mode", "mode_name", "method", "adaptive", "base_wake_up_ms",
                 "executions", "worst_error_x_m", "worst_error_y_m", "rms_error_m",
-                "energy_per_execution_j", "energy_j", "energy_provenance",
+                "energy_per_execution_j", "energy_j", "energy_provenance", *_PERCENTILES,
             ),
             {
                 **dict.fromkeys(("mode", "mode_name"), _NO_MODE),
@@ -257,20 +280,22 @@ TABLES: Mapping[str, Table] = {
                     ("energy_per_execution_j", "energy_j", "energy_provenance"),
                     f"{_NO_MODE}; or {_NO_FIGURE}",
                 ),
+                **_PERCENTILES_NULL,
             },
         ),
         Table(
             "designs",
-            "A design of a scenario, over the runs that all designs see",
+            "A design of a scenario in the worst of its worlds, over the runs that all designs see",
             "`designs.parquet` of `access-av designs`; `kept` of `access-av choose --json`",
-            (
-                "design", "choice", "runs", "energy_j", "rms_error_m", "p90_max_error_m",
-                "executions", "listened", "on_front",
-            ),
-            {
-                "energy_j": _NO_FIGURE,
-                **dict.fromkeys(("rms_error_m", "p90_max_error_m"), "in some run it was not found"),
-            },
+            ("design", *_IN_THE_WORST, "on_front"),
+            {"energy_j": _NO_FIGURE, **_IN_THE_WORST_NULL},
+        ),
+        Table(
+            "design_worlds",
+            "A design of a scenario in one of several worlds",
+            "`worlds.parquet` of `access-av designs`",
+            ("design", *_IN_THE_WORST),
+            {"energy_j": _NO_FIGURE, **_IN_THE_WORST_NULL},
         ),
         Table(
             "errors",

@@ -8,10 +8,14 @@ from typing import TYPE_CHECKING, Annotated, Any
 import typer
 
 from access_av.commands.options import (
+    MISSED,
     OTHER_SHARES,
     AsJson,
     DaskOption,
+    MaxError,
+    MaxRms,
     Out,
+    PercentileOption,
     Runs,
     ScenarioArgument,
     Seed,
@@ -19,9 +23,11 @@ from access_av.commands.options import (
     Threads,
 )
 from access_av.report.parts import value_text
-from access_av.terminal import console, progress, table
+from access_av.terminal import console, progress, table, width
 
 if TYPE_CHECKING:
+    from collections.abc import Callable
+
     import polars as pl
 
 app = typer.Typer()
@@ -29,6 +35,8 @@ app = typer.Typer()
 TABLE = "designs.parquet"
 # Rows that a terminal is shown.
 SHOWN = 20
+# Design, energy, percentile and its interval.
+LEAST_COLUMNS = 5
 
 
 def _bound(text: str) -> Any:
@@ -61,16 +69,18 @@ def designs(
 ) -> None:
     """Drive every design of a space, and find those that no other beats in energy and error.
 
-    All designs see the same runs. Drives are kept in results/parts: a command that was stopped goes
-    on. Writes designs.parquet, which ``access-av choose`` is asked, and report.html.
+    All designs see the same runs. What is not chosen but given, such as the Rician K, stands in the
+    space's table [world], and each design is judged in the worst of these worlds. Drives are kept
+    in results/parts: a command that was stopped goes on. Writes designs.parquet, which access-av
+    choose is asked, worlds.parquet, report.html, scenario.toml and space.toml.
     """
     from access_av._core import Scenario
     from access_av.campaign import Campaign, Shard, executor
-    from access_av.designs.drives import designs_of
+    from access_av.designs.drives import in_worlds
     from access_av.designs.search import search
     from access_av.designs.space import Space
     from access_av.designs.suggested import suggested
-    from access_av.designs.table import rows_of
+    from access_av.designs.table import rows_of, rows_of_worlds
     from access_av.errors import InputError
     from access_av.files import RESULTS, ResultsDirectory, json_text
     from access_av.parts import Parts
@@ -83,7 +93,8 @@ def designs(
         raise InputError("--optuna chooses by itself: not with --sobol, --halving or --shard")
     every = []
     if optuna is None:
-        every = designs_of(chosen, read.grid() if sobol is None else read.sobol(sobol))
+        choices = read.grid() if sobol is None else read.sobol(sobol)
+        every = in_worlds(chosen, choices, read.worlds)
     with progress("Driving") as tick, executor(dask, threads) as (pool, workers):
         campaign = Campaign(Parts(RESULTS / "parts"), pool, workers, share)
         found = (
@@ -96,34 +107,70 @@ def designs(
     if found is None:
         console.print(OTHER_SHARES.format(shard))
         return
-    rows = rows_of(found.driven)
+    rows, of_worlds = rows_of(found.driven), rows_of_worlds(found.driven)
     directory = ResultsDirectory.create(f"designs-{chosen.name}", out)
     directory.write_table(TABLE, rows)
-    directory.write_text("report.html", render_designs(chosen, found.driven, rows))
-    directory.write_manifest(scenario=chosen.name, runs=runs, seed=seed, drives=found.drives)
-    front = rows.filter("on_front").sort("energy_j")
+    if not of_worlds.is_empty():
+        directory.write_table("worlds.parquet", of_worlds)
+    directory.write_text("report.html", render_designs(chosen, found.driven, rows, of_worlds))
+    directory.write_text("scenario.toml", chosen.to_toml())
+    directory.write_text("space.toml", space.read_text(encoding="utf-8"))
+    how: list[object] = [] if sobol is None else ["--sobol", sobol]
+    how += ["--halving"] if halving else []
+    how += [] if optuna is None else ["--optuna", optuna]
+    directory.write_manifest(
+        repeat=(
+            *("designs", "scenario.toml", "--space", "space.toml", *how),
+            *("--runs", runs, "--seed", seed),
+        ),
+        scenario=chosen.name,
+        space=read.as_record(),
+        runs=runs,
+        seed=seed,
+        drives=found.drives,
+    )
+    front = rows.filter("on_front").sort("energy_j", "rms_error_m")
     if as_json:
         answer = {"front": front.to_dicts(), "drives": found.drives}
         print(json_text(answer))
         return
-    _show(front, f"{found.drives} drives of designs; of these no other is surely better")
-    console.print(f"Report: {directory.path / 'report.html'}", soft_wrap=True)
-    console.print(f"Ask: access-av choose {directory.path} --max-rms-m 0.1", soft_wrap=True)
+    _show(
+        front,
+        f"{front.height} of {rows.height} designs may be on the Pareto front of energy and RMS "
+        f"error (95 %, {runs} drives of each)",
+    )
+    if not of_worlds.is_empty():
+        console.print(
+            f"Each is shown in the worst of {len(read.worlds)} worlds: {', '.join(read.worlds)}. "
+            "worlds.parquet has all of them."
+        )
+    console.print(
+        f"{found.drives} drives. Report: {directory.path / 'report.html'}", soft_wrap=True
+    )
+    console.print(
+        f"Ask: access-av choose {directory.path} --max-error-m 0.3 --percentile 99", soft_wrap=True
+    )
 
 
 @app.command(
-    epilog="Example: [bold]access-av choose results/latest --max-energy-j 1 --max-rms-m 0.1[/]",
+    epilog="Example: [bold]access-av choose results/mine --max-energy-j 1 --max-error-m 0.3[/]",
 )
 def choose(
     results: Annotated[Path, typer.Argument(help="Directory that access-av designs wrote.")],
+    max_error_m: MaxError = None,
+    percentile: PercentileOption = None,
+    max_rms_m: MaxRms = None,
+    max_worst_m: Annotated[
+        float | None, _bound("Largest error of a run, in nine of ten runs.")
+    ] = None,
     max_energy_j: Annotated[float | None, _bound("Mean energy of a trip.")] = None,
-    max_rms_m: Annotated[float | None, _bound("RMS error over track and runs.")] = None,
-    max_worst_m: Annotated[float | None, _bound("Largest error, in nine of ten runs.")] = None,
     as_json: AsJson = False,
 ) -> None:
     """Choose the design with the least energy that keeps what it has to.
 
-    Where none does: what would have to change.
+    Those whose percentile keeps it with 95 % confidence come first. Designs that were driven in
+    several worlds have to keep it in every one of them. Where none keeps it: what would have to
+    change, and exit code 3.
     """
     from access_av import given_tables
     from access_av.designs.table import Constraints, what_to_change
@@ -135,22 +182,57 @@ def choose(
         raise InputError(f"{results}: no designs here ({TABLE} is missing)")
     rows = given_tables.read(file, "table of designs")
     given_tables.check_types(rows, str(file), "designs")
-    constraints = Constraints(max_energy_j, max_rms_m, max_worst_m)
+    constraints = Constraints(max_energy_j, max_rms_m, max_worst_m, max_error_m, percentile)
     kept = constraints.kept(rows)
     advice = what_to_change(constraints, rows) if kept.is_empty() else []
     if as_json:
         print(json_text({"kept": kept.to_dicts(), "advice": advice}))
     elif advice:
-        console.print("No design keeps all of it. What would have to change:")
+        console.print("No design keeps all of it. What would have to be allowed, by which design:")
         for line in advice:
             console.print(f"  {line}", soft_wrap=True)
     else:
-        _show(kept, f"{kept.height} of {rows.height} designs keep it, the least energy first")
+        title = f"{kept.height} of {rows.height} designs keep it, the least energy first"
+        _show(kept, title, constraints.percent)
+        for line in constraints.in_words(kept.row(0, named=True)):
+            console.print(f"The first: {line}.", soft_wrap=True)
+    if advice:
+        raise typer.Exit(MISSED)
 
 
-def _show(rows: pl.DataFrame, title: str) -> None:
-    made = table(["design", "energy J", "RMS m", "executions", "listened"], title=title)
-    for row in rows.head(SHOWN).iter_rows(named=True):
-        values = (row["energy_j"], row["rms_error_m"], row["executions"], row["listened"])
-        made.add_row(row["choice"], *map(value_text, values))
+def _show(rows: pl.DataFrame, title: str, percent: float = 99.0) -> None:
+    """Designs as a table, in as many columns as the terminal has room for."""
+    from access_av.statistics.percentiles import column, ends_text
+
+    name = column(percent)
+    low, high = (name.replace("_error_m", f"_error_{end}_m") for end in ("low", "high"))
+    columns: list[tuple[str, Callable[[dict[str, Any]], str]]] = [
+        ("design", lambda row: row["choice"] or "as it is"),
+        *([("worst in", lambda row: row["world"])] if (rows["world"] != "").any() else []),
+        ("energy J", lambda row: _known(row["energy_j"])),
+        (f"{percent:g} % m", lambda row: _known(row[name])),
+        ("(95 %)", lambda row: ends_text(row[low], row[high])),
+        ("RMS m", lambda row: _known(row["rms_error_m"])),
+        ("median m", lambda row: _known(row["p50_error_m"])),
+        ("executions", lambda row: _known(row["executions"])),
+        ("listened", lambda row: _known(row["listened"])),
+    ]
+    while True:
+        made = table([head for head, _ in columns], title=title)
+        for row in rows.head(SHOWN).iter_rows(named=True):
+            made.add_row(*(cell(row) for _, cell in columns))
+        if width(made) <= console.width or len(columns) <= LEAST_COLUMNS:
+            break
+        columns.pop()
     console.print(made)
+    if rows.height > SHOWN:
+        console.print(f"{rows.height - SHOWN} more in {TABLE}.")
+    if rows["energy_j"].null_count() == rows.height and rows.height:
+        console.print(
+            "Energy is not known: the platform has no figure for this method; vehicle.platform "
+            "names another one (access-av platform list)."
+        )
+
+
+def _known(value: float | None) -> str:
+    return "–" if value is None else value_text(value)

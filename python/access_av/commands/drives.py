@@ -4,7 +4,7 @@ from __future__ import annotations
 
 import math
 from pathlib import Path
-from typing import TYPE_CHECKING, Annotated
+from typing import TYPE_CHECKING, Annotated, Any
 
 import typer
 
@@ -147,6 +147,7 @@ def locate(
     from access_av._core import Site, Vehicle
     from access_av.files import ResultsDirectory, json_text
     from access_av.report.located import render_located
+    from access_av.report.operation import Operation
 
     from_scratch = start is not None and start.strip() == "scratch"
     plant, carrier = Site.load(site), Vehicle.load(vehicle)
@@ -180,7 +181,7 @@ def locate(
     directory.write_text("report.html", render_located(drive, plant, carrier, numbers, true))
     directory.write_text("site.toml", plant.to_toml())
     directory.write_text("vehicle.toml", carrier.to_toml())
-    told = {
+    told: dict[str, Any] = {
         **numbers,
         "lost_share": drive.lost_share,
         "remarks": drive.remarks,
@@ -192,6 +193,8 @@ def locate(
         print(json_text({**told, "directory": str(directory.path)}))
     else:
         _show(drive, numbers)
+        if (operation := Operation.under(carrier, drive.poses)) is not None:
+            console.print(f"{operation.in_words()} {operation.what_helps()}".strip())
         console.print(f"Files: {directory.path}", soft_wrap=True)
     if not drive.is_reliable:
         errors.print(_unreliable(drive), style="red", soft_wrap=True)

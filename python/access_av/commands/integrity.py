@@ -139,7 +139,7 @@ def _show(records: Sequence[dict[str, Any]]) -> None:
         if len({cell(one) for one in records}) == 1
     ]
     columns: list[tuple[str, Cell]] = [
-        ("world", lambda one: one["mismatch"]),
+        ("world", lambda one: "as believed" if one["mismatch"] == "none" else one["mismatch"]),
         *((name, cell) for name, cell in _SETTINGS if len({cell(one) for one in records}) > 1),
         *_FOUND,
     ]

@@ -26,7 +26,21 @@ AllowLarge = Annotated[
 ]
 ShardOption = Annotated[str, typer.Option(metavar="I/N", help="Only this share of the drives.")]
 DaskOption = Annotated[str | None, typer.Option(help="Address of a Dask scheduler.")]
+MaxRms = Annotated[
+    float | None, typer.Option(min=0.0, help="Largest RMS error over track and runs.")
+]
+MaxError = Annotated[
+    float | None,
+    typer.Option(min=0.0, help="So many percent of the errors (--percentile) are to be within it."),
+]
+PercentileOption = Annotated[
+    float | None,
+    typer.Option(help="Of --max-error-m: 50, 90, 95, 99 or 99.9.", show_default="99"),
+]
 AsJson = Annotated[bool, typer.Option("--json", help="Print JSON.")]
+
+# Exit code where something was found, and not what was asked for.
+MISSED = 3
 
 # What is said when a share of a campaign is done and others are not.
 OTHER_SHARES = "Share {} is done; other shares are not: run them, then this again."

@@ -67,7 +67,12 @@ def run(
         directory.write_text(name, tum_trajectory(*(poses[column] for column in columns)))
     directory.write_text("report.html", render_drive(chosen, result, seed))
     directory.write_text("scenario.toml", chosen.resolved().to_toml())
-    directory.write_manifest(scenario=chosen.name, runs=runs, seed=seed)
+    directory.write_manifest(
+        repeat=("run", "scenario.toml", "--runs", runs, "--seed", seed),
+        scenario=chosen.name,
+        runs=runs,
+        seed=seed,
+    )
     directory.link_latest()
 
     show_simulation(result, title=f"{chosen.name}: {runs} runs, seed {seed}")

@@ -3,21 +3,19 @@
 from __future__ import annotations
 
 from dataclasses import dataclass
-from typing import TYPE_CHECKING, Any
+from typing import TYPE_CHECKING
 
 import numpy as np
 
-from access_av.designs.drives import drive, joined
+from access_av.designs.drives import drive, in_worst, joined
 from access_av.designs.front import aims, not_beaten
 from access_av.errors import InputError
 
 if TYPE_CHECKING:
-    from collections.abc import Callable, Mapping, Sequence
-
-    from numpy.typing import NDArray
+    from collections.abc import Callable, Sequence
 
     from access_av.campaign import Campaign
-    from access_av.designs.drives import Design, Driven
+    from access_av.designs.drives import Design, Driven, Part
 
 # Successive halving: of the designs left, one in so many goes on to so many times the runs.
 KEEP_ONE_IN = 3
@@ -57,7 +55,7 @@ def rounds(runs: int, *, halving: bool) -> list[int]:
 
 def search(
     campaign: Campaign,
-    designs: Sequence[Design],
+    designs: Sequence[Sequence[Design]],
     *,
     runs: int,
     seed: int,
@@ -68,8 +66,10 @@ def search(
 
     Parameters
     ----------
+    designs
+        Each in every world: it is judged in the worst of them.
     runs
-        Drives of each design that is kept to the end.
+        Drives of each design that is kept to the end, in each world.
     halving
         Whether designs that are behind are left out before; all see the same runs.
 
@@ -80,32 +80,30 @@ def search(
     """
     if not designs:
         raise InputError("no designs to drive")
-    left = list(range(len(designs)))
-    parts: dict[int, list[Mapping[str, NDArray[Any]]]] = {index: [] for index in left}
+    nothing: list[Part] = []
+    left = [(worlds, [list(nothing) for _ in worlds]) for worlds in designs]
     done = drives = 0
     driven: list[Driven] = []
     stages = rounds(runs, halving=halving)
     for stage, upto in enumerate(stages):
+        every = [one for worlds, _ in left for one in worlds]
         made = drive(
-            campaign,
-            [designs[index] for index in left],
-            first_run=done,
-            runs=upto - done,
-            seed=seed,
-            progress=progress,
+            campaign, every, first_run=done, runs=upto - done, seed=seed, progress=progress
         )
-        for index, part in zip(left, made, strict=True):
+        kept = [parts for _, of_worlds in left for parts in of_worlds]
+        for parts, part in zip(kept, made, strict=True):
             if part is None:
                 return None
-            parts[index].append(part)
-        drives += len(left) * (upto - done)
+            parts.append(part)
+        drives += len(every) * (upto - done)
         done = upto
-        driven = [joined(designs[index], parts[index]) for index in left]
+        driven = [
+            in_worst([joined(*pair) for pair in zip(worlds, parts, strict=True)])
+            for worlds, parts in left
+        ]
         if stage + 1 < len(stages):
-            ranked = ranking(driven)
             keep = max(len(left) // KEEP_ONE_IN, 1)
-            kept = sorted(ranked[:keep])
-            left = [left[place] for place in kept]
+            left = [left[place] for place in sorted(ranking(driven)[:keep])]
     return Found(driven, drives)
 
 

@@ -4,7 +4,7 @@ from __future__ import annotations
 
 import itertools
 import math
-from dataclasses import dataclass
+from dataclasses import dataclass, field
 from typing import TYPE_CHECKING, Any
 
 import numpy as np
@@ -13,12 +13,15 @@ from access_av import toml
 from access_av.errors import InputError
 
 if TYPE_CHECKING:
-    from collections.abc import Mapping
+    from collections.abc import Mapping, Sequence
     from pathlib import Path
 
     from numpy.typing import NDArray
 
 MOST_DESIGNS = 100_000
+# The table of a space file that holds the worlds, and keys of a scenario that nobody can choose.
+WORLD = "world"
+NOT_CHOSEN = ("channel", "truth", "faults", "site.rician_k_db")
 BITS = 32
 # Joe and Kuo, new-joe-kuo-6.21201: polynomial and first direction numbers from dimension 2 on.
 SOBOL = (
@@ -61,9 +64,19 @@ class Dimension:
 
 @dataclass(frozen=True)
 class Space:
-    """All that may be chosen together."""
+    """All that may be chosen together, and the worlds in which each choice is to prove itself.
+
+    Attributes
+    ----------
+    dimensions
+        Keys of the scenario that are chosen.
+    worlds
+        Keys of the scenario that are given, by name of the world; a single world that changes
+        nothing where the space states none.
+    """
 
     dimensions: tuple[Dimension, ...]
+    worlds: Mapping[str, Mapping[str, Any]] = field(default_factory=lambda: {"": {}})
 
     @classmethod
     def read(cls, file: Path) -> Space:
@@ -84,16 +97,47 @@ class Space:
     def of(cls, table: Mapping[str, Any]) -> Space:
         """A space from nested tables: lists are choices, ``low`` and ``high`` a range.
 
+        The table ``world`` holds what is not chosen but given, lists alone.
+
+        Raises
+        ------
+        InputError
+            When it cannot be used; names the key and what is allowed.
+
         Examples
         --------
-        >>> space = Space.of({"vehicle": {"platform": {"mode": [0, 2]}}})
+        >>> space = Space.of(
+        ...     {
+        ...         "vehicle": {"platform": {"mode": [0, 2]}},
+        ...         "world": {"site": {"rician_k_db": [5.0, 15.0]}},
+        ...     }
+        ... )
         >>> space.grid()
         [{'vehicle.platform.mode': 0}, {'vehicle.platform.mode': 2}]
+        >>> list(space.worlds)
+        ['rician_k_db 5', 'rician_k_db 15']
         """
-        found = tuple(_dimensions(table, ""))
+        chosen = {key: value for key, value in table.items() if key != WORLD}
+        found = tuple(_dimensions(chosen, ""))
         if not found:
             raise InputError("no key with a list of choices, or with `low` and `high`")
-        return cls(found)
+        for dimension in found:
+            if any(f"{dimension.key}.".startswith(f"{key}.") for key in NOT_CHOSEN):
+                raise InputError(
+                    f"{dimension.key}: nobody chooses that; write [{WORLD}] {dimension.key} = […], "
+                    "and every design is judged in the worst of these worlds"
+                )
+        return cls(found, _worlds(table[WORLD])) if WORLD in table else cls(found)
+
+    def as_record(self) -> dict[str, Any]:
+        """Plain values: what each key may be, and the worlds."""
+        keys = {
+            each.key: list(each.choices)
+            if each.choices
+            else {"low": each.low, "high": each.high, "log": each.is_log}
+            for each in self.dimensions
+        }
+        return {"keys": keys, "worlds": {name: dict(given) for name, given in self.worlds.items()}}
 
     def grid(self) -> list[dict[str, Any]]:
         """Every combination of the choices.
@@ -103,15 +147,7 @@ class Space:
         InputError
             When a key has a range instead of choices, or there are too many combinations.
         """
-        for dimension in self.dimensions:
-            if not dimension.choices:
-                raise InputError(f"{dimension.key}: a grid needs a list of values, not a range")
-        count = math.prod(len(dimension.choices) for dimension in self.dimensions)
-        if count > MOST_DESIGNS:
-            raise InputError(f"the grid has {count} designs; at most {MOST_DESIGNS} are allowed")
-        keys = [dimension.key for dimension in self.dimensions]
-        combined = itertools.product(*(dimension.choices for dimension in self.dimensions))
-        return [dict(zip(keys, values, strict=True)) for values in combined]
+        return _combinations(self.dimensions)
 
     def sobol(self, count: int) -> list[dict[str, Any]]:
         """So many points spread evenly, without those that are the same design twice."""
@@ -156,6 +192,46 @@ def _directions(dimension: int) -> list[int]:
                 value ^= found[bit - step]
         found.append(value)
     return found
+
+
+def shown(values: Mapping[str, Any]) -> str:
+    """Values by the last part of their keys, for people.
+
+    Examples
+    --------
+    >>> shown({"vehicle.wake_up.bound_m": 0.25, "vehicle.platform": {"name": "a", "mode": 2}})
+    'bound_m 0.25, platform a 2'
+    """
+    return ", ".join(f"{key.rpartition('.')[2]} {_shown(value)}" for key, value in values.items())
+
+
+def _shown(value: Any) -> str:
+    if isinstance(value, dict):
+        return " ".join(map(_shown, value.values()))
+    return f"{value:g}" if isinstance(value, float) else str(value)
+
+
+def _combinations(dimensions: Sequence[Dimension]) -> list[dict[str, Any]]:
+    for dimension in dimensions:
+        if not dimension.choices:
+            raise InputError(f"{dimension.key}: a grid needs a list of values, not a range")
+    count = math.prod(len(dimension.choices) for dimension in dimensions)
+    if count > MOST_DESIGNS:
+        raise InputError(f"the grid has {count} designs; at most {MOST_DESIGNS} are allowed")
+    keys = [dimension.key for dimension in dimensions]
+    combined = itertools.product(*(dimension.choices for dimension in dimensions))
+    return [dict(zip(keys, values, strict=True)) for values in combined]
+
+
+def _worlds(table: Any) -> dict[str, dict[str, Any]]:
+    """Every combination of what is given, by its name."""
+    found = _dimensions(table, "") if isinstance(table, dict) else []
+    if not found:
+        raise InputError(f"{WORLD}: no key with a list of values")
+    try:
+        return {shown(world): world for world in _combinations(found)}
+    except InputError as error:
+        raise InputError(f"{WORLD}.{error}") from None
 
 
 def _dimensions(table: Mapping[str, Any], path: str) -> list[Dimension]:

@@ -10,15 +10,16 @@ from typing import TYPE_CHECKING, Any
 
 import numpy as np
 
-from access_av.designs.drives import designs_of, drive, joined
+from access_av.designs.drives import drive, in_worlds, in_worst, joined
 from access_av.designs.search import Found
 from access_av.errors import InputError
 
 if TYPE_CHECKING:
-    from collections.abc import Callable
+    from collections.abc import Callable, Sequence
 
     from access_av._core import Scenario
     from access_av.campaign import Campaign
+    from access_av.designs.drives import Design, Driven, Part
     from access_av.designs.space import Space
 
 # Designs that are asked for before the last ones are told: enough for all workers.
@@ -53,29 +54,36 @@ def suggested(
         directions=["minimize", "minimize"],
         sampler=optuna.samplers.NSGAIISampler(seed=seed % 2**32, population_size=BATCH),
     )
-    values: list[dict[str, Any]] = []
-    parts = []
-    while len(values) < count:
-        trials = [study.ask() for _ in range(min(BATCH, count - len(values)))]
+    kept: dict[str, tuple[dict[str, Any], list[Part]]] = {}
+    done = 0
+    while done < count:
+        trials = [study.ask() for _ in range(min(BATCH, count - done))]
         asked = [_values(trial, space) for trial in trials]
-        designs = designs_of(scenario, asked)
-        made = drive(campaign, designs, first_run=0, runs=runs, seed=seed)
-        for trial, design, part in zip(trials, designs, made, strict=True):
-            if part is None:
-                raise InputError("--optuna looks at all drives: it cannot be shared by --shard")
-            found = joined(design, [part])
-            aims = found.mean_energy_j, float(np.mean(found.square_m2))
+        designs = in_worlds(scenario, asked, space.worlds)
+        every = [one for worlds in designs for one in worlds]
+        made = drive(campaign, every, first_run=0, runs=runs, seed=seed)
+        parts: list[Part] = [part for part in made if part is not None]
+        if len(parts) < len(made):
+            raise InputError("--optuna looks at all drives: it cannot be shared by --shard")
+        for number, (trial, worlds) in enumerate(zip(trials, designs, strict=True)):
+            mine = parts[number * len(worlds) : (number + 1) * len(worlds)]
+            driven = _judged(worlds, mine)
+            aims = driven.mean_energy_j, float(np.mean(driven.square_m2))
             study.tell(trial, [min(aim, HOPELESS) for aim in aims])
-            parts.append(part)
-        values += asked
+            kept.setdefault(repr(asked[number]), (asked[number], mine))
+        done += len(trials)
         if progress is not None:
-            progress(len(values), count)
-    once = {repr(each): index for index, each in enumerate(values)}
-    designs = designs_of(scenario, [values[index] for index in once.values()])
-    driven = [
-        joined(design, [parts[index]]) for design, index in zip(designs, once.values(), strict=True)
+            progress(done, count)
+    # Once more, all together: a label says what differs from design to design.
+    designs = in_worlds(scenario, [chosen for chosen, _ in kept.values()], space.worlds)
+    judged = [
+        _judged(worlds, mine) for worlds, (_, mine) in zip(designs, kept.values(), strict=True)
     ]
-    return Found(driven, count * runs)
+    return Found(judged, count * runs * len(space.worlds))
+
+
+def _judged(worlds: Sequence[Design], parts: Sequence[Part]) -> Driven:
+    return in_worst([joined(one, [part]) for one, part in zip(worlds, parts, strict=True)])
 
 
 def _values(trial: Any, space: Space) -> dict[str, Any]:

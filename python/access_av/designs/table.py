@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import math
 from dataclasses import dataclass
 from typing import TYPE_CHECKING, Any
 
@@ -10,32 +11,64 @@ import polars as pl
 
 from access_av.designs.front import may_be_front
 from access_av.errors import InputError
+from access_av.statistics.percentiles import PERCENTS, as_columns, column, ends_text, names
 
 if TYPE_CHECKING:
     from collections.abc import Mapping, Sequence
 
     from access_av.designs.drives import Driven
 
+# Columns that may hold nothing known.
+NUMBERS = dict.fromkeys(("energy_j", "rms_error_m", "p90_max_error_m", *names()), pl.Float64)
+ENERGY = "energy"
+# Of the error that is bound, where none is given: what 3GPP's levels 2, 3 and 5 ask for.
+USUAL_PERCENT = 99.0
+# Column of those that keep what they have to: whether they do so with 95 %.
+SURELY = "is_sure"
+
 
 def rows_of(driven: Sequence[Driven]) -> pl.DataFrame:
-    """One row per design: what was chosen, energy, error, and whether it may be of the front."""
+    """One row per design: what was chosen, energy, errors, and whether it may be of the front.
+
+    Where designs were driven in several worlds, each is as it is in the worst of them.
+    """
     on_front = set(may_be_front(driven))
     return pl.DataFrame(
         [
-            {
-                "design": index,
-                "choice": one.design.label,
-                "runs": one.square_m2.size,
-                "energy_j": _known(one.mean_energy_j),
-                "rms_error_m": _known(one.rms_m),
-                "p90_max_error_m": _known(one.p90_worst_m),
-                "executions": float(one.executions.mean()),
-                "listened": float(one.listened.mean()),
-                "on_front": index in on_front,
-            }
+            {"design": index, **row_of(one), "on_front": index in on_front}
             for index, one in enumerate(driven)
-        ]
+        ],
+        infer_schema_length=None,
+        schema_overrides=NUMBERS,
     )
+
+
+def rows_of_worlds(driven: Sequence[Driven]) -> pl.DataFrame:
+    """One row per design and world; none where there is only one."""
+    return pl.DataFrame(
+        [
+            {"design": index, **row_of(world)}
+            for index, one in enumerate(driven)
+            for world in one.worlds
+        ],
+        infer_schema_length=None,
+        schema_overrides=NUMBERS,
+    )
+
+
+def row_of(one: Driven) -> dict[str, Any]:
+    """What was chosen, energy and errors of one design."""
+    return {
+        "choice": one.design.label,
+        "world": one.design.world,
+        "runs": one.square_m2.size,
+        "energy_j": _known(one.mean_energy_j),
+        "rms_error_m": _known(one.rms_m),
+        **as_columns(one.percentiles()),
+        "p90_max_error_m": _known(one.p90_worst_m),
+        "executions": float(one.executions.mean()),
+        "listened": float(one.listened.mean()),
+    }
 
 
 def _known(value: float) -> float | None:
@@ -54,41 +87,138 @@ class Constraints:
         Root mean square error over track and runs.
     max_worst_m
         Largest error of a run, in nine of ten.
+    max_error_m, percentile
+        So many percent of the errors are to be no larger than this; 99 where it is not given.
+
+    Raises
+    ------
+    InputError
+        For a percentile that is not one of :data:`~access_av.statistics.percentiles.PERCENTS`.
     """
 
     max_energy_j: float | None = None
     max_rms_m: float | None = None
     max_worst_m: float | None = None
+    max_error_m: float | None = None
+    percentile: float | None = None
+
+    def __post_init__(self) -> None:
+        if self.percent not in PERCENTS:
+            allowed = ", ".join(f"{percent:g}" for percent in PERCENTS)
+            raise InputError(f"percentile {self.percent:g}: it can be {allowed}")
+
+    @property
+    def percent(self) -> float:
+        """The percentile that is bound, in percent."""
+        return USUAL_PERCENT if self.percentile is None else self.percentile
+
+    @property
+    def is_empty(self) -> bool:
+        """Whether nothing is to be kept."""
+        return not self._judged({})
+
+    @property
+    def binds_energy_alone(self) -> bool:
+        """Whether no error is bound."""
+        return self._judged({}).keys() <= {ENERGY}
 
     def excess(self, row: Mapping[str, Any]) -> dict[str, float]:
         """By what factor a design goes beyond each constraint; at most 1 where it keeps it."""
-        has = {
-            "energy": (row["energy_j"], self.max_energy_j),
-            "RMS error": (row["rms_error_m"], self.max_rms_m),
-            "worst error": (row["p90_max_error_m"], self.max_worst_m),
-        }
         return {
             name: np.inf if value is None or bound <= 0.0 else value / bound
-            for name, (value, bound) in has.items()
-            if bound is not None
+            for name, (value, bound) in self._judged(row).items()
         }
 
+    def keeps(self, row: Mapping[str, Any]) -> bool:
+        """Whether a design keeps all of them."""
+        return all(factor <= 1.0 for factor in self.excess(row).values())
+
+    def keeps_surely(self, row: Mapping[str, Any]) -> bool:
+        """Whether it does so with 95 %: the percentile by the high end of its interval."""
+        high_m = row[column(self.percent).replace("_error_m", "_error_high_m")]
+        of_percentile = self.max_error_m is None or (
+            high_m is not None and high_m <= self.max_error_m
+        )
+        return of_percentile and self.keeps(row)
+
+    def in_words(self, row: Mapping[str, Any]) -> list[str]:
+        """What a design has of each, and what is asked.
+
+        Examples
+        --------
+        >>> row = {"p99_error_m": 0.286, "p99_error_low_m": 0.21, "p99_error_high_m": 0.34}
+        >>> Constraints(max_error_m=0.3).in_words(row)
+        ['99 % of errors within 0.286 m (95 %: 0.21 to 0.34), asked 0.3 m: too few drives to say']
+        """
+        told = []
+        for name, (value, bound) in self._judged(row).items():
+            unit = "J" if name == ENERGY else "m"
+            had, verdict = "not known" if value is None else f"{value:.3g} {unit}", "missed"
+            if value is not None and value <= bound:
+                verdict = "kept"
+            if name == self._percentile_name and value is not None:
+                low_m, high_m = _ends(row, self.percent)
+                if (high_m is None and verdict == "kept") or (high_m or 0.0) > bound >= value:
+                    verdict = "too few drives to say"
+                had += f" (95 %: {ends_text(low_m, high_m)})"
+            told.append(f"{name} {had}, asked {bound:g} {unit}: {verdict}")
+        return told
+
+    def instead(self, name: str, factor: float) -> str:
+        """A constraint that allows so many times as much, beside what it allows.
+
+        Examples
+        --------
+        >>> Constraints(max_energy_j=3.0).instead("energy", 4.0 / 3.0)
+        'energy 4 J instead of 3 J'
+        """
+        _, bound = self._judged({})[name]
+        unit = "J" if name == ENERGY else "m"
+        # Rounded up, so that what is allowed is enough.
+        needed = math.nextafter(bound * factor, 0.0)
+        step = 10.0 ** (math.floor(math.log10(needed)) - 2)
+        return f"{name} {math.ceil(needed / step) * step:.3g} {unit} instead of {bound:g} {unit}"
+
     def kept(self, rows: pl.DataFrame) -> pl.DataFrame:
-        """Designs that keep all of them, the one with the least energy first.
+        """Designs that keep all of them; first those that do so with 95 %, then by energy.
 
         Examples
         --------
         >>> rows = pl.DataFrame(
-        ...     {"energy_j": [2.0, 1.0], "rms_error_m": [0.1, 0.2], "p90_max_error_m": [0.3, 0.6]}
+        ...     {
+        ...         **{"energy_j": [2.0, 1.0], "rms_error_m": [0.1, 0.2]},
+        ...         **{"p90_max_error_m": [0.3, 0.6], "p99_error_high_m": [0.3, 0.6]},
+        ...         "p99_error_m": [0.25, 0.5],
+        ...     }
         ... )
         >>> Constraints(max_rms_m=0.15).kept(rows)["energy_j"].to_list()
         [2.0]
         """
-        keeps = [
-            all(excess <= 1.0 for excess in self.excess(row).values())
-            for row in rows.iter_rows(named=True)
-        ]
-        return rows.filter(pl.Series(keeps, dtype=pl.Boolean)).sort("energy_j", "rms_error_m")
+        records = rows.to_dicts()
+        keeps = pl.Series([self.keeps(row) for row in records], dtype=pl.Boolean)
+        surely = pl.Series(SURELY, [self.keeps_surely(row) for row in records], dtype=pl.Boolean)
+        found = rows.with_columns(surely).filter(keeps)
+        return found.sort(SURELY, "energy_j", "rms_error_m", descending=[True, False, False])
+
+    @property
+    def _percentile_name(self) -> str:
+        return f"{self.percent:g} % of errors within"
+
+    def _judged(self, row: Mapping[str, Any]) -> dict[str, tuple[float | None, float]]:
+        """What a row has of each that is bound, and the bound."""
+        every = {
+            ENERGY: (row.get("energy_j"), self.max_energy_j),
+            "RMS error": (row.get("rms_error_m"), self.max_rms_m),
+            self._percentile_name: (row.get(column(self.percent)), self.max_error_m),
+            "worst error": (row.get("p90_max_error_m"), self.max_worst_m),
+        }
+        return {name: (value, bound) for name, (value, bound) in every.items() if bound is not None}
+
+
+def _ends(row: Mapping[str, Any], percent: float) -> tuple[float | None, float | None]:
+    name = column(percent)
+    low_m, high_m = (row.get(name.replace("_error_m", f"_error_{it}_m")) for it in ("low", "high"))
+    return low_m, high_m
 
 
 def what_to_change(constraints: Constraints, rows: pl.DataFrame) -> list[str]:
@@ -113,12 +243,13 @@ def what_to_change(constraints: Constraints, rows: pl.DataFrame) -> list[str]:
         ]
         if others:
             factor, label = min(others)
-            advice.append(f"{name} allowed to be {factor:.3g} times as much: {label}")
+            advice.append(f"{constraints.instead(name, factor)}: {label}")
         else:
             advice.append(f"{name} alone, however much is allowed, does not help")
     nearest, row = min(zip(excesses, records, strict=True), key=lambda pair: max(pair[0].values()))
     factor = max(nearest.values())
-    if np.isfinite(factor):
-        advice.append(f"all of them {factor:.3g} times as much: {row['choice']}")
+    if np.isfinite(factor) and len(nearest) > 1:
+        every = ", ".join(constraints.instead(name, factor) for name in nearest)
+        advice.append(f"{every}: {row['choice']}")
     advice.append("else what does not vary: more radio heads, a better odometer, a surveyed road")
     return advice

@@ -1,9 +1,11 @@
 """Gains, weights and set points of a wake-up policy for one's own road and objective.
 
 Rounds of evenly spread points, each round in a box a third as wide around the best so far; all
-points see the same runs. What is chosen by what it reached in these runs looks better in them than
-it is. So the best few are driven again in other runs, and the best of these in a third lot, beside
-what was there before.
+points see the same runs, and what was there before is one of them. What is chosen by what it
+reached in these runs looks better in them than it is. So the best few are driven again in other
+runs. Of these two go on to a third lot: the best one, and the best one whose errors keep what is
+asked by the high end of their intervals, too. There they are driven beside what was there before,
+which remains unless one of them is better.
 """
 
 from __future__ import annotations
@@ -18,6 +20,7 @@ from access_av.designs.drives import designs_of, drive, joined
 from access_av.designs.front import differences, student
 from access_av.designs.space import Dimension, Space
 from access_av.errors import InputError
+from access_av.statistics.percentiles import column
 
 if TYPE_CHECKING:
     from collections.abc import Callable
@@ -61,6 +64,8 @@ class Tuned:
 
     Attributes
     ----------
+    before, after
+        The same, where nothing better was found.
     less
         By how much energy (J) and squared error (m²) are less, run by run: mean and the ends of
         the 95 % interval, shape (2, 3).
@@ -72,6 +77,11 @@ class Tuned:
     after: Driven
     less: Any
     drives: int
+
+    @property
+    def is_better(self) -> bool:
+        """Whether something better than before was found."""
+        return self.after is not self.before
 
 
 def space_of(scenario: Scenario) -> Space:
@@ -113,7 +123,8 @@ def tune(
     Parameters
     ----------
     constraints
-        What is to be kept. The objective is least energy; least error where only energy is bound.
+        What is to be kept. The objective is least energy; where only energy is bound, least error:
+        of its percentile where one is given, else of RMS.
     designs
         Points a round.
     runs
@@ -124,52 +135,70 @@ def tune(
     InputError
         When nothing is to be kept, or the platform has no energy figure for the method.
     """
-    if all(bound is None for bound in vars(constraints).values()):
+    if constraints.is_empty:
         raise InputError("nothing is to be kept: give a largest error or a largest energy")
     space = space_of(scenario)
     if not space.dimensions:
         raise InputError(f"{scenario.name}: its wake-up policy has nothing to tune")
-    rank = _ranking(constraints)
-    [before] = designs_of(scenario, [{}])
-    tried: list[Driven] = []
-    done = 0
+    goal = _Goal(constraints)
+    [as_it_was] = designs_of(scenario, [{}])
+    tried = _driven(campaign, [as_it_was], 0, runs, seed)
+    done = runs
     for _ in range(ROUNDS):
         points = designs_of(scenario, space.sobol(designs))
         tried += _driven(campaign, points, 0, runs, seed)
-        tried = sorted(tried, key=rank)[:FINALISTS]
+        tried = sorted(tried, key=goal.with_margin)[:FINALISTS]
         done += runs * len(points)
-        best = tried[0].design.values
+        best = next(it.design.values for it in tried if it.design.values)
         space = Space(tuple(_around(it, best[it.key]) for it in space.dimensions))
         if progress is not None:
-            progress(done, ROUNDS * designs * runs)
+            progress(done, (ROUNDS * designs + 1) * runs)
     if not np.isfinite(tried[0].mean_energy_j):
         name = tried[0].design.platform.name
         raise InputError(f"platform {name} has no energy figure for this method")
-    finalists = [it.design for it in tried]
-    chosen = min(_driven(campaign, finalists, runs, runs, seed), key=rank).design
-    old, new = _driven(campaign, [before, chosen], 2 * runs, runs, seed)
-    less = -differences(new, [old])[0][:, [0, 2, 1]]
-    return Tuned(old, new, less, done + runs * (len(finalists) + 2))
+    finalists = [it.design for it in tried if it.design.values]
+    again = _driven(campaign, finalists, runs, runs, seed)
+    safest, best_found = (min(again, key=it).design for it in (goal.with_margin, goal.as_found))
+    last = [as_it_was, safest, *([best_found] if best_found is not safest else [])]
+    # Of equals the first: what was there before.
+    before, *others = _driven(campaign, last, 2 * runs, runs, seed)
+    after = min([before, *others], key=goal.as_found)
+    less = -differences(after, [before])[0][:, [0, 2, 1]]
+    return Tuned(before, after, less, done + runs * (len(finalists) + len(last)))
 
 
-def _ranking(constraints: Constraints) -> Callable[[Driven], tuple[float, float]]:
-    """Least first: by how far it is surely beyond the constraints, then by the objective."""
-    only_energy = constraints.max_rms_m is None and constraints.max_worst_m is None
+@dataclass(frozen=True)
+class _Goal:
+    """What comes first is least: by how far it is beyond the constraints, then the objective."""
 
-    def rank(driven: Driven) -> tuple[float, float]:
-        # The upper end of the interval: who is lucky once is not better.
-        count = driven.square_m2.size
-        spread_m2 = float(np.std(driven.square_m2, ddof=1)) if count > 1 else 0.0
-        most_m2 = driven.rms_m**2 + student(max(count - 1, 1)) * spread_m2 / np.sqrt(count)
+    constraints: Constraints
+
+    def as_found(self, driven: Driven) -> tuple[float, float]:
+        """By what was found."""
+        return self._rank(driven, with_margin=False)
+
+    def with_margin(self, driven: Driven) -> tuple[float, float]:
+        """By the high end of the errors' intervals: who is lucky once is not better."""
+        return self._rank(driven, with_margin=True)
+
+    def _rank(self, driven: Driven, *, with_margin: bool) -> tuple[float, float]:
+        bounds, count = self.constraints, driven.square_m2.size
+        square_m2 = driven.rms_m**2
+        if with_margin and count > 1:
+            spread_m2 = float(np.std(driven.square_m2, ddof=1))
+            square_m2 += student(count - 1) * spread_m2 / np.sqrt(count)
+        [error] = driven.percentiles([bounds.percent], of_seen=True)
+        error_m = error.high if with_margin and error.high is not None else error.value
         row = {
             "energy_j": driven.mean_energy_j,
-            "rms_error_m": float(np.sqrt(most_m2)),
+            "rms_error_m": float(np.sqrt(square_m2)),
             "p90_max_error_m": driven.p90_worst_m,
+            column(bounds.percent): error_m,
         }
-        beyond = max(1.0, *constraints.excess(row).values())
-        return beyond, driven.rms_m if only_energy else driven.mean_energy_j
-
-    return rank
+        beyond = max(1.0, *bounds.excess(row).values())
+        if not bounds.binds_energy_alone:
+            return beyond, driven.mean_energy_j
+        return beyond, driven.rms_m if bounds.percentile is None else error_m
 
 
 def _driven(

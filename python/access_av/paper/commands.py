@@ -9,10 +9,13 @@ from typing import Annotated, Any
 import typer
 
 from access_av.commands.options import (
+    MISSED,
     OTHER_SHARES,
     AsJson,
     DaskOption,
+    MaxError,
     Out,
+    PercentileOption,
     PlatformOption,
     Runs,
     Seed,
@@ -192,6 +195,8 @@ def _bound(text: str) -> Any:
 )
 def explore(
     max_energy_j: Annotated[float | None, _bound("Energy of a trip.")] = None,
+    max_error_m: MaxError = None,
+    percentile: PercentileOption = None,
     max_rms_m: Annotated[float | None, _bound("RMS error over track and runs.")] = None,
     max_worst_m: Annotated[float | None, _bound("Worst mean error, X and Y.")] = None,
     max_executions: Annotated[float | None, _bound("Angle estimates in a trip.")] = None,
@@ -203,34 +208,42 @@ def explore(
     ] = None,
     as_json: AsJson = False,
 ) -> None:
-    """Find operating points within an energy budget and an error bound.
+    """Find operating points of the paper's trip within an energy budget and an error bound.
 
-    Asks the last evaluation; where there is none, runs it first.
+    Asks the last evaluation; where there is none, runs it first. For a trip of your own: access-av
+    designs. Exit code 3 where no operating point qualifies.
     """
     from access_av.design_space import Query
     from access_av.design_space import explore as answer
     from access_av.files import json_text
     from access_av.paper.results import operating_points
+    from access_av.statistics.percentiles import column, ends_text
 
-    with progress("No evaluation yet, driving") as tick:
+    with progress("Operating points") as tick:
         points = operating_points(results, reading, progress=tick)
     if not fixed:
         points = points.filter(adaptive=True)
-    query = Query(max_energy_j, max_rms_m, max_worst_m, max_executions, mode)
+    bounds = (max_energy_j, max_rms_m, max_worst_m, max_executions, mode, max_error_m)
+    query = Query(*bounds) if percentile is None else Query(*bounds, percentile)
     found = answer(points, query)
     if as_json:
         print(json_text(found.to_dicts()))
-        return
-    if found.is_empty():
+    elif found.is_empty():
         console.print(f"No operating point has {query}.")
         nearest = points.sort("energy_j").head(1)
         show_points(nearest, title="The one with the least energy")
+    if found.is_empty():
+        raise typer.Exit(MISSED)
+    if as_json:
         return
     show_points(found, title=f"Operating points with {query}")
     best = found.row(0, named=True)
+    name = column(query.percentile)
+    ends = [best[name.replace("_error_m", f"_error_{end}_m")] for end in ("low", "high")]
     console.print(
         f"Least energy: mode {best['mode']}, {best['energy_j']:.1f} J "
-        f"(energy per execution: {best['energy_provenance']})."
+        f"(energy per execution: {best['energy_provenance']}); {query.percentile:g} % of errors "
+        f"within {best[name]:.3g} m (95 %: {ends_text(*ends)})."
     )
 
 

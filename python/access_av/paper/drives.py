@@ -11,25 +11,39 @@ import polars as pl
 from access_av._core import Tapes
 from access_av.paper.methods import METHODS
 from access_av.paper.outcome import EVERY, Drives, Numbers, resamples
+from access_av.service_levels import INDEPENDENT_S
 from access_av.simulation import Simulation, simulate
+from access_av.statistics.percentiles import percentiles
 
 if TYPE_CHECKING:
     from collections.abc import Callable
 
+    from numpy.typing import NDArray
+
     from access_av._core import Scenario
     from access_av.platform import Platform
+    from access_av.statistics.percentiles import Percentile
 
 RESAMPLES = 200
+# Of the errors that are kept, every so many count for percentiles: half a second lies between them.
+SPARSE = 5
 # What every world is driven by: the paper's methods.
 TAPED = [method.replace("_", "-") for method in METHODS]
 
 
 @dataclass(frozen=True)
 class Driven:
-    """A setting's drives, and their statistics at each SSB."""
+    """A setting's drives, their statistics at each SSB, and some of their horizontal errors."""
 
     drives: Drives
     steps: pl.DataFrame
+    error_m: NDArray[np.float32]
+
+    def percentiles(self) -> list[Percentile]:
+        """Percentiles of the horizontal error, over all runs and times."""
+        driven_s = len(self.error_m) * float(self.steps["time_s"][-1])
+        independent = max(1, int(driven_s / INDEPENDENT_S))
+        return percentiles(self.error_m, independent=independent, resamples=RESAMPLES)
 
 
 @dataclass
@@ -116,6 +130,7 @@ class Driver:
                 besides_j=besides_j or 0.0,
             ),
             found.steps,
+            np.hypot(*np.moveaxis(found.errors_m[:, ::SPARSE], -1, 0)),
         )
 
     def _weights(self) -> Numbers:

@@ -27,6 +27,7 @@ from access_av.paper.outcome import Drives, Outcome
 from access_av.paper.readings import SHIPPED, Reading, load
 from access_av.paper.statements import paper_numbers
 from access_av.platform import Platform
+from access_av.statistics.percentiles import as_columns, names
 
 if TYPE_CHECKING:
     from collections.abc import Callable, Mapping, Sequence
@@ -84,7 +85,7 @@ def cases(platform: Platform) -> list[Case]:
     return every_ssb + fixed + adaptive
 
 
-@dataclass(frozen=True)
+@dataclass(frozen=True, eq=False, repr=False)
 class Evaluation:
     """All results of one reading.
 
@@ -112,6 +113,9 @@ class Evaluation:
     seed: int
     refitted: bool
     duration_s: float = 0.0
+
+    def __repr__(self) -> str:
+        return f"Evaluation({self.reading.name}, {self.runs} runs, {self.points.height} points)"
 
     @property
     def scenario(self) -> Scenario:
@@ -199,13 +203,17 @@ def evaluate_with(driver: Driver, reading: Reading) -> Evaluation:
     outcome, refitted = outcome_of(
         [(case, driven[case.setting].drives) for case in wanted], platform, driver.trip_s
     )
+    errors = {setting: as_columns(each.percentiles()) for setting, each in driven.items()}
     return Evaluation(
         reading=reading,
         points=pl.DataFrame(
-            [_point(case, outcome, refitted) for case in wanted],
+            [_point(case, outcome, refitted) | errors[case.setting] for case in wanted],
             infer_schema_length=None,
             # Without a single figure there would be no type either.
-            schema_overrides={"energy_j": pl.Float64, "energy_provenance": pl.String},
+            schema_overrides={
+                **dict.fromkeys(("energy_j", *names()), pl.Float64),
+                "energy_provenance": pl.String,
+            },
         ),
         errors=pl.concat([_errors(setting, each.steps) for setting, each in driven.items()]),
         snr=reference.select("time_s", "mean_true_snr_db"),

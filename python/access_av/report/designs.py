@@ -1,18 +1,19 @@
-"""The page of ``access-av designs``: energy against error, and a design along the track."""
+"""The page of ``access-av designs``: a table, energy against error, error over time."""
 
 from __future__ import annotations
 
 from html import escape
 from importlib.metadata import version
-from typing import TYPE_CHECKING
+from typing import TYPE_CHECKING, Any
 
 import altair as alt
 import numpy as np
 import polars as pl
 
-from access_av.report.chart import GREEN, GREY, ORANGE, thinned
+from access_av.report.chart import GREEN, GREY, ORANGE, finish, thinned
 from access_av.report.page import sheet
-from access_av.report.parts import figure, source, tile
+from access_av.report.parts import badge, figure, number, section, source, table, tile, value_text
+from access_av.statistics.percentiles import ends_text
 
 if TYPE_CHECKING:
     from collections.abc import Sequence
@@ -21,69 +22,178 @@ if TYPE_CHECKING:
     from access_av.designs.drives import Driven
     from access_av.report.chart import Spec
 
-# Designs that are drawn, and those of them along the track: the front first, then by energy.
-MOST_DESIGNS, MOST_TRACKS, POINTS_PER_TRACK = 4000, 40, 60
+# Designs that are drawn, those of them over time, and those in the table: the front first, then by
+# energy.
+MOST_DESIGNS, MOST_TRACKS, POINTS_PER_TRACK, MOST_ROWS = 4000, 40, 60, 100
+# More numbers beside their points could not be read.
+MOST_NAMES = 30
+
+COMPARED = (
+    "All designs drove the same runs. The Pareto front are those than which no other takes less "
+    "energy and has a smaller RMS error, as far as 95 % confidence tells. "
+)
+IN_WORST = (
+    "Each design was driven in {count} worlds ({names}), which nobody can choose: it stands here "
+    "as it is in the worst of them. "
+)
 
 
-def render_designs(scenario: Scenario, driven: Sequence[Driven], rows: pl.DataFrame) -> str:
-    """The designs of a scenario as an HTML page that loads nothing."""
-    known = rows.drop_nulls(["energy_j", "rms_error_m"])
-    specs = {} if known.is_empty() else {"designs": _linked(driven, known)}
-    drawn = figure("designs") if specs else "<p>No design has a known energy and error.</p>"
+def render_designs(
+    scenario: Scenario, driven: Sequence[Driven], rows: pl.DataFrame, of_worlds: pl.DataFrame
+) -> str:
+    """The designs of a scenario as an HTML page that loads nothing.
+
+    Parameters
+    ----------
+    scenario
+        What was driven.
+    driven
+        The designs.
+    rows, of_worlds
+        What :func:`~access_av.designs.table.rows_of` and
+        :func:`~access_av.designs.table.rows_of_worlds` make of them.
+    """
+    ordered = rows.sort("on_front", "energy_j", descending=[True, False], nulls_last=True)
+    known = ordered.drop_nulls(["energy_j", "rms_error_m"])
+    runs = int(rows["runs"].max())  # type: ignore[arg-type]
+    text = COMPARED
+    if not of_worlds.is_empty():
+        names = of_worlds["world"].unique(maintain_order=True).to_list()
+        text += IN_WORST.format(count=len(names), names="; ".join(names))
+    specs: dict[str, Spec] = {}
+    sections = [section("Designs", text, _table(ordered))]
+    if known.is_empty():
+        sections.append(section("Energy against error", "No design has a known energy.", ""))
+    else:
+        specs["designs"] = _energy_against_error(known.head(MOST_DESIGNS))
+        told = (
+            "Within which error 99 % of all positions are. Orange: on the Pareto front, with the "
+            "95 % interval by the bootstrap over whole drives. The numbers are those of the table."
+        )
+        sections.append(section("Energy against error", told, figure("designs")))
+        specs["tracks"] = _over_time(driven, known)
+        told = "RMS error of one design over its runs; choose which below."
+        sections.append(section("Over the drive", told, figure("tracks")))
+    if not of_worlds.is_empty():
+        sections.append(section("In each world", "", _table(of_worlds)))
+    written = source("Scenario, all defaults written out", scenario.to_toml())
+    sections.append(section("Provenance", "", written))
+    front = int(rows["on_front"].sum())
     return sheet(
         specs,
         title=f"ACCESS-AV designs: {escape(scenario.name)}",
         kicker="ACCESS-AV designs",
-        headline=f"{rows['on_front'].sum()} of {rows.height} designs are not surely beaten",
+        headline=f"{front} of {rows.height} designs may be on the Pareto front of energy and error",
         lead=escape(scenario.description),
-        tiles=tile(str(rows.height), "designs driven to the end"),
+        tiles=_tiles(rows, runs),
         meta=escape(f"Scenario “{scenario.name}”, version {version('access-av')}."),
-        sections=(
-            "<section><h2>Energy against error</h2><p>All designs saw the same runs. Orange: no "
-            "other design is better with 95 %. Click one to see its error along the track.</p>"
-            f"{drawn}</section><section><h2>Provenance</h2>"
-            f"{source('Scenario, all defaults written out', scenario.to_toml())}</section>"
-        ),
+        sections="".join(sections),
     )
 
 
-def _linked(driven: Sequence[Driven], known: pl.DataFrame) -> Spec:
-    """Energy against error, above the error along the track of what is clicked."""
-    drawn = known.sort("on_front", "energy_j", descending=[True, False]).head(MOST_DESIGNS)
-    nearest = drawn["design"].head(MOST_TRACKS).to_list()
+def _tiles(rows: pl.DataFrame, runs: int) -> str:
+    tiles = [tile(str(rows.height), f"designs, {runs} drives of each")]
+    if (energy_j := rows["energy_j"].min()) is not None:
+        tiles.append(tile(f"{value_text(energy_j)} J", "least energy of a trip"))
+    if (error_m := rows["p99_error_m"].min()) is not None:
+        tiles.append(tile(f"{value_text(error_m)} m", "least error that 99 % are within"))
+    return "".join(tiles)
+
+
+def _table(rows: pl.DataFrame) -> str:
+    """Designs side by side; the first :data:`MOST_ROWS` of them."""
+    worlds = (rows["world"] != "").any()
+    judged = "on_front" in rows.columns
+    head = ["No.", "Design", *(["World" if not judged else "Worst world"] if worlds else [])]
+    numbers = range(len(head), len(head) + 7)
+    head += ["Energy / J", "Median / m", "90 % / m", "99 % / m", "95 % interval of that"]
+    head += ["RMS / m", "Estimates", *(["Pareto front"] if judged else [])]
+    cells = []
+    for row in rows.head(MOST_ROWS).iter_rows(named=True):
+        cells.append(
+            [
+                str(row["design"]),
+                escape(row["choice"] or "as it is"),
+                *([escape(row["world"])] if worlds else []),
+                number(row["energy_j"], 2),
+                *(number(row[f"p{percent}_error_m"]) for percent in (50, 90, 99)),
+                ends_text(row["p99_error_low_m"], row["p99_error_high_m"]),
+                number(row["rms_error_m"]),
+                number(row["executions"], 0),
+                *([badge("yes", "yes") if row["on_front"] else ""] if judged else []),
+            ]
+        )
+    more = rows.height - MOST_ROWS
+    below = f'<p class="note">{more} more are in the Parquet file beside this page.</p>'
+    return table(head, cells, numbers=numbers) + (below if more > 0 else "")
+
+
+def _energy_against_error(drawn: pl.DataFrame) -> Spec:
+    """Energy against the 99th percentile of the error, with the numbers of the front's designs."""
+    columns = ("design", "choice", "energy_j", "p99_error_m", "rms_error_m", "executions")
+    ends = ("p99_error_low_m", "p99_error_high_m")
+    points = drawn.select(
+        *columns,
+        *ends,
+        "on_front",
+        # Without a percentile there is no place for it.
+    ).drop_nulls("p99_error_m")
+    front = points.filter("on_front")
+    x = alt.X("energy_j:Q", title="energy of a trip / J", scale=alt.Scale(type="log"))
+    tooltip = [
+        alt.Tooltip("design:Q", title="No."),
+        alt.Tooltip("choice:N", title="design"),
+        alt.Tooltip("energy_j:Q", title="energy / J", format=".3g"),
+        alt.Tooltip("p99_error_m:Q", title="99 % within / m", format=".3g"),
+        alt.Tooltip("rms_error_m:Q", title="RMS / m", format=".3g"),
+        alt.Tooltip("executions:Q", title="estimates", format=".0f"),
+    ]
+
+    def layer(rows: pl.DataFrame, colour: str, opacity: float) -> Any:
+        y = alt.Y("p99_error_m:Q", title="99 % of errors within / m", scale=alt.Scale(zero=False))
+        marks = alt.Chart(rows).mark_circle(size=70, color=colour, opacity=opacity)
+        return marks.encode(x=x, y=y, tooltip=tooltip)
+
+    # Of a layer without rows Vega warns in the console.
+    others, known = points.filter(~pl.col("on_front")), front.drop_nulls(list(ends))
+    layers = [] if others.is_empty() else [layer(others, GREY, 0.5)]
+    if not known.is_empty():
+        rules = alt.Chart(known).mark_rule(color=ORANGE, opacity=0.6)
+        layers.append(rules.encode(x=x, y="p99_error_low_m:Q", y2="p99_error_high_m:Q"))
+    if not front.is_empty():
+        names = alt.Chart(front.head(MOST_NAMES)).mark_text(dx=9, dy=-7, align="left", fontSize=11)
+        layers += [
+            layer(front, ORANGE, 1.0),
+            names.encode(x=x, y="p99_error_m:Q", text="design:N"),
+        ]
+    chart: Any = alt.layer(*layers)
+    return finish(
+        chart, height=320, description="Energy of a trip against the error of each design"
+    )
+
+
+def _over_time(driven: Sequence[Driven], known: pl.DataFrame) -> Spec:
+    """RMS error over the drive, of the design that is chosen."""
+    nearest = known.head(MOST_TRACKS)
+    names = [
+        f"{design}: {choice or 'as it is'}"
+        for design, choice in nearest.select("design", "choice").iter_rows()
+    ]
     tracks = pl.concat(
         thinned(
             pl.DataFrame(
                 {
-                    "design": index,
+                    "name": name,
                     "time_s": driven[index].track_s,
                     "rms_error_m": np.sqrt(driven[index].track_m2),
                 }
             ),
             POINTS_PER_TRACK,
         )
-        for index in nearest
+        for index, name in zip(nearest["design"], names, strict=True)
     )
-    clicked = alt.selection_point(fields=["design"], value=[{"design": nearest[0]}])
-    kind = (
-        alt.when(clicked)
-        .then(alt.value(GREEN))
-        .when("datum.on_front")
-        .then(alt.value(ORANGE))
-        .otherwise(alt.value(GREY))
-    )
-    points = (
-        alt.Chart(drawn)
-        .mark_circle(size=70)
-        .encode(
-            x=alt.X("energy_j:Q", title="energy of a trip / J", scale=alt.Scale(type="log")),
-            y=alt.Y("rms_error_m:Q", title="RMS error / m"),
-            color=kind,
-            tooltip=["choice", "energy_j", "rms_error_m", "executions", "listened"],
-        )
-        .add_params(clicked)
-        .properties(width=640, height=300)
-    )
+    select = alt.binding_select(options=names, name="Design ")
+    chosen = alt.param(name="chosen", value=names[0], bind=select)
     track = (
         alt.Chart(tracks)
         .mark_line(color=GREEN)
@@ -91,9 +201,7 @@ def _linked(driven: Sequence[Driven], known: pl.DataFrame) -> Spec:
             x=alt.X("time_s:Q", title="time / s"),
             y=alt.Y("rms_error_m:Q", title="RMS error / m"),
         )
-        .transform_filter(clicked)
-        .properties(width=640, height=160)
+        .add_params(chosen)
+        .transform_filter("datum.name == chosen")
     )
-    spec: Spec = (points & track).to_dict()
-    spec["description"] = "Energy against error of every design, and the error of one over time"
-    return spec
+    return finish(track, height=200, description="RMS error of a design over the drive")

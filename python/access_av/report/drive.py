@@ -10,13 +10,17 @@ from typing import TYPE_CHECKING
 from access_av.errors import InputError
 from access_av.report import drive_charts as charts
 from access_av.report.page import sheet
-from access_av.report.parts import figure, section, service_levels, source, tile
+from access_av.report.parts import figure, section, service_levels, source, table, tile
 
 if TYPE_CHECKING:
     from access_av._core import Scenario
     from access_av.report.chart import Spec
     from access_av.simulation import Simulation
     from access_av.statistics.integrity import Integrity
+
+
+# Of those that are known, the percentiles that head the page.
+SHOWN_PERCENTS = (50.0, 90.0, 99.0)
 
 
 def render_drive(scenario: Scenario, result: Simulation, seed: int) -> str:
@@ -33,14 +37,20 @@ def render_drive(scenario: Scenario, result: Simulation, seed: int) -> str:
     """
     if result.trajectories is None or result.executions is None:
         raise InputError("the page of a drive needs its trajectories: keep_trajectories=True")
+    operation = result.operation
     runs, duration_s = result.runs.height, float(result.steps["time_s"][-1])
     specs: dict[str, Spec] = {"error": charts.error_against_time(result.steps)}
     sections = [
         section(
-            "Error",
+            "In operation",
+            "" if operation is None else f"{operation.in_words()} {operation.what_helps()}".strip(),
+            _errors(result),
+        ),
+        section(
+            "Error over the drive",
             "Distance between estimate and truth at each SSB, over the runs.",
             figure("error"),
-        )
+        ),
     ]
     if not result.executions.is_empty():
         specs["executions"] = charts.executions_against_time(result.executions, runs, duration_s)
@@ -75,20 +85,22 @@ def render_drive(scenario: Scenario, result: Simulation, seed: int) -> str:
             source("Scenario, all defaults written out", scenario.to_toml()),
         )
     )
-    quantiles_m = result.error_quantiles_m
     tiles = [
-        tile(f"{quantiles_m[0.5]:.3f} m", "horizontal error, median"),
-        tile(f"{quantiles_m[0.9]:.3f} m", "90th percentile"),
-        tile(f"{quantiles_m[0.99]:.3f} m", "99th percentile"),
-        tile(f"{result.runs['executions'].sum() / runs:,.0f}", "executions in a run"),
+        tile(f"{each.value:.3f} m", f"{each.percent:g} % of errors are within")
+        for each in result.percentiles or ()
+        if each.percent in SHOWN_PERCENTS
     ]
-    if integrity is not None:
-        tiles.append(tile(f"{integrity.exceedances}", "errors beyond the protection level"))
+    estimates = result.runs["executions"].sum() / runs
+    tiles.append(tile(f"{estimates:,.0f}", "angles estimated in a run"))
+    if operation is not None and integrity is not None:
+        tiles.append(tile(f"{operation.reliable:.1%}", "of the time the position may be relied on"))
+        beyond = f"of {operation.epochs:,} errors beyond the protection level meanwhile"
+        tiles.append(tile(f"{integrity.exceedances:,}", beyond))
     return sheet(
         specs,
         title=f"ACCESS-AV drive: {escape(scenario.name)}",
         kicker="ACCESS-AV drive",
-        headline=f"{quantiles_m[0.9]:.2f} m or less in nine of ten epochs",
+        headline=f"{result.error_quantiles_m[0.9]:.2f} m or less for nine tenths of the time",
         lead=escape(scenario.description),
         tiles="".join(tiles),
         meta=escape(
@@ -99,12 +111,29 @@ def render_drive(scenario: Scenario, result: Simulation, seed: int) -> str:
     )
 
 
+def _errors(result: Simulation) -> str:
+    """Percentiles of the error, their intervals, and the means."""
+    rows = [
+        (
+            f"{each.percent:g} % of all positions",
+            f"{each.value:.3f} m",
+            each.interval if each.low is None else f"{each.interval} m",
+        )
+        for each in result.percentiles or ()
+    ]
+    if result.mean_error_m is not None:
+        rows.append(("on the mean", f"{result.mean_error_m:.3f} m", ""))
+    rows.append(("root mean square", f"{result.rms_error_m:.3f} m", ""))
+    return table(("Horizontal error", "within", "95 % interval"), rows, numbers=(1, 2))
+
+
 def _integrity_text(integrity: Integrity, alert_limit_m: float) -> str:
     shares = ", ".join(f"{state} {share:.2%}" for state, share in integrity.state_shares.items())
     return (
-        "Stanford diagram: how often an error met with a protection level. Right of the diagonal "
-        "the level did not hold; the dashed lines are the alert limit, "
-        f"{alert_limit_m:g} m. {integrity.epochs:,} epochs: {shares}. While ok, the error lay "
-        f"beyond the protection level {integrity.exceedances} times; the level is "
-        f"{integrity.median_level_over_error:.1f} times the error in the median."
+        "The protection level is what the vehicle says its error is within, but for the risk that "
+        "it is allowed; above the alert limit the position is of no use. The Stanford diagram "
+        "counts how often an error met with a level. Right of the diagonal the level did not hold; "
+        f"the dashed lines are the alert limit, {alert_limit_m:g} m. {integrity.epochs:,} "
+        f"positions: {shares}. The level is {integrity.median_level_over_error:.1f} times the "
+        "error in the median."
     )

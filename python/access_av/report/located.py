@@ -11,6 +11,7 @@ import polars as pl
 
 from access_av import drives
 from access_av.report import located_charts as charts
+from access_av.report.operation import Operation
 from access_av.report.page import sheet
 from access_av.report.parts import figure, number, section, source, table, tile
 
@@ -46,6 +47,10 @@ def render_located(
     """
     specs: dict[str, Spec] = {}
     sections = []
+    operation = Operation.under(vehicle, drive.poses)
+    if operation is not None:
+        told = f"{operation.in_words()} {operation.what_helps()}".strip()
+        sections.append(section("In operation", told, ""))
     if drive.remarks:
         sections.append(section("Remarks", "", _list(drive.remarks)))
     known = drive.poses.filter(~pl.col("searching"))
@@ -117,10 +122,12 @@ def _tiles(drive: Drive, numbers: dict[str, float]) -> str:
         if name in numbers:
             tiles[text] = f"{numbers[name]:.3f} m"
     if "nees_per_axis" in numbers:
-        tiles["NEES per axis; 1 is honest"] = f"{numbers['nees_per_axis']:.2f}"
+        tiles["NEES per axis (1: errors as large as stated)"] = f"{numbers['nees_per_axis']:.2f}"
     if "beyond_while_ok" in numbers and drive.poses["integrity"].null_count() == 0:
-        tiles["of the time ok"] = f"{numbers['ok_share']:.1%}"
-        tiles["beyond the level while ok"] = f"{numbers['beyond_while_ok']:.2%}"
+        tiles["of the time ok: the position may be relied on"] = f"{numbers['ok_share']:.1%}"
+        tiles["of the time ok, but beyond the protection level"] = (
+            f"{numbers['beyond_while_ok']:.2%}"
+        )
     return "".join(tile(value, text) for text, value in tiles.items())
 
 

@@ -2,6 +2,7 @@
 function theme() {
   const css = getComputedStyle(document.documentElement);
   const colour = (name) => css.getPropertyValue(name).trim();
+  const narrow = innerWidth < 640;
   const text = { labelColor: colour("--soft"), titleColor: colour("--soft") };
   return {
     background: "transparent",
@@ -9,8 +10,8 @@ function theme() {
     view: { stroke: null },
     axis: { ...text, gridColor: colour("--faint"), domainColor: colour("--faint"),
       tickColor: colour("--faint"), titleFontWeight: "normal", labelFontSize: 11, titleFontSize: 12 },
-    legend: { ...text, orient: "top", labelFontSize: 11, symbolStrokeWidth: 3, symbolSize: 70, columnPadding: 8, columns: innerWidth < 640 ? 3 : 0,
-      labelLimit: 220 },
+    legend: { ...text, orient: "top", labelFontSize: 11, symbolStrokeWidth: 3, symbolSize: 70, columnPadding: 8, columns: narrow ? 2 : 0,
+      labelLimit: narrow ? innerWidth / 2 - 60 : 220 },
     text: { color: colour("--ink") },
     rule: { color: colour("--soft") },
   };

@@ -17,7 +17,18 @@ OUTCOMES = {"reached": "yes", "too few drives": "fit", "not reached": "no"}
 
 def number(value: float | None, digits: int = 3) -> str:
     """A number as a reader wants it; a dash for none."""
-    return "–" if value is None else f"{value:,.{digits}f}"
+    return "–" if value is None else unsigned_zero(f"{value:,.{digits}f}")
+
+
+def unsigned_zero(text: str) -> str:
+    """A number's text, without a sign where nothing but zeros is left of it.
+
+    Examples
+    --------
+    >>> unsigned_zero("-0.00"), unsigned_zero("-0.01")
+    ('0.00', '-0.01')
+    """
+    return text if set(text) - set("+-0.,") else text.lstrip("+-")
 
 
 def value_text(value: Any) -> str:
@@ -31,7 +42,7 @@ def value_text(value: Any) -> str:
     if isinstance(value, list):
         return ", ".join(map(value_text, value)) or "none"
     if isinstance(value, (int, float)):
-        return f"{value:,.0f}" if abs(value) >= 1000 else f"{value:.4g}"
+        return f"{value:,.0f}" if abs(value) >= 1000 else unsigned_zero(f"{value:.4g}")
     return str(value)
 
 

@@ -181,11 +181,14 @@ pub enum DeltaT {
 #[derive(Debug, Clone, Copy, PartialEq, Serialize, Deserialize, JsonSchema)]
 #[serde(default, deny_unknown_fields)]
 pub struct UncertaintySettings {
-    /// Horizontal error to be kept, in metres: the paper's x̃_max. As few angles are estimated as
-    /// late as keeps it.
+    /// Horizontal error at which it wakes up, in metres: the paper's x̃_max. The next angles are
+    /// estimated as late, and as few of them, as keep the error below it by the localizer's own
+    /// covariance. A set point of the wake-ups, not the error that a drive reaches: where the
+    /// covariance is too small or no radio head is in reach, errors are larger. `access-av tune`
+    /// finds the set point for an error that is to be reached.
     #[schemars(range(min = 1e-3, max = 1e3))]
     pub bound_m: f64,
-    /// Probability with which it is kept.
+    /// Probability that the error is below `bound_m` at a wake-up, if the covariance is right.
     #[schemars(range(min = 0.01, max = 0.999_999))]
     pub confidence: f64,
     /// Shortest time from one wake-up to the next in ms: what the computer needs for an estimate.

@@ -125,7 +125,7 @@ def _error_chart(evaluation: Evaluation, points: pl.DataFrame, axis: str) -> Spe
                 scale=alt.Scale(
                     domain=names, range=[[4, 3] if name == EVERY_SSB else [1, 0] for name in names]
                 ),
-                legend=None,
+                legend=alt.Legend(title=None),
             ),
             opacity=alt.condition(picked, alt.value(1.0), alt.value(0.15)),
             tooltip=[

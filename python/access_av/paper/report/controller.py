@@ -173,7 +173,11 @@ def _front_chart(study: Study) -> Spec:
                 scale=alt.Scale(domain=names, range=[GREY, BLUE, ORANGE, GREEN]),
                 legend=alt.Legend(title=None, orient="top"),
             ),
-            shape=alt.Shape("what:N", scale=alt.Scale(domain=names), legend=None),
+            shape=alt.Shape(
+                "what:N",
+                scale=alt.Scale(domain=names),
+                legend=alt.Legend(title=None, orient="top"),
+            ),
             tooltip=["name:N", "executions:Q", "rms:Q"],
         )
     )

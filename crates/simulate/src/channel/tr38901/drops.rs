@@ -25,9 +25,9 @@ pub struct Drop {
     pub azimuth_spread_deg: f64,
     /// Zenith spread of arrival as drawn, in degrees.
     pub zenith_spread_deg: f64,
-    /// Delay spread of the paths that came of it, in seconds ...
+    /// Delay spread of the paths that came of it, in seconds.
     pub paths_delay_spread_s: f64,
-    /// ... and circular azimuth spread, in degrees.
+    /// Circular azimuth spread of these paths, in degrees.
     pub paths_azimuth_spread_deg: f64,
 }
 

@@ -50,9 +50,9 @@ pub struct Parameters {
     pub cluster_azimuth_deg: f64,
     /// See `cluster_delay_s`.
     pub cluster_zenith_deg: f64,
-    /// C_φ^NLOS (table 7.5-2) ...
+    /// C_φ^NLOS (table 7.5-2).
     pub azimuth_scaling: f64,
-    /// ... and C_θ^NLOS (table 7.5-4).
+    /// C_θ^NLOS (table 7.5-4).
     pub zenith_scaling: f64,
     /// Of lg of the delay (s) of everything beyond the straight way, where there is no line of sight
     /// (table 7.6.9-1).
