@@ -39,7 +39,12 @@ pub fn run(input: &[u8]) {
 fn check(read: &Result<OdometryLog, RecordingError>) {
     match read {
         Ok(log) => {
-            assert!(log.samples.iter().all(|it| it.is_finite()));
+            assert!(log.samples.iter().all(|it| {
+                let rate = it.yaw_rate_radps;
+                [it.time_s, it.distance_m, it.speed_mps, rate.unwrap_or(0.0)]
+                    .into_iter()
+                    .all(f64::is_finite)
+            }));
             assert!(log.samples.windows(2).all(|it| it[0].time_s < it[1].time_s));
             assert!(log.remarks.iter().all(|it| !it.to_string().is_empty()));
         }
