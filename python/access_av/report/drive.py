@@ -115,16 +115,16 @@ def _errors(result: Simulation) -> str:
     """Percentiles of the error, their intervals, and the means."""
     rows = [
         (
-            f"{each.percent:g} % of all positions",
+            f"{each.percent:g} % of all positions within",
             f"{each.value:.3f} m",
             each.interval if each.low is None else f"{each.interval} m",
         )
         for each in result.percentiles or ()
     ]
     if result.mean_error_m is not None:
-        rows.append(("on the mean", f"{result.mean_error_m:.3f} m", ""))
-    rows.append(("root mean square", f"{result.rms_error_m:.3f} m", ""))
-    return table(("Horizontal error", "within", "95 % interval"), rows, numbers=(1, 2))
+        rows.append(("mean", f"{result.mean_error_m:.3f} m", "–"))
+    rows.append(("root mean square", f"{result.rms_error_m:.3f} m", "–"))
+    return table(("Horizontal error", "", "95 % interval"), rows, numbers=(1, 2))
 
 
 def _integrity_text(integrity: Integrity, alert_limit_m: float) -> str:
