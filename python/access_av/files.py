@@ -24,6 +24,8 @@ from access_av import interrupt
 from access_av.errors import InputError
 
 if TYPE_CHECKING:
+    from collections.abc import Iterable
+
     import polars as pl
     from numpy.typing import ArrayLike
 
@@ -93,8 +95,8 @@ class ResultsDirectory:
         table.write_parquet(held, compression="zstd")
         return write_whole(self.path / name, held.getbuffer())
 
-    def write_manifest(self, **settings: Any) -> Path:
-        """Write ``manifest.json``: the version, the command line and the settings."""
+    def write_manifest(self, warnings: Iterable[object] = (), **settings: Any) -> Path:
+        """Write ``manifest.json``: version, command line, settings, warnings of them."""
         return self.write_json(
             "manifest.json",
             {
@@ -102,6 +104,7 @@ class ResultsDirectory:
                 "command": ["access-av", *sys.argv[1:]],
                 "written": datetime.now(timezone.utc).isoformat(timespec="seconds"),
                 **settings,
+                "warnings": [*map(str, warnings)],
             },
         )
 

@@ -17,6 +17,7 @@ from access_av.commands.options import (
     Seed,
     ShardOption,
     Threads,
+    load_scenario,
 )
 from access_av.report.parts import value_text
 from access_av.terminal import console, progress, table
@@ -64,7 +65,6 @@ def designs(
     All designs see the same runs. Drives are kept in results/parts: a command that was stopped goes
     on. Writes designs.parquet, which ``access-av choose`` is asked, and report.html.
     """
-    from access_av._core import Scenario
     from access_av.campaign import Campaign, Shard, executor
     from access_av.designs.drives import designs_of
     from access_av.designs.search import search
@@ -76,7 +76,7 @@ def designs(
     from access_av.parts import Parts
     from access_av.report.designs import render_designs
 
-    chosen = Scenario.load(scenario)
+    chosen = load_scenario(scenario)
     read = Space.read(space)
     share = Shard.parse(shard)
     if optuna is not None and (sobol is not None or halving or share != Shard()):
@@ -100,7 +100,9 @@ def designs(
     directory = ResultsDirectory.create(f"designs-{chosen.name}", out)
     directory.write_table(TABLE, rows)
     directory.write_text("report.html", render_designs(chosen, found.driven, rows))
-    directory.write_manifest(scenario=chosen.name, runs=runs, seed=seed, drives=found.drives)
+    directory.write_manifest(
+        scenario=chosen.name, runs=runs, seed=seed, drives=found.drives, warnings=chosen.warnings()
+    )
     front = rows.filter("on_front").sort("energy_j")
     if as_json:
         answer = {"front": front.to_dicts(), "drives": found.drives}

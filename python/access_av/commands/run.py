@@ -48,9 +48,8 @@ def run(
     from access_av.report.drive import render_drive
     from access_av.simulation import simulate
 
-    chosen = load_scenario(scenario, allow_large=allow_large)
-    if overrides:
-        chosen = chosen.with_overrides(dict(map(_override, overrides)))
+    given = dict(map(_override, overrides or ()))
+    chosen = load_scenario(scenario, allow_large=allow_large, overrides=given)
     directory = ResultsDirectory.create(f"run-{chosen.name}", out)
     with progress("Driving") as tick:
         result = simulate(
@@ -67,7 +66,7 @@ def run(
         directory.write_text(name, tum_trajectory(*(poses[column] for column in columns)))
     directory.write_text("report.html", render_drive(chosen, result, seed))
     directory.write_text("scenario.toml", chosen.resolved().to_toml())
-    directory.write_manifest(scenario=chosen.name, runs=runs, seed=seed)
+    directory.write_manifest(scenario=chosen.name, runs=runs, seed=seed, warnings=chosen.warnings())
     directory.link_latest()
 
     show_simulation(result, title=f"{chosen.name}: {runs} runs, seed {seed}")

@@ -14,6 +14,7 @@ from access_av.commands.options import (
     ScenarioArgument,
     Seed,
     Threads,
+    load_scenario,
 )
 from access_av.terminal import console, progress, table
 
@@ -55,7 +56,6 @@ def tune(
     tuned.json and manifest.json; drives are kept in results/parts, so that a command that was
     stopped goes on.
     """
-    from access_av._core import Scenario
     from access_av.campaign import Campaign, executor
     from access_av.designs.table import Constraints
     from access_av.designs.tune import space_of
@@ -63,8 +63,8 @@ def tune(
     from access_av.files import RESULTS, ResultsDirectory, json_text
     from access_av.parts import Parts
 
-    chosen = Scenario.load(scenario).with_overrides(
-        {"vehicle.platform": {"name": platform, "mode": mode}}
+    chosen = load_scenario(
+        scenario, overrides={"vehicle.platform": {"name": platform, "mode": mode}}
     )
     constraints = Constraints(max_energy_j, max_rms_m, max_worst_m)
     with progress("Tuning") as tick, executor(dask, threads) as (pool, workers):
@@ -89,7 +89,7 @@ def tune(
         "drives": found.drives,
     }
     directory.write_json("tuned.json", record)
-    directory.write_manifest(scenario=chosen.name, runs=runs, seed=seed)
+    directory.write_manifest(scenario=chosen.name, runs=runs, seed=seed, warnings=chosen.warnings())
     if as_json:
         print(json_text({**record, "directory": str(directory.path)}))
         return

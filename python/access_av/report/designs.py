@@ -12,7 +12,7 @@ import polars as pl
 
 from access_av.report.chart import GREEN, GREY, ORANGE, thinned
 from access_av.report.page import sheet
-from access_av.report.parts import figure, source, tile
+from access_av.report.parts import figure, source, tile, warnings
 
 if TYPE_CHECKING:
     from collections.abc import Sequence
@@ -38,7 +38,8 @@ def render_designs(scenario: Scenario, driven: Sequence[Driven], rows: pl.DataFr
         lead=escape(scenario.description),
         tiles=tile(str(rows.height), "designs driven to the end"),
         meta=escape(f"Scenario “{scenario.name}”, version {version('access-av')}."),
-        sections=(
+        sections=warnings(scenario.warnings())
+        + (
             "<section><h2>Energy against error</h2><p>All designs saw the same runs. Orange: no "
             "other design is better with 95 %. Click one to see its error along the track.</p>"
             f"{drawn}</section><section><h2>Provenance</h2>"

@@ -8,7 +8,7 @@ from typing import TYPE_CHECKING, Any
 
 from access_av.report import drive_charts as charts
 from access_av.report.page import sheet
-from access_av.report.parts import figure, number, source, table, tile
+from access_av.report.parts import figure, number, source, table, tile, warnings
 
 if TYPE_CHECKING:
     from collections.abc import Sequence
@@ -63,7 +63,8 @@ def render_integrity(
         tiles=tile(f"{worst['exceedance_share']:.1e}", f"beyond while ok, {worst['mismatch']}")
         + tile(f"{least['availability']:.1%}", f"available, {least['mismatch']}"),
         meta=escape(f"{runs} drives of each case, seed {seed}, version {version('access-av')}."),
-        sections=f"<section><h2>Cases</h2>{table(HEAD, rows, numbers=range(2, 13))}</section>"
+        sections=warnings(first.warnings())
+        + f"<section><h2>Cases</h2>{table(HEAD, rows, numbers=range(2, 13))}</section>"
         f"<section><h2>Stanford diagrams</h2>{diagrams}</section><section><h2>Provenance</h2>"
         f"{source('Scenario of the first case', first.to_toml())}</section>",
     )
