@@ -26,7 +26,7 @@ from access_av import interrupt
 from access_av.errors import InputError
 
 if TYPE_CHECKING:
-    from collections.abc import Sequence
+    from collections.abc import Iterable, Sequence
 
     import polars as pl
     from numpy.typing import ArrayLike
@@ -97,8 +97,10 @@ class ResultsDirectory:
         table.write_parquet(held, compression="zstd")
         return write_whole(self.path / name, held.getbuffer())
 
-    def write_manifest(self, *, repeat: Sequence[object] = (), **settings: Any) -> Path:
-        """Write ``manifest.json``: version, commit where it is known, command, settings.
+    def write_manifest(
+        self, *, repeat: Sequence[object] = (), warnings: Iterable[object] = (), **settings: Any
+    ) -> Path:
+        """Write ``manifest.json``: version, commit where known, command, settings, their warnings.
 
         ``command`` is what was typed; ``repeat``, where a command gives it, is what is to be typed
         in this directory, so that what it was given is still what it was.
@@ -112,6 +114,7 @@ class ResultsDirectory:
                 "written": datetime.now(timezone.utc).isoformat(timespec="seconds"),
                 **({"repeat": _typed(repeat)} if repeat else {}),
                 **settings,
+                "warnings": [*map(str, warnings)],
             },
         )
 

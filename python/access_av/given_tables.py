@@ -20,6 +20,10 @@ if TYPE_CHECKING:
 # Reads a table and forgets it.
 TRY = "import sys, polars; polars.read_parquet(sys.argv[1], glob=False)"
 
+# What may stand between the columns of CSV; of equally many the first is meant.
+SEPARATORS = (",", ";", "\t")
+DECIMAL_COMMA = r"^[+-]?\d+(,\d+)?([eE][+-]?\d+)?$"
+
 # Bytes of a file; a year of paths through a plant has less.
 MOST_BYTES = 4 << 30
 
@@ -35,12 +39,36 @@ def read(path: Path, what: str, schema: dict[str, Any] | None = None) -> pl.Data
     regular(path, MOST_BYTES)
     try:
         if path.suffix == ".csv":
-            return pl.read_csv(path, schema_overrides=schema, glob=False)
+            return _read_csv(path, schema)
         _try(path, what)
         return pl.read_parquet(path, glob=False)
     # Of some damage Polars makes a panic of its own.
     except (pl.exceptions.PolarsError, pl.exceptions.PanicException) as error:
         raise InputError(f"{path}: not a {what}: {error}") from None
+
+
+def _read_csv(path: Path, schema: dict[str, Any] | None) -> pl.DataFrame:
+    """Read CSV; where semicolons or tabs separate the columns, a comma may be the decimal one."""
+    with path.open(encoding="utf-8-sig", errors="replace") as file:
+        header = file.readline()
+    separator = max(SEPARATORS, key=header.count)
+    rows = pl.read_csv(path, schema_overrides=schema, separator=separator, glob=False)
+    text = [name for name in rows.select(pl.col(pl.String)).columns if name not in (schema or {})]
+    commas = [
+        name
+        for name in text
+        if separator != ","
+        and rows[name].str.contains(",", literal=True).any()
+        and rows[name].str.contains(DECIMAL_COMMA).all()
+    ]
+    points = rows.select(pl.col(pl.Float64)).columns
+    if commas and points:
+        raise InputError(
+            f"{path}: {commas[0]} has commas and {points[0]} decimal points, which is ambiguous; "
+            "write all numbers with a point, or all with a comma"
+        )
+    decimal = pl.col(commas).str.replace(",", ".", literal=True).cast(pl.Float64)
+    return rows.with_columns(decimal) if commas else rows
 
 
 def _try(path: Path, what: str) -> None:

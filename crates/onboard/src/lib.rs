@@ -20,6 +20,7 @@ pub mod localize;
 pub mod manifold;
 pub mod observation;
 mod pipeline;
+pub mod plausible;
 pub mod radio_head;
 pub mod receive;
 pub mod road;

@@ -4,6 +4,7 @@ use std::collections::HashMap;
 use std::hash::{DefaultHasher, Hash, Hasher};
 
 use onboard::energy::EnergyModel;
+use onboard::plausible::{self, Warning};
 use onboard::settings::{
     Check, Extent, Platform as CorePlatform, SettingsError as CoreError, Site as CoreSite,
     TomlFile, Vehicle as CoreVehicle,
@@ -31,6 +32,50 @@ create_exception!(
 #[allow(clippy::needless_pass_by_value)] // the shape that `map_err` wants
 pub fn settings_error(error: CoreError) -> PyErr {
     SettingsError::new_err(brief(error))
+}
+
+/// A value that can be read, and is most likely not what was meant.
+#[pyclass(frozen, eq, hash, module = "access_av._core")]
+#[derive(PartialEq, Eq, Hash)]
+pub struct SettingsWarning(Warning);
+
+#[pymethods]
+impl SettingsWarning {
+    /// Path of the key.
+    #[getter]
+    fn key(&self) -> &str {
+        &self.0.key
+    }
+
+    /// Its value.
+    #[getter]
+    fn value(&self) -> &str {
+        &self.0.value
+    }
+
+    /// Why it is doubtful, physically.
+    #[getter]
+    fn why(&self) -> &str {
+        &self.0.why
+    }
+
+    /// What to write instead.
+    #[getter]
+    fn write(&self) -> &str {
+        &self.0.write
+    }
+
+    fn __str__(&self) -> String {
+        self.0.to_string()
+    }
+
+    fn __repr__(&self) -> String {
+        format!("SettingsWarning({:?})", self.0.to_string())
+    }
+}
+
+fn told(warnings: Vec<Warning>) -> Vec<SettingsWarning> {
+    warnings.into_iter().map(SettingsWarning).collect()
 }
 
 /// A Python class for a checked TOML file of which some are shipped by name, with what is its own.
@@ -125,6 +170,19 @@ macro_rules! toml_file {
 toml_file! {
     /// A site, checked: the plant as the vehicles believe it to be.
     Site(CoreSite), "site",
+
+    /// What is most likely not what was meant, heard by a vehicle, or by one of which nothing is
+    /// stated. With a vehicle all that is doubtful of it, too; keys then begin with `site` and
+    /// `vehicle`. Raises `SettingsError` where the vehicle's platform has not what it asks for.
+    #[pyo3(signature = (vehicle = None))]
+    fn warnings(&self, vehicle: Option<&Vehicle>) -> PyResult<Vec<SettingsWarning>> {
+        let Some(vehicle) = vehicle else {
+            return Ok(told(plausible::of_site(&self.0)));
+        };
+        let mut found = plausible::of_both(&self.0, &vehicle.0);
+        found.extend(platform_warnings(&vehicle.0).map_err(settings_error)?);
+        Ok(told(found))
+    }
 }
 
 toml_file! {
@@ -136,6 +194,14 @@ toml_file! {
     #[pyo3(signature = (platform = None))]
     fn resolved(&self, platform: Option<&Platform>) -> PyResult<Self> {
         resolve(&self.0, platform).map(Self).map_err(settings_error)
+    }
+
+    /// What is most likely not what was meant. Raises `SettingsError` where there is no such platform,
+    /// or it has not what the vehicle asks for.
+    fn warnings(&self) -> PyResult<Vec<SettingsWarning>> {
+        let mut found = plausible::of_vehicle(&self.0);
+        found.extend(platform_warnings(&self.0).map_err(settings_error)?);
+        Ok(told(found))
     }
 }
 
@@ -168,6 +234,16 @@ toml_file! {
             ("odometry_samples", size.odometry_samples),
             ("bytes", size.bytes(1)),
         ]))
+    }
+
+    /// What of scenario, site and vehicle is most likely not what was meant. Raises `SettingsError`
+    /// where the vehicle's platform has not what it asks for.
+    fn warnings(&self) -> PyResult<Vec<SettingsWarning>> {
+        let of_platform = platform_warnings(&self.0.vehicle)
+            .map_err(|error| settings_error(error.beneath(&self.0.name, "vehicle")))?;
+        let mut found = self.0.warnings().map_err(settings_error)?;
+        found.extend(of_platform);
+        Ok(told(found))
     }
 
     /// The scenario with everything of the wake-up written out that its vehicle leaves to the
@@ -205,6 +281,11 @@ toml_file! {
         }))
     }
 
+    /// What is most likely not what was meant.
+    fn warnings(&self) -> Vec<SettingsWarning> {
+        told(plausible::of_platform(&self.0))
+    }
+
     /// Shortest time between two estimates, in seconds, of a vehicle's method in its mode.
     fn base_wake_up_s(&self, vehicle: &Vehicle) -> PyResult<f64> {
         self.0.base_wake_up_s(&vehicle.0).map_err(settings_error)
@@ -235,8 +316,22 @@ fn extent_of(name: &str) -> PyResult<Extent> {
 fn resolve(vehicle: &CoreVehicle, platform: Option<&Platform>) -> Result<CoreVehicle, CoreError> {
     match platform {
         Some(platform) => wake_up::resolve(vehicle, &platform.0),
-        None => wake_up::resolve(vehicle, &recording::load(&vehicle.platform.name)?),
+        None => wake_up::resolve(vehicle, &platform_of(vehicle)?),
     }
+}
+
+fn platform_of(vehicle: &CoreVehicle) -> Result<CorePlatform, CoreError> {
+    recording::load(&vehicle.platform.name)
+        .map_err(|error| error.beneath(&vehicle.name, "platform.name"))
+}
+
+/// What is doubtful of the platform that a vehicle names; an error where it cannot serve it.
+fn platform_warnings(vehicle: &CoreVehicle) -> Result<Vec<Warning>, CoreError> {
+    let platform = platform_of(vehicle)?;
+    platform.mode(&vehicle.platform, &vehicle.name)?;
+    wake_up::resolve(vehicle, &platform)?;
+    let found = plausible::of_platform(&platform).into_iter();
+    Ok(found.map(|it| it.beneath(&platform.name)).collect())
 }
 
 fn pairs(overrides: &Bound<'_, PyDict>) -> PyResult<Vec<(String, Value)>> {

@@ -18,6 +18,7 @@ mod error;
 mod file;
 mod library;
 pub mod mcap;
+mod number;
 mod odometry;
 mod odometry_csv;
 mod odometry_file;

@@ -1,4 +1,5 @@
-//! Tables of numbers with named columns, separated by commas, semicolons or tabs.
+//! Tables of numbers with named columns, separated by commas, semicolons or tabs; after the latter two, numbers
+//! may have a decimal comma.
 
 use std::path::Path;
 
@@ -6,6 +7,7 @@ use csv::{ReaderBuilder, StringRecord, Trim};
 
 use crate::error::RecordingError;
 use crate::file as files;
+use crate::number::Numbers;
 
 /// A day of samples at 50 Hz.
 const MOST_BYTES: u64 = 512 << 20;
@@ -39,9 +41,23 @@ impl Table {
     pub fn read(file: &Path, required: &[&str], optional: &[&str]) -> Result<Self, RecordingError> {
         let bytes =
             files::read(file, MOST_BYTES).map_err(|source| RecordingError::io(file, source))?;
-        let text = String::from_utf8_lossy(&bytes);
+        Self::parse(&String::from_utf8_lossy(&bytes), file, required, optional)
+    }
+
+    /// The same of a text; `file` is what errors name.
+    ///
+    /// # Errors
+    /// As for [`read`](Self::read).
+    pub fn parse(
+        text: &str,
+        file: &Path,
+        required: &[&str],
+        optional: &[&str],
+    ) -> Result<Self, RecordingError> {
+        let separator = separator(text);
+        let mut numbers = Numbers::new(separator);
         let mut reader = ReaderBuilder::new()
-            .delimiter(separator(&text) as u8)
+            .delimiter(separator as u8)
             .comment(Some(b'#'))
             .flexible(true)
             .trim(Trim::All)
@@ -81,7 +97,7 @@ impl Table {
             if record.iter().eq([""]) {
                 continue; // blanks
             }
-            let values = values(&record, table.header.len(), &wanted);
+            let values = values(&record, table.header.len(), &wanted, &mut numbers);
             table.rows.push(Row { line, values });
         }
         Ok(table)
@@ -123,9 +139,15 @@ fn values(
     record: &StringRecord,
     columns: usize,
     wanted: &[(&str, Option<usize>, bool)],
+    numbers: &mut Numbers,
 ) -> Result<Vec<Option<f64>>, String> {
     if record.len() != columns {
-        return Err(format!("{} fields instead of {columns}", record.len()));
+        let surplus = record.len() > columns;
+        let hint = if surplus { numbers.surplus_hint() } else { "" };
+        return Err(format!(
+            "{} fields instead of {columns}{hint}",
+            record.len()
+        ));
     }
     let value = |(name, place, required): &(&str, Option<usize>, bool)| {
         let field = place
@@ -134,9 +156,7 @@ fn values(
         if field.is_empty() && !required {
             return Ok(None);
         }
-        let number = field
-            .parse()
-            .map_err(|_| format!("{name} `{field}` is not a number"))?;
+        let number = numbers.read(field).map_err(|why| format!("{name} {why}"))?;
         Ok(Some(number))
     };
     wanted.iter().map(value).collect()

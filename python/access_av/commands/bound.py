@@ -46,7 +46,9 @@ def bound(
     directory.write_table("map.parquet", found.site)
     directory.write_text("report.html", render_bound(found, missed))
     directory.write_text("scenario.toml", found.scenario.to_toml())
-    directory.write_manifest(scenario=found.scenario.name, map_step_m=found.map_step_m)
+    directory.write_manifest(
+        scenario=found.scenario.name, map_step_m=found.map_step_m, warnings=chosen.warnings()
+    )
     summary = found.summary()
     if as_json:
         record = {**summary, "next_level": missed and missed.as_record()}

@@ -21,6 +21,7 @@ from access_av.commands.options import (
     Seed,
     ShardOption,
     Threads,
+    load_scenario,
 )
 from access_av.report.parts import value_text
 from access_av.terminal import console, progress, table, width
@@ -74,7 +75,6 @@ def designs(
     in results/parts: a command that was stopped goes on. Writes designs.parquet, which access-av
     choose is asked, worlds.parquet, report.html, scenario.toml and space.toml.
     """
-    from access_av._core import Scenario
     from access_av.campaign import Campaign, Shard, executor
     from access_av.designs.drives import in_worlds
     from access_av.designs.search import search
@@ -86,7 +86,7 @@ def designs(
     from access_av.parts import Parts
     from access_av.report.designs import render_designs
 
-    chosen = Scenario.load(scenario)
+    chosen = load_scenario(scenario)
     read = Space.read(space)
     share = Shard.parse(shard)
     if optuna is not None and (sobol is not None or halving or share != Shard()):
@@ -128,6 +128,7 @@ def designs(
         runs=runs,
         seed=seed,
         drives=found.drives,
+        warnings=chosen.warnings(),
     )
     front = rows.filter("on_front").sort("energy_j", "rms_error_m")
     if as_json:

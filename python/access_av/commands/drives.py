@@ -8,7 +8,14 @@ from typing import TYPE_CHECKING, Annotated, Any
 
 import typer
 
-from access_av.commands.options import AllowLarge, AsJson, Out, ScenarioArgument, load_scenario
+from access_av.commands.options import (
+    AllowLarge,
+    AsJson,
+    Out,
+    ScenarioArgument,
+    load_scenario,
+    load_site_and_vehicle,
+)
 from access_av.errors import InputError
 from access_av.terminal import console, errors, progress, show_warning
 
@@ -144,14 +151,13 @@ def locate(
     the time or at the end, or the input contradicts itself; what to check is said.
     """
     from access_av import drives
-    from access_av._core import Site, Vehicle
     from access_av.files import ResultsDirectory, json_text
     from access_av.report.located import render_located
     from access_av.report.operation import Operation
 
     from_scratch = start is not None and start.strip() == "scratch"
-    plant, carrier = Site.load(site), Vehicle.load(vehicle)
     pose = None if start is None or from_scratch else _pose(start)
+    plant, carrier = load_site_and_vehicle(site, vehicle, pose)
     directory = ResultsDirectory.create("locate", out)
     with progress("Locating"):
         drive = drives.locate(
@@ -187,7 +193,9 @@ def locate(
         "remarks": drive.remarks,
         "suspicions": drive.suspicions,
     }
-    directory.write_manifest(recording=str(recording), odometry=str(odometry), **told)
+    directory.write_manifest(
+        recording=str(recording), odometry=str(odometry), **told, warnings=plant.warnings(carrier)
+    )
     directory.link_latest()
     if as_json:
         print(json_text({**told, "directory": str(directory.path)}))

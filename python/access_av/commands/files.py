@@ -8,7 +8,7 @@ from typing import TYPE_CHECKING, Annotated, Any
 import typer
 
 from access_av._core import Platform, Scenario, SettingsError, Site, Vehicle
-from access_av.commands.options import AllowLarge, load_scenario
+from access_av.commands.options import AllowLarge, announce, read_scenario
 from access_av.terminal import console, show_error, table
 
 if TYPE_CHECKING:
@@ -18,12 +18,17 @@ if TYPE_CHECKING:
 Names = Annotated[list[str], typer.Argument(help="Shipped names, or paths.")]
 
 
-def _check(names: list[str], describe: Callable[[str], str]) -> None:
-    """Describe each that is fine, say of each other one what is wrong."""
+def _check(names: list[str], load: Callable[[str], Any]) -> None:
+    """Describe each that is fine, say of each other one what is wrong or doubtful."""
     wrong = 0
     for name in names:
         try:
-            console.print(f"{name}: fine{describe(name)}", soft_wrap=True)
+            read = load(name)
+            warnings = read.warnings()
+            verdict = f"{len(warnings)} doubtful" if warnings else "fine"
+            size = _size(read) if isinstance(read, Scenario) else ""
+            console.print(f"{name}: {verdict}{size}", soft_wrap=True)
+            announce(name, warnings)
         except SettingsError as error:
             show_error(error)
             wrong += 1
@@ -65,19 +70,19 @@ def files_app(what: str) -> typer.Typer:
 
     command = files.command(
         name="check",
-        help=f"Check {what} files; exit code 2 where one is wrong.",
+        help=f"Check {what} files: exit code 2 where one is wrong; warns where one is doubtful.",
         epilog=f"Example: [bold]access-av {what} check mine.toml[/]",
     )
     if what == "scenario":
 
         @command
         def check_scenarios(names: Names, allow_large: AllowLarge = False) -> None:
-            _check(names, lambda name: _size(load_scenario(name, allow_large=allow_large)))
+            _check(names, lambda name: read_scenario(name, allow_large=allow_large))
     else:
 
         @command
         def check(names: Names) -> None:
-            _check(names, lambda name: kind.load(name) and "")
+            _check(names, kind.load)
 
     @files.command(
         help=f"Print the JSON Schema of {what} files, for editors.",

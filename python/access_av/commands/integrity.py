@@ -17,6 +17,7 @@ from access_av.commands.options import (
     Seed,
     ShardOption,
     Threads,
+    load_scenario,
 )
 from access_av.terminal import console, progress, table, width
 
@@ -69,21 +70,21 @@ def integrity(
     import polars as pl
 
     from access_av import integrity_campaign
-    from access_av._core import Scenario
     from access_av.campaign import Campaign, Shard, executor
     from access_av.files import ResultsDirectory, json_text
     from access_av.hypotheses import hypotheses as sized
     from access_av.parts import Parts
     from access_av.report.integrity import render_integrity
 
+    chosen = load_scenario(scenario)
     directory = ResultsDirectory.create("integrity", out)
     share = Shard.parse(shard)
     if hypotheses:
-        mismatch = [*(mismatch or ()), *sized(Scenario.load(scenario))]
+        mismatch = [*(mismatch or ()), *sized(chosen)]
     with progress("Driving") as tick, executor(dask, threads) as (pool, workers):
         cases = integrity_campaign.drive(
             Campaign(Parts(directory.path / "parts"), pool, workers, share),
-            scenario,
+            chosen,
             runs=runs,
             seed=seed,
             only=mismatch,
@@ -98,7 +99,7 @@ def integrity(
     records = [case.as_record() for case in cases]
     directory.write_table("integrity.parquet", pl.DataFrame(records))
     directory.write_text("report.html", render_integrity(cases, records, runs, seed))
-    directory.write_manifest(scenario=scenario, runs=runs, seed=seed)
+    directory.write_manifest(scenario=scenario, runs=runs, seed=seed, warnings=chosen.warnings())
     if as_json:
         print(json_text({"cases": records, "directory": str(directory.path)}))
         return

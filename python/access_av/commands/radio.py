@@ -7,7 +7,13 @@ from typing import Annotated
 
 import typer
 
-from access_av.commands.options import AsJson, Out, ScenarioArgument
+from access_av.commands.options import (
+    AsJson,
+    Out,
+    ScenarioArgument,
+    load_scenario,
+    load_site,
+)
 from access_av.terminal import console, progress, show_next_level, show_plan
 
 app = typer.Typer()
@@ -38,7 +44,7 @@ def import_paths(
     """
     from access_av import ray_paths
 
-    found = ray_paths.import_paths(table, site, out, carrier_mhz=carrier_mhz)
+    found = ray_paths.import_paths(table, load_site(site), out, carrier_mhz=carrier_mhz)
     console.print(
         f"{out}: {found['paths']} paths between {found['heads']} radio heads and "
         f"{found['places']} places",
@@ -77,13 +83,19 @@ def plan(
     from access_av.next_level import next_level
     from access_av.placement import plan as plan_heads
 
+    chosen = load_scenario(scenario)
     with progress("Masts") as tick:
-        found = plan_heads(scenario, masts, add=add, eirp_dbm=eirp_dbm, progress=tick)
-    missed = next_level(scenario, found)
+        found = plan_heads(chosen, masts, add=add, eirp_dbm=eirp_dbm, progress=tick)
+    missed = next_level(chosen, found)
     directory = ResultsDirectory.create(f"plan-{found.scenario.name}", out)
     directory.write_table("masts.parquet", found.ranking)
     directory.write_text("scenario.toml", found.scenario.to_toml())
-    directory.write_manifest(scenario=found.scenario.name, masts=masts and str(masts), add=add)
+    directory.write_manifest(
+        scenario=found.scenario.name,
+        masts=masts and str(masts),
+        add=add,
+        warnings=chosen.warnings(),
+    )
     if as_json:
         record = {
             "scenario": found.scenario.name,

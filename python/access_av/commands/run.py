@@ -48,9 +48,8 @@ def run(
     from access_av.report.drive import render_drive
     from access_av.simulation import simulate
 
-    chosen = load_scenario(scenario, allow_large=allow_large)
-    if overrides:
-        chosen = chosen.with_overrides(dict(map(_override, overrides)))
+    given = dict(map(_override, overrides or ()))
+    chosen = load_scenario(scenario, allow_large=allow_large, overrides=given)
     directory = ResultsDirectory.create(f"run-{chosen.name}", out)
     with progress("Driving") as tick:
         result = simulate(
@@ -72,6 +71,7 @@ def run(
         scenario=chosen.name,
         runs=runs,
         seed=seed,
+        warnings=chosen.warnings(),
     )
     directory.link_latest()
 

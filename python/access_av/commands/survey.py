@@ -7,7 +7,7 @@ from typing import Annotated
 
 import typer
 
-from access_av.commands.options import AsJson, Out, Threads
+from access_av.commands.options import AsJson, Out, Threads, load_site_and_vehicle
 from access_av.errors import InputError
 from access_av.terminal import console, progress, show_warning, table
 
@@ -54,11 +54,12 @@ def survey(
     for number, folder in enumerate(drives):
         if folder.resolve() in (earlier.resolve() for earlier in drives[:number]):
             raise InputError(f"{folder}: given twice; a drive counts once")
+    plant, carrier = load_site_and_vehicle(site, vehicle)
     logged = [self_survey.read_drive(folder) for folder in drives]
     with progress("Replays") as tick:
         found = self_survey.survey(
-            site,
-            vehicle,
+            plant,
+            carrier,
             logged,
             position_std_m=position_std_m,
             mounting_std_rad=mounting_std_rad,
@@ -74,7 +75,12 @@ def survey(
     keys = [it.key for it in found.parameters]
     covariance = {"parameters": keys, "covariance": found.covariance.tolist()}
     directory.write_json("covariance.json", covariance)
-    directory.write_manifest(site=site, vehicle=vehicle, drives=[str(it) for it in drives])
+    directory.write_manifest(
+        site=site,
+        vehicle=vehicle,
+        drives=[str(it) for it in drives],
+        warnings=plant.warnings(carrier),
+    )
     if as_json:
         figures = {"angles": found.angles, "used": found.used, "nis": found.nis}
         print(json_text({**figures, "parameters": rows.to_dicts(), "directory": directory.path}))

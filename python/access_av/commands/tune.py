@@ -18,6 +18,7 @@ from access_av.commands.options import (
     ScenarioArgument,
     Seed,
     Threads,
+    load_scenario,
 )
 from access_av.terminal import console, errors, progress, table
 
@@ -69,7 +70,6 @@ def tune(
     Exit code 0: what is asked is kept, as far as the drives tell. 3: it is missed, also by what was
     found; which of it, and by how much, is said.
     """
-    from access_av._core import Scenario
     from access_av.campaign import Campaign, executor
     from access_av.designs.table import Constraints, row_of
     from access_av.designs.tune import space_of
@@ -77,8 +77,8 @@ def tune(
     from access_av.files import RESULTS, ResultsDirectory, json_text
     from access_av.parts import Parts
 
-    chosen = Scenario.load(scenario).with_overrides(
-        {"vehicle.platform": {"name": platform, "mode": mode}}
+    chosen = load_scenario(
+        scenario, overrides={"vehicle.platform": {"name": platform, "mode": mode}}
     )
     constraints = Constraints(max_energy_j, max_rms_m, max_worst_m, max_error_m, percentile)
     with progress("Tuning") as tick, executor(dask, threads) as (pool, workers):
@@ -124,7 +124,11 @@ def tune(
     }
     given = [text for name, value in asked.items() if value is not None for text in (name, value)]
     directory.write_manifest(
-        repeat=("tune", "scenario.toml", *given), scenario=chosen.name, runs=runs, seed=seed
+        repeat=("tune", "scenario.toml", *given),
+        scenario=chosen.name,
+        runs=runs,
+        seed=seed,
+        warnings=chosen.warnings(),
     )
     if as_json:
         print(json_text({**record, "directory": str(directory.path)}))

@@ -12,7 +12,17 @@ import polars as pl
 
 from access_av.report.chart import GREEN, GREY, ORANGE, finish, thinned
 from access_av.report.page import sheet
-from access_av.report.parts import badge, figure, number, section, source, table, tile, value_text
+from access_av.report.parts import (
+    badge,
+    figure,
+    number,
+    section,
+    source,
+    table,
+    tile,
+    value_text,
+    warnings,
+)
 from access_av.statistics.percentiles import ends_text
 
 if TYPE_CHECKING:
@@ -87,7 +97,7 @@ def render_designs(
         lead=escape(scenario.description),
         tiles=_tiles(rows, runs),
         meta=escape(f"Scenario “{scenario.name}”, version {version('access-av')}."),
-        sections="".join(sections),
+        sections=warnings(scenario.warnings()) + "".join(sections),
     )
 
 

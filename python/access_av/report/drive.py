@@ -10,7 +10,15 @@ from typing import TYPE_CHECKING
 from access_av.errors import InputError
 from access_av.report import drive_charts as charts
 from access_av.report.page import sheet
-from access_av.report.parts import figure, section, service_levels, source, table, tile
+from access_av.report.parts import (
+    figure,
+    section,
+    service_levels,
+    source,
+    table,
+    tile,
+    warnings,
+)
 
 if TYPE_CHECKING:
     from access_av._core import Scenario
@@ -107,7 +115,7 @@ def render_drive(scenario: Scenario, result: Simulation, seed: int) -> str:
             f"Scenario “{scenario.name}”, {runs} runs of {duration_s:.1f} s, seed {seed}, "
             f"version {version('access-av')}."
         ),
-        sections="".join(sections),
+        sections=warnings(scenario.warnings()) + "".join(sections),
     )
 
 

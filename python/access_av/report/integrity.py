@@ -8,7 +8,7 @@ from typing import TYPE_CHECKING, Any
 
 from access_av.report import drive_charts as charts
 from access_av.report.page import sheet
-from access_av.report.parts import figure, number, source, table, tile
+from access_av.report.parts import figure, number, source, table, tile, warnings
 
 if TYPE_CHECKING:
     from collections.abc import Sequence
@@ -71,7 +71,8 @@ def render_integrity(
         )
         + tile(f"{least['availability']:.1%}", f"of the time ok, worst case: {_world(least)}"),
         meta=escape(f"{runs} drives of each case, seed {seed}, version {version('access-av')}."),
-        sections=f"<section><h2>Cases</h2>{table(HEAD, rows, numbers=range(2, 13))}</section>"
+        sections=warnings(first.warnings())
+        + f"<section><h2>Cases</h2>{table(HEAD, rows, numbers=range(2, 13))}</section>"
         f"<section><h2>Stanford diagrams</h2>{diagrams}</section><section><h2>Provenance</h2>"
         f"{source('Scenario of the first case', first.to_toml())}</section>",
     )

@@ -13,7 +13,7 @@ from access_av import drives
 from access_av.report import located_charts as charts
 from access_av.report.operation import Operation
 from access_av.report.page import sheet
-from access_av.report.parts import figure, number, section, source, table, tile
+from access_av.report.parts import figure, number, section, source, table, tile, warnings
 
 if TYPE_CHECKING:
     from access_av._core import Site, Vehicle
@@ -93,7 +93,7 @@ def render_located(
         lead=escape(drive.suspicions[0]) + "." if drive.suspicions else "",
         tiles=_tiles(drive, numbers),
         meta=escape(f"Version {version('access-av')}."),
-        sections="".join(sections),
+        sections=warnings(site.warnings(vehicle)) + "".join(sections),
     )
 
 

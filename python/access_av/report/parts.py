@@ -117,6 +117,13 @@ def section(title: str, text: str, body: str) -> str:
     return f"<section><h2>{escape(title)}</h2>{lead}{body}</section>"
 
 
+def warnings(found: Iterable[object]) -> str:
+    """What of the settings is most likely not what was meant; nothing where all is plausible."""
+    items = "".join(f"<li>{escape(str(it))}</li>" for it in found)
+    text = "Each of these can be, and is most likely not what was meant:"
+    return section("Check these settings first", text, f"<ul>{items}</ul>") if items else ""
+
+
 def source(title: str, text: str) -> str:
     """A file to unfold."""
     return f"<details><summary>{escape(title)}</summary><pre>{escape(text)}</pre></details>"

@@ -9,7 +9,16 @@ from typing import TYPE_CHECKING
 from access_av.error_bound import MAP_TRAVEL_M, VISIBLE_SNR_DB
 from access_av.report import drive_charts as charts
 from access_av.report.page import sheet
-from access_av.report.parts import badge, figure, number, service_levels, source, table, tile
+from access_av.report.parts import (
+    badge,
+    figure,
+    number,
+    service_levels,
+    source,
+    table,
+    tile,
+    warnings,
+)
 
 if TYPE_CHECKING:
     from access_av.error_bound import ErrorBound
@@ -77,7 +86,7 @@ def render_bound(bound: ErrorBound, missed: NextLevel | None = None) -> str:
             )
         ),
         meta=escape(f"Scenario “{scenario.name}”, version {version('access-av')}."),
-        sections=sections,
+        sections=warnings(bound.scenario.warnings()) + sections,
     )
 
 

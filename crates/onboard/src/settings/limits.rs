@@ -82,7 +82,8 @@ impl Walk<'_> {
         let (least, most) = (limit("minimum"), limit("maximum"));
         let inside =
             least.is_none_or(|least| number >= least) && most.is_none_or(|most| number <= most);
-        self.check.that(inside, path, number, &allowed(least, most))
+        let allowed = format!("{}{}", allowed(least, most), unit_hint(path, number));
+        self.check.that(inside, path, number, &allowed)
     }
 
     fn length(&self, length: usize, schema: &Value, path: &str) -> Result<(), SettingsError> {
@@ -97,6 +98,42 @@ impl Walk<'_> {
             &allowed,
         )
     }
+}
+
+/// What to write where a number that is out of range looks like one of another unit.
+fn unit_hint(path: &str, value: f64) -> String {
+    let key = path.rsplit('.').next().unwrap_or(path);
+    let key = key.split('[').next().unwrap_or(key);
+    let is_share = ["confidence", "probability", "share", "scale_std"]
+        .iter()
+        .any(|it| key.ends_with(it));
+    if !(1e-6..=1e11).contains(&value.abs()) {
+        return String::new(); // of no unit
+    }
+    let (large, small) = (value.abs() > 1.0, value.abs() < 1.0);
+    let hint = if key.ends_with("_rad") || key.ends_with("_radps") {
+        format!(
+            "it is in radians, and {value} degrees are {:.4}",
+            value.to_radians()
+        )
+    } else if key.ends_with("_wavelengths") && small {
+        "it is in wavelengths, not metres: half a wavelength is 0.5".to_owned()
+    } else if key.ends_with("_mhz") && value < 100.0 {
+        format!("it is in MHz, and {value} GHz are {}", value * 1e3)
+    } else if key.ends_with("_mhz") {
+        format!("it is in MHz, and {value} Hz are {}", value * 1e-6)
+    } else if is_share && large {
+        format!("it is a share of 1, and {value} % are {}", value / 100.0)
+    } else if key.ends_with("_m") && large {
+        format!("it is in metres, and {value} mm are {}", value / 1e3)
+    } else if key.ends_with("_ms") {
+        format!("it is in milliseconds, and {value} s are {}", value * 1e3)
+    } else if key.ends_with("_s") && large {
+        format!("it is in seconds, and {value} ms are {}", value / 1e3)
+    } else {
+        return String::new();
+    };
+    format!("; {hint}")
 }
 
 /// Whether a variant of several is the one at hand: its tag says so, or it has none.

@@ -14,8 +14,41 @@ pub fn parse(text: &str, file: &str) -> Result<Table, SettingsError> {
     text.parse::<Table>()
         .map_err(|error| SettingsError::Syntax {
             file: file.to_owned(),
-            message: error.to_string().trim_end().to_owned(),
+            message: {
+                let at = error.span().map_or(0, |span| span.start);
+                format!("{}{}", error.to_string().trim_end(), comma_hint(text, at))
+            },
         })
+}
+
+/// What to write where the line of a syntax error has a decimal comma: `speed = 3,5`.
+fn comma_hint(text: &str, at: usize) -> String {
+    let start = text
+        .get(..at)
+        .and_then(|it| it.rfind('\n'))
+        .map_or(0, |it| it + 1);
+    let line = text
+        .get(start..)
+        .and_then(|it| it.lines().next())
+        .unwrap_or_default();
+    let mut values = line.split('=').skip(1).map(str::trim_start);
+    let comma = |value: &str| {
+        let is_number = |sign: char| sign.is_ascii_digit() || "+-,".contains(sign);
+        let number = value
+            .split(|sign| !is_number(sign))
+            .next()
+            .unwrap_or_default();
+        with_point(number.trim_end_matches(','))
+    };
+    let found = values.find_map(comma);
+    found.map(|hint| format!("\n{hint}")).unwrap_or_default()
+}
+
+/// What to write for a number with a decimal comma; nothing for what is none.
+fn with_point(number: &str) -> Option<String> {
+    let point = number.replacen(',', ".", 1);
+    let is_number = number.contains(',') && point.parse::<f64>().is_ok();
+    is_number.then(|| format!("numbers take a decimal point: write {point}, not {number}"))
 }
 
 /// Turns a parsed table into settings.
@@ -155,13 +188,28 @@ fn explain(file: &str, path: &str, message: &str) -> SettingsError {
         let hint = hint
             .map(|name| format!(" (did you mean `{name}`?)"))
             .unwrap_or_default();
-        (key, format!("{message}{hint}"))
+        (key, format!("{message}{hint}{}", number_hint(message)))
     };
     SettingsError::Shape {
         file: file.to_owned(),
         key,
         message,
     }
+}
+
+/// What to write where a list is too long for its commas, or a number stands in quotes.
+fn number_hint(message: &str) -> String {
+    let hint = if message.starts_with("invalid length") {
+        Some("numbers take a decimal point: write 3.5, not 3,5".to_owned())
+    } else {
+        let quoted = message.strip_prefix("invalid type: string \"");
+        let number = quoted
+            .and_then(|it| it.split('"').next())
+            .unwrap_or_default();
+        let in_quotes = || format!("write {number} without quotes");
+        with_point(number).or_else(|| number.parse::<f64>().ok().map(|_| in_quotes()))
+    };
+    hint.map(|hint| format!("; {hint}")).unwrap_or_default()
 }
 
 fn refuse_not_finite(value: &Value, path: &str, file: &str) -> Result<(), SettingsError> {

@@ -1,5 +1,7 @@
 //! A site: what is known of a plant, one file for the whole fleet.
 
+use nr_ssb::band::likely_lmax;
+use nr_ssb::{Lmax, SubcarrierSpacing};
 use schemars::JsonSchema;
 use serde::{Deserialize, Serialize};
 use toml::{Table, Value};
@@ -55,6 +57,24 @@ impl Site {
     /// Wavelength of the carrier in metres.
     pub fn wavelength_m(&self) -> f64 {
         SPEED_OF_LIGHT_MPS / (self.carrier_mhz * 1e6)
+    }
+
+    /// How many SSB indices a burst can have at its carrier: as many as TS 38.213, 4.1, gives the
+    /// subcarrier spacing, and the more where bands there differ.
+    pub fn ssb_indices(&self) -> u8 {
+        let spacing = match self.ssb.subcarrier_spacing_khz as u16 {
+            15 => SubcarrierSpacing::Khz15,
+            30 => SubcarrierSpacing::Khz30,
+            120 => SubcarrierSpacing::Khz120,
+            _ => SubcarrierSpacing::Khz240,
+        };
+        let size = likely_lmax(spacing, Some(self.carrier_mhz * 1e6));
+        let most = if size.certain {
+            size.likely
+        } else {
+            size.likely.max(Lmax::L8)
+        };
+        most.count()
     }
 
     /// The road, where there is one.

@@ -4,6 +4,7 @@ mod channel;
 mod faults;
 mod iq;
 mod motion;
+mod plausible;
 mod scenario_file;
 mod size;
 mod truth;

@@ -1,0 +1,111 @@
+//! What site and vehicle are together.
+
+use super::hearing::{drowned, unheard, unheard_at_start};
+use super::site::written;
+use super::usual::rounded;
+use super::vehicle::of_vehicle;
+use super::warning::Warning;
+use crate::road::Road;
+use crate::settings::{Shipped, Site, TomlFile, Vehicle};
+
+/// What is doubtful of a site, heard by a vehicle of which nothing is stated.
+pub fn of_site(site: &Site) -> Vec<Warning> {
+    let road = site.build_road().ok().flatten();
+    let Ok(vehicle) = Vehicle::from_library("default", &Shipped) else {
+        return written(site, road.as_ref()); // it is shipped
+    };
+    let mut found = in_reach(site, &vehicle, road.as_ref());
+    found.extend(drowned(site, &vehicle, road.as_ref()));
+    found
+}
+
+/// What is doubtful of a site and a vehicle that has driven there. Keys begin with `site` and
+/// `vehicle`.
+pub fn of_both(site: &Site, vehicle: &Vehicle) -> Vec<Warning> {
+    let road = site.build_road().ok().flatten();
+    beneath("site", in_reach(site, vehicle, road.as_ref()))
+        .chain(beneath("vehicle", on_site(site, vehicle)))
+        .collect()
+}
+
+/// The same of a vehicle that is to drive along a way: on a drive that was recorded, what was heard
+/// shows who drowns whom.
+pub fn of_both_along(site: &Site, vehicle: &Vehicle, way: &Road) -> Vec<Warning> {
+    let mut of_site = in_reach(site, vehicle, Some(way));
+    of_site.extend(drowned(site, vehicle, Some(way)));
+    beneath("site", of_site)
+        .chain(beneath("vehicle", on_site(site, vehicle)))
+        .collect()
+}
+
+fn beneath(path: &str, found: Vec<Warning>) -> impl Iterator<Item = Warning> {
+    found.into_iter().map(move |it| it.beneath(path))
+}
+
+/// A site by itself, and radio heads that are heard nowhere on the way.
+fn in_reach(site: &Site, vehicle: &Vehicle, way: Option<&Road>) -> Vec<Warning> {
+    let mut found = written(site, way);
+    // Of places in degrees or in a map's grid all has been said.
+    let of_places = |it: &Warning| it.key.ends_with("position_m") || it.key.starts_with("road");
+    if !found.iter().any(of_places) {
+        found.extend(unheard(site, vehicle, way));
+    }
+    found
+}
+
+/// A vehicle by itself, and on the site.
+fn on_site(site: &Site, vehicle: &Vehicle) -> Vec<Warning> {
+    let mut found = of_vehicle(vehicle);
+    found.extend(spacing_in_metres(site, vehicle));
+    found.extend(start_off_road(site, vehicle).or_else(|| unheard_at_start(site, vehicle)));
+    found.extend(strays(site, vehicle));
+    found
+}
+
+/// Half a wavelength, in metres: at carriers below 3 GHz the number is one that wavelengths may be.
+fn spacing_in_metres(site: &Site, vehicle: &Vehicle) -> Option<Warning> {
+    let (spacing, half_m) = (vehicle.array.spacing_wavelengths, 0.5 * site.wavelength_m());
+    let is_metres = (spacing / half_m - 1.0).abs() < 0.05 && spacing < 0.45;
+    is_metres.then(|| Warning {
+        key: "array.spacing_wavelengths".to_owned(),
+        value: spacing.to_string(),
+        why: format!(
+            "half a wavelength at {} MHz is {half_m:.4} m, and antennas as near are coupled",
+            site.carrier_mhz
+        ),
+        write: format!(
+            "write wavelengths: {spacing} m are {:.2}",
+            spacing / site.wavelength_m()
+        ),
+    })
+}
+
+/// A start beside the road that the vehicle follows, by more than it may be.
+fn start_off_road(site: &Site, vehicle: &Vehicle) -> Option<Warning> {
+    let (pose, road) = (vehicle.start.pose?, site.build_road().ok().flatten()?);
+    let projection = road.project(pose.point());
+    let beside_m = road
+        .pose(projection.along_m.clamp(0.0, road.length_m()))
+        .point()
+        .distance_m(pose.point());
+    let may_m = road.width_m() + 3.0 * vehicle.start.position_std_m + 10.0;
+    (vehicle.follows_road() && beside_m > may_m).then(|| Warning {
+        key: "start.pose".to_owned(),
+        value: format!("[{}, {}]", pose.x_m, pose.y_m),
+        why: format!("that is {beside_m:.0} m from the road that the vehicle follows"),
+        write:
+            "write it in metres in the frame of the road, or drive = \"differential\" if it roams"
+                .to_owned(),
+    })
+}
+
+/// Lane keeping that leaves the lane.
+fn strays(site: &Site, vehicle: &Vehicle) -> Option<Warning> {
+    let (rms_m, width_m) = (vehicle.lane_keeping.rms_m, site.road.as_ref()?.width_m);
+    (vehicle.follows_road() && rms_m > 0.5 * width_m).then(|| Warning {
+        key: "lane_keeping.rms_m".to_owned(),
+        value: rms_m.to_string(),
+        why: format!("the road is {width_m} m wide: it would leave it a third of the time"),
+        write: format!("write metres: {rms_m} cm are {}", rounded(rms_m / 100.0)),
+    })
+}

@@ -1,0 +1,100 @@
+//! Numbers that are not as numbers of their kind are: one row for each.
+
+use serde::Serialize;
+use serde_json::Value;
+
+use super::warning::Warning;
+
+/// What is usual of a number.
+#[derive(Debug, Clone, Copy)]
+pub struct Usual {
+    /// Path of its key; `[]` stands for every entry of a list, `[2]` for one.
+    pub key: &'static str,
+    /// Least and most of what is usual.
+    pub within: [f64; 2],
+    /// Why nothing else is.
+    pub why: &'static str,
+    /// What to write instead of a value.
+    pub write: fn(f64) -> String,
+}
+
+/// Warnings of numbers that are not as the rows say.
+pub fn unusual(settings: &impl Serialize, rows: &[Usual]) -> Vec<Warning> {
+    let settings = serde_json::to_value(settings).unwrap_or_default();
+    let mut found = Vec::new();
+    for row in rows {
+        let steps: Vec<&str> = row.key.split('.').collect();
+        visit(&settings, &steps, String::new(), &mut |key, number| {
+            let [least, most] = row.within;
+            if !(least..=most).contains(&number) {
+                found.push(Warning {
+                    key,
+                    value: number.to_string(),
+                    why: row.why.to_owned(),
+                    write: (row.write)(number),
+                });
+            }
+        });
+    }
+    found
+}
+
+/// Calls `told` with the path and value of every number that the steps lead to.
+fn visit(here: &Value, steps: &[&str], path: String, told: &mut impl FnMut(String, f64)) {
+    let Some((step, rest)) = steps.split_first() else {
+        if let Some(number) = here.as_f64() {
+            told(path, number);
+        }
+        return;
+    };
+    let (name, place) = step.split_once('[').unwrap_or((step, ""));
+    let Some(held) = here.get(name) else {
+        return;
+    };
+    let path = if path.is_empty() {
+        name.to_owned()
+    } else {
+        format!("{path}.{name}")
+    };
+    if place.is_empty() {
+        return visit(held, rest, path, told);
+    }
+    let wanted: Option<usize> = place.trim_end_matches(']').parse().ok();
+    for (index, item) in held.as_array().into_iter().flatten().enumerate() {
+        if wanted.is_none_or(|wanted| wanted == index) {
+            visit(item, rest, format!("{path}[{index}]"), told);
+        }
+    }
+}
+
+/// A number to be read by people: five digits of it.
+pub fn rounded(value: f64) -> f64 {
+    format!("{value:.4e}").parse().unwrap_or(value)
+}
+
+/// What to write for an angle given in degrees.
+pub fn as_degrees(value: f64) -> String {
+    let rad = value.to_radians();
+    format!("write radians: {value} degrees are {rad:.4}")
+}
+
+/// What to write for a share given in percent.
+pub fn as_percent(value: f64) -> String {
+    format!(
+        "write a share of 1: {value} % are {}",
+        rounded(value / 100.0)
+    )
+}
+
+/// What to write for a length given in millimetres.
+pub fn as_millimetres(value: f64) -> String {
+    format!("write metres: {value} mm are {}", rounded(value / 1000.0))
+}
+
+/// What to write for milliseconds given in seconds.
+pub fn as_milliseconds(value: f64) -> String {
+    format!(
+        "write milliseconds: {value} s are {}",
+        rounded(value * 1000.0)
+    )
+}
