@@ -431,6 +431,7 @@ COMMANDS = (
     ("synth", "yard", "--out", "drive"),
     ("locate", "--recording", "a.csv", "--odometry", "o.csv", *SITE_AND_VEHICLE),
     ("survey", "drive", *SITE_AND_VEHICLE),
+    ("angles", "iq.sigmf-meta", *SITE_AND_VEHICLE),
     ("import-paths", "t.csv", "--site", "yard", "--carrier-mhz", "3500", "--out", "p.npz"),
 )
 

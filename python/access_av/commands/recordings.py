@@ -7,7 +7,7 @@ from typing import Annotated
 
 import typer
 
-from access_av.commands.options import AsJson, Out
+from access_av.commands.options import AsJson, Out, load_site_and_vehicle
 from access_av.errors import InputError
 from access_av.terminal import (
     console,
@@ -175,8 +175,9 @@ def angles(
     from access_av.angle_log import estimate_angles
     from access_av.files import ResultsDirectory, json_text
 
+    plant, carrier = load_site_and_vehicle(site, vehicle)
     with progress("Estimating"):
-        found = estimate_angles(site, recording, vehicle=vehicle, start_time_s=start_time_s)
+        found = estimate_angles(plant, recording, vehicle=carrier, start_time_s=start_time_s)
     directory = ResultsDirectory.create("angles", out)
     directory.write_text("angles.csv", found.csv())
     directory.write_table("angles.parquet", found.angles)
