@@ -424,7 +424,7 @@ def test_latest_that_cannot_be_made(access_av: Cli, tmp_path: Path) -> None:
     (tmp_path / "results/latest/kept").write_text("")
     with pytest.warns(UserWarning, match="latest"):
         done = access_av(
-            "run", "paper", "--set", "motion.start_at_m=290", "--out", tmp_path / "out"
+            "run", "paper", "--set", "motion.start_at_m=290", "--out", tmp_path / "results/out"
         )
     assert done.code == 0, done.err
 
