@@ -7,10 +7,11 @@ from html import escape
 from importlib.metadata import version
 from typing import TYPE_CHECKING
 
+from access_av.assumptions import energy_boundary, flattering, in_words
 from access_av.errors import InputError
 from access_av.report import drive_charts as charts
 from access_av.report.page import sheet
-from access_av.report.parts import figure, section, service_levels, source, tile
+from access_av.report.parts import figure, section, service_levels, source, tile, value_text
 
 if TYPE_CHECKING:
     from access_av._core import Scenario
@@ -53,7 +54,8 @@ def render_drive(scenario: Scenario, result: Simulation, seed: int) -> str:
         )
     integrity = result.integrity
     if integrity is not None:
-        alert_limit_m = json.loads(scenario.vehicle.to_json())["integrity"]["alert_limit_m"]
+        vehicle = json.loads(scenario.resolved().vehicle.to_json())
+        alert_limit_m = vehicle["integrity"]["alert_limit_m"]
         specs["stanford"] = charts.stanford(result.trajectories, alert_limit_m)
         sections.append(
             section("Integrity", _integrity_text(integrity, alert_limit_m), figure("stanford"))
@@ -82,6 +84,9 @@ def render_drive(scenario: Scenario, result: Simulation, seed: int) -> str:
         tile(f"{quantiles_m[0.99]:.3f} m", "99th percentile"),
         tile(f"{result.runs['executions'].sum() / runs:,.0f}", "executions in a run"),
     ]
+    if (boundary := energy_boundary(scenario)) is not None:
+        energy_j = value_text(result.runs["energy_j"].mean())
+        tiles.append(tile(f"{energy_j} J", f"energy of a run: {boundary}"))
     if integrity is not None:
         tiles.append(tile(f"{integrity.exceedances}", "errors beyond the protection level"))
     return sheet(
@@ -89,7 +94,7 @@ def render_drive(scenario: Scenario, result: Simulation, seed: int) -> str:
         title=f"ACCESS-AV drive: {escape(scenario.name)}",
         kicker="ACCESS-AV drive",
         headline=f"{quantiles_m[0.9]:.2f} m or less in nine of ten epochs",
-        lead=escape(scenario.description),
+        lead=escape(f"{scenario.description} {in_words(flattering(scenario))}".strip()),
         tiles="".join(tiles),
         meta=escape(
             f"Scenario “{scenario.name}”, {runs} runs of {duration_s:.1f} s, seed {seed}, "

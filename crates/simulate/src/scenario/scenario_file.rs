@@ -110,10 +110,6 @@ impl TomlFile for Scenario {
             include_str!("../../../../scenarios/campus-handover.toml"),
         ),
         (
-            "yard-surveyed",
-            include_str!("../../../../scenarios/yard-surveyed.toml"),
-        ),
-        (
             "yard-array-off",
             include_str!("../../../../scenarios/yard-array-off.toml"),
         ),
