@@ -556,6 +556,7 @@ def test_optuna_suggests_the_same_designs_again(
 SPACE = """
 vehicle.platform = { name = ["jetson-agx-xavier-engine"], mode = [0, 2] }
 vehicle.localizer.kind = ["tracker"]
+vehicle.integrity.enabled = [false]
 vehicle.wake_up.policy = ["fixed"]
 vehicle.wake_up.interval_ms = [2000.0, 8000.0]
 """

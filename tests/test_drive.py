@@ -14,7 +14,7 @@ from access_av import Scenario, simulate
 from access_av.errors import InputError
 from access_av.report.drive import render_drive
 from access_av.report.operation import Operation
-from access_av.statistics import horizontal_error_m
+from access_av.statistics import Integrity, horizontal_error_m
 
 if TYPE_CHECKING:
     from collections.abc import Callable
@@ -75,6 +75,22 @@ def test_page_has_every_chart_and_loads_nothing(guarded: Simulation) -> None:
     assert guarded.trajectories is not None
     epochs = sum(row.get("epochs", 0) for rows in counted for row in rows)
     assert epochs == guarded.trajectories.height
+
+
+def test_integrity_is_there_without_trajectories(guarded: Simulation) -> None:
+    again = simulate(GUARDED, runs=2, seed=4)
+    assert again.trajectories is None
+    assert again.integrity is not None
+    assert again.integrity == guarded.integrity
+    # The same steps are counted in the table; its median is exact, the other a histogram's.
+    assert guarded.trajectories is not None
+    counted = Integrity.of(guarded.trajectories)
+    assert counted is not None
+    assert counted.state_shares == pytest.approx(again.integrity.state_shares)
+    assert counted.exceedances == again.integrity.exceedances
+    assert counted.median_level_over_error == pytest.approx(
+        again.integrity.median_level_over_error, rel=0.06
+    )
 
 
 def test_page_needs_trajectories() -> None:

@@ -47,7 +47,7 @@ def test_latest_points_to_the_newest(tmp_path: Path, monkeypatch: pytest.MonkeyP
     assert json.loads((tmp_path / "results/latest/claims.json").read_text()) == []
 
 
-def test_a_named_directory_is_used_as_it_is_and_is_the_latest_too(
+def test_a_directory_elsewhere_is_used_as_it_is_and_leaves_no_link(
     tmp_path: Path, monkeypatch: pytest.MonkeyPatch
 ) -> None:
     monkeypatch.chdir(tmp_path)
@@ -55,6 +55,16 @@ def test_a_named_directory_is_used_as_it_is_and_is_the_latest_too(
     directory.write_table("table.parquet", pl.DataFrame({"run": [0]}))
     directory.link_latest()
     assert [path.name for path in directory.path.iterdir()] == ["table.parquet"]
+    assert [path.name for path in tmp_path.iterdir()] == ["else"]
+
+
+def test_a_named_directory_under_results_is_the_latest_too(
+    tmp_path: Path, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    monkeypatch.chdir(tmp_path)
+    directory = ResultsDirectory.create("run", tmp_path / "results" / "mine")
+    directory.write_table("table.parquet", pl.DataFrame({"run": [0]}))
+    directory.link_latest()
     assert (tmp_path / "results/latest/table.parquet").samefile(directory.path / "table.parquet")
 
 

@@ -158,7 +158,7 @@ def test_samples_without_an_ssb_are_refused(drive: Path, tmp_path: Path) -> None
         )
 
 
-def test_integrity_comes_with_the_poses_where_the_vehicle_asks_for_it(
+def test_integrity_comes_with_the_poses_unless_the_vehicle_forgoes_it(
     drive: Path, tmp_path: Path
 ) -> None:
     vehicle = tmp_path / "vehicle.toml"
@@ -166,7 +166,9 @@ def test_integrity_comes_with_the_poses_where_the_vehicle_asks_for_it(
     poses = locate(drive, vehicle=vehicle).poses
     assert set(poses["integrity"].unique()) <= {"ok", "degraded", "unavailable"}
     assert poses["protection_level_m"].max() > 0.1  # type: ignore[operator]
-    assert locate(drive).poses["integrity"].is_null().all()
+    vehicle.write_text((drive / "vehicle.toml").read_text() + "[integrity]\nenabled = false\n")
+    assert locate(drive, vehicle=vehicle).poses["integrity"].is_null().all()
+    assert not locate(drive).poses["integrity"].is_null().any()
 
 
 def test_a_replayed_drive_honours_the_wake_up_policy(drive: Path) -> None:

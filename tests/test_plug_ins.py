@@ -19,7 +19,7 @@ if TYPE_CHECKING:
 
 DOCS = (ROOT / "docs/plug-ins.md").read_text(encoding="utf-8")
 SHORT = access_av.Scenario.load("paper-real-odometry-2").with_overrides(
-    {"motion.start_at_m": 280.0}
+    {"motion.start_at_m": 280.0, "vehicle.integrity.enabled": False}
 )
 
 

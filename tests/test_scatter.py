@@ -13,7 +13,7 @@ import access_av
 @pytest.mark.parametrize(("k_db", "most"), [(10.0, 1.1), (5.0, 1.1), (3.0, 1.1), (0.0, 1.3)])
 def test_used_angles_are_near_the_bound(k_db: float, most: float) -> None:
     scenario = access_av.Scenario.load("paper-real-odometry-4").with_overrides(
-        {"site.rician_k_db": k_db}
+        {"site.rician_k_db": k_db, "vehicle.integrity.enabled": False}
     )
     result = access_av.simulate(scenario, runs=3, seed=5, keep_trajectories=True)
     looks = result.executions.join(result.trajectories, on=["run", "time_s"])

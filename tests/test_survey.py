@@ -38,10 +38,15 @@ def logged(tmp_path_factory: pytest.TempPathFactory) -> Path:
     """Two drives of 40 s past the yard's first radio head, which stands elsewhere than believed."""
     scenario = Scenario.load("yard").with_overrides(
         {
+            # Of what is to be surveyed nothing is stated, and nothing else is off.
+            **{f"site.radio_heads[{head}].position_std_m": 0.0 for head in range(4)},
+            "vehicle.array": {},
+            "vehicle.start": {"position_std_m": 0.0, "heading_std_rad": 0.0},
+            "vehicle.integrity.enabled": False,
             "truth.site.radio_heads.gate.position_m": [
                 -40.0 + GATE_OFF_M[0],
                 45.0 + GATE_OFF_M[1],
-                0.0,
+                8.0,
             ],
             "truth.vehicle.array.mounting_rad": MOUNTING_OFF_RAD,
         }
@@ -53,7 +58,9 @@ def logged(tmp_path_factory: pytest.TempPathFactory) -> Path:
 
 
 def test_a_head_and_an_array_that_are_elsewhere_are_found(logged: Path) -> None:
-    found = survey("yard", str(logged / "0/vehicle.toml"), [logged / "0", logged / "1"])
+    found = survey(
+        str(logged / "0/site.toml"), str(logged / "0/vehicle.toml"), [logged / "0", logged / "1"]
+    )
     by_key = {it.key: it for it in found.parameters}
     truth = np.array([it.before for it in found.parameters])
     for key, off in (
@@ -69,7 +76,7 @@ def test_a_head_and_an_array_that_are_elsewhere_are_found(logged: Path) -> None:
     # The dock is 300 m away: the drives say nothing of it, and it stays where it was.
     assert not by_key["radio_heads[2].position_m[0]"].is_learnt
     heads = json.loads(found.site.to_json())["radio_heads"]
-    assert heads[2]["position_m"] == [310.0, 85.0, 0.0]
+    assert heads[2]["position_m"] == [310.0, 85.0, 7.0]
     assert heads[0]["position_m"][0] == by_key["radio_heads[0].position_m[0]"].found
     # Noise is stated with care: the innovations are no larger than believed.
     assert 0.3 < found.nis < 1.1
@@ -79,9 +86,9 @@ def test_what_it_writes_locates_better(
     access_av: Callable[..., Finished], logged: Path, tmp_path: Path
 ) -> None:
     out = tmp_path / "out"
-    one, vehicle = logged / "0", logged / "0/vehicle.toml"
+    one, vehicle, plan = logged / "0", logged / "0/vehicle.toml", logged / "0/site.toml"
     done = access_av(
-        "survey", one, logged / "1", "--site", "yard", "--vehicle", vehicle, "--out", out
+        "survey", one, logged / "1", "--site", plan, "--vehicle", vehicle, "--out", out
     )
     assert done.code == 0, done.err
     rows = pl.read_parquet(out / "survey.parquet")
@@ -91,18 +98,18 @@ def test_what_it_writes_locates_better(
     def rms_m(site: str) -> float:
         start = vehicle.read_text()
         believed = tmp_path / "vehicle.toml"
-        believed.write_text((out / "vehicle.toml").read_text() if site != "yard" else start)
+        believed.write_text((out / "vehicle.toml").read_text() if site != str(plan) else start)
         drive = drives.locate(site, one / "odometry.csv", one / "angles.csv", vehicle=believed)
         error_m = drives.error_m(drive.poses, one / "truth.tum")["error_m"]
         return float(np.sqrt(np.mean(error_m.to_numpy() ** 2)))
 
-    assert rms_m(str(out / "site.toml")) < 0.5 * rms_m("yard")
+    assert rms_m(str(out / "site.toml")) < 0.5 * rms_m(str(plan))
 
 
 def test_what_cannot_be_surveyed_is_named(logged: Path, tmp_path: Path) -> None:
-    vehicle = str(logged / "0/vehicle.toml")
+    plan, vehicle = str(logged / "0/site.toml"), str(logged / "0/vehicle.toml")
     with pytest.raises(InputError, match=r"neither odometry.csv nor odometry.mcap"):
-        survey("yard", vehicle, [tmp_path])
+        survey(plan, vehicle, [tmp_path])
     elsewhere = Site.load("yard").with_overrides(
         {f"radio_heads[{index}].pci": 900 + index for index in range(4)}
     )
@@ -114,7 +121,7 @@ def test_what_cannot_be_surveyed_is_named(logged: Path, tmp_path: Path) -> None:
         (lost / name).write_bytes((logged / "0" / name).read_bytes())
     (lost / "vehicle.toml").write_text('like = "tugger"\n')
     with pytest.raises(InputError, match=r"start.pose"):
-        survey("yard", vehicle, [lost])
+        survey(plan, vehicle, [lost])
     noisy = Scenario.load("yard").with_overrides({"vehicle.receiver.snr_noise_db": 1.0})
     with pytest.raises(SettingsError, match="fidelity"):
         drives.log_angles(noisy, tmp_path / "noisy")

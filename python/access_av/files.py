@@ -71,7 +71,12 @@ class ResultsDirectory:
         return cls(out, lock)
 
     def link_latest(self) -> None:
-        """Point ``results/latest`` here, wherever this directory is."""
+        """Point ``results/latest`` here, if this directory is one under ``results``.
+
+        With ``--out`` elsewhere the working directory stays as it is.
+        """
+        if RESULTS.resolve() not in self.path.resolve().parents:
+            return
         fresh = RESULTS / f".latest-{os.getpid()}"
         try:
             RESULTS.mkdir(parents=True, exist_ok=True)

@@ -99,7 +99,7 @@ def hypotheses(scenario: _core.Scenario) -> dict[str, Overrides]:
     Examples
     --------
     >>> from access_av import _core
-    >>> found = hypotheses(_core.Scenario.load("yard-surveyed"))
+    >>> found = hypotheses(_core.Scenario.load("yard"))
     >>> found["array mounting x 3"]
     {'truth.vehicle.array.mounting_rad': 0.03}
     """

@@ -89,7 +89,7 @@ class Case:
 
 
 def _settings(scenario: _core.Scenario) -> dict[str, Any]:
-    """``[integrity]`` of its vehicle."""
+    """``[integrity]`` of its vehicle, in which it is written out."""
     found: dict[str, Any] = json.loads(scenario.vehicle.to_json())["integrity"]
     return found
 
@@ -136,7 +136,7 @@ def drive(
     campaign
         Who drives, and where drives are kept.
     scenario
-        A scenario, or the name or path of one. A vehicle without a guard gets one.
+        A scenario, or the name or path of one. A monitor that is switched off is switched on.
     runs, seed
         Drives of each case, and their seed.
     only
@@ -175,8 +175,7 @@ def drive(
     """
     if not isinstance(scenario, _core.Scenario):
         scenario = _core.Scenario.load(scenario)
-    if json.loads(scenario.vehicle.to_json()).get("integrity") is None:
-        scenario = scenario.with_overrides({"vehicle.integrity": {}})
+    scenario = scenario.with_overrides({"vehicle.integrity.enabled": True})
     usual = mismatches(scenario)
     known = {**usual, **hypotheses(scenario)} if only else usual
     for name in only or ():

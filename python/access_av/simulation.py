@@ -48,6 +48,8 @@ class Simulation:
         Truth and estimate, one row per run and SSB. ``None`` unless kept.
     executions
         The angle estimates, one row each. ``None`` unless trajectories were kept.
+    integrity
+        How protection levels and errors went together; ``None`` where none were stated.
     error_quantiles_m
         Quantiles of the horizontal error over all runs and SSBs, by probability; out of a histogram
         whose bins are 5.9 % wide. Exact ones, with intervals: :attr:`percentiles`.
@@ -62,6 +64,7 @@ class Simulation:
     runs: pl.DataFrame
     trajectories: pl.DataFrame | None
     executions: pl.DataFrame | None
+    integrity: Integrity | None
     error_quantiles_m: Mapping[float, float]
     errors_m: NDArray[np.float32] | None = None
     scenario: Scenario | None = None
@@ -91,6 +94,7 @@ class Simulation:
             runs=_table(found.runs),
             trajectories=None if found.trajectories is None else _table(found.trajectories),
             executions=None if found.executions is None else _table(found.executions),
+            integrity=found.integrity and Integrity.of_runs(*found.integrity),
             error_quantiles_m=found.error_quantiles_m,
             errors_m=found.errors_m,
             scenario=scenario,
@@ -148,11 +152,6 @@ class Simulation:
         error_m = pl.when(~pl.col("searching")).then(horizontal_error_m())
         errors_m = self.trajectories.sort("run", "time_s").select(error_m).to_numpy()
         return np.asarray(errors_m.reshape(-1, self.steps.height))
-
-    @property
-    def integrity(self) -> Integrity | None:
-        """How protection levels and errors went together; ``None`` where none were stated."""
-        return None if self.trajectories is None else Integrity.of(self.trajectories)
 
     @property
     def operation(self) -> Operation | None:

@@ -182,8 +182,8 @@ def show_points(points: pl.DataFrame, title: str = "") -> None:
     console.print(made)
 
 
-def show_simulation(result: Simulation, title: str) -> None:
-    """Errors and executions of many drives, in one table."""
+def show_simulation(result: Simulation, title: str, energy_boundary: str | None) -> None:
+    """Errors and executions of many drives, in one table, and what their joules count."""
     steps, runs = result.steps, result.runs
     made = table(["", "value", "95 % interval"], title=title)
     rows: dict[str, tuple[Any, str]] = {
@@ -197,7 +197,7 @@ def show_simulation(result: Simulation, title: str) -> None:
         "worst mean error along the track, Y / m": (steps["mean_abs_error_y_m"].max(), ""),
         "duration / s": (steps["time_s"].max(), ""),
         "executions (angles estimated)": (runs["executions"].mean(), ""),
-        "energy / J": (runs["energy_j"].mean(), ""),
+        f"energy / J, {energy_boundary or 'not counted'}": (runs["energy_j"].mean(), ""),
     }
     if runs["found_s"].fill_null(1.0).max() != 0.0:
         found = runs.height - runs["found_s"].null_count()

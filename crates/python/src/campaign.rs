@@ -5,8 +5,8 @@ use std::sync::atomic::AtomicBool;
 
 use ::simulate::scenario::Scenario as CoreScenario;
 use ::simulate::{
-    Campaign, CampaignOptions, RunRecord, RunSummary, Simulation, SimulationError, Step,
-    StepStatistics, Tapes as CoreTapes,
+    Campaign, CampaignOptions, IntegritySummary, RunRecord, RunSummary, Simulation,
+    SimulationError, Step, StepStatistics, Tapes as CoreTapes,
 };
 use numpy::{Element, PyArray1, PyArray3, PyArrayMethods};
 use onboard::geometry::Pose;
@@ -36,6 +36,9 @@ pub struct SimulationResult {
     runs: Py<PyDict>,
     /// Truth and estimate, one row per run and SSB; `None` unless kept.
     trajectories: Option<Py<PyDict>>,
+    /// How protection levels and errors went together: `(runs, median of level over error)`, where
+    /// `runs` is as `runs` above of the steps with a protection level. `None` where none was stated.
+    integrity: Option<(Py<PyDict>, f64)>,
     /// Estimated angles, one row each; `None` unless kept.
     executions: Option<Py<PyDict>>,
     /// Quantiles of the horizontal error over all runs and SSBs, in metres, by probability; out of a
@@ -149,6 +152,7 @@ fn result(
         trajectories: keep_trajectories
             .then(|| trajectories(py, &campaign.records))
             .transpose()?,
+        integrity: integrity(py, campaign)?,
         executions: keep_trajectories
             .then(|| executions(py, &campaign.records))
             .transpose()?,
@@ -351,6 +355,28 @@ fn run_table(py: Python<'_>, campaign: &Campaign) -> PyResult<Py<PyDict>> {
         table.set_item(name, column(py, runs, value))?;
     }
     Ok(table.unbind())
+}
+
+/// Epochs by state, and those beyond the level while ok, of each run; the median is the histogram's.
+fn integrity(py: Python<'_>, campaign: &Campaign) -> PyResult<Option<(Py<PyDict>, f64)>> {
+    let runs = &campaign.integrity;
+    if runs.is_empty() {
+        return Ok(None);
+    }
+    let table = PyDict::new(py);
+    let columns: [Column<IntegritySummary>; 4] = [
+        ("ok", |run| run.ok as f64),
+        ("degraded", |run| {
+            (run.epochs - run.ok - run.unavailable) as f64
+        }),
+        ("unavailable", |run| run.unavailable as f64),
+        ("beyond", |run| run.beyond as f64),
+    ];
+    for (name, value) in columns {
+        table.set_item(name, column(py, runs, value))?;
+    }
+    let median = IntegritySummary::sum(runs).median_ratio();
+    Ok(Some((table.unbind(), median)))
 }
 
 /// Covariances and protection levels are NaN where the localizer does not know its own error, states

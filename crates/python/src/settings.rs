@@ -189,6 +189,13 @@ toml_file! {
     /// A vehicle, checked: what it is built of and how it is set, as it believes.
     Vehicle(CoreVehicle), "vehicle",
 
+    /// Protection level in metres above which its position is not to be relied on; `None` where no
+    /// integrity monitor runs.
+    #[getter]
+    fn alert_limit_m(&self) -> Option<f64> {
+        self.0.integrity_monitor().map(|it| it.alert_limit_m)
+    }
+
     /// The vehicle with everything of its wake-up written out that it leaves to the platform, which is
     /// the one it names unless another is given.
     #[pyo3(signature = (platform = None))]

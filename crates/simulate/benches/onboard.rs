@@ -25,7 +25,10 @@ fn main() {
 
 fn believed(site: &str) -> (Site, Vehicle) {
     let site = Site::from_library(site, &Shipped).unwrap();
-    (site, Vehicle::from_library("carrier", &Shipped).unwrap())
+    (
+        site,
+        Vehicle::from_library("paper-carrier", &Shipped).unwrap(),
+    )
 }
 
 /// 20 ms of the site's first cell on four antennas at 20 dB per resource element.

@@ -35,7 +35,10 @@ fn main() -> Result<()> {
 }
 
 fn cases() -> Result<Vec<(&'static str, Scenario)>> {
-    let shipped = changed("nlos-and-faults", [])?;
+    let shipped = changed(
+        "nlos-and-faults",
+        [("vehicle.integrity", Value::Table(Table::new()))],
+    )?;
     let with = |faults: Vec<FaultSettings>| Scenario {
         faults,
         ..shipped.clone()

@@ -1,8 +1,7 @@
 //! What each wake-up policy costs and what error it leaves, on the yard, with the settings shipped:
 //! `cargo run --release -p simulate --example wake_up_table -- [runs] [seed ...]`.
 //!
-//! Every policy drives the same runs over the same radio channel. Beside the uncertainty-driven
-//! policy stands the strict one, which listens to the bound alone.
+//! Every policy drives the same runs over the same radio channel.
 #![allow(clippy::print_stdout, reason = "prints a table")]
 
 mod common;
@@ -52,7 +51,7 @@ fn main() -> Result<()> {
     let (driven, references): (Vec<_>, Vec<_>) = policies.iter().partition(|policy| {
         matches!(
             policy.scenario.vehicle.wake_up,
-            WakeUpSettings::Uncertainty(_)
+            Some(WakeUpSettings::Uncertainty(_))
         )
     });
     for policy in driven {
@@ -84,13 +83,7 @@ fn policies() -> Result<Vec<Policy>> {
         let name = format!("fixed {interval_ms} ms");
         policies.push(policy(&name, changed("yard", fixed(interval_ms))?));
     }
-    let yard = changed("yard", [])?;
-    let mut strict = yard.clone();
-    if let WakeUpSettings::Uncertainty(settings) = &mut strict.vehicle.wake_up {
-        settings.least_gain_m2 = None;
-    }
-    policies.push(policy("uncertainty", yard));
-    policies.push(policy("  on demand alone", strict));
+    policies.push(policy("uncertainty", changed("yard", [])?));
     Ok(policies)
 }
 

@@ -172,7 +172,7 @@ impl Simulation {
         let mut integrity = Vec::new();
         let mut records = Vec::new();
         let mut errors_m = Vec::new();
-        let integrity_settings = self.scenario().vehicle.integrity;
+        let integrity_settings = self.scenario().vehicle.integrity_monitor();
         let alert_limit_m = integrity_settings.map_or(f64::INFINITY, |it| it.alert_limit_m);
         while runs.len() < count {
             let first = runs.len();

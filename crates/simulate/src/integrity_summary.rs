@@ -16,6 +16,8 @@ pub struct IntegritySummary {
     pub epochs: usize,
     /// Those whose state was `ok`.
     pub ok: usize,
+    /// Those whose state was `unavailable`.
+    pub unavailable: usize,
     /// Those whose state was `ok` although the error was beyond the protection level.
     pub beyond: usize,
     /// Alarms: times at which the state left `ok`.
@@ -51,6 +53,8 @@ impl IntegritySummary {
             let exceeds = error_m > alert_limit_m;
             summary.epochs += 1;
             summary.ok += usize::from(ok);
+            let unavailable = integrity.state == IntegrityState::Unavailable;
+            summary.unavailable += usize::from(unavailable);
             summary.beyond += usize::from(ok && error_m > integrity.protection_level_m);
             summary.alarms += usize::from(was_ok && !ok);
             let early = was_ok && !ok && !exceeds;
@@ -82,6 +86,7 @@ impl IntegritySummary {
         for run in runs {
             total.epochs += run.epochs;
             total.ok += run.ok;
+            total.unavailable += run.unavailable;
             total.beyond += run.beyond;
             total.alarms += run.alarms;
             total.early_alarms += run.early_alarms;

@@ -7,7 +7,7 @@ use onboard::radio_head::RadioHead;
 use onboard::road::Road;
 use onboard::settings::{
     Check, EstimatorSettings, LocalizerSettings, PlatformSettings, RadioHeadSettings,
-    SettingsError, Site, Vehicle, WakeUpSettings,
+    SettingsError, Site, Vehicle,
 };
 use rand::RngExt;
 use rand_distr::StandardNormal;
@@ -204,7 +204,7 @@ fn what_it_is(vehicle: &Vehicle) -> Vehicle {
         estimator: EstimatorSettings::default(),
         localizer: LocalizerSettings::default(),
         integrity: None,
-        wake_up: WakeUpSettings::default(),
+        wake_up: None,
         platform: PlatformSettings::default(),
         ..vehicle.clone()
     }

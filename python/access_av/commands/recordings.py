@@ -183,15 +183,20 @@ def angles(
     directory.write_table("angles.parquet", found.angles)
     directory.write_text("site.toml", found.site.to_toml())
     directory.write_text("vehicle.toml", found.vehicle.to_toml())
-    told = {
+    counts = {
         "angles": found.angles.height,
         "resolved": int(found.angles["resolved"].sum()),
-        "warnings": found.warnings,
     }
-    directory.write_manifest(recording=str(recording), start_time_s=start_time_s, **told)
+    directory.write_manifest(
+        recording=str(recording),
+        start_time_s=start_time_s,
+        **counts,
+        warnings=[*plant.warnings(carrier), *found.warnings],
+    )
     directory.link_latest()
     if as_json:
-        print(json_text({**told, "directory": str(directory.path)}))
+        told = {**counts, "warnings": found.warnings, "directory": str(directory.path)}
+        print(json_text(told))
         return
     for warning in found.warnings:
         show_warning(warning)

@@ -44,6 +44,7 @@ def run(
     """
     import polars as pl
 
+    from access_av.assumptions import energy_boundary, flattering, in_words
     from access_av.files import ResultsDirectory, tum_trajectory
     from access_av.report.drive import render_drive
     from access_av.simulation import simulate
@@ -66,16 +67,21 @@ def run(
         directory.write_text(name, tum_trajectory(*(poses[column] for column in columns)))
     directory.write_text("report.html", render_drive(chosen, result, seed))
     directory.write_text("scenario.toml", chosen.resolved().to_toml())
+    assumed = flattering(chosen)
     directory.write_manifest(
         repeat=("run", "scenario.toml", "--runs", runs, "--seed", seed),
         scenario=chosen.name,
         runs=runs,
         seed=seed,
+        assumed=assumed,
         warnings=chosen.warnings(),
     )
     directory.link_latest()
 
-    show_simulation(result, title=f"{chosen.name}: {runs} runs, seed {seed}")
+    title = f"{chosen.name}: {runs} runs, seed {seed}"
+    show_simulation(result, title, energy_boundary(chosen))
+    if assumed:
+        console.print(in_words(assumed), soft_wrap=True)
     if (levels := result.service_levels) and not all(verdict.reached for verdict in levels):
         console.print(f"What brings it further: access-av plan {scenario}", soft_wrap=True)
     console.print(f"Report: {directory.path / 'report.html'}", soft_wrap=True)

@@ -93,7 +93,7 @@ def space_of(scenario: Scenario) -> Space:
     >>> [dimension.key for dimension in space_of(Scenario.load("yard")).dimensions]
     ['vehicle.wake_up.bound_m', 'vehicle.wake_up.least_gain_m2', 'vehicle.wake_up.snr_headroom_db']
     """
-    policy = json.loads(scenario.vehicle.to_json())["wake_up"]
+    policy = json.loads(scenario.resolved().vehicle.to_json())["wake_up"]
     found = []
     for key, low, high in RANGES[policy["policy"]]:
         table: Any = policy

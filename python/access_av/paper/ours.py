@@ -76,7 +76,13 @@ def tracked(scenario: Scenario, base_ms: float, *, knows_road: bool = True) -> S
         {
             "vehicle.localizer.kind": "tracker",
             "vehicle.localizer.map": knows_road,
-            "vehicle.wake_up": {"policy": "uncertainty", "bound_m": BOUND_M, "base_ms": base_ms},
+            "vehicle.integrity.enabled": False,
+            "vehicle.wake_up": {
+                "policy": "uncertainty",
+                "bound_m": BOUND_M,
+                "base_ms": base_ms,
+                "least_gain_m2": 1e6,  # only where the bound demands it
+            },
         }
     )
 

@@ -7,6 +7,7 @@ from html import escape
 from importlib.metadata import version
 from typing import TYPE_CHECKING
 
+from access_av.assumptions import energy_boundary, flattering, in_words
 from access_av.errors import InputError
 from access_av.report import drive_charts as charts
 from access_av.report.page import sheet
@@ -17,6 +18,7 @@ from access_av.report.parts import (
     source,
     table,
     tile,
+    value_text,
     warnings,
 )
 
@@ -71,7 +73,8 @@ def render_drive(scenario: Scenario, result: Simulation, seed: int) -> str:
         )
     integrity = result.integrity
     if integrity is not None:
-        alert_limit_m = json.loads(scenario.vehicle.to_json())["integrity"]["alert_limit_m"]
+        vehicle = json.loads(scenario.resolved().vehicle.to_json())
+        alert_limit_m = vehicle["integrity"]["alert_limit_m"]
         specs["stanford"] = charts.stanford(result.trajectories, alert_limit_m)
         sections.append(
             section("Integrity", _integrity_text(integrity, alert_limit_m), figure("stanford"))
@@ -98,6 +101,9 @@ def render_drive(scenario: Scenario, result: Simulation, seed: int) -> str:
         for each in result.percentiles or ()
         if each.percent in SHOWN_PERCENTS
     ]
+    if (boundary := energy_boundary(scenario)) is not None:
+        energy_j = value_text(result.runs["energy_j"].mean())
+        tiles.append(tile(f"{energy_j} J", f"energy of a run: {boundary}"))
     estimates = result.runs["executions"].sum() / runs
     tiles.append(tile(f"{estimates:,.0f}", "angles estimated in a run"))
     if operation is not None and integrity is not None:
@@ -109,7 +115,7 @@ def render_drive(scenario: Scenario, result: Simulation, seed: int) -> str:
         title=f"ACCESS-AV drive: {escape(scenario.name)}",
         kicker="ACCESS-AV drive",
         headline=f"{result.error_quantiles_m[0.9]:.2f} m or less for nine tenths of the time",
-        lead=escape(scenario.description),
+        lead=escape(f"{scenario.description} {in_words(flattering(scenario))}".strip()),
         tiles="".join(tiles),
         meta=escape(
             f"Scenario “{scenario.name}”, {runs} runs of {duration_s:.1f} s, seed {seed}, "

@@ -2,7 +2,6 @@
 
 from __future__ import annotations
 
-import json
 from dataclasses import dataclass
 from typing import TYPE_CHECKING
 
@@ -121,8 +120,8 @@ has to slow down or stop: 30 % because the protection level was above the alert 
     @classmethod
     def under(cls, vehicle: Vehicle, steps: pl.DataFrame) -> Operation | None:
         """The same, by the vehicle's own alert limit; ``None`` where it is not guarded."""
-        guard = json.loads(vehicle.to_json()).get("integrity")
-        return None if guard is None else cls.of(steps, float(guard["alert_limit_m"]))
+        limit_m = vehicle.alert_limit_m
+        return None if limit_m is None else cls.of(steps, limit_m)
 
     def in_words(self) -> str:
         """How often, how near, and why not else."""

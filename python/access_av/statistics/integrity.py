@@ -86,22 +86,35 @@ class Integrity:
             return None
         ok = pl.col("integrity") == "ok"
         beyond = ok & (pl.col("error_m") > pl.col("protection_level_m"))
-        by_run = (
-            stated.group_by("run", maintain_order=True)
-            .agg(beyond.sum().alias("beyond"), ok.sum().alias("ok"))
-            .select("beyond", "ok")
-            .to_numpy()
-            .astype(np.float64)
+        runs = stated.group_by("run", maintain_order=True).agg(
+            beyond.sum().alias("beyond"),
+            *((pl.col("integrity") == state).sum().alias(state) for state in STATES),
         )
-        runs, affected = len(by_run), int((by_run[:, 0] > 0).sum())
         ratio = (pl.col("protection_level_m") / pl.col("error_m")).median()
+        counts = {name: runs[name].to_numpy().astype(np.float64) for name in ("beyond", *STATES)}
+        return cls.of_runs(counts, float(stated.select(ratio).item()))
+
+    @classmethod
+    def of_runs(
+        cls, counts: Mapping[str, NDArray[np.float64]], median_level_over_error: float
+    ) -> Integrity:
+        """From the steps of each run in each state, and ``beyond`` the level while ``ok``.
+
+        Examples
+        --------
+        >>> counts = {"ok": [1, 2], "degraded": [1, 0], "unavailable": [0, 0], "beyond": [1, 0]}
+        >>> counts = {name: np.array(of_run, float) for name, of_run in counts.items()}
+        >>> Integrity.of_runs(counts, 4.0).availability
+        0.75
+        """
+        by_run = np.column_stack([counts["beyond"], counts["ok"]])
+        epochs = int(sum(counts[state].sum() for state in STATES))
+        runs, affected = len(by_run), int((by_run[:, 0] > 0).sum())
         return cls(
             runs=runs,
-            epochs=stated.height,
-            state_shares={
-                state: stated.filter(integrity=state).height / stated.height for state in STATES
-            },
-            median_level_over_error=float(stated.select(ratio).item()),
+            epochs=epochs,
+            state_shares={state: float(counts[state].sum() / epochs) for state in STATES},
+            median_level_over_error=median_level_over_error,
             exceedances=int(by_run[:, 0].sum()),
             runs_with_exceedances=affected,
             exceedance_share=_share(by_run),

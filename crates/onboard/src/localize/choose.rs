@@ -35,7 +35,7 @@ pub fn built_in(
     }
     let config = TrackerConfig::new(site, vehicle);
     let heads = RadioHead::heard(site, vehicle);
-    let integrity = vehicle.integrity.as_ref().map(Into::into);
+    let integrity = vehicle.integrity_monitor().as_ref().map(Into::into);
     let road = site.build_road()?;
     let road = road.filter(|_| vehicle.follows_road());
     match road {

@@ -414,7 +414,7 @@ mod tests {
     fn search(seed: u64) -> Option<(f64, f64)> {
         let mut rng = ChaCha8Rng::seed_from_u64(seed);
         let site = Site::from_library("trip-2", &Shipped).unwrap();
-        let vehicle = Vehicle::from_library("carrier", &Shipped).unwrap();
+        let vehicle = Vehicle::from_library("paper-carrier", &Shipped).unwrap();
         let config = TrackerConfig::new(&site, &vehicle);
         let heads = RadioHead::heard(&site, &vehicle);
         let map = site.build_road().unwrap().unwrap();

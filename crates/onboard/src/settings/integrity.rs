@@ -6,11 +6,13 @@ use serde::{Deserialize, Serialize};
 use super::check::Check;
 use super::error::SettingsError;
 
-/// `[integrity]`: the tracker mistrusts its sources and states a protection level. Without this
-/// table it does not.
+/// `[integrity]`: the tracker mistrusts its sources and states a protection level. It does so without this
+/// table, too, by these defaults.
 #[derive(Debug, Clone, Copy, PartialEq, Serialize, Deserialize, JsonSchema)]
 #[serde(default, deny_unknown_fields)]
 pub struct IntegritySettings {
+    /// Whether it does. `false` takes every source at its word, and no position has a protection level.
+    pub enabled: bool,
     /// Protection level in metres above which the position is not to be relied on.
     #[schemars(range(min = 0.01, max = 1000.0))]
     pub alert_limit_m: f64,
@@ -54,6 +56,7 @@ pub struct FaultProbability {
 impl Default for IntegritySettings {
     fn default() -> Self {
         Self {
+            enabled: true,
             alert_limit_m: 1.5,
             risk_per_hour: 1.0,
             error_correlation_s: 3.0,
@@ -69,6 +72,16 @@ impl Default for FaultProbability {
             odometer: 1e-3,
             all_radio_heads: 0.01,
             array: 1e-5,
+        }
+    }
+}
+
+impl IntegritySettings {
+    /// Switched off: every source is taken at its word.
+    pub fn off() -> Self {
+        Self {
+            enabled: false,
+            ..Self::default()
         }
     }
 }

@@ -148,15 +148,19 @@ impl Platform {
         })
     }
 
-    /// The vehicle with the wake-up times written out that it leaves to the platform.
+    /// The vehicle with what it leaves to others written out: its wake-up times to the platform, how it wakes
+    /// up and whether it mistrusts its sources to the localizer.
     ///
     /// # Errors
     /// As [`base_wake_up_s`](Self::base_wake_up_s).
     pub fn resolve(&self, vehicle: &Vehicle) -> Result<Vehicle, SettingsError> {
         let mut resolved = vehicle.clone();
-        if let Some(time_ms @ None) = resolved.wake_up.base_ms() {
+        let mut wake_up = vehicle.wake_up_policy();
+        if let Some(time_ms @ None) = wake_up.base_ms() {
             *time_ms = Some(self.base_wake_up_s(vehicle)? * 1e3);
         }
+        resolved.wake_up = Some(wake_up);
+        resolved.integrity = vehicle.integrity_monitor().or(vehicle.integrity);
         Ok(resolved)
     }
 }
@@ -210,7 +214,7 @@ mod tests {
     use toml::Value;
 
     use super::*;
-    use crate::settings::Shipped;
+    use crate::settings::{IntegritySettings, Shipped};
 
     fn xavier() -> Platform {
         Platform::from_library("jetson-agx-xavier", &Shipped).unwrap()
@@ -300,7 +304,11 @@ mod tests {
             .unwrap();
         let resolved = xavier.resolve(&fixed).unwrap().to_toml();
         assert!(resolved.contains("interval_ms = 150.0"));
-        let tugger = vehicle("tugger");
+        let mut tugger = vehicle("tugger");
+        let resolved = xavier.resolve(&tugger).unwrap();
+        tugger.integrity = Some(IntegritySettings::default());
+        assert_eq!(resolved, tugger);
+        tugger.integrity = Some(IntegritySettings::off());
         assert_eq!(xavier.resolve(&tugger).unwrap(), tugger);
     }
 

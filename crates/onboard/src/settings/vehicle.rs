@@ -13,7 +13,7 @@ use super::receiver::{EstimatorMethod, EstimatorSettings, Pilots, ReceiverSettin
 use super::site::Site;
 use super::start::StartSettings;
 use super::toml_file::TomlFile;
-use super::wake_up::WakeUpSettings;
+use super::wake_up::{UncertaintySettings, WakeUpSettings};
 
 /// A vehicle file.
 #[derive(Debug, Clone, PartialEq, Serialize, Deserialize, JsonSchema)]
@@ -64,12 +64,14 @@ pub struct Vehicle {
     /// How angles and odometry become a pose.
     #[serde(default)]
     pub localizer: LocalizerSettings,
-    /// Whether and how sources are mistrusted.
+    /// Whether and how sources are mistrusted. Without it the tracker mistrusts them by the defaults;
+    /// dead reckoning cannot.
     #[serde(default, skip_serializing_if = "Option::is_none")]
     pub integrity: Option<IntegritySettings>,
-    /// When an angle is estimated.
-    #[serde(default)]
-    pub wake_up: WakeUpSettings,
+    /// When an angle is estimated. Without it a tracker wakes up by its own error, dead reckoning at every
+    /// SSB, and a recorded drive is located by all its angles.
+    #[serde(default, skip_serializing_if = "Option::is_none")]
+    pub wake_up: Option<WakeUpSettings>,
     /// On which computer.
     #[serde(default)]
     pub platform: PlatformSettings,
@@ -100,7 +102,7 @@ pub struct PlatformSettings {
 impl Default for PlatformSettings {
     fn default() -> Self {
         Self {
-            name: "jetson-agx-xavier".to_owned(),
+            name: "jetson-agx-xavier-engine".to_owned(),
             mode: 0,
         }
     }
@@ -110,6 +112,26 @@ impl Vehicle {
     /// Top speed in m/s.
     pub fn top_speed_mps(&self) -> f64 {
         self.top_speed_kmh / 3.6
+    }
+
+    /// Whether its localizer knows its own error.
+    const fn tracks(&self) -> bool {
+        matches!(self.localizer, LocalizerSettings::Tracker(_))
+    }
+
+    /// When it wakes up: as is set, else by its own error where it knows that.
+    pub fn wake_up_policy(&self) -> WakeUpSettings {
+        self.wake_up.unwrap_or(if self.tracks() {
+            WakeUpSettings::Uncertainty(UncertaintySettings::default())
+        } else {
+            WakeUpSettings::EVERY_SSB
+        })
+    }
+
+    /// What mistrusts the tracker's sources, unless it is switched off; dead reckoning has none.
+    pub fn integrity_monitor(&self) -> Option<IntegritySettings> {
+        let settings = self.integrity.unwrap_or_default();
+        (self.tracks() && settings.enabled).then_some(settings)
     }
 
     /// Whether its localizer follows a road where the site has one.
@@ -124,6 +146,10 @@ impl TomlFile for Vehicle {
     const SHIPPED: &'static [(&'static str, &'static str)] = &[
         ("default", include_str!("../../../../vehicles/default.toml")),
         ("paper", include_str!("../../../../vehicles/paper.toml")),
+        (
+            "paper-carrier",
+            include_str!("../../../../vehicles/paper-carrier.toml"),
+        ),
         ("carrier", include_str!("../../../../vehicles/carrier.toml")),
         ("tugger", include_str!("../../../../vehicles/tugger.toml")),
     ];
@@ -148,15 +174,15 @@ impl TomlFile for Vehicle {
             self.estimator.method,
             "where the antennas are not in a row (array.shape) it must be maximum-likelihood",
         )?;
-        let tracks = matches!(self.localizer, LocalizerSettings::Tracker(_));
+        let tracks = self.tracks();
         check.that(
-            tracks || self.integrity.is_none(),
+            tracks || self.integrity.is_none_or(|it| !it.enabled),
             "integrity",
             "given",
-            "it needs localizer.kind = \"tracker\"",
+            "it needs localizer.kind = \"tracker\"; leave it out, or write integrity.enabled = false",
         )?;
         check.that(
-            tracks || !matches!(self.wake_up, WakeUpSettings::Uncertainty(_)),
+            tracks || !matches!(self.wake_up, Some(WakeUpSettings::Uncertainty(_))),
             "wake_up.policy",
             "uncertainty",
             "it needs localizer.kind = \"tracker\", which knows its own error",
@@ -176,7 +202,7 @@ impl TomlFile for Vehicle {
         if let Some(integrity) = &self.integrity {
             integrity.check(check)?;
         }
-        self.wake_up.check(check)
+        self.wake_up_policy().check(check)
     }
 }
 

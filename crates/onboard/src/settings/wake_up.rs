@@ -20,13 +20,11 @@ pub enum WakeUpSettings {
     Uncertainty(UncertaintySettings),
 }
 
-impl Default for WakeUpSettings {
-    fn default() -> Self {
-        // Every SSB: none comes more often.
-        Self::Fixed(FixedSettings {
-            interval_ms: Some(1.0),
-        })
-    }
+impl WakeUpSettings {
+    /// At every SSB: none comes more often than that.
+    pub const EVERY_SSB: Self = Self::Fixed(FixedSettings {
+        interval_ms: Some(1.0),
+    });
 }
 
 /// `policy = "fixed"`
@@ -203,11 +201,9 @@ pub struct UncertaintySettings {
     pub wake_up_cost: Option<f64>,
     /// Variance in m² that makes a wake-up for one angle worth its energy before the bound demands
     /// it, and that it must take away where the bound is out of reach; one for several angles must
-    /// take away as much more as it costs more. Without it angles are estimated on the bound's demand
-    /// alone, and all there are where it is out of reach.
-    #[serde(skip_serializing_if = "Option::is_none")]
+    /// take away as much more as it costs more.
     #[schemars(range(min = 0.0, max = 1e6))]
-    pub least_gain_m2: Option<f64>,
+    pub least_gain_m2: f64,
     /// How much stronger than by the link budget an SSB may come, in dB. With it the receiver
     /// listens wherever an SSB as strong as that would be worth its energy, and what is sensed
     /// decides; without it all goes by the link budget, which keeps the receiver off for longer.
@@ -223,7 +219,7 @@ impl Default for UncertaintySettings {
             confidence: 0.9,
             base_ms: None,
             wake_up_cost: None,
-            least_gain_m2: None,
+            least_gain_m2: 1.5e-4,
             snr_headroom_db: None,
         }
     }

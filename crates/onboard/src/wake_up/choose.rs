@@ -36,7 +36,7 @@ pub fn built_in(
         let controller = Controller::new(settings, base_s, vehicle.top_speed_mps());
         Ok(Due::controlled(controller, settings.sensing))
     };
-    Ok(match vehicle.wake_up {
+    Ok(match vehicle.wake_up_policy() {
         WakeUpSettings::Fixed(settings) => {
             Box::new(FixedInterval::new(interval_s(settings.interval_ms)?))
         }
@@ -76,7 +76,7 @@ pub fn built_in(
 /// As [`built_in`].
 pub fn resolve(vehicle: &Vehicle, platform: &Platform) -> Result<Vehicle, SettingsError> {
     let mut resolved = platform.resolve(vehicle)?;
-    if let WakeUpSettings::Uncertainty(settings) = &mut resolved.wake_up {
+    if let Some(WakeUpSettings::Uncertainty(settings)) = &mut resolved.wake_up {
         settings.wake_up_cost = Some(wake_up_cost(settings, vehicle, platform)?);
     }
     Ok(resolved)

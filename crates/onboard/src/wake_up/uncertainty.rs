@@ -44,7 +44,7 @@ pub struct UncertaintyDriven {
     bound_m: f64,
     quantile: RadialQuantile,
     wake_up_cost: f64,
-    least_gain_m2: Option<f64>,
+    least_gain_m2: f64,
     snr_headroom_db: Option<f64>,
     period_s: f64,
     base_s: f64,
@@ -81,8 +81,7 @@ impl UncertaintyDriven {
 
     /// The angles to take, one bit for each radio head: as many as make the most of the energy of
     /// the wake-up, if they are worth it or demanded, and more where only more keep the bound until
-    /// the next SSB. Where nothing keeps it, those worth their energy, or all, if any price is to be
-    /// paid. `snr_db` is what a radio head at a distance is received with.
+    /// the next SSB. Where nothing keeps it, those worth their energy. `snr_db` is what a radio head at a distance is received with.
     fn choice(
         &self,
         tracker: &Tracker,
@@ -91,9 +90,6 @@ impl UncertaintyDriven {
         snr_db: impl Fn(&RadioHead, f64) -> f64,
     ) -> u64 {
         let demanded = !self.keeps(tracker, time_s);
-        if !demanded && self.least_gain_m2.is_none() {
-            return 0;
-        }
         let mut belief = tracker.forecast(time_s);
         let ahead_m = tracker.speed_mps() * (time_s - tracker.time_s()).max(0.0);
         let ahead = tracker.transition(&belief, LOOK_AHEAD_M);
@@ -135,11 +131,10 @@ impl UncertaintyDriven {
                 break;
             }
         }
-        match self.least_gain_m2 {
-            _ if demanded && kept => best,
-            Some(least_m2) if most_m2 >= least_m2 => best,
-            Some(_) => 0,
-            None => taken,
+        if (demanded && kept) || most_m2 >= self.least_gain_m2 {
+            best
+        } else {
+            0
         }
     }
 

@@ -27,7 +27,7 @@ fn tracker(at_m: f64, aside_m: f64, position_std_m: f64) -> (Tracker, Gap) {
             (2.0 * RADIUS_M * TURN_RAD).into(),
         ),
     ];
-    let carrier = Vehicle::from_library("carrier", &Shipped).unwrap();
+    let carrier = Vehicle::from_library("paper-carrier", &Shipped).unwrap();
     let vehicle = carrier.with_overrides(bends, &Shipped).unwrap();
     let map = Arc::new(site.build_road().unwrap().unwrap());
     let gap = map.gap_between(0.0, map.length_m()).unwrap();

@@ -3,7 +3,7 @@
 use onboard::receive::ReceiverConfig;
 use onboard::settings::{
     Check, EstimatorMethod, Library, LocalizerSettings, NamedText, Pilots, SettingsError, Shipped,
-    Site, TomlFile, Vehicle, WakeUpSettings, check_together,
+    Site, TomlFile, UncertaintySettings, Vehicle, WakeUpSettings, check_together,
 };
 
 /// Files in memory, beside the shipped ones.
@@ -86,7 +86,7 @@ fn likes_lead_from_file_to_file_and_end() {
     ]);
     let a = Vehicle::from_library("a", &shelf).unwrap();
     assert_eq!((a.odometer.scale, a.odometer.scale_std), (1.02, 0.2));
-    assert!(matches!(a.wake_up, WakeUpSettings::Uncertainty(_)));
+    assert!(matches!(a.wake_up, Some(WakeUpSettings::Uncertainty(_))));
 
     let (file, key, message) = refusal(Vehicle::from_library("loop", &shelf));
     assert_eq!((file.as_str(), key.as_str()), ("loop", "like"));
@@ -105,24 +105,21 @@ fn likes_lead_from_file_to_file_and_end() {
 #[test]
 fn another_kind_takes_none_of_the_old_ones_keys() {
     let fixed = vehicle("like = 'tugger'\n[wake_up]\npolicy = 'fixed'\ninterval_ms = 40").unwrap();
-    let WakeUpSettings::Fixed(settings) = fixed.wake_up else {
+    let Some(WakeUpSettings::Fixed(settings)) = fixed.wake_up else {
         panic!("{:?}", fixed.wake_up)
     };
     assert_eq!(settings.interval_ms, Some(40.0));
     // The same kind keeps them.
     let tight = vehicle("like = 'tugger'\nwake_up = { policy = 'uncertainty', bound_m = 0.1 }");
-    let WakeUpSettings::Uncertainty(settings) = tight.unwrap().wake_up else {
+    let Some(WakeUpSettings::Uncertainty(settings)) = tight.unwrap().wake_up else {
         panic!("the policy is uncertainty")
     };
-    assert_eq!(
-        (settings.bound_m, settings.least_gain_m2),
-        (0.1, Some(1.5e-4))
-    );
+    assert_eq!((settings.bound_m, settings.least_gain_m2), (0.1, 1.5e-4));
     // And so does a table that names no kind.
     let told = "like = 'paper'\nwake_up.snr_set_point = { kind = 'absolute', snr_db = 5.0 }";
     assert!(matches!(
         vehicle(told).unwrap().wake_up,
-        WakeUpSettings::Gated(_)
+        Some(WakeUpSettings::Gated(_))
     ));
     let tracker = "like = 'paper'\nlocalizer.kind = 'tracker'";
     let tracker = vehicle(tracker).unwrap().localizer;
@@ -325,6 +322,19 @@ fn defaults_are_a_vehicle_that_drives() {
     assert_eq!(plain.receiver.pilots, Pilots::Ssb);
     assert_eq!(plain.estimator.method, EstimatorMethod::MaximumLikelihood);
     assert!(plain.follows_road() && plain.start.known);
+    assert!(plain.start.position_std_m > 0.0 && plain.start.heading_std_rad > 0.0);
+    assert!(plain.integrity_monitor().is_some());
+    let by_error = WakeUpSettings::Uncertainty(UncertaintySettings::default());
+    assert_eq!(plain.wake_up_policy(), by_error);
+    let trusting = vehicle("name = 'plain'\nintegrity.enabled = false").unwrap();
+    assert!(trusting.integrity_monitor().is_none());
+    // Dead reckoning knows no error of its own: nothing to monitor, nothing to wake up by.
+    let text = "name = 'plain'\nlocalizer.kind = 'dead-reckoning'";
+    for off in ["", "\nintegrity.enabled = false"] {
+        let reckons = vehicle(&format!("{text}{off}")).unwrap();
+        assert!(reckons.integrity_monitor().is_none());
+        assert_eq!(reckons.wake_up_policy(), WakeUpSettings::EVERY_SSB);
+    }
     for name in Vehicle::names() {
         let shipped = Vehicle::from_library(name, &Shipped).unwrap();
         assert_eq!(vehicle(&shipped.to_toml()).unwrap(), shipped);

@@ -19,7 +19,7 @@ fn road() -> Road {
 }
 
 fn tracker() -> (Tracker, RadioHead) {
-    let vehicle = Vehicle::from_library("carrier", &Shipped).unwrap();
+    let vehicle = Vehicle::from_library("paper-carrier", &Shipped).unwrap();
     let heads = RadioHead::heard(&site(), &vehicle);
     let start = InitialPose {
         pose: Pose::default(),

@@ -7,7 +7,7 @@ use onboard::geometry::Pose;
 use onboard::localize::UpdateReason;
 use onboard::observation::SensedSsb;
 use onboard::receive::{Receiver, ReceiverConfig};
-use onboard::settings::{Site, Vehicle, WakeUpSettings};
+use onboard::settings::{IntegritySettings, Site, Vehicle, WakeUpSettings};
 use onboard::{Custom, Execution};
 
 use super::doubts::doubts;
@@ -173,8 +173,8 @@ fn look_back(
     executions: &[Execution],
 ) -> Result<Vec<LocatedPose>, ReplayError> {
     let unguarded = Vehicle {
-        integrity: None,
-        wake_up: WakeUpSettings::default(), // whatever was chosen then is heard again
+        integrity: Some(IntegritySettings::off()),
+        wake_up: Some(WakeUpSettings::EVERY_SSB), // whatever was chosen then is heard again
         ..in_time(vehicle)
     };
     let mut mistrusted_until_s = BTreeMap::new();

@@ -1,7 +1,7 @@
 //! Where a recorded drive begins.
 
 use onboard::geometry::Pose;
-use onboard::settings::{Check, LocalizerSettings, SettingsError, Site, Vehicle};
+use onboard::settings::{Check, LocalizerSettings, SettingsError, Site, Vehicle, WakeUpSettings};
 
 /// Where a drive begins, if not where the vehicle's settings say.
 #[derive(Debug, Clone, Copy, PartialEq, Default)]
@@ -32,6 +32,8 @@ pub fn starting(
     let mut vehicle = vehicle.clone();
     vehicle.start.pose = pose;
     vehicle.start.known = pose.is_some();
+    // Nobody saves energy on what is recorded already, unless asked to.
+    vehicle.wake_up.get_or_insert(WakeUpSettings::EVERY_SSB);
     let heard = site.radio_heads.iter();
     let heard = heard
         .filter(|head| vehicle.receiver.hears(head.pci))

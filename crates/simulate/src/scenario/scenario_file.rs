@@ -102,16 +102,16 @@ impl TomlFile for Scenario {
         ),
         ("yard", include_str!("../../../../scenarios/yard.toml")),
         (
+            "yard-surveyed",
+            include_str!("../../../../scenarios/yard-surveyed.toml"),
+        ),
+        (
             "nlos-and-faults",
             include_str!("../../../../scenarios/nlos-and-faults.toml"),
         ),
         (
             "campus-handover",
             include_str!("../../../../scenarios/campus-handover.toml"),
-        ),
-        (
-            "yard-surveyed",
-            include_str!("../../../../scenarios/yard-surveyed.toml"),
         ),
         (
             "yard-array-off",

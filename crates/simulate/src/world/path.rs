@@ -163,7 +163,7 @@ mod tests {
             surveyed: true,
         }];
         let road = Road::from_segments(Pose::default(), &bend, 5.0).unwrap();
-        let vehicle = Vehicle::from_library("carrier", &Shipped).unwrap();
+        let vehicle = Vehicle::from_library("paper-carrier", &Shipped).unwrap();
         let motion = MotionProfile::new(&MotionSettings::default(), &vehicle, road.length_m());
         let keeping = vehicle.lane_keeping.process();
         Path::new(road, motion, keeping, Streams::new(5, run))

@@ -11,7 +11,7 @@ use recording::LoggedAngle;
 use simulate::scenario::Scenario;
 use simulate::world::MotionProfile;
 
-use crate::common::{Burst, changed, shipped, simulation, value};
+use crate::common::{Burst, changed, shipped, simulation, unguarded, value};
 use crate::counting::allocations;
 
 #[test]
@@ -24,17 +24,18 @@ fn a_drive_under_way_allocates_nothing() {
     let guarded = || ("vehicle.integrity", value("{}"));
     let adapts = ("vehicle.receiver.phase_bias_probability", value("0.1"));
     // A bound that every angle is demanded for.
-    let mut demanding = shipped("yard");
-    demanding.vehicle.wake_up = WakeUpSettings::Uncertainty(UncertaintySettings {
+    let mut demanding = unguarded("yard");
+    demanding.vehicle.wake_up = Some(WakeUpSettings::Uncertainty(UncertaintySettings {
         bound_m: 1e-3,
+        least_gain_m2: 0.0,
         ..UncertaintySettings::default()
-    });
+    }));
     for (scenario, least_accepted) in [
-        (shipped("paper-real-odometry-4"), 2000),
+        (unguarded("paper-real-odometry-4"), 2000),
         (changed("paper-real-odometry-4", [guarded()]), 2000),
         (changed("paper-real-odometry-4", [guarded(), adapts]), 2000),
         (demanding, 2000),
-        (shipped("yard"), 20),
+        (unguarded("yard"), 20),
         (shipped("paper"), 200),
     ] {
         for map in [true, false] {
@@ -43,7 +44,7 @@ fn a_drive_under_way_allocates_nothing() {
             let changes = changes.into_iter().filter(|_| tracks);
             let scenario = scenario.with_overrides(changes, &Shipped).unwrap();
             let accepted = drive(&scenario);
-            let guarded = scenario.vehicle.integrity.is_some();
+            let guarded = scenario.vehicle.integrity_monitor().is_some();
             println!(
                 "{}, integrity {guarded}, map {map}: {accepted}",
                 scenario.name
@@ -64,7 +65,7 @@ fn drive(scenario: &Scenario) -> u32 {
     let start = road.pose(0.0);
     let mut onboard = Onboard::new(site, vehicle, platform, start, Custom::default()).unwrap();
 
-    let integrity = vehicle.integrity.is_some();
+    let integrity = vehicle.integrity_monitor().is_some();
     let mut accepted = 0;
     let mut burst = Vec::with_capacity(heads.len());
     let mut step = |number: u32| {

@@ -15,7 +15,7 @@ use recording::{
 use simulate::Step;
 use simulate::scenario::Scenario;
 
-use crate::common::{changed, shipped, value};
+use crate::common::{changed, unguarded, value};
 
 /// A drive as files, and its truth.
 struct Drive {
@@ -227,7 +227,7 @@ fn a_measurement_without_a_variance_is_unusable_whoever_made_it() {
         drive.locate();
         read_odometry_csv(&drive.dir.join("odometry.csv")).unwrap()
     };
-    let (_, mut angles, _) = common::logs(&shipped("paper-real-odometry-2"), 4);
+    let (_, mut angles, _) = common::logs(&unguarded("paper-real-odometry-2"), 4);
     angles.angles.truncate(5);
     let mut sound = angles.clone();
     sound.angles.truncate(1);

@@ -22,7 +22,7 @@ use simulate::world::{Antennas, LineOfSight};
 use simulate::{MakeCustom, RunRecord, SimulationError, Step};
 use toml::Value;
 
-use crate::common::{NONE, changed, run, shipped, simulation, value};
+use crate::common::{NONE, changed, run, shipped, simulation, unguarded, value};
 
 fn run_with(scenario: &Scenario, custom: &MakeCustom) -> Result<RunRecord, SimulationError> {
     simulation(scenario).run(2, 0, custom)
@@ -169,7 +169,7 @@ fn a_policy_of_ones_own_chooses() {
             ..Custom::default()
         })
     };
-    let scenario = shipped("paper-real-odometry-2");
+    let scenario = unguarded("paper-real-odometry-2");
     let record = run_with(&scenario, &strongest).unwrap();
     assert_eq!(record.executions.len(), record.steps.len().div_ceil(5));
     assert_eq!(record.listened, record.executions.len());
@@ -219,7 +219,7 @@ where
 
 #[test]
 fn an_estimator_without_deviation_gets_the_bound_at_its_snr() {
-    let scenario = shipped("paper-real-odometry-2");
+    let scenario = unguarded("paper-real-odometry-2");
     let bare = |phase_rad, _| {
         Ok(Some(EstimatedAngle::Angle {
             phase_rad,
@@ -248,7 +248,7 @@ fn an_estimator_without_deviation_gets_the_bound_at_its_snr() {
 
 #[test]
 fn a_likelihood_leads_where_its_angle_does() {
-    let scenario = shipped("paper-real-odometry-2");
+    let scenario = unguarded("paper-real-odometry-2");
     let built_in = run_with(&scenario, NONE).unwrap();
     // On a grid of a thousandth of a turn.
     let likelihood = |phase_rad: f64, sigma_rad: f64| {
@@ -279,7 +279,7 @@ fn a_likelihood_leads_where_its_angle_does() {
 
 #[test]
 fn an_estimator_may_find_nothing_or_fail() {
-    let scenario = shipped("paper-real-odometry-2");
+    let scenario = unguarded("paper-real-odometry-2");
     let record = retold(&scenario, |_, _| Ok(None)).unwrap();
     for execution in &record.executions {
         assert_eq!(execution.measured, None);

@@ -12,7 +12,7 @@ use simulate::scenario::Scenario;
 use simulate::{RunRecord, Step};
 use toml::Value;
 
-use crate::common::{Burst, changed, shipped, simulation, value};
+use crate::common::{Burst, changed, shipped, simulation, unguarded, value};
 use crate::counting::allocations;
 
 /// When the last SSB is sent before the end of a drive, in seconds.
@@ -29,7 +29,7 @@ struct Drive {
 
 impl Drive {
     fn new(mut scenario: Scenario, until_s: f64) -> Self {
-        scenario.vehicle.wake_up = WakeUpSettings::default();
+        scenario.vehicle.wake_up = Some(WakeUpSettings::EVERY_SSB);
         let (odometry, angles, record) = common::logs(&scenario, 6);
         let same_burst = |a: &LoggedAngle, b: &LoggedAngle| a.ssb.time_s == b.ssb.time_s;
         let bursts = angles.angles.chunk_by(same_burst).map(<[_]>::to_vec);
@@ -140,7 +140,7 @@ fn drives() -> Vec<Drive> {
     let no_map = [("vehicle.localizer.map", false.into())];
     let searching = [("vehicle.start.known", false.into())];
     vec![
-        Drive::new(shipped("paper-real-odometry-2"), 20.0),
+        Drive::new(unguarded("paper-real-odometry-2"), 20.0),
         Drive::new(changed("paper-real-odometry-2", no_map), 20.0),
         Drive::new(changed("paper-real-odometry-2", searching), 30.0),
         Drive::new(guarded, 12.0),

@@ -5,12 +5,12 @@ use simulate::Consistency;
 use simulate::scenario::Scenario;
 use toml::Value;
 
-use crate::common::{campaign, changed, shipped, value};
+use crate::common::{campaign, changed, unguarded, value};
 
 /// Heads 8 m high, and an array 1.2 m up and 0.8 m before the odometer's point.
 fn high() -> Scenario {
     let mut changes: Vec<(String, Value)> = Vec::new();
-    for (index, head) in shipped("paper-real-odometry-4")
+    for (index, head) in unguarded("paper-real-odometry-4")
         .site
         .radio_heads
         .iter()
@@ -48,7 +48,7 @@ fn heights_and_lever_arm_are_believed_as_they_are() {
     let places = heads.map(|head| format!("{}.position_m = {:?}", head.name, head.position_m));
     let places: Vec<String> = places.collect();
     let truth = format!("{{ radio_heads = {{ {} }} }}", places.join(", "));
-    let flat = shipped("paper-real-odometry-4")
+    let flat = unguarded("paper-real-odometry-4")
         .with_overrides(
             [
                 ("truth.site", value(&truth)),

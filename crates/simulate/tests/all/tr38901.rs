@@ -298,7 +298,7 @@ fn what_a_model_has_no_place_for_is_refused() {
     use onboard::settings::TomlFile;
     let hall = "{ size_m = [50.0, 0.0, 8.0], clutter_density = 0.3, clutter_size_m = 3.0, \
                 clutter_height_m = 2.0 }";
-    let yard = common::shipped("yard");
+    let yard = common::unguarded("yard");
     for (key, value, message) in [
         (
             "channel.hall",

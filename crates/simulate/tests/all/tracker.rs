@@ -8,7 +8,7 @@ use simulate::truth::World;
 use simulate::{Campaign, Consistency, RunRecord, Simulation, Step};
 use toml::Value;
 
-use crate::common::{NONE, campaign, changed, drives, shipped, simulation, value};
+use crate::common::{NONE, campaign, changed, drives, simulation, unguarded, value};
 
 const SEED: u64 = 11;
 
@@ -47,7 +47,7 @@ fn as_wrong_as_it_says_and_as_right_as_can_be() {
         ("paper-real-odometry-2", 0.26),
         ("paper-real-odometry-4", 0.20),
     ] {
-        let scenario = shipped(name);
+        let scenario = unguarded(name);
         let bound = Bound::new(&scenario).unwrap();
         let points = bound.along_route();
         let square_m2: f64 = points.iter().map(|p| p.position_rms_m.powi(2)).sum();
@@ -151,7 +151,7 @@ fn more_radio_heads_lower_the_bound() {
         "paper-real-odometry-4",
     ]
     .map(|name| {
-        let bound = Bound::new(&shipped(name)).unwrap().along_route();
+        let bound = Bound::new(&unguarded(name)).unwrap().along_route();
         bound.iter().map(|p| p.position_rms_m).sum::<f64>() / bound.len() as f64
     });
     assert!(
@@ -162,7 +162,7 @@ fn more_radio_heads_lower_the_bound() {
 
 #[test]
 fn the_site_bound_is_blind_along_the_line_through_two_heads() {
-    let scenario = shipped("paper-real-odometry-2");
+    let scenario = unguarded("paper-real-odometry-2");
     let bound = Bound::new(&scenario).unwrap();
     let between = bound.at([150.0, 10.0].into(), 50.0, 0.01).unwrap();
     // Far out on the line through both heads their angles say the same.
@@ -187,7 +187,7 @@ fn without_a_map_it_stays_within_its_covariance() {
 
 #[test]
 fn a_campus_is_driven_from_cell_to_cell() {
-    let records = drives(&shipped("campus-handover"), SEED, 1);
+    let records = drives(&unguarded("campus-handover"), SEED, 1);
     let mut cells: Vec<u16> = records[0]
         .executions
         .iter()

@@ -10,7 +10,7 @@ use simulate::scenario::Scenario;
 use simulate::truth::{Truth, World};
 use toml::Value;
 
-use crate::common::{changed, shipped, value};
+use crate::common::{changed, shipped, unguarded, value};
 
 const RUNS: u64 = 2000;
 
@@ -133,7 +133,7 @@ fn heights_and_what_has_no_deviation_are_as_believed() {
         scenario.site.radio_heads[1].eirp_dbm
     );
     assert_eq!(truth.vehicle.array.position_m[2], 0.0);
-    let certain = shipped("paper-real-odometry-2");
+    let certain = unguarded("paper-real-odometry-2");
     let truth = draw(&certain, 3);
     assert_eq!(truth.site, certain.site);
     assert_eq!(truth.told_start, truth.path.at(0.0).pose);
@@ -245,7 +245,7 @@ fn departures_act_in_the_world() {
         "paper-real-odometry-2",
         [("truth.site.road.segments", road)],
     );
-    assert_eq!(shorter.site, shipped("paper-real-odometry-2").site);
+    assert_eq!(shorter.site, unguarded("paper-real-odometry-2").site);
     let end = draw(&shorter, 0).path.at(1e3);
     assert!((end.along_m - 120.0).abs() < 1e-9);
 }

@@ -7,12 +7,26 @@ use onboard::settings::{Shipped, TomlFile, UncertaintySettings, WakeUpSettings};
 use simulate::scenario::Scenario;
 use simulate::{RunRecord, RunSummary, Step};
 
-use crate::common::{drives, shipped};
+use crate::common::{drives, unguarded};
 
 const SEED: u64 = 57;
 
 fn runs(scenario: &Scenario, runs: usize) -> Vec<RunSummary> {
     common::campaign(scenario, SEED, runs).runs
+}
+
+/// The yard of which everything but the odometer is exact, on a platform.
+fn bare_yard(platform: &str) -> Scenario {
+    let exact = (0..4).map(|head| format!("site.radio_heads[{head}].position_std_m"));
+    let exact: Vec<String> = exact.collect();
+    let start = "{ position_std_m = 0.0, heading_std_rad = 0.0 }";
+    let mut changes = vec![
+        ("vehicle.platform.name", platform.into()),
+        ("vehicle.array", common::value("{}")),
+        ("vehicle.start", common::value(start)),
+    ];
+    changes.extend(exact.iter().map(|key| (key.as_str(), 0.0.into())));
+    common::changed("yard", changes)
 }
 
 /// Mean over runs, and the standard error of it.
@@ -26,7 +40,8 @@ fn mean(values: impl Iterator<Item = f64> + Clone) -> (f64, f64) {
 /// The same runs under either policy: their differences are held against their own spread.
 #[test]
 fn half_the_executions_of_the_pid_for_no_more_error() {
-    let yard = shipped("yard");
+    // Of which the receiver is not counted: an angle costs what an execution does.
+    let yard = bare_yard("jetson-agx-xavier");
     let driven = runs(&yard, 6);
     for base_ms in [80.0, 150.0] {
         let changes = [
@@ -52,8 +67,7 @@ fn half_the_executions_of_the_pid_for_no_more_error() {
 /// taken at once, and the next wake-up is farther off.
 #[test]
 fn fewer_wake_ups_than_at_a_fixed_interval_for_no_more_error() {
-    let platform = [("vehicle.platform.name", "jetson-agx-xavier-engine".into())];
-    let yard = shipped("yard").with_overrides(platform, &Shipped).unwrap();
+    let yard = bare_yard("jetson-agx-xavier-engine");
     let changes = [
         ("vehicle.wake_up.policy", "fixed".into()),
         ("vehicle.wake_up.interval_ms", 100.0.into()),
@@ -97,15 +111,23 @@ fn fewer_executions_where_the_snr_is_sensed_first() {
     assert!(listened(&sensing) > listened(&by_budget), "what it costs");
 }
 
+/// More variance than any angle takes away: none is taken before the bound demands it.
+const NEVER_WORTH_IT_M2: f64 = 1e6;
+
 /// The drive with four radio heads, on the bound's demand alone, SSBs coming so late.
 fn on_demand(bound_m: f64, latency_ms: f64, runs: u64) -> Vec<RunRecord> {
     let settings = UncertaintySettings {
         bound_m,
-        confidence: 0.9,
+        least_gain_m2: NEVER_WORTH_IT_M2,
+        wake_up_cost: Some(0.5),
         ..UncertaintySettings::default()
     };
-    let mut scenario = shipped("paper-real-odometry-4");
-    scenario.vehicle.wake_up = WakeUpSettings::Uncertainty(settings);
+    driven_by(settings, latency_ms, runs)
+}
+
+fn driven_by(settings: UncertaintySettings, latency_ms: f64, runs: u64) -> Vec<RunRecord> {
+    let mut scenario = unguarded("paper-real-odometry-4");
+    scenario.vehicle.wake_up = Some(WakeUpSettings::Uncertainty(settings));
     scenario.ssb_latency_ms = latency_ms;
     drives(&scenario, SEED, runs)
 }
@@ -154,7 +176,12 @@ fn the_bound_is_kept_by_ssbs_that_come_late() {
 
 #[test]
 fn a_bound_out_of_reach_is_told_and_everything_tried() {
-    for record in on_demand(0.02, 0.0, 1) {
+    let settings = UncertaintySettings {
+        bound_m: 0.02,
+        least_gain_m2: 0.0,
+        ..UncertaintySettings::default()
+    };
+    for record in driven_by(settings, 0.0, 1) {
         let steps = record.steps.len();
         assert!(
             10 * record.out_of_reach > 9 * steps,
@@ -167,7 +194,7 @@ fn a_bound_out_of_reach_is_told_and_everything_tried() {
 
 #[test]
 fn a_looser_bound_costs_less() {
-    let executions = [0.15, 0.3, 0.6].map(|bound_m| on_demand(bound_m, 0.0, 1)[0].executions.len());
+    let executions = [0.3, 0.6, 1.2].map(|bound_m| on_demand(bound_m, 0.0, 1)[0].executions.len());
     assert!(
         executions[0] > 2 * executions[1] && executions[1] > 2 * executions[2],
         "{executions:?}"

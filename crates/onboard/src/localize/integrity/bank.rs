@@ -441,7 +441,7 @@ mod tests {
 
     fn trip() -> (Site, Vehicle) {
         let site = Site::from_library("trip-4", &Shipped).unwrap();
-        let vehicle = Vehicle::from_library("carrier", &Shipped).unwrap();
+        let vehicle = Vehicle::from_library("paper-carrier", &Shipped).unwrap();
         (site, vehicle)
     }
 

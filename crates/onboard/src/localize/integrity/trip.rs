@@ -14,7 +14,7 @@ pub(super) const SIGMA_RAD: f64 = 0.05;
 /// The radio heads, the road, and the tracker at its beginning.
 pub(super) fn trip() -> (Vec<RadioHead>, Road, Tracker) {
     let site = Site::from_library("trip-4", &Shipped).unwrap();
-    let vehicle = Vehicle::from_library("carrier", &Shipped).unwrap();
+    let vehicle = Vehicle::from_library("paper-carrier", &Shipped).unwrap();
     let heads = RadioHead::heard(&site, &vehicle);
     let road = site.build_road().unwrap().unwrap();
     let start = InitialPose {

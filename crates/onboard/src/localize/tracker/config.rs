@@ -232,7 +232,8 @@ impl TrackerConfig {
             UNKNOWN_ERROR_PROBABILITY
         });
         // Without a guard there is no tracker beside this one.
-        let is_alone = vehicle.integrity.is_none() && receiver.phase_bias_probability.is_some();
+        let is_alone =
+            vehicle.integrity_monitor().is_none() && receiver.phase_bias_probability.is_some();
         let is_usual = is_alone || error_probability >= LEAST_USUAL_ERROR_PROBABILITY;
         let mut config = Self {
             drive: vehicle.drive,

@@ -1,0 +1,53 @@
+"""Every shipped scenario that is not the paper's, as it is, in channels as set and worse.
+
+    python benches/shipped_scenarios.py [--runs 20] [--seed 1] [--only NAME] [--channel NAME]
+
+Asked: 99 % of the errors within 1 m, and beyond the level while ok at most 1e-2; a ``*`` marks what
+falls short.
+"""
+
+from __future__ import annotations
+
+import argparse
+import json
+import sys
+
+from access_av import Scenario, simulate
+from access_av.integrity_campaign import channels
+
+ERROR_M, BEYOND = 1.0, 1e-2
+
+
+def main() -> int:
+    """Drive and print; 1 if anything falls short."""
+    parser = argparse.ArgumentParser(description=__doc__)
+    parser.add_argument("--runs", type=int, default=20)
+    parser.add_argument("--seed", type=int, default=1)
+    parser.add_argument("--only", action="append")
+    parser.add_argument("--channel", action="append")
+    asked = parser.parse_args()
+    short = 0
+    print(f"{'scenario':24} {'channel':7} 90 %  99 %  ok %   beyond  level/error  J")
+    for name in asked.only or Scenario.names():
+        scenario = Scenario.load(name)
+        if json.loads(scenario.vehicle.to_json())["name"] == "paper":
+            continue
+        for channel, over in channels(asked.channel or ("as set", "K=5", "inf-sh", "umi")).items():
+            found = simulate(scenario.with_overrides(over), runs=asked.runs, seed=asked.seed)
+            kept, quantiles_m = found.integrity, found.error_quantiles_m
+            if kept is None:
+                raise RuntimeError(f"{name} states no protection level")
+            fails = quantiles_m[0.99] > ERROR_M or kept.exceedance_share > BEYOND
+            short += fails
+            print(
+                f"{name:24} {channel:7} {quantiles_m[0.9]:.2f}  {quantiles_m[0.99]:.2f} "
+                f"{100.0 * kept.availability:5.1f}  {kept.exceedance_share:8.1e} "
+                f"{kept.median_level_over_error:6.1f}  {found.runs['energy_j'].mean():10.1f}"
+                f"{' *' if fails else ''}",
+                flush=True,
+            )
+    return 1 if short else 0
+
+
+if __name__ == "__main__":
+    sys.exit(main())
