@@ -190,7 +190,7 @@ def angles(
     directory.write_manifest(
         recording=str(recording),
         start_time_s=start_time_s,
-        **counts,
+        found=counts,
         warnings=[*plant.warnings(carrier), *found.warnings],
     )
     directory.link_latest()
