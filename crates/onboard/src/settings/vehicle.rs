@@ -176,7 +176,7 @@ impl TomlFile for Vehicle {
         if let Some(integrity) = &self.integrity {
             integrity.check(check)?;
         }
-        self.wake_up.check(check)
+        self.wake_up.check(self.top_speed_mps(), check)
     }
 }
 
