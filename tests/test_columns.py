@@ -135,7 +135,7 @@ def test_unknowns() -> None:
     platform = Platform.load("jetson-agx-xavier")
     with tempfile.TemporaryDirectory() as parts:
         kept = Campaign(Parts(Path(parts)))
-        drawn = sample(kept, platform, worlds=2, controllers=2, runs=1, gates=True)
+        drawn = sample(kept, platform, worlds=2, controllers=2, runs=1, everything=True)
     assert drawn is not None
     check("unknowns", pl.DataFrame([vars(it) for it in sobol(drawn, 1, count=3).indices]))
 
