@@ -143,8 +143,7 @@ def _gated(
         scenario = reading.scenario.with_overrides(
             {
                 "vehicle.estimator.method": "music",
-                "vehicle.wake_up.due.policy": "fixed",
-                "vehicle.wake_up.due.interval_ms": constant_ms,
+                "vehicle.wake_up.due": fixed_interval(reading.scenario, constant_ms),
             }
         )
         found = driver.drive(scenario).drives

@@ -9,6 +9,7 @@ from typing import TYPE_CHECKING
 from access_av.paper.claims import EVIDENCE
 from access_av.paper.energy_fit import FREEDOMS
 from access_av.paper.freedoms import met_halves
+from access_av.paper.statements import of_claim
 
 if TYPE_CHECKING:
     from collections.abc import Sequence
@@ -88,6 +89,7 @@ def controller_text(counts: tuple[int, int, int]) -> str:
     return parts[0].split(" in ")[0] if len(parts) == 1 else ", ".join(parts)
 
 
+SAVING = "e4_average_saving_percent"
 PROMISE = (
     "The paper promises that adaptive MUSIC stays within 0.3 m and beats every fixed interval over "
     "most of the track (its accuracy: claims a1 and a2), and that it saves more than 52 % of the "
@@ -129,6 +131,11 @@ def bought_text(study: Study) -> str:
     return "No freedom of the energy fit makes both hold."
 
 
+def _saving_percent(study: Study, half: Half) -> float | None:
+    claims = {claim.id: claim.obtained for claim in study.of(half.reading.name)}
+    return claims.get(SAVING)
+
+
 def lead(study: Study) -> str:
     """Which halves hold under which readings, and why."""
     found = halves(study)
@@ -145,6 +152,16 @@ def lead(study: Study) -> str:
         f"{titles([half for half in found if half.energy and not half.accuracy])}; both under "
         f"{titles(both)}."
     ]
+    saved = [
+        f"“{half.reading.title}” saves {percent:.1f} %"
+        for half in found
+        if half.accuracy and (percent := _saving_percent(study, half)) is not None
+    ]
+    if saved and not both:
+        sentences.append(
+            f"Of those that are accurate {', '.join(saved)} on average; within 10 % of the stated "
+            f"{of_claim(SAVING)} % counts as reproduced."
+        )
     for half in both:
         t_max = (
             "t_max is kept"
