@@ -55,6 +55,7 @@ pub enum ServingSsb {
 }
 
 impl ServingSsb {
+    #[allow(clippy::trivially_copy_pass_by_ref)] // as serde calls it
     const fn is_first_after(&self) -> bool {
         matches!(self, Self::FirstAfter)
     }
