@@ -7,7 +7,7 @@ SOURCES := $(shell find crates sites vehicles scenarios platforms -type f 2>/dev
 DATA := $(abspath $(or $(ACCESS_AV_DATA),../shared/data))
 
 .DEFAULT_GOAL := help
-.PHONY: help demo test attack test-aarch64 count-aarch64 package lint lint-python docs figures bench clean
+.PHONY: help demo test attack test-aarch64 count-aarch64 package lint lint-python docs figures picture bench clean
 
 help: ## List these commands
 	@sed -n 's/^\([a-z0-9-]*\):.*## /  make \1\t/p' $(MAKEFILE_LIST) | expand -t 20
@@ -65,9 +65,16 @@ lint-python: .venv/installed-test
 docs: .venv/installed ## Write docs/columns.md from the table of columns
 	$(BIN)/access-av columns --markdown > docs/columns.md
 
-figures: .venv/installed ## Evaluate the paper in full (some 10 minutes) and take the figures of docs/paper.md from it
+CHROMIUM ?= chromium
+figures: .venv/installed ## Evaluate the paper in full (some 10 minutes) and take the figures of README and docs/paper.md from it
 	$(BIN)/access-av evaluate --seeds 5 --unknowns --out results/paper
 	for name in ablation front sobol; do cp results/paper/$$name.svg docs/paper-$$name.svg; done
+	$(MAKE) --no-print-directory picture REPORT=results/paper/report.html
+
+REPORT := results/latest/report.html
+picture: ## Take the README's picture from the report of the last evaluation (needs chromium)
+	$(CHROMIUM) --headless --no-sandbox --hide-scrollbars --virtual-time-budget=20000 \
+	  --window-size=1300,1150 --screenshot=docs/report.png file://$(abspath $(REPORT))
 
 bench: .venv/installed-bench ## Compare angle estimators and cell search with their peers; time the evaluation
 	$(BIN)/python benches/aoa_peers.py

@@ -10,6 +10,7 @@ import polars as pl
 import pytest
 
 from access_av import terminal
+from access_av.paper.statements import stated_claims
 
 if TYPE_CHECKING:
     from collections.abc import Callable
@@ -116,12 +117,13 @@ def test_set_changes_one_key(access_av: Cli, tmp_path: Path) -> None:
 def test_evaluation_leaves_its_files(quick_study: Path) -> None:
     names = {path.name for path in (quick_study / "latest").iterdir()}
     assert names == {
-        "ablation.svg", "ablations.parquet", "claims.json", "errors.parquet", "fixed_front.parquet",
-        "front.svg", "manifest.json", "operating_points.parquet", "ours.parquet", "platform.toml",
+        "ablation.svg", "ablations.parquet", "claims.json", "errors.parquet", "fair.parquet",
+        "fixed_front.parquet", "freedoms.parquet", "front.svg", "manifest.json",
+        "operating_points.parquet", "ours.parquet", "platform.toml",
         "report.html", "scenario.toml", "snr.parquet",
     }  # fmt: skip
     claims = json.loads((quick_study / "latest/claims.json").read_text())
-    assert len(claims) == 2 * 17
+    assert len(claims) == 2 * len(stated_claims())
 
 
 def test_explore_answers_from_the_last_evaluation(
@@ -181,7 +183,7 @@ PID = '[vehicle]\nlike = "paper"\n[vehicle.wake_up.due]\nbase_ms = 300.0\n'
         (SCENARIO + HEAD.replace("[205.0, 100.0,", "[0.0, 0.0,"), ["site.radio_heads[0]"]),
         (
             SCENARIO.replace('vehicle = "paper"\n', "") + HEAD + PID,
-            ["vehicle.wake_up.due.t_max_ms"],
+            ["vehicle.wake_up.due.position_uncertainty_m", "t_max of 240.0 ms"],
         ),
         (SCENARIO + HEAD + "[truth.vehicle.array]\nmountin_rad = 1\n",
          ["truth.vehicle.array.mountin_rad", "mounting_rad"]),

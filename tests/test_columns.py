@@ -136,17 +136,28 @@ def test_bound() -> None:
 
 
 def test_evaluation(quick_study: Path) -> None:
-    names = ("operating_points", "errors", "snr", "ablations", "fixed_front", "ours")
+    names = ("operating_points", "errors", "snr", "ablations", "fixed_front", "ours", "fair",
+             "freedoms")  # fmt: skip
     for name in names:
         check(name, pl.read_parquet(quick_study / "latest" / f"{name}.parquet"))
     check("claims", json.loads((quick_study / "latest/claims.json").read_text()))
+
+
+def test_chosen(access_av: Callable[..., Finished]) -> None:
+    done = access_av("chosen", "--runs", "1", "--json")
+    assert done.code == 0, done.err
+    found = json.loads(done.out)
+    check("chosen", found)
+    shipped = [one for one in found if one["is_shipped"]]
+    assert len({one["rms_error_m"] for one in shipped}) == 1, "the same reading each time"
+    assert len(found) > 2 * len(shipped) - 1, "each has an alternative"
 
 
 def test_unknowns() -> None:
     platform = Platform.load("jetson-agx-xavier")
     with tempfile.TemporaryDirectory() as parts:
         kept = Campaign(Parts(Path(parts)))
-        drawn = sample(kept, platform, worlds=2, controllers=2, runs=1, gates=True)
+        drawn = sample(kept, platform, worlds=2, controllers=2, runs=1, everything=True)
     assert drawn is not None
     check("unknowns", pl.DataFrame([vars(it) for it in sobol(drawn, 1, count=3).indices]))
 

@@ -4,7 +4,7 @@ import pytest
 
 import synthetic
 from access_av.paper import study
-from access_av.paper.energy_fit import ModeDemand, fit_energy
+from access_av.paper.energy_fit import FREEDOMS, ModeDemand, fit_energy, numbers
 from access_av.paper.methods import METHODS
 from access_av.paper.statements import paper_numbers
 from access_av.platform import Platform
@@ -54,8 +54,8 @@ def test_mode_0_draws_most_at_fixed_intervals(
         assert max(fixed_j, key=fixed_j.__getitem__) == 0
 
 
-def test_savings_are_those_stated(demands: dict[int, ModeDemand], energies: Energies) -> None:
-    savings = {
+def savings(demands: dict[int, ModeDemand], energies: Energies) -> dict[int, list[float]]:
+    return {
         mode: [
             1.0
             - energies[mode]["music"]
@@ -65,10 +65,44 @@ def test_savings_are_those_stated(demands: dict[int, ModeDemand], energies: Ener
         ]
         for mode, demand in demands.items()
     }
-    pairs = [saving for by_method in savings.values() for saving in by_method]
+
+
+def test_methods_draw_one_power_ratio_in_all_modes(
+    demands: dict[int, ModeDemand], energies: Energies
+) -> None:
+    for method in METHODS[1:]:
+        powers = [
+            energies[mode][method]
+            / demand.base_wake_up_s[method]
+            / (energies[mode]["music"] / demand.base_wake_up_s["music"])
+            for mode, demand in demands.items()
+        ]
+        assert powers == pytest.approx([powers[0]] * len(powers), rel=1e-12)
+
+
+def test_each_freedom_does_what_it_says(demands: dict[int, ModeDemand]) -> None:
+    none = fit_energy(demands, ())
+    for method in METHODS[1:]:
+        ratio = none[3][method] / none[3]["music"]
+        times_s = demands[3].base_wake_up_s
+        assert ratio == pytest.approx(times_s[method] / times_s["music"]), "the same power"
+    # Without a power of its own a mode has that of a busy core by its clock.
+    assert none[1]["music"] == pytest.approx(none[3]["music"]), "the same clock"
+    ratio = fit_energy(demands, ("ratio",))
+    for method in METHODS:
+        assert ratio[0][method] == pytest.approx(fit_energy(demands)[0][method])
+    assert ratio[4]["music"] == pytest.approx(none[4]["music"])
+    free = fit_energy(demands, ("ratio", "mode", "factor"))
+    pairs = [saving for by_method in savings(demands, free).values() for saving in by_method]
     assert sum(pairs) / len(pairs) == pytest.approx(0.4309, abs=1e-9)
-    for mode in (6, 7):
-        assert sum(savings[mode]) / len(METHODS) > 0.52
+    for mode, method in ((mode, method) for mode in (0, 6, 7) for method in METHODS):
+        assert free[mode][method] == pytest.approx(fit_energy(demands)[mode][method])
+
+
+def test_numbers_that_are_free_are_counted() -> None:
+    assert numbers(()) == (1, 1)
+    assert numbers() == (10, 4)
+    assert numbers(tuple(FREEDOMS)) == (11, 5)
 
 
 def test_the_shipped_platform_holds_what_the_fit_gives() -> None:

@@ -87,6 +87,59 @@ def test_estimates_that_cannot_be_are_refused(returned: Any, named: str) -> None
         assert "pci 1, index 0" in raised.value.__notes__[0]
 
 
+class Stating:
+    """An estimator that may say what an estimate takes."""
+
+    def __init__(self, **stated: Any) -> None:
+        vars(self).update(stated)
+
+    def __call__(self, snapshots: np.ndarray) -> tuple[float, float]:
+        return bartlett(snapshots), 0.02
+
+
+def test_an_estimator_is_billed_what_it_states_and_never_what_another_takes() -> None:
+    board = access_av.Platform.load("jetson-agx-xavier-engine")
+
+    def joules(column: str, **stated: Any) -> list[float | None]:
+        runs = access_av.simulate(SHORT, estimator=Stating(**stated), platform=board).runs
+        return [runs[column].item(), runs["executions"].item()]
+
+    assert joules("energy_j")[0] is None
+    energy_j, executions = joules("energy_executions_j", energy_per_execution_j=0.01)
+    assert energy_j == pytest.approx(0.01 * executions)
+    # So much a second as a busy core draws: twice the time, twice the energy.
+    one, two = (
+        joules("energy_executions_j", time_per_execution_s=time_s)[0] for time_s in (1e-3, 2e-3)
+    )
+    assert two == pytest.approx(2.0 * one)
+    assert 0.1 < one / (1e-3 * executions) < 30.0, "watts of a core"
+
+
+@pytest.mark.parametrize(
+    ("stated", "named"),
+    [
+        ({"energy_per_execution_j": -1.0}, "energy_per_execution_j"),
+        ({"energy_per_execution_j": float("nan")}, "finite"),
+        ({"time_per_execution_s": "long"}, "time_per_execution_s"),
+        ({"energy_per_execution_j": 1.0, "time_per_execution_s": 1.0}, "both"),
+    ],
+)
+def test_costs_that_cannot_be_are_refused(stated: dict[str, Any], named: str) -> None:
+    with pytest.raises(ValueError, match=named):
+        access_av.simulate(SHORT, estimator=Stating(**stated))
+
+
+def test_a_method_that_the_platform_does_not_know_says_which_key_to_set() -> None:
+    scenario = access_av.Scenario.load("paper").with_overrides(
+        {"vehicle.estimator.method": "maximum-likelihood"}
+    )
+    with pytest.raises(access_av.SettingsError, match=r"`wake_up\.due\.base_ms`") as refused:
+        access_av.simulate(scenario)
+    assert "what an estimate takes" in str(refused.value)
+    stated = scenario.with_overrides({"vehicle.wake_up.due.base_ms": 20.0})
+    assert access_av.simulate(stated).runs["energy_j"].item() is None
+
+
 def test_no_angle_is_no_error() -> None:
     result = access_av.simulate(SHORT, keep_trajectories=True, estimator=lambda _: None)
     assert result.executions is not None

@@ -6,6 +6,7 @@ import json
 from dataclasses import replace
 from typing import TYPE_CHECKING
 
+import numpy as np
 import pytest
 
 import synthetic
@@ -53,7 +54,8 @@ def test_t_max_is_kept_by_every_reading_that_claims_to(name: str, driver: Driver
 
 def test_only_gates_wait_for_a_better_ssb() -> None:
     gated = {name for name in readings.names() if readings.load(name).is_gated}
-    assert gated == {"gate", "gate-t-max", "factory"}
+    assert gated == {"factory", *(name for name in readings.names() if name.startswith("gate"))}
+    assert len(gated) == 7
 
 
 def test_a_controller_of_no_gain_makes_no_difference(driver: Driver) -> None:
@@ -122,8 +124,43 @@ def test_a_reading_that_contradicts_itself_is_named_and_the_others_are_judged(
 
 def test_an_explicit_contradiction_is_refused() -> None:
     changes = {"vehicle.wake_up.due.base_ms": 300.0}
-    with pytest.raises(SettingsError, match=r"wake_up\.due\.t_max_ms"):
+    with pytest.raises(SettingsError, match=r"wake_up\.due\.position_uncertainty_m"):
         Scenario.load("paper").with_overrides(changes)
     late = {"vehicle.wake_up.latest_ms": 100.0, "vehicle.wake_up.due.base_ms": 150.0}
     with pytest.raises(SettingsError, match=r"wake_up\.latest_ms"):
         Scenario.load("paper").with_overrides(late)
+
+
+def test_t_max_follows_from_the_position_uncertainty_unless_it_is_stated() -> None:
+    gate = readings.load("gate")
+    assert gate.wake_up["due"]["position_uncertainty_m"] == 1.0
+    assert gate.t_max_s == pytest.approx(0.24, abs=1e-12), "1 m at 15 km/h"
+    for changes, t_max_s in (
+        ({"position_uncertainty_m": 2.0}, 0.48),
+        ({"t_max_ms": 300.0}, 0.3),
+    ):
+        paths = {f"vehicle.wake_up.due.{key}": value for key, value in changes.items()}
+        changed = replace(gate, scenario=gate.scenario.with_overrides(paths))
+        assert changed.t_max_s == pytest.approx(t_max_s, abs=1e-12)
+
+
+@pytest.mark.parametrize("base_ms", [65.0, 80.0, 150.0])
+@pytest.mark.parametrize("serving", ["first-after", "last-before"])
+def test_algorithm_1_of_no_gain_is_the_fixed_interval(
+    base_ms: float, serving: str, driver: Driver
+) -> None:
+    """One clock: both execute at the same SSBs, whatever the base wake-up time."""
+    scenario = readings.load("every-ssb").scenario.with_overrides(
+        {f"vehicle.wake_up.{name}": 0.0 for name in ("kp", "ki", "kd")}
+        | {"vehicle.wake_up.base_ms": base_ms, "vehicle.wake_up.serving_ssb": serving}
+    )
+    one, other = (
+        driver.drive(each).drives for each in (scenario, ablation.fixed(scenario, base_ms))
+    )
+    period_ms = 20.0
+    rounds = np.ceil if serving == "first-after" else np.floor
+    gap_s = float(rounds(base_ms / period_ms)) * period_ms / 1e3
+    assert one.longest_gap_s == pytest.approx(gap_s)
+    # Algorithm 1 has no wake-up time before its second SSB: one estimate more, at the beginning.
+    assert abs(float(one.executions[0] - other.executions[0])) <= 1.0
+    assert float(one.rms_error_m[0]) == pytest.approx(float(other.rms_error_m[0]), rel=0.3)

@@ -41,8 +41,8 @@ def test_loads_nothing(page: str) -> None:
 def test_holds_every_chart(page: str) -> None:
     places = set(re.findall(r'class="chart" id="([^"]+)"', page))
     assert places >= {
-        "snr", "energy-bars", "executions", "design-space", "rsu-cost", "sensor-cost", "ablation",
-        "front",
+        "overview", "design-x", "design-y", "snr", "energy-bars", "executions", "design-space",
+        "rsu-cost", "sensor-cost", "ablation", "front",
     }  # fmt: skip
     assert sum(name.startswith("error-") for name in places) == 12
     for name in places:
@@ -77,14 +77,14 @@ def test_says_that_the_controller_matters_only_where_it_does(gain: float, said: 
 
 def test_sentences_are_made_from_what_was_obtained() -> None:
     study = synthetic.study()
-    assert "do not hold together under any reading" in summary.headline(study)
+    assert "hold together under none of 2 readings" in summary.headline(study)
     met = {claim.id: replace(claim, verdict="reproduced") for claim in study.of("gate")}
     both = replace(study, claims=[*study.of("every-ssb"), *met.values()])
-    assert "only with a gate" in summary.headline(both)
+    assert "only if estimates wait" in summary.headline(both)
     assert "which Algorithm 1 does not say" in summary.lead(both)
     assert "Algorithm 1 makes no difference" in summary.lead(both)
     without = [replace(claim, reading="every-ssb") for claim in met.values()]
-    assert "under Algorithm 1 as written" in summary.headline(
+    assert "under Algorithm 1 as it stands" in summary.headline(
         replace(study, claims=[*without, *study.of("gate")])
     )
 

@@ -12,8 +12,9 @@ from access_av import Scenario
 from access_av.campaign import Campaign, Shard
 from access_av.paper import search
 from access_av.paper.space import (
-    CONTROLLER,
     GATE,
+    OPEN_CONTROLLER,
+    OPEN_WORLD,
     SHIPPED_WORLD,
     WORLD,
     Dimension,
@@ -139,12 +140,12 @@ def test_the_shipped_world_is_in_the_space() -> None:
 
 
 def test_every_point_of_the_space_is_a_scenario() -> None:
-    dimensions = (*WORLD, *CONTROLLER, GATE)
+    dimensions = (*OPEN_WORLD, *OPEN_CONTROLLER, GATE)
     corners = [np.full(len(dimensions), end) for end in (0.0, 1.0 - 1e-9)]
     for point in [*corners, *latin_hypercube(30, len(dimensions), seed=2)]:
         values = named(dimensions, point.tolist())
         reading = search.as_reading(values)
         assert reading.is_gated == (values["gate"] != "none")
-        drawn_from = world_changes(values) | controller_changes(values, values["eirp_dbm"])
+        drawn_from = world_changes(values) | controller_changes(values, values)
         named_alike = {"name": "found", "description": reading.scenario.description}
         assert reading.scenario == Scenario.load("paper").with_overrides(drawn_from | named_alike)

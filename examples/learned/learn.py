@@ -78,15 +78,17 @@ class Network:
             kept.append(np.tanh(made) if number + 1 < len(self.layers) else made)
         return kept
 
-    def train(self, random, steps, batch=512, rate=2e-3):
-        """Fresh samples at every step, so that nothing is learnt by heart."""
+    def train(self, random, steps, batch=512, rate=2e-3, sample=None):
+        """Fresh samples at every step, so that nothing is learnt by heart, or ``sample``'s."""
+        sample = sample or (lambda: draw(random, random.uniform(-25.0, 15.0, batch)))
         moments = [
             [[np.zeros_like(part), np.zeros_like(part)] for part in it] for it in self.layers
         ]
         for step in range(1, steps + 1):
-            phase_rad, channels = draw(random, random.uniform(-25.0, 15.0, batch))
+            phase_rad, channels = sample()
             kept = self._forward(features(outer(channels)))
-            slope = (kept[-1] - np.stack([np.cos(phase_rad), np.sin(phase_rad)], axis=1)) / batch
+            wanted = np.stack([np.cos(phase_rad), np.sin(phase_rad)], axis=1)
+            slope = (kept[-1] - wanted) / phase_rad.size
             here = rate * 0.5 * (1.0 + np.cos(np.pi * step / steps))
             for number in reversed(range(len(self.layers))):
                 weight, _ = self.layers[number]

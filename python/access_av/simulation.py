@@ -225,7 +225,9 @@ def simulate(
         snapshots) and returns the angle from the array's axis in radians, 0 to π; or that angle
         and its standard deviation; or the logarithm of its likelihood over the electrical angle,
         at equally spaced values from −π on; or ``None`` where there is no angle. An angle without
-        standard deviation gets the Cramér–Rao bound at its SSB's SNR, which is said once.
+        standard deviation gets the Cramér–Rao bound at its SSB's SNR, which is said once. Its
+        attribute ``energy_per_execution_j`` or ``time_per_execution_s`` states what an estimate
+        takes; without one the runs have no energy.
     policy
         In place of the vehicle's wake-up policy: called with the :class:`Situation
         <access_av._core.Situation>` at each burst that is listened to, it returns whether to

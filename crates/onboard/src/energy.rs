@@ -30,6 +30,20 @@ struct Sleep {
     awake_s: f64,
 }
 
+/// What one estimate takes.
+#[derive(Debug, Clone, Copy, PartialEq, Default)]
+pub enum EstimateCost {
+    /// What the platform says of the vehicle's method.
+    #[default]
+    OfMethod,
+    /// So many joules above idle, by an estimator of the user's own.
+    EnergyJ(f64),
+    /// So many seconds of one busy core, by an estimator of the user's own.
+    TimeS(f64),
+    /// An estimator of the user's own that says nothing of it.
+    Unknown,
+}
+
 /// Energy of a run in joules.
 #[derive(Debug, Clone, Copy, PartialEq, Default)]
 pub struct Energy {
@@ -60,8 +74,33 @@ impl EnergyModel {
         platform: &Platform,
         extent: Extent,
     ) -> Result<Option<Self>, SettingsError> {
+        Self::with_cost(EstimateCost::OfMethod, vehicle, platform, extent)
+    }
+
+    /// The same where an estimate costs this; `None` where nobody knows, or where it is a time and
+    /// the platform does not say what a busy core draws.
+    ///
+    /// # Errors
+    /// As [`new`](Self::new).
+    pub fn with_cost(
+        cost: EstimateCost,
+        vehicle: &Vehicle,
+        platform: &Platform,
+        extent: Extent,
+    ) -> Result<Option<Self>, SettingsError> {
         let mode = platform.mode(&vehicle.platform, &vehicle.name)?;
-        let Some(execution) = Execution::new(vehicle, platform, mode, extent) else {
+        let execution = match cost {
+            EstimateCost::OfMethod => Execution::new(vehicle, platform, mode, extent),
+            EstimateCost::EnergyJ(energy_j) => Some(Execution {
+                energy_j,
+                time_s: 0.0,
+                boundary: Boundary::Marginal,
+                provenance: Provenance::Assumed,
+            }),
+            EstimateCost::TimeS(time_s) => Execution::of_time(time_s, platform, mode, extent),
+            EstimateCost::Unknown => None,
+        };
+        let Some(execution) = execution else {
             return Ok(None);
         };
         let idle = platform
@@ -167,16 +206,25 @@ impl Execution {
             });
         }
         let projected = cycles?.provenance == Provenance::Projected;
+        let execution = Self::of_time(time_s, platform, mode, extent)?;
+        Some(if projected {
+            Self {
+                provenance: Provenance::Projected,
+                ..execution
+            }
+        } else {
+            execution
+        })
+    }
+
+    /// So long on a busy core; `None` where the platform does not say what one draws.
+    fn of_time(time_s: f64, platform: &Platform, mode: &PowerMode, extent: Extent) -> Option<Self> {
         let (core_w, figure) = platform.core_power_w(mode, extent)?;
         Some(Self {
             energy_j: time_s * core_w,
             time_s,
             boundary: figure.boundary,
-            provenance: if projected {
-                Provenance::Projected
-            } else {
-                figure.provenance
-            },
+            provenance: figure.provenance,
         })
     }
 }
@@ -281,6 +329,21 @@ mod tests {
         assert!((energy.idle_j - 40.0).abs() < 1e-12, "{energy:?}");
         assert_eq!(model.boundary, Boundary::SocRails);
         assert!((platform.base_wake_up_s(&vehicle()).unwrap() - 3e-3).abs() < 1e-12);
+    }
+
+    #[test]
+    fn what_an_estimator_of_the_users_own_takes_is_what_it_states() {
+        let platform = Platform::from_toml(CONTROLLED, "test", &Shipped).unwrap();
+        let executions_j = |cost| {
+            let model = EnergyModel::with_cost(cost, &vehicle(), &platform, Extent::Value);
+            let model = model.unwrap();
+            model.map(|model| model.of_run(10, 100, 10.0).executions_j)
+        };
+        let close = |found: Option<f64>, expected: f64| (found.unwrap() - expected).abs() < 1e-12;
+        assert!(close(executions_j(EstimateCost::EnergyJ(0.3)), 3.0));
+        // A core takes 4 W.
+        assert!(close(executions_j(EstimateCost::TimeS(0.01)), 0.4));
+        assert_eq!(executions_j(EstimateCost::Unknown), None);
     }
 
     #[test]

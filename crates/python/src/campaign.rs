@@ -9,6 +9,7 @@ use ::simulate::{
     SimulationError, Step, StepStatistics, Tapes as CoreTapes,
 };
 use numpy::{Element, PyArray1, PyArray3, PyArrayMethods};
+use onboard::energy::EstimateCost;
 use onboard::geometry::Pose;
 use onboard::localize::AngleMeasurement;
 use onboard::settings::EstimatorMethod;
@@ -20,7 +21,7 @@ use toml::Value;
 
 use crate::message::brief;
 use crate::own_error::{covariance, level};
-use crate::plug_ins::{PythonEstimator, PythonLocalizer, PythonPolicy};
+use crate::plug_ins::{PythonEstimator, PythonLocalizer, PythonPolicy, estimate_cost};
 use crate::settings::{Platform, Scenario, settings_error};
 use crate::threads::at_most_one_per_core;
 
@@ -85,6 +86,7 @@ pub fn simulate(
         localizer,
         told_of_sigma: Arc::new(AtomicBool::new(false)),
     };
+    let estimate_cost = plug_ins.estimate_cost(py)?;
     let campaign = py.detach(|| {
         let raised = std::cell::RefCell::new(None);
         let options = CampaignOptions {
@@ -96,6 +98,7 @@ pub fn simulate(
             quantiles: true,
             errors_every,
             custom: &|start| plug_ins.custom(&scenario.0, start),
+            estimate_cost,
             progress: &|done| {
                 let told = Python::attach(|py| {
                     py.check_signals()?;
@@ -268,6 +271,14 @@ struct PlugIns {
 }
 
 impl PlugIns {
+    /// What an estimate costs: what the user's estimator states, if there is one.
+    fn estimate_cost(&self, py: Python<'_>) -> PyResult<EstimateCost> {
+        let Some(estimator) = &self.estimator else {
+            return Ok(EstimateCost::OfMethod);
+        };
+        estimate_cost(estimator.bind(py))
+    }
+
     fn custom(&self, scenario: &CoreScenario, start: Pose) -> Result<Custom, BoxError> {
         Python::attach(|py| {
             let measurand = scenario.vehicle.array.measurand();

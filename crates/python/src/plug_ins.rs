@@ -6,6 +6,7 @@ use std::sync::atomic::{AtomicBool, Ordering};
 
 use numpy::{PyArray2, PyReadonlyArray1};
 use onboard::BoxError;
+use onboard::energy::EstimateCost;
 use onboard::estimator::{AngleEstimator, EstimatedAngle};
 use onboard::geometry::Pose;
 use onboard::localize::tracker::OdometryVerdict;
@@ -126,6 +127,11 @@ impl From<PlugInError> for PyErr {
     }
 }
 
+/// Attributes by which an estimator states what one estimate takes: joules above idle ...
+const ENERGY: &str = "energy_per_execution_j";
+/// ... or seconds of one busy core.
+const TIME: &str = "time_per_execution_s";
+
 /// A Python callable in place of the angle estimator.
 pub struct PythonEstimator {
     call: Py<PyAny>,
@@ -231,6 +237,30 @@ impl PythonEstimator {
              a float64 array of the log-likelihood over the electrical angle, and None",
             found.get_type().name()?
         )))
+    }
+}
+
+/// What an estimator states of the energy or the time of one estimate.
+pub fn estimate_cost(estimator: &Bound<'_, PyAny>) -> PyResult<EstimateCost> {
+    let stated = |name: &str| -> PyResult<Option<f64>> {
+        let Some(value) = estimator.getattr_opt(name)?.filter(|it| !it.is_none()) else {
+            return Ok(None);
+        };
+        match value.extract::<f64>() {
+            Ok(number) if number.is_finite() && number >= 0.0 => Ok(Some(number)),
+            _ => Err(refused(&format!(
+                "the estimator's {name} is {}; it must be a finite number, 0 or above",
+                value.repr()?
+            ))),
+        }
+    };
+    match (stated(ENERGY)?, stated(TIME)?) {
+        (Some(_), Some(_)) => Err(refused(&format!(
+            "the estimator states both {ENERGY} and {TIME}; one of them is allowed"
+        ))),
+        (Some(energy_j), None) => Ok(EstimateCost::EnergyJ(energy_j)),
+        (None, Some(time_s)) => Ok(EstimateCost::TimeS(time_s)),
+        (None, None) => Ok(EstimateCost::Unknown),
     }
 }
 

@@ -1,7 +1,7 @@
 //! Many simulated drives, and what they have in common.
 
 use onboard::Custom;
-use onboard::energy::{Energy, EnergyModel};
+use onboard::energy::{Energy, EnergyModel, EstimateCost};
 use onboard::geometry::wrap_angle;
 use onboard::settings::Extent;
 use rayon::prelude::*;
@@ -32,6 +32,8 @@ pub struct CampaignOptions<'a> {
     pub errors_every: Option<usize>,
     /// The user's own code, made anew for each run.
     pub custom: &'a MakeCustom<'a>,
+    /// What an estimate costs.
+    pub estimate_cost: EstimateCost,
     /// Told how many runs are done; `false` stops the campaign.
     pub progress: &'a dyn Fn(usize) -> bool,
 }
@@ -48,6 +50,7 @@ impl Default for CampaignOptions<'_> {
             quantiles: true,
             errors_every: None,
             custom: &|_| Ok(Custom::default()),
+            estimate_cost: EstimateCost::OfMethod,
             progress: &|_| true,
         }
     }
@@ -166,7 +169,8 @@ impl Simulation {
             count.min(wave)
         };
         self.scenario().check_runs(at_once)?;
-        let energy = EnergyModel::new(&self.scenario().vehicle, self.platform(), Extent::Value)?;
+        let (cost, vehicle) = (options.estimate_cost, &self.scenario().vehicle);
+        let energy = EnergyModel::with_cost(cost, vehicle, self.platform(), Extent::Value)?;
         let mut sums = vec![StepSums::new(options.quantiles); self.steps()];
         let mut runs = Vec::new();
         let mut integrity = Vec::new();

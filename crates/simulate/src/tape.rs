@@ -79,8 +79,11 @@ impl Tapes {
     /// Whether a simulation is of the same world, and its method on the tapes: all may differ that
     /// only localizer, wake-up policy and computer go by.
     pub fn serve(&self, other: &Simulation) -> bool {
-        let method = other.scenario().vehicle.estimator.method;
-        self.methods.contains(&method) && self.simulation.world().sounds_like(other.world())
+        let grid_deg = |it: &Simulation| it.scenario().vehicle.estimator.music_grid_deg;
+        self.methods
+            .contains(&other.scenario().vehicle.estimator.method)
+            && grid_deg(&self.simulation) == grid_deg(other)
+            && self.simulation.world().sounds_like(other.world())
     }
 
     /// The campaign of a simulation that the tapes serve, over their runs.

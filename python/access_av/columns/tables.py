@@ -319,10 +319,11 @@ TABLES: Mapping[str, Table] = {
             "`claims.json` of `access-av evaluate`",
             (
                 "reading", "id", "says", "where", "stated", "obtained", "interval", "unit",
-                "verdict", "turns_with_seed", "evidence", "note", "met_by_seed",
+                "verdict", "turns_with_seed", "evidence", "note", "spread", "met_by_seed",
             ),
             {
-                "obtained": "it could not be judged, or nothing is within the budget",
+                "obtained": "it could not be judged, is not testable, or nothing is within the "
+                "budget",
                 "interval": "nothing in it is drawn, or it is of modes",
             },
         ),
@@ -355,6 +356,35 @@ TABLES: Mapping[str, Table] = {
                 "executions_less_high",
             ),
             dict.fromkeys(("energy_j", "papers_energy_j"), _NO_FIGURE),
+        ),
+        Table(
+            "fair",
+            "One way to localize in mode 0, with what it is told",
+            "`fair.parquet` of `access-av evaluate`",
+            (
+                "real_odometer", "map", "who", "executions", "rms_error_m", "rms_low_m",
+                "rms_high_m", "worst_error_m",
+            ),
+            {"worst_error_m": "it is the bound"},
+        ),
+        Table(
+            "freedoms",
+            "A freedom of the energy fit, beside those above it",
+            "`freedoms.parquet` of `access-av evaluate`",
+            (
+                "freedom", "free_numbers", "solved_numbers", "claims_met", "met_by_construction",
+                "average_saving_percent", "keep_energy", "keep_both",
+            ),
+            {"average_saving_percent": "it could not be judged"},
+        ),
+        Table(
+            "chosen",
+            "A value of something that the paper leaves open: the shipped one, or another",
+            "`chosen.parquet` of `access-av evaluate --unknowns`; `access-av chosen --json`",
+            (
+                "what", "value", "why", "is_shipped", "executions", "worst_error_m",
+                "rms_error_m", "rms_std_m", "fixed_rms_m", "every_ssb_rms_m",
+            ),
         ),
         Table(
             "unknowns",

@@ -11,7 +11,7 @@ from typing import TYPE_CHECKING
 
 import numpy as np
 
-from access_av.paper.evaluation import cases
+from access_av.paper.evaluation import cases, fixed_interval
 from access_av.paper.statements import paper_numbers
 
 if TYPE_CHECKING:
@@ -111,17 +111,20 @@ def fixed(scenario: Scenario, interval_ms: float) -> Scenario:
     return scenario.with_overrides(
         {
             "vehicle.estimator.method": "music",
-            "vehicle.wake_up.policy": "fixed",
-            "vehicle.wake_up.interval_ms": interval_ms,
+            "vehicle.wake_up": fixed_interval(scenario, interval_ms),
         }
     )
 
 
 def _fixed(driver: Driver, reading: Reading, drives: Drives, _: float) -> tuple[float, Drives]:
-    """A fixed interval of as many executions: so many fit into the trip."""
-    executions = round(float(drives.executions[0]))
-    interval_ms = round(1e3 * driver.trip_s / (executions - 0.5), 3)
-    return interval_ms, driver.drive(fixed(reading.scenario, interval_ms)).drives
+    """A fixed interval of as many executions: the nearest in number, a whole number of SSBs."""
+    period_ms = paper_numbers()["wake_up"]["ssb_period_ms"]
+    gap_ms = 1e3 * driver.trip_s / (float(drives.executions[0]) - 0.5)
+    wanted = float(drives.executions[0])
+    near = [period_ms * max(1, gap_ms // period_ms + more) for more in (0, 1)]
+    found = {ms: driver.drive(fixed(reading.scenario, ms)).drives for ms in near}
+    best_ms = min(found, key=lambda ms: abs(float(found[ms].executions[0]) - wanted))
+    return best_ms, found[best_ms]
 
 
 def _gated(
@@ -140,8 +143,7 @@ def _gated(
         scenario = reading.scenario.with_overrides(
             {
                 "vehicle.estimator.method": "music",
-                "vehicle.wake_up.due.policy": "fixed",
-                "vehicle.wake_up.due.interval_ms": constant_ms,
+                "vehicle.wake_up.due": fixed_interval(reading.scenario, constant_ms),
             }
         )
         found = driver.drive(scenario).drives

@@ -8,6 +8,7 @@ from typing import TYPE_CHECKING, Any
 import numpy as np
 
 from access_av.errors import InputError
+from access_av.paper import energy_fit
 from access_av.paper.findings import FINDINGS, Finding, MissingFigureError
 from access_av.paper.margins import margin
 from access_av.paper.statements import stated_claims
@@ -20,6 +21,7 @@ if TYPE_CHECKING:
 REPRODUCED = "reproduced"
 NOT_REPRODUCED = "not reproduced"
 NOT_JUDGED = "not judged"
+NOT_TESTABLE = "not testable"
 
 INDEPENDENT = "independent"
 CHOSEN = "chosen in view of it"
@@ -45,7 +47,9 @@ class Claim:
         Whether other runs may give another verdict: by its margin's spread over the runs, or
         because another seed that was tried did.
     evidence
-        One of :data:`EVIDENCE`: what the verdict is worth.
+        One of :data:`EVIDENCE`: what the verdict is worth; empty where there is none.
+    spread
+        How far single trips depart from a mean over the runs, where the claim is of one.
     met_by_seed
         Whether the claim is met by the runs of each seed, where it was judged with several.
     """
@@ -62,6 +66,7 @@ class Claim:
     turns_with_seed: bool
     evidence: str
     note: str
+    spread: Mapping[str, float] = field(default_factory=dict)
     met_by_seed: Mapping[int, bool] = field(default_factory=dict)
 
     @property
@@ -70,14 +75,26 @@ class Claim:
         return self.verdict == REPRODUCED
 
     @property
+    def is_judged(self) -> bool:
+        """Whether there is a verdict."""
+        return self.verdict in (REPRODUCED, NOT_REPRODUCED)
+
+    @property
     def seeds_met(self) -> str:
         """With how many of its seeds it is met, where they disagree; else nothing."""
         met = self.met_by_seed.values()
         return f"{sum(met)}/{len(met)}" if 0 < sum(met) < len(met) else ""
 
 
-def evidence(entry: Mapping[str, Any], chosen: Collection[str]) -> str:
+def evidence(
+    entry: Mapping[str, Any],
+    chosen: Collection[str],
+    freedoms: Collection[str] = energy_fit.SHIPPED,
+) -> str:
     """What it is worth that a claim is met, where ``chosen`` was chosen in view of the claims.
+
+    ``freedoms`` are those of the energies per execution: what one of them solves for is met by
+    construction.
 
     Examples
     --------
@@ -86,6 +103,8 @@ def evidence(entry: Mapping[str, Any], chosen: Collection[str]) -> str:
     """
     if "evidence" in entry:
         return str(entry["evidence"])
+    if entry.get("solved_by") in freedoms:
+        return BY_CONSTRUCTION
     # Energies are fitted to the paper's figures under every reading.
     return CHOSEN if {*entry["rests_on"]} & {*chosen, "energy"} else INDEPENDENT
 
@@ -95,6 +114,7 @@ def check_claims(
     *,
     reading: str = "",
     chosen: Collection[str] = ("radio", "controller"),
+    freedoms: Collection[str] = energy_fit.SHIPPED,
     stated: Mapping[str, Any] | None = None,
 ) -> list[Claim]:
     """Judge every claim of the paper, in the paper's order.
@@ -107,12 +127,14 @@ def check_claims(
         Its name.
     chosen
         What of it was chosen in view of the claims.
+    freedoms
+        What the energies per execution were fitted by.
     stated
         Claims as ``paper.toml`` has them; its own when ``None``. One that cannot be judged says why
         in its note, and the others are judged.
     """
     return [
-        _judge(claim_id, entry, outcome, reading, chosen)
+        _judge(claim_id, entry, outcome, reading, evidence(entry, chosen, freedoms))
         for claim_id, entry in (stated_claims() if stated is None else stated).items()
     ]
 
@@ -121,6 +143,8 @@ def margins(outcome: Outcome) -> dict[str, Numbers]:
     """By how much each claim is met in every variant; what cannot be judged is absent."""
     found = {}
     for claim_id, entry in stated_claims().items():
+        if entry["rule"] == NOT_TESTABLE:
+            continue
         try:
             found[claim_id] = margin(entry, FINDINGS[claim_id](outcome).value)
         except MissingFigureError:
@@ -145,24 +169,24 @@ def as_records(claims: list[Claim]) -> list[dict[str, Any]]:
 
 
 def _judge(
-    claim_id: str,
-    entry: Mapping[str, Any],
-    outcome: Outcome,
-    reading: str,
-    chosen: Collection[str],
+    claim_id: str, entry: Mapping[str, Any], outcome: Outcome, reading: str, kind: str
 ) -> Claim:
     finding: Finding | None = None
-    met, turns = False, False
-    try:
-        if claim_id not in FINDINGS:
-            raise InputError(f"nothing is obtained for it; claims are: {', '.join(FINDINGS)}")
-        finding = FINDINGS[claim_id](outcome)
-        by = np.atleast_1d(margin(entry, finding.value))
-        met = bool(by[0] >= 0.0)
-        turns = _turns(by)
-        note = " ".join(filter(None, (finding.note, "" if met else finding.conflict)))
-    except (MissingFigureError, InputError) as error:
-        finding, note = None, f"Not judged: {error}"
+    turns = False
+    if entry["rule"] == NOT_TESTABLE:
+        verdict, kind, note = NOT_TESTABLE, "", str(entry["why"])
+    else:
+        try:
+            if claim_id not in FINDINGS:
+                raise InputError(f"nothing is obtained for it; claims are: {', '.join(FINDINGS)}")
+            finding = FINDINGS[claim_id](outcome)
+            by = np.atleast_1d(margin(entry, finding.value))
+            met = bool(by[0] >= 0.0)
+            verdict = REPRODUCED if met else NOT_REPRODUCED
+            turns = _turns(by)
+            note = " ".join(filter(None, (finding.note, "" if met else finding.conflict)))
+        except (MissingFigureError, InputError) as error:
+            finding, verdict, note = None, NOT_JUDGED, f"Not judged: {error}"
     return Claim(
         reading=reading,
         id=claim_id,
@@ -172,10 +196,11 @@ def _judge(
         obtained=None if finding is None else _obtained(entry, finding.value),
         interval=None if finding is None else _interval(finding.value),
         unit=entry["unit"],
-        verdict=NOT_JUDGED if finding is None else REPRODUCED if met else NOT_REPRODUCED,
+        verdict=verdict,
         turns_with_seed=turns,
-        evidence=evidence(entry, chosen),
+        evidence=kind,
         note=note,
+        spread={} if finding is None else dict(finding.spread),
     )
 
 
@@ -186,6 +211,8 @@ def _turns(margins: Numbers) -> bool:
 
 def _obtained(entry: Mapping[str, Any], value: Any) -> Any:
     """The value of the sample as it is, in the stated one's shape."""
+    if entry["rule"] == "equal":
+        return value
     if entry["rule"] == "modes":
         query = entry["query"]
         return sorted(
@@ -216,6 +243,8 @@ def _first(value: Numbers) -> float:
 
 
 def _interval(value: Any) -> Any:
+    if isinstance(value, list):
+        return None
     if isinstance(value, dict):
         if any(isinstance(item, dict) for item in value.values()):
             return None

@@ -1,4 +1,4 @@
-"""Commands of the paper: ``evaluate``, ``readings``, ``search``, ``explore`` and ``fit``."""
+"""The commands ``evaluate``, ``readings``, ``chosen``, ``search``, ``explore`` and ``fit``."""
 
 from __future__ import annotations
 
@@ -47,7 +47,10 @@ def evaluate(
         int, typer.Option(min=1, help="Judge the claims with so many seeds, from --seed on.")
     ] = 1,
     unknowns: Annotated[
-        bool, typer.Option("--unknowns", help="Also: on what the claims hang (takes minutes).")
+        bool,
+        typer.Option(
+            "--unknowns", help="Also: on what the claims hang, thing by thing (takes minutes)."
+        ),
     ] = False,
     claims: Annotated[
         Path | None, typer.Option(help="Claims to judge, as in paper.toml; else the paper's.")
@@ -126,6 +129,41 @@ def readings(
 
 
 @app.command(
+    epilog="Example: [bold]access-av chosen --runs 100[/]",
+)
+def chosen(
+    platform: PlatformOption = "jetson-agx-xavier",
+    runs: Runs = 30,
+    seed: Seed = 1,
+    threads: Threads = None,
+    as_json: AsJson = False,
+) -> None:
+    """Print what the paper leaves open, what was chosen and why, and what another value does.
+
+    One thing is changed at a time, from the shipped reading in mode 0. What they do together:
+    access-av evaluate --unknowns.
+    """
+    from dataclasses import asdict
+
+    from access_av.files import json_text
+    from access_av.paper.chosen import effects
+    from access_av.paper.drives import Driver
+    from access_av.paper.terminal import show_chosen
+    from access_av.platform import Platform
+
+    with progress("Driving") as tick:
+        driver = Driver(Platform.load(platform), runs, seed, threads)
+        found = effects(driver, runs, progress=tick)
+    if as_json:
+        print(json_text([asdict(each) for each in found]))
+        return
+    show_chosen(found, runs)
+    for each in found:
+        if each.is_shipped:
+            console.print(f"{each.what}: {each.why}", markup=False)
+
+
+@app.command(
     epilog="Example: [bold]access-av search --worlds 64 --controllers 32[/]",
 )
 def search(
@@ -144,7 +182,7 @@ def search(
         Path | None, typer.Option(help="Write the best reading as a scenario file.")
     ] = None,
 ) -> None:
-    """Search for the reading of Algorithm 1 as written that meets most claims.
+    """Search for the reading of Algorithm 1 without a gate that meets most claims.
 
     Draws from what the paper leaves open; no gate, t_max kept. A search that was stopped goes on
     where it was (results/parts). The best one and its neighbours are driven again, more often.
@@ -268,7 +306,7 @@ def fit(
     from access_av.files import write_whole
     from access_av.methods import label
     from access_av.paper import study
-    from access_av.paper.energy_fit import FREE, SOLVED
+    from access_av.paper.energy_fit import numbers
     from access_av.paper.methods import METHODS
 
     with progress("Counting executions") as tick:
@@ -280,7 +318,8 @@ def fit(
         energies = (mode.energy_per_execution_j[method] for method in METHODS)
         made.add_row(str(mode.number), *(f"{energy.value:.4f}" for energy in energies))
     console.print(made)
-    console.print(f"{FREE} numbers were free, {SOLVED} of them solved for from stated figures.")
+    free, solved = numbers()
+    console.print(f"{free} numbers were free, {solved} of them solved for from stated figures.")
     if out is not None:
         write_whole(out, fitted.to_toml())
         console.print(f"Platform file: {out}", soft_wrap=True)

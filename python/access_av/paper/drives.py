@@ -28,7 +28,7 @@ RESAMPLES = 200
 # Of the errors that are kept, every so many count for percentiles: half a second lies between them.
 SPARSE = 5
 # What every world is driven by: the paper's methods.
-TAPED = [method.replace("_", "-") for method in METHODS]
+TAPED = tuple(method.replace("_", "-") for method in METHODS)
 
 
 @dataclass(frozen=True)
@@ -57,6 +57,7 @@ class Driver:
     count: int = RESAMPLES
     progress: Callable[[int, int], None] | None = None
     planned: int = 0
+    methods: tuple[str, ...] = TAPED
     known: dict[str, Driven] = field(default_factory=dict)
     tapes: list[Tapes] = field(default_factory=list)
 
@@ -87,7 +88,12 @@ class Driver:
         serving = [it for it in self.tapes if it.serve(scenario, platform=core)]
         if not serving:
             made = Tapes.record(
-                scenario, self.runs, self.seed, methods=TAPED, platform=core, threads=threads
+                scenario,
+                self.runs,
+                self.seed,
+                methods=list(self.methods),
+                platform=core,
+                threads=threads,
             )
             serving = [it for it in [made] if it and it.serve(scenario, platform=core)]
             self.tapes += serving

@@ -13,14 +13,13 @@ energies per execution that agree with them, given the executions the simulation
    mode 7 is within), below 260 J for modes 2, 3 and 6 and above it for the rest, and a fixed
    baseline below that of mode 0.
 3. *ESPRIT and Root-MUSIC.* Mode 0 follows from the stated sums. Elsewhere they draw MUSIC's power
-   times their ratio in mode 0, times one common factor that is solved for: the average saving over
-   all modes and methods is 43.09 %, while modes 6 and 7 keep the uncorrected ratio (their saving is
-   stated to exceed 52 %). The factor stays between a half and two: where an average saving asks for
-   another, there is no such power, and the claim fails.
+   times their ratio in mode 0: one ratio per method, the same in all modes.
 
-Of the 24 energies per execution of eight modes and three methods, 11 numbers are free: MUSIC's
-eight, the two ratios and the factor. Five of them are solved for from as many stated figures, the
-others kept within what is stated of budgets. :data:`FREE` and :data:`SOLVED` count them.
+What is solved for is no evidence, so the fit is free in as little as it can be, and
+:data:`FREEDOMS` names what it may be free in. One is not in :data:`SHIPPED`: another ratio in modes
+1 to 5, by one common factor, solved for so that the average saving over all modes and methods is
+the paper's 43.09 %. Nothing speaks for such a factor but the figure that it makes come true.
+:mod:`access_av.paper.freedoms` tells what each freedom buys.
 """
 
 from __future__ import annotations
@@ -35,7 +34,7 @@ from access_av.paper.methods import METHODS
 from access_av.paper.statements import of_claim, paper_numbers
 
 if TYPE_CHECKING:
-    from collections.abc import Mapping
+    from collections.abc import Collection, Mapping
 
     from access_av.paper.outcome import Numbers
 
@@ -45,10 +44,48 @@ NARROW_BUDGET, WIDE_BUDGET = "d1_budget_210_j", "d2_budget_260_j_rms_015_m"
 NEEDED_MODES = {0, 7, *of_claim(WIDE_BUDGET)}
 # Distance kept from a stated bound, so that another seed does not cross it.
 MARGIN = 0.02
-# How far ESPRIT's and Root-MUSIC's power may depart from their ratio to MUSIC's in mode 0.
+# How far the factor may take ESPRIT's and Root-MUSIC's power from their ratio in mode 0.
 LEAST_FACTOR, MOST_FACTOR = 0.5, 2.0
-# Numbers that the fit is free in, and stated figures that it solves for.
-FREE, SOLVED = 11, 5
+
+
+@dataclass(frozen=True)
+class Freedom:
+    """Something that the energies per execution may be chosen by.
+
+    Attributes
+    ----------
+    says
+        What it is.
+    free, solved
+        Numbers that it adds, and how many of them are solved for from stated figures.
+    """
+
+    says: str
+    free: int
+    solved: int
+
+
+# Without any there is one number, MUSIC's power in mode 0, solved for from its sum there; it goes
+# with the clock as that of a busy core does, and the methods draw the same.
+NONE = Freedom("the power of a busy core by its clock, the same for all methods", 1, 1)
+FREEDOMS = {
+    "ratio": Freedom("one power ratio per method, the same in all modes", 2, 2),
+    "mode": Freedom("a power of its own in each mode, within what is stated of budgets", 7, 1),
+    "factor": Freedom("another ratio in modes 1 to 5, by one factor solved for", 1, 1),
+}
+SHIPPED = ("ratio", "mode")
+
+
+def numbers(freedoms: Collection[str] = SHIPPED) -> tuple[int, int]:
+    """How many numbers a fit is free in, and how many of them are solved for.
+
+    Examples
+    --------
+    >>> numbers()
+    (10, 4)
+    """
+    taken = [NONE, *(FREEDOMS[name] for name in freedoms)]
+    return sum(each.free for each in taken), sum(each.solved for each in taken)
 
 
 @dataclass(frozen=True)
@@ -78,13 +115,17 @@ def busy_core_power_w(cpu_hz: float) -> float:
     return 6.97 + 0.148 * float((cpu_hz / 1.2e9) ** 3.96)
 
 
-def fit_energy(modes: Mapping[int, ModeDemand]) -> dict[int, dict[str, Numbers]]:
+def fit_energy(
+    modes: Mapping[int, ModeDemand], freedoms: Collection[str] = SHIPPED
+) -> dict[int, dict[str, Numbers]]:
     """Energy per execution in joules, by mode and method.
 
     Parameters
     ----------
     modes
         Executions and base wake-up times by mode number; must hold modes 0 and 7.
+    freedoms
+        What it is free in, of :data:`FREEDOMS`.
 
     Returns
     -------
@@ -102,9 +143,11 @@ def fit_energy(modes: Mapping[int, ModeDemand]) -> dict[int, dict[str, Numbers]]
             f"{sorted(NEEDED_MODES)}, "
             "for which the paper gives figures"
         )
-    music = _fit_music(modes)
-    ratio = _power_ratios_in_mode_0(modes, music[0])
-    factor = _common_factor(modes, music, ratio)
+    music = _fit_music(modes, own="mode" in freedoms)
+    ratio: dict[str, Numbers] = dict.fromkeys(METHODS[1:], np.ones(()))
+    if "ratio" in freedoms:
+        ratio = _power_ratios_in_mode_0(modes, music[0])
+    factor = _common_factor(modes, music, ratio) if "factor" in freedoms else np.ones(())
     return {
         mode: {
             "music": music[mode],
@@ -118,7 +161,8 @@ def fit_energy(modes: Mapping[int, ModeDemand]) -> dict[int, dict[str, Numbers]]
     }
 
 
-def _fit_music(modes: Mapping[int, ModeDemand]) -> dict[int, Numbers]:
+def _fit_music(modes: Mapping[int, ModeDemand], *, own: bool) -> dict[int, Numbers]:
+    """MUSIC's energies; without a power of its own in each mode, those of the prior."""
     sums_j = paper_numbers()["energy_j"]
     narrow_j, wide_j = (
         float(of_claim(claim, "query")["max_energy_j"]) for claim in (NARROW_BUDGET, WIDE_BUDGET)
@@ -126,10 +170,9 @@ def _fit_music(modes: Mapping[int, ModeDemand]) -> dict[int, Numbers]:
     zero = modes[0]
     most_j = sums_j["fixed_mode_0"]["music"]
     energy_0 = most_j / zero.fixed_executions["music"]
-    energies = {
-        0: np.asarray(energy_0),
-        7: np.asarray(sums_j["adaptive_mode_7"] / modes[7].adaptive_executions),
-    }
+    energies = {0: np.asarray(energy_0)}
+    if own:
+        energies[7] = np.asarray(sums_j["adaptive_mode_7"] / modes[7].adaptive_executions)
     for mode, demand in modes.items():
         if mode in energies:
             continue
@@ -138,6 +181,9 @@ def _fit_music(modes: Mapping[int, ModeDemand]) -> dict[int, Numbers]:
             * (demand.base_wake_up_s["music"] / zero.base_wake_up_s["music"])
             * (busy_core_power_w(demand.cpu_hz) / busy_core_power_w(zero.cpu_hz))
         )
+        if not own:
+            energies[mode] = np.asarray(prior)
+            continue
         within = mode in of_claim(WIDE_BUDGET)
         low_j, high_j = (narrow_j, wide_j) if within else (wide_j, float("inf"))
         low = low_j * (1.0 + MARGIN) / demand.adaptive_executions

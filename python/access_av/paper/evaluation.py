@@ -10,8 +10,9 @@ setting is simulated once, on the same seeds as all others.
 
 from __future__ import annotations
 
+import json
 import time
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 from typing import TYPE_CHECKING, Any
 
 import numpy as np
@@ -19,6 +20,7 @@ import polars as pl
 
 from access_av._core import Scenario
 from access_av.errors import InputError
+from access_av.paper import energy_fit
 from access_av.paper.drives import Driven, Driver
 from access_av.paper.energy_fit import NEEDED_MODES, ModeDemand, fit_energy
 from access_av.paper.findings import MissingFigureError, energy_j
@@ -47,11 +49,15 @@ class Setting:
         """The scenario with this method, and with this interval where it is a fixed one."""
         changes: dict[str, Any] = {"vehicle.estimator.method": self.method.replace("_", "-")}
         if not self.adaptive:
-            changes |= {
-                "vehicle.wake_up.policy": "fixed",
-                "vehicle.wake_up.interval_ms": self.base_wake_up_ms,
-            }
+            changes["vehicle.wake_up"] = fixed_interval(scenario, self.base_wake_up_ms)
         return scenario.with_overrides(changes)
+
+
+def fixed_interval(scenario: Scenario, interval_ms: float) -> dict[str, Any]:
+    """Wake-up settings of a fixed interval, on the clock of the scenario's own policy."""
+    wake_up = json.loads(scenario.to_json())["vehicle"]["wake_up"]
+    clock = wake_up.get("due", wake_up).get("serving_ssb", "first-after")
+    return {"policy": "fixed", "interval_ms": interval_ms, "serving_ssb": clock}
 
 
 @dataclass(frozen=True)
@@ -101,6 +107,8 @@ class Evaluation:
         What the claims are judged by.
     refitted
         Whether the energies per execution were fitted to the paper anew, or are the platform's.
+    freedoms
+        What they were fitted by, of :data:`access_av.paper.energy_fit.FREEDOMS`.
     """
 
     reading: Reading
@@ -113,6 +121,7 @@ class Evaluation:
     seed: int
     refitted: bool
     duration_s: float = 0.0
+    freedoms: tuple[str, ...] = energy_fit.SHIPPED
 
     def __repr__(self) -> str:
         return f"Evaluation({self.reading.name}, {self.runs} runs, {self.points.height} points)"
@@ -126,6 +135,17 @@ class Evaluation:
     def longest_gap_s(self) -> float:
         """Longest time between two adaptive estimates, in any mode and run."""
         return max(float(drives.longest_gap_s) for drives in self.outcome.adaptive.values())
+
+    def refit(self, freedoms: Sequence[str]) -> Evaluation:
+        """The same drives, the energies per execution fitted by other freedoms.
+
+        Nothing changes where they are the platform's own. Operating points keep theirs.
+        """
+        if not self.refitted:
+            return self
+        energies_j = fit_energy(demands(self.outcome, self.platform), freedoms)
+        outcome = replace(self.outcome, energy_per_execution_j=energies_j)
+        return replace(self, outcome=outcome, freedoms=tuple(freedoms))
 
     def campaign(self, name: str) -> pl.DataFrame:
         """Operating points of one campaign."""
@@ -201,7 +221,10 @@ def evaluate_with(driver: Driver, reading: Reading) -> Evaluation:
             driven[case.setting] = driver.drive(scenario)
     reference = driven[wanted[0].setting].steps
     outcome, refitted = outcome_of(
-        [(case, driven[case.setting].drives) for case in wanted], platform, driver.trip_s
+        [(case, driven[case.setting].drives) for case in wanted],
+        platform,
+        driver.trip_s,
+        settings=settings_of(reading, platform) | {"runs": driver.runs},
     )
     errors = {setting: as_columns(each.percentiles()) for setting, each in driven.items()}
     return Evaluation(
@@ -232,6 +255,7 @@ def outcome_of(
     trip_s: float,
     *,
     fit_each: bool = False,
+    settings: Mapping[str, float] | None = None,
 ) -> tuple[Outcome, bool]:
     """What the claims are judged by, and whether its energies were fitted anew.
 
@@ -258,8 +282,33 @@ def outcome_of(
             }
             for mode in platform.modes
         }
-    duty = float(paper_numbers()["day"]["duty"])
-    return Outcome(every_ssb, fixed, adaptive, energies_j, trip_s, duty, platform.name), refits
+    outcome = Outcome(
+        every_ssb,
+        fixed,
+        adaptive,
+        energies_j,
+        trip_s,
+        float(paper_numbers()["day"]["duty"]),
+        platform.name,
+        {mode.number: mode.cpu_hz / 1e6 for mode in platform.modes},
+        {mode.number: mode.base_wake_up_ms for mode in platform.modes},
+        {} if settings is None else settings,
+    )
+    return outcome, refits
+
+
+def settings_of(reading: Reading, platform: Platform) -> dict[str, float]:
+    """What a reading is set to where the paper states a setting, by name."""
+    scenario = json.loads(reading.scenario.resolved(platform.core).to_json())
+    vehicle = scenario["vehicle"]
+    controller = vehicle["wake_up"].get("due", vehicle["wake_up"])
+    names = ("kp", "ki", "kd", "weight_snr", "weight_velocity", "t_max_ms")
+    return {
+        "antennas": vehicle["array"]["elements"],
+        "snapshots": vehicle["receiver"]["snapshots"],
+        "ssb_period_ms": scenario["site"]["ssb"]["period_ms"],
+        **{name: controller[name] for name in names if name in controller},
+    }
 
 
 def demands(outcome: Outcome, platform: Platform) -> dict[int, ModeDemand]:

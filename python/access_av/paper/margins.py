@@ -1,7 +1,8 @@
 """By how much a claim is met: the rules of ``paper.toml``.
 
-A margin is relative to what is stated; it is positive where the claim is met, and continuous, so
-that it has an interval and a sensitivity. Obtained values may be arrays over variants.
+A margin is relative to what is stated, unless that is 0; it is positive where the claim is met, and
+continuous, so that it has an interval and a sensitivity. Obtained values may be arrays over
+variants.
 """
 
 from __future__ import annotations
@@ -16,6 +17,10 @@ if TYPE_CHECKING:
     from collections.abc import Callable, Mapping
 
     from access_av.paper.outcome import Numbers
+
+
+# Settings that differ by less are the same.
+ROUNDED = 1e-3
 
 
 def margin(entry: Mapping[str, Any], obtained: Any) -> Numbers:
@@ -60,7 +65,7 @@ def _at_most(stated: float, obtained: Any, _: float) -> Numbers:
 
 def _above(stated: float, obtained: Any, _: float) -> Numbers:
     # The next number below: what equals the bound is not above it.
-    return np.asarray((obtained - np.nextafter(stated, np.inf)) / stated)
+    return np.asarray((obtained - np.nextafter(stated, np.inf)) / (stated or 1.0))
 
 
 def _about(stated: float, obtained: Any, tolerance: float) -> Numbers:
@@ -83,22 +88,34 @@ def _query(entry: Mapping[str, Any], modes: Mapping[int, Mapping[str, Numbers]])
 
 def _modes(entry: Mapping[str, Any], modes: Mapping[int, Mapping[str, Numbers]]) -> Numbers:
     query = entry["query"]
-    within = {
-        number: _least(
-            [
-                _at_most(query["max_energy_j"], each["energy_j"], 0.0),
-                _at_most(query["max_rms_m"], each["rms_m"], 0.0),
-            ]
-        )
-        for number, each in modes.items()
-    }
-    listed = [within[number] for number in entry["stated"]]
-    others = [
-        -np.nextafter(margin, np.inf)
-        for number, margin in within.items()
-        if number not in entry["stated"]
-    ]
-    return _least(listed + others)
+    return _least(
+        [
+            bound(query[key], modes[number][name], 0.0)
+            for number in entry["stated"]
+            for bound, key, name in (
+                (_at_most, "max_energy_j", "energy_j"),
+                (_at_most, "max_rms_m", "rms_m"),
+            )
+        ]
+    )
+
+
+def _both(entry: Mapping[str, Any], obtained: Mapping[str, Numbers]) -> Numbers:
+    stated, tolerance = entry["stated"], float(entry["tolerance"])
+    return _least(
+        [
+            _at_most(stated["worst_m"], obtained["worst_m"], 0.0),
+            _about(stated["saving_percent"], obtained["saving_percent"], tolerance),
+        ]
+    )
+
+
+def _equal(entry: Mapping[str, Any], obtained: Any) -> Numbers:
+    stated = np.asarray(entry["stated"], dtype=np.float64)
+    found = np.asarray(obtained, dtype=np.float64)
+    # The paper prints fewer digits of a clock than the board's makers.
+    alike = found.shape == stated.shape and np.allclose(found, stated, rtol=ROUNDED, atol=0.0)
+    return np.asarray(0.0 if alike else -1.0)
 
 
 RULES: dict[str, Callable[..., Numbers]] = {
@@ -107,4 +124,6 @@ RULES: dict[str, Callable[..., Numbers]] = {
     "about": _each(_about),
     "query": _query,
     "modes": _modes,
+    "both": _both,
+    "equal": _equal,
 }

@@ -6,7 +6,7 @@ its runs (which make intervals), or readings that a search lays side by side. Cl
 
 from __future__ import annotations
 
-from dataclasses import dataclass
+from dataclasses import dataclass, field
 from typing import TYPE_CHECKING, TypeAlias
 
 import numpy as np
@@ -34,6 +34,8 @@ class Drives:
         Longest time between two estimates of any run.
     besides_j
         Energy besides that of the executions, where the platform counts it.
+    worst_of_runs_m
+        The worst error of each single run in x or y, where single runs are known.
     """
 
     executions: Numbers
@@ -43,6 +45,7 @@ class Drives:
     horizontal_m: Numbers
     longest_gap_s: float | Numbers = 0.0
     besides_j: float = 0.0
+    worst_of_runs_m: Numbers | None = None
 
     @property
     def worst_m(self) -> Numbers:
@@ -74,6 +77,7 @@ class Drives:
             worst_y_m=mean_y.max(axis=1).astype(np.float64),
             rms_error_m=np.sqrt(weights @ square_m2),
             horizontal_m=np.hypot(mean_x, mean_y),
+            worst_of_runs_m=size.max(axis=(1, 2)).astype(np.float64),
         )
 
 
@@ -93,6 +97,12 @@ class Outcome:
         By power mode and method; what the platform has no figure for is absent.
     trip_s
         Duration of a trip.
+    cpu_mhz
+        Clock by power mode.
+    base_wake_up_ms
+        By power mode and method.
+    settings
+        What else the reading and the evaluation are set to that the paper states, by name.
     duty
         Share of the day that is driven.
     """
@@ -104,6 +114,9 @@ class Outcome:
     trip_s: float
     duty: float = 1.0
     platform: str = ""
+    cpu_mhz: Mapping[int, float] = field(default_factory=dict)
+    base_wake_up_ms: Mapping[int, Mapping[str, float]] = field(default_factory=dict)
+    settings: Mapping[str, float] = field(default_factory=dict)
 
 
 def resamples(runs: int, count: int, seed: int = 0) -> Numbers:

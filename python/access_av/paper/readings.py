@@ -56,7 +56,8 @@ class Reading:
     @property
     def t_max_s(self) -> float | None:
         """Its t_max; ``None`` where it has no controller."""
-        settings = self.wake_up
+        resolved = self.scenario.resolved()
+        settings = json.loads(resolved.to_json())["vehicle"]["wake_up"]
         t_max_ms = settings.get("due", settings).get("t_max_ms")
         return None if t_max_ms is None else t_max_ms / 1e3
 

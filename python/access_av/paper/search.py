@@ -23,6 +23,8 @@ from access_av.paper.readings import OPEN, Reading
 from access_av.paper.space import (
     CONTROLLER,
     GATE,
+    OPEN_CONTROLLER,
+    OPEN_WORLD,
     SHIPPED_WORLD,
     WORLD,
     Dimension,
@@ -93,7 +95,7 @@ def sample(
     controllers: int,
     runs: int,
     seed: int = 1,
-    gates: bool = False,
+    everything: bool = False,
     progress: Callable[[int, int], None] | None = None,
 ) -> Sample | None:
     """Draw readings, and judge each by the paper's claims.
@@ -106,9 +108,9 @@ def sample(
         How many worlds, and how many controllers in each.
     runs
         Drives per setting.
-    gates
-        Whether a gate is one of the things drawn; without, all is Algorithm 1 as written, and the
-        first world is that of the shipped scenario.
+    everything
+        Whether all that the paper leaves open is drawn, a gate and a real head's power included;
+        without, it is Algorithm 1 without a gate in worlds like the shipped one, which comes first.
     progress
         Called as ``progress(done, total)`` with numbers of worlds.
 
@@ -117,16 +119,17 @@ def sample(
     Sample
         ``None`` where parts are missing that another shard computes.
     """
-    own = (*CONTROLLER, GATE) if gates else CONTROLLER
-    world_points = latin_hypercube(worlds, len(WORLD), seed)
-    if not gates:
+    own = (*OPEN_CONTROLLER, GATE) if everything else CONTROLLER
+    world = OPEN_WORLD if everything else WORLD
+    world_points = latin_hypercube(worlds, len(world), seed)
+    if not everything:
         world_points[0] = SHIPPED_WORLD
     own_points = latin_hypercube(worlds * controllers, len(own), seed + 1)
     own_points = own_points.reshape(worlds, controllers, len(own))
     tasks = [
         _task(
             platform,
-            named(WORLD, world_points[index].tolist()),
+            named(world, world_points[index].tolist()),
             [named(own, point) for point in own_points[index].tolist()],
             runs,
             seed,
@@ -139,7 +142,7 @@ def sample(
         return None
     repeated = np.repeat(world_points, controllers, axis=0)
     return Sample(
-        dimensions=(*WORLD, *own),
+        dimensions=(*world, *own),
         coordinates=np.hstack([repeated, own_points.reshape(-1, len(own))]),
         world=np.repeat(np.arange(worlds), controllers),
         margins={
@@ -196,10 +199,9 @@ def judge(
     """
     platform = Platform(_core.Platform.from_toml(board))
     driver = Driver(platform, runs, seed, threads=1, count=0)
-    paper = Scenario.load("paper").with_overrides(world_changes(world))
-    scenarios = [
-        paper.with_overrides(controller_changes(point, world["eirp_dbm"])) for point in controllers
-    ]
+    clock = {"vehicle.wake_up.due.serving_ssb": world.get("serving_ssb", "first-after")}
+    paper = Scenario.load("paper").with_overrides(world_changes(world) | clock)
+    scenarios = [paper.with_overrides(controller_changes(point, world)) for point in controllers]
     drives: list[tuple[Case, Drives]] = []
     for case in cases(platform):
         if case.setting.adaptive and case.mode is not None:
@@ -248,7 +250,7 @@ def as_toml(values: Mapping[str, Any], name: str = "found") -> str:
     """What was drawn, as a file of a reading: laid over the paper's scenario."""
     [head] = json.loads(Scenario.load("paper").to_json())["site"]["radio_heads"]
     tables: dict[str, dict[str, Any]] = {"site": {}, "site.radio_heads": {}, "vehicle": {}}
-    changes = world_changes(values) | controller_changes(values, values["eirp_dbm"])
+    changes = world_changes(values) | controller_changes(values, values)
     for path, value in changes.items():
         table, _, key = path.rpartition(".")
         if isinstance(value, dict):

@@ -7,16 +7,20 @@ adaptive MUSIC does in it. Points are coordinates from 0 to 1.
 
 from __future__ import annotations
 
+import math
 from dataclasses import dataclass
 from typing import TYPE_CHECKING, Any
 
 import numpy as np
+
+from access_av.paper.statements import paper_numbers
 
 if TYPE_CHECKING:
     from collections.abc import Mapping, Sequence
 
     from access_av.paper.outcome import Numbers
 
+WEIGHT_VELOCITY = float(paper_numbers()["wake_up"]["weight_velocity"])
 # SNR in the middle of the track at the shipped radiated power, in dB.
 MIDDLE_SNR_DB, SHIPPED_EIRP_DBM = 5.0, -17.3
 
@@ -70,6 +74,16 @@ WORLD = (
     Dimension("heading", "heading between estimates", choices=("held", "mean")),
     Dimension("snapshots", "snapshots", 10.0, 40.0),
 )
+# What is drawn beside them where it is asked on what the claims hang: also a real head's power.
+OPEN_WORLD = (
+    Dimension("eirp_dbm", "radiated power / dBm", -23.3, 10.0),
+    *WORLD[1:],
+    Dimension("axis", "array's axis", choices=("along", "across")),
+    Dimension("odometer", "odometer", choices=("exact", "real")),
+    Dimension("grid_deg", "MUSIC's grid / degrees", choices=("none", "0.5", "1")),
+    # The clock of fixed intervals too.
+    Dimension("serving_ssb", "between two SSBs", choices=("first-after", "last-before")),
+)
 # The world of the shipped scenario, up to its shadowing, which lasts for less than the range does.
 SHIPPED_WORLD = (0.5, 0.875, 0.25, 0.0, 0.75, 1.0 / 3.0)
 CONTROLLER = (
@@ -82,12 +96,16 @@ CONTROLLER = (
     Dimension("delta_t", "unit of Δt", choices=("seconds", "steps")),
     Dimension("sensing", "computed at", choices=("every-ssb", "wake-up")),
 )
+OPEN_CONTROLLER = (
+    *CONTROLLER,
+    Dimension("velocity", "velocity error counts", 0.0, 2.0),
+)
 GATE = Dimension("gate", "gate", choices=("none", "within t_max", "without bound"))
 
 
 def world_changes(point: Mapping[str, Any]) -> dict[str, Any]:
-    """What a point of :data:`WORLD` changes of the paper's scenario, by dotted paths."""
-    return {
+    """What a point of :data:`WORLD` or :data:`OPEN_WORLD` changes, by dotted paths."""
+    changes = {
         "site.radio_heads[0].eirp_dbm": point["eirp_dbm"],
         "site.rician_k_db": point["rician_k_db"],
         "channel.scatter": point["scatter"],
@@ -95,13 +113,23 @@ def world_changes(point: Mapping[str, Any]) -> dict[str, Any]:
         "vehicle.localizer.heading_between": point["heading"],
         "vehicle.receiver.snapshots": round(point["snapshots"]),
     }
+    if point.get("axis") == "across":
+        # To the right, where its ends are as far from the radio head as they can be.
+        changes["vehicle.array.mounting_rad"] = -0.5 * math.pi
+    if point.get("odometer") == "real":
+        changes["vehicle.odometer.scale_std"] = 0.003
+        changes["vehicle.odometer.noise_m_per_sqrt_m"] = 0.01
+    if point.get("grid_deg", "none") != "none":
+        changes["vehicle.estimator.music_grid_deg"] = float(point["grid_deg"])
+    return changes
 
 
-def controller_changes(point: Mapping[str, Any], eirp_dbm: float) -> dict[str, Any]:
-    """What a point of :data:`CONTROLLER`, and a gate, change in a world of this radiated power.
+def controller_changes(point: Mapping[str, Any], world: Mapping[str, Any]) -> dict[str, Any]:
+    """What a point of :data:`CONTROLLER`, and a gate, change in a world.
 
     What the vehicle believes of its link budget departs from the truth, not the other way round.
     """
+    eirp_dbm = world["eirp_dbm"]
     if point["set_point"] == "expected":
         set_point = {"kind": "expected", "offset_db": point["offset_db"]}
     else:
@@ -115,6 +143,8 @@ def controller_changes(point: Mapping[str, Any], eirp_dbm: float) -> dict[str, A
         "u_unit_ms": point["u_unit_ms"],
         "delta_t": point["delta_t"],
         "sensing": point["sensing"],
+        "serving_ssb": world.get("serving_ssb", "first-after"),
+        "weight_velocity": WEIGHT_VELOCITY * point.get("velocity", 1.0),
     }
     gate = point.get("gate", "none")
     bound = {"latest_ms": 240.0} if gate == "within t_max" else {}

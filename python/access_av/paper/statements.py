@@ -32,3 +32,14 @@ def of_claim(claim_id: str, key: str = "stated") -> Any:
     43.09
     """
     return stated_claims()[claim_id][key]
+
+
+def half(name: str) -> tuple[str, ...]:
+    """Ids of the claims that are a half of the paper's promise, ``accuracy`` or ``energy``.
+
+    Examples
+    --------
+    >>> half("accuracy")
+    ('a1_adaptive_worst_m', 'a2_adaptive_beats_fixed')
+    """
+    return tuple(key for key, entry in stated_claims().items() if entry.get("half") == name)

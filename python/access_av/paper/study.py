@@ -3,14 +3,15 @@
 from __future__ import annotations
 
 import time
-from dataclasses import asdict, dataclass
+from dataclasses import asdict, dataclass, field
 from typing import TYPE_CHECKING, Any
 
 import polars as pl
 
 from access_av._core import SettingsError
 from access_av.errors import InputError
-from access_av.paper import ablation, ours
+from access_av.paper import ablation, freedoms, ours
+from access_av.paper import chosen as chosen_otherwise
 from access_av.paper.claims import Claim, check_claims, with_seeds
 from access_av.paper.drives import Driver
 from access_av.paper.energy_fit import fit_energy
@@ -24,6 +25,7 @@ if TYPE_CHECKING:
     from collections.abc import Callable, Mapping, Sequence
 
     from access_av.campaign import Campaign
+    from access_av.paper.ours import Fair
     from access_av.paper.outcome import Drives
     from access_av.paper.readings import Reading
 
@@ -52,6 +54,12 @@ class Study:
         On what the claims hang, where asked for.
     unusable
         Readings that could not be evaluated, and why.
+    bought
+        What each freedom of the energy fit buys.
+    fair
+        The shipped reading and ours told the same, in mode 0.
+    effects
+        What each thing that was chosen does when it is chosen otherwise.
     """
 
     evaluations: list[Evaluation]
@@ -62,6 +70,9 @@ class Study:
     unknowns: Unknowns | None
     unusable: Mapping[str, str]
     duration_s: float
+    bought: list[freedoms.Bought] = field(default_factory=list)
+    fair: list[Fair] = field(default_factory=list)
+    effects: list[chosen_otherwise.Effect] = field(default_factory=list)
 
     @property
     def shown(self) -> Evaluation:
@@ -101,7 +112,12 @@ class Study:
             "ablations": pl.DataFrame([asdict(each) for each in self.ablations]),
             "fixed_front": pl.DataFrame(front),
             "ours": pl.DataFrame([asdict(each) for each in self.ours]),
+            "fair": pl.DataFrame([each.as_row() for each in self.fair]),
         }
+        if self.bought:
+            tables["freedoms"] = pl.DataFrame([each.as_row() for each in self.bought])
+        if self.effects:
+            tables["chosen"] = pl.DataFrame([asdict(each) for each in self.effects])
         if self.unknowns is not None:
             tables["unknowns"] = pl.DataFrame([asdict(each) for each in self.unknowns.indices])
         return tables
@@ -126,8 +142,8 @@ def study(
     seeds
         With how many seeds the claims are judged, from ``seed`` on; all else is of it alone.
     unknowns
-        Who draws a sample of what the paper leaves open, and where it is kept; none is drawn
-        without.
+        Who draws a sample of what the paper leaves open, and where it is kept; without, none is
+        drawn, and nothing that was chosen is changed.
     stated
         Claims as ``paper.toml`` has them; its own when ``None``.
 
@@ -158,7 +174,7 @@ def study(
             controllers=controllers,
             runs=drives,
             seed=seed,
-            gates=True,
+            everything=True,
             progress=progress,
         )
         hangs_on = None if drawn is None else sobol(drawn, drives)
@@ -177,11 +193,15 @@ def study(
         duration_s=0.0,
     )
     shown = made.shown
+    of_shown = shown.reading.name
     return Study(
         **{
             **vars(made),
             "front": ablation.front(driver, shown.reading),
             "ours": ours.compare(driver, shown),
+            "fair": ours.fair(driver, shown),
+            "effects": [] if unknowns is None else chosen_otherwise.effects(driver),
+            "bought": freedoms.ladder(evaluations, made.claims, of_shown, stated),
             "duration_s": time.monotonic() - started,
         }
     )
@@ -198,6 +218,7 @@ def judged(
             each.outcome,
             reading=each.reading.name,
             chosen=each.reading.chosen,
+            freedoms=each.freedoms,
             stated=stated,
         )
     ]

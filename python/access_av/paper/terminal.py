@@ -14,6 +14,7 @@ from access_av.terminal import console, is_narrow, table
 if TYPE_CHECKING:
     from collections.abc import Sequence
 
+    from access_av.paper.chosen import Effect
     from access_av.paper.claims import Claim
     from access_av.paper.evaluation import Evaluation
     from access_av.paper.search import Confirmed, Sample
@@ -23,7 +24,7 @@ if TYPE_CHECKING:
 
 def mark(claim: Claim) -> str:
     """A verdict in two signs: met or not, and whether it turns with the seed."""
-    sign = "–" if claim.verdict == NOT_JUDGED else "✓" if claim.reproduced else "✗"
+    sign = "–" if not claim.is_judged else "✓" if claim.reproduced else "✗"
     return sign + ((claim.seeds_met or "?") if claim.turns_with_seed else "")
 
 
@@ -31,10 +32,12 @@ def show_study(study: Study) -> None:
     """Claims by readings, the shown reading's modes, what it comes to."""
     show_evaluation(study.shown)
     _show_claims(study)
+    _show_freedoms(study)
     console.print(f"{summary.headline(study)}.", style="bold")
     console.print(summary.lead(study))
     shown = study.of(study.shown.reading.name)
     console.print(f"Claims met under “{study.shown.reading.title}”: {summary.counts_text(shown)}.")
+    console.print(summary.fair_text(study))
     console.print(summary.ours_text(study))
     if seeds := summary.seeds_text(study):
         console.print(seeds)
@@ -88,6 +91,48 @@ def _show_claims(study: Study) -> None:
         matrix.add_row(name, *map(mark, claims))
     console.print(matrix)
     console.print(", ".join(f"{i} {name}" for i, name in enumerate(columns, start=1)))
+
+
+def _show_freedoms(study: Study) -> None:
+    """What each freedom of the energy fit buys."""
+    if not study.bought:
+        return
+    made = table(
+        ["free in the energy fit", "numbers / solved", "claims met", "saving %", "both halves"],
+        title=f"What each freedom buys, claims under {study.shown.reading.name}",
+        text=1,
+    )
+    for index, each in enumerate(study.bought):
+        saving = each.average_saving_percent
+        made.add_row(
+            ("and " if index else "") + each.says + (" *" if each.is_shipped else ""),
+            f"{each.free} / {each.solved}",
+            f"{each.met} ({each.by_construction} by construction)",
+            "–" if saving is None else f"{saving:.1f}",
+            ", ".join(each.both) or "none",
+        )
+    console.print(made)
+    console.print("* claims are judged by this one")
+
+
+def show_chosen(effects: Sequence[Effect], runs: int) -> None:
+    """What the paper leaves open, what was chosen, and what another value does."""
+    made = table(
+        ["open", "chosen", "executions", "worst m", "RMS m", "80 ms: RMS", "every SSB: RMS"],
+        title=f"One thing at a time, mode 0 of the shipped reading, {runs} runs",
+        text=2,
+    )
+    for each in effects:
+        made.add_row(
+            each.what if each.is_shipped else "",
+            each.value if each.is_shipped else f"instead {each.value}",
+            f"{each.executions:.0f}",
+            f"{each.worst_error_m:.2f}",
+            f"{each.rms_error_m:.3f} ± {each.rms_std_m:.3f}",
+            f"{each.fixed_rms_m:.3f}",
+            f"{each.every_ssb_rms_m:.3f}",
+        )
+    console.print(made)
 
 
 def _show_unknowns(found: Unknowns) -> None:

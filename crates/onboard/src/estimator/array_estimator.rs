@@ -1,5 +1,7 @@
 //! The estimators of the `aoa` crate, for the vehicle's array.
 
+use std::f64::consts::{PI, TAU};
+
 use aoa::{Array, Covariance, DirectionFinder, Method, Reason, Verdict};
 
 use super::angle_estimator::{AngleEstimator, EstimatedAngle};
@@ -16,6 +18,19 @@ use crate::settings::{EstimatorMethod, Vehicle};
 pub struct ArrayEstimator<const N: usize> {
     array: Array<N>,
     method: Method,
+    grid_rad: Option<f64>,
+}
+
+impl<const N: usize> ArrayEstimator<N> {
+    /// The electrical angle of the nearest point of the grid, if there is one.
+    fn on_grid(&self, phase_rad: f64) -> f64 {
+        let Some(step_rad) = self.grid_rad else {
+            return phase_rad;
+        };
+        let turn = TAU * self.array.spacing_wavelengths();
+        let angle_rad = (phase_rad / turn).clamp(-1.0, 1.0).acos();
+        turn * ((angle_rad / step_rad).round() * step_rad).min(PI).cos()
+    }
 }
 
 /// Maximum likelihood in azimuth and elevation on `N` antennas that are not in a row.
@@ -34,10 +49,14 @@ pub fn built_in(vehicle: &Vehicle) -> Result<Box<dyn AngleEstimator>, aoa::Error
         EstimatorMethod::MaximumLikelihood => Method::MaximumLikelihood,
     };
     let spacing = vehicle.array.spacing_wavelengths;
+    let grid_rad = (vehicle.estimator.music_grid_deg)
+        .filter(|_| method == Method::Music)
+        .map(f64::to_radians);
     for_elements!(vehicle.array.elements, N => Ok(match vehicle.array.manifold::<N>()? {
         None => Box::new(ArrayEstimator::<N> {
             array: Array::new(spacing)?,
             method,
+            grid_rad,
         }),
         Some(manifold) => Box::new(AzimuthEstimator(manifold.finder()?)),
     }))
@@ -56,7 +75,7 @@ impl<const N: usize> AngleEstimator for ArrayEstimator<N> {
                 .and_then(|covariance| aoa::estimate(self.method, &covariance, &self.array))
         };
         Ok(estimate.ok().map(|estimate| EstimatedAngle::Angle {
-            phase_rad: estimate.phase_rad,
+            phase_rad: self.on_grid(estimate.phase_rad),
             phase_sigma_rad: Some(estimate.phase_sigma_rad),
             snr_db: Some(estimate.snr_db),
             resolved: estimate.is_resolved(),

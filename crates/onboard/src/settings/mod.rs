@@ -50,6 +50,6 @@ pub use start::StartSettings;
 pub use toml_file::{Library, NamedText, TomlFile};
 pub use vehicle::{PlatformSettings, Vehicle, check_together};
 pub use wake_up::{
-    DeltaT, DueSettings, FixedSettings, GatedSettings, PidSettings, SensingMode, SnrSetPoint,
-    UncertaintySettings, WakeUpSettings,
+    DeltaT, DueSettings, FixedSettings, GatedSettings, PidSettings, SensingMode, ServingSsb,
+    SnrSetPoint, UncertaintySettings, WakeUpSettings,
 };

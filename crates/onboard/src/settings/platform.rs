@@ -137,11 +137,12 @@ impl Platform {
                 mode.base_wake_up_ms.keys().chain(cycles).collect();
             let known: Vec<String> = known.iter().map(ToString::to_string).collect();
             let allowed = format!(
-                "mode {} of `{}` has a base wake-up time for {} only; set `wake_up.base_ms` or \
-                 `wake_up.interval_ms`",
+                "mode {} of `{}` has a base wake-up time, what an estimate takes there, for {} \
+                 only; choose one of them, or state it yourself: `{}`",
                 mode.mode,
                 self.name,
-                known.join(", ")
+                known.join(", "),
+                vehicle.wake_up_policy().base_key(),
             );
             let file = &vehicle.name;
             Check { file }.error("estimator.method", method, &allowed)
@@ -289,6 +290,7 @@ mod tests {
         vehicle.estimator.method = EstimatorMethod::MaximumLikelihood;
         let message = xavier.base_wake_up_s(&vehicle).unwrap_err().to_string();
         assert!(message.contains("root-music"), "{message}");
+        assert!(message.contains("`wake_up.due.base_ms`"), "{message}");
     }
 
     #[test]

@@ -121,11 +121,16 @@ impl Pilots {
 }
 
 /// `[estimator]`
-#[derive(Debug, Clone, Copy, PartialEq, Eq, Default, Serialize, Deserialize, JsonSchema)]
+#[derive(Debug, Clone, Copy, PartialEq, Default, Serialize, Deserialize, JsonSchema)]
 #[serde(default, deny_unknown_fields)]
 pub struct EstimatorSettings {
     /// The method.
     pub method: EstimatorMethod,
+    /// MUSIC's angles are those of a grid from the array's axis on, so many degrees apart; without it
+    /// its maximum is refined.
+    #[serde(skip_serializing_if = "Option::is_none")]
+    #[schemars(range(min = 0.01, max = 10.0))]
+    pub music_grid_deg: Option<f64>,
 }
 
 impl fmt::Display for EstimatorMethod {

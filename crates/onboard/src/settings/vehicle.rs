@@ -202,7 +202,7 @@ impl TomlFile for Vehicle {
         if let Some(integrity) = &self.integrity {
             integrity.check(check)?;
         }
-        self.wake_up_policy().check(check)
+        self.wake_up_policy().check(self.top_speed_mps(), check)
     }
 }
 

@@ -24,6 +24,7 @@ impl WakeUpSettings {
     /// At every SSB: none comes more often than that.
     pub const EVERY_SSB: Self = Self::Fixed(FixedSettings {
         interval_ms: Some(1.0),
+        serving_ssb: ServingSsb::FirstAfter,
     });
 }
 
@@ -35,6 +36,35 @@ pub struct FixedSettings {
     #[serde(skip_serializing_if = "Option::is_none")]
     #[schemars(range(min = 0.1, max = 3.6e6))]
     pub interval_ms: Option<f64>,
+    /// Which SSB serves an estimate that falls due between two.
+    #[serde(skip_serializing_if = "ServingSsb::is_first_after")]
+    pub serving_ssb: ServingSsb,
+}
+
+/// Which SSB serves an estimate that falls due, so long after the last one, between two SSBs.
+#[derive(Debug, Clone, Copy, PartialEq, Eq, Default, Serialize, Deserialize, JsonSchema)]
+#[serde(rename_all = "kebab-case")]
+pub enum ServingSsb {
+    /// The first at or after that: never sooner than the wake-up time, up to an SSB period later.
+    #[default]
+    FirstAfter,
+    /// The last at or before it: never later, up to an SSB period sooner.
+    LastBefore,
+}
+
+impl ServingSsb {
+    #[allow(clippy::trivially_copy_pass_by_ref)] // as serde calls it
+    const fn is_first_after(&self) -> bool {
+        matches!(self, Self::FirstAfter)
+    }
+
+    /// How much sooner than the wake-up time an SSB serves it, below this, in seconds.
+    pub const fn lead_s(self, period_s: f64) -> f64 {
+        match self {
+            Self::FirstAfter => 0.0,
+            Self::LastBefore => period_s,
+        }
+    }
 }
 
 /// `policy = "pid"`: Algorithm 1 and the choices it leaves open.
@@ -45,9 +75,17 @@ pub struct PidSettings {
     #[serde(skip_serializing_if = "Option::is_none")]
     #[schemars(range(min = 0.1, max = 3.6e6))]
     pub base_ms: Option<f64>,
-    /// Longest wake-up time in ms.
+    /// Longest wake-up time in ms; without it, the time in which the vehicle covers
+    /// `position_uncertainty_m` at its top speed.
+    #[serde(skip_serializing_if = "Option::is_none")]
     #[schemars(range(min = 0.1, max = 3.6e6))]
-    pub t_max_ms: f64,
+    pub t_max_ms: Option<f64>,
+    /// Bound on the position uncertainty between two estimates in metres, the paper's x̃_max.
+    #[schemars(range(min = 1e-3, max = 1e4))]
+    pub position_uncertainty_m: f64,
+    /// Which SSB serves an estimate that falls due between two.
+    #[serde(skip_serializing_if = "ServingSsb::is_first_after")]
+    pub serving_ssb: ServingSsb,
     /// Proportional gain.
     #[schemars(range(min = 0.0, max = 1e3))]
     pub kp: f64,
@@ -84,7 +122,9 @@ impl Default for PidSettings {
     fn default() -> Self {
         Self {
             base_ms: None,
-            t_max_ms: 240.0,
+            t_max_ms: None,
+            position_uncertainty_m: 1.0,
+            serving_ssb: ServingSsb::FirstAfter,
             kp: 0.75,
             ki: 0.08,
             kd: 0.195,
@@ -97,6 +137,43 @@ impl Default for PidSettings {
             u_unit_ms: 1000.0,
             integral_clamp: 0.5,
         }
+    }
+}
+
+impl PidSettings {
+    /// Longest wake-up time in seconds: x̃_max = v · t_max, unless it is stated.
+    pub fn t_max_s(&self, top_speed_mps: f64) -> f64 {
+        let stated_s = self.t_max_ms.map(|ms| ms * 1e-3);
+        stated_s.unwrap_or(self.position_uncertainty_m / top_speed_mps)
+    }
+
+    /// Refuses a longest wake-up time below the shortest, which `base` names.
+    ///
+    /// # Errors
+    /// [`SettingsError::Value`] at the key of `place` that states the longest.
+    pub fn check_t_max(
+        &self,
+        base_s: f64,
+        base: &str,
+        top_speed_mps: f64,
+        place: &str,
+        check: Check<'_>,
+    ) -> Result<(), SettingsError> {
+        let (t_max_s, base_ms) = (self.t_max_s(top_speed_mps), base_s * 1e3);
+        let (key, value, what) = match self.t_max_ms {
+            Some(t_max_ms) => ("t_max_ms", t_max_ms, "it".to_owned()),
+            None => (
+                "position_uncertainty_m",
+                self.position_uncertainty_m,
+                format!(
+                    "at the top speed that is a t_max of {:.1} ms, which",
+                    t_max_s * 1e3
+                ),
+            ),
+        };
+        let allowed = format!("{what} must not be below {base}, {base_ms} ms");
+        let key = format!("{place}.{key}");
+        check.that(t_max_s >= base_s - 1e-9, &key, value, &allowed)
     }
 }
 
@@ -226,6 +303,31 @@ impl Default for UncertaintySettings {
 }
 
 impl WakeUpSettings {
+    /// The settings of Algorithm 1, where it is what makes an estimate due.
+    pub const fn pid_mut(&mut self) -> Option<&mut PidSettings> {
+        match self {
+            Self::Pid(pid)
+            | Self::Gated(GatedSettings {
+                due: DueSettings::Pid(pid),
+                ..
+            }) => Some(pid),
+            Self::Fixed(_) | Self::Gated(_) | Self::Uncertainty(_) => None,
+        }
+    }
+
+    /// The key of the wake-up time that may be left to the platform.
+    pub(super) const fn base_key(&self) -> &'static str {
+        match self {
+            Self::Fixed(_) => "wake_up.interval_ms",
+            Self::Pid(_) | Self::Uncertainty(_) => "wake_up.base_ms",
+            Self::Gated(GatedSettings {
+                due: DueSettings::Fixed(_),
+                ..
+            }) => "wake_up.due.interval_ms",
+            Self::Gated(_) => "wake_up.due.base_ms",
+        }
+    }
+
     /// The wake-up time that a vehicle's settings may leave to its platform, if there is one.
     pub(super) const fn base_ms(&mut self) -> Option<&mut Option<f64>> {
         match self {
@@ -239,15 +341,13 @@ impl WakeUpSettings {
         }
     }
 
-    pub(super) fn check(&self, check: Check<'_>) -> Result<(), SettingsError> {
-        let not_below = |key: &str, longest_ms: f64, base_ms: Option<f64>, base: &str| {
-            let base_ms = base_ms.unwrap_or(0.0);
-            let allowed = format!("it must not be below {base}, {base_ms}");
-            check.that(longest_ms >= base_ms, key, longest_ms, &allowed)
-        };
+    pub(super) fn check(&self, top_speed_mps: f64, check: Check<'_>) -> Result<(), SettingsError> {
         let t_max = |pid: &PidSettings, place: &str| {
-            let (key, base) = (format!("{place}.t_max_ms"), format!("{place}.base_ms"));
-            not_below(&key, pid.t_max_ms, pid.base_ms, &base)
+            let (base_s, base) = (
+                pid.base_ms.unwrap_or(0.0) * 1e-3,
+                format!("{place}.base_ms"),
+            );
+            pid.check_t_max(base_s, &base, top_speed_mps, place, check)
         };
         match self {
             Self::Pid(pid) => t_max(pid, "wake_up"),
@@ -259,8 +359,15 @@ impl WakeUpSettings {
                         (pid.base_ms, "wake_up.due.base_ms")
                     }
                 };
+                let base_ms = base_ms.unwrap_or(0.0);
                 let latest_ms = gated.latest_ms.unwrap_or(f64::INFINITY);
-                not_below("wake_up.latest_ms", latest_ms, base_ms, base)
+                let allowed = format!("it must not be below {base}, {base_ms}");
+                check.that(
+                    latest_ms >= base_ms,
+                    "wake_up.latest_ms",
+                    latest_ms,
+                    &allowed,
+                )
             }
             Self::Fixed(_) | Self::Uncertainty(_) => Ok(()),
         }

@@ -9,12 +9,15 @@ use super::policy::WakeUpPolicy;
 use super::uncertainty::UncertaintyDriven;
 use crate::energy::EnergyModel;
 use crate::settings::{
-    Check, DueSettings, Extent, PidSettings, Platform, SettingsError, Site, UncertaintySettings,
-    Vehicle, WakeUpSettings,
+    Check, DueSettings, Extent, FixedSettings, PidSettings, Platform, SettingsError, Site,
+    UncertaintySettings, Vehicle, WakeUpSettings,
 };
 
 /// Energy of a wake-up before its first angle, in executions, where no platform knows.
 const UNKNOWN_WAKE_UP_COST: f64 = 0.5;
+
+/// What a shortest wake-up time is called that the platform has.
+const BASE: &str = "the base wake-up time";
 
 /// The policy of a vehicle at a site, base wake-up times being the platform's where the settings
 /// leave them to it.
@@ -30,33 +33,36 @@ pub fn built_in(
         Some(explicit_ms) => Ok(explicit_ms * 1e-3),
         None => platform.base_wake_up_s(vehicle),
     };
-    let controlled = |settings: &PidSettings, key: &str| {
+    let top_speed_mps = vehicle.top_speed_mps();
+    let period_s = site.ssb.period_ms * 1e-3;
+    let controlled = |settings: &PidSettings, place: &str| {
         let base_s = interval_s(settings.base_ms)?;
-        not_before(base_s, settings.t_max_ms, key, vehicle)?;
-        let controller = Controller::new(settings, base_s, vehicle.top_speed_mps());
-        Ok(Due::controlled(controller, settings.sensing))
+        let file = &vehicle.name;
+        settings.check_t_max(base_s, BASE, top_speed_mps, place, Check { file })?;
+        let controller = Controller::new(settings, base_s, top_speed_mps);
+        let lead_s = settings.serving_ssb.lead_s(period_s);
+        Ok(Due::controlled(controller, settings.sensing, lead_s))
+    };
+    let constant = |settings: &FixedSettings| {
+        let lead_s = settings.serving_ssb.lead_s(period_s);
+        Ok(Due::constant(interval_s(settings.interval_ms)?, lead_s))
     };
     Ok(match vehicle.wake_up_policy() {
-        WakeUpSettings::Fixed(settings) => {
-            Box::new(FixedInterval::new(interval_s(settings.interval_ms)?))
-        }
-        WakeUpSettings::Pid(settings) => {
-            Box::new(Adaptive::new(controlled(&settings, "wake_up.t_max_ms")?))
-        }
+        WakeUpSettings::Fixed(settings) => Box::new(FixedInterval::new(constant(&settings)?)),
+        WakeUpSettings::Pid(settings) => Box::new(Adaptive::new(controlled(&settings, "wake_up")?)),
         WakeUpSettings::Gated(settings) => {
             let (due, shortest_s) = match settings.due {
-                DueSettings::Fixed(due) => {
-                    let shortest_s = interval_s(due.interval_ms)?;
-                    (Due::constant(shortest_s), shortest_s)
-                }
+                DueSettings::Fixed(due) => (constant(&due)?, interval_s(due.interval_ms)?),
                 DueSettings::Pid(due) => {
-                    let shortest_s = interval_s(due.base_ms)?;
-                    (controlled(&due, "wake_up.due.t_max_ms")?, shortest_s)
+                    (controlled(&due, "wake_up.due")?, interval_s(due.base_ms)?)
                 }
             };
             let latest_s = match settings.latest_ms {
                 Some(latest_ms) => {
-                    not_before(shortest_s, latest_ms, "wake_up.latest_ms", vehicle)?;
+                    let (file, base_ms) = (&vehicle.name, shortest_s * 1e3);
+                    let allowed = format!("it must not be below {BASE}, {base_ms} ms");
+                    let good = latest_ms >= base_ms - 1e-9;
+                    Check { file }.that(good, "wake_up.latest_ms", latest_ms, &allowed)?;
                     latest_ms * 1e-3
                 }
                 None => f64::INFINITY,
@@ -76,8 +82,16 @@ pub fn built_in(
 /// As [`built_in`].
 pub fn resolve(vehicle: &Vehicle, platform: &Platform) -> Result<Vehicle, SettingsError> {
     let mut resolved = platform.resolve(vehicle)?;
-    if let Some(WakeUpSettings::Uncertainty(settings)) = &mut resolved.wake_up {
-        settings.wake_up_cost = Some(wake_up_cost(settings, vehicle, platform)?);
+    match &mut resolved.wake_up {
+        Some(WakeUpSettings::Uncertainty(settings)) => {
+            settings.wake_up_cost = Some(wake_up_cost(settings, vehicle, platform)?);
+        }
+        Some(policy) => {
+            if let Some(pid) = policy.pid_mut() {
+                pid.t_max_ms = Some(pid.t_max_s(vehicle.top_speed_mps()) * 1e3);
+            }
+        }
+        None => {}
     }
     Ok(resolved)
 }
@@ -94,17 +108,4 @@ fn wake_up_cost(
     let model = EnergyModel::new(vehicle, platform, Extent::Value)?;
     let known = model.and_then(|model| model.listening_in_executions());
     Ok(known.unwrap_or(UNKNOWN_WAKE_UP_COST))
-}
-
-/// Refuses a longest wake-up time below the shortest.
-fn not_before(
-    base_s: f64,
-    longest_ms: f64,
-    key: &str,
-    vehicle: &Vehicle,
-) -> Result<(), SettingsError> {
-    let file = &vehicle.name;
-    let base_ms = base_s * 1e3;
-    let allowed = format!("it must not be below the base wake-up time, {base_ms} ms");
-    Check { file }.that(longest_ms >= base_ms - 1e-9, key, longest_ms, &allowed)
 }

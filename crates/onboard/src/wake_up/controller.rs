@@ -23,7 +23,7 @@ impl Controller {
     /// Algorithm 1 from the base wake-up time on.
     pub fn new(settings: &PidSettings, base_s: f64, top_speed_mps: f64) -> Self {
         Self {
-            pid: Pid::new(settings, base_s),
+            pid: Pid::new(settings, base_s, settings.t_max_s(top_speed_mps)),
             set_point: settings.snr_set_point,
             snr_scale_db: settings.snr_scale_db,
             top_speed_mps,

@@ -7,32 +7,37 @@ use crate::observation::SensedSsb;
 use crate::radio_head::RadioHead;
 use crate::settings::SensingMode;
 
-/// So long after the last estimate as Algorithm 1, or a constant, says.
+/// So long after the last estimate as Algorithm 1, or a constant, says: the one clock of all policies
+/// that go by a wake-up time.
 #[derive(Debug)]
 pub struct Due {
     controller: Option<Controller>,
     sensing: SensingMode,
     wake_up_time_s: f64,
+    /// How much sooner an SSB serves it, below this.
+    lead_s: f64,
     last_estimate_s: Option<f64>,
 }
 
 impl Due {
-    /// A constant wake-up time.
-    pub const fn constant(wake_up_time_s: f64) -> Self {
+    /// A constant wake-up time; see [`ServingSsb`](crate::settings::ServingSsb) for `lead_s`.
+    pub const fn constant(wake_up_time_s: f64, lead_s: f64) -> Self {
         Self {
             controller: None,
             sensing: SensingMode::WakeUp,
             wake_up_time_s,
+            lead_s,
             last_estimate_s: None,
         }
     }
 
     /// What a controller says of the SSBs that are sensed.
-    pub const fn controlled(controller: Controller, sensing: SensingMode) -> Self {
+    pub const fn controlled(controller: Controller, sensing: SensingMode, lead_s: f64) -> Self {
         Self {
             controller: Some(controller),
             sensing,
             wake_up_time_s: 0.0,
+            lead_s,
             last_estimate_s: None,
         }
     }
@@ -81,8 +86,20 @@ impl Due {
             .is_none_or(|last_s| time_s - last_s + SAME_TIME_S >= interval_s)
     }
 
-    fn is_due(&self, time_s: f64) -> bool {
-        self.has_passed(time_s, self.wake_up_time_s)
+    /// Whether an estimate is due at the SSB at `time_s`.
+    pub fn is_due(&self, time_s: f64) -> bool {
+        if self.lead_s > 0.0 {
+            // The SSB after it would come after the wake-up time.
+            let last_s = self.last_estimate_s.unwrap_or(f64::NEG_INFINITY);
+            time_s - last_s + self.lead_s - SAME_TIME_S > self.wake_up_time_s
+        } else {
+            self.has_passed(time_s, self.wake_up_time_s)
+        }
+    }
+
+    /// When the last angle was estimated, in seconds.
+    pub const fn last_estimate_s(&self) -> Option<f64> {
+        self.last_estimate_s
     }
 }
 
@@ -92,7 +109,7 @@ mod tests {
 
     #[test]
     fn a_constant_time_passes_from_the_last_estimate_on() {
-        let mut due = Due::constant(0.08);
+        let mut due = Due::constant(0.08, 0.0);
         assert!(due.listens(0.0), "there was no estimate yet");
         due.estimated(0.02);
         assert!(!due.listens(0.08) && due.listens(0.1));
@@ -100,9 +117,26 @@ mod tests {
     }
 
     #[test]
+    fn the_last_ssb_before_a_wake_up_time_serves_it_where_asked() {
+        for (wake_up_time_s, served_s) in [(0.065, 0.06), (0.08, 0.08), (0.15, 0.14), (0.01, 0.02)]
+        {
+            let mut due = Due::constant(wake_up_time_s, 0.02);
+            due.estimated(0.0);
+            let first = (1..20)
+                .map(|k| f64::from(k) * 0.02)
+                .find(|&t| due.is_due(t));
+            assert_eq!(first, Some(served_s));
+        }
+    }
+
+    #[test]
     fn a_controller_that_senses_every_ssb_keeps_the_receiver_on() {
         let settings = crate::settings::PidSettings::default();
-        let mut due = Due::controlled(Controller::new(&settings, 0.08, 4.0), SensingMode::EverySsb);
+        let mut due = Due::controlled(
+            Controller::new(&settings, 0.08, 4.0),
+            SensingMode::EverySsb,
+            0.0,
+        );
         due.estimated(1.0);
         assert!(due.listens(1.02));
     }

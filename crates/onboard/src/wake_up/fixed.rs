@@ -1,6 +1,7 @@
 //! Wake-up at a fixed interval.
 
-use super::policy::{SAME_TIME_S, Situation, WakeUpPolicy};
+use super::due::Due;
+use super::policy::{Situation, WakeUpPolicy};
 use crate::BoxError;
 use crate::observation::SensedSsb;
 
@@ -8,40 +9,31 @@ use crate::observation::SensedSsb;
 /// (TS 38.213, 4.1).
 const BURST_S: f64 = 4.9e-3;
 
-/// Due at every multiple of the interval; each is served by the first burst at or after it. Waiting
-/// for a burst does not shift the ones that follow. What comes late, from before the last burst
-/// that served or along with it, is taken: whether it would have served is not remembered.
-#[derive(Debug, Clone, Copy, PartialEq)]
+/// Due a constant time after the last estimate, on the same clock as Algorithm 1. What comes late,
+/// from before the last estimate or along with it, is taken: whether it would have served is not
+/// remembered.
+#[derive(Debug)]
 pub struct FixedInterval {
-    interval_s: f64,
-    served: f64,
-    served_at_s: f64,
+    due: Due,
 }
 
 impl FixedInterval {
-    /// Due for the first time at 0 s.
-    pub const fn new(interval_s: f64) -> Self {
-        Self {
-            interval_s,
-            served: 0.0,
-            served_at_s: f64::NEG_INFINITY,
-        }
+    /// At the times that are due.
+    pub const fn new(due: Due) -> Self {
+        Self { due }
     }
 
-    /// Whether an estimate is due by `time_s`.
+    /// Whether an estimate is due at `time_s`.
     pub fn is_due(&self, time_s: f64) -> bool {
-        time_s + SAME_TIME_S >= self.served * self.interval_s || time_s < self.served_at_s + BURST_S
+        let last_s = self.due.last_estimate_s();
+        self.due.is_due(time_s) || last_s.is_some_and(|last_s| time_s < last_s + BURST_S)
     }
 
     /// Takes the SSB at `time_s` if an estimate is due.
     fn take(&mut self, time_s: f64) -> bool {
         let due = self.is_due(time_s);
-        if due {
-            // One SSB serves every due time up to it.
-            let served = ((time_s + SAME_TIME_S) / self.interval_s).floor() + 1.0;
-            if served > self.served {
-                (self.served, self.served_at_s) = (served, time_s);
-            }
+        if self.due.is_due(time_s) {
+            self.due.estimated(time_s);
         }
         due
     }
@@ -59,7 +51,7 @@ impl WakeUpPolicy for FixedInterval {
         chosen: &mut [bool],
     ) -> Result<f64, BoxError> {
         chosen.fill(self.take(now.time_s));
-        Ok(self.interval_s)
+        Ok(self.due.wake_up_time_s())
     }
 }
 
@@ -67,8 +59,8 @@ impl WakeUpPolicy for FixedInterval {
 mod tests {
     use super::*;
 
-    fn executions(interval_s: f64) -> usize {
-        let mut policy = FixedInterval::new(interval_s);
+    fn executions(interval_s: f64, lead_s: f64) -> usize {
+        let mut policy = FixedInterval::new(Due::constant(interval_s, lead_s));
         // The 80.33 s trip, on to the first SSB that finds the vehicle at its end.
         (0..=4017)
             .filter(|&k| policy.take(f64::from(k) * 0.02))
@@ -77,17 +69,21 @@ mod tests {
 
     #[test]
     fn executions_on_the_papers_trip() {
-        assert_eq!(executions(0.02), 4018);
-        assert_eq!(executions(0.08), 1005);
-        assert_eq!(executions(0.07), 1148);
-        assert_eq!(executions(0.075), 1072);
-        assert!(executions(0.065) > 1235);
-        assert!(executions(0.1) > 800);
+        for (interval_s, after, before) in [
+            (0.02, 4018, 4018),
+            (0.065, 1005, 1340), // an SSB every 20 ms: 80 ms or 60
+            (0.08, 1005, 1005),
+            (0.15, 503, 574),
+            (0.1, 804, 804),
+        ] {
+            assert_eq!(executions(interval_s, 0.0), after);
+            assert_eq!(executions(interval_s, 0.02), before);
+        }
     }
 
     #[test]
     fn what_comes_late_is_taken_and_shifts_nothing() {
-        let mut policy = FixedInterval::new(0.08);
+        let mut policy = FixedInterval::new(Due::constant(0.08, 0.0));
         assert!(policy.take(0.0) && policy.take(0.16));
         // From before, and another SSB of the burst that served.
         assert!(policy.take(0.02) && policy.take(0.163));
@@ -97,6 +93,6 @@ mod tests {
 
     #[test]
     fn faster_than_the_ssbs_means_every_ssb() {
-        assert_eq!(executions(0.001), 4018);
+        assert_eq!(executions(0.001, 0.0), 4018);
     }
 }

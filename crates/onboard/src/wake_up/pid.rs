@@ -25,7 +25,7 @@ pub struct Pid {
 
 impl Pid {
     /// Lines 1–6: `Initialize`.
-    pub fn new(settings: &PidSettings, base_s: f64) -> Self {
+    pub fn new(settings: &PidSettings, base_s: f64, max_s: f64) -> Self {
         Self {
             kp: settings.kp,                           // 2
             ki: settings.ki,                           // 2
@@ -35,7 +35,7 @@ impl Pid {
             weight_snr: settings.weight_snr,           // 4
             weight_velocity: settings.weight_velocity, // 4
             base_s,                                    // 5
-            max_s: settings.t_max_ms * 1e-3,           // 5
+            max_s,                                     // 5
             u_unit_s: settings.u_unit_ms * 1e-3,
             // Not in the paper: a shortfall that lasts would otherwise keep the wake-up time at
             // its bound long after it has passed.
@@ -80,7 +80,7 @@ mod tests {
             (0.0, 0.05, 0.08), // 0.02, 0.014, −0.4, 0.015 + 0.00112 − 0.078 < 0: t_base
             (0.2, 0.25, 0.24), // 0.22, 0.036, 2.0, 0.165 + 0.00288 + 0.39: t_max
         ];
-        let mut pid = Pid::new(&PidSettings::default(), 0.08);
+        let mut pid = Pid::new(&PidSettings::default(), 0.08, 0.24);
         for (snr, velocity, expected) in table {
             let wake_up_time_s = pid.calculate_wake_up_time(snr, velocity, 0.1);
             assert!(
@@ -99,7 +99,7 @@ mod tests {
                 integral_clamp,
                 ..Default::default()
             };
-            let mut pid = Pid::new(&settings, 0.08);
+            let mut pid = Pid::new(&settings, 0.08, 0.24);
             for _ in 0..1000 {
                 pid.calculate_wake_up_time(1.0, 0.0, 0.02);
             }

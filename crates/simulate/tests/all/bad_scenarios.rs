@@ -39,7 +39,7 @@ fn misspelt_keys_get_the_nearest_known_one() {
     );
     let nearest = "did you mean `t_max_ms`?";
     assert_says(
-        with_line("t_max_ms =", "tmax_ms ="),
+        with_line("position_uncertainty_m = 1.0", "tmax_ms = 240.0"),
         "vehicle.wake_up.due.tmax_ms",
         nearest,
     );
@@ -200,8 +200,12 @@ fn a_guess_of_the_road_is_straight() {
 
 #[test]
 fn contradictions_name_both_sides() {
-    let outcome = with_line("t_max_ms = 240.0", "base_ms = 250.0\nt_max_ms = 240.0");
+    let bound = "position_uncertainty_m = 1.0";
+    let outcome = with_line(bound, "base_ms = 250.0\nt_max_ms = 240.0");
     assert_says(outcome, "vehicle.wake_up.due.t_max_ms", "base_ms, 250");
+    let outcome = with_line(bound, "base_ms = 250.0\nposition_uncertainty_m = 1.0");
+    let key = "vehicle.wake_up.due.position_uncertainty_m";
+    assert_says(outcome, key, "t_max of 240.0 ms");
     let outcome = with_line("pilots = \"blind\"", "pilots = \"pss+sss\"");
     assert_says(outcome, "vehicle.estimator.method", "receiver.pilots");
     let outcome = with_line("stops = []", "stops = [{ at_m = 301, dwell_s = 1 }]");
@@ -216,7 +220,7 @@ fn contradictions_name_both_sides() {
 
 #[test]
 fn base_time_of_the_platform_counts_too() {
-    let scenario = with_line("t_max_ms = 240.0", "t_max_ms = 60.0").unwrap();
+    let scenario = with_line("position_uncertainty_m = 1.0", "t_max_ms = 60.0").unwrap();
     let simulation = Simulation::on_its_platform(&scenario).map(drop);
     let message = simulation.unwrap_err().to_string();
     assert!(

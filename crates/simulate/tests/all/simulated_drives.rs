@@ -20,14 +20,11 @@ fn simulation(overrides: &[(&str, Value)]) -> Simulation {
 fn campaign(simulation: &Simulation, runs: usize, threads: usize) -> Campaign {
     let options = CampaignOptions {
         seed: 7,
-        first_run: 0,
         runs,
         threads: Some(threads),
         keep_records: true,
-        errors_every: None,
-        quantiles: true,
         custom: NONE,
-        progress: &|_| true,
+        ..CampaignOptions::default()
     };
     simulation.campaign(&options).unwrap()
 }
@@ -200,14 +197,11 @@ fn own_estimators_and_policies_take_part() {
 fn the_caller_can_stop() {
     let options = CampaignOptions {
         seed: 1,
-        first_run: 0,
         runs: 1000,
         threads: Some(1),
-        keep_records: false,
-        errors_every: None,
-        quantiles: true,
         custom: NONE,
         progress: &|_| false,
+        ..CampaignOptions::default()
     };
     let outcome = simulation(&[]).campaign(&options);
     assert!(matches!(outcome, Err(SimulationError::Stopped)));

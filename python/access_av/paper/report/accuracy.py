@@ -6,11 +6,13 @@ from html import escape
 from typing import TYPE_CHECKING
 
 import altair as alt
+import numpy as np
 import polars as pl
 
 from access_av.methods import label
 from access_av.paper.methods import METHODS
 from access_av.paper.report.lines import EVERY_SSB, scale
+from access_av.paper.statements import paper_numbers
 from access_av.report.chart import BLUE, finish, thinned
 from access_av.report.parts import figure, number, table
 
@@ -19,13 +21,41 @@ if TYPE_CHECKING:
     from access_av.report.chart import Spec
 
 
+# A trend: the shadowing of single SSBs, drawn afresh for each, is averaged over so many of them.
+TREND_SSBS = 100
+
+
 def signal(evaluation: Evaluation, specs: dict[str, Spec]) -> str:
-    """SNR along the track."""
+    """SNR along the track, as the paper's figure of its trend has it."""
     specs["snr"] = _snr_chart(evaluation)
-    highest = evaluation.snr.sort("mean_true_snr_db").row(-1, named=True)
+    highest = _trend(evaluation).sort("mean_true_snr_db").row(-1, named=True)
+    ends = evaluation.snr["mean_true_snr_db"].gather([0, evaluation.snr.height - 1])
     return figure(
-        "snr", f"Highest {highest['mean_true_snr_db']:.1f} dB at {highest['time_s']:.1f} s."
+        "snr",
+        f"Mean over the runs and {TREND_SSBS * 20 / 1000:g} s. Highest "
+        f"{highest['mean_true_snr_db']:.1f} dB at {highest['time_s']:.0f} s, the vehicle being "
+        f"nearest to the radio head at {_nearest_s():.0f} s; {ends[0]:.1f} dB at the "
+        f"start, {ends[1]:.1f} dB at the end.",
     )
+
+
+def _trend(evaluation: Evaluation) -> pl.DataFrame:
+    means = pl.col("mean_true_snr_db").rolling_mean(TREND_SSBS, center=True, min_samples=1)
+    return evaluation.snr.with_columns(means)
+
+
+def _nearest_s() -> float:
+    """When the vehicle passes the radio head, from the paper's numbers: an arc of constant bend."""
+    trip = paper_numbers()["trip"]
+    length_m, turn_rad = trip["length_m"], np.radians(trip["bend_deg"])
+    speed_mps, ramp_mps2 = trip["top_speed_kmh"] / 3.6, trip["acceleration_mps2"]
+    along_m = np.linspace(0.0, length_m, 3001)
+    turned, radius_m = along_m / length_m * turn_rad, length_m / turn_rad
+    places_m = radius_m * np.array([np.sin(turned), 1.0 - np.cos(turned)])
+    head_m = np.array(trip["radio_head_m"])[:, None]
+    nearest_m = along_m[np.hypot(*(places_m - head_m)).argmin()]
+    # Past the ramp, where it happens, the speed is the top speed.
+    return float(nearest_m / speed_mps + 0.5 * speed_mps / ramp_mps2)
 
 
 def accuracy(evaluation: Evaluation, specs: dict[str, Spec]) -> str:
@@ -45,7 +75,7 @@ def accuracy(evaluation: Evaluation, specs: dict[str, Spec]) -> str:
         panels.append((f"{name} {', '.join(map(str, modes))}: {intervals} ms", rows))
     parts = []
     for index, (title, rows) in enumerate(panels):
-        for axis in ("x", "y"):
+        for axis in ("y", "x"):
             chart_id = f"error-{axis}-{index}"
             specs[chart_id] = _error_chart(evaluation, rows, axis)
             parts.append(figure(chart_id, title=f"{title}, error in {axis.upper()}"))
@@ -82,7 +112,7 @@ def accuracy_table(evaluation: Evaluation) -> str:
 def _snr_chart(evaluation: Evaluation) -> Spec:
     """SNR along the track (the paper's SNR figure)."""
     line = (
-        alt.Chart(thinned(evaluation.snr))
+        alt.Chart(thinned(_trend(evaluation)))
         .mark_line(color=BLUE, strokeWidth=2)
         .encode(
             x=alt.X("time_s:Q", title="time / s"),
@@ -125,6 +155,7 @@ def _error_chart(evaluation: Evaluation, points: pl.DataFrame, axis: str) -> Spe
                 scale=alt.Scale(
                     domain=names, range=[[4, 3] if name == EVERY_SSB else [1, 0] for name in names]
                 ),
+                # The same legend as the colours': two would contradict each other.
                 legend=alt.Legend(title=None),
             ),
             opacity=alt.condition(picked, alt.value(1.0), alt.value(0.15)),

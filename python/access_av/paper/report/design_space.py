@@ -10,7 +10,8 @@ import altair as alt
 import polars as pl
 
 from access_av.design_space import Query, explore
-from access_av.paper.report.lines import NAMES, by_mode, scale
+from access_av.paper.methods import ADAPTIVE_LABEL
+from access_av.paper.report.lines import COLOURS, NAMES, by_mode, scale
 from access_av.paper.statements import of_claim
 from access_av.report.chart import finish
 from access_av.report.parts import figure, table
@@ -21,9 +22,40 @@ if TYPE_CHECKING:
 
 
 def design(evaluation: Evaluation, specs: dict[str, Spec]) -> str:
-    """Accuracy against energy of every operating point."""
+    """The paper's axes, X and Y error and energy, as projections; and energy against RMS error."""
+    for axis in "xy":
+        specs[f"design-{axis}"] = _projection(evaluation, axis)
     specs["design-space"] = _chart(evaluation)
-    return figure("design-space")
+    projections = "".join(
+        figure(f"design-{axis}", title=f"Adaptive: worst error in {axis.upper()} against energy")
+        for axis in "xy"
+    )
+    return f'<div class="charts">{projections}</div>' + figure(
+        "design-space", title="All operating points: RMS error against energy"
+    )
+
+
+def _projection(evaluation: Evaluation, axis: str) -> Spec:
+    """The adaptive points of all modes, seen along one of the paper's two error axes."""
+    points = evaluation.campaign("R").filter(pl.col("energy_j").is_not_null())
+    columns = ("mode", "energy_j", "worst_error_x_m", "worst_error_y_m")
+    base = alt.Chart(points.select(columns).with_columns(pl.col(pl.Float64).round(4))).encode(
+        x=alt.X("energy_j:Q", title="energy of a trip / J", scale=alt.Scale(zero=False)),
+        y=alt.Y(f"worst_error_{axis}_m:Q", title=f"worst error in {axis.upper()} / m"),
+        tooltip=[
+            alt.Tooltip("mode:O", title="power mode"),
+            alt.Tooltip("energy_j:Q", title="energy / J", format=".1f"),
+            alt.Tooltip("worst_error_x_m:Q", title="worst X / m", format=".3f"),
+            alt.Tooltip("worst_error_y_m:Q", title="worst Y / m", format=".3f"),
+        ],
+    )
+    dots = base.mark_circle(size=110, color=COLOURS[ADAPTIVE_LABEL])
+    numbers = base.mark_text(dy=-11, fontSize=11).encode(text="mode:O")
+    return finish(
+        dots + numbers,
+        height=240,
+        description=f"Worst error in {axis.upper()} against energy of the adaptive points by mode",
+    )
 
 
 def queries(evaluation: Evaluation) -> str:

@@ -9,7 +9,7 @@ import altair as alt
 import polars as pl
 
 from access_av.methods import LABELS, label
-from access_av.paper.energy_fit import FREE, SOLVED
+from access_av.paper.energy_fit import numbers
 from access_av.paper.findings import MissingFigureError, savings_percent
 from access_av.paper.methods import ADAPTIVE_LABEL, METHODS
 from access_av.paper.report.lines import NAMES, by_mode, scale
@@ -19,18 +19,20 @@ from access_av.report.parts import figure, number, table
 
 if TYPE_CHECKING:
     from access_av.paper.evaluation import Evaluation
+    from access_av.paper.study import Study
     from access_av.report.chart import Spec
 
 
 def energy_text(evaluation: Evaluation) -> str:
     """What the energies are, and whose."""
+    free, solved = numbers(evaluation.freedoms)
     return escape(
         "Energy of a trip is the number of executions times the energy of one execution. "
         f"Boundary: {evaluation.platform.energy_boundary}. Bars are ours; diamonds are the "
         "values the paper states. "
         + (
             "Energies per execution were fitted to those and to the paper’s statements about the "
-            f"rest, under each reading anew: {FREE} numbers are free, {SOLVED} of them solved for "
+            f"rest, under each reading anew: {free} numbers are free, {solved} of them solved for "
             "from stated figures. So agreement here is a check of the executions, not of the power."
             if evaluation.refitted
             else "Energies per execution are the platform’s own."
@@ -64,6 +66,39 @@ def energy(evaluation: Evaluation, specs: dict[str, Spec]) -> str:
     specs["executions"] = _executions_chart(evaluation)
     bars = figure("energy-bars", title="Energy of a trip")
     return f'<div class="charts">{bars}{figure("executions", title="Executions in a trip")}</div>'
+
+
+def freedoms(study: Study) -> str:
+    """What each freedom of the energy fit buys."""
+    if not study.bought:
+        return "<p>The platform's energies are its own: nothing was fitted.</p>"
+    titles = {each.reading.name: each.reading.title for each in study.evaluations}
+
+    def named(readings: tuple[str, ...]) -> str:
+        return escape(", ".join(titles[name] for name in readings) or "none")
+
+    rows = [
+        (
+            ("" if index == 0 else "and ")
+            + escape(each.says)
+            + (" <b>(judged by)</b>" if each.is_shipped else ""),
+            f"{each.free} / {each.solved}",
+            f"{each.met} ({each.by_construction} by construction)",
+            number(each.average_saving_percent, 1),
+            named(each.energy),
+            named(each.both),
+        )
+        for index, each in enumerate(study.bought)
+    ]
+    head = (
+        "Free in the fit",
+        "Numbers free / solved for",
+        f"Claims met, “{study.shown.reading.title}”",
+        "Average saving / %",
+        "Energy half kept by",
+        "Both halves kept by",
+    )
+    return table(head, rows)
 
 
 def energy_table(evaluation: Evaluation) -> str:

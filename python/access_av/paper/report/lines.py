@@ -9,17 +9,18 @@ import polars as pl
 
 from access_av.methods import LABELS, label
 from access_av.paper.methods import ADAPTIVE_LABEL, METHODS
-from access_av.report.chart import BLUE, GREEN, GREY, ORANGE, PURPLE
+from access_av.report.chart import PURPLE
 
 if TYPE_CHECKING:
     from access_av.paper.evaluation import Evaluation
 
 EVERY_SSB = "MUSIC, 20 ms"
+# The paper's: black, red, green and blue; its black is a slate that a dark page shows as well.
 COLOURS = {
-    LABELS["music"]: GREY,
-    LABELS["esprit"]: ORANGE,
-    LABELS["root_music"]: GREEN,
-    ADAPTIVE_LABEL: BLUE,
+    LABELS["music"]: "#5b6470",
+    LABELS["esprit"]: "#d62728",
+    LABELS["root_music"]: "#2ca02c",
+    ADAPTIVE_LABEL: "#1f77e0",
     EVERY_SSB: PURPLE,
 }
 # In the order of a chart's legend.

@@ -52,6 +52,11 @@ def render(study: Study, specs: dict[str, Spec] | None = None) -> str:
         specs,
         shown=escape(evaluation.reading.title),
         headline=escape(summary.headline(study)),
+        promise=escape(summary.PROMISE),
+        overview=readings.overview(study, specs),
+        chosen=readings.chosen(study),
+        freedoms=energy.freedoms(study),
+        fair=controller.fair(study),
         lead=escape(summary.lead(study)),
         tiles=_tiles(study),
         meta=_meta(study),
@@ -87,10 +92,13 @@ def _tiles(study: Study) -> str:
         for kind, (held, judged) in met.items()
         if judged
     ]
-    with_map = [each for each in study.ours if each.map]
-    better = sum(each.is_better for each in with_map)
+    without_map = [each for each in study.ours if not each.map]
+    better = sum(each.is_better for each in without_map)
     made.append(
-        tile(f"{better} of {len(with_map)}", "modes in which ours is better in error and energy")
+        tile(
+            f"{better} of {len(without_map)}",
+            "modes in which ours is better in error and energy, the road known to neither",
+        )
     )
     return "".join(made)
 

@@ -5,13 +5,23 @@ from __future__ import annotations
 from html import escape
 from typing import TYPE_CHECKING
 
+import altair as alt
+import polars as pl
+
 from access_av.paper import summary
-from access_av.paper.claims import NOT_JUDGED
-from access_av.report.parts import badge, table, value_text
+from access_av.paper.chosen import entries
+from access_av.paper.statements import half as half_of
+from access_av.paper.statements import of_claim
+from access_av.report.chart import BLUE, GREEN, GREY, ORANGE, finish
+from access_av.report.parts import badge, figure, table, value_text
 
 if TYPE_CHECKING:
     from access_av.paper.claims import Claim
     from access_av.paper.study import Study
+    from access_av.report.chart import Spec
+
+# The worst error and the average saving: the first claim of one half, the last of the other.
+PROMISED = (("accuracy", 0), ("energy", -1))
 
 
 def readings(study: Study) -> str:
@@ -49,6 +59,100 @@ def readings(study: Study) -> str:
     return table(head, rows) + unusable
 
 
+def overview(study: Study, specs: dict[str, Spec]) -> str:
+    """The one picture: what each reading obtains of the paper's two promises."""
+    rows = []
+    for index, half in enumerate(summary.halves(study), start=1):
+        by_id = {it.id: it.obtained for it in study.of(half.reading.name)}
+        worst_m, saving = (by_id[half_of(name)[at]] for name, at in PROMISED)
+        if worst_m is not None and saving is not None:
+            rows.append(
+                {
+                    "number": str(index),
+                    "reading": half.reading.title,
+                    "worst": worst_m,
+                    "saving": saving,
+                    "keeps": ("neither", "accuracy", "saving", "both")[
+                        half.accuracy + 2 * half.energy
+                    ],
+                }
+            )
+    if not rows:
+        return ""
+    bound_m, stated = (of_claim(half_of(name)[at]) for name, at in PROMISED)
+    tolerance = of_claim(half_of("energy")[-1], "tolerance")
+    y = {"low": stated * (1 - tolerance), "high": stated * (1 + tolerance)}
+    least_m = min(0.1, *(row["worst"] for row in rows))
+    promised = (
+        alt.Chart(pl.DataFrame([{"left": 0.9 * least_m, "right": bound_m, **y}]))
+        .mark_rect(opacity=0.18, color=GREEN)
+        .encode(
+            x=alt.X(
+                "left:Q",
+                title="worst error of adaptive MUSIC, any mode / m",
+                scale=alt.Scale(type="log", nice=False),
+            ),
+            x2="right:Q",
+            y=alt.Y("low:Q", title="energy saved, average / %", scale=alt.Scale(zero=False)),
+            y2="high:Q",
+        )
+    )
+    base = alt.Chart(pl.DataFrame(rows)).encode(
+        x="worst:Q",
+        y="saving:Q",
+        tooltip=["reading:N", alt.Tooltip("worst:Q", format=".3f"),
+                 alt.Tooltip("saving:Q", format=".1f"), "keeps:N"],
+    )  # fmt: skip
+    kinds = ["neither", "accuracy", "saving", "both"]
+    dots = base.mark_circle(size=130, opacity=1.0).encode(
+        color=alt.Color(
+            "keeps:N",
+            scale=alt.Scale(domain=kinds, range=[GREY, BLUE, ORANGE, GREEN]),
+            legend=alt.Legend(title="keeps", orient="top"),
+        )
+    )
+    numbers = base.mark_text(dx=11, dy=-9, fontSize=11).encode(text="number:N")
+    specs["overview"] = finish(
+        promised + dots + numbers,
+        height=300,
+        description="Worst error and average saving of each reading, and what the paper promises",
+    )
+    return figure(
+        "overview",
+        "Each dot is a reading, its number that of the table below; the green field is what the "
+        "paper promises of both. Accuracy and saving ask for a further claim each (a2, e3).",
+    )
+
+
+def chosen(study: Study) -> str:
+    """What the paper leaves open, what was chosen, and what another value does."""
+    head = ("What is open", "Chosen", "Why")
+    if not study.effects:
+        rows = [tuple(escape(it[key]) for key in ("what", "value", "why")) for it in entries()]
+        return table(head, rows)
+    driven = [
+        (
+            f"<b>{escape(each.what)}</b>" if each.is_shipped else "",
+            escape(each.value) if each.is_shipped else f"instead {escape(each.value)}",
+            escape(each.why) if each.is_shipped else "",
+            f"{each.executions:.0f}",
+            f"{each.worst_error_m:.2f}",
+            f"{each.rms_error_m:.3f} ± {each.rms_std_m:.3f}",
+            f"{each.fixed_rms_m:.3f}",
+            f"{each.every_ssb_rms_m:.3f}",
+        )
+        for each in study.effects
+    ]
+    results = (
+        "Executions",
+        "Worst / m",
+        "RMS / m",
+        "Every 80 ms: RMS / m",
+        "Every SSB: RMS / m",
+    )
+    return table((*head, *results), driven, numbers=(3, 4, 5, 6, 7))
+
+
 def matrix(study: Study) -> str:
     """Every claim under every reading."""
     columns = [study.of(each.reading.name) for each in study.evaluations]
@@ -68,7 +172,7 @@ def claims(study: Study) -> str:
     """The claims under the shown reading, with intervals and what each verdict is worth."""
     rows = []
     for claim in study.of(study.shown.reading.name):
-        kind = "fit" if claim.verdict == NOT_JUDGED else "yes" if claim.reproduced else "no"
+        kind = "fit" if not claim.is_judged else "yes" if claim.reproduced else "no"
         turns = " " + badge("turns with the seed", "fit") if claim.turns_with_seed else ""
         if claim.seeds_met:
             turns += f"<small>met with {claim.seeds_met} seeds</small>"
@@ -102,7 +206,7 @@ def _met(held: bool) -> str:
 
 def _cell(claim: Claim) -> str:
     """A claim's value and verdict in a small cell."""
-    if claim.verdict == NOT_JUDGED:
+    if not claim.is_judged:
         return badge("–", "fit")
     sign = "✓" if claim.reproduced else "✗"
     if claim.turns_with_seed:

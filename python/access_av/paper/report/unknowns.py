@@ -8,7 +8,7 @@ from typing import TYPE_CHECKING
 import altair as alt
 import polars as pl
 
-from access_av.paper.space import CONTROLLER, GATE, WORLD
+from access_av.paper.space import GATE, OPEN_CONTROLLER, OPEN_WORLD
 from access_av.paper.unknowns import MATTERS
 from access_av.report.chart import BLUE, GREY, finish
 from access_av.report.parts import figure, table
@@ -18,7 +18,7 @@ if TYPE_CHECKING:
     from access_av.paper.unknowns import Unknowns
     from access_av.report.chart import Spec
 
-DIMENSIONS = (*WORLD, *CONTROLLER, GATE)
+DIMENSIONS = (*OPEN_WORLD, *OPEN_CONTROLLER, GATE)
 # Below this a total index is as good as none.
 LEAST_TOTAL = 0.05
 

@@ -1,0 +1,102 @@
+"""What the paper leaves open: what was chosen, why, and what another value does.
+
+One thing is changed at a time, from the shipped reading; ``chosen.toml`` has them. What they do
+together is what :mod:`access_av.paper.unknowns` draws.
+"""
+
+from __future__ import annotations
+
+from dataclasses import dataclass, replace
+from typing import TYPE_CHECKING, Any
+
+import numpy as np
+
+from access_av.paper.ablation import fixed
+from access_av.paper.readings import SHIPPED, load
+from access_av.toml import shipped
+
+if TYPE_CHECKING:
+    from collections.abc import Callable
+
+    from access_av._core import Scenario
+    from access_av.paper.drives import Driver
+
+# Drives of an alternative: a table that says what matters, not a verdict.
+RUNS = 30
+BASE_MS, EVERY_SSB_MS = 80.0, 20.0
+
+
+@dataclass(frozen=True)
+class Effect:
+    """The shipped reading in mode 0 with one thing chosen otherwise.
+
+    Attributes
+    ----------
+    value
+        What was chosen instead; what is shipped where ``is_shipped``.
+    worst_error_m, rms_error_m, executions
+        Of adaptive MUSIC.
+    fixed_rms_m, every_ssb_rms_m
+        Of MUSIC at its base wake-up time and at every SSB.
+    rms_std_m
+        Standard deviation of ``rms_error_m`` by the runs.
+    """
+
+    what: str
+    value: str
+    why: str
+    is_shipped: bool
+    executions: float
+    worst_error_m: float
+    rms_error_m: float
+    rms_std_m: float
+    fixed_rms_m: float
+    every_ssb_rms_m: float
+
+
+def entries() -> list[dict[str, Any]]:
+    """What was chosen, each with ``what``, ``value``, ``why`` and ``alternatives``.
+
+    Examples
+    --------
+    >>> entries()[0]["what"]
+    'radiated power'
+    """
+    return list(shipped("paper", "chosen.toml")["chosen"])
+
+
+def effects(
+    driver: Driver, runs: int = RUNS, *, progress: Callable[[int, int], None] | None = None
+) -> list[Effect]:
+    """The shipped values, and after each what its alternatives do, over so many runs."""
+    paper = load(SHIPPED).scenario
+    driver = replace(driver, methods=("music",), runs=runs, known={}, tapes=[], progress=None)
+    here = _driven(driver, paper)
+    found: list[Effect] = []
+    chosen = entries()
+    for index, entry in enumerate(chosen):
+        what, why = entry["what"], entry["why"]
+        found.append(Effect(what, entry["value"], why, True, **here))
+        for other in entry["alternatives"]:
+            there = _driven(driver, paper.with_overrides(other["changes"]))
+            found.append(Effect(what, other["value"], why, False, **there))
+        # A world is driven through once.
+        del driver.tapes[1:]
+        if progress is not None:
+            progress(index + 1, len(chosen))
+    return found
+
+
+def _driven(driver: Driver, scenario: Scenario) -> dict[str, float]:
+    adaptive = driver.drive(
+        scenario.with_overrides({"vehicle.wake_up.due.base_ms": BASE_MS})
+    ).drives
+    often, seldom = (driver.drive(fixed(scenario, ms)).drives for ms in (EVERY_SSB_MS, BASE_MS))
+    return {
+        "executions": float(adaptive.executions[0]),
+        "worst_error_m": float(adaptive.worst_m[0]),
+        "rms_error_m": float(adaptive.rms_error_m[0]),
+        "rms_std_m": float(np.std(adaptive.rms_error_m[1:])),
+        "fixed_rms_m": float(seldom.rms_error_m[0]),
+        "every_ssb_rms_m": float(often.rms_error_m[0]),
+    }

@@ -1,0 +1,157 @@
+"""What each freedom of the energy fit buys: the claims that are met with it.
+
+The drives are the same; only the energies per execution are fitted anew. What a freedom solves for
+is met by construction, so the fewer it takes, the more a claim of energy says.
+"""
+
+from __future__ import annotations
+
+from dataclasses import dataclass
+from typing import TYPE_CHECKING, Any
+
+from access_av.paper.claims import BY_CONSTRUCTION, check_claims
+from access_av.paper.energy_fit import FREEDOMS, NONE, SHIPPED, numbers
+from access_av.paper.statements import half, stated_claims
+
+if TYPE_CHECKING:
+    from collections.abc import Collection, Mapping, Sequence
+
+    from access_av.paper.claims import Claim
+    from access_av.paper.evaluation import Evaluation
+
+# One after the other, each beside those before it.
+LADDER = tuple(tuple(FREEDOMS)[:count] for count in range(len(FREEDOMS) + 1))
+
+
+@dataclass(frozen=True)
+class Bought:
+    """The claims under a fit of so much freedom.
+
+    Attributes
+    ----------
+    freedoms
+        All that the fit is free in.
+    says
+        The one that comes with this step.
+    free, solved
+        How many numbers are free, and how many of them are solved for.
+    met, by_construction
+        Claims met under the shown reading, and how many of them by construction.
+    average_saving_percent
+        What e4 is about, under the shown reading.
+    energy, both
+        Readings that keep the energy half, and of those the ones that keep both.
+    """
+
+    freedoms: tuple[str, ...]
+    says: str
+    free: int
+    solved: int
+    met: int
+    by_construction: int
+    average_saving_percent: float | None
+    energy: tuple[str, ...]
+    both: tuple[str, ...]
+
+    def as_row(self) -> dict[str, Any]:
+        """A row of the table ``freedoms``."""
+        return {
+            "freedom": self.says,
+            "free_numbers": self.free,
+            "solved_numbers": self.solved,
+            "claims_met": self.met,
+            "met_by_construction": self.by_construction,
+            "average_saving_percent": self.average_saving_percent,
+            "keep_energy": ", ".join(self.energy),
+            "keep_both": ", ".join(self.both),
+        }
+
+    @property
+    def is_shipped(self) -> bool:
+        """Whether the claims are judged by this fit."""
+        return self.freedoms == SHIPPED
+
+
+def met_halves(claims: Sequence[Claim]) -> tuple[bool, bool]:
+    """Whether the claims of one reading keep the accuracy half, and the energy half."""
+    met = {claim.id for claim in claims if claim.reproduced}
+    return met.issuperset(half("accuracy")), met.issuperset(half("energy"))
+
+
+def ladder(
+    evaluations: Sequence[Evaluation],
+    claims: Sequence[Claim],
+    shown: str,
+    stated: Mapping[str, Any] | None = None,
+) -> list[Bought]:
+    """The claims under ever more freedom; nothing where no energies were fitted.
+
+    Parameters
+    ----------
+    evaluations
+        One of each reading.
+    claims
+        Theirs, under the shipped fit.
+    shown
+        Name of the reading whose claims are counted.
+    stated
+        Claims as ``paper.toml`` has them; its own when ``None``.
+    """
+    stated = stated_claims() if stated is None else stated
+    # What no energy is in stays as it was judged.
+    with_energy = {
+        name: entry for name, entry in stated.items() if "energy" in entry.get("rests_on", ())
+    }
+    if not any(each.refitted for each in evaluations):
+        return []
+    return [_bought(freedoms, evaluations, claims, shown, with_energy) for freedoms in LADDER]
+
+
+def _bought(
+    freedoms: tuple[str, ...],
+    evaluations: Sequence[Evaluation],
+    claims: Sequence[Claim],
+    shown: str,
+    with_energy: Mapping[str, Any],
+) -> Bought:
+    free, solved = numbers(freedoms)
+    energy, both = [], []
+    counted: list[Claim] = []
+    for each in evaluations:
+        name = each.reading.name
+        judged = rejudged(each, claims, freedoms, with_energy)
+        keeps_accuracy, keeps_energy = met_halves(judged)
+        energy += [name] if keeps_energy else []
+        both += [name] if keeps_energy and keeps_accuracy else []
+        counted = judged if name == shown else counted
+    saving = [it.obtained for it in counted if it.id == "e4_average_saving_percent"]
+    return Bought(
+        freedoms=freedoms,
+        says=(FREEDOMS[freedoms[-1]] if freedoms else NONE).says,
+        free=free,
+        solved=solved,
+        met=sum(it.reproduced for it in counted),
+        by_construction=sum(it.reproduced and it.evidence == BY_CONSTRUCTION for it in counted),
+        average_saving_percent=saving[0] if saving else None,
+        energy=tuple(energy),
+        both=tuple(both),
+    )
+
+
+def rejudged(
+    evaluation: Evaluation,
+    claims: Sequence[Claim],
+    freedoms: Collection[str],
+    with_energy: Mapping[str, Any],
+) -> list[Claim]:
+    """The claims of a reading, those with an energy in them under a fit of these freedoms."""
+    reading = evaluation.reading
+    again = check_claims(
+        evaluation.refit(tuple(freedoms)).outcome,
+        reading=reading.name,
+        chosen=reading.chosen,
+        freedoms=freedoms,
+        stated=with_energy,
+    )
+    kept = [it for it in claims if it.reading == reading.name and it.id not in with_energy]
+    return kept + again
