@@ -4,6 +4,7 @@ from __future__ import annotations
 
 import json
 import math
+import re
 from typing import TYPE_CHECKING
 
 import polars as pl
@@ -247,6 +248,31 @@ def test_a_truth_of_another_time_is_refused(access_av: Cli, tmp_path: Path) -> N
     (tmp_path / "truth.tum").write_text("# time x y z qx qy qz qw\n")
     done = access_av(*arguments)
     assert (done.code, "truth.tum: holds no pose" in done.err) == (2, True)
+
+
+def test_one_radio_head_elsewhere_is_named(tmp_path: Path) -> None:
+    """Of six one is not missed: it is named, and the drive can be relied on."""
+    spoilt = robot()
+    x, y = HEADS_M[13]
+    spoilt.heads_m[13] = (x + 6.0, y - 8.0)
+    drive = spoilt.locate(tmp_path)
+    (diagnosis,) = drive.diagnoses
+    assert "pci 13 stands near" in diagnosis
+    place_m = re.findall(r"-?\d+\.\d", diagnosis)[:2]
+    assert [float(it) for it in place_m] == pytest.approx([x, y], abs=0.5), diagnosis
+    assert diagnosis in drive.remarks
+    assert drive.is_reliable == (spoilt.rms_error_m(drive) < 0.5)
+
+
+def test_never_found_is_no_success(access_av: Cli, tmp_path: Path) -> None:
+    whole = robot(3.0)
+    whole.angles = whole.angles.filter(pci=11)  # of one radio head alone no place is known
+    arguments = whole.write(tmp_path)
+    arguments[arguments.index("--start") + 1] = "scratch"
+    done = access_av(*arguments, "--json")
+    assert done.code == 3
+    assert json.loads(done.out)["lost_share"] == 1.0
+    assert "never found" in done.err
 
 
 def test_exit_codes(access_av: Cli, tmp_path: Path) -> None:

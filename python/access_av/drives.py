@@ -20,9 +20,6 @@ if TYPE_CHECKING:
 # Longest time between two poses of the truth between which it is taken for a straight line (s).
 MOST_TRUTH_GAP_S = 1.0
 
-# Share of the time that a drive may be lost without that being its result.
-MOST_LOST = 0.2
-
 FINDINGS = {"constant": pl.String, "constant_unit": pl.String}
 
 DATATYPES = ("ci16_le", "cf32_le")
@@ -164,9 +161,11 @@ class Drive:
     remarks
         What was wrong with the input, or remarkable about the drive; of remarks that differ in
         numbers only the first stands for all.
+    diagnoses
+        Those of the remarks that name what is wrong with the input as it was given, confirmed by
+        the localizer itself.
     suspicions
-        Those of the remarks that say how the input may have been meant: as given its angles come
-        from elsewhere than expected.
+        Those of the diagnoses that did harm: the drive is not to be relied on.
     findings
         What the drive showed of the vehicle by its end: one row per constant, as stated and as
         found, with its standard deviation; none where the localizer does not look for it.
@@ -178,6 +177,7 @@ class Drive:
     poses: pl.DataFrame
     angles: pl.DataFrame
     remarks: list[str]
+    diagnoses: list[str]
     suspicions: list[str]
     findings: pl.DataFrame
     _core: _core.LocatedDrive
@@ -185,14 +185,16 @@ class Drive:
 
     @property
     def lost_share(self) -> float:
-        """Share of the time that the angles came from elsewhere than expected."""
-        return float(self.poses["lost"].mean() or 0.0)  # type: ignore[arg-type]
+        """Share of the time that the angles came from elsewhere than expected.
+
+        1 where the vehicle was never found.
+        """
+        return self._core.lost_share
 
     @property
     def is_reliable(self) -> bool:
-        """Whether it was neither lost for long nor at its end, nor contradicts what was given."""
-        ends_lost = bool(self.poses["lost"][-1])
-        return not (self.lost_share > MOST_LOST or ends_lost or self.suspicions)
+        """Whether it was found, not lost for long or at its end, and nothing wrong did harm."""
+        return not (self._core.is_lost_for_long or self.suspicions)
 
     def write_mcap(self, path: str | Path) -> None:
         """Write poses, verdicts and diagnostics as MCAP (ROS 2); no poses while searching."""
@@ -299,6 +301,7 @@ def locate(
         poses=_poses(located.poses),
         angles=angles,
         remarks=located.remarks,
+        diagnoses=located.diagnoses,
         suspicions=located.suspicions,
         findings=pl.DataFrame(located.findings, schema_overrides=FINDINGS),
         smoothed=smoothed,

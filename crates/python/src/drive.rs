@@ -408,10 +408,30 @@ impl LocatedDrive {
         Ok(columns)
     }
 
-    /// How the input may have been meant, where its angles contradict what was given.
+    /// What is wrong with the input as it was given, harmful or not.
+    #[getter]
+    fn diagnoses(&self) -> Vec<String> {
+        let texts = self.core.diagnoses.iter().map(|it| it.text.clone());
+        texts.collect()
+    }
+
+    /// Share of the time that it was lost; 1 where it was never found.
+    #[getter]
+    fn lost_share(&self) -> f64 {
+        self.core.lost_share()
+    }
+
+    /// Whether it was lost for more than a fifth of the time, lost at the end, or never found.
+    #[getter]
+    fn is_lost_for_long(&self) -> bool {
+        self.core.is_lost_for_long()
+    }
+
+    /// Those of the diagnoses that did harm.
     #[getter]
     fn suspicions(&self) -> Vec<String> {
-        self.core.suspicions.clone()
+        let texts = self.core.suspicions().map(|it| it.text.clone());
+        texts.collect()
     }
 
     /// One pose per odometry sample: columns `time_s`, `x_m`, `y_m`, `heading_rad`, `speed_mps`,

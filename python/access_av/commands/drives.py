@@ -147,8 +147,8 @@ def locate(
     polyline_m, segments, or file (GeoJSON or CSV). docs/locate.md has examples of sites and
     vehicles.
 
-    Exit code 0: located. 2: the input cannot be used. 3: located, but lost for more than a fifth of
-    the time or at the end, or the input contradicts itself; what to check is said.
+    Exit code 0: located. 2: the input cannot be used. 3: never found, lost for more than a fifth of
+    the time or at the end, or something wrong in the input did harm; what to check is said.
     """
     from access_av import drives
     from access_av.files import ResultsDirectory, json_text
@@ -191,6 +191,7 @@ def locate(
         **numbers,
         "lost_share": drive.lost_share,
         "remarks": drive.remarks,
+        "diagnoses": drive.diagnoses,
         "suspicions": drive.suspicions,
     }
     directory.write_manifest(
@@ -224,8 +225,6 @@ def _show(drive: Drive, numbers: dict[str, float]) -> None:
         console.print(
             f"Found after {numbers['found_m']:.1f} m and {numbers['found_s']:.1f} s from scratch."
         )
-    elif _lost(drive):
-        console.print("Not found: several places fit the angles.")
     if "rms_error_m" in numbers:
         console.print(
             f"Horizontal error: RMS {numbers['rms_error_m']:.3f} m, "
@@ -236,20 +235,24 @@ def _show(drive: Drive, numbers: dict[str, float]) -> None:
 
 
 def _unreliable(drive: Drive) -> str:
-    at_end = ", the end included," if drive.poses["lost"][-1] else ""
-    lost = (
-        f"for {drive.lost_share:.0%} of the time{at_end} the angles came from elsewhere than "
-        "expected. "
-        if drive.lost_share
-        else ""
-    )
+    if _lost(drive):
+        happened = "the vehicle was never found. Give --start, or a longer drive. "
+    elif drive.lost_share:
+        at_end = ", the end included," if drive.poses["lost"][-1] else ""
+        happened = (
+            f"for {drive.lost_share:.0%} of the time{at_end} the angles came from elsewhere than "
+            "expected. "
+        )
+    else:
+        happened = ""
     check = (
         " ".join(f"{suspicion}." for suspicion in drive.suspicions)
         if drive.suspicions
         else "Check, in this order: start pose, array.mounting_rad (sign, mirrored array), places "
-        "and PCIs of the radio heads, phase_rad against angle_rad, the clocks, odometer.scale."
+        "and PCIs of the radio heads, drive (road or differential), yaw_rate_radps (unit, sign), "
+        "phase_rad against angle_rad, the clocks, odometer.scale."
     )
-    return f"not to be relied on: {lost}{check}"
+    return f"not to be relied on: {happened}{check}"
 
 
 def _lost(drive: Drive) -> bool:

@@ -9,8 +9,7 @@ use onboard::{Custom, Execution, Onboard};
 
 use super::bursts::{Burst, OfSsb, first_burst};
 use super::error::ReplayError;
-use super::located::{LocatedDrive, LocatedPose, Remark, gathered};
-use super::suspicion::Suspicion;
+use super::located::{Diagnosis, LocatedDrive, LocatedPose, Remark, gathered};
 use crate::library::load;
 use crate::odometry::OdometryLog;
 
@@ -98,7 +97,7 @@ impl<'a> Replay<'a> {
         let Some(findings) = self.drive.findings else {
             return;
         };
-        if !self.drive.suspicions.is_empty() {
+        if self.drive.suspicions().next().is_some() {
             return; // found where the vehicle never was
         }
         let time_s = self
@@ -164,6 +163,14 @@ impl<'a> Replay<'a> {
     ///
     /// # Errors
     /// [`ReplayError::Custom`].
+    pub fn drive_on(&mut self) -> Result<(), ReplayError> {
+        self.odometry_until(f64::INFINITY)
+    }
+
+    /// Takes in the rest of the odometry, and hands over the drive.
+    ///
+    /// # Errors
+    /// [`ReplayError::Custom`].
     pub fn finish(mut self) -> Result<LocatedDrive, ReplayError> {
         self.odometry_until(f64::INFINITY)?;
         self.drive.findings = self.onboard.findings();
@@ -205,16 +212,20 @@ impl<'a> Replay<'a> {
         &self.drive.executions
     }
 
-    /// Says how the input may have been meant. A wrong start is no more than remarkable once the
-    /// vehicle was found again.
-    pub fn suspect(&mut self, Suspicion { text, is_of_start }: Suspicion) {
+    /// The drive so far.
+    pub const fn located(&self) -> &LocatedDrive {
+        &self.drive
+    }
+
+    /// Says what is wrong with the input. A wrong start does no harm once the vehicle was found
+    /// again.
+    pub fn diagnose(&mut self, mut diagnosis: Diagnosis) {
         let first = self.drive.poses.first();
         let time_s = first.map_or(f64::NEG_INFINITY, |first| first.estimate.time_s);
         let is_found = self.onboard.recovered().is_some() && !self.onboard.is_lost();
-        if !(is_of_start && is_found) {
-            self.drive.suspicions.push(text.clone());
-        }
-        self.remark(time_s, text);
+        diagnosis.is_harmless |= diagnosis.is_of_start && is_found;
+        self.remark(time_s, diagnosis.text.clone());
+        self.drive.diagnoses.push(diagnosis);
     }
 
     fn odometry_until(&mut self, time_s: f64) -> Result<(), ReplayError> {

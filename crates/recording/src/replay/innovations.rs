@@ -2,7 +2,9 @@
 
 use std::sync::Arc;
 
+use onboard::geometry::Pose;
 use onboard::localize::tracker::{InitialPose, Tracker, TrackerConfig};
+use onboard::localize::{self, Localizer};
 use onboard::radio_head::RadioHead;
 use onboard::settings::{Check, Site, Vehicle};
 
@@ -11,15 +13,23 @@ use super::stated::with_phase;
 use crate::angle_log::LoggedAngle;
 use crate::odometry::OdometryLog;
 
-/// An angle as the tracker met it.
+/// An angle as the localizer met it.
 #[derive(Debug, Clone, Copy, PartialEq)]
 pub struct Met {
     /// Measured electrical angle minus the predicted one (rad).
     pub residual_rad: f64,
-    /// Variance of that as the tracker believes it (rad²).
+    /// Variance of that as the localizer believes it (rad²).
     pub variance: f64,
-    /// Whether the tracker used it.
+    /// Whether the localizer used it.
     pub used: bool,
+}
+
+/// Where the localizer believed the vehicle to be at an angle, and how it met the angle; nothing of
+/// one that told it nothing.
+#[derive(Debug, Clone, Copy, PartialEq, Default)]
+pub struct Step {
+    pub pose: Option<Pose>,
+    pub met: Option<Met>,
 }
 
 /// Drives with a tracker that neither searches nor guards itself, and tells what it met; `None` for
@@ -38,6 +48,42 @@ pub fn innovations(
     angles: &[LoggedAngle],
     used: Option<&[bool]>,
 ) -> Result<Vec<Option<Met>>, ReplayError> {
+    let mut tracker = plain_filter(site, vehicle)?;
+    if used.is_some() {
+        tracker.set_gate(f64::INFINITY);
+    }
+    let steps = replay_angles(&mut tracker, site, vehicle, odometry, angles, used)?;
+    Ok(steps.into_iter().map(|step| step.met).collect())
+}
+
+/// A tracker at the known start that neither searches nor guards itself.
+///
+/// # Errors
+/// As [`innovations`].
+pub fn plain_filter(site: &Site, vehicle: &Vehicle) -> Result<Tracker, ReplayError> {
+    let start = InitialPose {
+        pose: known_start(vehicle)?,
+        position_std_m: vehicle.start.position_std_m,
+        heading_std_rad: vehicle.start.heading_std_rad,
+    };
+    let heads = RadioHead::heard(site, vehicle);
+    let road = site.build_road()?.filter(|_| vehicle.follows_road());
+    let config = TrackerConfig::new(site, vehicle);
+    Ok(Tracker::new(config, road.map(Arc::new), &heads, &start))
+}
+
+/// The localizer that the vehicle's settings choose, with all that guards it.
+///
+/// # Errors
+/// As [`innovations`].
+pub fn vehicles_localizer(
+    site: &Site,
+    vehicle: &Vehicle,
+) -> Result<Box<dyn Localizer>, ReplayError> {
+    Ok(localize::built_in(site, vehicle, known_start(vehicle)?)?)
+}
+
+fn known_start(vehicle: &Vehicle) -> Result<Pose, ReplayError> {
     let (file, pose) = (&vehicle.name, vehicle.start.pose);
     Check { file }.that(
         pose.is_some(),
@@ -45,36 +91,60 @@ pub fn innovations(
         "missing",
         "a drive that says something of the site has a known start",
     )?;
-    let start = InitialPose {
-        pose: pose.unwrap_or_default(),
-        position_std_m: vehicle.start.position_std_m,
-        heading_std_rad: vehicle.start.heading_std_rad,
-    };
+    Ok(pose.unwrap_or_default())
+}
+
+/// Share of the angles at which a localizer may be lost before there is nothing to be learnt from it.
+const MOST_LOST: f64 = 0.2;
+
+/// Drives with a localizer: its belief at each angle, and how it met it, up to where it was lost for
+/// long (a search costs as much as a hundred trackers).
+///
+/// # Errors
+/// [`ReplayError::Custom`] where the localizer fails.
+pub fn replay_angles(
+    localizer: &mut dyn Localizer,
+    site: &Site,
+    vehicle: &Vehicle,
+    odometry: &OdometryLog,
+    angles: &[LoggedAngle],
+    used: Option<&[bool]>,
+) -> Result<Vec<Step>, ReplayError> {
     let heads = RadioHead::heard(site, vehicle);
-    let road = site.build_road()?.filter(|_| vehicle.follows_road());
-    let config = TrackerConfig::new(site, vehicle);
-    let mut tracker = Tracker::new(config, road.map(Arc::new), &heads, &start);
-    if used.is_some() {
-        tracker.set_gate(f64::INFINITY);
-    }
     let mut odometry = odometry.samples.iter().peekable();
     let measurand = vehicle.array.measurand();
-    let met = angles.iter().enumerate().map(|(index, logged)| {
+    let most_lost = (MOST_LOST * angles.len() as f64) as usize;
+    let (mut lost, mut steps) = (0, Vec::with_capacity(angles.len()));
+    for (index, logged) in angles.iter().enumerate() {
         let mut measured = with_phase(logged, &measurand).measured;
         measured.time_s -= vehicle.receiver.lateness_s;
         while let Some(sample) = odometry.next_if(|sample| sample.time_s <= measured.time_s) {
-            tracker.odometry(sample);
+            localizer.odometry(sample).map_err(ReplayError::Custom)?;
         }
-        let head = heads
-            .iter()
-            .find(|head| head.sends(logged.ssb.pci, logged.ssb.ssb_index))?;
-        let innovation = tracker.innovation(head, &measured)?;
-        let wanted = used.is_none_or(|used| used.get(index).copied().unwrap_or(false));
-        Some(Met {
-            residual_rad: innovation.residual,
-            variance: innovation.variance,
-            used: wanted && tracker.update(head, &measured).accepted,
-        })
-    });
-    Ok(met.collect())
+        let tracker = localizer.tracker();
+        let mut step = Step {
+            pose: tracker.map(|tracker| tracker.pose(measured.time_s).pose),
+            met: None,
+        };
+        let sends = |head: &&RadioHead| head.sends(logged.ssb.pci, logged.ssb.ssb_index);
+        if let Some(head) = heads.iter().find(sends) {
+            let innovation = tracker.and_then(|tracker| tracker.innovation(head, &measured));
+            let wanted = used.is_none_or(|used| used.get(index).copied().unwrap_or(false));
+            let accepted = wanted
+                && (localizer.update(head, &measured))
+                    .map_err(ReplayError::Custom)?
+                    .accepted;
+            step.met = innovation.map(|innovation| Met {
+                residual_rad: innovation.residual,
+                variance: innovation.variance,
+                used: accepted,
+            });
+        }
+        steps.push(step);
+        lost += usize::from(localizer.is_lost());
+        if lost > most_lost {
+            break;
+        }
+    }
+    Ok(steps)
 }

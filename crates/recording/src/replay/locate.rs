@@ -10,15 +10,17 @@ use onboard::receive::{Receiver, ReceiverConfig};
 use onboard::settings::{IntegritySettings, Site, Vehicle, WakeUpSettings};
 use onboard::{Custom, Execution};
 
-use super::doubts::doubts;
+use super::data_quality::warnings;
+use super::diagnosis::diagnose;
 use super::drive::Replay;
 use super::error::ReplayError;
+use super::evidence::HeadId;
+use super::hypotheses::Drive;
 use super::located::{LocatedDrive, LocatedPose};
-use super::mistakes::Drive;
 use super::receive::receive_recording;
+use super::sample_gaps::{SampleGap, lost_before_s, sample_gaps};
 use super::start::{StartChoice, starting};
 use super::stated::with_phase;
-use super::suspicion::{suspicions, too_fast};
 use crate::angle_log::{AngleLog, LoggedAngle};
 use crate::odometry::OdometryLog;
 use crate::sigmf::Recording;
@@ -47,11 +49,11 @@ pub fn locate_angles(
     let logged = angles.angles.as_slice();
     let measurand = vehicle.array.measurand();
     let angles: Vec<LoggedAngle> = logged.iter().map(|it| with_phase(it, &measurand)).collect();
-    for (time_s, text) in doubts(site, &vehicle, odometry, &angles)? {
+    for (time_s, text) in warnings(site, &vehicle, odometry, &angles)? {
         replay.remark(time_s, text);
     }
     replay.hear(&angles)?;
-    suspect(&mut replay, site, &vehicle, odometry, logged)?;
+    explain(&mut replay, site, &vehicle, odometry, logged)?;
     finish(replay, site, &vehicle, start, odometry, smooth)
 }
 
@@ -74,9 +76,6 @@ pub fn locate_recording(
     }
     let (vehicle, start) = starting(site, vehicle, start)?;
     let mut replay = Replay::new(site, &vehicle, start, Custom::default(), odometry)?;
-    for warning in recording.warnings() {
-        replay.remark(f64::NEG_INFINITY, warning.to_string());
-    }
     let file = recording.data_file().display().to_string();
     let mut receiver = Receiver::new(ReceiverConfig::new(site, &vehicle)).map_err(|source| {
         ReplayError::Receive {
@@ -85,8 +84,10 @@ pub fn locate_recording(
         }
     })?;
     let (mut heard_s, mut together) = (None, false);
+    let mut times_s: Vec<(HeadId, f64)> = Vec::new();
     receive_recording(&mut receiver, recording, start_time_s, |ssbs| {
         for it in ssbs {
+            times_s.push(((it.ssb.pci, it.ssb.ssb_index), it.ssb.time_s));
             let [first_s, _] = heard_s.unwrap_or([it.ssb.time_s; 2]);
             heard_s = Some([first_s, it.ssb.time_s]);
             together |= odometry.covers(it.ssb.time_s);
@@ -102,31 +103,69 @@ pub fn locate_recording(
     if heard_s.is_none() {
         return Err(ReplayError::NoSsb { file });
     }
-    let heard: Vec<LoggedAngle> = replay.executions().iter().filter_map(as_logged).collect();
-    suspect(&mut replay, site, &in_time(&vehicle), odometry, &heard)?;
+    let mut heard: Vec<LoggedAngle> = replay.executions().iter().filter_map(as_logged).collect();
+    let gaps = sample_gaps(&times_s);
+    if !gaps.is_empty() {
+        replay = relocate(site, &vehicle, start, odometry, &gaps, &mut heard)?;
+    }
+    for warning in recording.warnings() {
+        replay.remark(f64::NEG_INFINITY, warning.to_string());
+    }
+    explain(&mut replay, site, &in_time(&vehicle), odometry, &heard)?;
     finish(replay, site, &vehicle, start, odometry, smooth)
 }
 
-/// Says how a drive may have been meant.
-fn suspect(
+/// Locates a drive once more, by the angles that were heard, in whose recording samples are missing:
+/// each at the time that the SSBs tell.
+fn relocate<'a>(
+    site: &Site,
+    vehicle: &Vehicle,
+    start: Pose,
+    odometry: &'a OdometryLog,
+    gaps: &[SampleGap],
+    heard: &mut [LoggedAngle],
+) -> Result<Replay<'a>, ReplayError> {
+    for angle in heard.iter_mut() {
+        let late_s = lost_before_s(gaps, angle.ssb.time_s);
+        angle.ssb.time_s += late_s;
+        angle.measured.time_s += late_s;
+    }
+    let all_heard = Vehicle {
+        wake_up: WakeUpSettings::default(),
+        ..in_time(vehicle)
+    };
+    let mut replay = Replay::new(site, &all_heard, start, Custom::default(), odometry)?;
+    for gap in gaps {
+        let [_, at_s] = gap.between_s;
+        let text = format!(
+            "samples at {:.2} s: {:.2} ms are missing, by the times of the SSBs, and were added to \
+             the times of all that follow; write a capture with core:global_index after each gap",
+            at_s,
+            1e3 * gap.lost_s
+        );
+        replay.remark(at_s, text);
+    }
+    replay.hear(heard)?;
+    Ok(replay)
+}
+
+/// Takes in the rest of the odometry, and says what is wrong with the drive as it was given.
+fn explain(
     replay: &mut Replay<'_>,
     site: &Site,
     vehicle: &Vehicle,
     odometry: &OdometryLog,
     angles: &[LoggedAngle],
 ) -> Result<(), ReplayError> {
+    replay.drive_on()?;
     let given = Drive {
         site: Cow::Borrowed(site),
         vehicle: Cow::Borrowed(vehicle),
         odometry: Cow::Borrowed(odometry),
         angles: Cow::Borrowed(angles),
     };
-    let mut found = suspicions(&given)?;
-    if found.is_empty() {
-        found.extend(too_fast(vehicle, odometry));
-    }
-    for suspicion in found {
-        replay.suspect(suspicion);
+    for diagnosis in diagnose(&given, replay.located())? {
+        replay.diagnose(diagnosis);
     }
     Ok(())
 }

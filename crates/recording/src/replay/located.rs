@@ -76,9 +76,45 @@ pub struct LocatedDrive {
     pub findings: Option<Findings>,
     /// What was remarkable about single items of the input, in order of time.
     pub remarks: Vec<Remark>,
-    /// How the input may have been meant, where its angles contradict what was given; these are
-    /// among the remarks too.
-    pub suspicions: Vec<String>,
+    /// What is wrong with the input as it was given; these are among the remarks too.
+    pub diagnoses: Vec<Diagnosis>,
+}
+
+/// What is wrong with the input as it was given.
+#[derive(Debug, Clone, PartialEq)]
+pub struct Diagnosis {
+    /// What speaks for it, and what to check.
+    pub text: String,
+    /// Whether it is the start alone, which a vehicle that is found again has overcome.
+    pub is_of_start: bool,
+    /// Whether the drive was located well all the same.
+    pub is_harmless: bool,
+}
+
+/// Share of the time that a drive may be lost without that being its result.
+const MOST_LOST: f64 = 0.2;
+
+impl LocatedDrive {
+    /// Whether it never was where it could be relied on: lost for long, or at its end, or never found.
+    pub fn is_lost_for_long(&self) -> bool {
+        let ends_lost = self.poses.last().is_none_or(|last| last.is_lost);
+        ends_lost || self.lost_share() > MOST_LOST
+    }
+
+    /// Share of the time without a position that can be relied on: angles came from elsewhere than
+    /// expected, or the vehicle was never found.
+    pub fn lost_share(&self) -> f64 {
+        if self.poses.iter().all(|pose| pose.searching.is_some()) {
+            return 1.0;
+        }
+        let lost = self.poses.iter().filter(|pose| pose.is_lost).count();
+        lost as f64 / self.poses.len() as f64
+    }
+
+    /// What of the diagnoses did harm.
+    pub fn suspicions(&self) -> impl Iterator<Item = &Diagnosis> {
+        self.diagnoses.iter().filter(|it| !it.is_harmless)
+    }
 }
 
 #[cfg(test)]

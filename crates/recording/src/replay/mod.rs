@@ -2,24 +2,28 @@
 
 mod angles;
 mod bursts;
-mod doubts;
+mod data_quality;
+mod diagnosis;
 mod drive;
 mod error;
+mod evidence;
+mod hypotheses;
 mod innovations;
 mod locate;
 mod located;
-mod mistakes;
+mod moved_head;
 mod receive;
+mod sample_gaps;
 mod start;
 mod stated;
-mod suspicion;
+mod yaw_rate;
 
 pub use angles::{RecordedAngles, all_of_error, estimate_angles, scatter_sigma_rad};
 pub use drive::Replay;
 pub use error::ReplayError;
 pub use innovations::{Met, innovations};
 pub use locate::{locate_angles, locate_recording};
-pub use located::{LocatedDrive, LocatedPose, Remark};
+pub use located::{Diagnosis, LocatedDrive, LocatedPose, Remark};
 pub use receive::receive_recording;
 pub use start::{StartChoice, starting};
 pub use stated::as_stated;

@@ -2,6 +2,7 @@
 #![allow(clippy::print_stdout, clippy::unwrap_used, reason = "these are tests")]
 
 mod common;
+mod diagnosis;
 mod recorded_drives;
 mod scan;
 mod sigmf;

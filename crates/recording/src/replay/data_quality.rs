@@ -1,10 +1,10 @@
-//! What a recorded drive shows to be wrong before it is located.
+//! Data-quality warnings: what a recorded drive shows to be wrong before it is located.
 
 use std::collections::BTreeMap;
 use std::f64::consts::TAU;
 
 use onboard::geometry::wrap_angle;
-use onboard::settings::{DriveKind, Site, Vehicle};
+use onboard::settings::{Site, Vehicle};
 
 use super::error::ReplayError;
 use crate::angle_log::LoggedAngle;
@@ -17,21 +17,21 @@ const SILENCE_S: f64 = 20.0;
 const CONTRADICTION_RAD: f64 = 0.2;
 
 /// Remarks, and when in the drive they belong (s).
-pub type Doubts = Vec<(f64, String)>;
+pub type Warnings = Vec<(f64, String)>;
 
 /// What odometry and angles show to be wrong with themselves, each other, site or vehicle.
 ///
 /// # Errors
 /// [`ReplayError::Clocks`] where not a single angle falls into the time of the odometry.
-pub fn doubts(
+pub fn warnings(
     site: &Site,
     vehicle: &Vehicle,
     odometry: &OdometryLog,
     angles: &[LoggedAngle],
-) -> Result<Doubts, ReplayError> {
-    let mut doubts = Doubts::new();
+) -> Result<Warnings, ReplayError> {
+    let mut warnings = Warnings::new();
     let Some(odometry_s) = odometry.interval_s() else {
-        return Ok(doubts);
+        return Ok(warnings);
     };
     let [start_s, _] = odometry_s;
     let inside = |it: &&LoggedAngle| odometry.covers(it.measured.time_s);
@@ -49,7 +49,7 @@ pub fn doubts(
     let outside = angles.len() - heard.len();
     if outside > 0 {
         let text = format!("{outside} angles lie outside of the odometry's time; check the clocks");
-        doubts.push((start_s, text));
+        warnings.push((start_s, text));
     }
 
     let mut unknown: BTreeMap<(u16, u8), usize> = BTreeMap::new();
@@ -71,7 +71,7 @@ pub fn doubts(
             "{count} angles are of pci {pci}, ssb_index {index}, which the site does not have; they \
              are not used"
         );
-        doubts.push((start_s, text));
+        warnings.push((start_s, text));
     }
 
     let turns = |it: &&LoggedAngle| {
@@ -85,7 +85,7 @@ pub fn doubts(
              angle_rad, and their deviation, are in degrees",
             angles.len()
         );
-        doubts.push((start_s, text));
+        warnings.push((start_s, text));
     }
 
     let measurand = vehicle.array.measurand();
@@ -101,7 +101,7 @@ pub fn doubts(
              else angle_rad itself); phase_rad is used; check which is which, and the array's settings",
             angles.len()
         );
-        doubts.push((start_s, text));
+        warnings.push((start_s, text));
     }
 
     let times_s = heard.iter().map(|it| it.measured.time_s);
@@ -112,11 +112,11 @@ pub fn doubts(
                 "no angle for {:.0} s from {before_s:.1} s on",
                 time_s - before_s
             );
-            doubts.push((before_s, text));
+            warnings.push((before_s, text));
         }
         before_s = before_s.max(time_s);
     }
-    doubts.extend(of_odometry(odometry));
+    warnings.extend(of_odometry(odometry));
     let samples = &odometry.samples;
     let turning = samples.iter().filter(|it| it.yaw_rate_radps.is_some());
     let (turning, all) = (turning.count(), samples.len());
@@ -126,14 +126,9 @@ pub fn doubts(
              turns there",
             all - turning
         );
-        doubts.push((start_s, text));
+        warnings.push((start_s, text));
     }
-    if vehicle.drive == DriveKind::Differential && turning == 0 {
-        let text = "nothing tells how a differential drive turns: add yaw_rate_radps, or left and \
-                    right wheel, to the odometry";
-        doubts.push((start_s, text.to_owned()));
-    }
-    Ok(doubts)
+    Ok(warnings)
 }
 
 /// Distances that the speeds contradict.

@@ -1,0 +1,354 @@
+//! Misconfiguration diagnosis: whether a drive was meant in another way than it was given.
+//!
+//! The localizer that located the drive is run once more as given. Where its angles do not come
+//! from where it expects them, each [configuration hypothesis](Hypothesis) is screened by a plain
+//! filter, and the best of them are put to the localizer itself: the likelihoods of its innovations
+//! are compared (multiple-model testing; Bar-Shalom, Li and Kirubarajan, Estimation with
+//! Applications to Tracking and Navigation, 11.6). What is named is far more likely, and agrees
+//! with the angles.
+
+use std::collections::BTreeMap;
+
+use onboard::geometry::{Point, Pose};
+use onboard::radio_head::RadioHead;
+use onboard::settings::{DriveKind, LocalizerSettings};
+
+use super::error::ReplayError;
+use super::evidence::{Count, Evidence, HeadId, head_of};
+use super::hypotheses::{
+    Drive, Hypothesis, Subject, moved, of_drive, of_radio_heads, of_yaw_rate, robot,
+};
+use super::innovations::{plain_filter, replay_angles, vehicles_localizer};
+use super::located::{Diagnosis, LocatedDrive};
+use super::moved_head::triangulate;
+use super::yaw_rate;
+use crate::angle_log::LoggedAngle;
+
+/// Angles by which it is judged, spread over the drive; of a radio head at most one in this time (s).
+const MOST_ANGLES: usize = 3000;
+const LEAST_APART_S: f64 = 0.2;
+
+/// Log-odds a hypothesis must have: each is true of one drive of a thousand, and one of a thousand
+/// that are named may be wrong.
+const LOG_ODDS: f64 = 13.8;
+
+/// Log-odds within which two hypotheses cannot be told apart, and both are named.
+const AS_LIKELY: f64 = 5.0;
+
+/// Largest share of angles that may be refused where a drive is understood, ...
+const MOST_REFUSED: f64 = 0.2;
+
+/// ... and of one radio head's, with so many angles, that may be beyond three standard deviations of
+/// what is expected. Errors that stay over metres are found while driving, and nothing is refused.
+const MOST_MISFITS: f64 = 0.1;
+const LEAST_OF_HEAD: usize = 10;
+
+/// Hypotheses that are put to the localizer itself.
+const CONFIRMED: usize = 4;
+
+/// ... of those that the filter finds hardly less likely than the best.
+const CLOSE: f64 = 30.0;
+
+/// A radio head that is off by less is not called moved (m).
+const LEAST_MOVED_M: f64 = 2.0;
+
+/// By how much the path may change where a misconfiguration did no harm (m, root mean square).
+const HARMLESS_M: f64 = 0.5;
+
+/// A speed of so many times the vehicle's is in another unit.
+const TOO_FAST: f64 = 10.0;
+
+/// No vehicle is so slow in the median while it moves (m/s).
+const CRAWLS_MPS: f64 = 0.05;
+
+/// What is wrong with a drive as it was given: one diagnosis each.
+///
+/// # Errors
+/// As [`vehicles_localizer`].
+pub fn diagnose(given: &Drive<'_>, located: &LocatedDrive) -> Result<Vec<Diagnosis>, ReplayError> {
+    let is_tracker = matches!(given.vehicle.localizer, LocalizerSettings::Tracker(_));
+    if !(is_tracker && given.vehicle.start.known) {
+        let missing = missing_yaw_rate(given, !located.is_lost_for_long());
+        return Ok(missing.into_iter().chain(too_fast(given)).collect());
+    }
+    let given = spread(given);
+    let by_localizer = if located.is_lost_for_long() {
+        None
+    } else {
+        confirmed(&given)?
+    };
+    let is_lost = by_localizer.is_none();
+    // Of a localizer that is lost there is no prediction to compare with but that of its filter.
+    let Some(as_given) = by_localizer.map_or_else(|| screened(&given), |it| Ok(Some(it)))? else {
+        return Ok(Vec::new());
+    };
+    let is_sound = !is_lost && is_understood(&as_given);
+    let mut found = Vec::new();
+    if !is_sound {
+        found = better_explanations(&given, &as_given, is_lost)?;
+    }
+    if found.is_empty() {
+        found.extend(wrong_yaw_rate(&given, located, &as_given, is_sound)?);
+    }
+    if found.is_empty() {
+        found.extend(too_fast(&given));
+    }
+    found.extend(missing_yaw_rate(&given, is_sound));
+    Ok(found)
+}
+
+/// The drive by as many angles as it takes to judge it, in order of time.
+fn spread<'a>(given: &Drive<'a>) -> Drive<'a> {
+    let heads = RadioHead::heard(&given.site, &given.vehicle);
+    let mut given = given.clone();
+    let angles = given.angles.to_mut();
+    let sends = |it: &LoggedAngle| {
+        let (pci, ssb_index) = head_of(it);
+        heads.iter().any(|head| head.sends(pci, ssb_index))
+    };
+    angles.retain(|it| sends(it));
+    angles.sort_by(|a, b| a.measured.time_s.total_cmp(&b.measured.time_s));
+    let mut apart_s = LEAST_APART_S;
+    loop {
+        let mut last_s: BTreeMap<HeadId, f64> = BTreeMap::new();
+        let mut kept = angles.clone();
+        kept.retain(|it| {
+            let time_s = it.measured.time_s;
+            // Times of a regular log are told to some digits.
+            let is_apart = |last_s: f64| time_s - last_s > 0.99 * apart_s;
+            let is_kept = last_s
+                .get(&head_of(it))
+                .is_none_or(|last_s| is_apart(*last_s));
+            if is_kept {
+                last_s.insert(head_of(it), time_s);
+            }
+            is_kept
+        });
+        if kept.len() <= MOST_ANGLES {
+            *angles = kept;
+            return given;
+        }
+        apart_s *= 1.5;
+    }
+}
+
+/// Whether angles come from where they are expected, those of each radio head too.
+fn is_understood(evidence: &Evidence) -> bool {
+    let is_off = |it: &Count| it.angles >= LEAST_OF_HEAD && it.misfit_share() > MOST_MISFITS;
+    evidence.all.refused_share() < MOST_REFUSED && !evidence.heads.values().any(is_off)
+}
+
+/// What a plain filter makes of a drive: all that it takes to tell what is worth more.
+fn screened(drive: &Drive<'_>) -> Result<Option<Evidence>, ReplayError> {
+    Evidence::by(&mut plain_filter(&drive.site, &drive.vehicle)?, drive)
+}
+
+/// What the vehicle's own localizer makes of a drive; `None` where it is lost.
+fn confirmed(drive: &Drive<'_>) -> Result<Option<Evidence>, ReplayError> {
+    Evidence::by(
+        &mut *vehicles_localizer(&drive.site, &drive.vehicle)?,
+        drive,
+    )
+}
+
+/// The hypotheses that explain the drive's angles where it, as given, does not.
+fn better_explanations(
+    given: &Drive<'_>,
+    as_given: &Evidence,
+    is_lost: bool,
+) -> Result<Vec<Diagnosis>, ReplayError> {
+    let mut likely = Vec::new();
+    for hypothesis in hypotheses(given)? {
+        let meant = hypothesis.correct(given);
+        if !is_plausible(&meant) {
+            continue;
+        }
+        let Some(evidence) = screened(&meant)? else {
+            continue;
+        };
+        if evidence.log_likelihood.is_finite() {
+            likely.push((evidence.log_likelihood - hypothesis.penalty, hypothesis));
+        }
+    }
+    likely.sort_by(|a, b| b.0.total_cmp(&a.0));
+    let best = likely
+        .first()
+        .map_or(0.0, |(log_likelihood, _)| *log_likelihood);
+    let close = |it: &(f64, Hypothesis)| best - it.0 < CLOSE;
+    let mut judged = Vec::new();
+    for (_, hypothesis) in likely.into_iter().take_while(close).take(CONFIRMED) {
+        let meant = hypothesis.correct(given);
+        let Some(evidence) = confirmed(&meant)? else {
+            continue;
+        };
+        let log_odds = evidence.log_likelihood - as_given.log_likelihood - hypothesis.penalty;
+        let fits = evidence.all.refused_share() < MOST_REFUSED
+            && 2 * evidence.all.misfits < as_given.all.misfits;
+        if log_odds > LOG_ODDS && fits {
+            judged.push((log_odds, hypothesis, evidence));
+        }
+    }
+    judged.sort_by(|a, b| b.0.total_cmp(&a.0));
+    let best = judged.first().map_or(0.0, |(log_odds, ..)| *log_odds);
+    judged.retain(|(log_odds, ..)| best - log_odds < LOG_ODDS);
+    // What has something free in it explains whatever has not, too.
+    if judged.iter().any(|(_, it, _)| it.penalty == 0.0) {
+        judged.retain(|(_, it, _)| it.penalty == 0.0);
+    } else {
+        judged.truncate(1);
+    }
+    let best = judged.first().map_or(0.0, |(log_odds, ..)| *log_odds);
+    judged.retain(|(log_odds, ..)| best - log_odds < AS_LIKELY);
+    let diagnosis = |(_, hypothesis, evidence): (f64, Hypothesis, Evidence)| Diagnosis {
+        is_of_start: hypothesis.subject == Subject::Start,
+        is_harmless: !is_lost && apart_m(&as_given.path, &evidence.path) < HARMLESS_M,
+        text: format!(
+            "{:.0} % of the angles are not what is expected, but {:.0} % if {}; check {}",
+            100.0 * as_given.all.misfit_share(),
+            100.0 * evidence.all.misfit_share(),
+            hypothesis.meant,
+            hypothesis.check
+        ),
+    };
+    Ok(judged.into_iter().map(diagnosis).collect())
+}
+
+/// All that may be wrong with a drive.
+fn hypotheses(given: &Drive<'_>) -> Result<Vec<Hypothesis>, ReplayError> {
+    let site = &given.site;
+    let mut hypotheses = of_drive();
+    hypotheses.extend(of_radio_heads(site));
+    hypotheses.extend(yaw_rate_hypotheses(given).into_iter().map(|(_, it)| it));
+    if given.vehicle.drive == DriveKind::Road {
+        hypotheses.push(robot());
+    }
+    for (number, settings) in site.radio_heads.iter().enumerate() {
+        let head = RadioHead::from(settings);
+        let mut filter = plain_filter(site, &given.vehicle)?;
+        filter.set_excluded(&head, true);
+        let (odometry, angles) = (&given.odometry, &given.angles);
+        let steps = replay_angles(&mut filter, site, &given.vehicle, odometry, angles, None)?;
+        let path: Vec<Option<Pose>> = steps.iter().map(|step| step.pose).collect();
+        let id = (settings.pci, settings.ssb_index);
+        let place = triangulate(given, id, &path);
+        let is_elsewhere = |place: &Point| place.distance_m(head.position) > LEAST_MOVED_M;
+        let place = place.filter(is_elsewhere);
+        hypotheses.extend(place.and_then(|place| moved(site, number, place)));
+    }
+    Ok(hypotheses)
+}
+
+/// How far two paths are apart (m, root mean square).
+fn apart_m(one: &[Option<Pose>], other: &[Option<Pose>]) -> f64 {
+    let pairs = one
+        .iter()
+        .zip(other)
+        .filter_map(|(one, other)| one.zip(*other));
+    let squares: Vec<f64> = pairs
+        .map(|(one, other)| one.point().distance_m(other.point()).powi(2))
+        .collect();
+    (squares.iter().sum::<f64>() / squares.len().max(1) as f64).sqrt()
+}
+
+fn yaw_rate_hypotheses(given: &Drive<'_>) -> Vec<(f64, Hypothesis)> {
+    of_yaw_rate(yaw_rate::constant_radps(&given.odometry.samples))
+}
+
+fn is_on_road(given: &Drive<'_>) -> bool {
+    given.site.road.is_some() && given.vehicle.follows_road()
+}
+
+/// A yaw rate that is not what the road turns by, or that never changes where nothing fits.
+fn wrong_yaw_rate(
+    given: &Drive<'_>,
+    located: &LocatedDrive,
+    as_given: &Evidence,
+    is_sound: bool,
+) -> Result<Option<Diagnosis>, ReplayError> {
+    let is_constant = yaw_rate::constant_radps(&given.odometry.samples).is_some();
+    // Off the road the heading is the yaw rate's own, unless that never changes.
+    let tells_heading = is_on_road(given) || is_constant;
+    let told_per_turned = if tells_heading && !located.is_lost_for_long() {
+        yaw_rate::told_per_turned(&located.poses)
+    } else {
+        None
+    };
+    let is_it = |factor: f64| match told_per_turned {
+        Some(told) => is_constant || yaw_rate::is_about(told, factor),
+        None => is_constant && !is_sound,
+    };
+    let mut hypotheses = yaw_rate_hypotheses(given).into_iter();
+    let Some((_, hypothesis)) = hypotheses.find(|(factor, _)| is_it(*factor)) else {
+        return Ok(None);
+    };
+    let meant = hypothesis.correct(given);
+    let evidence = confirmed(&meant)?;
+    let is_worse = |it: &Evidence| as_given.log_likelihood - it.log_likelihood > LOG_ODDS;
+    // Without any yaw rate the localizer may be lost as well.
+    if evidence.as_ref().map_or(!is_constant, is_worse) {
+        return Ok(None);
+    }
+    let is_near = |it: &Evidence| apart_m(&as_given.path, &it.path) < HARMLESS_M;
+    let turned = told_per_turned.map_or(
+        String::from("angles come from elsewhere than expected"),
+        |told| format!("for each radian that the vehicle turns yaw_rate_radps tells {told:.2}"),
+    );
+    Ok(Some(Diagnosis {
+        is_of_start: false,
+        is_harmless: is_sound && evidence.as_ref().is_some_and(is_near),
+        text: format!("{turned}: {}; check {}", hypothesis.meant, hypothesis.check),
+    }))
+}
+
+/// An odometry without yaw rate where something has to tell how the vehicle turns.
+fn missing_yaw_rate(given: &Drive<'_>, is_sound: bool) -> Option<Diagnosis> {
+    let vehicle = &given.vehicle;
+    let mut samples = given.odometry.samples.iter();
+    if samples.any(|it| it.yaw_rate_radps.is_some()) {
+        return None;
+    }
+    let turns = match vehicle.drive {
+        DriveKind::Differential => "nothing tells how a differential drive turns",
+        DriveKind::Road if !is_on_road(given) => "nothing but angles tells how the vehicle turns",
+        DriveKind::Road if vehicle.gyroscope.is_some() => {
+            "the vehicle has a gyroscope, but the road alone tells how it turns"
+        }
+        DriveKind::Road => return None,
+    };
+    Some(Diagnosis {
+        is_of_start: false,
+        is_harmless: is_sound,
+        text: format!(
+            "{turns}: the odometry has no yaw_rate_radps; add it, or left and right wheel"
+        ),
+    })
+}
+
+/// Whether a vehicle drives as fast as that.
+fn is_plausible(drive: &Drive<'_>) -> bool {
+    let fastest_mps = TOO_FAST * drive.vehicle.top_speed_mps();
+    median_speed_mps(drive).is_none_or(|it| (CRAWLS_MPS..fastest_mps).contains(&it))
+}
+
+/// Median of the speeds while it moves.
+fn median_speed_mps(drive: &Drive<'_>) -> Option<f64> {
+    let speeds_mps = drive.odometry.samples.iter().map(|it| it.speed_mps.abs());
+    let mut moving_mps: Vec<f64> = speeds_mps.filter(|it| *it > 0.0).collect();
+    moving_mps.sort_by(f64::total_cmp);
+    moving_mps.get(moving_mps.len() / 2).copied()
+}
+
+/// Speeds that no such vehicle has. Angles refuse nothing where an odometer says so much.
+fn too_fast(given: &Drive<'_>) -> Option<Diagnosis> {
+    let vehicle = &given.vehicle;
+    let median_mps = median_speed_mps(given)?;
+    (median_mps > TOO_FAST * vehicle.top_speed_mps()).then(|| Diagnosis {
+        is_of_start: false,
+        is_harmless: false,
+        text: format!(
+            "the odometry says {median_mps:.1} m/s in the median while it moves, where \
+             top_speed_kmh is {}; check the units of distances, speeds and time_s",
+            vehicle.top_speed_kmh
+        ),
+    })
+}

@@ -1,0 +1,113 @@
+//! How well a way of reading a drive predicts its angles, by the innovations of a localizer.
+
+use std::collections::{BTreeMap, BTreeSet};
+use std::f64::consts::TAU;
+
+use onboard::geometry::Pose;
+use onboard::localize::Localizer;
+
+use super::error::ReplayError;
+use super::hypotheses::Drive;
+use super::innovations::{Met, Step, replay_angles};
+use super::stated::with_phase;
+use crate::angle_log::LoggedAngle;
+
+/// Share of angles that come from anywhere, by a reflection say; the others are Gaussian.
+const FROM_ANYWHERE: f64 = 0.1;
+
+/// Angles to one radio head within this time count as one (s).
+const INDEPENDENT_S: f64 = 1.0;
+
+/// Squared Mahalanobis distance of an angle that fits: within three standard deviations.
+const FITS: f64 = 9.0;
+
+/// A radio head by its PCI and SSB index.
+pub type HeadId = (u16, u8);
+
+pub fn head_of(angle: &LoggedAngle) -> HeadId {
+    (angle.ssb.pci, angle.ssb.ssb_index)
+}
+
+/// What became of angles: how many there were, how many were refused, how many fit the prediction.
+#[derive(Debug, Clone, Copy, Default)]
+pub struct Count {
+    pub angles: usize,
+    pub refused: usize,
+    pub misfits: usize,
+}
+
+impl Count {
+    pub fn refused_share(&self) -> f64 {
+        self.refused as f64 / self.angles.max(1) as f64
+    }
+
+    pub fn misfit_share(&self) -> f64 {
+        self.misfits as f64 / self.angles.max(1) as f64
+    }
+}
+
+/// How well a way of reading a drive predicts its angles.
+pub struct Evidence {
+    /// Sum over the angles, those that are not independent counted as one.
+    pub log_likelihood: f64,
+    pub all: Count,
+    pub heads: BTreeMap<HeadId, Count>,
+    /// Believed pose at each angle.
+    pub path: Vec<Option<Pose>>,
+}
+
+impl Evidence {
+    /// Drives with a localizer; `None` where it is lost for long.
+    ///
+    /// # Errors
+    /// As [`replay_angles`].
+    pub fn by(
+        localizer: &mut dyn Localizer,
+        drive: &Drive<'_>,
+    ) -> Result<Option<Self>, ReplayError> {
+        let Drive { site, vehicle, .. } = drive;
+        let (odometry, angles) = (&drive.odometry, &drive.angles);
+        let steps = replay_angles(localizer, site, vehicle, odometry, angles, None)?;
+        if steps.len() < angles.len() {
+            return Ok(None);
+        }
+        let measurand = vehicle.array.measurand();
+        let mut evidence = Self {
+            log_likelihood: 0.0,
+            all: Count::default(),
+            heads: BTreeMap::new(),
+            path: steps.iter().map(|step| step.pose).collect(),
+        };
+        for (Step { met, .. }, logged) in steps.iter().zip(angles.iter()) {
+            let sigma_rad = with_phase(logged, &measurand).measured.phase_sigma_rad;
+            evidence.log_likelihood += log_likelihood(met.as_ref(), sigma_rad);
+            let misfits = |met: &Met| met.residual_rad.powi(2) > FITS * met.variance;
+            let head = evidence.heads.entry(head_of(logged)).or_default();
+            for count in [&mut evidence.all, head] {
+                count.angles += 1;
+                count.refused += usize::from(met.is_none_or(|met| !met.used));
+                count.misfits += usize::from(met.as_ref().is_none_or(misfits));
+            }
+        }
+        evidence.log_likelihood *= independent_share(angles);
+        Ok(Some(evidence))
+    }
+}
+
+/// Of an angle, per standard deviation of its measurement: so it does not matter in what it is told.
+fn log_likelihood(met: Option<&Met>, sigma_rad: f64) -> f64 {
+    let gaussian = met.map_or(0.0, |met| {
+        (-0.5 * met.residual_rad.powi(2) / met.variance).exp() / (TAU * met.variance).sqrt()
+    });
+    (sigma_rad * ((1.0 - FROM_ANYWHERE) * gaussian + FROM_ANYWHERE / TAU)).ln()
+}
+
+/// Share of the angles that count as independent.
+fn independent_share(angles: &[LoggedAngle]) -> f64 {
+    let apart = |it: &LoggedAngle| {
+        let time = (it.measured.time_s / INDEPENDENT_S).floor() as i64;
+        (head_of(it), time)
+    };
+    let independent: BTreeSet<_> = angles.iter().map(apart).collect();
+    independent.len() as f64 / angles.len().max(1) as f64
+}

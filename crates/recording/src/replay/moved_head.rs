@@ -1,0 +1,136 @@
+//! Where a radio head stands by its own angles, along a path that the others tell.
+
+use std::f64::consts::TAU;
+
+use onboard::geometry::{Point, Pose, wrap_angle};
+use onboard::manifold::Measurand;
+
+use super::evidence::{HeadId, head_of};
+use super::hypotheses::Drive;
+use super::stated::with_phase;
+
+/// Share of angles that come from anywhere.
+const FROM_ANYWHERE: f64 = 0.1;
+
+/// What the path adds to an angle's deviation (rad).
+const PATH_STD_RAD: f64 = 0.1;
+
+/// How far from the path and from its stated place a radio head is looked for (m), and in what steps.
+const REACH_M: f64 = 60.0;
+const STEPS: usize = 60;
+
+/// Places that are refined, and to what step (m).
+const REFINED: usize = 12;
+const FINEST_M: f64 = 0.05;
+
+/// Log-likelihood within which places are as good as each other; the nearest to the stated is taken.
+const AS_GOOD: f64 = 3.0;
+
+/// Angles without which no place is told.
+const LEAST_ANGLES: usize = 10;
+
+/// An angle, from where it was seen: of the array, and the direction of its axis.
+struct Sighted {
+    from: Point,
+    axis_rad: f64,
+    phase_rad: f64,
+    variance: f64,
+}
+
+/// Where the angles of a radio head come from; `None` where they do not tell. `path` is the believed
+/// pose at each of the drive's angles.
+pub fn triangulate(drive: &Drive<'_>, head: HeadId, path: &[Option<Pose>]) -> Option<Point> {
+    let settings = (drive.site.radio_heads.iter()).find(|it| (it.pci, it.ssb_index) == head)?;
+    let array = &drive.vehicle.array;
+    let measurand = array.measurand();
+    let [forward_m, left_m, up_m] = array.position_m;
+    let [x_m, y_m, height_m] = settings.position_m;
+    let own = drive.angles.iter().zip(path);
+    let sighted: Vec<Sighted> = (own.filter(|(angle, _)| head_of(angle) == head))
+        .filter_map(|(angle, pose)| {
+            let (measured, pose) = (with_phase(angle, &measurand).measured, (*pose)?);
+            Some(Sighted {
+                from: pose.beside(forward_m, left_m),
+                axis_rad: pose.heading_rad + array.mounting_rad,
+                phase_rad: measured.phase_rad,
+                variance: measured.phase_sigma_rad.powi(2) + PATH_STD_RAD.powi(2),
+            })
+        })
+        .collect();
+    if sighted.len() < LEAST_ANGLES {
+        return None;
+    }
+    let stated = Point::new(x_m, y_m);
+    let likelihood = |place: Point| log_likelihood(&sighted, place, height_m - up_m, &measurand);
+    let bounds = |of: fn(&Point) -> f64| {
+        let of = sighted.iter().map(|it| of(&it.from));
+        let (low, high) = of.fold((f64::INFINITY, f64::NEG_INFINITY), |(low, high), it| {
+            (low.min(it), high.max(it))
+        });
+        (low - REACH_M, high + REACH_M)
+    };
+    let (west, east) = bounds(|it| it.x_m);
+    let (south, north) = bounds(|it| it.y_m);
+    let mut places: Vec<(f64, Point)> = Vec::with_capacity((STEPS + 1) * (STEPS + 1) + 1);
+    for i in 0..=STEPS {
+        for j in 0..=STEPS {
+            let share = |k: usize| k as f64 / STEPS as f64;
+            let place = Point::new(
+                west + share(i) * (east - west),
+                south + share(j) * (north - south),
+            );
+            places.push((likelihood(place), place));
+        }
+    }
+    places.push((likelihood(stated), stated));
+    places.sort_by(|one, other| other.0.total_cmp(&one.0));
+    let coarse_m = (east - west).max(north - south) / STEPS as f64;
+    let refined: Vec<(f64, Point)> = (places.into_iter().take(REFINED))
+        .map(|place| refine(place, coarse_m, likelihood))
+        .collect();
+    let best = refined
+        .iter()
+        .map(|it| it.0)
+        .fold(f64::NEG_INFINITY, f64::max);
+    let as_good = refined.iter().filter(|it| best - it.0 < AS_GOOD);
+    let nearest = as_good
+        .min_by(|(_, one), (_, other)| one.distance_m(stated).total_cmp(&other.distance_m(stated)));
+    nearest.map(|(_, place)| *place)
+}
+
+fn log_likelihood(sighted: &[Sighted], place: Point, rise_m: f64, measurand: &Measurand) -> f64 {
+    let of_angle = |it: &Sighted| {
+        let ground_m = it.from.distance_m(place);
+        let level = ground_m / ground_m.hypot(rise_m).max(f64::MIN_POSITIVE);
+        let predicted = measurand.value_rad(it.from.bearing_rad(place) - it.axis_rad, level);
+        let residual = wrap_angle(it.phase_rad - predicted);
+        let gaussian =
+            (-0.5 * residual * residual / it.variance).exp() / (TAU * it.variance).sqrt();
+        ((1.0 - FROM_ANYWHERE) * gaussian + FROM_ANYWHERE / TAU).ln()
+    };
+    sighted.iter().map(of_angle).sum()
+}
+
+/// Pattern search (Hooke and Jeeves, J. ACM 8(2), 1961) from a place on.
+fn refine(
+    mut best: (f64, Point),
+    mut step_m: f64,
+    likelihood: impl Fn(Point) -> f64,
+) -> (f64, Point) {
+    while step_m > FINEST_M {
+        let Point { x_m, y_m } = best.1;
+        let around = [(1.0, 0.0), (-1.0, 0.0), (0.0, 1.0), (0.0, -1.0)];
+        let tried = around.map(|(dx, dy)| {
+            let place = Point::new(x_m + step_m * dx, y_m + step_m * dy);
+            (likelihood(place), place)
+        });
+        let better = tried
+            .into_iter()
+            .max_by(|one, other| one.0.total_cmp(&other.0));
+        match better.filter(|it| it.0 > best.0) {
+            Some(better) => best = better,
+            None => step_m *= 0.5,
+        }
+    }
+    best
+}

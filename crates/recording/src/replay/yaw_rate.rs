@@ -1,0 +1,66 @@
+//! Whether the odometry's yaw rate is what it is said to be.
+
+use onboard::geometry::wrap_angle;
+use onboard::observation::OdometrySample;
+
+use super::located::LocatedPose;
+
+/// Yaw rates that differ by less are one and the same (rad/s).
+const CONSTANT_RADPS: f64 = 1e-9;
+
+/// Time over which turns are compared (s).
+const WINDOW_S: f64 = 2.0;
+
+/// Change of heading without which nothing is said of a yaw rate (rad).
+const LEAST_TURNED_RAD: f64 = 0.5;
+
+/// By what share a factor may be off to be taken for one.
+const ABOUT: f64 = 0.25;
+
+/// The yaw rate of a log in which it never changes.
+pub fn constant_radps(samples: &[OdometrySample]) -> Option<f64> {
+    let mut rates = samples.iter().map(|it| it.yaw_rate_radps);
+    let first_radps = rates.next()??;
+    let is_same =
+        |rate: Option<f64>| rate.is_some_and(|it| (it - first_radps).abs() < CONSTANT_RADPS);
+    rates.all(is_same).then_some(first_radps)
+}
+
+/// Radians that the yaw rate tells per radian that the located vehicle turned; `None`
+/// where the vehicle hardly turned, or the two have nothing to do with each other.
+pub fn told_per_turned(poses: &[LocatedPose]) -> Option<f64> {
+    let (mut told_turned, mut turned_turned) = (0.0, 0.0);
+    // By how much it has turned since the first pose, and the bounds of that.
+    let (mut heading_rad, mut least_rad, mut most_rad) = (0.0, 0.0_f64, 0.0_f64);
+    let mut told_told = 0.0;
+    let mut window = (poses.first()?, 0.0);
+    for pair in poses.windows(2) {
+        let [from, to] = pair else { continue };
+        let step_s = to.estimate.time_s - from.estimate.time_s;
+        window.1 += to.yaw_rate_radps? * step_s;
+        let (since, told) = window;
+        if to.estimate.time_s - since.estimate.time_s < WINDOW_S {
+            continue;
+        }
+        let (now, before) = (
+            to.estimate.pose.heading_rad,
+            since.estimate.pose.heading_rad,
+        );
+        let turned = wrap_angle(now - before);
+        told_turned += told * turned;
+        turned_turned += turned * turned;
+        told_told += told * told;
+        heading_rad += turned;
+        (least_rad, most_rad) = (least_rad.min(heading_rad), most_rad.max(heading_rad));
+        window = (to, 0.0);
+    }
+    let correlation2 = told_turned * told_turned / (told_told * turned_turned);
+    let is_told =
+        most_rad - least_rad > LEAST_TURNED_RAD && (told_told == 0.0 || correlation2 > 0.5);
+    is_told.then_some(told_turned / turned_turned)
+}
+
+/// Whether a yaw rate tells about so much per radian turned.
+pub fn is_about(told_per_turned: f64, factor: f64) -> bool {
+    (told_per_turned - factor).abs() < ABOUT * factor.abs()
+}
