@@ -131,7 +131,7 @@ fn relocate<'a>(
         angle.measured.time_s += late_s;
     }
     let all_heard = Vehicle {
-        wake_up: WakeUpSettings::default(),
+        wake_up: Some(WakeUpSettings::EVERY_SSB),
         ..in_time(vehicle)
     };
     let mut replay = Replay::new(site, &all_heard, start, Custom::default(), odometry)?;
