@@ -8,7 +8,7 @@ use numpy::{PyArray2, PyReadonlyArray1};
 use onboard::BoxError;
 use onboard::estimator::{AngleEstimator, EstimatedAngle};
 use onboard::geometry::Pose;
-use onboard::localize::tracker::OdometryVerdict;
+use onboard::localize::OdometryVerdict;
 use onboard::localize::{AngleMeasurement, Localizer, PoseEstimate, UpdateReason, UpdateVerdict};
 use onboard::manifold::Measurand;
 use onboard::observation::{OdometrySample, SensedSsb as CoreSensed, SsbObservation};

@@ -6,8 +6,9 @@ use std::f64::consts::TAU;
 
 use nr_ssb::{BchPayload, Beam, Burst, Case, Complex32, Lmax, Mib, Numerology, Ofdm, Pci};
 use onboard::estimator::{EstimatedAngle, built_in};
-use onboard::localize::tracker::{InitialPose, TrackerConfig};
-use onboard::localize::{AngleMeasurement, Tracker};
+use onboard::localize::InitialPose;
+use onboard::localize::ekf::EkfConfig;
+use onboard::localize::{AngleMeasurement, Ekf};
 use onboard::observation::OdometrySample;
 use onboard::radio_head::RadioHead;
 use onboard::receive::{Receiver, ReceiverConfig, Window};
@@ -93,19 +94,19 @@ fn samples_to_angle(bencher: divan::Bencher, pilots: &str) {
 
 /// With and without a map, and where errors that stay over metres are found.
 #[divan::bench(args = [(true, false), (false, false), (true, true)])]
-fn angle_to_pose(bencher: divan::Bencher, (map, finds_errors): (bool, bool)) {
+fn angle_to_pose(bencher: divan::Bencher, (map, estimates_bias): (bool, bool)) {
     let (site, mut vehicle) = believed("trip-2");
-    vehicle.receiver.phase_bias_probability = Some(if finds_errors { 0.75 } else { 0.0 });
+    vehicle.receiver.phase_bias_probability = Some(if estimates_bias { 0.75 } else { 0.0 });
     let road = site.build_road().unwrap().unwrap();
     let heads = RadioHead::heard(&site, &vehicle);
-    let config = TrackerConfig::new(&site, &vehicle);
+    let config = EkfConfig::new(&site, &vehicle);
     let start = InitialPose {
         pose: road.pose(0.0),
         position_std_m: 1.0,
         heading_std_rad: 0.05,
     };
     let known = map.then(|| std::sync::Arc::new(road));
-    let mut tracker = Tracker::new(config, known, &heads, &start);
+    let mut tracker = Ekf::new(config, known, &heads, &start);
     let mut at = |metres: f64| {
         tracker.odometry(&OdometrySample {
             time_s: 0.25 * metres,

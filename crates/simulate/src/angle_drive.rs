@@ -3,7 +3,7 @@
 use std::fs;
 use std::path::Path;
 
-use onboard::localize::tracker::TrackerConfig;
+use onboard::localize::ekf::EkfConfig;
 use onboard::settings::Check;
 use recording::{LoggedAngle, RecordingError, TimedPose};
 use recording::{write_angle_log, write_odometry_csv, write_tum};
@@ -41,7 +41,7 @@ pub fn log_angles(
     let mut vehicle = scenario.vehicle.clone();
     let method = vehicle.estimator.method;
     let tape = Tape::record(&simulation, &[method], Streams::new(seed, run), run)?;
-    let config = TrackerConfig::new(&scenario.site, &vehicle);
+    let config = EkfConfig::new(&scenario.site, &vehicle);
     let measurand = config.array.measurand;
     let scatter = measurand.scatter_variance(config.rician_k, measurand.mean_aperture());
     let angles: Vec<_> = tape

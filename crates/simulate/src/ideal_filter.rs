@@ -8,7 +8,7 @@
 //! from campaign to campaign.
 
 use onboard::localize::gaussian::{Matrix, product};
-use onboard::localize::tracker::state::{ACROSS, ALONG, STATES};
+use onboard::localize::ekf::state::{ACROSS, ALONG, STATES};
 use rand::RngExt;
 use rand_distr::StandardNormal;
 

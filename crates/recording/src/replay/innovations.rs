@@ -2,7 +2,8 @@
 
 use std::sync::Arc;
 
-use onboard::localize::tracker::{InitialPose, Tracker, TrackerConfig};
+use onboard::localize::{Ekf, InitialPose};
+use onboard::localize::ekf::EkfConfig;
 use onboard::radio_head::RadioHead;
 use onboard::settings::{Check, Site, Vehicle};
 
@@ -52,8 +53,8 @@ pub fn innovations(
     };
     let heads = RadioHead::heard(site, vehicle);
     let road = site.build_road()?.filter(|_| vehicle.follows_road());
-    let config = TrackerConfig::new(site, vehicle);
-    let mut tracker = Tracker::new(config, road.map(Arc::new), &heads, &start);
+    let config = EkfConfig::new(site, vehicle);
+    let mut tracker = Ekf::new(config, road.map(Arc::new), &heads, &start);
     if used.is_some() {
         tracker.set_gate(f64::INFINITY);
     }

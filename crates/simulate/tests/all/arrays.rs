@@ -2,7 +2,7 @@
 
 use num_complex::Complex64;
 use onboard::geometry::wrap_angle;
-use onboard::localize::thermal::ThermalNoise;
+use onboard::thermal::ThermalNoise;
 use onboard::settings::{ArraySettings, ArrayShape};
 use simulate::Consistency;
 use simulate::bound::Bound;

@@ -7,8 +7,8 @@ use std::sync::Arc;
 use num_complex::Complex64;
 use onboard::estimator::{AngleEstimator, EstimatedAngle, built_in};
 use onboard::geometry::{Pose, wrap_angle};
-use onboard::localize::thermal::ThermalNoise;
-use onboard::localize::tracker::OdometryVerdict;
+use onboard::thermal::ThermalNoise;
+use onboard::localize::OdometryVerdict;
 use onboard::localize::{
     AngleMeasurement, Localizer, PoseEstimate, UpdateReason, UpdateVerdict, copy_into,
 };

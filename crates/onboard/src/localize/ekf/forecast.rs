@@ -1,0 +1,208 @@
+//! What the belief would become: driven on, and with angles not yet heard.
+
+use std::f64::consts::TAU;
+
+use super::angle_model::{AngleModel, locate};
+use super::config::PhaseBias;
+use super::filter::{Ekf, MOST_STEPS};
+use super::motion::{Reading, Step};
+use super::state::{Belief, STATES};
+use super::update::PredictedMeasurement;
+use crate::localize::bias;
+use crate::localize::gaussian::{Innovation, Matrix, dot, identity, principal_variances, product};
+use crate::localize::measurement::{AngleMeasurement, UpdateReason};
+use crate::radio_head::RadioHead;
+
+/// Longest step of a forecast (m), where millimetres do not matter.
+const FORECAST_STEP_M: f64 = 5.0;
+
+/// What an outlier costs, `ln(2π/ε)` for outliers from all directions and a share ε of about 2 in 1000:
+/// the right place must survive a few.
+const OUTLIER: f64 = 8.0;
+
+/// An angle to a radio head that is not used.
+#[derive(Clone, Copy, Debug, PartialEq)]
+pub(in crate::localize) struct ExcludedInnovation {
+    /// The innovation; of the angle's variance only its noise, what stays from look to look being the
+    /// belief's.
+    pub innovation: Innovation,
+    /// Variance of the noise, had nothing been heard before (rad²).
+    pub first_variance: f64,
+    /// Distance driven, in wavelengths.
+    pub place_wavelengths: f64,
+}
+
+/// How driving on, nothing being heard, makes a covariance `Φ P Φᵀ + Q`.
+#[derive(Clone, Debug)]
+pub struct Transition {
+    jacobian: Matrix<STATES>,
+    noise: Matrix<STATES>,
+}
+
+impl Transition {
+    /// Variances of a belief's horizontal error after it, along the principal axes, larger first (m²).
+    pub fn principal_variances(&self, belief: &Belief) -> [f64; 2] {
+        let [first, second] = [self.jacobian[0], self.jacobian[1]];
+        let with_second = belief.cross(&second);
+        principal_variances(
+            belief.variance_along(&first) + self.noise[0][0],
+            dot(&first, &with_second) + self.noise[0][1],
+            dot(&second, &with_second) + self.noise[1][1],
+        )
+    }
+}
+
+impl Ekf {
+    /// The innovation that an angle would bring; `None` where it would bring none.
+    pub fn innovation(&self, head: &RadioHead, measured: &AngleMeasurement) -> Option<Innovation> {
+        self.predict_measurement(head, measured)
+            .ok()
+            .filter(|predicted| !predicted.excluded)
+            .map(|predicted| predicted.innovation)
+    }
+
+    /// Log-likelihood of an angle, beside that of one that has but its own noise and is foretold exactly.
+    ///
+    /// Looks that are not independent have a variance that says so: they cost nothing, however that
+    /// variance differs from place to place. Where errors are found that stay over metres, a look counts
+    /// as the share of a stretch that it tells of. Whoever leaves out a radio head takes its angles for
+    /// outliers.
+    pub(in crate::localize) fn log_likelihood(&self, predicted: &Result<PredictedMeasurement, UpdateReason>) -> f64 {
+        let Ok(predicted) = predicted else {
+            return 0.0;
+        };
+        if self.config.estimates_bias() {
+            let density = (predicted.hypotheses.as_ref()).map_or(TAU.recip(), |hypotheses| hypotheses.density);
+            let exact = (TAU * predicted.own_variance).sqrt().recip();
+            return predicted.independent_share() * (density / exact).ln();
+        }
+        let seen = predicted.innovation;
+        if predicted.excluded || seen.mahalanobis2() > self.config.gate {
+            return -OUTLIER;
+        }
+        -0.5 * (seen.mahalanobis2() + (seen.variance / seen.measurement_variance).ln())
+    }
+
+    /// What an angle to an excluded radio head would bring; it counts as a look. Where
+    /// errors are found that stay over metres there is nothing to test: a radio head that is off has a
+    /// large one, and counts little.
+    pub(in crate::localize) fn innovation_of_excluded(
+        &mut self,
+        head: &RadioHead,
+        measured: &AngleMeasurement,
+    ) -> Option<ExcludedInnovation> {
+        let predicted = self.predict_measurement(head, measured).ok()?;
+        self.heads.get_mut(predicted.head)?.last_update_m = predicted.place_m;
+        if self.config.estimates_bias() {
+            return None;
+        }
+        let Innovation {
+            residual,
+            variance,
+            measurement_variance,
+        } = predicted.innovation;
+        let bias = self.config.phase_bias;
+        let unbiased = PhaseBias {
+            std_rad: 0.0,
+            ..bias
+        };
+        let (sigma, (travelled_m, _)) = (predicted.own_variance.sqrt(), predicted.moved);
+        let (aperture, toward) = (predicted.aperture, predicted.toward);
+        let noise = unbiased.variance(sigma, predicted.elapsed_s, predicted.moved)
+            + (self.config).scatter_variance(travelled_m, aperture, toward);
+        // What is off by as much in many looks counts once.
+        let lasting = self.systematic_variance(&predicted);
+        Some(ExcludedInnovation {
+            innovation: Innovation {
+                residual,
+                variance: variance - measurement_variance + lasting + noise,
+                measurement_variance: noise,
+            },
+            first_variance: self.first_variance(&predicted),
+            place_wavelengths: predicted.place_m / self.config.array.wavelength_m,
+        })
+    }
+
+    /// The belief at `time_s`, had the vehicle driven on at its speed and heard nothing.
+    pub fn forecast(&self, time_s: f64) -> Belief {
+        let lag_s = (time_s - self.time_s()).max(0.0);
+        let speed_mps = self.odometry.map_or(0.0, |sample| sample.speed_mps);
+        if speed_mps == 0.0 {
+            return self.belief;
+        }
+        self.carry(self.belief, speed_mps * lag_s)
+    }
+
+    /// A belief carried on by what the odometer would read, nothing being heard.
+    pub fn carry(&self, belief: Belief, reading_m: f64) -> Belief {
+        self.carry_by(belief, reading_m, |_| ())
+    }
+
+    /// The same, step by step.
+    fn carry_by(&self, mut belief: Belief, reading_m: f64, mut by: impl FnMut(&Step)) -> Belief {
+        let steps = (reading_m.abs() / FORECAST_STEP_M).ceil().min(MOST_STEPS);
+        for _ in 0..steps as usize {
+            let step = self.step(&belief, &Reading::exact(reading_m / steps));
+            step.apply(&mut belief);
+            by(&step);
+        }
+        belief
+    }
+
+    /// What carrying a belief on by what the odometer would read makes of covariances near its own.
+    pub fn transition(&self, belief: &Belief, reading_m: f64) -> Transition {
+        let mut jacobian = identity();
+        let mut noise = Belief::independent(belief.mean, [0.0; STATES]);
+        self.carry_by(*belief, reading_m, |step| {
+            step.apply(&mut noise);
+            jacobian = product(&step.jacobian, &jacobian);
+        });
+        Transition {
+            jacobian,
+            noise: noise.covariance,
+        }
+    }
+
+    /// What an angle of thermal variance `thermal(distance)` to `head` would make of a belief
+    /// `ahead_m` further on than the newest odometry; `None` of a radio head that is not used, or would
+    /// rather repeat itself.
+    pub fn rehearse(
+        &self,
+        belief: &Belief,
+        ahead_m: f64,
+        head: &RadioHead,
+        thermal: impl Fn(f64) -> f64,
+    ) -> Option<Belief> {
+        let (number, known) = (self.heads.iter().enumerate()).find(|(_, mine)| mine.is(head))?;
+        if known.excluded {
+            return None;
+        }
+        let (pose, frame) = locate(&belief.mean, 0.0, self.map.as_deref());
+        let array = &self.config.array;
+        let angle_model = AngleModel::new(&known.known, pose, &frame, &belief.mean, array)?;
+        let travelled_m = self.driven_m + ahead_m - known.last_update_m;
+        let own = (self.config.noise_ratio() * thermal(angle_model.range_m)).sqrt();
+        let mut variance = self
+            .config
+            .phase_bias
+            .variance(own, f64::INFINITY, (travelled_m, 0.0))
+            + self.config.look_variance(travelled_m, &angle_model);
+        if self.config.estimates_bias() {
+            let predicted_levels = belief.variance_along(&angle_model.row) + variance;
+            let staying = self.errors.variance(number, travelled_m, predicted_levels);
+            if bias::repeats(travelled_m) && staying > variance {
+                return None;
+            }
+            variance += staying;
+        }
+        let mut updated = *belief;
+        updated.update(0.0, &angle_model.row, variance);
+        Some(updated)
+    }
+
+    /// Variances of a belief's horizontal error along its principal axes, larger first (m²).
+    pub fn principal_variances(belief: &Belief) -> [f64; 2] {
+        let [[aa, ab, ..], [_, bb, ..], ..] = belief.covariance;
+        principal_variances(aa, ab, bb)
+    }
+}

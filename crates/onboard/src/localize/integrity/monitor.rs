@@ -1,0 +1,402 @@
+//! A filter that mistrusts its sources.
+//!
+//! Beside the filter that uses every radio head there run filters that do without some of them
+//! ([`Bank`]). If one radio head is at fault, the filter without it is right within its own
+//! covariance, wherever the full solution may be: the protection level is the radius about the full
+//! solution that holds for all of them together, each as probable as its fault
+//! ([`LevelEquation`](super::level::LevelEquation)). The same of filters that believe otherwise of odometer,
+//! array, site plan and reflections ([`FaultModes`]), as probable as the angles leave it; if one of them becomes far
+//! more probable than what is stated, the position is its own, and not `ok` where something is at fault or was a moment
+//! ago, nor where the odometer's scale is certainly not what is stated, or was and has not been found to be since. All
+//! of it is of angles as noisy as they are heard to be ([`NoiseRatio`](super::angle_noise::AngleNoise)).
+//!
+//! A single radio head has no witness but odometry and road: the protection level then is what
+//! those two can vouch for, grows with the distance driven, and passes the alert limit unless they
+//! are good.
+
+use super::protection_level::{Hypothesis, LevelEquation};
+use crate::clone_in_place::clone_in_place;
+use crate::geometry::{Pose, wrap_angle};
+use crate::localize::ekf::Ekf;
+use crate::localize::measurement::{AngleMeasurement, OdometryVerdict, UpdateVerdict};
+use crate::localize::modes::{Bank, FaultModes, IntegrityConfig};
+use crate::localize::pose_estimate::{Integrity, IntegrityState, PoseEstimate};
+use crate::observation::OdometrySample;
+use crate::radio_head::RadioHead;
+
+/// Share of the risk that is not worth the effort.
+const NEGLIGIBLE: f64 = 0.1;
+
+/// Squared deviations by which two positions are apart that are not both right.
+const APART2: f64 = 9.0;
+
+/// The pose of the one who told it until another took over, as seen from that one's. Both move on alike.
+#[derive(Clone, Copy, Debug)]
+struct Handover {
+    since_s: f64,
+    apart: [f64; 3],
+    covariance: [[f64; 3]; 3],
+}
+
+impl Handover {
+    /// That somebody tells `now` who was not asked until then, when it was `before`; `None` where the two agree.
+    pub fn new(before: &PoseEstimate, now: &PoseEstimate) -> Option<Self> {
+        let covariance = before.covariance?;
+        let [[xx, xy, _], [_, yy, _], _] = covariance;
+        let [[own_xx, own_xy, _], [_, own_yy, _], _] = now.covariance?;
+        let (xx, xy, yy) = (xx + own_xx, xy + own_xy, yy + own_yy);
+        let (x_m, y_m) = (
+            before.pose.x_m - now.pose.x_m,
+            before.pose.y_m - now.pose.y_m,
+        );
+        let apart2 = yy * x_m * x_m - 2.0 * xy * x_m * y_m + xx * y_m * y_m;
+        (apart2 > APART2 * (xx * yy - xy * xy)).then(|| Self {
+            since_s: now.time_s,
+            apart: [
+                x_m,
+                y_m,
+                wrap_angle(before.pose.heading_rad - now.pose.heading_rad),
+            ],
+            covariance,
+        })
+    }
+
+    /// Where it would be now, if it is not so long ago (s) that nothing was taken back.
+    pub fn beside(&self, told: &PoseEstimate, patience_s: f64) -> Option<PoseEstimate> {
+        let [x_m, y_m, heading_rad] = self.apart;
+        (told.time_s - self.since_s <= patience_s).then_some(PoseEstimate {
+            pose: Pose {
+                x_m: told.pose.x_m + x_m,
+                y_m: told.pose.y_m + y_m,
+                heading_rad: told.pose.heading_rad + heading_rad,
+            },
+            covariance: Some(self.covariance),
+            ..*told
+        })
+    }
+}
+
+/// A filter with its witnesses.
+#[derive(Debug)]
+pub struct IntegrityMonitor {
+    config: IntegrityConfig,
+    level: LevelEquation,
+    bank: Bank,
+    restarted: Option<Restarted>,
+    /// Who told the position before, where that was another one.
+    handover: Option<Handover>,
+    /// Whether it was found by a search, and nothing has confirmed it yet.
+    is_found: bool,
+    /// Distance driven (m) when the sources could be told apart last.
+    trusted_m: f64,
+    /// When its filters began anew last (s).
+    begun_s: f64,
+    /// Whether the odometer's scale was certainly not what is stated, and has not been found to be since.
+    has_departed: bool,
+    /// When something was at fault last (s), as far as is known.
+    fault_s: f64,
+    now_s: f64,
+}
+
+/// Trackers begun anew from a vague pose.
+#[derive(Debug)]
+struct Restarted {
+    bank: Bank,
+    since_s: f64,
+}
+
+clone_in_place!(IntegrityMonitor {
+    config,
+    level,
+    bank,
+    restarted,
+    handover,
+    is_found,
+    trusted_m,
+    begun_s,
+    has_departed,
+    fault_s,
+    now_s
+});
+
+clone_in_place!(Restarted { bank, since_s });
+
+impl IntegrityMonitor {
+    /// Guards a filter of these radio heads. One that was found by a search, and not given, is on
+    /// probation since then.
+    pub fn new(
+        ekf: &Ekf,
+        heads: &[RadioHead],
+        config: IntegrityConfig,
+        found_s: Option<f64>,
+    ) -> Self {
+        let is_found = found_s.is_some();
+        let found_s = found_s.unwrap_or(f64::NEG_INFINITY);
+        let modes = FaultModes::new(ekf, config.fault_probability);
+        Self {
+            level: LevelEquation::new(config.risk),
+            trusted_m: ekf.driven_m(),
+            bank: Bank::new(ekf, heads, modes, found_s),
+            restarted: None,
+            handover: None,
+            is_found,
+            begun_s: found_s,
+            has_departed: false,
+            fault_s: f64::NEG_INFINITY,
+            now_s: found_s,
+            config,
+        }
+    }
+
+    /// The filter that uses every sound source.
+    pub fn ekf(&self) -> &Ekf {
+        self.bank.leader()
+    }
+
+    /// The filter by whose uncertainty to listen: where the level is beyond the alert limit, that of the
+    /// hypothesis by which it mostly is; else that of every sound source.
+    pub fn worst_case(&self) -> &Ekf {
+        let (bank, now_s) = (&self.bank, self.ekf().time_s());
+        if self.is_near(bank, now_s) {
+            return bank.leader();
+        }
+        let beyond = |(clean, hypothesis)| {
+            let alert_limit_m = self.config.alert_limit_m;
+            (self.level.share_beyond(alert_limit_m, &hypothesis), clean)
+        };
+        (self.suspects(bank, now_s).map(beyond))
+            .max_by(|(one, _), (other, _)| one.total_cmp(other))
+            .map_or(bank.leader(), |(_, clean)| clean)
+    }
+
+    /// When its filters began anew last (s), by angles that nothing contradicted.
+    pub const fn begun_s(&self) -> f64 {
+        self.begun_s
+    }
+
+    /// How much more the angles vary than stated.
+    pub const fn noise_ratio(&self) -> f64 {
+        self.bank.noise_ratio()
+    }
+
+    /// Moves every filter.
+    pub fn odometry(&mut self, sample: &OdometrySample) -> OdometryVerdict {
+        if let Some(restarted) = &mut self.restarted {
+            restarted.bank.odometry(sample);
+        }
+        self.bank.odometry(sample)
+    }
+
+    /// Takes in an angle: a test of its radio head, and information for whoever trusts that.
+    pub fn update(&mut self, head: &RadioHead, measured: &AngleMeasurement) -> UpdateVerdict {
+        self.now_s = self.now_s.max(measured.time_s);
+        let odometry_s = self.ekf().time_s();
+        let (solution_id, told) = (self.solution_id(), self.ekf().pose(odometry_s));
+        let verdict = self.bank.update(head, measured);
+        self.bank.judge(self.now_s, &self.config);
+        if let Some(bank) = self.bank.of_inexact(self.now_s, &self.config) {
+            (self.bank, self.restarted) = (bank, None);
+        }
+        if let Some(restarted) = &mut self.restarted {
+            restarted.bank.update(head, measured);
+            restarted.bank.judge(self.now_s, &self.config);
+        }
+        self.recover();
+        self.watch_faults();
+        if self.solution_id() != solution_id {
+            let handover = Handover::new(&told, &self.ekf().pose(odometry_s));
+            self.handover = handover.or(self.handover);
+        }
+        verdict
+    }
+
+    /// By what to know that another one tells the position.
+    fn solution_id(&self) -> (*const Ekf, usize, f64) {
+        let leader = std::ptr::from_ref(self.bank.leader());
+        (leader, self.bank.faulty(), self.begun_s)
+    }
+
+    /// Which of several is most probable may change from angle to angle, and who has begun anew knows nothing of the
+    /// odometer yet.
+    fn watch_faults(&mut self) {
+        if self.bank.modes().is_fault() {
+            self.fault_s = self.now_s;
+        }
+        let main = self.bank.main();
+        self.has_departed =
+            main.odometer_departs() || (self.has_departed && !main.knows_odometer());
+    }
+
+    /// Where the sources cannot be told apart, the filters may have been led astray, so far that
+    /// they refuse the good angles as outliers. Others then start from a pose as vague as what may
+    /// have happened meanwhile, and take over once nothing contradicts them. Until then, or until
+    /// the old ones are at peace again, nothing is `ok`. What a search found by angles that may have
+    /// been at fault is confirmed the same way.
+    fn recover(&mut self) {
+        let (now_s, patience_s) = (self.now_s, self.config.recovery_s);
+        let lost = self.bank.is_lost(&self.config);
+        let Some(restarted) = &self.restarted else {
+            if lost || self.is_found {
+                self.restart();
+            } else {
+                self.trusted_m = self.bank.main().driven_m();
+            }
+            return;
+        };
+        let aged = now_s - restarted.since_s > patience_s;
+        if !lost && !self.is_found && self.bank.quiet_s(now_s) > patience_s {
+            self.restarted = None;
+        } else if aged && restarted.bank.is_lost(&self.config) {
+            self.restart();
+        } else if restarted.bank.quiet_s(now_s) > patience_s
+            && !restarted.bank.modes().is_fault()
+            && self.is_near(&restarted.bank, now_s)
+            && let Some(restarted) = self.restarted.take()
+        {
+            self.bank = restarted.bank;
+            self.is_found = false;
+            self.begun_s = now_s;
+        }
+    }
+
+    fn restart(&mut self) {
+        let strayed_m = if self.bank.modes().errors_stay() {
+            0.0
+        } else {
+            self.bank.main().driven_m() - self.trusted_m
+        };
+        let position_std_m = self.config.alert_limit_m + strayed_m;
+        self.restarted = Some(Restarted {
+            bank: self.bank.restarted(position_std_m, self.now_s),
+            since_s: self.now_s,
+        });
+    }
+
+    /// The pose at `time_s`.
+    pub fn pose(&self, time_s: f64) -> PoseEstimate {
+        let mut pose = self.bank.leader().pose(time_s);
+        if !self.bank.main().config().estimates_bias() {
+            let beliefs = self.bank.beliefs();
+            pose.mix(beliefs.map(|(probability, right)| (probability, right.pose(time_s))));
+        }
+        pose.integrity = Some(self.integrity(time_s));
+        let handover = self.handover.as_ref();
+        if let Some(handover) = handover.and_then(|it| it.beside(&pose, self.config.recovery_s)) {
+            pose.cover(&handover);
+        }
+        if self.bank.modes().errors_stay() {
+            return pose;
+        }
+        let restarted = self.restarted.iter().map(|it| it.bank.main());
+        for other in self.bank.candidates(&self.config).chain(restarted) {
+            pose.cover(&other.pose(time_s));
+        }
+        pose
+    }
+
+    /// Protection level and state at `time_s`.
+    pub fn integrity(&self, time_s: f64) -> Integrity {
+        let levels = self.level.solve(&self.hypotheses(&self.bank, time_s));
+        let modes = self.bank.modes();
+        let state = if self.bank.is_outvoted(&self.config) && !modes.errors_stay() {
+            IntegrityState::Unavailable
+        } else if self.now_s - self.fault_s <= self.config.recovery_s
+            || self.has_departed
+            || self.restarted.is_some()
+            || self.bank.quiet_s(self.now_s) <= self.config.recovery_s
+            || levels.horizontal_m > self.config.alert_limit_m
+        {
+            IntegrityState::Degraded
+        } else {
+            IntegrityState::Ok
+        };
+        Integrity {
+            protection_level_m: levels.horizontal_m,
+            protection_level_along_m: levels.along_m,
+            protection_level_across_m: levels.across_m,
+            state,
+            faulty: self.bank.faulty(),
+        }
+    }
+
+    /// Whether the error is within the alert limit but for the risk.
+    fn is_near(&self, bank: &Bank, time_s: f64) -> bool {
+        let hypotheses = self.hypotheses(bank, time_s);
+        self.level.holds(self.config.alert_limit_m, hypotheses)
+    }
+
+    /// What may be and is not too improbable, and the filter that is right then.
+    fn suspects<'a>(
+        &self,
+        bank: &'a Bank,
+        time_s: f64,
+    ) -> impl Iterator<Item = (&'a Ekf, Hypothesis)> + Clone {
+        let told = bank.leader().pose(time_s);
+        let heard_noise_ratio = bank.noise_ratio();
+        let estimates_bias = bank.main().config().estimates_bias();
+        let head_probability = (self.config.fault_probability).of_radio_head(estimates_bias);
+        let negligible = NEGLIGIBLE * self.config.risk;
+        (bank.suspects(head_probability))
+            .filter(move |(probability, _)| *probability > negligible)
+            .filter_map(move |(probability, right)| {
+                let pose = right.pose(time_s);
+                let noise_ratio = right.unexpected_noise(heard_noise_ratio);
+                let hypothesis = Hypothesis::new(probability, &pose, noise_ratio, &told);
+                hypothesis.map(|it| (right, it))
+            })
+    }
+
+    fn hypotheses(&self, bank: &Bank, time_s: f64) -> impl Iterator<Item = Hypothesis> + Clone {
+        (self.suspects(bank, time_s)).map(|(_, hypothesis)| hypothesis)
+    }
+}
+
+#[cfg(test)]
+mod tests {
+    use std::f64::consts::PI;
+
+    use super::*;
+    use crate::localize::trip::{angle, trip};
+
+    /// Deviations by which a position may be another one at one angle.
+    const MOST_DEVIATIONS: f64 = 5.0;
+
+    #[test]
+    fn whoever_takes_over_covers_who_told_the_position_before() {
+        // The odometer reads half as much again, and a radio head is hidden later: neither explains the other.
+        const READS: f64 = 1.5;
+        const HIDDEN_S: f64 = 8.0;
+        const OFF_RAD: f64 = -0.6;
+        let (heads, road, ekf) = trip();
+        let mut guard = IntegrityMonitor::new(&ekf, &heads, IntegrityConfig::default(), None);
+        let mut farthest_m: f64 = 0.0;
+        let mut last = guard.pose(0.0);
+        for step in 1..150 {
+            let time_s = f64::from(step) * 0.1;
+            guard.odometry(&OdometrySample {
+                time_s,
+                distance_m: 4.0 * READS * time_s,
+                speed_mps: 4.0,
+                yaw_rate_radps: None,
+            });
+            let truth = road.pose(4.0 * time_s);
+            for (number, head) in heads.iter().enumerate() {
+                let bearing_rad = truth.point().bearing_rad(head.position) - truth.heading_rad;
+                let is_off = number == 0 && time_s > HIDDEN_S;
+                let off_rad = if is_off { OFF_RAD } else { 0.0 };
+                let before = guard.pose(time_s);
+                guard.update(head, &angle(time_s, PI * bearing_rad.cos() + off_rad));
+                last = guard.pose(time_s);
+                let moved_m = last.pose.point().distance_m(before.pose.point());
+                let [before_m2, now_m2] = [&before, &last].map(|it| it.principal_variances()[0]);
+                let std_m = before_m2.max(now_m2).sqrt();
+                assert!(moved_m < MOST_DEVIATIONS * std_m, "{moved_m} of {std_m} m");
+                farthest_m = farthest_m.max(moved_m);
+            }
+        }
+        assert!(farthest_m > 5.0, "{farthest_m}");
+        // Not for ever.
+        let std_m = last.principal_variances()[0].sqrt();
+        assert!(std_m < 0.5 * farthest_m, "{std_m} m");
+    }
+}
