@@ -127,7 +127,7 @@ def test_no_two_files_of_a_crate_import_each_other(crate: str) -> None:
 
 def test_the_page_on_the_house_names_files_that_are_there() -> None:
     page = (ROOT / "docs/architecture.md").read_text(encoding="utf-8")
-    for row in re.findall(r"^\| (?:a|an) .*$", page, re.M):
+    for row in re.findall(r"^\| (?:a|an) .*\|.*\|.*\|.*\|$", page, re.M):
         named = [path for path in re.findall(r"`([\w/.-]+\.(?:rs|toml))`", row) if "=" not in path]
         assert named or row.startswith("| array") or row.startswith("| an odometer"), row
         for path in named:

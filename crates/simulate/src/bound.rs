@@ -15,17 +15,17 @@
 //! sight says nothing.
 
 use onboard::geometry::{Point, Pose};
-use onboard::localize::gaussian::{Gaussian, Matrix, identity, product};
-use onboard::thermal::ThermalNoise;
-use onboard::localize::ekf::motion::{Reading, Step};
-use onboard::localize::ekf::angle_model::{RoadFrame, AngleModel};
-use onboard::localize::ekf::state::{ACROSS, ALONG, Belief, CURVATURE, HEADING, SCALE, STATES};
-use onboard::localize::{Ekf, InitialPose};
 use onboard::localize::ekf::EkfConfig;
+use onboard::localize::ekf::angle_model::{AngleModel, RoadFrame};
+use onboard::localize::ekf::motion::{Reading, Step};
+use onboard::localize::ekf::state::{ACROSS, ALONG, Belief, CURVATURE, HEADING, SCALE, STATES};
+use onboard::localize::gaussian::{Gaussian, Matrix, identity, product};
+use onboard::localize::{Ekf, InitialPose};
 use onboard::manifold::scatter_bound;
 use onboard::radio_head::RadioHead;
 use onboard::road::Road;
 use onboard::settings::{Check, SettingsError};
+use onboard::thermal::ThermalNoise;
 
 use crate::channel::Paths;
 use crate::ideal_filter::IdealFilter;
@@ -320,7 +320,8 @@ impl Bound {
             };
             let array = &self.config.array;
             for (number, head) in self.heads.iter().enumerate() {
-                let sighting = AngleModel::new(head, pose, &RoadFrame::PLANE, &[0.0; STATES], array)?;
+                let sighting =
+                    AngleModel::new(head, pose, &RoadFrame::PLANE, &[0.0; STATES], array)?;
                 let Some(fading) = self.fading(number, place) else {
                     continue;
                 };

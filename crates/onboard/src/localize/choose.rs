@@ -2,7 +2,7 @@
 
 use std::sync::Arc;
 
-use super::acquire::{Area, GaussianSum, Relocalizer, Search};
+use super::acquire::{Area, GaussianSum, Relocalizer};
 use super::dead_reckoning::DeadReckoning;
 use super::ekf::{Ekf, EkfConfig};
 use super::localizer::Localizer;
@@ -40,11 +40,15 @@ pub fn built_in(
         Some(road) if !vehicle.start.known => {
             let either = vehicle.start.either_direction;
             let search = GaussianSum::new(config, road.clone(), either, &heads);
-            Ok(Box::new(Search::new(search, Some(road), integrity)))
+            Ok(Box::new(Relocalizer::searching(
+                search,
+                Some(road),
+                integrity,
+            )))
         }
         None if !vehicle.start.known => {
             let search = GaussianSum::in_plane(config, Area::of_heads(&heads), &heads);
-            Ok(Box::new(Search::new(search, None, integrity)))
+            Ok(Box::new(Relocalizer::searching(search, None, integrity)))
         }
         road => {
             let start = InitialPose {
@@ -54,8 +58,8 @@ pub fn built_in(
             };
             let map = road.clone().map(Arc::new);
             let ekf = Ekf::new(config, map, &heads, &start);
-            Ok(Box::new(Relocalizer::new(
-                ekf, road, &heads, integrity, None,
+            Ok(Box::new(Relocalizer::tracking(
+                ekf, road, &heads, integrity,
             )))
         }
     }

@@ -22,12 +22,12 @@
 
 use super::policy::{SAME_TIME_S, Situation, WakeUpPolicy};
 use crate::BoxError;
-use crate::thermal::ThermalNoise;
 use crate::localize::ekf::state::Belief;
-use crate::localize::{RadialQuantile, Ekf};
+use crate::localize::{Ekf, RadialQuantile};
 use crate::observation::SensedSsb;
 use crate::radio_head::RadioHead;
 use crate::settings::{Site, UncertaintySettings, Vehicle};
+use crate::thermal::ThermalNoise;
 
 /// Longest wake-up time it looks ahead for, in seconds.
 const HORIZON_S: f64 = 20.0;

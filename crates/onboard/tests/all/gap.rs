@@ -3,8 +3,8 @@
 use std::sync::Arc;
 
 use onboard::localize::Ekf;
-use onboard::localize::{InitialPose, OdometryVerdict};
 use onboard::localize::ekf::EkfConfig;
+use onboard::localize::{InitialPose, OdometryVerdict};
 use onboard::observation::OdometrySample;
 use onboard::road::Gap;
 use onboard::settings::{Shipped, Site, TomlFile, Vehicle};

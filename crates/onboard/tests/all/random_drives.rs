@@ -5,7 +5,7 @@ use std::fmt::Write as _;
 
 use onboard::geometry::Pose;
 use onboard::localize::{
-    AngleMeasurement, History, AngleUpdate, UpdateReason, UpdateVerdict, built_in,
+    AngleMeasurement, AngleUpdate, History, UpdateReason, UpdateVerdict, built_in,
 };
 use onboard::observation::OdometrySample;
 use onboard::radio_head::RadioHead;

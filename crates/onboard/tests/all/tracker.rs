@@ -3,9 +3,9 @@
 use std::sync::Arc;
 
 use onboard::geometry::Pose;
-use onboard::localize::{InitialPose, OdometryVerdict};
 use onboard::localize::ekf::EkfConfig;
 use onboard::localize::{AngleMeasurement, Ekf, UpdateReason};
+use onboard::localize::{InitialPose, OdometryVerdict};
 use onboard::observation::OdometrySample;
 use onboard::radio_head::RadioHead;
 use onboard::road::Road;

@@ -1,8 +1,8 @@
 //! A drive being replayed.
 
 use onboard::geometry::Pose;
-use onboard::localize::Recovered;
 use onboard::localize::OdometryVerdict;
+use onboard::localize::Recovered;
 use onboard::localize::ekf::EstimatedConstants;
 use onboard::observation::OdometrySample;
 use onboard::settings::{Platform, Site, Vehicle};

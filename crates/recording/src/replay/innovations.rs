@@ -2,8 +2,8 @@
 
 use std::sync::Arc;
 
-use onboard::localize::{Ekf, InitialPose};
 use onboard::localize::ekf::EkfConfig;
+use onboard::localize::{Ekf, InitialPose};
 use onboard::radio_head::RadioHead;
 use onboard::settings::{Check, Site, Vehicle};
 

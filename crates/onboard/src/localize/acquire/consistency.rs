@@ -95,7 +95,8 @@ impl ConsistencyMonitor {
 
     /// Share of the radio heads heard lately that are off; `None` before enough angles.
     fn off(&self, refused: f64) -> Option<f64> {
-        let is_recent = |it: &&HeadStatistics| it.heard > 0 && self.angles.saturating_sub(it.last) < RECENT;
+        let is_recent =
+            |it: &&HeadStatistics| it.heard > 0 && self.angles.saturating_sub(it.last) < RECENT;
         let recent = || self.heads.iter().filter(is_recent);
         let off = recent().filter(|it| it.refused > refused || it.surprise > SURPRISED);
         (self.angles >= LEAST).then(|| off.count() as f64 / recent().count().max(1) as f64)

@@ -2,7 +2,7 @@
 //!
 //! One filter for each metre of the road, and for each direction in which it may be driven; without
 //! a road, one for each square of the plane and each of twelve headings: a sum of
-//! Gaussians (Sorenson and Alspach 1971), each weighed by how well it foretells the angles. Those
+//! Gaussians (Sorenson and Alspach 1971), each weighed by the likelihood of the angles. Those
 //! that fall far behind or leave the road are given up, those that meet become one. The vehicle is
 //! found when all that are left, taken as one Gaussian, know its place.
 
@@ -13,7 +13,9 @@ use crate::clone_in_place::clone_in_place;
 use crate::geometry::{Point, Pose, wrap_angle};
 use crate::localize::ekf::state::{ACROSS, ALONG, HEADING, STATES};
 use crate::localize::ekf::{Ekf, EkfConfig};
-use crate::localize::measurement::{AngleMeasurement, OdometryVerdict, UpdateReason, UpdateVerdict};
+use crate::localize::measurement::{
+    AngleMeasurement, OdometryVerdict, UpdateReason, UpdateVerdict,
+};
 use crate::localize::pose_estimate::{InitialPose, PoseEstimate};
 use crate::observation::OdometrySample;
 use crate::radio_head::RadioHead;
@@ -40,7 +42,7 @@ const FOUND_STD_RAD: f64 = 0.2;
 const HEADINGS: u32 = 12;
 const MOST_HYPOTHESES: f64 = 4000.0;
 
-/// Least weight beside the best, in the covariance that is told, of a hypothesis that is left: the next
+/// Least weight beside the best, in the covariance that is reported, of a hypothesis that is left: the next
 /// angles may make it the best, and where it is is then five deviations away at most.
 const LEAST_WEIGHT: f64 = 0.05;
 
@@ -182,12 +184,7 @@ clone_in_place!(GaussianSum {
 impl GaussianSum {
     /// The vehicle may be anywhere on `road`, driving along it or, where `either_direction`, also
     /// against it.
-    pub fn new(
-        config: EkfConfig,
-        road: Road,
-        either_direction: bool,
-        heads: &[RadioHead],
-    ) -> Self {
+    pub fn new(config: EkfConfig, road: Road, either_direction: bool, heads: &[RadioHead]) -> Self {
         let against = either_direction.then(|| Arc::new(road.reversed()));
         let roads = [Arc::new(road)].into_iter().chain(against).collect();
         Self::on(&config, Ground::Roads(roads), heads)
@@ -203,9 +200,9 @@ impl GaussianSum {
         area.spacing_m(MOST_HYPOTHESES / f64::from(HEADINGS), SPACING_M) <= SPACING_M
     }
 
-    /// Whether errors that stay are found at the places that are compared.
-    pub const fn estimates_bias(&self) -> bool {
-        self.config.estimates_bias()
+    /// Whether its filters have the states that a filter has which they are compared with.
+    pub fn is_of_the_model_of(&self, ekf: &Ekf) -> bool {
+        self.config.estimates_bias() == ekf.config().estimates_bias()
     }
 
     fn on(config: &EkfConfig, ground: Ground, heads: &[RadioHead]) -> Self {
@@ -287,7 +284,7 @@ impl GaussianSum {
         for (rank, hypothesis) in self.hypotheses.iter_mut().enumerate() {
             let predicted = hypothesis.ekf.predict_measurement(head, measured);
             hypothesis.log_likelihood += hypothesis.ekf.log_likelihood(&predicted);
-            let verdict = hypothesis.ekf.take(predicted, measured);
+            let verdict = hypothesis.ekf.update_predicted(predicted, measured);
             if rank == 0 {
                 first = verdict;
             }

@@ -4,9 +4,7 @@ mod consistency;
 mod gaussian_sum;
 mod relocalization_test;
 mod relocalizer;
-mod search;
-mod tracked;
+mod solution;
 
 pub use gaussian_sum::{Area, GaussianSum};
 pub use relocalizer::Relocalizer;
-pub use search::Search;

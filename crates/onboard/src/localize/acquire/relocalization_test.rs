@@ -1,4 +1,7 @@
-//! A search beside a filter: which of the two foretells the same angles better.
+//! A sequential probability ratio test (Wald 1945) between the place of a filter and the best place of a search beside
+//! it.
+
+use std::cmp::Ordering;
 
 use super::gaussian_sum::GaussianSum;
 use crate::clone_in_place::clone_in_place;
@@ -6,94 +9,84 @@ use crate::localize::ekf::Ekf;
 use crate::localize::measurement::AngleMeasurement;
 use crate::radio_head::RadioHead;
 
-/// Log-likelihood by which a place must foretell the angles better than another: a sequential test (Wald
-/// 1945) that is wrong once in three million.
+/// Log-likelihood ratio at which it decides: wrong once in three million (e⁻¹⁵).
 const BETTER: f64 = 15.0;
 
-/// Way to be driven before a find is believed (m): who stands hears the same errors again and again.
+/// Way to be driven before a find is believed (m): a vehicle that stands hears the same errors again and again.
 const LEAST_WAY_M: f64 = 0.5;
 
-/// After this time with angles and without a find it has listened for long (s).
+/// After this time with angles and without a find it is patient no more (s).
 const PATIENCE_S: f64 = 20.0;
 
-/// After this way a silent search beside a filter that hears now and then has listened for long (m).
+/// After this way a confirmation by few angles has taken long (m).
 const LONG_WAY_M: f64 = 100.0;
 
-/// Looks at one radio head within this way share their errors: clusters keep an angle wrong for so long (m).
-const LOOK_M: f64 = 10.0;
+/// Angles of one radio head within this way share their errors: clusters keep an angle wrong for so long (m).
+const INDEPENDENT_M: f64 = 10.0;
 
-/// Who has not heard anything for so long does not listen (s).
+/// Longer silences do not count as time with angles (s).
 const SILENCE_S: f64 = 1.0;
 
-/// A search, and how the filter does meanwhile.
+/// A search beside a filter, and the likelihoods of both.
 #[derive(Debug)]
-pub struct RelocalizationTest {
+pub(super) struct RelocalizationTest {
     pub search: GaussianSum,
-    pub is_wide: bool,
-    /// Time of the newest odometry (s) when it was told of; nobody is as long as nothing speaks against
-    /// the filter.
-    pub told_s: Option<f64>,
-    /// Whether the filter is refuted, so that its place is no longer told beside the search's.
-    pub speaks_alone: bool,
-    /// Whether angles may be off as if the filter were lost.
-    is_misled: bool,
-    /// Log-likelihood of the filter by the same angles.
-    own: f64,
+    /// Time of the newest odometry when it began to be reported (s).
+    pub reported_s: f64,
+    /// Whether the filter is refuted, so that its place is not reported any more beside the search's.
+    pub refutes: bool,
+    /// Whether angles may be off as if the vehicle were lost.
+    may_mislead: bool,
+    /// Log-likelihood of the angles by the filter.
+    of_filter: f64,
     /// Distance driven when it began, and driven since (m).
     since_m: f64,
     way_m: f64,
-    /// When the last angle was heard (s), and for how long it has listened without silence (s).
+    /// When the last angle was heard, and for how long with angles (s).
     heard_s: f64,
     listened_s: f64,
-    /// Angles, how many of them are looks of their own, and after which way each radio head had its last such look (m).
+    /// Angles, how many of them are independent, and after which way each radio head had its last such one (m).
     angles: u32,
-    looks: u32,
-    looked_m: Vec<f64>,
+    independent: u32,
+    independent_m: Vec<f64>,
 }
 
 clone_in_place!(RelocalizationTest {
     search,
-    is_wide,
-    told_s,
-    speaks_alone,
-    is_misled,
-    own,
+    reported_s,
+    refutes,
+    may_mislead,
+    of_filter,
     since_m,
     way_m,
     heard_s,
     listened_s,
     angles,
-    looks,
-    looked_m
+    independent,
+    independent_m
 });
 
 impl RelocalizationTest {
-    /// A search that begins now; of a silent one nobody is told.
-    pub fn new(
-        search: GaussianSum,
-        ekf: &Ekf,
-        is_wide: bool,
-        is_silent: bool,
-    ) -> Self {
+    /// One that begins now.
+    pub fn new(search: GaussianSum, ekf: &Ekf, may_mislead: bool) -> Self {
         let heads = search.heads().len();
         Self {
             search,
-            is_wide,
-            told_s: (!is_silent).then(|| ekf.time_s()),
-            speaks_alone: false,
-            is_misled: ekf.config().may_be_misled(),
-            own: 0.0,
+            reported_s: ekf.time_s(),
+            refutes: false,
+            may_mislead,
+            of_filter: 0.0,
             since_m: ekf.driven_m(),
             way_m: 0.0,
             heard_s: f64::NEG_INFINITY,
             listened_s: 0.0,
             angles: 0,
-            looks: 0,
-            looked_m: vec![f64::NEG_INFINITY; heads],
+            independent: 0,
+            independent_m: vec![f64::NEG_INFINITY; heads],
         }
     }
 
-    /// Lets both foretell an angle, before the filter takes it in.
+    /// Takes in an angle, before the filter does.
     pub fn update(&mut self, ekf: &Ekf, head: &RadioHead, measured: &AngleMeasurement) {
         self.way_m = ekf.driven_m() - self.since_m;
         let silence_s = measured.time_s - self.heard_s;
@@ -103,46 +96,41 @@ impl RelocalizationTest {
         self.heard_s = measured.time_s;
         let is_it = |mine: &RadioHead| mine.sends(head.pci, head.ssb_index);
         let number = self.search.heads().iter().position(is_it);
-        if let Some(looked_m) = number.and_then(|number| self.looked_m.get_mut(number)) {
+        if let Some(last_m) = number.and_then(|number| self.independent_m.get_mut(number)) {
             self.angles = self.angles.saturating_add(1);
-            if self.way_m - *looked_m >= LOOK_M {
-                *looked_m = self.way_m;
-                self.looks = self.looks.saturating_add(1);
+            if self.way_m - *last_m >= INDEPENDENT_M {
+                *last_m = self.way_m;
+                self.independent = self.independent.saturating_add(1);
             }
         }
-        self.own += ekf.log_likelihood(&ekf.predict_measurement(head, measured));
+        self.of_filter += ekf.log_likelihood(&ekf.predict_measurement(head, measured));
         self.search.update(head, measured);
     }
 
-    /// Log-likelihood by which the search's best place foretells the angles better than the filter does.
-    /// Against a filter that nothing else speaks against, or that may be misled, only looks of their own count.
-    fn lead(&self) -> f64 {
-        let lead = self.search.best() - self.own;
-        if self.is_silent() || self.is_misled {
-            lead * f64::from(self.looks) / f64::from(self.angles.max(1))
-        } else {
-            lead
+    /// Greater where the angles are certainly likelier at the search's best place, less where they are at the
+    /// filter's. A filter that is only to be confirmed, or whose angles may mislead, is compared by independent
+    /// angles.
+    pub fn compare(&self, is_confirming: bool) -> Ordering {
+        let mut ratio = self.search.best() - self.of_filter;
+        if is_confirming || self.may_mislead {
+            ratio = ratio * f64::from(self.independent) / f64::from(self.angles.max(1));
         }
-    }
-
-    /// Whether nobody is told of it.
-    pub const fn is_silent(&self) -> bool {
-        self.told_s.is_none()
-    }
-
-    /// Whether the search's best place is better than the filter's.
-    pub fn is_ahead(&self) -> bool {
-        self.lead() > BETTER
-    }
-
-    /// Whether it is worse.
-    pub fn is_behind(&self) -> bool {
-        self.lead() < -BETTER
+        if ratio > BETTER {
+            Ordering::Greater
+        } else if ratio < -BETTER {
+            Ordering::Less
+        } else {
+            Ordering::Equal
+        }
     }
 
     /// Whether enough way was driven to believe it.
     pub fn has_moved(&self) -> bool {
-        let least_m = if self.is_misled { LOOK_M } else { LEAST_WAY_M };
+        let least_m = if self.may_mislead {
+            INDEPENDENT_M
+        } else {
+            LEAST_WAY_M
+        };
         self.way_m >= least_m
     }
 
@@ -151,12 +139,12 @@ impl RelocalizationTest {
         self.way_m > LONG_WAY_M
     }
 
-    /// Tells of it from the newest odometry on, and begins to be patient anew.
-    pub const fn tell(&mut self, odometry_s: f64) {
-        (self.told_s, self.listened_s) = (Some(odometry_s), 0.0);
+    /// It is reported from the newest odometry on, and begins to be patient anew.
+    pub const fn report(&mut self, odometry_s: f64) {
+        (self.reported_s, self.listened_s) = (odometry_s, 0.0);
     }
 
-    /// Whether it has listened for long.
+    /// Whether angles were heard for long.
     pub fn is_patient(&self) -> bool {
         self.listened_s > PATIENCE_S
     }

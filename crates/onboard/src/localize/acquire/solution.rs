@@ -1,25 +1,23 @@
-//! A filter, guarded or not.
+//! What the pose comes from: one filter, or a bank of them with integrity monitoring.
 
-use crate::BoxError;
 use crate::localize::ekf::Ekf;
 use crate::localize::integrity::IntegrityMonitor;
-use crate::localize::localizer::{Localizer, copy_into};
 use crate::localize::measurement::{AngleMeasurement, OdometryVerdict, UpdateVerdict};
-use crate::localize::modes::IntegrityConfig;
+use crate::localize::modes::{IntegrityConfig, may_mislead};
 use crate::localize::pose_estimate::PoseEstimate;
 use crate::observation::OdometrySample;
 use crate::radio_head::RadioHead;
 
 /// A filter, guarded or not.
 #[derive(Debug)]
-pub enum Tracked {
+pub(super) enum Solution {
     /// It trusts its sources.
     Bare(Box<Ekf>),
     /// It does not.
     Guarded(Box<IntegrityMonitor>),
 }
 
-impl Clone for Tracked {
+impl Clone for Solution {
     fn clone(&self) -> Self {
         match self {
             Self::Bare(ekf) => Self::Bare(ekf.clone()),
@@ -36,7 +34,7 @@ impl Clone for Tracked {
     }
 }
 
-impl Tracked {
+impl Solution {
     /// A filter, guarded or not, that was given its place or found it at a time.
     pub fn new(
         ekf: Ekf,
@@ -45,7 +43,9 @@ impl Tracked {
         found_s: Option<f64>,
     ) -> Self {
         match integrity {
-            Some(config) => Self::Guarded(Box::new(IntegrityMonitor::new(&ekf, heads, config, found_s))),
+            Some(config) => Self::Guarded(Box::new(IntegrityMonitor::new(
+                &ekf, heads, config, found_s,
+            ))),
             None => Self::Bare(Box::new(ekf)),
         }
     }
@@ -71,6 +71,14 @@ impl Tracked {
         match self {
             Self::Bare(_) => f64::NEG_INFINITY,
             Self::Guarded(guard) => guard.begun_s(),
+        }
+    }
+
+    /// Whether angles may be off as if the vehicle were lost.
+    pub fn may_mislead(&self) -> bool {
+        match self {
+            Self::Bare(ekf) => may_mislead(ekf.config()),
+            Self::Guarded(monitor) => monitor.may_mislead(),
         }
     }
 
@@ -111,35 +119,5 @@ impl Tracked {
         if let Self::Bare(ekf) = self {
             ekf.keep_journal();
         }
-    }
-}
-
-impl Localizer for Ekf {
-    fn odometry(&mut self, sample: &OdometrySample) -> Result<OdometryVerdict, BoxError> {
-        Ok(Self::odometry(self, sample))
-    }
-
-    fn update(
-        &mut self,
-        head: &RadioHead,
-        measured: &AngleMeasurement,
-    ) -> Result<UpdateVerdict, BoxError> {
-        Ok(Self::update(self, head, measured))
-    }
-
-    fn pose(&self, time_s: f64) -> Result<PoseEstimate, BoxError> {
-        Ok(Self::pose(self, time_s))
-    }
-
-    fn copy_to(&self, slot: &mut Option<Box<dyn Localizer>>) -> bool {
-        copy_into(self, slot)
-    }
-
-    fn ekf(&self) -> Option<&Ekf> {
-        Some(self)
-    }
-
-    fn keep_journal(&mut self) {
-        Self::keep_journal(self);
     }
 }

@@ -1,21 +1,21 @@
-//! The errors of all radio heads' angles that stay over metres, estimated together with the state.
+//! The time-correlated biases of all radio heads' angles, estimated together with the state.
 //!
-//! State and errors stay one Gaussian, of the mean and covariance of the mixture over the pasts that an
-//! angle may have had (generalised pseudo-Bayes of first order, Bar-Shalom, Li and Kirubarajan 2001,
-//! 11.6). With the state's covariance P, and the row H of an angle by state and value, a past with the
-//! value kept moves everything along `P Hᵀ`, one with a value drawn anew along the part of it that is the
+//! State and biases stay one Gaussian, of the mean and covariance of the mixture over the jump hypotheses of an
+//! angle (generalised pseudo-Bayes of first order, Bar-Shalom, Li and Kirubarajan 2001,
+//! 11.6). With the state's covariance P, and the row H of an angle by state and value, the hypothesis of a
+//! value kept moves everything along `P Hᵀ`, that of a value drawn anew along the part of it that is the
 //! state's. So every covariance after an angle is a form of these two vectors.
 
-use super::jump_process::{MOST_VARIANCE, JumpHypotheses, JumpProcess};
+use super::jump_process::{JumpHypotheses, JumpProcess, MOST_VARIANCE};
 use crate::clone_in_place::clone_in_place;
 use crate::localize::ekf::smoother::Journal;
 use crate::localize::ekf::state::{Belief, STATES};
 use crate::localize::gaussian::{Innovation, Matrix, dot};
 
-/// How something varies with an angle: with the value of its radio head, and without.
+/// Covariance of something with an angle: with the bias of its radio head, and without.
 pub(super) type CrossCovariance = [f64; 2];
 
-/// What an angle makes of means and covariances.
+/// The update of means and covariances by the mixture over the jump hypotheses of an angle.
 pub(super) struct MixtureUpdate<'a> {
     hypotheses: &'a JumpHypotheses,
     /// By how much each past moves what varies with the angle, and both on average.
@@ -77,7 +77,8 @@ impl<'a> MixtureUpdate<'a> {
 
     /// The mean of the value.
     pub fn value_mean(&self) -> f64 {
-        self.hypotheses.kept.share * self.kept_rad + self.hypotheses.anew.share * self.hypotheses.mean_rad
+        self.hypotheses.kept.share * self.kept_rad
+            + self.hypotheses.anew.share * self.hypotheses.mean_rad
     }
 
     /// The variance of the value, which was `before`.
@@ -89,7 +90,7 @@ impl<'a> MixtureUpdate<'a> {
     }
 }
 
-/// One radio head's error.
+/// The bias of one radio head.
 #[derive(Clone, Copy, Debug, PartialEq)]
 struct HeadBias {
     size: JumpProcess,
@@ -106,7 +107,7 @@ impl HeadBias {
     }
 }
 
-/// The errors of all radio heads; none where they are not to be found.
+/// The biases of all radio heads; none where they are not estimated.
 #[derive(Debug, PartialEq)]
 pub struct CorrelatedBias {
     heads: Vec<HeadBias>,
@@ -117,8 +118,7 @@ pub struct CorrelatedBias {
 clone_in_place!(CorrelatedBias { heads, among });
 
 impl CorrelatedBias {
-    /// Those of so many radio heads, of which nothing is known but how probable they are; none where they
-    /// are impossible.
+    /// Those of so many radio heads, of which nothing is known but their probability; none where that is 0.
     pub fn new(radio_heads: usize, probability: f64) -> Self {
         let count = if probability > 0.0 { radio_heads } else { 0 };
         let unknown = HeadBias {
@@ -133,12 +133,12 @@ impl CorrelatedBias {
         }
     }
 
-    /// Whether there are none to be found.
+    /// Whether none is estimated.
     pub const fn is_empty(&self) -> bool {
         self.heads.is_empty()
     }
 
-    /// Forgets how the errors hang together with the state, which is another one.
+    /// Drops the covariances with the state, which has been replaced.
     pub fn decorrelate(&mut self) {
         for head in &mut self.heads {
             head.state_covariance = [0.0; STATES];
@@ -155,7 +155,9 @@ impl CorrelatedBias {
     /// What errors are expected to add to the variance of an angle; see [`JumpProcess::variance`].
     pub fn variance(&self, head: usize, travelled_m: f64, predicted_levels: f64) -> f64 {
         let error = self.heads.get(head);
-        error.map_or(0.0, |error| error.size.variance(travelled_m, predicted_levels))
+        error.map_or(0.0, |error| {
+            error.size.variance(travelled_m, predicted_levels)
+        })
     }
 
     fn covariance(&self, one: usize, other: usize) -> f64 {
@@ -207,11 +209,17 @@ impl CorrelatedBias {
             return; // as good as impossible
         }
         let predicted_levels = belief.cross(row);
-        let cross_with_angle: [CrossCovariance; STATES] =
-            std::array::from_fn(|i| [predicted_levels[i] + error.state_covariance[i], predicted_levels[i]]);
+        let cross_with_angle: [CrossCovariance; STATES] = std::array::from_fn(|i| {
+            [
+                predicted_levels[i] + error.state_covariance[i],
+                predicted_levels[i],
+            ]
+        });
         let change = MixtureUpdate::new(hypotheses, error.mean_rad, error.cross_with_angle[0]);
         error.mean_rad = change.value_mean();
-        for (covariance, cross_with_angle) in error.state_covariance.iter_mut().zip(cross_with_angle) {
+        for (covariance, cross_with_angle) in
+            error.state_covariance.iter_mut().zip(cross_with_angle)
+        {
             *covariance = change.value_covariance(*covariance, cross_with_angle);
         }
         if let Some(journal) = journal {
@@ -245,13 +253,15 @@ impl CorrelatedBias {
                 continue;
             }
             error.mean_rad += change.step(error.cross_with_angle);
-            for (covariance, cross_with_angle) in error.state_covariance.iter_mut().zip(cross_with_angle) {
+            for (covariance, cross_with_angle) in
+                error.state_covariance.iter_mut().zip(cross_with_angle)
+            {
                 *covariance += change.more(error.cross_with_angle, cross_with_angle);
             }
         }
     }
 
-    /// Tells a journal of the same as far as it can be told of one Gaussian: a measurement of state and
+    /// Logs for the smoother a Gaussian upper bound of the mixture update: a measurement of state and
     /// value with as much of its information as the value is likely to have been kept, one of the state
     /// alone with the rest of it, and a value that is so much what it was, and so much what the angle
     /// leaves for it beside the state. The mixture's covariance is never below that of these, as
@@ -274,7 +284,10 @@ impl CorrelatedBias {
         let Some(error) = self.heads.get(head) else {
             return;
         };
-        let all = || (cross_with_angle.iter().copied()).chain(self.heads.iter().map(|it| it.cross_with_angle));
+        let all = || {
+            (cross_with_angle.iter().copied())
+                .chain(self.heads.iter().map(|it| it.cross_with_angle))
+        };
         let (kept, anew) = (&hypotheses.kept, &hypotheses.anew);
         // Of the first measurement: by how much it corrects the second, and by how much that is the less
         // uncertain.
@@ -302,7 +315,7 @@ impl CorrelatedBias {
         journal.redrawn(head, kept.share, &by_state);
     }
 
-    /// Takes in how each value varies with a measurement of the state, and of the value of a radio head.
+    /// Covariance of each value with a measurement of the state, and of the value of a radio head.
     fn set_cross_covariances(&mut self, row: &[f64; STATES], of: Option<usize>) {
         for head in 0..self.heads.len() {
             let value_covariance = of.map_or(0.0, |of| self.covariance(head, of));
@@ -539,7 +552,7 @@ mod tests {
     #[test]
     fn the_state_is_as_uncertain_as_it_says_where_errors_are_as_assumed() {
         const RUNS: u32 = 400;
-        // Two radio heads, a look at each every 0.3 m: what is soon forgotten is forgotten in between.
+        // Two radio heads, an angle of each every 0.3 m: what is soon forgotten is forgotten in between.
         let mut random = ChaCha8Rng::seed_from_u64(5);
         for (way_m, bound_m) in [(2.0, 0.3), (20.0, 0.1)] {
             let (mut nees, mut square, mut within) = (0.0, 0.0, 0);
@@ -555,7 +568,11 @@ mod tests {
                 }
                 for predict_measurement in 0..(way_m / SOON_M) as usize {
                     for (head, drawn) in drawn.iter_mut().enumerate() {
-                        let since_m = if predict_measurement == 0 { f64::INFINITY } else { SOON_M };
+                        let since_m = if predict_measurement == 0 {
+                            f64::INFINITY
+                        } else {
+                            SOON_M
+                        };
                         let error = drawn.after(SOON_M, &mut random);
                         take(&mut errors, &mut belief, head, since_m, truth + error);
                     }

@@ -1,11 +1,11 @@
-//! The error of a radio head's angles that stays over metres, and how large it is.
+//! The time-correlated bias of a radio head's angles, and how large it is: a jump process.
 //!
 //! What reflections add to an angle stays much the same for about a metre and is another one then; how
 //! large it is differs from radio head to radio head and along the way. So it is a jump process: a value
 //! that is kept, or drawn anew from one of a few levels, and the level is another one after some way (a
-//! hidden Markov model). Besides, a look is off by as much again that is soon forgotten. By way and not by
-//! time: who stands sees the same error again. The value is estimated with the state, see
-//! [`CorrelatedBias`](super::staying_errors::StayingErrors); here it is weighed which of its pasts an angle
+//! hidden Markov model). Besides, each angle has an error of the same size that is soon forgotten. By way and not by
+//! time: a vehicle that stands sees the same error again. The value is estimated with the state, see
+//! [`CorrelatedBias`](super::staying_errors::StayingErrors); here it is weighed which of the jump hypotheses an angle
 //! speaks for, by Bayes.
 
 use crate::localize::gaussian::Innovation;
@@ -31,11 +31,11 @@ pub(super) const LEVEL_M: f64 = 20.0;
 /// Way that the other part of it stays (m).
 pub(super) const SOON_M: f64 = 0.3;
 
-/// The least way between two looks, as a share of that in which they repeat each other: who stands learns
+/// The least way between two angles, as a share of that in which they repeat each other: a vehicle that stands learns
 /// nothing, but a variance must stay a number.
 const LEAST_SHARE: f64 = 1e-5;
 
-/// Share of a look that is independent of the last one, `travelled_m` after it: independent is one in twice
+/// Share of an angle that is independent of the last one, `travelled_m` after it: independent is one in twice
 /// the way that a value is kept.
 pub fn independent(travelled_m: f64) -> f64 {
     (0.5 * travelled_m / VALUE_M).clamp(0.0, 1.0)
@@ -56,14 +56,14 @@ pub(super) fn share(travelled_m: f64) -> f64 {
     (travelled_m / SOON_M).clamp(LEAST_SHARE, 1.0)
 }
 
-/// How large a radio head's error is: the probability of each level, and before anything is heard.
+/// How large a radio head's bias is: the probability of each level, now and before anything is heard.
 #[derive(Clone, Copy, Debug, PartialEq)]
 pub struct JumpProcess {
     pub(super) levels: [f64; LEVELS],
     first: [f64; LEVELS],
 }
 
-/// How an angle may have come about: with the value kept, or drawn anew.
+/// A hypothesis of how an angle came about: with the value kept, or drawn anew (a jump).
 #[derive(Clone, Copy, Debug)]
 pub struct JumpHypothesis {
     /// Its probability.
@@ -75,7 +75,7 @@ pub struct JumpHypothesis {
     pub narrowing: f64,
 }
 
-/// How an angle's error may have come about.
+/// Both hypotheses of how an angle's bias came about.
 pub struct JumpHypotheses {
     /// Probability density of the angle (1/rad).
     pub density: f64,
@@ -144,7 +144,13 @@ impl JumpProcess {
     /// How an angle may have come about, `travelled_m` after the one before, whose innovation would be
     /// `seen` without the error. The value's mean was `value_rad`, and `known` is what its variance and its
     /// covariance with the rest add to the innovation's.
-    pub fn weigh(&self, travelled_m: f64, seen: &Innovation, value_rad: f64, known: f64) -> JumpHypotheses {
+    pub fn weigh(
+        &self,
+        travelled_m: f64,
+        seen: &Innovation,
+        value_rad: f64,
+        known: f64,
+    ) -> JumpHypotheses {
         let predicted_levels = self.predicted_levels(travelled_m);
         let stays = kept(travelled_m);
         let repetition = share(travelled_m).recip();
@@ -164,7 +170,8 @@ impl JumpProcess {
                     ..*seen
                 };
                 weights[hypothesis][level] = share * predicted_levels[level] * once.density();
-                inverse[hypothesis][level] = (seen.variance + variance + value * repetition).recip();
+                inverse[hypothesis][level] =
+                    (seen.variance + variance + value * repetition).recip();
             }
             of_value[level] = value * inverse[1][level];
             left[level] = value - value * of_value[level];
@@ -204,16 +211,22 @@ impl JumpProcess {
 
     /// Learns from an angle that may have come about so, `travelled_m` after the one before.
     pub fn learn(&mut self, travelled_m: f64, hypotheses: &JumpHypotheses) {
-        let by_way_and_angle = hypotheses.predicted_levels.into_iter().zip(hypotheses.levels);
+        let by_way_and_angle = hypotheses
+            .predicted_levels
+            .into_iter()
+            .zip(hypotheses.levels);
         for (level, (by_way, by_angle)) in self.levels.iter_mut().zip(by_way_and_angle) {
             *level = by_way + share(travelled_m) * (by_angle - by_way);
         }
     }
 
     /// Variance of an angle so far after the radio head's last one (rad²), which it does not repeat, that
-    /// tells as much of the state as is to be expected, where the state foretells it with a variance.
+    /// tells as much of the state as is to be expected, where the state predicts it with a variance.
     pub fn variance(&self, travelled_m: f64, predicted_levels: f64) -> f64 {
-        let levels = self.predicted_levels(travelled_m).into_iter().zip(VARIANCES);
+        let levels = self
+            .predicted_levels(travelled_m)
+            .into_iter()
+            .zip(VARIANCES);
         let told: f64 = levels
             .map(|(level, variance)| level / (predicted_levels + 2.0 * variance))
             .sum();

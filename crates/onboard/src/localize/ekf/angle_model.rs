@@ -1,5 +1,5 @@
-//! Seen from the vehicle: the electrical angle at which a radio head appears, and how it changes
-//! with the state.
+//! The measurement model: the electrical angle at which a radio head appears, and its Jacobian and second-order
+//! correction by the state.
 
 use super::state::{ACROSS, ALONG, CURVATURE, DATUM, HEADING, MOUNTING, PHASE, STATES};
 use crate::geometry::Pose;
@@ -25,15 +25,15 @@ pub struct ArrayModel {
 }
 
 impl ArrayModel {
-    /// How much of a look's scatter stays when looks are averaged that lie `travelled_m` apart, as
-    /// a multiple of what independent looks would leave.
+    /// How much of an angle's scatter stays when angles are averaged that lie `travelled_m` apart, as
+    /// a multiple of what independent ones would leave.
     ///
     /// Scatter that arrives from all directions of space has a flat spectrum over the distance
     /// travelled, one wave per wavelength to either side; the line of sight is a line in it, at
-    /// the cosine `toward` of the angle between it and the direction of travel. Looks fold the
+    /// the cosine `toward` of the angle between it and the direction of travel. Sampling folds the
     /// spectrum at multiples of 1/Δ, and what falls on the line is what an average cannot remove:
     /// `λ/(2Δ)` times the number of whole m with `|m λ/Δ − toward| < 1`. Up to half a wavelength
-    /// this is one look per half wavelength; far apart it tends to 1.
+    /// this is one angle per half wavelength; far apart it tends to 1.
     pub fn correlation(&self, travelled_m: f64, toward: f64) -> f64 {
         if !travelled_m.is_finite() {
             return 1.0;
@@ -123,7 +123,7 @@ pub struct AngleModel {
     slopes: [f64; 2],
 }
 
-/// What the bend of the electrical angle over the breadth of a belief does to its prediction.
+/// The second-order correction of a predicted angle over the width of a belief.
 #[derive(Clone, Copy, Debug, PartialEq)]
 pub struct SecondOrder {
     /// Shift of the expected electrical angle (rad).

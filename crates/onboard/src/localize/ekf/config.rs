@@ -1,7 +1,7 @@
 //! What the filter assumes of vehicle, road and radio.
 
+use super::angle_model::{AngleModel, ArrayModel};
 use super::motion::{MotionNoise, PathBend, Yaw};
-use super::angle_model::{ArrayModel, AngleModel};
 use crate::localize::quantile::normal_quantile;
 use crate::road::LaneKeeping;
 use crate::settings::{DriveKind, LocalizerSettings, RoadSettings, Site, TrackerSettings, Vehicle};
@@ -31,7 +31,7 @@ pub struct EkfConfig {
     pub wrong_lobe: Option<f64>,
     /// How many sound angles the gate refuses, as a share.
     pub outlier_probability: f64,
-    /// How many times the variance that is stated the angles are heard to have, where that is believed.
+    /// Measured variance of the angles over what is stated, where that is believed.
     pub heard_noise_ratio: Option<f64>,
     /// How the vehicle keeps to its lane; used with a map.
     pub lane_keeping: LaneKeeping,
@@ -85,11 +85,11 @@ pub struct EkfConfig {
     pub yaw_noise_rad_per_sqrt_rad: f64,
     /// Standard deviation of the angles' lateness (s); 0 takes their times as exact.
     pub lateness_std_s: f64,
-    /// The error of an angle that stays from look to look.
+    /// The bias of the angles that is stated.
     pub phase_bias: PhaseBias,
-    /// How probable an error is that stays over metres, and is found while driving; 0 where none is.
+    /// How probable a time-correlated bias is that this filter estimates; 0 where it estimates none.
     pub bias_probability: f64,
-    /// The same of one so rare that only a filter beside finds it; 0 where there is none.
+    /// The same of one so rare that only a filter beside estimates it; 0 where there is none.
     pub rare_bias_probability: f64,
     /// Time between odometry samples above which they are reported as a gap (s).
     pub gap_s: f64,
@@ -100,7 +100,7 @@ pub struct EkfConfig {
 /// Turn over which an error of the angles is forgotten (rad).
 const FORGETTING_TURN_RAD: f64 = 0.5;
 
-/// An error of the electrical angle that stays from look to look, each radio head's its own: a
+/// A stated bias of the electrical angle, each radio head's its own: a
 /// first-order Gauss–Markov process over time and distance.
 #[derive(Clone, Copy, Debug, PartialEq)]
 pub struct PhaseBias {
@@ -116,8 +116,8 @@ pub struct PhaseBias {
 
 impl PhaseBias {
     /// Variance (rad²) of an angle of the stated deviation, so long and so far after the radio head's
-    /// last one, as if looks were independent: with the correlation `ρ = e^{−Δ}` between neighbours
-    /// the mean of many looks has `(1 + ρ)/(1 − ρ) = coth Δ/2` times the variance that independent
+    /// last one, as if angles were independent: with the correlation `ρ = e^{−Δ}` between neighbours
+    /// the mean of many angles has `(1 + ρ)/(1 − ρ) = coth Δ/2` times the variance that independent
     /// ones would leave it.
     pub fn variance(&self, sigma_rad: f64, elapsed_s: f64, moved: (f64, f64)) -> f64 {
         let own = sigma_rad * sigma_rad;
@@ -125,7 +125,7 @@ impl PhaseBias {
         if stays + shared == 0.0 {
             return own;
         }
-        // Neither time nor way alone forgets: who stands sees the same error, and who drives on is
+        // Neither time nor way alone forgets: a vehicle that stands sees the same error, and one that drives on is
         // not another's sensor. Turning shows the radio head to another part of it.
         let (travelled_m, turned_rad) = moved;
         let by_way =
@@ -170,8 +170,8 @@ const USUAL_LATENESS_STD_S: f64 = 0.1;
 /// Probability that errors of a radio head's angles stay over metres, where nothing is stated of it: on a
 /// road, as a differential drive is as often lost, and would take the one for the other. And from which on
 /// it is usual, so that every filter is to find them.
-const UNKNOWN_ERROR_PROBABILITY: f64 = 0.1;
-const LEAST_USUAL_ERROR_PROBABILITY: f64 = 0.5;
+const UNKNOWN_BIAS_PROBABILITY: f64 = 0.1;
+const LEAST_USUAL_BIAS_PROBABILITY: f64 = 0.5;
 
 impl EkfConfig {
     /// What a filter on a vehicle assumes at a site.
@@ -229,11 +229,11 @@ impl EkfConfig {
         let bias_probability = (receiver.phase_bias_probability).unwrap_or(if wheels {
             0.0
         } else {
-            UNKNOWN_ERROR_PROBABILITY
+            UNKNOWN_BIAS_PROBABILITY
         });
         // Without a guard there is no filter beside this one.
         let is_alone = vehicle.integrity.is_none() && receiver.phase_bias_probability.is_some();
-        let is_usual = is_alone || bias_probability >= LEAST_USUAL_ERROR_PROBABILITY;
+        let is_usual = is_alone || bias_probability >= LEAST_USUAL_BIAS_PROBABILITY;
         let mut config = Self {
             drive: vehicle.drive,
             array: ArrayModel {
@@ -333,20 +333,24 @@ impl EkfConfig {
         self.wrong_lobe = Some(wrong_lobe).filter(|&it| it > self.outlier_probability);
     }
 
-    /// Whether errors that stay over metres are found while driving.
+    /// Whether a time-correlated bias of the angles is estimated.
     pub const fn estimates_bias(&self) -> bool {
         self.bias_probability > 0.0
     }
 
-    /// Whether angles may be off as if the vehicle were lost: those of an error that stays, where that is found but
-    /// rare, or such as are heard to be noisier than stated.
-    pub fn may_be_misled(&self) -> bool {
-        let is_rare = self.bias_probability < LEAST_USUAL_ERROR_PROBABILITY;
-        self.heard_noise_ratio.is_some() || (self.estimates_bias() && is_rare)
+    /// Whether a time-correlated bias is so usual that every filter estimates it.
+    pub fn is_bias_usual(&self) -> bool {
+        self.bias_probability >= LEAST_USUAL_BIAS_PROBABILITY
+    }
+
+    /// How many times the variance that it expects angles have that are heard to have so many times what is stated.
+    pub fn unexpected_noise(&self, heard: f64) -> f64 {
+        let expects = self.heard_noise_ratio.is_some() || self.estimates_bias();
+        if expects { 1.0 } else { heard }
     }
 
     /// Variance (rad²) by scatter of an angle `travelled_m` after the radio head's last one, see
-    /// [`ArrayModel::correlation`]. A look never counts for more than one: where successive errors
+    /// [`ArrayModel::correlation`]. An angle never counts for more than one: where successive errors
     /// cancel, they do so at one spacing and for a moment.
     /// [`AngleModel`] tells the aperture and the cosine `toward`.
     pub fn scatter_variance(&self, travelled_m: f64, aperture: f64, toward: f64) -> f64 {
@@ -355,10 +359,11 @@ impl EkfConfig {
         self.noise_ratio() * scatter * correlation.max(1.0)
     }
 
-    /// The same by all that several looks share: scatter and the surveys, whose errors stay until
+    /// The same by all that several angles share: scatter and the surveys, whose errors stay until
     /// the radio head is seen from another side, after about its distance.
     pub fn look_variance(&self, travelled_m: f64, angle_model: &AngleModel) -> f64 {
-        let mut variance = self.scatter_variance(travelled_m, angle_model.aperture, angle_model.toward);
+        let mut variance =
+            self.scatter_variance(travelled_m, angle_model.aperture, angle_model.toward);
         if angle_model.survey_variance > 0.0 {
             // Standing still nothing new is learnt, but the variance must stay a number.
             let same_side = angle_model.range_m / travelled_m.abs().max(1e-9);

@@ -1,4 +1,4 @@
-//! The filter itself: what it holds, how odometry moves it and angles correct it.
+//! The filter itself: what it holds, and how odometry moves it.
 
 use std::sync::Arc;
 
@@ -93,7 +93,7 @@ pub struct Ekf {
     pub(super) heads: Vec<Head>,
     pub(super) belief: Belief,
     /// What the radio heads' angles are off by over metres.
-    pub(super) errors: CorrelatedBias,
+    pub(super) bias: CorrelatedBias,
     pub(super) odometry: Option<OdometrySample>,
     pub(super) driven_m: f64,
     pub(super) turned_rad: f64,
@@ -111,7 +111,7 @@ clone_in_place!(Ekf {
     map,
     heads,
     belief,
-    errors,
+    bias,
     odometry,
     driven_m,
     turned_rad,
@@ -143,7 +143,7 @@ impl Ekf {
             map,
             heads: heads.iter().map(head).collect(),
             belief,
-            errors: CorrelatedBias::new(heads.len(), config.bias_probability),
+            bias: CorrelatedBias::new(heads.len(), config.bias_probability),
             odometry: None,
             driven_m: 0.0,
             turned_rad: 0.0,
@@ -184,7 +184,8 @@ impl Ekf {
         // differential drive's wheels may obey at once.
         if self.config.drive == DriveKind::Road {
             let usual_mps = SIGMAS_OF_SLIP * self.config.speed_noise_mps;
-            let mut least_mps = usual_mps.max(self.config.slip_acceleration_mps2 * duration_s.max(0.02));
+            let mut least_mps =
+                usual_mps.max(self.config.slip_acceleration_mps2 * duration_s.max(0.02));
             if (sample.speed_mps - previous.speed_mps).abs() > least_mps {
                 least_mps += self.bend_mps(sample.speed_mps, duration_s);
             }
@@ -344,7 +345,7 @@ impl Ekf {
                 journal.moved(&step.jacobian);
             }
             step.apply(&mut self.belief);
-            self.errors.moved(&step.jacobian);
+            self.bias.moved(&step.jacobian);
         }
         self.turned_rad += yaw.map_or(0.0, |yaw| yaw.turn_rad.abs()) * steps;
         self.driven_m += reading.read_m.abs() / (1.0 + self.belief.mean[SCALE]);
@@ -431,12 +432,12 @@ impl Ekf {
     pub(super) fn measure(&mut self, residual: f64, row: &[f64; STATES], variance: f64) {
         let journal = self.journal.as_mut();
         let told = journal.map(|journal| (journal, self.belief.variance_along(row) + variance));
-        self.errors.update(&self.belief, residual, row, variance);
+        self.bias.update(&self.belief, residual, row, variance);
         let gain = self.belief.update(residual, row, variance);
         if let Some((journal, total)) = told
             && total > 0.0
         {
-            let gains = gain.into_iter().chain(self.errors.gains(total));
+            let gains = gain.into_iter().chain(self.bias.gains(total));
             journal.measured(row, None, gains, residual, total);
         }
     }
@@ -455,7 +456,7 @@ impl Ekf {
     /// Replaces the state and its covariance, where several filters become one.
     pub(in crate::localize) fn set_belief(&mut self, belief: &Belief) {
         self.belief = *belief;
-        self.errors.decorrelate();
+        self.bias.decorrelate();
     }
 
     /// What the filter assumes.
@@ -497,13 +498,6 @@ impl Ekf {
         self.config.set_noise_ratio(ratio);
     }
 
-    /// How many times the variance that it expects angles have that are heard to have so many times what is
-    /// stated. Who finds errors that stay finds out by itself.
-    pub(in crate::localize) fn unexpected_noise(&self, heard: f64) -> f64 {
-        let knows = self.config.heard_noise_ratio.is_some() || self.config.estimates_bias();
-        if knows { 1.0 } else { heard }
-    }
-
     /// Distance driven since the start (m).
     pub const fn driven_m(&self) -> f64 {
         self.driven_m
@@ -527,7 +521,7 @@ impl Ekf {
         self.slip(by);
     }
 
-    /// By which share the speed leapt with the newest odometry, as no vehicle can do; 0 otherwise.
+    /// Share by which the speed jumped with the newest odometry, as no vehicle can do; 0 otherwise.
     pub(in crate::localize) const fn speed_jump(&self) -> f64 {
         self.speed_jumps.speed_jump()
     }

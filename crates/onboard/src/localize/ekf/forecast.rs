@@ -1,4 +1,4 @@
-//! What the belief would become: driven on, and with angles not yet heard.
+//! What the belief would become: predicted ahead, and updated with angles not yet heard.
 
 use std::f64::consts::TAU;
 
@@ -23,7 +23,7 @@ const OUTLIER: f64 = 8.0;
 /// An angle to a radio head that is not used.
 #[derive(Clone, Copy, Debug, PartialEq)]
 pub(in crate::localize) struct ExcludedInnovation {
-    /// The innovation; of the angle's variance only its noise, what stays from look to look being the
+    /// The innovation; of the angle's variance only its noise, biases being the
     /// belief's.
     pub innovation: Innovation,
     /// Variance of the noise, had nothing been heard before (rad²).
@@ -61,18 +61,21 @@ impl Ekf {
             .map(|predicted| predicted.innovation)
     }
 
-    /// Log-likelihood of an angle, beside that of one that has but its own noise and is foretold exactly.
+    /// Log-likelihood of an angle, relative to one that has but its own noise and is predicted exactly.
     ///
-    /// Looks that are not independent have a variance that says so: they cost nothing, however that
-    /// variance differs from place to place. Where errors are found that stay over metres, a look counts
-    /// as the share of a stretch that it tells of. Whoever leaves out a radio head takes its angles for
-    /// outliers.
-    pub(in crate::localize) fn log_likelihood(&self, predicted: &Result<PredictedMeasurement, UpdateReason>) -> f64 {
+    /// Angles that are not independent have a variance that says so: they cost nothing, however that
+    /// variance differs from place to place. Where a time-correlated bias is estimated, an angle counts
+    /// by its independent share. Angles of an excluded radio head are outliers.
+    pub(in crate::localize) fn log_likelihood(
+        &self,
+        predicted: &Result<PredictedMeasurement, UpdateReason>,
+    ) -> f64 {
         let Ok(predicted) = predicted else {
             return 0.0;
         };
-        if self.config.estimates_bias() {
-            let density = (predicted.hypotheses.as_ref()).map_or(TAU.recip(), |hypotheses| hypotheses.density);
+        if !self.bias.is_empty() {
+            let density = (predicted.hypotheses.as_ref())
+                .map_or(TAU.recip(), |hypotheses| hypotheses.density);
             let exact = (TAU * predicted.own_variance).sqrt().recip();
             return predicted.independent_share() * (density / exact).ln();
         }
@@ -83,8 +86,8 @@ impl Ekf {
         -0.5 * (seen.mahalanobis2() + (seen.variance / seen.measurement_variance).ln())
     }
 
-    /// What an angle to an excluded radio head would bring; it counts as a look. Where
-    /// errors are found that stay over metres there is nothing to test: a radio head that is off has a
+    /// The innovation that an angle to an excluded radio head would bring; it counts as an update. Where a
+    /// time-correlated bias is estimated there is nothing to test: a radio head that is off has a
     /// large one, and counts little.
     pub(in crate::localize) fn innovation_of_excluded(
         &mut self,
@@ -93,7 +96,7 @@ impl Ekf {
     ) -> Option<ExcludedInnovation> {
         let predicted = self.predict_measurement(head, measured).ok()?;
         self.heads.get_mut(predicted.head)?.last_update_m = predicted.place_m;
-        if self.config.estimates_bias() {
+        if !self.bias.is_empty() {
             return None;
         }
         let Innovation {
@@ -110,7 +113,7 @@ impl Ekf {
         let (aperture, toward) = (predicted.aperture, predicted.toward);
         let noise = unbiased.variance(sigma, predicted.elapsed_s, predicted.moved)
             + (self.config).scatter_variance(travelled_m, aperture, toward);
-        // What is off by as much in many looks counts once.
+        // What is off by as much in many angles counts once.
         let lasting = self.systematic_variance(&predicted);
         Some(ExcludedInnovation {
             innovation: Innovation {
@@ -187,14 +190,12 @@ impl Ekf {
             .phase_bias
             .variance(own, f64::INFINITY, (travelled_m, 0.0))
             + self.config.look_variance(travelled_m, &angle_model);
-        if self.config.estimates_bias() {
-            let predicted_levels = belief.variance_along(&angle_model.row) + variance;
-            let staying = self.errors.variance(number, travelled_m, predicted_levels);
-            if bias::repeats(travelled_m) && staying > variance {
-                return None;
-            }
-            variance += staying;
+        let predicted = belief.variance_along(&angle_model.row) + variance;
+        let by_bias = self.bias.variance(number, travelled_m, predicted);
+        if bias::repeats(travelled_m) && by_bias > variance {
+            return None;
         }
+        variance += by_bias;
         let mut updated = *belief;
         updated.update(0.0, &angle_model.row, variance);
         Some(updated)

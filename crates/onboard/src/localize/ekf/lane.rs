@@ -1,6 +1,6 @@
-//! Watching where the map does not tell how the road goes on: beyond its ends, and in its gaps.
+//! Whether the vehicle is in a lane of the map: beyond its ends and in its gaps it is not.
 
-use super::filter::{OffMap, Ekf};
+use super::filter::{Ekf, OffMap};
 use super::state::{ACROSS, ALONG, CURVATURE, HEADING, STATES};
 use crate::localize::gaussian::identity;
 
@@ -63,7 +63,7 @@ impl Ekf {
         }
         self.belief.mean[CURVATURE] = 0.0;
         self.belief.spread(&forget, &[[0.0; STATES]; STATES]);
-        self.errors.moved(&forget);
+        self.bias.moved(&forget);
     }
 
     /// Takes in that the vehicle is in its lane. What the belief knows already may come from the

@@ -1,7 +1,7 @@
 //! What comes out: the pose in the map frame, at any time, and smoothed after the drive.
 
-use super::filter::Ekf;
 use super::angle_model::locate;
+use super::filter::Ekf;
 use super::smoother::Journal;
 use super::state::{Belief, SCALE};
 use crate::localize::gaussian::transformed;
@@ -86,7 +86,7 @@ impl Ekf {
 
     pub(super) fn ask(&mut self, time_s: f64) {
         if let Some(journal) = &mut self.journal {
-            journal.asked(time_s, &self.belief, self.errors.state_covariance());
+            journal.asked(time_s, &self.belief, self.bias.state_covariance());
         }
     }
 }

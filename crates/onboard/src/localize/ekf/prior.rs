@@ -87,36 +87,32 @@ impl Ekf {
         self.driven_m = other.driven_m;
     }
 
-    /// The same filter, by which errors that stay have this probability and are not known yet.
-    pub(in crate::localize) fn finding_errors(&self, probability: f64) -> Self {
-        let mut ekf = self.clone();
-        ekf.config.bias_probability = probability;
-        ekf.errors = CorrelatedBias::new(self.heads.len(), probability);
-        ekf
-    }
-
-    /// The same filter as what is stated has it: angles are as noisy as that, and errors that stay are found by
-    /// none where they are rare.
+    /// The filter by what is stated: angles are as noisy as that, and a bias that is rare is not estimated.
     pub(in crate::localize) fn nominal(&self) -> Self {
-        let mut ekf = if self.config.rare_bias_probability > 0.0 {
-            self.finding_errors(0.0)
-        } else {
-            self.clone()
-        };
+        let mut ekf = self.clone();
+        if ekf.config.rare_bias_probability > 0.0 {
+            ekf.begin_bias(0.0);
+        }
         ekf.set_noise_ratio(None);
         ekf
     }
 
-    /// The same filter of an array of which nothing is taken as exact that is not stated; `None` where all of
-    /// it is.
-    pub(in crate::localize) fn uncalibrated(&self) -> Option<Self> {
-        let stds_rad = self.config.unstated_array_std_rad;
-        if stds_rad == [0.0; 2] {
-            return None;
+    /// Estimates a bias that is rare, unless it does.
+    pub(in crate::localize) fn estimate_rare_bias(&mut self) {
+        if self.bias.is_empty() {
+            self.begin_bias(self.config.rare_bias_probability);
         }
-        let mut ekf = self.clone();
-        let config = &mut ekf.config;
-        config.unstated_array_std_rad = [0.0; 2];
+    }
+
+    fn begin_bias(&mut self, probability: f64) {
+        self.config.bias_probability = probability;
+        self.bias = CorrelatedBias::new(self.heads.len(), probability);
+    }
+
+    /// Takes nothing of the array as exact that is not stated.
+    pub(in crate::localize) fn uncalibrate_array(&mut self) {
+        let config = &mut self.config;
+        let stds_rad = std::mem::take(&mut config.unstated_array_std_rad);
         for ((std, state), std_rad) in [
             (&mut config.mounting_std_rad, MOUNTING),
             (&mut config.phase_std_rad, PHASE),
@@ -125,33 +121,23 @@ impl Ekf {
         .zip(stds_rad)
         {
             *std = std.hypot(std_rad);
-            ekf.belief.covariance[state][state] += std_rad * std_rad;
+            self.belief.covariance[state][state] += std_rad * std_rad;
         }
-        Some(ekf)
     }
 
-    /// The same filter of a site plan that is off as a whole, by `std_m` in x and y.
-    pub(in crate::localize) fn displaced(&self, std_m: f64) -> Self {
-        let mut ekf = self.clone();
+    /// The site plan may be off as a whole, by `std_m` in x and y.
+    pub(in crate::localize) fn displace_site(&mut self, std_m: f64) {
         for state in DATUM {
-            ekf.belief.covariance[state][state] += std_m * std_m;
+            self.belief.covariance[state][state] += std_m * std_m;
         }
-        ekf.config.datum_std_m = ekf.config.datum_std_m.hypot(std_m);
-        ekf
+        self.config.datum_std_m = self.config.datum_std_m.hypot(std_m);
     }
 
-    /// The same where not all of the array is stated.
-    pub(in crate::localize) fn uncalibrated_or_self(&self) -> Self {
-        self.uncalibrated().unwrap_or_else(|| self.clone())
-    }
-
-    /// The same filter of an odometer that is so many times as noisy.
-    pub(in crate::localize) fn noisier(&self, times: f64) -> Self {
-        let mut ekf = self.clone();
-        let noise = &mut ekf.config.noise;
+    /// The odometer is so many times as noisy.
+    pub(in crate::localize) fn scale_odometer_noise(&mut self, times: f64) {
+        let noise = &mut self.config.noise;
         noise.odometer_m_per_sqrt_m *= times;
         noise.odometer_m_per_sqrt_s *= times;
-        ekf
     }
 
     /// The same filter begun anew where it is, every source in use, its place known to

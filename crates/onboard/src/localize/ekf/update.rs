@@ -1,5 +1,4 @@
-//! How an angle meets the belief: what is expected, how far off and how uncertain it is, and what is
-//! believed after it.
+//! The measurement update: an angle's prediction and innovation, its gate, and the corrected belief.
 
 use super::angle_model::{AngleModel, locate};
 use super::filter::Ekf;
@@ -15,40 +14,39 @@ use crate::radio_head::RadioHead;
 /// Most that angles can be later than stated (s).
 const MOST_LATENESS_S: f64 = 0.5;
 
-/// An angle as the belief meets it.
+/// An angle's prediction and innovation.
 pub(in crate::localize) struct PredictedMeasurement {
     pub head: usize,
     pub excluded: bool,
     pub place_m: f64,
     pub row: [f64; STATES],
-    /// Without the error that stays, where that is found while driving.
+    /// Without the time-correlated bias, where that is estimated.
     pub innovation: Innovation,
     /// Variance of the angle by its own noise (rad²).
     pub own_variance: f64,
-    /// Of the sighting; see [`AngleModel`].
+    /// See [`AngleModel`].
     pub aperture: f64,
     pub toward: f64,
     pub survey_variance: f64,
-    /// Time, way and turn since the last look that was used (s, m, rad).
+    /// Time, way and turn since the radio head's last update (s, m, rad).
     pub elapsed_s: f64,
     pub moved: (f64, f64),
     /// Variance by the odometry since its newest sample, and by the bend of the prediction (rad²).
     pub coasted_variance: f64,
     pub bend_variance: f64,
-    /// How the error that stays may have come about, where it is found while driving and the radio head is
-    /// used.
+    /// How the time-correlated bias may have come about, where it is estimated and the radio head is used.
     pub hypotheses: Option<JumpHypotheses>,
 }
 
 impl PredictedMeasurement {
-    /// Share of it that is independent of the last one, where errors that stay are found.
+    /// Share of it that is independent of the last one, where a time-correlated bias is estimated.
     pub fn independent_share(&self) -> f64 {
         bias::independent(self.moved.0.abs())
     }
 }
 
 impl Ekf {
-    /// What an angle to a radio head says beside the belief.
+    /// Predicts an angle to a radio head.
     #[inline]
     pub(in crate::localize) fn predict_measurement(
         &self,
@@ -96,7 +94,7 @@ impl Ekf {
         let hypotheses = if head.excluded {
             None
         } else {
-            (self.errors).weigh(index, travelled_m.abs(), &innovation, &row)
+            (self.bias).weigh(index, travelled_m.abs(), &innovation, &row)
         };
         Ok(PredictedMeasurement {
             head: index,
@@ -116,17 +114,21 @@ impl Ekf {
         })
     }
 
-    /// Variance of a look's noise, had the radio head not been heard before (rad²).
+    /// Variance of an angle's noise, had the radio head not been heard before (rad²).
     pub(in crate::localize) fn first_variance(&self, predicted: &PredictedMeasurement) -> f64 {
         let config = &self.config;
         let scatter = config.scatter_variance(f64::INFINITY, predicted.aperture, predicted.toward);
         predicted.own_variance + scatter
     }
 
-    /// Variance of what a look is off by that is neither noise nor the belief's (rad²).
+    /// Variance of an angle's systematic errors: surveys, stated bias, odometry since its newest sample, second order
+    /// (rad²).
     pub(in crate::localize) fn systematic_variance(&self, predicted: &PredictedMeasurement) -> f64 {
         let bias = self.config.phase_bias.std_rad;
-        predicted.survey_variance + bias * bias + predicted.coasted_variance + predicted.bend_variance
+        predicted.survey_variance
+            + bias * bias
+            + predicted.coasted_variance
+            + predicted.bend_variance
     }
 
     /// A radio head as it is seen from a state, or rather was seen when the angle was received.
@@ -156,12 +158,12 @@ impl Ekf {
 
     /// Corrects the state by one electrical angle to a radio head.
     pub fn update(&mut self, head: &RadioHead, measured: &AngleMeasurement) -> UpdateVerdict {
-        self.take(self.predict_measurement(head, measured), measured)
+        self.update_predicted(self.predict_measurement(head, measured), measured)
     }
 
-    /// Corrects the state by an angle that was looked at just now.
+    /// Corrects the state by an angle that was just predicted.
     #[inline]
-    pub(in crate::localize) fn take(
+    pub(in crate::localize) fn update_predicted(
         &mut self,
         predicted: Result<PredictedMeasurement, UpdateReason>,
         measured: &AngleMeasurement,
@@ -194,21 +196,20 @@ impl Ekf {
         self.verdict(UpdateReason::Consistent, Some(mahalanobis2))
     }
 
-    /// Takes in an angle whose error is found: whatever that is, it is no more believed than it deserves.
-    /// One that is far off is called an outlier; of a radio head known as off that is no news of the vehicle.
+    /// Corrects state and biases by an angle. One that is far off is called an outlier; of a radio head known as off that is no news of the vehicle.
     fn update_with_bias(
         &mut self,
         predicted: &PredictedMeasurement,
         hypotheses: &JumpHypotheses,
         measured: &AngleMeasurement,
     ) -> UpdateVerdict {
-        // By itself, its error being of any size that there is.
+        // Gated with the largest bias variance added.
         let mut seen = predicted.innovation;
         seen.variance += MOST_VARIANCE;
         let mahalanobis2 = seen.mahalanobis2();
-        let is_known = self.errors.is_large(predicted.head);
+        let is_known = self.bias.is_large(predicted.head);
         let (way_m, journal) = (predicted.moved.0.abs(), self.journal.as_mut());
-        (self.errors).take(
+        (self.bias).take(
             &mut self.belief,
             predicted.head,
             way_m,
@@ -223,7 +224,7 @@ impl Ekf {
         self.verdict(UpdateReason::Consistent, Some(mahalanobis2))
     }
 
-    /// Remembers when and where a radio head was looked at.
+    /// Remembers when and where a radio head was used.
     fn note_update(&mut self, predicted: &PredictedMeasurement, measured: &AngleMeasurement) {
         self.keep_bounds();
         if let Some(head) = self.heads.get_mut(predicted.head) {
@@ -233,8 +234,7 @@ impl Ekf {
         }
     }
 
-    /// An odometer that reads twice or half of what is driven, or an angle older than memory, is no
-    /// more believed however well it would explain the angles.
+    /// Clamps scale and lateness to what is plausible, however well more would explain the angles.
     fn keep_bounds(&mut self) {
         let mean = &mut self.belief.mean;
         let scale = self.config.odometer_scale;

@@ -19,7 +19,7 @@ use crate::clone_in_place::clone_in_place;
 use crate::geometry::{Pose, wrap_angle};
 use crate::localize::ekf::Ekf;
 use crate::localize::measurement::{AngleMeasurement, OdometryVerdict, UpdateVerdict};
-use crate::localize::modes::{Bank, FaultModes, IntegrityConfig};
+use crate::localize::modes::{Bank, IntegrityConfig, ModeId};
 use crate::localize::pose_estimate::{Integrity, IntegrityState, PoseEstimate};
 use crate::observation::OdometrySample;
 use crate::radio_head::RadioHead;
@@ -132,11 +132,10 @@ impl IntegrityMonitor {
     ) -> Self {
         let is_found = found_s.is_some();
         let found_s = found_s.unwrap_or(f64::NEG_INFINITY);
-        let modes = FaultModes::new(ekf, config.fault_probability);
         Self {
             level: LevelEquation::new(config.risk),
             trusted_m: ekf.driven_m(),
-            bank: Bank::new(ekf, heads, modes, found_s),
+            bank: Bank::new(ekf, heads, &config.fault_probability, found_s),
             restarted: None,
             handover: None,
             is_found,
@@ -174,6 +173,11 @@ impl IntegrityMonitor {
         self.begun_s
     }
 
+    /// Whether angles may be off by the mode that leads as if the vehicle were lost.
+    pub fn may_mislead(&self) -> bool {
+        self.bank.may_mislead()
+    }
+
     /// How much more the angles vary than stated.
     pub const fn noise_ratio(&self) -> f64 {
         self.bank.noise_ratio()
@@ -194,7 +198,7 @@ impl IntegrityMonitor {
         let (solution_id, told) = (self.solution_id(), self.ekf().pose(odometry_s));
         let verdict = self.bank.update(head, measured);
         self.bank.judge(self.now_s, &self.config);
-        if let Some(bank) = self.bank.of_inexact(self.now_s, &self.config) {
+        if let Some(bank) = self.bank.rebased(self.now_s, &self.config) {
             (self.bank, self.restarted) = (bank, None);
         }
         if let Some(restarted) = &mut self.restarted {
@@ -210,19 +214,18 @@ impl IntegrityMonitor {
         verdict
     }
 
-    /// By what to know that another one tells the position.
-    fn solution_id(&self) -> (*const Ekf, usize, f64) {
-        let leader = std::ptr::from_ref(self.bank.leader());
-        (leader, self.bank.faulty(), self.begun_s)
+    /// By what to know that another solution is reported.
+    fn solution_id(&self) -> (Option<ModeId>, usize, f64) {
+        (self.bank.leading_id(), self.bank.faulty(), self.begun_s)
     }
 
     /// Which of several is most probable may change from angle to angle, and who has begun anew knows nothing of the
     /// odometer yet.
     fn watch_faults(&mut self) {
-        if self.bank.modes().is_fault() {
+        if self.bank.is_fault() {
             self.fault_s = self.now_s;
         }
-        let main = self.bank.main();
+        let main = self.bank.nominal();
         self.has_departed =
             main.odometer_departs() || (self.has_departed && !main.knows_odometer());
     }
@@ -239,7 +242,7 @@ impl IntegrityMonitor {
             if lost || self.is_found {
                 self.restart();
             } else {
-                self.trusted_m = self.bank.main().driven_m();
+                self.trusted_m = self.bank.nominal().driven_m();
             }
             return;
         };
@@ -249,7 +252,7 @@ impl IntegrityMonitor {
         } else if aged && restarted.bank.is_lost(&self.config) {
             self.restart();
         } else if restarted.bank.quiet_s(now_s) > patience_s
-            && !restarted.bank.modes().is_fault()
+            && !restarted.bank.is_fault()
             && self.is_near(&restarted.bank, now_s)
             && let Some(restarted) = self.restarted.take()
         {
@@ -260,10 +263,10 @@ impl IntegrityMonitor {
     }
 
     fn restart(&mut self) {
-        let strayed_m = if self.bank.modes().errors_stay() {
+        let strayed_m = if self.bank.explains_heads() {
             0.0
         } else {
-            self.bank.main().driven_m() - self.trusted_m
+            self.bank.nominal().driven_m() - self.trusted_m
         };
         let position_std_m = self.config.alert_limit_m + strayed_m;
         self.restarted = Some(Restarted {
@@ -275,19 +278,17 @@ impl IntegrityMonitor {
     /// The pose at `time_s`.
     pub fn pose(&self, time_s: f64) -> PoseEstimate {
         let mut pose = self.bank.leader().pose(time_s);
-        if !self.bank.main().config().estimates_bias() {
-            let beliefs = self.bank.beliefs();
-            pose.mix(beliefs.map(|(probability, right)| (probability, right.pose(time_s))));
-        }
+        let mixture = self.bank.mixture();
+        pose.mix(mixture.map(|(probability, right)| (probability, right.pose(time_s))));
         pose.integrity = Some(self.integrity(time_s));
         let handover = self.handover.as_ref();
         if let Some(handover) = handover.and_then(|it| it.beside(&pose, self.config.recovery_s)) {
             pose.cover(&handover);
         }
-        if self.bank.modes().errors_stay() {
+        if self.bank.explains_heads() {
             return pose;
         }
-        let restarted = self.restarted.iter().map(|it| it.bank.main());
+        let restarted = self.restarted.iter().map(|it| it.bank.nominal());
         for other in self.bank.candidates(&self.config).chain(restarted) {
             pose.cover(&other.pose(time_s));
         }
@@ -297,8 +298,7 @@ impl IntegrityMonitor {
     /// Protection level and state at `time_s`.
     pub fn integrity(&self, time_s: f64) -> Integrity {
         let levels = self.level.solve(&self.hypotheses(&self.bank, time_s));
-        let modes = self.bank.modes();
-        let state = if self.bank.is_outvoted(&self.config) && !modes.errors_stay() {
+        let state = if self.bank.is_outvoted(&self.config) && !self.bank.explains_heads() {
             IntegrityState::Unavailable
         } else if self.now_s - self.fault_s <= self.config.recovery_s
             || self.has_departed
@@ -333,14 +333,12 @@ impl IntegrityMonitor {
     ) -> impl Iterator<Item = (&'a Ekf, Hypothesis)> + Clone {
         let told = bank.leader().pose(time_s);
         let heard_noise_ratio = bank.noise_ratio();
-        let estimates_bias = bank.main().config().estimates_bias();
-        let head_probability = (self.config.fault_probability).of_radio_head(estimates_bias);
         let negligible = NEGLIGIBLE * self.config.risk;
-        (bank.suspects(head_probability))
+        (bank.hypotheses())
             .filter(move |(probability, _)| *probability > negligible)
             .filter_map(move |(probability, right)| {
                 let pose = right.pose(time_s);
-                let noise_ratio = right.unexpected_noise(heard_noise_ratio);
+                let noise_ratio = right.config().unexpected_noise(heard_noise_ratio);
                 let hypothesis = Hypothesis::new(probability, &pose, noise_ratio, &told);
                 hypothesis.map(|it| (right, it))
             })

@@ -1,4 +1,8 @@
-//! Trackers that do without some of the radio heads.
+//! A static bank of filters, one for each fault mode of the [table](super::table), beside the nominal one.
+//!
+//! Multiple-model estimation (MMAE: Bar-Shalom, Li and Kirubarajan, Estimation with Applications to Tracking and
+//! Navigation, 2001, 11.6) of modes that do not switch: no filter is mixed with another (as IMM does), so that one
+//! without a radio head has never heard it, as solution separation needs.
 //!
 //! Beside the filter of every sound radio head run one without each of them and one without each
 //! two. If one radio head is at fault — seen round a corner, moved, spoofed — the filters without
@@ -6,20 +10,121 @@
 //! agree with each other; leave out a wrong one, and the fault is still among them. And when a
 //! radio head is excluded, filters that have never heard it are ready to take over, together with
 //! those that have heard neither it nor one of the others.
-//!
-//! And what else may be otherwise than stated has filters of its own ([`FaultModes`]).
 
 use super::config::IntegrityConfig;
 use super::head_test::HeadTest;
-use super::hypotheses::FaultModes;
+use super::likelihood::{LEAST_ODDS, LikelihoodRatio, SPEED_JUMP};
 use super::noise_ratio::NoiseRatio;
+use super::table::{Carry, Mode, ModeId, TABLE, Verdict, Weight};
 use crate::clone_in_place::clone_in_place;
-use crate::localize::ekf::Ekf;
-use crate::localize::measurement::{AngleMeasurement, OdometryVerdict, UpdateVerdict};
+use crate::localize::ekf::{Ekf, PredictedMeasurement};
+use crate::localize::measurement::{
+    AngleMeasurement, OdometryVerdict, UpdateReason, UpdateVerdict,
+};
 use crate::observation::OdometrySample;
 use crate::radio_head::RadioHead;
+use crate::settings::FaultProbability;
 
-/// A filter without one or two radio heads, and the test of each against it.
+/// The filter of a mode that is weighed by its posterior.
+#[derive(Debug)]
+struct ModeFilter {
+    mode: &'static Mode,
+    prior: f64,
+    ekf: Ekf,
+    /// To the nominal mode.
+    ratio: LikelihoodRatio,
+    /// Whether the vehicle stood since the filter began.
+    at_rest: bool,
+}
+
+clone_in_place!(ModeFilter {
+    mode,
+    prior,
+    ekf,
+    ratio,
+    at_rest
+});
+
+impl ModeFilter {
+    fn new(mode: &'static Mode, given: &Ekf, faults: &FaultProbability) -> Self {
+        let mut ekf = (mode.seed)(given);
+        (mode.alter)(&mut ekf);
+        Self {
+            mode,
+            prior: (mode.prior)(given.config(), faults),
+            ekf,
+            ratio: LikelihoodRatio::NONE,
+            at_rest: true,
+        }
+    }
+
+    /// Those of the table that apply to a filter.
+    fn all(given: &Ekf, faults: &FaultProbability) -> Vec<Self> {
+        let nominal = given.nominal();
+        let apply = |it: &&Mode| it.weight == Weight::Posterior && (it.applies)(&nominal, faults);
+        let modes = TABLE.iter().filter(apply);
+        modes.map(|mode| Self::new(mode, given, faults)).collect()
+    }
+
+    /// What of it is carried over to another nominal filter.
+    fn carry(
+        &mut self,
+        carry: Carry,
+        given: &Ekf,
+        excluded: Option<&RadioHead>,
+        faults: &FaultProbability,
+    ) {
+        match carry {
+            Carry::All => {}
+            Carry::AllButHead => exclude(&mut self.ekf, excluded, true),
+            Carry::Filter => self.ratio = LikelihoodRatio::NONE,
+            Carry::IfNotAgainst if !self.ratio.is_against() => {}
+            Carry::IfNotAgainst | Carry::Nothing => *self = Self::new(self.mode, given, faults),
+        }
+    }
+
+    /// How many times as probable it is as the nominal mode.
+    fn odds(&self) -> f64 {
+        self.ratio.odds(self.prior)
+    }
+
+    /// Moves on by an odometry sample, by which the nominal filter has moved on. What spoke against a fault that may
+    /// begin now says nothing of that.
+    fn odometry(&mut self, nominal: &Ekf, sample: &OdometrySample) {
+        self.ekf.odometry(sample);
+        let Some(onset) = self.mode.onset else {
+            return;
+        };
+        let was_at_rest = std::mem::replace(&mut self.at_rest, sample.speed_mps == 0.0);
+        let sets_off = was_at_rest && !self.at_rest;
+        let jump = self.ekf.speed_jump();
+        if !(sets_off || jump > 0.0) {
+            return;
+        }
+        if self.ratio.is_against() {
+            self.ekf.clone_from(nominal);
+            onset(&mut self.ekf, if sets_off { 0.0 } else { jump });
+        }
+        let least = if jump > 0.0 { SPEED_JUMP } else { 0.0 };
+        self.ratio.raise_to(least);
+    }
+
+    /// Takes in an angle, which the nominal filter predicts so.
+    fn update(
+        &mut self,
+        nominal: (&Ekf, &Result<PredictedMeasurement, UpdateReason>),
+        head: &RadioHead,
+        measured: &AngleMeasurement,
+    ) -> UpdateVerdict {
+        let predicted = self.ekf.predict_measurement(head, measured);
+        if measured.resolved {
+            self.ratio.update((&self.ekf, &predicted), nominal);
+        }
+        self.ekf.update_predicted(predicted, measured)
+    }
+}
+
+/// The filter without one or two radio heads, and the test of each against it.
 #[derive(Debug)]
 struct SubsetFilter {
     /// Numbers of the radio heads left out; the same twice where it is one.
@@ -39,6 +144,10 @@ impl SubsetFilter {
         self.without.contains(&head)
     }
 
+    const fn is_of_one(&self) -> bool {
+        self.without[0] == self.without[1]
+    }
+
     fn test(&self, head: usize) -> HeadTest {
         let [first, second] = self.tests;
         if self.without[0] == head {
@@ -52,36 +161,51 @@ impl SubsetFilter {
 /// The filters.
 #[derive(Debug)]
 pub(in crate::localize) struct Bank {
+    faults: FaultProbability,
     heads: Vec<RadioHead>,
     faulty: Vec<bool>,
     /// When each of them last disagreed with the filter without it (s).
     disagreed_s: Vec<f64>,
-    /// When it was lost last (s).
+    /// When a source was last at fault and not identified (s).
     lost_s: f64,
-    main: Ekf,
-    /// What may be otherwise than it believes.
-    modes: FaultModes,
+    /// The filter of every sound radio head, by what is stated.
+    nominal: Ekf,
+    modes: Vec<ModeFilter>,
     noise: NoiseRatio,
+    /// Prior probability of a fault of each radio head.
+    head_prior: f64,
     /// First those without one radio head, in order; then those without two.
     subsets: Vec<SubsetFilter>,
 }
 
 clone_in_place!(Bank {
+    faults,
     heads,
     faulty,
     disagreed_s,
     lost_s,
-    main,
+    nominal,
     modes,
     noise,
+    head_prior,
     subsets
 });
 
 impl Bank {
-    /// The filters beside this one, and what may be otherwise than it believes; nothing is known of them at
-    /// `now_s`.
-    pub fn new(ekf: &Ekf, heads: &[RadioHead], modes: FaultModes, now_s: f64) -> Self {
-        let ekf = ekf.nominal();
+    /// The modes beside a filter; nothing is known of them at `now_s`.
+    pub fn new(given: &Ekf, heads: &[RadioHead], faults: &FaultProbability, now_s: f64) -> Self {
+        let modes = ModeFilter::all(given, faults);
+        Self::with(given, heads, faults, modes, now_s)
+    }
+
+    fn with(
+        given: &Ekf,
+        heads: &[RadioHead],
+        faults: &FaultProbability,
+        modes: Vec<ModeFilter>,
+        now_s: f64,
+    ) -> Self {
+        let nominal = given.nominal();
         let count = heads.len();
         let one = (0..count).map(|head| [head; 2]);
         // Which of two disagrees nobody can tell.
@@ -89,7 +213,7 @@ impl Bank {
         let two =
             (0..pairs).flat_map(|first| (first + 1..pairs).map(move |second| [first, second]));
         let subset = |without: [usize; 2]| {
-            let mut ekf = ekf.clone();
+            let mut ekf = nominal.clone();
             for head in without {
                 exclude(&mut ekf, heads.get(head), true);
             }
@@ -99,83 +223,161 @@ impl Bank {
                 ekf,
             }
         };
+        let of_heads = TABLE
+            .iter()
+            .find(|it| it.weight == Weight::Prior { heads: 1 });
         Self {
+            faults: *faults,
             subsets: one.chain(two).map(subset).collect(),
             faulty: vec![false; count],
             disagreed_s: vec![f64::NEG_INFINITY; count],
             lost_s: now_s,
             heads: heads.to_vec(),
             modes,
-            main: ekf,
+            head_prior: of_heads.map_or(0.0, |it| (it.prior)(nominal.config(), faults)),
+            nominal,
             noise: NoiseRatio::new(count),
         }
     }
 
-    /// The filter of every sound radio head.
-    pub const fn main(&self) -> &Ekf {
-        &self.main
+    /// The filter of every sound radio head, by what is stated.
+    pub const fn nominal(&self) -> &Ekf {
+        &self.nominal
     }
 
-    /// The same begun anew from a vague pose, of which nothing is known at `now_s`.
+    /// The bank begun anew from a vague pose where the leading filter is; nothing is known of it at `now_s`.
     pub fn restarted(&self, position_std_m: f64, now_s: f64) -> Self {
         let start = self.leader().restarted(position_std_m);
+        let mut modes = ModeFilter::all(&start, &self.faults);
+        for it in &mut modes {
+            let before = self
+                .modes
+                .iter()
+                .find(|before| before.mode.id == it.mode.id);
+            if it.mode.on_restart != Carry::Nothing
+                && let Some(before) = before
+            {
+                it.clone_from(before);
+                it.carry(it.mode.on_restart, &start, None, &self.faults);
+            }
+        }
         Self {
             noise: self.noise.resumed(),
-            ..Self::new(&start, &self.heads, self.modes.beside(&start), now_s)
+            ..Self::with(&start, &self.heads, &self.faults, modes, now_s)
         }
     }
 
-    /// The same of an array that is not exact, once that is sure and nothing else may be; nothing is known of
-    /// it at `now_s`.
-    pub fn of_inexact(&self, now_s: f64, config: &IntegrityConfig) -> Option<Self> {
-        let uncalibrated = self.modes.uncalibrated()?;
+    /// The bank about the mode that leads as the nominal one, once it is certain and no radio head is in doubt;
+    /// nothing is known of it at `now_s`. What the others' likelihoods had in common with its own is taken off them.
+    pub fn rebased(&self, now_s: f64, config: &IntegrityConfig) -> Option<Self> {
+        let leading = self.leading()?;
+        let is_certain = (leading.mode.becomes_nominal_at).is_some_and(|it| leading.odds() > it);
         let is_quiet = self.faulty() == 0
-            && self.worst_case(config.recovery_threshold) == 0
+            && self.in_doubt(config.recovery_threshold) == 0
             && self.quiet_s(now_s) > config.recovery_s;
-        is_quiet.then(|| Self {
+        (is_certain && is_quiet).then(|| self.about(leading, now_s))
+    }
+
+    fn about(&self, nominal: &ModeFilter, now_s: f64) -> Self {
+        let others = self.modes.iter().filter(|it| it.mode.id != nominal.mode.id);
+        let mut modes: Vec<ModeFilter> = others.cloned().collect();
+        for it in &mut modes {
+            it.ratio = it.ratio.to(nominal.ratio);
+            it.carry(it.mode.on_rebase, &nominal.ekf, None, &self.faults);
+        }
+        Self {
             noise: self.noise.resumed(),
-            ..Self::new(uncalibrated, &self.heads, self.modes.beside_inexact(), now_s)
-        })
+            ..Self::with(&nominal.ekf, &self.heads, &self.faults, modes, now_s)
+        }
     }
 
-    /// The filter that is most probably right: the one of every sound radio head, unless something is otherwise.
+    /// The bank about the leading mode.
+    #[cfg(test)]
+    pub(super) fn about_leading(&self) -> Option<Self> {
+        self.leading().map(|it| self.about(it, 0.0))
+    }
+
+    /// The mode that leads: clearly more probable than the nominal one, and more so than any other.
+    fn leading(&self) -> Option<&ModeFilter> {
+        let most = (self.modes.iter()).max_by(|one, other| one.odds().total_cmp(&other.odds()));
+        most.filter(|it| it.odds() > LEAST_ODDS && it.mode.verdict != Verdict::Unled)
+    }
+
+    /// The filter that is most probably right: the nominal one, unless another mode leads.
     pub fn leader(&self) -> &Ekf {
-        self.modes.leader().unwrap_or(&self.main)
+        self.leading().map_or(&self.nominal, |it| &it.ekf)
     }
 
-    /// What may be otherwise than stated.
-    pub const fn modes(&self) -> &FaultModes {
-        &self.modes
+    /// The mode that leads, if it is not the nominal one.
+    pub fn leading_id(&self) -> Option<ModeId> {
+        self.leading().map(|it| it.mode.id)
     }
 
-    /// What may be, how probable it is and the filter that is right then: all is as stated, or something is
-    /// otherwise; or, as far as the odometer does not slip and errors do not stay, one
-    /// or two of the sound radio heads are at fault, of which each has the probability `head`.
-    pub fn suspects(&self, head: f64) -> impl Iterator<Item = (f64, &Ekf)> + Clone {
-        let trusted = self.modes.trusted();
+    /// Odds and filter of a mode.
+    #[cfg(test)]
+    pub(super) fn mode(&self, id: ModeId) -> Option<(f64, &Ekf)> {
+        let found = self.modes.iter().find(|it| it.mode.id == id);
+        found.map(|it| (it.odds(), &it.ekf))
+    }
+
+    /// Whether the mode that leads is a fault.
+    pub fn is_fault(&self) -> bool {
+        (self.leading()).is_some_and(|it| it.mode.verdict == Verdict::Degraded)
+    }
+
+    /// Whether angles may be off by the mode that leads as if the vehicle were lost.
+    pub fn may_mislead(&self) -> bool {
+        self.leading().is_some_and(|it| it.mode.misleads)
+    }
+
+    /// Whether a mode that explains disagreement of several radio heads is clearly more probable than the nominal
+    /// one, whatever leads.
+    pub fn explains_heads(&self) -> bool {
+        (self.modes.iter()).any(|it| it.mode.explains_heads && it.odds() > LEAST_ODDS)
+    }
+
+    /// The hypotheses of the protection level, each with its probability and the filter that is right under it: the
+    /// modes weighed by their posteriors, and, as far as none of those that are faults holds, one or two of the sound
+    /// radio heads at fault.
+    pub fn hypotheses(&self) -> impl Iterator<Item = (f64, &Ekf)> + Clone {
+        let total = self.total_odds();
+        let faults = (self.modes.iter()).filter(|it| it.mode.verdict != Verdict::Ok);
+        let fault_free = 1.0 - faults.map(ModeFilter::odds).sum::<f64>() / total;
         let heads = (self.subsets.iter())
             .filter(|subset| !subset.without.iter().any(|&it| self.is_faulty(it)))
             .map(move |subset| {
-                let [one, other] = subset.without;
-                let both = if one == other { 1.0 } else { head };
-                (trusted * head * both, &subset.ekf)
+                let both = if subset.is_of_one() {
+                    1.0
+                } else {
+                    self.head_prior
+                };
+                (fault_free * self.head_prior * both, &subset.ekf)
             });
-        self.beliefs().chain(heads)
+        let odds = std::iter::once((1.0, &self.nominal))
+            .chain(self.modes.iter().map(|it| (it.odds(), &it.ekf)));
+        odds.map(move |(odds, ekf)| (odds / total, ekf))
+            .chain(heads)
     }
 
-    /// How probable it is that all is as stated, and that something is otherwise; and the filter that is right
-    /// then.
-    pub fn beliefs(&self) -> impl Iterator<Item = (f64, &Ekf)> + Clone {
-        let total = self.modes.total_odds();
-        let odds = std::iter::once((1.0, &self.main)).chain(self.modes.odds());
+    /// The modes that may lead, each with its posterior among them and its filter: the estimate is one of those.
+    pub fn mixture(&self) -> impl Iterator<Item = (f64, &Ekf)> + Clone {
+        let may_lead = |it: &&ModeFilter| it.mode.verdict != Verdict::Unled;
+        let odds = std::iter::once((1.0, &self.nominal))
+            .chain((self.modes.iter().filter(may_lead)).map(|it| (it.odds(), &it.ekf)));
+        let total = 1.0 + odds.clone().skip(1).map(|(odds, _)| odds).sum::<f64>();
         odds.map(move |(odds, ekf)| (odds / total, ekf))
+    }
+
+    /// The odds of all modes, the nominal one among them.
+    fn total_odds(&self) -> f64 {
+        1.0 + self.modes.iter().map(ModeFilter::odds).sum::<f64>()
     }
 
     /// The filters without a radio head in doubt, one of which may take over soon.
     pub fn candidates(&self, config: &IntegrityConfig) -> impl Iterator<Item = &Ekf> {
-        let worst_case = |head: &usize| self.statistic(*head) > config.recovery_threshold;
-        let worst_case = self.sound().filter(worst_case);
-        worst_case.filter_map(|head| Some(&self.subsets.get(head)?.ekf))
+        let in_doubt = |head: &usize| self.statistic(*head) > config.recovery_threshold;
+        let in_doubt = self.sound().filter(in_doubt);
+        in_doubt.filter_map(|head| Some(&self.subset([head; 2])?.ekf))
     }
 
     fn sound(&self) -> impl Iterator<Item = usize> + Clone {
@@ -197,10 +399,14 @@ impl Bank {
         self.noise.ratio()
     }
 
+    fn subset(&self, without: [usize; 2]) -> Option<&SubsetFilter> {
+        self.subsets.iter().find(|it| it.without == without)
+    }
+
     /// How far the angles of a radio head are off from the filter without it, in standard
     /// deviations.
     fn statistic(&self, head: usize) -> f64 {
-        let test = self.subsets.get(head).map(|subset| subset.test(head));
+        let test = self.subset([head; 2]).map(|subset| subset.test(head));
         test.map_or(0.0, |test| self.deviations(head, &test))
     }
 
@@ -210,7 +416,7 @@ impl Bank {
     }
 
     /// Number of sound radio heads whose statistic is above a threshold.
-    fn worst_case(&self, threshold: f64) -> usize {
+    fn in_doubt(&self, threshold: f64) -> usize {
         self.sound()
             .filter(|&head| self.statistic(head) > threshold)
             .count()
@@ -221,52 +427,71 @@ impl Bank {
         for subset in &mut self.subsets {
             subset.ekf.odometry(sample);
         }
-        let verdict = self.main.odometry(sample);
-        self.modes.odometry(&self.main, sample);
+        let verdict = self.nominal.odometry(sample);
+        for it in &mut self.modes {
+            it.odometry(&self.nominal, sample);
+        }
         verdict
     }
 
-    /// Takes in an angle: a test of its radio head, and information for whoever uses that.
+    /// Takes in an angle: a test of its radio head, and information for every filter that uses that.
     pub fn update(&mut self, head: &RadioHead, measured: &AngleMeasurement) -> UpdateVerdict {
         let is_it = |mine: &RadioHead| mine.sends(head.pci, head.ssb_index);
         let number = self.heads.iter().position(is_it);
         if let Some(number) = number {
-            for subset in &mut self.subsets {
-                if !subset.lacks(number) {
-                    subset.ekf.update(head, measured);
-                    continue;
-                }
-                let Some(seen) = subset.ekf.innovation_of_excluded(head, measured) else {
-                    continue;
-                };
-                if subset.without == [number; 2] {
-                    self.noise.see(number, &seen);
-                }
-                // While the vehicle stands, scatter is one look however often it is seen.
-                if seen.innovation.measurement_variance < 1.0 {
-                    for (mine, test) in subset.without.iter().zip(&mut subset.tests) {
-                        if *mine == number {
-                            test.push(&seen.innovation);
-                        }
+            self.update_subsets(number, head, measured);
+        }
+        let noise_ratio = number.map_or(1.0, |number| self.noise.core_ratio_of(number));
+        let predicted = self.nominal.predict_measurement(head, measured);
+        let mut by_heads_explained = None;
+        for it in &mut self.modes {
+            (it.mode.adapt)(&mut it.ekf, noise_ratio);
+            let verdict = it.update((&self.nominal, &predicted), head, measured);
+            if it.mode.explains_heads {
+                by_heads_explained = Some(verdict);
+            }
+        }
+        let most = (self.modes.iter()).fold(LikelihoodRatio::NONE, |most, it| most.max(it.ratio));
+        for it in &mut self.modes {
+            it.ratio.limit_by(most);
+        }
+        let verdict = self.nominal.update_predicted(predicted, measured);
+        by_heads_explained
+            .filter(|_| self.explains_heads())
+            .unwrap_or(verdict)
+    }
+
+    fn update_subsets(&mut self, number: usize, head: &RadioHead, measured: &AngleMeasurement) {
+        for subset in &mut self.subsets {
+            if !subset.lacks(number) {
+                subset.ekf.update(head, measured);
+                continue;
+            }
+            let Some(seen) = subset.ekf.innovation_of_excluded(head, measured) else {
+                continue;
+            };
+            if subset.without == [number; 2] {
+                self.noise.see(number, &seen);
+            }
+            // While the vehicle stands, scatter is one measurement however often it is seen.
+            if seen.innovation.measurement_variance < 1.0 {
+                for (mine, test) in subset.without.iter().zip(&mut subset.tests) {
+                    if *mine == number {
+                        test.push(&seen.innovation);
                     }
                 }
             }
         }
-        let noise_ratio = number.map_or(1.0, |number| self.noise.core_ratio_of(number));
-        let predicted = self.main.predict_measurement(head, measured);
-        let if_staying = (self.modes).update(&self.main, &predicted, noise_ratio, head, measured);
-        let verdict = self.main.take(predicted, measured);
-        if_staying.unwrap_or(verdict)
     }
 
     /// Whether a source is at fault and nobody knows which, or too many are.
     pub fn is_lost(&self, config: &IntegrityConfig) -> bool {
-        self.worst_case(config.detection_threshold) > 0 || self.is_outvoted(config)
+        self.in_doubt(config.detection_threshold) > 0 || self.is_outvoted(config)
     }
 
     /// Whether half of several radio heads or more are at fault or in doubt.
     pub fn is_outvoted(&self, config: &IntegrityConfig) -> bool {
-        let against = self.worst_case(config.detection_threshold) + self.faulty();
+        let against = self.in_doubt(config.detection_threshold) + self.faulty();
         against > 1 && 2 * against >= self.heads.len()
     }
 
@@ -303,7 +528,7 @@ impl Bank {
     /// without it the largest statistic among the others falls below what it is without another by
     /// `odds`, in twice the logarithm of a likelihood ratio.
     fn faulty_head(&self, threshold: f64, odds: f64) -> Option<usize> {
-        if self.sound().count() < 3 || self.worst_case(threshold) == 0 {
+        if self.sound().count() < 3 || self.in_doubt(threshold) == 0 {
             return None;
         }
         let (mut best, mut second) = ((usize::MAX, f64::INFINITY), f64::INFINITY);
@@ -324,7 +549,7 @@ impl Bank {
     /// The largest statistic of a sound radio head when `left_out` is left out.
     fn disagreement_without(&self, left_out: usize) -> f64 {
         (self.subsets.iter())
-            .filter(|subset| subset.without[0] != subset.without[1] && subset.lacks(left_out))
+            .filter(|subset| !subset.is_of_one() && subset.lacks(left_out))
             .flat_map(|subset| subset.without.iter().zip(&subset.tests))
             .filter(|(head, _)| **head != left_out && !self.is_faulty(**head))
             .map(|(head, test)| self.deviations(*head, test))
@@ -337,16 +562,17 @@ impl Bank {
     }
 
     /// Leaves a radio head out everywhere, and with it what it has done.
-    fn exclude(&mut self, faulty_head: usize) {
+    pub(super) fn exclude(&mut self, faulty_head: usize) {
         let Some(faulty) = self.faulty.get_mut(faulty_head) else {
             return;
         };
         *faulty = true;
-        if let Some(without) = self.subsets.get(faulty_head) {
-            self.main = without.ekf.clone();
+        if let Some(without) = self.subset([faulty_head; 2]) {
+            self.nominal = without.ekf.clone();
         }
-        if let Some(known) = self.heads.get(faulty_head) {
-            self.modes.exclude(&self.main, known);
+        let known = self.heads.get(faulty_head);
+        for it in &mut self.modes {
+            it.carry(it.mode.on_exclude, &self.nominal, known, &self.faults);
         }
         for number in 0..self.subsets.len() {
             let Some([first, second]) = self.subsets.get(number).map(|subset| subset.without)
@@ -380,9 +606,9 @@ impl Bank {
             *faulty = false;
         }
         let known = self.heads.get(head);
-        exclude(&mut self.main, known, false);
-        if let Some(known) = known {
-            self.modes.readmit(known);
+        exclude(&mut self.nominal, known, false);
+        for it in &mut self.modes {
+            exclude(&mut it.ekf, known, false);
         }
         for subset in self.subsets.iter_mut().filter(|subset| !subset.lacks(head)) {
             exclude(&mut subset.ekf, known, false);
@@ -465,12 +691,7 @@ mod tests {
         for &head in without {
             alone.set_excluded(&heads[head], true);
         }
-        let mut bank = Bank::new(
-            &ekf().0,
-            &heads,
-            FaultModes::new(&ekf().0, FaultProbability::default()),
-            0.0,
-        );
+        let mut bank = Bank::new(&ekf().0, &heads, &FaultProbability::default(), 0.0);
         drive(bias_rad, |odometry, head, measured| {
             if let Some(sample) = odometry {
                 bank.odometry(sample);
@@ -489,22 +710,25 @@ mod tests {
         assert_eq!(sound.faulty_head(config.detection_threshold, odds), None);
         let (biased, _) = after(0.3, &[]);
         assert!(biased.is_lost(&config));
-        assert_eq!(biased.faulty_head(config.detection_threshold, odds), Some(2));
+        assert_eq!(
+            biased.faulty_head(config.detection_threshold, odds),
+            Some(2)
+        );
     }
 
     #[test]
     fn what_takes_over_has_never_heard_the_excluded() {
         let (mut bank, without) = after(0.3, &[2]);
         bank.exclude(2);
-        assert_eq!(bank.main().belief(), without.belief());
+        assert_eq!(bank.nominal().belief(), without.belief());
         assert_eq!(bank.faulty(), 1);
         let (_, without_both) = after(0.3, &[1, 2]);
-        let witness = bank.subsets[1].ekf.belief();
+        let witness = bank.subset([1; 2]).unwrap().ekf.belief();
         assert_eq!(witness, without_both.belief());
         // The test of the excluded goes on, for the day it agrees again.
         assert!(bank.statistic(2) > 5.5 && !bank.is_lost(&IntegrityConfig::default()));
         bank.readmit(2);
         assert_eq!(bank.faulty(), 0);
-        assert!(bank.main().belief() == without.belief());
+        assert!(bank.nominal().belief() == without.belief());
     }
 }

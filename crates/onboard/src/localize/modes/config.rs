@@ -1,11 +1,11 @@
-//! What the guard is to promise.
+//! What integrity monitoring is to promise.
 
 use crate::settings::{FaultProbability, IntegritySettings};
 
 /// However rare a fault is, under it the error is within the level more often than not.
 const MOST_CONDITIONAL: f64 = 0.49;
 
-/// What the guard is to promise.
+/// What integrity monitoring is to promise.
 #[derive(Clone, Copy, Debug, PartialEq)]
 pub struct IntegrityConfig {
     /// Probability with which the error of an independent epoch may exceed the protection level.
@@ -23,8 +23,8 @@ pub struct IntegrityConfig {
 }
 
 impl IntegrityConfig {
-    /// Probability with which the error may exceed the level with a radio head at fault, of those that
-    /// are tested for it: where errors that stay are found none is.
+    /// Probability with which the error may exceed the level with a radio head at fault, where radio heads are
+    /// tested for it.
     pub fn risk_under_fault(&self) -> f64 {
         (self.risk / self.fault_probability.of_radio_head(false)).min(MOST_CONDITIONAL)
     }

@@ -1,94 +1,100 @@
-//! Which of two filters foretells the angles better.
+//! How probable an angle is under a mode, and when a decision between modes is made by that.
 
 use std::f64::consts::TAU;
 
 use crate::localize::ekf::{Ekf, PredictedMeasurement};
 use crate::localize::measurement::UpdateReason;
 
-/// Share of the angles that come from anywhere, where scatter makes no more of them.
+/// Share of the angles that are outliers, from any direction, where scatter makes no more of them.
 const OUTLIERS: f64 = 2e-3;
 
-/// Largest logarithm of the likelihood ratio, for or against, as clear as a fault of a radio head is
-/// found: what more evidence there is must be forgotten some time.
-const SURE: f64 = 15.0;
+/// Odds to the nominal mode from which on a mode leads: the pose of two about as probable would jump to and fro.
+pub(super) const LEAST_ODDS: f64 = 10.0;
 
-/// Logarithm of a likelihood ratio.
+/// Largest logarithm of a likelihood ratio, for or against (an error of 3e-7 by Wald's test, as a fault of a radio head
+/// has): what more evidence there is must be forgotten some time.
+const CERTAIN: f64 = 15.0;
+
+/// That of a jump of the speed that no vehicle can do: slip, unless a reading is wild.
+pub(super) const SPEED_JUMP: f64 = 6.0;
+
+/// Logarithm of the likelihood ratio of a mode to the nominal one.
 #[derive(Clone, Copy, Debug, PartialEq)]
-pub(super) struct Evidence(f64);
+pub(super) struct LikelihoodRatio(f64);
 
-impl Evidence {
-    /// None either way.
+impl LikelihoodRatio {
+    /// One to one.
     pub const NONE: Self = Self(0.0);
 
-    /// What of it is left beside what speaks for another one.
-    pub const fn beside(self, other: Self) -> Self {
-        Self((self.0 - other.0).clamp(-SURE, SURE))
+    /// That to another mode of this ratio.
+    pub const fn to(self, other: Self) -> Self {
+        Self((self.0 - other.0).clamp(-CERTAIN, CERTAIN))
     }
 
-    /// Whether it rather speaks against than for.
+    /// Whether the angles speak against the mode.
     pub const fn is_against(self) -> bool {
         self.0 < 0.0
     }
 
     /// From now on it is at least so much.
-    pub const fn is_at_least(&mut self, evidence: f64) {
-        self.0 = self.0.max(evidence);
+    pub const fn raise_to(&mut self, least: f64) {
+        self.0 = self.0.max(least);
     }
 
-    /// Takes in how the filter for which it would speak, and the other, foretell an angle.
-    pub fn see(
+    /// Takes in an angle, which the mode's filter and the nominal one predict so.
+    pub fn update(
         &mut self,
-        [of_it, of_other]: [&Ekf; 2],
-        [it, other]: [&Result<PredictedMeasurement, UpdateReason>; 2],
+        (ekf, predicted): (&Ekf, &Result<PredictedMeasurement, UpdateReason>),
+        (nominal, by_nominal): (&Ekf, &Result<PredictedMeasurement, UpdateReason>),
     ) {
-        if let (Ok(it), Ok(other)) = (it, other)
-            && !(it.excluded || other.excluded)
+        if let (Ok(predicted), Ok(by_nominal)) = (predicted, by_nominal)
+            && !(predicted.excluded || by_nominal.excluded)
         {
-            let ratio = density(of_it, it) / density(of_other, other);
-            let share = independent_share(of_it, it).min(independent_share(of_other, other));
-            self.0 = (self.0 + share * ratio.ln()).max(-SURE);
+            let ratio = density(ekf, predicted) / density(nominal, by_nominal);
+            let share = independent_share(ekf, predicted);
+            let share = share.min(independent_share(nominal, by_nominal));
+            self.0 = (self.0 + share * ratio.ln()).max(-CERTAIN);
         }
     }
 
     /// The larger of the two.
-    pub const fn or_more(self, other: Self) -> Self {
+    pub const fn max(self, other: Self) -> Self {
         Self(self.0.max(other.0))
     }
 
-    /// What is left of it where that which most speaks for is no more than sure: the others, and what is stated,
-    /// come up to it.
-    pub const fn beside_most(&mut self, most: Self) {
-        self.0 = (self.0 - (most.0 - SURE).max(0.0)).max(-SURE);
+    /// Takes off what the largest of all modes has beyond certainty, so that any other may yet be found right.
+    pub const fn limit_by(&mut self, most: Self) {
+        self.0 = (self.0 - (most.0 - CERTAIN).max(0.0)).max(-CERTAIN);
     }
 
-    /// How many times as probable it is as not, where its probability was `prior` before.
+    /// Posterior odds to the nominal mode, of a prior probability.
     pub fn odds(self, prior: f64) -> f64 {
         prior / (1.0 - prior) * self.0.exp()
     }
 }
 
 /// Variance (rad²) of an angle by all but the belief, were the radio head not heard before.
-fn at_first(ekf: &Ekf, seen: &PredictedMeasurement) -> f64 {
-    ekf.first_variance(seen) + ekf.systematic_variance(seen)
+fn first_variance(ekf: &Ekf, predicted: &PredictedMeasurement) -> f64 {
+    ekf.first_variance(predicted) + ekf.systematic_variance(predicted)
 }
 
-/// What is seen again and again speaks once; where errors that stay are found, it is known what repeats
-/// itself.
-fn independent_share(ekf: &Ekf, seen: &PredictedMeasurement) -> f64 {
-    if seen.hypotheses.is_some() {
+/// Share of an angle that is independent of the radio head's last one; a filter that estimates a time-correlated bias
+/// predicts what repeats itself.
+fn independent_share(ekf: &Ekf, predicted: &PredictedMeasurement) -> f64 {
+    if predicted.hypotheses.is_some() {
         return 1.0;
     }
-    at_first(ekf, seen) / seen.innovation.measurement_variance
+    first_variance(ekf, predicted) / predicted.innovation.measurement_variance
 }
 
-/// Probability density of an angle (1/rad), which may be an outlier.
-fn density(ekf: &Ekf, seen: &PredictedMeasurement) -> f64 {
-    let inlier = seen.hypotheses.as_ref().map_or_else(
+/// Probability density of an angle (1/rad): Gaussian, or an outlier from anywhere.
+fn density(ekf: &Ekf, predicted: &PredictedMeasurement) -> f64 {
+    let inlier = predicted.hypotheses.as_ref().map_or_else(
         || {
-            // Who stands hears the same again, of a measurement variance that drowns the belief's.
-            let mut alone = seen.innovation;
+            // The measurement variance of one that repeats another would drown the belief's.
+            let mut alone = predicted.innovation;
             let belief = (alone.variance - alone.measurement_variance).max(0.0);
-            alone.variance = belief + at_first(ekf, seen);
+            alone.variance = belief + first_variance(ekf, predicted);
             alone.density()
         },
         |hypotheses| hypotheses.density,

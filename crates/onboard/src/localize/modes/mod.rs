@@ -1,15 +1,14 @@
-//! A static multiple-model bank of filters, one for each fault mode.
+//! Fault modes: a [table](table), a static bank of filters for them ([`Bank`]), the likelihood by which the bank weighs
+//! them, the test of each radio head, and how noisy the angles are heard to be.
 
 mod bank;
 mod config;
 mod head_test;
-mod hypotheses;
 mod likelihood;
 mod noise_ratio;
-mod slip;
 mod table;
 
 pub(in crate::localize) use bank::Bank;
 pub use config::IntegrityConfig;
 pub use head_test::HeadTest;
-pub(in crate::localize) use hypotheses::FaultModes;
+pub(in crate::localize) use table::{ModeId, may_mislead};

@@ -30,7 +30,7 @@ clone_in_place!(NoiseRatio { heads, of_all });
 /// What was heard of a radio head.
 #[derive(Clone, Copy, Debug, PartialEq)]
 struct HeadNoise {
-    /// The last look that is compared with.
+    /// The last innovation, which the next is compared with.
     last: Option<ExcludedInnovation>,
     /// None until it is heard: it is as noisy as all of them then.
     ratio: Option<Ratio>,
@@ -142,7 +142,7 @@ mod tests {
     use super::*;
     use crate::localize::gaussian::Innovation;
 
-    /// A look of 0.1 rad of stated deviation.
+    /// An angle of 0.1 rad of stated deviation.
     fn predict_measurement(place_wavelengths: f64, residual: f64) -> ExcludedInnovation {
         ExcludedInnovation {
             innovation: Innovation {
@@ -160,7 +160,10 @@ mod tests {
         let mut noise = NoiseRatio::new(1);
         for number in 0..2000 {
             let place_wavelengths = apart_wavelengths * f64::from(number);
-            noise.see(0, &predict_measurement(place_wavelengths, residual_rad(number)));
+            noise.see(
+                0,
+                &predict_measurement(place_wavelengths, residual_rad(number)),
+            );
         }
         noise
     }
@@ -212,7 +215,7 @@ mod tests {
         // Differences of 0.4 rad, where 0.14 rad are expected: 8 times the variance.
         let ratio = after(0.5, 0.2, 2.0);
         assert!((ratio - 8.0).abs() < 0.5, "{ratio}");
-        // Who hardly moves hears the same scatter again.
+        // A vehicle that hardly moves hears the same scatter again.
         assert_eq!(after(0.0, 0.2, 1e-3), 1.0);
     }
 
