@@ -1,4 +1,4 @@
-//! Whether the angles still come from where they are expected.
+//! Whether the innovations of most radio heads are consistent with the filter.
 
 use crate::clone_in_place::clone_in_place;
 use crate::localize::measurement::{UpdateReason, UpdateVerdict};
@@ -10,7 +10,7 @@ const WEIGHT: f64 = 1.0 / 8.0;
 /// Angles before anything is said.
 const LEAST: u32 = 5;
 
-/// Angles, of all radio heads, within which one must have been heard to have a voice.
+/// Angles, of all radio heads, within which one must have been heard to count.
 const RECENT: u32 = 32;
 
 /// Share of refused angles above which a radio head is not where it is expected, and below which it
@@ -22,7 +22,7 @@ const SURE: f64 = 0.2;
 /// where the belief is right.
 const SURPRISED: f64 = 5.0;
 
-/// A running judgement of the localizer's own expectations, by the majority of radio heads: one that
+/// Exponentially weighted statistics of the innovations of each radio head, of which the majority decides: one that
 /// is seen by a reflection is off for metres, whatever the number of its angles.
 #[derive(Debug, PartialEq)]
 pub struct ConsistencyMonitor {
@@ -32,7 +32,7 @@ pub struct ConsistencyMonitor {
 
 clone_in_place!(ConsistencyMonitor { heads, angles });
 
-/// What became of a radio head's angles.
+/// Those of a radio head: share of refused angles, mean squared Mahalanobis distance.
 #[derive(Clone, Copy, Debug, PartialEq)]
 struct HeadStatistics {
     pci: u16,
@@ -45,7 +45,7 @@ struct HeadStatistics {
 }
 
 impl ConsistencyMonitor {
-    /// Nothing is known yet of what becomes of these radio heads' angles.
+    /// Nothing is known yet of these radio heads.
     pub fn new(heads: &[RadioHead]) -> Self {
         let head = |head: &RadioHead| HeadStatistics {
             pci: head.pci,

@@ -1,16 +1,16 @@
-//! A filter that mistrusts its sources.
+//! Integrity monitoring of a bank of filters: protection level and state, recovery where a fault cannot be identified,
+//! and the handover between solutions.
 //!
-//! Beside the filter that uses every radio head there run filters that do without some of them
-//! ([`Bank`]). If one radio head is at fault, the filter without it is right within its own
-//! covariance, wherever the full solution may be: the protection level is the radius about the full
-//! solution that holds for all of them together, each as probable as its fault
-//! ([`LevelEquation`](super::level::LevelEquation)). The same of filters that believe otherwise of odometer,
-//! array, site plan and reflections ([`FaultModes`]), as probable as the angles leave it; if one of them becomes far
-//! more probable than what is stated, the position is its own, and not `ok` where something is at fault or was a moment
-//! ago, nor where the odometer's scale is certainly not what is stated, or was and has not been found to be since. All
-//! of it is of angles as noisy as they are heard to be ([`NoiseRatio`](super::angle_noise::AngleNoise)).
+//! If one radio head is at fault, the filter without it is right within its own covariance, wherever the full solution
+//! may be: the protection level is the radius about the reported solution that holds for all hypotheses of the
+//! [`Bank`] together, each at its probability ([`LevelEquation`]). All
+//! of it is of angles as noisy as they are heard to be.
 //!
-//! A single radio head has no witness but odometry and road: the protection level then is what
+//! The state is `unavailable` where half of the radio heads or more are at fault or in doubt; `degraded` where a mode
+//! leads that is a fault, or did within `recovery_s`, where a radio head is in doubt or a bank is begun anew, where the
+//! odometer's scale has departed from what is stated, and where the level is above the alert limit.
+//!
+//! With a single radio head odometry and road are all there is to compare it with: the protection level then is what
 //! those two can vouch for, grows with the distance driven, and passes the alert limit unless they
 //! are good.
 
@@ -30,7 +30,9 @@ const NEGLIGIBLE: f64 = 0.1;
 /// Squared deviations by which two positions are apart that are not both right.
 const APART2: f64 = 9.0;
 
-/// The pose of the one who told it until another took over, as seen from that one's. Both move on alike.
+/// The previous solution, relative to the one that is reported since. Where a radio head is excluded, another mode leads
+/// or a restarted bank takes over, the position may be another at one angle; as long as that may be taken back, the
+/// covariance covers both. Both move on alike.
 #[derive(Clone, Copy, Debug)]
 struct Handover {
     since_s: f64,
@@ -39,7 +41,7 @@ struct Handover {
 }
 
 impl Handover {
-    /// That somebody tells `now` who was not asked until then, when it was `before`; `None` where the two agree.
+    /// Another solution reports `now`, where the previous one reported `before`; `None` where the two agree.
     pub fn new(before: &PoseEstimate, now: &PoseEstimate) -> Option<Self> {
         let covariance = before.covariance?;
         let [[xx, xy, _], [_, yy, _], _] = covariance;
@@ -61,7 +63,7 @@ impl Handover {
         })
     }
 
-    /// Where it would be now, if it is not so long ago (s) that nothing was taken back.
+    /// Where the previous solution would be now; `None` after so long (s).
     pub fn beside(&self, told: &PoseEstimate, patience_s: f64) -> Option<PoseEstimate> {
         let [x_m, y_m, heading_rad] = self.apart;
         (told.time_s - self.since_s <= patience_s).then_some(PoseEstimate {
@@ -76,18 +78,18 @@ impl Handover {
     }
 }
 
-/// A filter with its witnesses.
+/// A bank and what became of it.
 #[derive(Debug)]
 pub struct IntegrityMonitor {
     config: IntegrityConfig,
     level: LevelEquation,
     bank: Bank,
     restarted: Option<Restarted>,
-    /// Who told the position before, where that was another one.
+    /// The previous solution.
     handover: Option<Handover>,
-    /// Whether it was found by a search, and nothing has confirmed it yet.
+    /// Whether it was found by a search, and no restarted bank has confirmed it yet.
     is_found: bool,
-    /// Distance driven (m) when the sources could be told apart last.
+    /// Distance driven (m) when no fault was unidentified last.
     trusted_m: f64,
     /// When its filters began anew last (s).
     begun_s: f64,
@@ -122,8 +124,7 @@ clone_in_place!(IntegrityMonitor {
 clone_in_place!(Restarted { bank, since_s });
 
 impl IntegrityMonitor {
-    /// Guards a filter of these radio heads. One that was found by a search, and not given, is on
-    /// probation since then.
+    /// Monitors a filter of these radio heads. One that was found by a search, and not given, is to be confirmed.
     pub fn new(
         ekf: &Ekf,
         heads: &[RadioHead],
@@ -147,13 +148,13 @@ impl IntegrityMonitor {
         }
     }
 
-    /// The filter that uses every sound source.
+    /// The leading filter.
     pub fn ekf(&self) -> &Ekf {
         self.bank.leader()
     }
 
     /// The filter by whose uncertainty to listen: where the level is beyond the alert limit, that of the
-    /// hypothesis by which it mostly is; else that of every sound source.
+    /// hypothesis which contributes most to it; else the leading one.
     pub fn worst_case(&self) -> &Ekf {
         let (bank, now_s) = (&self.bank, self.ekf().time_s());
         if self.is_near(bank, now_s) {
@@ -163,12 +164,12 @@ impl IntegrityMonitor {
             let alert_limit_m = self.config.alert_limit_m;
             (self.level.share_beyond(alert_limit_m, &hypothesis), clean)
         };
-        (self.suspects(bank, now_s).map(beyond))
+        (self.hypotheses_of(bank, now_s).map(beyond))
             .max_by(|(one, _), (other, _)| one.total_cmp(other))
             .map_or(bank.leader(), |(_, clean)| clean)
     }
 
-    /// When its filters began anew last (s), by angles that nothing contradicted.
+    /// When a restarted bank took over last (s).
     pub const fn begun_s(&self) -> f64 {
         self.begun_s
     }
@@ -191,7 +192,7 @@ impl IntegrityMonitor {
         self.bank.odometry(sample)
     }
 
-    /// Takes in an angle: a test of its radio head, and information for whoever trusts that.
+    /// Takes in an angle: a test of its radio head, and information for every filter that uses it.
     pub fn update(&mut self, head: &RadioHead, measured: &AngleMeasurement) -> UpdateVerdict {
         self.now_s = self.now_s.max(measured.time_s);
         let odometry_s = self.ekf().time_s();
@@ -206,7 +207,7 @@ impl IntegrityMonitor {
             restarted.bank.judge(self.now_s, &self.config);
         }
         self.recover();
-        self.watch_faults();
+        self.hold_faults();
         if self.solution_id() != solution_id {
             let handover = Handover::new(&told, &self.ekf().pose(odometry_s));
             self.handover = handover.or(self.handover);
@@ -214,14 +215,14 @@ impl IntegrityMonitor {
         verdict
     }
 
-    /// By what to know that another solution is reported.
+    /// By what another solution is known: mode, number of radio heads excluded, restart.
     fn solution_id(&self) -> (Option<ModeId>, usize, f64) {
         (self.bank.leading_id(), self.bank.faulty(), self.begun_s)
     }
 
-    /// Which of several is most probable may change from angle to angle, and who has begun anew knows nothing of the
+    /// Holds: which mode leads may change from angle to angle, and a restarted filter does not know the
     /// odometer yet.
-    fn watch_faults(&mut self) {
+    fn hold_faults(&mut self) {
         if self.bank.is_fault() {
             self.fault_s = self.now_s;
         }
@@ -230,14 +231,14 @@ impl IntegrityMonitor {
             main.odometer_departs() || (self.has_departed && !main.knows_odometer());
     }
 
-    /// Where the sources cannot be told apart, the filters may have been led astray, so far that
-    /// they refuse the good angles as outliers. Others then start from a pose as vague as what may
-    /// have happened meanwhile, and take over once nothing contradicts them. Until then, or until
-    /// the old ones are at peace again, nothing is `ok`. What a search found by angles that may have
+    /// Where a fault cannot be identified, the filters may have diverged, so far that
+    /// they refuse the good angles as outliers. Another bank then begins from a pose as vague as what may
+    /// have happened meanwhile, and takes over once no test contradicts it. Until then, or until
+    /// the old one has no doubts any more, nothing is `ok`. What a search found by angles that may have
     /// been at fault is confirmed the same way.
     fn recover(&mut self) {
         let (now_s, patience_s) = (self.now_s, self.config.recovery_s);
-        let lost = self.bank.is_lost(&self.config);
+        let lost = self.bank.is_lost();
         let Some(restarted) = &self.restarted else {
             if lost || self.is_found {
                 self.restart();
@@ -249,7 +250,7 @@ impl IntegrityMonitor {
         let aged = now_s - restarted.since_s > patience_s;
         if !lost && !self.is_found && self.bank.quiet_s(now_s) > patience_s {
             self.restarted = None;
-        } else if aged && restarted.bank.is_lost(&self.config) {
+        } else if aged && restarted.bank.is_lost() {
             self.restart();
         } else if restarted.bank.quiet_s(now_s) > patience_s
             && !restarted.bank.is_fault()
@@ -289,7 +290,7 @@ impl IntegrityMonitor {
             return pose;
         }
         let restarted = self.restarted.iter().map(|it| it.bank.nominal());
-        for other in self.bank.candidates(&self.config).chain(restarted) {
+        for other in self.bank.candidates().chain(restarted) {
             pose.cover(&other.pose(time_s));
         }
         pose
@@ -298,7 +299,7 @@ impl IntegrityMonitor {
     /// Protection level and state at `time_s`.
     pub fn integrity(&self, time_s: f64) -> Integrity {
         let levels = self.level.solve(&self.hypotheses(&self.bank, time_s));
-        let state = if self.bank.is_outvoted(&self.config) && !self.bank.explains_heads() {
+        let state = if self.bank.is_outvoted() && !self.bank.explains_heads() {
             IntegrityState::Unavailable
         } else if self.now_s - self.fault_s <= self.config.recovery_s
             || self.has_departed
@@ -325,8 +326,8 @@ impl IntegrityMonitor {
         self.level.holds(self.config.alert_limit_m, hypotheses)
     }
 
-    /// What may be and is not too improbable, and the filter that is right then.
-    fn suspects<'a>(
+    /// The hypotheses that are not negligible, each with the filter that is right under it.
+    fn hypotheses_of<'a>(
         &self,
         bank: &'a Bank,
         time_s: f64,
@@ -345,7 +346,7 @@ impl IntegrityMonitor {
     }
 
     fn hypotheses(&self, bank: &Bank, time_s: f64) -> impl Iterator<Item = Hypothesis> + Clone {
-        (self.suspects(bank, time_s)).map(|(_, hypothesis)| hypothesis)
+        (self.hypotheses_of(bank, time_s)).map(|(_, hypothesis)| hypothesis)
     }
 }
 

@@ -12,9 +12,10 @@
 //! those that have heard neither it nor one of the others.
 
 use super::config::IntegrityConfig;
-use super::head_test::HeadTest;
+use super::head_test::{CLEARED, DETECTED, HeadTest};
 use super::likelihood::{LEAST_ODDS, LikelihoodRatio, SPEED_JUMP};
 use super::noise_ratio::NoiseRatio;
+use super::subsets::{Subsets, exclude};
 use super::table::{Carry, Mode, ModeId, TABLE, Verdict, Weight};
 use crate::clone_in_place::clone_in_place;
 use crate::localize::ekf::{Ekf, PredictedMeasurement};
@@ -124,40 +125,6 @@ impl ModeFilter {
     }
 }
 
-/// The filter without one or two radio heads, and the test of each against it.
-#[derive(Debug)]
-struct SubsetFilter {
-    /// Numbers of the radio heads left out; the same twice where it is one.
-    without: [usize; 2],
-    tests: [HeadTest; 2],
-    ekf: Ekf,
-}
-
-clone_in_place!(SubsetFilter {
-    without,
-    tests,
-    ekf
-});
-
-impl SubsetFilter {
-    fn lacks(&self, head: usize) -> bool {
-        self.without.contains(&head)
-    }
-
-    const fn is_of_one(&self) -> bool {
-        self.without[0] == self.without[1]
-    }
-
-    fn test(&self, head: usize) -> HeadTest {
-        let [first, second] = self.tests;
-        if self.without[0] == head {
-            first
-        } else {
-            second
-        }
-    }
-}
-
 /// The filters.
 #[derive(Debug)]
 pub(in crate::localize) struct Bank {
@@ -174,8 +141,7 @@ pub(in crate::localize) struct Bank {
     noise: NoiseRatio,
     /// Prior probability of a fault of each radio head.
     head_prior: f64,
-    /// First those without one radio head, in order; then those without two.
-    subsets: Vec<SubsetFilter>,
+    subsets: Subsets,
 }
 
 clone_in_place!(Bank {
@@ -207,28 +173,12 @@ impl Bank {
     ) -> Self {
         let nominal = given.nominal();
         let count = heads.len();
-        let one = (0..count).map(|head| [head; 2]);
-        // Which of two disagrees nobody can tell.
-        let pairs = if count < 3 { 0 } else { count };
-        let two =
-            (0..pairs).flat_map(|first| (first + 1..pairs).map(move |second| [first, second]));
-        let subset = |without: [usize; 2]| {
-            let mut ekf = nominal.clone();
-            for head in without {
-                exclude(&mut ekf, heads.get(head), true);
-            }
-            SubsetFilter {
-                without,
-                tests: [HeadTest::default(); 2],
-                ekf,
-            }
-        };
         let of_heads = TABLE
             .iter()
             .find(|it| it.weight == Weight::Prior { heads: 1 });
         Self {
             faults: *faults,
-            subsets: one.chain(two).map(subset).collect(),
+            subsets: Subsets::new(count),
             faulty: vec![false; count],
             disagreed_s: vec![f64::NEG_INFINITY; count],
             lost_s: now_s,
@@ -273,7 +223,7 @@ impl Bank {
         let leading = self.leading()?;
         let is_certain = (leading.mode.becomes_nominal_at).is_some_and(|it| leading.odds() > it);
         let is_quiet = self.faulty() == 0
-            && self.in_doubt(config.recovery_threshold) == 0
+            && self.in_doubt(CLEARED) == 0
             && self.quiet_s(now_s) > config.recovery_s;
         (is_certain && is_quiet).then(|| self.about(leading, now_s))
     }
@@ -374,10 +324,10 @@ impl Bank {
     }
 
     /// The filters without a radio head in doubt, one of which may take over soon.
-    pub fn candidates(&self, config: &IntegrityConfig) -> impl Iterator<Item = &Ekf> {
-        let in_doubt = |head: &usize| self.statistic(*head) > config.recovery_threshold;
+    pub fn candidates(&self) -> impl Iterator<Item = &Ekf> {
+        let in_doubt = |head: &usize| self.statistic(*head) > CLEARED;
         let in_doubt = self.sound().filter(in_doubt);
-        in_doubt.filter_map(|head| Some(&self.subset([head; 2])?.ekf))
+        in_doubt.filter_map(|head| Some(&self.subsets.get(head, head)?.ekf))
     }
 
     fn sound(&self) -> impl Iterator<Item = usize> + Clone {
@@ -399,14 +349,10 @@ impl Bank {
         self.noise.ratio()
     }
 
-    fn subset(&self, without: [usize; 2]) -> Option<&SubsetFilter> {
-        self.subsets.iter().find(|it| it.without == without)
-    }
-
     /// How far the angles of a radio head are off from the filter without it, in standard
     /// deviations.
     fn statistic(&self, head: usize) -> f64 {
-        let test = self.subset([head; 2]).map(|subset| subset.test(head));
+        let test = self.subsets.get(head, head).map(|subset| subset.test(head));
         test.map_or(0.0, |test| self.deviations(head, &test))
     }
 
@@ -424,7 +370,7 @@ impl Bank {
 
     /// Moves every filter.
     pub fn odometry(&mut self, sample: &OdometrySample) -> OdometryVerdict {
-        for subset in &mut self.subsets {
+        for subset in self.subsets.iter_mut() {
             subset.ekf.odometry(sample);
         }
         let verdict = self.nominal.odometry(sample);
@@ -462,7 +408,13 @@ impl Bank {
     }
 
     fn update_subsets(&mut self, number: usize, head: &RadioHead, measured: &AngleMeasurement) {
-        for subset in &mut self.subsets {
+        let (faulty, noise) = (&self.faulty, &self.noise);
+        let keeps = |head: usize, statistic: f64| {
+            let is_faulty = faulty.get(head).is_some_and(|it| *it);
+            is_faulty || statistic > CLEARED * noise.ratio_of(head).sqrt()
+        };
+        self.subsets.hear(number, &self.heads, &self.nominal, keeps);
+        for subset in self.subsets.iter_mut() {
             if !subset.lacks(number) {
                 subset.ekf.update(head, measured);
                 continue;
@@ -485,13 +437,13 @@ impl Bank {
     }
 
     /// Whether a source is at fault and nobody knows which, or too many are.
-    pub fn is_lost(&self, config: &IntegrityConfig) -> bool {
-        self.in_doubt(config.detection_threshold) > 0 || self.is_outvoted(config)
+    pub fn is_lost(&self) -> bool {
+        self.in_doubt(DETECTED) > 0 || self.is_outvoted()
     }
 
     /// Whether half of several radio heads or more are at fault or in doubt.
-    pub fn is_outvoted(&self, config: &IntegrityConfig) -> bool {
-        let against = self.in_doubt(config.detection_threshold) + self.faulty();
+    pub fn is_outvoted(&self) -> bool {
+        let against = self.in_doubt(DETECTED) + self.faulty();
         against > 1 && 2 * against >= self.heads.len()
     }
 
@@ -504,7 +456,7 @@ impl Bank {
     /// readmits those that have come to agree again.
     pub fn judge(&mut self, now_s: f64, config: &IntegrityConfig) {
         for head in 0..self.heads.len() {
-            let disagrees = self.statistic(head) > config.recovery_threshold;
+            let disagrees = self.statistic(head) > CLEARED;
             let Some(disagreed_s) = self.disagreed_s.get_mut(head) else {
                 return;
             };
@@ -516,10 +468,10 @@ impl Bank {
         }
         // A wrong choice is itself a fault, and must be as rare as the risk under one.
         let odds = -2.0 * config.risk_under_fault().ln();
-        if let Some(faulty_head) = self.faulty_head(config.detection_threshold, odds) {
+        if let Some(faulty_head) = self.faulty_head(odds) {
             self.exclude(faulty_head);
         }
-        if self.is_lost(config) {
+        if self.is_lost() {
             self.lost_s = now_s;
         }
     }
@@ -527,12 +479,16 @@ impl Bank {
     /// The radio head that is at fault, if one is that much likelier to be it than any other:
     /// without it the largest statistic among the others falls below what it is without another by
     /// `odds`, in twice the logarithm of a likelihood ratio.
-    fn faulty_head(&self, threshold: f64, odds: f64) -> Option<usize> {
-        if self.sound().count() < 3 || self.in_doubt(threshold) == 0 {
+    fn faulty_head(&self, odds: f64) -> Option<usize> {
+        let watched = || {
+            self.sound()
+                .filter(|&head| self.subsets.get(head, head).is_some())
+        };
+        if watched().count() < 3 || self.in_doubt(DETECTED) == 0 {
             return None;
         }
         let (mut best, mut second) = ((usize::MAX, f64::INFINITY), f64::INFINITY);
-        for head in self.sound() {
+        for head in watched() {
             let disagreement = self.disagreement_without(head);
             if disagreement < best.1 {
                 second = best.1;
@@ -543,7 +499,7 @@ impl Bank {
         }
         let (head, least) = best;
         let sure = second * second - least * least > odds;
-        (sure && least < threshold && self.statistic(head) > threshold).then_some(head)
+        (sure && least < DETECTED && self.statistic(head) > DETECTED).then_some(head)
     }
 
     /// The largest statistic of a sound radio head when `left_out` is left out.
@@ -556,48 +512,20 @@ impl Bank {
             .fold(0.0, f64::max)
     }
 
-    fn number_without(&self, first: usize, second: usize) -> Option<usize> {
-        let (first, second) = (first.min(second), first.max(second));
-        (self.subsets.iter()).position(|subset| subset.without == [first, second])
-    }
-
     /// Leaves a radio head out everywhere, and with it what it has done.
     pub(super) fn exclude(&mut self, faulty_head: usize) {
         let Some(faulty) = self.faulty.get_mut(faulty_head) else {
             return;
         };
         *faulty = true;
-        if let Some(without) = self.subset([faulty_head; 2]) {
+        if let Some(without) = self.subsets.get(faulty_head, faulty_head) {
             self.nominal = without.ekf.clone();
         }
         let known = self.heads.get(faulty_head);
         for it in &mut self.modes {
             it.carry(it.mode.on_exclude, &self.nominal, known, &self.faults);
         }
-        for number in 0..self.subsets.len() {
-            let Some([first, second]) = self.subsets.get(number).map(|subset| subset.without)
-            else {
-                return;
-            };
-            if first == faulty_head || second == faulty_head {
-                continue;
-            }
-            // Without (first, culprit) it has not heard the culprit; of the second it is told now.
-            let clean = [first, second].map(|head| {
-                self.number_without(head, faulty_head)
-                    .and_then(|i| self.subsets.get(i))
-            });
-            let [Some(of_first), Some(of_second)] = clean else {
-                continue;
-            };
-            let tests = [of_first.test(first), of_second.test(second)];
-            let mut ekf = of_first.ekf.clone();
-            exclude(&mut ekf, self.heads.get(second), true);
-            if let Some(subset) = self.subsets.get_mut(number) {
-                subset.tests = tests;
-                subset.ekf = ekf;
-            }
-        }
+        self.subsets.exclude(faulty_head, &self.heads);
     }
 
     /// Uses a radio head again.
@@ -613,12 +541,6 @@ impl Bank {
         for subset in self.subsets.iter_mut().filter(|subset| !subset.lacks(head)) {
             exclude(&mut subset.ekf, known, false);
         }
-    }
-}
-
-fn exclude(ekf: &mut Ekf, head: Option<&RadioHead>, excluded: bool) {
-    if let Some(head) = head {
-        ekf.set_excluded(head, excluded);
     }
 }
 
@@ -705,15 +627,12 @@ mod tests {
 
     #[test]
     fn the_culprit_is_named_and_nobody_else() {
-        let (config, odds) = (IntegrityConfig::default(), 9.2);
+        let odds = 9.2;
         let (sound, _) = after(0.0, &[]);
-        assert_eq!(sound.faulty_head(config.detection_threshold, odds), None);
+        assert_eq!(sound.faulty_head(odds), None);
         let (biased, _) = after(0.3, &[]);
-        assert!(biased.is_lost(&config));
-        assert_eq!(
-            biased.faulty_head(config.detection_threshold, odds),
-            Some(2)
-        );
+        assert!(biased.is_lost());
+        assert_eq!(biased.faulty_head(odds), Some(2));
     }
 
     #[test]
@@ -723,10 +642,10 @@ mod tests {
         assert_eq!(bank.nominal().belief(), without.belief());
         assert_eq!(bank.faulty(), 1);
         let (_, without_both) = after(0.3, &[1, 2]);
-        let witness = bank.subset([1; 2]).unwrap().ekf.belief();
+        let witness = bank.subsets.get(1, 1).unwrap().ekf.belief();
         assert_eq!(witness, without_both.belief());
         // The test of the excluded goes on, for the day it agrees again.
-        assert!(bank.statistic(2) > 5.5 && !bank.is_lost(&IntegrityConfig::default()));
+        assert!(bank.statistic(2) > 5.5 && !bank.is_lost());
         bank.readmit(2);
         assert_eq!(bank.faulty(), 0);
         assert!(bank.nominal().belief() == without.belief());

@@ -14,11 +14,7 @@ pub struct IntegrityConfig {
     pub fault_probability: FaultProbability,
     /// Protection level above which the position is not to be relied on (m).
     pub alert_limit_m: f64,
-    /// Statistic at which a radio head counts as faulty, in standard deviations.
-    pub detection_threshold: f64,
-    /// Statistic below which a faulty radio head counts as sound again ...
-    pub recovery_threshold: f64,
-    /// ... after this time (s).
+    /// After this time without disagreement a source counts as sound again (s).
     pub recovery_s: f64,
 }
 
@@ -42,8 +38,6 @@ impl From<&IntegritySettings> for IntegrityConfig {
             alert_limit_m: settings.alert_limit_m,
             risk: settings.risk_per_epoch(),
             fault_probability: settings.fault_probability,
-            detection_threshold: 5.5,
-            recovery_threshold: 3.5,
             recovery_s: 5.0,
         }
     }

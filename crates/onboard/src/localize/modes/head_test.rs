@@ -9,6 +9,11 @@ const WEIGHTS: [f64; 3] = [0.5, 0.125, 0.03125];
 /// By how many standard deviations an angle may lead an average: two outliers on end are no fault.
 const MOST_LEAD: f64 = 3.0;
 
+/// Statistic, in standard deviations, from which on a radio head is at fault, and below which it agrees: an error of
+/// 4e-8 and of 5e-4 in a single test of a Gaussian.
+pub(super) const DETECTED: f64 = 5.5;
+pub(super) const CLEARED: f64 = 3.5;
+
 /// Exponentially weighted averages of the innovations that a radio head's angles would bring to a
 /// filter that does not use them, each beside the variance it has when nothing is wrong.
 #[derive(Clone, Copy, Debug, PartialEq, Default)]

@@ -6,6 +6,7 @@ mod config;
 mod head_test;
 mod likelihood;
 mod noise_ratio;
+mod subsets;
 mod table;
 
 pub(in crate::localize) use bank::Bank;
