@@ -17,6 +17,9 @@ const DIRECTIONS: usize = 32;
 /// Share of the squared level to which it is found; it is rounded up.
 const ACCURACY: f64 = 4e-3;
 
+/// Share of the risk below which an upper limit of what a hypothesis adds to it will do.
+const NEGLIGIBLE: f64 = 1e-3;
+
 /// Least logarithm of a probability over the risk: further out it is no straight line to aim along.
 const LEAST_EXCESS: f64 = -30.0;
 
@@ -77,12 +80,30 @@ impl Hypothesis {
         beyond_line(self.separation_m[1], std_m, level_m)
     }
 
-    /// Probability that it is further away.
+    /// Upper limit of the probability that it is further away, `exp(−((r − d)/σ)²/2)`: as if it were round.
+    fn most_beyond_circle(&self, radius_m: f64) -> f64 {
+        let room_m = radius_m - self.distance_m();
+        if room_m <= 0.0 {
+            return 1.0;
+        }
+        (-0.5 * (room_m / self.std_m).powi(2)).exp()
+    }
+
+    /// Probability that it is further away; where that is at most negligible, an upper limit.
     ///
     /// In polar coordinates about the mean, in which the Gaussian is round, the ray in direction t
     /// leaves the circle at ρ(t), and beyond lies `exp(−ρ²/2)` of what the ray has:
     /// `1/2π ∫ exp(−ρ(t)²/2) dt`.
-    fn beyond_circle(&self, directions: &[[f64; 2]; DIRECTIONS], radius_m: f64) -> f64 {
+    fn beyond_circle(
+        &self,
+        directions: &[[f64; 2]; DIRECTIONS],
+        radius_m: f64,
+        negligible: f64,
+    ) -> f64 {
+        let most = self.most_beyond_circle(radius_m);
+        if most < negligible {
+            return most;
+        }
         let ([x, y], [first, shared, own]) = (self.separation_m, self.root_m);
         let room = radius_m * radius_m - x * x - y * y;
         if room <= 0.0 {
@@ -156,7 +177,8 @@ impl LevelEquation {
 
     /// What a hypothesis adds to the probability of being further away than a level.
     pub fn share_beyond(&self, level_m: f64, hypothesis: &Hypothesis) -> f64 {
-        hypothesis.probability * hypothesis.beyond_circle(&self.directions, level_m)
+        let negligible = NEGLIGIBLE * self.risk / hypothesis.probability;
+        hypothesis.probability * hypothesis.beyond_circle(&self.directions, level_m, negligible)
     }
 
     /// The levels that hold for all of the hypotheses together.
@@ -171,15 +193,17 @@ impl LevelEquation {
         let mut brackets = [Bracket::new(reach_m, at_none); 3];
         while brackets.iter().any(Bracket::is_open) {
             let [circle_m, along_m, across_m] = brackets.map(|it| it.next().sqrt());
+            let is_open = brackets.map(|it| it.is_open());
             let mut beyond = [0.0; 3];
             for one in hypotheses.clone() {
-                let share = [
-                    one.beyond_circle(&self.directions, circle_m),
-                    one.beyond_along(along_m),
-                    one.beyond_across(across_m),
-                ];
-                for (sum, share) in beyond.iter_mut().zip(share) {
-                    *sum += one.probability * share;
+                if is_open[0] {
+                    beyond[0] += self.share_beyond(circle_m, &one);
+                }
+                if is_open[1] {
+                    beyond[1] += one.probability * one.beyond_along(along_m);
+                }
+                if is_open[2] {
+                    beyond[2] += one.probability * one.beyond_across(across_m);
                 }
             }
             for (bracket, beyond) in brackets.iter_mut().zip(beyond) {
