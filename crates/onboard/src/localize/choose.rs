@@ -33,7 +33,7 @@ pub fn built_in(
     }
     let config = EkfConfig::new(site, vehicle);
     let heads = RadioHead::heard(site, vehicle);
-    let integrity = vehicle.integrity.as_ref().map(Into::into);
+    let integrity = vehicle.integrity;
     let road = site.build_road()?;
     let road = road.filter(|_| vehicle.follows_road());
     match road {

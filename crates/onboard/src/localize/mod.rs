@@ -19,8 +19,6 @@ pub mod modes;
 mod out_of_sequence;
 mod pose_estimate;
 mod quantile;
-#[cfg(test)]
-mod trip;
 
 pub use choose::built_in;
 pub use dead_reckoning::DeadReckoning;

@@ -22,15 +22,15 @@ const SURE: f64 = 0.2;
 /// where the belief is right.
 const SURPRISED: f64 = 5.0;
 
-/// Exponentially weighted statistics of the innovations of each radio head, of which the majority decides: one that
-/// is seen by a reflection is off for metres, whatever the number of its angles.
-#[derive(Debug, PartialEq)]
-pub struct ConsistencyMonitor {
-    heads: Vec<HeadStatistics>,
-    angles: u32,
+clone_in_place! {
+    /// Exponentially weighted statistics of the innovations of each radio head, of which the majority decides: one that
+    /// is seen by a reflection is off for metres, whatever the number of its angles.
+    #[derive(Debug, PartialEq)]
+    pub struct ConsistencyMonitor {
+        heads: Vec<HeadStatistics>,
+        angles: u32,
+    }
 }
-
-clone_in_place!(ConsistencyMonitor { heads, angles });
 
 /// Those of a radio head: share of refused angles, mean squared Mahalanobis distance.
 #[derive(Clone, Copy, Debug, PartialEq)]

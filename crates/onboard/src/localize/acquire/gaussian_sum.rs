@@ -16,6 +16,7 @@ use crate::localize::ekf::{Ekf, EkfConfig};
 use crate::localize::measurement::{
     AngleMeasurement, OdometryVerdict, UpdateReason, UpdateVerdict,
 };
+use crate::localize::modes::log_likelihood;
 use crate::localize::pose_estimate::{InitialPose, PoseEstimate};
 use crate::observation::OdometrySample;
 use crate::radio_head::RadioHead;
@@ -104,20 +105,16 @@ enum Ground {
     Plane(Area),
 }
 
-/// A hypothesis of where the vehicle is.
-#[derive(Debug)]
-struct Hypothesis {
-    /// Number of the road it drives on; 0 in the plane.
-    road: usize,
-    ekf: Ekf,
-    log_likelihood: f64,
+clone_in_place! {
+    /// A hypothesis of where the vehicle is.
+    #[derive(Debug)]
+    struct Hypothesis {
+        /// Number of the road it drives on; 0 in the plane.
+        road: usize,
+        ekf: Ekf,
+        log_likelihood: f64,
+    }
 }
-
-clone_in_place!(Hypothesis {
-    road,
-    ekf,
-    log_likelihood
-});
 
 impl Hypothesis {
     /// Distance along its road, and the standard deviation of that (m).
@@ -165,21 +162,16 @@ impl Hypothesis {
     }
 }
 
-/// The search for the first pose.
-#[derive(Debug)]
-pub struct GaussianSum {
-    config: EkfConfig,
-    ground: Ground,
-    heads: Vec<RadioHead>,
-    hypotheses: Vec<Hypothesis>,
+clone_in_place! {
+    /// The search for the first pose.
+    #[derive(Debug)]
+    pub struct GaussianSum {
+        config: EkfConfig,
+        ground: Ground,
+        heads: Vec<RadioHead>,
+        hypotheses: Vec<Hypothesis>,
+    }
 }
-
-clone_in_place!(GaussianSum {
-    config,
-    ground,
-    heads,
-    hypotheses
-});
 
 impl GaussianSum {
     /// The vehicle may be anywhere on `road`, driving along it or, where `either_direction`, also
@@ -202,7 +194,7 @@ impl GaussianSum {
 
     /// Whether its filters have the states that a filter has which they are compared with.
     pub fn is_of_the_model_of(&self, ekf: &Ekf) -> bool {
-        self.config.estimates_bias() == ekf.config().estimates_bias()
+        self.config.estimates_bias() == ekf.is_with_bias()
     }
 
     fn on(config: &EkfConfig, ground: Ground, heads: &[RadioHead]) -> Self {
@@ -283,7 +275,7 @@ impl GaussianSum {
         let mut first = UpdateVerdict::unused(UpdateReason::Unusable);
         for (rank, hypothesis) in self.hypotheses.iter_mut().enumerate() {
             let predicted = hypothesis.ekf.predict_measurement(head, measured);
-            hypothesis.log_likelihood += hypothesis.ekf.log_likelihood(&predicted);
+            hypothesis.log_likelihood += log_likelihood(&hypothesis.ekf, &predicted);
             let verdict = hypothesis.ekf.update_predicted(predicted, measured);
             if rank == 0 {
                 first = verdict;

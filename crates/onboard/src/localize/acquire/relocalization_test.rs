@@ -7,6 +7,7 @@ use super::gaussian_sum::GaussianSum;
 use crate::clone_in_place::clone_in_place;
 use crate::localize::ekf::Ekf;
 use crate::localize::measurement::AngleMeasurement;
+use crate::localize::modes::log_likelihood;
 use crate::radio_head::RadioHead;
 
 /// Log-likelihood ratio at which it decides: wrong once in three million (e⁻¹⁵).
@@ -27,44 +28,31 @@ const INDEPENDENT_M: f64 = 10.0;
 /// Longer silences do not count as time with angles (s).
 const SILENCE_S: f64 = 1.0;
 
-/// A search beside a filter, and the likelihoods of both.
-#[derive(Debug)]
-pub(super) struct RelocalizationTest {
-    pub search: GaussianSum,
-    /// Time of the newest odometry when it began to be reported (s).
-    pub reported_s: f64,
-    /// Whether the filter is refuted, so that its place is not reported any more beside the search's.
-    pub refutes: bool,
-    /// Whether angles may be off as if the vehicle were lost.
-    may_mislead: bool,
-    /// Log-likelihood of the angles by the filter.
-    of_filter: f64,
-    /// Distance driven when it began, and driven since (m).
-    since_m: f64,
-    way_m: f64,
-    /// When the last angle was heard, and for how long with angles (s).
-    heard_s: f64,
-    listened_s: f64,
-    /// Angles, how many of them are independent, and after which way each radio head had its last such one (m).
-    angles: u32,
-    independent: u32,
-    independent_m: Vec<f64>,
+clone_in_place! {
+    /// A search beside a filter, and the likelihoods of both.
+    #[derive(Debug)]
+    pub(super) struct RelocalizationTest {
+        pub search: GaussianSum,
+        /// Time of the newest odometry when it began to be reported (s).
+        pub reported_s: f64,
+        /// Whether the filter is refuted, so that its place is not reported any more beside the search's.
+        pub refutes: bool,
+        /// Whether angles may be off as if the vehicle were lost.
+        may_mislead: bool,
+        /// Log-likelihood of the angles by the filter.
+        of_filter: f64,
+        /// Distance driven when it began, and driven since (m).
+        since_m: f64,
+        way_m: f64,
+        /// When the last angle was heard, and for how long with angles (s).
+        heard_s: f64,
+        listened_s: f64,
+        /// Angles, how many of them are independent, and after which way each radio head had its last such one (m).
+        angles: u32,
+        independent: u32,
+        independent_m: Vec<f64>,
+    }
 }
-
-clone_in_place!(RelocalizationTest {
-    search,
-    reported_s,
-    refutes,
-    may_mislead,
-    of_filter,
-    since_m,
-    way_m,
-    heard_s,
-    listened_s,
-    angles,
-    independent,
-    independent_m
-});
 
 impl RelocalizationTest {
     /// One that begins now.
@@ -103,7 +91,7 @@ impl RelocalizationTest {
                 self.independent = self.independent.saturating_add(1);
             }
         }
-        self.of_filter += ekf.log_likelihood(&ekf.predict_measurement(head, measured));
+        self.of_filter += log_likelihood(ekf, &ekf.predict_measurement(head, measured));
         self.search.update(head, measured);
     }
 

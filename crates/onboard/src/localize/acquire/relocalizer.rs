@@ -26,12 +26,12 @@ use crate::localize::localizer::{Localizer, Recovered, copy_into};
 use crate::localize::measurement::{
     AngleMeasurement, OdometryVerdict, UpdateReason, UpdateVerdict,
 };
-use crate::localize::modes::IntegrityConfig;
 use crate::localize::pose_estimate::{Integrity, IntegrityState, PoseEstimate};
 use crate::localize::quantile::RadialQuantile;
 use crate::observation::OdometrySample;
 use crate::radio_head::RadioHead;
 use crate::road::Road;
+use crate::settings::IntegritySettings;
 
 /// How far about the believed place is searched first (m), beyond three of its deviations.
 const NEARBY_M: f64 = 2.0;
@@ -62,6 +62,10 @@ enum Phase {
 
 /// What the next phase depends on.
 #[derive(Clone, Copy, Debug)]
+#[expect(
+    clippy::struct_excessive_bools,
+    reason = "each is a fact of its own; the phases are the state machine"
+)]
 struct Evidence {
     /// Most radio heads' angles come from elsewhere than predicted.
     is_lost: bool,
@@ -106,7 +110,6 @@ impl Phase {
         // A diverged filter can become self-consistent: every other place must be less likely, too.
         let is_confirmed = by.search == Ordering::Less && by.is_consistent;
         match self {
-            Self::Searching | Self::Given => Transition::Stay,
             Self::Tracking => match (by.is_lost && by.is_rested, by.may_mislead) {
                 (false, _) => Transition::Stay,
                 (true, true) => Transition::Begin(Self::Confirming),
@@ -133,7 +136,7 @@ impl Phase {
             Self::Relocalizing { wide: false } if by.is_patient => {
                 Transition::Begin(Self::Relocalizing { wide: true })
             }
-            Self::Relocalizing { .. } => Transition::Stay,
+            Self::Searching | Self::Given | Self::Relocalizing { .. } => Transition::Stay,
         }
     }
 }
@@ -143,38 +146,28 @@ impl Phase {
 struct Setup {
     road: Option<Road>,
     heads: Vec<RadioHead>,
-    integrity: Option<IntegrityConfig>,
+    integrity: Option<IntegritySettings>,
     quantile: RadialQuantile,
 }
 
-/// The built-in localizer.
-#[derive(Debug)]
-pub struct Relocalizer {
-    setup: Arc<Setup>,
-    phase: Phase,
-    /// Of the first pose; `None` once that is found.
-    search: Option<GaussianSum>,
-    /// `None` until then.
-    solution: Option<Solution>,
-    consistency: ConsistencyMonitor,
-    /// Between the solution and a search, as long as that runs.
-    test: Option<RelocalizationTest>,
-    rests_until_s: f64,
-    recovered: Option<Recovered>,
-    keeps_journal: bool,
+clone_in_place! {
+    /// The built-in localizer.
+    #[derive(Debug)]
+    pub struct Relocalizer {
+        setup: Arc<Setup>,
+        phase: Phase,
+        /// Of the first pose; `None` once that is found.
+        search: Option<GaussianSum>,
+        /// `None` until then.
+        solution: Option<Solution>,
+        consistency: ConsistencyMonitor,
+        /// Between the solution and a search, as long as that runs.
+        test: Option<RelocalizationTest>,
+        rests_until_s: f64,
+        recovered: Option<Recovered>,
+        keeps_journal: bool,
+    }
 }
-
-clone_in_place!(Relocalizer {
-    setup,
-    phase,
-    search,
-    solution,
-    consistency,
-    test,
-    rests_until_s,
-    recovered,
-    keeps_journal
-});
 
 impl Relocalizer {
     /// Tracks on from a filter of these radio heads; `road` is where the vehicle is searched for if it is lost.
@@ -182,7 +175,7 @@ impl Relocalizer {
         ekf: Ekf,
         road: Option<Road>,
         heads: &[RadioHead],
-        integrity: Option<IntegrityConfig>,
+        integrity: Option<IntegritySettings>,
     ) -> Self {
         let phase = if road.is_none() {
             Phase::Given
@@ -199,7 +192,7 @@ impl Relocalizer {
     pub fn searching(
         search: GaussianSum,
         road: Option<Road>,
-        integrity: Option<IntegrityConfig>,
+        integrity: Option<IntegritySettings>,
     ) -> Self {
         let made = Self::new(Phase::Searching, road, search.heads(), integrity);
         Self {
@@ -212,7 +205,7 @@ impl Relocalizer {
         phase: Phase,
         road: Option<Road>,
         heads: &[RadioHead],
-        integrity: Option<IntegrityConfig>,
+        integrity: Option<IntegritySettings>,
     ) -> Self {
         Self {
             phase,
@@ -227,7 +220,7 @@ impl Relocalizer {
                 road,
                 heads: heads.to_vec(),
                 integrity,
-                quantile: RadialQuantile::new(integrity.unwrap_or_default().risk),
+                quantile: RadialQuantile::new(integrity.unwrap_or_default().risk_per_epoch()),
             }),
         }
     }

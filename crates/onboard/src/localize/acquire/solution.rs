@@ -3,10 +3,11 @@
 use crate::localize::ekf::Ekf;
 use crate::localize::integrity::IntegrityMonitor;
 use crate::localize::measurement::{AngleMeasurement, OdometryVerdict, UpdateVerdict};
-use crate::localize::modes::{IntegrityConfig, may_mislead};
+use crate::localize::modes::may_mislead;
 use crate::localize::pose_estimate::PoseEstimate;
 use crate::observation::OdometrySample;
 use crate::radio_head::RadioHead;
+use crate::settings::IntegritySettings;
 
 /// A filter, guarded or not.
 #[derive(Debug)]
@@ -39,7 +40,7 @@ impl Solution {
     pub fn new(
         ekf: Ekf,
         heads: &[RadioHead],
-        integrity: Option<IntegrityConfig>,
+        integrity: Option<IntegritySettings>,
         found_s: Option<f64>,
     ) -> Self {
         match integrity {

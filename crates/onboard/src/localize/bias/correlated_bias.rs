@@ -107,15 +107,15 @@ impl HeadBias {
     }
 }
 
-/// The biases of all radio heads; none where they are not estimated.
-#[derive(Debug, PartialEq)]
-pub struct CorrelatedBias {
-    heads: Vec<HeadBias>,
-    /// Covariance of the values with each other, row by row (rad²).
-    among: Vec<f64>,
+clone_in_place! {
+    /// The biases of all radio heads; none where they are not estimated.
+    #[derive(Debug, PartialEq)]
+    pub struct CorrelatedBias {
+        heads: Vec<HeadBias>,
+        /// Covariance of the values with each other, row by row (rad²).
+        among: Vec<f64>,
+    }
 }
-
-clone_in_place!(CorrelatedBias { heads, among });
 
 impl CorrelatedBias {
     /// Those of so many radio heads, of which nothing is known but their probability; none where that is 0.

@@ -115,7 +115,7 @@ pub struct AngleModel {
     /// Derivative of α by each state.
     turn: [f64; STATES],
     /// Steps of the place by each state towards the radio head and to the left of it.
-    angle_model: [[f64; STATES]; 2],
+    steps: [[f64; STATES]; 2],
     /// Horizontal distance of the radio head (m).
     ground_m: f64,
     /// First and second derivative by α, both negated: `2π (d/λ) cos ε` times sine and cosine of α
@@ -170,26 +170,26 @@ impl AngleModel {
         let (left, ahead) = (bearing - frame.direction_rad).sin_cos();
         // Turning on the spot moves the array.
         let (aside, along) = (bearing - pose.heading_rad).sin_cos();
-        let mut angle_model = [[0.0; STATES]; 2];
-        angle_model[0][ALONG] = ahead * frame.stretch;
-        angle_model[0][ACROSS] = left;
-        angle_model[0][HEADING] = aside * forward_m - along * left_m;
-        angle_model[1][ALONG] = -left * frame.stretch;
-        angle_model[1][ACROSS] = ahead;
-        angle_model[1][HEADING] = along * forward_m + aside * left_m;
-        for step in &mut angle_model {
+        let mut steps = [[0.0; STATES]; 2];
+        steps[0][ALONG] = ahead * frame.stretch;
+        steps[0][ACROSS] = left;
+        steps[0][HEADING] = aside * forward_m - along * left_m;
+        steps[1][ALONG] = -left * frame.stretch;
+        steps[1][ACROSS] = ahead;
+        steps[1][HEADING] = along * forward_m + aside * left_m;
+        for step in &mut steps {
             // Along a bend the vehicle turns as it goes.
             step[ALONG] += frame.curvature_per_m * step[HEADING];
         }
         // A step to the left of the line of sight turns the bearing to the right.
-        let mut turn = angle_model[1].map(|step| -step / ground_m);
+        let mut turn = steps[1].map(|step| -step / ground_m);
         turn[ALONG] -= frame.curvature_per_m;
         turn[HEADING] -= 1.0;
         turn[MOUNTING] = -1.0;
         // A step towards the radio head raises it: d cos ε = −sin² ε dρ/R.
         let climb = by_level * (1.0 - level * level) / range_m;
         let mut row = turn.map(|turn| -slopes[0] * turn);
-        for (value, step) in row.iter_mut().zip(angle_model[0]) {
+        for (value, step) in row.iter_mut().zip(steps[0]) {
             *value -= climb * step;
         }
         row[PHASE] = by_phase;
@@ -207,7 +207,7 @@ impl AngleModel {
             survey_variance: (slopes[0] / ground_m).powi(2) * survey_variance,
             aperture: array.measurand.aperture(azimuth, level),
             turn,
-            angle_model,
+            steps,
             ground_m,
             slopes,
         })
@@ -222,7 +222,7 @@ impl AngleModel {
     pub fn bend(&self, covariance: &Matrix<STATES>) -> SecondOrder {
         const BENT: [usize; 4] = [ALONG, ACROSS, HEADING, MOUNTING];
         let bent = |row: &[f64; STATES]| BENT.map(|state| row[state]);
-        let (turn, [ahead, left]) = (bent(&self.turn), self.angle_model.each_ref().map(bent));
+        let (turn, [ahead, left]) = (bent(&self.turn), self.steps.each_ref().map(bent));
         let with = |row: [f64; 4]| BENT.map(|state| dot(&bent(&covariance[state]), &row));
         let (with_turn, with_ahead, with_left) = (with(turn), with(ahead), with(left));
         let (gg, gr, gt) = (

@@ -85,42 +85,28 @@ impl Head {
     }
 }
 
-/// The filter. With a map it works along and across the road, without in the plane.
-#[derive(Debug, PartialEq)]
-pub struct Ekf {
-    pub(super) config: EkfConfig,
-    pub(super) map: Option<Arc<Road>>,
-    pub(super) heads: Vec<Head>,
-    pub(super) belief: Belief,
-    /// What the radio heads' angles are off by over metres.
-    pub(super) bias: CorrelatedBias,
-    pub(super) odometry: Option<OdometrySample>,
-    pub(super) driven_m: f64,
-    pub(super) turned_rad: f64,
-    /// Where the vehicle is that the map does not tell how the road goes on.
-    pub(super) off_map: Option<OffMap>,
-    pub(super) journal: Option<Journal<STATES>>,
-    pub(super) sample_interval: SampleInterval,
-    pub(super) speed_jumps: SpeedJumps,
-    /// What the speeds say was driven (m) since the odometer last moved.
-    pub(super) unread_m: f64,
+clone_in_place! {
+    /// The filter. With a map it works along and across the road, without in the plane.
+    #[derive(Debug, PartialEq)]
+    pub struct Ekf {
+        pub(super) config: EkfConfig,
+        pub(super) map: Option<Arc<Road>>,
+        pub(super) heads: Vec<Head>,
+        pub(super) belief: Belief,
+        /// What the radio heads' angles are off by over metres.
+        pub(super) bias: CorrelatedBias,
+        pub(super) odometry: Option<OdometrySample>,
+        pub(super) driven_m: f64,
+        pub(super) turned_rad: f64,
+        /// Where the vehicle is that the map does not tell how the road goes on.
+        pub(super) off_map: Option<OffMap>,
+        pub(super) journal: Option<Journal<STATES>>,
+        pub(super) sample_interval: SampleInterval,
+        pub(super) speed_jumps: SpeedJumps,
+        /// What the speeds say was driven (m) since the odometer last moved.
+        pub(super) unread_m: f64,
+    }
 }
-
-clone_in_place!(Ekf {
-    config,
-    map,
-    heads,
-    belief,
-    bias,
-    odometry,
-    driven_m,
-    turned_rad,
-    off_map,
-    journal,
-    sample_interval,
-    speed_jumps,
-    unread_m
-});
 
 impl Ekf {
     /// A filter that starts from a given pose. `map` is the course of the road, if known.
@@ -472,6 +458,11 @@ impl Ekf {
     /// Constants of the vehicle as estimated by now.
     pub fn findings(&self) -> EstimatedConstants {
         EstimatedConstants::new(&self.config, &self.belief)
+    }
+
+    /// Whether it estimates a time-correlated bias of the angles.
+    pub(in crate::localize) const fn is_with_bias(&self) -> bool {
+        !self.bias.is_empty()
     }
 
     /// Whether a map tells how the road goes.

@@ -1,24 +1,22 @@
-//! What the belief would become: predicted ahead, and updated with angles not yet heard.
-
-use std::f64::consts::TAU;
+//! What comes out: the pose in the map frame at any time, the belief predicted ahead and updated with angles not yet
+//! heard, and the smoothed poses.
 
 use super::angle_model::{AngleModel, locate};
 use super::config::PhaseBias;
 use super::filter::{Ekf, MOST_STEPS};
 use super::motion::{Reading, Step};
-use super::state::{Belief, STATES};
-use super::update::PredictedMeasurement;
+use super::smoother::Journal;
+use super::state::{Belief, SCALE, STATES};
 use crate::localize::bias;
-use crate::localize::gaussian::{Innovation, Matrix, dot, identity, principal_variances, product};
-use crate::localize::measurement::{AngleMeasurement, UpdateReason};
+use crate::localize::gaussian::{
+    Innovation, Matrix, dot, identity, principal_variances, product, transformed,
+};
+use crate::localize::measurement::AngleMeasurement;
+use crate::localize::pose_estimate::PoseEstimate;
 use crate::radio_head::RadioHead;
 
 /// Longest step of a forecast (m), where millimetres do not matter.
 const FORECAST_STEP_M: f64 = 5.0;
-
-/// What an outlier costs, `ln(2π/ε)` for outliers from all directions and a share ε of about 2 in 1000:
-/// the right place must survive a few.
-const OUTLIER: f64 = 8.0;
 
 /// An angle to a radio head that is not used.
 #[derive(Clone, Copy, Debug, PartialEq)]
@@ -61,31 +59,6 @@ impl Ekf {
             .map(|predicted| predicted.innovation)
     }
 
-    /// Log-likelihood of an angle, relative to one that has but its own noise and is predicted exactly.
-    ///
-    /// Angles that are not independent have a variance that says so: they cost nothing, however that
-    /// variance differs from place to place. Where a time-correlated bias is estimated, an angle counts
-    /// by its independent share. Angles of an excluded radio head are outliers.
-    pub(in crate::localize) fn log_likelihood(
-        &self,
-        predicted: &Result<PredictedMeasurement, UpdateReason>,
-    ) -> f64 {
-        let Ok(predicted) = predicted else {
-            return 0.0;
-        };
-        if !self.bias.is_empty() {
-            let density = (predicted.hypotheses.as_ref())
-                .map_or(TAU.recip(), |hypotheses| hypotheses.density);
-            let exact = (TAU * predicted.own_variance).sqrt().recip();
-            return predicted.independent_share() * (density / exact).ln();
-        }
-        let seen = predicted.innovation;
-        if predicted.excluded || seen.mahalanobis2() > self.config.gate {
-            return -OUTLIER;
-        }
-        -0.5 * (seen.mahalanobis2() + (seen.variance / seen.measurement_variance).ln())
-    }
-
     /// The innovation that an angle to an excluded radio head would bring; it counts as an update. Where a
     /// time-correlated bias is estimated there is nothing to test: a radio head that is off has a
     /// large one, and counts little.
@@ -96,7 +69,7 @@ impl Ekf {
     ) -> Option<ExcludedInnovation> {
         let predicted = self.predict_measurement(head, measured).ok()?;
         self.heads.get_mut(predicted.head)?.last_update_m = predicted.place_m;
-        if !self.bias.is_empty() {
+        if self.is_with_bias() {
             return None;
         }
         let Innovation {
@@ -205,5 +178,89 @@ impl Ekf {
     pub fn principal_variances(belief: &Belief) -> [f64; 2] {
         let [[aa, ab, ..], [_, bb, ..], ..] = belief.covariance;
         principal_variances(aa, ab, bb)
+    }
+}
+
+/// Nothing is known better than to a nanometre and a nanoradian: so much the covariance says at
+/// least, though a belief that began exactly has no width.
+const LEAST_VARIANCE: f64 = 1e-18;
+
+impl Ekf {
+    /// The pose at `time_s`, carried on from the newest odometry at its speed.
+    pub fn pose(&self, time_s: f64) -> PoseEstimate {
+        let (_, lag_variance) = self.coasting(time_s);
+        self.pose_of(&self.forecast(time_s), time_s, lag_variance)
+    }
+
+    /// Distance driven since the newest odometry, and its variance.
+    pub(super) fn coasting(&self, time_s: f64) -> (f64, f64) {
+        let Some(sample) = self.odometry else {
+            return (0.0, 0.0);
+        };
+        let lag_s = (time_s - sample.time_s).max(0.0);
+        (
+            self.speed_mps() * lag_s,
+            self.config.coasting_variance(lag_s),
+        )
+    }
+
+    /// Speed along the heading (m/s).
+    pub fn speed_mps(&self) -> f64 {
+        let reading = self.odometry.map_or(0.0, |sample| sample.speed_mps);
+        reading / (1.0 + self.belief.mean[SCALE])
+    }
+
+    /// The pose of a belief whose place along the way has so much more variance than it says.
+    pub(super) fn pose_of(&self, belief: &Belief, time_s: f64, lag_variance: f64) -> PoseEstimate {
+        let map = self.map.as_deref();
+        let (pose, frame) = locate(&belief.mean, 0.0, map);
+        let (sin, cos) = frame.direction_rad.sin_cos();
+        // (x, y, heading) by (along, across, heading).
+        let jacobian = [
+            [cos * frame.stretch, -sin, 0.0],
+            [sin * frame.stretch, cos, 0.0],
+            [frame.curvature_per_m, 0.0, 1.0],
+        ];
+        let mut inner = [[0.0; 3]; 3];
+        for i in 0..3 {
+            for j in 0..3 {
+                inner[i][j] = belief.covariance[i][j];
+            }
+        }
+        inner[0][0] += lag_variance;
+        let mut covariance = transformed(&jacobian, &inner);
+        for i in 0..3 {
+            covariance[i][i] += LEAST_VARIANCE;
+        }
+        PoseEstimate {
+            time_s,
+            pose,
+            covariance: Some(covariance),
+            integrity: None,
+        }
+    }
+}
+
+impl Ekf {
+    /// Keeps a journal from now on, from which the drive can be smoothed; it grows by about 2 kB
+    /// with each odometry sample.
+    pub fn keep_journal(&mut self) {
+        self.journal.get_or_insert_default();
+    }
+
+    /// The poses at the odometry samples since the journal was begun, by everything that is known
+    /// now; none without a journal.
+    pub fn smoothed(&self) -> Vec<PoseEstimate> {
+        let journal = self.journal.iter();
+        let beliefs = journal.flat_map(Journal::smoothed);
+        beliefs
+            .map(|(time_s, belief)| self.pose_of(&belief, time_s, 0.0))
+            .collect()
+    }
+
+    pub(super) fn ask(&mut self, time_s: f64) {
+        if let Some(journal) = &mut self.journal {
+            journal.asked(time_s, &self.belief, self.bias.state_covariance());
+        }
     }
 }

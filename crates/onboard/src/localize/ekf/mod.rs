@@ -14,8 +14,6 @@ mod forecast;
 mod lane;
 pub mod motion;
 mod odometer;
-mod pda;
-mod pose;
 mod prior;
 pub mod smoother;
 pub mod state;

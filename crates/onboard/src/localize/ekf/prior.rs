@@ -99,7 +99,7 @@ impl Ekf {
 
     /// Estimates a bias that is rare, unless it does.
     pub(in crate::localize) fn estimate_rare_bias(&mut self) {
-        if self.bias.is_empty() {
+        if !self.is_with_bias() {
             self.begin_bias(self.config.rare_bias_probability);
         }
     }

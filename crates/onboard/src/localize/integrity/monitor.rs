@@ -19,10 +19,11 @@ use crate::clone_in_place::clone_in_place;
 use crate::geometry::{Pose, wrap_angle};
 use crate::localize::ekf::Ekf;
 use crate::localize::measurement::{AngleMeasurement, OdometryVerdict, UpdateVerdict};
-use crate::localize::modes::{Bank, IntegrityConfig, ModeId};
+use crate::localize::modes::{Bank, ModeId, RECOVERY_S};
 use crate::localize::pose_estimate::{Integrity, IntegrityState, PoseEstimate};
 use crate::observation::OdometrySample;
 use crate::radio_head::RadioHead;
+use crate::settings::IntegritySettings;
 
 /// Share of the risk that is not worth the effort.
 const NEGLIGIBLE: f64 = 0.1;
@@ -78,65 +79,53 @@ impl Handover {
     }
 }
 
-/// A bank and what became of it.
-#[derive(Debug)]
-pub struct IntegrityMonitor {
-    config: IntegrityConfig,
-    level: LevelEquation,
-    bank: Bank,
-    restarted: Option<Restarted>,
-    /// The previous solution.
-    handover: Option<Handover>,
-    /// Whether it was found by a search, and no restarted bank has confirmed it yet.
-    is_found: bool,
-    /// Distance driven (m) when no fault was unidentified last.
-    trusted_m: f64,
-    /// When its filters began anew last (s).
-    begun_s: f64,
-    /// Whether the odometer's scale was certainly not what is stated, and has not been found to be since.
-    has_departed: bool,
-    /// When something was at fault last (s), as far as is known.
-    fault_s: f64,
-    now_s: f64,
+clone_in_place! {
+    /// A bank and what became of it.
+    #[derive(Debug)]
+    pub struct IntegrityMonitor {
+        settings: IntegritySettings,
+        level: LevelEquation,
+        bank: Bank,
+        restarted: Option<Restarted>,
+        /// The previous solution.
+        handover: Option<Handover>,
+        /// Whether it was found by a search, and no restarted bank has confirmed it yet.
+        is_found: bool,
+        /// Distance driven (m) when no fault was unidentified last.
+        trusted_m: f64,
+        /// When its filters began anew last (s).
+        begun_s: f64,
+        /// Whether the odometer's scale was certainly not what is stated, and has not been found to be since.
+        has_departed: bool,
+        /// When something was at fault last (s), as far as is known.
+        fault_s: f64,
+        now_s: f64,
+    }
 }
 
-/// Trackers begun anew from a vague pose.
-#[derive(Debug)]
-struct Restarted {
-    bank: Bank,
-    since_s: f64,
+clone_in_place! {
+    /// Trackers begun anew from a vague pose.
+    #[derive(Debug)]
+    struct Restarted {
+        bank: Bank,
+        since_s: f64,
+    }
 }
-
-clone_in_place!(IntegrityMonitor {
-    config,
-    level,
-    bank,
-    restarted,
-    handover,
-    is_found,
-    trusted_m,
-    begun_s,
-    has_departed,
-    fault_s,
-    now_s
-});
-
-clone_in_place!(Restarted { bank, since_s });
 
 impl IntegrityMonitor {
     /// Monitors a filter of these radio heads. One that was found by a search, and not given, is to be confirmed.
     pub fn new(
         ekf: &Ekf,
         heads: &[RadioHead],
-        config: IntegrityConfig,
+        settings: IntegritySettings,
         found_s: Option<f64>,
     ) -> Self {
         let is_found = found_s.is_some();
         let found_s = found_s.unwrap_or(f64::NEG_INFINITY);
         Self {
-            level: LevelEquation::new(config.risk),
+            level: LevelEquation::new(settings.risk_per_epoch()),
             trusted_m: ekf.driven_m(),
-            bank: Bank::new(ekf, heads, &config.fault_probability, found_s),
+            bank: Bank::new(ekf, heads, &settings, found_s),
             restarted: None,
             handover: None,
             is_found,
@@ -144,7 +133,7 @@ impl IntegrityMonitor {
             has_departed: false,
             fault_s: f64::NEG_INFINITY,
             now_s: found_s,
-            config,
+            settings,
         }
     }
 
@@ -161,7 +150,7 @@ impl IntegrityMonitor {
             return bank.leader();
         }
         let beyond = |(clean, hypothesis)| {
-            let alert_limit_m = self.config.alert_limit_m;
+            let alert_limit_m = self.settings.alert_limit_m;
             (self.level.share_beyond(alert_limit_m, &hypothesis), clean)
         };
         (self.hypotheses_of(bank, now_s).map(beyond))
@@ -198,13 +187,13 @@ impl IntegrityMonitor {
         let odometry_s = self.ekf().time_s();
         let (solution_id, told) = (self.solution_id(), self.ekf().pose(odometry_s));
         let verdict = self.bank.update(head, measured);
-        self.bank.judge(self.now_s, &self.config);
-        if let Some(bank) = self.bank.rebased(self.now_s, &self.config) {
+        self.bank.judge(self.now_s);
+        if let Some(bank) = self.bank.rebased(self.now_s) {
             (self.bank, self.restarted) = (bank, None);
         }
         if let Some(restarted) = &mut self.restarted {
             restarted.bank.update(head, measured);
-            restarted.bank.judge(self.now_s, &self.config);
+            restarted.bank.judge(self.now_s);
         }
         self.recover();
         self.hold_faults();
@@ -237,7 +226,7 @@ impl IntegrityMonitor {
     /// the old one has no doubts any more, nothing is `ok`. What a search found by angles that may have
     /// been at fault is confirmed the same way.
     fn recover(&mut self) {
-        let (now_s, patience_s) = (self.now_s, self.config.recovery_s);
+        let (now_s, patience_s) = (self.now_s, RECOVERY_S);
         let lost = self.bank.is_lost();
         let Some(restarted) = &self.restarted else {
             if lost || self.is_found {
@@ -269,7 +258,7 @@ impl IntegrityMonitor {
         } else {
             self.bank.nominal().driven_m() - self.trusted_m
         };
-        let position_std_m = self.config.alert_limit_m + strayed_m;
+        let position_std_m = self.settings.alert_limit_m + strayed_m;
         self.restarted = Some(Restarted {
             bank: self.bank.restarted(position_std_m, self.now_s),
             since_s: self.now_s,
@@ -283,7 +272,7 @@ impl IntegrityMonitor {
         pose.mix(mixture.map(|(probability, right)| (probability, right.pose(time_s))));
         pose.integrity = Some(self.integrity(time_s));
         let handover = self.handover.as_ref();
-        if let Some(handover) = handover.and_then(|it| it.beside(&pose, self.config.recovery_s)) {
+        if let Some(handover) = handover.and_then(|it| it.beside(&pose, RECOVERY_S)) {
             pose.cover(&handover);
         }
         if self.bank.explains_heads() {
@@ -301,11 +290,11 @@ impl IntegrityMonitor {
         let levels = self.level.solve(&self.hypotheses(&self.bank, time_s));
         let state = if self.bank.is_outvoted() && !self.bank.explains_heads() {
             IntegrityState::Unavailable
-        } else if self.now_s - self.fault_s <= self.config.recovery_s
+        } else if self.now_s - self.fault_s <= RECOVERY_S
             || self.has_departed
             || self.restarted.is_some()
-            || self.bank.quiet_s(self.now_s) <= self.config.recovery_s
-            || levels.horizontal_m > self.config.alert_limit_m
+            || self.bank.quiet_s(self.now_s) <= RECOVERY_S
+            || levels.horizontal_m > self.settings.alert_limit_m
         {
             IntegrityState::Degraded
         } else {
@@ -323,7 +312,7 @@ impl IntegrityMonitor {
     /// Whether the error is within the alert limit but for the risk.
     fn is_near(&self, bank: &Bank, time_s: f64) -> bool {
         let hypotheses = self.hypotheses(bank, time_s);
-        self.level.holds(self.config.alert_limit_m, hypotheses)
+        self.level.holds(self.settings.alert_limit_m, hypotheses)
     }
 
     /// The hypotheses that are not negligible, each with the filter that is right under it.
@@ -334,7 +323,7 @@ impl IntegrityMonitor {
     ) -> impl Iterator<Item = (&'a Ekf, Hypothesis)> + Clone {
         let told = bank.leader().pose(time_s);
         let heard_noise_ratio = bank.noise_ratio();
-        let negligible = NEGLIGIBLE * self.config.risk;
+        let negligible = NEGLIGIBLE * self.level.risk();
         (bank.hypotheses())
             .filter(move |(probability, _)| *probability > negligible)
             .filter_map(move |(probability, right)| {
@@ -355,7 +344,7 @@ mod tests {
     use std::f64::consts::PI;
 
     use super::*;
-    use crate::localize::trip::{angle, trip};
+    use crate::localize::modes::trip::{angle, trip};
 
     /// Deviations by which a position may be another one at one angle.
     const MOST_DEVIATIONS: f64 = 5.0;
@@ -367,7 +356,7 @@ mod tests {
         const HIDDEN_S: f64 = 8.0;
         const OFF_RAD: f64 = -0.6;
         let (heads, road, ekf) = trip();
-        let mut guard = IntegrityMonitor::new(&ekf, &heads, IntegrityConfig::default(), None);
+        let mut guard = IntegrityMonitor::new(&ekf, &heads, IntegritySettings::default(), None);
         let mut farthest_m: f64 = 0.0;
         let mut last = guard.pose(0.0);
         for step in 1..150 {

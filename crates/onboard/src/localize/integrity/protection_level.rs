@@ -168,6 +168,11 @@ impl LevelEquation {
         Self { risk, directions }
     }
 
+    /// The risk.
+    pub const fn risk(&self) -> f64 {
+        self.risk
+    }
+
     /// Whether such a level holds for all of the hypotheses together, which is far less work than to
     /// solve for the least that does.
     pub fn holds(&self, level_m: f64, hypotheses: impl Iterator<Item = Hypothesis>) -> bool {

@@ -11,8 +11,7 @@
 //! radio head is excluded, filters that have never heard it are ready to take over, together with
 //! those that have heard neither it nor one of the others.
 
-use super::config::IntegrityConfig;
-use super::head_test::{CLEARED, DETECTED, HeadTest};
+use super::head_test::{CLEARED, DETECTED, HeadTest, RECOVERY_S};
 use super::likelihood::{LEAST_ODDS, LikelihoodRatio, SPEED_JUMP};
 use super::noise_ratio::NoiseRatio;
 use super::subsets::{Subsets, exclude};
@@ -24,27 +23,24 @@ use crate::localize::measurement::{
 };
 use crate::observation::OdometrySample;
 use crate::radio_head::RadioHead;
-use crate::settings::FaultProbability;
+use crate::settings::{FaultProbability, IntegritySettings};
 
-/// The filter of a mode that is weighed by its posterior.
-#[derive(Debug)]
-struct ModeFilter {
-    mode: &'static Mode,
-    prior: f64,
-    ekf: Ekf,
-    /// To the nominal mode.
-    ratio: LikelihoodRatio,
-    /// Whether the vehicle stood since the filter began.
-    at_rest: bool,
+/// However rare a fault is, under it the error is within the level more often than not.
+const MOST_UNDER_FAULT: f64 = 0.49;
+
+clone_in_place! {
+    /// The filter of a mode that is weighed by its posterior.
+    #[derive(Debug)]
+    struct ModeFilter {
+        mode: &'static Mode,
+        prior: f64,
+        ekf: Ekf,
+        /// To the nominal mode.
+        ratio: LikelihoodRatio,
+        /// Whether the vehicle stood since the filter began.
+        at_rest: bool,
+    }
 }
-
-clone_in_place!(ModeFilter {
-    mode,
-    prior,
-    ekf,
-    ratio,
-    at_rest
-});
 
 impl ModeFilter {
     fn new(mode: &'static Mode, given: &Ekf, faults: &FaultProbability) -> Self {
@@ -125,59 +121,49 @@ impl ModeFilter {
     }
 }
 
-/// The filters.
-#[derive(Debug)]
-pub(in crate::localize) struct Bank {
-    faults: FaultProbability,
-    heads: Vec<RadioHead>,
-    faulty: Vec<bool>,
-    /// When each of them last disagreed with the filter without it (s).
-    disagreed_s: Vec<f64>,
-    /// When a source was last at fault and not identified (s).
-    lost_s: f64,
-    /// The filter of every sound radio head, by what is stated.
-    nominal: Ekf,
-    modes: Vec<ModeFilter>,
-    noise: NoiseRatio,
-    /// Prior probability of a fault of each radio head.
-    head_prior: f64,
-    subsets: Subsets,
+clone_in_place! {
+    /// The filters.
+    #[derive(Debug)]
+    pub(in crate::localize) struct Bank {
+        settings: IntegritySettings,
+        heads: Vec<RadioHead>,
+        faulty: Vec<bool>,
+        /// When each of them last disagreed with the filter without it (s).
+        disagreed_s: Vec<f64>,
+        /// When a source was last at fault and not identified (s).
+        lost_s: f64,
+        /// The filter of every sound radio head, by what is stated.
+        nominal: Ekf,
+        modes: Vec<ModeFilter>,
+        noise: NoiseRatio,
+        /// Prior probability of a fault of each radio head.
+        head_prior: f64,
+        subsets: Subsets,
+    }
 }
-
-clone_in_place!(Bank {
-    faults,
-    heads,
-    faulty,
-    disagreed_s,
-    lost_s,
-    nominal,
-    modes,
-    noise,
-    head_prior,
-    subsets
-});
 
 impl Bank {
     /// The modes beside a filter; nothing is known of them at `now_s`.
-    pub fn new(given: &Ekf, heads: &[RadioHead], faults: &FaultProbability, now_s: f64) -> Self {
-        let modes = ModeFilter::all(given, faults);
-        Self::with(given, heads, faults, modes, now_s)
+    pub fn new(given: &Ekf, heads: &[RadioHead], settings: &IntegritySettings, now_s: f64) -> Self {
+        let modes = ModeFilter::all(given, &settings.fault_probability);
+        Self::with(given, heads, settings, modes, now_s)
     }
 
     fn with(
         given: &Ekf,
         heads: &[RadioHead],
-        faults: &FaultProbability,
+        settings: &IntegritySettings,
         modes: Vec<ModeFilter>,
         now_s: f64,
     ) -> Self {
+        let faults = &settings.fault_probability;
         let nominal = given.nominal();
         let count = heads.len();
         let of_heads = TABLE
             .iter()
             .find(|it| it.weight == Weight::Prior { heads: 1 });
         Self {
-            faults: *faults,
+            settings: *settings,
             subsets: Subsets::new(count),
             faulty: vec![false; count],
             disagreed_s: vec![f64::NEG_INFINITY; count],
@@ -198,7 +184,7 @@ impl Bank {
     /// The bank begun anew from a vague pose where the leading filter is; nothing is known of it at `now_s`.
     pub fn restarted(&self, position_std_m: f64, now_s: f64) -> Self {
         let start = self.leader().restarted(position_std_m);
-        let mut modes = ModeFilter::all(&start, &self.faults);
+        let mut modes = ModeFilter::all(&start, &self.settings.fault_probability);
         for it in &mut modes {
             let before = self
                 .modes
@@ -208,23 +194,27 @@ impl Bank {
                 && let Some(before) = before
             {
                 it.clone_from(before);
-                it.carry(it.mode.on_restart, &start, None, &self.faults);
+                it.carry(
+                    it.mode.on_restart,
+                    &start,
+                    None,
+                    &self.settings.fault_probability,
+                );
             }
         }
         Self {
             noise: self.noise.resumed(),
-            ..Self::with(&start, &self.heads, &self.faults, modes, now_s)
+            ..Self::with(&start, &self.heads, &self.settings, modes, now_s)
         }
     }
 
     /// The bank about the mode that leads as the nominal one, once it is certain and no radio head is in doubt;
     /// nothing is known of it at `now_s`. What the others' likelihoods had in common with its own is taken off them.
-    pub fn rebased(&self, now_s: f64, config: &IntegrityConfig) -> Option<Self> {
+    pub fn rebased(&self, now_s: f64) -> Option<Self> {
         let leading = self.leading()?;
         let is_certain = (leading.mode.becomes_nominal_at).is_some_and(|it| leading.odds() > it);
-        let is_quiet = self.faulty() == 0
-            && self.in_doubt(CLEARED) == 0
-            && self.quiet_s(now_s) > config.recovery_s;
+        let is_quiet =
+            self.faulty() == 0 && self.in_doubt(CLEARED) == 0 && self.quiet_s(now_s) > RECOVERY_S;
         (is_certain && is_quiet).then(|| self.about(leading, now_s))
     }
 
@@ -233,11 +223,16 @@ impl Bank {
         let mut modes: Vec<ModeFilter> = others.cloned().collect();
         for it in &mut modes {
             it.ratio = it.ratio.to(nominal.ratio);
-            it.carry(it.mode.on_rebase, &nominal.ekf, None, &self.faults);
+            it.carry(
+                it.mode.on_rebase,
+                &nominal.ekf,
+                None,
+                &self.settings.fault_probability,
+            );
         }
         Self {
             noise: self.noise.resumed(),
-            ..Self::with(&nominal.ekf, &self.heads, &self.faults, modes, now_s)
+            ..Self::with(&nominal.ekf, &self.heads, &self.settings, modes, now_s)
         }
     }
 
@@ -454,7 +449,7 @@ impl Bank {
 
     /// Excludes the radio head that is at fault, where two others remain to agree without it, and
     /// readmits those that have come to agree again.
-    pub fn judge(&mut self, now_s: f64, config: &IntegrityConfig) {
+    pub fn judge(&mut self, now_s: f64) {
         for head in 0..self.heads.len() {
             let disagrees = self.statistic(head) > CLEARED;
             let Some(disagreed_s) = self.disagreed_s.get_mut(head) else {
@@ -462,12 +457,14 @@ impl Bank {
             };
             if disagrees {
                 *disagreed_s = now_s;
-            } else if now_s - *disagreed_s > config.recovery_s && self.is_faulty(head) {
+            } else if now_s - *disagreed_s > RECOVERY_S && self.is_faulty(head) {
                 self.readmit(head);
             }
         }
         // A wrong choice is itself a fault, and must be as rare as the risk under one.
-        let odds = -2.0 * config.risk_under_fault().ln();
+        let head = self.settings.fault_probability.of_radio_head(false);
+        let risk = (self.settings.risk_per_epoch() / head).min(MOST_UNDER_FAULT);
+        let odds = -2.0 * risk.ln();
         if let Some(faulty_head) = self.faulty_head(odds) {
             self.exclude(faulty_head);
         }
@@ -523,7 +520,12 @@ impl Bank {
         }
         let known = self.heads.get(faulty_head);
         for it in &mut self.modes {
-            it.carry(it.mode.on_exclude, &self.nominal, known, &self.faults);
+            it.carry(
+                it.mode.on_exclude,
+                &self.nominal,
+                known,
+                &self.settings.fault_probability,
+            );
         }
         self.subsets.exclude(faulty_head, &self.heads);
     }
@@ -552,7 +554,7 @@ mod tests {
     use crate::geometry::Pose;
     use crate::localize::ekf::EkfConfig;
     use crate::localize::pose_estimate::InitialPose;
-    use crate::settings::{FaultProbability, Shipped, Site, TomlFile, Vehicle};
+    use crate::settings::{Shipped, Site, TomlFile, Vehicle};
 
     /// A minute of driving past four radio heads, of which number 2 is off by `bias_rad`; what was
     /// measured goes to `sinks`.
@@ -613,7 +615,7 @@ mod tests {
         for &head in without {
             alone.set_excluded(&heads[head], true);
         }
-        let mut bank = Bank::new(&ekf().0, &heads, &FaultProbability::default(), 0.0);
+        let mut bank = Bank::new(&ekf().0, &heads, &IntegritySettings::default(), 0.0);
         drive(bias_rad, |odometry, head, measured| {
             if let Some(sample) = odometry {
                 bank.odometry(sample);

@@ -14,6 +14,9 @@ const MOST_LEAD: f64 = 3.0;
 pub(super) const DETECTED: f64 = 5.5;
 pub(super) const CLEARED: f64 = 3.5;
 
+/// After this time without disagreement a source counts as sound again (s).
+pub(in crate::localize) const RECOVERY_S: f64 = 5.0;
+
 /// Exponentially weighted averages of the innovations that a radio head's angles would bring to a
 /// filter that does not use them, each beside the variance it has when nothing is wrong.
 #[derive(Clone, Copy, Debug, PartialEq, Default)]

@@ -73,6 +73,33 @@ impl LikelihoodRatio {
     }
 }
 
+/// Log-likelihood of an angle, relative to one that has but its own noise and is predicted exactly: so places can be
+/// compared.
+///
+/// Angles that are not independent have a variance that says so: they cost nothing, however that
+/// variance differs from place to place. Where a time-correlated bias is estimated, an angle counts
+/// by its independent share. Angles that the gate refuses, or of an excluded radio head, are outliers.
+pub(in crate::localize) fn log_likelihood(
+    ekf: &Ekf,
+    predicted: &Result<PredictedMeasurement, UpdateReason>,
+) -> f64 {
+    let Ok(predicted) = predicted else {
+        return 0.0;
+    };
+    if ekf.is_with_bias() {
+        let jumps = predicted.hypotheses.as_ref();
+        let density = jumps.map_or(TAU.recip(), |jumps| jumps.density);
+        let exact = (TAU * predicted.own_variance).sqrt().recip();
+        return predicted.independent_share() * (density / exact).ln();
+    }
+    let innovation = predicted.innovation;
+    if predicted.excluded || innovation.mahalanobis2() > ekf.config().gate {
+        return (OUTLIERS / TAU).ln();
+    }
+    let growth = innovation.variance / innovation.measurement_variance;
+    -0.5 * (innovation.mahalanobis2() + growth.ln())
+}
+
 /// Variance (rad²) of an angle by all but the belief, were the radio head not heard before.
 fn first_variance(ekf: &Ekf, predicted: &PredictedMeasurement) -> f64 {
     ekf.first_variance(predicted) + ekf.systematic_variance(predicted)

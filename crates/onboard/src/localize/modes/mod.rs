@@ -2,7 +2,6 @@
 //! them, the test of each radio head, and how noisy the angles are heard to be.
 
 mod bank;
-mod config;
 mod head_test;
 mod likelihood;
 mod noise_ratio;
@@ -10,6 +9,9 @@ mod subsets;
 mod table;
 
 pub(in crate::localize) use bank::Bank;
-pub use config::IntegrityConfig;
 pub use head_test::HeadTest;
+pub(in crate::localize) use head_test::RECOVERY_S;
+pub(in crate::localize) use likelihood::log_likelihood;
+#[cfg(test)]
+pub(in crate::localize) use table::trip;
 pub(in crate::localize) use table::{ModeId, may_mislead};

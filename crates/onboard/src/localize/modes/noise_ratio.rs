@@ -16,16 +16,16 @@ const OF_MOST: f64 = 0.995_007;
 const CORE: f64 = 1.5;
 const OF_CORE: f64 = 0.778_465;
 
-/// Mean squared difference between successive innovations of a radio head, over what it ought to be
-/// (von Neumann 1941); that of each, and of all. What is off by as much each time, as a fault makes it, does not show
-/// in it.
-#[derive(Debug, PartialEq)]
-pub struct NoiseRatio {
-    heads: Vec<HeadNoise>,
-    of_all: Ratio,
+clone_in_place! {
+    /// Mean squared difference between successive innovations of a radio head, over what it ought to be
+    /// (von Neumann 1941); that of each, and of all. What is off by as much each time, as a fault makes it, does not show
+    /// in it.
+    #[derive(Debug, PartialEq)]
+    pub struct NoiseRatio {
+        heads: Vec<HeadNoise>,
+        of_all: Ratio,
+    }
 }
-
-clone_in_place!(NoiseRatio { heads, of_all });
 
 /// What was heard of a radio head.
 #[derive(Clone, Copy, Debug, PartialEq)]

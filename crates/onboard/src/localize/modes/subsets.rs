@@ -18,20 +18,16 @@ const LEAST_WATCHED: usize = 4;
 /// Radio heads from which on two are left out: which of two disagrees nobody can tell.
 const LEAST_FOR_PAIRS: usize = 3;
 
-/// The filter without one or two radio heads, and the test of each against it.
-#[derive(Debug)]
-pub(super) struct SubsetFilter {
-    /// Numbers of the radio heads left out; the same twice where it is one.
-    pub without: [usize; 2],
-    pub tests: [HeadTest; 2],
-    pub ekf: Ekf,
+clone_in_place! {
+    /// The filter without one or two radio heads, and the test of each against it.
+    #[derive(Debug)]
+    pub(super) struct SubsetFilter {
+        /// Numbers of the radio heads left out; the same twice where it is one.
+        pub without: [usize; 2],
+        pub tests: [HeadTest; 2],
+        pub ekf: Ekf,
+    }
 }
-
-clone_in_place!(SubsetFilter {
-    without,
-    tests,
-    ekf
-});
 
 impl SubsetFilter {
     pub fn lacks(&self, head: usize) -> bool {

@@ -237,6 +237,50 @@ pub(in crate::localize) fn may_mislead(config: &EkfConfig) -> bool {
     config.estimates_bias() && !config.is_bias_usual()
 }
 
+/// A trip past four radio heads at 4 m/s, for tests.
+#[cfg(test)]
+pub(in crate::localize) mod trip {
+    use std::sync::Arc;
+
+    use crate::localize::ekf::{Ekf, EkfConfig};
+    use crate::localize::measurement::AngleMeasurement;
+    use crate::localize::pose_estimate::InitialPose;
+    use crate::radio_head::RadioHead;
+    use crate::road::Road;
+    use crate::settings::{Shipped, Site, TomlFile, Vehicle};
+
+    /// Standard deviation of the angles (rad).
+    pub(in crate::localize) const SIGMA_RAD: f64 = 0.05;
+
+    /// The radio heads, the road, and the filter at its beginning.
+    pub(in crate::localize) fn trip() -> (Vec<RadioHead>, Road, Ekf) {
+        let site = Site::from_library("trip-4", &Shipped).unwrap();
+        let vehicle = Vehicle::from_library("carrier", &Shipped).unwrap();
+        let heads = RadioHead::heard(&site, &vehicle);
+        let road = site.build_road().unwrap().unwrap();
+        let start = InitialPose {
+            pose: road.pose(0.0),
+            position_std_m: 0.1,
+            heading_std_rad: 0.01,
+        };
+        let config = EkfConfig::new(&site, &vehicle);
+        let ekf = Ekf::new(config, Some(Arc::new(road.clone())), &heads, &start);
+        (heads, road, ekf)
+    }
+
+    /// An angle.
+    pub(in crate::localize) const fn angle(time_s: f64, phase_rad: f64) -> AngleMeasurement {
+        AngleMeasurement {
+            time_s,
+            phase_rad,
+            phase_sigma_rad: SIGMA_RAD,
+            angle_rad: f64::NAN,
+            snr_db: 20.0,
+            resolved: true,
+        }
+    }
+}
+
 #[cfg(test)]
 mod tests {
     use std::f64::consts::PI;
@@ -246,10 +290,11 @@ mod tests {
     use rand_distr::StandardNormal;
 
     use super::super::bank::Bank;
+    use super::trip::{SIGMA_RAD, angle, trip};
     use super::*;
     use crate::localize::ekf::state::{ALONG, DATUM};
-    use crate::localize::trip::{SIGMA_RAD, angle, trip};
     use crate::observation::OdometrySample;
+    use crate::settings::IntegritySettings;
 
     /// How the world departs from what is stated.
     #[derive(Default)]
@@ -266,15 +311,14 @@ mod tests {
         heard_until_s: f64,
     }
 
+    /// How far off a filter is at the end (m).
+    type Distance = Box<dyn Fn(&Ekf) -> f64>;
+
     /// So long past four radio heads in this world, whose angles are off by `off_rad` after so many metres: the bank
     /// then, and how far off its leading filter, and that of a mode, is.
-    fn drive(
-        world: &World,
-        until_s: f64,
-        off_rad: impl Fn(usize, f64) -> f64,
-    ) -> (Bank, Box<dyn Fn(&Ekf) -> f64>) {
+    fn drive(world: &World, until_s: f64, off_rad: impl Fn(usize, f64) -> f64) -> (Bank, Distance) {
         let (heads, road, ekf) = trip();
-        let mut bank = Bank::new(&ekf, &heads, &FaultProbability::default(), 0.0);
+        let mut bank = Bank::new(&ekf, &heads, &IntegritySettings::default(), 0.0);
         let mut noise = ChaCha8Rng::seed_from_u64(1);
         let mut distance_m = 0.0;
         for step in 1..(10.0 * until_s) as u32 {
