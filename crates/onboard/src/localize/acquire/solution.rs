@@ -9,34 +9,34 @@ use crate::observation::OdometrySample;
 use crate::radio_head::RadioHead;
 use crate::settings::IntegritySettings;
 
-/// A filter, guarded or not.
+/// One filter, or a monitored bank of them.
 #[derive(Debug)]
 pub(super) enum Solution {
-    /// It trusts its sources.
+    /// Its sources are taken at their word.
     Bare(Box<Ekf>),
-    /// It does not.
-    Guarded(Box<IntegrityMonitor>),
+    /// They are not.
+    Monitored(Box<IntegrityMonitor>),
 }
 
 impl Clone for Solution {
     fn clone(&self) -> Self {
         match self {
             Self::Bare(ekf) => Self::Bare(ekf.clone()),
-            Self::Guarded(guard) => Self::Guarded(guard.clone()),
+            Self::Monitored(monitor) => Self::Monitored(monitor.clone()),
         }
     }
 
     fn clone_from(&mut self, source: &Self) {
         match (self, source) {
             (Self::Bare(mine), Self::Bare(theirs)) => (**mine).clone_from(theirs),
-            (Self::Guarded(mine), Self::Guarded(theirs)) => (**mine).clone_from(theirs),
+            (Self::Monitored(mine), Self::Monitored(theirs)) => (**mine).clone_from(theirs),
             (mine, theirs) => *mine = theirs.clone(),
         }
     }
 }
 
 impl Solution {
-    /// A filter, guarded or not, that was given its place or found it at a time.
+    /// Of a filter that was given its place, or found it at a time (s).
     pub fn new(
         ekf: Ekf,
         heads: &[RadioHead],
@@ -44,7 +44,7 @@ impl Solution {
         found_s: Option<f64>,
     ) -> Self {
         match integrity {
-            Some(config) => Self::Guarded(Box::new(IntegrityMonitor::new(
+            Some(config) => Self::Monitored(Box::new(IntegrityMonitor::new(
                 &ekf, heads, config, found_s,
             ))),
             None => Self::Bare(Box::new(ekf)),
@@ -55,7 +55,7 @@ impl Solution {
     pub fn ekf(&self) -> &Ekf {
         match self {
             Self::Bare(ekf) => ekf,
-            Self::Guarded(guard) => guard.ekf(),
+            Self::Monitored(monitor) => monitor.ekf(),
         }
     }
 
@@ -63,7 +63,7 @@ impl Solution {
     pub fn worst_case(&self) -> &Ekf {
         match self {
             Self::Bare(ekf) => ekf,
-            Self::Guarded(guard) => guard.worst_case(),
+            Self::Monitored(monitor) => monitor.worst_case(),
         }
     }
 
@@ -71,7 +71,7 @@ impl Solution {
     pub const fn begun_s(&self) -> f64 {
         match self {
             Self::Bare(_) => f64::NEG_INFINITY,
-            Self::Guarded(guard) => guard.begun_s(),
+            Self::Monitored(monitor) => monitor.begun_s(),
         }
     }
 
@@ -79,7 +79,7 @@ impl Solution {
     pub fn may_mislead(&self) -> bool {
         match self {
             Self::Bare(ekf) => may_mislead(ekf.config()),
-            Self::Guarded(monitor) => monitor.may_mislead(),
+            Self::Monitored(monitor) => monitor.may_mislead(),
         }
     }
 
@@ -87,7 +87,7 @@ impl Solution {
     pub const fn noise_ratio(&self) -> f64 {
         match self {
             Self::Bare(_) => 1.0,
-            Self::Guarded(guard) => guard.noise_ratio(),
+            Self::Monitored(monitor) => monitor.noise_ratio(),
         }
     }
 
@@ -95,7 +95,7 @@ impl Solution {
     pub fn odometry(&mut self, sample: &OdometrySample) -> OdometryVerdict {
         match self {
             Self::Bare(ekf) => ekf.odometry(sample),
-            Self::Guarded(guard) => guard.odometry(sample),
+            Self::Monitored(monitor) => monitor.odometry(sample),
         }
     }
 
@@ -103,7 +103,7 @@ impl Solution {
     pub fn update(&mut self, head: &RadioHead, measured: &AngleMeasurement) -> UpdateVerdict {
         match self {
             Self::Bare(ekf) => ekf.update(head, measured),
-            Self::Guarded(guard) => guard.update(head, measured),
+            Self::Monitored(monitor) => monitor.update(head, measured),
         }
     }
 
@@ -111,11 +111,11 @@ impl Solution {
     pub fn pose(&self, time_s: f64) -> PoseEstimate {
         match self {
             Self::Bare(ekf) => ekf.pose(time_s),
-            Self::Guarded(guard) => guard.pose(time_s),
+            Self::Monitored(monitor) => monitor.pose(time_s),
         }
     }
 
-    /// Keeps a journal, where there is no guard, whose filters take each other's place.
+    /// Keeps a journal, where there is no bank, whose filters take each other's place.
     pub fn keep_journal(&mut self) {
         if let Self::Bare(ekf) = self {
             ekf.keep_journal();

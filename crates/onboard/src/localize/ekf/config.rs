@@ -72,7 +72,7 @@ pub struct EkfConfig {
     pub acceleration_mps2: f64,
     /// Acceleration that the vehicle cannot do: the odometer slipped (m/s²).
     pub slip_acceleration_mps2: f64,
-    /// Whether the odometer may slip without a leap.
+    /// Whether the odometer may slip without a jump of the speed.
     pub may_slip: bool,
     /// Standard deviation of a reading of the speed (m/s).
     pub speed_noise_mps: f64,
@@ -231,7 +231,7 @@ impl EkfConfig {
         } else {
             UNKNOWN_BIAS_PROBABILITY
         });
-        // Without a guard there is no filter beside this one.
+        // Without integrity monitoring there is no filter beside this one.
         let is_alone = vehicle.integrity.is_none() && receiver.phase_bias_probability.is_some();
         let is_usual = is_alone || bias_probability >= LEAST_USUAL_BIAS_PROBABILITY;
         let mut config = Self {

@@ -3,8 +3,9 @@
 
 use super::angle_model::{AngleModel, locate};
 use super::config::PhaseBias;
-use super::filter::{Ekf, MOST_STEPS};
+use super::filter::Ekf;
 use super::motion::{Reading, Step};
+use super::predict::MOST_STEPS;
 use super::smoother::Journal;
 use super::state::{Belief, SCALE, STATES};
 use crate::localize::bias;

@@ -14,6 +14,8 @@
 //! those two can vouch for, grows with the distance driven, and passes the alert limit unless they
 //! are good.
 
+use std::cell::RefCell;
+
 use super::protection_level::{Hypothesis, LevelEquation};
 use crate::clone_in_place::clone_in_place;
 use crate::geometry::{Pose, wrap_angle};
@@ -85,6 +87,8 @@ clone_in_place! {
     pub struct IntegrityMonitor {
         settings: IntegritySettings,
         level: LevelEquation,
+        /// Those of the newest level: room that is kept.
+        hypotheses: RefCell<Vec<Hypothesis>>,
         bank: Bank,
         restarted: Option<Restarted>,
         /// The previous solution.
@@ -124,6 +128,7 @@ impl IntegrityMonitor {
         let found_s = found_s.unwrap_or(f64::NEG_INFINITY);
         Self {
             level: LevelEquation::new(settings.risk_per_epoch()),
+            hypotheses: RefCell::default(),
             trusted_m: ekf.driven_m(),
             bank: Bank::new(ekf, heads, &settings, found_s),
             restarted: None,
@@ -287,7 +292,10 @@ impl IntegrityMonitor {
 
     /// Protection level and state at `time_s`.
     pub fn integrity(&self, time_s: f64) -> Integrity {
-        let levels = self.level.solve(&self.hypotheses(&self.bank, time_s));
+        let mut hypotheses = self.hypotheses.borrow_mut();
+        hypotheses.clear();
+        hypotheses.extend(self.hypotheses_of(&self.bank, time_s).map(|(_, it)| it));
+        let levels = self.level.solve(&hypotheses);
         let state = if self.bank.is_outvoted() && !self.bank.explains_heads() {
             IntegrityState::Unavailable
         } else if self.now_s - self.fault_s <= RECOVERY_S
@@ -311,7 +319,7 @@ impl IntegrityMonitor {
 
     /// Whether the error is within the alert limit but for the risk.
     fn is_near(&self, bank: &Bank, time_s: f64) -> bool {
-        let hypotheses = self.hypotheses(bank, time_s);
+        let hypotheses = self.hypotheses_of(bank, time_s).map(|(_, it)| it);
         self.level.holds(self.settings.alert_limit_m, hypotheses)
     }
 
@@ -320,7 +328,7 @@ impl IntegrityMonitor {
         &self,
         bank: &'a Bank,
         time_s: f64,
-    ) -> impl Iterator<Item = (&'a Ekf, Hypothesis)> + Clone {
+    ) -> impl Iterator<Item = (&'a Ekf, Hypothesis)> {
         let told = bank.leader().pose(time_s);
         let heard_noise_ratio = bank.noise_ratio();
         let negligible = NEGLIGIBLE * self.level.risk();
@@ -332,10 +340,6 @@ impl IntegrityMonitor {
                 let hypothesis = Hypothesis::new(probability, &pose, noise_ratio, &told);
                 hypothesis.map(|it| (right, it))
             })
-    }
-
-    fn hypotheses(&self, bank: &Bank, time_s: f64) -> impl Iterator<Item = Hypothesis> + Clone {
-        (self.hypotheses_of(bank, time_s)).map(|(_, hypothesis)| hypothesis)
     }
 }
 

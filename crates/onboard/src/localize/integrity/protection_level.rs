@@ -187,12 +187,12 @@ impl LevelEquation {
     }
 
     /// The levels that hold for all of the hypotheses together.
-    pub fn solve(&self, hypotheses: &(impl Iterator<Item = Hypothesis> + Clone)) -> Levels {
-        let total: f64 = hypotheses.clone().map(|it| it.probability).sum();
+    pub fn solve(&self, hypotheses: &[Hypothesis]) -> Levels {
+        let total: f64 = hypotheses.iter().map(|it| it.probability).sum();
         let at_none = (total / self.risk).ln();
         // A deviation of t leaves exp(−t²/2) at most in a circle: that far, all of them are within.
         let deviations = (2.0 * at_none).max(0.0).sqrt();
-        let reach_m = (hypotheses.clone())
+        let reach_m = (hypotheses.iter())
             .map(|it| it.distance_m() + deviations * it.std_m)
             .fold(0.0, f64::max);
         let mut brackets = [Bracket::new(reach_m, at_none); 3];
@@ -200,9 +200,9 @@ impl LevelEquation {
             let [circle_m, along_m, across_m] = brackets.map(|it| it.next().sqrt());
             let is_open = brackets.map(|it| it.is_open());
             let mut beyond = [0.0; 3];
-            for one in hypotheses.clone() {
+            for one in hypotheses {
                 if is_open[0] {
-                    beyond[0] += self.share_beyond(circle_m, &one);
+                    beyond[0] += self.share_beyond(circle_m, one);
                 }
                 if is_open[1] {
                     beyond[1] += one.probability * one.beyond_along(along_m);
@@ -301,7 +301,7 @@ mod tests {
     }
 
     fn levels(risk: f64, hypotheses: &[Hypothesis]) -> Levels {
-        LevelEquation::new(risk).solve(&hypotheses.iter().copied())
+        LevelEquation::new(risk).solve(hypotheses)
     }
 
     #[test]
