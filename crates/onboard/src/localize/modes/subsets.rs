@@ -230,3 +230,41 @@ pub(super) fn exclude(ekf: &mut Ekf, head: Option<&RadioHead>, excluded: bool) {
         ekf.set_excluded(head, excluded);
     }
 }
+
+#[cfg(test)]
+mod tests {
+    use super::super::table::trip::trip;
+    use super::*;
+
+    #[test]
+    fn filters_are_those_of_the_radio_heads_heard_lately() {
+        let (known, _, ekf) = trip();
+        let heads: Vec<RadioHead> = (0..8).map(|pci| RadioHead { pci, ..known[0] }).collect();
+        for keeps_first in [false, true] {
+            let mut subsets = Subsets::new(heads.len());
+            let mut hear = |head: usize| {
+                subsets.hear(head, &heads, &ekf, |it, _| keeps_first && it == 0);
+                subsets.clone()
+            };
+            for head in 0..4 {
+                hear(head);
+            }
+            // One and two of five.
+            assert_eq!(hear(4).iter().count(), 5 + 10);
+            for _ in 0..10 {
+                for head in 1..5 {
+                    hear(head);
+                }
+            }
+            // The first is not heard lately, and its filters end as another one is heard.
+            let now = hear(5);
+            assert_eq!(now.get(0, 0).is_some(), keeps_first);
+            assert_eq!(now.get(3, 0).is_some(), keeps_first);
+            assert!(now.get(1, 5).is_some());
+            let watched = if keeps_first { 6 } else { 5 };
+            assert_eq!(now.iter().count(), watched * (watched + 1) / 2);
+            let order: Vec<_> = now.iter().map(|it| (!it.is_of_one(), it.without)).collect();
+            assert!(order.is_sorted());
+        }
+    }
+}
