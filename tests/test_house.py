@@ -127,7 +127,7 @@ def test_no_two_files_of_a_crate_import_each_other(crate: str) -> None:
 
 def test_the_page_on_the_house_names_files_that_are_there() -> None:
     page = (ROOT / "docs/architecture.md").read_text(encoding="utf-8")
-    for row in re.findall(r"^\| (?:a|an) .*$", page, re.M):
+    for row in re.findall(r"^\| (?:a|an) .*\|.*\|.*\|.*\|$", page, re.M):
         named = [path for path in re.findall(r"`([\w/.-]+\.(?:rs|toml))`", row) if "=" not in path]
         assert named or row.startswith("| array") or row.startswith("| an odometer"), row
         for path in named:
@@ -138,3 +138,15 @@ def test_the_page_on_the_house_names_files_that_are_there() -> None:
                 *ROOT.glob(f"crates/{path}"),
             ]
             assert found, f"{path} in: {row}"
+
+
+def test_where_is_what_names_files_that_are_there() -> None:
+    page = (ROOT / "docs/architecture.md").read_text(encoding="utf-8")
+    section = page.split("### Where is …?")[1].split("\n## ")[0]
+    answers = re.findall(r"^\| .+\? \| `([\w/.-]+)` \|$", section, re.M)
+    assert len(answers) >= 20
+    for path in answers:
+        assert (ROOT / "crates/onboard/src" / path).is_file(), path
+    stack = page.split("## The localizer")[1].split("### Fault modes")[0]
+    for path in re.findall(r"localize/[\w/.]+", stack):
+        assert (ROOT / "crates/onboard/src" / path).exists(), path

@@ -1,8 +1,18 @@
 //! Copying without allocation, where what is copied over has the same shape.
 
-/// Implements [`Clone`] field by field, and [`Clone::clone_from`] too: what a derive leaves out.
+/// Implements [`Clone`] field by field, and [`Clone::clone_from`] too, which a derive leaves out.
 macro_rules! clone_in_place {
-    ($type:ident { $($field:ident),+ }) => {
+    (
+        $(#[$meta:meta])*
+        $vis:vis struct $type:ident {
+            $($(#[$field_meta:meta])* $field_vis:vis $field:ident: $kind:ty),+ $(,)?
+        }
+    ) => {
+        $(#[$meta])*
+        $vis struct $type {
+            $($(#[$field_meta])* $field_vis $field: $kind),+
+        }
+
         impl Clone for $type {
             fn clone(&self) -> Self {
                 Self { $($field: self.$field.clone()),+ }

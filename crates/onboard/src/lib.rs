@@ -25,6 +25,7 @@ pub mod radio_head;
 pub mod receive;
 pub mod road;
 pub mod settings;
+pub mod thermal;
 pub mod wake_up;
 
 pub use pipeline::{Custom, Execution, Heard, Observed, OdometryDefect, Onboard, SsbSource};

@@ -4,16 +4,16 @@ use crate::BoxError;
 use crate::estimator::{self, AngleEstimator};
 use crate::geometry::Pose;
 use crate::link_budget::LinkBudget;
-use crate::localize::thermal::ThermalNoise;
-use crate::localize::tracker::{Calibration, Findings, OdometryVerdict};
+use crate::localize::ekf::{Calibration, EstimatedConstants};
 use crate::localize::{
-    self, AngleMeasurement, History, Localizer, PoseEstimate, Recovered, Sighted, Tracker,
-    UpdateReason, UpdateVerdict,
+    self, AngleMeasurement, AngleUpdate, Ekf, History, Localizer, OdometryVerdict, PoseEstimate,
+    Recovered, UpdateReason, UpdateVerdict,
 };
 use crate::manifold::Measurand;
 use crate::observation::{OdometrySample, SensedSsb, SsbObservation};
 use crate::radio_head::RadioHead;
 use crate::settings::{Check, Platform, SettingsError, Site, Vehicle, check_together};
+use crate::thermal::ThermalNoise;
 use crate::wake_up::{self, Situation, WakeUpPolicy};
 
 /// The pipeline on the vehicle. Nothing is allocated once it is warm.
@@ -31,7 +31,7 @@ pub struct Onboard {
     chosen: Vec<bool>,
     executions: Vec<Execution>,
     /// Those of them that are for the localizer.
-    burst: Vec<Sighted>,
+    burst: Vec<AngleUpdate>,
 }
 
 /// What does not change during a drive.
@@ -241,9 +241,9 @@ impl Onboard {
                 }
             }
             self.localizer.update(&mut self.burst)?;
-            for sighted in &self.burst {
-                if let Some(execution) = self.executions.get_mut(sighted.number) {
-                    execution.verdict = sighted.verdict;
+            for update in &self.burst {
+                if let Some(execution) = self.executions.get_mut(update.number) {
+                    execution.verdict = update.verdict;
                 }
             }
         }
@@ -281,7 +281,7 @@ impl Onboard {
         };
         let verdict = UpdateVerdict::unused(reason);
         if let (Some(&head), Some(measured)) = (head, measured) {
-            self.burst.push(Sighted {
+            self.burst.push(AngleUpdate {
                 number: self.executions.len(),
                 head,
                 measured,
@@ -322,13 +322,13 @@ impl Onboard {
 
     /// How far the array has come from its survey, where the localizer looks for it.
     pub fn calibration(&self) -> Option<Calibration> {
-        let tracker = self.localizer.localizer().tracker();
-        tracker.map(Tracker::calibration)
+        let tracker = self.localizer.localizer().ekf();
+        tracker.map(Ekf::calibration)
     }
 
     /// What the drive has shown of odometer, yaw rate and clock, where the localizer looks for it.
-    pub fn findings(&self) -> Option<Findings> {
-        let mut findings = self.localizer.localizer().tracker()?.findings();
+    pub fn findings(&self) -> Option<EstimatedConstants> {
+        let mut findings = self.localizer.localizer().ekf()?.findings();
         findings.lateness_s.stated += self.lateness_s;
         findings.lateness_s.found += self.lateness_s;
         Some(findings)
@@ -343,7 +343,7 @@ impl Onboard {
     /// Where the vehicle was at each odometry sample since the journal was begun, by everything
     /// that is known now; nowhere without journal, or without tracker.
     pub fn smoothed(&self) -> Vec<PoseEstimate> {
-        let tracker = self.localizer.localizer().tracker();
-        tracker.map(Tracker::smoothed).unwrap_or_default()
+        let tracker = self.localizer.localizer().ekf();
+        tracker.map(Ekf::smoothed).unwrap_or_default()
     }
 }

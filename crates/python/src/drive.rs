@@ -7,7 +7,7 @@ use numpy::{PyArray1, PyReadonlyArray1};
 use onboard::Execution;
 use onboard::geometry::Pose;
 use onboard::localize::AngleMeasurement;
-use onboard::localize::tracker::Finding;
+use onboard::localize::ekf::EstimatedConstant;
 use onboard::settings::{Site as CoreSite, Vehicle as CoreVehicle};
 use pyo3::exceptions::PyValueError;
 use pyo3::prelude::*;
@@ -383,23 +383,24 @@ impl LocatedDrive {
     /// `constant_unit`, `stated_value`, `found_value` and `found_value_std`; empty where the localizer does not look for it.
     #[getter]
     fn findings<'py>(&self, py: Python<'py>) -> PyResult<Bound<'py, PyDict>> {
-        let rows: Vec<(&str, &str, Finding)> = self.core.findings.map_or_else(Vec::new, |it| {
-            vec![
-                ("odometer.scale", "1", it.odometer_scale),
-                ("gyroscope.scale", "1", it.yaw_rate_scale),
-                ("gyroscope.bias_radps", "rad/s", it.yaw_rate_bias_radps),
-                ("array.mounting_rad", "rad", it.mounting_rad),
-                ("array.phase_rad", "rad", it.phase_rad),
-                ("receiver.lateness_s", "s", it.lateness_s),
-            ]
-        });
+        let rows: Vec<(&str, &str, EstimatedConstant)> =
+            self.core.findings.map_or_else(Vec::new, |it| {
+                vec![
+                    ("odometer.scale", "1", it.odometer_scale),
+                    ("gyroscope.scale", "1", it.yaw_rate_scale),
+                    ("gyroscope.bias_radps", "rad/s", it.yaw_rate_bias_radps),
+                    ("array.mounting_rad", "rad", it.mounting_rad),
+                    ("array.phase_rad", "rad", it.phase_rad),
+                    ("receiver.lateness_s", "s", it.lateness_s),
+                ]
+            });
         let columns = PyDict::new(py);
         columns.set_item("constant", rows.iter().map(|it| it.0).collect::<Vec<_>>())?;
         columns.set_item(
             "constant_unit",
             rows.iter().map(|it| it.1).collect::<Vec<_>>(),
         )?;
-        let column = |value: fn(&Finding) -> f64| {
+        let column = |value: fn(&EstimatedConstant) -> f64| {
             PyArray1::from_iter(py, rows.iter().map(|(.., finding)| value(finding)))
         };
         columns.set_item("stated_value", column(|it| it.stated))?;

@@ -9,7 +9,7 @@ use onboard::BoxError;
 use onboard::energy::EstimateCost;
 use onboard::estimator::{AngleEstimator, EstimatedAngle};
 use onboard::geometry::Pose;
-use onboard::localize::tracker::OdometryVerdict;
+use onboard::localize::OdometryVerdict;
 use onboard::localize::{AngleMeasurement, Localizer, PoseEstimate, UpdateReason, UpdateVerdict};
 use onboard::manifold::Measurand;
 use onboard::observation::{OdometrySample, SensedSsb as CoreSensed, SsbObservation};

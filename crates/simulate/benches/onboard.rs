@@ -6,12 +6,13 @@ use std::f64::consts::TAU;
 
 use nr_ssb::{BchPayload, Beam, Burst, Case, Complex32, Lmax, Mib, Numerology, Ofdm, Pci};
 use onboard::estimator::{EstimatedAngle, built_in};
-use onboard::localize::tracker::{InitialPose, TrackerConfig};
-use onboard::localize::{AngleMeasurement, Tracker};
+use onboard::localize::InitialPose;
+use onboard::localize::ekf::EkfConfig;
+use onboard::localize::{AngleMeasurement, Ekf};
 use onboard::observation::OdometrySample;
 use onboard::radio_head::RadioHead;
 use onboard::receive::{Receiver, ReceiverConfig, Window};
-use onboard::settings::{Shipped, Site, TomlFile, Vehicle};
+use onboard::settings::{IntegritySettings, Shipped, Site, TomlFile, Vehicle};
 use rand_distr::{Distribution, StandardNormal};
 use simulate::random::{Purpose, Streams};
 
@@ -96,19 +97,19 @@ fn samples_to_angle(bencher: divan::Bencher, pilots: &str) {
 
 /// With and without a map, and where errors that stay over metres are found.
 #[divan::bench(args = [(true, false), (false, false), (true, true)])]
-fn angle_to_pose(bencher: divan::Bencher, (map, finds_errors): (bool, bool)) {
+fn angle_to_pose(bencher: divan::Bencher, (map, estimates_bias): (bool, bool)) {
     let (site, mut vehicle) = believed("trip-2");
-    vehicle.receiver.phase_bias_probability = Some(if finds_errors { 0.75 } else { 0.0 });
+    vehicle.receiver.phase_bias_probability = Some(if estimates_bias { 0.75 } else { 0.0 });
     let road = site.build_road().unwrap().unwrap();
     let heads = RadioHead::heard(&site, &vehicle);
-    let config = TrackerConfig::new(&site, &vehicle);
+    let config = EkfConfig::new(&site, &vehicle);
     let start = InitialPose {
         pose: road.pose(0.0),
         position_std_m: 1.0,
         heading_std_rad: 0.05,
     };
     let known = map.then(|| std::sync::Arc::new(road));
-    let mut tracker = Tracker::new(config, known, &heads, &start);
+    let mut tracker = Ekf::new(config, known, &heads, &start);
     let mut at = |metres: f64| {
         tracker.odometry(&OdometrySample {
             time_s: 0.25 * metres,
@@ -132,4 +133,46 @@ fn angle_to_pose(bencher: divan::Bencher, (map, finds_errors): (bool, bool)) {
     bencher
         .with_inputs(|| tracker.clone())
         .bench_local_refs(|tracker| tracker.update(&heads[0], divan::black_box(&measured)));
+}
+
+/// One SSB of each of four radio heads and an odometry sample, guarded and bare, and the position after it.
+#[divan::bench(args = [true, false])]
+fn burst_to_pose(bencher: divan::Bencher, guarded: bool) {
+    let (site, mut vehicle) = believed("trip-4");
+    vehicle.integrity = guarded.then(IntegritySettings::default);
+    let road = site.build_road().unwrap().unwrap();
+    let heads = RadioHead::heard(&site, &vehicle);
+    let mut localizer = onboard::localize::built_in(&site, &vehicle, road.pose(0.0)).unwrap();
+    let mut number = 0;
+    let mut next = || {
+        // To and fro, so that the road does not end.
+        let time_s = 0.02 * f64::from(number);
+        let way_m = 100.0 - 100.0 * (0.04 * time_s).cos();
+        number += 1;
+        let odometry = localizer.odometry(&OdometrySample {
+            time_s,
+            distance_m: way_m,
+            speed_mps: 4.0 * (0.04 * time_s).sin(),
+            yaw_rate_radps: None,
+        });
+        odometry.unwrap();
+        let pose = road.pose(way_m);
+        for head in &heads {
+            let angle_rad = pose.point().bearing_rad(head.position) - pose.heading_rad;
+            let measured = AngleMeasurement {
+                time_s,
+                phase_rad: 0.5 * TAU * angle_rad.cos(),
+                phase_sigma_rad: 0.05,
+                angle_rad,
+                snr_db: 20.0,
+                resolved: true,
+            };
+            localizer.update(head, &measured).unwrap();
+        }
+        localizer.pose(time_s).unwrap()
+    };
+    for _ in 0..1000 {
+        next();
+    }
+    bencher.bench_local(next);
 }

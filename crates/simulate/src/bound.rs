@@ -9,22 +9,23 @@
 //!
 //! One angle has the variance of its thermal noise (the Cramér–Rao bound of the snapshots at the
 //! link budget's SNR) and that of the scatter, which successive looks share as
-//! [`ArrayModel::correlation`](onboard::localize::tracker::ArrayModel::correlation) says: its spectrum at the
+//! [`ArrayModel::correlation`](onboard::localize::ekf::ArrayModel::correlation) says: its spectrum at the
 //! line of sight stands for white noise, as it may where the state changes little in a wavelength.
 //! Where the scenario has traced paths, K is theirs at each place, and a radio head without a line of
 //! sight says nothing.
 
 use onboard::geometry::{Point, Pose};
+use onboard::localize::ekf::EkfConfig;
+use onboard::localize::ekf::angle_model::{AngleModel, RoadFrame};
+use onboard::localize::ekf::motion::{Reading, Step};
+use onboard::localize::ekf::state::{ACROSS, ALONG, Belief, CURVATURE, HEADING, SCALE, STATES};
 use onboard::localize::gaussian::{Gaussian, Matrix, identity, product};
-use onboard::localize::thermal::ThermalNoise;
-use onboard::localize::tracker::motion::{Reading, Step};
-use onboard::localize::tracker::sighting::{Footing, Sighting};
-use onboard::localize::tracker::state::{ACROSS, ALONG, Belief, CURVATURE, HEADING, SCALE, STATES};
-use onboard::localize::tracker::{InitialPose, Tracker, TrackerConfig};
+use onboard::localize::{Ekf, InitialPose};
 use onboard::manifold::scatter_bound;
 use onboard::radio_head::RadioHead;
 use onboard::road::Road;
 use onboard::settings::{Check, SettingsError};
+use onboard::thermal::ThermalNoise;
 
 use crate::channel::Paths;
 use crate::ideal_filter::IdealFilter;
@@ -55,7 +56,7 @@ pub struct BoundPoint {
 /// What the bound of a scenario is made of.
 #[derive(Clone, Debug)]
 pub struct Bound {
-    config: TrackerConfig,
+    config: EkfConfig,
     map: bool,
     road: Road,
     motion: MotionProfile,
@@ -95,7 +96,7 @@ impl Bound {
             }
         });
         Ok(Self {
-            config: TrackerConfig::new(site, vehicle),
+            config: EkfConfig::new(site, vehicle),
             map: site.road.is_some() && vehicle.follows_road(),
             motion: MotionProfile::new(&scenario.motion, vehicle, road.length_m()),
             heads: RadioHead::heard(site, vehicle),
@@ -122,7 +123,7 @@ impl Bound {
 
     /// The bound at each SSB of the drive, every SSB being used.
     pub fn along_route(&self) -> Vec<BoundPoint> {
-        let scatter = |travelled_m, sighting: &Sighting| {
+        let scatter = |travelled_m, sighting: &AngleModel| {
             scatter_bound(self.config.rician_k, sighting.aperture)
                 * (self.config.array).correlation(travelled_m, sighting.toward)
         };
@@ -136,7 +137,7 @@ impl Bound {
     /// A filter that makes the errors the tracker says it makes, at every `stride`-th SSB.
     pub fn ideal_filter(&self, stride: usize) -> IdealFilter {
         let scatter =
-            |travelled_m, sighting: &Sighting| self.config.look_variance(travelled_m, sighting);
+            |travelled_m, sighting: &AngleModel| self.config.look_variance(travelled_m, sighting);
         let mut filter = IdealFilter::default();
         let (mut since, mut before) = (identity(), [[0.0; STATES]; STATES]);
         let mut number = 0;
@@ -156,11 +157,11 @@ impl Bound {
     /// became of an error since the one before.
     fn walk(
         &self,
-        scatter: impl Fn(f64, &Sighting) -> f64,
+        scatter: impl Fn(f64, &AngleModel) -> f64,
         mut visit: impl FnMut(&Matrix<STATES>, &Belief, f64, f64),
     ) {
         let map = self.map.then_some(&self.road);
-        let mut belief = Tracker::prior(&self.config, map, &self.start);
+        let mut belief = Ekf::prior(&self.config, map, &self.start);
         let mut last_look_m = f64::NEG_INFINITY;
         let mut before_m = self.motion.at(0.0).along_m;
         let steps = (self.motion.duration_s() / self.period_s).ceil() as usize + 1;
@@ -170,7 +171,7 @@ impl Bound {
             let mut transition = self.advance(&mut belief, along_m - before_m);
             before_m = along_m;
             let travelled_m = along_m - last_look_m;
-            let scatter = |sighting: &Sighting| scatter(travelled_m, sighting);
+            let scatter = |sighting: &AngleModel| scatter(travelled_m, sighting);
             self.listen(&mut belief, along_m, scatter, &mut transition);
             last_look_m = along_m;
             visit(&transition, &belief, time_s, along_m);
@@ -209,14 +210,14 @@ impl Bound {
         &self,
         belief: &mut Belief,
         along_m: f64,
-        scatter: impl Fn(&Sighting) -> f64,
+        scatter: impl Fn(&AngleModel) -> f64,
         transition: &mut Matrix<STATES>,
     ) {
         let pose = self.road.pose(along_m);
         let curvature_per_m = self.road.curvature_per_m(along_m);
-        let footing = if self.map {
+        let frame = if self.map {
             belief.mean[ALONG] = along_m;
-            Footing {
+            RoadFrame {
                 direction_rad: pose.heading_rad,
                 stretch: 1.0,
                 curvature_per_m,
@@ -226,11 +227,11 @@ impl Bound {
             belief.mean[ACROSS] = pose.y_m;
             belief.mean[HEADING] = pose.heading_rad;
             belief.mean[CURVATURE] = curvature_per_m;
-            Footing::PLANE
+            RoadFrame::PLANE
         };
         for (number, head) in self.heads.iter().enumerate() {
             let array = &self.config.array;
-            let sighting = Sighting::new(head, pose, &footing, &belief.mean, array);
+            let sighting = AngleModel::new(head, pose, &frame, &belief.mean, array);
             let fading = self.fading(number, pose.point());
             if let Some((sighting, fading)) = sighting.zip(fading) {
                 let row = sighting.row;
@@ -254,7 +255,7 @@ impl Bound {
     }
 
     /// Variance (rad²) of a look by thermal noise, at the sharpness that the array has there.
-    fn thermal_variance(&self, head: &RadioHead, sighting: &Sighting) -> f64 {
+    fn thermal_variance(&self, head: &RadioHead, sighting: &AngleModel) -> f64 {
         let mean = self.config.array.measurand.mean_aperture();
         self.thermal.variance(head, sighting.range_m) * (mean / sighting.aperture)
     }
@@ -319,7 +320,8 @@ impl Bound {
             };
             let array = &self.config.array;
             for (number, head) in self.heads.iter().enumerate() {
-                let sighting = Sighting::new(head, pose, &Footing::PLANE, &[0.0; STATES], array)?;
+                let sighting =
+                    AngleModel::new(head, pose, &RoadFrame::PLANE, &[0.0; STATES], array)?;
                 let Some(fading) = self.fading(number, place) else {
                     continue;
                 };

@@ -2,7 +2,7 @@
 
 use onboard::geometry::Pose;
 use onboard::localize::Integrity;
-use onboard::localize::tracker::Calibration;
+use onboard::localize::ekf::Calibration;
 use onboard::{Execution, Heard, Onboard};
 
 use crate::error::SimulationError;

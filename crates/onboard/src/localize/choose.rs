@@ -2,13 +2,11 @@
 
 use std::sync::Arc;
 
-use super::area::Area;
+use super::acquire::{Area, GaussianSum, Relocalizer};
 use super::dead_reckoning::DeadReckoning;
-use super::initialise::Initialiser;
+use super::ekf::{Ekf, EkfConfig};
 use super::localizer::Localizer;
-use super::recovery::Recovery;
-use super::search::Search;
-use super::tracker::{InitialPose, Tracker, TrackerConfig};
+use super::pose_estimate::InitialPose;
 use crate::geometry::Pose;
 use crate::radio_head::RadioHead;
 use crate::settings::{LocalizerSettings, SettingsError, Site, Vehicle};
@@ -33,20 +31,24 @@ pub fn built_in(
             localizer.by_azimuth()
         }));
     }
-    let config = TrackerConfig::new(site, vehicle);
+    let config = EkfConfig::new(site, vehicle);
     let heads = RadioHead::heard(site, vehicle);
-    let integrity = vehicle.integrity_monitor().as_ref().map(Into::into);
+    let integrity = vehicle.integrity_monitor();
     let road = site.build_road()?;
     let road = road.filter(|_| vehicle.follows_road());
     match road {
         Some(road) if !vehicle.start.known => {
             let either = vehicle.start.either_direction;
-            let search = Initialiser::new(config, road.clone(), either, &heads);
-            Ok(Box::new(Search::new(search, Some(road), integrity)))
+            let search = GaussianSum::new(config, road.clone(), either, &heads);
+            Ok(Box::new(Relocalizer::searching(
+                search,
+                Some(road),
+                integrity,
+            )))
         }
         None if !vehicle.start.known => {
-            let search = Initialiser::in_plane(config, Area::of_heads(&heads), &heads);
-            Ok(Box::new(Search::new(search, None, integrity)))
+            let search = GaussianSum::in_plane(config, Area::of_heads(&heads), &heads);
+            Ok(Box::new(Relocalizer::searching(search, None, integrity)))
         }
         road => {
             let start = InitialPose {
@@ -55,9 +57,9 @@ pub fn built_in(
                 heading_std_rad: vehicle.start.heading_std_rad,
             };
             let map = road.clone().map(Arc::new);
-            let tracker = Tracker::new(config, map, &heads, &start);
-            Ok(Box::new(Recovery::new(
-                tracker, road, &heads, integrity, None,
+            let ekf = Ekf::new(config, map, &heads, &start);
+            Ok(Box::new(Relocalizer::tracking(
+                ekf, road, &heads, integrity,
             )))
         }
     }

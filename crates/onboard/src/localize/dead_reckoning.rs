@@ -2,9 +2,8 @@
 //! Infrastructure, and Vehicle Trajectory Model").
 
 use super::localizer::{Localizer, copy_into};
-use super::measurement::{AngleMeasurement, UpdateReason, UpdateVerdict};
+use super::measurement::{AngleMeasurement, OdometryVerdict, UpdateReason, UpdateVerdict};
 use super::pose_estimate::PoseEstimate;
-use super::tracker::OdometryVerdict;
 use crate::BoxError;
 use crate::geometry::{Point, Pose, wrap_angle};
 use crate::observation::OdometrySample;

@@ -116,26 +116,35 @@ impl<const N: usize> Gaussian<N> {
     /// Covariance through a linearised motion, `P ← F P Fᵀ + Q`. The mean is the caller's, who
     /// knows the motion itself and not only its Jacobian.
     pub fn spread(&mut self, jacobian: &Matrix<N>, noise: &Matrix<N>) {
+        // `(F P)ᵀ`: jacobians of motion are nearly identity, most products are skipped.
         let mut left = [[0.0; N]; N];
         for i in 0..N {
+            let mut row = [0.0; N];
             for k in 0..N {
                 let f = jacobian[i][k];
-                // Jacobians of motion are nearly identity: most products are skipped.
                 if f != 0.0 {
                     for j in 0..N {
-                        left[i][j] += f * self.covariance[k][j];
+                        row[j] += f * self.covariance[k][j];
                     }
                 }
             }
+            for j in 0..N {
+                left[j][i] = row[j];
+            }
         }
-        for i in 0..N {
-            for j in i..N {
-                let mut sum = noise[i][j];
-                for k in 0..N {
-                    sum += left[i][k] * jacobian[j][k];
+        for j in 0..N {
+            let mut column: [f64; N] = std::array::from_fn(|i| noise[i][j]);
+            for k in 0..N {
+                let f = jacobian[j][k];
+                if f != 0.0 {
+                    for i in 0..N {
+                        column[i] += left[k][i] * f;
+                    }
                 }
-                self.covariance[i][j] = sum;
-                self.covariance[j][i] = sum;
+            }
+            for i in 0..=j {
+                self.covariance[i][j] = column[i];
+                self.covariance[j][i] = column[i];
             }
         }
     }

@@ -2,9 +2,9 @@
 
 use std::any::Any;
 
-use super::measurement::{AngleMeasurement, UpdateVerdict};
+use super::ekf::Ekf;
+use super::measurement::{AngleMeasurement, OdometryVerdict, UpdateVerdict};
 use super::pose_estimate::PoseEstimate;
-use super::tracker::{OdometryVerdict, Tracker};
 use crate::BoxError;
 use crate::observation::OdometrySample;
 use crate::radio_head::RadioHead;
@@ -68,15 +68,15 @@ pub trait Localizer: Any + Send {
         None
     }
 
-    /// The tracker in it, if it is one and knows where it is.
-    fn tracker(&self) -> Option<&Tracker> {
+    /// The filter in it, if it is one and knows where it is.
+    fn ekf(&self) -> Option<&Ekf> {
         None
     }
 
-    /// The tracker by whose uncertainty to listen: that of the fault that nothing speaks against yet, if
+    /// The filter by whose uncertainty to listen: that of the fault that nothing speaks against yet, if
     /// there is one.
-    fn doubtful(&self) -> Option<&Tracker> {
-        self.tracker()
+    fn worst_case(&self) -> Option<&Ekf> {
+        self.ekf()
     }
 
     /// Keeps from now on what smoothing takes, if it can be smoothed.

@@ -1,4 +1,4 @@
-//! Angles of arrival as localizers take them, and what becomes of them.
+//! What localizers take, and what becomes of it: angles of arrival and odometry.
 
 /// An angle of arrival as a localizer takes it.
 #[derive(Debug, Clone, Copy, PartialEq)]
@@ -73,5 +73,63 @@ impl UpdateReason {
             Self::TooLate => "too late",
             Self::Excluded => "excluded",
         }
+    }
+}
+
+/// What became of one odometry sample.
+#[derive(Clone, Copy, Debug, PartialEq)]
+pub enum OdometryVerdict {
+    /// Used.
+    Accepted,
+    /// The first one: it sets the origin of the distance.
+    First,
+    /// Used, after this many seconds without odometry.
+    AfterGap {
+        /// Length of the gap in seconds.
+        gap_s: f64,
+    },
+    /// Used, as in the plane: the vehicle has certainly driven off the end of the map.
+    BeyondMap {
+        /// How far from its end, in metres.
+        by_m: f64,
+    },
+    /// Used, as in the plane: the vehicle may be where the road was not surveyed.
+    InMapGap {
+        /// Where that stretch begins, along the road in metres.
+        from_m: f64,
+        /// Where it ends.
+        to_m: f64,
+    },
+    /// The distance jumped; the speed was used instead, with its uncertainty.
+    DistanceJump {
+        /// By how much, in metres.
+        jump_m: f64,
+    },
+    /// Used, but for its yaw rate, by which no vehicle turns: it turned on as before.
+    YawRateRefused {
+        /// What was read, in rad/s.
+        radps: f64,
+    },
+    /// Refused: the same time as the one before.
+    Duplicate,
+    /// Refused: older than the one before.
+    TimeBackwards,
+    /// Refused: a value that is not a number.
+    NotFinite,
+}
+
+impl OdometryVerdict {
+    /// Whether the sample moved the state.
+    pub const fn accepted(&self) -> bool {
+        matches!(
+            self,
+            Self::Accepted
+                | Self::First
+                | Self::AfterGap { .. }
+                | Self::BeyondMap { .. }
+                | Self::InMapGap { .. }
+                | Self::DistanceJump { .. }
+                | Self::YawRateRefused { .. }
+        )
     }
 }

@@ -1,37 +1,30 @@
 //! From odometry and angles to a pose. [`Localizer`] is the door for others; [`DeadReckoning`] is
 //! the smallest one to copy from.
+//!
+//! The built-in one, from the inside out: an extended Kalman filter ([`ekf`]) that may estimate a time-correlated
+//! bias of the angles ([`bias`]); a bank of such filters, one for each fault mode ([`modes`]); protection level and
+//! integrity state from their separation ([`integrity`]); acquisition of the first pose and relocalization
+//! ([`acquire`]); and measurements that come out of sequence ([`History`]).
 
-mod area;
+pub mod acquire;
+pub mod bias;
 mod choose;
-mod contest;
 mod dead_reckoning;
+pub mod ekf;
 pub mod gaussian;
-mod history;
-mod initialise;
 pub mod integrity;
-mod integrity_state;
 mod localizer;
 mod measurement;
+pub mod modes;
+mod out_of_sequence;
 mod pose_estimate;
 mod quantile;
-mod recovery;
-mod search;
-pub mod smoother;
-pub mod thermal;
-mod tracked;
-pub mod tracker;
-mod watch;
 
-pub use area::Area;
 pub use choose::built_in;
 pub use dead_reckoning::DeadReckoning;
-pub use history::{HISTORY_S, History, Sighted};
-pub use initialise::Initialiser;
-pub use integrity_state::{Integrity, IntegrityState};
+pub use ekf::Ekf;
 pub use localizer::{Localizer, Recovered, copy_into};
-pub use measurement::{AngleMeasurement, UpdateReason, UpdateVerdict};
-pub use pose_estimate::PoseEstimate;
+pub use measurement::{AngleMeasurement, OdometryVerdict, UpdateReason, UpdateVerdict};
+pub use out_of_sequence::{AngleUpdate, HISTORY_S, History};
+pub use pose_estimate::{InitialPose, Integrity, IntegrityState, PoseEstimate};
 pub use quantile::{RadialQuantile, normal_quantile};
-pub use recovery::Recovery;
-pub use search::Search;
-pub use tracker::Tracker;

@@ -22,12 +22,12 @@
 
 use super::policy::{SAME_TIME_S, Situation, WakeUpPolicy};
 use crate::BoxError;
-use crate::localize::thermal::ThermalNoise;
-use crate::localize::tracker::state::Belief;
-use crate::localize::{RadialQuantile, Tracker};
+use crate::localize::ekf::state::Belief;
+use crate::localize::{Ekf, RadialQuantile};
 use crate::observation::SensedSsb;
 use crate::radio_head::RadioHead;
 use crate::settings::{Site, UncertaintySettings, Vehicle};
+use crate::thermal::ThermalNoise;
 
 /// Longest wake-up time it looks ahead for, in seconds.
 const HORIZON_S: f64 = 20.0;
@@ -75,7 +75,7 @@ impl UncertaintyDriven {
     }
 
     /// Whether the error keeps the bound until the SSB after `time_s` without another angle.
-    pub fn keeps(&self, tracker: &Tracker, time_s: f64) -> bool {
+    pub fn keeps(&self, tracker: &Ekf, time_s: f64) -> bool {
         self.error_m(tracker, time_s + self.period_s) <= self.bound_m
     }
 
@@ -84,7 +84,7 @@ impl UncertaintyDriven {
     /// the next SSB. Where nothing keeps it, those worth their energy. `snr_db` is what a radio head at a distance is received with.
     fn choice(
         &self,
-        tracker: &Tracker,
+        tracker: &Ekf,
         time_s: f64,
         heads: &[RadioHead],
         snr_db: impl Fn(&RadioHead, f64) -> f64,
@@ -140,7 +140,7 @@ impl UncertaintyDriven {
 
     /// Time from `time_s` on for which the bound holds without another angle, in seconds: the
     /// latest wake-up.
-    fn wake_up_time_s(&self, tracker: &Tracker, time_s: f64) -> f64 {
+    fn wake_up_time_s(&self, tracker: &Ekf, time_s: f64) -> f64 {
         let holds =
             |periods: f64| self.error_m(tracker, time_s + periods * self.period_s) <= self.bound_m;
         let (mut low, mut high) = (0.0, (HORIZON_S / self.period_s).ceil());
@@ -158,9 +158,9 @@ impl UncertaintyDriven {
         (low * self.period_s).max(self.period_s)
     }
 
-    fn error_m(&self, tracker: &Tracker, time_s: f64) -> f64 {
+    fn error_m(&self, tracker: &Ekf, time_s: f64) -> f64 {
         let belief = tracker.forecast(time_s);
-        self.quantile.radius(Tracker::principal_variances(&belief))
+        self.quantile.radius(Ekf::principal_variances(&belief))
     }
 }
 
@@ -173,7 +173,7 @@ impl WakeUpPolicy for UncertaintyDriven {
         if !self.last_wake_up_s.is_none_or(is_free) {
             return Ok(false);
         }
-        let tracker = now.localizer.doubtful();
+        let tracker = now.localizer.worst_case();
         let headroom_db = self.snr_headroom_db.unwrap_or(0.0);
         let snr_db =
             |head: &RadioHead, distance_m| now.budget.snr_db(head, distance_m) + headroom_db;
@@ -187,7 +187,7 @@ impl WakeUpPolicy for UncertaintyDriven {
         chosen: &mut [bool],
     ) -> Result<f64, BoxError> {
         self.last_wake_up_s = Some(now.time_s);
-        let Some(tracker) = now.localizer.doubtful() else {
+        let Some(tracker) = now.localizer.worst_case() else {
             chosen.fill(true);
             return Ok(self.period_s);
         };
@@ -206,7 +206,7 @@ impl WakeUpPolicy for UncertaintyDriven {
     }
 
     fn keeps_bound(&self, now: &Situation<'_>) -> Option<bool> {
-        let tracker = now.localizer.tracker()?;
+        let tracker = now.localizer.ekf()?;
         Some(self.keeps(tracker, now.now_s))
     }
 }

@@ -2,8 +2,9 @@
 
 use std::sync::Arc;
 
-use onboard::localize::Tracker;
-use onboard::localize::tracker::{InitialPose, OdometryVerdict, TrackerConfig};
+use onboard::localize::Ekf;
+use onboard::localize::ekf::EkfConfig;
+use onboard::localize::{InitialPose, OdometryVerdict};
 use onboard::observation::OdometrySample;
 use onboard::road::Gap;
 use onboard::settings::{Shipped, Site, TomlFile, Vehicle};
@@ -13,7 +14,7 @@ const RADIUS_M: f64 = 200.0;
 const TURN_RAD: f64 = 0.1;
 
 /// A tracker on a straight road: 90 m of it, 80 m that nobody has surveyed, and 90 m again.
-fn tracker(at_m: f64, aside_m: f64, position_std_m: f64) -> (Tracker, Gap) {
+fn tracker(at_m: f64, aside_m: f64, position_std_m: f64) -> (Ekf, Gap) {
     let gap_m = 4.0 * RADIUS_M * TURN_RAD.sin();
     let road = format!(
         "like = 'trip-2'\n[road]\nsegments = [{{ length_m = 90.0 }}, \
@@ -36,8 +37,8 @@ fn tracker(at_m: f64, aside_m: f64, position_std_m: f64) -> (Tracker, Gap) {
         position_std_m,
         heading_std_rad: 0.01,
     };
-    let config = TrackerConfig::new(&site, &vehicle);
-    (Tracker::new(config, Some(map), &[], &start), gap)
+    let config = EkfConfig::new(&site, &vehicle);
+    (Ekf::new(config, Some(map), &[], &start), gap)
 }
 
 /// Odometry at 4 m/s.

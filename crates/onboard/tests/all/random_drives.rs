@@ -5,7 +5,7 @@ use std::fmt::Write as _;
 
 use onboard::geometry::Pose;
 use onboard::localize::{
-    AngleMeasurement, History, Sighted, UpdateReason, UpdateVerdict, built_in,
+    AngleMeasurement, AngleUpdate, History, UpdateReason, UpdateVerdict, built_in,
 };
 use onboard::observation::OdometrySample;
 use onboard::radio_head::RadioHead;
@@ -101,7 +101,7 @@ fn drive(seed: u64) {
                 snr_db: 20.0,
                 resolved: true,
             };
-            burst.push(Sighted {
+            burst.push(AngleUpdate {
                 number: burst.len(),
                 head: *head,
                 measured,

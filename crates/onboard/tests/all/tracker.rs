@@ -3,8 +3,9 @@
 use std::sync::Arc;
 
 use onboard::geometry::Pose;
-use onboard::localize::tracker::{InitialPose, OdometryVerdict, TrackerConfig};
-use onboard::localize::{AngleMeasurement, Tracker, UpdateReason};
+use onboard::localize::ekf::EkfConfig;
+use onboard::localize::{AngleMeasurement, Ekf, UpdateReason};
+use onboard::localize::{InitialPose, OdometryVerdict};
 use onboard::observation::OdometrySample;
 use onboard::radio_head::RadioHead;
 use onboard::road::Road;
@@ -18,7 +19,7 @@ fn road() -> Road {
     site().build_road().unwrap().unwrap()
 }
 
-fn tracker() -> (Tracker, RadioHead) {
+fn tracker() -> (Ekf, RadioHead) {
     let vehicle = Vehicle::from_library("paper-carrier", &Shipped).unwrap();
     let heads = RadioHead::heard(&site(), &vehicle);
     let start = InitialPose {
@@ -26,8 +27,8 @@ fn tracker() -> (Tracker, RadioHead) {
         position_std_m: 0.5,
         heading_std_rad: 0.01,
     };
-    let config = TrackerConfig::new(&site(), &vehicle);
-    let mut tracker = Tracker::new(config, Some(Arc::new(road())), &heads, &start);
+    let config = EkfConfig::new(&site(), &vehicle);
+    let mut tracker = Ekf::new(config, Some(Arc::new(road())), &heads, &start);
     assert_eq!(tracker.odometry(&sample(0.0, 0.0)), OdometryVerdict::First);
     assert_eq!(
         tracker.odometry(&sample(0.1, 0.4)),
@@ -146,7 +147,7 @@ fn beyond_the_end_of_the_map_it_drives_on_and_comes_back() {
     let length_m = road().length_m();
     let (mut tracker, _) = tracker();
     let (mut beyond, mut before) = (0, [0.0; 2]);
-    let across = |tracker: &Tracker, time_s: f64| tracker.pose(time_s).principal_variances();
+    let across = |tracker: &Ekf, time_s: f64| tracker.pose(time_s).principal_variances();
     // Out to 60 m beyond the end and back again, backwards.
     let turn_s = (length_m + 60.0) / 4.0;
     for number in 6..(2.0 * turn_s / 0.02) as u32 {
@@ -197,7 +198,7 @@ fn a_gap_loses_time_and_a_jump_loses_certainty() {
     ));
     // The counter is worthless, the speed is not: 2 s at 4 m/s.
     assert!((jump.pose(2.1).pose.x_m - 8.4).abs() < 0.05);
-    let variance = |tracker: &Tracker| tracker.pose(2.1).principal_variances()[0];
+    let variance = |tracker: &Ekf| tracker.pose(2.1).principal_variances()[0];
     assert!(variance(&jump) > variance(&gap) + 1.0);
 }
 
@@ -207,7 +208,7 @@ fn a_transition_makes_of_a_covariance_what_driving_on_makes_of_it() {
     let belief = *tracker.belief();
     for way_m in [0.0, 0.2, 4.0, 30.0] {
         let found = (tracker.transition(&belief, way_m)).principal_variances(&belief);
-        let expected = Tracker::principal_variances(&tracker.carry(belief, way_m));
+        let expected = Ekf::principal_variances(&tracker.carry(belief, way_m));
         for (found, expected) in found.into_iter().zip(expected) {
             let ratio = found / expected;
             assert!((ratio - 1.0).abs() < 1e-9, "{way_m} m: {ratio}");

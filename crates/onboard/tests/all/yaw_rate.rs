@@ -4,8 +4,9 @@ use std::f64::consts::TAU;
 use std::sync::Arc;
 
 use onboard::geometry::wrap_angle;
-use onboard::localize::Tracker;
-use onboard::localize::tracker::{InitialPose, TrackerConfig};
+use onboard::localize::Ekf;
+use onboard::localize::InitialPose;
+use onboard::localize::ekf::EkfConfig;
 use onboard::observation::OdometrySample;
 use onboard::road::Road;
 use onboard::settings::{Shipped, Site, TomlFile, Vehicle};
@@ -22,20 +23,20 @@ fn road() -> Road {
 
 /// A tracker with a good gyroscope and a poor odometer at the beginning of the road, with a map of
 /// it or without.
-fn tracker(map: bool, position_std_m: f64) -> Tracker {
+fn tracker(map: bool, position_std_m: f64) -> Ekf {
     let site = Site::from_library("trip-1", &Shipped).unwrap();
     let text = "name = 'tug'\n[gyroscope]\nnoise_rad_per_sqrt_s = 1e-4\n\
                 [odometer]\nrate_hz = 10.0\nnoise_m_per_sqrt_m = 0.1\n\
                 [lane_keeping]\nrms_m = 0.1\nwavelength_m = 30.0";
     let vehicle = Vehicle::from_toml(text, "vehicle.toml", &Shipped).unwrap();
-    let mut config = TrackerConfig::new(&site, &vehicle);
+    let mut config = EkfConfig::new(&site, &vehicle);
     config.yaw_rate_bias_std_radps = 0.0;
     let start = InitialPose {
         pose: road().pose(0.0),
         position_std_m,
         heading_std_rad: 0.001,
     };
-    Tracker::new(config, map.then(|| Arc::new(road())), &[], &start)
+    Ekf::new(config, map.then(|| Arc::new(road())), &[], &start)
 }
 
 #[test]

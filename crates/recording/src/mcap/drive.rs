@@ -13,7 +13,7 @@ use crate::file::Partial;
 use crate::replay::{LocatedDrive, LocatedPose, Remark};
 use onboard::Execution;
 use onboard::localize::IntegrityState;
-use onboard::localize::tracker::Calibration;
+use onboard::localize::ekf::Calibration;
 
 /// Topic of the poses.
 const POSE_TOPIC: &str = "/access_av/odometry";

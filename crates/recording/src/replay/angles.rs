@@ -2,8 +2,8 @@
 
 use onboard::BoxError;
 use onboard::estimator;
-use onboard::localize::thermal::ThermalNoise;
-use onboard::localize::tracker::TrackerConfig;
+use onboard::thermal::ThermalNoise;
+use onboard::localize::ekf::EkfConfig;
 use onboard::receive::{Receiver, ReceiverConfig};
 use onboard::settings::{Check, Site, Vehicle, check_together};
 
@@ -75,7 +75,7 @@ pub fn estimate_angles(
 
 /// Deviation (rad) that the scatter which a site states by its Rician K adds to an angle.
 pub fn scatter_sigma_rad(site: &Site, vehicle: &Vehicle) -> f64 {
-    let config = TrackerConfig::new(site, vehicle);
+    let config = EkfConfig::new(site, vehicle);
     let measurand = config.array.measurand;
     let variance = measurand.scatter_variance(config.rician_k, measurand.mean_aperture());
     variance.sqrt()

@@ -1,8 +1,9 @@
 //! A drive being replayed.
 
 use onboard::geometry::Pose;
+use onboard::localize::OdometryVerdict;
 use onboard::localize::Recovered;
-use onboard::localize::tracker::{Findings, OdometryVerdict};
+use onboard::localize::ekf::EstimatedConstants;
 use onboard::observation::OdometrySample;
 use onboard::settings::{Platform, Site, Vehicle};
 use onboard::{Custom, Execution, Onboard};
@@ -105,7 +106,7 @@ impl<'a> Replay<'a> {
             .poses
             .last()
             .map_or(0.0, |last| last.estimate.time_s);
-        let Findings {
+        let EstimatedConstants {
             odometer_scale,
             lateness_s,
             mounting_rad,

@@ -3,8 +3,8 @@
 use std::sync::Arc;
 
 use onboard::geometry::Pose;
-use onboard::localize::tracker::{InitialPose, Tracker, TrackerConfig};
-use onboard::localize::{self, Localizer};
+use onboard::localize::ekf::EkfConfig;
+use onboard::localize::{self, Ekf, InitialPose, Localizer};
 use onboard::radio_head::RadioHead;
 use onboard::settings::{Check, Site, Vehicle};
 
@@ -60,7 +60,7 @@ pub fn innovations(
 ///
 /// # Errors
 /// As [`innovations`].
-pub fn plain_filter(site: &Site, vehicle: &Vehicle) -> Result<Tracker, ReplayError> {
+pub fn plain_filter(site: &Site, vehicle: &Vehicle) -> Result<Ekf, ReplayError> {
     let start = InitialPose {
         pose: known_start(vehicle)?,
         position_std_m: vehicle.start.position_std_m,
@@ -68,8 +68,8 @@ pub fn plain_filter(site: &Site, vehicle: &Vehicle) -> Result<Tracker, ReplayErr
     };
     let heads = RadioHead::heard(site, vehicle);
     let road = site.build_road()?.filter(|_| vehicle.follows_road());
-    let config = TrackerConfig::new(site, vehicle);
-    Ok(Tracker::new(config, road.map(Arc::new), &heads, &start))
+    let config = EkfConfig::new(site, vehicle);
+    Ok(Ekf::new(config, road.map(Arc::new), &heads, &start))
 }
 
 /// The localizer that the vehicle's settings choose, with all that guards it.
@@ -121,14 +121,14 @@ pub fn replay_angles(
         while let Some(sample) = odometry.next_if(|sample| sample.time_s <= measured.time_s) {
             localizer.odometry(sample).map_err(ReplayError::Custom)?;
         }
-        let tracker = localizer.tracker();
+        let ekf = localizer.ekf();
         let mut step = Step {
-            pose: tracker.map(|tracker| tracker.pose(measured.time_s).pose),
+            pose: ekf.map(|ekf| ekf.pose(measured.time_s).pose),
             met: None,
         };
         let sends = |head: &&RadioHead| head.sends(logged.ssb.pci, logged.ssb.ssb_index);
         if let Some(head) = heads.iter().find(sends) {
-            let innovation = tracker.and_then(|tracker| tracker.innovation(head, &measured));
+            let innovation = ekf.and_then(|ekf| ekf.innovation(head, &measured));
             let wanted = used.is_none_or(|used| used.get(index).copied().unwrap_or(false));
             let accepted = wanted
                 && (localizer.update(head, &measured))

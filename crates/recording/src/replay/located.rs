@@ -5,7 +5,7 @@ use std::collections::btree_map::Entry;
 
 use onboard::Execution;
 use onboard::localize::PoseEstimate;
-use onboard::localize::tracker::{Calibration, Findings};
+use onboard::localize::ekf::{Calibration, EstimatedConstants};
 
 /// Where the vehicle was at one instant.
 #[derive(Debug, Clone, Copy, PartialEq)]
@@ -73,7 +73,7 @@ pub struct LocatedDrive {
     /// The poses as seen from the end of the drive, from the first known one on, where asked for.
     pub smoothed: Vec<LocatedPose>,
     /// What the drive showed of the vehicle by its end, where the localizer looks for it.
-    pub findings: Option<Findings>,
+    pub findings: Option<EstimatedConstants>,
     /// What was remarkable about single items of the input, in order of time.
     pub remarks: Vec<Remark>,
     /// What is wrong with the input as it was given; these are among the remarks too.

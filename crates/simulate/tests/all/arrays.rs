@@ -2,8 +2,8 @@
 
 use num_complex::Complex64;
 use onboard::geometry::wrap_angle;
-use onboard::localize::thermal::ThermalNoise;
 use onboard::settings::{ArraySettings, ArrayShape};
+use onboard::thermal::ThermalNoise;
 use simulate::Consistency;
 use simulate::bound::Bound;
 use simulate::random::Streams;

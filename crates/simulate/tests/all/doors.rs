@@ -7,13 +7,13 @@ use std::sync::Arc;
 use num_complex::Complex64;
 use onboard::estimator::{AngleEstimator, EstimatedAngle, built_in};
 use onboard::geometry::{Pose, wrap_angle};
-use onboard::localize::thermal::ThermalNoise;
-use onboard::localize::tracker::OdometryVerdict;
+use onboard::localize::OdometryVerdict;
 use onboard::localize::{
     AngleMeasurement, Localizer, PoseEstimate, UpdateReason, UpdateVerdict, copy_into,
 };
 use onboard::observation::{OdometrySample, SensedSsb, SsbObservation};
 use onboard::radio_head::RadioHead;
+use onboard::thermal::ThermalNoise;
 use onboard::wake_up::{Situation, WakeUpPolicy};
 use onboard::{BoxError, Custom};
 use simulate::channel::Propagation;

@@ -1,6 +1,6 @@
 //! The tracker on simulated drives.
 
-use onboard::localize::tracker::Calibration;
+use onboard::localize::ekf::Calibration;
 use onboard::settings::{ArraySettings, GyroscopeSettings};
 use simulate::bound::Bound;
 use simulate::random::Streams;

@@ -1,0 +1,504 @@
+//! A start from scratch: the vehicle hears radio heads, but does not know where it is.
+//!
+//! One filter for each metre of the road, and for each direction in which it may be driven; without
+//! a road, one for each square of the plane and each of twelve headings: a sum of
+//! Gaussians (Sorenson and Alspach 1971), each weighed by the likelihood of the angles. Those
+//! that fall far behind or leave the road are given up, those that meet become one. The vehicle is
+//! found when all that are left, taken as one Gaussian, know its place.
+
+use std::f64::consts::TAU;
+use std::sync::Arc;
+
+use crate::clone_in_place::clone_in_place;
+use crate::geometry::{Point, Pose, wrap_angle};
+use crate::localize::ekf::state::{ACROSS, ALONG, HEADING, STATES};
+use crate::localize::ekf::{Ekf, EkfConfig};
+use crate::localize::measurement::{
+    AngleMeasurement, OdometryVerdict, UpdateReason, UpdateVerdict,
+};
+use crate::localize::modes::log_likelihood;
+use crate::localize::pose_estimate::{InitialPose, PoseEstimate};
+use crate::observation::OdometrySample;
+use crate::radio_head::RadioHead;
+use crate::road::Road;
+
+/// Distance between the first hypotheses (m): within it an angle is linear enough to be followed,
+/// also into a narrow bend and out of it.
+const SPACING_M: f64 = 1.0;
+
+/// Log-likelihood by which a hypothesis may fall behind the best; e^−25 is one in 10¹¹.
+const BEHIND: f64 = 25.0;
+
+/// Standard deviation of the position, along its ellipse's longer axis, at which it is found (m).
+/// Another place 100 m away then has a probability of less than 2 in 100 000.
+const FOUND_STD_M: f64 = 0.4;
+
+/// Probability of the other direction of travel at which it is ruled out.
+const OTHER_WAY: f64 = 1e-5;
+
+/// Standard deviation of the heading at which it is found in the plane (rad).
+const FOUND_STD_RAD: f64 = 0.2;
+
+/// Headings of the first hypotheses in each square of the plane, and the most hypotheses.
+const HEADINGS: u32 = 12;
+const MOST_HYPOTHESES: f64 = 4000.0;
+
+/// Least weight beside the best, in the covariance that is reported, of a hypothesis that is left: the next
+/// angles may make it the best, and where it is is then five deviations away at most.
+const LEAST_WEIGHT: f64 = 0.05;
+
+/// A rectangle along the axes of the map.
+#[derive(Clone, Copy, Debug, PartialEq)]
+pub struct Area {
+    from: Point,
+    to: Point,
+}
+
+impl Area {
+    /// The square with this middle.
+    pub fn around(middle: Point, half_side_m: f64) -> Self {
+        Self {
+            from: Point::new(middle.x_m - half_side_m, middle.y_m - half_side_m),
+            to: Point::new(middle.x_m + half_side_m, middle.y_m + half_side_m),
+        }
+    }
+
+    /// Where the radio heads are, and a quarter of that to each side.
+    pub fn of_heads(heads: &[RadioHead]) -> Self {
+        let bounds = |along: fn(&RadioHead) -> f64| {
+            let values = || heads.iter().map(along);
+            let least = values().fold(f64::INFINITY, f64::min);
+            let most = values().fold(f64::NEG_INFINITY, f64::max);
+            (least, most)
+        };
+        let (west, east) = bounds(|head| head.position.x_m);
+        let (south, north) = bounds(|head| head.position.y_m);
+        let margin_m = 0.25 * (east - west).max(north - south);
+        Self {
+            from: Point::new(west - margin_m, south - margin_m),
+            to: Point::new(east + margin_m, north + margin_m),
+        }
+    }
+
+    /// Distance between places of which there are at most so many, but at least `least_m`.
+    pub fn spacing_m(&self, most_places: f64, least_m: f64) -> f64 {
+        let square_m2 = (self.to.x_m - self.from.x_m) * (self.to.y_m - self.from.y_m);
+        (square_m2 / most_places).sqrt().max(least_m)
+    }
+
+    /// The middles of its squares.
+    pub fn places(&self, spacing_m: f64) -> impl Iterator<Item = Point> {
+        let count = move |length_m: f64| (length_m / spacing_m).ceil().max(1.0) as u32;
+        let middle = move |number: u32| (f64::from(number) + 0.5) * spacing_m;
+        let (from, to) = (self.from, self.to);
+        let (columns, rows) = (count(to.x_m - from.x_m), count(to.y_m - from.y_m));
+        (0..columns).flat_map(move |column| {
+            (0..rows).map(move |row| Point::new(from.x_m + middle(column), from.y_m + middle(row)))
+        })
+    }
+}
+
+/// Where the vehicle may be.
+#[derive(Clone, Debug)]
+enum Ground {
+    Roads(Vec<Arc<Road>>),
+    Plane(Area),
+}
+
+clone_in_place! {
+    /// A hypothesis of where the vehicle is.
+    #[derive(Debug)]
+    struct Hypothesis {
+        /// Number of the road it drives on; 0 in the plane.
+        road: usize,
+        ekf: Ekf,
+        log_likelihood: f64,
+    }
+}
+
+impl Hypothesis {
+    /// Distance along its road, and the standard deviation of that (m).
+    fn along_m(&self) -> (f64, f64) {
+        let belief = self.ekf.belief();
+        (
+            belief.mean[ALONG],
+            belief.covariance[ALONG][ALONG].max(0.0).sqrt(),
+        )
+    }
+
+    /// Whether another one in the plane is within a deviation of it in each direction.
+    fn meets(&self, other: &Self) -> bool {
+        let (mine, yours) = (self.ekf.belief(), other.ekf.belief());
+        [ALONG, ACROSS, HEADING].into_iter().all(|state| {
+            let mut apart = mine.mean[state] - yours.mean[state];
+            if state == HEADING {
+                apart = wrap_angle(apart);
+            }
+            apart * apart < mine.covariance[state][state]
+        })
+    }
+
+    /// Takes in another hypothesis on the same road: the Gaussian of the same mean and covariance
+    /// as both together.
+    fn absorb(&mut self, other: &Self) {
+        let ratio = (other.log_likelihood - self.log_likelihood).exp();
+        let weight = ratio / (1.0 + ratio);
+        let (mut one, two) = (*self.ekf.belief(), other.ekf.belief());
+        let mut apart = two.mean;
+        for (apart, mean) in apart.iter_mut().zip(one.mean) {
+            *apart -= mean;
+        }
+        apart[HEADING] = wrap_angle(apart[HEADING]);
+        for i in 0..STATES {
+            one.mean[i] += weight * apart[i];
+            for j in 0..STATES {
+                one.covariance[i][j] += weight
+                    * (two.covariance[i][j] - one.covariance[i][j]
+                        + (1.0 - weight) * apart[i] * apart[j]);
+            }
+        }
+        self.ekf.set_belief(&one);
+        self.log_likelihood += ratio.ln_1p();
+    }
+}
+
+clone_in_place! {
+    /// The search for the first pose.
+    #[derive(Debug)]
+    pub struct GaussianSum {
+        config: EkfConfig,
+        ground: Ground,
+        heads: Vec<RadioHead>,
+        hypotheses: Vec<Hypothesis>,
+    }
+}
+
+impl GaussianSum {
+    /// The vehicle may be anywhere on `road`, driving along it or, where `either_direction`, also
+    /// against it.
+    pub fn new(config: EkfConfig, road: Road, either_direction: bool, heads: &[RadioHead]) -> Self {
+        let against = either_direction.then(|| Arc::new(road.reversed()));
+        let roads = [Arc::new(road)].into_iter().chain(against).collect();
+        Self::on(&config, Ground::Roads(roads), heads)
+    }
+
+    /// The vehicle may be anywhere in an area, heading anywhere.
+    pub fn in_plane(config: EkfConfig, area: Area, heads: &[RadioHead]) -> Self {
+        Self::on(&config, Ground::Plane(area), heads)
+    }
+
+    /// Whether all of an area is searched as finely as is useful.
+    pub fn is_small(area: Area) -> bool {
+        area.spacing_m(MOST_HYPOTHESES / f64::from(HEADINGS), SPACING_M) <= SPACING_M
+    }
+
+    /// Whether its filters have the states that a filter has which they are compared with.
+    pub fn is_of_the_model_of(&self, ekf: &Ekf) -> bool {
+        self.config.estimates_bias() == ekf.is_with_bias()
+    }
+
+    fn on(config: &EkfConfig, ground: Ground, heads: &[RadioHead]) -> Self {
+        let mut made = Self {
+            config: *config,
+            ground,
+            heads: heads.to_vec(),
+            hypotheses: Vec::new(),
+        };
+        made.restart();
+        made
+    }
+
+    /// Counts distances on from where another filter of the same vehicle does.
+    pub(super) fn resume(&mut self, other: &Ekf) {
+        for hypothesis in &mut self.hypotheses {
+            hypothesis.ekf.resume(other);
+        }
+    }
+
+    fn restart(&mut self) {
+        let roads = match &self.ground {
+            Ground::Roads(roads) => roads,
+            Ground::Plane(area) => {
+                let spacing_m = area.spacing_m(MOST_HYPOTHESES / f64::from(HEADINGS), SPACING_M);
+                let turn_rad = TAU / f64::from(HEADINGS);
+                for place in area.places(spacing_m) {
+                    self.hypotheses.extend((0..HEADINGS).map(|number| {
+                        let start = InitialPose {
+                            pose: Pose {
+                                x_m: place.x_m,
+                                y_m: place.y_m,
+                                heading_rad: wrap_angle(f64::from(number) * turn_rad),
+                            },
+                            position_std_m: 0.5 * spacing_m,
+                            heading_std_rad: 0.5 * turn_rad,
+                        };
+                        Hypothesis {
+                            road: 0,
+                            ekf: Ekf::new(self.config, None, &self.heads, &start),
+                            log_likelihood: 0.0,
+                        }
+                    }));
+                }
+                return;
+            }
+        };
+        for (number, road) in roads.iter().enumerate() {
+            let count = (road.length_m() / SPACING_M).ceil().max(1.0);
+            let spacing_m = road.length_m() / count;
+            let heads = &self.heads;
+            let hypothesis = |index: usize| {
+                let start = InitialPose {
+                    pose: road.pose((index as f64 + 0.5) * spacing_m),
+                    position_std_m: 0.5 * spacing_m,
+                    heading_std_rad: 1.0,
+                };
+                Hypothesis {
+                    road: number,
+                    ekf: Ekf::new(self.config, Some(road.clone()), heads, &start),
+                    log_likelihood: 0.0,
+                }
+            };
+            self.hypotheses.extend((0..count as usize).map(hypothesis));
+        }
+    }
+
+    /// Moves every hypothesis.
+    pub fn odometry(&mut self, sample: &OdometrySample) -> OdometryVerdict {
+        let ekfs = self.hypotheses.iter_mut();
+        ekfs.fold(OdometryVerdict::NotFinite, |_, hypothesis| {
+            hypothesis.ekf.odometry(sample)
+        })
+    }
+
+    /// Judges every hypothesis by an angle. The verdict is that of the likeliest.
+    pub fn update(&mut self, head: &RadioHead, measured: &AngleMeasurement) -> UpdateVerdict {
+        let mut first = UpdateVerdict::unused(UpdateReason::Unusable);
+        for (rank, hypothesis) in self.hypotheses.iter_mut().enumerate() {
+            let predicted = hypothesis.ekf.predict_measurement(head, measured);
+            hypothesis.log_likelihood += log_likelihood(&hypothesis.ekf, &predicted);
+            let verdict = hypothesis.ekf.update_predicted(predicted, measured);
+            if rank == 0 {
+                first = verdict;
+            }
+        }
+        self.prune();
+        first
+    }
+
+    fn prune(&mut self) {
+        let by_likelihood =
+            |a: &Hypothesis, b: &Hypothesis| b.log_likelihood.total_cmp(&a.log_likelihood);
+        self.hypotheses.sort_unstable_by(by_likelihood);
+        let best = self
+            .hypotheses
+            .first()
+            .map_or(0.0, |best| best.log_likelihood);
+        let ground = &self.ground;
+        let possible = |hypothesis: &Hypothesis| {
+            let Ground::Roads(roads) = ground else {
+                return true;
+            };
+            let (along_m, std_m) = hypothesis.along_m();
+            let length_m = roads
+                .get(hypothesis.road)
+                .map_or(0.0, |road| road.length_m());
+            (-3.0 * std_m..=length_m + 3.0 * std_m).contains(&along_m)
+        };
+        self.hypotheses
+            .retain(|hypothesis| possible(hypothesis) && hypothesis.log_likelihood > best - BEHIND);
+        let in_plane = matches!(self.ground, Ground::Plane(_));
+        let mut kept = 0;
+        for index in 0..self.hypotheses.len() {
+            let (better, rest) = self.hypotheses.split_at_mut(index);
+            let Some(hypothesis) = rest.first() else {
+                break;
+            };
+            let (along_m, std_m) = hypothesis.along_m();
+            let met = better.iter_mut().take(kept).find(|other| {
+                if in_plane {
+                    return hypothesis.meets(other);
+                }
+                other.road == hypothesis.road && (other.along_m().0 - along_m).abs() < std_m
+            });
+            if let Some(other) = met {
+                other.absorb(hypothesis);
+            } else {
+                self.hypotheses.swap(kept, index);
+                kept += 1;
+            }
+        }
+        self.hypotheses.truncate(kept);
+        if self.hypotheses.is_empty() {
+            // What seemed right has driven off the road.
+            self.restart();
+        }
+    }
+
+    /// The radio heads it listens to.
+    pub fn heads(&self) -> &[RadioHead] {
+        &self.heads
+    }
+
+    /// Number of hypotheses left.
+    pub fn left(&self) -> usize {
+        self.hypotheses.len()
+    }
+
+    /// Log-likelihood of the best hypothesis.
+    pub(super) fn best(&self) -> f64 {
+        self.hypotheses
+            .first()
+            .map_or(f64::NEG_INFINITY, |best| best.log_likelihood)
+    }
+
+    /// One filter for all hypotheses that are left, once they know the position.
+    pub fn found(&self) -> Option<Ekf> {
+        let all = self.mixture(f64::NEG_INFINITY, 0.0);
+        let is_placed = all.principal_variances()[0] < FOUND_STD_M * FOUND_STD_M;
+        let heading_known = match self.ground {
+            Ground::Roads(_) => true,
+            Ground::Plane(_) => {
+                let [.., [.., variance]] = all.covariance.unwrap_or_default();
+                variance < FOUND_STD_RAD * FOUND_STD_RAD
+            }
+        };
+        if !(is_placed && heading_known) {
+            return None;
+        }
+        let mut one = self.hypotheses.first()?.clone();
+        let best = one.log_likelihood;
+        let mut other_way = 0.0;
+        for hypothesis in self.hypotheses.iter().skip(1) {
+            if hypothesis.road == one.road {
+                one.absorb(hypothesis);
+            } else {
+                other_way += (hypothesis.log_likelihood - best).exp();
+            }
+        }
+        (other_way < OTHER_WAY).then_some(one.ekf)
+    }
+
+    /// Mean over all hypotheses, each weighed by its likelihood, and a covariance that covers what each of
+    /// them may come to: where the vehicle may be, which is far from Gaussian as long as several are left.
+    pub fn pose(&self, time_s: f64) -> PoseEstimate {
+        self.mixture(time_s, LEAST_WEIGHT)
+    }
+
+    /// Mean and covariance over all hypotheses, none of them weighing less than so much of the best in the
+    /// latter.
+    fn mixture(&self, time_s: f64, least_weight: f64) -> PoseEstimate {
+        let best = self
+            .hypotheses
+            .iter()
+            .map(|hypothesis| hypothesis.log_likelihood)
+            .fold(f64::NEG_INFINITY, f64::max);
+        let weighed = || {
+            self.hypotheses.iter().map(|hypothesis| {
+                let weight = (hypothesis.log_likelihood - best).exp();
+                (weight, hypothesis.ekf.pose(time_s))
+            })
+        };
+        let (mut total, mut x_m, mut y_m) = (0.0, 0.0, 0.0);
+        let (mut sin, mut cos) = (0.0, 0.0);
+        for (weight, PoseEstimate { pose, .. }) in weighed() {
+            total += weight;
+            x_m += weight * pose.x_m;
+            y_m += weight * pose.y_m;
+            sin += weight * pose.heading_rad.sin();
+            cos += weight * pose.heading_rad.cos();
+        }
+        let mean = Pose {
+            x_m: x_m / total,
+            y_m: y_m / total,
+            heading_rad: sin.atan2(cos),
+        };
+        let mut covariance = [[0.0; 3]; 3];
+        let mut total = 0.0;
+        for (weight, estimate) in weighed() {
+            let weight = weight.max(least_weight);
+            total += weight;
+            let pose = estimate.pose;
+            let off = [
+                pose.x_m - mean.x_m,
+                pose.y_m - mean.y_m,
+                wrap_angle(pose.heading_rad - mean.heading_rad),
+            ];
+            let own = estimate.covariance.unwrap_or_default();
+            for (row, (own, a)) in covariance.iter_mut().zip(own.iter().zip(off)) {
+                for (value, (own, b)) in row.iter_mut().zip(own.iter().zip(off)) {
+                    *value += weight * (own + a * b);
+                }
+            }
+        }
+        let covariance = covariance.map(|row| row.map(|value| value / total));
+        PoseEstimate {
+            time_s,
+            pose: mean,
+            covariance: Some(covariance),
+            integrity: None,
+        }
+    }
+}
+
+#[cfg(test)]
+mod tests {
+    use rand::{RngExt, SeedableRng};
+    use rand_chacha::ChaCha8Rng;
+    use rand_distr::StandardNormal;
+
+    use super::*;
+    use crate::settings::{Shipped, Site, TomlFile, Vehicle};
+
+    /// Drives from `start_m` until found; the error then, in metres and in standard deviations.
+    fn search(seed: u64) -> Option<(f64, f64)> {
+        let mut rng = ChaCha8Rng::seed_from_u64(seed);
+        let site = Site::from_library("trip-2", &Shipped).unwrap();
+        let vehicle = Vehicle::from_library("paper-carrier", &Shipped).unwrap();
+        let config = EkfConfig::new(&site, &vehicle);
+        let heads = RadioHead::heard(&site, &vehicle);
+        let map = site.build_road().unwrap().unwrap();
+        let start_m = rng.random::<f64>() * 200.0;
+        let mut search = GaussianSum::new(config, map.clone(), false, &heads);
+        for step in 0..1000 {
+            let time_s = f64::from(step) * 0.02;
+            let distance_m = 4.0 * time_s;
+            search.odometry(&OdometrySample {
+                time_s,
+                distance_m,
+                speed_mps: 4.0,
+                yaw_rate_radps: None,
+            });
+            let truth = map.pose(start_m + distance_m);
+            for head in &heads {
+                let bearing_rad = truth.point().bearing_rad(head.position);
+                let noise: f64 = rng.sample(StandardNormal);
+                let phase_rad =
+                    std::f64::consts::PI * (bearing_rad - truth.heading_rad).cos() + 0.1 * noise;
+                let measured = AngleMeasurement {
+                    time_s,
+                    phase_rad: wrap_angle(phase_rad),
+                    phase_sigma_rad: 0.001,
+                    angle_rad: f64::NAN,
+                    snr_db: 20.0,
+                    resolved: true,
+                };
+                search.update(head, &measured);
+            }
+            if let Some(ekf) = search.found() {
+                let estimate = ekf.pose(time_s);
+                let error_m = estimate.pose.point().distance_m(truth.point());
+                return Some((error_m, error_m / estimate.principal_variances()[0].sqrt()));
+            }
+        }
+        None
+    }
+
+    #[test]
+    fn two_heads_and_the_road_are_enough() {
+        let right = (0..100)
+            .filter_map(search)
+            .filter(|(error_m, sigmas)| *error_m < 2.0 && *sigmas < 4.5)
+            .count();
+        assert!(right >= 99, "{right} of 100");
+    }
+}

@@ -1,0 +1,10 @@
+//! The first pose, and the pose after the vehicle was lost.
+
+mod consistency;
+mod gaussian_sum;
+mod relocalization_test;
+mod relocalizer;
+mod solution;
+
+pub use gaussian_sum::{Area, GaussianSum};
+pub use relocalizer::Relocalizer;

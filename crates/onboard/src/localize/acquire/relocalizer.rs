@@ -1,0 +1,583 @@
+//! The state machine about the filter: it searches for the first pose, tracks, and searches again where it is lost.
+//!
+//! As long as angles come from where the filter predicts them, this only watches. When most of them
+//! do not, the position is declared unavailable, and a search runs beside the filter: about where it
+//! believes to be first, then wherever radio heads are, or along all of the road where there is one.
+//! Where angles may be off as if the vehicle were lost, the filter is only confirmed: the position stays what it is
+//! until the search finds a better place. A given place in the plane is a hypothesis like others, and is confirmed from
+//! the first angle on.
+//! What the search finds takes over only if the same angles are likelier there than at the filter's place: a restart
+//! that would be worse than what it replaces never happens. Meanwhile the covariance
+//! covers both; where the filter is refuted, a search nearby alone is reported. A bank that has begun anew
+//! by itself meanwhile is not searched for any more.
+
+use std::cmp::Ordering;
+use std::sync::Arc;
+
+use super::consistency::ConsistencyMonitor;
+use super::gaussian_sum::{Area, GaussianSum};
+use super::relocalization_test::RelocalizationTest;
+use super::solution::Solution;
+use crate::BoxError;
+use crate::clone_in_place::clone_in_place;
+use crate::geometry::wrap_angle;
+use crate::localize::ekf::Ekf;
+use crate::localize::localizer::{Localizer, Recovered, copy_into};
+use crate::localize::measurement::{
+    AngleMeasurement, OdometryVerdict, UpdateReason, UpdateVerdict,
+};
+use crate::localize::pose_estimate::{Integrity, IntegrityState, PoseEstimate};
+use crate::localize::quantile::RadialQuantile;
+use crate::observation::OdometrySample;
+use crate::radio_head::RadioHead;
+use crate::road::Road;
+use crate::settings::IntegritySettings;
+
+/// How far about the believed place is searched first (m), beyond three of its deviations.
+const NEARBY_M: f64 = 2.0;
+
+/// Most of three deviations that count as nearby (m).
+const MOST_NEARBY_M: f64 = 10.0;
+
+/// After a search that found no better place the next one waits so long (s).
+const REST_S: f64 = 10.0;
+
+/// Radio heads without which a place in the plane cannot be told from others.
+const LEAST_HEADS: usize = 3;
+
+/// What the localizer is at.
+#[derive(Clone, Copy, Debug, PartialEq, Eq)]
+enum Phase {
+    /// It searches for the first pose.
+    Searching,
+    /// It tracks from a given pose in the plane, which the first angle begins to confirm.
+    Given,
+    /// It tracks.
+    Tracking,
+    /// It tracks; a search runs beside it.
+    Confirming,
+    /// It is lost; a search runs beside it, nearby or wide.
+    Relocalizing { wide: bool },
+}
+
+/// What the next phase depends on.
+#[derive(Clone, Copy, Debug)]
+#[expect(
+    clippy::struct_excessive_bools,
+    reason = "each is a fact of its own; the phases are the state machine"
+)]
+struct Evidence {
+    /// Most radio heads' angles come from elsewhere than predicted.
+    is_lost: bool,
+    /// They come from where they are predicted.
+    is_consistent: bool,
+    /// They may come from elsewhere without the vehicle being lost.
+    may_mislead: bool,
+    /// The last search is long enough ago.
+    is_rested: bool,
+    /// Whether the angles are likelier at the best place searched, or at the filter's.
+    search: Ordering,
+    /// The search is of one place.
+    is_found: bool,
+    /// No odometry since the search is reported: before anything moves the covariance covers both.
+    is_just_reported: bool,
+    /// Enough way was driven for a find; a long one.
+    has_moved: bool,
+    has_moved_far: bool,
+    /// Angles were heard for long.
+    is_patient: bool,
+}
+
+/// What is done between two phases.
+#[derive(Clone, Copy, Debug, PartialEq, Eq)]
+enum Transition {
+    Stay,
+    /// A search begins.
+    Begin(Phase),
+    /// The search is reported.
+    Report,
+    /// Its find takes over.
+    TakeOver,
+    /// It ends, and the next may have to wait.
+    End {
+        rests: bool,
+    },
+}
+
+impl Phase {
+    fn next(self, by: &Evidence) -> Transition {
+        let is_ahead = by.search == Ordering::Greater;
+        // A diverged filter can become self-consistent: every other place must be less likely, too.
+        let is_confirmed = by.search == Ordering::Less && by.is_consistent;
+        match self {
+            Self::Tracking => match (by.is_lost && by.is_rested, by.may_mislead) {
+                (false, _) => Transition::Stay,
+                (true, true) => Transition::Begin(Self::Confirming),
+                (true, false) => Transition::Begin(Self::Relocalizing { wide: false }),
+            },
+            Self::Confirming => {
+                let is_long = by.is_patient || (by.may_mislead && by.has_moved_far);
+                if (is_ahead && by.has_moved) || (by.is_lost && !by.may_mislead) {
+                    Transition::Report
+                } else if !is_ahead && (is_confirmed || is_long || by.is_found) {
+                    Transition::End {
+                        rests: by.may_mislead,
+                    }
+                } else {
+                    Transition::Stay
+                }
+            }
+            Self::Relocalizing { .. } if by.is_just_reported => Transition::Stay,
+            Self::Relocalizing { .. } if is_ahead && !by.has_moved => Transition::Stay,
+            Self::Relocalizing { .. } if is_ahead && by.is_found => Transition::TakeOver,
+            Self::Relocalizing { .. } if is_confirmed || (!is_ahead && by.is_found) => {
+                Transition::End { rests: true }
+            }
+            Self::Relocalizing { wide: false } if by.is_patient => {
+                Transition::Begin(Self::Relocalizing { wide: true })
+            }
+            Self::Searching | Self::Given | Self::Relocalizing { .. } => Transition::Stay,
+        }
+    }
+}
+
+/// What does not change on the way.
+#[derive(Debug)]
+struct Setup {
+    road: Option<Road>,
+    heads: Vec<RadioHead>,
+    integrity: Option<IntegritySettings>,
+    quantile: RadialQuantile,
+}
+
+clone_in_place! {
+    /// The built-in localizer.
+    #[derive(Debug)]
+    pub struct Relocalizer {
+        setup: Arc<Setup>,
+        phase: Phase,
+        /// Of the first pose; `None` once that is found.
+        search: Option<GaussianSum>,
+        /// `None` until then.
+        solution: Option<Solution>,
+        consistency: ConsistencyMonitor,
+        /// Between the solution and a search, as long as that runs.
+        test: Option<RelocalizationTest>,
+        rests_until_s: f64,
+        recovered: Option<Recovered>,
+        keeps_journal: bool,
+    }
+}
+
+impl Relocalizer {
+    /// Tracks on from a filter of these radio heads; `road` is where the vehicle is searched for if it is lost.
+    pub fn tracking(
+        ekf: Ekf,
+        road: Option<Road>,
+        heads: &[RadioHead],
+        integrity: Option<IntegritySettings>,
+    ) -> Self {
+        let phase = if road.is_none() {
+            Phase::Given
+        } else {
+            Phase::Tracking
+        };
+        Self {
+            solution: Some(Solution::new(ekf, heads, integrity, None)),
+            ..Self::new(phase, road, heads, integrity)
+        }
+    }
+
+    /// Searches for the first pose.
+    pub fn searching(
+        search: GaussianSum,
+        road: Option<Road>,
+        integrity: Option<IntegritySettings>,
+    ) -> Self {
+        let made = Self::new(Phase::Searching, road, search.heads(), integrity);
+        Self {
+            search: Some(search),
+            ..made
+        }
+    }
+
+    fn new(
+        phase: Phase,
+        road: Option<Road>,
+        heads: &[RadioHead],
+        integrity: Option<IntegritySettings>,
+    ) -> Self {
+        Self {
+            phase,
+            search: None,
+            solution: None,
+            consistency: ConsistencyMonitor::new(heads),
+            test: None,
+            rests_until_s: f64::NEG_INFINITY,
+            recovered: None,
+            keeps_journal: false,
+            setup: Arc::new(Setup {
+                road,
+                heads: heads.to_vec(),
+                integrity,
+                quantile: RadialQuantile::new(integrity.unwrap_or_default().risk_per_epoch()),
+            }),
+        }
+    }
+
+    /// Tracks from now on what was found at a time (s).
+    fn track(&mut self, found: Ekf, now_s: f64) {
+        let setup = &self.setup;
+        let mut solution = Solution::new(found, &setup.heads, setup.integrity, Some(now_s));
+        if self.keeps_journal {
+            solution.keep_journal();
+        }
+        (self.solution, self.search) = (Some(solution), None);
+        self.end_search();
+        self.consistency.reset();
+    }
+
+    fn end_search(&mut self) {
+        (self.phase, self.test) = (Phase::Tracking, None);
+    }
+
+    /// Begins a search beside the solution.
+    fn begin(&mut self, phase: Phase, now_s: f64) {
+        let is_wide = phase == Phase::Relocalizing { wide: true };
+        let test = (self.solution.as_ref()).and_then(|solution| {
+            let search = self.search_about(solution, now_s, is_wide)?;
+            let may_mislead = solution.may_mislead();
+            Some(RelocalizationTest::new(search, solution.ekf(), may_mislead))
+        });
+        self.phase = if test.is_some() {
+            phase
+        } else {
+            Phase::Tracking
+        };
+        self.test = test;
+    }
+
+    /// A search nearby, or wherever radio heads are: at once where that is no more to look at.
+    fn search_about(&self, solution: &Solution, now_s: f64, is_wide: bool) -> Option<GaussianSum> {
+        let (ekf, heads) = (solution.ekf(), self.setup.heads.as_slice());
+        let mut config = *ekf.config();
+        if config.heard_noise_ratio.is_some() {
+            config.set_noise_ratio(Some(solution.noise_ratio()));
+        }
+        let all = || Area::of_heads(heads);
+        let mut search = match &self.setup.road {
+            Some(road) => GaussianSum::new(config, road.clone(), true, heads),
+            None if heads.len() < LEAST_HEADS => return None,
+            None if is_wide || GaussianSum::is_small(all()) => {
+                GaussianSum::in_plane(config, all(), heads)
+            }
+            None => {
+                let here = solution.pose(now_s);
+                let three_m = 3.0 * here.principal_variances()[0].sqrt();
+                let nearby_m = NEARBY_M + three_m.min(MOST_NEARBY_M);
+                let area = Area::around(here.pose.point(), nearby_m);
+                GaussianSum::in_plane(config, area, heads)
+            }
+        };
+        search.resume(ekf);
+        Some(search)
+    }
+
+    fn evidence(&self, solution: &Solution, now_s: f64) -> Evidence {
+        let (test, odometry_s) = (self.test.as_ref(), solution.ekf().time_s());
+        let is = |what: fn(&RelocalizationTest) -> bool| test.is_some_and(what);
+        let is_confirming = self.phase == Phase::Confirming;
+        Evidence {
+            is_lost: self.consistency.is_lost(),
+            is_consistent: self.consistency.is_sure(),
+            may_mislead: solution.may_mislead(),
+            is_rested: now_s >= self.rests_until_s,
+            search: test.map_or(Ordering::Equal, |it| it.compare(is_confirming)),
+            is_found: is(|it| it.search.found().is_some()),
+            is_just_reported: test.is_some_and(|it| it.reported_s == odometry_s),
+            has_moved: is(RelocalizationTest::has_moved),
+            has_moved_far: is(RelocalizationTest::has_moved_far),
+            is_patient: is(RelocalizationTest::is_patient),
+        }
+    }
+
+    /// Goes on to the next phase.
+    fn advance(&mut self, now_s: f64) {
+        let Some(solution) = &self.solution else {
+            return;
+        };
+        let odometry_s = solution.ekf().time_s();
+        let evidence = self.evidence(solution, now_s);
+        let is_ahead = evidence.search == Ordering::Greater;
+        let is_reported = matches!(self.phase, Phase::Relocalizing { .. });
+        if let (true, Some(test)) = (is_reported && !evidence.is_just_reported, &mut self.test) {
+            test.refutes = is_ahead && evidence.has_moved;
+        }
+        match self.phase.next(&evidence) {
+            Transition::Stay => {}
+            Transition::Begin(phase) => self.begin(phase, now_s),
+            Transition::Report => {
+                self.phase = Phase::Relocalizing { wide: false };
+                if let Some(test) = &mut self.test {
+                    test.report(odometry_s);
+                }
+            }
+            Transition::TakeOver => {
+                if let Some(found) = self.test.as_ref().and_then(|it| it.search.found()) {
+                    let (from, to) = (solution.pose(now_s).pose, found.pose(now_s).pose);
+                    self.recovered = Some(Recovered {
+                        time_s: now_s,
+                        moved_m: from.point().distance_m(to.point()),
+                        turned_rad: wrap_angle(to.heading_rad - from.heading_rad),
+                    });
+                    self.track(found, now_s);
+                }
+            }
+            Transition::End { rests } => {
+                if rests {
+                    self.rests_until_s = now_s + REST_S;
+                    self.consistency.reset();
+                }
+                self.end_search();
+            }
+        }
+    }
+}
+
+impl Localizer for Relocalizer {
+    fn odometry(&mut self, sample: &OdometrySample) -> Result<OdometryVerdict, BoxError> {
+        if let Some(search) = &mut self.search {
+            return Ok(search.odometry(sample));
+        }
+        if let Some(test) = &mut self.test {
+            test.search.odometry(sample);
+        }
+        let solution = self.solution.as_mut();
+        Ok(solution.map_or(OdometryVerdict::NotFinite, |it| it.odometry(sample)))
+    }
+
+    fn update(
+        &mut self,
+        head: &RadioHead,
+        measured: &AngleMeasurement,
+    ) -> Result<UpdateVerdict, BoxError> {
+        let now_s = measured.time_s;
+        if let Some(search) = &mut self.search {
+            let verdict = search.update(head, measured);
+            if let Some(found) = search.found() {
+                self.track(found, now_s);
+            }
+            return Ok(verdict);
+        }
+        // A search is of places as the filter that it is compared with predicts angles there.
+        let is_of_other_model = |test: &RelocalizationTest| {
+            (self.solution.as_ref()).is_some_and(|it| !test.search.is_of_the_model_of(it.ekf()))
+        };
+        if self.phase == Phase::Given || self.test.as_ref().is_some_and(is_of_other_model) {
+            self.begin(Phase::Confirming, now_s);
+        }
+        let Some(solution) = &mut self.solution else {
+            return Ok(UpdateVerdict::unused(UpdateReason::Unusable));
+        };
+        if let Some(test) = &mut self.test {
+            test.update(solution.ekf(), head, measured);
+        }
+        let begun_s = solution.begun_s();
+        let verdict = solution.update(head, measured);
+        let (has_begun_anew, noise_ratio) = (solution.begun_s() > begun_s, solution.noise_ratio());
+        if has_begun_anew && self.is_lost() {
+            // The filter that was lost is no more.
+            self.end_search();
+            self.consistency.reset();
+        }
+        self.consistency.see(head, &verdict, noise_ratio);
+        self.advance(now_s);
+        Ok(verdict)
+    }
+
+    fn pose(&self, time_s: f64) -> Result<PoseEstimate, BoxError> {
+        let quantile = &self.setup.quantile;
+        let Some(solution) = &self.solution else {
+            let mut estimate = self.search.as_ref().ok_or("no search")?.pose(time_s);
+            let level_m = quantile.radius(estimate.principal_variances());
+            estimate.integrity = (self.setup.integrity).map(|_| Integrity::unavailable(level_m));
+            return Ok(estimate);
+        };
+        let mut estimate = solution.pose(time_s);
+        if let (Phase::Relocalizing { wide }, Some(test)) = (self.phase, &self.test) {
+            let searched = test.search.pose(time_s);
+            // Along all of a road, or far about, its best place may be anywhere.
+            let is_near = self.setup.road.is_none() && !wide;
+            if is_near && test.refutes {
+                (estimate.pose, estimate.covariance) = (searched.pose, searched.covariance);
+            } else {
+                estimate.cover(&searched);
+            }
+            let level_m = quantile.radius(estimate.principal_variances());
+            if let Some(integrity) = &mut estimate.integrity {
+                integrity.state = IntegrityState::Unavailable;
+                integrity.raise(level_m);
+            }
+        }
+        Ok(estimate)
+    }
+
+    fn copy_to(&self, slot: &mut Option<Box<dyn Localizer>>) -> bool {
+        copy_into(self, slot)
+    }
+
+    fn hypotheses(&self) -> Option<usize> {
+        self.search.as_ref().map(GaussianSum::left)
+    }
+
+    fn is_lost(&self) -> bool {
+        matches!(self.phase, Phase::Relocalizing { .. })
+    }
+
+    fn recovered(&self) -> Option<Recovered> {
+        self.recovered
+    }
+
+    fn ekf(&self) -> Option<&Ekf> {
+        self.solution.as_ref().map(Solution::ekf)
+    }
+
+    fn worst_case(&self) -> Option<&Ekf> {
+        self.solution.as_ref().map(Solution::worst_case)
+    }
+
+    fn keep_journal(&mut self) {
+        self.keeps_journal = true;
+        if let Some(solution) = &mut self.solution {
+            solution.keep_journal();
+        }
+    }
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    /// Nothing speaks for anything.
+    const NONE: Evidence = Evidence {
+        is_lost: false,
+        is_consistent: false,
+        may_mislead: false,
+        is_rested: true,
+        search: Ordering::Equal,
+        is_found: false,
+        is_just_reported: false,
+        has_moved: false,
+        has_moved_far: false,
+        is_patient: false,
+    };
+
+    #[test]
+    fn phases_follow_the_table() {
+        use Ordering::{Greater, Less};
+        use Phase::{Confirming, Given, Relocalizing, Searching, Tracking};
+        use Transition::{Begin, End, Report, Stay, TakeOver};
+        let (near, wide) = (Relocalizing { wide: false }, Relocalizing { wide: true });
+        let (lost, found) = (true, true);
+        let is = |change: fn(&mut Evidence)| {
+            let mut evidence = NONE;
+            change(&mut evidence);
+            evidence
+        };
+        let ahead = |evidence: Evidence| Evidence {
+            search: Greater,
+            ..evidence
+        };
+        let behind = |evidence: Evidence| Evidence {
+            search: Less,
+            ..evidence
+        };
+        let is_lost = Evidence {
+            is_lost: lost,
+            ..NONE
+        };
+        let is_found = Evidence {
+            is_found: found,
+            ..NONE
+        };
+        let moved = is(|it| it.has_moved = true);
+        for (phase, evidence, expected) in [
+            (Searching, is_lost, Stay),
+            (Given, is_lost, Stay),
+            (Tracking, NONE, Stay),
+            (Tracking, is_lost, Begin(near)),
+            (
+                Tracking,
+                is(|it| (it.is_lost, it.is_rested) = (true, false)),
+                Stay,
+            ),
+            (
+                Tracking,
+                is(|it| (it.is_lost, it.may_mislead) = (true, true)),
+                Begin(Confirming),
+            ),
+            (Confirming, NONE, Stay),
+            (Confirming, is_lost, Report),
+            (
+                Confirming,
+                is(|it| (it.is_lost, it.may_mislead) = (true, true)),
+                Stay,
+            ),
+            (Confirming, ahead(NONE), Stay),
+            (Confirming, ahead(is_found), Stay),
+            (Confirming, ahead(moved), Report),
+            (Confirming, is_found, End { rests: false }),
+            (Confirming, behind(NONE), Stay),
+            (
+                Confirming,
+                behind(is(|it| it.is_consistent = true)),
+                End { rests: false },
+            ),
+            (
+                Confirming,
+                is(|it| it.is_patient = true),
+                End { rests: false },
+            ),
+            (Confirming, is(|it| it.has_moved_far = true), Stay),
+            (
+                Confirming,
+                is(|it| (it.has_moved_far, it.may_mislead) = (true, true)),
+                End { rests: true },
+            ),
+            (near, NONE, Stay),
+            (
+                near,
+                is(|it| (it.is_patient, it.is_just_reported) = (true, true)),
+                Stay,
+            ),
+            (near, is(|it| it.is_patient = true), Begin(wide)),
+            (near, ahead(is_found), Stay),
+            (
+                near,
+                ahead(Evidence {
+                    is_found: found,
+                    ..moved
+                }),
+                TakeOver,
+            ),
+            (near, is_found, End { rests: true }),
+            (
+                near,
+                behind(is(|it| it.is_consistent = true)),
+                End { rests: true },
+            ),
+            (wide, is(|it| it.is_patient = true), Stay),
+            (
+                wide,
+                ahead(Evidence {
+                    is_found: found,
+                    ..moved
+                }),
+                TakeOver,
+            ),
+            (wide, behind(NONE), Stay),
+        ] {
+            assert_eq!(phase.next(&evidence), expected, "{phase:?} by {evidence:?}");
+        }
+    }
+}

@@ -1,0 +1,626 @@
+//! The time-correlated biases of all radio heads' angles, estimated together with the state.
+//!
+//! State and biases stay one Gaussian, of the mean and covariance of the mixture over the jump hypotheses of an
+//! angle (generalised pseudo-Bayes of first order, Bar-Shalom, Li and Kirubarajan 2001,
+//! 11.6). With the state's covariance P, and the row H of an angle by state and value, the hypothesis of a
+//! value kept moves everything along `P Hᵀ`, that of a value drawn anew along the part of it that is the
+//! state's. So every covariance after an angle is a form of these two vectors.
+
+use super::jump_process::{JumpHypotheses, JumpProcess, MOST_VARIANCE};
+use crate::clone_in_place::clone_in_place;
+use crate::localize::ekf::smoother::Journal;
+use crate::localize::ekf::state::{Belief, STATES};
+use crate::localize::gaussian::{Innovation, Matrix, dot};
+
+/// Covariance of something with an angle: with the bias of its radio head, and without.
+pub(super) type CrossCovariance = [f64; 2];
+
+/// The update of means and covariances by the mixture over the jump hypotheses of an angle.
+pub(super) struct MixtureUpdate<'a> {
+    hypotheses: &'a JumpHypotheses,
+    /// By how much each past moves what varies with the angle, and both on average.
+    steps: [f64; 2],
+    means: [f64; 2],
+    /// What covariances grow by, by both vectors: the squares, and the product.
+    squares: [f64; 2],
+    product: f64,
+    /// How the value varies with the angle, what it is where it is kept, and by how much it is another one
+    /// where it is not.
+    cross_with_angle: f64,
+    kept_rad: f64,
+    apart_rad: f64,
+}
+
+impl<'a> MixtureUpdate<'a> {
+    /// By an angle that may have come about so, which the value, until then of this mean, varies with so.
+    pub fn new(hypotheses: &'a JumpHypotheses, value_rad: f64, cross_with_angle: f64) -> Self {
+        let all = [&hypotheses.kept, &hypotheses.anew];
+        let steps = all.map(|hypothesis| hypothesis.residual * hypothesis.gain);
+        // The mixture's covariance is that of its parts and of their means.
+        let both = hypotheses.kept.share * hypotheses.anew.share;
+        let square = |of: usize| both * steps[of] * steps[of] - all[of].share * all[of].narrowing;
+        let kept_rad = value_rad + steps[0] * cross_with_angle;
+        Self {
+            hypotheses,
+            steps,
+            means: [all[0].share * steps[0], all[1].share * steps[1]],
+            squares: [square(0), square(1)],
+            product: -both * steps[0] * steps[1],
+            cross_with_angle,
+            kept_rad,
+            apart_rad: kept_rad - hypotheses.mean_rad,
+        }
+    }
+
+    /// By how much the mean moves of what varies so with the angle.
+    pub fn step(&self, with: CrossCovariance) -> f64 {
+        self.means[0] * with[0] + self.means[1] * with[1]
+    }
+
+    /// By how much the covariance grows of what varies so and so with the angle.
+    pub fn more(&self, one: CrossCovariance, other: CrossCovariance) -> f64 {
+        self.squares[0] * one[0] * other[0]
+            + self.squares[1] * one[1] * other[1]
+            + self.product * (one[0] * other[1] + one[1] * other[0])
+    }
+
+    /// The covariance of the value with anything else.
+    pub fn value_covariance(&self, before: f64, with: CrossCovariance) -> f64 {
+        let (kept, anew) = (&self.hypotheses.kept, &self.hypotheses.anew);
+        kept.share * (before - kept.narrowing * self.cross_with_angle * with[0])
+            - anew.share * self.hypotheses.narrowing * with[1]
+            + kept.share
+                * anew.share
+                * self.apart_rad
+                * (self.steps[0] * with[0] - self.steps[1] * with[1])
+    }
+
+    /// The mean of the value.
+    pub fn value_mean(&self) -> f64 {
+        self.hypotheses.kept.share * self.kept_rad
+            + self.hypotheses.anew.share * self.hypotheses.mean_rad
+    }
+
+    /// The variance of the value, which was `before`.
+    pub fn value_variance(&self, before: f64) -> f64 {
+        let (kept, anew) = (&self.hypotheses.kept, &self.hypotheses.anew);
+        kept.share * (before - kept.narrowing * self.cross_with_angle * self.cross_with_angle)
+            + anew.share * self.hypotheses.variance
+            + kept.share * anew.share * self.apart_rad * self.apart_rad
+    }
+}
+
+/// The bias of one radio head.
+#[derive(Clone, Copy, Debug, PartialEq)]
+struct HeadBias {
+    size: JumpProcess,
+    /// The value (rad), and its covariance with the state.
+    mean_rad: f64,
+    state_covariance: [f64; STATES],
+    /// And with the newest measurement.
+    cross_with_angle: CrossCovariance,
+}
+
+impl HeadBias {
+    fn along(&self, row: &[f64; STATES]) -> f64 {
+        dot(&self.state_covariance, row)
+    }
+}
+
+clone_in_place! {
+    /// The biases of all radio heads; none where they are not estimated.
+    #[derive(Debug, PartialEq)]
+    pub struct CorrelatedBias {
+        heads: Vec<HeadBias>,
+        /// Covariance of the values with each other, row by row (rad²).
+        among: Vec<f64>,
+    }
+}
+
+impl CorrelatedBias {
+    /// Those of so many radio heads, of which nothing is known but their probability; none where that is 0.
+    pub fn new(radio_heads: usize, probability: f64) -> Self {
+        let count = if probability > 0.0 { radio_heads } else { 0 };
+        let unknown = HeadBias {
+            size: JumpProcess::new(probability),
+            mean_rad: 0.0,
+            state_covariance: [0.0; STATES],
+            cross_with_angle: CrossCovariance::default(),
+        };
+        Self {
+            heads: vec![unknown; count],
+            among: vec![0.0; count * count],
+        }
+    }
+
+    /// Whether none is estimated.
+    pub const fn is_empty(&self) -> bool {
+        self.heads.is_empty()
+    }
+
+    /// Drops the covariances with the state, which has been replaced.
+    pub fn decorrelate(&mut self) {
+        for head in &mut self.heads {
+            head.state_covariance = [0.0; STATES];
+        }
+    }
+
+    /// Whether a radio head's error is probably so large that it says next to nothing.
+    pub fn is_large(&self, head: usize) -> bool {
+        self.heads.get(head).is_some_and(|error| {
+            error.size.is_large() || error.mean_rad * error.mean_rad > MOST_VARIANCE
+        })
+    }
+
+    /// What errors are expected to add to the variance of an angle; see [`JumpProcess::variance`].
+    pub fn variance(&self, head: usize, travelled_m: f64, predicted_levels: f64) -> f64 {
+        let error = self.heads.get(head);
+        error.map_or(0.0, |error| {
+            error.size.variance(travelled_m, predicted_levels)
+        })
+    }
+
+    fn covariance(&self, one: usize, other: usize) -> f64 {
+        let place = one * self.heads.len() + other;
+        self.among.get(place).copied().unwrap_or_default()
+    }
+
+    /// The state moves with this Jacobian.
+    pub fn moved(&mut self, jacobian: &Matrix<STATES>) {
+        for head in &mut self.heads {
+            let before = head.state_covariance;
+            for (after, row) in head.state_covariance.iter_mut().zip(jacobian) {
+                *after = dot(row, &before);
+            }
+        }
+    }
+
+    /// How an angle to a radio head may have come about; see [`JumpProcess::weigh`]. `None` of a radio
+    /// head whose error is not found.
+    pub fn weigh(
+        &self,
+        head: usize,
+        travelled_m: f64,
+        seen: &Innovation,
+        row: &[f64; STATES],
+    ) -> Option<JumpHypotheses> {
+        let error = self.heads.get(head)?;
+        let known = 2.0 * error.along(row) + self.covariance(head, head);
+        Some((error.size).weigh(travelled_m, seen, error.mean_rad, known))
+    }
+
+    /// Corrects state and errors by an angle to a radio head that may have come about so.
+    pub fn take(
+        &mut self,
+        belief: &mut Belief,
+        head: usize,
+        travelled_m: f64,
+        row: &[f64; STATES],
+        hypotheses: &JumpHypotheses,
+        journal: Option<&mut Journal<STATES>>,
+    ) {
+        self.set_cross_covariances(row, Some(head));
+        let own = self.covariance(head, head);
+        let Some(error) = self.heads.get_mut(head) else {
+            return;
+        };
+        error.size.learn(travelled_m, hypotheses);
+        if hypotheses.density <= 0.0 {
+            return; // as good as impossible
+        }
+        let predicted_levels = belief.cross(row);
+        let cross_with_angle: [CrossCovariance; STATES] = std::array::from_fn(|i| {
+            [
+                predicted_levels[i] + error.state_covariance[i],
+                predicted_levels[i],
+            ]
+        });
+        let change = MixtureUpdate::new(hypotheses, error.mean_rad, error.cross_with_angle[0]);
+        error.mean_rad = change.value_mean();
+        for (covariance, cross_with_angle) in
+            error.state_covariance.iter_mut().zip(cross_with_angle)
+        {
+            *covariance = change.value_covariance(*covariance, cross_with_angle);
+        }
+        if let Some(journal) = journal {
+            self.tell(journal, head, row, &cross_with_angle, hypotheses);
+        }
+        for i in 0..STATES {
+            belief.mean[i] += change.step(cross_with_angle[i]);
+            for j in i..STATES {
+                belief.covariance[i][j] += change.more(cross_with_angle[i], cross_with_angle[j]);
+                belief.covariance[j][i] = belief.covariance[i][j];
+            }
+        }
+        let count = self.heads.len();
+        let with_each = |heads: &[HeadBias], at: usize| heads.get(at).map(|it| it.cross_with_angle);
+        for (place, covariance) in self.among.iter_mut().enumerate() {
+            let (one, other) = (place / count, place % count);
+            let (Some(with_one), Some(with_other)) =
+                (with_each(&self.heads, one), with_each(&self.heads, other))
+            else {
+                continue;
+            };
+            *covariance = match (one == head, other == head) {
+                (true, true) => change.value_variance(own),
+                (true, false) => change.value_covariance(*covariance, with_other),
+                (false, true) => change.value_covariance(*covariance, with_one),
+                (false, false) => *covariance + change.more(with_one, with_other),
+            };
+        }
+        for (other, error) in self.heads.iter_mut().enumerate() {
+            if other == head {
+                continue;
+            }
+            error.mean_rad += change.step(error.cross_with_angle);
+            for (covariance, cross_with_angle) in
+                error.state_covariance.iter_mut().zip(cross_with_angle)
+            {
+                *covariance += change.more(error.cross_with_angle, cross_with_angle);
+            }
+        }
+    }
+
+    /// Logs for the smoother a Gaussian upper bound of the mixture update: a measurement of state and
+    /// value with as much of its information as the value is likely to have been kept, one of the state
+    /// alone with the rest of it, and a value that is so much what it was, and so much what the angle
+    /// leaves for it beside the state. The mixture's covariance is never below that of these, as
+    /// `T M⁻¹ Tᵀ` is convex in `T` and `M` together (Boyd and Vandenberghe, Convex Optimization, 3.1.7),
+    /// so that what is between them is noise.
+    fn tell(
+        &self,
+        journal: &mut Journal<STATES>,
+        head: usize,
+        row: &[f64; STATES],
+        cross_with_angle: &[CrossCovariance; STATES],
+        hypotheses: &JumpHypotheses,
+    ) {
+        let [with_measured, known] = [0, 1].map(|of| {
+            row.iter()
+                .zip(cross_with_angle)
+                .map(|(by, with)| by * with[of])
+                .sum::<f64>()
+        });
+        let Some(error) = self.heads.get(head) else {
+            return;
+        };
+        let all = || {
+            (cross_with_angle.iter().copied())
+                .chain(self.heads.iter().map(|it| it.cross_with_angle))
+        };
+        let (kept, anew) = (&hypotheses.kept, &hypotheses.anew);
+        // Of the first measurement: by how much it corrects the second, and by how much that is the less
+        // uncertain.
+        let (mut less, mut corrected) = (0.0, 0.0);
+        if kept.share > 0.0 && kept.narrowing > 0.0 {
+            let once = with_measured + error.cross_with_angle[0];
+            let total = once + (kept.narrowing.recip() - once).max(0.0) / kept.share;
+            let residual = kept.residual * kept.gain / kept.narrowing;
+            let gain = all().map(|[measured, _]| measured / total);
+            journal.measured(row, Some(head), gain, residual, total);
+            less = with_measured / total;
+            corrected = less * residual;
+        }
+        if anew.share > 0.0 && anew.narrowing > 0.0 {
+            let total = known - less * with_measured
+                + (anew.narrowing.recip() - known).max(0.0) / anew.share;
+            let residual = anew.residual * anew.gain / anew.narrowing - corrected;
+            let gain = all().map(|[measured, alone]| (alone - less * measured) / total);
+            if total > 0.0 {
+                journal.measured(row, None, gain, residual, total);
+            }
+        }
+        let beside = hypotheses.narrowing / (1.0 - known * anew.narrowing);
+        let by_state = row.map(|by| -anew.share * beside * by);
+        journal.redrawn(head, kept.share, &by_state);
+    }
+
+    /// Covariance of each value with a measurement of the state, and of the value of a radio head.
+    fn set_cross_covariances(&mut self, row: &[f64; STATES], of: Option<usize>) {
+        for head in 0..self.heads.len() {
+            let value_covariance = of.map_or(0.0, |of| self.covariance(head, of));
+            if let Some(error) = self.heads.get_mut(head) {
+                let alone = error.along(row);
+                error.cross_with_angle = [alone + value_covariance, alone];
+            }
+        }
+    }
+
+    /// Corrects the errors by a scalar measurement of the state, which `belief` is about to be corrected by:
+    /// the rest of a Kalman update.
+    pub fn update(&mut self, belief: &Belief, residual: f64, row: &[f64; STATES], variance: f64) {
+        if self.is_empty() {
+            return;
+        }
+        let cross = belief.cross(row);
+        let total = dot(row, &cross).max(0.0) + variance;
+        self.set_cross_covariances(row, None);
+        if total <= 0.0 {
+            return; // nothing to learn
+        }
+        for head in &mut self.heads {
+            let gain = head.cross_with_angle[1] / total;
+            head.mean_rad += gain * residual;
+            for (covariance, cross) in head.state_covariance.iter_mut().zip(cross) {
+                *covariance -= gain * cross;
+            }
+        }
+        let heads = &self.heads;
+        let pairs = (heads.iter()).flat_map(|one| {
+            heads
+                .iter()
+                .map(|other| one.cross_with_angle[1] * other.cross_with_angle[1])
+        });
+        for (covariance, product) in self.among.iter_mut().zip(pairs) {
+            *covariance -= product / total;
+        }
+    }
+
+    /// Gains of the values in the newest [`update`](Self::update), whose innovation had this variance.
+    pub fn gains(&self, total: f64) -> impl Iterator<Item = f64> {
+        self.heads
+            .iter()
+            .map(move |head| head.cross_with_angle[1] / total)
+    }
+
+    /// Covariances of each value with the state.
+    pub fn state_covariance(&self) -> impl Iterator<Item = [f64; STATES]> {
+        self.heads.iter().map(|head| head.state_covariance)
+    }
+}
+
+#[cfg(test)]
+mod tests {
+    use rand::{RngExt, SeedableRng};
+    use rand_chacha::ChaCha8Rng;
+    use rand_distr::StandardNormal;
+
+    use super::super::jump_process::{
+        LEVEL_M, LEVELS, LEVELS_RAD, SOON_M, VALUE_M, VARIANCES, share,
+    };
+    use super::*;
+    use crate::localize::gaussian::{Gaussian, identity};
+
+    const OWN_VARIANCE: f64 = 1e-4;
+
+    /// With this probability of any, every level is as probable as another.
+    const EVEN: f64 = 0.75;
+
+    /// A state of which angles tell the first component, known to one radian.
+    fn unknown() -> Belief {
+        let mut sigma = [0.0; STATES];
+        (sigma[0], sigma[1]) = (1.0, 0.5);
+        Belief::independent([0.0; STATES], sigma)
+    }
+
+    fn row() -> [f64; STATES] {
+        let mut row = [0.0; STATES];
+        row[0] = 1.0;
+        row
+    }
+
+    /// Takes in an angle of a radio head, as the filter does.
+    fn take(errors: &mut CorrelatedBias, belief: &mut Belief, head: usize, way_m: f64, rad: f64) {
+        let seen = belief.innovation(rad - belief.mean[0], &row(), OWN_VARIANCE);
+        let hypotheses = errors.weigh(head, way_m, &seen, &row()).unwrap();
+        errors.take(belief, head, way_m, &row(), &hypotheses, None);
+    }
+
+    const ALL: usize = STATES + 2;
+
+    /// State and errors as one.
+    fn whole(belief: &Belief, errors: &CorrelatedBias) -> Gaussian<ALL> {
+        let mut whole = Gaussian::<ALL>::independent([0.0; ALL], [0.0; ALL]);
+        for i in 0..STATES {
+            whole.mean[i] = belief.mean[i];
+            whole.covariance[i][..STATES].copy_from_slice(&belief.covariance[i]);
+        }
+        for (one, error) in errors.heads.iter().enumerate() {
+            whole.mean[STATES + one] = error.mean_rad;
+            for i in 0..STATES {
+                whole.covariance[i][STATES + one] = error.state_covariance[i];
+                whole.covariance[STATES + one][i] = error.state_covariance[i];
+            }
+            for other in 0..2 {
+                whole.covariance[STATES + one][STATES + other] = errors.covariance(one, other);
+            }
+        }
+        whole
+    }
+
+    fn assert_same(one: &Gaussian<ALL>, other: &Gaussian<ALL>) {
+        for i in 0..ALL {
+            assert!((one.mean[i] - other.mean[i]).abs() < 1e-12, "{i}");
+            for j in 0..ALL {
+                let apart = one.covariance[i][j] - other.covariance[i][j];
+                assert!(apart.abs() < 1e-12, "{i} {j}: {apart}");
+            }
+        }
+    }
+
+    /// The mixture of all that an angle may have come about by, each updated by itself.
+    fn mixture(
+        before: &Gaussian<ALL>,
+        levels: [f64; LEVELS],
+        head: usize,
+        way_m: f64,
+        rad: f64,
+    ) -> Gaussian<ALL> {
+        let mut whole_row = [0.0; ALL];
+        (whole_row[0], whole_row[STATES + head]) = (1.0, 1.0);
+        let changes = 1.0 - (-way_m / LEVEL_M).exp();
+        let stays = (-way_m / VALUE_M).exp();
+        let mut parts = vec![];
+        for (level, value) in levels.into_iter().zip(VARIANCES) {
+            let probability = level + changes * (1.0 / LEVELS as f64 - level);
+            let mut anew = *before;
+            anew.mean[STATES + head] = 0.0;
+            for i in 0..ALL {
+                anew.covariance[i][STATES + head] = 0.0;
+                anew.covariance[STATES + head][i] = 0.0;
+            }
+            anew.covariance[STATES + head][STATES + head] = value;
+            for (probable, mut decorrelate) in [(stays, *before), (1.0 - stays, anew)] {
+                let residual = rad - decorrelate.mean[0] - decorrelate.mean[STATES + head];
+                let once = decorrelate.innovation(residual, &whole_row, OWN_VARIANCE + value);
+                let repeated = OWN_VARIANCE + value / share(way_m);
+                decorrelate.update(residual, &whole_row, repeated);
+                parts.push((probable * probability * once.density(), decorrelate));
+            }
+        }
+        let total: f64 = parts.iter().map(|(weight, _)| weight).sum();
+        let mut mixed = Gaussian::<ALL>::independent([0.0; ALL], [0.0; ALL]);
+        for (weight, decorrelate) in &parts {
+            for i in 0..ALL {
+                mixed.mean[i] += weight / total * decorrelate.mean[i];
+            }
+        }
+        for (weight, decorrelate) in &parts {
+            for i in 0..ALL {
+                for j in 0..ALL {
+                    let apart = [i, j].map(|at| decorrelate.mean[at] - mixed.mean[at]);
+                    mixed.covariance[i][j] +=
+                        weight / total * (decorrelate.covariance[i][j] + apart[0] * apart[1]);
+                }
+            }
+        }
+        mixed
+    }
+
+    #[test]
+    fn state_and_errors_have_the_moments_of_the_mixture() {
+        let (mut errors, mut belief) = (CorrelatedBias::new(2, EVEN), unknown());
+        let mut motion = identity::<STATES>();
+        (motion[0][1], motion[1][1]) = (0.3, 0.9);
+        let mut whole_motion = identity::<ALL>();
+        (whole_motion[0][1], whole_motion[1][1]) = (0.3, 0.9);
+        for (head, way_m, rad) in [
+            (0, f64::INFINITY, 0.4),
+            (1, f64::INFINITY, -0.2),
+            (0, 0.08, 0.43),
+            (1, 0.5, 0.6),
+            (1, 0.0, 0.6),
+            (0, 1.7, -1.1),
+            (1, 0.3, 0.1),
+        ] {
+            let levels = errors.heads[head].size.levels;
+            let expected = mixture(&whole(&belief, &errors), levels, head, way_m, rad);
+            take(&mut errors, &mut belief, head, way_m, rad);
+            assert_same(&whole(&belief, &errors), &expected);
+            // What moves the state, and what is measured of it alone.
+            let mut expected = whole(&belief, &errors);
+            expected.spread(&whole_motion, &[[0.0; ALL]; ALL]);
+            belief.spread(&motion, &[[0.0; STATES]; STATES]);
+            errors.moved(&motion);
+            assert_same(&whole(&belief, &errors), &expected);
+            let mut whole_row = [0.0; ALL];
+            whole_row[0] = 1.0;
+            let whole_gain = expected.update(0.1, &whole_row, 0.3);
+            let total = belief.variance_along(&row()) + 0.3;
+            errors.update(&belief, 0.1, &row(), 0.3);
+            let gain = belief.update(0.1, &row(), 0.3);
+            assert_same(&whole(&belief, &errors), &expected);
+            for (gain, expected) in gain.into_iter().chain(errors.gains(total)).zip(whole_gain) {
+                assert!((gain - expected).abs() < 1e-12);
+            }
+        }
+    }
+
+    /// Angles of a radio head whose error is drawn as is assumed of it.
+    struct Drawn {
+        level: f64,
+        value_rad: f64,
+    }
+
+    impl Drawn {
+        fn after(&mut self, way_m: f64, random: &mut ChaCha8Rng) -> f64 {
+            let happens = |within_m: f64, random: &mut ChaCha8Rng| {
+                random.random::<f64>() > (-way_m / within_m).exp()
+            };
+            if happens(LEVEL_M, random) {
+                self.level = LEVELS_RAD[random.random_range(0..LEVELS)];
+            }
+            if happens(VALUE_M, random) {
+                self.value_rad = self.level * random.sample::<f64, _>(StandardNormal);
+            }
+            let soon = self.level * random.sample::<f64, _>(StandardNormal);
+            let own = OWN_VARIANCE.sqrt() * random.sample::<f64, _>(StandardNormal);
+            self.value_rad + soon + own
+        }
+    }
+
+    #[test]
+    fn the_state_is_as_uncertain_as_it_says_where_errors_are_as_assumed() {
+        const RUNS: u32 = 400;
+        // Two radio heads, an angle of each every 0.3 m: what is soon forgotten is forgotten in between.
+        let mut random = ChaCha8Rng::seed_from_u64(5);
+        for (way_m, bound_m) in [(2.0, 0.3), (20.0, 0.1)] {
+            let (mut nees, mut square, mut within) = (0.0, 0.0, 0);
+            for _ in 0..RUNS {
+                let (mut errors, mut belief) = (CorrelatedBias::new(2, EVEN), unknown());
+                let truth: f64 = random.sample(StandardNormal);
+                let mut drawn = [0, 1].map(|_| Drawn {
+                    level: LEVELS_RAD[random.random_range(0..LEVELS)],
+                    value_rad: 0.0,
+                });
+                for head in &mut drawn {
+                    head.value_rad = head.level * random.sample::<f64, _>(StandardNormal);
+                }
+                for predict_measurement in 0..(way_m / SOON_M) as usize {
+                    for (head, drawn) in drawn.iter_mut().enumerate() {
+                        let since_m = if predict_measurement == 0 {
+                            f64::INFINITY
+                        } else {
+                            SOON_M
+                        };
+                        let error = drawn.after(SOON_M, &mut random);
+                        take(&mut errors, &mut belief, head, since_m, truth + error);
+                    }
+                }
+                let off = belief.mean[0] - truth;
+                nees += off * off / belief.covariance[0][0];
+                within += u32::from(off * off < 3.84 * belief.covariance[0][0]);
+                square += off * off;
+            }
+            let runs = f64::from(RUNS);
+            // A mixture is no Gaussian: its tails are heavier than they are told.
+            let within = f64::from(within) / runs;
+            assert!(within > 0.87, "{way_m} m: {within}");
+            assert!(nees / runs < 2.0, "{way_m} m: {}", nees / runs);
+            assert!((square / runs).sqrt() < bound_m, "{way_m} m");
+        }
+    }
+
+    #[test]
+    fn its_size_is_found_within_metres_and_found_anew_where_it_changes() {
+        let (mut errors, mut belief) = (CorrelatedBias::new(1, EVEN), unknown());
+        belief.covariance[0][0] = 1e-6;
+        for predict_measurement in 0..300 {
+            let error_rad = 0.01 * f64::from(predict_measurement % 7 - 3);
+            take(&mut errors, &mut belief, 0, 0.1, error_rad);
+        }
+        assert!(!errors.is_large(0));
+        let small = errors.variance(0, 2.0, 1e-4);
+        assert!(small < 0.05 * 0.05, "{small}");
+        for predict_measurement in 0..60 {
+            let error_rad = 0.8 + 0.3 * f64::from(predict_measurement % 3 - 1);
+            take(&mut errors, &mut belief, 0, 0.1, error_rad);
+        }
+        assert!(errors.is_large(0));
+        // What is made of such angles hardly moves the belief.
+        assert!(belief.mean[0].abs() < 3e-3, "{}", belief.mean[0]);
+    }
+
+    #[test]
+    fn who_stands_learns_nothing() {
+        let (mut errors, mut belief) = (CorrelatedBias::new(1, EVEN), unknown());
+        for _ in 0..30 {
+            take(&mut errors, &mut belief, 0, 0.1, 0.02);
+        }
+        let before = belief.covariance[0][0];
+        for _ in 0..1000 {
+            take(&mut errors, &mut belief, 0, 0.0, 0.02);
+        }
+        assert!(belief.covariance[0][0] > 0.9 * before);
+    }
+}

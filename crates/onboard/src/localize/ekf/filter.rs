@@ -1,0 +1,200 @@
+//! The filter itself: what it holds, and what is known by it.
+
+use std::sync::Arc;
+
+use super::config::EkfConfig;
+use super::constants::{Calibration, EstimatedConstants, departs};
+use super::odometer::{SampleInterval, SpeedJumps};
+use super::smoother::Journal;
+use super::state::{Belief, SCALE, STATES};
+use crate::clone_in_place::clone_in_place;
+use crate::localize::bias::CorrelatedBias;
+use crate::localize::pose_estimate::InitialPose;
+use crate::observation::OdometrySample;
+use crate::radio_head::RadioHead;
+use crate::road::{Gap, Road};
+
+/// Where the vehicle is off the map.
+#[derive(Clone, Copy, Debug, PartialEq)]
+pub(super) enum OffMap {
+    /// Certainly beyond one of its ends, this far (m).
+    Beyond {
+        /// Distance from the end.
+        by_m: f64,
+    },
+    /// Not certainly outside of this gap.
+    Gap(Gap),
+}
+
+#[derive(Clone, Copy, Debug, PartialEq)]
+pub(super) struct Head {
+    pub known: RadioHead,
+    pub excluded: bool,
+    /// Distance driven when its last angle was used (m) ...
+    pub last_update_m: f64,
+    /// ... the time then (s) ...
+    pub last_update_s: f64,
+    /// ... and the angle turned (rad).
+    pub last_update_rad: f64,
+}
+
+impl Head {
+    pub fn is(&self, other: &RadioHead) -> bool {
+        self.known.sends(other.pci, other.ssb_index)
+    }
+}
+
+clone_in_place! {
+    /// The filter. With a map it works along and across the road, without in the plane.
+    #[derive(Debug, PartialEq)]
+    pub struct Ekf {
+        pub(super) config: EkfConfig,
+        pub(super) map: Option<Arc<Road>>,
+        pub(super) heads: Vec<Head>,
+        pub(super) belief: Belief,
+        /// What the radio heads' angles are off by over metres.
+        pub(super) bias: CorrelatedBias,
+        pub(super) odometry: Option<OdometrySample>,
+        pub(super) driven_m: f64,
+        pub(super) turned_rad: f64,
+        /// Where the vehicle is that the map does not tell how the road goes on.
+        pub(super) off_map: Option<OffMap>,
+        pub(super) journal: Option<Journal<STATES>>,
+        pub(super) sample_interval: SampleInterval,
+        pub(super) speed_jumps: SpeedJumps,
+        /// What the speeds say was driven (m) since the odometer last moved.
+        pub(super) unread_m: f64,
+    }
+}
+
+impl Ekf {
+    /// A filter that starts from a given pose. `map` is the course of the road, if known.
+    pub fn new(
+        config: EkfConfig,
+        map: Option<Arc<Road>>,
+        heads: &[RadioHead],
+        start: &InitialPose,
+    ) -> Self {
+        let belief = Self::prior(&config, map.as_deref(), start);
+        let head = |&known| Head {
+            known,
+            excluded: false,
+            last_update_m: f64::NEG_INFINITY,
+            last_update_s: f64::NEG_INFINITY,
+            last_update_rad: f64::NEG_INFINITY,
+        };
+        let mut ekf = Self {
+            config,
+            map,
+            heads: heads.iter().map(head).collect(),
+            belief,
+            bias: CorrelatedBias::new(heads.len(), config.bias_probability),
+            odometry: None,
+            driven_m: 0.0,
+            turned_rad: 0.0,
+            off_map: None,
+            journal: None,
+            sample_interval: SampleInterval::default(),
+            speed_jumps: SpeedJumps::default(),
+            unread_m: 0.0,
+        };
+        ekf.update_off_map();
+        ekf
+    }
+
+    pub(super) fn measure(&mut self, residual: f64, row: &[f64; STATES], variance: f64) {
+        let journal = self.journal.as_mut();
+        let told = journal.map(|journal| (journal, self.belief.variance_along(row) + variance));
+        self.bias.update(&self.belief, residual, row, variance);
+        let gain = self.belief.update(residual, row, variance);
+        if let Some((journal, total)) = told
+            && total > 0.0
+        {
+            let gains = gain.into_iter().chain(self.bias.gains(total));
+            journal.measured(row, None, gains, residual, total);
+        }
+    }
+
+    /// Time of the newest odometry (s).
+    pub fn time_s(&self) -> f64 {
+        self.odometry
+            .map_or(f64::NEG_INFINITY, |sample| sample.time_s)
+    }
+
+    /// The state and its covariance.
+    pub const fn belief(&self) -> &Belief {
+        &self.belief
+    }
+
+    /// Replaces the state and its covariance, where several filters become one.
+    pub(in crate::localize) fn set_belief(&mut self, belief: &Belief) {
+        self.belief = *belief;
+        self.bias.decorrelate();
+    }
+
+    /// What the filter assumes.
+    pub const fn config(&self) -> &EkfConfig {
+        &self.config
+    }
+
+    /// How far the array has come from its survey.
+    pub fn calibration(&self) -> Calibration {
+        Calibration::new(&self.config, &self.belief)
+    }
+
+    /// Constants of the vehicle as estimated by now.
+    pub fn findings(&self) -> EstimatedConstants {
+        EstimatedConstants::new(&self.config, &self.belief)
+    }
+
+    /// Whether it estimates a time-correlated bias of the angles.
+    pub(in crate::localize) const fn is_with_bias(&self) -> bool {
+        !self.bias.is_empty()
+    }
+
+    /// Whether a map tells how the road goes.
+    pub(in crate::localize) const fn has_map(&self) -> bool {
+        self.map.is_some()
+    }
+
+    /// Whether the odometer's scale is certainly not what is stated.
+    pub(in crate::localize) fn odometer_departs(&self) -> bool {
+        let config = &self.config;
+        let by = self.belief.mean[SCALE] - (config.odometer_scale - 1.0);
+        let walked = config.noise.scale_per_sqrt_m * self.driven_m.sqrt();
+        let stated_std = config.odometer_scale_std.hypot(walked);
+        departs(by, self.belief.covariance[SCALE][SCALE].sqrt(), stated_std)
+    }
+
+    /// Whether the angles tell more of the odometer's scale than what is stated.
+    pub(in crate::localize) fn knows_odometer(&self) -> bool {
+        self.belief.covariance[SCALE][SCALE] < 0.5 * self.config.odometer_scale_std.powi(2)
+    }
+
+    /// Expects angles of so many times the variance that is stated, or what is stated.
+    pub(in crate::localize) fn set_noise_ratio(&mut self, ratio: Option<f64>) {
+        self.config.set_noise_ratio(ratio);
+    }
+
+    /// Distance driven since the start (m).
+    pub const fn driven_m(&self) -> f64 {
+        self.driven_m
+    }
+
+    /// Sets the largest squared Mahalanobis distance of an angle that is used.
+    pub fn set_gate(&mut self, gate: f64) {
+        self.config.gate = gate;
+    }
+
+    /// Share by which the speed jumped with the newest odometry, as no vehicle can do; 0 otherwise.
+    pub(in crate::localize) const fn speed_jump(&self) -> f64 {
+        self.speed_jumps.speed_jump()
+    }
+
+    /// Leaves the angles of a radio head unused, or uses them again.
+    pub fn set_excluded(&mut self, head: &RadioHead, excluded: bool) {
+        for mine in self.heads.iter_mut().filter(|mine| mine.is(head)) {
+            mine.excluded = excluded;
+        }
+    }
+}

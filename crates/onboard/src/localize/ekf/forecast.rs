@@ -1,0 +1,267 @@
+//! What comes out: the pose in the map frame at any time, the belief predicted ahead and updated with angles not yet
+//! heard, and the smoothed poses.
+
+use super::angle_model::{AngleModel, locate};
+use super::config::PhaseBias;
+use super::filter::Ekf;
+use super::motion::{Reading, Step};
+use super::predict::MOST_STEPS;
+use super::smoother::Journal;
+use super::state::{Belief, SCALE, STATES};
+use crate::localize::bias;
+use crate::localize::gaussian::{
+    Innovation, Matrix, dot, identity, principal_variances, product, transformed,
+};
+use crate::localize::measurement::AngleMeasurement;
+use crate::localize::pose_estimate::PoseEstimate;
+use crate::radio_head::RadioHead;
+
+/// Longest step of a forecast (m), where millimetres do not matter.
+const FORECAST_STEP_M: f64 = 5.0;
+
+/// An angle to a radio head that is not used.
+#[derive(Clone, Copy, Debug, PartialEq)]
+pub(in crate::localize) struct ExcludedInnovation {
+    /// The innovation; of the angle's variance only its noise, biases being the
+    /// belief's.
+    pub innovation: Innovation,
+    /// Variance of the noise, had nothing been heard before (rad²).
+    pub first_variance: f64,
+    /// Distance driven, in wavelengths.
+    pub place_wavelengths: f64,
+}
+
+/// How driving on, nothing being heard, makes a covariance `Φ P Φᵀ + Q`.
+#[derive(Clone, Debug)]
+pub struct Transition {
+    jacobian: Matrix<STATES>,
+    noise: Matrix<STATES>,
+}
+
+impl Transition {
+    /// Variances of a belief's horizontal error after it, along the principal axes, larger first (m²).
+    pub fn principal_variances(&self, belief: &Belief) -> [f64; 2] {
+        let [first, second] = [self.jacobian[0], self.jacobian[1]];
+        let with_second = belief.cross(&second);
+        principal_variances(
+            belief.variance_along(&first) + self.noise[0][0],
+            dot(&first, &with_second) + self.noise[0][1],
+            dot(&second, &with_second) + self.noise[1][1],
+        )
+    }
+}
+
+impl Ekf {
+    /// The innovation that an angle would bring; `None` where it would bring none.
+    pub fn innovation(&self, head: &RadioHead, measured: &AngleMeasurement) -> Option<Innovation> {
+        self.predict_measurement(head, measured)
+            .ok()
+            .filter(|predicted| !predicted.excluded)
+            .map(|predicted| predicted.innovation)
+    }
+
+    /// The innovation that an angle to an excluded radio head would bring; it counts as an update. Where a
+    /// time-correlated bias is estimated there is nothing to test: a radio head that is off has a
+    /// large one, and counts little.
+    pub(in crate::localize) fn innovation_of_excluded(
+        &mut self,
+        head: &RadioHead,
+        measured: &AngleMeasurement,
+    ) -> Option<ExcludedInnovation> {
+        let predicted = self.predict_measurement(head, measured).ok()?;
+        self.heads.get_mut(predicted.head)?.last_update_m = predicted.place_m;
+        if self.is_with_bias() {
+            return None;
+        }
+        let Innovation {
+            residual,
+            variance,
+            measurement_variance,
+        } = predicted.innovation;
+        let bias = self.config.phase_bias;
+        let unbiased = PhaseBias {
+            std_rad: 0.0,
+            ..bias
+        };
+        let (sigma, (travelled_m, _)) = (predicted.own_variance.sqrt(), predicted.moved);
+        let (aperture, toward) = (predicted.aperture, predicted.toward);
+        let noise = unbiased.variance(sigma, predicted.elapsed_s, predicted.moved)
+            + (self.config).scatter_variance(travelled_m, aperture, toward);
+        // What is off by as much in many angles counts once.
+        let lasting = self.systematic_variance(&predicted);
+        Some(ExcludedInnovation {
+            innovation: Innovation {
+                residual,
+                variance: variance - measurement_variance + lasting + noise,
+                measurement_variance: noise,
+            },
+            first_variance: self.first_variance(&predicted),
+            place_wavelengths: predicted.place_m / self.config.array.wavelength_m,
+        })
+    }
+
+    /// The belief at `time_s`, had the vehicle driven on at its speed and heard nothing.
+    pub fn forecast(&self, time_s: f64) -> Belief {
+        let lag_s = (time_s - self.time_s()).max(0.0);
+        let speed_mps = self.odometry.map_or(0.0, |sample| sample.speed_mps);
+        if speed_mps == 0.0 {
+            return self.belief;
+        }
+        self.carry(self.belief, speed_mps * lag_s)
+    }
+
+    /// A belief carried on by what the odometer would read, nothing being heard.
+    pub fn carry(&self, belief: Belief, reading_m: f64) -> Belief {
+        self.carry_by(belief, reading_m, |_| ())
+    }
+
+    /// The same, step by step.
+    fn carry_by(&self, mut belief: Belief, reading_m: f64, mut by: impl FnMut(&Step)) -> Belief {
+        let steps = (reading_m.abs() / FORECAST_STEP_M).ceil().min(MOST_STEPS);
+        for _ in 0..steps as usize {
+            let step = self.step(&belief, &Reading::exact(reading_m / steps));
+            step.apply(&mut belief);
+            by(&step);
+        }
+        belief
+    }
+
+    /// What carrying a belief on by what the odometer would read makes of covariances near its own.
+    pub fn transition(&self, belief: &Belief, reading_m: f64) -> Transition {
+        let mut jacobian = identity();
+        let mut noise = Belief::independent(belief.mean, [0.0; STATES]);
+        self.carry_by(*belief, reading_m, |step| {
+            step.apply(&mut noise);
+            jacobian = product(&step.jacobian, &jacobian);
+        });
+        Transition {
+            jacobian,
+            noise: noise.covariance,
+        }
+    }
+
+    /// What an angle of thermal variance `thermal(distance)` to `head` would make of a belief
+    /// `ahead_m` further on than the newest odometry; `None` of a radio head that is not used, or would
+    /// rather repeat itself.
+    pub fn rehearse(
+        &self,
+        belief: &Belief,
+        ahead_m: f64,
+        head: &RadioHead,
+        thermal: impl Fn(f64) -> f64,
+    ) -> Option<Belief> {
+        let (number, known) = (self.heads.iter().enumerate()).find(|(_, mine)| mine.is(head))?;
+        if known.excluded {
+            return None;
+        }
+        let (pose, frame) = locate(&belief.mean, 0.0, self.map.as_deref());
+        let array = &self.config.array;
+        let angle_model = AngleModel::new(&known.known, pose, &frame, &belief.mean, array)?;
+        let travelled_m = self.driven_m + ahead_m - known.last_update_m;
+        let own = (self.config.noise_ratio() * thermal(angle_model.range_m)).sqrt();
+        let mut variance = self
+            .config
+            .phase_bias
+            .variance(own, f64::INFINITY, (travelled_m, 0.0))
+            + self.config.look_variance(travelled_m, &angle_model);
+        let predicted = belief.variance_along(&angle_model.row) + variance;
+        let by_bias = self.bias.variance(number, travelled_m, predicted);
+        if bias::repeats(travelled_m) && by_bias > variance {
+            return None;
+        }
+        variance += by_bias;
+        let mut updated = *belief;
+        updated.update(0.0, &angle_model.row, variance);
+        Some(updated)
+    }
+
+    /// Variances of a belief's horizontal error along its principal axes, larger first (m²).
+    pub fn principal_variances(belief: &Belief) -> [f64; 2] {
+        let [[aa, ab, ..], [_, bb, ..], ..] = belief.covariance;
+        principal_variances(aa, ab, bb)
+    }
+}
+
+/// Nothing is known better than to a nanometre and a nanoradian: so much the covariance says at
+/// least, though a belief that began exactly has no width.
+const LEAST_VARIANCE: f64 = 1e-18;
+
+impl Ekf {
+    /// The pose at `time_s`, carried on from the newest odometry at its speed.
+    pub fn pose(&self, time_s: f64) -> PoseEstimate {
+        let (_, lag_variance) = self.coasting(time_s);
+        self.pose_of(&self.forecast(time_s), time_s, lag_variance)
+    }
+
+    /// Distance driven since the newest odometry, and its variance.
+    pub(super) fn coasting(&self, time_s: f64) -> (f64, f64) {
+        let Some(sample) = self.odometry else {
+            return (0.0, 0.0);
+        };
+        let lag_s = (time_s - sample.time_s).max(0.0);
+        (
+            self.speed_mps() * lag_s,
+            self.config.coasting_variance(lag_s),
+        )
+    }
+
+    /// Speed along the heading (m/s).
+    pub fn speed_mps(&self) -> f64 {
+        let reading = self.odometry.map_or(0.0, |sample| sample.speed_mps);
+        reading / (1.0 + self.belief.mean[SCALE])
+    }
+
+    /// The pose of a belief whose place along the way has so much more variance than it says.
+    pub(super) fn pose_of(&self, belief: &Belief, time_s: f64, lag_variance: f64) -> PoseEstimate {
+        let map = self.map.as_deref();
+        let (pose, frame) = locate(&belief.mean, 0.0, map);
+        let (sin, cos) = frame.direction_rad.sin_cos();
+        // (x, y, heading) by (along, across, heading).
+        let jacobian = [
+            [cos * frame.stretch, -sin, 0.0],
+            [sin * frame.stretch, cos, 0.0],
+            [frame.curvature_per_m, 0.0, 1.0],
+        ];
+        let mut inner = [[0.0; 3]; 3];
+        for i in 0..3 {
+            for j in 0..3 {
+                inner[i][j] = belief.covariance[i][j];
+            }
+        }
+        inner[0][0] += lag_variance;
+        let mut covariance = transformed(&jacobian, &inner);
+        for i in 0..3 {
+            covariance[i][i] += LEAST_VARIANCE;
+        }
+        PoseEstimate {
+            time_s,
+            pose,
+            covariance: Some(covariance),
+            integrity: None,
+        }
+    }
+}
+
+impl Ekf {
+    /// Keeps a journal from now on, from which the drive can be smoothed; it grows by about 2 kB
+    /// with each odometry sample.
+    pub fn keep_journal(&mut self) {
+        self.journal.get_or_insert_default();
+    }
+
+    /// The poses at the odometry samples since the journal was begun, by everything that is known
+    /// now; none without a journal.
+    pub fn smoothed(&self) -> Vec<PoseEstimate> {
+        let journal = self.journal.iter();
+        let beliefs = journal.flat_map(Journal::smoothed);
+        beliefs
+            .map(|(time_s, belief)| self.pose_of(&belief, time_s, 0.0))
+            .collect()
+    }
+
+    pub(super) fn ask(&mut self, time_s: f64) {
+        if let Some(journal) = &mut self.journal {
+            journal.asked(time_s, &self.belief, self.bias.state_covariance());
+        }
+    }
+}

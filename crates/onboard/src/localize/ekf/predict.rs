@@ -1,0 +1,339 @@
+//! The time update: what an odometry sample is worth, and how it moves the belief.
+
+use super::filter::{Ekf, OffMap};
+use super::motion::{Reading, Step, Yaw};
+use super::state::{ACROSS, ALONG, Belief, HEADING, SCALE, STATES, YAW_RATE_BIAS};
+use crate::localize::measurement::OdometryVerdict;
+use crate::observation::OdometrySample;
+use crate::road::Gap;
+use crate::settings::DriveKind;
+
+/// Longest step over which the road's curvature is taken as constant (m).
+const STEP_M: f64 = 1.0;
+
+/// Most steps at a time: over a kilometre without odometry nothing is known of bends.
+pub(super) const MOST_STEPS: f64 = 1000.0;
+
+/// A speed of so many times the vehicle's is none, whatever was stated; it is read as that.
+const WILD: f64 = 10.0;
+
+/// Deviations of the speed's reading from which on a step of it is slip, and the most that slip
+/// adds to the deviation of the odometer's scale.
+const SIGMAS_OF_SLIP: f64 = 5.0;
+pub(in crate::localize) const MOST_SLIP: f64 = 0.3;
+
+/// What was driven is taken from the speeds where it is within these shares of what is read.
+const DRIVEN_BY_READ: [f64; 2] = [0.5, 1e3];
+
+/// Deviations within which the place is known where a bend may begin.
+const SIGMAS_OF_BEND: f64 = 3.0;
+
+/// How far the scale walks of an odometer that may slip without a jump of the speed (per √m).
+const SLIP_WALK_PER_SQRT_M: f64 = 0.1;
+
+/// Standard deviation of where along the road the vehicle takes up a new curvature (m): no vehicle does
+/// at a point, as maps of arcs draw it, but over about its own length.
+const TRANSITION_M: f64 = 0.5;
+
+/// Squared Mahalanobis distance up to which the yaw rate on a road is taken at its word: 6σ.
+const TURN_GATE: f64 = 36.0;
+
+/// What a refused yaw rate may have hidden: that the vehicle turned by this much faster or slower
+/// than before (rad/s, a standard deviation).
+const REFUSED_RADPS: f64 = 0.5;
+
+/// How the yaw rate wanders while no sample tells of it: the density of a white angular acceleration
+/// (rad²/s³), by which it changes by 0.5 rad/s within half a second.
+const UNTOLD_TURN: f64 = 0.5;
+
+impl Ekf {
+    /// Moves the state by one odometry sample.
+    pub fn odometry(&mut self, sample: &OdometrySample) -> OdometryVerdict {
+        if !sample.is_finite() {
+            return OdometryVerdict::NotFinite;
+        }
+        let most_mps = WILD * self.config.top_speed_mps;
+        let sample = &OdometrySample {
+            speed_mps: sample.speed_mps.clamp(-most_mps, most_mps),
+            ..*sample
+        };
+        let Some(previous) = self.odometry else {
+            self.odometry = Some(*sample);
+            self.ask(sample.time_s);
+            return OdometryVerdict::First;
+        };
+        let duration_s = sample.time_s - previous.time_s;
+        if duration_s == 0.0 {
+            return OdometryVerdict::Duplicate;
+        }
+        if duration_s < 0.0 {
+            return OdometryVerdict::TimeBackwards;
+        }
+        self.odometry = Some(*sample);
+        self.detect_slip(&previous, sample, duration_s);
+        let moved_m = sample.distance_m - previous.distance_m;
+        // A counter that was reset or overflowed says nothing of the distance: the speeds do.
+        let jumped = moved_m.abs() > self.config.top_speed_mps * duration_s + 0.1;
+        let reading_m = if jumped {
+            0.5 * (previous.speed_mps + sample.speed_mps) * duration_s
+        } else {
+            moved_m
+        };
+        let mean_mps = 0.5 * (previous.speed_mps + sample.speed_mps);
+        let reading = self.reading(reading_m, mean_mps * duration_s);
+        let read_radps = sample.yaw_rate_radps;
+        let credible = |rate: &f64| rate.abs() <= self.config.top_yaw_rate_radps;
+        let refused = read_radps.filter(|rate| !credible(rate));
+        // The vehicle turns on as before, or by anything that a moment allows.
+        let rate = read_radps.filter(credible);
+        let before = previous.yaw_rate_radps.filter(credible);
+        let rate = rate.or(before.filter(|_| refused.is_some()));
+        // Where samples were lost, nothing tells of the turn until the last of them was due.
+        let told_s = self.sample_interval.told_s(duration_s);
+        let untold_s = duration_s - told_s;
+        let mut told = reading;
+        if let (Some(rate), true) = (rate, untold_s > 0.0) {
+            told = reading.share(told_s / duration_s);
+            let guessed = (self.turns_as_told())
+                .then(|| self.guessed_yaw(before.unwrap_or(rate), rate, untold_s));
+            self.advance(reading.share(untold_s / duration_s), untold_s, guessed);
+        }
+        let yaw = rate.map(|rate| {
+            let mut yaw = self.yaw(rate, told.read_m, told_s);
+            let change_rad = (before.unwrap_or(rate) - rate) * told_s;
+            if refused.is_some() {
+                yaw.variance += (REFUSED_RADPS * told_s).powi(2);
+            } else if self.turns_as_told() {
+                // When between two samples the rate changed nobody knows: evenly distributed.
+                yaw.variance += change_rad * change_rad / 12.0;
+            }
+            yaw
+        });
+        let last_s = if yaw.is_some() { told_s } else { duration_s };
+        self.advance(told, last_s, yaw);
+        if jumped {
+            self.add_along_variance(self.config.coasting_variance(duration_s));
+        }
+        self.ask(sample.time_s);
+        if jumped {
+            OdometryVerdict::DistanceJump { jump_m: moved_m }
+        } else if let Some(radps) = refused {
+            OdometryVerdict::YawRateRefused { radps }
+        } else if duration_s > self.config.gap_s {
+            OdometryVerdict::AfterGap { gap_s: duration_s }
+        } else {
+            match self.off_map {
+                Some(OffMap::Beyond { by_m }) => OdometryVerdict::BeyondMap { by_m },
+                Some(OffMap::Gap(Gap { from_m, to_m })) => {
+                    OdometryVerdict::InMapGap { from_m, to_m }
+                }
+                None => OdometryVerdict::Accepted,
+            }
+        }
+    }
+
+    /// Expects slip where the speed jumps as no vehicle can, which is a jump of the odometer's scale, or where the vehicle
+    /// sets off and may slip unseen. A differential drive's wheels may obey at once.
+    fn detect_slip(&mut self, previous: &OdometrySample, sample: &OdometrySample, duration_s: f64) {
+        if self.config.drive != DriveKind::Road {
+            return;
+        }
+        let usual_mps = SIGMAS_OF_SLIP * self.config.speed_noise_mps;
+        let mut least_mps =
+            usual_mps.max(self.config.slip_acceleration_mps2 * duration_s.max(0.02));
+        if (sample.speed_mps - previous.speed_mps).abs() > least_mps {
+            least_mps += self.bend_mps(sample.speed_mps, duration_s);
+        }
+        (self.speed_jumps).step(previous.speed_mps, sample.speed_mps, least_mps);
+        let sets_off = previous.speed_mps == 0.0 && sample.speed_mps != 0.0;
+        let unseen = self.config.may_slip && sets_off;
+        self.slip(if unseen {
+            MOST_SLIP
+        } else {
+            self.speed_jumps.speed_jump()
+        });
+    }
+
+    /// What is read, and what was driven of it by the speeds. A reading that is short by chance, or by the steps in
+    /// which wheels count, is no better for that: were its noise taken for less, the odometer would win
+    /// against the yaw rate wherever it reads too little, and lose wherever it reads too much.
+    fn reading(&mut self, read_m: f64, driven_m: f64) -> Reading {
+        self.unread_m += driven_m;
+        if read_m == 0.0 {
+            return Reading::exact(read_m);
+        }
+        let share = std::mem::take(&mut self.unread_m) / read_m;
+        if share == 0.0 || !share.is_finite() {
+            return Reading::exact(read_m); // no speed is told, or no time
+        }
+        let [least, most] = DRIVEN_BY_READ;
+        let driven_m = read_m * share.abs().clamp(least, most).copysign(share);
+        Reading { read_m, driven_m }
+    }
+
+    /// By how much a bend that begins or ends here changes the speed: its inner side is the shorter.
+    fn bend_mps(&self, speed_mps: f64, duration_s: f64) -> f64 {
+        let Some(map) = &self.map else {
+            return 0.0;
+        };
+        let (mean, covariance) = (&self.belief.mean, &self.belief.covariance);
+        let reach_m =
+            SIGMAS_OF_BEND * covariance[ALONG][ALONG].sqrt() + speed_mps.abs() * duration_s;
+        let aside_m = mean[ACROSS].abs() + SIGMAS_OF_BEND * covariance[ACROSS][ACROSS].sqrt();
+        let [before, after] = [-reach_m, reach_m].map(|by| map.curvature_per_m(mean[ALONG] + by));
+        (after - before).abs() * aside_m * speed_mps.abs()
+    }
+
+    /// The odometer's scale may have changed by a share.
+    fn slip(&mut self, by: f64) {
+        let variance = &mut self.belief.covariance[SCALE][SCALE];
+        *variance = variance.max((*variance + by * by).min(MOST_SLIP * MOST_SLIP));
+    }
+
+    /// What the yaw rate says of a step.
+    fn yaw(&self, rate_radps: f64, reading_m: f64, duration_s: f64) -> Yaw {
+        let config = &self.config;
+        let turn_rad = rate_radps * duration_s;
+        Yaw {
+            turn_rad,
+            duration_s,
+            is_told: true,
+            variance: config.yaw_noise_rad_per_sqrt_s.powi(2) * duration_s
+                + config.yaw_noise_rad_per_sqrt_m.powi(2) * reading_m.abs()
+                + config.yaw_noise_rad_per_sqrt_rad.powi(2) * turn_rad.abs(),
+        }
+    }
+
+    /// What is to be made of a turn between two yaw rates whose samples were lost: the mean of both,
+    /// and a Brownian bridge about it.
+    fn guessed_yaw(&self, from_radps: f64, to_radps: f64, duration_s: f64) -> Yaw {
+        let change_rad = (to_radps - from_radps) * duration_s;
+        let wander = UNTOLD_TURN * duration_s.powi(3);
+        let most_rad = self.config.top_yaw_rate_radps * duration_s;
+        Yaw {
+            turn_rad: 0.5 * (from_radps + to_radps) * duration_s,
+            duration_s,
+            is_told: false,
+            variance: ((change_rad * change_rad).max(wander) / 12.0).min(most_rad * most_rad),
+        }
+    }
+
+    /// Whether the yaw rate alone, if there is one, says how the vehicle turns.
+    fn turns_as_told(&self) -> bool {
+        self.config.drive == DriveKind::Differential || self.map.is_none()
+    }
+
+    fn advance(&mut self, reading: Reading, duration_s: f64, yaw: Option<Yaw>) {
+        let steps = (reading.read_m.abs() / STEP_M)
+            .ceil()
+            .clamp(1.0, MOST_STEPS);
+        let share = 1.0 / steps;
+        let yaw = yaw.map(|yaw| Yaw {
+            turn_rad: yaw.turn_rad * share,
+            duration_s: yaw.duration_s * share,
+            variance: yaw.variance * share,
+            ..yaw
+        });
+        for _ in 0..steps as usize {
+            let step = self.next_step(reading.share(share), duration_s * share, yaw);
+            if let Some(journal) = &mut self.journal {
+                journal.moved(&step.jacobian);
+            }
+            step.apply(&mut self.belief);
+            self.bias.moved(&step.jacobian);
+        }
+        self.turned_rad += yaw.map_or(0.0, |yaw| yaw.turn_rad.abs()) * steps;
+        self.driven_m += reading.read_m.abs() / (1.0 + self.belief.mean[SCALE]);
+        self.update_off_map();
+    }
+
+    /// The step that odometry tells of; a gyroscope's word on the present state is taken in.
+    fn next_step(&mut self, reading: Reading, duration_s: f64, yaw: Option<Yaw>) -> Step {
+        let read_m = reading.read_m;
+        if self.config.drive == DriveKind::Differential {
+            let turn = yaw.unwrap_or_else(|| self.config.unknown_turn(read_m, duration_s));
+            if read_m == 0.0 && turn.turn_rad == 0.0 && turn.is_told {
+                return Step::standing(&self.belief.mean); // the wheels do
+            }
+            return Step::turning(&self.belief.mean, read_m, &turn, &self.config.noise);
+        }
+        if let (None, Some(yaw)) = (&self.map, yaw) {
+            if read_m != 0.0 {
+                return Step::turning(&self.belief.mean, read_m, &yaw, &self.config.noise);
+            }
+            // Steered wheels that stand do not turn: what is read is the bias.
+            let mut row = [0.0; STATES];
+            row[YAW_RATE_BIAS] = yaw.duration_s;
+            let expected = self.belief.mean[YAW_RATE_BIAS] * yaw.duration_s;
+            self.measure(yaw.turn_rad - expected, &row, yaw.variance);
+            return Step::standing(&self.belief.mean);
+        }
+        let step = self.step(&self.belief, &reading);
+        let Some(yaw) = yaw else {
+            return step;
+        };
+        let (residual, row, mut variance) = step.turn_seen(&self.belief.mean, &yaw);
+        // What hardly can be counts as much as keeps it at the gate (Huber).
+        let surprise = self.belief.innovation(residual, &row, variance);
+        if surprise.mahalanobis2() > TURN_GATE {
+            variance += residual * residual / TURN_GATE - surprise.variance;
+        }
+        self.measure(residual, &row, variance);
+        self.step(&self.belief, &reading)
+            .informed(&self.belief.mean, &yaw)
+    }
+
+    /// The step that is to be expected over what the odometer would read.
+    pub(super) fn step(&self, belief: &Belief, reading: &Reading) -> Step {
+        let (mean, config, read_m) = (&belief.mean, &self.config, reading.read_m);
+        if config.drive == DriveKind::Differential {
+            let straight_on = Yaw {
+                turn_rad: 0.0,
+                duration_s: 0.0,
+                variance: 0.0,
+                is_told: false,
+            };
+            return Step::turning(mean, read_m, &straight_on, &config.noise);
+        }
+        let noise = &config.noise;
+        let Some(map) = &self.map else {
+            return Step::in_plane(mean, read_m, 0.0, &config.path_bend, noise);
+        };
+        let middle_m = mean[ALONG] + 0.5 * read_m;
+        if self.off_map.is_some() {
+            let curvature_per_m = map.curvature_per_m(middle_m);
+            return Step::in_plane(mean, read_m, curvature_per_m, &config.path_bend, noise);
+        }
+        let variance = |state: usize| belief.covariance[state][state].max(0.0);
+        let road = map.bending(middle_m, variance(ALONG).sqrt().max(TRANSITION_M));
+        let keeping = &config.lane_keeping;
+        Step::along_lane(mean, variance(HEADING), reading, &road, keeping, noise)
+    }
+
+    fn add_along_variance(&mut self, variance: f64) {
+        if self.map.is_some() {
+            self.belief.covariance[ALONG][ALONG] += variance;
+            return;
+        }
+        let (sin, cos) = self.belief.mean[HEADING].sin_cos();
+        let direction = [cos, sin];
+        for i in 0..2 {
+            for j in 0..2 {
+                self.belief.covariance[i][j] += variance * direction[i] * direction[j];
+            }
+        }
+    }
+
+    /// Expects slip from now on: by so much at once, anew whenever the vehicle sets off, when nothing
+    /// tells it from the speed, with every jump of the speed that is more than it accelerates, and with every
+    /// metre of a differential drive, whose speed may jump.
+    pub(in crate::localize) fn expect_slip(&mut self, by: f64) {
+        let config = &mut self.config;
+        config.may_slip = true;
+        config.slip_acceleration_mps2 = config.acceleration_mps2;
+        if config.drive == DriveKind::Differential {
+            config.noise.scale_per_sqrt_m = SLIP_WALK_PER_SQRT_M;
+        }
+        self.slip(by);
+    }
+}

@@ -1,0 +1,171 @@
+//! What the filter believes before any measurement.
+
+use std::sync::Arc;
+
+use super::angle_model::locate;
+use super::config::EkfConfig;
+use super::filter::Ekf;
+use super::state::{
+    ACROSS, ALONG, Belief, CURVATURE, DATUM, HEADING, LATENESS, MOUNTING, PHASE, SCALE, STATES,
+    YAW_RATE_BIAS, YAW_RATE_SCALE,
+};
+use crate::geometry::wrap_angle;
+use crate::localize::bias::CorrelatedBias;
+use crate::localize::pose_estimate::InitialPose;
+use crate::radio_head::RadioHead;
+use crate::road::Road;
+
+/// An exact start is known to a micrometre and a microradian: what is taken as exact leaves a variance
+/// of rounding, of either sign.
+const LEAST_VARIANCE: f64 = 1e-12;
+
+impl Ekf {
+    /// The belief before any measurement.
+    pub fn prior(config: &EkfConfig, map: Option<&Road>, start: &InitialPose) -> Belief {
+        let mut sigma = [0.0; STATES];
+        sigma[SCALE] = config.odometer_scale_std;
+        sigma[YAW_RATE_BIAS] = config.yaw_rate_bias_std_radps;
+        sigma[YAW_RATE_SCALE] = config.yaw_rate_scale_std;
+        sigma[MOUNTING] = config.mounting_std_rad;
+        sigma[PHASE] = config.phase_std_rad;
+        for state in DATUM {
+            sigma[state] = config.datum_std_m;
+        }
+        sigma[LATENESS] = config.lateness_std_s;
+        let mut mean = [0.0; STATES];
+        mean[SCALE] = config.odometer_scale - 1.0;
+        mean[YAW_RATE_BIAS] = config.yaw_rate_bias_radps;
+        mean[MOUNTING] = config.mounting_rad;
+        mean[PHASE] = config.phase_rad;
+        let Some(map) = map else {
+            mean[ALONG] = start.pose.x_m;
+            mean[ACROSS] = start.pose.y_m;
+            mean[HEADING] = start.pose.heading_rad;
+            sigma[ALONG] = start.position_std_m;
+            sigma[ACROSS] = start.position_std_m;
+            sigma[HEADING] = start.heading_std_rad;
+            sigma[CURVATURE] = config.curvature_variance().sqrt();
+            return Belief::independent(mean, sigma);
+        };
+        let place = map.project(start.pose.point());
+        let heading_rad = wrap_angle(start.pose.heading_rad - map.pose(place.along_m).heading_rad);
+        if map.gap_between(place.along_m, place.along_m).is_some() {
+            // No lane to keep to: what is given is all there is.
+            mean[ALONG] = place.along_m;
+            mean[ACROSS] = place.lateral_m;
+            mean[HEADING] = heading_rad;
+            sigma[ALONG] = start.position_std_m;
+            sigma[ACROSS] = start.position_std_m;
+            sigma[HEADING] = start.heading_std_rad;
+            return Belief::independent(mean, sigma);
+        }
+        let [offset_variance, heading_variance] = config.lane_keeping.stationary();
+        mean[ALONG] = place.along_m;
+        sigma[ALONG] = start.position_std_m;
+        sigma[ACROSS] = offset_variance.sqrt();
+        sigma[HEADING] = heading_variance.sqrt();
+        let mut belief = Belief::independent(mean, sigma);
+        // The given pose is a measurement beside what lane keeping already says. Where the road
+        // bends, the heading tells of the place along it.
+        let curvature_per_m = map.curvature_per_m(place.along_m);
+        for (state, value, std, by_along) in [
+            (ACROSS, place.lateral_m, start.position_std_m, 0.0),
+            (HEADING, heading_rad, start.heading_std_rad, curvature_per_m),
+        ] {
+            let mut row = [0.0; STATES];
+            row[state] = 1.0;
+            row[ALONG] = by_along;
+            let expected = belief.mean[state] + by_along * (belief.mean[ALONG] - place.along_m);
+            belief.update(value - expected, &row, (std * std).max(LEAST_VARIANCE));
+        }
+        belief
+    }
+
+    /// Counts distances on from where another filter of the same vehicle does.
+    pub(in crate::localize) fn resume(&mut self, other: &Self) {
+        self.odometry = other.odometry;
+        self.driven_m = other.driven_m;
+    }
+
+    /// The filter by what is stated: angles are as noisy as that, and a bias that is rare is not estimated.
+    pub(in crate::localize) fn nominal(&self) -> Self {
+        let mut ekf = self.clone();
+        if ekf.config.rare_bias_probability > 0.0 {
+            ekf.begin_bias(0.0);
+        }
+        ekf.set_noise_ratio(None);
+        ekf
+    }
+
+    /// Estimates a bias that is rare, unless it does.
+    pub(in crate::localize) fn estimate_rare_bias(&mut self) {
+        if !self.is_with_bias() {
+            self.begin_bias(self.config.rare_bias_probability);
+        }
+    }
+
+    fn begin_bias(&mut self, probability: f64) {
+        self.config.bias_probability = probability;
+        self.bias = CorrelatedBias::new(self.heads.len(), probability);
+    }
+
+    /// Takes nothing of the array as exact that is not stated.
+    pub(in crate::localize) fn uncalibrate_array(&mut self) {
+        let config = &mut self.config;
+        let stds_rad = std::mem::take(&mut config.unstated_array_std_rad);
+        for ((std, state), std_rad) in [
+            (&mut config.mounting_std_rad, MOUNTING),
+            (&mut config.phase_std_rad, PHASE),
+        ]
+        .into_iter()
+        .zip(stds_rad)
+        {
+            *std = std.hypot(std_rad);
+            self.belief.covariance[state][state] += std_rad * std_rad;
+        }
+    }
+
+    /// The site plan may be off as a whole, by `std_m` in x and y.
+    pub(in crate::localize) fn displace_site(&mut self, std_m: f64) {
+        for state in DATUM {
+            self.belief.covariance[state][state] += std_m * std_m;
+        }
+        self.config.datum_std_m = self.config.datum_std_m.hypot(std_m);
+    }
+
+    /// The odometer is so many times as noisy.
+    pub(in crate::localize) fn scale_odometer_noise(&mut self, times: f64) {
+        let noise = &mut self.config.noise;
+        noise.odometer_m_per_sqrt_m *= times;
+        noise.odometer_m_per_sqrt_s *= times;
+    }
+
+    /// The same filter begun anew where it is, every source in use, its place known to
+    /// `position_std_m` and its heading by the road alone, or by a quarter turn where no map tells
+    /// how the road lies.
+    pub(in crate::localize) fn restarted(&self, position_std_m: f64) -> Self {
+        let along_m = self.belief.mean[ALONG];
+        let surveyed = |map: &&Arc<Road>| map.gap_between(along_m, along_m).is_none();
+        let road = self.map.as_ref().filter(surveyed);
+        let pose = match road {
+            Some(map) => map.pose(along_m),
+            None => locate(&self.belief.mean, 0.0, self.map.as_deref()).0,
+        };
+        let start = InitialPose {
+            pose,
+            position_std_m,
+            heading_std_rad: if road.is_some() { 1.0 } else { 0.3 },
+        };
+        let heads: Vec<RadioHead> = self.heads.iter().map(|head| head.known).collect();
+        let mut restarted = Self::new(self.config, self.map.clone(), &heads, &start);
+        // Where the road crosses itself its nearest place may be another one.
+        if self.map.is_some() {
+            restarted.belief.mean[ALONG] = along_m;
+        }
+        Self {
+            odometry: self.odometry,
+            driven_m: self.driven_m,
+            ..restarted
+        }
+    }
+}

@@ -1,0 +1,326 @@
+//! The measurement update: an angle's prediction and innovation, its gate, and the corrected belief.
+
+use std::f64::consts::TAU;
+
+use super::angle_model::{AngleModel, locate};
+use super::filter::Ekf;
+use super::motion::Reading;
+use super::state::{ACROSS, ALONG, HEADING, LATENESS, SCALE, STATES, YAW_RATE_BIAS};
+use crate::geometry::wrap_angle;
+use crate::localize::bias::{self, JumpHypotheses, MOST_VARIANCE};
+use crate::localize::gaussian::Innovation;
+use crate::localize::measurement::{AngleMeasurement, UpdateReason, UpdateVerdict};
+use crate::radio_head::RadioHead;
+
+/// Most that angles can be later than stated (s).
+const MOST_LATENESS_S: f64 = 0.5;
+
+/// Probability that an angle which its estimator does not vouch for is wrong: as likely as not.
+const WRONG_IF_UNRESOLVED: f64 = 0.5;
+
+/// An angle is Gaussian with its stated deviation or, with the probability `wrong`, anything. The
+/// belief after it is a mixture of the belief updated and the belief as it was (probabilistic data
+/// association, Bar-Shalom and Tse 1975). This is the Gaussian measurement, residual and variance,
+/// that gives the belief the mixture's mean and variance. `None` where the mixture is wider than the
+/// belief was: such an angle says nothing.
+fn equivalent(innovation: &Innovation, wrong: f64) -> Option<(f64, f64)> {
+    let (residual, total) = (innovation.residual, innovation.variance);
+    let holds = (1.0 - wrong) * innovation.density();
+    let holds = holds / (holds + wrong / TAU);
+    // With the gain K = P Hᵀ/S the mixture has the mean p K r and the covariance
+    // P − p (S − (1 − p) r²) K Kᵀ, p being the probability that the angle holds.
+    let narrowing = holds * (total - (1.0 - holds) * residual * residual);
+    let equivalent_total = total * total / narrowing;
+    let belief = total - innovation.measurement_variance;
+    (narrowing > 0.0).then(|| {
+        (
+            holds * residual * equivalent_total / total,
+            equivalent_total - belief,
+        )
+    })
+}
+
+/// An angle's prediction and innovation.
+pub(in crate::localize) struct PredictedMeasurement {
+    pub head: usize,
+    pub excluded: bool,
+    pub place_m: f64,
+    pub row: [f64; STATES],
+    /// Without the time-correlated bias, where that is estimated.
+    pub innovation: Innovation,
+    /// Variance of the angle by its own noise (rad²).
+    pub own_variance: f64,
+    /// See [`AngleModel`].
+    pub aperture: f64,
+    pub toward: f64,
+    pub survey_variance: f64,
+    /// Time, way and turn since the radio head's last update (s, m, rad).
+    pub elapsed_s: f64,
+    pub moved: (f64, f64),
+    /// Variance by the odometry since its newest sample, and by the bend of the prediction (rad²).
+    pub coasted_variance: f64,
+    pub bend_variance: f64,
+    /// How the time-correlated bias may have come about, where it is estimated and the radio head is used.
+    pub hypotheses: Option<JumpHypotheses>,
+}
+
+impl PredictedMeasurement {
+    /// Share of it that is independent of the last one, where a time-correlated bias is estimated.
+    pub fn independent_share(&self) -> f64 {
+        bias::independent(self.moved.0.abs())
+    }
+}
+
+impl Ekf {
+    /// Predicts an angle to a radio head.
+    #[inline]
+    pub(in crate::localize) fn predict_measurement(
+        &self,
+        head: &RadioHead,
+        measured: &AngleMeasurement,
+    ) -> Result<PredictedMeasurement, UpdateReason> {
+        let sigma = measured.phase_sigma_rad * self.config.noise_ratio().sqrt();
+        let usable = measured.time_s.is_finite()
+            && measured.phase_rad.is_finite()
+            && sigma.is_finite()
+            && sigma > 0.0;
+        if !usable {
+            return Err(UpdateReason::Unusable);
+        }
+        if measured.time_s < self.time_s() {
+            return Err(UpdateReason::TooLate);
+        }
+        let (index, head) = (self.heads.iter().enumerate())
+            .find(|(_, mine)| mine.is(head))
+            .ok_or(UpdateReason::UnknownRadioHead)?;
+        let (ahead_m, ahead_variance) = self.coasting(measured.time_s);
+        // From the newest odometry to the angle the vehicle has strayed on in its lane.
+        let ahead = (ahead_m != 0.0)
+            .then(|| Reading::exact(ahead_m * (1.0 + self.belief.mean[SCALE])))
+            .map(|reading| self.step(&self.belief, &reading));
+        let mean = (ahead.as_ref()).map_or(&self.belief.mean, |ahead| &ahead.mean);
+        let angle_model = self
+            .angle_model(&head.known, mean)
+            .ok_or(UpdateReason::Unusable)?;
+        let bend = angle_model.bend(&self.belief.covariance);
+        let place_m = self.driven_m + ahead_m;
+        let travelled_m = place_m - head.last_update_m;
+        let shared = (self.config).look_variance(travelled_m, &angle_model);
+        let elapsed_s = measured.time_s - head.last_update_s;
+        let turned_rad = self.turned_rad - head.last_update_rad;
+        let moved = (travelled_m, turned_rad);
+        let stated = (self.config.phase_bias).variance(sigma, elapsed_s, moved);
+        let (row, strayed) = (ahead.as_ref()).map_or((angle_model.row, 0.0), |ahead| {
+            ahead.seen_before(&angle_model.row)
+        });
+        let coasted = angle_model.row[ALONG].powi(2) * ahead_variance + strayed;
+        let measurement_variance = stated + shared + coasted + bend.variance;
+        let residual = wrap_angle(measured.phase_rad - angle_model.phase_rad - bend.shift_rad);
+        let innovation = (self.belief).innovation(residual, &row, measurement_variance);
+        let hypotheses = if head.excluded {
+            None
+        } else {
+            (self.bias).weigh(index, travelled_m.abs(), &innovation, &row)
+        };
+        Ok(PredictedMeasurement {
+            head: index,
+            excluded: head.excluded,
+            place_m,
+            row,
+            innovation,
+            own_variance: sigma * sigma,
+            aperture: angle_model.aperture,
+            toward: angle_model.toward,
+            survey_variance: angle_model.survey_variance,
+            elapsed_s,
+            moved,
+            coasted_variance: coasted,
+            bend_variance: bend.variance,
+            hypotheses,
+        })
+    }
+
+    /// Variance of an angle's noise, had the radio head not been heard before (rad²).
+    pub(in crate::localize) fn first_variance(&self, predicted: &PredictedMeasurement) -> f64 {
+        let config = &self.config;
+        let scatter = config.scatter_variance(f64::INFINITY, predicted.aperture, predicted.toward);
+        predicted.own_variance + scatter
+    }
+
+    /// Variance of an angle's systematic errors: surveys, stated bias, odometry since its newest sample, second order
+    /// (rad²).
+    pub(in crate::localize) fn systematic_variance(&self, predicted: &PredictedMeasurement) -> f64 {
+        let bias = self.config.phase_bias.std_rad;
+        predicted.survey_variance
+            + bias * bias
+            + predicted.coasted_variance
+            + predicted.bend_variance
+    }
+
+    /// A radio head as it is seen from a state, or rather was seen when the angle was received.
+    fn angle_model(&self, head: &RadioHead, mean: &[f64; STATES]) -> Option<AngleModel> {
+        let (map, array) = (self.map.as_deref(), &self.config.array);
+        if self.config.lateness_std_s == 0.0 {
+            let (pose, frame) = locate(mean, 0.0, map);
+            return AngleModel::new(head, pose, &frame, mean, array);
+        }
+        let speed_mps = self.speed_mps();
+        let (mut pose, frame) = locate(mean, -speed_mps * mean[LATENESS], map);
+        let mut rate_radps = 0.0;
+        if map.is_none() {
+            let read = self.odometry.and_then(|sample| sample.yaw_rate_radps);
+            let top = self.config.top_yaw_rate_radps;
+            rate_radps =
+                read.filter(|rate| rate.abs() <= top).unwrap_or_default() - mean[YAW_RATE_BIAS];
+            pose.heading_rad -= rate_radps * mean[LATENESS];
+        }
+        let mut angle_model = AngleModel::new(head, pose, &frame, mean, array)?;
+        let (sin, cos) = (pose.heading_rad - frame.direction_rad).sin_cos();
+        let row = &mut angle_model.row;
+        row[LATENESS] = -speed_mps * (row[ALONG] * cos / frame.stretch + row[ACROSS] * sin)
+            - rate_radps * row[HEADING];
+        Some(angle_model)
+    }
+
+    /// Corrects the state by one electrical angle to a radio head.
+    pub fn update(&mut self, head: &RadioHead, measured: &AngleMeasurement) -> UpdateVerdict {
+        self.update_predicted(self.predict_measurement(head, measured), measured)
+    }
+
+    /// Corrects the state by an angle that was just predicted.
+    #[inline]
+    pub(in crate::localize) fn update_predicted(
+        &mut self,
+        predicted: Result<PredictedMeasurement, UpdateReason>,
+        measured: &AngleMeasurement,
+    ) -> UpdateVerdict {
+        let predicted = match predicted {
+            Ok(predicted) if predicted.excluded => {
+                return self.verdict(UpdateReason::Excluded, None);
+            }
+            Ok(predicted) => predicted,
+            Err(reason) => return self.verdict(reason, None),
+        };
+        if let Some(hypotheses) = &predicted.hypotheses {
+            return self.update_with_bias(&predicted, hypotheses, measured);
+        }
+        let seen = predicted.innovation;
+        let mahalanobis2 = seen.mahalanobis2();
+        if mahalanobis2 > self.config.gate {
+            return self.verdict(UpdateReason::Outlier, Some(mahalanobis2));
+        }
+        let (mut residual, mut variance) = (seen.residual, seen.measurement_variance);
+        let unresolved = (!measured.resolved).then_some(WRONG_IF_UNRESOLVED);
+        if let Some(wrong) = unresolved.or(self.config.wrong_lobe) {
+            let Some(likely) = equivalent(&seen, wrong) else {
+                return self.verdict(UpdateReason::Outlier, Some(mahalanobis2));
+            };
+            (residual, variance) = likely;
+        }
+        self.measure(residual, &predicted.row, variance);
+        self.note_update(&predicted, measured);
+        self.verdict(UpdateReason::Consistent, Some(mahalanobis2))
+    }
+
+    /// Corrects state and biases by an angle. One that is far off is called an outlier; of a radio head known as off that is no news of the vehicle.
+    fn update_with_bias(
+        &mut self,
+        predicted: &PredictedMeasurement,
+        hypotheses: &JumpHypotheses,
+        measured: &AngleMeasurement,
+    ) -> UpdateVerdict {
+        // Gated with the largest bias variance added.
+        let mut seen = predicted.innovation;
+        seen.variance += MOST_VARIANCE;
+        let mahalanobis2 = seen.mahalanobis2();
+        let is_known = self.bias.is_large(predicted.head);
+        let (way_m, journal) = (predicted.moved.0.abs(), self.journal.as_mut());
+        (self.bias).take(
+            &mut self.belief,
+            predicted.head,
+            way_m,
+            &predicted.row,
+            hypotheses,
+            journal,
+        );
+        self.note_update(predicted, measured);
+        if mahalanobis2 > self.config.gate {
+            return self.verdict(UpdateReason::Outlier, (!is_known).then_some(mahalanobis2));
+        }
+        self.verdict(UpdateReason::Consistent, Some(mahalanobis2))
+    }
+
+    /// Remembers when and where a radio head was used.
+    fn note_update(&mut self, predicted: &PredictedMeasurement, measured: &AngleMeasurement) {
+        self.keep_bounds();
+        if let Some(head) = self.heads.get_mut(predicted.head) {
+            head.last_update_m = predicted.place_m;
+            head.last_update_s = measured.time_s;
+            head.last_update_rad = self.turned_rad;
+        }
+    }
+
+    /// Clamps scale and lateness to what is plausible, however well more would explain the angles.
+    fn keep_bounds(&mut self) {
+        let mean = &mut self.belief.mean;
+        let scale = self.config.odometer_scale;
+        mean[SCALE] = mean[SCALE].clamp(0.5 * scale - 1.0, 2.0 * scale - 1.0);
+        mean[LATENESS] = mean[LATENESS].clamp(-MOST_LATENESS_S, MOST_LATENESS_S);
+    }
+
+    fn verdict(&self, reason: UpdateReason, mahalanobis2: Option<f64>) -> UpdateVerdict {
+        UpdateVerdict {
+            accepted: reason == UpdateReason::Consistent,
+            reason,
+            mahalanobis_squared: mahalanobis2,
+            threshold: Some(self.config.gate),
+        }
+    }
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+    use crate::localize::gaussian::Gaussian;
+
+    #[test]
+    fn the_belief_has_the_moments_of_the_mixture() {
+        let (prior_variance, variance) = (0.8_f64, 0.3_f64);
+        let normal =
+            |x: f64, variance: f64| (-0.5 * x * x / variance).exp() / (TAU * variance).sqrt();
+        for measured in [0.0, 0.6, 1.1, -1.4] {
+            // Bayes by the sum over the state: right, or anywhere on the circle.
+            let mut moments = [0.0; 3];
+            for step in -60_000..60_000 {
+                let x = 1e-4 * f64::from(step);
+                let likelihood = normal(measured - x, variance) + TAU.recip();
+                let weight = likelihood * normal(x, prior_variance);
+                for (power, moment) in (0..).zip(&mut moments) {
+                    *moment += weight * x.powi(power);
+                }
+            }
+            let mean = moments[1] / moments[0];
+            let spread = moments[2] / moments[0] - mean * mean;
+
+            let mut belief = Gaussian::independent([0.0], [prior_variance.sqrt()]);
+            let innovation = belief.innovation(measured, &[1.0], variance);
+            let (residual, variance) = equivalent(&innovation, WRONG_IF_UNRESOLVED).unwrap();
+            belief.update(residual, &[1.0], variance);
+            assert!((belief.mean[0] - mean).abs() < 1e-6, "{measured}");
+            assert!(
+                (belief.covariance[0][0] - spread).abs() < 1e-6,
+                "{measured}"
+            );
+        }
+    }
+
+    #[test]
+    fn far_off_it_says_nothing() {
+        let innovation = Innovation {
+            residual: 0.9,
+            variance: 0.05,
+            measurement_variance: 0.01,
+        };
+        assert_eq!(equivalent(&innovation, WRONG_IF_UNRESOLVED), None);
+    }
+}

@@ -1,0 +1,394 @@
+//! Integrity monitoring of a bank of filters: protection level and state, recovery where a fault cannot be identified,
+//! and the handover between solutions.
+//!
+//! If one radio head is at fault, the filter without it is right within its own covariance, wherever the full solution
+//! may be: the protection level is the radius about the reported solution that holds for all hypotheses of the
+//! [`Bank`] together, each at its probability ([`LevelEquation`]). All
+//! of it is of angles as noisy as they are heard to be.
+//!
+//! The state is `unavailable` where half of the radio heads or more are at fault or in doubt; `degraded` where a mode
+//! leads that is a fault, or did within `recovery_s`, where a radio head is in doubt or a bank is begun anew, where the
+//! odometer's scale has departed from what is stated, and where the level is above the alert limit.
+//!
+//! With a single radio head odometry and road are all there is to compare it with: the protection level then is what
+//! those two can vouch for, grows with the distance driven, and passes the alert limit unless they
+//! are good.
+
+use std::cell::RefCell;
+
+use super::protection_level::{Hypothesis, LevelEquation};
+use crate::clone_in_place::clone_in_place;
+use crate::geometry::{Pose, wrap_angle};
+use crate::localize::ekf::Ekf;
+use crate::localize::measurement::{AngleMeasurement, OdometryVerdict, UpdateVerdict};
+use crate::localize::modes::{Bank, ModeId, RECOVERY_S};
+use crate::localize::pose_estimate::{Integrity, IntegrityState, PoseEstimate};
+use crate::observation::OdometrySample;
+use crate::radio_head::RadioHead;
+use crate::settings::IntegritySettings;
+
+/// Share of the risk that is not worth the effort.
+const NEGLIGIBLE: f64 = 0.1;
+
+/// Squared deviations by which two positions are apart that are not both right.
+const APART2: f64 = 9.0;
+
+/// The previous solution, relative to the one that is reported since. Where a radio head is excluded, another mode leads
+/// or a restarted bank takes over, the position may be another at one angle; as long as that may be taken back, the
+/// covariance covers both. Both move on alike.
+#[derive(Clone, Copy, Debug)]
+struct Handover {
+    since_s: f64,
+    apart: [f64; 3],
+    covariance: [[f64; 3]; 3],
+}
+
+impl Handover {
+    /// Another solution reports `now`, where the previous one reported `before`; `None` where the two agree.
+    pub fn new(before: &PoseEstimate, now: &PoseEstimate) -> Option<Self> {
+        let covariance = before.covariance?;
+        let [[xx, xy, _], [_, yy, _], _] = covariance;
+        let [[own_xx, own_xy, _], [_, own_yy, _], _] = now.covariance?;
+        let (xx, xy, yy) = (xx + own_xx, xy + own_xy, yy + own_yy);
+        let (x_m, y_m) = (
+            before.pose.x_m - now.pose.x_m,
+            before.pose.y_m - now.pose.y_m,
+        );
+        let apart2 = yy * x_m * x_m - 2.0 * xy * x_m * y_m + xx * y_m * y_m;
+        (apart2 > APART2 * (xx * yy - xy * xy)).then(|| Self {
+            since_s: now.time_s,
+            apart: [
+                x_m,
+                y_m,
+                wrap_angle(before.pose.heading_rad - now.pose.heading_rad),
+            ],
+            covariance,
+        })
+    }
+
+    /// Where the previous solution would be now; `None` after so long (s).
+    pub fn beside(&self, told: &PoseEstimate, patience_s: f64) -> Option<PoseEstimate> {
+        let [x_m, y_m, heading_rad] = self.apart;
+        (told.time_s - self.since_s <= patience_s).then_some(PoseEstimate {
+            pose: Pose {
+                x_m: told.pose.x_m + x_m,
+                y_m: told.pose.y_m + y_m,
+                heading_rad: told.pose.heading_rad + heading_rad,
+            },
+            covariance: Some(self.covariance),
+            ..*told
+        })
+    }
+}
+
+clone_in_place! {
+    /// A bank and what became of it.
+    #[derive(Debug)]
+    pub struct IntegrityMonitor {
+        settings: IntegritySettings,
+        level: LevelEquation,
+        /// Those of the newest level: room that is kept.
+        hypotheses: RefCell<Vec<Hypothesis>>,
+        bank: Bank,
+        restarted: Option<Restarted>,
+        /// The previous solution.
+        handover: Option<Handover>,
+        /// Whether it was found by a search, and no restarted bank has confirmed it yet.
+        is_found: bool,
+        /// Distance driven (m) when no fault was unidentified last.
+        trusted_m: f64,
+        /// When its filters began anew last (s).
+        begun_s: f64,
+        /// Whether the odometer's scale was certainly not what is stated, and has not been found to be since.
+        has_departed: bool,
+        /// When something was at fault last (s), as far as is known.
+        fault_s: f64,
+        now_s: f64,
+    }
+}
+
+clone_in_place! {
+    /// Trackers begun anew from a vague pose.
+    #[derive(Debug)]
+    struct Restarted {
+        bank: Bank,
+        since_s: f64,
+    }
+}
+
+impl IntegrityMonitor {
+    /// Monitors a filter of these radio heads. One that was found by a search, and not given, is to be confirmed.
+    pub fn new(
+        ekf: &Ekf,
+        heads: &[RadioHead],
+        settings: IntegritySettings,
+        found_s: Option<f64>,
+    ) -> Self {
+        let is_found = found_s.is_some();
+        let found_s = found_s.unwrap_or(f64::NEG_INFINITY);
+        Self {
+            level: LevelEquation::new(settings.risk_per_epoch()),
+            hypotheses: RefCell::default(),
+            trusted_m: ekf.driven_m(),
+            bank: Bank::new(ekf, heads, &settings, found_s),
+            restarted: None,
+            handover: None,
+            is_found,
+            begun_s: found_s,
+            has_departed: false,
+            fault_s: f64::NEG_INFINITY,
+            now_s: found_s,
+            settings,
+        }
+    }
+
+    /// The leading filter.
+    pub fn ekf(&self) -> &Ekf {
+        self.bank.leader()
+    }
+
+    /// The filter by whose uncertainty to listen: where the level is beyond the alert limit, that of the
+    /// hypothesis which contributes most to it; else the leading one.
+    pub fn worst_case(&self) -> &Ekf {
+        let (bank, now_s) = (&self.bank, self.ekf().time_s());
+        if self.is_near(bank, now_s) {
+            return bank.leader();
+        }
+        let beyond = |(clean, hypothesis)| {
+            let alert_limit_m = self.settings.alert_limit_m;
+            (self.level.share_beyond(alert_limit_m, &hypothesis), clean)
+        };
+        (self.hypotheses_of(bank, now_s).map(beyond))
+            .max_by(|(one, _), (other, _)| one.total_cmp(other))
+            .map_or(bank.leader(), |(_, clean)| clean)
+    }
+
+    /// When a restarted bank took over last (s).
+    pub const fn begun_s(&self) -> f64 {
+        self.begun_s
+    }
+
+    /// Whether angles may be off by the mode that leads as if the vehicle were lost.
+    pub fn may_mislead(&self) -> bool {
+        self.bank.may_mislead()
+    }
+
+    /// How much more the angles vary than stated.
+    pub const fn noise_ratio(&self) -> f64 {
+        self.bank.noise_ratio()
+    }
+
+    /// Moves every filter.
+    pub fn odometry(&mut self, sample: &OdometrySample) -> OdometryVerdict {
+        if let Some(restarted) = &mut self.restarted {
+            restarted.bank.odometry(sample);
+        }
+        self.bank.odometry(sample)
+    }
+
+    /// Takes in an angle: a test of its radio head, and information for every filter that uses it.
+    pub fn update(&mut self, head: &RadioHead, measured: &AngleMeasurement) -> UpdateVerdict {
+        self.now_s = self.now_s.max(measured.time_s);
+        let odometry_s = self.ekf().time_s();
+        let (solution_id, told) = (self.solution_id(), self.ekf().pose(odometry_s));
+        let verdict = self.bank.update(head, measured);
+        self.bank.judge(self.now_s);
+        if let Some(bank) = self.bank.rebased(self.now_s) {
+            (self.bank, self.restarted) = (bank, None);
+        }
+        if let Some(restarted) = &mut self.restarted {
+            restarted.bank.update(head, measured);
+            restarted.bank.judge(self.now_s);
+        }
+        self.recover();
+        self.hold_faults();
+        if self.solution_id() != solution_id {
+            let handover = Handover::new(&told, &self.ekf().pose(odometry_s));
+            self.handover = handover.or(self.handover);
+        }
+        verdict
+    }
+
+    /// By what another solution is known: mode, number of radio heads excluded, restart.
+    fn solution_id(&self) -> (Option<ModeId>, usize, f64) {
+        (self.bank.leading_id(), self.bank.faulty(), self.begun_s)
+    }
+
+    /// Holds: which mode leads may change from angle to angle, and a restarted filter does not know the
+    /// odometer yet.
+    fn hold_faults(&mut self) {
+        if self.bank.is_fault() {
+            self.fault_s = self.now_s;
+        }
+        let main = self.bank.nominal();
+        self.has_departed =
+            main.odometer_departs() || (self.has_departed && !main.knows_odometer());
+    }
+
+    /// Where a fault cannot be identified, the filters may have diverged, so far that
+    /// they refuse the good angles as outliers. Another bank then begins from a pose as vague as what may
+    /// have happened meanwhile, and takes over once no test contradicts it. Until then, or until
+    /// the old one has no doubts any more, nothing is `ok`. What a search found by angles that may have
+    /// been at fault is confirmed the same way.
+    fn recover(&mut self) {
+        let (now_s, patience_s) = (self.now_s, RECOVERY_S);
+        let lost = self.bank.is_lost();
+        let Some(restarted) = &self.restarted else {
+            if lost || self.is_found {
+                self.restart();
+            } else {
+                self.trusted_m = self.bank.nominal().driven_m();
+            }
+            return;
+        };
+        let aged = now_s - restarted.since_s > patience_s;
+        if !lost && !self.is_found && self.bank.quiet_s(now_s) > patience_s {
+            self.restarted = None;
+        } else if aged && restarted.bank.is_lost() {
+            self.restart();
+        } else if restarted.bank.quiet_s(now_s) > patience_s
+            && !restarted.bank.is_fault()
+            && self.is_near(&restarted.bank, now_s)
+            && let Some(restarted) = self.restarted.take()
+        {
+            self.bank = restarted.bank;
+            self.is_found = false;
+            self.begun_s = now_s;
+        }
+    }
+
+    fn restart(&mut self) {
+        let strayed_m = if self.bank.explains_heads() {
+            0.0
+        } else {
+            self.bank.nominal().driven_m() - self.trusted_m
+        };
+        let position_std_m = self.settings.alert_limit_m + strayed_m;
+        self.restarted = Some(Restarted {
+            bank: self.bank.restarted(position_std_m, self.now_s),
+            since_s: self.now_s,
+        });
+    }
+
+    /// The pose at `time_s`.
+    pub fn pose(&self, time_s: f64) -> PoseEstimate {
+        let mut pose = self.bank.leader().pose(time_s);
+        let mixture = self.bank.mixture();
+        pose.mix(mixture.map(|(probability, right)| (probability, right.pose(time_s))));
+        pose.integrity = Some(self.integrity(time_s));
+        let handover = self.handover.as_ref();
+        if let Some(handover) = handover.and_then(|it| it.beside(&pose, RECOVERY_S)) {
+            pose.cover(&handover);
+        }
+        if self.bank.explains_heads() {
+            return pose;
+        }
+        let restarted = self.restarted.iter().map(|it| it.bank.nominal());
+        for other in self.bank.candidates().chain(restarted) {
+            pose.cover(&other.pose(time_s));
+        }
+        pose
+    }
+
+    /// Protection level and state at `time_s`.
+    pub fn integrity(&self, time_s: f64) -> Integrity {
+        let mut hypotheses = self.hypotheses.borrow_mut();
+        hypotheses.clear();
+        hypotheses.extend(self.hypotheses_of(&self.bank, time_s).map(|(_, it)| it));
+        let levels = self.level.solve(&hypotheses);
+        let state = if self.bank.is_outvoted() && !self.bank.explains_heads() {
+            IntegrityState::Unavailable
+        } else if self.now_s - self.fault_s <= RECOVERY_S
+            || self.has_departed
+            || self.restarted.is_some()
+            || self.bank.quiet_s(self.now_s) <= RECOVERY_S
+            || levels.horizontal_m > self.settings.alert_limit_m
+        {
+            IntegrityState::Degraded
+        } else {
+            IntegrityState::Ok
+        };
+        Integrity {
+            protection_level_m: levels.horizontal_m,
+            protection_level_along_m: levels.along_m,
+            protection_level_across_m: levels.across_m,
+            state,
+            faulty: self.bank.faulty(),
+        }
+    }
+
+    /// Whether the error is within the alert limit but for the risk.
+    fn is_near(&self, bank: &Bank, time_s: f64) -> bool {
+        let hypotheses = self.hypotheses_of(bank, time_s).map(|(_, it)| it);
+        self.level.holds(self.settings.alert_limit_m, hypotheses)
+    }
+
+    /// The hypotheses that are not negligible, each with the filter that is right under it.
+    fn hypotheses_of<'a>(
+        &self,
+        bank: &'a Bank,
+        time_s: f64,
+    ) -> impl Iterator<Item = (&'a Ekf, Hypothesis)> {
+        let told = bank.leader().pose(time_s);
+        let heard_noise_ratio = bank.noise_ratio();
+        let negligible = NEGLIGIBLE * self.level.risk();
+        (bank.hypotheses())
+            .filter(move |(probability, _)| *probability > negligible)
+            .filter_map(move |(probability, right)| {
+                let pose = right.pose(time_s);
+                let noise_ratio = right.config().unexpected_noise(heard_noise_ratio);
+                let hypothesis = Hypothesis::new(probability, &pose, noise_ratio, &told);
+                hypothesis.map(|it| (right, it))
+            })
+    }
+}
+
+#[cfg(test)]
+mod tests {
+    use std::f64::consts::PI;
+
+    use super::*;
+    use crate::localize::modes::trip::{angle, trip};
+
+    /// Deviations by which a position may be another one at one angle.
+    const MOST_DEVIATIONS: f64 = 5.0;
+
+    #[test]
+    fn whoever_takes_over_covers_who_told_the_position_before() {
+        // The odometer reads half as much again, and a radio head is hidden later: neither explains the other.
+        const READS: f64 = 1.5;
+        const HIDDEN_S: f64 = 8.0;
+        const OFF_RAD: f64 = -0.6;
+        let (heads, road, ekf) = trip();
+        let mut guard = IntegrityMonitor::new(&ekf, &heads, IntegritySettings::default(), None);
+        let mut farthest_m: f64 = 0.0;
+        let mut last = guard.pose(0.0);
+        for step in 1..150 {
+            let time_s = f64::from(step) * 0.1;
+            guard.odometry(&OdometrySample {
+                time_s,
+                distance_m: 4.0 * READS * time_s,
+                speed_mps: 4.0,
+                yaw_rate_radps: None,
+            });
+            let truth = road.pose(4.0 * time_s);
+            for (number, head) in heads.iter().enumerate() {
+                let bearing_rad = truth.point().bearing_rad(head.position) - truth.heading_rad;
+                let is_off = number == 0 && time_s > HIDDEN_S;
+                let off_rad = if is_off { OFF_RAD } else { 0.0 };
+                let before = guard.pose(time_s);
+                guard.update(head, &angle(time_s, PI * bearing_rad.cos() + off_rad));
+                last = guard.pose(time_s);
+                let moved_m = last.pose.point().distance_m(before.pose.point());
+                let [before_m2, now_m2] = [&before, &last].map(|it| it.principal_variances()[0]);
+                let std_m = before_m2.max(now_m2).sqrt();
+                assert!(moved_m < MOST_DEVIATIONS * std_m, "{moved_m} of {std_m} m");
+                farthest_m = farthest_m.max(moved_m);
+            }
+        }
+        assert!(farthest_m > 5.0, "{farthest_m}");
+        // Not for ever.
+        let std_m = last.principal_variances()[0].sqrt();
+        assert!(std_m < 0.5 * farthest_m, "{std_m} m");
+    }
+}

@@ -1,0 +1,396 @@
+//! Protection levels: how far from the estimate the vehicle may be, but for the risk that is allowed.
+//!
+//! Solution separation as in ARAIM (Blanch, Walter, Enge, Lee, Pervan, Rippl, Spletter and Kropp,
+//! IEEE Transactions on Aerospace and Electronic Systems 51, 2015): the level r solves
+//! `Σₖ pₖ P(error > r | k) = risk` over the hypotheses k, nothing at fault (p = 1) and each fault at
+//! its probability. Under k the estimate of the filter that k does not touch is right within its own
+//! covariance; the separation of the two estimates is taken as it is, not as its threshold.
+
+use std::f64::consts::TAU;
+
+use crate::localize::gaussian::principal_variances;
+use crate::localize::pose_estimate::PoseEstimate;
+
+/// Directions over which a probability is summed.
+const DIRECTIONS: usize = 32;
+
+/// Share of the squared level to which it is found; it is rounded up.
+const ACCURACY: f64 = 4e-3;
+
+/// Share of the risk below which an upper limit of what a hypothesis adds to it will do.
+const NEGLIGIBLE: f64 = 1e-3;
+
+/// Least logarithm of a probability over the risk: further out it is no straight line to aim along.
+const LEAST_EXCESS: f64 = -30.0;
+
+/// Where the vehicle is if something is at fault, as seen from the estimate: a Gaussian.
+#[derive(Clone, Copy, Debug)]
+pub struct Hypothesis {
+    probability: f64,
+    /// Ahead of the estimate and to its left (m).
+    separation_m: [f64; 2],
+    /// Lower triangular square root of the covariance along these axes (m).
+    root_m: [f64; 3],
+    /// Larger standard deviation (m).
+    std_m: f64,
+}
+
+impl Hypothesis {
+    /// That `right` is right within `variance_ratio` times its covariance, and not `told`; `None` where
+    /// it does not know its own error.
+    pub fn new(
+        probability: f64,
+        right: &PoseEstimate,
+        variance_ratio: f64,
+        told: &PoseEstimate,
+    ) -> Option<Self> {
+        let [[xx, xy, _], [_, yy, _], _] = right.covariance?;
+        let (sin, cos) = told.pose.heading_rad.sin_cos();
+        let [x_m, y_m] = [
+            right.pose.x_m - told.pose.x_m,
+            right.pose.y_m - told.pose.y_m,
+        ];
+        let along = cos * cos * xx + 2.0 * cos * sin * xy + sin * sin * yy;
+        let across = sin * sin * xx - 2.0 * cos * sin * xy + cos * cos * yy;
+        let mixed = cos * sin * (yy - xx) + (cos * cos - sin * sin) * xy;
+        let [along, mixed, across] = [along, mixed, across].map(|it| variance_ratio * it);
+        let first = along.max(0.0).sqrt();
+        let shared = if first > 0.0 { mixed / first } else { 0.0 };
+        let own = (across - shared * shared).max(0.0).sqrt();
+        Some(Self {
+            probability,
+            separation_m: [cos * x_m + sin * y_m, cos * y_m - sin * x_m],
+            root_m: [first, shared, own],
+            std_m: principal_variances(along, mixed, across)[0].sqrt(),
+        })
+    }
+
+    fn distance_m(&self) -> f64 {
+        self.separation_m[0].hypot(self.separation_m[1])
+    }
+
+    /// Probability that the vehicle is further ahead or behind than `level_m`.
+    fn beyond_along(&self, level_m: f64) -> f64 {
+        beyond_line(self.separation_m[0], self.root_m[0], level_m)
+    }
+
+    /// Probability that it is further to a side.
+    fn beyond_across(&self, level_m: f64) -> f64 {
+        let std_m = self.root_m[1].hypot(self.root_m[2]);
+        beyond_line(self.separation_m[1], std_m, level_m)
+    }
+
+    /// Upper limit of the probability that it is further away, `exp(−((r − d)/σ)²/2)`: as if it were round.
+    fn most_beyond_circle(&self, radius_m: f64) -> f64 {
+        let room_m = radius_m - self.distance_m();
+        if room_m <= 0.0 {
+            return 1.0;
+        }
+        (-0.5 * (room_m / self.std_m).powi(2)).exp()
+    }
+
+    /// Probability that it is further away; where that is at most negligible, an upper limit.
+    ///
+    /// In polar coordinates about the mean, in which the Gaussian is round, the ray in direction t
+    /// leaves the circle at ρ(t), and beyond lies `exp(−ρ²/2)` of what the ray has:
+    /// `1/2π ∫ exp(−ρ(t)²/2) dt`.
+    fn beyond_circle(
+        &self,
+        directions: &[[f64; 2]; DIRECTIONS],
+        radius_m: f64,
+        negligible: f64,
+    ) -> f64 {
+        let most = self.most_beyond_circle(radius_m);
+        if most < negligible {
+            return most;
+        }
+        let ([x, y], [first, shared, own]) = (self.separation_m, self.root_m);
+        let room = radius_m * radius_m - x * x - y * y;
+        if room <= 0.0 {
+            return 1.0;
+        }
+        let beyond = |[cos, sin]: &[f64; 2]| {
+            let ray = [first * cos, shared * cos + own * sin];
+            let along = x * ray[0] + y * ray[1];
+            let square = ray[0] * ray[0] + ray[1] * ray[1];
+            if square <= 0.0 {
+                return 0.0;
+            }
+            let exit = ((along * along + square * room).sqrt() - along) / square;
+            (-0.5 * exit * exit).exp()
+        };
+        directions.iter().map(beyond).sum::<f64>() / DIRECTIONS as f64
+    }
+}
+
+/// Probability, at most 1.4 % too large where it is small, that a Gaussian is further from zero than
+/// `level`.
+fn beyond_line(mean: f64, std: f64, level: f64) -> f64 {
+    let room = level - mean.abs();
+    if room <= 0.0 {
+        return 1.0;
+    }
+    (upper_tail(room / std) + upper_tail((level + mean.abs()) / std)).min(1.0)
+}
+
+/// Upper limit of the probability of a standard normal variable above x ≥ 0 (Sampford, Annals of
+/// Mathematical Statistics 24, 1953).
+fn upper_tail(x: f64) -> f64 {
+    4.0 * (-0.5 * x * x).exp() / (TAU.sqrt() * (3.0 * x + (x * x + 8.0).sqrt()))
+}
+
+/// Levels that the error leaves with a stated risk.
+#[derive(Clone, Copy, Debug, PartialEq)]
+pub struct Levels {
+    /// In any direction (m).
+    pub horizontal_m: f64,
+    /// Ahead or behind (m).
+    pub along_m: f64,
+    /// To either side (m).
+    pub across_m: f64,
+}
+
+/// Finds levels for a risk.
+#[derive(Clone, Debug)]
+pub struct LevelEquation {
+    risk: f64,
+    directions: [[f64; 2]; DIRECTIONS],
+}
+
+impl LevelEquation {
+    /// The equation for a risk in (0, 1).
+    pub fn new(risk: f64) -> Self {
+        let mut directions = [[0.0; 2]; DIRECTIONS];
+        for (number, direction) in directions.iter_mut().enumerate() {
+            let (sin, cos) = (TAU * number as f64 / DIRECTIONS as f64).sin_cos();
+            *direction = [cos, sin];
+        }
+        Self { risk, directions }
+    }
+
+    /// The risk.
+    pub const fn risk(&self) -> f64 {
+        self.risk
+    }
+
+    /// Whether such a level holds for all of the hypotheses together, which is far less work than to
+    /// solve for the least that does.
+    pub fn holds(&self, level_m: f64, hypotheses: impl Iterator<Item = Hypothesis>) -> bool {
+        let beyond = hypotheses.map(|it| self.share_beyond(level_m, &it));
+        beyond.sum::<f64>() <= self.risk
+    }
+
+    /// What a hypothesis adds to the probability of being further away than a level.
+    pub fn share_beyond(&self, level_m: f64, hypothesis: &Hypothesis) -> f64 {
+        let negligible = NEGLIGIBLE * self.risk / hypothesis.probability;
+        hypothesis.probability * hypothesis.beyond_circle(&self.directions, level_m, negligible)
+    }
+
+    /// The levels that hold for all of the hypotheses together.
+    pub fn solve(&self, hypotheses: &[Hypothesis]) -> Levels {
+        let total: f64 = hypotheses.iter().map(|it| it.probability).sum();
+        let at_none = (total / self.risk).ln();
+        // A deviation of t leaves exp(−t²/2) at most in a circle: that far, all of them are within.
+        let deviations = (2.0 * at_none).max(0.0).sqrt();
+        let reach_m = (hypotheses.iter())
+            .map(|it| it.distance_m() + deviations * it.std_m)
+            .fold(0.0, f64::max);
+        let mut brackets = [Bracket::new(reach_m, at_none); 3];
+        while brackets.iter().any(Bracket::is_open) {
+            let [circle_m, along_m, across_m] = brackets.map(|it| it.next().sqrt());
+            let is_open = brackets.map(|it| it.is_open());
+            let mut beyond = [0.0; 3];
+            for one in hypotheses {
+                if is_open[0] {
+                    beyond[0] += self.share_beyond(circle_m, one);
+                }
+                if is_open[1] {
+                    beyond[1] += one.probability * one.beyond_along(along_m);
+                }
+                if is_open[2] {
+                    beyond[2] += one.probability * one.beyond_across(across_m);
+                }
+            }
+            for (bracket, beyond) in brackets.iter_mut().zip(beyond) {
+                bracket.narrow((beyond / self.risk).ln());
+            }
+        }
+        let [horizontal_m, along_m, across_m] = brackets.map(|it| it.high.sqrt());
+        Levels {
+            horizontal_m,
+            along_m,
+            across_m,
+        }
+    }
+}
+
+/// Between which squares a level is, and the logarithms of probability over risk there. Over the
+/// square of the level the logarithm is about a straight line: regula falsi, in which an end that
+/// stays is halved (Illinois) so that both close in.
+#[derive(Clone, Copy, Debug)]
+struct Bracket {
+    low: f64,
+    high: f64,
+    at_low: f64,
+    at_high: f64,
+}
+
+impl Bracket {
+    fn new(reach_m: f64, at_none: f64) -> Self {
+        Self {
+            low: 0.0,
+            high: reach_m * reach_m,
+            at_low: at_none,
+            at_high: -0.1 * at_none,
+        }
+    }
+
+    fn is_open(&self) -> bool {
+        self.high - self.low > ACCURACY * self.high
+    }
+
+    /// Where to look next.
+    fn next(&self) -> f64 {
+        let share = (self.at_low / (self.at_low - self.at_high)).clamp(0.05, 0.95);
+        self.low + share * (self.high - self.low)
+    }
+
+    /// Takes in what was found there.
+    fn narrow(&mut self, excess: f64) {
+        if !self.is_open() {
+            return;
+        }
+        let middle = self.next();
+        if excess > 0.0 {
+            (self.low, self.at_low, self.at_high) = (middle, excess, 0.5 * self.at_high);
+        } else {
+            let excess = excess.max(LEAST_EXCESS);
+            (self.high, self.at_high, self.at_low) = (middle, excess, 0.5 * self.at_low);
+        }
+    }
+}
+
+#[cfg(test)]
+mod tests {
+    use rand::{RngExt, SeedableRng};
+    use rand_chacha::ChaCha8Rng;
+    use rand_distr::StandardNormal;
+
+    use super::*;
+    use crate::geometry::Pose;
+    use crate::localize::quantile::{RadialQuantile, normal_quantile};
+
+    fn estimate(x_m: f64, y_m: f64, covariance: [[f64; 2]; 2]) -> PoseEstimate {
+        let [[xx, xy], [_, yy]] = covariance;
+        PoseEstimate {
+            time_s: 0.0,
+            pose: Pose {
+                x_m,
+                y_m,
+                heading_rad: 0.6,
+            },
+            covariance: Some([[xx, xy, 0.0], [xy, yy, 0.0], [0.0; 3]]),
+            integrity: None,
+        }
+    }
+
+    fn hypothesis(probability: f64, [x_m, y_m]: [f64; 2], covariance: [[f64; 2]; 2]) -> Hypothesis {
+        let told = estimate(1.0, -2.0, [[0.0; 2]; 2]);
+        let right = estimate(1.0 + x_m, -2.0 + y_m, covariance);
+        Hypothesis::new(probability, &right, 1.0, &told).unwrap()
+    }
+
+    fn levels(risk: f64, hypotheses: &[Hypothesis]) -> Levels {
+        LevelEquation::new(risk).solve(hypotheses)
+    }
+
+    #[test]
+    fn without_separation_they_are_the_quantiles() {
+        for risk in [1e-2, 1e-3, 1e-8] {
+            for small in [0.0, 0.04, 0.3, 1.0] {
+                let found = levels(
+                    risk,
+                    &[hypothesis(1.0, [0.0; 2], [[1.0, 0.0], [0.0, small]])],
+                );
+                let radius = RadialQuantile::new(risk).radius([1.0, small]);
+                // Up to 0.2 % of rounding up.
+                assert!((-1e-3..3e-3).contains(&(found.horizontal_m / radius - 1.0)));
+                let along_std = 0.6_f64.cos().hypot(small.sqrt() * 0.6_f64.sin());
+                let along = normal_quantile(0.5 * risk) * along_std;
+                let ratio = found.along_m / along;
+                assert!((1.0..1.006).contains(&ratio), "{ratio}");
+            }
+        }
+    }
+
+    #[test]
+    fn along_a_far_separation_it_is_the_one_sided_quantile() {
+        // Φ⁻¹(0.99) = 2.326.
+        let found = levels(
+            1e-2,
+            &[hypothesis(1.0, [3.0, 4.0], [[0.36, 0.48], [0.48, 0.64]])],
+        );
+        assert!(
+            (found.horizontal_m / 7.326 - 1.0).abs() < 0.005,
+            "{found:?}"
+        );
+    }
+
+    /// Of as many draws of hypotheses and places as many are beyond as the risk says.
+    #[test]
+    fn hypotheses_share_the_risk() {
+        let mut rng = ChaCha8Rng::seed_from_u64(1);
+        let narrow = [[0.01, 0.002], [0.002, 0.02]];
+        let (draws, risk) = (200_000, 1e-2);
+        for (wide, separation_m) in [
+            ([[0.09, 0.02], [0.02, 0.04]], [0.3, -0.2]),
+            ([[1.0, -0.3], [-0.3, 0.1]], [0.0, 1.5]),
+            ([[0.01, 0.0], [0.0, 4e-4]], [0.05, 0.0]),
+        ] {
+            let fault = 0.3;
+            let all = [
+                hypothesis(1.0 - fault, [0.0; 2], narrow),
+                hypothesis(fault, separation_m, wide),
+            ];
+            let found = levels(risk, &all);
+            let equation = LevelEquation::new(risk);
+            assert!(equation.holds(found.horizontal_m, all.into_iter()));
+            assert!(!equation.holds(0.99 * found.horizontal_m, all.into_iter()));
+            let mut beyond = [0; 3];
+            for _ in 0..draws {
+                let one = all[usize::from(rng.random::<f64>() < fault)];
+                let mut normal = || rng.sample::<f64, _>(StandardNormal);
+                let (a, b) = (normal(), normal());
+                let x = one.separation_m[0] + one.root_m[0] * a;
+                let y = one.separation_m[1] + one.root_m[1] * a + one.root_m[2] * b;
+                beyond[0] += u32::from(x.hypot(y) > found.horizontal_m);
+                beyond[1] += u32::from(x.abs() > found.along_m);
+                beyond[2] += u32::from(y.abs() > found.across_m);
+            }
+            // 2000 ± 45 by counting; rounding up by 0.2 %, and the limit of the tail, take off 4 %.
+            for share in beyond.map(|count| f64::from(count) / (f64::from(draws) * risk)) {
+                assert!(
+                    (0.89..1.07).contains(&share),
+                    "{separation_m:?}: {beyond:?}"
+                );
+            }
+        }
+    }
+
+    #[test]
+    fn a_rarer_fault_counts_less_and_no_fault_costs_nothing() {
+        let nominal = hypothesis(1.0, [0.0; 2], [[0.01, 0.0], [0.0, 0.01]]);
+        let fault = |probability| hypothesis(probability, [0.3, 0.1], [[0.04, 0.0], [0.0, 0.02]]);
+        let with = |probability| levels(1e-3, &[nominal, fault(probability)]).horizontal_m;
+        assert!(with(0.1) > 1.05 * with(0.01));
+        assert!((with(1e-9) / levels(1e-3, &[nominal]).horizontal_m - 1.0).abs() < 3e-3);
+    }
+
+    #[test]
+    fn exact_knowledge_needs_only_the_separation() {
+        let exact = |separation_m| levels(1e-2, &[hypothesis(1.0, separation_m, [[0.0; 2]; 2])]);
+        assert_eq!(exact([0.0, 0.0]).horizontal_m, 0.0);
+        let radius_m = exact([0.3, 0.4]).horizontal_m;
+        assert!((radius_m - 0.5).abs() < 0.002, "{radius_m}");
+    }
+}

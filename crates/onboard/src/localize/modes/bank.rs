@@ -1,0 +1,655 @@
+//! A static bank of filters, one for each fault mode of the [table](super::table), beside the nominal one.
+//!
+//! Multiple-model estimation (MMAE: Bar-Shalom, Li and Kirubarajan, Estimation with Applications to Tracking and
+//! Navigation, 2001, 11.6) of modes that do not switch: no filter is mixed with another (as IMM does), so that one
+//! without a radio head has never heard it, as solution separation needs.
+//!
+//! Beside the filter of every sound radio head run one without each of them and one without each
+//! two. If one radio head is at fault — seen round a corner, moved, spoofed — the filters without
+//! it are not. Those without two tell which one it is: leave out the right one, and the others
+//! agree with each other; leave out a wrong one, and the fault is still among them. And when a
+//! radio head is excluded, filters that have never heard it are ready to take over, together with
+//! those that have heard neither it nor one of the others.
+
+use super::head_test::{CLEARED, DETECTED, HeadTest, RECOVERY_S};
+use super::likelihood::{LEAST_ODDS, LikelihoodRatio, SPEED_JUMP};
+use super::noise_ratio::NoiseRatio;
+use super::subsets::{Subsets, exclude};
+use super::table::{Carry, Mode, ModeId, TABLE, Verdict, Weight};
+use crate::clone_in_place::clone_in_place;
+use crate::localize::ekf::{Ekf, PredictedMeasurement};
+use crate::localize::measurement::{
+    AngleMeasurement, OdometryVerdict, UpdateReason, UpdateVerdict,
+};
+use crate::observation::OdometrySample;
+use crate::radio_head::RadioHead;
+use crate::settings::{FaultProbability, IntegritySettings};
+
+/// However rare a fault is, under it the error is within the level more often than not.
+const MOST_UNDER_FAULT: f64 = 0.49;
+
+clone_in_place! {
+    /// The filter of a mode that is weighed by its posterior.
+    #[derive(Debug)]
+    struct ModeFilter {
+        mode: &'static Mode,
+        prior: f64,
+        ekf: Ekf,
+        /// To the nominal mode.
+        ratio: LikelihoodRatio,
+        /// Whether the vehicle stood since the filter began.
+        at_rest: bool,
+    }
+}
+
+impl ModeFilter {
+    fn new(mode: &'static Mode, given: &Ekf, faults: &FaultProbability) -> Self {
+        let mut ekf = (mode.seed)(given);
+        (mode.alter)(&mut ekf);
+        Self {
+            mode,
+            prior: (mode.prior)(given.config(), faults),
+            ekf,
+            ratio: LikelihoodRatio::NONE,
+            at_rest: true,
+        }
+    }
+
+    /// Those of the table that apply to a filter.
+    fn all(given: &Ekf, faults: &FaultProbability) -> Vec<Self> {
+        let nominal = given.nominal();
+        let apply = |it: &&Mode| it.weight == Weight::Posterior && (it.applies)(&nominal, faults);
+        let modes = TABLE.iter().filter(apply);
+        modes.map(|mode| Self::new(mode, given, faults)).collect()
+    }
+
+    /// What of it is carried over to another nominal filter.
+    fn carry(
+        &mut self,
+        carry: Carry,
+        given: &Ekf,
+        excluded: Option<&RadioHead>,
+        faults: &FaultProbability,
+    ) {
+        match carry {
+            Carry::All => {}
+            Carry::AllButHead => exclude(&mut self.ekf, excluded, true),
+            Carry::Filter => self.ratio = LikelihoodRatio::NONE,
+            Carry::IfNotAgainst if !self.ratio.is_against() => {}
+            Carry::IfNotAgainst | Carry::Nothing => *self = Self::new(self.mode, given, faults),
+        }
+    }
+
+    /// How many times as probable it is as the nominal mode.
+    fn odds(&self) -> f64 {
+        self.ratio.odds(self.prior)
+    }
+
+    /// Moves on by an odometry sample, by which the nominal filter has moved on. What spoke against a fault that may
+    /// begin now says nothing of that.
+    fn odometry(&mut self, nominal: &Ekf, sample: &OdometrySample) {
+        self.ekf.odometry(sample);
+        let Some(onset) = self.mode.onset else {
+            return;
+        };
+        let was_at_rest = std::mem::replace(&mut self.at_rest, sample.speed_mps == 0.0);
+        let sets_off = was_at_rest && !self.at_rest;
+        let jump = self.ekf.speed_jump();
+        if !(sets_off || jump > 0.0) {
+            return;
+        }
+        if self.ratio.is_against() {
+            self.ekf.clone_from(nominal);
+            onset(&mut self.ekf, if sets_off { 0.0 } else { jump });
+        }
+        let least = if jump > 0.0 { SPEED_JUMP } else { 0.0 };
+        self.ratio.raise_to(least);
+    }
+
+    /// Takes in an angle, which the nominal filter predicts so.
+    fn update(
+        &mut self,
+        nominal: (&Ekf, &Result<PredictedMeasurement, UpdateReason>),
+        head: &RadioHead,
+        measured: &AngleMeasurement,
+    ) -> UpdateVerdict {
+        let predicted = self.ekf.predict_measurement(head, measured);
+        if measured.resolved {
+            self.ratio.update((&self.ekf, &predicted), nominal);
+        }
+        self.ekf.update_predicted(predicted, measured)
+    }
+}
+
+clone_in_place! {
+    /// The filters.
+    #[derive(Debug)]
+    pub(in crate::localize) struct Bank {
+        settings: IntegritySettings,
+        heads: Vec<RadioHead>,
+        faulty: Vec<bool>,
+        /// When each of them last disagreed with the filter without it (s).
+        disagreed_s: Vec<f64>,
+        /// When a source was last at fault and not identified (s).
+        lost_s: f64,
+        /// The filter of every sound radio head, by what is stated.
+        nominal: Ekf,
+        modes: Vec<ModeFilter>,
+        noise: NoiseRatio,
+        /// Prior probability of a fault of each radio head.
+        head_prior: f64,
+        subsets: Subsets,
+    }
+}
+
+impl Bank {
+    /// The modes beside a filter; nothing is known of them at `now_s`.
+    pub fn new(given: &Ekf, heads: &[RadioHead], settings: &IntegritySettings, now_s: f64) -> Self {
+        let modes = ModeFilter::all(given, &settings.fault_probability);
+        Self::with(given, heads, settings, modes, now_s)
+    }
+
+    fn with(
+        given: &Ekf,
+        heads: &[RadioHead],
+        settings: &IntegritySettings,
+        modes: Vec<ModeFilter>,
+        now_s: f64,
+    ) -> Self {
+        let faults = &settings.fault_probability;
+        let nominal = given.nominal();
+        let count = heads.len();
+        let of_heads = TABLE
+            .iter()
+            .find(|it| it.weight == Weight::Prior { heads: 1 });
+        Self {
+            settings: *settings,
+            subsets: Subsets::new(count),
+            faulty: vec![false; count],
+            disagreed_s: vec![f64::NEG_INFINITY; count],
+            lost_s: now_s,
+            heads: heads.to_vec(),
+            modes,
+            head_prior: of_heads.map_or(0.0, |it| (it.prior)(nominal.config(), faults)),
+            nominal,
+            noise: NoiseRatio::new(count),
+        }
+    }
+
+    /// The filter of every sound radio head, by what is stated.
+    pub const fn nominal(&self) -> &Ekf {
+        &self.nominal
+    }
+
+    /// The bank begun anew from a vague pose where the leading filter is; nothing is known of it at `now_s`.
+    pub fn restarted(&self, position_std_m: f64, now_s: f64) -> Self {
+        let start = self.leader().restarted(position_std_m);
+        let mut modes = ModeFilter::all(&start, &self.settings.fault_probability);
+        for it in &mut modes {
+            let before = self
+                .modes
+                .iter()
+                .find(|before| before.mode.id == it.mode.id);
+            if it.mode.on_restart != Carry::Nothing
+                && let Some(before) = before
+            {
+                it.clone_from(before);
+                it.carry(
+                    it.mode.on_restart,
+                    &start,
+                    None,
+                    &self.settings.fault_probability,
+                );
+            }
+        }
+        Self {
+            noise: self.noise.resumed(),
+            ..Self::with(&start, &self.heads, &self.settings, modes, now_s)
+        }
+    }
+
+    /// The bank about the mode that leads as the nominal one, once it is certain and no radio head is in doubt;
+    /// nothing is known of it at `now_s`. What the others' likelihoods had in common with its own is taken off them.
+    pub fn rebased(&self, now_s: f64) -> Option<Self> {
+        let leading = self.leading()?;
+        let is_certain = (leading.mode.becomes_nominal_at).is_some_and(|it| leading.odds() > it);
+        let is_quiet =
+            self.faulty() == 0 && self.in_doubt(CLEARED) == 0 && self.quiet_s(now_s) > RECOVERY_S;
+        (is_certain && is_quiet).then(|| self.about(leading, now_s))
+    }
+
+    fn about(&self, nominal: &ModeFilter, now_s: f64) -> Self {
+        let others = self.modes.iter().filter(|it| it.mode.id != nominal.mode.id);
+        let mut modes: Vec<ModeFilter> = others.cloned().collect();
+        for it in &mut modes {
+            it.ratio = it.ratio.to(nominal.ratio);
+            it.carry(
+                it.mode.on_rebase,
+                &nominal.ekf,
+                None,
+                &self.settings.fault_probability,
+            );
+        }
+        Self {
+            noise: self.noise.resumed(),
+            ..Self::with(&nominal.ekf, &self.heads, &self.settings, modes, now_s)
+        }
+    }
+
+    /// The bank about the leading mode.
+    #[cfg(test)]
+    pub(super) fn about_leading(&self) -> Option<Self> {
+        self.leading().map(|it| self.about(it, 0.0))
+    }
+
+    /// The mode that leads: clearly more probable than the nominal one, and more so than any other.
+    fn leading(&self) -> Option<&ModeFilter> {
+        let most = (self.modes.iter()).max_by(|one, other| one.odds().total_cmp(&other.odds()));
+        most.filter(|it| it.odds() > LEAST_ODDS && it.mode.verdict != Verdict::Unled)
+    }
+
+    /// The filter that is most probably right: the nominal one, unless another mode leads.
+    pub fn leader(&self) -> &Ekf {
+        self.leading().map_or(&self.nominal, |it| &it.ekf)
+    }
+
+    /// The mode that leads, if it is not the nominal one.
+    pub fn leading_id(&self) -> Option<ModeId> {
+        self.leading().map(|it| it.mode.id)
+    }
+
+    /// Odds and filter of a mode.
+    #[cfg(test)]
+    pub(super) fn mode(&self, id: ModeId) -> Option<(f64, &Ekf)> {
+        let found = self.modes.iter().find(|it| it.mode.id == id);
+        found.map(|it| (it.odds(), &it.ekf))
+    }
+
+    /// Whether the mode that leads is a fault.
+    pub fn is_fault(&self) -> bool {
+        (self.leading()).is_some_and(|it| it.mode.verdict == Verdict::Degraded)
+    }
+
+    /// Whether angles may be off by the mode that leads as if the vehicle were lost.
+    pub fn may_mislead(&self) -> bool {
+        self.leading().is_some_and(|it| it.mode.misleads)
+    }
+
+    /// Whether a mode that explains disagreement of several radio heads is clearly more probable than the nominal
+    /// one, whatever leads.
+    pub fn explains_heads(&self) -> bool {
+        (self.modes.iter()).any(|it| it.mode.explains_heads && it.odds() > LEAST_ODDS)
+    }
+
+    /// The hypotheses of the protection level, each with its probability and the filter that is right under it: the
+    /// modes weighed by their posteriors, and, as far as none of those that are faults holds, one or two of the sound
+    /// radio heads at fault.
+    pub fn hypotheses(&self) -> impl Iterator<Item = (f64, &Ekf)> + Clone {
+        let total = self.total_odds();
+        let faults = (self.modes.iter()).filter(|it| it.mode.verdict != Verdict::Ok);
+        let fault_free = 1.0 - faults.map(ModeFilter::odds).sum::<f64>() / total;
+        let heads = (self.subsets.iter())
+            .filter(|subset| !subset.without.iter().any(|&it| self.is_faulty(it)))
+            .map(move |subset| {
+                let both = if subset.is_of_one() {
+                    1.0
+                } else {
+                    self.head_prior
+                };
+                (fault_free * self.head_prior * both, &subset.ekf)
+            });
+        let odds = std::iter::once((1.0, &self.nominal))
+            .chain(self.modes.iter().map(|it| (it.odds(), &it.ekf)));
+        odds.map(move |(odds, ekf)| (odds / total, ekf))
+            .chain(heads)
+    }
+
+    /// The modes that may lead, each with its posterior among them and its filter: the estimate is one of those.
+    pub fn mixture(&self) -> impl Iterator<Item = (f64, &Ekf)> + Clone {
+        let may_lead = |it: &&ModeFilter| it.mode.verdict != Verdict::Unled;
+        let odds = std::iter::once((1.0, &self.nominal))
+            .chain((self.modes.iter().filter(may_lead)).map(|it| (it.odds(), &it.ekf)));
+        let total = 1.0 + odds.clone().skip(1).map(|(odds, _)| odds).sum::<f64>();
+        odds.map(move |(odds, ekf)| (odds / total, ekf))
+    }
+
+    /// The odds of all modes, the nominal one among them.
+    fn total_odds(&self) -> f64 {
+        1.0 + self.modes.iter().map(ModeFilter::odds).sum::<f64>()
+    }
+
+    /// The filters without a radio head in doubt, one of which may take over soon.
+    pub fn candidates(&self) -> impl Iterator<Item = &Ekf> {
+        let in_doubt = |head: &usize| self.statistic(*head) > CLEARED;
+        let in_doubt = self.sound().filter(in_doubt);
+        in_doubt.filter_map(|head| Some(&self.subsets.get(head, head)?.ekf))
+    }
+
+    fn sound(&self) -> impl Iterator<Item = usize> + Clone {
+        let faulty = self.faulty.iter().enumerate();
+        faulty.filter_map(|(head, faulty)| (!faulty).then_some(head))
+    }
+
+    /// Number of radio heads found faulty.
+    pub fn faulty(&self) -> usize {
+        self.faulty.iter().filter(|faulty| **faulty).count()
+    }
+
+    fn is_faulty(&self, head: usize) -> bool {
+        self.faulty.get(head).is_some_and(|faulty| *faulty)
+    }
+
+    /// By how much more variance the angles have than stated.
+    pub const fn noise_ratio(&self) -> f64 {
+        self.noise.ratio()
+    }
+
+    /// How far the angles of a radio head are off from the filter without it, in standard
+    /// deviations.
+    fn statistic(&self, head: usize) -> f64 {
+        let test = self.subsets.get(head, head).map(|subset| subset.test(head));
+        test.map_or(0.0, |test| self.deviations(head, &test))
+    }
+
+    /// The statistic of a test of a radio head, with the noise that there is.
+    fn deviations(&self, head: usize, test: &HeadTest) -> f64 {
+        test.statistic() / self.noise.ratio_of(head).sqrt()
+    }
+
+    /// Number of sound radio heads whose statistic is above a threshold.
+    fn in_doubt(&self, threshold: f64) -> usize {
+        self.sound()
+            .filter(|&head| self.statistic(head) > threshold)
+            .count()
+    }
+
+    /// Moves every filter.
+    pub fn odometry(&mut self, sample: &OdometrySample) -> OdometryVerdict {
+        for subset in self.subsets.iter_mut() {
+            subset.ekf.odometry(sample);
+        }
+        let verdict = self.nominal.odometry(sample);
+        for it in &mut self.modes {
+            it.odometry(&self.nominal, sample);
+        }
+        verdict
+    }
+
+    /// Takes in an angle: a test of its radio head, and information for every filter that uses that.
+    pub fn update(&mut self, head: &RadioHead, measured: &AngleMeasurement) -> UpdateVerdict {
+        let is_it = |mine: &RadioHead| mine.sends(head.pci, head.ssb_index);
+        let number = self.heads.iter().position(is_it);
+        if let Some(number) = number {
+            self.update_subsets(number, head, measured);
+        }
+        let noise_ratio = number.map_or(1.0, |number| self.noise.core_ratio_of(number));
+        let predicted = self.nominal.predict_measurement(head, measured);
+        let mut by_heads_explained = None;
+        for it in &mut self.modes {
+            (it.mode.adapt)(&mut it.ekf, noise_ratio);
+            let verdict = it.update((&self.nominal, &predicted), head, measured);
+            if it.mode.explains_heads {
+                by_heads_explained = Some(verdict);
+            }
+        }
+        let most = (self.modes.iter()).fold(LikelihoodRatio::NONE, |most, it| most.max(it.ratio));
+        for it in &mut self.modes {
+            it.ratio.limit_by(most);
+        }
+        let verdict = self.nominal.update_predicted(predicted, measured);
+        by_heads_explained
+            .filter(|_| self.explains_heads())
+            .unwrap_or(verdict)
+    }
+
+    fn update_subsets(&mut self, number: usize, head: &RadioHead, measured: &AngleMeasurement) {
+        let (faulty, noise) = (&self.faulty, &self.noise);
+        let keeps = |head: usize, statistic: f64| {
+            let is_faulty = faulty.get(head).is_some_and(|it| *it);
+            is_faulty || statistic > CLEARED * noise.ratio_of(head).sqrt()
+        };
+        self.subsets.hear(number, &self.heads, &self.nominal, keeps);
+        for subset in self.subsets.iter_mut() {
+            if !subset.lacks(number) {
+                subset.ekf.update(head, measured);
+                continue;
+            }
+            let Some(seen) = subset.ekf.innovation_of_excluded(head, measured) else {
+                continue;
+            };
+            if subset.without == [number; 2] {
+                self.noise.see(number, &seen);
+            }
+            // While the vehicle stands, scatter is one measurement however often it is seen.
+            if seen.innovation.measurement_variance < 1.0 {
+                for (mine, test) in subset.without.iter().zip(&mut subset.tests) {
+                    if *mine == number {
+                        test.push(&seen.innovation);
+                    }
+                }
+            }
+        }
+    }
+
+    /// Whether a source is at fault and nobody knows which, or too many are.
+    pub fn is_lost(&self) -> bool {
+        self.in_doubt(DETECTED) > 0 || self.is_outvoted()
+    }
+
+    /// Whether half of several radio heads or more are at fault or in doubt.
+    pub fn is_outvoted(&self) -> bool {
+        let against = self.in_doubt(DETECTED) + self.faulty();
+        against > 1 && 2 * against >= self.heads.len()
+    }
+
+    /// For how long it has not been lost (s).
+    pub fn quiet_s(&self, now_s: f64) -> f64 {
+        now_s - self.lost_s
+    }
+
+    /// Excludes the radio head that is at fault, where two others remain to agree without it, and
+    /// readmits those that have come to agree again.
+    pub fn judge(&mut self, now_s: f64) {
+        for head in 0..self.heads.len() {
+            let disagrees = self.statistic(head) > CLEARED;
+            let Some(disagreed_s) = self.disagreed_s.get_mut(head) else {
+                return;
+            };
+            if disagrees {
+                *disagreed_s = now_s;
+            } else if now_s - *disagreed_s > RECOVERY_S && self.is_faulty(head) {
+                self.readmit(head);
+            }
+        }
+        // A wrong choice is itself a fault, and must be as rare as the risk under one.
+        let head = self.settings.fault_probability.of_radio_head(false);
+        let risk = (self.settings.risk_per_epoch() / head).min(MOST_UNDER_FAULT);
+        let odds = -2.0 * risk.ln();
+        if let Some(faulty_head) = self.faulty_head(odds) {
+            self.exclude(faulty_head);
+        }
+        if self.is_lost() {
+            self.lost_s = now_s;
+        }
+    }
+
+    /// The radio head that is at fault, if one is that much likelier to be it than any other:
+    /// without it the largest statistic among the others falls below what it is without another by
+    /// `odds`, in twice the logarithm of a likelihood ratio.
+    fn faulty_head(&self, odds: f64) -> Option<usize> {
+        let watched = || {
+            self.sound()
+                .filter(|&head| self.subsets.get(head, head).is_some())
+        };
+        if watched().count() < 3 || self.in_doubt(DETECTED) == 0 {
+            return None;
+        }
+        let (mut best, mut second) = ((usize::MAX, f64::INFINITY), f64::INFINITY);
+        for head in watched() {
+            let disagreement = self.disagreement_without(head);
+            if disagreement < best.1 {
+                second = best.1;
+                best = (head, disagreement);
+            } else {
+                second = second.min(disagreement);
+            }
+        }
+        let (head, least) = best;
+        let sure = second * second - least * least > odds;
+        (sure && least < DETECTED && self.statistic(head) > DETECTED).then_some(head)
+    }
+
+    /// The largest statistic of a sound radio head when `left_out` is left out.
+    fn disagreement_without(&self, left_out: usize) -> f64 {
+        (self.subsets.iter())
+            .filter(|subset| !subset.is_of_one() && subset.lacks(left_out))
+            .flat_map(|subset| subset.without.iter().zip(&subset.tests))
+            .filter(|(head, _)| **head != left_out && !self.is_faulty(**head))
+            .map(|(head, test)| self.deviations(*head, test))
+            .fold(0.0, f64::max)
+    }
+
+    /// Leaves a radio head out everywhere, and with it what it has done.
+    pub(super) fn exclude(&mut self, faulty_head: usize) {
+        let Some(faulty) = self.faulty.get_mut(faulty_head) else {
+            return;
+        };
+        *faulty = true;
+        if let Some(without) = self.subsets.get(faulty_head, faulty_head) {
+            self.nominal = without.ekf.clone();
+        }
+        let known = self.heads.get(faulty_head);
+        for it in &mut self.modes {
+            it.carry(
+                it.mode.on_exclude,
+                &self.nominal,
+                known,
+                &self.settings.fault_probability,
+            );
+        }
+        self.subsets.exclude(faulty_head, &self.heads);
+    }
+
+    /// Uses a radio head again.
+    fn readmit(&mut self, head: usize) {
+        if let Some(faulty) = self.faulty.get_mut(head) {
+            *faulty = false;
+        }
+        let known = self.heads.get(head);
+        exclude(&mut self.nominal, known, false);
+        for it in &mut self.modes {
+            exclude(&mut it.ekf, known, false);
+        }
+        for subset in self.subsets.iter_mut().filter(|subset| !subset.lacks(head)) {
+            exclude(&mut subset.ekf, known, false);
+        }
+    }
+}
+
+#[cfg(test)]
+mod tests {
+    use std::sync::Arc;
+
+    use super::*;
+    use crate::geometry::Pose;
+    use crate::localize::ekf::EkfConfig;
+    use crate::localize::pose_estimate::InitialPose;
+    use crate::settings::{Shipped, Site, TomlFile, Vehicle};
+
+    /// A minute of driving past four radio heads, of which number 2 is off by `bias_rad`; what was
+    /// measured goes to `sinks`.
+    fn drive(
+        bias_rad: f64,
+        mut sink: impl FnMut(Option<&OdometrySample>, usize, &AngleMeasurement),
+    ) {
+        let (site, _) = trip();
+        let road = site.build_road().unwrap().unwrap();
+        for step in 1..600 {
+            let time_s = f64::from(step) * 0.1;
+            let odometry = OdometrySample {
+                time_s,
+                distance_m: 4.0 * time_s,
+                speed_mps: 4.0,
+                yaw_rate_radps: None,
+            };
+            let pose = road.pose(4.0 * time_s);
+            for (number, head) in site.radio_heads.iter().enumerate() {
+                let bearing_rad = pose.point().bearing_rad(RadioHead::from(head).position);
+                let bias_rad = if number == 2 { bias_rad } else { 0.0 };
+                let phase_rad = std::f64::consts::PI * (bearing_rad - pose.heading_rad).cos();
+                let measured = AngleMeasurement {
+                    time_s,
+                    phase_rad: phase_rad + bias_rad,
+                    phase_sigma_rad: 0.05,
+                    angle_rad: f64::NAN,
+                    snr_db: 20.0,
+                    resolved: true,
+                };
+                sink((number == 0).then_some(&odometry), number, &measured);
+            }
+        }
+    }
+
+    fn trip() -> (Site, Vehicle) {
+        let site = Site::from_library("trip-4", &Shipped).unwrap();
+        let vehicle = Vehicle::from_library("paper-carrier", &Shipped).unwrap();
+        (site, vehicle)
+    }
+
+    fn ekf() -> (Ekf, Vec<RadioHead>) {
+        let (site, vehicle) = trip();
+        let config = EkfConfig::new(&site, &vehicle);
+        let heads = RadioHead::heard(&site, &vehicle);
+        let start = InitialPose {
+            pose: Pose::default(),
+            position_std_m: 0.1,
+            heading_std_rad: 0.01,
+        };
+        let map = Arc::new(site.build_road().unwrap().unwrap());
+        (Ekf::new(config, Some(map), &heads, &start), heads)
+    }
+
+    /// The bank after the drive, and the same filter having done without some radio heads.
+    fn after(bias_rad: f64, without: &[usize]) -> (Bank, Ekf) {
+        let (mut alone, heads) = ekf();
+        for &head in without {
+            alone.set_excluded(&heads[head], true);
+        }
+        let mut bank = Bank::new(&ekf().0, &heads, &IntegritySettings::default(), 0.0);
+        drive(bias_rad, |odometry, head, measured| {
+            if let Some(sample) = odometry {
+                bank.odometry(sample);
+                alone.odometry(sample);
+            }
+            bank.update(&heads[head], measured);
+            alone.update(&heads[head], measured);
+        });
+        (bank, alone)
+    }
+
+    #[test]
+    fn the_culprit_is_named_and_nobody_else() {
+        let odds = 9.2;
+        let (sound, _) = after(0.0, &[]);
+        assert_eq!(sound.faulty_head(odds), None);
+        let (biased, _) = after(0.3, &[]);
+        assert!(biased.is_lost());
+        assert_eq!(biased.faulty_head(odds), Some(2));
+    }
+
+    #[test]
+    fn what_takes_over_has_never_heard_the_excluded() {
+        let (mut bank, without) = after(0.3, &[2]);
+        bank.exclude(2);
+        assert_eq!(bank.nominal().belief(), without.belief());
+        assert_eq!(bank.faulty(), 1);
+        let (_, without_both) = after(0.3, &[1, 2]);
+        let witness = bank.subsets.get(1, 1).unwrap().ekf.belief();
+        assert_eq!(witness, without_both.belief());
+        // The test of the excluded goes on, for the day it agrees again.
+        assert!(bank.statistic(2) > 5.5 && !bank.is_lost());
+        bank.readmit(2);
+        assert_eq!(bank.faulty(), 0);
+        assert!(bank.nominal().belief() == without.belief());
+    }
+}

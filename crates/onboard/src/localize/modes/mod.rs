@@ -1,0 +1,17 @@
+//! Fault modes: a [table](table), a static bank of filters for them ([`Bank`]), the likelihood by which the bank weighs
+//! them, the test of each radio head, and how noisy the angles are heard to be.
+
+mod bank;
+mod head_test;
+mod likelihood;
+mod noise_ratio;
+mod subsets;
+mod table;
+
+pub(in crate::localize) use bank::Bank;
+pub use head_test::HeadTest;
+pub(in crate::localize) use head_test::RECOVERY_S;
+pub(in crate::localize) use likelihood::log_likelihood;
+#[cfg(test)]
+pub(in crate::localize) use table::trip;
+pub(in crate::localize) use table::{ModeId, may_mislead};

@@ -1,0 +1,270 @@
+//! The filters without one or two of the radio heads heard lately, each with its tests.
+//!
+//! Those of a radio head begin with its first angle, as copies of filters that have heard all others: until then they
+//! would be the same. They end where it has not been heard lately and others are, so that cost grows with the radio
+//! heads in reach and not with those of the site.
+
+use super::head_test::HeadTest;
+use crate::clone_in_place::clone_in_place;
+use crate::localize::ekf::Ekf;
+use crate::radio_head::RadioHead;
+
+/// Angles, of all radio heads, within which one of them is heard lately.
+const LATELY: u64 = 32;
+
+/// So many radio heads keep their filters however long ago they were heard: what they have done may still count.
+const LEAST_WATCHED: usize = 4;
+
+/// Radio heads from which on two are left out: which of two disagrees nobody can tell.
+const LEAST_FOR_PAIRS: usize = 3;
+
+clone_in_place! {
+    /// The filter without one or two radio heads, and the test of each against it.
+    #[derive(Debug)]
+    pub(super) struct SubsetFilter {
+        /// Numbers of the radio heads left out; the same twice where it is one.
+        pub without: [usize; 2],
+        pub tests: [HeadTest; 2],
+        pub ekf: Ekf,
+    }
+}
+
+impl SubsetFilter {
+    pub fn lacks(&self, head: usize) -> bool {
+        self.without.contains(&head)
+    }
+
+    pub const fn is_of_one(&self) -> bool {
+        self.without[0] == self.without[1]
+    }
+
+    pub fn test(&self, head: usize) -> HeadTest {
+        let [first, second] = self.tests;
+        if self.without[0] == head {
+            first
+        } else {
+            second
+        }
+    }
+}
+
+/// All such filters.
+#[derive(Debug)]
+pub(super) struct Subsets {
+    /// First those without one radio head, in order, and those without two; then such that are there for reuse.
+    filters: Vec<SubsetFilter>,
+    used: usize,
+    /// Number of the last angle of each radio head, and of all of them.
+    last: Vec<u64>,
+    angles: u64,
+}
+
+impl Clone for Subsets {
+    fn clone(&self) -> Self {
+        Self {
+            filters: self.iter().cloned().collect(),
+            last: self.last.clone(),
+            ..*self
+        }
+    }
+
+    /// What is there for reuse stays.
+    fn clone_from(&mut self, source: &Self) {
+        (self.used, self.angles) = (source.used, source.angles);
+        self.last.clone_from(&source.last);
+        let mut theirs = source.iter();
+        for (mine, theirs) in self.filters.iter_mut().zip(theirs.by_ref()) {
+            mine.clone_from(theirs);
+        }
+        let there = self.filters.len();
+        self.filters.extend(source.iter().skip(there).cloned());
+    }
+}
+
+impl Subsets {
+    /// None yet, of so many radio heads.
+    pub fn new(heads: usize) -> Self {
+        Self {
+            filters: Vec::new(),
+            used: 0,
+            last: vec![0; heads],
+            angles: 0,
+        }
+    }
+
+    pub fn iter(&self) -> impl Iterator<Item = &SubsetFilter> + Clone {
+        self.filters.iter().take(self.used)
+    }
+
+    pub fn iter_mut(&mut self) -> impl Iterator<Item = &mut SubsetFilter> {
+        self.filters.iter_mut().take(self.used)
+    }
+
+    /// The one without these radio heads.
+    pub fn get(&self, one: usize, other: usize) -> Option<&SubsetFilter> {
+        let without = [one.min(other), one.max(other)];
+        self.iter().find(|it| it.without == without)
+    }
+
+    /// A radio head is about to be heard; `keeps` tells of which radio heads filters must not
+    /// end, by their statistic.
+    pub fn hear(
+        &mut self,
+        head: usize,
+        heads: &[RadioHead],
+        nominal: &Ekf,
+        keeps: impl Fn(usize, f64) -> bool,
+    ) {
+        self.angles += 1;
+        if let Some(last) = self.last.get_mut(head) {
+            *last = self.angles;
+        }
+        if self.get(head, head).is_some() {
+            return;
+        }
+        while let Some(past) = self.longest_unheard(&keeps) {
+            self.end(past);
+        }
+        let ones = self.iter().filter(|it| it.is_of_one()).count();
+        self.begin([head; 2], (head, heads.get(head)), nominal);
+        let pairs = if heads.len() < LEAST_FOR_PAIRS {
+            0
+        } else {
+            ones
+        };
+        // The first are those of one radio head, in order, the new one not yet among them.
+        for number in 0..pairs {
+            if let Some([other, _]) = self.filters.get(number).map(|it| it.without) {
+                let without = [head.min(other), head.max(other)];
+                self.begin(without, (head, heads.get(head)), nominal);
+            }
+        }
+        let order = |it: &SubsetFilter| (!it.is_of_one(), it.without);
+        if let Some(used) = self.filters.get_mut(..self.used) {
+            used.sort_unstable_by_key(order);
+        }
+    }
+
+    /// Replaces every filter that has heard a radio head at fault by one that has not.
+    pub fn exclude(&mut self, faulty: usize, heads: &[RadioHead]) {
+        for number in 0..self.used {
+            let Some([first, second]) = self.filters.get(number).map(|it| it.without) else {
+                return;
+            };
+            if first == faulty || second == faulty {
+                continue;
+            }
+            let clean = [first, second].map(|head| self.get(head, faulty));
+            let [Some(of_first), Some(of_second)] = clean else {
+                continue;
+            };
+            let tests = [of_first.test(first), of_second.test(second)];
+            let mut ekf = of_first.ekf.clone();
+            exclude(&mut ekf, heads.get(second), true);
+            if let Some(filter) = self.filters.get_mut(number) {
+                (filter.tests, filter.ekf) = (tests, ekf);
+            }
+        }
+    }
+
+    /// The radio head that has not been heard for longest, if that is not lately and enough others are watched.
+    fn longest_unheard(&self, keeps: impl Fn(usize, f64) -> bool) -> Option<usize> {
+        let last = |head: &usize| self.last.get(*head).copied().unwrap_or_default();
+        let ones = (self.iter().filter(|it| it.is_of_one())).map(|it| it.without[0]);
+        if ones.clone().count() < LEAST_WATCHED {
+            return None;
+        }
+        let statistic = |head| {
+            self.get(head, head)
+                .map_or(0.0, |it| it.test(head).statistic())
+        };
+        let ends =
+            |head: &usize| self.angles - last(head) > LATELY && !keeps(*head, statistic(*head));
+        let unheard = ones.filter(ends);
+        unheard.min_by_key(last)
+    }
+
+    /// Ends the filters without a radio head.
+    fn end(&mut self, head: usize) {
+        let mut kept = 0;
+        for number in 0..self.used {
+            if self.filters.get(number).is_some_and(|it| !it.lacks(head)) {
+                self.filters.swap(kept, number);
+                kept += 1;
+            }
+        }
+        self.used = kept;
+    }
+
+    /// Begins a filter without these radio heads, as a copy of the one that lacks all of them but the new one.
+    fn begin(&mut self, without: [usize; 2], new: (usize, Option<&RadioHead>), nominal: &Ekf) {
+        let spare = self.filters.len() > self.used;
+        let spare = if spare { self.filters.pop() } else { None };
+        let other = without.into_iter().find(|head| *head != new.0);
+        let from = other.and_then(|other| self.get(other, other));
+        let from = from.map_or(nominal, |it| &it.ekf);
+        let tests = [HeadTest::default(); 2];
+        let mut filter = match spare {
+            Some(mut spare) => {
+                spare.ekf.clone_from(from);
+                (spare.without, spare.tests) = (without, tests);
+                spare
+            }
+            None => SubsetFilter {
+                without,
+                tests,
+                ekf: from.clone(),
+            },
+        };
+        exclude(&mut filter.ekf, new.1, true);
+        self.filters.push(filter);
+        let end = self.filters.len() - 1;
+        self.filters.swap(self.used, end);
+        self.used += 1;
+    }
+}
+
+/// Leaves a radio head out, or uses it again.
+pub(super) fn exclude(ekf: &mut Ekf, head: Option<&RadioHead>, excluded: bool) {
+    if let Some(head) = head {
+        ekf.set_excluded(head, excluded);
+    }
+}
+
+#[cfg(test)]
+mod tests {
+    use super::super::table::trip::trip;
+    use super::*;
+
+    #[test]
+    fn filters_are_those_of_the_radio_heads_heard_lately() {
+        let (known, _, ekf) = trip();
+        let heads: Vec<RadioHead> = (0..8).map(|pci| RadioHead { pci, ..known[0] }).collect();
+        for keeps_first in [false, true] {
+            let mut subsets = Subsets::new(heads.len());
+            let mut hear = |head: usize| {
+                subsets.hear(head, &heads, &ekf, |it, _| keeps_first && it == 0);
+                subsets.clone()
+            };
+            for head in 0..4 {
+                hear(head);
+            }
+            // One and two of five.
+            assert_eq!(hear(4).iter().count(), 5 + 10);
+            for _ in 0..10 {
+                for head in 1..5 {
+                    hear(head);
+                }
+            }
+            // The first is not heard lately, and its filters end as another one is heard.
+            let now = hear(5);
+            assert_eq!(now.get(0, 0).is_some(), keeps_first);
+            assert_eq!(now.get(3, 0).is_some(), keeps_first);
+            assert!(now.get(1, 5).is_some());
+            let watched = if keeps_first { 6 } else { 5 };
+            assert_eq!(now.iter().count(), watched * (watched + 1) / 2);
+            let order: Vec<_> = now.iter().map(|it| (!it.is_of_one(), it.without)).collect();
+            assert!(order.is_sorted());
+        }
+    }
+}

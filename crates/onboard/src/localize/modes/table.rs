@@ -1,0 +1,509 @@
+//! The table of fault modes: what may be wrong, how probable that is before any angle is heard, how a filter that
+//! reckons with it differs from the nominal one, and what its hypothesis goes through. A mode is a row; a further one is
+//! a further row and its test.
+
+use crate::localize::ekf::{Ekf, EkfConfig, MOST_SLIP};
+use crate::settings::{DriveKind, FaultProbability};
+
+/// Prior probability of an array that is off where nothing is stated of it, and of angles noisier than stated. The
+/// likelihoods soon outweigh both.
+const UNCALIBRATED: f64 = 0.1;
+const NOISIER_ANGLES: f64 = 0.02;
+
+/// An odometer noisier than stated is so many times as probable as slip, and so many times as noisy.
+const NOISY_TO_SLIP: f64 = 30.0;
+const ODOMETER_NOISE: f64 = 3.0;
+
+/// No fault has a larger prior probability.
+const MOST_PROBABLE: f64 = 0.5;
+
+/// Standard deviation of the displacement of a site plan, in x and y (m).
+const DISPLACEMENT_STD_M: f64 = 1.5;
+
+/// Odds to the nominal mode from which on an array is certainly not calibrated.
+const CERTAIN_ODDS: f64 = 100.0;
+
+/// What a mode is called.
+#[derive(Clone, Copy, Debug, PartialEq, Eq)]
+pub(in crate::localize) enum ModeId {
+    /// The odometer slips.
+    Slip,
+    /// Mounting and phases of the array are off.
+    UncalibratedArray,
+    /// The odometer is noisier than stated.
+    NoisyOdometer,
+    /// The site plan is displaced as a whole.
+    DisplacedSite,
+    /// The angles are noisier than stated.
+    NoisyAngles,
+    /// The angles have a time-correlated (multipath) bias.
+    CorrelatedBias,
+    /// A radio head is at fault.
+    HeadOut,
+    /// Two radio heads are.
+    TwoHeadsOut,
+}
+
+/// By what a mode counts.
+#[derive(Clone, Copy, Debug, PartialEq, Eq)]
+pub(in crate::localize) enum Weight {
+    /// Its posterior odds to the nominal mode: prior times likelihood ratio.
+    Posterior,
+    /// Its prior alone: one filter for each set of so many radio heads, which has never heard them. Angles decide by
+    /// a test which of them to exclude.
+    Prior {
+        /// Number of radio heads left out.
+        heads: usize,
+    },
+}
+
+/// What becomes of the position where a mode is far more probable than the nominal one.
+#[derive(Clone, Copy, Debug, PartialEq, Eq)]
+pub(in crate::localize) enum Verdict {
+    /// It leads, and nothing is at fault.
+    Ok,
+    /// It leads, and something is at fault: a radio head that is off would explain the same angles.
+    Degraded,
+    /// A fault that never leads, as the nominal filter explains the same; it counts in the protection level alone.
+    Unled,
+}
+
+/// What a hypothesis carries over where the nominal filter becomes another one.
+#[derive(Clone, Copy, Debug, PartialEq, Eq)]
+pub(in crate::localize) enum Carry {
+    /// Filter and likelihood.
+    All,
+    /// Both, but for the radio head that is excluded.
+    AllButHead,
+    /// The filter, without the likelihood: that was against another nominal filter.
+    Filter,
+    /// Filter and likelihood where the angles do not speak against it, else nothing.
+    IfNotAgainst,
+    /// Nothing: it begins anew from the nominal filter.
+    Nothing,
+}
+
+/// A row of the table.
+#[derive(Debug)]
+pub(in crate::localize) struct Mode {
+    pub id: ModeId,
+    /// Whether it is watched beside this nominal filter.
+    pub applies: fn(&Ekf, &FaultProbability) -> bool,
+    /// Its probability before any angle is heard; of each of the radio heads, where it is those.
+    pub prior: fn(&EkfConfig, &FaultProbability) -> f64,
+    /// The filter that it begins from, of the one that is given.
+    pub seed: fn(&Ekf) -> Ekf,
+    /// How its filter differs from that.
+    pub alter: fn(&mut Ekf),
+    /// How its filter follows the variance that the angles are heard to have, as a multiple of what is stated.
+    pub adapt: fn(&mut Ekf, f64),
+    pub weight: Weight,
+    pub verdict: Verdict,
+    /// How it begins anew whenever the vehicle sets off or its speed jumps by a share, at which a fault may begin.
+    pub onset: Option<fn(&mut Ekf, f64)>,
+    /// When a radio head is excluded,
+    pub on_exclude: Carry,
+    /// when a mode becomes the nominal one,
+    pub on_rebase: Carry,
+    /// and when the bank begins anew from a vague pose.
+    pub on_restart: Carry,
+    /// Odds from which on it becomes the nominal mode.
+    pub becomes_nominal_at: Option<f64>,
+    /// Whether it explains disagreement of several radio heads.
+    pub explains_heads: bool,
+    /// Whether angles may be off by it as if the vehicle were lost.
+    pub misleads: bool,
+}
+
+/// What most rows have in common: watched where a bias is not usual, as that would explain the same.
+const ROW: Mode = Mode {
+    id: ModeId::HeadOut,
+    applies: |nominal, _| !nominal.config().estimates_bias(),
+    prior: |_, _| 0.0,
+    seed: Ekf::nominal,
+    alter: |_| (),
+    adapt: |_, _| (),
+    weight: Weight::Posterior,
+    verdict: Verdict::Ok,
+    onset: None,
+    on_exclude: Carry::Nothing,
+    on_rebase: Carry::All,
+    on_restart: Carry::Nothing,
+    becomes_nominal_at: None,
+    explains_heads: false,
+    misleads: false,
+};
+
+const SLIP: Mode = Mode {
+    id: ModeId::Slip,
+    prior: |_, faults| faults.odometer,
+    alter: |ekf| ekf.expect_slip(MOST_SLIP),
+    verdict: Verdict::Degraded,
+    onset: Some(|ekf, jump| ekf.expect_slip(if jump > 0.0 { jump } else { MOST_SLIP })),
+    on_exclude: Carry::AllButHead,
+    on_rebase: Carry::IfNotAgainst,
+    ..ROW
+};
+
+const HEAD_OUT: Mode = Mode {
+    id: ModeId::HeadOut,
+    applies: |_, _| true,
+    prior: |config, faults| faults.of_radio_head(config.estimates_bias()),
+    weight: Weight::Prior { heads: 1 },
+    ..ROW
+};
+
+/// The modes, in the order in which their filters are updated.
+pub(in crate::localize) static TABLE: [Mode; 9] = [
+    SLIP,
+    // Where every filter estimates a bias, that explains what slip would.
+    Mode {
+        applies: |nominal, _| nominal.config().estimates_bias(),
+        verdict: Verdict::Unled,
+        ..SLIP
+    },
+    Mode {
+        id: ModeId::UncalibratedArray,
+        applies: |nominal, _| {
+            let config = nominal.config();
+            config.unstated_array_std_rad != [0.0; 2] && !config.estimates_bias()
+        },
+        prior: |_, _| UNCALIBRATED,
+        alter: Ekf::uncalibrate_array,
+        becomes_nominal_at: Some(CERTAIN_ODDS),
+        ..ROW
+    },
+    // The wheels of a differential drive slip a little with every metre.
+    Mode {
+        id: ModeId::NoisyOdometer,
+        applies: |nominal, _| {
+            let config = nominal.config();
+            config.drive == DriveKind::Road && !config.estimates_bias()
+        },
+        prior: |_, faults| (NOISY_TO_SLIP * faults.odometer).min(MOST_PROBABLE),
+        alter: |ekf| ekf.scale_odometer_noise(ODOMETER_NOISE),
+        on_rebase: Carry::Nothing,
+        ..ROW
+    },
+    // Without a map the radio heads are the frame.
+    Mode {
+        id: ModeId::DisplacedSite,
+        applies: |nominal, faults| {
+            let watched = faults.all_radio_heads > 0.0 && nominal.has_map();
+            watched && !nominal.config().estimates_bias()
+        },
+        prior: |_, faults| faults.all_radio_heads,
+        alter: |ekf| {
+            ekf.uncalibrate_array();
+            ekf.displace_site(DISPLACEMENT_STD_M);
+        },
+        verdict: Verdict::Degraded,
+        on_exclude: Carry::All,
+        ..ROW
+    },
+    Mode {
+        id: ModeId::NoisyAngles,
+        prior: |_, _| NOISIER_ANGLES,
+        alter: |ekf| ekf.set_noise_ratio(Some(1.0)),
+        adapt: |ekf, ratio| ekf.set_noise_ratio(Some(ratio)),
+        on_rebase: Carry::Nothing,
+        misleads: true,
+        ..ROW
+    },
+    // Estimated already by a filter that a search has found with it.
+    Mode {
+        id: ModeId::CorrelatedBias,
+        applies: |nominal, _| nominal.config().rare_bias_probability > 0.0,
+        prior: |config, _| config.rare_bias_probability,
+        seed: Ekf::clone,
+        alter: Ekf::estimate_rare_bias,
+        verdict: Verdict::Degraded,
+        on_exclude: Carry::Filter,
+        on_restart: Carry::Filter,
+        explains_heads: true,
+        misleads: true,
+        ..ROW
+    },
+    HEAD_OUT,
+    Mode {
+        id: ModeId::TwoHeadsOut,
+        weight: Weight::Prior { heads: 2 },
+        ..HEAD_OUT
+    },
+];
+
+/// Whether the angles of a filter without a bank may be off as if the vehicle were lost.
+pub(in crate::localize) fn may_mislead(config: &EkfConfig) -> bool {
+    config.estimates_bias() && !config.is_bias_usual()
+}
+
+/// A trip past four radio heads at 4 m/s, for tests.
+#[cfg(test)]
+pub(in crate::localize) mod trip {
+    use std::sync::Arc;
+
+    use crate::localize::ekf::{Ekf, EkfConfig};
+    use crate::localize::measurement::AngleMeasurement;
+    use crate::localize::pose_estimate::InitialPose;
+    use crate::radio_head::RadioHead;
+    use crate::road::Road;
+    use crate::settings::{Shipped, Site, TomlFile, Vehicle};
+
+    /// Standard deviation of the angles (rad).
+    pub(in crate::localize) const SIGMA_RAD: f64 = 0.05;
+
+    /// The radio heads, the road, and the filter at its beginning.
+    pub(in crate::localize) fn trip() -> (Vec<RadioHead>, Road, Ekf) {
+        let site = Site::from_library("trip-4", &Shipped).unwrap();
+        let vehicle = Vehicle::from_library("paper-carrier", &Shipped).unwrap();
+        let heads = RadioHead::heard(&site, &vehicle);
+        let road = site.build_road().unwrap().unwrap();
+        let start = InitialPose {
+            pose: road.pose(0.0),
+            position_std_m: 0.1,
+            heading_std_rad: 0.01,
+        };
+        let config = EkfConfig::new(&site, &vehicle);
+        let ekf = Ekf::new(config, Some(Arc::new(road.clone())), &heads, &start);
+        (heads, road, ekf)
+    }
+
+    /// An angle.
+    pub(in crate::localize) const fn angle(time_s: f64, phase_rad: f64) -> AngleMeasurement {
+        AngleMeasurement {
+            time_s,
+            phase_rad,
+            phase_sigma_rad: SIGMA_RAD,
+            angle_rad: f64::NAN,
+            snr_db: 20.0,
+            resolved: true,
+        }
+    }
+}
+
+#[cfg(test)]
+mod tests {
+    use std::f64::consts::PI;
+
+    use rand::{RngExt, SeedableRng};
+    use rand_chacha::ChaCha8Rng;
+    use rand_distr::StandardNormal;
+
+    use super::super::bank::Bank;
+    use super::trip::{SIGMA_RAD, angle, trip};
+    use super::*;
+    use crate::localize::ekf::state::{ALONG, DATUM};
+    use crate::observation::OdometrySample;
+    use crate::settings::IntegritySettings;
+
+    /// How the world departs from what is stated.
+    #[derive(Default)]
+    struct World {
+        /// The array is turned by so much (rad).
+        turned_rad: f64,
+        /// All radio heads stand so far off (m).
+        moved_m: [f64; 2],
+        /// The odometer reads so much more, as a share, from a time on (s).
+        scale: (f64, f64),
+        /// The angles have so many times the variance that is stated besides their own.
+        noise: f64,
+        /// They are heard until this time (s); always, if 0.
+        heard_until_s: f64,
+    }
+
+    /// How far off a filter is at the end (m).
+    type Distance = Box<dyn Fn(&Ekf) -> f64>;
+
+    /// So long past four radio heads in this world, whose angles are off by `off_rad` after so many metres: the bank
+    /// then, and how far off its leading filter, and that of a mode, is.
+    fn drive(world: &World, until_s: f64, off_rad: impl Fn(usize, f64) -> f64) -> (Bank, Distance) {
+        let (heads, road, ekf) = trip();
+        let mut bank = Bank::new(&ekf, &heads, &IntegritySettings::default(), 0.0);
+        let mut noise = ChaCha8Rng::seed_from_u64(1);
+        let mut distance_m = 0.0;
+        for step in 1..(10.0 * until_s) as u32 {
+            let time_s = f64::from(step) * 0.1;
+            let (scale, from_s) = world.scale;
+            let reads = if time_s > from_s { 1.0 + scale } else { 1.0 };
+            distance_m += 0.4 * reads;
+            bank.odometry(&OdometrySample {
+                time_s,
+                distance_m,
+                speed_mps: 4.0 * reads,
+                yaw_rate_radps: None,
+            });
+            if world.heard_until_s > 0.0 && time_s > world.heard_until_s {
+                continue;
+            }
+            let way_m = 4.0 * time_s;
+            let truth = road.pose(way_m);
+            for (number, head) in heads.iter().enumerate() {
+                let place = head.position.moved(world.moved_m);
+                let bearing_rad = truth.point().bearing_rad(place) - truth.heading_rad;
+                let phase_rad = PI * (bearing_rad - world.turned_rad).cos();
+                let predicted =
+                    (bank.nominal()).predict_measurement(head, &angle(time_s, phase_rad));
+                let seen = predicted.map(|it| bank.nominal().first_variance(&it));
+                let variance = SIGMA_RAD * SIGMA_RAD + world.noise * seen.unwrap_or(0.0);
+                let own_rad = variance.sqrt() * noise.sample::<f64, _>(StandardNormal);
+                let phase_rad = phase_rad + off_rad(number, way_m) + own_rad;
+                bank.update(head, &angle(time_s, phase_rad));
+            }
+        }
+        let last_s = until_s - 0.1;
+        let off_m = move |ekf: &Ekf| {
+            let truth = road.pose(4.0 * last_s).point();
+            ekf.pose(last_s).pose.point().distance_m(truth)
+        };
+        (bank, Box::new(off_m))
+    }
+
+    const EXACT: fn(usize, f64) -> f64 = |_, _| 0.0;
+
+    #[test]
+    fn the_nominal_mode_leads_where_all_is_as_stated() {
+        let (bank, off_m) = drive(&World::default(), 60.0, EXACT);
+        assert!(bank.leading_id().is_none() && off_m(bank.leader()) < 0.3);
+        let modes = TABLE.iter().filter_map(|it| bank.mode(it.id));
+        assert!(modes.into_iter().all(|(odds, _)| odds < 0.1));
+        assert!(!bank.nominal().odometer_departs());
+    }
+
+    #[test]
+    fn an_uncalibrated_array_leads_and_is_no_fault() {
+        let turned_rad = 0.02;
+        let world = World {
+            turned_rad,
+            ..World::default()
+        };
+        let (bank, off_m) = drive(&world, 60.0, EXACT);
+        assert_eq!(bank.leading_id(), Some(ModeId::UncalibratedArray));
+        assert!(!bank.is_fault() && off_m(bank.leader()) < 0.3);
+        // About its filter as the nominal one nothing is wrong any more.
+        let bank = bank.about_leading().unwrap();
+        assert!(bank.leading_id().is_none() && bank.mode(ModeId::UncalibratedArray).is_none());
+    }
+
+    #[test]
+    fn a_displaced_site_leads_and_is_a_fault() {
+        let moved_m = [1.2, -1.6];
+        let world = World {
+            moved_m,
+            ..World::default()
+        };
+        let (mut bank, off_m) = drive(&world, 60.0, EXACT);
+        assert!(bank.leading_id() == Some(ModeId::DisplacedSite) && bank.is_fault());
+        let [[xx, ..], [_, yy, _], _] = bank.leader().pose(59.9).covariance.unwrap();
+        assert!(off_m(bank.leader()) < 3.0 * (xx + yy).sqrt());
+        let found = *bank.leader().belief();
+        for (state, moved_m) in DATUM.into_iter().zip(moved_m) {
+            let by_m = found.mean[state] - moved_m;
+            let std_m = found.covariance[state][state].sqrt();
+            assert!(std_m < 0.3 && by_m.abs() < 4.0 * std_m, "{by_m} of {std_m}");
+        }
+        // It is no reason to exclude a radio head, and stays where one is.
+        bank.exclude(0);
+        assert!(
+            bank.leading_id() == Some(ModeId::DisplacedSite) && *bank.leader().belief() == found
+        );
+    }
+
+    #[test]
+    fn noisier_angles_lead_and_are_no_fault() {
+        let noise = 3.0;
+        let world = World {
+            noise,
+            ..World::default()
+        };
+        let (bank, off_m) = drive(&world, 60.0, EXACT);
+        assert!(bank.leading_id() == Some(ModeId::NoisyAngles) && !bank.is_fault());
+        let variance = |ekf: &Ekf| ekf.belief().covariance[ALONG][ALONG];
+        assert!(variance(bank.leader()) > 2.0 * variance(bank.nominal()));
+        assert!(off_m(bank.leader()) < 4.0 * variance(bank.leader()).sqrt());
+    }
+
+    #[test]
+    fn a_noisier_odometer_leaves_nine_times_its_variance() {
+        let world = World {
+            heard_until_s: 1e-3,
+            ..World::default()
+        };
+        let (bank, _) = drive(&world, 10.2, EXACT);
+        let way_m = bank.nominal().driven_m();
+        let own_variance = way_m * bank.nominal().config().noise.odometer_m_per_sqrt_m.powi(2);
+        let variance = |ekf: &Ekf| ekf.belief().covariance[ALONG][ALONG];
+        let (_, noisier) = bank.mode(ModeId::NoisyOdometer).unwrap();
+        let more = variance(noisier) - variance(bank.nominal());
+        assert!((more / (8.0 * own_variance) - 1.0).abs() < 0.01, "{more}");
+    }
+
+    #[test]
+    fn an_odometer_far_beyond_its_scale_departs() {
+        let (_, _, ekf) = trip();
+        for (deviations, departs) in [(1.0, false), (20.0, true)] {
+            let scale = (deviations * ekf.config().odometer_scale_std, 0.0);
+            let (bank, _) = drive(
+                &World {
+                    scale,
+                    ..World::default()
+                },
+                60.0,
+                EXACT,
+            );
+            assert_eq!(bank.nominal().odometer_departs(), departs, "{deviations}");
+        }
+    }
+
+    #[test]
+    fn slip_since_the_start_is_probable_and_of_a_sound_odometer_it_is_not() {
+        let odds = |scale| {
+            let scale = (scale, 0.0);
+            let (bank, _) = drive(
+                &World {
+                    scale,
+                    ..World::default()
+                },
+                30.0,
+                EXACT,
+            );
+            bank.mode(ModeId::Slip).unwrap().0
+        };
+        assert!(odds(0.0) < 1e-3);
+        assert!(odds(0.2) > 100.0);
+        assert!(odds(-0.2) > 100.0);
+    }
+
+    #[test]
+    fn a_jump_of_the_speed_counts_as_slip_before_any_angle_tells() {
+        for scale in [-0.1, 0.1] {
+            let world = World {
+                scale: (scale, 20.0),
+                heard_until_s: 20.0,
+                ..World::default()
+            };
+            let (bank, off_m) = drive(&world, 30.0, EXACT);
+            let (odds, slip) = bank.mode(ModeId::Slip).unwrap();
+            assert!(odds > 0.1, "{odds}");
+            let covariance = slip.pose(29.9).covariance.unwrap();
+            let std_m = (covariance[0][0] + covariance[1][1]).sqrt();
+            // Slip by the jump is one deviation of what is expected.
+            assert!(
+                (off_m(slip) / std_m - 1.0).abs() < 0.3,
+                "{} of {std_m}",
+                off_m(slip)
+            );
+        }
+    }
+
+    #[test]
+    fn a_correlated_bias_explains_the_radio_heads_and_is_a_fault() {
+        // Of each radio head another one every three metres, as reflections make it.
+        let bias_rad = |head: usize, way_m: f64| {
+            let number = (way_m / 3.0).floor() as u64 * 4 + head as u64;
+            0.3 * ChaCha8Rng::seed_from_u64(number).sample::<f64, _>(StandardNormal)
+        };
+        let (bank, off_m) = drive(&World::default(), 60.0, bias_rad);
+        assert!(bank.explains_heads() && bank.is_fault());
+        assert!(off_m(bank.leader()) < 1.0, "{}", off_m(bank.leader()));
+    }
+}
