@@ -96,3 +96,30 @@ pub fn copy_into<L: Localizer + Clone>(
     }
     true
 }
+
+/// The filter by itself: it neither searches nor monitors its sources.
+impl Localizer for Ekf {
+    fn odometry(&mut self, sample: &OdometrySample) -> Result<OdometryVerdict, BoxError> {
+        Ok(Self::odometry(self, sample))
+    }
+
+    fn update(
+        &mut self,
+        head: &RadioHead,
+        measured: &AngleMeasurement,
+    ) -> Result<UpdateVerdict, BoxError> {
+        Ok(Self::update(self, head, measured))
+    }
+
+    fn pose(&self, time_s: f64) -> Result<PoseEstimate, BoxError> {
+        Ok(Self::pose(self, time_s))
+    }
+
+    fn copy_to(&self, slot: &mut Option<Box<dyn Localizer>>) -> bool {
+        copy_into(self, slot)
+    }
+
+    fn ekf(&self) -> Option<&Ekf> {
+        Some(self)
+    }
+}

@@ -2,10 +2,10 @@
 
 use onboard::BoxError;
 use onboard::estimator;
-use onboard::thermal::ThermalNoise;
 use onboard::localize::ekf::EkfConfig;
 use onboard::receive::{Receiver, ReceiverConfig};
 use onboard::settings::{Check, Site, Vehicle, check_together};
+use onboard::thermal::ThermalNoise;
 
 use super::error::ReplayError;
 use super::receive::receive_recording;
