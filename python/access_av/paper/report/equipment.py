@@ -130,9 +130,9 @@ def _roadside_unit_chart(units: int, years: int) -> Spec:
 
 def _sensor_chart() -> Spec:
     """Price of the sensors."""
-    table = pl.DataFrame(cost.sensors())
+    table = pl.DataFrame(cost.sensors()).sort("price_usd", descending=True)
     base = alt.Chart(table).encode(
-        y=alt.Y("name:N", title=None, sort="-x", axis=alt.Axis(labelLimit=170)),
+        y=alt.Y("name:N", title=None, sort=table["name"].to_list(), axis=alt.Axis(labelLimit=170)),
         x=alt.X("price_usd:Q", title="price / USD", scale=alt.Scale(domainMax=4800)),
         tooltip=["name:N", "price_usd:Q", "source:N"],
     )
