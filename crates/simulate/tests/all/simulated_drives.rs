@@ -25,9 +25,8 @@ fn campaign(simulation: &Simulation, runs: usize, threads: usize) -> Campaign {
         threads: Some(threads),
         keep_records: true,
         errors_every: None,
-        quantiles: true,
-        custom: NONE,
         progress: &|_| true,
+        ..CampaignOptions::default()
     };
     simulation.campaign(&options).unwrap()
 }
@@ -205,9 +204,8 @@ fn the_caller_can_stop() {
         threads: Some(1),
         keep_records: false,
         errors_every: None,
-        quantiles: true,
-        custom: NONE,
         progress: &|_| false,
+        ..CampaignOptions::default()
     };
     let outcome = simulation(&[]).campaign(&options);
     assert!(matches!(outcome, Err(SimulationError::Stopped)));
