@@ -226,7 +226,8 @@ def fair(driver: Driver, evaluation: Evaluation) -> list[Fair]:
             once = mine.with_overrides(
                 {"vehicle.wake_up": {"policy": "fixed", "interval_ms": ONCE_MS}}
             )
-            found.append(_fair(real, knows_road, "one angle", driver.drive(once).drives))
+            if knows_road:
+                found.append(_fair(real, knows_road, "one angle", driver.drive(once).drives))
             if real:
                 found.append(_bound(real, knows_road, once))
     return found

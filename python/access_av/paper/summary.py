@@ -4,12 +4,13 @@ from __future__ import annotations
 
 from collections import Counter
 from dataclasses import dataclass
-from typing import TYPE_CHECKING
+from typing import TYPE_CHECKING, Any
 
 from access_av.paper.claims import EVIDENCE
 from access_av.paper.energy_fit import FREEDOMS
 from access_av.paper.freedoms import met_halves
 from access_av.paper.statements import of_claim
+from access_av.report.parts import value_text
 
 if TYPE_CHECKING:
     from collections.abc import Sequence
@@ -193,6 +194,19 @@ def seeds_text(study: Study) -> str:
         f"Seeds {seeds[0]} to {seeds[-1]}: {len(several) - len(differ)} of {len(several)} verdicts "
         f"are the same with each, {len(differ)} turn."
     )
+
+
+def shown_value(value: Any) -> str:
+    """A claim's stated or obtained value; a table of settings row by row.
+
+    Examples
+    --------
+    >>> shown_value([[0, 2265.6, 80], [1, 1200, 150]])
+    '0 2265.6 80; 1 1200 150'
+    """
+    if isinstance(value, list) and value and isinstance(value[0], list):
+        return "; ".join(" ".join(f"{each:g}" for each in row) for row in value)
+    return value_text(value)
 
 
 def counts(claims: Sequence[Claim]) -> dict[str, tuple[int, int]]:

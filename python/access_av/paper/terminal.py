@@ -74,8 +74,8 @@ def _show_claims(study: Study) -> None:
     for claim in shown:
         row = [
             claim.id if wide else claim.id.split("_")[0],
-            value_text(claim.stated),
-            f"{value_text(claim.obtained)} {mark(claim)}",
+            summary.shown_value(claim.stated),
+            f"{summary.shown_value(claim.obtained)} {mark(claim)}",
             claim.evidence,
         ]
         made.add_row(*row[: len(head)])

@@ -23,7 +23,6 @@ fn campaign(simulation: &Simulation, runs: usize, threads: usize) -> Campaign {
         runs,
         threads: Some(threads),
         keep_records: true,
-        custom: NONE,
         ..CampaignOptions::default()
     };
     simulation.campaign(&options).unwrap()
@@ -199,7 +198,6 @@ fn the_caller_can_stop() {
         seed: 1,
         runs: 1000,
         threads: Some(1),
-        custom: NONE,
         progress: &|_| false,
         ..CampaignOptions::default()
     };

@@ -160,7 +160,7 @@ def matrix(study: Study) -> str:
     rows = [
         (
             f"<b>{escape(_short(claims[0]))}</b> <span>{escape(claims[0].says)}</span>",
-            f"<span>{escape(value_text(claims[0].stated))}</span>",
+            f"<span>{escape(summary.shown_value(claims[0].stated))}</span>",
             *(_cell(claim) for claim in claims),
         )
         for claims in zip(*columns, strict=True)
@@ -176,7 +176,7 @@ def claims(study: Study) -> str:
         turns = " " + badge("turns with the seed", "fit") if claim.turns_with_seed else ""
         if claim.seeds_met:
             turns += f"<small>met with {claim.seeds_met} seeds</small>"
-        obtained = escape(value_text(claim.obtained))
+        obtained = escape(summary.shown_value(claim.obtained))
         if isinstance(claim.interval, list):
             low, high = (value_text(end) for end in claim.interval)
             obtained += f"<small>{low} … {high}</small>"
@@ -184,7 +184,7 @@ def claims(study: Study) -> str:
             (
                 f"<b>{escape(claim.says)}</b><small>{escape(claim.where)} · "
                 f"<code>{escape(claim.id)}</code></small><small>{escape(claim.note)}</small>",
-                escape(value_text(claim.stated)),
+                escape(summary.shown_value(claim.stated)),
                 obtained,
                 escape(claim.unit),
                 escape(claim.evidence),
@@ -212,5 +212,5 @@ def _cell(claim: Claim) -> str:
     if claim.turns_with_seed:
         sign += f" {claim.seeds_met or '?'}"
     plain = isinstance(claim.obtained, (int, float))
-    value = f"<small>{escape(value_text(claim.obtained))}</small>" if plain else ""
+    value = f"<small>{escape(summary.shown_value(claim.obtained))}</small>" if plain else ""
     return badge(sign, "yes" if claim.reproduced else "no") + value
