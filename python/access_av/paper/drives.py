@@ -96,7 +96,8 @@ class Driver:
                 threads=threads,
             )
             serving = [it for it in [made] if it and it.serve(scenario, platform=core)]
-            self.tapes += serving
+            # A tape takes 100 MB: the first world, which most readings are in, and the latest stay.
+            self.tapes = [*self.tapes[:1], *serving]
         if not serving:
             return simulate(
                 scenario,

@@ -156,10 +156,12 @@ def study(
     # Four adaptive settings and as many constants a reading; the fixed ones and the front once.
     planned = 8 * len(chosen) + len({case.setting for case in cases(platform)}) + 24
     driver = Driver(platform, runs, seed, threads, progress=progress, planned=planned)
-    evaluations, unusable = [], {}
+    evaluations, ablations, unusable = [], [], {}
     for reading in chosen:
         try:
             evaluations.append(evaluate_with(driver, reading))
+            # At once, while the driver has its world on tape.
+            ablations += ablation.ablate(driver, evaluations[-1])
         except SettingsError as error:
             unusable[reading.name] = str(error)
     if not evaluations:
@@ -185,7 +187,7 @@ def study(
     made = Study(
         evaluations=evaluations,
         claims=with_seeds(claims) if seeds > 1 else claims[seed],
-        ablations=[found for each in evaluations for found in ablation.ablate(driver, each)],
+        ablations=ablations,
         front=[],
         ours=[],
         unknowns=hangs_on,
