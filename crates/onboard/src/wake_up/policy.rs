@@ -7,8 +7,9 @@ use crate::observation::SensedSsb;
 use crate::radio_head::RadioHead;
 use crate::settings::SnrSetPoint;
 
-/// Clock readings this close count as equal: far below any SSB period, far above rounding.
-pub const SAME_TIME_S: f64 = 1e-9;
+/// Clock readings this close count as equal: a clock 60 ppm off over the longest SSB period (160 ms), far below the
+/// shortest (5 ms). SSBs that are received come a fraction of a sample sooner or later than a period after the last.
+pub const SAME_TIME_S: f64 = 1e-5;
 
 /// What a policy may base its decision on, beside what is sensed of the SSBs.
 #[derive(Clone, Copy)]

@@ -124,8 +124,8 @@ const ELEMENTS: usize = 4;
 
 /// The propagation along a straight road past a radio head.
 fn along_a_road(model: &str, settings: &ChannelSettings, run: u64) -> Tr38901Propagation {
-    let yard = changed("yard", []);
-    let (mut site, vehicle): (Site, Vehicle) = (yard.site, yard.vehicle);
+    let trip = changed("paper-real-odometry-4", []); // radio heads and antennas at one height
+    let (mut site, vehicle): (Site, Vehicle) = (trip.site, trip.vehicle);
     site.radio_heads[0].position_m = [HEAD.x_m, HEAD.y_m, 0.0];
     let straight = Segment {
         length_m: LENGTH_M,
