@@ -23,6 +23,9 @@ const STEPS: usize = 60;
 const REFINED: usize = 12;
 const FINEST_M: f64 = 0.05;
 
+/// Moves with one step: one to each side of a cell, along both axes.
+const MOST_MOVES: usize = 4;
+
 /// Log-likelihood within which places are as good as each other; the nearest to the stated is taken.
 const AS_GOOD: f64 = 3.0;
 
@@ -111,26 +114,30 @@ fn log_likelihood(sighted: &[Sighted], place: Point, rise_m: f64, measurand: &Me
     sighted.iter().map(of_angle).sum()
 }
 
-/// Pattern search (Hooke and Jeeves, J. ACM 8(2), 1961) from a place on.
+/// Pattern search (Hooke and Jeeves, J. ACM 8(2), 1961) from a place on; no farther with a step than the grid that it
+/// comes from could have missed, for along a path that has diverged the likelihood rises for kilometres.
 fn refine(
     mut best: (f64, Point),
     mut step_m: f64,
     likelihood: impl Fn(Point) -> f64,
 ) -> (f64, Point) {
     while step_m > FINEST_M {
-        let Point { x_m, y_m } = best.1;
-        let around = [(1.0, 0.0), (-1.0, 0.0), (0.0, 1.0), (0.0, -1.0)];
-        let tried = around.map(|(dx, dy)| {
-            let place = Point::new(x_m + step_m * dx, y_m + step_m * dy);
-            (likelihood(place), place)
-        });
-        let better = tried
-            .into_iter()
-            .max_by(|one, other| one.0.total_cmp(&other.0));
-        match better.filter(|it| it.0 > best.0) {
-            Some(better) => best = better,
-            None => step_m *= 0.5,
+        for _ in 0..MOST_MOVES {
+            let Point { x_m, y_m } = best.1;
+            let around = [(1.0, 0.0), (-1.0, 0.0), (0.0, 1.0), (0.0, -1.0)];
+            let tried = around.map(|(dx, dy)| {
+                let place = Point::new(x_m + step_m * dx, y_m + step_m * dy);
+                (likelihood(place), place)
+            });
+            let better = tried
+                .into_iter()
+                .max_by(|one, other| one.0.total_cmp(&other.0));
+            let Some(better) = better.filter(|it| it.0 > best.0) else {
+                break;
+            };
+            best = better;
         }
+        step_m *= 0.5;
     }
     best
 }
