@@ -40,7 +40,7 @@ def azimuth_errors_deg(cells: list[nr.Cell], recording: Recording) -> dict[int, 
             near = abs(ssb["ssb_first_sample_incl_cp"] - cell.sample_start) < 20
             if near and ssb["pci"] == cell.pci:
                 assert cell.azimuth_rad is not None
-                error = np.degrees(cell.azimuth_rad) - truth["azimuth_from_axis_deg"]
+                error = np.degrees(cell.azimuth_rad) + 90.0 - truth["azimuth_from_broadside_deg"]
                 errors.setdefault(cell.pci, []).append((error + 180) % 360 - 180)
     return errors
 

@@ -108,10 +108,10 @@ def test_command_writes_what_it_promises(
     assert "dock" in done.out
     names = {path.name for path in (tmp_path / "b").iterdir()}
     said = " ".join(done.out.split())
-    assert "falls short of level 6 on 35.7% of the route" in said
-    assert "What mends that and is usually the cheapest: half the odometer's errors." in said
+    assert "falls short of level 5 on 21.6% of the route" in said
+    assert "What mends that and is usually the cheapest: 8 antennas." in said
     page = (tmp_path / "b" / "report.html").read_text()
-    assert "falls short of level 6" in page
+    assert "falls short of level 5" in page
     assert names == {
         "bound.parquet", "map.parquet", "report.html", "scenario.toml", "manifest.json",
     }  # fmt: skip
@@ -119,7 +119,7 @@ def test_command_writes_what_it_promises(
     assert re.search(r"^ 6 +0\.3 +99\.9% .* not reached", narrow, re.MULTILINE)
     route = pl.read_parquet(tmp_path / "b/bound.parquet")
     told = json.loads(access_av("bound", "yard", "--json", "--out", tmp_path / "b").out)
-    assert told["next_level"]["cheapest"] == "half the odometer's errors"
+    assert told["next_level"]["cheapest"] == "8 antennas"
     assert told["median_m"] == route["bound_m"].median()
     assert told["median_m"] < told["p90_m"] < told["max_m"]
     assert [head["pci"] for head in told["heads"]] == [11, 12, 13, 14]

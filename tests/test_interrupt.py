@@ -32,6 +32,10 @@ LONG: dict[str, list[str]] = {
         "locate", "--recording", "drive/iq.sigmf-meta", "--odometry", "drive/odometry.csv",
         "--site", "drive/site.toml", "--vehicle", "drive/vehicle.toml", "--out", "out",
     ],
+    "angles": [
+        "angles", "drive/iq.sigmf-meta", "--site", "drive/site.toml",
+        "--vehicle", "drive/vehicle.toml", "--out", "out",
+    ],
     "scan": ["scan", "drive/iq.sigmf-meta"],
     "aoa": ["aoa", "drive/iq.sigmf-meta"],
     "profile": ["profile", "--out", "profiled.toml"],
@@ -50,6 +54,7 @@ LONG: dict[str, list[str]] = {
         "import-paths", "nowhere.csv", "--site", "yard", "--carrier-mhz", "3500", "--out", "x.npz",
     ],
     "readings": ["readings"],
+    "chosen": ["chosen", "--runs", "2000"],
     "columns": ["columns"],
     "scenario": ["scenario", "check", *access_av.Scenario.names() * 40],
     "site": ["site", "check", *access_av.Site.names() * 40],
