@@ -114,7 +114,7 @@ REMARKED = {
     ),
     "no distance": (
         lambda it: setattr(it, "odometry", it.odometry.drop("distance_m")),
-        "distance_m is not there",
+        "distance_m is taken from the speeds",
     ),
     "half of the yaw rates": (
         odometry(yaw_rate_radps=OTHERS.then(YAW).otherwise(None)),

@@ -95,6 +95,7 @@ def test_a_short_wander_does_not_lead_far_away() -> None:
         [vehicle]
         name = "wander"
         localizer = { kind = "tracker" }
+        integrity.enabled = false
         lane_keeping = { rms_m = 0.46, wavelength_m = 5.2176 }
         """
     )

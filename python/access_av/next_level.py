@@ -118,7 +118,7 @@ def next_level(scenario: _core.Scenario | str, planned: Plan | None = None) -> N
     >>> from access_av.placement import plan
     >>> found = next_level("yard", plan("yard"))
     >>> found.level.name, found.cheapest.what
-    ('6', "half the odometer's errors")
+    ('5', '8 antennas')
     """
     if not isinstance(scenario, _core.Scenario):
         scenario = _core.Scenario.load(scenario)

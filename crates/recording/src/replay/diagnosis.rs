@@ -85,7 +85,14 @@ pub fn diagnose(given: &Drive<'_>, located: &LocatedDrive) -> Result<Vec<Diagnos
     let is_sound = !is_lost && is_understood(&as_given);
     let mut found = Vec::new();
     if !is_sound {
-        found = better_explanations(&given, &as_given, is_lost)?;
+        found = better_explanations(&given, hypotheses(&given)?, &as_given, is_lost)?;
+    } else if located.poses.iter().any(|pose| pose.is_lost)
+        && let Some(from_start) = screened(&given)?.filter(|it| !is_understood(it))
+    {
+        // It was found elsewhere: a start that was wrong is one that no filter could have gone on from.
+        let mut of_start = of_drive();
+        of_start.retain(|it| it.subject == Subject::Start);
+        found = better_explanations(&given, of_start, &from_start, false)?;
     }
     if found.is_empty() {
         found.extend(wrong_yaw_rate(&given, located, &as_given, is_sound)?);
@@ -151,14 +158,15 @@ fn confirmed(drive: &Drive<'_>) -> Result<Option<Evidence>, ReplayError> {
     )
 }
 
-/// The hypotheses that explain the drive's angles where it, as given, does not.
+/// Of these hypotheses those that explain the drive's angles where it, as given, does not.
 fn better_explanations(
     given: &Drive<'_>,
+    hypotheses: Vec<Hypothesis>,
     as_given: &Evidence,
     is_lost: bool,
 ) -> Result<Vec<Diagnosis>, ReplayError> {
     let mut likely = Vec::new();
-    for hypothesis in hypotheses(given)? {
+    for hypothesis in hypotheses {
         let meant = hypothesis.correct(given);
         if !is_plausible(&meant) {
             continue;
