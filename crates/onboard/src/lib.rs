@@ -14,6 +14,7 @@ mod clone_in_place;
 mod elements;
 pub mod energy;
 pub mod estimator;
+pub mod gaussian;
 pub mod geometry;
 pub mod link_budget;
 pub mod localize;

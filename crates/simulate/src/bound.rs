@@ -14,12 +14,12 @@
 //! Where the scenario has traced paths, K is theirs at each place, and a radio head without a line of
 //! sight says nothing.
 
+use onboard::gaussian::{Gaussian, Matrix, identity, product};
 use onboard::geometry::{Point, Pose};
 use onboard::localize::ekf::EkfConfig;
 use onboard::localize::ekf::angle_model::{AngleModel, RoadFrame};
 use onboard::localize::ekf::motion::{Reading, Step};
 use onboard::localize::ekf::state::{ACROSS, ALONG, Belief, CURVATURE, HEADING, SCALE, STATES};
-use onboard::localize::gaussian::{Gaussian, Matrix, identity, product};
 use onboard::localize::{Ekf, InitialPose};
 use onboard::manifold::scatter_bound;
 use onboard::radio_head::RadioHead;

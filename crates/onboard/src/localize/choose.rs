@@ -2,12 +2,12 @@
 
 use std::sync::Arc;
 
-use super::acquire::{Area, GaussianSum, Relocalizer};
+use super::acquire::{GaussianSum, Relocalizer};
 use super::dead_reckoning::DeadReckoning;
 use super::ekf::{Ekf, EkfConfig};
 use super::localizer::Localizer;
 use super::pose_estimate::InitialPose;
-use crate::geometry::Pose;
+use crate::geometry::{Area, Pose};
 use crate::radio_head::RadioHead;
 use crate::settings::{LocalizerSettings, SettingsError, Site, Vehicle};
 
@@ -47,7 +47,8 @@ pub fn built_in(
             )))
         }
         None if !vehicle.start.known => {
-            let search = GaussianSum::in_plane(config, Area::of_heads(&heads), &heads);
+            let area = Area::about(heads.iter().map(|head| head.position));
+            let search = GaussianSum::in_plane(config, area, &heads);
             Ok(Box::new(Relocalizer::searching(search, None, integrity)))
         }
         road => {

@@ -1,6 +1,6 @@
 //! Where a localizer believes the vehicle to be, and how far that can be relied on.
 
-use super::gaussian;
+use crate::gaussian;
 use crate::geometry::{Pose, wrap_angle};
 
 /// Where a localizer believes the vehicle to be.

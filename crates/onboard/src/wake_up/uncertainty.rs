@@ -22,8 +22,9 @@
 
 use super::policy::{SAME_TIME_S, Situation, WakeUpPolicy};
 use crate::BoxError;
+use crate::gaussian::RadialQuantile;
+use crate::localize::Ekf;
 use crate::localize::ekf::state::Belief;
-use crate::localize::{Ekf, RadialQuantile};
 use crate::observation::SensedSsb;
 use crate::radio_head::RadioHead;
 use crate::settings::{Site, UncertaintySettings, Vehicle};

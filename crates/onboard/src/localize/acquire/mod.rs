@@ -6,5 +6,5 @@ mod relocalization_test;
 mod relocalizer;
 mod solution;
 
-pub use gaussian_sum::{Area, GaussianSum};
+pub use gaussian_sum::GaussianSum;
 pub use relocalizer::Relocalizer;

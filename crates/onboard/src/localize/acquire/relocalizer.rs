@@ -15,19 +15,19 @@ use std::cmp::Ordering;
 use std::sync::Arc;
 
 use super::consistency::ConsistencyMonitor;
-use super::gaussian_sum::{Area, GaussianSum};
+use super::gaussian_sum::GaussianSum;
 use super::relocalization_test::RelocalizationTest;
 use super::solution::Solution;
 use crate::BoxError;
 use crate::clone_in_place::clone_in_place;
-use crate::geometry::wrap_angle;
+use crate::gaussian::RadialQuantile;
+use crate::geometry::{Area, wrap_angle};
 use crate::localize::ekf::Ekf;
 use crate::localize::localizer::{Localizer, Recovered, copy_into};
 use crate::localize::measurement::{
     AngleMeasurement, OdometryVerdict, UpdateReason, UpdateVerdict,
 };
 use crate::localize::pose_estimate::{Integrity, IntegrityState, PoseEstimate};
-use crate::localize::quantile::RadialQuantile;
 use crate::observation::OdometrySample;
 use crate::radio_head::RadioHead;
 use crate::road::Road;
@@ -264,7 +264,7 @@ impl Relocalizer {
         if config.heard_noise_ratio.is_some() {
             config.set_noise_ratio(Some(solution.noise_ratio()));
         }
-        let all = || Area::of_heads(heads);
+        let all = || Area::about(heads.iter().map(|head| head.position));
         let mut search = match &self.setup.road {
             Some(road) => GaussianSum::new(config, road.clone(), true, heads),
             None if heads.len() < LEAST_HEADS => return None,

@@ -8,9 +8,9 @@
 
 use super::jump_process::{JumpHypotheses, JumpProcess, MOST_VARIANCE};
 use crate::clone_in_place::clone_in_place;
-use crate::localize::ekf::smoother::Journal;
+use crate::gaussian::smoother::Journal;
+use crate::gaussian::{Innovation, Matrix, dot};
 use crate::localize::ekf::state::{Belief, STATES};
-use crate::localize::gaussian::{Innovation, Matrix, dot};
 
 /// Covariance of something with an angle: with the bias of its radio head, and without.
 pub(super) type CrossCovariance = [f64; 2];
@@ -379,7 +379,7 @@ mod tests {
         LEVEL_M, LEVELS, LEVELS_RAD, SOON_M, VALUE_M, VARIANCES, share,
     };
     use super::*;
-    use crate::localize::gaussian::{Gaussian, identity};
+    use crate::gaussian::{Gaussian, identity};
 
     const OWN_VARIANCE: f64 = 1e-4;
 

@@ -8,7 +8,7 @@
 //! [`CorrelatedBias`](super::staying_errors::StayingErrors); here it is weighed which of the jump hypotheses an angle
 //! speaks for, by Bayes.
 
-use crate::localize::gaussian::Innovation;
+use crate::gaussian::Innovation;
 
 /// How many levels there are, and their deviations (rad): from what calibration leaves to no more than a side.
 pub(super) const LEVELS: usize = 4;

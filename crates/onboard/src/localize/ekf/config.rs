@@ -2,7 +2,7 @@
 
 use super::angle_model::{AngleModel, ArrayModel};
 use super::motion::{MotionNoise, PathBend, Yaw};
-use crate::localize::quantile::normal_quantile;
+use crate::gaussian::normal_quantile;
 use crate::road::LaneKeeping;
 use crate::settings::{DriveKind, LocalizerSettings, RoadSettings, Site, TrackerSettings, Vehicle};
 

@@ -6,12 +6,12 @@ use super::config::PhaseBias;
 use super::filter::Ekf;
 use super::motion::{Reading, Step};
 use super::predict::MOST_STEPS;
-use super::smoother::Journal;
 use super::state::{Belief, SCALE, STATES};
-use crate::localize::bias;
-use crate::localize::gaussian::{
+use crate::gaussian::smoother::Journal;
+use crate::gaussian::{
     Innovation, Matrix, dot, identity, principal_variances, product, transformed,
 };
+use crate::localize::bias;
 use crate::localize::measurement::AngleMeasurement;
 use crate::localize::pose_estimate::PoseEstimate;
 use crate::radio_head::RadioHead;

@@ -2,7 +2,7 @@
 
 use super::filter::{Ekf, OffMap};
 use super::state::{ACROSS, ALONG, CURVATURE, HEADING, STATES};
-use crate::localize::gaussian::identity;
+use crate::gaussian::identity;
 
 /// Deviations of the place along the road that count as certain.
 const SIGMAS: f64 = 3.0;

@@ -16,7 +16,6 @@ pub mod motion;
 mod odometer;
 mod predict;
 mod prior;
-pub mod smoother;
 pub mod state;
 mod update;
 

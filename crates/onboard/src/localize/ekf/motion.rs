@@ -14,8 +14,8 @@ use super::state::{
     ACROSS, ALONG, Belief, CURVATURE, HEADING, MOUNTING, PHASE, SCALE, STATES, YAW_RATE_BIAS,
     YAW_RATE_SCALE,
 };
+use crate::gaussian::{Matrix, identity};
 use crate::geometry::Pose;
-use crate::localize::gaussian::{Matrix, identity};
 use crate::road::{Bending, LaneKeeping};
 
 /// How the path bends where no map tells.

@@ -6,9 +6,9 @@ use super::angle_model::{AngleModel, locate};
 use super::filter::Ekf;
 use super::motion::Reading;
 use super::state::{ACROSS, ALONG, HEADING, LATENESS, SCALE, STATES, YAW_RATE_BIAS};
+use crate::gaussian::Innovation;
 use crate::geometry::wrap_angle;
 use crate::localize::bias::{self, JumpHypotheses, MOST_VARIANCE};
-use crate::localize::gaussian::Innovation;
 use crate::localize::measurement::{AngleMeasurement, UpdateReason, UpdateVerdict};
 use crate::radio_head::RadioHead;
 
@@ -281,7 +281,7 @@ impl Ekf {
 #[cfg(test)]
 mod tests {
     use super::*;
-    use crate::localize::gaussian::Gaussian;
+    use crate::gaussian::Gaussian;
 
     #[test]
     fn the_belief_has_the_moments_of_the_mixture() {

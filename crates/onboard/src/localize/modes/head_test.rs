@@ -1,6 +1,6 @@
 //! Whether the angles to one radio head keep agreeing with everything else.
 
-use crate::localize::gaussian::Innovation;
+use crate::gaussian::Innovation;
 
 /// Weight of the newest angle in each of the averages: a fault that leaps out is found by the
 /// first, a bias below the noise of single angles by the last.

@@ -14,7 +14,7 @@
 //! Beside the state there may be errors of the measurements that are estimated with it, each measurement's
 //! one: `n` states and errors together, of which motions move the states only.
 
-use crate::localize::gaussian::{Gaussian, Matrix};
+use super::belief::{Gaussian, Matrix};
 
 /// What a filter did, in order of time.
 #[derive(Clone, Debug, Default, PartialEq)]
@@ -263,7 +263,7 @@ impl Rest {
 #[cfg(test)]
 mod tests {
     use super::*;
-    use crate::localize::gaussian::identity;
+    use crate::gaussian::identity;
 
     const STEPS: usize = 7;
     const SIZE: usize = 2 * STEPS;
