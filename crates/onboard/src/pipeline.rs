@@ -4,7 +4,7 @@ use crate::BoxError;
 use crate::estimator::{self, AngleEstimator};
 use crate::geometry::Pose;
 use crate::link_budget::LinkBudget;
-use crate::localize::ekf::{Calibration, EstimatedConstants};
+use crate::localize::ekf::EstimatedConstants;
 use crate::localize::{
     self, AngleMeasurement, AngleUpdate, Ekf, History, Localizer, OdometryVerdict, PoseEstimate,
     Recovered, UpdateReason, UpdateVerdict,
@@ -320,18 +320,12 @@ impl Onboard {
         self.localizer.localizer().pose(time_s)
     }
 
-    /// How far the array has come from its survey, where the localizer looks for it.
-    pub fn calibration(&self) -> Option<Calibration> {
-        let tracker = self.localizer.localizer().ekf();
-        tracker.map(Ekf::calibration)
-    }
-
-    /// What the drive has shown of odometer, yaw rate and clock, where the localizer looks for it.
-    pub fn findings(&self) -> Option<EstimatedConstants> {
-        let mut findings = self.localizer.localizer().ekf()?.findings();
-        findings.lateness_s.stated += self.lateness_s;
-        findings.lateness_s.found += self.lateness_s;
-        Some(findings)
+    /// Constants of odometer, yaw rate, array and clock as estimated by now, where the localizer does.
+    pub fn constants(&self) -> Option<EstimatedConstants> {
+        let mut constants = self.localizer.localizer().ekf()?.constants();
+        constants.lateness_s.stated += self.lateness_s;
+        constants.lateness_s.found += self.lateness_s;
+        Some(constants)
     }
 
     /// Keeps from now on what smoothing takes, where the localizer is a tracker without a guard,

@@ -215,7 +215,7 @@ impl Tape {
             record.add(&heard.map_err(SimulationError::of_drive)?);
             record.add_step(&onboard, time_s, burst.truth, burst.snr_db)?;
         }
-        record.calibration = onboard.calibration();
+        record.constants = onboard.constants();
         Ok(record)
     }
 }

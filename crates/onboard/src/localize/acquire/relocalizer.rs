@@ -17,16 +17,17 @@ use std::sync::Arc;
 use super::consistency::ConsistencyMonitor;
 use super::gaussian_sum::GaussianSum;
 use super::relocalization_test::RelocalizationTest;
-use super::solution::Solution;
 use crate::BoxError;
 use crate::clone_in_place::clone_in_place;
 use crate::gaussian::RadialQuantile;
 use crate::geometry::{Area, wrap_angle};
 use crate::localize::ekf::Ekf;
+use crate::localize::integrity::IntegrityMonitor;
 use crate::localize::localizer::{Localizer, Recovered, copy_into};
 use crate::localize::measurement::{
     AngleMeasurement, OdometryVerdict, UpdateReason, UpdateVerdict,
 };
+use crate::localize::modes::may_mislead;
 use crate::localize::pose_estimate::{Integrity, IntegrityState, PoseEstimate};
 use crate::observation::OdometrySample;
 use crate::radio_head::RadioHead;
@@ -150,6 +151,104 @@ struct Setup {
     quantile: RadialQuantile,
 }
 
+/// One filter, or a monitored bank of them.
+#[derive(Debug)]
+enum Solution {
+    Bare(Box<Ekf>),
+    Monitored(Box<IntegrityMonitor>),
+}
+
+impl Clone for Solution {
+    fn clone(&self) -> Self {
+        match self {
+            Self::Bare(ekf) => Self::Bare(ekf.clone()),
+            Self::Monitored(monitor) => Self::Monitored(monitor.clone()),
+        }
+    }
+
+    fn clone_from(&mut self, source: &Self) {
+        match (self, source) {
+            (Self::Bare(mine), Self::Bare(theirs)) => (**mine).clone_from(theirs),
+            (Self::Monitored(mine), Self::Monitored(theirs)) => (**mine).clone_from(theirs),
+            (mine, theirs) => *mine = theirs.clone(),
+        }
+    }
+}
+
+impl Solution {
+    /// Of a filter that was given its place, or found it at a time (s).
+    fn new(ekf: Ekf, setup: &Setup, found_s: Option<f64>) -> Self {
+        match setup.integrity {
+            Some(settings) => Self::Monitored(Box::new(IntegrityMonitor::new(
+                &ekf,
+                &setup.heads,
+                settings,
+                found_s,
+            ))),
+            None => Self::Bare(Box::new(ekf)),
+        }
+    }
+
+    const fn monitor(&self) -> Option<&IntegrityMonitor> {
+        match self {
+            Self::Bare(_) => None,
+            Self::Monitored(monitor) => Some(monitor),
+        }
+    }
+
+    /// The filter that uses every sound source.
+    fn ekf(&self) -> &Ekf {
+        match self {
+            Self::Bare(ekf) => ekf,
+            Self::Monitored(monitor) => monitor.ekf(),
+        }
+    }
+
+    /// When it began anew last by itself (s), if ever.
+    fn begun_s(&self) -> f64 {
+        (self.monitor()).map_or(f64::NEG_INFINITY, IntegrityMonitor::begun_s)
+    }
+
+    /// Whether angles may be off as if the vehicle were lost.
+    fn may_mislead(&self) -> bool {
+        let bare = || may_mislead(self.ekf().config());
+        (self.monitor()).map_or_else(bare, IntegrityMonitor::may_mislead)
+    }
+
+    /// How much more the angles vary than stated, as far as anybody listens to that.
+    fn noise_ratio(&self) -> f64 {
+        (self.monitor()).map_or(1.0, IntegrityMonitor::noise_ratio)
+    }
+
+    fn odometry(&mut self, sample: &OdometrySample) -> OdometryVerdict {
+        match self {
+            Self::Bare(ekf) => ekf.odometry(sample),
+            Self::Monitored(monitor) => monitor.odometry(sample),
+        }
+    }
+
+    fn update(&mut self, head: &RadioHead, measured: &AngleMeasurement) -> UpdateVerdict {
+        match self {
+            Self::Bare(ekf) => ekf.update(head, measured),
+            Self::Monitored(monitor) => monitor.update(head, measured),
+        }
+    }
+
+    fn pose(&self, time_s: f64) -> PoseEstimate {
+        match self {
+            Self::Bare(ekf) => ekf.pose(time_s),
+            Self::Monitored(monitor) => monitor.pose(time_s),
+        }
+    }
+
+    /// Keeps a journal, where there is no bank, whose filters take each other's place.
+    fn keep_journal(&mut self) {
+        if let Self::Bare(ekf) = self {
+            ekf.keep_journal();
+        }
+    }
+}
+
 clone_in_place! {
     /// The built-in localizer.
     #[derive(Debug)]
@@ -182,10 +281,9 @@ impl Relocalizer {
         } else {
             Phase::Tracking
         };
-        Self {
-            solution: Some(Solution::new(ekf, heads, integrity, None)),
-            ..Self::new(phase, road, heads, integrity)
-        }
+        let mut made = Self::new(phase, road, heads, integrity);
+        made.solution = Some(Solution::new(ekf, &made.setup, None));
+        made
     }
 
     /// Searches for the first pose.
@@ -194,11 +292,9 @@ impl Relocalizer {
         road: Option<Road>,
         integrity: Option<IntegritySettings>,
     ) -> Self {
-        let made = Self::new(Phase::Searching, road, search.heads(), integrity);
-        Self {
-            search: Some(search),
-            ..made
-        }
+        let mut made = Self::new(Phase::Searching, road, search.heads(), integrity);
+        made.search = Some(search);
+        made
     }
 
     fn new(
@@ -227,8 +323,7 @@ impl Relocalizer {
 
     /// Tracks from now on what was found at a time (s).
     fn track(&mut self, found: Ekf, now_s: f64) {
-        let setup = &self.setup;
-        let mut solution = Solution::new(found, &setup.heads, setup.integrity, Some(now_s));
+        let mut solution = Solution::new(found, &self.setup, Some(now_s));
         if self.keeps_journal {
             solution.keep_journal();
         }
@@ -443,7 +538,9 @@ impl Localizer for Relocalizer {
     }
 
     fn worst_case(&self) -> Option<&Ekf> {
-        self.solution.as_ref().map(Solution::worst_case)
+        let solution = self.solution.as_ref()?;
+        let monitor = solution.monitor().map(IntegrityMonitor::worst_case);
+        Some(monitor.unwrap_or_else(|| solution.ekf()))
     }
 
     fn keep_journal(&mut self) {

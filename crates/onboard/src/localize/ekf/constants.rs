@@ -3,22 +3,38 @@
 use super::config::EkfConfig;
 use super::state::{Belief, LATENESS, MOUNTING, PHASE, SCALE, YAW_RATE_BIAS, YAW_RATE_SCALE};
 
+/// Departures count from this many standard deviations on.
+const SIGMAS: f64 = 3.0;
+
 /// A constant as stated, and as found while driving.
 #[derive(Clone, Copy, Debug, PartialEq)]
 pub struct EstimatedConstant {
     /// What is stated ...
     pub stated: f64,
-    /// ... what was found ...
+    /// ... and its standard deviation.
+    pub stated_std: f64,
+    /// What was found ...
     pub found: f64,
     /// ... and its standard deviation.
     pub std: f64,
 }
 
 impl EstimatedConstant {
+    /// How far it is from what is stated.
+    pub fn departure(&self) -> f64 {
+        self.found - self.stated
+    }
+
     /// Whether it is off by more than `least`, and certainly so.
     pub fn is_remarkable(&self, least: f64) -> bool {
-        let by = (self.found - self.stated).abs();
+        let by = self.departure().abs();
         by > least && by > 2.0 * self.std
+    }
+
+    /// Whether it is certainly not what it was stated to be: its departure is beyond three standard deviations of what
+    /// is stated by three of its own. Of what is stated rightly, fewer than 0.27 % of the drives see this.
+    pub fn departs(&self) -> bool {
+        self.departure().abs() > SIGMAS * (self.stated_std + self.std)
     }
 }
 
@@ -39,75 +55,35 @@ pub struct EstimatedConstants {
     pub lateness_s: EstimatedConstant,
 }
 
-/// Departures count from this many standard deviations on.
-const SIGMAS: f64 = 3.0;
-
-/// Whether a constant is certainly not what it was stated to be: its departure is beyond three standard deviations of
-/// what is stated by three of its own. Of what is stated rightly, fewer than 0.27 % of the drives see this.
-pub(super) fn departs(by: f64, std: f64, stated_std: f64) -> bool {
-    by.abs() > SIGMAS * (stated_std + std)
-}
-
-/// A constant of the array, as found while driving.
-#[derive(Clone, Copy, Debug, PartialEq)]
-pub struct Departure {
-    /// How far it is from the survey (rad) ...
-    pub by_rad: f64,
-    /// ... the standard deviation of that ...
-    pub std_rad: f64,
-    /// ... and the standard deviation that the survey was said to have.
-    pub surveyed_std_rad: f64,
-}
-
-impl Departure {
-    /// Whether it is certain that the survey does not hold.
-    pub fn alarms(&self) -> bool {
-        departs(self.by_rad, self.std_rad, self.surveyed_std_rad)
-    }
-}
-
-/// The array's mounting and phase calibration, as found while driving.
-#[derive(Clone, Copy, Debug, PartialEq)]
-pub struct Calibration {
-    /// Direction of its axis from the surveyed one, counter-clockwise.
-    pub mounting: Departure,
-    /// Phase per element from the calibrated one.
-    pub phase: Departure,
-}
-
-impl Calibration {
-    pub(super) fn new(config: &EkfConfig, belief: &Belief) -> Self {
-        let departure = |state: usize, surveyed_rad: f64, surveyed_std_rad: f64| Departure {
-            by_rad: belief.mean[state] - surveyed_rad,
-            std_rad: belief.covariance[state][state].sqrt(),
-            surveyed_std_rad,
-        };
-        Self {
-            mounting: departure(MOUNTING, config.mounting_rad, config.mounting_std_rad),
-            phase: departure(PHASE, config.phase_rad, config.phase_std_rad),
-        }
-    }
-
-    /// Whether mounting or phase calibration no longer hold.
-    pub fn alarms(&self) -> bool {
-        self.mounting.alarms() || self.phase.alarms()
-    }
-}
-
 impl EstimatedConstants {
     pub(super) fn new(config: &EkfConfig, belief: &Belief) -> Self {
-        let finding = |state: usize, offset: f64, stated: f64| EstimatedConstant {
+        let constant = |state: usize, offset: f64, (stated, stated_std)| EstimatedConstant {
             stated,
+            stated_std,
             found: offset + belief.mean[state],
             std: belief.covariance[state][state].max(0.0).sqrt(),
         };
+        let yaw_rate_bias = (config.yaw_rate_bias_radps, config.yaw_rate_bias_std_radps);
         Self {
-            odometer_scale: finding(SCALE, 1.0, config.odometer_scale),
-            yaw_rate_bias_radps: finding(YAW_RATE_BIAS, 0.0, config.yaw_rate_bias_radps),
-            yaw_rate_scale: finding(YAW_RATE_SCALE, 1.0, 1.0),
-            mounting_rad: finding(MOUNTING, 0.0, config.mounting_rad),
-            phase_rad: finding(PHASE, 0.0, config.phase_rad),
-            lateness_s: finding(LATENESS, 0.0, 0.0),
+            odometer_scale: constant(
+                SCALE,
+                1.0,
+                (config.odometer_scale, config.odometer_scale_std),
+            ),
+            yaw_rate_bias_radps: constant(YAW_RATE_BIAS, 0.0, yaw_rate_bias),
+            yaw_rate_scale: constant(YAW_RATE_SCALE, 1.0, (1.0, config.yaw_rate_scale_std)),
+            mounting_rad: constant(
+                MOUNTING,
+                0.0,
+                (config.mounting_rad, config.mounting_std_rad),
+            ),
+            phase_rad: constant(PHASE, 0.0, (config.phase_rad, config.phase_std_rad)),
+            lateness_s: constant(LATENESS, 0.0, (0.0, config.lateness_std_s)),
         }
+    }
+
+    /// Whether mounting or phase calibration of the array no longer hold.
+    pub fn array_departs(&self) -> bool {
+        self.mounting_rad.departs() || self.phase_rad.departs()
     }
 }

@@ -3,7 +3,7 @@
 use std::sync::Arc;
 
 use super::config::EkfConfig;
-use super::constants::{Calibration, EstimatedConstants, departs};
+use super::constants::EstimatedConstants;
 use super::odometer::{SampleInterval, SpeedJumps};
 use super::state::{Belief, SCALE, STATES};
 use crate::clone_in_place::clone_in_place;
@@ -137,13 +137,8 @@ impl Ekf {
         &self.config
     }
 
-    /// How far the array has come from its survey.
-    pub fn calibration(&self) -> Calibration {
-        Calibration::new(&self.config, &self.belief)
-    }
-
     /// Constants of the vehicle as estimated by now.
-    pub fn findings(&self) -> EstimatedConstants {
+    pub fn constants(&self) -> EstimatedConstants {
         EstimatedConstants::new(&self.config, &self.belief)
     }
 
@@ -159,11 +154,10 @@ impl Ekf {
 
     /// Whether the odometer's scale is certainly not what is stated.
     pub(in crate::localize) fn odometer_departs(&self) -> bool {
-        let config = &self.config;
-        let by = self.belief.mean[SCALE] - (config.odometer_scale - 1.0);
-        let walked = config.noise.scale_per_sqrt_m * self.driven_m.sqrt();
-        let stated_std = config.odometer_scale_std.hypot(walked);
-        departs(by, self.belief.covariance[SCALE][SCALE].sqrt(), stated_std)
+        let mut scale = self.constants().odometer_scale;
+        let walked = self.config.noise.scale_per_sqrt_m * self.driven_m.sqrt();
+        scale.stated_std = scale.stated_std.hypot(walked);
+        scale.departs()
     }
 
     /// Whether the angles tell more of the odometer's scale than what is stated.

@@ -21,7 +21,7 @@ mod update;
 
 pub use angle_model::ArrayModel;
 pub use config::EkfConfig;
-pub use constants::{Calibration, Departure, EstimatedConstant, EstimatedConstants};
+pub use constants::{EstimatedConstant, EstimatedConstants};
 pub use filter::Ekf;
 pub(in crate::localize) use forecast::ExcludedInnovation;
 pub use motion::{MotionNoise, PathBend};
