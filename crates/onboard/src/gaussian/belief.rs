@@ -3,6 +3,9 @@
 
 use std::f64::consts::TAU;
 
+/// Deviations beyond which chance is ruled out: 0.27 % of a Gaussian.
+pub const CERTAIN_SIGMAS: f64 = 3.0;
+
 /// Square matrix, row major.
 pub type Matrix<const N: usize> = [[f64; N]; N];
 
@@ -101,6 +104,11 @@ impl Innovation {
     pub fn density(&self) -> f64 {
         (-0.5 * self.mahalanobis2()).exp() / (TAU * self.variance).sqrt()
     }
+}
+
+/// Probability density (1/rad) of an angle that has this one or, with the probability `outliers`, comes from anywhere.
+pub fn with_outliers(density: f64, outliers: f64) -> f64 {
+    outliers / TAU + (1.0 - outliers) * density
 }
 
 impl<const N: usize> Gaussian<N> {

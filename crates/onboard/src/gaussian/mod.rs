@@ -6,6 +6,7 @@ mod quantile;
 pub mod smoother;
 
 pub use belief::{
-    Gaussian, Innovation, Matrix, dot, identity, principal_variances, product, transformed,
+    CERTAIN_SIGMAS, Gaussian, Innovation, Matrix, dot, identity, principal_variances, product,
+    transformed, with_outliers,
 };
 pub use quantile::{RadialQuantile, normal_quantile};

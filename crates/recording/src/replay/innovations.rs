@@ -2,6 +2,7 @@
 
 use std::sync::Arc;
 
+use onboard::gaussian::Innovation;
 use onboard::geometry::Pose;
 use onboard::localize::ekf::EkfConfig;
 use onboard::localize::{self, Ekf, InitialPose, Localizer};
@@ -16,10 +17,8 @@ use crate::odometry::OdometryLog;
 /// An angle as the localizer met it.
 #[derive(Debug, Clone, Copy, PartialEq)]
 pub struct Met {
-    /// Measured electrical angle minus the predicted one (rad).
-    pub residual_rad: f64,
-    /// Variance of that as the localizer believes it (rad²).
-    pub variance: f64,
+    /// Of the electrical angle (rad).
+    pub innovation: Innovation,
     /// Whether the localizer used it.
     pub used: bool,
 }
@@ -135,8 +134,7 @@ pub fn replay_angles(
                     .map_err(ReplayError::Custom)?
                     .accepted;
             step.met = innovation.map(|innovation| Met {
-                residual_rad: innovation.residual,
-                variance: innovation.variance,
+                innovation,
                 used: accepted,
             });
         }

@@ -7,11 +7,8 @@ use super::gaussian_sum::GaussianSum;
 use crate::clone_in_place::clone_in_place;
 use crate::localize::ekf::Ekf;
 use crate::localize::measurement::AngleMeasurement;
-use crate::localize::modes::log_likelihood;
+use crate::localize::modes::{CERTAIN, log_likelihood};
 use crate::radio_head::RadioHead;
-
-/// Log-likelihood ratio at which it decides: wrong once in three million (e⁻¹⁵).
-const BETTER: f64 = 15.0;
 
 /// Way to be driven before a find is believed (m): a vehicle that stands hears the same errors again and again.
 const LEAST_WAY_M: f64 = 0.5;
@@ -103,9 +100,9 @@ impl RelocalizationTest {
         if is_confirming || self.may_mislead {
             ratio = ratio * f64::from(self.independent) / f64::from(self.angles.max(1));
         }
-        if ratio > BETTER {
+        if ratio > CERTAIN {
             Ordering::Greater
-        } else if ratio < -BETTER {
+        } else if ratio < -CERTAIN {
             Ordering::Less
         } else {
             Ordering::Equal

@@ -2,9 +2,7 @@
 
 use super::config::EkfConfig;
 use super::state::{Belief, LATENESS, MOUNTING, PHASE, SCALE, YAW_RATE_BIAS, YAW_RATE_SCALE};
-
-/// Departures count from this many standard deviations on.
-const SIGMAS: f64 = 3.0;
+use crate::gaussian::CERTAIN_SIGMAS;
 
 /// A constant as stated, and as found while driving.
 #[derive(Clone, Copy, Debug, PartialEq)]
@@ -34,7 +32,7 @@ impl EstimatedConstant {
     /// Whether it is certainly not what it was stated to be: its departure is beyond three standard deviations of what
     /// is stated by three of its own. Of what is stated rightly, fewer than 0.27 % of the drives see this.
     pub fn departs(&self) -> bool {
-        self.departure().abs() > SIGMAS * (self.stated_std + self.std)
+        self.departure().abs() > CERTAIN_SIGMAS * (self.stated_std + self.std)
     }
 }
 

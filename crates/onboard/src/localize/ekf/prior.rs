@@ -140,10 +140,9 @@ impl Ekf {
         noise.odometer_m_per_sqrt_s *= times;
     }
 
-    /// The same filter begun anew where it is, every source in use, its place known to
-    /// `position_std_m` and its heading by the road alone, or by a quarter turn where no map tells
-    /// how the road lies.
-    pub(in crate::localize) fn restarted(&self, position_std_m: f64) -> Self {
+    /// A filter of this configuration begun anew where this one is, every source in use, its place known to
+    /// `position_std_m` and its heading by the road alone, or to 0.3 rad where no map tells how the road lies.
+    pub(in crate::localize) fn restarted(&self, config: EkfConfig, position_std_m: f64) -> Self {
         let along_m = self.belief.mean[ALONG];
         let surveyed = |map: &&Arc<Road>| map.gap_between(along_m, along_m).is_none();
         let road = self.map.as_ref().filter(surveyed);
@@ -157,7 +156,7 @@ impl Ekf {
             heading_std_rad: if road.is_some() { 1.0 } else { 0.3 },
         };
         let heads: Vec<RadioHead> = self.heads.iter().map(|head| head.known).collect();
-        let mut restarted = Self::new(self.config, self.map.clone(), &heads, &start);
+        let mut restarted = Self::new(config, self.map.clone(), &heads, &start);
         // Where the road crosses itself its nearest place may be another one.
         if self.map.is_some() {
             restarted.belief.mean[ALONG] = along_m;

@@ -1,12 +1,10 @@
 //! The measurement update: an angle's prediction and innovation, its gate, and the corrected belief.
 
-use std::f64::consts::TAU;
-
 use super::angle_model::{AngleModel, locate};
 use super::filter::Ekf;
 use super::motion::Reading;
 use super::state::{ACROSS, ALONG, HEADING, LATENESS, SCALE, STATES, YAW_RATE_BIAS};
-use crate::gaussian::Innovation;
+use crate::gaussian::{Innovation, with_outliers};
 use crate::geometry::wrap_angle;
 use crate::localize::bias::{self, JumpHypotheses, MOST_VARIANCE};
 use crate::localize::measurement::{AngleMeasurement, UpdateReason, UpdateVerdict};
@@ -25,8 +23,8 @@ const WRONG_IF_UNRESOLVED: f64 = 0.5;
 /// belief was: such an angle says nothing.
 fn equivalent(innovation: &Innovation, wrong: f64) -> Option<(f64, f64)> {
     let (residual, total) = (innovation.residual, innovation.variance);
-    let holds = (1.0 - wrong) * innovation.density();
-    let holds = holds / (holds + wrong / TAU);
+    let density = innovation.density();
+    let holds = (1.0 - wrong) * density / with_outliers(density, wrong);
     // With the gain K = P Hᵀ/S the mixture has the mean p K r and the covariance
     // P − p (S − (1 − p) r²) K Kᵀ, p being the probability that the angle holds.
     let narrowing = holds * (total - (1.0 - holds) * residual * residual);
@@ -280,6 +278,8 @@ impl Ekf {
 
 #[cfg(test)]
 mod tests {
+    use std::f64::consts::TAU;
+
     use super::*;
     use crate::gaussian::Gaussian;
 

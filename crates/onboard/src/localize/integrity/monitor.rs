@@ -18,6 +18,7 @@ use std::cell::RefCell;
 
 use super::protection_level::{Hypothesis, LevelEquation};
 use crate::clone_in_place::clone_in_place;
+use crate::gaussian::CERTAIN_SIGMAS;
 use crate::geometry::{Pose, wrap_angle};
 use crate::localize::ekf::Ekf;
 use crate::localize::measurement::{AngleMeasurement, OdometryVerdict, UpdateVerdict};
@@ -29,9 +30,6 @@ use crate::settings::IntegritySettings;
 
 /// Share of the risk that is not worth the effort.
 const NEGLIGIBLE: f64 = 0.1;
-
-/// Squared deviations by which two positions are apart that are not both right.
-const APART2: f64 = 9.0;
 
 /// The previous solution, relative to the one that is reported since. Where a radio head is excluded, another mode leads
 /// or a restarted bank takes over, the position may be another at one angle; as long as that may be taken back, the
@@ -55,7 +53,7 @@ impl Handover {
             before.pose.y_m - now.pose.y_m,
         );
         let apart2 = yy * x_m * x_m - 2.0 * xy * x_m * y_m + xx * y_m * y_m;
-        (apart2 > APART2 * (xx * yy - xy * xy)).then(|| Self {
+        (apart2 > CERTAIN_SIGMAS.powi(2) * (xx * yy - xy * xy)).then(|| Self {
             since_s: now.time_s,
             apart: [
                 x_m,

@@ -181,9 +181,11 @@ impl Bank {
         &self.nominal
     }
 
-    /// The bank begun anew from a vague pose where the leading filter is; nothing is known of it at `now_s`.
+    /// The bank begun anew from a vague pose where the leading filter is, about what is nominal, whatever leads;
+    /// nothing is known of it at `now_s`.
     pub fn restarted(&self, position_std_m: f64, now_s: f64) -> Self {
-        let start = self.leader().restarted(position_std_m);
+        let config = *self.nominal.config();
+        let start = self.leader().restarted(config, position_std_m);
         let mut modes = ModeFilter::all(&start, &self.settings.fault_probability);
         for it in &mut modes {
             let before = self

@@ -11,7 +11,7 @@ mod table;
 pub(in crate::localize) use bank::Bank;
 pub use head_test::HeadTest;
 pub(in crate::localize) use head_test::RECOVERY_S;
-pub(in crate::localize) use likelihood::log_likelihood;
+pub(in crate::localize) use likelihood::{CERTAIN, log_likelihood};
 #[cfg(test)]
 pub(in crate::localize) use table::trip;
 pub(in crate::localize) use table::{ModeId, may_mislead};

@@ -210,13 +210,16 @@ pub(in crate::localize) static TABLE: [Mode; 9] = [
         misleads: true,
         ..ROW
     },
-    // Estimated already by a filter that a search has found with it.
+    // Estimated already by a filter that a search has found with it; that may have been of noisier angles, too.
     Mode {
         id: ModeId::CorrelatedBias,
         applies: |nominal, _| nominal.config().rare_bias_probability > 0.0,
         prior: |config, _| config.rare_bias_probability,
         seed: Ekf::clone,
-        alter: Ekf::estimate_rare_bias,
+        alter: |ekf| {
+            ekf.set_noise_ratio(None);
+            ekf.estimate_rare_bias();
+        },
         verdict: Verdict::Degraded,
         on_exclude: Carry::Filter,
         on_restart: Carry::Filter,
@@ -471,6 +474,28 @@ mod tests {
         assert!(odds(0.0) < 1e-3);
         assert!(odds(0.2) > 100.0);
         assert!(odds(-0.2) > 100.0);
+    }
+
+    #[test]
+    fn a_bank_begun_anew_is_about_what_is_stated_whatever_leads() {
+        let world = World {
+            scale: (0.2, 0.0),
+            ..World::default()
+        };
+        let (bank, _) = drive(&world, 30.0, EXACT);
+        assert_eq!(bank.leading_id(), Some(ModeId::Slip));
+        let again = bank.restarted(1.0, 30.0).restarted(1.0, 30.0);
+        assert_eq!(again.nominal().config(), trip().2.config());
+    }
+
+    #[test]
+    fn a_bias_is_estimated_beside_the_stated_noise_whatever_a_search_reckoned_with() {
+        let (heads, _, mut found) = trip();
+        found.set_noise_ratio(Some(3.0));
+        let bank = Bank::new(&found, &heads, &IntegritySettings::default(), 0.0);
+        let (_, with_bias) = bank.mode(ModeId::CorrelatedBias).unwrap();
+        assert_eq!(with_bias.config().heard_noise_ratio, None);
+        assert!(with_bias.is_with_bias());
     }
 
     #[test]
