@@ -328,16 +328,16 @@ impl Onboard {
         Some(constants)
     }
 
-    /// Keeps from now on what smoothing takes, where the localizer is a tracker without a guard,
-    /// whose trackers take each other's place. Angles must come in time from now on.
+    /// Keeps from now on what smoothing takes, where the localizer is one filter and no bank,
+    /// whose filters take each other's place. Angles must come in time from now on.
     pub fn keep_journal(&mut self) {
         self.localizer.keep_journal();
     }
 
     /// Where the vehicle was at each odometry sample since the journal was begun, by everything
-    /// that is known now; nowhere without journal, or without tracker.
+    /// that is known now; nowhere without a journal.
     pub fn smoothed(&self) -> Vec<PoseEstimate> {
-        let tracker = self.localizer.localizer().ekf();
-        tracker.map(Ekf::smoothed).unwrap_or_default()
+        let ekf = self.localizer.localizer().ekf();
+        ekf.map(Ekf::smoothed).unwrap_or_default()
     }
 }

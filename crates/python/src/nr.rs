@@ -259,7 +259,7 @@ impl Scan {
                 .map(|ssb| Py::new(py, Cell::from(ssb)))
                 .collect::<Result<_, _>>()?,
             faults: scan.faults.iter().map(ToString::to_string).collect(),
-            looked: scan.looked.iter().map(ToString::to_string).collect(),
+            looked: scan.searched.iter().map(ToString::to_string).collect(),
         })
     }
 }

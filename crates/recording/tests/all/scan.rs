@@ -294,7 +294,7 @@ fn a_scan_says_where_it_has_looked() {
     source.centre_frequency_hz = Some(3_699.84e6);
     let looked = |found: recording::scan::Scan| -> Vec<String> {
         assert!(found.ssbs.is_empty());
-        found.looked.iter().map(ToString::to_string).collect()
+        found.searched.iter().map(ToString::to_string).collect()
     };
     let found = scan(&mut source, &ScanSettings::default()).unwrap();
     assert_eq!(

@@ -354,7 +354,7 @@ impl EkfConfig {
 
     /// The same by all that several angles share: scatter and the surveys, whose errors stay until
     /// the radio head is seen from another side, after about its distance.
-    pub fn look_variance(&self, travelled_m: f64, angle_model: &AngleModel) -> f64 {
+    pub fn shared_variance(&self, travelled_m: f64, angle_model: &AngleModel) -> f64 {
         let mut variance =
             self.scatter_variance(travelled_m, angle_model.aperture, angle_model.toward);
         if angle_model.survey_variance > 0.0 {

@@ -143,7 +143,7 @@ impl Ekf {
     /// What an angle of thermal variance `thermal(distance)` to `head` would make of a belief
     /// `ahead_m` further on than the newest odometry; `None` of a radio head that is not used, or would
     /// rather repeat itself.
-    pub fn rehearse(
+    pub fn predicted_update(
         &self,
         belief: &Belief,
         ahead_m: f64,
@@ -163,7 +163,7 @@ impl Ekf {
             .config
             .phase_bias
             .variance(own, f64::INFINITY, (travelled_m, 0.0))
-            + self.config.look_variance(travelled_m, &angle_model);
+            + self.config.shared_variance(travelled_m, &angle_model);
         let predicted = belief.variance_along(&angle_model.row) + variance;
         let by_bias = self.bias.variance(number, travelled_m, predicted);
         if bias::repeats(travelled_m) && by_bias > variance {

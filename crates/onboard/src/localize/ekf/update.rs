@@ -103,7 +103,7 @@ impl Ekf {
         let bend = angle_model.bend(&self.belief.covariance);
         let place_m = self.driven_m + ahead_m;
         let travelled_m = place_m - head.last_update_m;
-        let shared = (self.config).look_variance(travelled_m, &angle_model);
+        let shared = (self.config).shared_variance(travelled_m, &angle_model);
         let elapsed_s = measured.time_s - head.last_update_s;
         let turned_rad = self.turned_rad - head.last_update_rad;
         let moved = (travelled_m, turned_rad);

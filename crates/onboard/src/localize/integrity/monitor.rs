@@ -106,7 +106,7 @@ clone_in_place! {
 }
 
 clone_in_place! {
-    /// Trackers begun anew from a vague pose.
+    /// A bank begun anew from a vague pose.
     #[derive(Debug)]
     struct Restarted {
         bank: Bank,

@@ -1,4 +1,4 @@
-//! Drives on tape: what comes to the vehicle, to be driven again with another localizer or wake-up
+//! Measurement traces of drives: what comes to the vehicle, to be driven again with another localizer or wake-up
 //! policy.
 //!
 //! What an SSB brings does not depend on which others were heard, its noise included
@@ -20,15 +20,15 @@ use crate::record::RunRecord;
 use crate::run::Simulation;
 use crate::world::Faults;
 
-/// Runs of a world, each on tape.
-pub struct Tapes {
+/// Runs of a world, each as its measurements.
+pub struct MeasurementTraces {
     simulation: Simulation,
     methods: Vec<EstimatorMethod>,
-    runs: Vec<Tape>,
+    runs: Vec<MeasurementTrace>,
 }
 
-/// One run on tape.
-pub(crate) struct Tape {
+/// One run: what comes to the vehicle.
+pub(crate) struct MeasurementTrace {
     run: u64,
     pub told_start: Pose,
     pub odometry: Vec<OdometrySample>,
@@ -48,8 +48,8 @@ struct Burst {
     end: usize,
 }
 
-impl Tapes {
-    /// Tapes of the first `runs` runs of a scenario, with the angles of these methods; `None` where
+impl MeasurementTraces {
+    /// MeasurementTraces of the first `runs` runs of a scenario, with the angles of these methods; `None` where
     /// it matters to an SSB which others are listened to, or when.
     ///
     /// # Errors
@@ -66,7 +66,9 @@ impl Tapes {
         let numbers = first..first + options.runs as u64;
         let runs: Vec<_> = thread_pool(options.threads)?.install(|| {
             (numbers.into_par_iter())
-                .map(|run| Tape::record(simulation, methods, Streams::new(seed, run), run))
+                .map(|run| {
+                    MeasurementTrace::record(simulation, methods, Streams::new(seed, run), run)
+                })
                 .collect()
         });
         Ok(Some(Self {
@@ -76,7 +78,7 @@ impl Tapes {
         }))
     }
 
-    /// Whether a simulation is of the same world, and its method on the tapes: all may differ that
+    /// Whether a simulation is of the same world, and its method in the traces: all may differ that
     /// only localizer, wake-up policy and computer go by.
     pub fn serve(&self, other: &Simulation) -> bool {
         let grid_deg = |it: &Simulation| it.scenario().vehicle.estimator.music_grid_deg;
@@ -86,7 +88,7 @@ impl Tapes {
             && self.simulation.world().sounds_like(other.world())
     }
 
-    /// The campaign of a simulation that the tapes serve, over their runs.
+    /// The campaign of a simulation that the traces serve, over their runs.
     ///
     /// # Errors
     /// [`SimulationError`], as [`Simulation::campaign`] has them.
@@ -98,14 +100,14 @@ impl Tapes {
         let wanted = simulation.scenario().vehicle.estimator.method;
         let method = self.methods.iter().position(|&method| method == wanted);
         simulation.campaign_of(options, self.runs.len(), |number| {
-            let tape = self.runs.get(number).zip(method);
-            let (tape, method) = tape.ok_or(SimulationError::NotOnTape)?;
-            tape.drive(simulation, method)
+            let trace = self.runs.get(number).zip(method);
+            let (trace, method) = trace.ok_or(SimulationError::NotTraced)?;
+            trace.drive(simulation, method)
         })
     }
 }
 
-impl Tape {
+impl MeasurementTrace {
     /// The angles of a method, in order of time.
     pub fn angles_of(&self, method: usize) -> impl Iterator<Item = (SensedSsb, AngleMeasurement)> {
         let angles = self.angles.get(method).into_iter().flatten();
@@ -118,7 +120,7 @@ impl Tape {
         self.bursts.iter().map(|burst| (burst.time_s, burst.truth))
     }
 
-    /// Puts a run on tape, with the angles of these methods.
+    /// Records a run, with the angles of these methods.
     pub fn record(
         simulation: &Simulation,
         methods: &[EstimatorMethod],
@@ -138,7 +140,7 @@ impl Tape {
         let mut channels = HeadChannel::all(&mut truth, streams);
         let mut faults = Faults::new(&scenario.faults);
         let mut observation = SsbObservation::new(scenario.vehicle.array.elements.into());
-        let mut tape = Self {
+        let mut trace = Self {
             run,
             told_start: truth.told_start,
             odometry: Vec::new(),
@@ -150,7 +152,7 @@ impl Tape {
             let time_s = simulation.time_s(number);
             while let Some(sample_s) = truth.odometer.next_s(time_s) {
                 let sample = truth.odometer.sample(truth.path.at(sample_s));
-                tape.odometry.extend(sample.map(|it| faults.slip(it)));
+                trace.odometry.extend(sample.map(|it| faults.slip(it)));
             }
             let vehicle = truth
                 .path
@@ -166,8 +168,8 @@ impl Tape {
                     continue;
                 }
                 channel.observe(number as u64, &reception, &mut observation);
-                tape.sensed.push(reception.ssb);
-                for (estimator, angles) in estimators.iter_mut().zip(&mut tape.angles) {
+                trace.sensed.push(reception.ssb);
+                for (estimator, angles) in estimators.iter_mut().zip(&mut trace.angles) {
                     let estimated = estimator.estimate(&observation);
                     let estimated = estimated.map_err(SimulationError::Custom)?;
                     // The built-in estimators all tell their standard deviation.
@@ -177,14 +179,14 @@ impl Tape {
                     }));
                 }
             }
-            tape.bursts.push(Burst {
+            trace.bursts.push(Burst {
                 time_s,
                 truth: truth.path.at(time_s).pose,
                 snr_db: strongest_db,
-                end: tape.sensed.len(),
+                end: trace.sensed.len(),
             });
         }
-        Ok(tape)
+        Ok(trace)
     }
 
     fn drive(&self, simulation: &Simulation, method: usize) -> Result<RunRecord, SimulationError> {
@@ -220,7 +222,7 @@ impl Tape {
     }
 }
 
-/// A burst from tape.
+/// A burst from trace.
 struct Played<'a> {
     sensed: &'a [SensedSsb],
     angles: &'a [Option<AngleMeasurement>],

@@ -1,9 +1,9 @@
-//! Drives from tape are the drives themselves, to the last bit.
+//! Drives from trace are the drives themselves, to the last bit.
 
 use onboard::settings::{EstimatorMethod, TomlFile};
 use recording::Files;
 use simulate::scenario::Scenario;
-use simulate::{CampaignOptions, Simulation, Tapes};
+use simulate::{CampaignOptions, MeasurementTraces, Simulation};
 use toml::Value;
 
 const RUNS: usize = 3;
@@ -25,15 +25,15 @@ fn options() -> CampaignOptions<'static> {
     }
 }
 
-fn record(simulation: &Simulation, methods: &[EstimatorMethod]) -> Tapes {
-    let tapes = Tapes::record(simulation, methods, &options()).unwrap();
-    tapes.expect("it is independent of listening")
+fn record(simulation: &Simulation, methods: &[EstimatorMethod]) -> MeasurementTraces {
+    let traces = MeasurementTraces::record(simulation, methods, &options()).unwrap();
+    traces.expect("it is independent of listening")
 }
 
 #[test]
 fn every_policy_and_method_drives_as_by_itself() {
     let methods = [EstimatorMethod::Music, EstimatorMethod::Esprit];
-    let tapes = record(&simulation("paper", &[]), &methods);
+    let traces = record(&simulation("paper", &[]), &methods);
     let tracker = ("vehicle.localizer.kind", Value::from("tracker"));
     let policy = |name: &str| ("vehicle.wake_up.policy", Value::from(name));
     let esprit = ("vehicle.estimator.method", Value::from("esprit"));
@@ -46,10 +46,10 @@ fn every_policy_and_method_drives_as_by_itself() {
         &[tracker, policy("uncertainty"), bound],
     ] {
         let simulation = simulation("paper", changes);
-        assert!(tapes.serve(&simulation), "{changes:?}");
+        assert!(traces.serve(&simulation), "{changes:?}");
         let own = simulation.campaign(&options()).unwrap();
         assert!(own.runs.iter().all(|run| run.executions > 5));
-        assert_eq!(tapes.campaign(&simulation, &options()).unwrap(), own);
+        assert_eq!(traces.campaign(&simulation, &options()).unwrap(), own);
     }
 }
 
@@ -59,14 +59,14 @@ fn several_radio_heads_and_faults_too() {
         "nlos-and-faults",
         &[("vehicle.receiver.snr_noise_db", Value::from(0.0))],
     );
-    let tapes = record(&simulation, &[EstimatorMethod::MaximumLikelihood]);
+    let traces = record(&simulation, &[EstimatorMethod::MaximumLikelihood]);
     let own = simulation.campaign(&options()).unwrap();
-    assert_eq!(tapes.campaign(&simulation, &options()).unwrap(), own);
+    assert_eq!(traces.campaign(&simulation, &options()).unwrap(), own);
 }
 
 #[test]
 fn another_world_is_not_on_the_tape() {
-    let tapes = record(&simulation("paper", &[]), &[EstimatorMethod::Music]);
+    let traces = record(&simulation("paper", &[]), &[EstimatorMethod::Music]);
     for (key, value) in [
         ("site.rician_k_db", Value::from(7.0)),
         ("site.radio_heads[0].eirp_dbm", Value::from(0.0)),
@@ -78,7 +78,7 @@ fn another_world_is_not_on_the_tape() {
         ("vehicle.estimator.method", Value::from("esprit")),
     ] {
         let other = simulation("paper", &[(key, value)]);
-        assert!(!tapes.serve(&other), "{key}");
+        assert!(!traces.serve(&other), "{key}");
     }
     // What is believed of the radiated power is not the power.
     let believed = [
@@ -88,7 +88,7 @@ fn another_world_is_not_on_the_tape() {
             Value::from(-17.3),
         ),
     ];
-    assert!(tapes.serve(&simulation("paper", &believed)));
+    assert!(traces.serve(&simulation("paper", &believed)));
 }
 
 #[test]
@@ -98,7 +98,7 @@ fn where_it_matters_when_the_vehicle_listens_there_is_no_tape() {
         ("vehicle.receiver.snr_noise_db", Value::from(1.0)),
     ] {
         let simulation = simulation("paper", &[(key, value)]);
-        let tapes = Tapes::record(&simulation, &[EstimatorMethod::Music], &options());
-        assert!(tapes.unwrap().is_none(), "{key}");
+        let traces = MeasurementTraces::record(&simulation, &[EstimatorMethod::Music], &options());
+        assert!(traces.unwrap().is_none(), "{key}");
     }
 }

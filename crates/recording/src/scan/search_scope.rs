@@ -6,7 +6,7 @@ use nr_ssb::SubcarrierSpacing;
 
 /// One kind of search through a recording.
 #[derive(Debug, Clone, PartialEq)]
-pub struct Looked {
+pub struct SearchScope {
     /// Subcarrier spacing looked for.
     pub spacing: SubcarrierSpacing,
     /// At which frequencies of the SSB's centre.
@@ -38,7 +38,7 @@ pub enum Places {
     },
 }
 
-impl fmt::Display for Looked {
+impl fmt::Display for SearchScope {
     fn fmt(&self, f: &mut fmt::Formatter<'_>) -> fmt::Result {
         write!(f, "{} kHz spacing, ", self.spacing.khz())?;
         match self.places {
