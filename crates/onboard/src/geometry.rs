@@ -60,19 +60,18 @@ impl Area {
     }
 
     /// Where these points are, and a quarter of that to each side.
-    pub fn about(points: impl Iterator<Item = Point> + Clone) -> Self {
-        let bounds = |along: fn(Point) -> f64| {
-            let values = || points.clone().map(along);
-            let least = values().fold(f64::INFINITY, f64::min);
-            let most = values().fold(f64::NEG_INFINITY, f64::max);
-            (least, most)
-        };
-        let (west, east) = bounds(|point| point.x_m);
-        let (south, north) = bounds(|point| point.y_m);
-        let margin_m = 0.25 * (east - west).max(north - south);
+    pub fn about(points: impl Iterator<Item = Point>) -> Self {
+        let [none, all] = [f64::INFINITY, f64::NEG_INFINITY].map(|it| Point::new(it, it));
+        let (from, to) = points.fold((none, all), |(from, to), point| {
+            (
+                Point::new(from.x_m.min(point.x_m), from.y_m.min(point.y_m)),
+                Point::new(to.x_m.max(point.x_m), to.y_m.max(point.y_m)),
+            )
+        });
+        let margin_m = 0.25 * (to.x_m - from.x_m).max(to.y_m - from.y_m);
         Self {
-            from: Point::new(west - margin_m, south - margin_m),
-            to: Point::new(east + margin_m, north + margin_m),
+            from: from.moved([-margin_m; 2]),
+            to: to.moved([margin_m; 2]),
         }
     }
 
@@ -114,6 +113,15 @@ impl Pose {
     #[must_use]
     pub const fn point(self) -> Point {
         Point::new(self.x_m, self.y_m)
+    }
+
+    /// How far another pose is from it: east and north (m), and counter-clockwise in (−π, π] (rad).
+    pub fn offset_of(self, other: Self) -> [f64; 3] {
+        [
+            other.x_m - self.x_m,
+            other.y_m - self.y_m,
+            wrap_angle(other.heading_rad - self.heading_rad),
+        ]
     }
 
     /// The pose after `length_m` along an arc of constant `curvature_per_m` (left is positive).

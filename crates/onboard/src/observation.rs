@@ -119,6 +119,24 @@ impl SsbObservation {
     }
 }
 
+/// An angle of arrival as a localizer takes it.
+#[derive(Debug, Clone, Copy, PartialEq)]
+pub struct AngleMeasurement {
+    /// Time in seconds.
+    pub time_s: f64,
+    /// Electrical angle ω = 2π(d/λ)·cos θ between neighbouring antennas of a row, in radians; of any
+    /// other array the azimuth from its axis.
+    pub phase_rad: f64,
+    /// Its standard deviation from noise, in radians.
+    pub phase_sigma_rad: f64,
+    /// Angle of arrival θ from the array's axis, in radians: 0..=π of a row, −π..=π of any other.
+    pub angle_rad: f64,
+    /// SNR per antenna and snapshot, in dB.
+    pub snr_db: f64,
+    /// Whether the estimator vouches for it: that it is Gaussian with this standard deviation.
+    pub resolved: bool,
+}
+
 #[cfg(test)]
 mod tests {
     use super::*;

@@ -6,7 +6,7 @@ use super::acquire::{GaussianSum, Relocalizer};
 use super::dead_reckoning::DeadReckoning;
 use super::ekf::{Ekf, EkfConfig};
 use super::localizer::Localizer;
-use super::pose_estimate::InitialPose;
+use super::output::InitialPose;
 use crate::geometry::{Area, Pose};
 use crate::radio_head::RadioHead;
 use crate::settings::{LocalizerSettings, SettingsError, Site, Vehicle};

@@ -2,10 +2,11 @@
 //! Infrastructure, and Vehicle Trajectory Model").
 
 use super::localizer::{Localizer, copy_into};
-use super::measurement::{AngleMeasurement, OdometryVerdict, UpdateReason, UpdateVerdict};
-use super::pose_estimate::PoseEstimate;
+use super::output::PoseEstimate;
+use super::output::{OdometryVerdict, UpdateReason, UpdateVerdict};
 use crate::BoxError;
 use crate::geometry::{Point, Pose, wrap_angle};
+use crate::observation::AngleMeasurement;
 use crate::observation::OdometrySample;
 use crate::radio_head::RadioHead;
 use crate::settings::HeadingBetween;

@@ -10,14 +10,13 @@ use std::f64::consts::TAU;
 use std::sync::Arc;
 
 use crate::clone_in_place::clone_in_place;
-use crate::geometry::{Area, Pose, wrap_angle};
+use crate::geometry::{Area, Point, Pose, wrap_angle};
 use crate::localize::ekf::state::{ACROSS, ALONG, HEADING, STATES};
 use crate::localize::ekf::{Ekf, EkfConfig};
-use crate::localize::measurement::{
-    AngleMeasurement, OdometryVerdict, UpdateReason, UpdateVerdict,
-};
 use crate::localize::modes::log_likelihood;
-use crate::localize::pose_estimate::{InitialPose, PoseEstimate};
+use crate::localize::output::{InitialPose, PoseEstimate};
+use crate::localize::output::{OdometryVerdict, UpdateReason, UpdateVerdict};
+use crate::observation::AngleMeasurement;
 use crate::observation::OdometrySample;
 use crate::radio_head::RadioHead;
 use crate::road::Road;
@@ -75,16 +74,19 @@ impl Hypothesis {
         )
     }
 
+    /// How far the state of another one is from its own.
+    fn apart(&self, other: &Self) -> [f64; STATES] {
+        let (own, theirs) = (&self.ekf.belief().mean, &other.ekf.belief().mean);
+        let mut apart: [f64; STATES] = std::array::from_fn(|state| theirs[state] - own[state]);
+        apart[HEADING] = wrap_angle(apart[HEADING]);
+        apart
+    }
+
     /// Whether another one in the plane is within a deviation of it in each direction.
     fn meets(&self, other: &Self) -> bool {
-        let (mine, yours) = (self.ekf.belief(), other.ekf.belief());
-        [ALONG, ACROSS, HEADING].into_iter().all(|state| {
-            let mut apart = mine.mean[state] - yours.mean[state];
-            if state == HEADING {
-                apart = wrap_angle(apart);
-            }
-            apart * apart < mine.covariance[state][state]
-        })
+        let (apart, covariance) = (self.apart(other), &self.ekf.belief().covariance);
+        let is_within = |state: usize| apart[state] * apart[state] < covariance[state][state];
+        [ALONG, ACROSS, HEADING].into_iter().all(is_within)
     }
 
     /// Takes in another hypothesis on the same road: the Gaussian of the same mean and covariance
@@ -92,12 +94,7 @@ impl Hypothesis {
     fn absorb(&mut self, other: &Self) {
         let ratio = (other.log_likelihood - self.log_likelihood).exp();
         let weight = ratio / (1.0 + ratio);
-        let (mut one, two) = (*self.ekf.belief(), other.ekf.belief());
-        let mut apart = two.mean;
-        for (apart, mean) in apart.iter_mut().zip(one.mean) {
-            *apart -= mean;
-        }
-        apart[HEADING] = wrap_angle(apart[HEADING]);
+        let (mut one, two, apart) = (*self.ekf.belief(), other.ekf.belief(), self.apart(other));
         for i in 0..STATES {
             one.mean[i] += weight * apart[i];
             for j in 0..STATES {
@@ -165,49 +162,46 @@ impl GaussianSum {
     }
 
     fn restart(&mut self) {
-        let roads = match &self.ground {
-            Ground::Roads(roads) => roads,
+        let (config, heads) = (self.config, &self.heads);
+        let hypothesis = |road: usize, map: Option<&Arc<Road>>, start: InitialPose| Hypothesis {
+            road,
+            ekf: Ekf::new(config, map.cloned(), heads, &start),
+            log_likelihood: 0.0,
+        };
+        match &self.ground {
+            Ground::Roads(roads) => {
+                for (number, road) in roads.iter().enumerate() {
+                    let count = (road.length_m() / SPACING_M).ceil().max(1.0);
+                    let spacing_m = road.length_m() / count;
+                    self.hypotheses.extend((0..count as usize).map(|index| {
+                        let start = InitialPose {
+                            pose: road.pose((index as f64 + 0.5) * spacing_m),
+                            position_std_m: 0.5 * spacing_m,
+                            heading_std_rad: 1.0,
+                        };
+                        hypothesis(number, Some(road), start)
+                    }));
+                }
+            }
             Ground::Plane(area) => {
                 let spacing_m = area.spacing_m(MOST_HYPOTHESES / f64::from(HEADINGS), SPACING_M);
                 let turn_rad = TAU / f64::from(HEADINGS);
-                for place in area.places(spacing_m) {
+                for Point { x_m, y_m } in area.places(spacing_m) {
                     self.hypotheses.extend((0..HEADINGS).map(|number| {
+                        let heading_rad = wrap_angle(f64::from(number) * turn_rad);
                         let start = InitialPose {
                             pose: Pose {
-                                x_m: place.x_m,
-                                y_m: place.y_m,
-                                heading_rad: wrap_angle(f64::from(number) * turn_rad),
+                                x_m,
+                                y_m,
+                                heading_rad,
                             },
                             position_std_m: 0.5 * spacing_m,
                             heading_std_rad: 0.5 * turn_rad,
                         };
-                        Hypothesis {
-                            road: 0,
-                            ekf: Ekf::new(self.config, None, &self.heads, &start),
-                            log_likelihood: 0.0,
-                        }
+                        hypothesis(0, None, start)
                     }));
                 }
-                return;
             }
-        };
-        for (number, road) in roads.iter().enumerate() {
-            let count = (road.length_m() / SPACING_M).ceil().max(1.0);
-            let spacing_m = road.length_m() / count;
-            let heads = &self.heads;
-            let hypothesis = |index: usize| {
-                let start = InitialPose {
-                    pose: road.pose((index as f64 + 0.5) * spacing_m),
-                    position_std_m: 0.5 * spacing_m,
-                    heading_std_rad: 1.0,
-                };
-                Hypothesis {
-                    road: number,
-                    ekf: Ekf::new(self.config, Some(road.clone()), heads, &start),
-                    log_likelihood: 0.0,
-                }
-            };
-            self.hypotheses.extend((0..count as usize).map(hypothesis));
         }
     }
 
@@ -366,18 +360,7 @@ impl GaussianSum {
         for (weight, estimate) in weighed() {
             let weight = weight.max(least_weight);
             total += weight;
-            let pose = estimate.pose;
-            let off = [
-                pose.x_m - mean.x_m,
-                pose.y_m - mean.y_m,
-                wrap_angle(pose.heading_rad - mean.heading_rad),
-            ];
-            let own = estimate.covariance.unwrap_or_default();
-            for (row, (own, a)) in covariance.iter_mut().zip(own.iter().zip(off)) {
-                for (value, (own, b)) in row.iter_mut().zip(own.iter().zip(off)) {
-                    *value += weight * (own + a * b);
-                }
-            }
+            estimate.add_about(mean, weight, &mut covariance);
         }
         let covariance = covariance.map(|row| row.map(|value| value / total));
         PoseEstimate {

@@ -6,8 +6,8 @@ use std::cmp::Ordering;
 use super::gaussian_sum::GaussianSum;
 use crate::clone_in_place::clone_in_place;
 use crate::localize::ekf::Ekf;
-use crate::localize::measurement::AngleMeasurement;
 use crate::localize::modes::{CERTAIN, log_likelihood};
+use crate::observation::AngleMeasurement;
 use crate::radio_head::RadioHead;
 
 /// Way to be driven before a find is believed (m): a vehicle that stands hears the same errors again and again.

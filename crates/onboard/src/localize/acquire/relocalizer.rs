@@ -20,15 +20,14 @@ use super::relocalization_test::RelocalizationTest;
 use crate::BoxError;
 use crate::clone_in_place::clone_in_place;
 use crate::gaussian::RadialQuantile;
-use crate::geometry::{Area, wrap_angle};
+use crate::geometry::Area;
 use crate::localize::ekf::Ekf;
 use crate::localize::integrity::IntegrityMonitor;
 use crate::localize::localizer::{Localizer, Recovered, copy_into};
-use crate::localize::measurement::{
-    AngleMeasurement, OdometryVerdict, UpdateReason, UpdateVerdict,
-};
 use crate::localize::modes::may_mislead;
-use crate::localize::pose_estimate::{Integrity, IntegrityState, PoseEstimate};
+use crate::localize::output::{Integrity, IntegrityState, PoseEstimate};
+use crate::localize::output::{OdometryVerdict, UpdateReason, UpdateVerdict};
+use crate::observation::AngleMeasurement;
 use crate::observation::OdometrySample;
 use crate::radio_head::RadioHead;
 use crate::road::Road;
@@ -419,11 +418,12 @@ impl Relocalizer {
             }
             Transition::TakeOver => {
                 if let Some(found) = self.test.as_ref().and_then(|it| it.search.found()) {
-                    let (from, to) = (solution.pose(now_s).pose, found.pose(now_s).pose);
+                    let from = solution.pose(now_s).pose;
+                    let [x_m, y_m, turned_rad] = from.offset_of(found.pose(now_s).pose);
                     self.recovered = Some(Recovered {
                         time_s: now_s,
-                        moved_m: from.point().distance_m(to.point()),
-                        turned_rad: wrap_angle(to.heading_rad - from.heading_rad),
+                        moved_m: x_m.hypot(y_m),
+                        turned_rad,
                     });
                     self.track(found, now_s);
                 }

@@ -12,8 +12,8 @@ use crate::gaussian::{
     Innovation, Matrix, dot, identity, principal_variances, product, transformed,
 };
 use crate::localize::bias;
-use crate::localize::measurement::AngleMeasurement;
-use crate::localize::pose_estimate::PoseEstimate;
+use crate::localize::output::PoseEstimate;
+use crate::observation::AngleMeasurement;
 use crate::radio_head::RadioHead;
 
 /// Longest step of a forecast (m), where millimetres do not matter.

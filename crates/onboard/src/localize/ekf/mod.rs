@@ -8,7 +8,6 @@
 
 pub mod angle_model;
 mod config;
-mod constants;
 mod filter;
 mod forecast;
 mod lane;
@@ -21,8 +20,7 @@ mod update;
 
 pub use angle_model::ArrayModel;
 pub use config::EkfConfig;
-pub use constants::{EstimatedConstant, EstimatedConstants};
-pub use filter::Ekf;
+pub use filter::{Ekf, EstimatedConstant, EstimatedConstants};
 pub(in crate::localize) use forecast::ExcludedInnovation;
 pub use motion::{MotionNoise, PathBend};
 pub(in crate::localize) use predict::MOST_SLIP;

@@ -4,7 +4,7 @@ use super::filter::{Ekf, OffMap};
 use super::motion::{Reading, Step, Yaw};
 use super::state::{ACROSS, ALONG, Belief, HEADING, SCALE, STATES, YAW_RATE_BIAS};
 use crate::gaussian::CERTAIN_SIGMAS;
-use crate::localize::measurement::OdometryVerdict;
+use crate::localize::output::OdometryVerdict;
 use crate::observation::OdometrySample;
 use crate::road::Gap;
 use crate::settings::DriveKind;

@@ -11,7 +11,7 @@ use super::state::{
 };
 use crate::geometry::wrap_angle;
 use crate::localize::bias::CorrelatedBias;
-use crate::localize::pose_estimate::InitialPose;
+use crate::localize::output::InitialPose;
 use crate::radio_head::RadioHead;
 use crate::road::Road;
 
@@ -142,7 +142,7 @@ impl Ekf {
 
     /// A filter of this configuration begun anew where this one is, every source in use, its place known to
     /// `position_std_m` and its heading by the road alone, or to 0.3 rad where no map tells how the road lies.
-    pub(in crate::localize) fn restarted(&self, config: EkfConfig, position_std_m: f64) -> Self {
+    pub(in crate::localize) fn restarted(&self, config: &EkfConfig, position_std_m: f64) -> Self {
         let along_m = self.belief.mean[ALONG];
         let surveyed = |map: &&Arc<Road>| map.gap_between(along_m, along_m).is_none();
         let road = self.map.as_ref().filter(surveyed);
@@ -156,7 +156,7 @@ impl Ekf {
             heading_std_rad: if road.is_some() { 1.0 } else { 0.3 },
         };
         let heads: Vec<RadioHead> = self.heads.iter().map(|head| head.known).collect();
-        let mut restarted = Self::new(config, self.map.clone(), &heads, &start);
+        let mut restarted = Self::new(*config, self.map.clone(), &heads, &start);
         // Where the road crosses itself its nearest place may be another one.
         if self.map.is_some() {
             restarted.belief.mean[ALONG] = along_m;

@@ -7,7 +7,8 @@ use super::state::{ACROSS, ALONG, HEADING, LATENESS, SCALE, STATES, YAW_RATE_BIA
 use crate::gaussian::{Innovation, with_outliers};
 use crate::geometry::wrap_angle;
 use crate::localize::bias::{self, JumpHypotheses, MOST_VARIANCE};
-use crate::localize::measurement::{AngleMeasurement, UpdateReason, UpdateVerdict};
+use crate::localize::output::{UpdateReason, UpdateVerdict};
+use crate::observation::AngleMeasurement;
 use crate::radio_head::RadioHead;
 
 /// Most that angles can be later than stated (s).

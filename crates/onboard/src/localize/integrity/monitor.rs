@@ -19,11 +19,12 @@ use std::cell::RefCell;
 use super::protection_level::{Hypothesis, LevelEquation};
 use crate::clone_in_place::clone_in_place;
 use crate::gaussian::CERTAIN_SIGMAS;
-use crate::geometry::{Pose, wrap_angle};
+use crate::geometry::Pose;
 use crate::localize::ekf::Ekf;
-use crate::localize::measurement::{AngleMeasurement, OdometryVerdict, UpdateVerdict};
 use crate::localize::modes::{Bank, ModeId, RECOVERY_S};
-use crate::localize::pose_estimate::{Integrity, IntegrityState, PoseEstimate};
+use crate::localize::output::{Integrity, IntegrityState, PoseEstimate};
+use crate::localize::output::{OdometryVerdict, UpdateVerdict};
+use crate::observation::AngleMeasurement;
 use crate::observation::OdometrySample;
 use crate::radio_head::RadioHead;
 use crate::settings::IntegritySettings;
@@ -48,18 +49,12 @@ impl Handover {
         let [[xx, xy, _], [_, yy, _], _] = covariance;
         let [[own_xx, own_xy, _], [_, own_yy, _], _] = now.covariance?;
         let (xx, xy, yy) = (xx + own_xx, xy + own_xy, yy + own_yy);
-        let (x_m, y_m) = (
-            before.pose.x_m - now.pose.x_m,
-            before.pose.y_m - now.pose.y_m,
-        );
+        let apart = now.pose.offset_of(before.pose);
+        let [x_m, y_m, _] = apart;
         let apart2 = yy * x_m * x_m - 2.0 * xy * x_m * y_m + xx * y_m * y_m;
-        (apart2 > CERTAIN_SIGMAS.powi(2) * (xx * yy - xy * xy)).then(|| Self {
+        (apart2 > CERTAIN_SIGMAS.powi(2) * (xx * yy - xy * xy)).then_some(Self {
             since_s: now.time_s,
-            apart: [
-                x_m,
-                y_m,
-                wrap_angle(before.pose.heading_rad - now.pose.heading_rad),
-            ],
+            apart,
             covariance,
         })
     }

@@ -9,7 +9,7 @@
 use std::f64::consts::TAU;
 
 use crate::gaussian::principal_variances;
-use crate::localize::pose_estimate::PoseEstimate;
+use crate::localize::output::PoseEstimate;
 
 /// Directions over which a probability is summed.
 const DIRECTIONS: usize = 32;

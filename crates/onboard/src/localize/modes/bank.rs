@@ -11,16 +11,14 @@
 //! radio head is excluded, filters that have never heard it are ready to take over, together with
 //! those that have heard neither it nor one of the others.
 
-use super::head_test::{CLEARED, DETECTED, HeadTest, RECOVERY_S};
 use super::likelihood::{LEAST_ODDS, LikelihoodRatio, SPEED_JUMP};
 use super::noise_ratio::NoiseRatio;
-use super::subsets::{Subsets, exclude};
+use super::subsets::{CLEARED, DETECTED, HeadTest, RECOVERY_S, Subsets, exclude};
 use super::table::{Carry, Mode, ModeId, TABLE, Verdict, Weight};
 use crate::clone_in_place::clone_in_place;
 use crate::localize::ekf::{Ekf, PredictedMeasurement};
-use crate::localize::measurement::{
-    AngleMeasurement, OdometryVerdict, UpdateReason, UpdateVerdict,
-};
+use crate::localize::output::{OdometryVerdict, UpdateReason, UpdateVerdict};
+use crate::observation::AngleMeasurement;
 use crate::observation::OdometrySample;
 use crate::radio_head::RadioHead;
 use crate::settings::{FaultProbability, IntegritySettings};
@@ -184,8 +182,7 @@ impl Bank {
     /// The bank begun anew from a vague pose where the leading filter is, about what is nominal, whatever leads;
     /// nothing is known of it at `now_s`.
     pub fn restarted(&self, position_std_m: f64, now_s: f64) -> Self {
-        let config = *self.nominal.config();
-        let start = self.leader().restarted(config, position_std_m);
+        let start = (self.leader()).restarted(self.nominal.config(), position_std_m);
         let mut modes = ModeFilter::all(&start, &self.settings.fault_probability);
         for it in &mut modes {
             let before = self
@@ -555,7 +552,7 @@ mod tests {
     use super::*;
     use crate::geometry::Pose;
     use crate::localize::ekf::EkfConfig;
-    use crate::localize::pose_estimate::InitialPose;
+    use crate::localize::output::InitialPose;
     use crate::settings::{Shipped, Site, TomlFile, Vehicle};
 
     /// A minute of driving past four radio heads, of which number 2 is off by `bias_rad`; what was

@@ -4,7 +4,7 @@ use std::f64::consts::TAU;
 
 use crate::gaussian::with_outliers;
 use crate::localize::ekf::{Ekf, PredictedMeasurement};
-use crate::localize::measurement::UpdateReason;
+use crate::localize::output::UpdateReason;
 
 /// Share of the angles that are outliers, from any direction, where scatter makes no more of them.
 const OUTLIERS: f64 = 2e-3;

@@ -246,8 +246,8 @@ pub(in crate::localize) mod trip {
     use std::sync::Arc;
 
     use crate::localize::ekf::{Ekf, EkfConfig};
-    use crate::localize::measurement::AngleMeasurement;
-    use crate::localize::pose_estimate::InitialPose;
+    use crate::localize::output::InitialPose;
+    use crate::observation::AngleMeasurement;
     use crate::radio_head::RadioHead;
     use crate::road::Road;
     use crate::settings::{Shipped, Site, TomlFile, Vehicle};
