@@ -120,12 +120,25 @@ clone_in_place! {
 }
 
 impl GaussianSum {
-    /// The vehicle may be anywhere on `road`, driving along it or, where `either_direction`, also
-    /// against it.
-    pub fn new(config: EkfConfig, road: Road, either_direction: bool, heads: &[RadioHead]) -> Self {
+    /// The vehicle may be anywhere on `road`, driving along it or, where `either_direction`, also against it; without a
+    /// road anywhere about the radio heads.
+    pub fn new(
+        config: EkfConfig,
+        road: Option<Road>,
+        either_direction: bool,
+        heads: &[RadioHead],
+    ) -> Self {
+        let Some(road) = road else {
+            return Self::in_plane(config, Self::about(heads), heads);
+        };
         let against = either_direction.then(|| Arc::new(road.reversed()));
         let roads = [Arc::new(road)].into_iter().chain(against).collect();
         Self::on(&config, Ground::Roads(roads), heads)
+    }
+
+    /// Where the vehicle is without a road.
+    fn about(heads: &[RadioHead]) -> Area {
+        Area::about(heads.iter().map(|head| head.position))
     }
 
     /// The vehicle may be anywhere in an area, heading anywhere.
@@ -133,9 +146,9 @@ impl GaussianSum {
         Self::on(&config, Ground::Plane(area), heads)
     }
 
-    /// Whether all of an area is searched as finely as is useful.
-    pub fn is_small(area: Area) -> bool {
-        area.spacing_m(MOST_HYPOTHESES / f64::from(HEADINGS), SPACING_M) <= SPACING_M
+    /// Whether all about these radio heads is searched as finely as is useful.
+    pub fn is_small(heads: &[RadioHead]) -> bool {
+        Self::about(heads).spacing_m(MOST_HYPOTHESES / f64::from(HEADINGS), SPACING_M) <= SPACING_M
     }
 
     /// Whether its filters have the states that a filter has which they are compared with.
@@ -390,7 +403,7 @@ mod tests {
         let heads = RadioHead::heard(&site, &vehicle);
         let map = site.build_road().unwrap().unwrap();
         let start_m = rng.random::<f64>() * 200.0;
-        let mut search = GaussianSum::new(config, map.clone(), false, &heads);
+        let mut search = GaussianSum::new(config, Some(map.clone()), false, &heads);
         for step in 0..1000 {
             let time_s = f64::from(step) * 0.02;
             let distance_m = 4.0 * time_s;

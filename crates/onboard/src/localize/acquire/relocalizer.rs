@@ -42,6 +42,12 @@ const MOST_NEARBY_M: f64 = 10.0;
 /// After a search that found no better place the next one waits so long (s).
 const REST_S: f64 = 10.0;
 
+/// After this time with angles and without a find a search is patient no more (s).
+const PATIENCE_S: f64 = 20.0;
+
+/// After this way a confirmation by few angles has taken long (m).
+const LONG_WAY_M: f64 = 100.0;
+
 /// Radio heads without which a place in the plane cannot be told from others.
 const LEAST_HEADS: usize = 3;
 
@@ -358,12 +364,12 @@ impl Relocalizer {
         if config.heard_noise_ratio.is_some() {
             config.set_noise_ratio(Some(solution.noise_ratio()));
         }
-        let all = || Area::about(heads.iter().map(|head| head.position));
-        let mut search = match &self.setup.road {
-            Some(road) => GaussianSum::new(config, road.clone(), true, heads),
+        let road = self.setup.road.as_ref();
+        let mut search = match road {
+            Some(_) => GaussianSum::new(config, road.cloned(), true, heads),
             None if heads.len() < LEAST_HEADS => return None,
-            None if is_wide || GaussianSum::is_small(all()) => {
-                GaussianSum::in_plane(config, all(), heads)
+            None if is_wide || GaussianSum::is_small(heads) => {
+                GaussianSum::new(config, None, true, heads)
             }
             None => {
                 let here = solution.pose(now_s);
@@ -378,20 +384,20 @@ impl Relocalizer {
     }
 
     fn evidence(&self, solution: &Solution, now_s: f64) -> Evidence {
-        let (test, odometry_s) = (self.test.as_ref(), solution.ekf().time_s());
-        let is = |what: fn(&RelocalizationTest) -> bool| test.is_some_and(what);
-        let is_confirming = self.phase == Phase::Confirming;
+        let odometry_s = solution.ekf().time_s();
+        let is = |what: &dyn Fn(&RelocalizationTest) -> bool| self.test.as_ref().is_some_and(what);
+        let compared = |it: &RelocalizationTest| it.compare(self.phase == Phase::Confirming);
         Evidence {
             is_lost: self.consistency.is_lost(),
             is_consistent: self.consistency.is_sure(),
             may_mislead: solution.may_mislead(),
             is_rested: now_s >= self.rests_until_s,
-            search: test.map_or(Ordering::Equal, |it| it.compare(is_confirming)),
-            is_found: is(|it| it.search.found().is_some()),
-            is_just_reported: test.is_some_and(|it| it.reported_s == odometry_s),
-            has_moved: is(RelocalizationTest::has_moved),
-            has_moved_far: is(RelocalizationTest::has_moved_far),
-            is_patient: is(RelocalizationTest::is_patient),
+            search: self.test.as_ref().map_or(Ordering::Equal, compared),
+            is_found: is(&|it| it.search.found().is_some()),
+            is_just_reported: is(&|it| it.reported_s == odometry_s),
+            has_moved: is(&|it| it.way_m >= it.least_way_m()),
+            has_moved_far: is(&|it| it.way_m > LONG_WAY_M),
+            is_patient: is(&|it| it.listened_s > PATIENCE_S),
         }
     }
 

@@ -9,7 +9,7 @@ use super::state::{
     ACROSS, ALONG, Belief, CURVATURE, DATUM, HEADING, LATENESS, MOUNTING, PHASE, SCALE, STATES,
     YAW_RATE_BIAS, YAW_RATE_SCALE,
 };
-use crate::geometry::wrap_angle;
+use crate::geometry::{Pose, wrap_angle};
 use crate::localize::bias::CorrelatedBias;
 use crate::localize::output::InitialPose;
 use crate::radio_head::RadioHead;
@@ -37,45 +37,49 @@ impl Ekf {
         mean[YAW_RATE_BIAS] = config.yaw_rate_bias_radps;
         mean[MOUNTING] = config.mounting_rad;
         mean[PHASE] = config.phase_rad;
-        let Some(map) = map else {
-            mean[ALONG] = start.pose.x_m;
-            mean[ACROSS] = start.pose.y_m;
-            mean[HEADING] = start.pose.heading_rad;
-            sigma[ALONG] = start.position_std_m;
+        let Pose {
+            x_m,
+            y_m,
+            heading_rad,
+        } = start.pose;
+        let place = map.map(|map| (map, map.project(start.pose.point())));
+        let (given, lane) = place.map_or(([x_m, y_m, heading_rad], None), |(map, place)| {
+            let along_m = place.along_m;
+            let heading_rad = wrap_angle(heading_rad - map.pose(along_m).heading_rad);
+            let in_lane = map.gap_between(along_m, along_m).is_none();
+            let given = [along_m, place.lateral_m, heading_rad];
+            (given, in_lane.then_some(map))
+        });
+        sigma[ALONG] = start.position_std_m;
+        let Some(map) = lane else {
+            // No lane to keep to: what is given is all there is.
+            for (state, value) in [ALONG, ACROSS, HEADING].into_iter().zip(given) {
+                mean[state] = value;
+            }
             sigma[ACROSS] = start.position_std_m;
             sigma[HEADING] = start.heading_std_rad;
-            sigma[CURVATURE] = config.curvature_variance().sqrt();
+            if map.is_none() {
+                sigma[CURVATURE] = config.curvature_variance().sqrt();
+            }
             return Belief::independent(mean, sigma);
         };
-        let place = map.project(start.pose.point());
-        let heading_rad = wrap_angle(start.pose.heading_rad - map.pose(place.along_m).heading_rad);
-        if map.gap_between(place.along_m, place.along_m).is_some() {
-            // No lane to keep to: what is given is all there is.
-            mean[ALONG] = place.along_m;
-            mean[ACROSS] = place.lateral_m;
-            mean[HEADING] = heading_rad;
-            sigma[ALONG] = start.position_std_m;
-            sigma[ACROSS] = start.position_std_m;
-            sigma[HEADING] = start.heading_std_rad;
-            return Belief::independent(mean, sigma);
-        }
+        let [along_m, lateral_m, heading_rad] = given;
         let [offset_variance, heading_variance] = config.lane_keeping.stationary();
-        mean[ALONG] = place.along_m;
-        sigma[ALONG] = start.position_std_m;
+        mean[ALONG] = along_m;
         sigma[ACROSS] = offset_variance.sqrt();
         sigma[HEADING] = heading_variance.sqrt();
         let mut belief = Belief::independent(mean, sigma);
         // The given pose is a measurement beside what lane keeping already says. Where the road
         // bends, the heading tells of the place along it.
-        let curvature_per_m = map.curvature_per_m(place.along_m);
+        let curvature_per_m = map.curvature_per_m(along_m);
         for (state, value, std, by_along) in [
-            (ACROSS, place.lateral_m, start.position_std_m, 0.0),
+            (ACROSS, lateral_m, start.position_std_m, 0.0),
             (HEADING, heading_rad, start.heading_std_rad, curvature_per_m),
         ] {
             let mut row = [0.0; STATES];
             row[state] = 1.0;
             row[ALONG] = by_along;
-            let expected = belief.mean[state] + by_along * (belief.mean[ALONG] - place.along_m);
+            let expected = belief.mean[state] + by_along * (belief.mean[ALONG] - along_m);
             belief.update(value - expected, &row, (std * std).max(LEAST_VARIANCE));
         }
         belief

@@ -1,18 +1,11 @@
 //! Integrity monitoring of a bank of filters: protection level and state, recovery where a fault cannot be identified,
 //! and the handover between solutions.
 //!
-//! If one radio head is at fault, the filter without it is right within its own covariance, wherever the full solution
-//! may be: the protection level is the radius about the reported solution that holds for all hypotheses of the
-//! [`Bank`] together, each at its probability ([`LevelEquation`]). All
-//! of it is of angles as noisy as they are heard to be.
-//!
-//! The state is `unavailable` where half of the radio heads or more are at fault or in doubt; `degraded` where a mode
-//! leads that is a fault, or did within `recovery_s`, where a radio head is in doubt or a bank is begun anew, where the
-//! odometer's scale has departed from what is stated, and where the level is above the alert limit.
-//!
-//! With a single radio head odometry and road are all there is to compare it with: the protection level then is what
-//! those two can vouch for, grows with the distance driven, and passes the alert limit unless they
-//! are good.
+//! Under each hypothesis of the [`Bank`] one of its filters is right within its own covariance, wherever the reported
+//! solution may be: the protection level is the radius about that which holds for all of them together
+//! ([`LevelEquation`]), of angles as noisy as they are heard to be. With a single radio head it is what odometry and
+//! road can vouch for, grows with the distance driven, and passes the alert limit unless they are good. The states are
+//! those of `docs/integrity.md`.
 
 use std::cell::RefCell;
 

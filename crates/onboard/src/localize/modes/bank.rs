@@ -284,7 +284,7 @@ impl Bank {
     /// modes weighed by their posteriors, and, as far as none of those that are faults holds, one or two of the sound
     /// radio heads at fault.
     pub fn hypotheses(&self) -> impl Iterator<Item = (f64, &Ekf)> + Clone {
-        let total = self.total_odds();
+        let total = 1.0 + self.modes.iter().map(ModeFilter::odds).sum::<f64>();
         let faults = (self.modes.iter()).filter(|it| it.mode.verdict != Verdict::Ok);
         let fault_free = 1.0 - faults.map(ModeFilter::odds).sum::<f64>() / total;
         let heads = (self.subsets.iter())
@@ -297,24 +297,22 @@ impl Bank {
                 };
                 (fault_free * self.head_prior * both, &subset.ekf)
             });
-        let odds = std::iter::once((1.0, &self.nominal))
-            .chain(self.modes.iter().map(|it| (it.odds(), &it.ekf)));
+        let odds = self.weighed(|_| true);
         odds.map(move |(odds, ekf)| (odds / total, ekf))
             .chain(heads)
     }
 
     /// The modes that may lead, each with its posterior among them and its filter: the estimate is one of those.
     pub fn mixture(&self) -> impl Iterator<Item = (f64, &Ekf)> + Clone {
-        let may_lead = |it: &&ModeFilter| it.mode.verdict != Verdict::Unled;
-        let odds = std::iter::once((1.0, &self.nominal))
-            .chain((self.modes.iter().filter(may_lead)).map(|it| (it.odds(), &it.ekf)));
+        let odds = self.weighed(|it| it.mode.verdict != Verdict::Unled);
         let total = 1.0 + odds.clone().skip(1).map(|(odds, _)| odds).sum::<f64>();
         odds.map(move |(odds, ekf)| (odds / total, ekf))
     }
 
-    /// The odds of all modes, the nominal one among them.
-    fn total_odds(&self) -> f64 {
-        1.0 + self.modes.iter().map(ModeFilter::odds).sum::<f64>()
+    /// The nominal mode and others, each with its odds to that and its filter.
+    fn weighed(&self, which: fn(&ModeFilter) -> bool) -> impl Iterator<Item = (f64, &Ekf)> + Clone {
+        let others = self.modes.iter().filter(move |it| which(it));
+        std::iter::once((1.0, &self.nominal)).chain(others.map(|it| (it.odds(), &it.ekf)))
     }
 
     /// The filters without a radio head in doubt, one of which may take over soon.

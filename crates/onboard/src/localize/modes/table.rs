@@ -5,24 +5,6 @@
 use crate::localize::ekf::{Ekf, EkfConfig, MOST_SLIP};
 use crate::settings::{DriveKind, FaultProbability};
 
-/// Prior probability of an array that is off where nothing is stated of it, and of angles noisier than stated. The
-/// likelihoods soon outweigh both.
-const UNCALIBRATED: f64 = 0.1;
-const NOISIER_ANGLES: f64 = 0.02;
-
-/// An odometer noisier than stated is so many times as probable as slip, and so many times as noisy.
-const NOISY_TO_SLIP: f64 = 30.0;
-const ODOMETER_NOISE: f64 = 3.0;
-
-/// No fault has a larger prior probability.
-const MOST_PROBABLE: f64 = 0.5;
-
-/// Standard deviation of the displacement of a site plan, in x and y (m).
-const DISPLACEMENT_STD_M: f64 = 1.5;
-
-/// Odds to the nominal mode from which on an array is certainly not calibrated.
-const CERTAIN_ODDS: f64 = 100.0;
-
 /// What a mode is called.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
 pub(in crate::localize) enum ModeId {
@@ -162,15 +144,16 @@ pub(in crate::localize) static TABLE: [Mode; 9] = [
         verdict: Verdict::Unled,
         ..SLIP
     },
+    // The likelihoods soon outweigh this prior, and that of noisier angles.
     Mode {
         id: ModeId::UncalibratedArray,
         applies: |nominal, _| {
             let config = nominal.config();
             config.unstated_array_std_rad != [0.0; 2] && !config.estimates_bias()
         },
-        prior: |_, _| UNCALIBRATED,
+        prior: |_, _| 0.1,
         alter: Ekf::uncalibrate_array,
-        becomes_nominal_at: Some(CERTAIN_ODDS),
+        becomes_nominal_at: Some(100.0),
         ..ROW
     },
     // The wheels of a differential drive slip a little with every metre.
@@ -180,8 +163,9 @@ pub(in crate::localize) static TABLE: [Mode; 9] = [
             let config = nominal.config();
             config.drive == DriveKind::Road && !config.estimates_bias()
         },
-        prior: |_, faults| (NOISY_TO_SLIP * faults.odometer).min(MOST_PROBABLE),
-        alter: |ekf| ekf.scale_odometer_noise(ODOMETER_NOISE),
+        // So many times as probable as slip, but no likelier than not.
+        prior: |_, faults| (30.0 * faults.odometer).min(0.5),
+        alter: |ekf| ekf.scale_odometer_noise(3.0),
         on_rebase: Carry::Nothing,
         ..ROW
     },
@@ -195,7 +179,7 @@ pub(in crate::localize) static TABLE: [Mode; 9] = [
         prior: |_, faults| faults.all_radio_heads,
         alter: |ekf| {
             ekf.uncalibrate_array();
-            ekf.displace_site(DISPLACEMENT_STD_M);
+            ekf.displace_site(1.5);
         },
         verdict: Verdict::Degraded,
         on_exclude: Carry::All,
@@ -203,7 +187,7 @@ pub(in crate::localize) static TABLE: [Mode; 9] = [
     },
     Mode {
         id: ModeId::NoisyAngles,
-        prior: |_, _| NOISIER_ANGLES,
+        prior: |_, _| 0.02,
         alter: |ekf| ekf.set_noise_ratio(Some(1.0)),
         adapt: |ekf, ratio| ekf.set_noise_ratio(Some(ratio)),
         on_rebase: Carry::Nothing,
