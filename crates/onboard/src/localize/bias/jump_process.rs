@@ -5,7 +5,7 @@
 //! that is kept, or drawn anew from one of a few levels, and the level is another one after some way (a
 //! hidden Markov model). Besides, each angle has an error of the same size that is soon forgotten. By way and not by
 //! time: a vehicle that stands sees the same error again. The value is estimated with the state, see
-//! [`CorrelatedBias`](super::staying_errors::StayingErrors); here it is weighed which of the jump hypotheses an angle
+//! [`CorrelatedBias`](super::correlated_bias::CorrelatedBias); here it is weighed which of the jump hypotheses an angle
 //! speaks for, by Bayes.
 
 use crate::gaussian::Innovation;
