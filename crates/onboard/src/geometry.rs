@@ -198,6 +198,41 @@ mod tests {
     }
 
     #[test]
+    fn an_area_is_about_its_points_and_its_squares_cover_it() {
+        let points = [
+            Point::new(-2.0, 1.0),
+            Point::new(6.0, 5.0),
+            Point::new(0.0, 3.0),
+        ];
+        let area = Area::about(points.into_iter());
+        assert_eq!(
+            (area.from, area.to),
+            (Point::new(-4.0, -1.0), Point::new(8.0, 7.0))
+        );
+        // 12 m by 8 m: at most so many squares, none smaller than asked.
+        assert!((area.spacing_m(24.0, 1.0) - 2.0).abs() < 1e-12);
+        assert!((area.spacing_m(1e6, 1.0) - 1.0).abs() < 1e-12);
+        let places: Vec<Point> = area.places(2.0).collect();
+        assert_eq!(places.len(), 24);
+        assert_eq!(
+            (places[0], places[23]),
+            (Point::new(-3.0, 0.0), Point::new(7.0, 6.0))
+        );
+    }
+
+    #[test]
+    fn an_offset_turns_the_shorter_way() {
+        let pose = |x_m, heading_rad| Pose {
+            x_m,
+            y_m: 1.0,
+            heading_rad,
+        };
+        let [x_m, y_m, turn_rad] = pose(2.0, 3.0).offset_of(pose(5.0, -3.0));
+        assert_eq!((x_m, y_m), (3.0, 0.0));
+        assert!((turn_rad - (TAU - 6.0)).abs() < 1e-12);
+    }
+
+    #[test]
     fn quarter_circle() {
         let end = Pose::default().along_arc(5.0 * PI, 0.1);
         assert!((end.x_m - 10.0).abs() < 1e-12 && (end.y_m - 10.0).abs() < 1e-12);

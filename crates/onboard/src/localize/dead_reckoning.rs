@@ -90,15 +90,14 @@ impl DeadReckoning {
             self.pose.heading_rad = aoh_rad;
             self.anchor = self.pose.point();
         }
+        let reason = if usable {
+            UpdateReason::Consistent
+        } else {
+            UpdateReason::Unusable
+        };
         UpdateVerdict {
             accepted: usable,
-            reason: if usable {
-                UpdateReason::Consistent
-            } else {
-                UpdateReason::Unusable
-            },
-            mahalanobis_squared: None,
-            threshold: None,
+            ..UpdateVerdict::unused(reason)
         }
     }
 

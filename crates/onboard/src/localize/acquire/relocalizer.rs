@@ -217,12 +217,12 @@ impl Solution {
     /// Whether angles may be off as if the vehicle were lost.
     fn may_mislead(&self) -> bool {
         let bare = || may_mislead(self.ekf().config());
-        (self.monitor()).map_or_else(bare, IntegrityMonitor::may_mislead)
+        (self.monitor()).map_or_else(bare, |it| it.bank().may_mislead())
     }
 
     /// How much more the angles vary than stated, as far as anybody listens to that.
     fn noise_ratio(&self) -> f64 {
-        (self.monitor()).map_or(1.0, IntegrityMonitor::noise_ratio)
+        (self.monitor()).map_or(1.0, |it| it.bank().noise_ratio())
     }
 
     fn odometry(&mut self, sample: &OdometrySample) -> OdometryVerdict {

@@ -184,7 +184,7 @@ impl Ekf {
 
     /// Share by which the speed jumped with the newest odometry, as no vehicle can do; 0 otherwise.
     pub(in crate::localize) const fn speed_jump(&self) -> f64 {
-        self.speed_jumps.speed_jump()
+        self.speed_jumps.speed_jump
     }
 
     /// Leaves the angles of a radio head unused, or uses them again.

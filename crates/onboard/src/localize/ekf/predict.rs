@@ -148,7 +148,7 @@ impl Ekf {
         self.slip(if unseen {
             MOST_SLIP
         } else {
-            self.speed_jumps.speed_jump()
+            self.speed_jumps.speed_jump
         });
     }
 

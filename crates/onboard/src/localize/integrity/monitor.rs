@@ -154,14 +154,9 @@ impl IntegrityMonitor {
         self.begun_s
     }
 
-    /// Whether angles may be off by the mode that leads as if the vehicle were lost.
-    pub fn may_mislead(&self) -> bool {
-        self.bank.may_mislead()
-    }
-
-    /// How much more the angles vary than stated.
-    pub const fn noise_ratio(&self) -> f64 {
-        self.bank.noise_ratio()
+    /// The bank that is reported.
+    pub(in crate::localize) const fn bank(&self) -> &Bank {
+        &self.bank
     }
 
     /// Moves every filter.
