@@ -10,6 +10,7 @@ are first used, so that importing the package takes no time.
 ``synthesize``         record a scenario's drive as somebody on the vehicle would have
 ``estimate_angles``    a recording's angles, for ``locate``
 ``locate``             where the vehicle was in a recorded drive
+``Live``               the pipeline on a vehicle, fed as samples, angles and odometry come
 ``survey``             where radio heads stand, as ordinary drives show it
 ``evaluate``           the paper's evaluation
 ``explore``            operating points that meet an energy budget and an error
@@ -44,6 +45,7 @@ from __future__ import annotations
 from typing import TYPE_CHECKING
 
 from access_av._core import (
+    Live,
     Recording,
     RecordingError,
     Scenario,
@@ -87,6 +89,7 @@ __all__ = [
     "ErrorBound",
     "Evaluation",
     "InputError",
+    "Live",
     "Plan",
     "Platform",
     "Query",

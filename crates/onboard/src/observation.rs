@@ -67,6 +67,9 @@ pub struct SsbObservation {
     pub noise_variance: Option<f64>,
     /// Carrier frequency offset in Hz.
     pub cfo_hz: f64,
+    /// Whether it is the first of its beam since a search has found that. Such a one is heard by itself:
+    /// the others of its burst may have been heard before the search was through.
+    pub is_first: bool,
     elements: usize,
     /// Snapshot after snapshot.
     values: Vec<Complex64>,
@@ -85,6 +88,7 @@ impl SsbObservation {
             },
             noise_variance: None,
             cfo_hz: 0.0,
+            is_first: false,
             elements,
             values: Vec::with_capacity(elements * MAX_SNAPSHOTS),
         }
@@ -104,7 +108,7 @@ impl SsbObservation {
     pub fn restart(&mut self, ssb: SensedSsb) {
         self.ssb = ssb;
         self.noise_variance = None;
-        self.cfo_hz = 0.0;
+        (self.cfo_hz, self.is_first) = (0.0, false);
         self.values.clear();
     }
 
@@ -112,7 +116,8 @@ impl SsbObservation {
     pub fn copy_from(&mut self, other: &Self) {
         self.values.clone_from(&other.values);
         (self.ssb, self.noise_variance) = (other.ssb, other.noise_variance);
-        (self.cfo_hz, self.elements) = (other.cfo_hz, other.elements);
+        (self.cfo_hz, self.is_first) = (other.cfo_hz, other.is_first);
+        self.elements = other.elements;
     }
 
     /// Number of antennas.

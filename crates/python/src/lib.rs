@@ -6,6 +6,7 @@ mod campaign;
 mod channel;
 mod drive;
 mod interrupt;
+mod live;
 mod message;
 mod nr;
 mod own_error;
@@ -75,6 +76,8 @@ mod _core {
     use crate::channel::{channel_drops, check_paths};
     #[pymodule_export]
     use crate::drive::{LocatedDrive, estimate_angles, locate, log_angles, read_tum, synthesize};
+    #[pymodule_export]
+    use crate::live::{Live, LiveEnergy, LiveHead, LiveOutcome, LiveStatus};
     #[pymodule_export]
     use crate::message::brief_text;
     #[pymodule_export]

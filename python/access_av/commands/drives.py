@@ -12,9 +12,11 @@ from access_av.commands.options import (
     AllowLarge,
     AsJson,
     Out,
+    Overrides,
     ScenarioArgument,
     load_scenario,
     load_site_and_vehicle,
+    overridden,
 )
 from access_av.errors import InputError
 from access_av.terminal import console, errors, progress, show_warning
@@ -50,6 +52,7 @@ def synth(
         typer.Option("--angles", help="angles.csv in place of samples: far less."),
     ] = False,
     allow_large: AllowLarge = False,
+    overrides: Overrides = None,
 ) -> None:
     """Record a scenario's drive: samples of all antennas, odometry, site, vehicle, truth.
 
@@ -60,7 +63,8 @@ def synth(
     from access_av import drives
     from access_av.files import ResultsDirectory
 
-    chosen = load_scenario(scenario, allow_large=allow_large)
+    given = overridden(overrides)
+    chosen = load_scenario(scenario, allow_large=allow_large, overrides=given)
     directory = ResultsDirectory.create("synth", out)
     if angles:
         count = drives.log_angles(chosen, directory.path, seed=seed, run=run, duration_s=duration_s)

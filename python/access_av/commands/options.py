@@ -9,7 +9,9 @@ from typing import TYPE_CHECKING, Annotated, Any
 import typer
 
 from access_av._core import Scenario, Site, Vehicle
+from access_av.errors import InputError
 from access_av.terminal import show_warning
+from access_av.toml import tomllib
 
 if TYPE_CHECKING:
     from collections.abc import Iterable, Mapping
@@ -29,6 +31,10 @@ Out = Annotated[
 ]
 AllowLarge = Annotated[
     bool, typer.Option("--allow-large", help="Also drives that take hours and gigabytes.")
+]
+Overrides = Annotated[
+    list[str] | None,
+    typer.Option("--set", metavar="KEY=VALUE", help="Change one key; may be repeated."),
 ]
 ShardOption = Annotated[str, typer.Option(metavar="I/N", help="Only this share of the drives.")]
 DaskOption = Annotated[str | None, typer.Option(help="Address of a Dask scheduler.")]
@@ -50,6 +56,22 @@ MISSED = 3
 
 # What is said when a share of a campaign is done and others are not.
 OTHER_SHARES = "Share {} is done; other shares are not: run them, then this again."
+
+
+def overridden(given: Iterable[str] | None) -> dict[str, Any]:
+    """The keys that ``--set`` names, with their values."""
+    return dict(map(_override, given or ()))
+
+
+def _override(text: str) -> tuple[str, Any]:
+    """Split KEY=VALUE; the value is read as TOML, and as plain text where it is none."""
+    key, equals, value = text.partition("=")
+    if not equals or not key.strip():
+        raise InputError(f"--set {text}: write KEY=VALUE, for example site.rician_k_db=10")
+    try:
+        return key.strip(), tomllib.loads(f"value = {value}")["value"]
+    except tomllib.TOMLDecodeError:
+        return key.strip(), value.strip()
 
 
 def load_scenario(

@@ -2,22 +2,20 @@
 
 from __future__ import annotations
 
-from typing import Annotated, Any
-
 import typer
 
 from access_av.commands.options import (
     AllowLarge,
     Out,
+    Overrides,
     Runs,
     ScenarioArgument,
     Seed,
     Threads,
     load_scenario,
+    overridden,
 )
-from access_av.errors import InputError
 from access_av.terminal import console, progress, show_simulation
-from access_av.toml import tomllib
 
 app = typer.Typer()
 
@@ -32,10 +30,7 @@ def run(
     threads: Threads = None,
     out: Out = None,
     allow_large: AllowLarge = False,
-    overrides: Annotated[
-        list[str] | None,
-        typer.Option("--set", metavar="KEY=VALUE", help="Change one key; may be repeated."),
-    ] = None,
+    overrides: Overrides = None,
 ) -> None:
     """Drive one scenario and write its trajectories.
 
@@ -49,7 +44,7 @@ def run(
     from access_av.report.drive import render_drive
     from access_av.simulation import simulate
 
-    given = dict(map(_override, overrides or ()))
+    given = overridden(overrides)
     chosen = load_scenario(scenario, allow_large=allow_large, overrides=given)
     directory = ResultsDirectory.create(f"run-{chosen.name}", out)
     with progress("Driving") as tick:
@@ -85,14 +80,3 @@ def run(
     if (levels := result.service_levels) and not all(verdict.reached for verdict in levels):
         console.print(f"What brings it further: access-av plan {scenario}", soft_wrap=True)
     console.print(f"Report: {directory.path / 'report.html'}", soft_wrap=True)
-
-
-def _override(text: str) -> tuple[str, Any]:
-    """Split KEY=VALUE; the value is read as TOML, and as plain text where it is none."""
-    key, equals, value = text.partition("=")
-    if not equals or not key.strip():
-        raise InputError(f"--set {text}: write KEY=VALUE, for example site.rician_k_db=10")
-    try:
-        return key.strip(), tomllib.loads(f"value = {value}")["value"]
-    except tomllib.TOMLDecodeError:
-        return key.strip(), value.strip()

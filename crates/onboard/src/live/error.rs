@@ -1,7 +1,5 @@
 //! What a live pipeline refuses. Its state is kept.
 
-use nr_ssb::front_end::FrontEndError;
-
 use crate::BoxError;
 use crate::pipeline::OdometryDefect;
 use crate::receive::ReceiveError;
@@ -14,10 +12,8 @@ pub enum LiveError {
     /// Site, vehicle and platform do not go together.
     #[error(transparent)]
     Settings(#[from] SettingsError),
-    /// Rate or frequency of the samples do not suit the SSB, or their lengths differ.
-    #[error(transparent)]
-    FrontEnd(#[from] FrontEndError),
-    /// The samples are of another number of antennas, or the receiver's settings are not possible.
+    /// Rate or frequency of the samples do not suit the SSB, their lengths differ, or they are of another
+    /// number of antennas.
     #[error(transparent)]
     Receive(#[from] ReceiveError),
     /// Samples, where none were announced.

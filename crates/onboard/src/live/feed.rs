@@ -345,7 +345,7 @@ impl Live {
 
     /// What has come of the samples.
     pub fn stream_counts(&self) -> StreamCounts {
-        let counts = self.stream.as_ref().map(|stream| stream.counts);
+        let counts = self.stream.as_ref().map(SampleStream::counts);
         counts.unwrap_or_default()
     }
 

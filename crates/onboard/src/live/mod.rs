@@ -47,5 +47,5 @@ pub use outcome::{HeadStatus, Outcome};
 pub use samples::{cf32, ci8, ci16};
 pub use start::starting_at;
 pub use status::{Reason, State, Status};
-pub use stream::{StreamConfig, StreamCounts};
+pub use stream::{SampleStream, StreamConfig, StreamCounts};
 pub use stream_clock::Continuity;
