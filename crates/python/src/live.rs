@@ -217,7 +217,7 @@ pub struct LiveEnergy {
 /// ...     _ = live.odometry(0.02 * step, 1.5, yaw_rate_radps=0.0)
 /// >>> status = live.status(1.0)
 /// >>> status.state, status.reason
-/// ('degraded', 'no angle has been accepted yet')
+/// ('ok', 'nothing is wrong')
 /// >>> round(status.pose[0], 1)
 /// -57.5
 #[pyclass(frozen, module = "access_av._core")]
