@@ -96,7 +96,7 @@ fn trial(spacing: SubcarrierSpacing, period_s: f64, ppm: f64, seed: u64) -> [(He
         };
         windows
             .receive(&window, &mut |seen| {
-                note(1, seen.ssb.sample_start, seen.ssb.ssb_index)
+                note(1, seen.ssb.sample_start, seen.ssb.ssb_index);
             })
             .unwrap();
     }
