@@ -16,9 +16,11 @@ use nr_ssb::{Complex32, Lmax};
 
 const ANTENNAS: usize = 2;
 const SNR_DB: f64 = 5.0;
-/// Bursts of a trial, and of how many a cell is to be found in.
-const BURSTS: usize = 6;
+/// A cell is to be found within three bursts, or a quarter of a second where that is more; it is then heard
+/// for three more.
 const SOON: usize = 3;
+const SOON_S: f64 = 0.25;
+const MORE: usize = 3;
 const SSB_FREQ_HZ: f64 = 3.6e9;
 
 /// What was heard: number of the burst, beam.
@@ -61,6 +63,11 @@ impl Air {
     }
 }
 
+/// Bursts that a cell is to be found within.
+fn soon(period_s: f64) -> usize {
+    SOON.max((SOON_S / period_s).ceil() as usize)
+}
+
 fn trial(spacing: SubcarrierSpacing, period_s: f64, ppm: f64, seed: u64) -> [(Heard, usize); 2] {
     let air = Air::new(spacing, period_s, ppm, seed);
     let usual = ReceiverConfig::new(SSB_FREQ_HZ, spacing, ANTENNAS);
@@ -75,7 +82,7 @@ fn trial(spacing: SubcarrierSpacing, period_s: f64, ppm: f64, seed: u64) -> [(He
             None => *wrong += 1,
         }
     };
-    for number in 0..BURSTS {
+    for number in 0..soon(period_s) + MORE {
         let (start, samples) = air.period(number, 1000 * seed);
         let antennas = slices(&samples);
         for block in 0..antennas[0].len().div_ceil(10_000) {
@@ -109,11 +116,11 @@ fn trial(spacing: SubcarrierSpacing, period_s: f64, ppm: f64, seed: u64) -> [(He
 fn main() {
     let trials: u64 = std::env::args().nth(1).map_or(2, |it| it.parse().unwrap());
     println!(
-        "spacing_khz,period_ms,receiver,trials,found_within_three_bursts,ssbs,wrong_beams,missed_after_found"
+        "spacing_khz,period_ms,receiver,trials,found_soon,ssbs,wrong_beams,missed_after_found"
     );
     for spacing in [Khz15, Khz30] {
         for period_s in [0.02, 0.16] {
-            let mut sums = [[0_usize; 5]; 2];
+            let (soon, mut sums) = (soon(period_s), [[0_usize; 5]; 2]);
             for step in -5..=5 {
                 let ppm = 4.0 * f64::from(step);
                 for number in 0..trials {
@@ -122,8 +129,8 @@ fn main() {
                         sums.iter_mut().zip(trial(spacing, period_s, ppm, seed))
                     {
                         let first = heard.iter().map(|(burst, _)| *burst).min();
-                        let found = first.is_some_and(|burst| burst < SOON);
-                        let after = first.map_or(0, |burst| 2 * (BURSTS - 1 - burst));
+                        let found = first.is_some_and(|burst| burst < soon);
+                        let after = first.map_or(0, |burst| 2 * (soon + MORE - 1 - burst));
                         let followed = heard
                             .iter()
                             .filter(|(burst, _)| Some(*burst) > first)
