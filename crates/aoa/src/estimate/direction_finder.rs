@@ -3,6 +3,7 @@
 use num_complex::Complex64;
 
 use super::pilots::checked_noise_variance;
+use super::residual;
 use crate::array::manifold::{Direction, Manifold, Neighbourhood, dot, evenly_spread};
 use crate::bound;
 use crate::covariance::sample::Covariance;
@@ -10,6 +11,8 @@ use crate::error::Error;
 use crate::linalg::matrix::Matrix;
 use crate::method::maximum_likelihood::{residual_power, snr};
 use crate::result::azimuth_elevation::DirectionEstimate;
+use crate::result::direction::{threshold_doubt, with_misfit};
+use crate::result::goodness_of_fit::{Model, Residual};
 use crate::result::verdict::{Reason, Verdict};
 
 /// Directions of the first search lie so far apart, in units of the array's resolution: from the nearest
@@ -142,11 +145,9 @@ impl<M: Manifold<N>, const N: usize> DirectionFinder<M, N> {
             std::mem::swap(&mut best, other);
         }
         let snapshots = covariance.snapshots();
-        let snr = snr::<N>(
-            best.beam,
-            noise.unwrap_or_else(|| residual_power::<N>(trace, best.beam)),
-        );
-        let covariance = bound::covariance_around(
+        let noise_power = noise.unwrap_or_else(|| residual_power::<N>(trace, best.beam));
+        let snr = snr::<N>(best.beam, noise_power);
+        let noise_covariance = bound::covariance_around(
             &best.around,
             best.direction,
             snr,
@@ -165,23 +166,33 @@ impl<M: Manifold<N>, const N: usize> DirectionFinder<M, N> {
         let [lowest, highest] = self.elevations_rad;
         let elevation_rad = best.direction.elevation_rad;
         // Overhead is no edge.
-        let margin = 3.0 * covariance[1][1].sqrt();
+        let margin = 3.0 * noise_covariance[1][1].sqrt();
         let low = elevation_rad - margin < lowest && lowest > -1.57;
         let high = elevation_rad + margin > highest && highest < 1.57;
-        let doubt = if snr < bound::resolvable_snr::<N>(snapshots) {
-            Some(Reason::ThresholdSnr)
-        } else if alike {
-            Some(Reason::Ambiguous)
-        } else if !self.is_level() && (low || high) {
-            Some(Reason::EdgeOfElevations)
-        } else {
-            None
+        let at_edge = !self.is_level() && (low || high);
+        let model = Model::new::<N>(
+            [1, if self.is_level() { 1 } else { 2 }],
+            snapshots,
+            noise.is_some(),
+        );
+        let left = best.residual(matrix, usize::from(model.parameters));
+        let fit = model.fit(&left, noise_power, trace);
+        let misfit = fit.misfit(&model.limits());
+        let weak = threshold_doubt(snr, bound::resolvable_snr::<N>(snapshots));
+        let reason = match weak {
+            None if alike => Some(Reason::Ambiguous),
+            _ => misfit
+                .or(weak)
+                .or(at_edge.then_some(Reason::EdgeOfElevations)),
         };
+        let birge = with_misfit(1.0, model.birge(&left, noise_power), misfit).powi(2);
         Ok(DirectionEstimate {
             direction: best.direction,
-            covariance,
+            covariance: noise_covariance.map(|row| row.map(|it| it * birge)),
+            noise_covariance,
             snr_db: 10.0 * snr.log10(),
-            verdict: doubt.map_or(Verdict::Resolved, Verdict::Unresolved),
+            fit,
+            verdict: reason.map_or(Verdict::Resolved, Verdict::Unresolved),
         })
     }
 
@@ -277,6 +288,21 @@ impl<M: Manifold<N>, const N: usize> DirectionFinder<M, N> {
 }
 
 impl<const N: usize> Candidate<N> {
+    /// What a source there leaves, `parameters` of its direction having been chosen: azimuth, elevation.
+    fn residual(&self, matrix: &Matrix<N>, parameters: usize) -> Residual {
+        let Neighbourhood {
+            response,
+            power,
+            tangents,
+            ..
+        } = &self.around;
+        let tangents = tangents.map(|tangent| {
+            let along = dot(response, &tangent) / power;
+            std::array::from_fn(|n| tangent[n] - response[n] * along)
+        });
+        residual::beside(matrix, response, &tangents[..parameters])
+    }
+
     /// Outside the main lobe, where the response to the first order is another one.
     fn is_far_from(&self, direction: &Direction) -> bool {
         let [x, y] = self.direction.step_to(direction);

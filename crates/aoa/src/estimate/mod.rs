@@ -7,6 +7,7 @@ pub(crate) mod direction_finder;
 pub(crate) mod one;
 pub(crate) mod pilots;
 pub(crate) mod pseudo_spectrum;
+mod residual;
 pub(crate) mod several;
 mod side_by_side;
 pub(crate) mod smoothing;

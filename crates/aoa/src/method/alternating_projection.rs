@@ -16,6 +16,7 @@ use crate::bound::steering_matrix;
 use crate::linalg::dense::{adjoint, inverse, product};
 use crate::linalg::matrix::{Matrix, zeros};
 use crate::list::List;
+use crate::result::goodness_of_fit::Residual;
 use crate::spectrum::polynomial::wrap;
 
 /// Directions on the circle that a projected beam is looked at in, for each antenna.
@@ -43,6 +44,9 @@ pub(crate) struct Fit<const N: usize> {
     gram_inverse: Matrix<N>,
     /// `V'`.
     slope: [f64; N],
+    /// `R`, and `A+ R`, sources by antennas.
+    matrix: Matrix<N>,
+    received: Matrix<N>,
     /// `V`: what the sources leave.
     residual: f64,
 }
@@ -79,11 +83,51 @@ impl<const N: usize> Fit<N> {
             metric: product(&adjoint(&derivative), &projected, [k, N, k]),
             powers: product(&received, &adjoint(&pseudo_inverse), [k, N, k]),
             slope: std::array::from_fn(|i| -2.0 * slopes[i][i].re),
+            matrix: *matrix,
+            received,
             residual: (trace - explained).max(trace * 1e-15),
             pseudo_inverse,
             projected,
             gram_inverse,
         })
+    }
+
+    /// What the sources leave, and the noise power per antenna that this makes, both of the matrix that
+    /// was fitted. `None` if what is received from the sources is singular.
+    ///
+    /// With `H = P R A+^H`, regressed on the waveforms `S = A+ R A+^H`, the part that hangs together with
+    /// them is `tr(H S^-1 H^H)`. Of it the angles take what a step of theirs would,
+    /// `V'^T V''^-1 V' / 2` without the noise in `V''`.
+    pub(crate) fn residual(&self) -> Option<(Residual, f64)> {
+        let k = self.sources;
+        let inverse_powers = inverse(self.powers, k)?;
+        // R A+^H, N by k.
+        let received = adjoint(&self.received);
+        let weighted = product(&received, &inverse_powers, [N, k, k]);
+        let explained = product(&weighted, &self.received, [N, k, N]);
+        let (mut rest, mut rest_squared) = (0.0, 0.0);
+        for i in 0..N {
+            for j in 0..N {
+                let entry = self.matrix[i][j] - explained[i][j];
+                rest_squared += entry.norm_sqr();
+                if i == j {
+                    rest += entry.re;
+                }
+            }
+        }
+        let inverse_curvature = self.inverse_curvature(0.0)?;
+        let mut taken = 0.0;
+        for i in 0..k {
+            for j in 0..k {
+                taken += 0.5 * self.slope[i] * inverse_curvature[i][j].re * self.slope[j];
+            }
+        }
+        let residual = Residual {
+            coherent: (self.residual - rest - taken).max(0.0),
+            rest,
+            rest_squared,
+        };
+        Some((residual, self.noise_variance()))
     }
 
     /// Variance of the noise per antenna.

@@ -3,31 +3,76 @@
 use std::f64::consts::{FRAC_PI_2, PI};
 
 use super::angle::AngleEstimate;
+use super::goodness_of_fit::GoodnessOfFit;
 use super::verdict::{Reason, Verdict};
 use crate::array::linear::Array;
 use crate::simd::math::{acos, log10};
 
-/// An estimate from its electrical angle, with the angle, its standard deviation, and the verdict
-/// as far as geometry decides it.
-pub(crate) fn describe<const N: usize>(
-    phase_rad: f64,
-    phase_sigma_rad: f64,
-    snr: f64,
-    doubt: Option<Reason>,
-    array: &Array<N>,
-) -> AngleEstimate {
+/// What is known of an electrical angle before it becomes a direction.
+pub(crate) struct Found {
+    pub(crate) phase_rad: f64,
+    pub(crate) noise_sigma_rad: f64,
+    pub(crate) snr: f64,
+    pub(crate) fit: GoodnessOfFit,
+    /// See [`Model::birge`](super::goodness_of_fit::Model::birge).
+    pub(crate) birge: f64,
+    pub(crate) misfit: Option<Reason>,
+    /// What gives reason to doubt it besides.
+    pub(crate) doubt: Option<Reason>,
+}
+
+/// An estimate from its electrical angle, with the angle, its standard deviation, and the verdict.
+pub(crate) fn describe<const N: usize>(found: &Found, array: &Array<N>) -> AngleEstimate {
     let end_fire = array.phase_at_end_fire_rad();
-    let (phase_sigma_rad, angle_rad, sigma_rad) =
-        direction::<false>(phase_rad, phase_sigma_rad, end_fire);
-    let reason = doubt.or_else(|| geometric_doubt(phase_rad, phase_sigma_rad, end_fire));
+    let phase_rad = found.phase_rad;
+    let (noise_sigma, ..) = direction::<false>(phase_rad, found.noise_sigma_rad, end_fire);
+    let sigma = with_misfit(noise_sigma, found.birge, found.misfit);
+    let (phase_sigma_rad, angle_rad, sigma_rad) = direction::<false>(phase_rad, sigma, end_fire);
+    let geometric = geometric_doubt(phase_rad, noise_sigma, end_fire);
     AngleEstimate {
         phase_rad,
         phase_sigma_rad,
+        phase_noise_sigma_rad: noise_sigma,
         angle_rad,
         sigma_rad,
-        snr_db: 10.0 * log10::<false>(snr),
-        verdict: reason.map_or(Verdict::Resolved, Verdict::Unresolved),
+        snr_db: 10.0 * log10::<false>(found.snr),
+        fit: found.fit,
+        verdict: verdict(found.doubt, geometric, found.misfit),
     }
+}
+
+/// A standard deviation of noise, and of a misfit if there is one.
+#[inline(always)]
+pub(crate) fn with_misfit(noise_sigma: f64, birge: f64, misfit: Option<Reason>) -> f64 {
+    if misfit.is_some() {
+        noise_sigma * birge.sqrt()
+    } else {
+        noise_sigma
+    }
+}
+
+/// What is wrong with the model explains why the SNR seems low, so it is named before that.
+#[inline(always)]
+pub(crate) fn verdict(
+    doubt: Option<Reason>,
+    geometric: Option<Reason>,
+    misfit: Option<Reason>,
+) -> Verdict {
+    let reason = match (doubt, geometric) {
+        (None, Some(geometric)) => Some(geometric),
+        _ => misfit.or(doubt),
+    };
+    reason.map_or(Verdict::Resolved, Verdict::Unresolved)
+}
+
+/// Whether noise may have led to a wholly wrong direction, where this SNR is needed to exclude that.
+#[inline(always)]
+pub(crate) fn threshold_doubt(snr: f64, needed: f64) -> Option<Reason> {
+    (snr < needed).then_some(if snr < 1.0 {
+        Reason::ThresholdSnr
+    } else {
+        Reason::TooFewSnapshots
+    })
 }
 
 /// From an electrical angle and its standard deviation: that standard deviation limited to what it
