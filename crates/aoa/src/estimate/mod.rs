@@ -9,6 +9,7 @@ pub(crate) mod pilots;
 pub(crate) mod pseudo_spectrum;
 mod residual;
 pub(crate) mod several;
+mod several_directions;
 mod side_by_side;
 pub(crate) mod smoothing;
 pub(crate) mod source_count;

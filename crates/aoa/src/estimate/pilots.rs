@@ -49,17 +49,15 @@ pub fn maximum_likelihood_pilots<const N: usize>(
         None => maximum_likelihood::residual_power::<N>(power, beam),
     };
     let snr = maximum_likelihood::snr::<N>(beam, noise);
-    let model = Model::one::<N>(blocks.len(), noise_variance.is_some());
+    let tests = Model::one::<N>(blocks.len(), noise_variance.is_some()).tests();
     let left = Residuals::of::<false, N>(&single, &place).item(0);
-    let fit = model.fit(&left, noise, power);
     Ok(describe(
         &Found {
             phase_rad: place.phase_rad[0],
             noise_sigma_rad: bound::stochastic::<N>(snr, blocks.len()),
             snr,
-            fit,
-            birge: model.birge(&left, noise),
-            misfit: fit.misfit(&model.limits()),
+            tests,
+            tested: tests.of(&left, noise, power),
             doubt: threshold_doubt(snr, bound::resolvable_snr::<N>(blocks.len())),
         },
         array,

@@ -17,7 +17,7 @@ use crate::method::alternating_projection::{self, Fit};
 use crate::method::{esprit, music, root_music};
 use crate::result::angle::{AngleEstimate, AngleEstimates};
 use crate::result::direction::{Found, describe, threshold_doubt};
-use crate::result::goodness_of_fit::{GoodnessOfFit, Model};
+use crate::result::goodness_of_fit::{Model, Tested};
 use crate::result::verdict::Reason;
 use crate::spectrum::polynomial::wrap;
 
@@ -127,15 +127,14 @@ pub fn estimate_several_smoothed<const N: usize, const M: usize>(
     // Of what was received itself: an average is no sample covariance.
     let snapshots = full.snapshots();
     let model = Model::new::<N>([sources, sources], snapshots, false);
-    let (fit, misfit, birge) = match Fit::at(full.unscaled(), &phases).and_then(|it| it.residual())
-    {
-        None => (GoodnessOfFit::default(), None, 1.0),
-        Some((left, noise)) => {
-            let power = full.power() * full.weight() * N as f64;
-            let fit = model.fit(&left, noise, power);
-            (fit, fit.misfit(&model.limits()), model.birge(&left, noise))
-        }
-    };
+    let tests = model.tests();
+    let power = full.power() * full.weight() * N as f64;
+    let tested = Fit::at(full.unscaled(), &phases)
+        .and_then(|fit| fit.residual())
+        .map_or(Tested::NOTHING, |(left, noise)| {
+            tests.of(&left, noise, power)
+        });
+    let misfit = tests.misfit(&tested);
     let mut estimates = [None; M];
     for (k, place) in estimates[..sources].iter_mut().enumerate() {
         let (phase, sigma) = (phases[k], sigmas[k]);
@@ -143,10 +142,10 @@ pub fn estimate_several_smoothed<const N: usize, const M: usize>(
             let gap = wrap(phases[other] - phase).abs();
             other != k && gap < 2.0 * sigma.hypot(sigmas[other])
         });
-        let doubt = if (hidden || close || !separated) && correlated {
-            Some(Reason::Correlated)
-        } else if misfit.is_some() {
+        let doubt = if misfit.is_some() && !correlated {
             None
+        } else if (hidden || close || !separated) && correlated {
+            Some(Reason::Correlated)
         } else if hidden {
             let weakest = powers.weakest_snr(sources, noise_variance);
             threshold_doubt(weakest, f64::INFINITY)
@@ -160,9 +159,8 @@ pub fn estimate_several_smoothed<const N: usize, const M: usize>(
             phase_rad: phase,
             noise_sigma_rad: sigma,
             snr,
-            fit,
-            birge,
-            misfit: misfit.filter(|_| doubt.is_none()),
+            tests,
+            tested,
             doubt,
         };
         *place = Some(describe(&found, &array));

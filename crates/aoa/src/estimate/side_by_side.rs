@@ -18,8 +18,10 @@ use crate::linalg::matrix::Matrix;
 use crate::method::maximum_likelihood::{residual_power, snr};
 use crate::method::{esprit, music, root_music};
 use crate::result::angle::AngleEstimate;
-use crate::result::direction::{direction, geometric_doubt, threshold_doubt, verdict, with_misfit};
-use crate::result::goodness_of_fit::{GoodnessOfFit, Model};
+use crate::result::direction::{
+    direction, geometric_doubt, no_more_than_ignorance, threshold_doubt, verdict,
+};
+use crate::result::goodness_of_fit::{Model, Tested};
 use crate::simd::instructions::dispatch;
 use crate::simd::math::{log10, times_plus};
 use crate::spectrum::side_by_side::{Places, Spectra};
@@ -140,35 +142,36 @@ impl<const N: usize> SideBySide<'_, N> {
         let per_snapshot = excess * excess / (2.0 * self.snapshots as f64 * aperture::<N>());
         let threshold = bound::resolvable_snr::<N>(self.snapshots);
         let values = spectra.values::<FUSED>(places);
-        let model = Model::one::<N>(self.snapshots, false);
-        let limits = model.limits();
-        let (mut snrs, mut noise) = ([0.0; W], [0.0; W]);
-        let (mut snr_db, mut noise_sigma) = ([0.0; W], [0.0; W]);
-        for w in 0..W {
-            let beam = values[w] * (1.0 / N as f64);
-            noise[w] = residual_power::<N>(spectra.re[0][w], beam);
-            snrs[w] = snr::<N>(beam, noise[w]);
-            // The stochastic bound.
-            let inverse = 1.0 / snrs[w];
-            let variance = times_plus::<FUSED>(inverse * (1.0 / N as f64), inverse, inverse);
-            noise_sigma[w] = (variance * per_snapshot).sqrt();
-        }
-        let mut fits = [GoodnessOfFit::default(); W];
-        let (mut misfits, mut phase_sigma) = ([None; W], [0.0; W]);
+        let tests = Model::one::<N>(self.snapshots, false).tests();
+        let (mut snrs, mut snr_db) = ([0.0; W], [0.0; W]);
+        let (mut noise_sigma, mut phase_sigma) = ([0.0; W], [0.0; W]);
+        let (mut coherent, mut noise, mut inflation) = ([0.0; W], [0.0; W], [0.0; W]);
         let (mut angle, mut sigma) = ([0.0; W], [0.0; W]);
         for w in 0..W {
-            let left = residuals.item(w);
-            fits[w] = model.fit(&left, noise[w], spectra.re[0][w]);
-            misfits[w] = fits[w].misfit(&limits);
-            phase_sigma[w] = with_misfit(noise_sigma[w], model.birge(&left, noise[w]), misfits[w]);
+            let beam = values[w] * (1.0 / N as f64);
+            let power = residual_power::<N>(spectra.re[0][w], beam);
+            let snr = snr::<N>(beam, power);
+            // The stochastic bound.
+            let inverse = 1.0 / snr;
+            let variance = times_plus::<FUSED>(inverse * (1.0 / N as f64), inverse, inverse);
+            noise_sigma[w] = no_more_than_ignorance((variance * per_snapshot).sqrt());
+            let tested = tests.of(&residuals.item(w), power, spectra.re[0][w]);
+            (coherent[w], noise[w]) = (tested.coherent, tested.noise);
+            inflation[w] = tested.inflation;
+            snrs[w] = snr;
         }
         for w in 0..W {
             snr_db[w] = 10.0 * log10::<FUSED>(snrs[w]);
-            (noise_sigma[w], ..) = direction::<FUSED>(phases[w], noise_sigma[w], end_fire);
+            let with_misfit = noise_sigma[w] * inflation[w].sqrt();
             (phase_sigma[w], angle[w], sigma[w]) =
-                direction::<FUSED>(phases[w], phase_sigma[w], end_fire);
+                direction::<FUSED>(phases[w], with_misfit, end_fire);
         }
         for (w, estimate) in estimates.iter_mut().enumerate() {
+            let tested = Tested {
+                coherent: coherent[w],
+                noise: noise[w],
+                inflation: inflation[w],
+            };
             let doubt = threshold_doubt(snrs[w], threshold);
             let geometric = geometric_doubt(phases[w], noise_sigma[w], end_fire);
             *estimate = AngleEstimate {
@@ -178,8 +181,8 @@ impl<const N: usize> SideBySide<'_, N> {
                 angle_rad: angle[w],
                 sigma_rad: sigma[w],
                 snr_db: snr_db[w],
-                fit: fits[w],
-                verdict: verdict(doubt, geometric, misfits[w]),
+                fit: tests.fit(&tested),
+                verdict: verdict(doubt, geometric, tests.misfit(&tested)),
             };
         }
     }

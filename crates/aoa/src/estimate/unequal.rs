@@ -96,16 +96,15 @@ pub fn maximum_likelihood_pilots_unequal<const N: usize>(
         antennas: living as u8,
         ..Model::one::<N>(count, true)
     };
+    let tests = model.tests();
     let noise = count as f64;
-    let fit = model.fit(&left, noise, value / total);
     Ok(describe(
         &Found {
             phase_rad,
             noise_sigma_rad: sigma,
             snr,
-            fit,
-            birge: model.birge(&left, noise),
-            misfit: fit.misfit(&model.limits()),
+            tests,
+            tested: tests.of(&left, noise, value / total),
             doubt,
         },
         array,

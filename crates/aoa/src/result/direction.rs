@@ -3,7 +3,7 @@
 use std::f64::consts::{FRAC_PI_2, PI};
 
 use super::angle::AngleEstimate;
-use super::goodness_of_fit::GoodnessOfFit;
+use super::goodness_of_fit::{Tested, Tests};
 use super::verdict::{Reason, Verdict};
 use crate::array::linear::Array;
 use crate::simd::math::{acos, log10};
@@ -13,20 +13,23 @@ pub(crate) struct Found {
     pub(crate) phase_rad: f64,
     pub(crate) noise_sigma_rad: f64,
     pub(crate) snr: f64,
-    pub(crate) fit: GoodnessOfFit,
-    /// See [`Model::birge`](super::goodness_of_fit::Model::birge).
-    pub(crate) birge: f64,
-    pub(crate) misfit: Option<Reason>,
-    /// What gives reason to doubt it besides.
+    pub(crate) tests: Tests,
+    pub(crate) tested: Tested,
+    /// What gives reason to doubt it, geometry and misfit aside.
     pub(crate) doubt: Option<Reason>,
 }
 
 /// An estimate from its electrical angle, with the angle, its standard deviation, and the verdict.
 pub(crate) fn describe<const N: usize>(found: &Found, array: &Array<N>) -> AngleEstimate {
     let end_fire = array.phase_at_end_fire_rad();
-    let phase_rad = found.phase_rad;
-    let (noise_sigma, ..) = direction::<false>(phase_rad, found.noise_sigma_rad, end_fire);
-    let sigma = with_misfit(noise_sigma, found.birge, found.misfit);
+    let Found {
+        phase_rad,
+        tests,
+        tested,
+        ..
+    } = *found;
+    let noise_sigma = no_more_than_ignorance(found.noise_sigma_rad);
+    let sigma = noise_sigma * tested.inflation.sqrt();
     let (phase_sigma_rad, angle_rad, sigma_rad) = direction::<false>(phase_rad, sigma, end_fire);
     let geometric = geometric_doubt(phase_rad, noise_sigma, end_fire);
     AngleEstimate {
@@ -36,31 +39,22 @@ pub(crate) fn describe<const N: usize>(found: &Found, array: &Array<N>) -> Angle
         angle_rad,
         sigma_rad,
         snr_db: 10.0 * log10::<false>(found.snr),
-        fit: found.fit,
-        verdict: verdict(found.doubt, geometric, found.misfit),
+        fit: tests.fit(&tested),
+        verdict: verdict(found.doubt, geometric, tests.misfit(&tested)),
     }
 }
 
-/// A standard deviation of noise, and of a misfit if there is one.
-#[inline(always)]
-pub(crate) fn with_misfit(noise_sigma: f64, birge: f64, misfit: Option<Reason>) -> f64 {
-    if misfit.is_some() {
-        noise_sigma * birge.sqrt()
-    } else {
-        noise_sigma
-    }
-}
-
-/// What is wrong with the model explains why the SNR seems low, so it is named before that.
+/// Something wrong with the model explains why the SNR seems low, so it is named before that.
 #[inline(always)]
 pub(crate) fn verdict(
     doubt: Option<Reason>,
     geometric: Option<Reason>,
     misfit: Option<Reason>,
 ) -> Verdict {
-    let reason = match (doubt, geometric) {
-        (None, Some(geometric)) => Some(geometric),
-        _ => misfit.or(doubt),
+    let reason = match doubt {
+        None => geometric.or(misfit),
+        Some(Reason::ThresholdSnr | Reason::TooFewSnapshots) => misfit.or(doubt),
+        Some(_) => doubt,
     };
     reason.map_or(Verdict::Resolved, Verdict::Unresolved)
 }
@@ -75,6 +69,17 @@ pub(crate) fn threshold_doubt(snr: f64, needed: f64) -> Option<Reason> {
     })
 }
 
+/// A standard deviation, or that of a phase drawn at random, `pi / sqrt(3)`, where it is larger.
+#[inline(always)]
+pub(crate) fn no_more_than_ignorance(phase_sigma_rad: f64) -> f64 {
+    const IGNORANCE: f64 = 1.813_799_364_234_217_8;
+    if phase_sigma_rad < IGNORANCE {
+        phase_sigma_rad
+    } else {
+        IGNORANCE
+    }
+}
+
 /// From an electrical angle and its standard deviation: that standard deviation limited to what it
 /// means to know nothing, the angle, and its standard deviation.
 #[inline(always)]
@@ -83,10 +88,8 @@ pub(crate) fn direction<const FUSED: bool>(
     phase_sigma_rad: f64,
     end_fire_rad: f64,
 ) -> (f64, f64, f64) {
-    // Standard deviation of a phase drawn at random, pi / sqrt(3).
-    const IGNORANCE: f64 = 1.813_799_364_234_217_8;
     let lesser = |a: f64, b: f64| if a < b { a } else { b };
-    let phase_sigma_rad = lesser(phase_sigma_rad, IGNORANCE);
+    let phase_sigma_rad = no_more_than_ignorance(phase_sigma_rad);
     let cosine = phase_rad / end_fire_rad;
     let cosine = if cosine > 1.0 { 1.0 } else { cosine };
     let cosine = if cosine < -1.0 { -1.0 } else { cosine };

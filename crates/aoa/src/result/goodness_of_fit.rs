@@ -17,6 +17,7 @@
 //! mean, and about a chi^2 of `m^2 - 1` degrees of freedom over them. Where it is known, the trace is.
 
 use super::verdict::Reason;
+use crate::simd::math::select;
 
 /// Either test finds fault with a model that holds with this probability: one in a hundred for both.
 const FALSE_ALARM_DEVIATE: f64 = 2.575_829_303_548_901;
@@ -65,11 +66,30 @@ pub(crate) struct Residual {
     pub(crate) rest_squared: f64,
 }
 
-/// The largest ratios that are still called a fit, see [`GoodnessOfFit`].
+/// The tests of a model, with what they need of it.
 #[derive(Debug, Clone, Copy)]
-pub(crate) struct Limits {
-    coherent: f64,
-    noise: f64,
+pub(crate) struct Tests {
+    model: Model,
+    /// Degrees of freedom of both parts; one where there are none.
+    coherent_freedom: f64,
+    rest_freedom: f64,
+    dimensions_left: f64,
+    /// John's statistic is this times `m tr E^2 / (tr E)^2 - 1`; without a meaning in one dimension.
+    shape: Option<f64>,
+    /// The largest ratios that are still called a fit.
+    coherent_limit: f64,
+    noise_limit: f64,
+}
+
+/// What the tests say of a residual.
+#[derive(Debug, Clone, Copy)]
+pub(crate) struct Tested {
+    pub(crate) coherent: f64,
+    pub(crate) noise: f64,
+    /// By what factor the variance of an angle is larger than noise makes it: 1 if the model fits.
+    /// Otherwise what hangs together with the waveforms is taken to displace the angle as it does
+    /// everything else: the square of Birge's ratio (1932).
+    pub(crate) inflation: f64,
 }
 
 impl Model {
@@ -125,45 +145,81 @@ impl Model {
         }
     }
 
-    pub(crate) fn limits(self) -> Limits {
-        let [coherent, noise] = self.freedoms().map(largest_ratio);
-        Limits { coherent, noise }
+    pub(crate) fn tests(self) -> Tests {
+        let [coherent_limit, noise_limit] = self.freedoms().map(largest_ratio);
+        let (m, l) = (self.dimensions_left(), self.snapshots_left());
+        Tests {
+            model: self,
+            coherent_freedom: self.coherent_freedom().max(1.0),
+            rest_freedom: self.rest_freedom().max(1.0),
+            dimensions_left: m,
+            shape: (m > 1.0).then(|| (l * m + 1.0) / (m * m - 1.0)),
+            coherent_limit,
+            noise_limit,
+        }
     }
+}
 
+impl Tested {
+    /// No residual, and no misfit.
+    pub(crate) const NOTHING: Self = Self {
+        coherent: 1.0,
+        noise: 1.0,
+        inflation: 1.0,
+    };
+}
+
+impl Tests {
     /// `noise_power` is the noise variance per antenna, `power` that of all antennas, both summed over
     /// the snapshots: relative to the latter rounding is told from noise.
     #[inline(always)]
-    pub(crate) fn fit(self, left: &Residual, noise_power: f64, power: f64) -> GoodnessOfFit {
+    pub(crate) fn of(&self, left: &Residual, noise_power: f64, power: f64) -> Tested {
         const ROUNDING: f64 = 1e-13;
+        let larger = |a: f64, b: f64| if a > b { a } else { b };
         let least = power * ROUNDING;
-        let rest = if left.rest > least { left.rest } else { least };
-        // The variance of noise in one real dimension.
-        let of_rest = rest / self.rest_freedom().max(1.0);
-        let of_noise = 0.5 * noise_power / f64::from(self.snapshots);
-        let (coherent, noise) = if self.noise_is_known {
-            (of_noise, of_rest / of_noise)
+        let rest = larger(left.rest, least);
+        // The variance of noise in one real dimension, as stated or estimated and as the rest has it.
+        let of_noise = 0.5 * noise_power / f64::from(self.model.snapshots);
+        let of_rest = rest / self.rest_freedom;
+        let of_coherent = left.coherent / self.coherent_freedom;
+        let (coherent, noise) = if self.model.noise_is_known {
+            (of_coherent / of_noise, of_rest / of_noise)
         } else {
-            let (m, l) = (self.dimensions_left(), self.snapshots_left());
-            let unequal = m * left.rest_squared / (rest * rest) - 1.0;
-            let tested = left.rest > least && m > 1.0;
-            let noise = unequal * (l * m + 1.0) / (m * m - 1.0);
-            (of_rest, if tested { noise } else { 1.0 })
+            let unequal = self.dimensions_left * left.rest_squared / (rest * rest) - 1.0;
+            let noise = self
+                .shape
+                .map_or(1.0, |shape| select(left.rest > least, unequal * shape, 1.0));
+            (of_coherent / of_rest, noise)
         };
-        GoodnessOfFit {
-            coherent: left.coherent / (self.coherent_freedom().max(1.0) * coherent),
+        let fits = (coherent <= self.coherent_limit) && (noise <= self.noise_limit);
+        let inflation = select(fits, 1.0, larger(of_coherent / of_noise, 1.0));
+        Tested {
+            coherent,
             noise,
-            model: self,
+            inflation,
         }
     }
 
-    /// By what factor the variance of an angle is larger than noise of this power makes it, if what hangs
-    /// together with the waveforms displaces it as it does everything else: the square of Birge's ratio
-    /// (1932).
+    /// That as it is told.
     #[inline(always)]
-    pub(crate) fn birge(self, left: &Residual, noise_power: f64) -> f64 {
-        let each = left.coherent / self.coherent_freedom().max(1.0);
-        let ratio = 2.0 * f64::from(self.snapshots) * each / noise_power;
-        if ratio > 1.0 { ratio } else { 1.0 }
+    pub(crate) const fn fit(&self, tested: &Tested) -> GoodnessOfFit {
+        GoodnessOfFit {
+            coherent: tested.coherent,
+            noise: tested.noise,
+            model: self.model,
+        }
+    }
+
+    /// What is wrong with the model, if something is.
+    #[inline(always)]
+    pub(crate) fn misfit(&self, tested: &Tested) -> Option<Reason> {
+        if tested.noise > self.noise_limit {
+            Some(Reason::MoreSources)
+        } else if tested.coherent > self.coherent_limit {
+            Some(Reason::Multipath)
+        } else {
+            None
+        }
     }
 }
 
@@ -186,18 +242,6 @@ impl GoodnessOfFit {
             .fold(1.0, f64::min);
         // They are independent.
         less * (2.0 - less)
-    }
-
-    /// What is wrong with the model, if something is.
-    #[inline(always)]
-    pub(crate) fn misfit(&self, limits: &Limits) -> Option<Reason> {
-        if self.noise > limits.noise {
-            Some(Reason::MoreSources)
-        } else if self.coherent > limits.coherent {
-            Some(Reason::Multipath)
-        } else {
-            None
-        }
     }
 }
 

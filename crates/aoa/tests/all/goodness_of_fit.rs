@@ -240,3 +240,46 @@ fn the_reason_is_the_cause() {
         }
     }
 }
+
+#[test]
+fn two_sources_of_any_array_are_as_good_as_they_say() {
+    let array = ArbitraryArray::<8>::circular(0.7).unwrap();
+    for (elevations, correlated) in [
+        ([0.3, 0.3], false),
+        ([0.0, FRAC_PI_2], false),
+        ([0.3, 0.3], true),
+    ] {
+        let finder = DirectionFinder::new(array, elevations).unwrap();
+        let mut random = Random::new(68);
+        let (trials, mut nees, mut resolved) = (80, [0.0; 2], 0);
+        for _ in 0..trials {
+            let first = random.uniform(-2.6, 0.0);
+            let truth = [first, first + random.uniform(0.9, 2.2)];
+            let [a, b] = truth.map(|azimuth| array.response(Direction::new(azimuth, 0.3)));
+            let snapshots: Vec<[Complex64; 8]> = (0..40)
+                .map(|_| {
+                    let [mut x, y] = [(); 2].map(|()| random.gaussian() * 10.0);
+                    if correlated {
+                        x = y;
+                    }
+                    std::array::from_fn(|n| a[n] * x + b[n] * y + random.gaussian())
+                })
+                .collect();
+            let covariance = Covariance::from_snapshots(&snapshots).unwrap();
+            let found = finder.estimate_several(&covariance, 2).unwrap();
+            for k in 0..2 {
+                let error = found[k].direction.azimuth_rad - truth[k];
+                nees[k] += error * error / found[k].covariance[0][0] / f64::from(trials);
+                resolved += u32::from(found[k].is_resolved());
+            }
+        }
+        println!("{elevations:?}, correlated {correlated}: NEES {nees:.2?}, {resolved} resolved");
+        // Four standard deviations of the mean of squares.
+        let chance = 4.0 * (2.0 / f64::from(trials)).sqrt();
+        assert!(nees.iter().all(|it| (it - 1.0).abs() < chance), "{nees:?}");
+        assert!(
+            f64::from(resolved) > 0.95 * 2.0 * f64::from(trials),
+            "{resolved}"
+        );
+    }
+}
