@@ -3,7 +3,13 @@
 Angles are measured from the array's axis, in rad, 0 to pi; the electrical angle, the phase step
 from one antenna to the next, is ``2 pi (d / lambda) cos(angle)``. Snapshots are complex arrays
 ``(antennas, snapshots)`` or ``(batch, antennas, snapshots)``; nothing removes their mean, so
-despread pilots (the same vector in every snapshot) are welcome.
+despread pilots (the same vector in every snapshot) are welcome. Their noise must be independent: a
+smoothed channel estimate says the same several times over.
+
+Every estimate says what it is worth. ``p_value`` tests whether plane waves in white noise explain
+what was received; where they do not, ``verdict`` says whether reflections (or antennas unlike those
+described) or another source are the cause, and the standard deviations hold what that displaces,
+as far as the residual shows it. A model that holds is doubted once in a hundred times.
 
 Examples
 --------
@@ -18,6 +24,7 @@ Examples
 from access_av._core.aoa import (
     AngleEstimate,
     DirectionEstimate,
+    MeasuredManifold,
     calibrate,
     covariance,
     crb_rad,
@@ -28,6 +35,7 @@ from access_av._core.aoa import (
     estimate_sources,
     forward_backward,
     maximum_likelihood,
+    maximum_likelihood_pilots,
     music,
     root_music,
     spectrum,
@@ -36,6 +44,7 @@ from access_av._core.aoa import (
 __all__ = [
     "AngleEstimate",
     "DirectionEstimate",
+    "MeasuredManifold",
     "calibrate",
     "covariance",
     "crb_rad",
@@ -46,6 +55,7 @@ __all__ = [
     "estimate_sources",
     "forward_backward",
     "maximum_likelihood",
+    "maximum_likelihood_pilots",
     "music",
     "root_music",
     "spectrum",

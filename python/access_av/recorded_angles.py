@@ -44,9 +44,11 @@ class BurstAngle:
         Counter-clockwise from the array's broadside, which is a quarter turn clockwise of its axis,
         seen from above.
     sigma_deg
-        Standard deviation by the receiver's noise alone; multipath is not in it.
+        Standard deviation: of noise and, where the verdict names reflections, of what they do.
     snr_db
         Per antenna and sample.
+    verdict
+        ``resolved``, or ``unresolved:`` and why it should not be relied on.
     truth_deg
         Measured azimuth, where annotated.
     """
@@ -56,6 +58,7 @@ class BurstAngle:
     sigma_deg: float
     snr_db: float
     label: str
+    verdict: str
     truth_deg: float | None = None
 
     def as_record(self) -> dict[str, Any]:
@@ -127,7 +130,7 @@ def estimate_bursts(
             calibration = gains / np.abs(gains)
             continue
         phases = calibration if truth.channel_phases is None else truth.channel_phases
-        azimuth_deg, sigma_rad, snr_db = _estimate(
+        azimuth_deg, sigma_rad, snr_db, verdict = _estimate(
             _equalised(snapshots), places, spacing_wavelengths, phases
         )
         bursts.append(
@@ -137,6 +140,7 @@ def estimate_bursts(
                 sigma_deg=math.degrees(sigma_rad),
                 snr_db=snr_db,
                 label=label,
+                verdict=verdict,
                 truth_deg=truth.azimuth_from_broadside_deg,
             )
         )
@@ -148,12 +152,13 @@ def _estimate(
     places: NDArray[np.float64] | None,
     spacing_wavelengths: float | None,
     phases: NDArray[np.complex128] | None,
-) -> tuple[float, float, float]:
-    """Azimuth from broadside (°), its standard deviation (rad), and the SNR (dB)."""
+) -> tuple[float, float, float, str]:
+    """Azimuth from broadside (°), its standard deviation (rad), the SNR (dB), and the verdict."""
     if places is not None:
         source = aoa.direction(snapshots, places, calibration=phases)
         azimuth_deg = from_broadside_deg(math.degrees(float(source.azimuth_rad)))
-        return azimuth_deg, float(source.azimuth_sigma_rad), float(source.snr_db)
+        sigma_rad, snr_db = float(source.azimuth_sigma_rad), float(source.snr_db)
+        return azimuth_deg, sigma_rad, snr_db, str(source.verdict)
     if spacing_wavelengths is None:
         raise InputError("neither spacing nor places of the antennas are known")
     found = aoa.maximum_likelihood(
@@ -163,6 +168,7 @@ def _estimate(
         90.0 - math.degrees(float(found.angle_rad)),
         float(found.sigma_rad),
         float(found.snr_db),
+        str(found.verdict),
     )
 
 

@@ -26,9 +26,10 @@ mod _core {
     mod aoa {
         #[pymodule_export]
         use crate::aoa::{
-            AngleEstimate, DirectionEstimate, calibrate, covariance, crb_rad, direction,
-            direction_crb_rad, direction_spectrum, esprit, estimate_sources, forward_backward,
-            maximum_likelihood, music, root_music, spectrum,
+            AngleEstimate, DirectionEstimate, MeasuredManifold, calibrate, covariance, crb_rad,
+            direction, direction_crb_rad, direction_spectrum, esprit, estimate_sources,
+            forward_backward, maximum_likelihood, maximum_likelihood_pilots, music, root_music,
+            spectrum,
         };
         use pyo3::prelude::*;
 

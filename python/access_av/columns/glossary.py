@@ -300,8 +300,8 @@ _GLOSSARY = {
     "azimuth_from_broadside_deg": ("°", "Azimuth from broadside, counter-clockwise"),
     "sigma_deg": (
         "°",
-        "Standard deviation of the angle by the receiver's noise alone; neither scatter nor the "
-        "array's own errors are in it",
+        "Standard deviation of the angle: by noise and, where `verdict` names reflections, by what "
+        "they displace; an array mounted askew is not in it",
     ),
     "label": ("text", "The annotation's label"),
     "truth_deg": ("°", "Annotated azimuth from broadside"),

@@ -419,7 +419,7 @@ TABLES: Mapping[str, Table] = {
             "`access-av aoa --json`",
             (
                 "sample_start", "azimuth_from_broadside_deg", "sigma_deg", "snr_db", "label",
-                "truth_deg",
+                "verdict", "truth_deg",
             ),
             {"truth_deg": "not annotated; the key is absent then"},
         ),
