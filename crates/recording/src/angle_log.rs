@@ -16,7 +16,7 @@ use crate::table::Table;
 use onboard::localize::AngleMeasurement;
 use onboard::observation::SensedSsb;
 
-const COLUMNS: [&str; 7] = [
+const COLUMNS: [&str; 8] = [
     "time_s",
     "pci",
     "ssb_index",
@@ -24,6 +24,7 @@ const COLUMNS: [&str; 7] = [
     "phase_sigma_rad",
     "angle_rad",
     "snr_db",
+    "resolved",
 ];
 
 /// Columns that every log has, and those of which some may be missing.
@@ -262,7 +263,7 @@ pub fn write_angle_log(file: &Path, angles: &[LoggedAngle]) -> Result<(), Record
         // Writing into a string does not fail.
         let _ = writeln!(
             text,
-            "{},{},{},{},{},{},{}",
+            "{},{},{},{},{},{},{},{}",
             measured.time_s,
             ssb.pci,
             ssb.ssb_index,
@@ -270,6 +271,7 @@ pub fn write_angle_log(file: &Path, angles: &[LoggedAngle]) -> Result<(), Record
             measured.phase_sigma_rad,
             measured.angle_rad,
             measured.snr_db,
+            u8::from(measured.resolved),
         );
     }
     files::write(file, text.as_bytes())
