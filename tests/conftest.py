@@ -12,6 +12,10 @@ if TYPE_CHECKING:
 
 ROOT = Path(__file__).parent.parent
 
+# Parallel workers are given the size of no terminal, which consoles would keep to.
+for size in ("COLUMNS", "LINES"):
+    os.environ.pop(size, None)
+
 
 class Finished(NamedTuple):
     code: int

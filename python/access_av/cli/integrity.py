@@ -1,4 +1,4 @@
-"""The command ``integrity``: the guard where the world is not as believed."""
+"""The command ``integrity``: protection levels under injected faults and wrong settings."""
 
 from __future__ import annotations
 
