@@ -144,7 +144,7 @@ def test_tables_hold_no_nan(name: str) -> None:
     end_m = {"paper": 290.0}.get(name, 0.0)
     if end_m:
         scenario = scenario.with_overrides({"motion.start_at_m": end_m})
-    found = access_av.simulate(scenario, runs=20, keep_trajectories=True)
+    found = access_av.simulate(scenario, keep_trajectories=True)
     for table in (found.runs, found.steps, found.trajectories, found.executions):
         assert table is not None
         for column in table.select(pl.col(pl.Float64)):
