@@ -1,0 +1,17 @@
+//! What comes in, each source on a thread of its own.
+
+mod connection;
+mod framing;
+mod lines;
+mod message;
+mod raw;
+mod recording;
+mod start;
+mod zeromq;
+mod zmtp;
+
+pub use framing::{Framing, View};
+pub use lines::Lines;
+pub use message::parse;
+pub use start::{Sources, start};
+pub use zmtp::read_frame;
