@@ -8,6 +8,10 @@ pub const MAX_ELEMENTS: usize = 16;
 /// Most snapshots (or despread blocks) one observation holds.
 pub const MAX_SNAPSHOTS: usize = 64;
 
+/// All SSBs of a burst begin this close together: within half a frame (TS 38.213, 4.1), less their
+/// own length. Bursts may come every half frame.
+pub const BURST_S: f64 = 4.9e-3;
+
 /// Wheel odometry at one instant.
 #[derive(Debug, Clone, Copy, PartialEq)]
 pub struct OdometrySample {
@@ -22,6 +26,16 @@ pub struct OdometrySample {
 }
 
 impl OdometrySample {
+    /// One that has no distance: [`Live`](crate::Live) drives on by its speed.
+    pub const fn of_speed(time_s: f64, speed_mps: f64, yaw_rate_radps: Option<f64>) -> Self {
+        Self {
+            time_s,
+            distance_m: f64::NAN,
+            speed_mps,
+            yaw_rate_radps,
+        }
+    }
+
     /// Whether all its values are numbers.
     pub fn is_finite(&self) -> bool {
         self.time_s.is_finite()
@@ -92,6 +106,13 @@ impl SsbObservation {
         self.noise_variance = None;
         self.cfo_hz = 0.0;
         self.values.clear();
+    }
+
+    /// Becomes a copy of another observation, in the memory there is.
+    pub fn copy_from(&mut self, other: &Self) {
+        self.values.clone_from(&other.values);
+        (self.ssb, self.noise_variance) = (other.ssb, other.noise_variance);
+        (self.cfo_hz, self.elements) = (other.cfo_hz, other.elements);
     }
 
     /// Number of antennas.

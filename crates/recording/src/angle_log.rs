@@ -13,6 +13,8 @@ use std::path::Path;
 use crate::error::RecordingError;
 use crate::file as files;
 use crate::table::Table;
+use onboard::Observed;
+use onboard::burst::OfSsb;
 use onboard::localize::AngleMeasurement;
 use onboard::observation::SensedSsb;
 
@@ -62,6 +64,16 @@ pub struct LoggedAngle {
     pub ssb: SensedSsb,
     /// The angle.
     pub measured: AngleMeasurement,
+}
+
+impl OfSsb for LoggedAngle {
+    fn ssb(&self) -> &SensedSsb {
+        &self.ssb
+    }
+
+    fn observed(&self) -> Observed<'_> {
+        Observed::Angle(self.measured)
+    }
 }
 
 /// The usable angles of a file, in its order, and the lines left out.

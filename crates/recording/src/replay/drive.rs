@@ -1,5 +1,6 @@
 //! A drive being replayed.
 
+use onboard::burst::{Burst, OfSsb, first_burst};
 use onboard::geometry::Pose;
 use onboard::localize::OdometryVerdict;
 use onboard::localize::Recovered;
@@ -8,7 +9,6 @@ use onboard::observation::OdometrySample;
 use onboard::settings::{Platform, Site, Vehicle};
 use onboard::{Custom, Execution, Onboard};
 
-use super::bursts::{Burst, OfSsb, first_burst};
 use super::error::ReplayError;
 use super::located::{Diagnosis, LocatedDrive, LocatedPose, Remark, gathered};
 use crate::library::load;

@@ -1,7 +1,6 @@
 //! A recorded drive through the pipeline: odometry and SSBs, or angles, in order of time.
 
 mod angles;
-mod bursts;
 mod data_quality;
 mod diagnosis;
 mod drive;

@@ -18,6 +18,7 @@ mod gap;
 mod integrity;
 mod iq_fidelity;
 mod late;
+mod live;
 mod locate;
 mod simulated_drives;
 mod smoother;

@@ -1,13 +1,9 @@
 //! SSBs that belong together, as the pipeline hears them.
 
-use onboard::observation::{SensedSsb, SsbObservation};
-use onboard::{BoxError, Observed, SsbSource};
-
-use crate::angle_log::LoggedAngle;
-
-/// All SSBs of a burst begin this close together: within half a frame (TS 38.213, 4.1), less their
-/// own length. Bursts may come every half frame.
-const BURST_S: f64 = 4.9e-3;
+use crate::BoxError;
+use crate::localize::AngleMeasurement;
+use crate::observation::{BURST_S, SensedSsb, SsbObservation};
+use crate::pipeline::{Observed, SsbSource};
 
 /// Something that came with one SSB.
 pub trait OfSsb {
@@ -15,16 +11,6 @@ pub trait OfSsb {
     fn ssb(&self) -> &SensedSsb;
     /// What the pipeline is to make an angle of.
     fn observed(&self) -> Observed<'_>;
-}
-
-impl OfSsb for LoggedAngle {
-    fn ssb(&self) -> &SensedSsb {
-        &self.ssb
-    }
-
-    fn observed(&self) -> Observed<'_> {
-        Observed::Angle(self.measured)
-    }
 }
 
 impl OfSsb for SsbObservation {
@@ -37,7 +23,17 @@ impl OfSsb for SsbObservation {
     }
 }
 
-/// A burst that was recorded.
+impl OfSsb for (SensedSsb, AngleMeasurement) {
+    fn ssb(&self) -> &SensedSsb {
+        &self.0
+    }
+
+    fn observed(&self) -> Observed<'_> {
+        Observed::Angle(self.1)
+    }
+}
+
+/// A burst that was received.
 pub struct Burst<'a, T>(pub &'a [T]);
 
 impl<T: OfSsb> SsbSource for Burst<'_, T> {
