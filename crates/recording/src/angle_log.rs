@@ -15,6 +15,7 @@ use crate::file as files;
 use crate::table::Table;
 use onboard::Observed;
 use onboard::burst::OfSsb;
+use onboard::live::AngleObservation;
 use onboard::localize::AngleMeasurement;
 use onboard::observation::SensedSsb;
 
@@ -64,6 +65,21 @@ pub struct LoggedAngle {
     pub ssb: SensedSsb,
     /// The angle.
     pub measured: AngleMeasurement,
+}
+
+impl From<&LoggedAngle> for AngleObservation {
+    fn from(logged: &LoggedAngle) -> Self {
+        let LoggedAngle { ssb, measured } = logged;
+        Self {
+            pci: ssb.pci,
+            ssb_index: ssb.ssb_index,
+            time_s: ssb.time_s,
+            phase_rad: measured.phase_rad,
+            sigma_rad: measured.phase_sigma_rad,
+            snr_db: Some(ssb.snr_db),
+            resolved: measured.resolved,
+        }
+    }
 }
 
 impl OfSsb for LoggedAngle {

@@ -2,8 +2,6 @@
 
 mod file;
 mod json;
-mod mcap;
-mod mqtt;
 mod queue;
 mod record;
 mod start;
@@ -11,6 +9,6 @@ mod tum;
 mod vda5050;
 
 pub use queue::Queue;
-pub use record::{By, Level, PoseRecord, Record};
+pub use record::{By, Level, PoseRecord, Record, energy_json, head_json, status_json};
 pub use start::{Sinks, start};
 pub use vda5050::{Localized, position};

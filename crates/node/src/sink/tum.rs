@@ -5,6 +5,7 @@ use std::io::{BufWriter, Write};
 use std::path::Path;
 
 use anyhow::Result;
+use onboard::live::State;
 use recording::{TimedPose, tum_text};
 
 use super::file::create;
@@ -26,7 +27,7 @@ impl Tum {
     pub fn take(&mut self, record: &Record) -> Result<()> {
         if let Record::Pose(PoseRecord { status, by: By::Odometry }) = record
             && let Some(pose) = status.pose
-            && status.has_place()
+            && !matches!(status.state, State::Waiting | State::Searching)
         {
             let time_s = status.time_s;
             self.0.write_all(tum_text(&[TimedPose { time_s, pose }]).as_bytes())?;

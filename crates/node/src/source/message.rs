@@ -25,6 +25,8 @@ enum Message {
         phase_rad: f64,
         phase_sigma_rad: f64,
         snr_db: Option<f64>,
+        #[serde(default = "yes")]
+        resolved: bool,
     },
     SetPose {
         time_s: Option<f64>,
@@ -40,6 +42,10 @@ enum Message {
     Readmit {
         pci: u16,
     },
+}
+
+const fn yes() -> bool {
+    true
 }
 
 /// What a line says; nothing where it is blank.
@@ -72,6 +78,7 @@ pub fn parse(line: &[u8]) -> Result<Option<Input>, String> {
             phase_rad,
             phase_sigma_rad,
             snr_db,
+            resolved,
         } => Input::Angle(AngleObservation {
             pci,
             ssb_index,
@@ -79,6 +86,7 @@ pub fn parse(line: &[u8]) -> Result<Option<Input>, String> {
             phase_rad,
             sigma_rad: phase_sigma_rad,
             snr_db,
+            resolved,
         }),
         Message::SetPose {
             time_s,
@@ -88,7 +96,11 @@ pub fn parse(line: &[u8]) -> Result<Option<Input>, String> {
             covariance,
         } => Input::Command(Command::SetPose {
             time_s,
-            pose: Pose::new(x_m, y_m, heading_rad),
+            pose: Pose {
+                x_m,
+                y_m,
+                heading_rad,
+            },
             covariance,
         }),
         Message::Reset {} => Input::Command(Command::Reset),

@@ -13,5 +13,6 @@ mod zmtp;
 pub use framing::{Framing, View};
 pub use lines::Lines;
 pub use message::parse;
-pub use start::{Sources, start};
+pub use recording::Blocks;
+pub use start::{Files, Sources, start};
 pub use zmtp::read_frame;

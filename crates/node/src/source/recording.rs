@@ -39,9 +39,9 @@ impl Blocks {
         (self.at < self.recording.length()).then(|| self.time_s(self.at))
     }
 
-    /// Length of a block at most, in seconds.
-    pub fn block_s(&self) -> f64 {
-        self.block as f64 / self.rate_hz
+    /// Length of a block that was read, in seconds.
+    pub fn length_s(&self, samples: &[Vec<Complex32>]) -> f64 {
+        samples.first().map_or(0, Vec::len) as f64 / self.rate_hz
     }
 
     fn time_s(&self, sample: u64) -> f64 {
@@ -88,7 +88,7 @@ pub fn run(recording: Recording, start_s: f64, inbox: &Inbox, health: &Arc<Sourc
             Ok(None) => break,
             Ok(Some(time_s)) => {
                 let count = antennas.first().map_or(0, Vec::len);
-                let end_s = time_s + count as f64 / blocks.rate_hz;
+                let end_s = time_s + blocks.length_s(&antennas);
                 let due = Duration::try_from_secs_f64(end_s - first_s).unwrap_or_default();
                 std::thread::sleep(due.saturating_sub(began.elapsed()));
                 health.came(count as u64);

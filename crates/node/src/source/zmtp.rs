@@ -30,9 +30,12 @@ pub fn greet(stream: &mut (impl Read + Write)) -> io::Result<()> {
     stream.write_all(&greeting)?;
     let mut theirs = [0_u8; 64];
     read_exact(stream, &mut theirs)?;
-    let [0xff, _, _, _, _, _, _, _, _, 0x7f, 3.., _, mechanism @ ..] = &theirs else {
-        return Err(invalid("what answers is no ZeroMQ of version 3 or later"));
+    let [0xff, _, _, _, _, _, _, _, _, 0x7f, version, _, mechanism @ ..] = &theirs else {
+        return Err(invalid("what answers is no ZeroMQ"));
     };
+    if *version < 3 {
+        return Err(invalid("what answers is ZeroMQ of a version before 3"));
+    }
     if !mechanism.starts_with(b"NULL\0") {
         return Err(invalid("the transmitter demands security"));
     }

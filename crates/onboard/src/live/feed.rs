@@ -152,14 +152,59 @@ impl Live {
         time_s: f64,
         antennas: &[&[Complex32]],
     ) -> Result<Continuity, LiveError> {
+        let continuity = self.receive(time_s, antennas, false)?;
+        self.hear_before(f64::INFINITY)?;
+        Ok(continuity)
+    }
+
+    /// As [`samples`](Self::samples), but nothing is heard before [`hear_before`](Self::hear_before) says so: for
+    /// recordings, whose odometry is known before it is its turn. `ends` says that samples are missing after
+    /// these.
+    ///
+    /// # Errors
+    /// As [`samples`](Self::samples).
+    pub fn receive(
+        &mut self,
+        time_s: f64,
+        antennas: &[&[Complex32]],
+        ends: bool,
+    ) -> Result<Continuity, LiveError> {
         finite("the time of samples", time_s)?;
         let stream = self.stream.as_mut().ok_or(LiveError::NoStream)?;
-        let continuity = stream.push(time_s, antennas)?;
+        let continuity = stream.push(time_s, antennas, ends)?;
         if let Some(end_s) = stream.next_s() {
             self.see(end_s);
         }
-        self.hear_stream()?;
         Ok(continuity)
+    }
+
+    /// Hears the bursts that are complete and began before `time_s`.
+    ///
+    /// # Errors
+    /// [`LiveError::Custom`] where the user's own code fails.
+    pub fn hear_before(&mut self, time_s: f64) -> Result<(), LiveError> {
+        while let Some(stream) = &mut self.stream {
+            let burst = stream.burst();
+            let number = burst.len();
+            if burst.first().is_none_or(|first| first.ssb().time_s >= time_s) {
+                break;
+            }
+            let heard = hear(&mut self.onboard, burst);
+            stream.forget(number);
+            self.book(heard)?;
+        }
+        Ok(())
+    }
+
+    /// Ends a stretch of samples after which some will be missing, so that its last SSBs are found at once.
+    ///
+    /// # Errors
+    /// [`LiveError::Receive`].
+    pub fn end_stretch(&mut self) -> Result<(), LiveError> {
+        match &mut self.stream {
+            Some(stream) => stream.break_off(),
+            None => Ok(()),
+        }
     }
 
     /// Takes in odometry, and says what the localizer made of it. Its speed alone is enough: see
@@ -228,10 +273,8 @@ impl Live {
     /// # Errors
     /// [`LiveError::Custom`] where the user's own code fails.
     pub fn settle(&mut self) -> Result<(), LiveError> {
-        if let Some(stream) = &mut self.stream {
-            stream.break_off()?;
-        }
-        self.hear_stream()?;
+        self.end_stretch()?;
+        self.hear_before(f64::INFINITY)?;
         self.hear_angles()
     }
 
@@ -509,20 +552,6 @@ impl Live {
             distance_m,
             ..*sample
         }
-    }
-
-    fn hear_stream(&mut self) -> Result<(), LiveError> {
-        while let Some(stream) = &mut self.stream {
-            let burst = stream.burst();
-            let number = burst.len();
-            if number == 0 {
-                break;
-            }
-            let heard = hear(&mut self.onboard, burst);
-            stream.forget(number);
-            self.book(heard)?;
-        }
-        Ok(())
     }
 
     fn hear_angles(&mut self) -> Result<(), LiveError> {

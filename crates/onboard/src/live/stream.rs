@@ -44,7 +44,7 @@ pub struct SampleStream {
     /// In order of time: `held` of them, the others are memory.
     observations: Vec<SsbObservation>,
     held: usize,
-    /// Until when all samples were looked at.
+    /// Until when all samples were looked at; infinite where a stretch of them has ended.
     heard_until_s: f64,
     /// What has come.
     pub counts: StreamCounts,
@@ -80,11 +80,12 @@ impl SampleStream {
         (self.counts.taken_s > 0.0).then(|| self.clock.time_s(self.clock.next() as f64))
     }
 
-    /// Takes in the next samples of every antenna.
+    /// Takes in the next samples of every antenna; `ends` says that none follow them without a gap.
     pub fn push(
         &mut self,
         time_s: f64,
         antennas: &[&[Complex32]],
+        ends: bool,
     ) -> Result<Continuity, LiveError> {
         let elements = self.base.len();
         let found = antennas.len();
@@ -118,7 +119,11 @@ impl SampleStream {
         let new = new.get(..elements).unwrap_or_default();
         self.counts.taken_s += (length - left_out) as f64 / self.clock.rate_hz();
         self.front_end.push(new, &mut self.base)?;
-        self.receive()?;
+        if ends {
+            self.break_off()?;
+        } else {
+            self.receive()?;
+        }
         Ok(continuity)
     }
 
@@ -129,6 +134,7 @@ impl SampleStream {
         let length = self.base.first().map_or(0, Vec::len) as u64;
         self.base_start += length;
         self.base.iter_mut().for_each(Vec::clear);
+        self.heard_until_s = f64::INFINITY;
         Ok(())
     }
 

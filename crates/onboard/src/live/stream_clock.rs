@@ -85,15 +85,13 @@ impl StreamClock {
         // What the time's own digits and a sample leave open.
         let resolution_s = (2.0 * time_s.abs() * f64::EPSILON).max(1.0 / self.rate_hz);
         let drift_s = RATE_ERROR * self.last_length as f64 / self.rate_hz;
-        if late_s.abs() > resolution_s {
-            self.anchor = (next, time_s);
-        }
         let (continuity, left_out) = if late_s.abs() <= 2.0 * resolution_s + drift_s {
+            self.keep_to(next, time_s, resolution_s);
             (Continuity::Contiguous, 0)
         } else if late_s > 0.0 {
-            let lost = (late_s * self.rate_hz).round();
-            self.next = Some(next + lost as u64);
-            self.anchor = (next + lost as u64, time_s);
+            let first = next + (late_s * self.rate_hz).round() as u64;
+            self.next = Some(first);
+            self.keep_to(first, time_s, resolution_s);
             (Continuity::Gap { lost_s: late_s }, 0)
         } else if late_s > -RESTART_S {
             let again = (-late_s * self.rate_hz).round() as usize;
@@ -110,6 +108,13 @@ impl StreamClock {
         self.next = Some(self.next() + (length - left_out) as u64);
         self.last_length = length;
         (continuity, left_out)
+    }
+
+    /// Counts from this sample on, unless its time is what counting says.
+    fn keep_to(&mut self, sample: u64, time_s: f64, resolution_s: f64) {
+        if (time_s - self.time_s(sample as f64)).abs() > resolution_s {
+            self.anchor = (sample, time_s);
+        }
     }
 }
 

@@ -25,4 +25,4 @@ pub use locate::{locate_angles, locate_recording};
 pub use located::{Diagnosis, LocatedDrive, LocatedPose, Remark};
 pub use receive::receive_recording;
 pub use start::{StartChoice, starting};
-pub use stated::as_stated;
+pub use stated::{as_stated, with_phase};
