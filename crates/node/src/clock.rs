@@ -111,14 +111,11 @@ impl ArrivalClock {
 pub struct DriveClock(Option<(f64, Instant)>);
 
 impl DriveClock {
-    /// Something of this time came in. `false` where the time is earlier by more than a second: another clock,
-    /// or the drive began anew.
-    pub fn see(&mut self, time_s: f64) -> bool {
-        let now_s = self.now_s();
-        if now_s.is_none_or(|now_s| time_s > now_s) {
+    /// Something of this time came in.
+    pub fn see(&mut self, time_s: f64) {
+        if self.0.is_none_or(|(newest_s, _)| time_s > newest_s) {
             self.0 = Some((time_s, Instant::now()));
         }
-        now_s.is_none_or(|now_s| time_s > now_s - 1.0)
     }
 
     /// What time it is; `None` before anything came in.

@@ -13,8 +13,8 @@ use onboard::{Custom, Live, OdometryDefect};
 
 use crate::clock::DriveClock;
 use crate::gate::{Gate, Windows};
-use crate::inbox::{Block, Command, Inbox, Input};
-use crate::sink::{By, Level, PoseRecord, Queue, Record};
+use crate::inbox::{Block, Command, Inbox, Input, Level};
+use crate::sink::{By, PoseRecord, Queue, Record};
 use crate::statistics::{Punctuality, SourceHealth};
 use crate::web::Board;
 
@@ -63,7 +63,10 @@ pub struct Engine {
     gate: Arc<Gate>,
     windows: Windows,
     sleeps: bool,
+    period_s: f64,
     ssb_s: f64,
+    /// Samples that the pipeline has not got yet.
+    pending: Block,
     /// Ends of blocks in the stream's time, and when they arrived.
     arrivals: VecDeque<(f64, Instant)>,
     last_pose: Option<(f64, Instant)>,
@@ -89,6 +92,8 @@ impl Engine {
             live: setup.live()?,
             windows: Windows::new(&setup.site),
             ssb_s: SSB_MS_AT_15_KHZ * 1e-3 * 15.0 / setup.site.ssb.subcarrier_spacing_khz,
+            period_s: setup.site.ssb.period_s(),
+            pending: Block::default(),
             setup,
             records,
             board,
@@ -128,6 +133,7 @@ impl Engine {
             self.watch(sources, silent_after);
             self.tick()?;
         }
+        self.receive(true)?;
         self.live.settle()?;
         self.publish_heard(None)
     }
@@ -139,8 +145,7 @@ impl Engine {
                 self.clock.see(until_s);
                 let is_over = |[_, end_s]: [f64; 2]| until_s >= end_s;
                 if self.gate.wanted().is_some_and(is_over) {
-                    self.live.end_stretch()?;
-                    self.live.hear_before(f64::INFINITY)?;
+                    self.receive(true)?;
                     self.publish_heard(Some(came))?;
                     self.sleep_until_next(until_s)?;
                 }
@@ -154,36 +159,56 @@ impl Engine {
                 self.publish_heard(Some(came))?;
             }
             Input::Command(command) => self.command(command)?,
-            Input::Remark { source, text } => self.event(Level::Warn, source, text),
+            Input::Remark { level, source, text } => self.event(level, source, text),
             Input::End => {}
         }
         Ok(())
     }
 
     fn samples(&mut self, block: Block, came: Instant, inbox: &Inbox) -> Result<(), LiveError> {
-        let length = block.antennas.first().map_or(0, Vec::len);
-        let rate_hz = self.setup.stream.map_or(1.0, |it| it.rate_hz);
-        let end_s = block.time_s + length as f64 / rate_hz;
+        let end_s = block.time_s + block.length() as f64 / self.rate_hz();
         self.clock.see(end_s);
         if self.arrivals.len() == ARRIVALS {
             self.arrivals.pop_front();
         }
         self.arrivals.push_back((end_s, came));
+        let pending_s = self.pending.length() as f64 / self.rate_hz();
+        let is_next = (self.pending.time_s + pending_s - block.time_s).abs() < 0.5 / self.rate_hz();
+        if pending_s > 0.0 && !is_next {
+            self.receive(true)?;
+        }
+        self.pending.append(&block);
+        inbox.give_back(block.antennas);
+        if self.gate.wanted().is_none() && end_s - self.pending.time_s >= self.period_s {
+            self.receive(false)?;
+            self.publish_heard(Some(came))?;
+            self.sleep_until_next(end_s)?;
+        }
+        Ok(())
+    }
+
+    fn rate_hz(&self) -> f64 {
+        self.setup.stream.map_or(1.0, |it| it.rate_hz)
+    }
+
+    /// Hands the samples of a window, or of a period, to the pipeline, all at once: whoever searches for cells
+    /// must see a whole burst.
+    fn receive(&mut self, ends: bool) -> Result<(), LiveError> {
         let mut antennas: [&[Complex32]; MAX_ELEMENTS] = [&[]; MAX_ELEMENTS];
-        for (antenna, samples) in antennas.iter_mut().zip(&block.antennas) {
+        for (antenna, samples) in antennas.iter_mut().zip(&self.pending.antennas) {
             *antenna = samples;
         }
-        let antennas = antennas.get(..block.antennas.len()).unwrap_or_default();
-        let taken = self.live.samples(block.time_s, antennas);
-        inbox.give_back(block.antennas);
+        let antennas = antennas.get(..self.pending.antennas.len()).unwrap_or_default();
+        let taken = if self.pending.length() > 0 {
+            self.live.receive(self.pending.time_s, antennas, ends).map(drop)
+        } else {
+            self.live.end_stretch()
+        };
+        self.pending.antennas.iter_mut().for_each(Vec::clear);
         if let Err(error) = taken {
             self.refused("samples", &error)?;
         }
-        let heard = self.publish_heard(Some(came));
-        if self.gate.wanted().is_none() {
-            self.sleep_until_next(end_s)?;
-        }
-        heard
+        self.live.hear_before(f64::INFINITY)
     }
 
     /// Closes the gate up to the next burst that is wanted.
@@ -252,6 +277,7 @@ impl Engine {
         self.live = self.setup.live()?;
         self.clock.reset();
         self.arrivals.clear();
+        self.pending = Block::default();
         (self.last_pose, self.last_status_s) = (None, f64::NEG_INFINITY);
         self.gate.open();
         Ok(())

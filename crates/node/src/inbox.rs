@@ -8,6 +8,7 @@ use num_complex::Complex32;
 use onboard::geometry::Pose;
 use onboard::live::AngleObservation;
 use onboard::observation::OdometrySample;
+use serde::Serialize;
 
 /// Bytes of samples that wait at most: 0.13 s of four antennas at 3.84 Msps.
 pub const MOST_SAMPLE_BYTES: usize = 16 << 20;
@@ -26,10 +27,36 @@ pub struct Block {
 }
 
 impl Block {
+    /// Samples of each antenna.
+    pub fn length(&self) -> usize {
+        self.antennas.first().map_or(0, Vec::len)
+    }
+
+    /// Adds the samples that come after these.
+    pub fn append(&mut self, next: &Self) {
+        if self.length() == 0 {
+            self.time_s = next.time_s;
+        }
+        self.antennas.resize_with(next.antennas.len(), Vec::new);
+        for (samples, more) in self.antennas.iter_mut().zip(&next.antennas) {
+            samples.extend_from_slice(more);
+        }
+    }
+
     fn bytes(&self) -> usize {
         let samples: usize = self.antennas.iter().map(Vec::len).sum();
         samples * size_of::<Complex32>()
     }
+}
+
+/// How serious an event is.
+#[derive(Debug, Clone, Copy, PartialEq, Eq, Serialize)]
+#[serde(rename_all = "lowercase")]
+pub enum Level {
+    /// Good to know.
+    Info,
+    /// Something needs watching.
+    Warn,
 }
 
 /// What is asked of the node by message.
@@ -67,6 +94,8 @@ pub enum Input {
     Command(Command),
     /// Something about a source that somebody should know.
     Remark {
+        /// How serious it is.
+        level: Level,
         /// Which source.
         source: &'static str,
         /// What.
@@ -74,6 +103,14 @@ pub enum Input {
     },
     /// A source has come to its end, and no more will come.
     End,
+}
+
+impl Input {
+    /// Something that needs watching.
+    pub const fn warning(source: &'static str, text: String) -> Self {
+        let level = Level::Warn;
+        Self::Remark { level, source, text }
+    }
 }
 
 /// What waits to be taken.

@@ -10,7 +10,8 @@ use std::time::Duration;
 use access_av_node::engine::{Engine, Setup};
 use access_av_node::playback;
 use access_av_node::settings::{NodeSettings, PageSettings};
-use access_av_node::sink::{self, Level, Queue, Sinks};
+use access_av_node::inbox::Level;
+use access_av_node::sink::{self, Queue, Sinks};
 use access_av_node::source::{self, Sources};
 use access_av_node::statistics::Punctuality;
 use access_av_node::web::{self, Board, Counters};
@@ -145,7 +146,7 @@ fn drive(settings: &NodeSettings, setup: Setup, mut sources: Sources) -> Result<
         },
     ));
     let stop = Arc::new(AtomicBool::new(false));
-    let sinks = Sinks::open(&settings.output)?;
+    let sinks = Sinks::open(&settings.output, &settings.name, &sources.inbox)?;
     let site = web::site_json(&setup.site, &settings.name);
     let gate = Arc::clone(&sources.gate);
     let mut engine = Engine::new(
@@ -160,7 +161,7 @@ fn drive(settings: &NodeSettings, setup: Setup, mut sources: Sources) -> Result<
     let writing = sink::start(sinks, Arc::clone(&records))?;
     engine.event(Level::Info, "node", format!("{} begins", settings.name));
     let driven = if is_playback {
-        playback::play(&mut engine, sources.files, settings.pace, &stop)
+        playback::play(&mut engine, sources.files, &sources.health, settings.pace, &stop)
     } else {
         source::start(settings, &mut sources)?;
         let silent_after = Duration::from_secs_f64(settings.silent_after_s);

@@ -1,6 +1,7 @@
 //! Files played through the pipeline in the order of time, so that the poses are those of `access-av locate`,
 //! to the bit.
 
+use std::sync::Arc;
 use std::sync::atomic::{AtomicBool, Ordering};
 use std::time::{Duration, Instant};
 
@@ -14,6 +15,7 @@ use recording::LoggedAngle;
 use crate::engine::Engine;
 use crate::settings::Pace;
 use crate::source::{Blocks, Files};
+use crate::statistics::SourceHealth;
 
 /// Samples that are looked at together, in seconds, as where a recording is located.
 const BLOCK_S: f64 = 0.02;
@@ -24,13 +26,21 @@ const AHEAD_S: f64 = 0.01;
 ///
 /// # Errors
 /// What is wrong with a file, or stops the pipeline.
-pub fn play(engine: &mut Engine, files: Files, pace: Pace, stop: &AtomicBool) -> Result<()> {
+pub fn play(
+    engine: &mut Engine,
+    files: Files,
+    health: &[Arc<SourceHealth>],
+    pace: Pace,
+    stop: &AtomicBool,
+) -> Result<()> {
     let blocks = files.recording.map(|(recording, start_s)| Blocks::new(recording, start_s, BLOCK_S));
     let mut player = Player {
         engine,
         blocks,
         samples: Vec::new(),
         angles: &files.angles,
+        health,
+        stop,
         pace: (pace == Pace::RealTime).then(Instant::now),
         first_s: None,
     };
@@ -41,7 +51,7 @@ pub fn play(engine: &mut Engine, files: Files, pace: Pace, stop: &AtomicBool) ->
         player.odometry(sample)?;
     }
     if !stop.load(Ordering::Acquire) {
-        player.hear_before(f64::INFINITY, stop)?;
+        player.hear_before(f64::INFINITY)?;
     }
     player.engine.live_mut().settle()?;
     player.engine.publish_heard(None)?;
@@ -53,6 +63,8 @@ struct Player<'a> {
     blocks: Option<Blocks>,
     samples: Vec<Vec<Complex32>>,
     angles: &'a [LoggedAngle],
+    health: &'a [Arc<SourceHealth>],
+    stop: &'a AtomicBool,
     /// When the drive began, if it is played as it was recorded.
     pace: Option<Instant>,
     first_s: Option<f64>,
@@ -60,20 +72,21 @@ struct Player<'a> {
 
 impl Player<'_> {
     fn odometry(&mut self, sample: &OdometrySample) -> Result<()> {
-        self.hear_before(sample.time_s, &AtomicBool::new(false))?;
+        self.hear_before(sample.time_s)?;
         self.wait_for(sample.time_s);
+        self.came("odometry", 1);
         self.engine.odometry(sample, None)?;
         self.engine.tick()?;
         Ok(())
     }
 
     /// Hears every burst that began before `time_s`.
-    fn hear_before(&mut self, time_s: f64, stop: &AtomicBool) -> Result<()> {
+    fn hear_before(&mut self, time_s: f64) -> Result<()> {
         self.hear_angles_before(time_s)?;
         while let Some(blocks) = &mut self.blocks
             && let Some(next_s) = blocks.next_s()
             && next_s <= time_s + AHEAD_S
-            && !stop.load(Ordering::Acquire)
+            && !self.stop.load(Ordering::Acquire)
         {
             let Some(block_s) = blocks.read(&mut self.samples)? else {
                 break;
@@ -87,6 +100,8 @@ impl Player<'_> {
             live.receive(block_s, &antennas, ends)?;
             live.hear_before(time_s)?;
             self.engine.publish_heard(None)?;
+            let samples = self.samples.first().map_or(0, Vec::len);
+            self.came("samples", samples as u64);
             self.wait_for(block_s);
             self.engine.see(block_s);
             if time_s.is_infinite() {
@@ -108,9 +123,15 @@ impl Player<'_> {
             }
             self.engine.live_mut().settle()?;
             self.engine.publish_heard(None)?;
+            self.came("angles", burst.len() as u64);
             self.angles = later;
         }
         Ok(())
+    }
+
+    fn came(&self, name: &str, items: u64) {
+        let health = self.health.iter().find(|it| it.name == name);
+        health.inspect(|it| it.came(items));
     }
 
     fn wait_for(&mut self, time_s: f64) {

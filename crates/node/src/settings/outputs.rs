@@ -51,8 +51,8 @@ pub struct McapOutput {
     #[serde(default = "five")]
     #[schemars(range(min = 0.1, max = 1000.0))]
     pub pose_hz: f64,
-    /// Verdicts on angles per second at most.
-    #[serde(default = "five")]
+    /// Verdicts on angles per second and radio head at most.
+    #[serde(default = "one")]
     #[schemars(range(min = 0.0, max = 10_000.0))]
     pub verdict_hz: f64,
     /// Size in MB at which the next file is begun.

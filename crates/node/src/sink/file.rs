@@ -1,7 +1,7 @@
 //! Files that grow: whole when the node ends, and as new ones by size and time.
 
 use std::fs::{self, File};
-use std::io::{self, BufWriter, Write};
+use std::io::{self, BufWriter};
 use std::path::{Path, PathBuf};
 
 use anyhow::{Context, Result};
@@ -19,32 +19,6 @@ pub fn create(path: &Path) -> Result<BufWriter<File>> {
     };
     let file = made().with_context(|| path.display().to_string())?;
     Ok(BufWriter::with_capacity(1 << 16, file))
-}
-
-/// Counts what is written through it.
-pub struct Counted<W> {
-    inner: W,
-    /// Bytes written.
-    pub bytes: u64,
-}
-
-impl<W> Counted<W> {
-    /// Nothing is written yet.
-    pub const fn new(inner: W) -> Self {
-        Self { inner, bytes: 0 }
-    }
-}
-
-impl<W: Write> Write for Counted<W> {
-    fn write(&mut self, bytes: &[u8]) -> io::Result<usize> {
-        let written = self.inner.write(bytes)?;
-        self.bytes += written as u64;
-        Ok(written)
-    }
-
-    fn flush(&mut self) -> io::Result<()> {
-        self.inner.flush()
-    }
 }
 
 /// Removes the oldest files of a folder that a prefix and an ending tell, so that so many are left.

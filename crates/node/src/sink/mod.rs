@@ -2,6 +2,8 @@
 
 mod file;
 mod json;
+mod mcap;
+mod mqtt;
 mod queue;
 mod record;
 mod start;
@@ -9,6 +11,6 @@ mod tum;
 mod vda5050;
 
 pub use queue::Queue;
-pub use record::{By, Level, PoseRecord, Record, energy_json, head_json, status_json};
+pub use record::{By, PoseRecord, Record, energy_json, head_json, status_json};
 pub use start::{Sinks, start};
 pub use vda5050::{Localized, position};

@@ -4,15 +4,7 @@ use onboard::live::{HeadStatus, LiveEnergy, Outcome, Status};
 use serde::Serialize;
 use serde_json::{Value, json};
 
-/// How serious an event is.
-#[derive(Debug, Clone, Copy, PartialEq, Eq, Serialize)]
-#[serde(rename_all = "lowercase")]
-pub enum Level {
-    /// Good to know.
-    Info,
-    /// Something needs watching.
-    Warn,
-}
+use crate::inbox::Level;
 
 /// What a pose came by.
 #[derive(Debug, Clone, Copy, PartialEq, Eq, Serialize)]

@@ -8,9 +8,12 @@ use std::time::Duration;
 use anyhow::{Context, Result};
 
 use super::json::Json;
+use super::mcap::Mcap;
+use super::mqtt::Mqtt;
 use super::queue::Queue;
 use super::record::Record;
 use super::tum::Tum;
+use crate::inbox::Inbox;
 use crate::settings::Outputs;
 
 /// What is written is sent to the disk this often at least.
@@ -21,6 +24,8 @@ const FLUSH: Duration = Duration::from_millis(200);
 pub struct Sinks {
     json: Option<Json>,
     tum: Option<Tum>,
+    mcap: Option<Mcap>,
+    mqtt: Option<Mqtt>,
 }
 
 impl Sinks {
@@ -28,10 +33,13 @@ impl Sinks {
     ///
     /// # Errors
     /// What is wrong with one of them.
-    pub fn open(settings: &Outputs) -> Result<Self> {
+    pub fn open(settings: &Outputs, name: &str, inbox: &Arc<Inbox>) -> Result<Self> {
+        let connect = |mqtt| Mqtt::new(mqtt, name, Arc::clone(inbox));
         Ok(Self {
             json: settings.json.as_ref().map(Json::new).transpose()?,
             tum: settings.tum.as_deref().map(Tum::new).transpose()?,
+            mcap: settings.mcap.as_ref().map(Mcap::new).transpose()?,
+            mqtt: settings.mqtt.as_ref().map(connect).transpose()?,
         })
     }
 
@@ -41,6 +49,12 @@ impl Sinks {
         }
         if let Some(tum) = &mut self.tum {
             tum.take(record).context("output.tum")?;
+        }
+        if let Some(mcap) = &mut self.mcap {
+            mcap.take(record).context("output.mcap")?;
+        }
+        if let Some(mqtt) = &mut self.mqtt {
+            mqtt.take(record);
         }
         Ok(())
     }
@@ -56,6 +70,9 @@ impl Sinks {
     }
 
     fn finish(mut self) -> Result<()> {
+        if let Some(mcap) = &mut self.mcap {
+            mcap.finish().context("output.mcap")?;
+        }
         self.flush()
     }
 }

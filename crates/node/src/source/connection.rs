@@ -8,7 +8,7 @@ use std::path::Path;
 use std::time::Duration;
 
 use crate::address::Address;
-use crate::inbox::{Inbox, Input};
+use crate::inbox::{Inbox, Input, Level};
 
 /// A reader looks this often whether the node ends.
 const LOOK: Duration = Duration::from_millis(200);
@@ -27,14 +27,15 @@ pub enum Event<'a> {
 
 /// Reads an address until the node ends, or a file or standard input does, and hands all to `take`.
 pub fn read(address: &Address, source: &'static str, inbox: &Inbox, mut take: impl FnMut(Event<'_>)) {
-    let remark = |text: String| inbox.put(Input::Remark { source, text });
+    let remark = |text: String| inbox.put(Input::warning(source, text));
     let mut said = String::new();
     let mut opener = Opener::default();
     while !inbox.is_closed() {
         match opener.open(address) {
             Ok(Some(mut stream)) => {
                 if !said.is_empty() {
-                    remark(format!("{address}: connected"));
+                    let (level, text) = (Level::Info, format!("{address}: connected"));
+                    inbox.put(Input::Remark { level, source, text });
                     said.clear();
                 }
                 take(Event::Begin);

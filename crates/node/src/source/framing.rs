@@ -198,7 +198,7 @@ impl Framing {
                         ),
                     };
                     let source = self.health.name;
-                    self.inbox.put(Input::Remark { source, text });
+                    self.inbox.put(Input::warning(source, text));
                 }
                 start_s
             }
@@ -227,7 +227,7 @@ impl Framing {
             if !std::mem::replace(&mut self.told_of_defects, true) {
                 let text = "samples that are no numbers were set to 0; check samples.format".to_owned();
                 let source = self.health.name;
-                self.inbox.put(Input::Remark { source, text });
+                self.inbox.put(Input::warning(source, text));
             }
         }
         self.inbox.put(Input::Samples(Block { time_s, antennas }));

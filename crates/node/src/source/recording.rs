@@ -96,7 +96,7 @@ pub fn run(recording: Recording, start_s: f64, inbox: &Inbox, health: &Arc<Sourc
             }
             Err(error) => {
                 let (source, text) = ("samples", error.to_string());
-                inbox.put(Input::Remark { source, text });
+                inbox.put(Input::warning(source, text));
                 break;
             }
         }

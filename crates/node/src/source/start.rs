@@ -214,7 +214,7 @@ fn messages(address: &Address, inbox: &Inbox, health: &SourceHealth) {
                 // The first few tell enough.
                 if health.defects() <= 10 || health.defects().is_multiple_of(1000) {
                     let (source, text) = ("messages", format!("{address}: left out, {why}"));
-                    inbox.put(Input::Remark { source, text });
+                    inbox.put(Input::warning(source, text));
                 }
             }
         }

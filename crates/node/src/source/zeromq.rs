@@ -27,11 +27,7 @@ pub fn run(endpoints: &[Address], mut framing: Framing, inbox: &Inbox) {
         let (error, received) = session(endpoints, &mut framing, inbox);
         let text = error.to_string();
         if received || text != said {
-            let source = "samples";
-            inbox.put(Input::Remark {
-                source,
-                text: text.clone(),
-            });
+            inbox.put(Input::warning("samples", text.clone()));
             said = text;
         }
         std::thread::sleep(RETRY);

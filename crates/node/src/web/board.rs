@@ -7,8 +7,8 @@ use std::time::{Duration, Instant};
 use onboard::live::{HeadStatus, LiveEnergy, Status};
 use serde_json::{Value, json};
 
-use crate::inbox::Inbox;
-use crate::sink::{Level, Queue};
+use crate::inbox::{Inbox, Level};
+use crate::sink::Queue;
 use crate::statistics::{Punctuality, SourceHealth};
 
 /// Events that the page shows.
