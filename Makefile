@@ -7,13 +7,20 @@ SOURCES := $(shell find crates sites vehicles scenarios platforms -type f 2>/dev
 DATA := $(abspath $(or $(ACCESS_AV_DATA),../shared/data))
 
 .DEFAULT_GOAL := help
-.PHONY: help demo test attack test-aarch64 count-aarch64 package lint lint-python docs figures picture bench clean
+.PHONY: help demo live test attack test-aarch64 count-aarch64 package lint lint-python docs figures picture bench clean
 
 help: ## List these commands
 	@sed -n 's/^\([a-z0-9-]*\):.*## /  make \1\t/p' $(MAKEFILE_LIST) | expand -t 20
 
 demo: .venv/installed ## Install into .venv, evaluate the paper under every reading, write results/latest/report.html
 	$(BIN)/access-av evaluate
+
+NODE := target/release/access-av-node
+live: .venv/installed-live $(NODE) ## Drive a simulated yard in real time into the node, and open its page (Ctrl-C ends it)
+	$(BIN)/python examples/live/live.py --node $(NODE) $(LIVE)
+
+$(NODE): $(SOURCES)
+	cargo build --release --package access-av-node
 
 test: .venv/installed-test ## Run every test: Rust, static checks of the Python side, pytest
 	cargo test --workspace --quiet
@@ -97,6 +104,10 @@ clean: ## Remove what was built (results stay)
 AS_RUST_TESTS := --config-settings build-args='--profile dev'
 .venv/installed-test: .venv/bin/python $(SOURCES) $(wildcard .venv/installed)
 	$(BIN)/python -m pip install --quiet --editable '.[test]' $(if $(wildcard .venv/installed),,$(AS_RUST_TESTS))
+	@touch $@
+
+.venv/installed-live: .venv/installed
+	$(BIN)/python -m pip install --quiet --editable '.[live]'
 	@touch $@
 
 .venv/installed-bench: .venv/installed

@@ -29,8 +29,8 @@ if TYPE_CHECKING:
     from numpy.typing import NDArray
 
 FULL_SCALE = 32768.0
-# Samples of each answer: 4 ms at 3.84 Msps.
-ANSWER = 15360
+# Samples of each answer: 1 ms at 3.84 Msps, as a base station's slot.
+ANSWER = 3840
 
 
 class Drive:
@@ -39,8 +39,10 @@ class Drive:
     def __init__(self, folder: Path) -> None:
         metadata = json.loads((folder / "iq.sigmf-meta").read_text(encoding="utf-8"))
         self.rate_hz = float(metadata["global"]["core:sample_rate"])
+        self.centre_mhz = metadata["captures"][0]["core:frequency"] / 1e6
         self.antennas = int(metadata["global"]["core:num_channels"])
-        assert metadata["global"]["core:datatype"] == "ci16_le"
+        if metadata["global"]["core:datatype"] != "ci16_le":
+            raise SystemExit(f"{folder}: core:datatype must be ci16_le")
         self.samples = np.memmap(folder / "iq.sigmf-data", dtype="<i2", mode="r")
         self.samples = self.samples.reshape(-1, self.antennas, 2)
         self.captures = [
@@ -162,7 +164,7 @@ class Transmitter:
         self.server.close()
 
 
-def node_toml(transmitter: Transmitter, centre_mhz: float, page: str) -> str:
+def node_toml(transmitter: Transmitter, page: str) -> str:
     """Settings of a node that listens to a transmitter."""
     antennas = list(range(transmitter.drive.antennas))
     return f"""\
@@ -175,7 +177,7 @@ endpoints = {json.dumps(transmitter.endpoints)}
 
 [samples.stream]
 rate_msps = {transmitter.drive.rate_hz / 1e6}
-centre_mhz = {centre_mhz}
+centre_mhz = {transmitter.drive.centre_mhz}
 antennas = {antennas}
 clock.start-time-s = 0.0
 
@@ -186,7 +188,7 @@ listen = "{page}"
 
 def main() -> None:
     parser = argparse.ArgumentParser(description=__doc__.splitlines()[0])
-    parser.add_argument("drive", type=Path)
+    parser.add_argument("drive", type=Path, metavar="DRIVE")
     parser.add_argument("--port", type=int, default=2000)
     parser.add_argument("--odometry-port", type=int, default=2100)
     parser.add_argument("--once", action="store_true")

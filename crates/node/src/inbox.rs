@@ -10,12 +10,12 @@ use onboard::live::AngleObservation;
 use onboard::observation::OdometrySample;
 use serde::Serialize;
 
-/// Bytes of samples that wait at most: 0.13 s of four antennas at 3.84 Msps.
-pub const MOST_SAMPLE_BYTES: usize = 16 << 20;
+/// Bytes of samples that wait at most: 0.1 s of four antennas at 3.84 Msps.
+pub const MOST_SAMPLE_BYTES: usize = 12 << 20;
 /// Other things that wait at most.
 pub const MOST_OTHERS: usize = 4096;
 /// Buffers of blocks kept for reuse.
-const MOST_SPARE: usize = 64;
+const MOST_SPARE: usize = 8;
 
 /// Samples of every antenna of the array, in its order.
 #[derive(Debug, Default)]
@@ -250,11 +250,11 @@ mod tests {
         for number in 0..12 {
             inbox.put(block(f64::from(number)));
         }
-        // A block is 2 MiB: eight fit.
-        assert_eq!(inbox.dropped(), [4, 0]);
+        // A block is 2 MiB: six fit.
+        assert_eq!(inbox.dropped(), [6, 0]);
         let wait = Duration::ZERO;
         assert!(matches!(inbox.take(wait), Some((_, Input::Odometry(_)))));
-        for number in 4..12 {
+        for number in 6..12 {
             let Some((_, Input::Samples(block))) = inbox.take(wait) else {
                 panic!("no samples");
             };
