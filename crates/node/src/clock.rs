@@ -120,7 +120,8 @@ impl DriveClock {
 
     /// What time it is; `None` before anything came in.
     pub fn now_s(&self) -> Option<f64> {
-        self.0.map(|(time_s, at)| time_s + at.elapsed().as_secs_f64())
+        self.0
+            .map(|(time_s, at)| time_s + at.elapsed().as_secs_f64())
     }
 
     /// Begins anew.
@@ -138,7 +139,8 @@ mod tests {
 
     /// Blocks of 1 ms, each delayed by up to 20 ms but one in ten; `lost_s` before block `at`.
     fn run(drift: f64, lost: Option<(usize, f64)>, blocks: usize) -> (Vec<f64>, Vec<Finding>) {
-        let (mut clock, mut found, mut errors_s) = (ArrivalClock::new(RATE_HZ), Vec::new(), Vec::new());
+        let (mut clock, mut found, mut errors_s) =
+            (ArrivalClock::new(RATE_HZ), Vec::new(), Vec::new());
         let mut lost_s = 0.0;
         for number in 0..blocks {
             if let Some((at, by_s)) = lost
@@ -147,7 +149,11 @@ mod tests {
                 lost_s = by_s;
             }
             let true_s = 1.7e9 + number as f64 * 1e-3 * (1.0 + drift) + lost_s;
-            let delay_s = if number % 10 == 0 { 1e-4 } else { 1e-3 * (number * 7 % 20) as f64 };
+            let delay_s = if number % 10 == 0 {
+                1e-4
+            } else {
+                1e-3 * (number * 7 % 20) as f64
+            };
             let (time_s, finding) = clock.block(BLOCK, true_s + 1e-3 + delay_s);
             errors_s.push(time_s - true_s);
             found.extend(finding);

@@ -47,7 +47,12 @@ impl Setup {
     /// # Errors
     /// [`LiveError`] where these do not go together.
     pub fn live(&self) -> Result<Live, LiveError> {
-        let Self { site, vehicle, platform, stream } = self;
+        let Self {
+            site,
+            vehicle,
+            platform,
+            stream,
+        } = self;
         Live::new(site, vehicle, platform, None, *stream, Custom::default())
     }
 }
@@ -154,12 +159,16 @@ impl Engine {
             Input::Angle(angle) => {
                 self.clock.see(angle.time_s);
                 if let Err(error) = self.live.angle(&angle) {
-                    self.refused("angles", &error)?;
+                    self.refused("angles", &error);
                 }
                 self.publish_heard(Some(came))?;
             }
-            Input::Command(command) => self.command(command)?,
-            Input::Remark { level, source, text } => self.event(level, source, text),
+            Input::Command(command) => self.command(command),
+            Input::Remark {
+                level,
+                source,
+                text,
+            } => self.event(level, source, text),
             Input::End => {}
         }
         Ok(())
@@ -198,15 +207,19 @@ impl Engine {
         for (antenna, samples) in antennas.iter_mut().zip(&self.pending.antennas) {
             *antenna = samples;
         }
-        let antennas = antennas.get(..self.pending.antennas.len()).unwrap_or_default();
+        let antennas = antennas
+            .get(..self.pending.antennas.len())
+            .unwrap_or_default();
         let taken = if self.pending.length() > 0 {
-            self.live.receive(self.pending.time_s, antennas, ends).map(drop)
+            self.live
+                .receive(self.pending.time_s, antennas, ends)
+                .map(drop)
         } else {
             self.live.end_stretch()
         };
         self.pending.antennas.iter_mut().for_each(Vec::clear);
         if let Err(error) = taken {
-            self.refused("samples", &error)?;
+            self.refused("samples", &error);
         }
         self.live.hear_before(f64::INFINITY)
     }
@@ -247,14 +260,23 @@ impl Engine {
         match self.live.odometry(sample) {
             Ok(_) => {}
             Err(LiveError::Odometry(OdometryDefect::TimeReversed))
-                if self.clock.now_s().is_some_and(|now_s| sample.time_s < now_s - RESTART_S) =>
+                if self
+                    .clock
+                    .now_s()
+                    .is_some_and(|now_s| sample.time_s < now_s - RESTART_S) =>
             {
-                let text = format!("odometry goes back to {:.3} s: everything begins anew", sample.time_s);
+                let text = format!(
+                    "odometry goes back to {:.3} s: everything begins anew",
+                    sample.time_s
+                );
                 self.event(Level::Warn, "odometry", text);
                 self.restart()?;
                 self.live.odometry(sample)?;
             }
-            Err(error) => return self.refused("odometry", &error),
+            Err(error) => {
+                self.refused("odometry", &error);
+                return Ok(());
+            }
         }
         self.clock.see(sample.time_s);
         let status = self.live.status(sample.time_s)?;
@@ -283,9 +305,13 @@ impl Engine {
         Ok(())
     }
 
-    fn command(&mut self, command: Command) -> Result<(), LiveError> {
+    fn command(&mut self, command: Command) {
         let done = match command {
-            Command::SetPose { time_s, pose, covariance } => {
+            Command::SetPose {
+                time_s,
+                pose,
+                covariance,
+            } => {
                 let newest_s = self.live.onboard().newest_odometry().map(|it| it.time_s);
                 let time_s = time_s.or(newest_s).unwrap_or(0.0);
                 self.live.set_pose(time_s, pose, covariance)
@@ -298,7 +324,6 @@ impl Engine {
             Ok(()) => {
                 self.gate.open();
                 self.event(Level::Info, "messages", format!("done: {command:?}"));
-                Ok(())
             }
             Err(error) => self.refused("messages", &error),
         }
@@ -362,7 +387,8 @@ impl Engine {
         if self.board.is_due() {
             let (heads, energy) = (self.live.heads(), self.live.energy());
             let taken_s = self.live.stream_counts().taken_s;
-            self.board.show(now_s, &self.live.status(now_s)?, heads, &energy, taken_s);
+            self.board
+                .show(now_s, &self.live.status(now_s)?, heads, &energy, taken_s);
         }
         if now_s - self.last_status_s >= STATUS_S {
             self.last_status_s = now_s;
@@ -376,17 +402,21 @@ impl Engine {
         Ok(())
     }
 
-    /// Input that was refused is an event; what the pipeline cannot go on from ends it.
-    fn refused(&mut self, source: &'static str, error: &LiveError) -> Result<(), LiveError> {
+    /// Input that was refused is an event.
+    fn refused(&mut self, source: &'static str, error: &LiveError) {
         self.event(Level::Warn, source, format!("left out: {error}"));
-        Ok(())
     }
 
     /// Hands on an event.
     pub fn event(&mut self, level: Level, source: &'static str, text: String) {
         let time_s = self.clock.now_s();
         self.board.event(time_s, level, source, &text);
-        self.records.put(Record::Event { time_s, level, source, text });
+        self.records.put(Record::Event {
+            time_s,
+            level,
+            source,
+            text,
+        });
     }
 
     /// Notes a time of the drive.

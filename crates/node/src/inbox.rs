@@ -109,7 +109,11 @@ impl Input {
     /// Something that needs watching.
     pub const fn warning(source: &'static str, text: String) -> Self {
         let level = Level::Warn;
-        Self::Remark { level, source, text }
+        Self::Remark {
+            level,
+            source,
+            text,
+        }
     }
 }
 
@@ -218,15 +222,12 @@ impl Waiting {
         let Some(place) = self.inputs.iter().position(of_kind) else {
             return false;
         };
-        match self.inputs.remove(place) {
-            Some((_, Input::Samples(block))) => {
-                self.sample_bytes -= block.bytes();
-                self.dropped_blocks += 1;
-            }
-            _ => {
-                self.others -= 1;
-                self.dropped_others += 1;
-            }
+        if let Some((_, Input::Samples(block))) = self.inputs.remove(place) {
+            self.sample_bytes -= block.bytes();
+            self.dropped_blocks += 1;
+        } else {
+            self.others -= 1;
+            self.dropped_others += 1;
         }
         true
     }
@@ -262,7 +263,12 @@ mod tests {
             inbox.give_back(block.antennas);
         }
         assert!(inbox.take(wait).is_none());
-        assert!(inbox.buffers(4).iter().all(|it| it.is_empty() && it.capacity() > 0));
+        assert!(
+            inbox
+                .buffers(4)
+                .iter()
+                .all(|it| it.is_empty() && it.capacity() > 0)
+        );
     }
 
     #[test]
@@ -271,7 +277,10 @@ mod tests {
         for number in 0..10_000 {
             inbox.put(Input::Slept(f64::from(number)));
         }
-        assert!(matches!(inbox.take(Duration::ZERO), Some((_, Input::Slept(9999.0)))));
+        assert!(matches!(
+            inbox.take(Duration::ZERO),
+            Some((_, Input::Slept(9999.0)))
+        ));
         assert!(inbox.take(Duration::ZERO).is_none());
         for _ in 0..MOST_OTHERS + 3 {
             inbox.put(Input::Command(Command::Reset));

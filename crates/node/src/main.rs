@@ -8,9 +8,9 @@ use std::sync::atomic::{AtomicBool, Ordering};
 use std::time::Duration;
 
 use access_av_node::engine::{Engine, Setup};
+use access_av_node::inbox::Level;
 use access_av_node::playback;
 use access_av_node::settings::{NodeSettings, PageSettings};
-use access_av_node::inbox::Level;
 use access_av_node::sink::{self, Queue, Sinks};
 use access_av_node::source::{self, Sources};
 use access_av_node::statistics::Punctuality;
@@ -85,7 +85,12 @@ fn run(arguments: &Arguments) -> Result<String> {
         None => as_stated(&site, &vehicle),
         Some(_) => (site, vehicle),
     };
-    let setup = Setup { site, vehicle, platform, stream: sources.stream };
+    let setup = Setup {
+        site,
+        vehicle,
+        platform,
+        stream: sources.stream,
+    };
     let live = setup.live()?;
     drop(live);
     if arguments.dry_run {
@@ -142,7 +147,9 @@ fn drive(settings: &NodeSettings, setup: Setup, mut sources: Sources) -> Result<
             punctuality: Arc::clone(&punctuality),
             sources: sources.health.clone(),
             rate_hz: sources.stream.map_or(0.0, |it| it.rate_hz),
-            heads: heads.map(|it| (it.pci, it.ssb_index, it.name.clone())).collect(),
+            heads: heads
+                .map(|it| (it.pci, it.ssb_index, it.name.clone()))
+                .collect(),
         },
     ));
     let stop = Arc::new(AtomicBool::new(false));
@@ -157,11 +164,17 @@ fn drive(settings: &NodeSettings, setup: Setup, mut sources: Sources) -> Result<
         gate,
         settings.sleep && !is_playback,
     )?;
-    serve(settings.page.clone(), &board, site, &stop)?;
+    serve(settings.page.as_ref(), &board, site, &stop)?;
     let writing = sink::start(sinks, Arc::clone(&records))?;
     engine.event(Level::Info, "node", format!("{} begins", settings.name));
     let driven = if is_playback {
-        playback::play(&mut engine, sources.files, &sources.health, settings.pace, &stop)
+        playback::play(
+            &mut engine,
+            sources.files,
+            &sources.health,
+            settings.pace,
+            &stop,
+        )
     } else {
         source::start(settings, &mut sources)?;
         let silent_after = Duration::from_secs_f64(settings.silent_after_s);
@@ -180,13 +193,15 @@ fn drive(settings: &NodeSettings, setup: Setup, mut sources: Sources) -> Result<
 
 /// Serves the page if there is to be one, and heeds signals, on a thread of its own.
 fn serve(
-    page: Option<PageSettings>,
+    page: Option<&PageSettings>,
     board: &Arc<Board>,
     site: serde_json::Value,
     stop: &Arc<AtomicBool>,
 ) -> Result<()> {
-    let runtime = tokio::runtime::Builder::new_current_thread().enable_all().build()?;
-    let listener = match &page {
+    let runtime = tokio::runtime::Builder::new_current_thread()
+        .enable_all()
+        .build()?;
+    let listener = match page {
         Some(page) => {
             let listener = runtime.block_on(web::open(page))?;
             let address = listener.local_addr()?;

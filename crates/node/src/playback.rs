@@ -33,7 +33,9 @@ pub fn play(
     pace: Pace,
     stop: &AtomicBool,
 ) -> Result<()> {
-    let blocks = files.recording.map(|(recording, start_s)| Blocks::new(recording, start_s, BLOCK_S));
+    let blocks = files
+        .recording
+        .map(|(recording, start_s)| Blocks::new(recording, start_s, BLOCK_S));
     let mut player = Player {
         engine,
         blocks,
@@ -119,7 +121,9 @@ impl Player<'_> {
             let (burst, later) = self.angles.split_at(first_burst(self.angles));
             self.wait_for(first.ssb.time_s);
             for angle in burst {
-                self.engine.live_mut().angle(&AngleObservation::from(angle))?;
+                self.engine
+                    .live_mut()
+                    .angle(&AngleObservation::from(angle))?;
             }
             self.engine.live_mut().settle()?;
             self.engine.publish_heard(None)?;

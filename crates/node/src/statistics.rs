@@ -189,7 +189,10 @@ mod tests {
             (found.p99_s, 9.9e-3),
             (found.p999_s, 9.99e-3),
         ] {
-            assert!((found_s / expected_s - 1.0).abs() < 0.13, "{found_s} {expected_s}");
+            assert!(
+                (found_s / expected_s - 1.0).abs() < 0.13,
+                "{found_s} {expected_s}"
+            );
         }
         assert!((found.most_s - 1e-2).abs() < 1e-8);
         let (_, all) = *histogram.cumulative().last().unwrap();

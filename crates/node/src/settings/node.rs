@@ -156,7 +156,8 @@ impl TomlFile for NodeSettings {
         }
         if let Some(SampleSource::Raw { address, .. }) = &self.samples {
             let good = !matches!(address, Address::Udp(_));
-            let allowed = "samples that are lost on the way would go unnoticed: use TCP, Unix or `-`";
+            let allowed =
+                "samples that are lost on the way would go unnoticed: use TCP, Unix or `-`";
             check.that(good, "samples.address", address, allowed)?;
         }
         let standard = |it: &Address| *it == Address::Standard;
@@ -170,7 +171,9 @@ impl TomlFile for NodeSettings {
         if let Some(stream) = self.samples.as_ref().and_then(SampleSource::stream) {
             let mut sorted = stream.antennas.clone();
             sorted.sort_unstable();
-            let each_once = (0..).zip(&sorted).all(|(k, antenna): (u8, _)| k == *antenna);
+            let each_once = (0..)
+                .zip(&sorted)
+                .all(|(k, antenna): (u8, _)| k == *antenna);
             check.that(
                 each_once,
                 "samples.stream.antennas",

@@ -29,7 +29,11 @@ pub fn keep_newest(folder: &Path, prefix: &str, ending: &str, keep: usize) -> io
     let mut found: Vec<PathBuf> = Vec::new();
     for entry in fs::read_dir(folder)? {
         let path = entry?.path();
-        let name = path.file_name().unwrap_or_default().to_string_lossy().into_owned();
+        let name = path
+            .file_name()
+            .unwrap_or_default()
+            .to_string_lossy()
+            .into_owned();
         if name.starts_with(prefix) && name.ends_with(ending) {
             found.push(path);
         }

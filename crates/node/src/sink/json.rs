@@ -51,12 +51,19 @@ impl Json {
                 Way::Clients(listener, Vec::new())
             }
             Address::Udp(socket) => {
-                let any = if socket.starts_with('[') { "[::]:0" } else { "0.0.0.0:0" };
+                let any = if socket.starts_with('[') {
+                    "[::]:0"
+                } else {
+                    "0.0.0.0:0"
+                };
                 let from = UdpSocket::bind(any).with_context(named)?;
                 from.set_nonblocking(true).with_context(named)?;
                 Way::Datagrams(from, socket.clone())
             }
-            _ => bail!("{}: it must be `-`, tcp-listen://, udp:// or a path", named()),
+            _ => bail!(
+                "{}: it must be `-`, tcp-listen://, udp:// or a path",
+                named()
+            ),
         };
         Ok(Self {
             way,

@@ -83,13 +83,23 @@ impl Mcap {
                 let writer = self.writer(ssb.time_s)?;
                 Ok(writer.verdict(VERDICT_TOPIC, &outcome.execution)?)
             }
-            Record::Status { status, heads, time_s, .. } => {
+            Record::Status {
+                status,
+                heads,
+                time_s,
+                ..
+            } => {
                 let input = self.input();
                 let writer = self.writer(*time_s)?;
                 writer.diagnostics(*time_s, &[diagnosis(status, heads), input])?;
                 self.rotate(*time_s)
             }
-            Record::Event { level, source, text, .. } => {
+            Record::Event {
+                level,
+                source,
+                text,
+                ..
+            } => {
                 self.events.push((*level, format!("{source}: {text}")));
                 Ok(())
             }
@@ -102,7 +112,9 @@ impl Mcap {
         self.odom_s = Some(status.time_s);
         if (0.0..10.0).contains(&elapsed_s) {
             let turn_rad = status.yaw_rate_radps.unwrap_or(0.0) * elapsed_s;
-            self.odom = self.odom.along_chord(status.speed_mps * elapsed_s, turn_rad);
+            self.odom = self
+                .odom
+                .along_chord(status.speed_mps * elapsed_s, turn_rad);
         }
         let (Some(pose), true) = (
             status.pose,
@@ -141,7 +153,11 @@ impl Mcap {
             let path = self.settings.folder.join(name);
             self.number += 1;
             let writer = McapWriter::compressed(create(&path)?)?;
-            self.file = Some(Open { path, writer, began_s: time_s });
+            self.file = Some(Open {
+                path,
+                writer,
+                began_s: time_s,
+            });
             if let Some(keep) = self.settings.keep {
                 keep_newest(&self.settings.folder, PREFIX, ".mcap", keep)?;
             }
@@ -176,7 +192,10 @@ impl Mcap {
     /// What was remarkable since the last diagnosis.
     fn input(&mut self) -> DiagnosticStatus {
         let events = std::mem::take(&mut self.events);
-        let warns = events.iter().filter(|(level, _)| *level == Level::Warn).count();
+        let warns = events
+            .iter()
+            .filter(|(level, _)| *level == Level::Warn)
+            .count();
         let (level, message) = match warns {
             0 => (DiagnosticLevel::Ok, "nothing to remark".to_owned()),
             1 => (DiagnosticLevel::Warn, "1 remarkable item".to_owned()),
@@ -187,7 +206,9 @@ impl Mcap {
             level,
             name: "access_av: input".to_owned(),
             message,
-            values: values.zip(events.into_iter().map(|(_, text)| text)).collect(),
+            values: values
+                .zip(events.into_iter().map(|(_, text)| text))
+                .collect(),
         }
     }
 }
@@ -218,7 +239,10 @@ fn diagnosis(status: &Status, heads: &[HeadStatus]) -> DiagnosticStatus {
     };
     let mut values = vec![
         ("state".to_owned(), status.state.name().to_owned()),
-        ("what to do".to_owned(), status.reason.what_to_do().to_owned()),
+        (
+            "what to do".to_owned(),
+            status.reason.what_to_do().to_owned(),
+        ),
         ("tracked SSBs".to_owned(), status.tracked.to_string()),
     ];
     if let Some(level_m) = status.protection_level_m {
@@ -226,9 +250,14 @@ fn diagnosis(status: &Status, heads: &[HeadStatus]) -> DiagnosticStatus {
     }
     for head in heads {
         let name = format!("PCI {}, SSB {}", head.head.pci, head.head.ssb_index);
-        let snr = head.snr_db.map_or("not heard".to_owned(), |it| format!("{it:.1} dB"));
+        let snr = head
+            .snr_db
+            .map_or("not heard".to_owned(), |it| format!("{it:.1} dB"));
         let (accepted, refused) = (head.accepted, head.refused);
-        values.push((name, format!("{snr}, {accepted} accepted, {refused} refused")));
+        values.push((
+            name,
+            format!("{snr}, {accepted} accepted, {refused} refused"),
+        ));
     }
     DiagnosticStatus {
         level,
@@ -244,8 +273,16 @@ mod tests {
 
     #[test]
     fn the_map_holds_odom_holds_the_vehicle() {
-        let in_map = Pose { x_m: 3.0, y_m: -4.0, heading_rad: 2.0 };
-        let in_odom = Pose { x_m: 10.0, y_m: 5.0, heading_rad: -0.7 };
+        let in_map = Pose {
+            x_m: 3.0,
+            y_m: -4.0,
+            heading_rad: 2.0,
+        };
+        let in_odom = Pose {
+            x_m: 10.0,
+            y_m: 5.0,
+            heading_rad: -0.7,
+        };
         let odom = between(in_map, in_odom);
         let (sin, cos) = odom.heading_rad.sin_cos();
         let x_m = odom.x_m + cos * in_odom.x_m - sin * in_odom.y_m;

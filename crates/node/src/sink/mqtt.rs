@@ -34,7 +34,13 @@ impl Mqtt {
         let mut options = MqttOptions::new(id, settings.host.clone(), settings.port);
         options.set_keep_alive(Duration::from_secs(10));
         let (client, mut connection) = Client::new(options, WAITING);
-        let remark = move |level, text| inbox.put(Input::Remark { level, source: "mqtt", text });
+        let remark = move |level, text| {
+            inbox.put(Input::Remark {
+                level,
+                source: "mqtt",
+                text,
+            });
+        };
         let work = move || {
             let mut said = String::new();
             for event in connection.iter() {
@@ -80,7 +86,9 @@ impl Mqtt {
             self.last_s = status.time_s;
             let payload = object.to_string();
             let topic = self.settings.topic.clone();
-            let _ = self.client.try_publish(topic, QoS::AtMostOnce, false, payload);
+            let _ = self
+                .client
+                .try_publish(topic, QoS::AtMostOnce, false, payload);
         }
     }
 }

@@ -40,7 +40,10 @@ impl Queue {
     pub fn put(&self, record: Record) {
         let mut waiting = self.waiting.lock().unwrap_or_else(PoisonError::into_inner);
         while self.waits && waiting.records.len() >= MOST && !waiting.is_closed {
-            waiting = self.taken.wait(waiting).unwrap_or_else(PoisonError::into_inner);
+            waiting = self
+                .taken
+                .wait(waiting)
+                .unwrap_or_else(PoisonError::into_inner);
         }
         if waiting.records.len() >= MOST {
             waiting.records.pop_front();
@@ -64,13 +67,19 @@ impl Queue {
 
     /// No more will come.
     pub fn close(&self) {
-        self.waiting.lock().unwrap_or_else(PoisonError::into_inner).is_closed = true;
+        self.waiting
+            .lock()
+            .unwrap_or_else(PoisonError::into_inner)
+            .is_closed = true;
         self.came.notify_all();
         self.taken.notify_all();
     }
 
     /// Records that were dropped.
     pub fn dropped(&self) -> u64 {
-        self.waiting.lock().unwrap_or_else(PoisonError::into_inner).dropped
+        self.waiting
+            .lock()
+            .unwrap_or_else(PoisonError::into_inner)
+            .dropped
     }
 }

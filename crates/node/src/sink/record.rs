@@ -83,7 +83,12 @@ impl Record {
                     "residual_rad": outcome.residual_rad,
                 })
             }
-            Self::Status { status, heads, energy, time_s } => {
+            Self::Status {
+                status,
+                heads,
+                energy,
+                time_s,
+            } => {
                 let mut value = status_json(status);
                 value["type"] = json!("status");
                 value["now_s"] = json!(time_s);
@@ -92,7 +97,12 @@ impl Record {
                 value["energy"] = energy_json(energy);
                 value
             }
-            Self::Event { time_s, level, source, text } => json!({
+            Self::Event {
+                time_s,
+                level,
+                source,
+                text,
+            } => json!({
                 "type": "event", "time_s": time_s, "level": level, "source": source, "text": text,
             }),
         }

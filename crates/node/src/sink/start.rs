@@ -92,5 +92,7 @@ pub fn start(mut sinks: Sinks, records: Arc<Queue>) -> Result<JoinHandle<Result<
         }
         sinks.finish()
     };
-    Ok(thread::Builder::new().name("sinks".to_owned()).spawn(write)?)
+    Ok(thread::Builder::new()
+        .name("sinks".to_owned())
+        .spawn(write)?)
 }

@@ -25,12 +25,16 @@ impl Tum {
 
     /// Writes a pose; none while the first is searched for.
     pub fn take(&mut self, record: &Record) -> Result<()> {
-        if let Record::Pose(PoseRecord { status, by: By::Odometry }) = record
+        if let Record::Pose(PoseRecord {
+            status,
+            by: By::Odometry,
+        }) = record
             && let Some(pose) = status.pose
             && !matches!(status.state, State::Waiting | State::Searching)
         {
             let time_s = status.time_s;
-            self.0.write_all(tum_text(&[TimedPose { time_s, pose }]).as_bytes())?;
+            self.0
+                .write_all(tum_text(&[TimedPose { time_s, pose }]).as_bytes())?;
         }
         Ok(())
     }

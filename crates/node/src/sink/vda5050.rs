@@ -11,7 +11,7 @@ use crate::settings::{MqttOutput, VdaVersion};
 pub struct Localized {
     after_s: f64,
     lost_after_s: f64,
-    is_localized: bool,
+    now: bool,
     /// Since when the state says otherwise (s).
     since_s: Option<f64>,
 }
@@ -22,7 +22,7 @@ impl Localized {
         Self {
             after_s: settings.localized_after_s,
             lost_after_s: settings.lost_after_s,
-            is_localized: false,
+            now: false,
             since_s: None,
         }
     }
@@ -30,16 +30,20 @@ impl Localized {
     /// Whether it is, now that the state is this.
     pub fn judge(&mut self, state: State, time_s: f64) -> bool {
         let says = state.is_localized();
-        if says == self.is_localized {
+        if says == self.now {
             self.since_s = None;
-            return self.is_localized;
+            return self.now;
         }
         let since_s = *self.since_s.get_or_insert(time_s);
-        let wait_s = if says { self.after_s } else { self.lost_after_s };
+        let wait_s = if says {
+            self.after_s
+        } else {
+            self.lost_after_s
+        };
         if time_s - since_s >= wait_s {
-            (self.is_localized, self.since_s) = (says, None);
+            (self.now, self.since_s) = (says, None);
         }
-        self.is_localized
+        self.now
     }
 }
 
@@ -47,7 +51,8 @@ impl Localized {
 pub fn position(status: &Status, localized: bool, settings: &MqttOutput) -> Option<Value> {
     let pose = status.pose?;
     let theta = pose.heading_rad;
-    let mut object = json!({"x": pose.x_m, "y": pose.y_m, "theta": theta, "mapId": settings.map_id});
+    let mut object =
+        json!({"x": pose.x_m, "y": pose.y_m, "theta": theta, "mapId": settings.map_id});
     let name = match settings.vda5050 {
         VdaVersion::V2 => "positionInitialized",
         VdaVersion::V3 => "localized",

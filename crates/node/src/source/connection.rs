@@ -26,7 +26,12 @@ pub enum Event<'a> {
 }
 
 /// Reads an address until the node ends, or a file or standard input does, and hands all to `take`.
-pub fn read(address: &Address, source: &'static str, inbox: &Inbox, mut take: impl FnMut(Event<'_>)) {
+pub fn read(
+    address: &Address,
+    source: &'static str,
+    inbox: &Inbox,
+    mut take: impl FnMut(Event<'_>),
+) {
     let remark = |text: String| inbox.put(Input::warning(source, text));
     let mut said = String::new();
     let mut opener = Opener::default();
@@ -35,7 +40,11 @@ pub fn read(address: &Address, source: &'static str, inbox: &Inbox, mut take: im
             Ok(Some(mut stream)) => {
                 if !said.is_empty() {
                     let (level, text) = (Level::Info, format!("{address}: connected"));
-                    inbox.put(Input::Remark { level, source, text });
+                    inbox.put(Input::Remark {
+                        level,
+                        source,
+                        text,
+                    });
                     said.clear();
                 }
                 take(Event::Begin);
@@ -67,11 +76,7 @@ pub fn read(address: &Address, source: &'static str, inbox: &Inbox, mut take: im
     }
 }
 
-fn drain(
-    stream: &mut dyn Read,
-    inbox: &Inbox,
-    take: &mut impl FnMut(Event<'_>),
-) -> io::Result<()> {
+fn drain(stream: &mut dyn Read, inbox: &Inbox, take: &mut impl FnMut(Event<'_>)) -> io::Result<()> {
     let mut bytes = vec![0; CHUNK];
     while !inbox.is_closed() {
         match stream.read(&mut bytes) {
@@ -107,7 +112,10 @@ impl Opener {
             Address::File(path) => Box::new(File::open(path)?),
             Address::Tcp(socket) => Box::new(connect(socket)?),
             Address::TcpListen(socket) => {
-                let listener = self.tcp.take().map_or_else(|| TcpListener::bind(socket), Ok)?;
+                let listener = self
+                    .tcp
+                    .take()
+                    .map_or_else(|| TcpListener::bind(socket), Ok)?;
                 listener.set_nonblocking(true)?;
                 let accepted = listener.accept();
                 self.tcp = Some(listener);
@@ -141,7 +149,9 @@ impl Opener {
 /// Listens at a path; a socket that nobody listens at any more is left from a run before.
 fn listen_at(path: &Path) -> io::Result<UnixListener> {
     use std::os::unix::fs::FileTypeExt;
-    let is_socket = path.symlink_metadata().is_ok_and(|it| it.file_type().is_socket());
+    let is_socket = path
+        .symlink_metadata()
+        .is_ok_and(|it| it.file_type().is_socket());
     if is_socket && UnixStream::connect(path).is_err() {
         std::fs::remove_file(path)?;
     }

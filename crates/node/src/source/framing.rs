@@ -163,14 +163,21 @@ impl Framing {
         while first < frames {
             let count = MOST_FRAMES.min(frames - first);
             let block_s = start_s + first as f64 / rate_hz;
-            let place = |time_s: f64| ((time_s - block_s) * rate_hz).clamp(0.0, count as f64) as usize;
+            let place =
+                |time_s: f64| ((time_s - block_s) * rate_hz).clamp(0.0, count as f64) as usize;
             let wanted = self.gate.wanted();
             let [from, until] = wanted.map_or([0, count], |stretch| stretch.map(place));
             if from < until {
-                self.decode(channels, first + from, until - from, block_s + from as f64 / rate_hz);
+                self.decode(
+                    channels,
+                    first + from,
+                    until - from,
+                    block_s + from as f64 / rate_hz,
+                );
             }
             if until < count {
-                self.inbox.put(Input::Slept(block_s + count as f64 / rate_hz));
+                self.inbox
+                    .put(Input::Slept(block_s + count as f64 / rate_hz));
             }
             first += count;
         }
@@ -225,7 +232,8 @@ impl Framing {
         if !all_numbers {
             self.health.defect();
             if !std::mem::replace(&mut self.told_of_defects, true) {
-                let text = "samples that are no numbers were set to 0; check samples.format".to_owned();
+                let text =
+                    "samples that are no numbers were set to 0; check samples.format".to_owned();
                 let source = self.health.name;
                 self.inbox.put(Input::warning(source, text));
             }
@@ -289,8 +297,14 @@ mod tests {
     fn formats_and_what_is_no_number() {
         let one = Complex32::new(0.5, -1.0);
         for (format, bytes) in [
-            (SampleFormat::Cf32, [0.5f32.to_le_bytes(), (-1.0f32).to_le_bytes()].concat()),
-            (SampleFormat::Ci16, [16384i16.to_le_bytes(), (-32768i16).to_le_bytes()].concat()),
+            (
+                SampleFormat::Cf32,
+                [0.5f32.to_le_bytes(), (-1.0f32).to_le_bytes()].concat(),
+            ),
+            (
+                SampleFormat::Ci16,
+                [16384i16.to_le_bytes(), (-32768i16).to_le_bytes()].concat(),
+            ),
             (SampleFormat::Ci8, vec![64, 128]),
         ] {
             let mut framing = framing(format, &[0]);

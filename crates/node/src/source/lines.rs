@@ -49,7 +49,8 @@ mod tests {
 
     #[test]
     fn lines_are_the_same_however_they_come() {
-        let text = [b"one\n\ntwo\n".as_slice(), &[b'x'; LONGEST + 1], b"\nthree"].concat();
+        let long = vec![b'x'; LONGEST + 1];
+        let text = [b"one\n\ntwo\n".as_slice(), &long, b"\nthree"].concat();
         for piece in [1, 2, 7, 1000, text.len()] {
             let (mut lines, mut found) = (Lines::default(), Vec::new());
             for bytes in text.chunks(piece) {

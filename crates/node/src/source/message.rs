@@ -121,7 +121,8 @@ mod tests {
         };
         assert_eq!((sample.time_s, sample.speed_mps), (1.5, 2.0));
         assert!(sample.distance_m.is_nan() && sample.yaw_rate_radps.is_none());
-        let angle = br#"{"type":"angle","time_s":1,"pci":11,"phase_rad":0.1,"phase_sigma_rad":0.02}"#;
+        let angle =
+            br#"{"type":"angle","time_s":1,"pci":11,"phase_rad":0.1,"phase_sigma_rad":0.02}"#;
         assert!(matches!(parse(angle), Ok(Some(Input::Angle(it))) if it.pci == 11));
         let pose = br#"{"type":"set-pose","x_m":1,"y_m":2,"heading_rad":0}"#;
         assert!(matches!(
@@ -148,9 +149,15 @@ mod tests {
             ("[1]", "type"),
             (r#"{"type":"odometer"}"#, "odometry"),
             (r#"{"type":"odometry","time_s":1}"#, "speed_mps"),
-            (r#"{"type":"odometry","speed_mps":1,"speed":2}"#, "unknown field `speed`"),
+            (
+                r#"{"type":"odometry","speed_mps":1,"speed":2}"#,
+                "unknown field `speed`",
+            ),
             (r#"{"type":"odometry","speed_mps":1e999}"#, "out of range"),
-            (r#"{"type":"angle","time_s":1,"pci":-1,"phase_rad":0,"phase_sigma_rad":1}"#, "-1"),
+            (
+                r#"{"type":"angle","time_s":1,"pci":-1,"phase_rad":0,"phase_sigma_rad":1}"#,
+                "-1",
+            ),
         ] {
             let error = parse(line.as_bytes()).unwrap_err();
             assert!(error.contains(said), "{line}: {error}");

@@ -15,4 +15,4 @@ pub use lines::Lines;
 pub use message::parse;
 pub use recording::Blocks;
 pub use start::{Files, Sources, start};
-pub use zmtp::read_frame;
+pub use zmtp::{answer, greet};

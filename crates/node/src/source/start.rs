@@ -48,7 +48,11 @@ impl Sources {
     ///
     /// # Errors
     /// What is wrong with a file, or with samples that are not of this vehicle.
-    pub fn open(settings: &NodeSettings, antennas: usize, track_width_m: Option<f64>) -> Result<Self> {
+    pub fn open(
+        settings: &NodeSettings,
+        antennas: usize,
+        track_width_m: Option<f64>,
+    ) -> Result<Self> {
         let mut files = Files::default();
         let mut stream = None;
         let mut health = Vec::new();
@@ -64,7 +68,11 @@ impl Sources {
                 }
                 None => 0,
             };
-            let found = if let SampleSource::Sigmf { recording, start_time_s } = samples {
+            let found = if let SampleSource::Sigmf {
+                recording,
+                start_time_s,
+            } = samples
+            {
                 let recording = Recording::open_unverified(recording)?;
                 let centre_hz = recording.centre_frequency_hz().with_context(|| {
                     let file = recording.data_file().display();
@@ -103,7 +111,10 @@ impl Sources {
         Ok(Self {
             inbox: Arc::default(),
             gate: Arc::default(),
-            health: health.into_iter().map(|name| Arc::new(SourceHealth::new(name))).collect(),
+            health: health
+                .into_iter()
+                .map(|name| Arc::new(SourceHealth::new(name)))
+                .collect(),
             stream,
             files,
         })
@@ -138,15 +149,29 @@ pub fn start(settings: &NodeSettings, sources: &mut Sources) -> Result<()> {
                     spawn("samples", Box::new(work))?;
                 }
             }
-            SampleSource::Raw { address, format, stream } => {
+            SampleSource::Raw {
+                address,
+                format,
+                stream,
+            } => {
                 let framing = Framing::new(stream, *format, gate, inbox, health);
                 let address = address.clone();
-                spawn("samples", Box::new(move |inbox| raw::run(&address, framing, inbox)))?;
+                spawn(
+                    "samples",
+                    Box::new(move |inbox| raw::run(&address, framing, inbox)),
+                )?;
             }
-            SampleSource::Zeromq { endpoints, format, stream } => {
+            SampleSource::Zeromq {
+                endpoints,
+                format,
+                stream,
+            } => {
                 let framing = Framing::new(stream, *format, gate, inbox, health);
                 let endpoints = endpoints.clone();
-                spawn("samples", Box::new(move |inbox| zeromq::run(&endpoints, framing, inbox)))?;
+                spawn(
+                    "samples",
+                    Box::new(move |inbox| zeromq::run(&endpoints, framing, inbox)),
+                )?;
             }
             SampleSource::Soapy(_) => bail!(
                 "samples.source is soapy, and this program was built without the feature `soapy`"
@@ -166,17 +191,23 @@ pub fn start(settings: &NodeSettings, sources: &mut Sources) -> Result<()> {
         spawn("odometry", Box::new(move |inbox| play(log, inbox, &health)))?;
     }
     if let Some(health) = sources.health("angles") {
-        let log = files.angles.iter().map(|it| (it.ssb.time_s, Input::Angle(it.into()))).collect();
+        let log = files
+            .angles
+            .iter()
+            .map(|it| (it.ssb.time_s, Input::Angle(it.into())))
+            .collect();
         spawn("angles", Box::new(move |inbox| play(log, inbox, &health)))?;
     }
     let inbox = Arc::clone(&sources.inbox);
-    thread::Builder::new().name("sources".to_owned()).spawn(move || {
-        for thread in threads {
-            // A source that panicked has ended like any other.
-            let _ = thread.join();
-        }
-        inbox.put(Input::End);
-    })?;
+    thread::Builder::new()
+        .name("sources".to_owned())
+        .spawn(move || {
+            for thread in threads {
+                // A source that panicked has ended like any other.
+                let _ = thread.join();
+            }
+            inbox.put(Input::End);
+        })?;
     Ok(())
 }
 

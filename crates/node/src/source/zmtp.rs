@@ -30,7 +30,22 @@ pub fn greet(stream: &mut (impl Read + Write)) -> io::Result<()> {
     stream.write_all(&greeting)?;
     let mut theirs = [0_u8; 64];
     read_exact(stream, &mut theirs)?;
-    let [0xff, _, _, _, _, _, _, _, _, 0x7f, version, _, mechanism @ ..] = &theirs else {
+    let [
+        0xff,
+        _,
+        _,
+        _,
+        _,
+        _,
+        _,
+        _,
+        _,
+        0x7f,
+        version,
+        _,
+        mechanism @ ..,
+    ] = &theirs
+    else {
         return Err(invalid("what answers is no ZeroMQ"));
     };
     if *version < 3 {
@@ -187,7 +202,14 @@ mod tests {
     fn what_is_no_answer_is_refused_before_room_is_made_for_it() {
         let endless = [&[MORE, 0, LONG][..], &u64::MAX.to_be_bytes()].concat();
         let cut = [&[MORE, 0, LONG][..], &LONGEST.to_be_bytes(), &[0; 10]].concat();
-        for told in [&endless[..], &cut, &[0, 3, 1, 2, 3], &[0, 0], &[0x80, 0], &[MORE, 0]] {
+        for told in [
+            &endless[..],
+            &cut,
+            &[0, 3, 1, 2, 3],
+            &[0, 0],
+            &[0x80, 0],
+            &[MORE, 0],
+        ] {
             let mut samples = Vec::new();
             assert!(answer(&mut Peer(told), &mut samples).is_err(), "{told:?}");
             assert!(samples.capacity() <= 2 * CHUNK);
@@ -201,11 +223,17 @@ mod tests {
         greeting[9..12].copy_from_slice(&[0x7f, 3, 1]);
         greeting[12..16].copy_from_slice(b"NULL");
         let ready = |kind: &[u8]| {
-            let body = [b"\x05READY\x0bSocket-Type\0\0\0", &[kind.len() as u8], kind].concat();
+            let mut body = b"\x05READY\x0bSocket-Type\0\0\0".to_vec();
+            body.push(kind.len() as u8);
+            body.extend(kind);
             [&greeting[..], &[COMMAND, body.len() as u8], &body].concat()
         };
         assert!(greet(&mut Peer(&ready(b"REP"))).is_ok());
-        for told in [ready(b"PUB"), b"HTTP/1.1 200 OK\r\n".repeat(8), greeting.to_vec()] {
+        for told in [
+            ready(b"PUB"),
+            b"HTTP/1.1 200 OK\r\n".to_vec().repeat(8),
+            greeting.to_vec(),
+        ] {
             assert!(greet(&mut Peer(&told)).is_err());
         }
     }

@@ -180,7 +180,9 @@ impl Board {
             value["what_to_do"] = json!(shown.status.reason.what_to_do());
             value["now_s"] = json!(shown.now_s);
             let heads = shown.heads.iter();
-            value["heads"] = heads.map(|it| crate::sink::head_json(it, shown.now_s)).collect();
+            value["heads"] = heads
+                .map(|it| crate::sink::head_json(it, shown.now_s))
+                .collect();
             value["energy"] = crate::sink::energy_json(&shown.energy);
             value["duty"] = json!(self.duty(&shown));
         }
@@ -189,7 +191,11 @@ impl Board {
 
     /// Share of the samples that were looked at.
     pub fn duty(&self, shown: &Shown) -> Option<f64> {
-        let samples = self.counters.sources.iter().find(|it| it.name == "samples")?;
+        let samples = self
+            .counters
+            .sources
+            .iter()
+            .find(|it| it.name == "samples")?;
         let came_s = samples.items() as f64 / self.counters.rate_hz;
         (came_s > 0.0).then(|| (shown.taken_s / came_s).min(1.0))
     }

@@ -21,7 +21,10 @@ struct Text(String);
 impl Text {
     fn family(&mut self, name: &str, kind: &str, help: &str) {
         // Writing into a string does not fail.
-        let _ = writeln!(self.0, "# HELP access_av_{name} {help}\n# TYPE access_av_{name} {kind}");
+        let _ = writeln!(
+            self.0,
+            "# HELP access_av_{name} {help}\n# TYPE access_av_{name} {kind}"
+        );
     }
 
     fn sample(&mut self, name: &str, labels: &[(&str, &str)], value: f64) {
@@ -76,7 +79,11 @@ pub fn text(board: &Board) -> String {
         &punctuality.jitter,
     );
     let [blocks, messages] = counters.inbox.dropped();
-    text.family("dropped_total", "counter", "What could not be taken in time.");
+    text.family(
+        "dropped_total",
+        "counter",
+        "What could not be taken in time.",
+    );
     for (what, count) in [
         ("blocks", blocks),
         ("messages", messages),
@@ -85,9 +92,21 @@ pub fn text(board: &Board) -> String {
         text.sample("dropped_total", &[("what", what)], count as f64);
     }
     for (name, kind, help) in [
-        ("source_items_total", "counter", "Samples per channel, or messages, of a source."),
-        ("source_defects_total", "counter", "Items of a source that could not be used."),
-        ("source_silent_seconds", "gauge", "Time since a source brought something."),
+        (
+            "source_items_total",
+            "counter",
+            "Samples per channel, or messages, of a source.",
+        ),
+        (
+            "source_defects_total",
+            "counter",
+            "Items of a source that could not be used.",
+        ),
+        (
+            "source_silent_seconds",
+            "gauge",
+            "Time since a source brought something.",
+        ),
     ] {
         text.family(name, kind, help);
         for source in &counters.sources {
@@ -120,11 +139,31 @@ pub fn text(board: &Board) -> String {
         text.one("protection_level_meters", "gauge", help, level_m);
     }
     for (name, kind, help) in [
-        ("head_snr_decibels", "gauge", "SNR of a radio head's last SSB."),
-        ("head_residual_radians", "gauge", "Residual of a radio head's last angle."),
-        ("head_accepted_total", "counter", "Angles of a radio head that were accepted."),
-        ("head_refused_total", "counter", "Angles of a radio head that were not."),
-        ("head_faulty", "gauge", "1 for a radio head that is found faulty."),
+        (
+            "head_snr_decibels",
+            "gauge",
+            "SNR of a radio head's last SSB.",
+        ),
+        (
+            "head_residual_radians",
+            "gauge",
+            "Residual of a radio head's last angle.",
+        ),
+        (
+            "head_accepted_total",
+            "counter",
+            "Angles of a radio head that were accepted.",
+        ),
+        (
+            "head_refused_total",
+            "counter",
+            "Angles of a radio head that were not.",
+        ),
+        (
+            "head_faulty",
+            "gauge",
+            "1 for a radio head that is found faulty.",
+        ),
     ] {
         text.family(name, kind, help);
         for head in &shown.heads {
@@ -163,5 +202,8 @@ pub fn text(board: &Board) -> String {
 
 /// A label's value as Prometheus has it.
 fn escaped(value: &str) -> String {
-    value.replace('\\', "\\\\").replace('"', "\\\"").replace('\n', "\\n")
+    value
+        .replace('\\', "\\\\")
+        .replace('"', "\\\"")
+        .replace('\n', "\\n")
 }

@@ -38,7 +38,9 @@ struct Shared {
 /// Where it cannot be had, with its key.
 pub async fn open(settings: &PageSettings) -> Result<TcpListener> {
     let named = || format!("page.listen is {:?}", settings.listen);
-    TcpListener::bind(&settings.listen).await.with_context(named)
+    TcpListener::bind(&settings.listen)
+        .await
+        .with_context(named)
 }
 
 /// Serves until the node ends.
@@ -58,7 +60,10 @@ pub async fn serve(
     };
     let router = Router::new()
         .route("/", get(page))
-        .route("/site.json", get(|State(it): State<Shared>| async move { json_text(&it.site) }))
+        .route(
+            "/site.json",
+            get(|State(it): State<Shared>| async move { json_text(&it.site) }),
+        )
         .route("/state.json", get(state))
         .route("/events", get(events))
         .route("/metrics", get(prometheus))
@@ -76,7 +81,10 @@ async fn page() -> impl IntoResponse {
 }
 
 fn json_text(text: &str) -> impl IntoResponse + use<> {
-    let headers = [(CONTENT_TYPE, "application/json"), (CACHE_CONTROL, "no-store")];
+    let headers = [
+        (CONTENT_TYPE, "application/json"),
+        (CACHE_CONTROL, "no-store"),
+    ];
     (headers, text.to_owned())
 }
 
@@ -92,7 +100,9 @@ async fn prometheus(State(shared): State<Shared>) -> impl IntoResponse {
 }
 
 /// What the page shows, whenever it has changed.
-async fn events(State(shared): State<Shared>) -> Sse<impl Stream<Item = Result<Event, Infallible>>> {
+async fn events(
+    State(shared): State<Shared>,
+) -> Sse<impl Stream<Item = Result<Event, Infallible>>> {
     let changes = stream::unfold((shared, None), |(shared, last)| async move {
         let mut number = shared.board.number();
         // Once a second also where nothing changes, for the ages of what is shown.

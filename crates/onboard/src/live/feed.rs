@@ -186,7 +186,10 @@ impl Live {
         while let Some(stream) = &mut self.stream {
             let burst = stream.burst();
             let number = burst.len();
-            if burst.first().is_none_or(|first| first.ssb().time_s >= time_s) {
+            if burst
+                .first()
+                .is_none_or(|first| first.ssb().time_s >= time_s)
+            {
                 break;
             }
             let heard = hear(&mut self.onboard, burst);
