@@ -153,11 +153,38 @@ impl Framing {
 
     /// Takes in so many samples of each channel.
     pub fn take(&mut self, channels: &[View<'_>], frames: usize) {
-        if frames == 0 {
-            return;
+        if frames > 0 {
+            let start_s = self.start_s(frames);
+            self.cut(frames, start_s, |it, first, count, time_s| {
+                it.decode(channels, first, count, time_s);
+            });
         }
+    }
+
+    /// Takes in samples of each channel, equally many, the first of which was received at `time_s`.
+    #[cfg(feature = "soapy")]
+    pub fn take_samples(&mut self, channels: &[&[Complex32]], time_s: f64) {
+        let frames = channels.first().map_or(0, |samples| samples.len());
+        self.cut(frames, time_s, |it, first, count, time_s| {
+            let mut antennas = it.inbox.buffers(it.antennas.len());
+            for (samples, antenna) in channels.iter().zip(&it.antennas) {
+                if let Some(into) = antennas.get_mut(usize::from(*antenna)) {
+                    into.clear();
+                    into.extend_from_slice(samples.get(first..first + count).unwrap_or_default());
+                }
+            }
+            it.inbox.put(Input::Samples(Block { time_s, antennas }));
+        });
+    }
+
+    /// Hands what is wanted of so many samples to `take`, with its first, its number and its time.
+    fn cut(
+        &mut self,
+        frames: usize,
+        start_s: f64,
+        mut take: impl FnMut(&mut Self, usize, usize, f64),
+    ) {
         self.health.came(frames as u64);
-        let start_s = self.start_s(frames);
         let rate_hz = self.rate_hz;
         let mut first = 0;
         while first < frames {
@@ -168,16 +195,12 @@ impl Framing {
             let wanted = self.gate.wanted();
             let [from, until] = wanted.map_or([0, count], |stretch| stretch.map(place));
             if from < until {
-                self.decode(
-                    channels,
-                    first + from,
-                    until - from,
-                    block_s + from as f64 / rate_hz,
-                );
+                let time_s = block_s + from as f64 / rate_hz;
+                take(self, first + from, until - from, time_s);
             }
             if until < count {
-                self.inbox
-                    .put(Input::Slept(block_s + count as f64 / rate_hz));
+                let end_s = block_s + count as f64 / rate_hz;
+                self.inbox.put(Input::Slept(end_s));
             }
             first += count;
         }

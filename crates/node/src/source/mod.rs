@@ -6,6 +6,8 @@ mod lines;
 mod message;
 mod raw;
 mod recording;
+#[cfg(feature = "soapy")]
+mod soapy;
 mod start;
 mod zeromq;
 mod zmtp;

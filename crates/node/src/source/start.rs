@@ -57,6 +57,12 @@ impl Sources {
         let mut stream = None;
         let mut health = Vec::new();
         if let Some(samples) = &settings.samples {
+            if matches!(samples, SampleSource::Soapy(_)) && cfg!(not(feature = "soapy")) {
+                bail!(
+                    "samples.source is soapy; this program was built without the feature `soapy`: \
+                     cargo build --release -p access-av-node --features soapy"
+                );
+            }
             health.push("samples");
             let found = match samples.stream() {
                 Some(stated) => {
@@ -173,9 +179,17 @@ pub fn start(settings: &NodeSettings, sources: &mut Sources) -> Result<()> {
                     Box::new(move |inbox| zeromq::run(&endpoints, framing, inbox)),
                 )?;
             }
-            SampleSource::Soapy(_) => bail!(
-                "samples.source is soapy, and this program was built without the feature `soapy`"
-            ),
+            #[cfg(feature = "soapy")]
+            SampleSource::Soapy(radio) => {
+                // The format is that of Soapy's own conversion.
+                let format = crate::settings::SampleFormat::Cf32;
+                let framing = Framing::new(&radio.stream, format, Arc::clone(&gate), inbox, health);
+                let radio = radio.clone();
+                let work = move |inbox: &Inbox| super::soapy::run(&radio, framing, &gate, inbox);
+                spawn("samples", Box::new(work))?;
+            }
+            #[cfg(not(feature = "soapy"))]
+            SampleSource::Soapy(_) => {} // refused where the files are opened
         }
     }
     for address in &settings.messages {
