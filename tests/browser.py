@@ -69,10 +69,10 @@ class Browser:
 
     def wait_for(self, expression: str, *, seconds: float = 10.0) -> None:
         """Waits until an expression is true."""
+        look = f"if ({expression}) done(true); else if (Date.now() > end) done(false);"
         found = self.evaluate(
-            "new Promise(done => { const end = Date.now() + %d; (function look() {"
-            " if (%s) done(true); else if (Date.now() > end) done(false); else setTimeout(look, 50);"
-            " })(); })" % (1000 * seconds, expression)
+            f"new Promise(done => {{ const end = Date.now() + {1000 * seconds};"
+            f" (function look() {{ {look} else setTimeout(look, 50); }})(); }})"
         )
         assert found, f"{expression}: not within {seconds} s: {self.text()}"
 

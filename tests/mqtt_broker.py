@@ -1,4 +1,4 @@
-"""An MQTT broker that prints what is published to a topic, one message a line: `mqtt_broker.py PORT TOPIC`."""
+"""An MQTT broker that prints what is published to a topic: `mqtt_broker.py PORT TOPIC`."""
 
 from __future__ import annotations
 
@@ -13,7 +13,8 @@ from amqtt.client import MQTTClient
 async def main(port: int, topic: str) -> None:
     logging.disable(logging.CRITICAL)
     listeners = {"default": {"type": "tcp", "bind": f"127.0.0.1:{port}"}}
-    broker = Broker({"listeners": listeners, "plugins": {"amqtt.plugins.authentication.AnonymousAuthPlugin": {}}})
+    plugins: dict[str, dict[str, str]] = {"amqtt.plugins.authentication.AnonymousAuthPlugin": {}}
+    broker = Broker({"listeners": listeners, "plugins": plugins})
     await broker.start()
     client = MQTTClient()
     await client.connect(f"mqtt://127.0.0.1:{port}/")

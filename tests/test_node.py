@@ -12,7 +12,7 @@ import threading
 import time
 import urllib.request
 from pathlib import Path
-from typing import TYPE_CHECKING, Any
+from typing import Any
 
 import jsonschema
 import pytest
@@ -27,9 +27,6 @@ from conftest import ROOT
 
 sys.path.insert(0, str(ROOT / "examples/live"))
 from transmitter import Drive, Transmitter, node_toml
-
-if TYPE_CHECKING:
-    from collections.abc import Iterator
 
 NODE = Path(os.environ.get("ACCESS_AV_NODE", ROOT / "target/debug/access-av-node"))
 SCHEMAS = Path(os.environ.get("ACCESS_AV_DATA", ROOT / "../shared/data")) / "vda5050"
@@ -162,8 +159,8 @@ localized_after_s = 0.5
 
 
 @pytest.fixture(scope="module")
-def live(drive: Path, tmp_path_factory: pytest.TempPathFactory) -> Iterator[Live]:
-    yield Live(drive, tmp_path_factory.mktemp("live"))
+def live(drive: Path, tmp_path_factory: pytest.TempPathFactory) -> Live:
+    return Live(drive, tmp_path_factory.mktemp("live"))
 
 
 def test_every_radio_head_is_heard_through_sockets_of_others(live: Live) -> None:
@@ -255,9 +252,9 @@ def test_the_page_shows_the_drive_in_a_browser(live: Live) -> None:
 @pytest.mark.parametrize(
     ("change", "said"),
     [
-        ('rate_msps = 3.84', "rate_msps"),
-        ('antennas = [0, 1, 1, 3]', "samples.stream.antennas"),
-        ('antennas = [0, 1, 2]', "3 channels"),
+        ("rate_msps = 3.84", "rate_msps"),
+        ("antennas = [0, 1, 1, 3]", "samples.stream.antennas"),
+        ("antennas = [0, 1, 2]", "3 channels"),
         ('format = "ci12"', "ci12"),
         ('address = "udp://127.0.0.1:5"', "samples.address"),
         ('adress = "x"', "did you mean `address`"),

@@ -1,4 +1,4 @@
-"""A simulated yard drives in real time, its samples go through ZeroMQ into `access-av-node`, and the page opens.
+"""A simulated yard drives in real time, through ZeroMQ, into `access-av-node`; its page opens.
 
     python examples/live/live.py [--node PROGRAM] [--duration-s 60] [--no-browser]
 
@@ -33,6 +33,7 @@ def recorded(folder: Path, duration_s: float) -> Drive:
 
 
 def main() -> int:
+    """Drives until Ctrl-C."""
     parser = argparse.ArgumentParser(description=__doc__.splitlines()[0])
     parser.add_argument("--node", default=str(ROOT / "target/release/access-av-node"))
     parser.add_argument("--duration-s", type=float, default=60.0)

@@ -1,8 +1,8 @@
 """A simulated drive sent as radios and wheels would: samples by ZeroMQ, odometry by TCP.
 
-Samples: a REP socket for each antenna, which answers every request by cf32 samples, as the drivers of srsRAN,
-OCUDU and OpenAirInterface do; between the recorded bursts there is noise. Odometry: newline JSON to whoever
-connects. Both run in real time from the moment that the first samples are asked for.
+Samples: a REP socket for each antenna, which answers every request by cf32 samples, as the drivers
+of srsRAN, OCUDU and OpenAirInterface do; between the recorded bursts there is noise. Odometry:
+newline JSON to whoever connects. Both run in real time from when the first samples are asked for.
 
     python examples/live/transmitter.py DRIVE [--port 2000] [--odometry-port 2100] [--once]
 
@@ -45,23 +45,23 @@ class Drive:
             raise SystemExit(f"{folder}: core:datatype must be ci16_le")
         self.samples = np.memmap(folder / "iq.sigmf-data", dtype="<i2", mode="r")
         self.samples = self.samples.reshape(-1, self.antennas, 2)
-        self.captures = [
-            (capture["core:sample_start"], capture.get("core:global_index", capture["core:sample_start"]))
-            for capture in metadata["captures"]
-        ]
+        starts = [it["core:sample_start"] for it in metadata["captures"]]
+        indices = [it.get("core:global_index", 0) for it in metadata["captures"]]
+        self.captures = list(zip(starts, indices, strict=True))
         ends = [start for start, _ in self.captures[1:]] + [len(self.samples)]
         self.ends = ends
         self.length = self.captures[-1][1] + ends[-1] - self.captures[-1][0]
         with (folder / "odometry.csv").open(encoding="utf-8") as file:
-            self.odometry = [
-                {key: float(value) for key, value in row.items() if value} for row in csv.DictReader(file)
-            ]
+            rows = csv.DictReader(file)
+            self.odometry = [{key: float(row[key]) for key in row if row[key]} for row in rows]
         # Noise as it stands between two SSBs: the quieter half of the first burst tells its power.
         first = self.samples[: ends[0]].astype(np.float32) / FULL_SCALE
         power = np.sort((first**2).sum(axis=2).mean(axis=1))[: len(first) // 4].mean()
         random = np.random.default_rng(1)
         shape = (self.antennas, 1 << 18, 2)
-        self.noise = (random.standard_normal(shape, np.float32) * np.sqrt(power / 2.0)).astype(np.float32)
+        self.noise = (random.standard_normal(shape, np.float32) * np.sqrt(power / 2.0)).astype(
+            np.float32
+        )
 
     def answers(self) -> Iterator[tuple[int, list[NDArray[np.float32]]]]:
         """Number of samples up to each answer's end, and the samples of every antenna."""
@@ -187,6 +187,7 @@ listen = "{page}"
 
 
 def main() -> None:
+    """Sends a drive."""
     parser = argparse.ArgumentParser(description=__doc__.splitlines()[0])
     parser.add_argument("drive", type=Path, metavar="DRIVE")
     parser.add_argument("--port", type=int, default=2000)

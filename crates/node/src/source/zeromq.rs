@@ -1,6 +1,6 @@
 //! Samples by ZeroMQ, a socket for each channel, aligned by counting.
 
-use std::io;
+use std::io::{self, BufReader};
 use std::net::TcpStream;
 use std::time::Duration;
 
@@ -11,10 +11,12 @@ use crate::address::Address;
 use crate::inbox::{Inbox, Input};
 
 const RETRY: Duration = Duration::from_millis(300);
+const HEADER: usize = 64;
 
 /// One channel's transmitter.
 struct Channel {
-    stream: TcpStream,
+    /// Buffered for the few bytes before a frame's samples, which are longer and are read past the buffer.
+    stream: BufReader<TcpStream>,
     /// Samples that the other channels have not reached yet.
     pending: Vec<u8>,
 }
@@ -68,7 +70,7 @@ fn open(endpoint: &Address) -> io::Result<Channel> {
     zmtp::greet(&mut stream)?;
     zmtp::request(&mut stream)?;
     Ok(Channel {
-        stream,
+        stream: BufReader::with_capacity(HEADER, stream),
         pending: Vec::new(),
     })
 }
@@ -78,7 +80,7 @@ impl Channel {
     fn fill(&mut self, sample_bytes: usize, inbox: &Inbox) -> io::Result<()> {
         while self.pending.len() < sample_bytes && !inbox.is_closed() {
             match zmtp::answer(&mut self.stream, &mut self.pending) {
-                Ok(_) => zmtp::request(&mut self.stream)?,
+                Ok(_) => zmtp::request(self.stream.get_mut())?,
                 Err(error) if is_idle(&error) => {}
                 Err(error) => return Err(error),
             }
