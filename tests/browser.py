@@ -38,11 +38,12 @@ class Browser:
         )
         self.socket = connect(found.group(), max_size=None)
         self.number = 0
-        target = self.call("Target.createTarget", url=address)["targetId"]
+        target = self.call("Target.createTarget", url="about:blank")["targetId"]
         attached = self.call("Target.attachToTarget", targetId=target, flatten=True)
         self.session = attached["sessionId"]
         self.errors: list[str] = []
         self.call("Runtime.enable")
+        self.call("Page.navigate", url=address)
 
     def call(self, method: str, **parameters: Any) -> dict[str, Any]:
         """Calls a method of the protocol."""

@@ -84,9 +84,8 @@ def main() -> None:
     half = memory_mib[len(memory_mib) // 2 :]
     print(f"{drive_s:.0f} s of the drive in {took_s:.0f} s")
     print(f"processor: {100 * used_s / drive_s:.1f} % of a core")
-    print(
-        f"memory: {max(memory_mib):.0f} MiB at most, {half[0]:.0f} at half, {half[-1]:.0f} at the end"
-    )
+    at = f"{half[0]:.0f} at half, {half[-1]:.0f} at the end"
+    print(f"memory: {max(memory_mib):.0f} MiB at most, {at}")
     print(f"samples looked at: {100 * told['duty']:.1f} %")
     print(f"dropped: {told['dropped']}")
     for name, figures in told["latency"].items():
