@@ -19,7 +19,9 @@ if TYPE_CHECKING:
     from collections.abc import Mapping
     from pathlib import Path
 
-FLEET = ("vehicles", "hours_per_day", "days_per_year", "years", "trip_s")
+FLEET = ("vehicles", "hours_per_day", "days_per_year", "years")
+# One of these says how often a vehicle drives.
+TRIPS = ("trips_per_day", "trip_s")
 ITEM = ("units", "price", "yearly", "power_w", "embodied_kg")
 DAY_S = 86_400.0
 
@@ -107,10 +109,11 @@ def balance(figures: Mapping[str, Any]) -> Balance:
         {"currency", "grid", "grid_g_per_kwh", "electricity_per_kwh", "fleet", "before", "after"},
     )
     fleet = figures.get("fleet", {})
-    _only(fleet, "fleet.", set(FLEET))
+    _only(fleet, "fleet.", {*FLEET, *TRIPS})
     use = {name: _range(fleet, f"fleet.{name}").central for name in FLEET}
-    if use["trip_s"] <= 0.0 or not 0.0 <= use["hours_per_day"] <= 24.0:
-        raise InputError("fleet.trip_s must be above 0, fleet.hours_per_day from 0 to 24")
+    if not 0.0 <= use["hours_per_day"] <= 24.0:
+        raise InputError("fleet.hours_per_day: it must be from 0 to 24")
+    use["trips"] = _trips(fleet, use["hours_per_day"])
     price = _range(figures, "electricity_per_kwh")
     grams = _grid(figures)
     before, after = (_way(figures, name, use, price, grams) for name in ("before", "after"))
@@ -132,6 +135,21 @@ def balance(figures: Mapping[str, Any]) -> Balance:
             after.capital.minus(before.capital), before.yearly.minus(after.yearly)
         ),
     )
+
+
+def _trips(fleet: Mapping[str, Any], hours: float) -> float:
+    """Trips of one vehicle on a day of work: as stated, or one after the other for so many hours."""
+    given = [name for name in TRIPS if name in fleet]
+    if len(given) != 1:
+        raise InputError(
+            "fleet: give either trips_per_day, or trip_s where trip follows upon trip all day"
+        )
+    value = _range(fleet, f"fleet.{given[0]}").central
+    if given == ["trips_per_day"]:
+        return value
+    if value <= 0.0:
+        raise InputError("fleet.trip_s: it must be above 0")
+    return hours * 3600.0 / value
 
 
 def _payback(more: Range, saved_yearly: Range) -> Range | None:
@@ -177,9 +195,8 @@ def _way(
                 onboard_w = onboard_w.plus(power_w)
             else:
                 fixed_w = fixed_w.plus(power_w)
-    trips = hours * 3600.0 / use["trip_s"]
     vehicle_j = onboard_w.scaled(hours * 3600.0).plus(
-        _range(way, f"{name}.energy_j_per_trip").scaled(trips)
+        _range(way, f"{name}.energy_j_per_trip").scaled(use["trips"])
     )
     # Infrastructure is on all day and every day, vehicles while they work.
     fixed_j = fixed_w.scaled(DAY_S)

@@ -31,6 +31,7 @@ from access_av.commands import (
 from access_av.errors import InputError
 from access_av.paper import codesign_command as codesign
 from access_av.paper import commands as paper
+from access_av.study import command as study
 from access_av.terminal import (
     console,
     give_up_output,
@@ -100,11 +101,11 @@ def _options(
 
 
 for _room in (
-    *(paper, codesign, run, bound, radio, integrity, designs, tune),
+    *(study, paper, codesign, run, bound, radio, integrity, designs, tune),
     *(recordings, drives, survey, profile, balance, columns),
 ):
     app.add_typer(_room.app)
-for _what in ("site", "vehicle", "scenario", "platform"):
+for _what in ("site", "vehicle", "scenario", "platform", "plant"):
     app.add_typer(files.files_app(_what), name=_what, cls=_Commands)
 
 

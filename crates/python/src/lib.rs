@@ -82,7 +82,9 @@ mod _core {
     #[pymodule_export]
     use crate::recording::{Recording, RecordingError};
     #[pymodule_export]
-    use crate::settings::{Platform, Scenario, SettingsError, SettingsWarning, Site, Vehicle};
+    use crate::settings::{
+        Plant, Platform, Scenario, SettingsError, SettingsWarning, Site, Vehicle,
+    };
     #[pymodule_export]
     use crate::survey::LoggedDrive;
 

@@ -7,7 +7,7 @@ from typing import TYPE_CHECKING, Annotated, Any
 
 import typer
 
-from access_av._core import Platform, Scenario, SettingsError, Site, Vehicle
+from access_av._core import Plant, Platform, Scenario, SettingsError, Site, Vehicle
 from access_av.commands.options import AllowLarge, announce, read_scenario
 from access_av.terminal import console, show_error, table
 
@@ -47,7 +47,13 @@ def _size(scenario: Scenario) -> str:
 
 def files_app(what: str) -> typer.Typer:
     """Commands that show, check and describe the files of one kind."""
-    kinds = {"site": Site, "vehicle": Vehicle, "scenario": Scenario, "platform": Platform}
+    kinds = {
+        "site": Site,
+        "vehicle": Vehicle,
+        "scenario": Scenario,
+        "platform": Platform,
+        "plant": Plant,
+    }
     kind: Any = kinds[what]
     files = typer.Typer(no_args_is_help=True, help=f"Show, check and describe {what} files.")
     example = kind.names()[0]
