@@ -10,7 +10,7 @@ from pathlib import Path
 from typing import TYPE_CHECKING, Any
 
 import access_av
-from access_av.toml import tomllib
+from access_av.tables.toml import tomllib
 from attack import mutate
 
 if TYPE_CHECKING:

@@ -7,8 +7,8 @@ from typing import TYPE_CHECKING, Any
 
 import polars as pl
 
-from access_av.columns import GLOSSARY, TABLES
-from access_av.toml import shipped
+from access_av.tables.columns import GLOSSARY, TABLES
+from access_av.tables.toml import shipped
 from attack import mutate
 from attack.files import recorded
 

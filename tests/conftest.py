@@ -24,9 +24,9 @@ def access_av(
     monkeypatch: pytest.MonkeyPatch, capsys: pytest.CaptureFixture[str], tmp_path: Path
 ) -> Callable[..., Finished]:
     """Run the command line in this process; its latest results are the test's own."""
-    from access_av.cli import main
+    from access_av.cli.main import main
 
-    monkeypatch.setattr("access_av.files.RESULTS", tmp_path / "results")
+    monkeypatch.setattr("access_av.tables.results_directory.RESULTS", tmp_path / "results")
 
     def run(*arguments: str, columns: int = 100) -> Finished:
         monkeypatch.setattr(sys, "argv", ["access-av", *map(str, arguments)])
@@ -42,12 +42,12 @@ def access_av(
 @pytest.fixture(scope="session")
 def quick_study(tmp_path_factory: pytest.TempPathFactory) -> Path:
     """Results of a small evaluation, in a directory that stands for ``results/``."""
-    from access_av.paper import results as paper_results
+    from access_av.report.paper import results as paper_results
 
     results = tmp_path_factory.mktemp("results")
     directory = results / "2000-01-01T000000.000-evaluate"
     with pytest.MonkeyPatch.context() as patch:
-        patch.setattr("access_av.files.RESULTS", results)
+        patch.setattr("access_av.tables.results_directory.RESULTS", results)
         paper_results.run(["every-ssb", "gate"], runs=3, seed=5, out=directory)
     return results
 

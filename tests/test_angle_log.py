@@ -11,9 +11,9 @@ import polars as pl
 import pytest
 
 from access_av import InputError, RecordingError, Site, drives, estimate_angles
-from access_av.array_truth import ArrayTruth
-from access_av.columns.tables import TABLES
-from access_av.recorded_angles import estimate_bursts
+from access_av.signal.array_annotations import ArrayTruth
+from access_av.signal.recorded_angles import estimate_bursts
+from access_av.tables.columns import TABLES
 
 if TYPE_CHECKING:
     from collections.abc import Callable

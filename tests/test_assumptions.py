@@ -8,7 +8,7 @@ from typing import TYPE_CHECKING
 import pytest
 
 from access_av import Scenario
-from access_av.assumptions import flattering
+from access_av.run.assumptions import flattering
 
 if TYPE_CHECKING:
     from collections.abc import Callable

@@ -9,9 +9,9 @@ from typing import TYPE_CHECKING, Any
 
 import pytest
 
-from access_av.balance import balance, read, text
+from access_av.economics.balance import balance, read, text
 from access_av.errors import InputError
-from access_av.toml import tomllib
+from access_av.tables.toml import tomllib
 
 if TYPE_CHECKING:
     from pathlib import Path

@@ -9,8 +9,8 @@ import polars as pl
 import pytest
 
 from access_av import Scenario, _core
-from access_av.error_bound import ErrorBound, bound
 from access_av.report.placement import render_bound
+from access_av.run.error_bound import ErrorBound, bound
 
 if TYPE_CHECKING:
     from collections.abc import Callable

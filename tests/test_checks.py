@@ -9,10 +9,11 @@ from typing import TYPE_CHECKING
 import polars as pl
 import pytest
 
-from access_av import SettingsError, SettingsWarning, given_tables
+from access_av import SettingsError, SettingsWarning
 from access_av._core import Platform, Scenario, Site, Vehicle
 from access_av.errors import InputError
-from access_av.toml import tomllib
+from access_av.tables import validation
+from access_av.tables.toml import tomllib
 from conftest import ROOT, Finished
 
 if TYPE_CHECKING:
@@ -443,7 +444,7 @@ def test_every_command_says_it_before_all_else(
     def stop(_: str, warnings: list[SettingsWarning]) -> None:
         raise InputError(f"asked first: {len(warnings)} doubtful")
 
-    monkeypatch.setattr("access_av.commands.options.announce", stop)
+    monkeypatch.setattr("access_av.cli.options.announce", stop)
     done = access_av(*command)
     assert done.code == 2
     assert "asked first: 0 doubtful" in done.err
@@ -459,11 +460,11 @@ def test_commands_load_settings_in_one_place() -> None:
 def test_german_tables_are_read(tmp_path: Path) -> None:
     file = tmp_path / "masts.csv"
     file.write_text("name;x_m;y_m\nTor, Süd;1,5;-2\nHalle;3;4,25\n", encoding="utf-8")
-    rows = given_tables.read(file, "table of masts", {"name": pl.String})
+    rows = validation.read(file, "table of masts", {"name": pl.String})
     assert rows.rows() == [("Tor, Süd", 1.5, -2.0), ("Halle", 3.0, 4.25)]
     file.write_text("name;x_m;y_m\nTor;1,234;2.5\n", encoding="utf-8")
     with pytest.raises(InputError, match="ambiguous; write all numbers with a point"):
-        given_tables.read(file, "table of masts", {"name": pl.String})
+        validation.read(file, "table of masts", {"name": pl.String})
 
 
 def test_a_warning_tells_its_parts() -> None:

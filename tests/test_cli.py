@@ -9,7 +9,7 @@ from typing import TYPE_CHECKING
 import polars as pl
 import pytest
 
-from access_av import terminal
+from access_av.cli import terminal
 from access_av.paper.statements import stated_claims
 
 if TYPE_CHECKING:
@@ -255,7 +255,7 @@ def test_out_that_is_a_file(access_av: Cli, tmp_path: Path) -> None:
 def test_in_a_pipe_progress_is_told_in_lines(
     monkeypatch: pytest.MonkeyPatch, capsys: pytest.CaptureFixture[str]
 ) -> None:
-    monkeypatch.setattr("access_av.terminal.FIRST_LINE_S", 0.05)
+    monkeypatch.setattr("access_av.cli.terminal.FIRST_LINE_S", 0.05)
     with terminal.progress("Driving") as tick:
         tick(3, 12)
         time.sleep(0.2)

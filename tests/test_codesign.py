@@ -12,8 +12,8 @@ import numpy as np
 import pytest
 
 from access_av import Scenario, simulate
+from access_av.device.platform import Platform
 from access_av.paper.codesign import compare
-from access_av.platform import Platform
 
 if TYPE_CHECKING:
     from pathlib import Path

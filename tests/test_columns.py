@@ -22,11 +22,11 @@ from access_av import (
     simulate,
     statistics,
 )
-from access_av.campaign import Campaign
-from access_av.paper.search import sample
+from access_av.device.platform import Platform
+from access_av.paper.sampled_readings import sample
 from access_av.paper.unknowns import sobol
-from access_av.parts import Parts
-from access_av.platform import Platform
+from access_av.run.campaign import Campaign
+from access_av.run.result_cache import Parts
 from conftest import ROOT
 
 if TYPE_CHECKING:

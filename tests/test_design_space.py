@@ -4,7 +4,7 @@ import polars as pl
 import pytest
 
 import synthetic
-from access_av.design_space import Query, explore, pareto_front
+from access_av.designs.operating_points import Query, explore, pareto_front
 
 
 @pytest.fixture(scope="module")

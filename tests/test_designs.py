@@ -20,18 +20,18 @@ import numpy as np
 import pytest
 
 from access_av import Scenario, columns
-from access_av.campaign import Campaign, CampaignError, Shard, Task, executor
 from access_av.designs import drives
-from access_av.designs.drives import Design, Driven, designs_of, in_worlds
+from access_av.designs.driven import Design, Driven, designs_of, in_worlds
 from access_av.designs.front import front, may_be_front
 from access_av.designs.search import Found, rounds, search
 from access_av.designs.space import Space, sobol
 from access_av.designs.suggested import suggested
 from access_av.designs.table import Constraints, rows_of, rows_of_worlds, what_to_change
+from access_av.device.platform import Platform
 from access_av.errors import InputError
-from access_av.parts import Parts
-from access_av.platform import Platform
 from access_av.report.designs import render_designs
+from access_av.run.campaign import Campaign, CampaignError, Shard, Task, executor
+from access_av.run.result_cache import Parts
 
 # Spaces.
 
@@ -165,7 +165,7 @@ def test_a_full_disk_names_the_part_and_leaves_nothing(
         raise OSError(28, "No space left on device")
 
     with monkeypatch.context() as patch:
-        patch.setattr("access_av.files.os.fsync", full)
+        patch.setattr("access_av.tables.results_directory.os.fsync", full)
         with pytest.raises(OSError, match="No space left") as caught:
             Campaign(parts).run(tasks())
     assert str(caught.value.filename).startswith(str(parts.path))
@@ -213,8 +213,8 @@ KILLER = """
 import os, signal, sys, time
 from pathlib import Path
 sys.path.insert(0, {tests!r})
-from access_av.campaign import Campaign
-from access_av.parts import Parts
+from access_av.run.campaign import Campaign
+from access_av.run.result_cache import Parts
 from test_designs import tasks
 campaign = Campaign(Parts(Path({parts!r})))
 for instant in {instants!r}:
@@ -265,8 +265,8 @@ DYING = """
 import json, subprocess, sys, threading, time
 from pathlib import Path
 sys.path.insert(0, {tests!r})
-from access_av.campaign import Campaign, CampaignError, executor
-from access_av.parts import Parts
+from access_av.run.campaign import Campaign, CampaignError, executor
+from access_av.run.result_cache import Parts
 from test_designs import tasks
 parts, file = Path({parts!r}), Path({parts!r}) / "scheduler.json"
 parts.mkdir()

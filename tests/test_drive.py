@@ -13,7 +13,7 @@ import pytest
 from access_av import Scenario, simulate
 from access_av.errors import InputError
 from access_av.report.drive import render_drive
-from access_av.report.operation import Operation
+from access_av.run.operation import Operation
 from access_av.statistics import Integrity, horizontal_error_m
 
 if TYPE_CHECKING:

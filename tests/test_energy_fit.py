@@ -3,11 +3,10 @@ from __future__ import annotations
 import pytest
 
 import synthetic
+from access_av.device.platform import Platform
 from access_av.paper import study
 from access_av.paper.energy_fit import FREEDOMS, ModeDemand, fit_energy, numbers
-from access_av.paper.methods import METHODS
-from access_av.paper.statements import paper_numbers
-from access_av.platform import Platform
+from access_av.paper.statements import METHODS, paper_numbers
 
 Energies = dict[int, dict[str, float]]
 

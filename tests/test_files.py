@@ -9,7 +9,7 @@ import numpy as np
 import polars as pl
 import pytest
 
-from access_av.files import ResultsDirectory, tum_trajectory, write_whole
+from access_av.tables.results_directory import ResultsDirectory, tum_trajectory, write_whole
 
 if TYPE_CHECKING:
     from pathlib import Path

@@ -6,14 +6,14 @@ from typing import TYPE_CHECKING
 
 import pytest
 
+from access_av.device.platform import Platform
 from access_av.paper import summary
-from access_av.paper.drives import Driver
+from access_av.paper.driver import Driver
 from access_av.paper.energy_fit import FREEDOMS, SHIPPED
 from access_av.paper.evaluation import Evaluation, evaluate_with
 from access_av.paper.freedoms import LADDER, ladder, met_halves
 from access_av.paper.readings import load_all
 from access_av.paper.study import Study, judged
-from access_av.platform import Platform
 
 if TYPE_CHECKING:
     from collections.abc import Sequence

@@ -19,7 +19,11 @@ FILES = {
 }
 CORE = "access_av._core"
 # What puts the general part and the paper's together.
-TOP = {"access_av", "access_av.cli", "access_av.__main__"}
+TOP = {"access_av", "access_av.cli.main", "access_av.cli.paper_tables", "access_av.__main__"}
+TOP |= {"access_av.cli.paper", "access_av.cli.codesign"}
+PAPERS = ("access_av.paper", "access_av.report.paper")
+# Named after the command or the thing that is shown; elsewhere a file's name means one thing.
+NAMED_AFTER_ANOTHER = {"cli", "report"}
 
 
 def imported_by(module: str) -> set[str]:
@@ -48,8 +52,43 @@ def test_no_two_modules_import_each_other() -> None:
 
 def test_what_is_general_does_not_import_the_paper() -> None:
     for module, imported in GRAPH.items():
-        if module not in TOP and not module.startswith("access_av.paper"):
-            assert not {name for name in imported if name.startswith("access_av.paper")}, module
+        if module not in TOP and not module.startswith(PAPERS):
+            assert not {name for name in imported if name.startswith(PAPERS)}, module
+
+
+def folder(module: str) -> str:
+    """The folder that a module lies in, or is."""
+    return module if FILES[module].name == "__init__.py" else module.rpartition(".")[0]
+
+
+def test_no_two_folders_use_each_other() -> None:
+    graph: dict[str, set[str]] = {}
+    for module, imported in GRAPH.items():
+        used = {folder(name) for name in imported} - {folder(module), "access_av"}
+        if folder(module) != "access_av":
+            graph.setdefault(folder(module), set()).update(used)
+    try:
+        tuple(TopologicalSorter(graph).static_order())
+    except CycleError as error:
+        pytest.fail(" -> ".join(error.args[1]))
+
+
+def test_no_file_name_means_two_things() -> None:
+    paths = [path.relative_to(PACKAGE / "access_av") for path in FILES.values()]
+    names = [
+        path.name
+        for path in paths
+        if path.name != "__init__.py" and path.parts[0] not in NAMED_AFTER_ANOTHER
+    ]
+    assert sorted(names) == sorted(set(names))
+
+
+def test_public_modules_are_imported_by_their_public_names() -> None:
+    code = "import access_av, access_av.cost as it; from access_av.nr import Searcher"
+    assert printed_by(f"{code}; print(it.__name__, it is access_av.cost)") == [
+        "access_av.economics.cost",
+        "True",
+    ]
 
 
 def test_modules_import_from_where_a_thing_is() -> None:
@@ -98,5 +137,5 @@ def test_importing_it_loads_neither_charts_nor_tables() -> None:
 
 
 def test_the_command_line_starts_without_charts() -> None:
-    code = "import sys, access_av.cli; print('altair' in sys.modules, 'polars' in sys.modules)"
+    code = "import sys, access_av.cli.main; print('altair' in sys.modules, 'polars' in sys.modules)"
     assert printed_by(code) == ["False", "False"]

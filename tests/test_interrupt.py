@@ -14,7 +14,7 @@ import pytest
 import typer.main
 
 import access_av
-from access_av.cli import app
+from access_av.cli.main import app
 
 if TYPE_CHECKING:
     from pathlib import Path

@@ -13,7 +13,7 @@ from mcap.reader import make_reader
 
 from access_av import Site, Vehicle, drives
 from access_av._core import RecordingError
-from access_av.toml import tomllib
+from access_av.tables.toml import tomllib
 from conftest import ROOT
 from robot import HEADS_M, RATE_HZ, TRACK_M, robot
 

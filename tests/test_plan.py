@@ -11,11 +11,11 @@ import polars as pl
 import pytest
 
 from access_av import InputError, Scenario, bound, columns, plan, service_levels, simulate
-from access_av.campaign import Campaign
-from access_av.hypotheses import SIZES, hypotheses, mismatches
-from access_av.integrity_campaign import drive
-from access_av.next_level import next_level
-from access_av.parts import Parts
+from access_av.radio.upgrades import next_level
+from access_av.run.campaign import Campaign
+from access_av.run.fault_injection import SIZES, hypotheses, mismatches
+from access_av.run.integrity_campaign import drive
+from access_av.run.result_cache import Parts
 
 if TYPE_CHECKING:
     from collections.abc import Callable
@@ -185,7 +185,7 @@ def test_an_integrity_campaign_goes_on_where_it_stopped(
     def driven_again(*_: object, **__: object) -> None:
         raise AssertionError("it was kept")
 
-    monkeypatch.setattr("access_av.integrity_campaign.driven", driven_again)
+    monkeypatch.setattr("access_av.run.integrity_campaign.driven", driven_again)
     assert json.loads(access_av(*arguments).out)["cases"] == record["cases"]
     for wide, last in ((80, "risk/h   ≤"), (60, "beyond       ≤"), (120, "level/error")):
         shown = access_av(*arguments[:-1], columns=wide)

@@ -14,11 +14,10 @@ from typing import TYPE_CHECKING
 
 import numpy as np
 import pytest
-
-from access_av.platform import Platform
 from access_av.profile import counters, device, power_modes
-from access_av.profile.counters import SensorError
-from access_av.profile.energy import (
+
+from access_av.device.counters import SensorError
+from access_av.device.energy import (
     Interval,
     Recording,
     TooShortError,
@@ -26,7 +25,8 @@ from access_av.profile.energy import (
     above_idle,
     energy_sampled,
 )
-from access_av.profile.workload import Timing, repeat
+from access_av.device.platform import Platform
+from access_av.device.workload import Timing, repeat
 
 if TYPE_CHECKING:
     from collections.abc import Callable

@@ -11,12 +11,12 @@ import pytest
 
 import synthetic
 from access_av import Scenario, SettingsError
+from access_av.device.platform import Platform
 from access_av.errors import InputError
 from access_av.paper import ablation, readings
-from access_av.paper.drives import Driver
+from access_av.paper.driver import Driver
 from access_av.paper.evaluation import evaluate_with
-from access_av.paper.report.page import render
-from access_av.platform import Platform
+from access_av.report.paper.evaluation import render
 
 if TYPE_CHECKING:
     from collections.abc import Callable

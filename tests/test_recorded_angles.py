@@ -7,7 +7,7 @@ import numpy as np
 import pytest
 
 from access_av.errors import InputError
-from access_av.recorded_angles import estimate_bursts, mean_absolute_error_deg
+from access_av.signal.recorded_angles import estimate_bursts, mean_absolute_error_deg
 
 if TYPE_CHECKING:
     from collections.abc import Callable

@@ -11,10 +11,10 @@ import vl_convert
 
 import synthetic
 from access_av.paper import summary
-from access_av.paper.report.page import render
-from access_av.paper.report.readings import readings
 from access_av.report import located_charts
-from access_av.report.parts import number, unsigned_zero, value_text
+from access_av.report.paper.evaluation import render
+from access_av.report.paper.readings import readings
+from access_av.tables.numbers import number, unsigned_zero, value_text
 from robot import HEADS_M, robot
 
 if TYPE_CHECKING:

@@ -11,11 +11,11 @@ import pytest
 
 import second_implementation as second
 from access_av import Scenario
+from access_av.device.platform import Platform
 from access_av.paper.ablation import fixed
-from access_av.paper.drives import Driver
+from access_av.paper.driver import Driver
 from access_av.paper.outcome import resamples
 from access_av.paper.readings import load
-from access_av.platform import Platform
 
 if TYPE_CHECKING:
     from collections.abc import Callable

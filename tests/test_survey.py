@@ -19,7 +19,7 @@ from access_av import (
     drives,
     survey,
 )
-from access_av.self_survey import read_drive
+from access_av.drives.self_survey import read_drive
 
 if TYPE_CHECKING:
     from collections.abc import Callable

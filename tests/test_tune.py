@@ -9,11 +9,11 @@ import numpy as np
 import pytest
 
 from access_av import InputError, Scenario
-from access_av.campaign import Campaign
 from access_av.designs.space import Dimension
 from access_av.designs.table import Constraints
 from access_av.designs.tune import _around, space_of, tune
-from access_av.parts import Parts
+from access_av.run.campaign import Campaign
+from access_av.run.result_cache import Parts
 
 if TYPE_CHECKING:
     from collections.abc import Callable
@@ -77,7 +77,7 @@ def pretended(text: str, _seed: int, _first: int, runs: int) -> dict[str, np.nda
 
 def test_what_cannot_be_bettered_stays(campaign: Campaign, monkeypatch: pytest.MonkeyPatch) -> None:
     """From a set point that is as late as the error allows, any other takes more energy."""
-    monkeypatch.setattr("access_av.designs.drives.simulated", pretended)
+    monkeypatch.setattr("access_av.designs.driven.simulated", pretended)
     scenario = short({"policy": "fixed", "interval_ms": 400.0})
     for bound in (Constraints(max_rms_m=0.2), Constraints(max_error_m=0.397, percentile=99.0)):
         found = tune(campaign, scenario, bound, designs=8, runs=3)
@@ -89,7 +89,7 @@ def test_what_cannot_be_bettered_stays(campaign: Campaign, monkeypatch: pytest.M
 def test_a_percentile_is_kept_by_the_least_energy(
     campaign: Campaign, monkeypatch: pytest.MonkeyPatch
 ) -> None:
-    monkeypatch.setattr("access_av.designs.drives.simulated", pretended)
+    monkeypatch.setattr("access_av.designs.driven.simulated", pretended)
     scenario = short({"policy": "fixed", "interval_ms": 20.0})
     found = tune(campaign, scenario, Constraints(max_error_m=0.3), designs=16, runs=3)
     assert found.is_better
@@ -101,7 +101,7 @@ def test_a_percentile_is_kept_by_the_least_energy(
 def test_a_constraint_that_is_missed_ends_with_exit_code_3(
     access_av: Callable[..., Finished], monkeypatch: pytest.MonkeyPatch, tmp_path: Path
 ) -> None:
-    monkeypatch.setattr("access_av.designs.drives.simulated", pretended)
+    monkeypatch.setattr("access_av.designs.driven.simulated", pretended)
     (tmp_path / "short.toml").write_text(
         'like = "paper-real-odometry-2"\n'
         'vehicle = { like = "tugger", wake_up = { policy = "fixed", interval_ms = 400.0 } }\n'

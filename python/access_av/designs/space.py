@@ -9,8 +9,8 @@ from typing import TYPE_CHECKING, Any
 
 import numpy as np
 
-from access_av import toml
 from access_av.errors import InputError
+from access_av.tables import toml
 
 if TYPE_CHECKING:
     from collections.abc import Mapping, Sequence

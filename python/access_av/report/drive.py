@@ -7,25 +7,17 @@ from html import escape
 from importlib.metadata import version
 from typing import TYPE_CHECKING
 
-from access_av.assumptions import energy_boundary, flattering, in_words
 from access_av.errors import InputError
 from access_av.report import drive_charts as charts
 from access_av.report.page import sheet
-from access_av.report.parts import (
-    figure,
-    section,
-    service_levels,
-    source,
-    table,
-    tile,
-    value_text,
-    warnings,
-)
+from access_av.report.parts import figure, section, service_levels, source, table, tile, warnings
+from access_av.run.assumptions import energy_boundary, flattering, in_words
+from access_av.tables.numbers import value_text
 
 if TYPE_CHECKING:
     from access_av._core import Scenario
     from access_av.report.chart import Spec
-    from access_av.simulation import Simulation
+    from access_av.run.simulation import Simulation
     from access_av.statistics.integrity import Integrity
 
 

@@ -6,23 +6,15 @@ from html import escape
 from importlib.metadata import version
 from typing import TYPE_CHECKING
 
-from access_av.error_bound import MAP_TRAVEL_M, VISIBLE_SNR_DB
 from access_av.report import drive_charts as charts
 from access_av.report.page import sheet
-from access_av.report.parts import (
-    badge,
-    figure,
-    number,
-    service_levels,
-    source,
-    table,
-    tile,
-    warnings,
-)
+from access_av.report.parts import badge, figure, service_levels, source, table, tile, warnings
+from access_av.run.error_bound import MAP_TRAVEL_M, VISIBLE_SNR_DB
+from access_av.tables.numbers import number
 
 if TYPE_CHECKING:
-    from access_av.error_bound import ErrorBound
-    from access_av.next_level import NextLevel
+    from access_av.radio.upgrades import NextLevel
+    from access_av.run.error_bound import ErrorBound
 
 _ENOUGH = {True: ("enough", "yes"), False: ("not enough", "no")}
 

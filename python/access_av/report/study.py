@@ -7,15 +7,16 @@ from html import escape
 from importlib.metadata import version
 from typing import TYPE_CHECKING
 
-from access_av.assumptions import energy_boundary, flattering, in_words
 from access_av.report import study_charts as charts
 from access_av.report.page import sheet
 from access_av.report.parts import badge, figure, section, source, table, tile, warnings
+from access_av.run.assumptions import energy_boundary, flattering, in_words
 from access_av.study import economy
-from access_av.study.points import idle_w
 
 if TYPE_CHECKING:
-    from access_av.carbon import Range
+    from collections.abc import Mapping
+
+    from access_av.economics.carbon import Range
     from access_av.report.chart import Spec
     from access_av.study.answer import Study
     from access_av.study.points import Point
@@ -35,7 +36,7 @@ def render_study(study: Study) -> str:
     Parameters
     ----------
     study
-        What :func:`access_av.study` returned.
+        What :func:`access_av.study_plant` returned.
     """
     specs: dict[str, Spec] = {
         "map": charts.road_map(study),
@@ -76,14 +77,16 @@ def render_study(study: Study) -> str:
 def _headline(study: Study) -> str:
     judged = study.judged(study.believed)
     return escape(
-        f"{judged[0].upper()}{judged[1:]} for {study.error_m:g} m on {study.percent:g} % of the time"
+        f"{judged[0].upper()}{judged[1:]} for {study.error_m:g} m, {study.percent:g} % of the time"
     )
 
 
 def _tiles(study: Study) -> str:
     believed, poor = (it.percentile(study.percent).value for it in (study.believed, study.poor))
     made = [
-        tile(f"{believed:.2f} m", f"{study.percent:g} % of the time the error is within, as believed"),
+        tile(
+            f"{believed:.2f} m", f"{study.percent:g} % of the time the error is within, as believed"
+        ),
         tile(f"{poor:.2f} m", "the same where lines of sight are poor"),
     ]
     if study.point is not None:
@@ -125,8 +128,8 @@ def _verdict(study: Study) -> str:
     )  # fmt: skip
     return section(
         "Is it good enough?",
-        "Whatever is stated with a standard deviation was drawn anew for each drive. Good enough, or "
-        "not, is what the interval of the share within says; probably, what its middle says. Poor "
+        "Whatever is stated with a standard deviation was drawn anew for each drive. Good enough, "
+        "or not, is what the interval of the share within says; probably, what its middle says. Poor "
         f"line of sight is the channel model “{channel}” of 3GPP TR 38.901. Reliable: state ok, "
         "the protection level below the alert limit.",
         table(head, rows, numbers=range(1, 7)),
@@ -144,12 +147,12 @@ def _where(study: Study) -> str:
         )
         for number, place in enumerate(study.worst, start=1)
     ]
-    kept = study.places["passes"].mean()
+    kept = study.places["passes"].sum() / study.places.height
     head = ("", "Along the road", "Place", f"{study.percent:g} % within", "Why")
     return section(
         "Where is it not?",
-        f"The road is coloured by the error that {study.percent:g} % of the positions within 5 m of "
-        f"a place are within; {kept:.0%} of the road keep the target. Triangles are radio heads, "
+        f"The road is coloured by the error that {study.percent:g} % of the positions within 5 m "
+        f"of a place are within; {kept:.0%} of the road keep the target. Triangles are radio heads, "
         "squares stops, numbers the worst places. places.csv has each metre. Drawn to scale on a "
         "wide screen.",
         figure("map")
@@ -208,7 +211,8 @@ def _remedies(study: Study) -> str:
         "What would mend it?",
         f"{text} Each by itself, driven in the same {pairs} worlds as the plant as it is; helps is "
         "what is surely better than that.",
-        table(head, rows, numbers=range(1, 6)) + _sources(study, [it.remedy.price for it in study.mended]),
+        table(head, rows, numbers=range(1, 6))
+        + _sources(study, [it.remedy.price for it in study.mended]),
     )
 
 
@@ -220,8 +224,8 @@ def _operation(study: Study) -> str:
     idle = study.day.idle_wh
     text = (
         f"Recommended: {point.name}. It takes {_joules_range(economy.trip_j(point))} a trip, which "
-        f"is {_range(study.day.trips_wh)} Wh a day for the fleet. Boundary: {boundary}; receiver and "
-        "estimates, low to high."
+        f"is {_range(study.day.trips_wh)} Wh a day for the fleet. Boundary: {boundary}; receiver "
+        "and estimates, low to high."
     )
     if idle is not None and study.day.idle_share is not None and point.idle_w is not None:
         text += (
@@ -315,8 +319,8 @@ def _money(study: Study) -> str:
     ]  # fmt: skip
     return section(
         "What does it cost?",
-        "Low … central … high, without discounting. The cells are there anyway and are not counted. "
-        "The first row counts what localizing adds; with a computer for this alone its idle power "
+        "Low … central … high, without discounting. The cells are there anyway and are not "
+        "counted. The first row counts what localizing adds; with a computer for this alone its idle power "
         "is added. What a LiDAR’s or a roadside unit’s own computing draws is not counted.",
         table(head, rows, numbers=range(1, 7)) + _sources(study, used),
     )
@@ -375,7 +379,7 @@ def _joules_range(values: Range) -> str:
     return f"{_range(values)} J"
 
 
-def _idle(watts: dict[str, float]) -> str:
+def _idle(watts: Mapping[str, float]) -> str:
     ends = dict.fromkeys(f"{watts[extent]:.3g}" for extent in ("low", "value", "high"))
     return " … ".join(ends)
 

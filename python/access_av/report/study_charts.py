@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 import json
-from typing import TYPE_CHECKING
+from typing import TYPE_CHECKING, Any
 
 import altair as alt
 import polars as pl
@@ -83,9 +83,7 @@ def road_map(study: Study) -> Spec:
             ],
         )
     )
-    mast = alt.Chart(heads).encode(
-        x=alt.X("x_m:Q", scale=across), y=alt.Y("y_m:Q", scale=upward)
-    )
+    mast = alt.Chart(heads).encode(x=alt.X("x_m:Q", scale=across), y=alt.Y("y_m:Q", scale=upward))
     masts = mast.mark_point(
         shape="triangle-up", filled=True, size=170, color=GREEN, opacity=1.0
     ).encode(tooltip=["name:N"])
@@ -115,9 +113,9 @@ def road_map(study: Study) -> Spec:
         layers += marked.mark_point(
             shape="circle", filled=True, size=330, color="#16202c", opacity=1.0
         )
-        layers += marked.mark_text(
-            fontSize=12, fontWeight="bold", color="#ffffff", dy=1
-        ).encode(text="number:N")
+        layers += marked.mark_text(fontSize=12, fontWeight="bold", color="#ffffff", dy=1).encode(
+            text="number:N"
+        )
     return finish(
         layers,
         height=height,
@@ -127,10 +125,11 @@ def road_map(study: Study) -> Spec:
 
 def _class(error_m: pl.Expr, target_m: float) -> pl.Expr:
     names = _classes(target_m)
-    found = pl.when(error_m <= SHARES[0] * target_m).then(pl.lit(names[0]))
+    found: Any = pl.when(error_m <= SHARES[0] * target_m).then(pl.lit(names[0]))
     for share, name in zip(SHARES[1:], names[1:-1], strict=True):
         found = found.when(error_m <= share * target_m).then(pl.lit(name))
-    return found.otherwise(pl.lit(names[-1]))
+    last: pl.Expr = found.otherwise(pl.lit(names[-1]))
+    return last
 
 
 def _classes(target_m: float) -> list[str]:
@@ -149,9 +148,7 @@ def _stops(study: Study) -> list[dict[str, float]]:
 
 
 def _at(study: Study, along_m: list[float]) -> pl.DataFrame:
-    rows = [
-        study.places.row(min(study.places.height - 1, int(at)), named=True) for at in along_m
-    ]
+    rows = [study.places.row(min(study.places.height - 1, int(at)), named=True) for at in along_m]
     columns = ("along_m", "x_m", "y_m")
     return pl.DataFrame([{name: row[name] for name in columns} for row in rows])
 
@@ -264,4 +261,6 @@ def ways_to_operate(study: Study) -> Spec:
         .mark_rule(strokeDash=[5, 4], strokeWidth=1.5)
         .encode(y="error_m:Q")
     )
-    return finish(chart + target, height=300, description="Energy against error, each way to operate")
+    return finish(
+        chart + target, height=300, description="Energy against error, each way to operate"
+    )

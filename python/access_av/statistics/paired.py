@@ -72,9 +72,7 @@ def _less(first: float, second: float) -> float:
     return 0.0 if first == second else first - second
 
 
-def _resampled(
-    errors: NDArray[Any], drawn: NDArray[Any], percent: float
-) -> NDArray[np.float64]:
+def _resampled(errors: NDArray[Any], drawn: NDArray[Any], percent: float) -> NDArray[np.float64]:
     """The percentile in each resample, whose drives count as often as they were drawn."""
     order = np.argsort(errors, axis=None, kind="stable")
     pooled, run = errors.ravel()[order], order // errors.shape[1]

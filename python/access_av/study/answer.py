@@ -4,15 +4,12 @@ from __future__ import annotations
 
 import json
 from dataclasses import dataclass
-from pathlib import Path
 from typing import TYPE_CHECKING, Any
 
 import polars as pl
 
 from access_av import _core
-from access_av.carbon import Range
 from access_av.errors import InputError
-from access_av.statistics.percentiles import Percentile
 from access_av.study import economy
 from access_av.study.driven import Driven, drive
 from access_av.study.places import WorstPlace, by_place, worst_places
@@ -21,14 +18,19 @@ from access_av.study.remedies import Remedy, remedies
 from access_av.study.unstated import Unstated, unstated
 
 if TYPE_CHECKING:
-    from collections.abc import Callable, Sequence
+    from collections.abc import Callable
+    from pathlib import Path
 
-    from access_av.balance import Way
+    from access_av.economics.balance import Way
+    from access_av.economics.carbon import Range
+    from access_av.statistics.percentiles import Percentile
 
 # Drives of each kind where none are asked for, by how many SSBs a trip has: about a minute on two
 # cores. Remedies and ways to operate are compared in pairs, which takes fewer.
 BUDGET_SSBS = 420_000.0
 FEWEST, MOST = 4, 24
+# Of them for each remedy, each way to operate, and poor line of sight, which takes longest.
+SHARES = (0.65, 0.4, 0.2)
 
 
 @dataclass(frozen=True)
@@ -114,7 +116,7 @@ class Study:
         return None if self.recommended is None else self.points[self.recommended]
 
     def judged(self, driven: Driven) -> str:
-        """Whether drives keep the target: ``good enough``, ``not good enough`` or what is likely."""
+        """Whether drives keep the target, for sure or probably."""
         share, low, high = driven.within(self.error_m)
         asked = 0.01 * self.percent
         if low >= asked:
@@ -135,8 +137,8 @@ class Study:
         believed = self.judged(self.believed)
         return (
             f"{believed[0].upper()}{believed[1:]}: for {self.percent:g} % of the time the vehicle "
-            f"knows its position {self.in_words(self.believed)}; {self.error_m:g} m is asked. Where "
-            f"lines of sight are poor: {self.judged(self.poor)}, {self.in_words(self.poor)}."
+            f"knows its position {self.in_words(self.believed)}; {self.error_m:g} m is asked. "
+            f"Where lines of sight are poor: {self.judged(self.poor)}, {self.in_words(self.poor)}."
         )
 
     def summary(self) -> dict[str, Any]:
@@ -234,7 +236,7 @@ class Study:
         }
 
 
-def study(
+def study_plant(
     plant: _core.Plant | str | Path,
     *,
     runs: int | None = None,
@@ -243,7 +245,7 @@ def study(
     always_mend: bool = False,
     progress: Callable[[int, int], None] | None = None,
 ) -> Study:
-    """Answer a plant's question: is it good enough, where not, what mends it, what does it cost?
+    """Tell whether a plant's localization is good enough, where not, what mends it, and its cost.
 
     Parameters
     ----------
@@ -270,7 +272,7 @@ def study(
 
     Examples
     --------
-    >>> found = study("trip-2", runs=2)
+    >>> found = study_plant("trip-2", runs=2)
     >>> found.point in [found.points[place] for place in found.front]
     True
     """
@@ -286,45 +288,42 @@ def study(
     error_m, percent = plant.target
     fleet = json.loads(plant.to_json())["fleet"]
     full = _runs(scenario) if runs is None else runs
-    pairs, ways_runs, poor_runs = (max(2, round(share * full)) for share in (0.65, 0.4, 0.2))
-    pairs, ways_runs, poor_runs = (min(full, it) for it in (pairs, ways_runs, poor_runs))
-    changes = remedies(scenario, fleet["vehicles"])
+    pairs, few, fewest = (min(full, max(2, round(share * full))) for share in SHARES)
     operated = tried(scenario)
-    total = full + poor_runs + ways_runs * (len(operated) - 1) + pairs * len(changes)
-    done = 0
+    done, total = 0, full + fewest + few * (len(operated) - 1)
 
     def driven(name: str, variant: _core.Scenario, count: int) -> Driven:
         nonlocal done
-        made = drive(name, variant, count, seed, threads)
+
+        def tell(now: int, _: int) -> None:
+            if progress is not None:
+                progress(done + now, total)
+
+        made = drive(name, variant, count, seed, threads, tell)
         done += count
-        if progress is not None:
-            progress(done, total)
         return made
 
     believed = driven("as it is", scenario, full)
-    poor = driven("poor line of sight", plant.poor_scenario(), poor_runs)
+    changes = []
+    if always_mend or believed.within(error_m)[1] < 0.01 * percent:
+        changes = remedies(scenario, fleet["vehicles"])
+        total += pairs * len(changes)
+    prices = economy.Prices.of(plant)
+    mended = []
+    for remedy in changes:
+        changed = scenario.with_overrides(dict(remedy.settings))
+        made = driven(remedy.name, changed, pairs)
+        mended.append(_mended(remedy, made, believed, percent, prices))
+    mended.sort(key=lambda it: it.less_m[0])
+    poor = driven("poor line of sight", plant.poor_scenario(), fewest)
     at_ways: list[tuple[str, str, Driven]] = []
     for name, (method, wake_up, settings) in operated.items():
         made = (
-            driven(name, scenario.with_overrides(settings), ways_runs)
+            driven(name, scenario.with_overrides(settings), few)
             if settings
-            else believed.first(ways_runs)
+            else believed.first(few)
         )
         at_ways.append((method, wake_up, made))
-    prices = economy.Prices.of(plant)
-    mended = []
-    if always_mend or believed.within(error_m)[1] < 0.01 * percent:
-        for remedy in changes:
-            mended.append(
-                _mended(
-                    remedy,
-                    driven(remedy.name, scenario.with_overrides(dict(remedy.settings)), pairs),
-                    believed,
-                    percent,
-                    prices,
-                )
-            )
-        mended.sort(key=lambda it: it.less_m[0])
     found = points(at_ways, percent)
     chosen = recommended(found, error_m)
     places = by_place(believed, percent, error_m)

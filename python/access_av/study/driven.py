@@ -4,14 +4,14 @@ from __future__ import annotations
 
 import json
 from dataclasses import dataclass
-from typing import TYPE_CHECKING, Any
+from typing import TYPE_CHECKING
 
 import numpy as np
 import polars as pl
 
-from access_av.platform import Platform
-from access_av.service_levels import INDEPENDENT_S
-from access_av.simulation import simulate
+from access_av.device.platform import Platform
+from access_av.run.service_levels import INDEPENDENT_S
+from access_av.run.simulation import simulate
 from access_av.statistics.paired import paired_difference
 from access_av.statistics.percentiles import percentiles
 from access_av.statistics.proportions import clopper_pearson
@@ -146,7 +146,7 @@ class Driven:
         """Energy of a trip by ``low``, ``value`` and ``high``; ``None`` without a figure."""
         vehicle = self.scenario.vehicle
         core = (platform or Platform.load(platform_name(self.scenario))).core
-        estimates, listened = int(round(self.executions.mean())), int(round(self.listened.mean()))
+        estimates, listened = (round(float(it.mean())) for it in (self.executions, self.listened))
         found = {}
         for extent in EXTENTS:
             parts = core.energy_j(vehicle, estimates, listened, self.duration_s, extent)

@@ -6,15 +6,15 @@ import json
 from dataclasses import dataclass
 from typing import TYPE_CHECKING, Any
 
-from access_av.balance import balance
-from access_av.carbon import Range
-from access_av.toml import shipped
+from access_av.economics.balance import balance
+from access_av.economics.carbon import Range
+from access_av.tables.toml import shipped
 
 if TYPE_CHECKING:
     from collections.abc import Mapping
 
     from access_av import _core
-    from access_av.balance import Way
+    from access_av.economics.balance import Way
     from access_av.study.points import Point
 
 OURS, WITH_IDLE, LIDAR, ROADSIDE = (
@@ -34,7 +34,7 @@ class Prices:
     currency
         What money is counted in.
     ranges, sources
-        By the keys of ``[prices]`` and of ``facts/plant.toml``.
+        By the keys of ``[prices]`` and of ``economics/prices.toml``.
     """
 
     currency: str
@@ -45,7 +45,7 @@ class Prices:
     def of(cls, plant: _core.Plant) -> Prices:
         """The plant's, completed."""
         own: dict[str, Any] = json.loads(plant.to_json()).get("prices", {})
-        facts = shipped("facts", "plant.toml")
+        facts = shipped("economics", "prices.toml")
         taken = {name: own.get(name, fact) for name, fact in facts.items() if name != "currency"}
         return cls(
             currency=str(own.get("currency", facts["currency"]["name"])),
@@ -95,10 +95,7 @@ def day(plant: _core.Plant, point: Point) -> Day:
 def trip_j(point: Point) -> Range:
     """Energy of a trip in joules, low to high, without the board that would idle."""
     return _range(
-        {
-            extent: energy.estimates_j + energy.listening_j
-            for extent, energy in point.energy.items()
-        }
+        {extent: energy.estimates_j + energy.listening_j for extent, energy in point.energy.items()}
     )
 
 
@@ -144,8 +141,7 @@ def ways(plant: _core.Plant, point: Point, prices: Prices) -> dict[str, Way]:
         }
         found[WITH_IDLE] = {**ours, "onboard": [receiver, board]}
     return {
-        name: balance({**common, "before": way, "after": way}).before
-        for name, way in found.items()
+        name: balance({**common, "before": way, "after": way}).before for name, way in found.items()
     }
 
 

@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import json
 import math
 from dataclasses import dataclass
 from typing import TYPE_CHECKING, Any
@@ -10,7 +11,7 @@ import numpy as np
 import polars as pl
 
 from access_av import _core
-from access_av.error_bound import VISIBLE_SNR_DB, along_route
+from access_av.run.error_bound import VISIBLE_SNR_DB, along_route
 
 if TYPE_CHECKING:
     from collections.abc import Mapping
@@ -124,8 +125,6 @@ def _dilution(
 
 def radio_heads(scenario: _core.Scenario) -> list[Mapping[str, Any]]:
     """The radio heads of a scenario's site, as they are set."""
-    import json
-
     heads: list[Mapping[str, Any]] = json.loads(scenario.site.to_json())["radio_heads"]
     return heads
 
@@ -161,8 +160,8 @@ def _why(row: Mapping[str, Any], places: pl.DataFrame, stops_m: list[float]) -> 
         return "every radio head in reach lies straight ahead or behind"
     if isinstance(usual, float) and dilution > 1.5 * usual:
         return (
-            f"radio heads lie ahead, behind or far away: a degree in their angles is {dilution:.1f} "
-            f"m along the road, against {usual:.1f} m at the median of the road"
+            f"radio heads lie ahead, behind or far away: a degree in their angles is "
+            f"{dilution:.1f} m along the road, against {usual:.1f} m at the median of the road"
         )
     if row["heads_visible"] == 1:
         return "one radio head alone is in reach"

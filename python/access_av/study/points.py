@@ -9,7 +9,7 @@ from typing import TYPE_CHECKING, Any
 import numpy as np
 
 from access_av.designs.front import not_beaten
-from access_av.platform import Platform
+from access_av.device.platform import Platform
 from access_av.study.driven import EXTENTS, Driven, Energy, platform_name
 
 if TYPE_CHECKING:
@@ -18,7 +18,7 @@ if TYPE_CHECKING:
     from access_av import _core
 
 # Wake-ups that are tried beside the vehicle's own, by what a table calls them.
-FIXED_MS = (100.0, 200.0, 500.0, 1000.0)
+FIXED_MS = (200.0, 500.0, 1000.0)
 # An estimator that takes raw snapshots is tried where the vehicle knows the pilots.
 METHODS = ("root-music", "esprit", "music")
 
@@ -74,8 +74,7 @@ def tried(scenario: _core.Scenario) -> dict[str, tuple[str, str, dict[str, Any]]
             found[name] = (method, name, {"vehicle.wake_up": wake_up})
     if own != in_words({"policy": "uncertainty"}):
         name = in_words({"policy": "uncertainty"})
-        settings = {"vehicle.wake_up": {"policy": "uncertainty"}}
-        found[name] = (method, name, settings)
+        found[name] = (method, name, {"vehicle.wake_up": {"policy": "uncertainty"}})
     for other in METHODS:
         if other != method:
             settings = {"vehicle.estimator.method": other, "vehicle.receiver.pilots": "blind"}
@@ -93,7 +92,8 @@ def in_words(wake_up: Mapping[str, Any]) -> str:
         "pid": "by Algorithm 1",
         "gated": "gated by SNR",
     }
-    return named.get(wake_up["policy"], wake_up["policy"])
+    policy = str(wake_up["policy"])
+    return named.get(policy, policy)
 
 
 def points(drives: Sequence[tuple[str, str, Driven]], percent: float) -> list[Point]:

@@ -6,8 +6,8 @@ import json
 from dataclasses import dataclass
 from typing import TYPE_CHECKING, Any
 
-from access_av.error_bound import along_route
-from access_av.placement import plan
+from access_av.radio.placement import plan
+from access_av.run.error_bound import along_route
 
 if TYPE_CHECKING:
     from collections.abc import Mapping
@@ -59,7 +59,7 @@ def remedies(scenario: _core.Scenario, vehicles: int) -> list[Remedy]:
     """
     site, vehicle = (json.loads(part.to_json()) for part in (scenario.site, scenario.vehicle))
     found = [
-        _remember(vehicle, vehicles),
+        _remember(vehicle),
         _more_ssbs(site),
         _calibrate(vehicle, vehicles),
         _survey(site),
@@ -70,7 +70,7 @@ def remedies(scenario: _core.Scenario, vehicles: int) -> list[Remedy]:
     return [remedy for remedy in found if remedy is not None]
 
 
-def _remember(vehicle: Mapping[str, Any], vehicles: int) -> Remedy | None:
+def _remember(vehicle: Mapping[str, Any]) -> Remedy | None:
     if vehicle["odometer"]["scale_std"] <= REMEMBERED_SCALE_STD:
         return None
     what = (
@@ -132,9 +132,7 @@ def _odometer(vehicle: Mapping[str, Any], vehicles: int) -> Remedy | None:
     }
     if not settings:
         return None
-    return Remedy(
-        "a better odometer", "half the odometer’s errors", settings, "odometer", vehicles
-    )
+    return Remedy("a better odometer", "half the odometer’s errors", settings, "odometer", vehicles)
 
 
 def _move(scenario: _core.Scenario, site: Mapping[str, Any]) -> Remedy | None:

@@ -7,8 +7,8 @@ from dataclasses import dataclass
 from pathlib import Path
 from typing import TYPE_CHECKING, Any
 
-from access_av import toml
-from access_av.error_bound import along_route
+from access_av.run.error_bound import along_route
+from access_av.tables import toml
 
 if TYPE_CHECKING:
     from collections.abc import Mapping
