@@ -22,6 +22,7 @@ from access_av.cli import (
     drives,
     files,
     integrity,
+    new,
     paper,
     profile,
     radio,
@@ -105,6 +106,8 @@ for _room in (
     *(recordings, drives, survey, profile, balance, columns),
 ):
     app.add_typer(_room.app)
+app.add_typer(new.app, name="new", cls=_Commands)
+app.add_typer(new.export_app)
 for _what in ("site", "vehicle", "scenario", "platform", "plant"):
     app.add_typer(files.files_app(_what), name=_what, cls=_Commands)
 

@@ -129,8 +129,8 @@ def _verdict(study: Study) -> str:
     return section(
         "Is it good enough?",
         "Whatever is stated with a standard deviation was drawn anew for each drive. Good enough, "
-        "or not, is what the interval of the share within says; probably, what its middle says. Poor "
-        f"line of sight is the channel model “{channel}” of 3GPP TR 38.901. Reliable: state ok, "
+        "or not, is what the interval of the share within says; probably, what its middle says. "
+        f"Poor line of sight is the channel model “{channel}” of 3GPP TR 38.901. Reliable: state ok, "
         "the protection level below the alert limit.",
         table(head, rows, numbers=range(1, 7)),
     )
@@ -152,9 +152,9 @@ def _where(study: Study) -> str:
     return section(
         "Where is it not?",
         f"The road is coloured by the error that {study.percent:g} % of the positions within 5 m "
-        f"of a place are within; {kept:.0%} of the road keep the target. Triangles are radio heads, "
-        "squares stops, numbers the worst places. places.csv has each metre. Drawn to scale on a "
-        "wide screen.",
+        f"of a place are within; {kept:.0%} of the road keep the target. Triangles are radio "
+        "heads, squares stops, numbers the worst places. places.csv has each metre. "
+        "Drawn to scale on a wide screen.",
         figure("map")
         + table(head, rows, numbers=(1, 2, 3))
         + '<div class="charts">'
@@ -320,8 +320,9 @@ def _money(study: Study) -> str:
     return section(
         "What does it cost?",
         "Low … central … high, without discounting. The cells are there anyway and are not "
-        "counted. The first row counts what localizing adds; with a computer for this alone its idle power "
-        "is added. What a LiDAR’s or a roadside unit’s own computing draws is not counted.",
+        "counted. The first row counts what localizing adds; with a computer for this alone "
+        "its idle power is added. What a LiDAR’s or a roadside unit’s own computing draws is "
+        "not counted.",
         table(head, rows, numbers=range(1, 7)) + _sources(study, used),
     )
 

@@ -1,4 +1,4 @@
-"""Roads and radio heads in CSV: commas, or semicolons with decimal commas, as spreadsheets write."""
+"""Roads and radio heads in CSV, also with semicolons and decimal commas."""
 
 from __future__ import annotations
 
@@ -57,7 +57,7 @@ def read_heads(path: Path) -> Drawn:
 
 
 def road_text(points_m: Sequence[tuple[float, float]], *, german: bool = False) -> str:
-    """Points of a road as CSV, to a tenth of a millimetre; ``german`` with semicolons and commas."""
+    """Points of a road as CSV; ``german`` with semicolons and decimal commas."""
     rows = [("x_m", "y_m"), *((f"{x_m:.4f}", f"{y_m:.4f}") for x_m, y_m in points_m)]
     return _text(rows, german=german)
 

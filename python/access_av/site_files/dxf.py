@@ -69,19 +69,21 @@ def read(
         of the kind, and a scale that nobody confirmed.
     """
     try:
-        import ezdxf
+        from ezdxf.filemanagement import readfile
         from ezdxf.lldxf.const import DXFError
     except ImportError as error:
         raise InputError(f"{path}: DXF needs the extra: pip install 'access-av[cad]'") from error
     try:
-        drawing = ezdxf.readfile(regular(path, MOST_BYTES))
+        drawing = readfile(regular(path, MOST_BYTES))
     except (DXFError, UnicodeDecodeError, ValueError) as error:
         raise InputError(f"{path}: not a DXF drawing: {error}") from error
     if scale_m is None:
         raise InputError(f"{path}: {_unconfirmed(drawing)}")
     model = drawing.modelspace()
     layers = sorted({entity.dxf.layer for entity in model})
-    start, segments, points = (0.0, 0.0, 0.0), [], []
+    start = (0.0, 0.0, 0.0)
+    segments: list[Segment] = []
+    points: list[tuple[float, float]] = []
     if road_layer is not None:
         found = [
             entity
@@ -110,7 +112,7 @@ def _unconfirmed(drawing: Any) -> str:
 
 
 def _vertices(entity: Any, scale_m: float) -> list[tuple[float, float, float]]:
-    """Points in metres, each with the bulge of what follows: the tangent of a quarter of its arc."""
+    """Points in metres, each with its bulge: the tangent of a quarter of the arc that follows."""
     if entity.dxftype() == "LINE":
         ends = (entity.dxf.start, entity.dxf.end)
         return [(scale_m * end.x, scale_m * end.y, 0.0) for end in ends]
