@@ -43,6 +43,17 @@ PercentileOption = Annotated[
     float | None,
     typer.Option(help="Of --max-error-m: 50, 90, 95, 99 or 99.9.", show_default="99"),
 ]
+Vary = Annotated[
+    list[str] | None,
+    typer.Option("--vary", metavar="KEY=a,b,c", help="Values of a key side by side; repeatable."),
+]
+Compare = Annotated[
+    list[str] | None, typer.Option("--compare", help="Another file, side by side; repeatable.")
+]
+Percents = Annotated[
+    list[float] | None,
+    typer.Option("--percentile", min=1.0, max=100.0, help="Compared percentiles; 50, 90 and 99."),
+]
 AsJson = Annotated[bool, typer.Option("--json", help="Print JSON.")]
 
 # Exit code where something was found, and not what was asked for.

@@ -8,13 +8,17 @@ import typer
 
 from access_av.cli.options import (
     AllowLarge,
+    Compare,
     Out,
+    Percents,
     Runs,
     ScenarioArgument,
     Seed,
     Threads,
+    Vary,
     load_scenario,
 )
+from access_av.cli.side_by_side import show_compared, side_by_side
 from access_av.cli.terminal import console, progress, show_simulation
 from access_av.errors import InputError
 from access_av.tables.toml import tomllib
@@ -32,6 +36,9 @@ def run(
     threads: Threads = None,
     out: Out = None,
     allow_large: AllowLarge = False,
+    vary: Vary = None,
+    compare: Compare = None,
+    percentile: Percents = None,
     overrides: Annotated[
         list[str] | None,
         typer.Option("--set", metavar="KEY=VALUE", help="Change one key; may be repeated."),
@@ -40,13 +47,16 @@ def run(
     """Drive one scenario and write its trajectories.
 
     Writes trajectories.parquet, executions.parquet, trajectory.tum and truth.tum (the first run),
-    report.html, scenario.toml with every default, and manifest.json.
+    report.html, scenario.toml with every default, and manifest.json; with --vary or --compare also
+    compared.parquet.
     """
     import polars as pl
 
+    from access_av.report.compared import compared_section
     from access_av.report.drive import render_drive
     from access_av.run.assumptions import energy_boundary, flattering, in_words
     from access_av.run.simulation import simulate
+    from access_av.study.compare import table as compared_table
     from access_av.tables.results_directory import ResultsDirectory, tum_trajectory
 
     given = dict(map(_override, overrides or ()))
@@ -65,7 +75,12 @@ def run(
     for name, poses, prefix in (("trajectory.tum", known, ""), ("truth.tum", first, "true_")):
         columns = ("time_s", f"{prefix}x_m", f"{prefix}y_m", f"{prefix}heading_rad")
         directory.write_text(name, tum_trajectory(*(poses[column] for column in columns)))
-    directory.write_text("report.html", render_drive(chosen, result, seed))
+    others = {name: load_scenario(name, allow_large=allow_large) for name in compare or ()}
+    beside = side_by_side(chosen, vary, others, percentile, runs, seed, threads)
+    if beside:
+        directory.write_table("compared.parquet", compared_table(beside))
+    page = render_drive(chosen, result, seed, compared_section(beside))
+    directory.write_text("report.html", page)
     directory.write_text("scenario.toml", chosen.resolved().to_toml())
     assumed = flattering(chosen)
     directory.write_manifest(
@@ -78,6 +93,7 @@ def run(
     )
     directory.link_latest()
 
+    show_compared(beside)
     title = f"{chosen.name}: {runs} runs, seed {seed}"
     show_simulation(result, title, energy_boundary(chosen))
     if assumed:

@@ -7,7 +7,8 @@ from typing import Annotated
 import typer
 
 from access_av._core import Plant
-from access_av.cli.options import AsJson, Out, Seed, Threads, announce
+from access_av.cli.options import AsJson, Compare, Out, Percents, Seed, Threads, Vary, announce
+from access_av.cli.side_by_side import show_compared, side_by_side
 from access_av.cli.terminal import console, progress, table
 
 app = typer.Typer()
@@ -16,7 +17,7 @@ app = typer.Typer()
 @app.command(
     epilog="Example: [bold]access-av new plant mine.toml; access-av study mine.toml[/]",
 )
-def study_plant(
+def study(
     plant: Annotated[str, typer.Argument(help="Shipped name, or path of a plant's TOML file.")],
     runs: Annotated[
         int | None,
@@ -28,15 +29,21 @@ def study_plant(
     always_mend: Annotated[
         bool, typer.Option("--always-mend", help="Drive remedies also where the target is kept.")
     ] = False,
+    vary: Vary = None,
+    compare: Compare = None,
+    percentile: Percents = None,
     as_json: AsJson = False,
 ) -> None:
     """Tell whether a plant's localization is good enough, where not, what mends it and its cost.
 
     Writes report.html, study.json, errors.parquet, drives.parquet, places.parquet, places.csv,
-    points.parquet, plant.toml with every default, and manifest.json.
+    points.parquet, plant.toml with every default, and manifest.json; with --vary or --compare also
+    compared.parquet.
     """
+    from access_av.report.compared import compared_section
     from access_av.report.study import render_study
     from access_av.study.answer import study_plant
+    from access_av.study.compare import table as compared_table
     from access_av.tables.results_directory import ResultsDirectory, json_text
 
     chosen = Plant.load(plant)
@@ -50,7 +57,19 @@ def study_plant(
         directory.write_table(f"{name}.parquet", rows)
     directory.write_text("places.csv", found.places.write_csv(float_precision=4))
     directory.write_json("study.json", found.summary())
-    directory.write_text("report.html", render_study(found))
+    scenarios = {name: Plant.load(name).scenario() for name in compare or ()}
+    beside = side_by_side(
+        chosen.scenario(),
+        vary,
+        scenarios,
+        percentile or [50.0, found.percent],
+        found.believed.runs,
+        seed,
+        threads,
+    )
+    if beside:
+        directory.write_table("compared.parquet", compared_table(beside))
+    directory.write_text("report.html", render_study(found, compared_section(beside)))
     directory.write_text("plant.toml", chosen.to_toml())
     directory.write_manifest(
         repeat=("study", "plant.toml", "--seed", seed, "--runs", found.believed.runs),
@@ -82,6 +101,7 @@ def study_plant(
                 it.outcome,
             )
         console.print(made)
+    show_compared(beside)
     if found.point is not None:
         console.print(f"Recommended: {found.point.name}.")
     console.print(f"Report: {directory.path / 'report.html'}", soft_wrap=True)

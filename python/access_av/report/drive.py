@@ -25,7 +25,7 @@ if TYPE_CHECKING:
 SHOWN_PERCENTS = (50.0, 90.0, 99.0)
 
 
-def render_drive(scenario: Scenario, result: Simulation, seed: int) -> str:
+def render_drive(scenario: Scenario, result: Simulation, seed: int, beside: str = "") -> str:
     """The drives of one scenario as an HTML page that loads nothing.
 
     Parameters
@@ -36,6 +36,8 @@ def render_drive(scenario: Scenario, result: Simulation, seed: int) -> str:
         What :func:`access_av.simulate` returned, trajectories kept.
     seed
         Its seed.
+    beside
+        A section on other variants, as HTML.
     """
     if result.trajectories is None or result.executions is None:
         raise InputError("the page of a drive needs its trajectories: keep_trajectories=True")
@@ -81,6 +83,7 @@ def render_drive(scenario: Scenario, result: Simulation, seed: int) -> str:
                 service_levels(levels),
             )
         )
+    sections.append(beside)
     sections.append(
         section(
             "Provenance",

@@ -30,13 +30,15 @@ _KINDS = {
 _OUTCOMES = {"helps": "yes", "not sure": "fit", "makes it worse": "no"}
 
 
-def render_study(study: Study) -> str:
+def render_study(study: Study, beside: str = "") -> str:
     """A study as an HTML page that loads nothing.
 
     Parameters
     ----------
     study
         What :func:`access_av.study_plant` returned.
+    beside
+        A section on other variants, as HTML.
     """
     specs: dict[str, Spec] = {
         "map": charts.road_map(study),
@@ -64,6 +66,7 @@ def render_study(study: Study) -> str:
         + _remedies(study)
         + _operation(study)
         + _money(study)
+        + beside
         + _unstated(study)
         + section(
             "Provenance",
@@ -130,7 +133,7 @@ def _verdict(study: Study) -> str:
         "Is it good enough?",
         "Whatever is stated with a standard deviation was drawn anew for each drive. Good enough, "
         "or not, is what the interval of the share within says; probably, what its middle says. "
-        f"Poor line of sight is the channel model “{channel}” of 3GPP TR 38.901. Reliable: state ok, "
+        f"Poor line of sight is the channel model “{channel}” of TR 38.901. Reliable: state ok, "
         "the protection level below the alert limit.",
         table(head, rows, numbers=range(1, 7)),
     )
@@ -173,7 +176,7 @@ def _remedies(study: Study) -> str:
     if not study.mended:
         return section(
             "What would mend it?",
-            "The target is kept for sure: no remedy was driven. With --always-mend they are.",
+            "The drives keep the target: no remedy was driven. With --always-mend they are.",
             "",
         )
     currency = escape(study.prices.currency)
@@ -295,23 +298,16 @@ def _money(study: Study) -> str:
         return ""
     fleet = json.loads(study.plant.to_json())["fleet"]
     years, currency = fleet["years"], escape(study.prices.currency)
+    ways = study.ways.values()
     rows = [
-        (
-            escape(name),
-            _range(way.capital),
-            _range(way.yearly),
-            _range(economy.total(way, years)),
-            _range(way.embodied_kg),
-            _range(way.use_kg_per_year),
-            _range(economy.total_kg(way, years)),
-        )
-        for name, way in study.ways.items()
+        (f"to buy / {currency}", *(_range(way.capital) for way in ways)),
+        (f"a year / {currency}", *(_range(way.yearly) for way in ways)),
+        (f"{years:g} years / {currency}", *(_range(economy.total(way, years)) for way in ways)),
+        ("production / kgCO2e", *(_range(way.embodied_kg) for way in ways)),
+        ("use a year / kgCO2e", *(_range(way.use_kg_per_year) for way in ways)),
+        (f"{years:g} years / kgCO2e", *(_range(economy.total_kg(way, years)) for way in ways)),
     ]
-    head = (
-        f"To localize {fleet['vehicles']} vehicles", f"to buy / {currency}", f"a year / {currency}",
-        f"{years:g} years / {currency}", "production / kgCO2e", "use a year / kgCO2e",
-        f"{years:g} years / kgCO2e",
-    )  # fmt: skip
+    head = (f"{fleet['vehicles']} vehicles by", *study.ways)
     used = [
         "receiver", "lidar", "roadside_unit", "roadside_unit_yearly", "electricity_per_kwh",
         "grid_g_per_kwh", "lidar_power_w", "roadside_unit_power_w", "receiver_embodied_kg",
@@ -320,10 +316,10 @@ def _money(study: Study) -> str:
     return section(
         "What does it cost?",
         "Low … central … high, without discounting. The cells are there anyway and are not "
-        "counted. The first row counts what localizing adds; with a computer for this alone "
+        "counted. The first column counts what localizing adds; with a computer for this alone "
         "its idle power is added. What a LiDAR’s or a roadside unit’s own computing draws is "
         "not counted.",
-        table(head, rows, numbers=range(1, 7)) + _sources(study, used),
+        table(head, rows, numbers=range(1, 5)) + _sources(study, used),
     )
 
 

@@ -7,12 +7,13 @@ from typing import TYPE_CHECKING, Any
 import numpy as np
 
 from access_av.designs.front import student
-from access_av.statistics.percentiles import percentiles
 
 if TYPE_CHECKING:
     from numpy.typing import ArrayLike, NDArray
 
 RESAMPLES = 400
+# Counts that are held at a time.
+MOST_COUNTS = 4_000_000
 
 
 def paired_difference(
@@ -55,8 +56,8 @@ def paired_difference(
     mine, its = (np.atleast_2d(np.asarray(it, dtype=np.float64)) for it in (errors, others))
     if len(mine) != len(its):
         raise ValueError(f"{len(mine)} drives cannot be paired with {len(its)}")
-    [first], [second] = percentiles(mine, [percent]), percentiles(its, [percent])
-    difference = _less(first.value, second.value)
+    every = np.ones((1, len(mine)), dtype=np.int64)
+    difference = _less(*(float(_resampled(it, every, percent)[0]) for it in (mine, its)))
     runs = len(mine)
     if runs == 1 or not np.isfinite(difference):
         return difference, -np.inf, np.inf
@@ -76,9 +77,9 @@ def _resampled(errors: NDArray[Any], drawn: NDArray[Any], percent: float) -> NDA
     """The percentile in each resample, whose drives count as often as they were drawn."""
     order = np.argsort(errors, axis=None, kind="stable")
     pooled, run = errors.ravel()[order], order // errors.shape[1]
-    found = np.empty(len(drawn))
-    for row, times in enumerate(drawn):
-        counted = np.cumsum(times[run])
-        rank = max(1, int(np.ceil(round(percent / 100.0 * counted[-1], 6))))
-        found[row] = pooled[np.searchsorted(counted, rank)]
-    return found
+    found = []
+    for times in np.array_split(drawn, max(1, drawn.shape[0] * pooled.size // MOST_COUNTS)):
+        counted = np.cumsum(times[:, run], axis=1)
+        ranks = np.maximum(1.0, np.ceil(np.round(percent / 100.0 * counted[:, -1], 6)))
+        found.append(pooled[(counted < ranks[:, None]).sum(axis=1)])
+    return np.concatenate(found)

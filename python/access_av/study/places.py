@@ -27,6 +27,8 @@ APART_M = 40.0
 MOST_PLACES = 3
 # Until so far from its start a vehicle knows its place mostly from what it is told there.
 STARTING_M = 20.0
+# Below this SNR noise is a large part of an angle's error.
+WEAK_SNR_DB = 5.0
 
 
 @dataclass(frozen=True)
@@ -165,8 +167,7 @@ def _why(row: Mapping[str, Any], places: pl.DataFrame, stops_m: list[float]) -> 
         )
     if row["heads_visible"] == 1:
         return "one radio head alone is in reach"
-    weak = places["best_snr_db"].quantile(0.1, "linear")
-    if weak is not None and row["best_snr_db"] <= weak:
+    if row["best_snr_db"] < WEAK_SNR_DB:
         return f"the strongest radio head is weak here ({row['best_snr_db']:.0f} dB)"
     if any(0.0 <= row["along_m"] - stop_m < 2.0 * WINDOW_M for stop_m in stops_m):
         return "at a stop: the error it arrives with stays as long as it stands"
