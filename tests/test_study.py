@@ -12,9 +12,11 @@ import numpy as np
 import polars as pl
 import pytest
 
+import layout
 from access_av import Plant, SettingsError, study_plant
 from access_av.errors import InputError
 from access_av.statistics.paired import paired_difference
+from access_av.tables.columns.tables import TABLES
 
 if TYPE_CHECKING:
     from collections.abc import Callable
@@ -221,13 +223,36 @@ def test_places_are_those_of_the_road(results: Path, said: dict[str, Any]) -> No
 
 
 def test_variants_stand_side_by_side(results: Path, page: str) -> None:
-    compared = pl.read_parquet(results / "compared.parquet")
+    compared = pl.read_parquet(results / "compared.parquet").filter(percent=90.0)
     assert compared["variant"].to_list() == ["as it is", "site.rician_k_db = 3"]
-    assert compared["p90_error_m"][0] == pytest.approx(percentile(errors(results, "as it is"), 90))
-    assert compared["p90_more_m"][1] == pytest.approx(
-        compared["p90_error_m"][1] - compared["p90_error_m"][0]
-    )
+    first, second = compared["percentile_m"]
+    assert first == pytest.approx(percentile(errors(results, "as it is"), 90))
+    assert compared["more_m"].to_list() == [None, pytest.approx(second - first)]
     assert "site.rician_k_db = 3" in page
+
+
+@pytest.mark.parametrize("width", [1300, 800, 400])
+def test_nothing_of_the_page_overlaps_or_is_cut(results: Path, tmp_path: Path, width: int) -> None:
+    if layout.chromium() is None:
+        pytest.skip("no chromium to measure the page with")
+    found = layout.measure(results / "report.html", tmp_path, width)
+    assert found["width"] == width
+    assert found["charts"] == 4
+    assert found["found"] == []
+
+
+@pytest.mark.parametrize(
+    ("file", "table"),
+    [
+        ("errors", "study_errors"),
+        ("drives", "study_drives"),
+        ("places", "places"),
+        ("points", "study_points"),
+        ("compared", "compared"),
+    ],
+)
+def test_columns_are_those_that_are_documented(results: Path, file: str, table: str) -> None:
+    assert tuple(pl.read_parquet(results / f"{file}.parquet").columns) == TABLES[table].columns
 
 
 def test_the_page_is_small_loads_nothing_and_shows_names_as_they_are(results: Path) -> None:

@@ -18,7 +18,7 @@ from access_av.cli.options import (
     Vary,
     load_scenario,
 )
-from access_av.cli.side_by_side import show_compared, side_by_side
+from access_av.cli.side_by_side import PERCENTS, show_compared, side_by_side, variants
 from access_av.cli.terminal import console, progress, show_simulation
 from access_av.errors import InputError
 from access_av.tables.toml import tomllib
@@ -61,6 +61,8 @@ def run(
 
     given = dict(map(_override, overrides or ()))
     chosen = load_scenario(scenario, allow_large=allow_large, overrides=given)
+    others = {name: load_scenario(name, allow_large=allow_large) for name in compare or ()}
+    scenarios = variants(chosen, vary, others)
     directory = ResultsDirectory.create(f"run-{chosen.name}", out)
     with progress("Driving") as tick:
         result = simulate(
@@ -75,8 +77,8 @@ def run(
     for name, poses, prefix in (("trajectory.tum", known, ""), ("truth.tum", first, "true_")):
         columns = ("time_s", f"{prefix}x_m", f"{prefix}y_m", f"{prefix}heading_rad")
         directory.write_text(name, tum_trajectory(*(poses[column] for column in columns)))
-    others = {name: load_scenario(name, allow_large=allow_large) for name in compare or ()}
-    beside = side_by_side(chosen, vary, others, percentile, runs, seed, threads)
+    asked = percentile or PERCENTS
+    beside = side_by_side(scenarios, asked, runs, seed, threads)
     if beside:
         directory.write_table("compared.parquet", compared_table(beside))
     page = render_drive(chosen, result, seed, compared_section(beside))

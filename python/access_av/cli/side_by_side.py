@@ -15,28 +15,34 @@ if TYPE_CHECKING:
 PERCENTS = (50.0, 90.0, 99.0)
 
 
-def side_by_side(
+def variants(
     scenario: _core.Scenario,
     vary: Sequence[str] | None,
     others: Mapping[str, _core.Scenario],
-    percents: Sequence[float] | None,
+) -> dict[str, _core.Scenario]:
+    """A scenario, other values of its keys, and other scenarios, by their labels."""
+    from access_av.study.compare import AS_IT_IS, varied
+
+    of_keys = {label: scenario.with_overrides(it) for label, it in varied(vary or ())}
+    return {AS_IT_IS: scenario, **of_keys, **others}
+
+
+def side_by_side(
+    scenarios: Mapping[str, _core.Scenario],
+    percents: Sequence[float],
     runs: int,
     seed: int,
     threads: int | None,
 ) -> list[Compared]:
-    """Drive a scenario, and beside it other values of its keys and other scenarios."""
-    from access_av.study.compare import AS_IT_IS, compare, varied
+    """Drive variants in the same worlds; nothing where there is but one."""
+    from access_av.study.compare import compare
 
-    variants = {AS_IT_IS: scenario}
-    for label, overrides in varied(vary or ()):
-        variants[label] = scenario.with_overrides(overrides)
-    variants |= others
-    if len(variants) == 1:
+    if len(scenarios) == 1:
         return []
     with progress("Comparing") as tick:
         return compare(
-            variants,
-            sorted(percents or PERCENTS),
+            scenarios,
+            sorted(percents),
             runs=runs,
             seed=seed,
             threads=threads,

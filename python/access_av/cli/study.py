@@ -8,7 +8,7 @@ import typer
 
 from access_av._core import Plant
 from access_av.cli.options import AsJson, Compare, Out, Percents, Seed, Threads, Vary, announce
-from access_av.cli.side_by_side import show_compared, side_by_side
+from access_av.cli.side_by_side import show_compared, side_by_side, variants
 from access_av.cli.terminal import console, progress, table
 
 app = typer.Typer()
@@ -48,6 +48,8 @@ def study(
 
     chosen = Plant.load(plant)
     announce(plant, chosen.warnings())
+    others = {name: Plant.load(name).scenario() for name in compare or ()}
+    scenarios = variants(chosen.scenario(), vary, others)
     directory = ResultsDirectory.create(f"study-{chosen.name}", out)
     with progress("Driving") as tick:
         found = study_plant(
@@ -57,16 +59,8 @@ def study(
         directory.write_table(f"{name}.parquet", rows)
     directory.write_text("places.csv", found.places.write_csv(float_precision=4))
     directory.write_json("study.json", found.summary())
-    scenarios = {name: Plant.load(name).scenario() for name in compare or ()}
-    beside = side_by_side(
-        chosen.scenario(),
-        vary,
-        scenarios,
-        percentile or [50.0, found.percent],
-        found.believed.runs,
-        seed,
-        threads,
-    )
+    asked = percentile or [50.0, found.percent]
+    beside = side_by_side(scenarios, asked, found.believed.runs, seed, threads)
     if beside:
         directory.write_table("compared.parquet", compared_table(beside))
     directory.write_text("report.html", render_study(found, compared_section(beside)))

@@ -9,7 +9,6 @@ from typing import TYPE_CHECKING, Any
 import polars as pl
 
 from access_av.errors import InputError
-from access_av.statistics.percentiles import column
 from access_av.study.driven import Driven, drive
 from access_av.tables.toml import tomllib
 
@@ -140,20 +139,22 @@ def compare(
 
 
 def table(found: Sequence[Compared]) -> pl.DataFrame:
-    """One row per variant: columns ``compared`` of :mod:`access_av.columns`."""
+    """One row per variant and percentile: columns ``compared`` of :mod:`access_av.columns`."""
     rows = []
     for it in found:
-        row: dict[str, Any] = {"variant": it.driven.name, "runs": it.driven.runs}
         for place, percent in enumerate(it.percents):
-            known, name = it.driven.percentile(percent), column(percent)
-            less = (None, None, None) if it.less_m is None else it.less_m[place]
-            row |= {
-                name: known.value,
-                name.replace("_error_m", "_error_low_m"): known.low,
-                name.replace("_error_m", "_error_high_m"): known.high,
-                name.replace("_error_m", "_more_m"): less[0],
-                name.replace("_error_m", "_more_low_m"): less[1],
-                name.replace("_error_m", "_more_high_m"): less[2],
-            }
-        rows.append({**row, "energy_j": it.energy_j})
+            known = it.driven.percentile(percent)
+            more = (None, None, None) if it.less_m is None else it.less_m[place]
+            rows.append(
+                {
+                    "variant": it.driven.name,
+                    "runs": it.driven.runs,
+                    "percent": percent,
+                    "percentile_m": known.value,
+                    "percentile_low_m": known.low,
+                    "percentile_high_m": known.high,
+                    **dict(zip(("more_m", "more_low_m", "more_high_m"), more, strict=True)),
+                    "energy_j": it.energy_j,
+                }
+            )
     return pl.DataFrame(rows, infer_schema_length=None)

@@ -46,6 +46,41 @@ _GLOSSARY = {
         "true or false",
         "The angles come from elsewhere than expected; do not rely on the pose",
     ),
+    # A study of a plant.
+    "variant": ("text", "What was driven: as it is, a remedy, a way to operate, or a changed key"),
+    "duration_s": ("s", "Duration of a trip"),
+    "median_error_m": ("m", "Half of the horizontal errors within 5 m of the place are no larger"),
+    "target_error_m": ("m", "So many of the horizontal errors as the target asks are no larger"),
+    "within_share": ("1", "Share of the errors within 5 m of the place that are within the target"),
+    "passes": ("true or false", "target_error_m is within the target"),
+    "dilution_m_per_deg": (
+        "m/°",
+        "By how much an error of one degree in every angle shows along the road",
+    ),
+    "heads_visible": ("1", "Radio heads with an expected SNR of -6 dB or more"),
+    "best_snr_db": ("dB", "Expected SNR of the strongest radio head"),
+    "wake_up": ("text", "When the vehicle wakes up"),
+    **{
+        f"{part}_{extent}_j": ("J", f"Energy of a trip, {what}, {end}")
+        for part, what in (
+            ("estimates", "angle estimates"),
+            ("listening", "the receiver while it listens"),
+            ("idle", "the board that would idle, where the platform counts it"),
+        )
+        for extent, end in (("low", "at least"), ("value", "usual"), ("high", "at most"))
+    },
+    **{
+        f"idle_{extent}_w": ("W", f"Drawn whether or not anything is estimated, {end}")
+        for extent, end in (("low", "at least"), ("value", "usual"), ("high", "at most"))
+    },
+    "recommended": ("true or false", "The way to operate that is recommended"),
+    "percent": ("1", "Which percentile of the horizontal error"),
+    "percentile_m": ("m", "That percentile"),
+    "percentile_low_m": ("m", "Low end of its 95 % interval"),
+    "percentile_high_m": ("m", "High end of its 95 % interval"),
+    "more_m": ("m", "By how much it is larger than the first variant's, in pairs of drives"),
+    "more_low_m": ("m", "Low end of the 95 % interval of that"),
+    "more_high_m": ("m", "High end of the 95 % interval of that"),
     # Errors of the position.
     "error_x_m": ("m", "Estimate minus truth, x"),
     "error_y_m": ("m", "Estimate minus truth, y"),

@@ -284,6 +284,61 @@ TABLES: Mapping[str, Table] = {
             },
         ),
         Table(
+            "study_errors",
+            "An epoch of a drive of a study, ten of them a second",
+            "`errors.parquet` of `access-av study`",
+            ("variant", "run", "time_s", "error_m"),
+        ),
+        Table(
+            "study_drives",
+            "A drive of a study",
+            "`drives.parquet` of `access-av study`",
+            ("variant", "run", "executions", "listened", "duration_s"),
+        ),
+        Table(
+            "places",
+            "A metre of a plant's road",
+            "`places.parquet` and `places.csv` of `access-av study`",
+            (
+                "along_m", "x_m", "y_m", "median_error_m", "target_error_m", "within_share",
+                "passes", "bound_m", "dilution_m_per_deg", "heads_visible", "best_snr_db",
+            ),
+            {"dilution_m_per_deg": "no radio head in reach tells of the distance along the road"},
+        ),
+        Table(
+            "study_points",
+            "A way to operate the vehicle, in a power mode",
+            "`points.parquet` of `access-av study`",
+            (
+                "variant", "method", "wake_up", "mode", "mode_name", "target_error_m",
+                *(
+                    f"{part}_{extent}_j"
+                    for part in ("estimates", "listening", "idle")
+                    for extent in ("low", "value", "high")
+                ),
+                "idle_low_w", "idle_value_w", "idle_high_w", "on_front", "recommended",
+            ),
+            dict.fromkeys(
+                ("idle_low_w", "idle_value_w", "idle_high_w"), "the platform has no such figure"
+            ),
+        ),
+        Table(
+            "compared",
+            "A percentile of the error of one of several variants",
+            "`compared.parquet` of `access-av run` and `access-av study`, with --vary or --compare",
+            (
+                "variant", "runs", "percent", "percentile_m", "percentile_low_m",
+                "percentile_high_m", "more_m", "more_low_m", "more_high_m", "energy_j",
+            ),
+            {
+                "energy_j": _NO_FIGURE,
+                **dict.fromkeys(("more_m", "more_low_m", "more_high_m"), "the first variant"),
+                **dict.fromkeys(
+                    ("percentile_low_m", "percentile_high_m"), "one run has no interval"
+                ),
+            },
+        ),
+        Table(
             "designs",
             "A design of a scenario in the worst of its worlds, over the runs that all designs see",
             "`designs.parquet` of `access-av designs`; `kept` of `access-av choose --json`",
