@@ -168,7 +168,9 @@ export_app = typer.Typer()
 
 @export_app.command(epilog="Example: [bold]access-av export yard yard.geojson[/]")
 def export(
-    site: Annotated[str, typer.Argument(help="Shipped name, or path of a site's TOML file.")],
+    site: Annotated[
+        str, typer.Argument(help="Shipped name, or path of a TOML file, of a site or a plant.")
+    ],
     file: Annotated[Path, typer.Argument(help="Name that ends in .geojson or .csv.")],
     origin: OriginText = None,
     german: Annotated[
@@ -183,9 +185,14 @@ def export(
     from access_av import _core
     from access_av.site_files import csv_file, geojson
     from access_av.site_files.read import of_site
+    from access_av.tables import toml
     from access_av.tables.results_directory import write_whole
 
-    drawn = of_site(_core.Site.load(site))
+    is_plant = (
+        "fleet" in toml.read(Path(site)) if Path(site).is_file() else site not in _core.Site.names()
+    )
+    of = _core.Plant.load(site).scenario().site if is_plant else _core.Site.load(site)
+    drawn = of_site(of)
     place = None
     if origin is not None:
         latitude, longitude = _numbers("--origin", origin, 2)
