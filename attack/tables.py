@@ -87,7 +87,7 @@ def given(random: Random, case: Case) -> list[str]:
 def figures(random: Random, case: Case) -> list[str]:
     """The figures of a fleet, or a space of designs."""
     if random.random() < 0.6:
-        fleet = mutate.table(random, shipped("facts", "balance.toml"))
+        fleet = mutate.table(random, shipped("economics", "balance.toml"))
         return case.access_av("balance", case.write("fleet.toml", fleet))
     case.write("short.toml", SHORT)
     space = case.write("space.toml", mutate.table(random, SPACE))

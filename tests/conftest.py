@@ -12,6 +12,27 @@ if TYPE_CHECKING:
 
 ROOT = Path(__file__).parent.parent
 
+# Parallel workers are given the size of no terminal, which consoles would keep to.
+for size in ("COLUMNS", "LINES"):
+    os.environ.pop(size, None)
+
+
+# Files of tests that drive, attack or start programs for longer than a person waits after a change.
+SLOW = {
+    *("test_attack", "test_interrupt", "test_robustness", "test_readme"),
+    *("test_bags", "test_locate", "test_locate_mistakes", "test_real_drives", "test_survey"),
+    *("test_channel", "test_plan", "test_designs", "test_tune", "test_profile"),
+    *("test_bound", "test_drive", "test_plug_ins", "test_scatter", "test_truth"),
+    *("test_codesign", "test_outlook", "test_readings", "test_second_implementation"),
+    *("test_headline", "test_unknowns", "test_cli", "test_columns"),
+}
+
+
+def pytest_collection_modifyitems(items: list[pytest.Item]) -> None:
+    for item in items:
+        if item.path.stem in SLOW:
+            item.add_marker(pytest.mark.slow)
+
 
 class Finished(NamedTuple):
     code: int

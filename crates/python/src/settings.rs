@@ -237,7 +237,7 @@ toml_file! {
         Ok(HashMap::from([
             ("duration_s", size.duration_s),
             ("bursts", size.bursts),
-            ("looks", size.looks),
+            ("ssbs", size.looks),
             ("odometry_samples", size.odometry_samples),
             ("bytes", size.bytes(1)),
         ]))

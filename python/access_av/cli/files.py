@@ -40,7 +40,7 @@ def _size(scenario: Scenario) -> str:
     """What a drive takes."""
     size = scenario.size
     return (
-        f"; a drive of {size['duration_s']:.0f} s, {size['looks']:.0f} SSBs, "
+        f"; a drive of {size['duration_s']:.0f} s, {size['ssbs']:.0f} SSBs, "
         f"{size['bytes'] * 1e-6:.0f} MB"
     )
 

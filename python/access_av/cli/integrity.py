@@ -1,4 +1,4 @@
-"""The command ``integrity``: the guard where the world is not as believed."""
+"""The command ``integrity``: protection levels under injected faults and wrong settings."""
 
 from __future__ import annotations
 
@@ -58,7 +58,7 @@ def integrity(
     out: Out = None,
     as_json: AsJson = False,
 ) -> None:
-    """Drive under everything that can be otherwise than believed.
+    """Inject faults and wrong settings, and count what the protection level still covers.
 
     Array turned or badly calibrated, odometer worse than stated, radio heads elsewhere or hidden:
     by channel, by number of radio heads. With --out a stopped campaign goes on where it stopped.
@@ -140,7 +140,7 @@ def _show(records: Sequence[dict[str, Any]]) -> None:
         if len({cell(one) for one in records}) == 1
     ]
     columns: list[tuple[str, Cell]] = [
-        ("world", lambda one: "as believed" if one["mismatch"] == "none" else one["mismatch"]),
+        ("world", lambda one: "as stated" if one["mismatch"] == "none" else one["mismatch"]),
         *((name, cell) for name, cell in _SETTINGS if len({cell(one) for one in records}) > 1),
         *_FOUND,
     ]

@@ -122,7 +122,7 @@ def readings(
     if name is not None:
         print(known.load(name).scenario.to_toml(), end="")
         return
-    made = table(["reading", "what it is", "chosen in view of the claims"], text=3)
+    made = table(["reading", "what it is", "calibrated to the claims"], text=3)
     for one in known.load_all():
         made.add_row(one.name, one.scenario.description, ", ".join(one.chosen) or "nothing")
     console.print(made)

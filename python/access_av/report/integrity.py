@@ -25,7 +25,7 @@ HEAD = (
 
 def _world(case: dict[str, Any]) -> str:
     """How the world of a case departs from what is believed."""
-    return "all as believed" if case["mismatch"] == "none" else str(case["mismatch"])
+    return "all as stated" if case["mismatch"] == "none" else str(case["mismatch"])
 
 
 def render_integrity(

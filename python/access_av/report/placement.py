@@ -101,7 +101,7 @@ def _map_text(bound: ErrorBound) -> str:
         )
     return (
         f"Of a vehicle that has listened on {MAP_TRAVEL_M:g} m of way "
-        f"({bound.map_looks:.0f} independent looks at each radio head), knows its heading to "
+        f"({bound.map_angles:.0f} independent angles to each radio head), knows its heading to "
         f"{bound.map_heading_std_rad * 1e3:.1f} mrad and nothing of its place. Squares of "
         f"{bound.map_step_m:g} m; none where the radio heads leave a direction open. "
         "Drawn to scale on a wide screen."

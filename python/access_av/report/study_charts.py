@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import json
+import math
 from typing import TYPE_CHECKING, Any
 
 import altair as alt
@@ -243,7 +244,12 @@ def ways_to_operate(study: Study) -> Spec:
         alt.Chart(rows)
         .mark_point(filled=True, opacity=0.9)
         .encode(
-            x=alt.X("energy_j:Q", title="energy of a trip / J", scale=alt.Scale(type="log")),
+            x=alt.X(
+                "energy_j:Q",
+                title="energy of a trip / J",
+                scale=alt.Scale(type="log"),
+                axis=alt.Axis(values=_round_values(rows["energy_j"])),
+            ),
             y=alt.Y("error_m:Q", title=f"{study.percent:g} % of errors within / m"),
             color=alt.Color(
                 "kind:N",
@@ -264,3 +270,10 @@ def ways_to_operate(study: Study) -> Spec:
     return finish(
         chart + target, height=300, description="Energy against error, each way to operate"
     )
+
+
+def _round_values(values: pl.Series) -> list[float]:
+    """1, 2 and 5 times each power of ten about some values: a narrow axis has room for them."""
+    low, high = (float(it) for it in (values.min(), values.max()))  # type: ignore[arg-type]
+    powers = range(math.floor(math.log10(low)), math.ceil(math.log10(high)) + 1)
+    return [round(step * 10.0**power, 9) for power in powers for step in (1.0, 2.0, 5.0)]

@@ -21,10 +21,10 @@ if TYPE_CHECKING:
 # An SSB is to be detected down to this Es/Iot (TS 38.133, side condition of intra-frequency
 # measurements).
 VISIBLE_SNR_DB = -6.0
-# The map is of a vehicle that has listened for so long a way ...
+# The map is of a vehicle that has listened over so long a way, an independent angle per half
+# wavelength.
 MAP_TRAVEL_M = 1.0
-# ... one independent look per half wavelength.
-LOOKS_PER_WAVELENGTH = 2.0
+ANGLES_PER_WAVELENGTH = 2.0
 MARGIN_M = 20.0
 MAP_CELLS = 3000
 MOST_MAP_CELLS = 40_000
@@ -45,7 +45,7 @@ class ErrorBound:
         One row per radio head; columns ``bound_heads``.
     site
         The bound over the site, one row per square of ``map_step_m``; columns ``bound_map``. Of a
-        vehicle that has listened for ``map_looks`` independent looks, knows its heading to
+        vehicle that has measured ``map_angles`` independent angles, knows its heading to
         ``map_heading_std_rad`` and nothing of its place.
     """
 
@@ -54,7 +54,7 @@ class ErrorBound:
     heads: pl.DataFrame
     site: pl.DataFrame
     map_step_m: float
-    map_looks: float
+    map_angles: float
     map_heading_std_rad: float
 
     def summary(self) -> dict[str, Any]:
@@ -126,7 +126,7 @@ def bound(scenario: _core.Scenario | str, *, map_step_m: float | None = None) ->
             f"allowed are at most {MOST_MAP_CELLS}, from {_least_step(low, high):.2g} m on"
         )
     wavelength_m = SPEED_OF_LIGHT_MPS / (settings["carrier_mhz"] * 1e6)
-    looks = max(1.0, MAP_TRAVEL_M * LOOKS_PER_WAVELENGTH / wavelength_m)
+    looks = max(1.0, MAP_TRAVEL_M * ANGLES_PER_WAVELENGTH / wavelength_m)
     heading_std_rad = float(route.select(pl.col("heading_std_rad").median()).item())
     x_m, y_m = (
         grid.ravel()
@@ -145,7 +145,7 @@ def bound(scenario: _core.Scenario | str, *, map_step_m: float | None = None) ->
         heads=heads,
         site=site.with_columns(pl.col("bound_m").fill_nan(None)),
         map_step_m=step_m,
-        map_looks=looks,
+        map_angles=looks,
         map_heading_std_rad=heading_std_rad,
     )
 

@@ -6,8 +6,6 @@ from typing import TYPE_CHECKING, Any
 
 import numpy as np
 
-from access_av.designs.front import student
-
 if TYPE_CHECKING:
     from numpy.typing import ArrayLike, NDArray
 
@@ -53,6 +51,8 @@ def paired_difference(
     >>> bool(found[0] < 0.0 and found[2] < 0.0)
     True
     """
+    from scipy.special import stdtrit
+
     mine, its = (np.atleast_2d(np.asarray(it, dtype=np.float64)) for it in (errors, others))
     if len(mine) != len(its):
         raise ValueError(f"{len(mine)} drives cannot be paired with {len(its)}")
@@ -65,7 +65,9 @@ def paired_difference(
     spread = _resampled(mine, drawn, percent) - _resampled(its, drawn, percent)
     if not np.isfinite(spread).all():
         return difference, -np.inf, np.inf
-    half = student(runs - 1) * float(np.std(spread, ddof=1)) * np.sqrt(runs / (runs - 1))
+    half = (
+        float(stdtrit(runs - 1, 0.975)) * float(np.std(spread, ddof=1)) * np.sqrt(runs / (runs - 1))
+    )
     return difference, difference - half, difference + half
 
 

@@ -256,7 +256,7 @@ _GLOSSARY = {
     "turns_with_seed": ("true or false", "Other runs may give another verdict"),
     "evidence": (
         "text",
-        "What the verdict is worth: independent, chosen in view of it, by construction, or "
+        "What the verdict is worth: independent, calibrated, by construction, or "
         "arithmetic; empty where it is not testable",
     ),
     "note": ("text", "What else there is to say"),

@@ -20,7 +20,7 @@ import numpy as np
 import pytest
 
 from access_av import Scenario, columns
-from access_av.designs import drives
+from access_av.designs import driven
 from access_av.designs.driven import Design, Driven, designs_of, in_worlds
 from access_av.designs.front import front, may_be_front
 from access_av.designs.search import Found, rounds, search
@@ -416,7 +416,7 @@ def test_a_design_is_judged_in_the_worst_of_its_worlds(
             "track_s": np.arange(0.0, 9001.0, 10.0), "track_m2": np.ones(901),
         }  # fmt: skip
 
-    monkeypatch.setattr(drives, "simulated", pretended)
+    monkeypatch.setattr(driven, "simulated", pretended)
     space = Space.of(
         {
             "vehicle": {
@@ -482,7 +482,7 @@ def by_halving(tmp_path: Path, monkeypatch: pytest.MonkeyPatch, *, halving: bool
             "track_m2": np.ones(3),
         }  # fmt: skip
 
-    monkeypatch.setattr(drives, "simulated", pretended)
+    monkeypatch.setattr(driven, "simulated", pretended)
     space = Space.of(
         {
             "vehicle": {
@@ -532,7 +532,7 @@ def test_optuna_suggests_the_same_designs_again(
             "error_m": rms_m[:, None], "track_s": np.arange(3.0), "track_m2": np.ones(3),
         }  # fmt: skip
 
-    monkeypatch.setattr(drives, "simulated", pretended)
+    monkeypatch.setattr(driven, "simulated", pretended)
     space = Space.of(
         {
             "vehicle": {

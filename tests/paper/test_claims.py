@@ -197,7 +197,7 @@ def test_evidence_follows_from_what_was_chosen() -> None:
         for kind in EVIDENCE
     }
     assert of_kind["independent"] == ["a3", "a4", "a5", "a7", "a8", "a9"]
-    assert "e4" in of_kind["chosen in view of it"]
+    assert "e4" in of_kind["calibrated"]
     assert [name for name in of_kind["by construction"] if name[0] != "x"] == ["e1", "d1"]
     free = evidence(entries["e4_average_saving_percent"], [], freedoms=("ratio", "factor"))
     assert free == "by construction", "it is solved for by the factor"

@@ -14,8 +14,9 @@ from typing import TYPE_CHECKING
 
 import numpy as np
 import pytest
-from access_av.profile import counters, device, power_modes
 
+from access_av.device import counters, power_modes
+from access_av.device import profile as device
 from access_av.device.counters import SensorError
 from access_av.device.energy import (
     Interval,
