@@ -68,6 +68,19 @@ def test_round_figures_by_hand() -> None:
     assert found.saved.central == pytest.approx(-1000.0 + 4.0 * (450.4 - yearly))
 
 
+def test_trips_a_day_are_as_stated_and_not_one_after_the_other() -> None:
+    stated = figures()
+    del stated["fleet"]["trip_s"]
+    stated["fleet"]["trips_per_day"] = 40
+    # Ten boxes of 10 W for ten hours, and 40 trips of 100 J.
+    assert balance(stated).after.energy_day_kj.central == pytest.approx(360.0 + 4.0)
+    for wrong in ({**stated["fleet"], "trip_s": 100.0}, {"trip_s": 0.0}):
+        bad = figures()
+        bad["fleet"] |= wrong
+        with pytest.raises(InputError, match="trip_s"):
+            balance(bad)
+
+
 def test_ranges_hold_whatever_the_figures_turn_out_to_be() -> None:
     wide = balance(figures())
     for price in (900.0, 1200.0):
