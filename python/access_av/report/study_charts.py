@@ -112,7 +112,7 @@ def road_map(study: Study) -> Spec:
             x=alt.X("x_m:Q", scale=across), y=alt.Y("y_m:Q", scale=upward)
         )
         layers += marked.mark_point(
-            shape="circle", filled=True, size=330, color="#16202c", opacity=1.0
+            shape="circle", filled=True, size=330, color="#16202c", stroke="#ffffff", opacity=1.0
         )
         layers += marked.mark_text(fontSize=12, fontWeight="bold", color="#ffffff", dy=1).encode(
             text="number:N"

@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import json
+import math
 from dataclasses import dataclass
 from typing import TYPE_CHECKING, Any
 
@@ -10,6 +11,7 @@ import polars as pl
 
 from access_av import _core
 from access_av.errors import InputError
+from access_av.run.service_levels import INDEPENDENT_S
 from access_av.study import economy
 from access_av.study.driven import Driven, drive
 from access_av.study.places import WorstPlace, by_place, worst_places
@@ -288,8 +290,9 @@ def study_plant(
         )
     error_m, percent = plant.target
     fleet = json.loads(plant.to_json())["fleet"]
-    full = _runs(scenario) if runs is None else runs
-    pairs, few, fewest = (min(full, max(2, round(share * full))) for share in SHARES)
+    usual = _runs(scenario) if runs is None else runs
+    full = min(2 * usual, max(usual, _sure(scenario, percent))) if runs is None else runs
+    pairs, few, fewest = (min(full, max(2, round(share * usual))) for share in SHARES)
     operated = tried(scenario)
     done, total = 0, full + fewest + few * (len(operated) - 1)
 
@@ -358,6 +361,13 @@ def _runs(scenario: _core.Scenario) -> int:
         period_ms = json.loads(scenario.site.to_json())["ssb"]["period_ms"]
         share = min(1.0, period_ms / wake_up["interval_ms"])
     return int(min(MOST, max(FEWEST, BUDGET_ANGLES // (share * scenario.size["looks"]))))
+
+
+def _sure(scenario: _core.Scenario, percent: float) -> int:
+    """From so many drives on the percentile's interval has a high end."""
+    independent = math.log(0.025) / math.log(0.01 * percent)  # Clopper and Pearson, all within
+    # The size is from above: a trip takes a little less.
+    return math.ceil(1.02 * independent * INDEPENDENT_S / scenario.size["duration_s"])
 
 
 def _mended(
