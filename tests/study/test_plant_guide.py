@@ -35,7 +35,7 @@ def blocks(language: str) -> list[str]:
     return re.findall(rf"```{language}\n(.*?)```", GUIDE, flags=re.DOTALL)
 
 
-def test_its_commands_run(
+def test_its_commands_and_its_python_run(
     access_av: Callable[..., Any], tmp_path: Path, monkeypatch: pytest.MonkeyPatch
 ) -> None:
     monkeypatch.chdir(tmp_path)
@@ -58,8 +58,6 @@ def test_its_commands_run(
     assert (tmp_path / "study" / "report.html").is_file()
     assert (tmp_path / "what-if" / "compared.parquet").is_file()
 
-
-def test_its_python_runs(tmp_path: Path) -> None:
     (example,) = blocks("python")
     done = subprocess.run(
         [sys.executable, "-c", example], cwd=tmp_path, capture_output=True, text=True, check=True

@@ -186,6 +186,8 @@ def _beside(scenario: _core.Scenario, site: dict[str, Any]) -> list[dict[str, An
     """Places round where the bound is largest, as high as the site's first radio head."""
     route = along_route(scenario)
     weakest = route.row(int(route["bound_m"].arg_max() or 0), named=True)
+    # A trip may begin somewhere on the road; no mast stands on what lies before, either.
+    whole = along_route(scenario.with_overrides({"motion.start_at_m": 0.0}))
     width_m = (site.get("road") or {}).get("width_m", 0.0)
     z_m = site["radio_heads"][0]["position_m"][2]
     made = []
@@ -195,7 +197,7 @@ def _beside(scenario: _core.Scenario, site: dict[str, Any]) -> list[dict[str, An
             x_m = round(weakest["x_m"] + away_m * math.cos(angle_rad))
             y_m = round(weakest["y_m"] + away_m * math.sin(angle_rad))
             nearest_m = (((pl.col("x_m") - x_m) ** 2 + (pl.col("y_m") - y_m) ** 2) ** 0.5).min()
-            if route.select(nearest_m).item() > max(width_m, 0.5 * BESIDE_M[0]):
+            if whole.select(nearest_m).item() > max(width_m, 0.5 * BESIDE_M[0]):
                 name = f"({x_m}, {y_m}) m"
                 made.append({"name": name, "x_m": float(x_m), "y_m": float(y_m), "z_m": z_m})
     return made

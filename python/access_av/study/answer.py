@@ -275,7 +275,8 @@ def study_plant(
 
     Examples
     --------
-    >>> found = study_plant("trip-2", runs=2)
+    >>> plant = _core.Plant.load("bends").with_overrides({"motion.start_at_m": 580.0})
+    >>> found = study_plant(plant, runs=2)
     >>> found.point in [found.points[place] for place in found.front]
     True
     """

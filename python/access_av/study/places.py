@@ -27,6 +27,9 @@ APART_M = 40.0
 MOST_PLACES = 3
 # Until so far from its start a vehicle knows its place mostly from what it is told there.
 STARTING_M = 20.0
+# An odometer carries errors on for so long; so much more than usual is worth naming.
+CARRIED_M = 60.0
+MORE_THAN_USUAL = 1.25
 # Below this SNR noise is a large part of an angle's error.
 WEAK_SNR_DB = 5.0
 
@@ -153,17 +156,19 @@ def worst_places(places: pl.DataFrame, stops_m: list[float]) -> list[WorstPlace]
 
 def _why(row: Mapping[str, Any], places: pl.DataFrame, stops_m: list[float]) -> str:
     """What is particular about a place: of several reasons the weightiest."""
-    dilution, usual = row["dilution_m_per_deg"], places["dilution_m_per_deg"].median()
     if not row["heads_visible"]:
         return "no radio head is in reach: the odometer is alone"
     if row["along_m"] < STARTING_M:
         return "just set off: the vehicle knows its place mostly from what it is told at the start"
-    if dilution is None:
+    if row["dilution_m_per_deg"] is None:
         return "every radio head in reach lies straight ahead or behind"
-    if isinstance(usual, float) and dilution > 1.5 * usual:
+    # The odometer carries the error of the way that was just driven.
+    here, usual = _carried(places, row["along_m"]), _usual(places)
+    if here > MORE_THAN_USUAL * usual:
         return (
-            f"radio heads lie ahead, behind or far away: a degree in their angles is "
-            f"{dilution:.1f} m along the road, against {usual:.1f} m at the median of the road"
+            f"on the {CARRIED_M:g} m before, radio heads lie ahead, behind or far away: a degree in "
+            f"their angles is {here:.1f} m along the road, against {usual:.1f} m at the median of "
+            "the road"
         )
     if row["heads_visible"] == 1:
         return "one radio head alone is in reach"
@@ -171,7 +176,24 @@ def _why(row: Mapping[str, Any], places: pl.DataFrame, stops_m: list[float]) -> 
         return f"the strongest radio head is weak here ({row['best_snr_db']:.0f} dB)"
     if any(0.0 <= row["along_m"] - stop_m < 2.0 * WINDOW_M for stop_m in stops_m):
         return "at a stop: the error it arrives with stays as long as it stands"
+    bound = places["bound_m"].median()
+    if isinstance(bound, float) and row["bound_m"] <= bound:
+        return "drives that happened to be bad here: what could be reached here is as elsewhere"
     return (
         "nothing particular in the geometry: errors of odometer, array and radio heads’ places, "
         "as large as they are stated"
     )
+
+
+def _carried(places: pl.DataFrame, along_m: float) -> float:
+    """Root mean square of the dilution on the way to a place."""
+    before = pl.col("along_m").is_between(along_m - CARRIED_M, along_m)
+    square = (pl.col("dilution_m_per_deg").filter(before) ** 2).mean().sqrt()
+    found = places.select(square).item()
+    return math.inf if found is None else float(found)
+
+
+def _usual(places: pl.DataFrame) -> float:
+    """The median of that over the road."""
+    every = range(0, places.height, 10)
+    return float(np.median([_carried(places, places["along_m"][place]) for place in every]))
