@@ -166,8 +166,8 @@ def _why(row: Mapping[str, Any], places: pl.DataFrame, stops_m: list[float]) -> 
     here, usual = _carried(places, row["along_m"]), _usual(places)
     if here > MORE_THAN_USUAL * usual:
         return (
-            f"on the {CARRIED_M:g} m before, radio heads lie ahead, behind or far away: a degree in "
-            f"their angles is {here:.1f} m along the road, against {usual:.1f} m at the median of "
+            f"on the {CARRIED_M:g} m before, radio heads lie ahead, behind or far away: a degree "
+            f"of their angles is {here:.1f} m along the road, against {usual:.1f} m at the median of "
             "the road"
         )
     if row["heads_visible"] == 1:
