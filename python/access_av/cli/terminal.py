@@ -328,7 +328,7 @@ def show_cells(title: str, cells: Sequence[dict[str, Any]]) -> None:
     with_angles = any("azimuth_deg" in cell for cell in cells)
     columns = ["PCI", "SSB", "SFN", "SNR dB", "CFO Hz"]
     if with_angles:
-        columns += ["azimuth °", "σ noise °", "verdict"]
+        columns += ["azimuth °", "σ noise °"]
     if not is_narrow():
         columns += ["sample", "MHz", "kHz"]
     made = table(columns, title=title, text=0)
@@ -343,7 +343,6 @@ def show_cells(title: str, cells: Sequence[dict[str, Any]]) -> None:
             if "azimuth_deg" in cell
             else "–",
             "σ noise °": f"{cell['sigma_deg']:.3f}" if "sigma_deg" in cell else "–",
-            "verdict": cell.get("verdict", "–"),
             "sample": str(cell["sample_start"]),
             "MHz": f"{cell['ssb_freq_hz'] / 1e6:.3f}",
             "kHz": str(cell["scs_khz"]),

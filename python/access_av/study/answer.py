@@ -361,7 +361,7 @@ def _runs(scenario: _core.Scenario) -> int:
     if wake_up["policy"] == "fixed":
         period_ms = json.loads(scenario.site.to_json())["ssb"]["period_ms"]
         share = min(1.0, period_ms / wake_up["interval_ms"])
-    return int(min(MOST, max(FEWEST, BUDGET_ANGLES // (share * scenario.size["looks"]))))
+    return int(min(MOST, max(FEWEST, BUDGET_ANGLES // (share * scenario.size["ssbs"]))))
 
 
 def _sure(scenario: _core.Scenario, percent: float) -> int:

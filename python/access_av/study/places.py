@@ -167,8 +167,8 @@ def _why(row: Mapping[str, Any], places: pl.DataFrame, stops_m: list[float]) -> 
     if here > MORE_THAN_USUAL * usual:
         return (
             f"on the {CARRIED_M:g} m before, radio heads lie ahead, behind or far away: a degree "
-            f"of their angles is {here:.1f} m along the road, against {usual:.1f} m at the median of "
-            "the road"
+            f"of their angles is {here:.1f} m along the road, against {usual:.1f} m at the median "
+            "of the road"
         )
     if row["heads_visible"] == 1:
         return "one radio head alone is in reach"
