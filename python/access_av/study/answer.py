@@ -13,10 +13,10 @@ from access_av import _core
 from access_av.errors import InputError
 from access_av.run.service_levels import INDEPENDENT_S
 from access_av.study import economy
-from access_av.study.driven import Driven, drive
 from access_av.study.places import WorstPlace, by_place, worst_places
 from access_av.study.points import Point, front, points, recommended, tried
 from access_av.study.remedies import Remedy, remedies
+from access_av.study.trips import Driven, drive
 from access_av.study.unstated import Unstated, unstated
 
 if TYPE_CHECKING:

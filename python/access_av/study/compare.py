@@ -9,7 +9,7 @@ from typing import TYPE_CHECKING, Any
 import polars as pl
 
 from access_av.errors import InputError
-from access_av.study.driven import Driven, drive
+from access_av.study.trips import Driven, drive
 from access_av.tables.toml import tomllib
 
 if TYPE_CHECKING:

@@ -18,7 +18,7 @@ if TYPE_CHECKING:
 
     from numpy.typing import NDArray
 
-    from access_av.study.driven import Driven
+    from access_av.study.trips import Driven
 
 # A percentile is of the errors so far before and behind a place: of one metre there are too few.
 WINDOW_M = 5.0

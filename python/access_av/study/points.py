@@ -10,7 +10,7 @@ import numpy as np
 
 from access_av.designs.front import not_beaten
 from access_av.device.platform import Platform
-from access_av.study.driven import EXTENTS, Driven, Energy, platform_name
+from access_av.study.trips import EXTENTS, Driven, Energy, platform_name
 
 if TYPE_CHECKING:
     from collections.abc import Mapping, Sequence
