@@ -190,7 +190,7 @@ def along_road(study: Study) -> Spec:
 
 def signal_along_road(study: Study) -> Spec:
     """Dilution along the road, and the strongest radio head's SNR."""
-    rows = thinned(study.places.select("along_m", "dilution_m_per_deg", "best_snr_db"))
+    rows = thinned(study.places.select("along_m", "dilution_of_degree_m", "best_snr_db"))
     x = alt.X("along_m:Q", title="along the road / m", scale=alt.Scale(nice=False))
     dilution = (
         alt.Chart(rows)
@@ -198,7 +198,7 @@ def signal_along_road(study: Study) -> Spec:
         .encode(
             x=x,
             y=alt.Y(
-                "dilution_m_per_deg:Q",
+                "dilution_of_degree_m:Q",
                 title="dilution / m per degree",
                 axis=alt.Axis(titleColor=BLUE),
             ),

@@ -102,11 +102,11 @@ def by_place(driven: Driven, percent: float, error_m: float) -> pl.DataFrame:
             "within_share": within,
             "passes": percentile_m <= error_m,
             "bound_m": bound_m,
-            "dilution_m_per_deg": _dilution(driven.scenario, here_x, here_y, visible),
+            "dilution_of_degree_m": _dilution(driven.scenario, here_x, here_y, visible),
             "heads_visible": visible.sum(axis=0),
             "best_snr_db": snr_db.max(axis=0),
         }
-    ).with_columns(pl.col("dilution_m_per_deg").fill_nan(None))
+    ).with_columns(pl.col("dilution_of_degree_m").fill_nan(None))
 
 
 def _rising(along_m: NDArray[Any], values: NDArray[Any]) -> tuple[NDArray[Any], NDArray[Any]]:
@@ -160,7 +160,7 @@ def _why(row: Mapping[str, Any], places: pl.DataFrame, stops_m: list[float]) -> 
         return "no radio head is in reach: the odometer is alone"
     if row["along_m"] < STARTING_M:
         return "just set off: the vehicle knows its place mostly from what it is told at the start"
-    if row["dilution_m_per_deg"] is None:
+    if row["dilution_of_degree_m"] is None:
         return "every radio head in reach lies straight ahead or behind"
     # The odometer carries the error of the way that was just driven.
     here, usual = _carried(places, row["along_m"]), _usual(places)
@@ -188,7 +188,7 @@ def _why(row: Mapping[str, Any], places: pl.DataFrame, stops_m: list[float]) -> 
 def _carried(places: pl.DataFrame, along_m: float) -> float:
     """Root mean square of the dilution on the way to a place."""
     before = pl.col("along_m").is_between(along_m - CARRIED_M, along_m)
-    square = (pl.col("dilution_m_per_deg").filter(before) ** 2).mean().sqrt()
+    square = (pl.col("dilution_of_degree_m").filter(before) ** 2).mean().sqrt()
     found = places.select(square).item()
     return math.inf if found is None else float(found)
 

@@ -53,8 +53,8 @@ _GLOSSARY = {
     "target_error_m": ("m", "So many of the horizontal errors as the target asks are no larger"),
     "within_share": ("1", "Share of the errors within 5 m of the place that are within the target"),
     "passes": ("true or false", "target_error_m is within the target"),
-    "dilution_m_per_deg": (
-        "m/°",
+    "dilution_of_degree_m": (
+        "m",
         "By how much an error of one degree in every angle shows along the road",
     ),
     "heads_visible": ("1", "Radio heads with an expected SNR of -6 dB or more"),

@@ -301,9 +301,9 @@ TABLES: Mapping[str, Table] = {
             "`places.parquet` and `places.csv` of `access-av study`",
             (
                 "along_m", "x_m", "y_m", "median_error_m", "target_error_m", "within_share",
-                "passes", "bound_m", "dilution_m_per_deg", "heads_visible", "best_snr_db",
+                "passes", "bound_m", "dilution_of_degree_m", "heads_visible", "best_snr_db",
             ),
-            {"dilution_m_per_deg": "no radio head in reach tells of the distance along the road"},
+            {"dilution_of_degree_m": "no radio head in reach tells of the distance along the road"},
         ),
         Table(
             "study_points",
