@@ -36,7 +36,8 @@ if TYPE_CHECKING:
 
 UNITS = {
     "m": "m", "m2": "m²", "s": "s", "ms": "ms", "rad": "rad", "rad2": "rad²", "deg": "°",
-    "db": "dB", "dbfs": "dB", "hz": "Hz", "khz": "kHz", "mps": "m/s", "radps": "rad/s", "j": "J", "w": "W",
+    "db": "dB", "dbfs": "dB", "hz": "Hz", "khz": "kHz", "mps": "m/s", "radps": "rad/s",
+    "j": "J", "w": "W",
 }  # fmt: skip
 
 
