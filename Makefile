@@ -1,13 +1,18 @@
 # ACCESS-AV: what a person types. `make help` lists it.
 PYTHON ?= python3
+SHELL := bash
+.SHELLFLAGS := -o pipefail -c
 BIN := .venv/bin
-SOURCES := $(shell find crates sites vehicles scenarios platforms -type f 2>/dev/null) Cargo.toml Cargo.lock pyproject.toml
+SOURCES := $(shell find crates sites vehicles scenarios platforms plants -type f 2>/dev/null) Cargo.toml Cargo.lock pyproject.toml
+
+# Tests of a file stay in one process: they share what it has driven.
+PYTEST := $(BIN)/python -m pytest --numprocesses auto --dist loadscope
 
 # Reference vectors and recordings, beside the project.
 DATA := $(abspath $(or $(ACCESS_AV_DATA),../shared/data))
 
 .DEFAULT_GOAL := help
-.PHONY: help demo test attack test-aarch64 count-aarch64 package lint lint-python docs figures picture bench clean
+.PHONY: help demo live check test attack test-aarch64 count-aarch64 package lint lint-python docs figures picture bench clean
 
 help: ## List these commands
 	@sed -n 's/^\([a-z0-9-]*\):.*## /  make \1\t/p' $(MAKEFILE_LIST) | expand -t 20
@@ -15,12 +20,22 @@ help: ## List these commands
 demo: .venv/installed ## Install into .venv, evaluate the paper under every reading, write results/latest/report.html
 	$(BIN)/access-av evaluate
 
-test: .venv/installed-test ## Run every test: Rust, static checks of the Python side, pytest
+NODE := target/release/access-av-node
+live: .venv/installed-live $(NODE) ## Drive a simulated yard in real time into the node, and open its page (Ctrl-C ends it)
+	$(BIN)/python examples/live/live.py --node $(NODE) $(LIVE)
+
+$(NODE): $(SOURCES)
+	cargo build --release --package access-av-node
+
+check: lint ## Check after a change: formats, lints, types, the fast tests of both languages
+	cargo test --workspace --quiet --lib
+	$(PYTEST) -m "not slow"
+
+test: lint ## Run everything: formats, lints, types, every test of both languages
 	cargo test --workspace --quiet
 	@if [ -d "$(DATA)" ]; then ACCESS_AV_DATA="$(DATA)" cargo test --quiet -p nr-ssb -- --ignored; \
 	  else echo "not tested: reference vectors and recordings; no $(DATA) (ACCESS_AV_DATA)"; fi
-	$(MAKE) --no-print-directory lint-python
-	$(BIN)/python -m pytest
+	$(PYTEST)
 
 attack: .venv/installed-test ## Attack it with random input, drives and plug-ins; SEED=… repeats an attack
 	$(BIN)/python -m attack $(if $(SEED),--seed $(SEED)) $(ATTACK)
@@ -52,11 +67,9 @@ package: ## Pack the crates that others may use alone, and build and test each f
 	  cargo test --release --quiet --target-dir target/packaged --manifest-path "$$folder"/$$crate-*/Cargo.toml || exit 2; \
 	done
 
-lint: lint-python ## Check formatting and lints of both languages
+lint: .venv/installed-test ## Check formats, lints and types of both languages
 	cargo fmt --all --check
-	cargo clippy --workspace --all-targets -- -D warnings
-
-lint-python: .venv/installed-test
+	cargo clippy --workspace --all-targets --quiet -- -D warnings
 	$(BIN)/ruff check
 	$(BIN)/ruff format --check
 	$(BIN)/mypy
@@ -88,15 +101,27 @@ clean: ## Remove what was built (results stay)
 	$(PYTHON) -m venv .venv
 	$(BIN)/python -m pip install --quiet --upgrade pip
 
-.venv/installed: .venv/bin/python $(SOURCES)
-	$(BIN)/python -m pip install --quiet --editable .
+# Says what is being built, and all of it where that fails.
+define install
+	@$(BIN)/python -m pip install --verbose --editable $(1) 2>&1 | tee .venv/install.log \
+	  | { grep --line-buffered -oE "(Downloading|Compiling) [^ ]+|Finished .release.*|Finished .dev.*" || true; } \
+	  || { tail -n 60 .venv/install.log; exit 2; }
+	@rm -f .venv/installed .venv/installed-test
 	@touch $@
+endef
 
-# Where nobody has asked for the fast build yet, what Rust's tests compile anyway is tested: it takes minutes
-# less, and checks for overflow.
-AS_RUST_TESTS := --config-settings build-args='--profile dev'
-.venv/installed-test: .venv/bin/python $(SOURCES) $(wildcard .venv/installed)
-	$(BIN)/python -m pip install --quiet --editable '.[test]' $(if $(wildcard .venv/installed),,$(AS_RUST_TESTS))
+# The fast build, as wheels have it.
+.venv/installed: .venv/bin/python $(SOURCES)
+	@echo "Building the Rust core with every optimisation: some minutes, once"
+	$(call install,.)
+
+# For tests what Rust's own tests compile anyway: in seconds after a change, and it checks for overflow.
+.venv/installed-test: .venv/bin/python $(SOURCES)
+	@echo "Building the Rust core as its tests compile it"
+	$(call install,'.[test]' --config-settings build-args='--profile dev')
+
+.venv/installed-live: .venv/installed
+	$(BIN)/python -m pip install --quiet --editable '.[live]'
 	@touch $@
 
 .venv/installed-bench: .venv/installed

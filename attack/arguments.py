@@ -51,7 +51,7 @@ QUICK: dict[str, list[str]] = {
 @cache
 def options(command: str) -> list[Any]:
     """The options of a command that change something, as the command itself has them."""
-    from access_av.cli import app
+    from access_av.cli.main import app
 
     found: Any = typer.main.get_command(app)
     parameters = found.commands[command].params

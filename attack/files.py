@@ -10,7 +10,7 @@ from pathlib import Path
 from typing import TYPE_CHECKING, Any
 
 import access_av
-from access_av.toml import tomllib
+from access_av.tables.toml import tomllib
 from attack import mutate
 
 if TYPE_CHECKING:
@@ -22,7 +22,7 @@ if TYPE_CHECKING:
 TRY_SCENARIO = """\
 import access_av
 scenario = access_av.Scenario.load({name!r})
-if scenario.size["looks"] < 30_000:
+if scenario.size["ssbs"] < 30_000:
     found = access_av.simulate(scenario, threads=1, keep_trajectories=True)
     found.trajectories.write_parquet("trajectories.parquet")
     found.executions.write_parquet("executions.parquet")
@@ -33,7 +33,7 @@ if scenario.size["looks"] < 30_000:
 TRY_BOUND = """\
 import access_av
 scenario = access_av.Scenario.load({name!r})
-if scenario.size["looks"] < 30_000:
+if scenario.size["ssbs"] < 30_000:
     found = access_av.bound(scenario, map_step_m=20.0)
     found.route.write_parquet("bound.parquet")
     found.site.write_parquet("map.parquet")

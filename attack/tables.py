@@ -7,8 +7,8 @@ from typing import TYPE_CHECKING, Any
 
 import polars as pl
 
-from access_av.columns import GLOSSARY, TABLES
-from access_av.toml import shipped
+from access_av.tables.columns import GLOSSARY, TABLES
+from access_av.tables.toml import shipped
 from attack import mutate
 from attack.files import recorded
 
@@ -87,7 +87,7 @@ def given(random: Random, case: Case) -> list[str]:
 def figures(random: Random, case: Case) -> list[str]:
     """The figures of a fleet, or a space of designs."""
     if random.random() < 0.6:
-        fleet = mutate.table(random, shipped("facts", "balance.toml"))
+        fleet = mutate.table(random, shipped("economics", "balance.toml"))
         return case.access_av("balance", case.write("fleet.toml", fleet))
     case.write("short.toml", SHORT)
     space = case.write("space.toml", mutate.table(random, SPACE))

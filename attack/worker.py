@@ -17,8 +17,8 @@ from pathlib import Path
 from typing import Any
 
 from access_av import InputError, RecordingError, SettingsError
+from access_av.cli.terminal import plain
 from access_av.report import page
-from access_av.terminal import plain
 from attack import files, kinds
 from attack.verdict import judge
 
@@ -34,14 +34,14 @@ def limit_memory() -> None:
 
 def execute(command: list[str]) -> dict[str, Any]:
     """Run a command in this process: exit code, and what was raised other than an exit."""
-    from access_av import cli
+    from access_av.cli import main
 
     sys.argv = list(command)
     raised = ""
     code: object = 0
     try:
         if command[0] == "access-av":
-            cli.main()
+            main.main()
         else:
             runpy.run_path(command[1], run_name="__main__")
     except SystemExit as stopped:

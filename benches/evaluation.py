@@ -10,9 +10,9 @@ from rich.console import Console
 from rich.table import Table
 
 from access_av import simulate
+from access_av.device.platform import Platform
 from access_av.paper.readings import load_all
 from access_av.paper.study import study
-from access_av.platform import Platform
 
 
 def main() -> None:

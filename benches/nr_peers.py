@@ -209,8 +209,8 @@ def main() -> None:
     samples = recording(np.random.default_rng(1))
     notebook, lean = "py3gpp, as its notebook", "py3gpp, lean"
     receivers: dict[str, tuple[Receiver, int]] = {
-        "access_av.nr.Searcher": (ours_kept(), REPETITIONS),
-        "access_av.nr.search": (ours_anew, REPETITIONS),
+        "access_av.signal.nr.Searcher": (ours_kept(), REPETITIONS),
+        "access_av.signal.nr.search": (ours_anew, REPETITIONS),
         notebook: (py3gpp_notebook, 1),
         lean: (py3gpp_lean(), 1),
     }

@@ -13,7 +13,7 @@ import json
 import sys
 
 from access_av import Scenario, simulate
-from access_av.integrity_campaign import channels
+from access_av.run.integrity_campaign import channels
 
 ERROR_M, BEYOND = 1.0, 1e-2
 

@@ -12,6 +12,28 @@ if TYPE_CHECKING:
 
 ROOT = Path(__file__).parent.parent
 
+# Parallel workers are given the size of no terminal, which consoles would keep to.
+for size in ("COLUMNS", "LINES"):
+    os.environ.pop(size, None)
+
+
+# Files of tests that drive, attack or start programs for longer than a person waits after a change.
+SLOW = {
+    *("test_attack", "test_interrupt", "test_robustness", "test_readme"),
+    *("test_bags", "test_locate", "test_locate_mistakes", "test_real_drives", "test_survey"),
+    *("test_channel", "test_plan", "test_designs", "test_tune", "test_profile"),
+    *("test_bound", "test_drive", "test_plug_ins", "test_scatter", "test_truth"),
+    *("test_codesign", "test_outlook", "test_readings", "test_second_implementation"),
+    *("test_headline", "test_unknowns", "test_cli", "test_columns"),
+    *("test_node", "test_live", "test_off_the_road", "test_study", "test_plant_guide"),
+}
+
+
+def pytest_collection_modifyitems(items: list[pytest.Item]) -> None:
+    for item in items:
+        if item.path.stem in SLOW:
+            item.add_marker(pytest.mark.slow)
+
 
 class Finished(NamedTuple):
     code: int
@@ -24,9 +46,9 @@ def access_av(
     monkeypatch: pytest.MonkeyPatch, capsys: pytest.CaptureFixture[str], tmp_path: Path
 ) -> Callable[..., Finished]:
     """Run the command line in this process; its latest results are the test's own."""
-    from access_av.cli import main
+    from access_av.cli.main import main
 
-    monkeypatch.setattr("access_av.files.RESULTS", tmp_path / "results")
+    monkeypatch.setattr("access_av.tables.results_directory.RESULTS", tmp_path / "results")
 
     def run(*arguments: str, columns: int = 100) -> Finished:
         monkeypatch.setattr(sys, "argv", ["access-av", *map(str, arguments)])
@@ -42,12 +64,12 @@ def access_av(
 @pytest.fixture(scope="session")
 def quick_study(tmp_path_factory: pytest.TempPathFactory) -> Path:
     """Results of a small evaluation, in a directory that stands for ``results/``."""
-    from access_av.paper import results as paper_results
+    from access_av.report.paper import results as paper_results
 
     results = tmp_path_factory.mktemp("results")
     directory = results / "2000-01-01T000000.000-evaluate"
     with pytest.MonkeyPatch.context() as patch:
-        patch.setattr("access_av.files.RESULTS", results)
+        patch.setattr("access_av.tables.results_directory.RESULTS", results)
         paper_results.run(["every-ssb", "gate"], runs=3, seed=5, out=directory)
     return results
 

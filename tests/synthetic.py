@@ -8,13 +8,13 @@ from types import SimpleNamespace
 import numpy as np
 import polars as pl
 
-from access_av.paper import ablation, ours
+from access_av.device.platform import Figure, PowerMode
+from access_av.paper import ablation, own_design
 from access_av.paper.claims import check_claims
 from access_av.paper.evaluation import Evaluation, _point, cases, outcome_of
 from access_av.paper.outcome import Drives
 from access_av.paper.readings import load
 from access_av.paper.study import Study
-from access_av.platform import Figure, PowerMode
 
 ROWS = [
     (0, 2265.6, 80, 65, 70),
@@ -128,7 +128,7 @@ def study(*, controller_gain: float = 0.0) -> Study:
         ],
         front=[(80.0, drives(0.6, 1005)), (240.0, drives(0.9, 335))],
         ours=[
-            ours.beside(shown, mode.number, drives(0.1, 30), knows_road=True)
+            own_design.beside(shown, mode.number, drives(0.1, 30), knows_road=True)
             for mode in shown.platform.modes
         ],
         unknowns=None,

@@ -4,12 +4,14 @@ What is done is a function here, what there is to know about is a module; both c
 are first used, so that importing the package takes no time.
 
 =====================  ============================================================================
+``study_plant``        is a plant's localization good enough, what mends it, what does it cost
 ``simulate``           drive a scenario many times
 ``bound``              how well any localizer can do in it
 ``plan``               where to put further radio heads
 ``synthesize``         record a scenario's drive as somebody on the vehicle would have
 ``estimate_angles``    a recording's angles, for ``locate``
 ``locate``             where the vehicle was in a recorded drive
+``Live``               the pipeline on a vehicle, fed as samples, angles and odometry come
 ``survey``             where radio heads stand, as ordinary drives show it
 ``evaluate``           the paper's evaluation
 ``explore``            operating points that meet an energy budget and an error
@@ -17,6 +19,7 @@ are first used, so that importing the package takes no time.
 ``Vehicle``            a vehicle as it believes to be built, and how it is set
 ``Scenario``           a site, a vehicle, and the world around them, otherwise or not
 ``Platform``           the onboard computer: power modes, energy per execution
+``Plant``              a site, a vehicle, a fleet of it, and the accuracy that is needed
 ``Recording``          samples on disk (SigMF, raw)
 ``channel``            channels by themselves: drops of 3GPP TR 38.901
 ``ray_paths``          paths of a ray tracer, for the simulator
@@ -44,6 +47,8 @@ from __future__ import annotations
 from typing import TYPE_CHECKING
 
 from access_av._core import (
+    Live,
+    Plant,
     Recording,
     RecordingError,
     Scenario,
@@ -57,29 +62,22 @@ from access_av.errors import InputError
 from access_av.lazy import attach
 
 if TYPE_CHECKING:
-    from access_av import (
-        aoa,
-        carbon,
-        channel,
-        columns,
-        cost,
-        drives,
-        nr,
-        paper,
-        ray_paths,
-        recorded_angles,
-        service_levels,
-        statistics,
-    )
-    from access_av.angle_log import AngleLog, estimate_angles
-    from access_av.design_space import Query, explore
-    from access_av.drives import Drive, SynthesizedDrive, locate, synthesize
-    from access_av.error_bound import ErrorBound, bound
+    from access_av import drives, paper, statistics
+    from access_av.designs.operating_points import Query, explore
+    from access_av.device.platform import Platform
+    from access_av.drives.angle_log import AngleLog, estimate_angles
+    from access_av.drives.recorded import Drive, SynthesizedDrive, locate, synthesize
+    from access_av.drives.self_survey import Survey, survey
+    from access_av.economics import carbon, cost
     from access_av.paper.evaluation import Evaluation, evaluate
-    from access_av.placement import Plan, plan
-    from access_av.platform import Platform
-    from access_av.self_survey import Survey, survey
-    from access_av.simulation import Simulation, simulate
+    from access_av.radio import channel, ray_paths
+    from access_av.radio.placement import Plan, plan
+    from access_av.run import service_levels
+    from access_av.run.error_bound import ErrorBound, bound
+    from access_av.run.simulation import Simulation, simulate
+    from access_av.signal import aoa, nr, recorded_angles
+    from access_av.study.answer import Study, study_plant
+    from access_av.tables import columns
 
 __all__ = [
     "AngleLog",
@@ -87,7 +85,9 @@ __all__ = [
     "ErrorBound",
     "Evaluation",
     "InputError",
+    "Live",
     "Plan",
+    "Plant",
     "Platform",
     "Query",
     "Recording",
@@ -97,6 +97,7 @@ __all__ = [
     "SettingsWarning",
     "Simulation",
     "Site",
+    "Study",
     "Survey",
     "SynthesizedDrive",
     "Vehicle",
@@ -120,6 +121,7 @@ __all__ = [
     "service_levels",
     "simulate",
     "statistics",
+    "study_plant",
     "survey",
     "synthesize",
 ]
@@ -128,28 +130,29 @@ if not TYPE_CHECKING:
     __getattr__, __dir__ = attach(
         __name__,
         {
-            "access_av.angle_log": ["AngleLog", "estimate_angles"],
-            "access_av.design_space": ["Query", "explore"],
-            "access_av.drives": ["Drive", "SynthesizedDrive", "locate", "synthesize"],
-            "access_av.error_bound": ["ErrorBound", "bound"],
+            "access_av.drives.angle_log": ["AngleLog", "estimate_angles"],
+            "access_av.designs.operating_points": ["Query", "explore"],
+            "access_av.drives.recorded": ["Drive", "SynthesizedDrive", "locate", "synthesize"],
+            "access_av.run.error_bound": ["ErrorBound", "bound"],
             "access_av.paper.evaluation": ["Evaluation", "evaluate"],
-            "access_av.placement": ["Plan", "plan"],
-            "access_av.platform": ["Platform"],
-            "access_av.self_survey": ["Survey", "survey"],
-            "access_av.simulation": ["Simulation", "simulate"],
+            "access_av.radio.placement": ["Plan", "plan"],
+            "access_av.device.platform": ["Platform"],
+            "access_av.drives.self_survey": ["Survey", "survey"],
+            "access_av.run.simulation": ["Simulation", "simulate"],
+            "access_av.study.answer": ["Study", "study_plant"],
         },
-        modules=[
-            "aoa",
-            "carbon",
-            "channel",
-            "columns",
-            "cost",
-            "drives",
-            "nr",
-            "paper",
-            "ray_paths",
-            "recorded_angles",
-            "service_levels",
-            "statistics",
-        ],
+        modules={
+            "aoa": "access_av.signal.aoa",
+            "carbon": "access_av.economics.carbon",
+            "channel": "access_av.radio.channel",
+            "columns": "access_av.tables.columns",
+            "cost": "access_av.economics.cost",
+            "drives": "access_av.drives",
+            "nr": "access_av.signal.nr",
+            "paper": "access_av.paper",
+            "ray_paths": "access_av.radio.ray_paths",
+            "recorded_angles": "access_av.signal.recorded_angles",
+            "service_levels": "access_av.run.service_levels",
+            "statistics": "access_av.statistics",
+        },
     )

@@ -9,7 +9,7 @@ def main() -> None:
     """Run the command line; Ctrl-C counts from the first import on."""
     try:
         interrupt.guard()
-        from access_av.cli import main as run
+        from access_av.cli.main import main as run
 
         run()
     except SystemExit as ended:

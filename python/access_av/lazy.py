@@ -4,14 +4,16 @@ from __future__ import annotations
 
 import sys
 from importlib import import_module
+from importlib.machinery import ModuleSpec
 from typing import TYPE_CHECKING, Any
 
 if TYPE_CHECKING:
     from collections.abc import Callable, Mapping, Sequence
+    from types import ModuleType
 
 
 def attach(
-    package: str, homes: Mapping[str, Sequence[str]], modules: Sequence[str] = ()
+    package: str, homes: Mapping[str, Sequence[str]], modules: Mapping[str, str] | None = None
 ) -> tuple[Callable[[str], Any], Callable[[], list[str]]]:
     """``__getattr__`` and ``__dir__`` of a package.
 
@@ -22,19 +24,22 @@ def attach(
     homes
         Names to find in the package, by the module that each is from.
     modules
-        Modules of the package to find in it.
+        Modules to find in the package, by the names they have there; `import` finds them too.
 
     Examples
     --------
-    >>> find, names = attach("access_av", {"access_av.methods": ["label"]}, ["cost"])
+    >>> modules = {"cost": "access_av.economics.cost"}
+    >>> find, names = attach("access_av", {"access_av.signal.methods": ["label"]}, modules)
     >>> find("label")("music"), find("cost").__name__
-    ('MUSIC', 'access_av.cost')
+    ('MUSIC', 'access_av.economics.cost')
     """
     home = {name: module for module, names in homes.items() for name in names}
+    modules = modules or {}
+    sys.meta_path.append(_Aliases({f"{package}.{name}": it for name, it in modules.items()}))
 
     def find(name: str) -> Any:
         if name in modules:
-            return import_module(f"{package}.{name}")
+            return import_module(modules[name])
         if name in home:
             return getattr(import_module(home[name]), name)
         raise AttributeError(f"module {package!r} has no attribute {name!r}")
@@ -43,3 +48,22 @@ def attach(
         return sorted({*vars(sys.modules[package]), *home, *modules})
 
     return find, names
+
+
+class _Aliases:
+    """Imports a module that lies elsewhere: ``access_av.cost`` is ``access_av.economics.cost``.
+
+    Finder and loader without their base classes, whose import takes longer than the package's.
+    """
+
+    def __init__(self, modules: Mapping[str, str]) -> None:
+        self.modules = modules
+
+    def find_spec(self, name: str, *_: object) -> ModuleSpec | None:
+        return ModuleSpec(name, self) if name in self.modules else None  # type: ignore[arg-type]
+
+    def create_module(self, _: ModuleSpec) -> None:
+        """Leave it to Python: what is made is replaced at once."""
+
+    def exec_module(self, module: ModuleType) -> None:
+        sys.modules[module.__name__] = import_module(self.modules[module.__name__])

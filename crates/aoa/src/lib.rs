@@ -55,10 +55,14 @@
 //! receivers: [`Calibration`]. Elements in a circle, a plane, anywhere: [`DirectionFinder`], in azimuth
 //! and elevation.
 //!
-//! # What an estimate does not know
+//! # What an estimate knows of itself
 //!
-//! The standard deviation is that of noise. Reflections that stand still while the snapshots are taken
-//! displace the estimate by more than that, whatever the method.
+//! Whether plane waves and white noise explain what was received is tested ([`GoodnessOfFit`]): a model
+//! that holds is doubted once in a hundred times. Reflections, antennas unlike those described and sources
+//! that were not looked for are named in the [`Verdict`], and the standard deviation then holds what
+//! they displace, as far as the residual shows it. One thing cannot be known from one look: a reflection
+//! from nearly the source's own direction, within about a twentieth of the beam's width at 20 dB, arrives
+//! as one plane wave from between the two.
 
 // Loops over vector registers must be compiled into the function that was chosen for the processor.
 #![allow(clippy::inline_always)]
@@ -101,6 +105,7 @@ pub use list::List;
 pub use num_complex::Complex64;
 pub use result::angle::{AngleEstimate, AngleEstimates};
 pub use result::azimuth_elevation::DirectionEstimate;
+pub use result::goodness_of_fit::GoodnessOfFit;
 pub use result::verdict::{Reason, Verdict};
 
 #[cfg(doctest)]

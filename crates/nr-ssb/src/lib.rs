@@ -163,14 +163,14 @@
 //! [`ScanError`](raster::ScanError), a [`TrackError`](track::TrackError), with a receiver a [`ReceiverError`](receiver::ReceiverError).
 //! Nothing panics.
 
-// Each folder uses only those before it: numeric, standard; transmit, dsp; input, receive; search;
+// Each folder uses only those before it: numeric, standard; transmit, dsp; input, one_ssb; search;
 // track, raster; receiver.
 mod dsp;
 mod error;
 mod input;
 mod numeric;
+mod one_ssb;
 pub mod raster;
-mod receive;
 pub mod receiver;
 pub mod search;
 mod standard;
@@ -180,7 +180,7 @@ mod transmit;
 pub use error::Error;
 pub use input::{diagnose, front_end};
 pub use num_complex::Complex32;
-pub use receive::measure;
+pub use one_ssb::measure;
 pub use standard::band::{self, Band};
 pub use standard::coding::{polar, rate_matching};
 pub use standard::grid::{self, SsbGrid};

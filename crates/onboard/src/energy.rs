@@ -14,6 +14,8 @@ use crate::settings::{
 pub struct EnergyModel {
     per_execution_j: f64,
     per_listening_j: f64,
+    /// How long the receiver is on for a burst, its settling included, in seconds.
+    pub on_time_s: f64,
     idle_w: f64,
     sleep: Option<Sleep>,
     /// What the sum of it counts.
@@ -148,6 +150,7 @@ impl EnergyModel {
         Ok(Some(Self {
             per_execution_j: execution.energy_j * scale(execution.boundary),
             per_listening_j: radio_j + burst_j,
+            on_time_s: on_s,
             idle_w: idle.map_or(0.0, |figure| figure.at(extent)),
             sleep,
             boundary,

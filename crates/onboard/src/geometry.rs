@@ -43,6 +43,56 @@ impl From<[f64; 2]> for Point {
     }
 }
 
+/// A rectangle along the axes of the map.
+#[derive(Clone, Copy, Debug, PartialEq)]
+pub struct Area {
+    from: Point,
+    to: Point,
+}
+
+impl Area {
+    /// The square with this middle.
+    pub fn around(middle: Point, half_side_m: f64) -> Self {
+        Self {
+            from: Point::new(middle.x_m - half_side_m, middle.y_m - half_side_m),
+            to: Point::new(middle.x_m + half_side_m, middle.y_m + half_side_m),
+        }
+    }
+
+    /// Where these points are, and a quarter of that to each side.
+    pub fn about(points: impl Iterator<Item = Point>) -> Self {
+        let [none, all] = [f64::INFINITY, f64::NEG_INFINITY].map(|it| Point::new(it, it));
+        let (from, to) = points.fold((none, all), |(from, to), point| {
+            (
+                Point::new(from.x_m.min(point.x_m), from.y_m.min(point.y_m)),
+                Point::new(to.x_m.max(point.x_m), to.y_m.max(point.y_m)),
+            )
+        });
+        let margin_m = 0.25 * (to.x_m - from.x_m).max(to.y_m - from.y_m);
+        Self {
+            from: from.moved([-margin_m; 2]),
+            to: to.moved([margin_m; 2]),
+        }
+    }
+
+    /// Distance between places of which there are at most so many, but at least `least_m`.
+    pub fn spacing_m(&self, most_places: f64, least_m: f64) -> f64 {
+        let square_m2 = (self.to.x_m - self.from.x_m) * (self.to.y_m - self.from.y_m);
+        (square_m2 / most_places).sqrt().max(least_m)
+    }
+
+    /// The middles of its squares.
+    pub fn places(&self, spacing_m: f64) -> impl Iterator<Item = Point> {
+        let count = move |length_m: f64| (length_m / spacing_m).ceil().max(1.0) as u32;
+        let middle = move |number: u32| (f64::from(number) + 0.5) * spacing_m;
+        let (from, to) = (self.from, self.to);
+        let (columns, rows) = (count(to.x_m - from.x_m), count(to.y_m - from.y_m));
+        (0..columns).flat_map(move |column| {
+            (0..rows).map(move |row| Point::new(from.x_m + middle(column), from.y_m + middle(row)))
+        })
+    }
+}
+
 /// Place and heading in the `map` frame.
 #[derive(Debug, Clone, Copy, PartialEq, Default, Serialize, Deserialize, JsonSchema)]
 #[serde(default, deny_unknown_fields)]
@@ -63,6 +113,15 @@ impl Pose {
     #[must_use]
     pub const fn point(self) -> Point {
         Point::new(self.x_m, self.y_m)
+    }
+
+    /// How far another pose is from it: east and north (m), and counter-clockwise in (−π, π] (rad).
+    pub fn offset_of(self, other: Self) -> [f64; 3] {
+        [
+            other.x_m - self.x_m,
+            other.y_m - self.y_m,
+            wrap_angle(other.heading_rad - self.heading_rad),
+        ]
     }
 
     /// The pose after `length_m` along an arc of constant `curvature_per_m` (left is positive).
@@ -136,6 +195,41 @@ mod tests {
             assert!((wrap_angle(angle) - wrapped).abs() < 1e-12, "{angle}");
         }
         assert!((wrap_angle(7.0) - (7.0 - TAU)).abs() < 1e-12);
+    }
+
+    #[test]
+    fn an_area_is_about_its_points_and_its_squares_cover_it() {
+        let points = [
+            Point::new(-2.0, 1.0),
+            Point::new(6.0, 5.0),
+            Point::new(0.0, 3.0),
+        ];
+        let area = Area::about(points.into_iter());
+        assert_eq!(
+            (area.from, area.to),
+            (Point::new(-4.0, -1.0), Point::new(8.0, 7.0))
+        );
+        // 12 m by 8 m: at most so many squares, none smaller than asked.
+        assert!((area.spacing_m(24.0, 1.0) - 2.0).abs() < 1e-12);
+        assert!((area.spacing_m(1e6, 1.0) - 1.0).abs() < 1e-12);
+        let places: Vec<Point> = area.places(2.0).collect();
+        assert_eq!(places.len(), 24);
+        assert_eq!(
+            (places[0], places[23]),
+            (Point::new(-3.0, 0.0), Point::new(7.0, 6.0))
+        );
+    }
+
+    #[test]
+    fn an_offset_turns_the_shorter_way() {
+        let pose = |x_m, heading_rad| Pose {
+            x_m,
+            y_m: 1.0,
+            heading_rad,
+        };
+        let [x_m, y_m, turn_rad] = pose(2.0, 3.0).offset_of(pose(5.0, -3.0));
+        assert_eq!((x_m, y_m), (3.0, 0.0));
+        assert!((turn_rad - (TAU - 6.0)).abs() < 1e-12);
     }
 
     #[test]

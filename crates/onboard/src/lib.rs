@@ -10,12 +10,15 @@
 //! right-handed, headings run counter-clockwise from +x. Angles of arrival are measured from the
 //! vehicle's forward axis.
 
+pub mod burst;
 mod clone_in_place;
 mod elements;
 pub mod energy;
 pub mod estimator;
+pub mod gaussian;
 pub mod geometry;
 pub mod link_budget;
+pub mod live;
 pub mod localize;
 pub mod manifold;
 pub mod observation;
@@ -28,6 +31,7 @@ pub mod settings;
 pub mod thermal;
 pub mod wake_up;
 
+pub use live::Live;
 pub use pipeline::{Custom, Execution, Heard, Observed, OdometryDefect, Onboard, SsbSource};
 
 /// Whatever a user's own code fails with.

@@ -8,6 +8,10 @@ pub const MAX_ELEMENTS: usize = 16;
 /// Most snapshots (or despread blocks) one observation holds.
 pub const MAX_SNAPSHOTS: usize = 64;
 
+/// All SSBs of a burst begin this close together: within half a frame (TS 38.213, 4.1), less their
+/// own length. Bursts may come every half frame.
+pub const BURST_S: f64 = 4.9e-3;
+
 /// Wheel odometry at one instant.
 #[derive(Debug, Clone, Copy, PartialEq)]
 pub struct OdometrySample {
@@ -22,6 +26,16 @@ pub struct OdometrySample {
 }
 
 impl OdometrySample {
+    /// One that has no distance: [`Live`](crate::Live) drives on by its speed.
+    pub const fn of_speed(time_s: f64, speed_mps: f64, yaw_rate_radps: Option<f64>) -> Self {
+        Self {
+            time_s,
+            distance_m: f64::NAN,
+            speed_mps,
+            yaw_rate_radps,
+        }
+    }
+
     /// Whether all its values are numbers.
     pub fn is_finite(&self) -> bool {
         self.time_s.is_finite()
@@ -53,6 +67,9 @@ pub struct SsbObservation {
     pub noise_variance: Option<f64>,
     /// Carrier frequency offset in Hz.
     pub cfo_hz: f64,
+    /// Whether it is the first of its beam since a search has found that. Such a one is heard by itself:
+    /// the others of its burst may have been heard before the search was through.
+    pub is_first: bool,
     elements: usize,
     /// Snapshot after snapshot.
     values: Vec<Complex64>,
@@ -71,6 +88,7 @@ impl SsbObservation {
             },
             noise_variance: None,
             cfo_hz: 0.0,
+            is_first: false,
             elements,
             values: Vec::with_capacity(elements * MAX_SNAPSHOTS),
         }
@@ -90,8 +108,16 @@ impl SsbObservation {
     pub fn restart(&mut self, ssb: SensedSsb) {
         self.ssb = ssb;
         self.noise_variance = None;
-        self.cfo_hz = 0.0;
+        (self.cfo_hz, self.is_first) = (0.0, false);
         self.values.clear();
+    }
+
+    /// Becomes a copy of another observation, in the memory there is.
+    pub fn copy_from(&mut self, other: &Self) {
+        self.values.clone_from(&other.values);
+        (self.ssb, self.noise_variance) = (other.ssb, other.noise_variance);
+        (self.cfo_hz, self.is_first) = (other.cfo_hz, other.is_first);
+        self.elements = other.elements;
     }
 
     /// Number of antennas.
@@ -117,6 +143,24 @@ impl SsbObservation {
     pub fn values(&self) -> &[Complex64] {
         &self.values
     }
+}
+
+/// An angle of arrival as a localizer takes it.
+#[derive(Debug, Clone, Copy, PartialEq)]
+pub struct AngleMeasurement {
+    /// Time in seconds.
+    pub time_s: f64,
+    /// Electrical angle ω = 2π(d/λ)·cos θ between neighbouring antennas of a row, in radians; of any
+    /// other array the azimuth from its axis.
+    pub phase_rad: f64,
+    /// Its standard deviation from noise, in radians.
+    pub phase_sigma_rad: f64,
+    /// Angle of arrival θ from the array's axis, in radians: 0..=π of a row, −π..=π of any other.
+    pub angle_rad: f64,
+    /// SNR per antenna and snapshot, in dB.
+    pub snr_db: f64,
+    /// Whether the estimator vouches for it: that it is Gaussian with this standard deviation.
+    pub resolved: bool,
 }
 
 #[cfg(test)]

@@ -4,7 +4,7 @@ use crate::BoxError;
 use crate::estimator::{self, AngleEstimator};
 use crate::geometry::Pose;
 use crate::link_budget::LinkBudget;
-use crate::localize::ekf::{Calibration, EstimatedConstants};
+use crate::localize::ekf::EstimatedConstants;
 use crate::localize::{
     self, AngleMeasurement, AngleUpdate, Ekf, History, Localizer, OdometryVerdict, PoseEstimate,
     Recovered, UpdateReason, UpdateVerdict,
@@ -37,6 +37,8 @@ pub struct Onboard {
 /// What does not change during a drive.
 struct Surroundings {
     heads: Vec<RadioHead>,
+    /// Those that the user has excluded.
+    excluded: Vec<RadioHead>,
     budget: LinkBudget,
     height_m: f64,
 }
@@ -132,6 +134,11 @@ pub enum OdometryDefect {
     NotFinite,
 }
 
+/// As long as a pose is searched for, every angle helps.
+fn is_searching(localizer: &dyn Localizer) -> bool {
+    localizer.hypotheses().is_some() || localizer.is_lost()
+}
+
 impl Onboard {
     /// The pipeline of a vehicle at a site, at 0 s and `start`, or in search of its start where the
     /// vehicle's settings say that it is not known.
@@ -180,6 +187,7 @@ impl Onboard {
             executions: Vec::with_capacity(heads.len()),
             burst: Vec::with_capacity(heads.len()),
             surroundings: Surroundings {
+                excluded: Vec::with_capacity(heads.len()),
                 heads,
                 budget: LinkBudget::new(site, vehicle),
                 height_m,
@@ -218,10 +226,9 @@ impl Onboard {
         self.sensed.clear();
         self.executions.clear();
         self.burst.clear();
+        let listened = self.listens(time_s)?;
         let now = self.surroundings.at(time_s, self.odometry, &self.localizer);
-        // As long as the first pose is searched for, every angle helps.
-        let searching = now.localizer.hypotheses().is_some() || now.localizer.is_lost();
-        let listened = searching || self.policy.listens(&now)?;
+        let searching = is_searching(now.localizer);
         if listened {
             source.sense(&mut self.sensed)?;
             self.chosen.clear();
@@ -255,6 +262,57 @@ impl Onboard {
         })
     }
 
+    /// The angles that were estimated of the last burst that was heard.
+    pub fn executions(&self) -> &[Execution] {
+        &self.executions
+    }
+
+    /// Whether the receiver is to listen to the burst at `time_s`, as things stand now.
+    ///
+    /// # Errors
+    /// Whatever a user's policy fails with.
+    pub fn listens(&mut self, time_s: f64) -> Result<bool, BoxError> {
+        let now = self.surroundings.at(time_s, self.odometry, &self.localizer);
+        Ok(is_searching(now.localizer) || self.policy.listens(&now)?)
+    }
+
+    /// Leaves the angles of a cell out from now on, or takes them in again; `false` where the site has
+    /// no such cell.
+    pub fn exclude(&mut self, pci: u16, excluded: bool) -> bool {
+        let Surroundings {
+            heads,
+            excluded: out,
+            ..
+        } = &mut self.surroundings;
+        let known = heads.iter().chain(out.iter()).any(|head| head.pci == pci);
+        let (from, to) = if excluded { (heads, out) } else { (out, heads) };
+        to.extend(from.extract_if(.., |head| head.pci == pci));
+        known
+    }
+
+    /// Goes on with another localizer, which knows nothing of what came before but the newest odometry,
+    /// from where it counts distances.
+    ///
+    /// # Errors
+    /// Whatever a user's localizer fails with.
+    pub fn replace_localizer(&mut self, localizer: Box<dyn Localizer>) -> Result<(), BoxError> {
+        self.localizer = History::new(localizer);
+        if let Some(newest) = &self.odometry {
+            self.localizer.odometry(newest)?;
+        }
+        Ok(())
+    }
+
+    /// Forgets the odometry so far: its clock, or its distance, begins anew.
+    pub fn forget_odometry(&mut self) {
+        self.odometry = None;
+    }
+
+    /// The newest odometry.
+    pub const fn newest_odometry(&self) -> Option<&OdometrySample> {
+        self.odometry.as_ref()
+    }
+
     /// Estimates the angle of an SSB for the localizer.
     fn estimate(&mut self, observation: &SsbObservation) -> Result<(), BoxError> {
         let ssb = observation.ssb;
@@ -273,11 +331,15 @@ impl Onboard {
             time_s: measured.time_s - self.lateness_s,
             ..measured
         });
-        let mut heads = self.surroundings.heads.iter();
-        let head = heads.find(|head| head.sends(ssb.pci, ssb.ssb_index));
+        let Surroundings {
+            heads, excluded, ..
+        } = &self.surroundings;
+        let sends = |head: &&RadioHead| head.sends(ssb.pci, ssb.ssb_index);
+        let head = heads.iter().find(sends);
         let reason = match head {
-            None => UpdateReason::UnknownRadioHead,
             Some(_) => UpdateReason::Unusable,
+            None if excluded.iter().any(|head| sends(&head)) => UpdateReason::Excluded,
+            None => UpdateReason::UnknownRadioHead,
         };
         let verdict = UpdateVerdict::unused(reason);
         if let (Some(&head), Some(measured)) = (head, measured) {
@@ -320,30 +382,24 @@ impl Onboard {
         self.localizer.localizer().pose(time_s)
     }
 
-    /// How far the array has come from its survey, where the localizer looks for it.
-    pub fn calibration(&self) -> Option<Calibration> {
-        let tracker = self.localizer.localizer().ekf();
-        tracker.map(Ekf::calibration)
+    /// Constants of odometer, yaw rate, array and clock as estimated by now, where the localizer does.
+    pub fn constants(&self) -> Option<EstimatedConstants> {
+        let mut constants = self.localizer.localizer().ekf()?.constants();
+        constants.lateness_s.stated += self.lateness_s;
+        constants.lateness_s.found += self.lateness_s;
+        Some(constants)
     }
 
-    /// What the drive has shown of odometer, yaw rate and clock, where the localizer looks for it.
-    pub fn findings(&self) -> Option<EstimatedConstants> {
-        let mut findings = self.localizer.localizer().ekf()?.findings();
-        findings.lateness_s.stated += self.lateness_s;
-        findings.lateness_s.found += self.lateness_s;
-        Some(findings)
-    }
-
-    /// Keeps from now on what smoothing takes, where the localizer is a tracker without a guard,
-    /// whose trackers take each other's place. Angles must come in time from now on.
+    /// Keeps from now on what smoothing takes, where the localizer is one filter and no bank,
+    /// whose filters take each other's place. Angles must come in time from now on.
     pub fn keep_journal(&mut self) {
         self.localizer.keep_journal();
     }
 
     /// Where the vehicle was at each odometry sample since the journal was begun, by everything
-    /// that is known now; nowhere without journal, or without tracker.
+    /// that is known now; nowhere without a journal.
     pub fn smoothed(&self) -> Vec<PoseEstimate> {
-        let tracker = self.localizer.localizer().ekf();
-        tracker.map(Ekf::smoothed).unwrap_or_default()
+        let ekf = self.localizer.localizer().ekf();
+        ekf.map(Ekf::smoothed).unwrap_or_default()
     }
 }

@@ -12,15 +12,18 @@ use std::sync::{Mutex, PoisonError};
 use std::thread;
 
 use aoa::{Array, Batch, Calibration, Complex64, Method, Real, Smoothing};
+use num_complex::Complex;
 use numpy::{AllowTypeChange, PyArrayLike1};
 use pyo3::exceptions::PyValueError;
 use pyo3::prelude::*;
 
-pub use azimuth_elevation::{DirectionEstimate, direction, direction_crb_rad, direction_spectrum};
+pub use azimuth_elevation::{
+    DirectionEstimate, MeasuredManifold, direction, direction_crb_rad, direction_spectrum,
+};
 pub use bounds::crb_rad;
 pub use result::AngleEstimate;
 use result::Estimates;
-use samples::{Samples, Visitor, value_error};
+use samples::{SampleArray, Samples, for_antennas, slice, value_error};
 pub use spectra::spectrum;
 pub use statistics::{calibrate, covariance, estimate_sources, forward_backward};
 
@@ -36,250 +39,274 @@ struct Request<'a, 'py> {
     threads: usize,
 }
 
-/// Directions of arrival by MUSIC.
-///
-/// The peaks of the pseudo-spectrum are found to rounding: there is no grid to choose.
+/// A function of Python that estimates by a method, which may depend on an option of its own.
+macro_rules! estimator {
+    ($(#[$doc:meta])* $name:ident($($option:ident: $type:ty = $default:tt)?) $method:expr) => {
+        $(#[$doc])*
+        #[pyfunction]
+        #[pyo3(signature = (snapshots, *, spacing_wavelengths=0.5, sources=1, $($option=$default,)? forward_backward=false, subarray=None, calibration=None, threads=1))]
+        #[allow(clippy::too_many_arguments)]
+        pub fn $name(
+            snapshots: &Bound<'_, PyAny>,
+            spacing_wavelengths: f64,
+            sources: usize,
+            $($option: $type,)?
+            forward_backward: bool,
+            subarray: Option<usize>,
+            calibration: Option<&Bound<'_, PyAny>>,
+            threads: usize,
+        ) -> PyResult<AngleEstimate> {
+            let smoothing = Smoothing {
+                forward_backward,
+                subarray,
+            };
+            estimate(
+                snapshots,
+                &Request {
+                    method: $method,
+                    spacing_wavelengths,
+                    sources,
+                    smoothing,
+                    calibration,
+                    threads,
+                },
+            )
+        }
+    };
+}
+
+estimator!(
+    /// Directions of arrival by MUSIC.
+    ///
+    /// The peaks of the pseudo-spectrum are found to rounding: there is no grid to choose.
+    ///
+    /// Parameters
+    /// ----------
+    /// snapshots : ndarray
+    ///     Complex samples, `(antennas, snapshots)` or `(batch, antennas, snapshots)`; 2 to 16
+    ///     antennas, complex64 or complex128, any strides. The mean is not removed.
+    /// spacing_wavelengths : float
+    ///     Distance between neighbouring antennas in wavelengths.
+    /// sources : int
+    ///     Number of sources, 1 to antennas - 1.
+    /// forward_backward : bool
+    ///     Average the covariance forward and backward, which separates two coherent sources.
+    /// subarray : int, optional
+    ///     Average the covariance over the subarrays of so many antennas, which separates up to
+    ///     ``antennas - subarray + 1`` coherent sources.
+    /// calibration : array_like, optional
+    ///     Complex gain of each channel, see `calibrate`. Every channel is divided by its own.
+    /// threads : int
+    ///     Threads to spread a batch over; one per core at most.
+    ///
+    /// Returns
+    /// -------
+    /// AngleEstimate
+    ///     Angles from the array's axis, standard deviations, SNRs, verdicts.
+    ///
+    /// Raises
+    /// ------
+    /// ValueError
+    ///     Wrong shape or type; NaN, infinite or only zero samples; too many sources.
+    ///
+    /// Examples
+    /// --------
+    /// >>> import numpy as np
+    /// >>> from access_av import aoa
+    /// >>> rng = np.random.default_rng(1)
+    /// >>> noise = rng.normal(size=(4, 20, 2)) @ [1, 1j] / np.sqrt(2)
+    /// >>> steering = np.exp(1j * np.pi * np.cos(np.radians(70)) * np.arange(4))
+    /// >>> found = aoa.music(10 * steering[:, None] + noise)
+    /// >>> bool(abs(found.angle_rad - np.radians(70)) < 3 * found.sigma_rad)
+    /// True
+    /// >>> found.verdict
+    /// 'resolved'
+    music() Method::Music
+);
+estimator!(
+    /// Directions of arrival by Root-MUSIC: the roots of the MUSIC polynomial.
+    ///
+    /// Parameters, result and errors as for `music`.
+    ///
+    /// Examples
+    /// --------
+    /// >>> import numpy as np
+    /// >>> from access_av import aoa
+    /// >>> angles = np.radians([60, 100])
+    /// >>> steering = np.exp(1j * np.pi * np.cos(angles) * np.arange(4)[:, None])
+    /// >>> rng = np.random.default_rng(1)
+    /// >>> signals = rng.normal(size=(2, 50, 2)) @ [1, 1j]
+    /// >>> noise = 0.01 * (rng.normal(size=(4, 50, 2)) @ [1, 1j])
+    /// >>> found = aoa.root_music(steering @ signals + noise, sources=2)
+    /// >>> np.degrees(found.angle_rad).round().tolist()
+    /// [60.0, 100.0]
+    root_music() Method::RootMusic
+);
+estimator!(
+    /// Directions of arrival by ESPRIT.
+    ///
+    /// Parameters, result and errors as for `music`, but for
+    ///
+    /// Parameters
+    /// ----------
+    /// total_least_squares : bool
+    ///     Solve the rotation between the subarrays by total, not ordinary, least squares.
+    ///
+    /// Examples
+    /// --------
+    /// >>> import numpy as np
+    /// >>> from access_av import aoa
+    /// >>> steering = np.exp(1j * np.pi * np.cos(np.radians(120)) * np.arange(4))
+    /// >>> found = aoa.esprit(np.outer(steering, np.ones(20)))
+    /// >>> round(float(np.degrees(found.angle_rad)), 6)
+    /// 120.0
+    esprit(total_least_squares: bool = true) if total_least_squares {
+        Method::EspritTls
+    } else {
+        Method::EspritLs
+    }
+);
+estimator!(
+    /// Directions of arrival by maximum likelihood: optimal, the fastest for one source, and for several,
+    /// which may be coherent, the most exact and the slowest (alternating projection).
+    ///
+    /// Parameters, result and errors as for `music`.
+    ///
+    /// Examples
+    /// --------
+    /// >>> import numpy as np
+    /// >>> from access_av import aoa
+    /// >>> steering = np.exp(1j * np.pi * np.cos(np.radians([30, 90])) * np.arange(4)[:, None])
+    /// >>> batch = np.repeat(steering.T[:, :, None], 20, axis=2)
+    /// >>> found = aoa.maximum_likelihood(batch)
+    /// >>> np.degrees(found.angle_rad).round(6).tolist()
+    /// [30.0, 90.0]
+    maximum_likelihood() Method::MaximumLikelihood
+);
+
+/// Directions of arrival from despread pilots, by maximum likelihood.
 ///
 /// Parameters
 /// ----------
-/// snapshots : ndarray
-///     Complex samples, `(antennas, snapshots)` or `(batch, antennas, snapshots)`; 2 to 16
-///     antennas, complex64 or complex128, any strides. The mean is not removed.
-/// spacing_wavelengths : float
-///     Distance between neighbouring antennas in wavelengths.
-/// sources : int
-///     Number of sources, 1 to antennas - 1.
-/// forward_backward : bool
-///     Average the covariance forward and backward, which separates two coherent sources.
-/// subarray : int, optional
-///     Average the covariance over the subarrays of so many antennas, which separates up to
-///     ``antennas - subarray + 1`` coherent sources.
-/// calibration : array_like, optional
-///     Complex gain of each channel, see `calibrate`. Every channel is divided by its own.
-/// threads : int
-///     Threads to spread a batch over; one per core at most.
+/// blocks : ndarray
+///     Complex, `(antennas, blocks)` or `(batch, antennas, blocks)`: per antenna and coherent piece of
+///     signal (an OFDM symbol) the sum of the received samples times the conjugated pilots, divided by
+///     the root of the pilots' energy. Neither carrier offset nor channel phase between blocks matters.
+/// noise_variance : float or array_like, optional
+///     Variance of the noise of a block; one for each antenna where they differ, infinite where a channel
+///     is dead. Estimated without, which takes two blocks or more.
+/// spacing_wavelengths, calibration
+///     As for `music`.
 ///
 /// Returns
 /// -------
 /// AngleEstimate
-///     Angles from the array's axis, standard deviations, SNRs, verdicts.
+///     `snr_db` is per antenna and block.
 ///
 /// Raises
 /// ------
 /// ValueError
-///     Wrong shape or type; NaN, infinite or only zero samples; too many sources.
+///     Wrong shape or type; NaN, infinite or only zero blocks; a variance that is not positive.
 ///
 /// Examples
 /// --------
 /// >>> import numpy as np
 /// >>> from access_av import aoa
-/// >>> rng = np.random.default_rng(1)
-/// >>> noise = rng.normal(size=(4, 20, 2)) @ [1, 1j] / np.sqrt(2)
 /// >>> steering = np.exp(1j * np.pi * np.cos(np.radians(70)) * np.arange(4))
-/// >>> found = aoa.music(10 * steering[:, None] + noise)
-/// >>> bool(abs(found.angle_rad - np.radians(70)) < 3 * found.sigma_rad)
-/// True
-/// >>> found.verdict
-/// 'resolved'
+/// >>> blocks = np.outer(steering, [9, 9j, -9])
+/// >>> found = aoa.maximum_likelihood_pilots(blocks, noise_variance=1.0)
+/// >>> round(float(np.degrees(found.angle_rad)), 6), round(found.phase_sigma_rad, 3)
+/// (70.0, 0.02)
 #[pyfunction]
-#[pyo3(signature = (snapshots, *, spacing_wavelengths=0.5, sources=1, forward_backward=false, subarray=None, calibration=None, threads=1))]
-#[allow(clippy::too_many_arguments)]
-pub fn music(
-    snapshots: &Bound<'_, PyAny>,
+#[pyo3(signature = (blocks, *, noise_variance=None, spacing_wavelengths=0.5, calibration=None))]
+pub fn maximum_likelihood_pilots(
+    blocks: &Bound<'_, PyAny>,
+    noise_variance: Option<&Bound<'_, PyAny>>,
     spacing_wavelengths: f64,
-    sources: usize,
-    forward_backward: bool,
-    subarray: Option<usize>,
     calibration: Option<&Bound<'_, PyAny>>,
-    threads: usize,
 ) -> PyResult<AngleEstimate> {
-    let method = Method::Music;
-    estimate(
-        snapshots,
-        &Request {
-            method,
-            spacing_wavelengths,
-            sources,
-            smoothing: Smoothing {
-                forward_backward,
-                subarray,
-            },
-            calibration,
-            threads,
-        },
-    )
+    let samples = Samples::of(blocks)?;
+    let noise = noise_variance.map(noise_of).transpose()?;
+    let values = for_antennas!(samples.antennas, N => {
+        let array = calibrated_array::<N>(spacing_wavelengths, calibration)?;
+        let noise = noise.map(Noise::per_antenna::<N>).transpose()?;
+        samples.map::<N, _>(blocks.py(), |item| {
+            let blocks = item.snapshots();
+            match &noise {
+                Some(Noise::Unequal(each)) => {
+                    aoa::maximum_likelihood_pilots_unequal(&blocks, each, &array)
+                }
+                Some(Noise::Equal(each)) => {
+                    aoa::maximum_likelihood_pilots(&blocks, Some(*each), &array)
+                }
+                None => aoa::maximum_likelihood_pilots(&blocks, None, &array),
+            }
+        })
+    })?;
+    let estimates = Estimates::new(values, samples.shape([]));
+    Ok(AngleEstimate { estimates })
 }
 
-/// Directions of arrival by Root-MUSIC: the roots of the MUSIC polynomial.
-///
-/// Parameters, result and errors as for `music`.
-///
-/// Examples
-/// --------
-/// >>> import numpy as np
-/// >>> from access_av import aoa
-/// >>> angles = np.radians([60, 100])
-/// >>> steering = np.exp(1j * np.pi * np.cos(angles) * np.arange(4)[:, None])
-/// >>> rng = np.random.default_rng(1)
-/// >>> signals = rng.normal(size=(2, 50, 2)) @ [1, 1j]
-/// >>> noise = 0.01 * (rng.normal(size=(4, 50, 2)) @ [1, 1j])
-/// >>> found = aoa.root_music(steering @ signals + noise, sources=2)
-/// >>> np.degrees(found.angle_rad).round().tolist()
-/// [60.0, 100.0]
-#[pyfunction]
-#[pyo3(signature = (snapshots, *, spacing_wavelengths=0.5, sources=1, forward_backward=false, subarray=None, calibration=None, threads=1))]
-#[allow(clippy::too_many_arguments)]
-pub fn root_music(
-    snapshots: &Bound<'_, PyAny>,
-    spacing_wavelengths: f64,
-    sources: usize,
-    forward_backward: bool,
-    subarray: Option<usize>,
-    calibration: Option<&Bound<'_, PyAny>>,
-    threads: usize,
-) -> PyResult<AngleEstimate> {
-    let method = Method::RootMusic;
-    estimate(
-        snapshots,
-        &Request {
-            method,
-            spacing_wavelengths,
-            sources,
-            smoothing: Smoothing {
-                forward_backward,
-                subarray,
-            },
-            calibration,
-            threads,
-        },
-    )
+/// Noise variance of all antennas, or of each.
+enum Noise<E> {
+    Equal(f64),
+    Unequal(E),
 }
 
-/// Directions of arrival by ESPRIT.
-///
-/// Parameters, result and errors as for `music`, but for
-///
-/// Parameters
-/// ----------
-/// total_least_squares : bool
-///     Solve the rotation between the subarrays by total, not ordinary, least squares.
-///
-/// Examples
-/// --------
-/// >>> import numpy as np
-/// >>> from access_av import aoa
-/// >>> steering = np.exp(1j * np.pi * np.cos(np.radians(120)) * np.arange(4))
-/// >>> found = aoa.esprit(np.outer(steering, np.ones(20)))
-/// >>> round(float(np.degrees(found.angle_rad)), 6)
-/// 120.0
-#[pyfunction]
-#[pyo3(signature = (snapshots, *, spacing_wavelengths=0.5, sources=1, total_least_squares=true, forward_backward=false, subarray=None, calibration=None, threads=1))]
-#[allow(clippy::too_many_arguments)]
-pub fn esprit(
-    snapshots: &Bound<'_, PyAny>,
-    spacing_wavelengths: f64,
-    sources: usize,
-    total_least_squares: bool,
-    forward_backward: bool,
-    subarray: Option<usize>,
-    calibration: Option<&Bound<'_, PyAny>>,
-    threads: usize,
-) -> PyResult<AngleEstimate> {
-    let method = if total_least_squares {
-        Method::EspritTls
-    } else {
-        Method::EspritLs
-    };
-    estimate(
-        snapshots,
-        &Request {
-            method,
-            spacing_wavelengths,
-            sources,
-            smoothing: Smoothing {
-                forward_backward,
-                subarray,
-            },
-            calibration,
-            threads,
-        },
-    )
+fn noise_of(variance: &Bound<'_, PyAny>) -> PyResult<Noise<Vec<f64>>> {
+    if let Ok(one) = variance.extract::<f64>() {
+        return Ok(Noise::Equal(one));
+    }
+    let each: PyArrayLike1<'_, f64, AllowTypeChange> = variance.extract().map_err(|_| {
+        PyValueError::new_err("noise_variance must be a number, or one for each antenna")
+    })?;
+    Ok(Noise::Unequal(each.as_array().to_vec()))
 }
 
-/// Directions of arrival by maximum likelihood: optimal, the fastest for one source, and for several,
-/// which may be coherent, the most exact and the slowest (alternating projection).
-///
-/// Parameters, result and errors as for `music`.
-///
-/// Examples
-/// --------
-/// >>> import numpy as np
-/// >>> from access_av import aoa
-/// >>> steering = np.exp(1j * np.pi * np.cos(np.radians([30, 90])) * np.arange(4)[:, None])
-/// >>> batch = np.repeat(steering.T[:, :, None], 20, axis=2)
-/// >>> found = aoa.maximum_likelihood(batch)
-/// >>> np.degrees(found.angle_rad).round(6).tolist()
-/// [30.0, 90.0]
-#[pyfunction]
-#[pyo3(signature = (snapshots, *, spacing_wavelengths=0.5, sources=1, forward_backward=false, subarray=None, calibration=None, threads=1))]
-pub fn maximum_likelihood(
-    snapshots: &Bound<'_, PyAny>,
-    spacing_wavelengths: f64,
-    sources: usize,
-    forward_backward: bool,
-    subarray: Option<usize>,
-    calibration: Option<&Bound<'_, PyAny>>,
-    threads: usize,
-) -> PyResult<AngleEstimate> {
-    let method = Method::MaximumLikelihood;
-    estimate(
-        snapshots,
-        &Request {
-            method,
-            spacing_wavelengths,
-            sources,
-            smoothing: Smoothing {
-                forward_backward,
-                subarray,
-            },
-            calibration,
-            threads,
-        },
-    )
+impl Noise<Vec<f64>> {
+    fn per_antenna<const N: usize>(self) -> PyResult<Noise<[f64; N]>> {
+        match self {
+            Self::Equal(variance) => Ok(Noise::Equal(variance)),
+            Self::Unequal(each) => each
+                .try_into()
+                .map(Noise::Unequal)
+                .map_err(|each: Vec<f64>| {
+                    let count = each.len();
+                    PyValueError::new_err(format!(
+                        "noise_variance must have one number per antenna: {N}, not {count}"
+                    ))
+                }),
+        }
+    }
 }
 
 #[inline]
 fn estimate(snapshots: &Bound<'_, PyAny>, request: &Request<'_, '_>) -> PyResult<AngleEstimate> {
-    let samples = Samples::of(snapshots)?;
-    let estimator = Estimator {
-        samples: &samples,
-        request,
-        py: snapshots.py(),
-    };
-    let estimates = samples.visit(estimator)?;
+    let (samples, py) = (Samples::of(snapshots)?, snapshots.py());
+    let estimates = for_antennas!(samples.antennas, N => match &samples.array {
+        SampleArray::Double(array) => request.run::<f64, N>(py, &samples, slice(array)?),
+        SampleArray::Single(array) => request.run::<f32, N>(py, &samples, slice(array)?),
+    })?;
     Ok(AngleEstimate { estimates })
 }
 
-struct Estimator<'a, 'py> {
-    samples: &'a Samples<'py>,
-    request: &'a Request<'a, 'py>,
-    py: Python<'py>,
-}
-
-impl Visitor for Estimator<'_, '_> {
-    type Output = Estimates;
-
+impl Request<'_, '_> {
     #[inline]
-    fn visit<T: Real, const N: usize>(self, batch: Batch<'_, T, N>) -> PyResult<Estimates> {
+    fn run<T: Real, const N: usize>(
+        &self,
+        py: Python<'_>,
+        samples: &Samples<'_>,
+        values: &[Complex<T>],
+    ) -> PyResult<Estimates<aoa::AngleEstimate>> {
+        let batch = Batch::<T, N>::new(values, samples.snapshots).map_err(value_error)?;
         let Request {
             method,
             sources,
             smoothing,
             threads,
             ..
-        } = *self.request;
-        let array =
-            calibrated_array::<N>(self.request.spacing_wavelengths, self.request.calibration)?;
+        } = *self;
+        let array = calibrated_array::<N>(self.spacing_wavelengths, self.calibration)?;
         let maximum = method.maximum_sources::<N>();
         if !(1..=maximum).contains(&sources) {
             let error = aoa::Error::TooManySources {
@@ -291,7 +318,7 @@ impl Visitor for Estimator<'_, '_> {
         let run = |batch: Batch<'_, T, N>, estimates: &mut [aoa::AngleEstimate]| {
             batch.estimate(method, &array, smoothing, sources, estimates)
         };
-        if self.samples.batch.is_none() && sources == 1 {
+        if samples.batch.is_none() && sources == 1 {
             let mut estimate = [aoa::AngleEstimate::default()];
             run(batch, &mut estimate).map_err(|error| value_error(error.error))?;
             let [only] = estimate;
@@ -309,7 +336,7 @@ impl Visitor for Estimator<'_, '_> {
             }
             Ok(())
         };
-        let outcomes = self.py.detach(|| {
+        let outcomes = py.detach(|| {
             thread::scope(|scope| {
                 // Where no thread is to be had, the others and this one do its share.
                 let helpers: Vec<_> = (share..batch.len())
@@ -325,7 +352,7 @@ impl Visitor for Estimator<'_, '_> {
         });
         let errors = outcomes.into_iter().filter_map(Result::err);
         if let Some(first) = errors.min_by_key(|error: &aoa::BatchError| error.item) {
-            return Err(match self.samples.batch {
+            return Err(match samples.batch {
                 Some(_) => value_error(first),
                 None => value_error(first.error),
             });
@@ -333,7 +360,7 @@ impl Visitor for Estimator<'_, '_> {
         let axes = (sources > 1).then_some(sources);
         Ok(Estimates::Many {
             values,
-            shape: self.samples.shape(axes),
+            shape: samples.shape(axes),
         })
     }
 }

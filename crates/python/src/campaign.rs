@@ -5,8 +5,8 @@ use std::sync::atomic::AtomicBool;
 
 use ::simulate::scenario::Scenario as CoreScenario;
 use ::simulate::{
-    Campaign, CampaignOptions, IntegritySummary, RunRecord, RunSummary, Simulation,
-    SimulationError, Step, StepStatistics, Tapes as CoreTapes,
+    Campaign, CampaignOptions, IntegritySummary, MeasurementTraces, RunRecord, RunSummary,
+    Simulation, SimulationError, Step, StepStatistics,
 };
 use numpy::{Element, PyArray1, PyArray3, PyArrayMethods};
 use onboard::energy::EstimateCost;
@@ -164,12 +164,12 @@ fn result(
     })
 }
 
-/// Runs of a scenario's world on tape: what comes to the vehicle, with the angle of every SSB.
+/// Runs of a scenario's world as measurement traces: what comes to the vehicle, with the angle of every SSB.
 ///
 /// Driven again with another localizer or wake-up policy they give what a campaign of its own would,
 /// to the last bit, for a small part of its computing.
 #[pyclass(frozen, module = "access_av._core")]
-pub struct Tapes(CoreTapes);
+pub struct Tapes(MeasurementTraces);
 
 #[pymethods]
 impl Tapes {
@@ -202,12 +202,12 @@ impl Tapes {
                 threads,
                 ..CampaignOptions::default()
             };
-            CoreTapes::record(&simulation, &methods, &options)
+            MeasurementTraces::record(&simulation, &methods, &options)
         });
         Ok(tapes.map_err(python_error)?.map(Self))
     }
 
-    /// Whether a scenario is of the same world, and its method on the tapes.
+    /// Whether a scenario is of the same world, and its method in the traces.
     #[pyo3(signature = (scenario, *, platform = None))]
     fn serve(&self, scenario: &Scenario, platform: Option<&Platform>) -> PyResult<bool> {
         Ok(self.0.serve(&simulation(scenario, platform)?))

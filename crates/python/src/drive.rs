@@ -384,7 +384,7 @@ impl LocatedDrive {
     #[getter]
     fn findings<'py>(&self, py: Python<'py>) -> PyResult<Bound<'py, PyDict>> {
         let rows: Vec<(&str, &str, EstimatedConstant)> =
-            self.core.findings.map_or_else(Vec::new, |it| {
+            self.core.constants.map_or_else(Vec::new, |it| {
                 vec![
                     ("odometer.scale", "1", it.odometer_scale),
                     ("gyroscope.scale", "1", it.yaw_rate_scale),

@@ -6,6 +6,7 @@ mod campaign;
 mod channel;
 mod drive;
 mod interrupt;
+mod live;
 mod message;
 mod nr;
 mod own_error;
@@ -26,9 +27,10 @@ mod _core {
     mod aoa {
         #[pymodule_export]
         use crate::aoa::{
-            AngleEstimate, DirectionEstimate, calibrate, covariance, crb_rad, direction,
-            direction_crb_rad, direction_spectrum, esprit, estimate_sources, forward_backward,
-            maximum_likelihood, music, root_music, spectrum,
+            AngleEstimate, DirectionEstimate, MeasuredManifold, calibrate, covariance, crb_rad,
+            direction, direction_crb_rad, direction_spectrum, esprit, estimate_sources,
+            forward_backward, maximum_likelihood, maximum_likelihood_pilots, music, root_music,
+            spectrum,
         };
         use pyo3::prelude::*;
 
@@ -76,13 +78,17 @@ mod _core {
     #[pymodule_export]
     use crate::drive::{LocatedDrive, estimate_angles, locate, log_angles, read_tum, synthesize};
     #[pymodule_export]
+    use crate::live::{Live, LiveEnergy, LiveHead, LiveOutcome, LiveStatus};
+    #[pymodule_export]
     use crate::message::brief_text;
     #[pymodule_export]
     use crate::plug_ins::{RadioHead, SensedSsb, Situation};
     #[pymodule_export]
     use crate::recording::{Recording, RecordingError};
     #[pymodule_export]
-    use crate::settings::{Platform, Scenario, SettingsError, SettingsWarning, Site, Vehicle};
+    use crate::settings::{
+        Plant, Platform, Scenario, SettingsError, SettingsWarning, Site, Vehicle,
+    };
     #[pymodule_export]
     use crate::survey::LoggedDrive;
 

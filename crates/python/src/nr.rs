@@ -259,7 +259,7 @@ impl Scan {
                 .map(|ssb| Py::new(py, Cell::from(ssb)))
                 .collect::<Result<_, _>>()?,
             faults: scan.faults.iter().map(ToString::to_string).collect(),
-            looked: scan.looked.iter().map(ToString::to_string).collect(),
+            looked: scan.searched.iter().map(ToString::to_string).collect(),
         })
     }
 }
@@ -390,7 +390,7 @@ fn scan_error(error: ScanError) -> PyErr {
 }
 
 /// One or two axes of complex64, row by row; what is already so is not copied.
-fn complex_samples<'py>(
+pub fn complex_samples<'py>(
     samples: &Bound<'py, PyAny>,
 ) -> PyResult<PyReadonlyArrayDyn<'py, Complex32>> {
     let py = samples.py();
@@ -409,7 +409,7 @@ fn complex_samples<'py>(
 }
 
 /// The antennas' samples.
-fn rows<'a>(samples: &'a PyReadonlyArrayDyn<'_, Complex32>) -> PyResult<Vec<&'a [Complex32]>> {
+pub fn rows<'a>(samples: &'a PyReadonlyArrayDyn<'_, Complex32>) -> PyResult<Vec<&'a [Complex32]>> {
     let length = samples.shape().last().copied().unwrap_or(0);
     Ok(samples.as_slice()?.chunks_exact(length.max(1)).collect())
 }

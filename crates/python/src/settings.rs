@@ -15,7 +15,7 @@ use pyo3::exceptions::{PyTypeError, PyValueError};
 use pyo3::prelude::*;
 use pyo3::types::{PyBool, PyDict, PyFloat, PyInt, PyList, PyString, PyTuple};
 use recording::Files;
-use simulate::scenario::Scenario as CoreScenario;
+use simulate::scenario::{Plant as CorePlant, Scenario as CoreScenario};
 use toml::{Table, Value};
 
 use crate::message::brief;
@@ -237,7 +237,7 @@ toml_file! {
         Ok(HashMap::from([
             ("duration_s", size.duration_s),
             ("bursts", size.bursts),
-            ("looks", size.looks),
+            ("ssbs", size.looks),
             ("odometry_samples", size.odometry_samples),
             ("bytes", size.bytes(1)),
         ]))
@@ -260,6 +260,33 @@ toml_file! {
         let mut resolved = self.0.clone();
         resolved.vehicle = resolve(&self.0.vehicle, platform).map_err(settings_error)?;
         Ok(Self(resolved))
+    }
+}
+
+toml_file! {
+    /// A plant, checked: a site, a vehicle, a fleet of it, and the accuracy that is needed.
+    Plant(CorePlant), "plant",
+
+    /// Horizontal error that is not to be passed, in metres, and for how much of the time, in percent.
+    #[getter]
+    fn target(&self) -> (f64, f64) {
+        (self.0.target.error_m(), self.0.target.percent())
+    }
+
+    /// A trip, through the channel as it is believed.
+    fn scenario(&self) -> Scenario {
+        Scenario(self.0.scenario(&self.0.channel))
+    }
+
+    /// A trip where lines of sight are poor.
+    fn poor_scenario(&self) -> Scenario {
+        Scenario(self.0.scenario(&self.0.poor_channel))
+    }
+
+    /// What of site, vehicle and trip is most likely not what was meant. Raises `SettingsError`
+    /// where the vehicle's platform has not what it asks for.
+    fn warnings(&self) -> PyResult<Vec<SettingsWarning>> {
+        self.scenario().warnings()
     }
 }
 

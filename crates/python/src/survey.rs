@@ -122,8 +122,8 @@ impl LoggedDrive {
         };
         let used = met.iter().map(|it| it.is_some_and(|it| it.used));
         (
-            number(|it| it.residual_rad),
-            number(|it| it.variance),
+            number(|it| it.innovation.residual),
+            number(|it| it.innovation.variance),
             PyArray1::from_iter(py, used),
         )
             .into_pyobject(py)

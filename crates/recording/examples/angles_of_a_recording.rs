@@ -12,7 +12,7 @@ use std::env;
 use std::error::Error;
 
 use onboard::estimator::{self, EstimatedAngle};
-use onboard::receive::{Receiver, ReceiverConfig};
+use onboard::receive::ReceiverConfig;
 use onboard::settings::{Site, Vehicle};
 use recording::replay::{ReplayError, receive_recording};
 use recording::{Recording, load};
@@ -26,11 +26,11 @@ fn main() -> Result<(), Box<dyn Error>> {
     let site: Site = load(site)?;
     let vehicle: Vehicle = load(vehicle)?;
     let mut recording = Recording::open(file)?;
-    let mut receiver = Receiver::new(ReceiverConfig::new(&site, &vehicle))?;
+    let config = ReceiverConfig::new(&site, &vehicle);
     let mut estimator = estimator::built_in(&vehicle)?;
 
     println!("time_s,pci,ssb_index,phase_rad,phase_sigma_rad,snr_db");
-    receive_recording(&mut receiver, &mut recording, 0.0, |observations| {
+    receive_recording(config, &mut recording, 0.0, |observations| {
         for observation in observations {
             let ssb = observation.ssb;
             let estimated = estimator

@@ -13,10 +13,13 @@ use std::path::Path;
 use crate::error::RecordingError;
 use crate::file as files;
 use crate::table::Table;
+use onboard::Observed;
+use onboard::burst::OfSsb;
+use onboard::live::AngleObservation;
 use onboard::localize::AngleMeasurement;
 use onboard::observation::SensedSsb;
 
-const COLUMNS: [&str; 7] = [
+const COLUMNS: [&str; 8] = [
     "time_s",
     "pci",
     "ssb_index",
@@ -24,6 +27,7 @@ const COLUMNS: [&str; 7] = [
     "phase_sigma_rad",
     "angle_rad",
     "snr_db",
+    "resolved",
 ];
 
 /// Columns that every log has, and those of which some may be missing.
@@ -62,6 +66,31 @@ pub struct LoggedAngle {
     pub ssb: SensedSsb,
     /// The angle.
     pub measured: AngleMeasurement,
+}
+
+impl From<&LoggedAngle> for AngleObservation {
+    fn from(logged: &LoggedAngle) -> Self {
+        let LoggedAngle { ssb, measured } = logged;
+        Self {
+            pci: ssb.pci,
+            ssb_index: ssb.ssb_index,
+            time_s: ssb.time_s,
+            phase_rad: measured.phase_rad,
+            sigma_rad: measured.phase_sigma_rad,
+            snr_db: Some(ssb.snr_db),
+            resolved: measured.resolved,
+        }
+    }
+}
+
+impl OfSsb for LoggedAngle {
+    fn ssb(&self) -> &SensedSsb {
+        &self.ssb
+    }
+
+    fn observed(&self) -> Observed<'_> {
+        Observed::Angle(self.measured)
+    }
 }
 
 /// The usable angles of a file, in its order, and the lines left out.
@@ -262,7 +291,7 @@ pub fn write_angle_log(file: &Path, angles: &[LoggedAngle]) -> Result<(), Record
         // Writing into a string does not fail.
         let _ = writeln!(
             text,
-            "{},{},{},{},{},{},{}",
+            "{},{},{},{},{},{},{},{}",
             measured.time_s,
             ssb.pci,
             ssb.ssb_index,
@@ -270,6 +299,7 @@ pub fn write_angle_log(file: &Path, angles: &[LoggedAngle]) -> Result<(), Record
             measured.phase_sigma_rad,
             measured.angle_rad,
             measured.snr_db,
+            u8::from(measured.resolved),
         );
     }
     files::write(file, text.as_bytes())

@@ -6,7 +6,7 @@
 mod common;
 
 use onboard::Custom;
-use onboard::localize::gaussian::principal_variances;
+use onboard::gaussian::principal_variances;
 use onboard::settings::{Check, Shipped, TomlFile};
 use rand::RngExt;
 use simulate::random::{Purpose, Streams};

@@ -8,11 +8,11 @@ use recording::replay::{all_of_error, scatter_sigma_rad};
 use recording::{LoggedAngle, RecordingError, TimedPose};
 use recording::{write_angle_log, write_odometry_csv, write_tum};
 
+use crate::measurement_trace::MeasurementTrace;
 use crate::random::Streams;
 use crate::run::Simulation;
 use crate::scenario::Scenario;
 use crate::synth::{SynthError, write_settings};
-use crate::tape::Tape;
 
 /// Writes run `run` of a scenario into `directory`, up to `end_s`: `angles.csv` with the angle of
 /// every SSB, `odometry.csv`, the truth in `truth.tum`, `scenario.toml`, and what the vehicle
@@ -39,9 +39,9 @@ pub fn log_angles(
         "a log of angles takes snapshots that are there at once, with the SNR as it is",
     )?;
     let method = scenario.vehicle.estimator.method;
-    let tape = Tape::record(&simulation, &[method], Streams::new(seed, run), run)?;
+    let trace = MeasurementTrace::record(&simulation, &[method], Streams::new(seed, run), run)?;
     let scatter_rad = scatter_sigma_rad(&scenario.site, &scenario.vehicle);
-    let angles: Vec<_> = tape
+    let angles: Vec<_> = trace
         .angles_of(0)
         .filter(|(ssb, _)| ssb.time_s <= end_s)
         .map(|(ssb, mut measured)| {
@@ -50,11 +50,11 @@ pub fn log_angles(
         })
         .collect();
     let mut vehicle = all_of_error(&scenario.site, &scenario.vehicle);
-    vehicle.start.pose = vehicle.start.known.then_some(tape.told_start);
-    let truth: Vec<_> = (tape.truth().filter(|(time_s, _)| *time_s <= end_s))
+    vehicle.start.pose = vehicle.start.known.then_some(trace.told_start);
+    let truth: Vec<_> = (trace.truth().filter(|(time_s, _)| *time_s <= end_s))
         .map(|(time_s, pose)| TimedPose { time_s, pose })
         .collect();
-    let odometry: Vec<_> = (tape.odometry.iter().copied())
+    let odometry: Vec<_> = (trace.odometry.iter().copied())
         .filter(|sample| sample.time_s <= end_s)
         .collect();
 

@@ -14,12 +14,12 @@
 //! Where the scenario has traced paths, K is theirs at each place, and a radio head without a line of
 //! sight says nothing.
 
+use onboard::gaussian::{Gaussian, Matrix, identity, product};
 use onboard::geometry::{Point, Pose};
 use onboard::localize::ekf::EkfConfig;
 use onboard::localize::ekf::angle_model::{AngleModel, RoadFrame};
 use onboard::localize::ekf::motion::{Reading, Step};
 use onboard::localize::ekf::state::{ACROSS, ALONG, Belief, CURVATURE, HEADING, SCALE, STATES};
-use onboard::localize::gaussian::{Gaussian, Matrix, identity, product};
 use onboard::localize::{Ekf, InitialPose};
 use onboard::manifold::scatter_bound;
 use onboard::radio_head::RadioHead;
@@ -123,9 +123,9 @@ impl Bound {
 
     /// The bound at each SSB of the drive, every SSB being used.
     pub fn along_route(&self) -> Vec<BoundPoint> {
-        let scatter = |travelled_m, sighting: &AngleModel| {
-            scatter_bound(self.config.rician_k, sighting.aperture)
-                * (self.config.array).correlation(travelled_m, sighting.toward)
+        let scatter = |travelled_m, angle_model: &AngleModel| {
+            scatter_bound(self.config.rician_k, angle_model.aperture)
+                * (self.config.array).correlation(travelled_m, angle_model.toward)
         };
         let mut points = Vec::new();
         self.walk(scatter, |_, belief, time_s, along_m| {
@@ -136,8 +136,9 @@ impl Bound {
 
     /// A filter that makes the errors the tracker says it makes, at every `stride`-th SSB.
     pub fn ideal_filter(&self, stride: usize) -> IdealFilter {
-        let scatter =
-            |travelled_m, sighting: &AngleModel| self.config.look_variance(travelled_m, sighting);
+        let scatter = |travelled_m, angle_model: &AngleModel| {
+            self.config.shared_variance(travelled_m, angle_model)
+        };
         let mut filter = IdealFilter::default();
         let (mut since, mut before) = (identity(), [[0.0; STATES]; STATES]);
         let mut number = 0;
@@ -152,7 +153,7 @@ impl Bound {
         filter
     }
 
-    /// Drives the route with looks whose scatter has the variance `scatter(travelled, sighting)`,
+    /// Drives the route with looks whose scatter has the variance `scatter(travelled, angle_model)`,
     /// and calls `visit(Ψ, belief, time, distance along the road)` at each SSB, Ψ being what
     /// became of an error since the one before.
     fn walk(
@@ -171,7 +172,7 @@ impl Bound {
             let mut transition = self.advance(&mut belief, along_m - before_m);
             before_m = along_m;
             let travelled_m = along_m - last_look_m;
-            let scatter = |sighting: &AngleModel| scatter(travelled_m, sighting);
+            let scatter = |angle_model: &AngleModel| scatter(travelled_m, angle_model);
             self.listen(&mut belief, along_m, scatter, &mut transition);
             last_look_m = along_m;
             visit(&transition, &belief, time_s, along_m);
@@ -231,12 +232,12 @@ impl Bound {
         };
         for (number, head) in self.heads.iter().enumerate() {
             let array = &self.config.array;
-            let sighting = AngleModel::new(head, pose, &frame, &belief.mean, array);
+            let angle_model = AngleModel::new(head, pose, &frame, &belief.mean, array);
             let fading = self.fading(number, pose.point());
-            if let Some((sighting, fading)) = sighting.zip(fading) {
-                let row = sighting.row;
-                let thermal = self.thermal_variance(head, &sighting);
-                let variance = fading * scatter(&sighting) + thermal;
+            if let Some((angle_model, fading)) = angle_model.zip(fading) {
+                let row = angle_model.row;
+                let thermal = self.thermal_variance(head, &angle_model);
+                let variance = fading * scatter(&angle_model) + thermal;
                 let gain = belief.update(0.0, &row, variance);
                 // (I − K H) times the transition so far.
                 let mut seen = [0.0; STATES];
@@ -254,10 +255,10 @@ impl Bound {
         }
     }
 
-    /// Variance (rad²) of a look by thermal noise, at the sharpness that the array has there.
-    fn thermal_variance(&self, head: &RadioHead, sighting: &AngleModel) -> f64 {
+    /// Variance (rad²) of an angle by thermal noise, at the sharpness that the array has there.
+    fn thermal_variance(&self, head: &RadioHead, angle_model: &AngleModel) -> f64 {
         let mean = self.config.array.measurand.mean_aperture();
-        self.thermal.variance(head, sighting.range_m) * (mean / sighting.aperture)
+        self.thermal.variance(head, angle_model.range_m) * (mean / angle_model.aperture)
     }
 
     /// By how much the scatter's variance at a place is larger than at the K that is expected; none
@@ -320,14 +321,14 @@ impl Bound {
             };
             let array = &self.config.array;
             for (number, head) in self.heads.iter().enumerate() {
-                let sighting =
+                let angle_model =
                     AngleModel::new(head, pose, &RoadFrame::PLANE, &[0.0; STATES], array)?;
                 let Some(fading) = self.fading(number, place) else {
                     continue;
                 };
-                let scatter = scatter_bound(self.config.rician_k, sighting.aperture);
-                let thermal = self.thermal_variance(head, &sighting);
-                belief.update(0.0, &sighting.row, (fading * scatter + thermal) / looks);
+                let scatter = scatter_bound(self.config.rician_k, angle_model.aperture);
+                let thermal = self.thermal_variance(head, &angle_model);
+                belief.update(0.0, &angle_model.row, (fading * scatter + thermal) / looks);
             }
             let [along, across] = [ALONG, ACROSS].map(|i| belief.covariance[i][i]);
             information += 1.0 / (along + across);

@@ -1,6 +1,6 @@
 //! Roots of covariances.
 
-use onboard::localize::gaussian::Matrix;
+use onboard::gaussian::Matrix;
 
 /// Lower factor `L Lᵀ` of a positive semidefinite matrix, of which the lower triangle is read;
 /// directions that have less than a rounding error of the variance `scale` get none.

@@ -24,8 +24,8 @@ pub enum SimulationError {
     #[error("no threads to run on: {0}")]
     Threads(#[from] rayon::ThreadPoolBuildError),
     /// A run or method that was not recorded.
-    #[error("not on tape")]
-    NotOnTape,
+    #[error("no trace of this run")]
+    NotTraced,
     /// The caller asked to stop.
     #[error("stopped")]
     Stopped,

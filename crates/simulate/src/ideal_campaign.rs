@@ -36,7 +36,7 @@ impl IdealFilter {
             steps: self.run(seed, run).enumerate().map(step).collect(),
             executions: Vec::new(),
             listened: 0,
-            calibration: None,
+            constants: None,
             out_of_reach: 0,
         }
     }

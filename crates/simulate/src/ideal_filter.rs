@@ -7,8 +7,8 @@
 //! so that the steps of a run are far from independent and even a perfect filter's figures scatter
 //! from campaign to campaign.
 
+use onboard::gaussian::{Matrix, product};
 use onboard::localize::ekf::state::{ACROSS, ALONG, STATES};
-use onboard::localize::gaussian::{Matrix, product};
 use rand::RngExt;
 use rand_distr::StandardNormal;
 

@@ -145,7 +145,7 @@ mod tests {
             steps: steps.iter().enumerate().map(step).collect(),
             executions: Vec::new(),
             listened: 0,
-            calibration: None,
+            constants: None,
             out_of_reach: 0,
         }
     }

@@ -2,7 +2,7 @@
 
 use onboard::geometry::Pose;
 use onboard::localize::Integrity;
-use onboard::localize::ekf::Calibration;
+use onboard::localize::ekf::EstimatedConstants;
 use onboard::{Execution, Heard, Onboard};
 
 use crate::error::SimulationError;
@@ -72,8 +72,8 @@ pub struct RunRecord {
     pub executions: Vec<Execution>,
     /// SSB bursts that the receiver listened to.
     pub listened: usize,
-    /// The array as found by the end of the drive, where the localizer looks for it.
-    pub calibration: Option<Calibration>,
+    /// Constants of the vehicle as estimated by the end of the drive, where the localizer does.
+    pub constants: Option<EstimatedConstants>,
     /// SSBs at which no choice of angles could keep the bound of an uncertainty-driven wake-up.
     pub out_of_reach: usize,
 }
@@ -95,7 +95,7 @@ impl RunRecord {
             steps: Vec::with_capacity(steps),
             executions: Vec::with_capacity(steps),
             listened: 0,
-            calibration: None,
+            constants: None,
             out_of_reach: 0,
         }
     }

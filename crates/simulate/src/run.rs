@@ -108,7 +108,7 @@ impl Simulation {
             drive.hear_until(time_s, &mut record)?;
             record.add_step(&drive.onboard, time_s, truth.pose, drive.strongest_db)?;
         }
-        record.calibration = drive.onboard.calibration();
+        record.constants = drive.onboard.constants();
         Ok(record)
     }
 }

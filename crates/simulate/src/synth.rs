@@ -118,6 +118,7 @@ pub fn synthesize(
         },
     )?;
     let mut snrs_db = vec![0.0; channels.len()];
+    let cfos_hz: Vec<f64> = (0..channels.len()).map(|index| air.cfo_hz(index)).collect();
     let mut truth = Vec::new();
     let mut number = 0u64;
     loop {
@@ -137,9 +138,14 @@ pub fn synthesize(
         if !settings.continuous || number == 0 {
             writer.begin_capture(burst.start);
         }
-        for ((head, snr_db), start) in channels.iter().zip(&snrs_db).zip(&burst.ssb_starts) {
-            let place = writer.length() as f64 + start - burst.start as f64;
-            writer.annotate(annotation(scenario, head, &here, *snr_db, place));
+        let (begin, starts) = (burst.start as f64, &burst.ssb_starts);
+        for (index, (head, start)) in channels.iter().zip(starts).enumerate() {
+            let received = Received {
+                snr_db: snrs_db.get(index).copied().unwrap_or(f64::NAN),
+                cfo_hz: cfos_hz.get(index).copied().unwrap_or(f64::NAN),
+                sample_start: writer.length() as f64 + start - begin,
+            };
+            writer.annotate(annotation(scenario, head, &here, &received));
         }
         let antennas: Vec<_> = burst.antennas.iter().map(Vec::as_slice).collect();
         writer.write(&antennas)?;
@@ -205,13 +211,20 @@ fn write_odometry(
     write_odometry_csv(file, &samples)
 }
 
+/// How an SSB is received: SNR, frequency offset by the oscillators, first sample.
+struct Received {
+    snr_db: f64,
+    cfo_hz: f64,
+    sample_start: f64,
+}
+
 fn annotation(
     scenario: &Scenario,
     channel: &HeadChannel,
     vehicle: &VehicleState,
-    snr_db: f64,
-    sample_start: f64,
+    received: &Received,
 ) -> Annotation {
+    let sample_start = received.sample_start;
     let head = channel.head();
     let ssb_freq_hz = scenario.site.carrier_mhz * 1e6;
     let scs_hz = scenario.site.ssb.subcarrier_spacing_khz * 1e3;
@@ -220,7 +233,8 @@ fn annotation(
     let ssb = json!({
         "pci": head.pci,
         "ssb_index": head.ssb_index,
-        "snr_db": snr_db,
+        "snr_db": received.snr_db,
+        "cfo_hz": received.cfo_hz,
         "scs_hz": scs_hz,
         "ssb_freq_hz": ssb_freq_hz,
         "ssb_first_sample_incl_cp": sample_start,

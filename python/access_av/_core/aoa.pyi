@@ -6,6 +6,7 @@ from numpy.typing import ArrayLike, NDArray
 __all__ = [
     "AngleEstimate",
     "DirectionEstimate",
+    "MeasuredManifold",
     "calibrate",
     "covariance",
     "crb_rad",
@@ -16,6 +17,7 @@ __all__ = [
     "estimate_sources",
     "forward_backward",
     "maximum_likelihood",
+    "maximum_likelihood_pilots",
     "music",
     "root_music",
     "spectrum",
@@ -37,7 +39,7 @@ class AngleEstimate:
         """Angle from the array's axis, 0 to pi."""
     @property
     def sigma_rad(self) -> _Values:
-        """Standard deviation of `angle_rad`."""
+        """Standard deviation of `angle_rad`: of noise, and of the misfit where there is one."""
     @property
     def phase_rad(self) -> _Values:
         """Electrical angle, the phase step from one antenna to the next: best for a filter."""
@@ -45,8 +47,14 @@ class AngleEstimate:
     def phase_sigma_rad(self) -> _Values:
         """Standard deviation of `phase_rad`."""
     @property
+    def phase_noise_sigma_rad(self) -> _Values:
+        """Standard deviation of `phase_rad` that noise alone makes."""
+    @property
     def snr_db(self) -> _Values:
         """SNR per antenna and snapshot, as estimated."""
+    @property
+    def p_value(self) -> _Values:
+        """Probability that plane waves in white noise fit as badly as this or worse."""
     @property
     def resolved(self) -> bool | NDArray[np.bool_]:
         """Whether the estimate may be relied on."""
@@ -74,11 +82,17 @@ class DirectionEstimate:
     def elevation_sigma_rad(self) -> _Values:
         """Standard deviation of `elevation_rad`; 0 where the elevation was given."""
     @property
+    def noise_covariance(self) -> NDArray[np.float64]:
+        """What of `covariance` noise alone makes."""
+    @property
     def covariance(self) -> NDArray[np.float64]:
         """Covariance of azimuth and elevation in rad^2, `(2, 2)` or `(batch, 2, 2)`."""
     @property
     def snr_db(self) -> _Values:
         """SNR per antenna and snapshot, as estimated."""
+    @property
+    def p_value(self) -> _Values:
+        """Probability that plane waves in white noise fit as badly as this or worse."""
     @property
     def resolved(self) -> bool | NDArray[np.bool_]:
         """Whether the estimate may be relied on."""
@@ -86,18 +100,29 @@ class DirectionEstimate:
     def verdict(self) -> str | NDArray[np.str_]:
         """`resolved`, or `unresolved: ` and the reason."""
 
+@final
+class MeasuredManifold:
+    """What an array receives from every direction, measured: patterns and coupling included."""
+
+    def __new__(
+        cls, responses: ArrayLike, elevations_rad: ArrayLike | None = None
+    ) -> MeasuredManifold:
+        """Of responses `(azimuths, antennas)` or `(elevations, azimuths, antennas)`."""
+
 def direction(
     snapshots: _Samples,
-    places_wavelengths: ArrayLike,
+    places_wavelengths: ArrayLike | MeasuredManifold,
     *,
     elevations_rad: tuple[float, float] = ...,
+    sources: int = 1,
+    noise_variance: float | None = None,
     calibration: ArrayLike | None = None,
 ) -> DirectionEstimate:
-    """Azimuth and elevation of one source by maximum likelihood, antennas in any places."""
+    """Azimuth and elevation by maximum likelihood, antennas in any places."""
 
 def direction_spectrum(
     snapshots: _Samples,
-    places_wavelengths: ArrayLike,
+    places_wavelengths: ArrayLike | MeasuredManifold,
     azimuths_rad: ArrayLike,
     elevations_rad: ArrayLike,
     *,
@@ -108,7 +133,7 @@ def direction_spectrum(
     """Spectrum `(elevations, azimuths)`, of a batch one for each, antennas in any places."""
 
 def direction_crb_rad(
-    places_wavelengths: ArrayLike,
+    places_wavelengths: ArrayLike | MeasuredManifold,
     azimuth_rad: float,
     elevation_rad: float,
     snr_db: float,
@@ -165,6 +190,15 @@ def maximum_likelihood(
     threads: int = 1,
 ) -> AngleEstimate:
     """Directions by maximum likelihood, coherent sources too; parameters as of `music`."""
+
+def maximum_likelihood_pilots(
+    blocks: _Samples,
+    *,
+    noise_variance: float | ArrayLike | None = None,
+    spacing_wavelengths: float = 0.5,
+    calibration: ArrayLike | None = None,
+) -> AngleEstimate:
+    """Directions from despread pilots, `(antennas, blocks)` or `(batch, antennas, blocks)`."""
 
 def covariance(snapshots: _Samples) -> NDArray[np.complex128]:
     """Sample covariance of the antennas, mean not removed: `(…, antennas, antennas)`."""

@@ -119,6 +119,7 @@ class Receiver:
         antennas: int,
         period_s: float = 0.02,
         search_every_s: float = 1.0,
+        cfo_ppm: float | None = None,
     ) -> Receiver: ...
     def push(self, samples: ArrayLike) -> list[Cell]:
         """SSBs completed by the next samples, `(samples,)` or `(antennas, samples)`."""

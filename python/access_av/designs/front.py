@@ -11,7 +11,7 @@ if TYPE_CHECKING:
 
     from numpy.typing import NDArray
 
-    from access_av.designs.drives import Driven
+    from access_av.designs.driven import Driven
 
 
 def differences(one: Driven, others: Sequence[Driven]) -> NDArray[np.float64]:

@@ -7,15 +7,15 @@ from typing import TYPE_CHECKING
 
 import numpy as np
 
-from access_av.designs.drives import drive, in_worst, joined
+from access_av.designs.driven import drive, in_worst, joined
 from access_av.designs.front import aims, not_beaten
 from access_av.errors import InputError
 
 if TYPE_CHECKING:
     from collections.abc import Callable, Sequence
 
-    from access_av.campaign import Campaign
-    from access_av.designs.drives import Design, Driven, Part
+    from access_av.designs.driven import Design, Driven, Part
+    from access_av.run.campaign import Campaign
 
 # Successive halving: of the designs left, one in so many goes on to so many times the runs.
 KEEP_ONE_IN = 3

@@ -9,8 +9,8 @@ from typing import TYPE_CHECKING, Any
 
 import numpy as np
 
-from access_av import toml
 from access_av.errors import InputError
+from access_av.tables import toml
 
 if TYPE_CHECKING:
     from collections.abc import Mapping, Sequence
@@ -22,19 +22,6 @@ MOST_DESIGNS = 100_000
 # The table of a space file that holds the worlds, and keys of a scenario that nobody can choose.
 WORLD = "world"
 NOT_CHOSEN = ("channel", "truth", "faults", "site.rician_k_db")
-BITS = 32
-# Joe and Kuo, new-joe-kuo-6.21201: polynomial and first direction numbers from dimension 2 on.
-SOBOL = (
-    (0, (1,)),
-    (1, (1, 3)),
-    (1, (1, 3, 1)),
-    (2, (1, 1, 1)),
-    (1, (1, 1, 3, 3)),
-    (4, (1, 3, 5, 13)),
-    (2, (1, 1, 5, 5, 17)),
-    (4, (1, 1, 5, 5, 5)),
-    (7, (1, 1, 7, 11, 19)),
-)
 
 
 @dataclass(frozen=True)
@@ -168,30 +155,13 @@ def sobol(count: int, dimensions: int) -> NDArray[np.float64]:
     >>> sobol(4, 2).tolist()
     [[0.0, 0.0], [0.5, 0.5], [0.75, 0.25], [0.25, 0.75]]
     """
-    if not 1 <= dimensions <= len(SOBOL) + 1:
-        raise InputError(f"{dimensions} keys vary; Sobol points go up to {len(SOBOL) + 1}")
-    directions = np.array([_directions(number) for number in range(dimensions)], dtype=np.uint64)
-    points = np.zeros((count, dimensions), dtype=np.uint64)
-    for index in range(1, count):
-        # Gray code: from one point to the next, the lowest zero bit of the index changes.
-        changed = (~(index - 1) & index).bit_length() - 1
-        points[index] = points[index - 1] ^ directions[:, changed]
-    return points / 2.0**BITS
+    from scipy.stats import qmc
 
-
-def _directions(dimension: int) -> list[int]:
-    if dimension == 0:
-        return [1 << (BITS - 1 - bit) for bit in range(BITS)]
-    polynomial, first = SOBOL[dimension - 1]
-    degree = len(first)
-    found = [number << (BITS - 1 - bit) for bit, number in enumerate(first)]
-    for bit in range(degree, BITS):
-        value = found[bit - degree] ^ (found[bit - degree] >> degree)
-        for step in range(1, degree):
-            if polynomial >> (degree - 1 - step) & 1:
-                value ^= found[bit - step]
-        found.append(value)
-    return found
+    # So many that SciPy has no doubt of their balance; the first of them.
+    drawn = qmc.Sobol(dimensions, scramble=False, bits=32).random_base2(
+        max(count - 1, 0).bit_length()
+    )
+    return np.asarray(drawn[:count])
 
 
 def shown(values: Mapping[str, Any]) -> str:

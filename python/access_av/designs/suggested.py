@@ -10,7 +10,7 @@ from typing import TYPE_CHECKING, Any
 
 import numpy as np
 
-from access_av.designs.drives import drive, in_worlds, in_worst, joined
+from access_av.designs.driven import drive, in_worlds, in_worst, joined
 from access_av.designs.search import Found
 from access_av.errors import InputError
 
@@ -18,9 +18,9 @@ if TYPE_CHECKING:
     from collections.abc import Callable, Sequence
 
     from access_av._core import Scenario
-    from access_av.campaign import Campaign
-    from access_av.designs.drives import Design, Driven, Part
+    from access_av.designs.driven import Design, Driven, Part
     from access_av.designs.space import Space
+    from access_av.run.campaign import Campaign
 
 # Designs that are asked for before the last ones are told: enough for all workers.
 BATCH = 16

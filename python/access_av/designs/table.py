@@ -16,7 +16,7 @@ from access_av.statistics.percentiles import PERCENTS, as_columns, column, ends_
 if TYPE_CHECKING:
     from collections.abc import Mapping, Sequence
 
-    from access_av.designs.drives import Driven
+    from access_av.designs.driven import Driven
 
 # Columns that may hold nothing known.
 NUMBERS = dict.fromkeys(("energy_j", "rms_error_m", "p90_max_error_m", *names()), pl.Float64)

@@ -16,7 +16,7 @@ from typing import TYPE_CHECKING, Any
 
 import numpy as np
 
-from access_av.designs.drives import designs_of, drive, joined
+from access_av.designs.driven import designs_of, drive, joined
 from access_av.designs.front import differences, student
 from access_av.designs.space import Dimension, Space
 from access_av.errors import InputError
@@ -26,9 +26,9 @@ if TYPE_CHECKING:
     from collections.abc import Callable
 
     from access_av._core import Scenario
-    from access_av.campaign import Campaign
-    from access_av.designs.drives import Design, Driven
+    from access_av.designs.driven import Design, Driven
     from access_av.designs.table import Constraints
+    from access_av.run.campaign import Campaign
 
 # What may be tuned of each policy: key, least, most; on a logarithmic scale where positive.
 Range = tuple[str, float, float]

@@ -48,5 +48,8 @@ if not TYPE_CHECKING:
             "access_av.paper.readings": ["Reading"],
             "access_av.paper.statements": ["paper_numbers"],
         },
-        modules=["claims", "energy_fit", "evaluation", "readings", "study"],
+        modules={
+            name: f"access_av.paper.{name}"
+            for name in ("claims", "energy_fit", "evaluation", "readings", "study")
+        },
     )

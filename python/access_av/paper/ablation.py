@@ -16,7 +16,7 @@ from access_av.paper.statements import paper_numbers
 
 if TYPE_CHECKING:
     from access_av._core import Scenario
-    from access_av.paper.drives import Driver
+    from access_av.paper.driver import Driver
     from access_av.paper.evaluation import Evaluation
     from access_av.paper.outcome import Drives
     from access_av.paper.readings import Reading

@@ -13,13 +13,13 @@ import numpy as np
 
 from access_av.paper.ablation import fixed
 from access_av.paper.readings import SHIPPED, load
-from access_av.toml import shipped
+from access_av.tables.toml import shipped
 
 if TYPE_CHECKING:
     from collections.abc import Callable
 
     from access_av._core import Scenario
-    from access_av.paper.drives import Driver
+    from access_av.paper.driver import Driver
 
 # Drives of an alternative: a table that says what matters, not a verdict.
 RUNS = 30

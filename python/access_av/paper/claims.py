@@ -24,11 +24,11 @@ NOT_JUDGED = "not judged"
 NOT_TESTABLE = "not testable"
 
 INDEPENDENT = "independent"
-CHOSEN = "chosen in view of it"
+CALIBRATED = "calibrated"
 BY_CONSTRUCTION = "by construction"
 ARITHMETIC = "arithmetic"
 # From the one that says most to the one that says least.
-EVIDENCE = (INDEPENDENT, CHOSEN, BY_CONSTRUCTION, ARITHMETIC)
+EVIDENCE = (INDEPENDENT, CALIBRATED, BY_CONSTRUCTION, ARITHMETIC)
 
 # A verdict turns with the seed unless its margin is this many standard deviations of the difference
 # between two seeds away from zero: 99 % of other seeds agree.
@@ -91,7 +91,7 @@ def evidence(
     chosen: Collection[str],
     freedoms: Collection[str] = energy_fit.SHIPPED,
 ) -> str:
-    """What it is worth that a claim is met, where ``chosen`` was chosen in view of the claims.
+    """What it is worth that a claim is met, where ``chosen`` was chosen with the claims in view.
 
     ``freedoms`` are those of the energies per execution: what one of them solves for is met by
     construction.
@@ -106,7 +106,7 @@ def evidence(
     if entry.get("solved_by") in freedoms:
         return BY_CONSTRUCTION
     # Energies are fitted to the paper's figures under every reading.
-    return CHOSEN if {*entry["rests_on"]} & {*chosen, "energy"} else INDEPENDENT
+    return CALIBRATED if {*entry["rests_on"]} & {*chosen, "energy"} else INDEPENDENT
 
 
 def check_claims(
@@ -126,7 +126,7 @@ def check_claims(
     reading
         Its name.
     chosen
-        What of it was chosen in view of the claims.
+        What of it was chosen with the claims in view.
     freedoms
         What the energies per execution were fitted by.
     stated

@@ -14,10 +14,10 @@ from typing import TYPE_CHECKING
 
 import numpy as np
 
-from access_av.paper.ours import tracked
+from access_av.device.platform import Platform
+from access_av.paper.own_design import tracked
 from access_av.paper.readings import load
-from access_av.platform import Platform
-from access_av.simulation import Simulation, simulate
+from access_av.run.simulation import Simulation, simulate
 
 if TYPE_CHECKING:
     from collections.abc import Callable

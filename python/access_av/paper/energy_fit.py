@@ -30,8 +30,7 @@ from typing import TYPE_CHECKING
 import numpy as np
 
 from access_av.errors import InputError
-from access_av.paper.methods import METHODS
-from access_av.paper.statements import of_claim, paper_numbers
+from access_av.paper.statements import METHODS, of_claim, paper_numbers
 
 if TYPE_CHECKING:
     from collections.abc import Collection, Mapping

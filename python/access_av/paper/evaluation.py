@@ -19,22 +19,21 @@ import numpy as np
 import polars as pl
 
 from access_av._core import Scenario
+from access_av.device.platform import Platform
 from access_av.errors import InputError
 from access_av.paper import energy_fit
-from access_av.paper.drives import Driven, Driver
+from access_av.paper.driver import Driven, Driver
 from access_av.paper.energy_fit import NEEDED_MODES, ModeDemand, fit_energy
 from access_av.paper.findings import MissingFigureError, energy_j
-from access_av.paper.methods import METHODS
 from access_av.paper.outcome import Drives, Outcome
 from access_av.paper.readings import SHIPPED, Reading, load
-from access_av.paper.statements import paper_numbers
-from access_av.platform import Platform
+from access_av.paper.statements import METHODS, paper_numbers
 from access_av.statistics.percentiles import as_columns, names
 
 if TYPE_CHECKING:
     from collections.abc import Callable, Mapping, Sequence
 
-    from access_av.platform import PowerMode
+    from access_av.device.platform import PowerMode
 
 
 @dataclass(frozen=True)

@@ -12,10 +12,9 @@ from typing import TYPE_CHECKING, Any
 
 import numpy as np
 
-from access_av.cost import Saving, roadside_units, sensor_cost_ratio
-from access_av.methods import label
-from access_av.paper.methods import METHODS
-from access_av.paper.statements import of_claim, paper_numbers
+from access_av.economics.cost import Saving, roadside_units, sensor_cost_ratio
+from access_av.paper.statements import METHODS, of_claim, paper_numbers
+from access_av.signal.methods import label
 
 if TYPE_CHECKING:
     from collections.abc import Callable, Mapping

@@ -15,7 +15,7 @@ from typing import TYPE_CHECKING, Any
 from access_av._core import Scenario
 from access_av.errors import InputError
 from access_av.paper.statements import paper_numbers
-from access_av.toml import shipped
+from access_av.tables.toml import shipped
 
 if TYPE_CHECKING:
     from collections.abc import Iterable

@@ -4,7 +4,12 @@ from __future__ import annotations
 
 from typing import Any
 
-from access_av.toml import shipped
+from access_av.signal.methods import label
+from access_av.tables.toml import shipped
+
+# The angle-of-arrival methods that the paper compares.
+METHODS = ("music", "esprit", "root_music")
+ADAPTIVE_LABEL = label("music", adaptive=True)
 
 
 def paper_numbers() -> dict[str, Any]:

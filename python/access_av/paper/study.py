@@ -9,25 +9,25 @@ from typing import TYPE_CHECKING, Any
 import polars as pl
 
 from access_av._core import SettingsError
+from access_av.device.platform import Figure, Platform
 from access_av.errors import InputError
-from access_av.paper import ablation, freedoms, ours
+from access_av.paper import ablation, freedoms, own_design
 from access_av.paper import chosen as chosen_otherwise
 from access_av.paper.claims import Claim, check_claims, with_seeds
-from access_av.paper.drives import Driver
+from access_av.paper.driver import Driver
 from access_av.paper.energy_fit import fit_energy
 from access_av.paper.evaluation import Evaluation, cases, demands, evaluate, evaluate_with
 from access_av.paper.readings import SHIPPED
-from access_av.paper.search import sample
+from access_av.paper.sampled_readings import sample
 from access_av.paper.unknowns import Unknowns, sobol
-from access_av.platform import Figure, Platform
 
 if TYPE_CHECKING:
     from collections.abc import Callable, Mapping, Sequence
 
-    from access_av.campaign import Campaign
-    from access_av.paper.ours import Fair
     from access_av.paper.outcome import Drives
+    from access_av.paper.own_design import Fair
     from access_av.paper.readings import Reading
+    from access_av.run.campaign import Campaign
 
 FIT_SOURCE = "access-av fit: agrees with the sums and statements of the paper"
 # Of `evaluate --unknowns`: worlds, controllers in each, drives per setting.
@@ -66,7 +66,7 @@ class Study:
     claims: list[Claim]
     ablations: list[ablation.Ablation]
     front: list[tuple[float, Drives]]
-    ours: list[ours.Comparison]
+    ours: list[own_design.Comparison]
     unknowns: Unknowns | None
     unusable: Mapping[str, str]
     duration_s: float
@@ -200,8 +200,8 @@ def study(
         **{
             **vars(made),
             "front": ablation.front(driver, shown.reading),
-            "ours": ours.compare(driver, shown),
-            "fair": ours.fair(driver, shown),
+            "ours": own_design.compare(driver, shown),
+            "fair": own_design.fair(driver, shown),
             "effects": [] if unknowns is None else chosen_otherwise.effects(driver),
             "bought": freedoms.ladder(evaluations, made.claims, of_shown, stated),
             "duration_s": time.monotonic() - started,

@@ -10,7 +10,7 @@ from access_av.paper.claims import EVIDENCE
 from access_av.paper.energy_fit import FREEDOMS
 from access_av.paper.freedoms import met_halves
 from access_av.paper.statements import of_claim
-from access_av.report.parts import value_text
+from access_av.tables.numbers import value_text
 
 if TYPE_CHECKING:
     from collections.abc import Sequence

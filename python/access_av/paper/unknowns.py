@@ -23,7 +23,7 @@ if TYPE_CHECKING:
     from collections.abc import Mapping
 
     from access_av.paper.outcome import Numbers
-    from access_av.paper.search import Sample
+    from access_av.paper.sampled_readings import Sample
 
 # Total indices below matter to nobody.
 MATTERS = 0.1

@@ -12,24 +12,15 @@ import polars as pl
 
 from access_av.report.chart import GREEN, GREY, ORANGE, finish, thinned
 from access_av.report.page import sheet
-from access_av.report.parts import (
-    badge,
-    figure,
-    number,
-    section,
-    source,
-    table,
-    tile,
-    value_text,
-    warnings,
-)
+from access_av.report.parts import badge, figure, section, source, table, tile, warnings
 from access_av.statistics.percentiles import ends_text
+from access_av.tables.numbers import number, value_text
 
 if TYPE_CHECKING:
     from collections.abc import Sequence
 
     from access_av._core import Scenario
-    from access_av.designs.drives import Driven
+    from access_av.designs.driven import Driven
     from access_av.report.chart import Spec
 
 # Designs that are drawn, those of them over time, and those in the table: the front first, then by

@@ -7,25 +7,17 @@ from html import escape
 from importlib.metadata import version
 from typing import TYPE_CHECKING
 
-from access_av.assumptions import energy_boundary, flattering, in_words
 from access_av.errors import InputError
 from access_av.report import drive_charts as charts
 from access_av.report.page import sheet
-from access_av.report.parts import (
-    figure,
-    section,
-    service_levels,
-    source,
-    table,
-    tile,
-    value_text,
-    warnings,
-)
+from access_av.report.parts import figure, section, service_levels, source, table, tile, warnings
+from access_av.run.assumptions import energy_boundary, flattering, in_words
+from access_av.tables.numbers import value_text
 
 if TYPE_CHECKING:
     from access_av._core import Scenario
     from access_av.report.chart import Spec
-    from access_av.simulation import Simulation
+    from access_av.run.simulation import Simulation
     from access_av.statistics.integrity import Integrity
 
 
@@ -33,7 +25,7 @@ if TYPE_CHECKING:
 SHOWN_PERCENTS = (50.0, 90.0, 99.0)
 
 
-def render_drive(scenario: Scenario, result: Simulation, seed: int) -> str:
+def render_drive(scenario: Scenario, result: Simulation, seed: int, beside: str = "") -> str:
     """The drives of one scenario as an HTML page that loads nothing.
 
     Parameters
@@ -44,6 +36,8 @@ def render_drive(scenario: Scenario, result: Simulation, seed: int) -> str:
         What :func:`access_av.simulate` returned, trajectories kept.
     seed
         Its seed.
+    beside
+        A section on other variants, as HTML.
     """
     if result.trajectories is None or result.executions is None:
         raise InputError("the page of a drive needs its trajectories: keep_trajectories=True")
@@ -89,6 +83,7 @@ def render_drive(scenario: Scenario, result: Simulation, seed: int) -> str:
                 service_levels(levels),
             )
         )
+    sections.append(beside)
     sections.append(
         section(
             "Provenance",

@@ -12,8 +12,8 @@ from access_av.report.chart import BLUE, GREEN, LEAST_M, ORANGE, finish, thinned
 from access_av.statistics.consistency import horizontal_error_m
 
 if TYPE_CHECKING:
-    from access_av.error_bound import ErrorBound
     from access_av.report.chart import Spec
+    from access_av.run.error_bound import ErrorBound
 
 # Bins of the Stanford diagram per factor of ten: 12 % wide.
 BINS_PER_DECADE = 20

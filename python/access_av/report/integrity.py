@@ -8,12 +8,13 @@ from typing import TYPE_CHECKING, Any
 
 from access_av.report import drive_charts as charts
 from access_av.report.page import sheet
-from access_av.report.parts import figure, number, source, table, tile, warnings
+from access_av.report.parts import figure, source, table, tile, warnings
+from access_av.tables.numbers import number
 
 if TYPE_CHECKING:
     from collections.abc import Sequence
 
-    from access_av.integrity_campaign import Case
+    from access_av.run.integrity_campaign import Case
 
 HEAD = (
     "World", "Channel", "Radio heads", "Available", "Beyond while ok", "95 %, up to",
@@ -24,7 +25,7 @@ HEAD = (
 
 def _world(case: dict[str, Any]) -> str:
     """How the world of a case departs from what is believed."""
-    return "all as believed" if case["mismatch"] == "none" else str(case["mismatch"])
+    return "all as stated" if case["mismatch"] == "none" else str(case["mismatch"])
 
 
 def render_integrity(

@@ -9,15 +9,16 @@ from typing import TYPE_CHECKING
 
 import polars as pl
 
-from access_av import drives
+from access_av.drives import recorded as drives
 from access_av.report import located_charts as charts
-from access_av.report.operation import Operation
 from access_av.report.page import sheet
-from access_av.report.parts import figure, number, section, source, table, tile, warnings
+from access_av.report.parts import figure, section, source, table, tile, warnings
+from access_av.run.operation import Operation
+from access_av.tables.numbers import number
 
 if TYPE_CHECKING:
     from access_av._core import Site, Vehicle
-    from access_av.drives import Drive
+    from access_av.drives.recorded import Drive
     from access_av.report.chart import Spec
 
 MOST_REMARKS = 50

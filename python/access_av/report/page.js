@@ -8,7 +8,7 @@ function theme() {
     background: "transparent",
     font: "system-ui, -apple-system, 'Segoe UI', Roboto, sans-serif",
     view: { stroke: null },
-    axis: { ...text, gridColor: colour("--faint"), domainColor: colour("--faint"),
+    axis: { ...text, labelOverlap: true, labelSeparation: 3, gridColor: colour("--faint"), domainColor: colour("--faint"),
       tickColor: colour("--faint"), titleFontWeight: "normal", labelFontSize: 11, titleFontSize: 12 },
     legend: { ...text, orient: "top", labelFontSize: 11, symbolStrokeWidth: 3, symbolSize: 70, columnPadding: 8, columns: narrow ? 2 : 0,
       labelLimit: narrow ? innerWidth / 2 - 60 : 220 },

@@ -3,47 +3,16 @@
 from __future__ import annotations
 
 from html import escape
-from typing import TYPE_CHECKING, Any
+from typing import TYPE_CHECKING
 
 if TYPE_CHECKING:
     from collections.abc import Iterable, Sequence
 
-    from access_av.service_levels import Verdict
+    from access_av.run.service_levels import Verdict
 
 
 # Kind of badge by how a service level was judged.
 OUTCOMES = {"reached": "yes", "too few drives": "fit", "not reached": "no"}
-
-
-def number(value: float | None, digits: int = 3) -> str:
-    """A number as a reader wants it; a dash for none."""
-    return "–" if value is None else unsigned_zero(f"{value:,.{digits}f}")
-
-
-def unsigned_zero(text: str) -> str:
-    """A number's text, without a sign where nothing but zeros is left of it.
-
-    Examples
-    --------
-    >>> unsigned_zero("-0.00"), unsigned_zero("-0.01")
-    ('0.00', '-0.01')
-    """
-    return text if set(text) - set("+-0.,") else text.lstrip("+-")
-
-
-def value_text(value: Any) -> str:
-    """A claim's stated or obtained value, whatever its shape."""
-    if value is None:
-        return "none"
-    if isinstance(value, dict):
-        return ", ".join(
-            f"{key.replace('_', ' ')} {value_text(item)}" for key, item in value.items()
-        )
-    if isinstance(value, list):
-        return ", ".join(map(value_text, value)) or "none"
-    if isinstance(value, (int, float)):
-        return f"{value:,.0f}" if abs(value) >= 1000 else unsigned_zero(f"{value:.4g}")
-    return str(value)
 
 
 def badge(text: str, kind: str) -> str:

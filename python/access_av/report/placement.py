@@ -6,23 +6,15 @@ from html import escape
 from importlib.metadata import version
 from typing import TYPE_CHECKING
 
-from access_av.error_bound import MAP_TRAVEL_M, VISIBLE_SNR_DB
 from access_av.report import drive_charts as charts
 from access_av.report.page import sheet
-from access_av.report.parts import (
-    badge,
-    figure,
-    number,
-    service_levels,
-    source,
-    table,
-    tile,
-    warnings,
-)
+from access_av.report.parts import badge, figure, service_levels, source, table, tile, warnings
+from access_av.run.error_bound import MAP_TRAVEL_M, VISIBLE_SNR_DB
+from access_av.tables.numbers import number
 
 if TYPE_CHECKING:
-    from access_av.error_bound import ErrorBound
-    from access_av.next_level import NextLevel
+    from access_av.radio.upgrades import NextLevel
+    from access_av.run.error_bound import ErrorBound
 
 _ENOUGH = {True: ("enough", "yes"), False: ("not enough", "no")}
 
@@ -109,7 +101,7 @@ def _map_text(bound: ErrorBound) -> str:
         )
     return (
         f"Of a vehicle that has listened on {MAP_TRAVEL_M:g} m of way "
-        f"({bound.map_looks:.0f} independent looks at each radio head), knows its heading to "
+        f"({bound.map_angles:.0f} independent angles to each radio head), knows its heading to "
         f"{bound.map_heading_std_rad * 1e3:.1f} mrad and nothing of its place. Squares of "
         f"{bound.map_step_m:g} m; none where the radio heads leave a direction open. "
         "Drawn to scale on a wide screen."

@@ -18,10 +18,10 @@ class Alarms:
     alarms
         Their number.
     early
-        Those of them at which the error was within the alert limit ...
+        Alarms at which the error was within the alert limit.
     suspicions
-        ... and those of these at which the protection level was within it too: a source was
-        suspected, nominally a false alarm.
+        Early alarms at which the protection level was within it, too: a source was suspected,
+        nominally a false alarm.
     excursions
         Times at which the error passed the alert limit.
     longest_silence_s

@@ -21,6 +21,9 @@ if TYPE_CHECKING:
 # levels ask for.
 PERCENTS = (50.0, 90.0, 95.0, 99.0, 99.9)
 
+# Errors that are counted together before they are counted one by one.
+BLOCK = 256
+
 
 @dataclass(frozen=True)
 class Percentile:
@@ -149,9 +152,10 @@ def percentiles(
     >>> found.value, found.low, found.high
     (9.0, 0.99, 9.8)
     """
-    rows: NDArray[Any] = np.sort(np.atleast_2d(np.asarray(errors, dtype=np.float64)), axis=1)
-    counts = (~np.isnan(rows)).sum(axis=1)
-    pooled = np.sort(rows[~np.isnan(rows)])
+    rows: NDArray[Any] = np.atleast_2d(np.asarray(errors, dtype=np.float64))
+    run, epoch = np.nonzero(~np.isnan(rows))
+    order = np.argsort(rows[run, epoch])
+    run, pooled = run[order], rows[run, epoch][order]
     if pooled.size == 0:
         raise ValueError("percentiles need at least one error")
     for percent in percents:
@@ -161,13 +165,14 @@ def percentiles(
     rng = np.random.default_rng(seed)
     drawn = rng.multinomial(runs, np.full(runs, 1.0 / runs), size=resamples)
     outside = int(_beyond(runs) * resamples) if runs > 1 else 0
+    sizes = drawn @ np.bincount(run, minlength=runs)
     found = []
     for percent in percents:
         value = float(pooled[_ranks(percent, np.array([pooled.size]))[0] - 1])
         if runs == 1:
             found.append(Percentile(percent, value, None, None))
             continue
-        of_resamples = np.sort(_weighted(rows, pooled, drawn, _ranks(percent, drawn @ counts)))
+        of_resamples = np.sort(pooled[_places(run, drawn, _ranks(percent, sizes))])
         low, high = float(of_resamples[outside]), float(of_resamples[-1 - outside])
         if independent is not None:
             high = max(high, _seldom_seen(pooled, percent, independent))
@@ -206,21 +211,22 @@ def _ranks(percent: float, sizes: NDArray[Any]) -> NDArray[Any]:
     return np.maximum(np.ceil(np.round(percent / 100.0 * sizes, 6)).astype(np.int64), 1)
 
 
-def _weighted(
-    rows: NDArray[Any], pooled: NDArray[Any], drawn: NDArray[Any], ranks: NDArray[Any]
-) -> NDArray[Any]:
-    """Of each resample the least error that as many as its rank are no larger than.
+def _places(run: NDArray[Any], drawn: NDArray[Any], ranks: NDArray[Any]) -> NDArray[Any]:
+    """Where in the order of all errors each resample has as many as its rank.
 
-    By bisection in the order of all errors; ``rows`` are sorted, NaN last.
+    Counted by blocks first, and then within the few blocks in which that happens. ``run`` is the
+    run of each error, in their order; ``drawn`` how often a resample has a run.
     """
-    low = np.zeros(len(drawn), dtype=np.int64)
-    high = np.full(len(drawn), pooled.size - 1)
-    while (open_ := low < high).any():
-        middle = (low + high) // 2
-        below = np.zeros(len(drawn), dtype=np.int64)
-        for row, times in zip(rows, drawn.T, strict=True):
-            below += times * np.searchsorted(row, pooled[middle], side="right")
-        enough = below >= ranks
-        high = np.where(open_ & enough, middle, high)
-        low = np.where(open_ & ~enough, middle + 1, low)
-    return np.asarray(pooled[low])
+    runs, blocks = drawn.shape[1], -(-len(run) // BLOCK)
+    in_block = np.bincount(run * blocks + np.arange(len(run)) // BLOCK, minlength=runs * blocks)
+    reached = np.cumsum(drawn @ in_block.reshape(runs, blocks), axis=1)
+    block = (reached < ranks[:, np.newaxis]).sum(axis=1)
+    places = np.empty(len(drawn), dtype=np.int64)
+    for number in np.unique(block):
+        of, start = np.flatnonzero(block == number), number * BLOCK
+        before = reached[of, number - 1] if number else np.zeros(len(of), dtype=np.int64)
+        within = before[:, np.newaxis] + np.cumsum(
+            drawn[np.ix_(of, run[start : start + BLOCK])], axis=1
+        )
+        places[of] = start + (within < ranks[of, np.newaxis]).sum(axis=1)
+    return places

@@ -6,7 +6,6 @@ use crate::error::Error;
 use crate::kernel::real::Real;
 use crate::linalg::eigen::hermitian_eigen;
 use crate::linalg::matrix::{Matrix, zeros};
-use crate::spectrum::polynomial::Spectrum;
 
 /// Covariance `R = sum_t w_t x_t x_t^H / sum_t w_t` of the antennas, and how many snapshots it
 /// stands for.
@@ -130,11 +129,6 @@ impl<const N: usize> Covariance<N> {
     /// The matrix up to a factor.
     pub(crate) const fn unscaled(&self) -> &Matrix<N> {
         &self.sum
-    }
-
-    /// `a^H R a`, up to the same factor.
-    pub(crate) fn spectrum(&self) -> Spectrum<N> {
-        Spectrum::of_matrix(&self.sum)
     }
 
     /// The sum of the weights, which is that factor.

@@ -3,6 +3,7 @@
 use num_complex::Complex64;
 
 use super::pilots::checked_noise_variance;
+use super::residual;
 use crate::array::manifold::{Direction, Manifold, Neighbourhood, dot, evenly_spread};
 use crate::bound;
 use crate::covariance::sample::Covariance;
@@ -10,6 +11,8 @@ use crate::error::Error;
 use crate::linalg::matrix::Matrix;
 use crate::method::maximum_likelihood::{residual_power, snr};
 use crate::result::azimuth_elevation::DirectionEstimate;
+use crate::result::direction::threshold_doubt;
+use crate::result::goodness_of_fit::{Model, Residual};
 use crate::result::verdict::{Reason, Verdict};
 
 /// Directions of the first search lie so far apart, in units of the array's resolution: from the nearest
@@ -48,8 +51,8 @@ pub struct DirectionFinder<M, const N: usize> {
 }
 
 /// A direction while it is sought.
-struct Candidate<const N: usize> {
-    direction: Direction,
+pub(super) struct Candidate<const N: usize> {
+    pub(super) direction: Direction,
     around: Neighbourhood<N>,
     /// `a^H R a / a^H a`.
     beam: f64,
@@ -142,11 +145,9 @@ impl<M: Manifold<N>, const N: usize> DirectionFinder<M, N> {
             std::mem::swap(&mut best, other);
         }
         let snapshots = covariance.snapshots();
-        let snr = snr::<N>(
-            best.beam,
-            noise.unwrap_or_else(|| residual_power::<N>(trace, best.beam)),
-        );
-        let covariance = bound::covariance_around(
+        let noise_power = noise.unwrap_or_else(|| residual_power::<N>(trace, best.beam));
+        let snr = snr::<N>(best.beam, noise_power);
+        let noise_covariance = bound::covariance_around(
             &best.around,
             best.direction,
             snr,
@@ -162,31 +163,59 @@ impl<M: Manifold<N>, const N: usize> DirectionFinder<M, N> {
                 };
                 per_snapshot * (snapshots as f64) < LIKELIER.ln()
             });
-        let [lowest, highest] = self.elevations_rad;
-        let elevation_rad = best.direction.elevation_rad;
-        // Overhead is no edge.
-        let margin = 3.0 * covariance[1][1].sqrt();
-        let low = elevation_rad - margin < lowest && lowest > -1.57;
-        let high = elevation_rad + margin > highest && highest < 1.57;
-        let doubt = if snr < bound::resolvable_snr::<N>(snapshots) {
-            Some(Reason::ThresholdSnr)
-        } else if alike {
-            Some(Reason::Ambiguous)
-        } else if !self.is_level() && (low || high) {
-            Some(Reason::EdgeOfElevations)
-        } else {
-            None
+        let at_edge = self.is_at_edge(best.direction, &noise_covariance);
+        let model = Model::new::<N>(
+            [1, if self.is_level() { 1 } else { 2 }],
+            snapshots,
+            noise.is_some(),
+        );
+        let left = best.residual(matrix, usize::from(model.parameters));
+        let tests = model.tests();
+        let tested = tests.of(&left, noise_power, trace);
+        let misfit = tests.misfit(&tested);
+        let weak = threshold_doubt(snr, bound::resolvable_snr::<N>(snapshots));
+        let reason = match weak {
+            None if alike => Some(Reason::Ambiguous),
+            _ => misfit
+                .or(weak)
+                .or(at_edge.then_some(Reason::EdgeOfElevations)),
         };
         Ok(DirectionEstimate {
             direction: best.direction,
-            covariance,
+            covariance: noise_covariance.map(|row| row.map(|it| it * tested.inflation)),
+            noise_covariance,
             snr_db: 10.0 * snr.log10(),
-            verdict: doubt.map_or(Verdict::Resolved, Verdict::Unresolved),
+            fit: tests.fit(&tested),
+            verdict: reason.map_or(Verdict::Resolved, Verdict::Unresolved),
         })
     }
 
+    /// The same way of looking with another manifold, without directions to begin with.
+    pub(super) const fn with_manifold<L>(&self, manifold: L) -> DirectionFinder<L, N> {
+        DirectionFinder {
+            manifold,
+            elevations_rad: self.elevations_rad,
+            resolution_rad: self.resolution_rad,
+            grid: Vec::new(),
+        }
+    }
+
+    /// Directions all over, and the responses there, of unit length.
+    pub(super) fn grid(&self) -> &[(Direction, [Complex64; N])] {
+        &self.grid
+    }
+
+    /// Whether the source may as well be beyond the elevations looked at. Overhead is no edge.
+    pub(super) fn is_at_edge(&self, direction: Direction, covariance: &[[f64; 2]; 2]) -> bool {
+        let [lowest, highest] = self.elevations_rad;
+        let margin = 3.0 * covariance[1][1].sqrt();
+        let low = direction.elevation_rad - margin < lowest && lowest > -1.57;
+        let high = direction.elevation_rad + margin > highest && highest < 1.57;
+        !self.is_level() && (low || high)
+    }
+
     /// Whether the elevation is given.
-    fn is_level(&self) -> bool {
+    pub(super) fn is_level(&self) -> bool {
         self.elevations_rad[0] == self.elevations_rad[1]
     }
 
@@ -202,7 +231,7 @@ impl<M: Manifold<N>, const N: usize> DirectionFinder<M, N> {
 
     /// Fisher scoring: steps uphill by the slope over the curvature that an exact source would have,
     /// halved as long as they lead down.
-    fn climb(&self, matrix: &Matrix<N>, trace: f64, start: Direction) -> Candidate<N> {
+    pub(super) fn climb(&self, matrix: &Matrix<N>, trace: f64, start: Direction) -> Candidate<N> {
         let mut here = self.candidate(matrix, start);
         for _ in 0..STEPS {
             let mut step = self.scoring_step(matrix, trace, &here);
@@ -277,6 +306,21 @@ impl<M: Manifold<N>, const N: usize> DirectionFinder<M, N> {
 }
 
 impl<const N: usize> Candidate<N> {
+    /// What a source there leaves, `parameters` of its direction having been chosen: azimuth, elevation.
+    fn residual(&self, matrix: &Matrix<N>, parameters: usize) -> Residual {
+        let Neighbourhood {
+            response,
+            power,
+            tangents,
+            ..
+        } = &self.around;
+        let tangents = tangents.map(|tangent| {
+            let along = dot(response, &tangent) / power;
+            std::array::from_fn(|n| tangent[n] - response[n] * along)
+        });
+        residual::beside(matrix, response, &tangents[..parameters])
+    }
+
     /// Outside the main lobe, where the response to the first order is another one.
     fn is_far_from(&self, direction: &Direction) -> bool {
         let [x, y] = self.direction.step_to(direction);
@@ -286,7 +330,7 @@ impl<const N: usize> Candidate<N> {
 }
 
 /// `a^H R a`.
-fn power<const N: usize>(matrix: &Matrix<N>, a: &[Complex64; N]) -> f64 {
+pub(super) fn power<const N: usize>(matrix: &Matrix<N>, a: &[Complex64; N]) -> f64 {
     let mut power = 0.0;
     for i in 0..N {
         let mut row = Complex64::ZERO;

@@ -2,14 +2,17 @@
 
 use num_complex::Complex64;
 
+use super::residual::Residuals;
 use crate::array::linear::Array;
 use crate::bound;
 use crate::covariance::sample::Covariance;
 use crate::error::Error;
+use crate::linalg::hermitians::Hermitians;
 use crate::method::maximum_likelihood;
 use crate::result::angle::AngleEstimate;
-use crate::result::direction::describe;
-use crate::result::verdict::Reason;
+use crate::result::direction::{Found, describe, threshold_doubt};
+use crate::result::goodness_of_fit::Model;
+use crate::spectrum::side_by_side::Spectra;
 
 /// Maximum likelihood angle from despread pilots.
 ///
@@ -35,21 +38,28 @@ pub fn maximum_likelihood_pilots<const N: usize>(
     let covariance = Covariance::from_snapshots(blocks)?
         .calibrated(array)
         .validated()?;
-    let spectrum = covariance.spectrum();
-    let (phase_rad, value) = spectrum.maximum();
-    let beam = value / N as f64;
+    let mut single = Hermitians::<N, 1>::ZERO;
+    single.set(0, covariance.unscaled());
+    let spectrum = Spectra::of_matrices(&single);
+    let place = spectrum.maxima::<false>();
+    let beam = spectrum.values::<false>(&place)[0] / N as f64;
+    let power = spectrum.re[0][0];
     let noise = match noise_variance {
         Some(value) => checked_noise_variance(value)? * covariance.weight(),
-        None => maximum_likelihood::residual_power::<N>(spectrum.lags[0].re, beam),
+        None => maximum_likelihood::residual_power::<N>(power, beam),
     };
     let snr = maximum_likelihood::snr::<N>(beam, noise);
-    let threshold = snr < bound::resolvable_snr::<N>(blocks.len());
-    let sigma = bound::stochastic::<N>(snr, blocks.len());
+    let tests = Model::one::<N>(blocks.len(), noise_variance.is_some()).tests();
+    let left = Residuals::of::<false, N>(&single, &place).item(0);
     Ok(describe(
-        phase_rad,
-        sigma,
-        snr,
-        threshold.then_some(Reason::ThresholdSnr),
+        &Found {
+            phase_rad: place.phase_rad[0],
+            noise_sigma_rad: bound::stochastic::<N>(snr, blocks.len()),
+            snr,
+            tests,
+            tested: tests.of(&left, noise, power),
+            doubt: threshold_doubt(snr, bound::resolvable_snr::<N>(blocks.len())),
+        },
         array,
     ))
 }

@@ -16,7 +16,8 @@ use crate::list::List;
 use crate::method::alternating_projection::{self, Fit};
 use crate::method::{esprit, music, root_music};
 use crate::result::angle::{AngleEstimate, AngleEstimates};
-use crate::result::direction::describe;
+use crate::result::direction::{Found, describe, threshold_doubt};
+use crate::result::goodness_of_fit::{Model, Tested};
 use crate::result::verdict::Reason;
 use crate::spectrum::polynomial::wrap;
 
@@ -123,6 +124,17 @@ pub fn estimate_several_smoothed<const N: usize, const M: usize>(
     let averaged_again = || hermitian_eigen(full.forward_backward().matrix(), N);
     let correlated = powers.largest_correlation(sources) > CORRELATED
         || hidden && shows(&averaged_again(), sources, full.snapshots());
+    // Of what was received itself: an average is no sample covariance.
+    let snapshots = full.snapshots();
+    let model = Model::new::<N>([sources, sources], snapshots, false);
+    let tests = model.tests();
+    let power = full.power() * full.weight() * N as f64;
+    let tested = Fit::at(full.unscaled(), &phases)
+        .and_then(|fit| fit.residual())
+        .map_or(Tested::NOTHING, |(left, noise)| {
+            tests.of(&left, noise, power)
+        });
+    let misfit = tests.misfit(&tested);
     let mut estimates = [None; M];
     for (k, place) in estimates[..sources].iter_mut().enumerate() {
         let (phase, sigma) = (phases[k], sigmas[k]);
@@ -130,17 +142,28 @@ pub fn estimate_several_smoothed<const N: usize, const M: usize>(
             let gap = wrap(phases[other] - phase).abs();
             other != k && gap < 2.0 * sigma.hypot(sigmas[other])
         });
-        let doubt = if (hidden || close || !separated) && correlated {
+        let doubt = if misfit.is_some() && !correlated {
+            None
+        } else if (hidden || close || !separated) && correlated {
             Some(Reason::Correlated)
         } else if hidden {
-            Some(Reason::ThresholdSnr)
+            let weakest = powers.weakest_snr(sources, noise_variance);
+            threshold_doubt(weakest, f64::INFINITY)
         } else if close || !separated {
             Some(Reason::SourcesNotSeparated)
         } else {
             None
         };
         let snr = powers.snr(k, noise_variance);
-        *place = Some(describe(phase, sigma, snr, doubt, &array));
+        let found = Found {
+            phase_rad: phase,
+            noise_sigma_rad: sigma,
+            snr,
+            tests,
+            tested,
+            doubt,
+        };
+        *place = Some(describe(&found, &array));
     }
     estimates[..sources].sort_unstable_by(|a, b| match (a, b) {
         (Some(a), Some(b)) => a.angle_rad.total_cmp(&b.angle_rad),
@@ -196,6 +219,11 @@ impl<const N: usize> Default for SourcePowers<N> {
 impl<const N: usize> SourcePowers<N> {
     fn snr(&self, source: usize, noise_variance: f64) -> f64 {
         (self.0[source][source].re / noise_variance).max(1e-9)
+    }
+
+    fn weakest_snr(&self, sources: usize, noise_variance: f64) -> f64 {
+        let each = (0..sources).map(|source| self.snr(source, noise_variance));
+        each.fold(f64::INFINITY, f64::min)
     }
 
     fn largest_correlation(&self, sources: usize) -> f64 {

@@ -7,6 +7,7 @@
 use num_complex::Complex;
 
 use super::choice::Method;
+use super::residual::Residuals;
 use crate::array::linear::Array;
 use crate::array::steering::aperture;
 use crate::bound;
@@ -17,8 +18,10 @@ use crate::linalg::matrix::Matrix;
 use crate::method::maximum_likelihood::{residual_power, snr};
 use crate::method::{esprit, music, root_music};
 use crate::result::angle::AngleEstimate;
-use crate::result::direction::{direction, geometric_doubt};
-use crate::result::verdict::{Reason, Verdict};
+use crate::result::direction::{
+    direction, geometric_doubt, no_more_than_ignorance, threshold_doubt, verdict,
+};
+use crate::result::goodness_of_fit::{Model, Tested};
 use crate::simd::instructions::dispatch;
 use crate::simd::math::{log10, times_plus};
 use crate::spectrum::side_by_side::{Places, Spectra};
@@ -30,14 +33,6 @@ pub(super) struct SideBySide<'a, const N: usize> {
     pub(super) array: &'a Array<N>,
     pub(super) forward_backward: bool,
     pub(super) snapshots: usize,
-}
-
-/// What an estimate needs of the samples.
-#[derive(Clone, Copy)]
-enum Moments<'a, const N: usize, const W: usize> {
-    /// For maximum likelihood, the sums along the diagonals of the covariances.
-    Lags(&'a Spectra<N, W>),
-    Covariances(&'a Hermitians<N, W>),
 }
 
 impl<const N: usize> SideBySide<'_, N> {
@@ -56,14 +51,6 @@ impl<const N: usize> SideBySide<'_, N> {
             let mut channels = item.chunks_exact(self.snapshots);
             std::array::from_fn(|_| channels.next().unwrap_or_default())
         });
-        if self.method == Method::MaximumLikelihood && self.array.is_ideal() {
-            // Forward–backward averaging leaves the sums along the diagonals as they are.
-            let mut lags = Spectra::<N, W>::ZERO;
-            for (w, channels) in items.enumerate() {
-                lags.set(w, &T::lags(&channels));
-            }
-            return self.of_moments(Moments::Lags(&lags), estimates);
-        }
         let mut covariances = Hermitians::<N, W>::ZERO;
         for (w, channels) in items.enumerate() {
             covariances.set(w, &T::products(&channels));
@@ -71,70 +58,69 @@ impl<const N: usize> SideBySide<'_, N> {
         if !self.array.is_ideal() {
             covariances = covariances.scaled(&self.array.calibration().inverse_gains());
         }
-        if self.forward_backward {
-            covariances = covariances.forward_backward();
-        }
-        self.of_moments(Moments::Covariances(&covariances), estimates)
+        self.of_covariances(&covariances, estimates)
     }
 
-    fn of_moments<const W: usize>(
+    fn of_covariances<const W: usize>(
         &self,
-        moments: Moments<'_, N, W>,
+        covariances: &Hermitians<N, W>,
         estimates: &mut [AngleEstimate],
     ) -> Result<(), (usize, Error)> {
         dispatch!(
-            self.of_moments_generic::<false, W>(moments, estimates),
-            self.of_moments_generic::<true, W>(moments, estimates),
-            self.of_moments_avx2(moments, estimates),
-            self.of_moments_avx512(moments, estimates)
+            self.of_covariances_generic::<false, W>(covariances, estimates),
+            self.of_covariances_generic::<true, W>(covariances, estimates),
+            self.of_covariances_avx2(covariances, estimates),
+            self.of_covariances_avx512(covariances, estimates)
         )
     }
 
     #[cfg(target_arch = "x86_64")]
     #[target_feature(enable = "avx2,fma")]
-    fn of_moments_avx2<const W: usize>(
+    fn of_covariances_avx2<const W: usize>(
         &self,
-        moments: Moments<'_, N, W>,
+        covariances: &Hermitians<N, W>,
         estimates: &mut [AngleEstimate],
     ) -> Result<(), (usize, Error)> {
-        self.of_moments_generic::<true, W>(moments, estimates)
+        self.of_covariances_generic::<true, W>(covariances, estimates)
     }
 
     #[cfg(target_arch = "x86_64")]
     #[target_feature(enable = "avx2,fma,avx512f")]
-    fn of_moments_avx512<const W: usize>(
+    fn of_covariances_avx512<const W: usize>(
         &self,
-        moments: Moments<'_, N, W>,
+        covariances: &Hermitians<N, W>,
         estimates: &mut [AngleEstimate],
     ) -> Result<(), (usize, Error)> {
-        self.of_moments_generic::<true, W>(moments, estimates)
+        self.of_covariances_generic::<true, W>(covariances, estimates)
     }
 
     #[inline(always)]
-    fn of_moments_generic<const FUSED: bool, const W: usize>(
+    fn of_covariances_generic<const FUSED: bool, const W: usize>(
         &self,
-        moments: Moments<'_, N, W>,
+        covariances: &Hermitians<N, W>,
         estimates: &mut [AngleEstimate],
     ) -> Result<(), (usize, Error)> {
-        let spectra = match moments {
-            Moments::Lags(lags) => *lags,
-            Moments::Covariances(covariances) => Spectra::of_matrices(covariances),
-        };
+        let spectra = Spectra::of_matrices(covariances);
         spectra.check(estimates.len())?;
-        let places = match (self.method, moments) {
-            (Method::MaximumLikelihood, _) | (_, Moments::Lags(_)) => spectra.maxima::<FUSED>(),
-            (method, Moments::Covariances(covariances)) => {
-                let principal = covariances.principal_eigenvectors::<FUSED>();
-                match method {
-                    Method::RootMusic => root_music::places::<FUSED, N, W>(&principal),
-                    Method::EspritLs | Method::EspritTls => {
-                        esprit::places::<FUSED, N, W>(&principal)
-                    }
-                    _ => music::places::<FUSED, N, W>(&principal),
-                }
+        let places = if self.method == Method::MaximumLikelihood {
+            // Forward–backward averaging leaves the sums along the diagonals as they are.
+            spectra.maxima::<FUSED>()
+        } else {
+            let averaged = self
+                .forward_backward
+                .then(|| covariances.forward_backward());
+            let principal = averaged
+                .as_ref()
+                .unwrap_or(covariances)
+                .principal_eigenvectors::<FUSED>();
+            match self.method {
+                Method::RootMusic => root_music::places::<FUSED, N, W>(&principal),
+                Method::EspritLs | Method::EspritTls => esprit::places::<FUSED, N, W>(&principal),
+                _ => music::places::<FUSED, N, W>(&principal),
             }
         };
-        self.describe::<FUSED, W>(&spectra, &places, estimates);
+        let residuals = Residuals::of::<FUSED, N>(covariances, &places);
+        self.describe::<FUSED, W>(&spectra, &places, &residuals, estimates);
         Ok(())
     }
 
@@ -144,6 +130,7 @@ impl<const N: usize> SideBySide<'_, N> {
         &self,
         spectra: &Spectra<N, W>,
         places: &Places<W>,
+        residuals: &Residuals<W>,
         estimates: &mut [AngleEstimate],
     ) {
         let phases = &places.phase_rad;
@@ -155,33 +142,47 @@ impl<const N: usize> SideBySide<'_, N> {
         let per_snapshot = excess * excess / (2.0 * self.snapshots as f64 * aperture::<N>());
         let threshold = bound::resolvable_snr::<N>(self.snapshots);
         let values = spectra.values::<FUSED>(places);
-        let mut snrs = [0.0; W];
-        let (mut snr_db, mut phase_sigma) = ([0.0; W], [0.0; W]);
+        let tests = Model::one::<N>(self.snapshots, false).tests();
+        let (mut snrs, mut snr_db) = ([0.0; W], [0.0; W]);
+        let (mut noise_sigma, mut phase_sigma) = ([0.0; W], [0.0; W]);
+        let (mut coherent, mut noise, mut inflation) = ([0.0; W], [0.0; W], [0.0; W]);
         let (mut angle, mut sigma) = ([0.0; W], [0.0; W]);
         for w in 0..W {
             let beam = values[w] * (1.0 / N as f64);
-            let snr = snr::<N>(beam, residual_power::<N>(spectra.re[0][w], beam));
+            let power = residual_power::<N>(spectra.re[0][w], beam);
+            let snr = snr::<N>(beam, power);
             // The stochastic bound.
             let inverse = 1.0 / snr;
             let variance = times_plus::<FUSED>(inverse * (1.0 / N as f64), inverse, inverse);
-            phase_sigma[w] = (variance * per_snapshot).sqrt();
+            noise_sigma[w] = no_more_than_ignorance((variance * per_snapshot).sqrt());
+            let tested = tests.of(&residuals.item(w), power, spectra.re[0][w]);
+            (coherent[w], noise[w]) = (tested.coherent, tested.noise);
+            inflation[w] = tested.inflation;
             snrs[w] = snr;
         }
         for w in 0..W {
             snr_db[w] = 10.0 * log10::<FUSED>(snrs[w]);
+            let with_misfit = noise_sigma[w] * inflation[w].sqrt();
             (phase_sigma[w], angle[w], sigma[w]) =
-                direction::<FUSED>(phases[w], phase_sigma[w], end_fire);
+                direction::<FUSED>(phases[w], with_misfit, end_fire);
         }
         for (w, estimate) in estimates.iter_mut().enumerate() {
-            let doubt = (snrs[w] < threshold).then_some(Reason::ThresholdSnr);
-            let doubt = doubt.or_else(|| geometric_doubt(phases[w], phase_sigma[w], end_fire));
+            let tested = Tested {
+                coherent: coherent[w],
+                noise: noise[w],
+                inflation: inflation[w],
+            };
+            let doubt = threshold_doubt(snrs[w], threshold);
+            let geometric = geometric_doubt(phases[w], noise_sigma[w], end_fire);
             *estimate = AngleEstimate {
                 phase_rad: phases[w],
                 phase_sigma_rad: phase_sigma[w],
+                phase_noise_sigma_rad: noise_sigma[w],
                 angle_rad: angle[w],
                 sigma_rad: sigma[w],
                 snr_db: snr_db[w],
-                verdict: doubt.map_or(Verdict::Resolved, Verdict::Unresolved),
+                fit: tests.fit(&tested),
+                verdict: verdict(doubt, geometric, tests.misfit(&tested)),
             };
         }
     }
@@ -191,7 +192,7 @@ impl<const N: usize> SideBySide<'_, N> {
         let mut single = Hermitians::<N, 1>::ZERO;
         single.set(0, covariance);
         let mut estimate = [AngleEstimate::default()];
-        self.of_moments(Moments::Covariances(&single), &mut estimate)
+        self.of_covariances(&single, &mut estimate)
             .map_err(|(_, error)| error)?;
         let [only] = estimate;
         Ok(only)

@@ -2,12 +2,15 @@
 
 use num_complex::Complex64;
 
+use super::residual;
 use crate::array::linear::Array;
+use crate::array::steering::steering_vector;
 use crate::bound;
 use crate::covariance::sample::Covariance;
 use crate::error::Error;
 use crate::result::angle::AngleEstimate;
-use crate::result::direction::describe;
+use crate::result::direction::{Found, describe, threshold_doubt};
+use crate::result::goodness_of_fit::Model;
 use crate::result::verdict::Reason;
 use crate::spectrum::polynomial::Spectrum;
 
@@ -74,10 +77,38 @@ pub fn maximum_likelihood_pilots_unequal<const N: usize>(
     let doubt = if alike > ALIKE {
         Some(Reason::Ambiguous)
     } else {
-        let enough = bound::resolvable_snr::<N>(count) / (1.0 - alike);
-        (snr < enough).then_some(Reason::ThresholdSnr)
+        threshold_doubt(snr, bound::resolvable_snr::<N>(count) / (1.0 - alike))
     };
-    Ok(describe(phase_rad, sigma, snr, doubt, array))
+    // White noise of unit variance in the living channels.
+    let whitening = weights.map(f64::sqrt);
+    let mut white = *covariance.unscaled();
+    for (row, a) in white.iter_mut().zip(whitening) {
+        for (entry, b) in row.iter_mut().zip(whitening) {
+            *entry *= a * b;
+        }
+    }
+    let steering = steering_vector::<N>(phase_rad);
+    let response = std::array::from_fn(|n| steering[n] * whitening[n]);
+    let centre = (0..N).map(|n| n as f64 * weights[n]).sum::<f64>() / total;
+    let tangent = std::array::from_fn(|n| response[n] * Complex64::new(0.0, n as f64 - centre));
+    let left = residual::beside(&white, &response, &[tangent]);
+    let model = Model {
+        antennas: living as u8,
+        ..Model::one::<N>(count, true)
+    };
+    let tests = model.tests();
+    let noise = count as f64;
+    Ok(describe(
+        &Found {
+            phase_rad,
+            noise_sigma_rad: sigma,
+            snr,
+            tests,
+            tested: tests.of(&left, noise, value / total),
+            doubt,
+        },
+        array,
+    ))
 }
 
 /// Power that the weighted array receives from the worst direction beside its main lobe, over that

@@ -7,7 +7,7 @@
 macro_rules! kernels {
     (
         $module:ident, $arch:ident, $features:literal, $real:ident, $complexes:literal,
-        $vector:ident, $zero:expr, $add:ident,
+        $vector:ident, $zero:expr,
         load: $load:expr, direct: $direct:expr, crossed: $crossed:expr, total: $total:expr $(,)?
     ) => {
         pub(in crate::kernel) mod $module {
@@ -113,36 +113,6 @@ macro_rules! kernels {
                     }
                 }
                 matrix
-            }
-
-            #[target_feature(enable = $features)]
-            pub(in crate::kernel) fn lags<const N: usize>(
-                channels: &[&[Complex<$real>]; N],
-            ) -> [Complex64; N] {
-                let (whole, length) = chunks(channels);
-                // Two sums for each: fewer additions then wait for one another.
-                let (mut re, mut im) = ([[zero(); N]; 2], [[zero(); N]; 2]);
-                for at in 0..length / $complexes {
-                    let x = load(&whole, at);
-                    for k in 0..N {
-                        for n in 0..N - k {
-                            re[n % 2][k] = direct(re[n % 2][k], x[n + k], x[n]);
-                        }
-                    }
-                    for k in 1..N {
-                        for n in 0..N - k {
-                            im[n % 2][k] = crossed(im[n % 2][k], x[n + k], x[n]);
-                        }
-                    }
-                }
-                let mut lags = [Complex64::ZERO; N];
-                for k in 0..N {
-                    lags[k] = total($add(re[0][k], re[1][k]), $add(im[0][k], im[1][k]));
-                }
-                if length < shortest(channels) {
-                    portable::add_lags(channels, length, &mut lags);
-                }
-                lags
             }
         }
     };

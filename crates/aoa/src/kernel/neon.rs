@@ -7,7 +7,7 @@ use super::loops::kernels;
 
 kernels!(
     neon_f64, aarch64, "neon", f64, 2,
-    float64x2_t, vdupq_n_f64(0.0), vaddq_f64,
+    float64x2_t, vdupq_n_f64(0.0),
     load: |chunk: &Chunk| {
         // SAFETY: the chunk is as many pairs of a real and an imaginary part as are loaded.
         #[allow(unsafe_code)]
@@ -20,7 +20,7 @@ kernels!(
 );
 kernels!(
     neon_f32, aarch64, "neon", f32, 4,
-    float32x4_t, vdupq_n_f32(0.0), vaddq_f32,
+    float32x4_t, vdupq_n_f32(0.0),
     load: |chunk: &Chunk| {
         // SAFETY: as above.
         #[allow(unsafe_code)]

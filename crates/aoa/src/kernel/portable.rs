@@ -52,24 +52,3 @@ pub(super) fn add_products<T: Copy + Into<f64>, const N: usize>(
         }
     }
 }
-
-/// Adds to each lag what the samples from `start` on contribute.
-pub(super) fn add_lags<T: Copy + Into<f64>, const N: usize>(
-    channels: &[&[Complex<T>]; N],
-    start: usize,
-    lags: &mut [Complex64; N],
-) {
-    for i in 0..N {
-        for j in 0..=i {
-            lags[i - j] += correlation(&channels[i][start..], &channels[j][start..]);
-        }
-    }
-}
-
-pub(super) fn lags<T: Copy + Into<f64>, const N: usize>(
-    channels: &[&[Complex<T>]; N],
-) -> [Complex64; N] {
-    let mut lags = [Complex64::ZERO; N];
-    add_lags(channels, 0, &mut lags);
-    lags
-}

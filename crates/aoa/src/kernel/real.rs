@@ -1,6 +1,6 @@
 //! The sample types, and for each the kernels that fit the processor.
 
-use num_complex::{Complex, Complex64};
+use num_complex::Complex;
 
 #[cfg(target_arch = "aarch64")]
 use super::neon;
@@ -16,7 +16,7 @@ impl Real for f32 {}
 impl Real for f64 {}
 
 mod sealed {
-    use num_complex::{Complex, Complex64};
+    use num_complex::Complex;
 
     use crate::linalg::matrix::Matrix;
 
@@ -24,9 +24,6 @@ mod sealed {
     pub trait Kernel: Copy {
         /// `sum_t x_t x_t^H` of channels of the same length.
         fn products<const N: usize>(channels: &[&[Complex<Self>]; N]) -> Matrix<N>;
-
-        /// The sums along its diagonals, `c_k = sum_t sum_n x_(n+k) conj(x_n)`.
-        fn lags<const N: usize>(channels: &[&[Complex<Self>]; N]) -> [Complex64; N];
     }
 }
 
@@ -40,16 +37,6 @@ macro_rules! kernel {
                     neon::$neon::products(channels),
                     x86::$avx2::products(channels),
                     x86::$avx512::products(channels)
-                )
-            }
-
-            #[inline]
-            fn lags<const N: usize>(channels: &[&[Complex<$real>]; N]) -> [Complex64; N] {
-                dispatch!(
-                    portable::lags(channels),
-                    neon::$neon::lags(channels),
-                    x86::$avx2::lags(channels),
-                    x86::$avx512::lags(channels)
                 )
             }
         }
@@ -70,12 +57,6 @@ mod tests {
             let channels = std::array::from_fn(|n| &samples[n * length..(n + 1) * length]);
             let (fast, plain) = (T::products::<4>(&channels), portable::products(&channels));
             for (fast, plain) in fast.iter().flatten().zip(plain.iter().flatten()) {
-                assert!((fast - plain).norm() < 1e-4, "{fast} {plain}");
-            }
-            for (fast, plain) in T::lags::<4>(&channels)
-                .iter()
-                .zip(portable::lags(&channels))
-            {
                 assert!((fast - plain).norm() < 1e-4, "{fast} {plain}");
             }
         }

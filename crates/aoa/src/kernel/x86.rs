@@ -28,7 +28,7 @@ fn parts_pd(direct: __m128d, crossed: __m128d) -> Complex64 {
 
 kernels!(
     avx2_f64, x86_64, "avx2,fma", f64, 2,
-    __m256d, _mm256_setzero_pd(), _mm256_add_pd,
+    __m256d, _mm256_setzero_pd(),
     load: |chunk: &Chunk| {
         // SAFETY: the chunk is as many numbers as are loaded.
         #[allow(unsafe_code)]
@@ -44,7 +44,7 @@ kernels!(
 );
 kernels!(
     avx2_f32, x86_64, "avx2,fma", f32, 4,
-    __m256, _mm256_setzero_ps(), _mm256_add_ps,
+    __m256, _mm256_setzero_ps(),
     load: |chunk: &Chunk| {
         // SAFETY: as above.
         #[allow(unsafe_code)]
@@ -63,7 +63,7 @@ kernels!(
 );
 kernels!(
     avx512_f64, x86_64, "avx2,fma,avx512f", f64, 4,
-    __m512d, _mm512_setzero_pd(), _mm512_add_pd,
+    __m512d, _mm512_setzero_pd(),
     load: |chunk: &Chunk| {
         // SAFETY: as above.
         #[allow(unsafe_code)]

@@ -225,9 +225,9 @@ impl<const N: usize, const W: usize> Hermitians<N, W> {
         columns
     }
 
-    /// `A v` of matrices with both triangles filled.
+    /// `A v`.
     #[inline(always)]
-    fn times<const FUSED: bool>(&self, vectors: &Vectors<N, W>) -> Vectors<N, W> {
+    pub(crate) fn times<const FUSED: bool>(&self, vectors: &Vectors<N, W>) -> Vectors<N, W> {
         let mut products = Vectors {
             re: [[0.0; W]; N],
             im: [[0.0; W]; N],
@@ -236,7 +236,8 @@ impl<const N: usize, const W: usize> Hermitians<N, W> {
             for w in 0..W {
                 let (mut re, mut im) = (0.0, 0.0);
                 for k in 0..N {
-                    let (a, b) = (self.re[i][k][w], self.im[i][k][w]);
+                    let (a, b, sign) = self.entries(i, k);
+                    let (a, b) = (a[w], sign * b[w]);
                     let (c, d) = (vectors.re[k][w], vectors.im[k][w]);
                     re = times_plus::<FUSED>(a, c, times_plus::<FUSED>(-b, d, re));
                     im = times_plus::<FUSED>(a, d, times_plus::<FUSED>(b, c, im));
@@ -249,6 +250,23 @@ impl<const N: usize, const W: usize> Hermitians<N, W> {
 }
 
 impl<const N: usize, const W: usize> Vectors<N, W> {
+    /// Steering vectors, of the electrical angles whose cosines and sines these are.
+    #[inline(always)]
+    pub(crate) fn steering<const FUSED: bool>(cos: &[f64; W], sin: &[f64; W]) -> Self {
+        let mut steering = Self {
+            re: [[1.0; W]; N],
+            im: [[0.0; W]; N],
+        };
+        for n in 1..N {
+            for w in 0..W {
+                let (a, b) = (steering.re[n - 1][w], steering.im[n - 1][w]);
+                steering.re[n][w] = times_plus::<FUSED>(a, cos[w], -b * sin[w]);
+                steering.im[n][w] = times_plus::<FUSED>(a, sin[w], b * cos[w]);
+            }
+        }
+        steering
+    }
+
     /// To unit norm; zero stays zero.
     #[inline(always)]
     fn normalise<const FUSED: bool>(&mut self) {

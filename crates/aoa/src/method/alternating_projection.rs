@@ -16,6 +16,7 @@ use crate::bound::steering_matrix;
 use crate::linalg::dense::{adjoint, inverse, product};
 use crate::linalg::matrix::{Matrix, zeros};
 use crate::list::List;
+use crate::result::goodness_of_fit::Residual;
 use crate::spectrum::polynomial::wrap;
 
 /// Directions on the circle that a projected beam is looked at in, for each antenna.
@@ -30,27 +31,32 @@ const ROUNDING: f64 = 1e-12;
 /// A step of this size ends the search.
 const SETTLED_RAD: f64 = 1e-10;
 
-/// The likelihood around electrical angles.
+/// The likelihood around the directions of sources, each of one parameter or of equally many.
 pub(crate) struct Fit<const N: usize> {
     sources: usize,
+    /// Of all sources together, those of each side by side.
+    parameters: usize,
     /// `A+`, sources by antennas.
     pseudo_inverse: Matrix<N>,
-    /// `P D`, antennas by sources.
+    /// `P D`, antennas by parameters.
     projected: Matrix<N>,
-    /// `D^H P D`, `A+ R A+^H` and `(A^H A)^-1`, sources by sources.
+    /// `D^H P D`, parameters by parameters.
     metric: Matrix<N>,
+    /// `A+ R A+^H` and `(A^H A)^-1`, sources by sources.
     powers: Matrix<N>,
     gram_inverse: Matrix<N>,
     /// `V'`.
     slope: [f64; N],
+    /// `R`, and `A+ R`, sources by antennas.
+    matrix: Matrix<N>,
+    received: Matrix<N>,
     /// `V`: what the sources leave.
     residual: f64,
 }
 
 impl<const N: usize> Fit<N> {
-    /// `None` if the steering vectors do not tell the sources apart.
+    /// Around electrical angles. `None` if the steering vectors do not tell the sources apart.
     pub(crate) fn at(matrix: &Matrix<N>, phases: &[f64]) -> Option<Self> {
-        let k = phases.len();
         let steering = steering_matrix::<N>(phases);
         let mut derivative = steering;
         for (n, row) in derivative.iter_mut().enumerate() {
@@ -58,27 +64,43 @@ impl<const N: usize> Fit<N> {
                 *element *= Complex64::new(0.0, n as f64);
             }
         }
-        let steering_h = adjoint(&steering);
-        let gram_inverse = inverse(product(&steering_h, &steering, [k, N, k]), k)?;
+        Self::around(matrix, (&steering, &derivative), [phases.len(); 2])
+    }
+
+    /// Around the responses `A` of sources and `D`, their derivatives by all parameters, both as columns.
+    pub(crate) fn around(
+        matrix: &Matrix<N>,
+        (steering, derivative): (&Matrix<N>, &Matrix<N>),
+        [k, parameters]: [usize; 2],
+    ) -> Option<Self> {
+        let steering_h = adjoint(steering);
+        let gram_inverse = inverse(product(&steering_h, steering, [k, N, k]), k)?;
         let pseudo_inverse = product(&gram_inverse, &steering_h, [k, k, N]);
-        let within = product(&pseudo_inverse, &derivative, [k, N, k]);
-        let removed = product(&steering, &within, [N, k, k]);
-        let mut projected = derivative;
+        let within = product(&pseudo_inverse, derivative, [k, N, parameters]);
+        let removed = product(steering, &within, [N, k, parameters]);
+        let mut projected = *derivative;
         for (row, removed) in projected.iter_mut().zip(removed) {
             for (entry, removed) in row.iter_mut().zip(removed) {
                 *entry -= removed;
             }
         }
         let received = product(&pseudo_inverse, matrix, [k, N, N]);
-        let slopes = product(&received, &projected, [k, N, k]);
-        let explained = product(&received, &steering, [k, N, k]);
+        let slopes = product(&received, &projected, [k, N, parameters]);
+        let explained = product(&received, steering, [k, N, k]);
         let trace: f64 = (0..N).map(|n| matrix[n][n].re).sum();
         let explained: f64 = (0..k).map(|i| explained[i][i].re).sum();
         Some(Self {
             sources: k,
-            metric: product(&adjoint(&derivative), &projected, [k, N, k]),
+            parameters,
+            metric: product(
+                &adjoint(derivative),
+                &projected,
+                [parameters, N, parameters],
+            ),
             powers: product(&received, &adjoint(&pseudo_inverse), [k, N, k]),
-            slope: std::array::from_fn(|i| -2.0 * slopes[i][i].re),
+            slope: std::array::from_fn(|i| -2.0 * slopes[i * k / parameters][i].re),
+            matrix: *matrix,
+            received,
             residual: (trace - explained).max(trace * 1e-15),
             pseudo_inverse,
             projected,
@@ -86,34 +108,86 @@ impl<const N: usize> Fit<N> {
         })
     }
 
+    /// What the sources leave, and the noise power per antenna that this makes, both of the matrix that
+    /// was fitted. `None` if what is received from the sources is singular.
+    ///
+    /// With `H = P R A+^H`, regressed on the waveforms `S = A+ R A+^H`, the part that hangs together with
+    /// them is `tr(H S^-1 H^H)`. Of it the angles take what a step of theirs would,
+    /// `V'^T V''^-1 V' / 2` without the noise in `V''`.
+    pub(crate) fn residual(&self) -> Option<(Residual, f64)> {
+        let k = self.sources;
+        let inverse_powers = inverse(self.powers, k)?;
+        // R A+^H, N by k.
+        let received = adjoint(&self.received);
+        let weighted = product(&received, &inverse_powers, [N, k, k]);
+        let explained = product(&weighted, &self.received, [N, k, N]);
+        let (mut rest, mut rest_squared) = (0.0, 0.0);
+        for i in 0..N {
+            for j in 0..N {
+                let entry = self.matrix[i][j] - explained[i][j];
+                rest_squared += entry.norm_sqr();
+                if i == j {
+                    rest += entry.re;
+                }
+            }
+        }
+        let inverse_curvature = self.inverse_curvature(0.0)?;
+        let mut taken = 0.0;
+        for i in 0..self.parameters {
+            for j in 0..self.parameters {
+                taken += 0.5 * self.slope[i] * inverse_curvature[i][j].re * self.slope[j];
+            }
+        }
+        let residual = Residual {
+            coherent: (self.residual - rest - taken).max(0.0),
+            rest,
+            rest_squared,
+        };
+        Some((residual, self.noise_variance()))
+    }
+
     /// Variance of the noise per antenna.
     pub(crate) fn noise_variance(&self) -> f64 {
         self.residual / (N - self.sources) as f64
     }
 
+    /// The source that a parameter is of.
+    const fn owner(&self, parameter: usize) -> usize {
+        parameter * self.sources / self.parameters
+    }
+
+    /// SNR of a source.
+    pub(crate) fn snr(&self, source: usize) -> f64 {
+        let noise = self.noise_variance();
+        let power = self.powers[source][source].re - self.gram_inverse[source][source].re * noise;
+        (power / noise).max(1e-9)
+    }
+
     /// Inverse of the curvature for sources whose covariance is `A+ R A+^H` less the noise's part.
     fn inverse_curvature(&self, noise_variance: f64) -> Option<Matrix<N>> {
         let mut curvature = zeros::<N>();
-        for i in 0..self.sources {
-            for j in 0..self.sources {
-                let source = self.powers[j][i] - self.gram_inverse[j][i] * noise_variance;
+        for i in 0..self.parameters {
+            for j in 0..self.parameters {
+                let (a, b) = (self.owner(i), self.owner(j));
+                let source = self.powers[b][a] - self.gram_inverse[b][a] * noise_variance;
                 curvature[i][j] = (2.0 * (self.metric[i][j] * source).re).into();
             }
         }
-        inverse(curvature, self.sources)
+        inverse(curvature, self.parameters)
     }
 
-    /// Visits for each source the Hermitian `H` by which its angle moves with the covariance,
+    /// Visits for each parameter the Hermitian `H` by which it moves with the covariance,
     /// `d omega = tr(H dR)`: to first order `-V''^-1 dV'`. `None` if the curvature is singular.
     pub(crate) fn sensitivities(&self, mut visit: impl FnMut(&Matrix<N>)) -> Option<()> {
         let inverse_curvature = self.inverse_curvature(self.noise_variance())?;
-        for k in 0..self.sources {
+        for k in 0..self.parameters {
             let mut weighted = zeros::<N>();
-            for s in 0..self.sources {
+            for s in 0..self.parameters {
                 let weight = inverse_curvature[k][s];
+                let pseudo_inverse = &self.pseudo_inverse[self.owner(s)];
                 for i in 0..N {
                     for j in 0..N {
-                        weighted[i][j] += self.projected[i][s] * self.pseudo_inverse[s][j] * weight;
+                        weighted[i][j] += self.projected[i][s] * pseudo_inverse[j] * weight;
                     }
                 }
             }

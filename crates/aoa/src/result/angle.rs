@@ -2,6 +2,7 @@
 
 use std::f64::consts::{FRAC_PI_2, PI};
 
+use super::goodness_of_fit::GoodnessOfFit;
 use super::verdict::{Reason, Verdict};
 use crate::list::List;
 
@@ -11,15 +12,20 @@ pub struct AngleEstimate {
     /// Electrical angle `omega`, in (-pi, pi]: what was measured. Its noise is Gaussian and does not
     /// depend on the direction, so filters should take this one.
     pub phase_rad: f64,
-    /// Standard deviation of `phase_rad`, from the bound at the estimated SNR.
+    /// Standard deviation of `phase_rad`: that of noise and, where the model does not fit
+    /// ([`Reason::is_misfit`]), what the misfit displaces.
     pub phase_sigma_rad: f64,
+    /// That of noise alone, of the method at the estimated SNR.
+    pub phase_noise_sigma_rad: f64,
     /// Angle from the array's axis, 0 to pi.
     pub angle_rad: f64,
     /// Standard deviation of `angle_rad`; near end-fire, where the linear law diverges, the angle
     /// that one standard deviation of `phase_rad` makes there.
     pub sigma_rad: f64,
-    /// Estimated SNR per antenna and snapshot.
+    /// Estimated SNR per antenna and snapshot. Whatever the sources leave counts as noise.
     pub snr_db: f64,
+    /// How well plane waves and white noise explain what was received; of all sources together.
+    pub fit: GoodnessOfFit,
     /// Whether the estimate may be relied on.
     pub verdict: Verdict,
 }
@@ -37,9 +43,11 @@ impl Default for AngleEstimate {
         Self {
             phase_rad: 0.0,
             phase_sigma_rad: PI / 3.0_f64.sqrt(),
+            phase_noise_sigma_rad: PI / 3.0_f64.sqrt(),
             angle_rad: FRAC_PI_2,
             sigma_rad: FRAC_PI_2,
             snr_db: f64::NEG_INFINITY,
+            fit: GoodnessOfFit::default(),
             verdict: Verdict::Unresolved(Reason::ThresholdSnr),
         }
     }

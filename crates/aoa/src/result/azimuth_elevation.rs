@@ -1,5 +1,6 @@
 //! What an estimate of azimuth and elevation says.
 
+use super::goodness_of_fit::GoodnessOfFit;
 use super::verdict::Verdict;
 use crate::array::manifold::Direction;
 
@@ -8,11 +9,17 @@ use crate::array::manifold::Direction;
 pub struct DirectionEstimate {
     /// Azimuth and elevation.
     pub direction: Direction,
-    /// Covariance of (azimuth, elevation) in rad^2, from the bound at the estimated SNR; zero where the
+    /// Covariance of (azimuth, elevation) in rad^2: that of noise and, where the model does not fit
+    /// ([`Reason::is_misfit`](crate::Reason::is_misfit)), what the misfit displaces. Zero where the
     /// elevation is given.
     pub covariance: [[f64; 2]; 2],
-    /// Estimated SNR per antenna (their mean, where they differ) and snapshot.
+    /// That of noise alone, from the bound at the estimated SNR.
+    pub noise_covariance: [[f64; 2]; 2],
+    /// Estimated SNR per antenna (their mean, where they differ) and snapshot. Whatever the source leaves
+    /// counts as noise.
     pub snr_db: f64,
+    /// How well one plane wave and white noise explain what was received.
+    pub fit: GoodnessOfFit,
     /// Whether the estimate may be relied on.
     pub verdict: Verdict,
 }

@@ -3,30 +3,80 @@
 use std::f64::consts::{FRAC_PI_2, PI};
 
 use super::angle::AngleEstimate;
+use super::goodness_of_fit::{Tested, Tests};
 use super::verdict::{Reason, Verdict};
 use crate::array::linear::Array;
 use crate::simd::math::{acos, log10};
 
-/// An estimate from its electrical angle, with the angle, its standard deviation, and the verdict
-/// as far as geometry decides it.
-pub(crate) fn describe<const N: usize>(
-    phase_rad: f64,
-    phase_sigma_rad: f64,
-    snr: f64,
-    doubt: Option<Reason>,
-    array: &Array<N>,
-) -> AngleEstimate {
+/// What is known of an electrical angle before it becomes a direction.
+pub(crate) struct Found {
+    pub(crate) phase_rad: f64,
+    pub(crate) noise_sigma_rad: f64,
+    pub(crate) snr: f64,
+    pub(crate) tests: Tests,
+    pub(crate) tested: Tested,
+    /// What gives reason to doubt it, geometry and misfit aside.
+    pub(crate) doubt: Option<Reason>,
+}
+
+/// An estimate from its electrical angle, with the angle, its standard deviation, and the verdict.
+pub(crate) fn describe<const N: usize>(found: &Found, array: &Array<N>) -> AngleEstimate {
     let end_fire = array.phase_at_end_fire_rad();
-    let (phase_sigma_rad, angle_rad, sigma_rad) =
-        direction::<false>(phase_rad, phase_sigma_rad, end_fire);
-    let reason = doubt.or_else(|| geometric_doubt(phase_rad, phase_sigma_rad, end_fire));
+    let Found {
+        phase_rad,
+        tests,
+        tested,
+        ..
+    } = *found;
+    let noise_sigma = no_more_than_ignorance(found.noise_sigma_rad);
+    let sigma = noise_sigma * tested.inflation.sqrt();
+    let (phase_sigma_rad, angle_rad, sigma_rad) = direction::<false>(phase_rad, sigma, end_fire);
+    let geometric = geometric_doubt(phase_rad, noise_sigma, end_fire);
     AngleEstimate {
         phase_rad,
         phase_sigma_rad,
+        phase_noise_sigma_rad: noise_sigma,
         angle_rad,
         sigma_rad,
-        snr_db: 10.0 * log10::<false>(snr),
-        verdict: reason.map_or(Verdict::Resolved, Verdict::Unresolved),
+        snr_db: 10.0 * log10::<false>(found.snr),
+        fit: tests.fit(&tested),
+        verdict: verdict(found.doubt, geometric, tests.misfit(&tested)),
+    }
+}
+
+/// Something wrong with the model explains why the SNR seems low, so it is named before that.
+#[inline(always)]
+pub(crate) fn verdict(
+    doubt: Option<Reason>,
+    geometric: Option<Reason>,
+    misfit: Option<Reason>,
+) -> Verdict {
+    let reason = match doubt {
+        None => geometric.or(misfit),
+        Some(Reason::ThresholdSnr | Reason::TooFewSnapshots) => misfit.or(doubt),
+        Some(_) => doubt,
+    };
+    reason.map_or(Verdict::Resolved, Verdict::Unresolved)
+}
+
+/// Whether noise may have led to a wholly wrong direction, where this SNR is needed to exclude that.
+#[inline(always)]
+pub(crate) fn threshold_doubt(snr: f64, needed: f64) -> Option<Reason> {
+    (snr < needed).then_some(if snr < 1.0 {
+        Reason::ThresholdSnr
+    } else {
+        Reason::TooFewSnapshots
+    })
+}
+
+/// A standard deviation, or that of a phase drawn at random, `pi / sqrt(3)`, where it is larger.
+#[inline(always)]
+pub(crate) fn no_more_than_ignorance(phase_sigma_rad: f64) -> f64 {
+    const IGNORANCE: f64 = 1.813_799_364_234_217_8;
+    if phase_sigma_rad < IGNORANCE {
+        phase_sigma_rad
+    } else {
+        IGNORANCE
     }
 }
 
@@ -38,10 +88,8 @@ pub(crate) fn direction<const FUSED: bool>(
     phase_sigma_rad: f64,
     end_fire_rad: f64,
 ) -> (f64, f64, f64) {
-    // Standard deviation of a phase drawn at random, pi / sqrt(3).
-    const IGNORANCE: f64 = 1.813_799_364_234_217_8;
     let lesser = |a: f64, b: f64| if a < b { a } else { b };
-    let phase_sigma_rad = lesser(phase_sigma_rad, IGNORANCE);
+    let phase_sigma_rad = no_more_than_ignorance(phase_sigma_rad);
     let cosine = phase_rad / end_fire_rad;
     let cosine = if cosine > 1.0 { 1.0 } else { cosine };
     let cosine = if cosine < -1.0 { -1.0 } else { cosine };

@@ -15,8 +15,17 @@ pub enum Verdict {
 #[derive(Debug, Clone, Copy, PartialEq, Eq)]
 #[non_exhaustive]
 pub enum Reason {
-    /// SNR and snapshots are too few to exclude a wholly wrong direction.
+    /// The SNR is too low, below 0 dB, to exclude a wholly wrong direction with so many snapshots.
     ThresholdSnr,
+    /// Too few snapshots to exclude a wholly wrong direction at this SNR, which is above 0 dB.
+    TooFewSnapshots,
+    /// What arrives with the source's waveform is no plane wave: there are reflections, or the antennas
+    /// are not as described. The standard deviation holds what that displaces, see
+    /// [`GoodnessOfFit`](crate::GoodnessOfFit).
+    Multipath,
+    /// What the sources leave is no white noise: there are more of them, or the channels' noise is
+    /// unequal, or larger than stated.
+    MoreSources,
     /// So near to the array's axis that the other end, or no direction, fits as well.
     NearEndFire,
     /// Elements more than half a wavelength apart: several directions fit equally well.
@@ -32,7 +41,7 @@ pub enum Reason {
 
 impl Verdict {
     /// Every verdict there is.
-    pub const ALL: [Self; 7] = [
+    pub const ALL: [Self; 10] = [
         Self::Resolved,
         Self::Unresolved(Reason::ThresholdSnr),
         Self::Unresolved(Reason::NearEndFire),
@@ -40,6 +49,9 @@ impl Verdict {
         Self::Unresolved(Reason::SourcesNotSeparated),
         Self::Unresolved(Reason::Correlated),
         Self::Unresolved(Reason::EdgeOfElevations),
+        Self::Unresolved(Reason::TooFewSnapshots),
+        Self::Unresolved(Reason::Multipath),
+        Self::Unresolved(Reason::MoreSources),
     ];
 
     /// Its place in [`Verdict::ALL`].
@@ -52,7 +64,17 @@ impl Verdict {
             Self::Unresolved(Reason::SourcesNotSeparated) => 4,
             Self::Unresolved(Reason::Correlated) => 5,
             Self::Unresolved(Reason::EdgeOfElevations) => 6,
+            Self::Unresolved(Reason::TooFewSnapshots) => 7,
+            Self::Unresolved(Reason::Multipath) => 8,
+            Self::Unresolved(Reason::MoreSources) => 9,
         }
+    }
+}
+
+impl Reason {
+    /// Whether the [model does not fit](crate::GoodnessOfFit), noise aside.
+    pub const fn is_misfit(&self) -> bool {
+        matches!(self, Self::Multipath | Self::MoreSources)
     }
 }
 
@@ -60,6 +82,11 @@ impl fmt::Display for Reason {
     fn fmt(&self, f: &mut fmt::Formatter<'_>) -> fmt::Result {
         f.write_str(match self {
             Self::ThresholdSnr => "SNR too low to exclude a wholly wrong direction",
+            Self::TooFewSnapshots => "too few snapshots to exclude a wholly wrong direction",
+            Self::Multipath => "no plane wave: reflections, or antennas unlike those described",
+            Self::MoreSources => {
+                "more than white noise is left: another source, or unequal channels"
+            }
             Self::NearEndFire => "too near to the array's axis",
             Self::Ambiguous => "several directions fit: elements more than half a wavelength apart",
             Self::SourcesNotSeparated => "sources not separated",

@@ -6,8 +6,6 @@
 
 use std::f64::consts::{FRAC_PI_2, PI, TAU};
 
-use num_complex::Complex64;
-
 use crate::error::Error;
 use crate::linalg::hermitians::{Hermitians, Vectors};
 use crate::simd::math::{arg, times_plus};
@@ -78,13 +76,6 @@ impl<const N: usize, const W: usize> Spectra<N, W> {
         5..=8 => 2,
         _ => 1,
     };
-
-    #[inline(always)]
-    pub(crate) fn set(&mut self, w: usize, lags: &[Complex64; N]) {
-        for k in 0..N {
-            (self.re[k][w], self.im[k][w]) = (lags[k].re, lags[k].im);
-        }
-    }
 
     /// # Errors
     /// The first of the spectra that is of no covariance, and why.

@@ -211,12 +211,13 @@ fn overhead_is_a_direction_like_others() {
     let finder = DirectionFinder::new(array, [0.0, FRAC_PI_2]).unwrap();
     let overhead = Direction::new(0.0, FRAC_PI_2).unit_vector();
     let mut random = Random::new(15);
+    let mut resolved = 0;
     for _ in 0..50 {
         let direction = Direction::new(random.uniform(-PI, PI), FRAC_PI_2 - 0.01);
         let found = finder
             .estimate(&snapshots(&mut random, &array, direction, 30.0, 50))
             .unwrap();
-        assert!(found.is_resolved(), "{found:?}");
+        resolved += usize::from(found.is_resolved());
         let cosine: f64 = found
             .direction
             .unit_vector()
@@ -226,6 +227,8 @@ fn overhead_is_a_direction_like_others() {
             .sum();
         assert!(cosine.acos() < 0.05, "{found:?}");
     }
+    // Four false alarms of fifty have a probability of 0.002.
+    assert!(resolved > 46, "{resolved}");
 }
 
 #[test]
@@ -277,10 +280,10 @@ fn a_measured_manifold_with_coupling_does_as_well_as_the_true_one() {
     assert!(ratios.iter().all(|it| *it < 1.1), "{ratios:?}");
     // The bound holds for an SNR per antenna, which coupling changes: the estimate knows that.
     assert!((1.8..2.2).contains(&nees), "NEES {nees} of 2");
-    // Who leaves the coupling out is wrong by more than the noise.
+    // Who leaves the coupling out is wrong by more than the noise, and is told so.
     let ideal = DirectionFinder::new(truth.0, [0.0, FRAC_PI_2]).unwrap();
-    let (_, blind, _) = quality(&ideal, &truth, [20.0, 70.0], 20.0);
-    assert!(blind > 10.0, "{blind}");
+    let (ratios, _, resolved) = quality(&ideal, &truth, [20.0, 70.0], 20.0);
+    assert!(ratios[0] > 2.0 && resolved < 0.01, "{ratios:?} {resolved}");
 }
 
 #[test]

@@ -2,7 +2,8 @@
 
 use num_complex::Complex32;
 
-use crate::receive::measure::Measurement;
+use super::window::Seen;
+use crate::one_ssb::measure::Measurement;
 use crate::standard::grid::SUBCARRIERS;
 use crate::standard::message::payload::BchPayload;
 use crate::standard::numerology::Lmax;
@@ -35,6 +36,29 @@ pub struct HeardSsb {
     pub noise_variance: Vec<f64>,
     /// SS-RSRP, SS-RSRQ and SS-SINR per antenna.
     pub measurements: Vec<Measurement>,
-    /// Looked at where it was expected; `false` for one that a search found.
+    /// Looked at where it was expected; `false` of the first after a search has found its beam.
     pub tracked: bool,
+}
+
+impl HeardSsb {
+    /// What was seen, places brought to a rate of `ratio` samples for each one at the base rate.
+    pub(super) fn new<const A: usize>(seen: &mut Seen<'_, A>, ratio: f64) -> Self {
+        let ssb = seen.ssb;
+        let mut channel = vec![[Complex32::ZERO; SUBCARRIERS]; A];
+        seen.tracker.channel(ssb.residual_delay, &mut channel);
+        Self {
+            pci: ssb.pci,
+            ssb_index: ssb.ssb_index,
+            lmax: Some(seen.tracker.lmax()),
+            half_frame: ssb.half_frame,
+            payload: ssb.payload,
+            sample_start: ssb.sample_start * ratio,
+            cfo_hz: ssb.cfo_hz,
+            snr_db: ssb.snr_db,
+            channel,
+            noise_variance: ssb.noise_variance.to_vec(),
+            measurements: ssb.measurements.to_vec(),
+            tracked: seen.is_followed,
+        }
+    }
 }

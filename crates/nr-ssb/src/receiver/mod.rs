@@ -1,9 +1,10 @@
 //! One receiver: samples of any rate in, SSBs with the channel of every antenna out.
 //!
-//! It wraps the [front end](crate::front_end), the [search](crate::search) and a
-//! [tracker](crate::track) for each beam that was found. Blocks may have any length. Until a cell is
-//! found, and from then on once in [`search_every_s`](ReceiverConfig::search_every_s), all samples
-//! are searched; between searches an SSB is looked at only where it is expected.
+//! Until a beam is found, and from then on once in [`search_every_s`](ReceiverConfig::search_every_s), all
+//! samples of a period are searched; between searches an SSB is looked at only where it is expected. That is
+//! [`WindowReceiver`], which takes windows of samples at the base rate; [`StreamReceiver`] puts the [front
+//! end](crate::front_end) before it, for samples of any rate in blocks of any length, with gaps; and
+//! [`Receiver`] is that of a number of antennas which is not part of its type.
 //!
 //! ```
 //! # use nr_ssb::{BchPayload, Beam, Burst, Case, Complex32, Lmax, Mib, Numerology, Ofdm, Pci};
@@ -17,7 +18,7 @@
 //! # let quarter_turn: Vec<_> = sent.iter().map(|x| x * Complex32::I).collect();
 //!
 //! // Two antennas at 15.36 Msps, the SSB at the recording's centre.
-//! let mut receiver = Receiver::new(ReceiverConfig::new(15.36e6, 3_700.8e6, 3_700.8e6, Khz30, 2))?;
+//! let mut receiver = Receiver::new(ReceiverConfig::new(3_700.8e6, Khz30, 2), 15.36e6, 3_700.8e6)?;
 //! let mut beams = Vec::new();
 //! for _ in 0..3 {
 //!     // A period of 20 ms.
@@ -33,13 +34,17 @@
 //! # Ok::<(), Box<dyn std::error::Error>>(())
 //! ```
 
-mod beam_tracker;
+mod any_antennas;
+mod beam;
 mod config;
 mod error;
 mod heard;
 mod stream;
+mod window;
 
+pub use any_antennas::Receiver;
 pub use config::ReceiverConfig;
 pub use error::ReceiverError;
 pub use heard::HeardSsb;
-pub use stream::Receiver;
+pub use stream::StreamReceiver;
+pub use window::{Seen, Window, WindowReceiver};

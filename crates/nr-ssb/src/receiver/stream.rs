@@ -2,260 +2,188 @@
 
 use num_complex::Complex32;
 
-use super::beam_tracker::{BeamTracker, beam_tracker};
 use super::config::ReceiverConfig;
 use super::error::ReceiverError;
-use super::heard::HeardSsb;
-use crate::dsp::base_rate::{CYCLIC_PREFIX, SSB_SAMPLES};
+use super::window::{GUARD, Seen, Window, WindowReceiver};
+use crate::dsp::base_rate::SSB_SAMPLES;
 use crate::input::front_end::FrontEnd;
-use crate::search::Searcher;
-use crate::standard::pci::Pci;
 
-/// Samples at the base rate to either side of an SSB in which its tracker may look for it.
-const GUARD: usize = 64;
-/// What is needed beyond a period: an SSB that begins at its end, and the guards.
-const OVERLAP: usize = SSB_SAMPLES + 2 * GUARD;
-/// Two places of one beam closer than this, in samples, are one SSB.
-const SAME_SSB_SAMPLES: f64 = CYCLIC_PREFIX as f64;
+/// Time that is searched at once (s).
+const SEARCHED_S: f64 = 0.005;
 
-/// A beam that is tracked.
-struct Beam {
-    pci: Pci,
-    ssb_index: u8,
-    tracker: Box<dyn BeamTracker>,
-    /// Periods since it was heard, and where it is expected next, samples at the base rate.
-    periods: f64,
-    next_start: f64,
-}
+/// What is needed beyond the place where an SSB begins.
+const BEYOND: f64 = SSB_SAMPLES as f64 + GUARD;
 
-/// See the [module](super).
-pub struct Receiver {
-    config: ReceiverConfig,
+/// Front end and [`WindowReceiver`] for samples of any rate, in blocks of any length: what it says does
+/// not depend on where blocks end.
+pub struct StreamReceiver<const A: usize> {
+    receiver: WindowReceiver<A>,
     front_end: FrontEnd,
-    searcher: Searcher,
-    /// Samples of a period at the base rate.
-    period: f64,
-    /// Per antenna the guard before, and the samples at the base rate that are not yet heard; the
-    /// first is number `start` of the stream.
-    base: Vec<Vec<Complex32>>,
+    /// Samples searched at once, at the base rate.
+    stretch: i64,
+    /// Samples at the base rate that may still be looked at; the first is number `start`.
+    base: [Vec<Complex32>; A],
     start: i64,
-    /// From this sample on a search is due.
-    search_at: f64,
-    beams: Vec<Beam>,
+    /// Up to where it is decided whether to search.
+    searched: i64,
 }
 
-impl Receiver {
-    /// Plans transforms and buffers.
+impl<const A: usize> StreamReceiver<A> {
+    /// Plans transforms and buffers. `centre_frequency_hz` stands at 0 Hz in the samples.
     ///
     /// # Errors
     /// [`ReceiverError`] for a rate, band, number of antennas or setting that is not possible.
-    pub fn new(config: ReceiverConfig) -> Result<Self, ReceiverError> {
-        config.check()?;
+    pub fn new(
+        config: ReceiverConfig,
+        sample_rate_hz: f64,
+        centre_frequency_hz: f64,
+    ) -> Result<Self, ReceiverError> {
         let search = &config.search;
-        let offset_hz =
-            search.ssb_freq_hz.unwrap_or(config.centre_frequency_hz) - config.centre_frequency_hz;
-        let (spacing, antennas) = (search.spacing, search.antennas);
-        Ok(Self {
-            front_end: FrontEnd::new(config.sample_rate_hz, offset_hz, spacing.hz(), antennas)?,
-            searcher: Searcher::new(search.clone())?,
-            period: (config.period_s * spacing.base_rate_hz()).round(),
-            base: vec![vec![Complex32::ZERO; GUARD]; antennas],
-            start: -(GUARD as i64),
-            search_at: 0.0,
-            beams: Vec::new(),
-            config,
-        })
+        let ssb_freq_hz = search.ssb_freq_hz.unwrap_or(centre_frequency_hz);
+        let (offset_hz, scs_hz) = (ssb_freq_hz - centre_frequency_hz, search.spacing.hz());
+        let mut made = Self {
+            front_end: FrontEnd::new(sample_rate_hz, offset_hz, scs_hz, search.antennas)?,
+            stretch: (SEARCHED_S * search.spacing.base_rate_hz()).round() as i64,
+            receiver: WindowReceiver::new(config)?,
+            base: std::array::from_fn(|_| Vec::new()),
+            start: 0,
+            searched: 0,
+        };
+        made.go_on_at(0);
+        Ok(made)
     }
 
-    /// The settings.
-    pub const fn config(&self) -> &ReceiverConfig {
-        &self.config
+    /// What keeps to the beams.
+    pub const fn receiver(&self) -> &WindowReceiver<A> {
+        &self.receiver
     }
 
-    /// Beams that are tracked now.
-    pub fn tracked(&self) -> usize {
-        self.beams.len()
+    /// Samples of the input for each one at the base rate, which SSBs are counted at.
+    pub fn input_per_output(&self) -> f64 {
+        self.front_end.input_per_output()
+    }
+
+    /// Up to where all SSBs of the beams that are tracked have been shown, samples at the base rate: a burst
+    /// is complete once the last of its beams was there.
+    pub fn heard_until(&self) -> f64 {
+        let next_start = self.receiver.next_start();
+        if next_start.is_finite() {
+            next_start
+        } else {
+            self.end() as f64 - BEYOND
+        }
     }
 
     /// Takes the next samples of every antenna and shows `take` the SSBs that they complete, in order
-    /// of time within a period. Two periods at most are held back.
+    /// of time; places are in samples at the base rate from the first of all.
     ///
     /// # Errors
     /// [`ReceiverError::FrontEnd`] for another number of antennas or unequal lengths.
     pub fn push(
         &mut self,
         antennas: &[&[Complex32]],
-        take: &mut dyn FnMut(&HeardSsb),
+        take: &mut dyn FnMut(Seen<'_, A>),
     ) -> Result<(), ReceiverError> {
         self.front_end.push(antennas, &mut self.base)?;
-        while self.length() >= self.period as usize + OVERLAP {
-            self.hear(self.period as usize, take)?;
-        }
-        Ok(())
+        self.hear(false, take)
     }
 
-    /// Ends the stream: shows what is held back and forgets all cells.
+    /// The samples go on at number `sample` of the input: those between are missing. Shows what was held
+    /// back.
     ///
     /// # Errors
     /// None that [`push`](Self::push) has not.
-    pub fn finish(&mut self, take: &mut dyn FnMut(&HeardSsb)) -> Result<(), ReceiverError> {
+    pub fn gap_to(
+        &mut self,
+        sample: u64,
+        take: &mut dyn FnMut(Seen<'_, A>),
+    ) -> Result<(), ReceiverError> {
+        self.finish(take)?;
+        self.go_on_at((sample as f64 / self.input_per_output()).round() as i64);
+        Ok(())
+    }
+
+    /// Ends a stretch of samples: shows what is held back. What comes next is after a gap of no length.
+    ///
+    /// # Errors
+    /// None that [`push`](Self::push) has not.
+    pub fn finish(&mut self, take: &mut dyn FnMut(Seen<'_, A>)) -> Result<(), ReceiverError> {
         self.front_end.finish(&mut self.base);
-        while self.length() >= GUARD + SSB_SAMPLES {
-            let rest = self.length() - GUARD;
-            self.hear(rest.min(self.period as usize), take)?;
+        for samples in &mut self.base {
+            samples.extend([Complex32::ZERO; GUARD as usize]);
         }
+        self.hear(true, take)?;
+        self.go_on_at(self.end() - GUARD as i64);
+        Ok(())
+    }
+
+    /// Forgets beams and samples, for a stream that begins anew.
+    pub fn reset(&mut self) {
+        let mut unheard: [Vec<Complex32>; A] = std::array::from_fn(|_| Vec::new());
+        self.front_end.finish(&mut unheard);
+        self.receiver.reset();
+        self.go_on_at(0);
+    }
+
+    /// Number of the sample after the last.
+    fn end(&self) -> i64 {
+        self.start + self.base[0].len() as i64
+    }
+
+    /// The next sample at the base rate is this one, after silence: an SSB may begin with it.
+    fn go_on_at(&mut self, number: i64) {
         for samples in &mut self.base {
             samples.clear();
-            samples.resize(GUARD, Complex32::ZERO);
+            samples.resize(GUARD as usize, Complex32::ZERO);
         }
-        self.beams.clear();
-        (self.start, self.search_at) = (-(GUARD as i64), 0.0);
-        Ok(())
+        (self.start, self.searched) = (number - GUARD as i64, number);
     }
 
-    fn length(&self) -> usize {
-        self.base.first().map_or(0, Vec::len)
-    }
-
-    /// Hears the SSBs that begin in the next `hop` samples beyond the guard, and moves on by as many.
-    fn hear(&mut self, hop: usize, take: &mut dyn FnMut(&HeardSsb)) -> Result<(), ReceiverError> {
-        let mut heard = if self.start as f64 >= self.search_at || self.beams.is_empty() {
-            self.search(hop)?
-        } else {
-            self.track(hop)?
-        };
-        heard.sort_by(|a, b| a.sample_start.total_cmp(&b.sample_start));
-        let ratio = self.front_end.input_per_output();
-        for ssb in &mut heard {
-            ssb.sample_start *= ratio;
-            take(ssb);
-        }
-        for samples in &mut self.base {
-            samples.drain(..hop);
-        }
-        self.start += hop as i64;
-        let lost = self.config.lost_after_s / self.config.period_s;
-        self.beams
-            .retain(|beam| beam.periods <= lost.max(1.0) + 1.0);
-        Ok(())
-    }
-
-    /// All SSBs that begin in the hop, and a tracker for each beam among them.
-    fn search(&mut self, hop: usize) -> Result<Vec<HeardSsb>, ReceiverError> {
-        let slices: Vec<&[Complex32]> = self.base.iter().map(Vec::as_slice).collect();
-        let mut channels = Vec::new();
-        self.searcher.reset();
-        let found = self.searcher.push_with(&slices, &mut |ssb, received| {
-            let channel = received.channel.to_vec();
-            let noise = received.noise_variance.to_vec();
-            channels.push((ssb.pci, ssb.sample_start, channel, noise));
-        })?;
-        let mut heard = Vec::new();
-        let begins = GUARD as f64..(GUARD + hop) as f64;
-        for ssb in found
-            .iter()
-            .filter(|ssb| begins.contains(&ssb.sample_start))
-        {
-            let same = |(pci, start, ..): &&(Pci, f64, _, _)| {
-                (*pci, *start) == (ssb.pci, ssb.sample_start)
-            };
-            let Some((.., channel, noise_variance)) = channels.iter().find(same) else {
-                continue;
-            };
-            let mut ssb = ssb.clone();
-            ssb.sample_start += self.start as f64;
-            heard.push(HeardSsb {
-                pci: ssb.pci,
-                ssb_index: ssb.ssb_index,
-                lmax: ssb.lmax,
-                half_frame: ssb.half_frame,
-                payload: ssb.payload,
-                sample_start: ssb.sample_start,
-                cfo_hz: ssb.cfo_hz,
-                snr_db: ssb.snr_db,
-                channel: channel.clone(),
-                noise_variance: noise_variance.clone(),
-                measurements: ssb.measurements().to_vec(),
-                tracked: false,
-            });
-            let known = |beam: &&mut Beam| (beam.pci, beam.ssb_index) == (ssb.pci, ssb.ssb_index);
-            if let Some(beam) = self.beams.iter_mut().find(known) {
-                let late = ((ssb.sample_start - beam.next_start) / self.period).round();
-                let sent_after = (beam.periods + late).max(1.0) * self.period;
-                beam.tracker.found(&ssb, sent_after);
-                beam.heard(self.period);
-            } else {
-                let mut beam = Beam {
-                    pci: ssb.pci,
-                    ssb_index: ssb.ssb_index,
-                    tracker: beam_tracker(&self.config.search, &ssb)?,
-                    periods: 0.0,
-                    next_start: 0.0,
-                };
-                beam.heard(self.period);
-                self.beams.push(beam);
+    /// Searches and tracks in the order in which the samples for it are there; all that are there at the end.
+    fn hear(
+        &mut self,
+        is_end: bool,
+        take: &mut dyn FnMut(Seen<'_, A>),
+    ) -> Result<(), ReceiverError> {
+        let end = self.end();
+        loop {
+            let last = end as f64 - BEYOND;
+            let next_start = self.receiver.next_start();
+            let mut stretch_end = self.searched + self.stretch;
+            if is_end && stretch_end as f64 > last {
+                stretch_end = last.floor() as i64;
             }
-        }
-        self.skip_to(self.start as f64 + begins.end);
-        let every = self.config.search_every_s * self.config.search.spacing.base_rate_hz();
-        self.search_at = self.start as f64 + every.max(self.period);
-        Ok(heard)
-    }
-
-    /// The SSBs of known beams that are expected to begin in the hop.
-    fn track(&mut self, hop: usize) -> Result<Vec<HeardSsb>, ReceiverError> {
-        let slices: Vec<&[Complex32]> = self.base.iter().map(Vec::as_slice).collect();
-        let (start, length) = (self.start as f64, self.length() as f64);
-        let end = start + (GUARD + hop) as f64;
-        let mut heard: Vec<HeardSsb> = Vec::new();
-        for beam in &mut self.beams {
-            while beam.next_start < end {
-                let next = beam.next_start;
-                let inside = next >= start && next + SSB_SAMPLES as f64 <= start + length;
-                let seen = if inside {
-                    beam.tracker.track(&slices, start, next)?
-                } else {
-                    None
-                };
-                // The beam is told by DM-RS; another's SSB is not this one.
-                match seen.filter(|seen| seen.ssb_index == beam.ssb_index) {
-                    Some(seen) => {
-                        beam.heard(self.period);
-                        let again = |it: &HeardSsb| {
-                            (it.pci, it.ssb_index) == (seen.pci, seen.ssb_index)
-                                && (it.sample_start - seen.sample_start).abs() < SAME_SSB_SAMPLES
-                        };
-                        if !heard.iter().any(again) {
-                            heard.push(seen);
-                        }
-                    }
-                    None => beam.miss(self.period),
+            let slices = self.base.each_ref().map(Vec::as_slice);
+            let window = |from: i64, to: i64| {
+                slices.map(|it| it.get(from as usize..to as usize).unwrap_or_default())
+            };
+            if stretch_end > self.searched
+                && stretch_end as f64 <= last
+                && stretch_end as f64 <= next_start
+            {
+                if self.receiver.searches_at(self.searched as f64) {
+                    let start = self.searched - GUARD as i64;
+                    let to = stretch_end + BEYOND as i64;
+                    let antennas = window(start - self.start, to - self.start);
+                    let antennas = antennas.as_slice();
+                    self.receiver.search(&Window { start, antennas })?;
                 }
+                self.searched = stretch_end;
+            } else if next_start <= last {
+                let (start, antennas) = (self.start, slices.as_slice());
+                self.receiver
+                    .track_next(&Window { start, antennas }, take)?;
+            } else {
+                break;
             }
         }
-        Ok(heard)
-    }
-
-    /// Beams that a search has not heard are expected again after it.
-    fn skip_to(&mut self, end: f64) {
-        for beam in &mut self.beams {
-            while beam.next_start < end {
-                beam.miss(self.period);
-            }
+        let next_start = self.receiver.next_start().min(end as f64).floor() as i64;
+        let from = self.searched.min(next_start) - GUARD as i64 - 1;
+        let gone = (from - self.start).clamp(0, end - self.start);
+        for samples in &mut self.base {
+            samples.drain(..gone as usize);
         }
-    }
-}
-
-impl Beam {
-    /// It was heard, and is expected a period later.
-    fn heard(&mut self, period: f64) {
-        self.periods = 0.0;
-        self.miss(period);
-    }
-
-    /// Expects it a period later.
-    fn miss(&mut self, period: f64) {
-        self.periods += 1.0;
-        self.next_start = self.tracker.expected_start(self.periods * period);
+        self.start += gone;
+        Ok(())
     }
 }

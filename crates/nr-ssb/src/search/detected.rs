@@ -3,7 +3,7 @@
 use num_complex::Complex32;
 
 use crate::dsp::received_grid::{MAX_ANTENNAS, ReceivedGrid};
-use crate::receive::measure::Measurement;
+use crate::one_ssb::measure::Measurement;
 use crate::standard::grid::{SUBCARRIERS, SsbGrid};
 use crate::standard::message::payload::BchPayload;
 use crate::standard::numerology::Lmax;

@@ -2,7 +2,7 @@
 
 use num_complex::Complex64;
 
-use crate::receive::measure::Measurement;
+use crate::one_ssb::measure::Measurement;
 use crate::standard::grid::SYMBOLS;
 use crate::standard::message::payload::BchPayload;
 use crate::standard::pci::Pci;

@@ -1,7 +1,9 @@
 //! The receiver as a whole: a stream of samples in blocks of any length, SSBs out.
 
-use crate::air::{Cell, add_noise, raised, rng, silence};
-use nr_ssb::receiver::{HeardSsb, Receiver, ReceiverConfig};
+use crate::air::{Cell, add_noise, raised, rng, silence, slices};
+use nr_ssb::receiver::{
+    HeardSsb, Receiver, ReceiverConfig, StreamReceiver, Window, WindowReceiver,
+};
 use nr_ssb::{Complex32, Lmax, SubcarrierSpacing};
 
 const SPACING: SubcarrierSpacing = SubcarrierSpacing::Khz30;
@@ -36,7 +38,7 @@ fn cell_and_samples() -> (Cell, Vec<Vec<Complex32>>) {
 }
 
 fn heard(config: ReceiverConfig, samples: &[Vec<Complex32>], block: usize) -> Vec<HeardSsb> {
-    let mut receiver = Receiver::new(config).unwrap();
+    let mut receiver = Receiver::new(config, RATE_HZ, 3.6e9 - 2e6).unwrap();
     let mut heard = Vec::new();
     for first in (0..samples[0].len()).step_by(block) {
         let end = samples[0].len().min(first + block);
@@ -53,13 +55,7 @@ fn heard(config: ReceiverConfig, samples: &[Vec<Complex32>], block: usize) -> Ve
 #[test]
 fn every_ssb_of_a_stream_is_heard_once_with_its_channel() {
     let (cell, samples) = cell_and_samples();
-    let config = ReceiverConfig::new(
-        RATE_HZ,
-        cell.ssb_freq_hz - 2e6,
-        cell.ssb_freq_hz,
-        SPACING,
-        3,
-    );
+    let config = ReceiverConfig::new(cell.ssb_freq_hz, SPACING, 3);
     let all = heard(config.clone(), &samples, 1_000_000_000);
     let beams: Vec<u8> = all.iter().map(|ssb| ssb.ssb_index).collect();
     assert_eq!(beams, [2, 5, 2, 5, 2, 5, 2, 2, 2, 2, 5, 2, 5]);
@@ -98,12 +94,19 @@ fn every_ssb_of_a_stream_is_heard_once_with_its_channel() {
 
 #[test]
 fn settings_that_cannot_be_are_refused() {
-    let config = ReceiverConfig::new(RATE_HZ, 3.6e9, 3.6e9, SPACING, 2);
+    let config = ReceiverConfig::new(3.6e9, SPACING, 2);
     for (name, wrong) in [
         (
             "period_s",
             ReceiverConfig {
                 period_s: 0.0,
+                ..config.clone()
+            },
+        ),
+        (
+            "oscillator_ppm",
+            ReceiverConfig {
+                oscillator_ppm: 130.0,
                 ..config.clone()
             },
         ),
@@ -122,12 +125,82 @@ fn settings_that_cannot_be_are_refused() {
             },
         ),
     ] {
-        let error = Receiver::new(wrong).err().unwrap().to_string();
+        let error = Receiver::new(wrong, RATE_HZ, 3.6e9)
+            .err()
+            .unwrap()
+            .to_string();
         assert!(error.starts_with(name), "{error}");
     }
-    let many = ReceiverConfig::new(RATE_HZ, 3.6e9, 3.6e9, SPACING, 17);
-    assert!(Receiver::new(many).is_err());
-    let mut receiver = Receiver::new(config).unwrap();
+    let many = ReceiverConfig::new(3.6e9, SPACING, 17);
+    assert!(Receiver::new(many, RATE_HZ, 3.6e9).is_err());
+    let mut receiver = Receiver::new(config, RATE_HZ, 3.6e9).unwrap();
     let one: &[Complex32] = &[];
     assert!(receiver.push(&[one], &mut |_| {}).is_err());
+}
+
+#[test]
+fn an_oscillator_20_ppm_off_is_found_within_three_bursts_of_the_longest_period() {
+    for (spacing, ppm) in [
+        (SubcarrierSpacing::Khz15, -20.0),
+        (SubcarrierSpacing::Khz30, 20.0),
+    ] {
+        let mut cell = Cell::random(&mut rng(6), spacing, 2);
+        (cell.lmax, cell.ssb_indices, cell.ssb_freq_hz) = (Lmax::L8, vec![2, 5], 3.6e9);
+        cell.cfo_hz = -1e-6 * ppm * cell.ssb_freq_hz;
+        let config = ReceiverConfig {
+            period_s: 0.16,
+            ..ReceiverConfig::new(cell.ssb_freq_hz, spacing, 2)
+        };
+        let rate_hz = spacing.base_rate_hz();
+        let period = 0.16 * rate_hz * (1.0 + 1e-6 * ppm);
+        let mut receiver = WindowReceiver::<2>::new(config).unwrap();
+        let mut beams = Vec::new();
+        for number in 0..5 {
+            // Awake around the bursts.
+            let begin = cell.delay + f64::from(number) * period;
+            let mut samples = silence(2, (0.006 * rate_hz) as usize);
+            let burst = Cell {
+                delay: 300.0 + begin.fract(),
+                ..cell.clone()
+            };
+            burst.add_to(&mut samples);
+            add_noise(&mut samples, 5.0, &mut rng(7 + u64::from(number as u32)));
+            let window = Window {
+                start: begin.floor() as i64 - 300,
+                antennas: &slices(&samples),
+            };
+            let mut heard = Vec::new();
+            receiver
+                .receive(&window, &mut |seen| heard.push(seen.ssb.ssb_index))
+                .unwrap();
+            beams.push(heard);
+        }
+        println!("{spacing:?} {ppm}: {beams:?}");
+        assert!(beams[2..].iter().all(|heard| *heard == [2, 5]), "{beams:?}");
+    }
+}
+
+#[test]
+fn samples_that_are_missing_untold_are_told_by_the_beams() {
+    let (cell, samples) = cell_and_samples();
+    let config = ReceiverConfig {
+        lost_after_s: 10.0,
+        ..ReceiverConfig::new(cell.ssb_freq_hz, SPACING, 3)
+    };
+    let mut receiver = StreamReceiver::<3>::new(config, RATE_HZ, 3.6e9 - 2e6).unwrap();
+    // 7 ms are cut out within the third period; then all of it again, for the search to come round.
+    let cut = (0.05 * RATE_HZ) as usize..(0.057 * RATE_HZ) as usize;
+    let mut untold = Vec::new();
+    let mut push = |range: std::ops::Range<usize>| {
+        let block: Vec<&[Complex32]> = samples.iter().map(|it| &it[range.clone()]).collect();
+        receiver
+            .push(&block, &mut |seen| untold.push(seen.untold))
+            .unwrap();
+    };
+    push(0..cut.start);
+    push(cut.end..samples[0].len());
+    let lost = 0.007 * SPACING.base_rate_hz();
+    assert_eq!(untold[..6], [0.0; 6]);
+    let last = *untold.last().unwrap();
+    assert!((last - lost).abs() < 1.0, "{untold:?}");
 }

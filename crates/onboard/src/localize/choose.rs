@@ -2,11 +2,11 @@
 
 use std::sync::Arc;
 
-use super::acquire::{Area, GaussianSum, Relocalizer};
+use super::acquire::{GaussianSum, Relocalizer};
 use super::dead_reckoning::DeadReckoning;
 use super::ekf::{Ekf, EkfConfig};
 use super::localizer::Localizer;
-use super::pose_estimate::InitialPose;
+use super::output::InitialPose;
 use crate::geometry::Pose;
 use crate::radio_head::RadioHead;
 use crate::settings::{LocalizerSettings, SettingsError, Site, Vehicle};
@@ -34,33 +34,19 @@ pub fn built_in(
     let config = EkfConfig::new(site, vehicle);
     let heads = RadioHead::heard(site, vehicle);
     let integrity = vehicle.integrity_monitor();
-    let road = site.build_road()?;
-    let road = road.filter(|_| vehicle.follows_road());
-    match road {
-        Some(road) if !vehicle.start.known => {
-            let either = vehicle.start.either_direction;
-            let search = GaussianSum::new(config, road.clone(), either, &heads);
-            Ok(Box::new(Relocalizer::searching(
-                search,
-                Some(road),
-                integrity,
-            )))
-        }
-        None if !vehicle.start.known => {
-            let search = GaussianSum::in_plane(config, Area::of_heads(&heads), &heads);
-            Ok(Box::new(Relocalizer::searching(search, None, integrity)))
-        }
-        road => {
-            let start = InitialPose {
-                pose: start,
-                position_std_m: vehicle.start.position_std_m,
-                heading_std_rad: vehicle.start.heading_std_rad,
-            };
-            let map = road.clone().map(Arc::new);
-            let ekf = Ekf::new(config, map, &heads, &start);
-            Ok(Box::new(Relocalizer::tracking(
-                ekf, road, &heads, integrity,
-            )))
-        }
+    let road = site.build_road()?.filter(|_| vehicle.follows_road());
+    if !vehicle.start.known {
+        let either = vehicle.start.either_direction;
+        let search = GaussianSum::new(config, road.clone(), either, &heads);
+        return Ok(Box::new(Relocalizer::searching(search, road, integrity)));
     }
+    let start = InitialPose {
+        pose: start,
+        position_std_m: vehicle.start.position_std_m,
+        heading_std_rad: vehicle.start.heading_std_rad,
+    };
+    let ekf = Ekf::new(config, road.clone().map(Arc::new), &heads, &start);
+    Ok(Box::new(Relocalizer::tracking(
+        ekf, road, &heads, integrity,
+    )))
 }

@@ -2,10 +2,11 @@
 //! Infrastructure, and Vehicle Trajectory Model").
 
 use super::localizer::{Localizer, copy_into};
-use super::measurement::{AngleMeasurement, OdometryVerdict, UpdateReason, UpdateVerdict};
-use super::pose_estimate::PoseEstimate;
+use super::output::PoseEstimate;
+use super::output::{OdometryVerdict, UpdateReason, UpdateVerdict};
 use crate::BoxError;
 use crate::geometry::{Point, Pose, wrap_angle};
+use crate::observation::AngleMeasurement;
 use crate::observation::OdometrySample;
 use crate::radio_head::RadioHead;
 use crate::settings::HeadingBetween;
@@ -89,15 +90,14 @@ impl DeadReckoning {
             self.pose.heading_rad = aoh_rad;
             self.anchor = self.pose.point();
         }
+        let reason = if usable {
+            UpdateReason::Consistent
+        } else {
+            UpdateReason::Unusable
+        };
         UpdateVerdict {
             accepted: usable,
-            reason: if usable {
-                UpdateReason::Consistent
-            } else {
-                UpdateReason::Unusable
-            },
-            mahalanobis_squared: None,
-            threshold: None,
+            ..UpdateVerdict::unused(reason)
         }
     }
 

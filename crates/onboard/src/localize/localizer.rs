@@ -3,9 +3,10 @@
 use std::any::Any;
 
 use super::ekf::Ekf;
-use super::measurement::{AngleMeasurement, OdometryVerdict, UpdateVerdict};
-use super::pose_estimate::PoseEstimate;
+use super::output::PoseEstimate;
+use super::output::{OdometryVerdict, UpdateVerdict};
 use crate::BoxError;
+use crate::observation::AngleMeasurement;
 use crate::observation::OdometrySample;
 use crate::radio_head::RadioHead;
 

@@ -11,20 +11,19 @@ pub mod bias;
 mod choose;
 mod dead_reckoning;
 pub mod ekf;
-pub mod gaussian;
 pub mod integrity;
 mod localizer;
-mod measurement;
 pub mod modes;
 mod out_of_sequence;
-mod pose_estimate;
-mod quantile;
+mod output;
 
+pub use crate::observation::AngleMeasurement;
 pub use choose::built_in;
 pub use dead_reckoning::DeadReckoning;
 pub use ekf::Ekf;
 pub use localizer::{Localizer, Recovered, copy_into};
-pub use measurement::{AngleMeasurement, OdometryVerdict, UpdateReason, UpdateVerdict};
 pub use out_of_sequence::{AngleUpdate, HISTORY_S, History};
-pub use pose_estimate::{InitialPose, Integrity, IntegrityState, PoseEstimate};
-pub use quantile::{RadialQuantile, normal_quantile};
+pub use output::{
+    InitialPose, Integrity, IntegrityState, OdometryVerdict, PoseEstimate, UpdateReason,
+    UpdateVerdict,
+};

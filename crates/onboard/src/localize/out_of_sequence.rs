@@ -9,8 +9,9 @@
 use std::collections::VecDeque;
 
 use super::localizer::Localizer;
-use super::measurement::{AngleMeasurement, OdometryVerdict, UpdateReason, UpdateVerdict};
+use super::output::{OdometryVerdict, UpdateReason, UpdateVerdict};
 use crate::BoxError;
+use crate::observation::AngleMeasurement;
 use crate::observation::OdometrySample;
 use crate::radio_head::RadioHead;
 

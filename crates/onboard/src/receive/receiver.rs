@@ -1,12 +1,13 @@
-//! The vehicle's receiver: finds cells, keeps to them, and makes an [`SsbObservation`] of every SSB.
+//! The vehicle's receiver: an [`SsbObservation`] of every SSB of the site's cells.
 //!
-//! It is given windows of samples at the base rate (256 to a symbol), however they came about: cut
-//! from a recording, or made by the simulator around each burst.
+//! What finds cells and keeps to them is [`nr_ssb::receiver`]. [`Receiver`] takes windows at the base rate
+//! (256 samples to a symbol), as the simulator makes them around each burst, [`StreamReceiver`] a stream of
+//! any rate.
 
 use aoa::DirectionFinder;
 use nr_ssb::grid::{SUBCARRIERS, SYMBOLS};
-use nr_ssb::search::{SearchConfig, SearchError, Searcher};
-use nr_ssb::track::{TrackError, Tracked, Tracker};
+use nr_ssb::receiver::{self as ssb, ReceiverError, Seen, WindowReceiver};
+use nr_ssb::track::{Tracked, Tracker};
 use nr_ssb::{Complex32, SubcarrierSpacing};
 use num_complex::Complex64;
 use thiserror::Error;
@@ -21,18 +22,9 @@ use crate::settings::{ArraySettings, Pilots, Site, Vehicle};
 /// Samples of an SSB at the base rate: four symbols of 256 with a cyclic prefix of 18.
 pub const SSB_SAMPLES: usize = 4 * 274;
 
-/// SSBs in a row that must be missing before one is given up, and for how many seconds.
-const MISSES: u32 = 8;
-const ABSENT_S: f64 = 2.0;
-/// Time after which a receiver that has cells looks for others, in seconds.
-const SEARCH_INTERVAL_S: f64 = 1.0;
-/// The same where it has none, once it has looked at every frequency offset.
-const LOST_INTERVAL_S: f64 = 0.1;
 /// Largest error of the receiver's oscillator in parts per million, over its carrier: three times
 /// the standard deviation that a scenario may give it.
 const OSCILLATOR_PPM: f64 = 60.0;
-/// An SSB must lie this many samples inside a window; half a cyclic prefix and the filter's reach.
-const GUARD: f64 = 16.0;
 
 /// What a receiver is told.
 #[derive(Debug, Clone, PartialEq)]
@@ -51,6 +43,8 @@ pub struct ReceiverConfig {
     pub array: ArraySettings,
     /// Cells to listen to; all without.
     pub cells: Option<Vec<u16>>,
+    /// How often a receiver that has cells looks for others, in seconds.
+    pub search_every_s: f64,
 }
 
 impl ReceiverConfig {
@@ -70,6 +64,21 @@ impl ReceiverConfig {
             snapshots: vehicle.receiver.snapshots.into(),
             array: vehicle.array.clone(),
             cells: Some(heads.filter(|pci| vehicle.receiver.hears(*pci)).collect()),
+            search_every_s: 1.0,
+        }
+    }
+
+    /// What the receiver of SSBs is told of it.
+    fn of_ssbs(&self) -> ssb::ReceiverConfig {
+        let antennas = self.array.elements.into();
+        let widest_ppm = ssb::ReceiverConfig::widest_ppm(self.ssb_freq_hz, self.spacing);
+        ssb::ReceiverConfig {
+            period_s: self.period_s,
+            oscillator_ppm: OSCILLATOR_PPM.min(widest_ppm),
+            cells: self.cells.clone(),
+            search_every_s: self.search_every_s,
+            decode_pbch: matches!(self.pilots, Pilots::Ssb),
+            ..ssb::ReceiverConfig::new(self.ssb_freq_hz, self.spacing, antennas)
         }
     }
 }
@@ -88,12 +97,9 @@ pub struct Window<'a> {
 /// What makes receiving impossible.
 #[derive(Debug, Clone, PartialEq, Error)]
 pub enum ReceiveError {
-    /// The search refuses its settings or samples.
+    /// Settings, rate, frequency or samples do not suit.
     #[error(transparent)]
-    Search(#[from] SearchError),
-    /// A tracker refuses its samples.
-    #[error(transparent)]
-    Track(#[from] TrackError),
+    Ssb(#[from] ReceiverError),
     /// Samples of another number of antennas than it was told of.
     #[error("{found} channels; the vehicle's array has {elements}")]
     Antennas {
@@ -110,23 +116,20 @@ pub enum ReceiveError {
     Calibration(usize),
 }
 
-/// A receiver on one frequency.
-pub struct Receiver(Box<dyn SsbReceiver>);
+/// A receiver on one frequency, of windows.
+pub struct Receiver(Box<dyn OfWindows>);
 
 impl Receiver {
     /// A receiver that knows no cell yet.
     ///
     /// # Errors
-    /// [`ReceiveError::Search`] or [`ReceiveError::Calibration`] for impossible settings.
+    /// [`ReceiveError::Ssb`] or [`ReceiveError::Calibration`] for impossible settings.
     pub fn new(config: ReceiverConfig) -> Result<Self, ReceiveError> {
+        let told = config.of_ssbs();
         for_elements!(config.array.elements, A => {
-            Ok(Self(Box::new(ArrayReceiver::<A>::new(config)?)))
+            let receiver = WindowReceiver::<A>::new(told)?;
+            Ok(Self(Box::new((receiver, Observer::<A>::new(config)?))))
         })
-    }
-
-    /// What it was told.
-    pub fn config(&self) -> &ReceiverConfig {
-        self.0.config()
     }
 
     /// Number of SSBs that are tracked.
@@ -139,7 +142,8 @@ impl Receiver {
         self.0.searches()
     }
 
-    /// Looks for cells where it is time to, and hands every SSB that lies in the window to `take`.
+    /// Looks for cells where it is time to, and hands every SSB that lies in the window to `take`, in order
+    /// of time.
     ///
     /// # Errors
     /// [`ReceiveError`] where the antennas are not as many as it was told of, or not equally long.
@@ -152,9 +156,73 @@ impl Receiver {
     }
 }
 
-/// A receiver of any number of antennas.
-trait SsbReceiver: Send {
-    fn config(&self) -> &ReceiverConfig;
+/// A receiver on one frequency, of a stream.
+pub struct StreamReceiver(Box<dyn OfStream>);
+
+impl StreamReceiver {
+    /// A receiver that knows no cell yet, for samples of a rate around a frequency.
+    ///
+    /// # Errors
+    /// As [`Receiver::new`].
+    pub fn new(
+        config: ReceiverConfig,
+        sample_rate_hz: f64,
+        centre_hz: f64,
+    ) -> Result<Self, ReceiveError> {
+        let told = config.of_ssbs();
+        for_elements!(config.array.elements, A => {
+            let receiver = ssb::StreamReceiver::<A>::new(told, sample_rate_hz, centre_hz)?;
+            Ok(Self(Box::new((receiver, Observer::<A>::new(config)?))))
+        })
+    }
+
+    /// Number of SSBs that are tracked.
+    pub fn tracked(&self) -> usize {
+        self.0.tracked()
+    }
+
+    /// Up to which sample of the input all SSBs that begin before have been handed over.
+    pub fn heard_until(&self) -> f64 {
+        self.0.heard_until()
+    }
+
+    /// Takes the next samples and hands every SSB that they complete to `take`, in order of time. `time_s`
+    /// says when a sample of the input was received, the first of all being number 0; beside the
+    /// observation `take` gets the samples that were missing untold before it, in seconds, and are
+    /// counted in its time.
+    ///
+    /// # Errors
+    /// [`ReceiveError`] where the antennas are not as many as it was told of, or not equally long.
+    pub fn push(
+        &mut self,
+        antennas: &[&[Complex32]],
+        time_s: &dyn Fn(f64) -> f64,
+        take: &mut dyn FnMut(&SsbObservation, f64),
+    ) -> Result<(), ReceiveError> {
+        self.0.push(antennas, time_s, take)
+    }
+
+    /// The next sample of the input is this one, those before are missing. Hands over what was held back.
+    ///
+    /// # Errors
+    /// None that [`push`](Self::push) has not.
+    pub fn gap_to(
+        &mut self,
+        sample: u64,
+        time_s: &dyn Fn(f64) -> f64,
+        take: &mut dyn FnMut(&SsbObservation, f64),
+    ) -> Result<(), ReceiveError> {
+        self.0.gap_to(sample, time_s, take)
+    }
+
+    /// Forgets cells and samples, for a stream that begins anew at sample 0.
+    pub fn reset(&mut self) {
+        self.0.reset();
+    }
+}
+
+/// Windows of any number of antennas.
+trait OfWindows: Send {
     fn tracked(&self) -> usize;
     fn searches(&self) -> u64;
     fn receive(
@@ -164,52 +232,112 @@ trait SsbReceiver: Send {
     ) -> Result<(), ReceiveError>;
 }
 
-struct ArrayReceiver<const A: usize> {
+impl<const A: usize> OfWindows for (WindowReceiver<A>, Observer<A>) {
+    fn tracked(&self) -> usize {
+        self.0.tracked()
+    }
+
+    fn searches(&self) -> u64 {
+        self.0.searches()
+    }
+
+    fn receive(
+        &mut self,
+        window: &Window<'_>,
+        take: &mut dyn FnMut(&SsbObservation),
+    ) -> Result<(), ReceiveError> {
+        let (receiver, observer) = self;
+        check_antennas::<A>(window.antennas)?;
+        let (start, antennas) = (window.start as i64, window.antennas);
+        let base_rate_hz = observer.config.spacing.base_rate_hz();
+        receiver.receive(&ssb::Window { start, antennas }, &mut |seen| {
+            let elapsed_s = (seen.ssb.sample_start - start as f64) / base_rate_hz;
+            take(observer.observe(&seen, window.time_s + elapsed_s));
+        })?;
+        Ok(())
+    }
+}
+
+/// A stream of any number of antennas.
+trait OfStream: Send {
+    fn tracked(&self) -> usize;
+    fn heard_until(&self) -> f64;
+    fn push(
+        &mut self,
+        antennas: &[&[Complex32]],
+        time_s: &dyn Fn(f64) -> f64,
+        take: &mut dyn FnMut(&SsbObservation, f64),
+    ) -> Result<(), ReceiveError>;
+    fn gap_to(
+        &mut self,
+        sample: u64,
+        time_s: &dyn Fn(f64) -> f64,
+        take: &mut dyn FnMut(&SsbObservation, f64),
+    ) -> Result<(), ReceiveError>;
+    fn reset(&mut self);
+}
+
+impl<const A: usize> OfStream for (ssb::StreamReceiver<A>, Observer<A>) {
+    fn tracked(&self) -> usize {
+        self.0.receiver().tracked()
+    }
+
+    fn heard_until(&self) -> f64 {
+        self.0.heard_until() * self.0.input_per_output()
+    }
+
+    fn push(
+        &mut self,
+        antennas: &[&[Complex32]],
+        time_s: &dyn Fn(f64) -> f64,
+        take: &mut dyn FnMut(&SsbObservation, f64),
+    ) -> Result<(), ReceiveError> {
+        check_antennas::<A>(antennas)?;
+        let (receiver, observer) = self;
+        let ratio = receiver.input_per_output();
+        receiver.push(antennas, &mut |seen| {
+            observer.observe_in_stream(&seen, ratio, time_s, take);
+        })?;
+        Ok(())
+    }
+
+    fn gap_to(
+        &mut self,
+        sample: u64,
+        time_s: &dyn Fn(f64) -> f64,
+        take: &mut dyn FnMut(&SsbObservation, f64),
+    ) -> Result<(), ReceiveError> {
+        let (receiver, observer) = self;
+        let ratio = receiver.input_per_output();
+        receiver.gap_to(sample, &mut |seen| {
+            observer.observe_in_stream(&seen, ratio, time_s, take);
+        })?;
+        Ok(())
+    }
+
+    fn reset(&mut self) {
+        self.0.reset();
+    }
+}
+
+fn check_antennas<const A: usize>(antennas: &[&[Complex32]]) -> Result<(), ReceiveError> {
+    let found = antennas.len();
+    if found == A {
+        return Ok(());
+    }
+    Err(ReceiveError::Antennas { found, elements: A })
+}
+
+/// Makes observations of what a receiver has seen.
+struct Observer<const A: usize> {
     config: ReceiverConfig,
     calibration: [Complex64; A],
     /// Of antennas that are not in a row.
     finder: Option<DirectionFinder<ArrayManifold<A>, A>>,
-    search: SearchConfig,
-    searcher: Searcher,
-    cells: Vec<Cell<A>>,
-    last_search_s: f64,
-    searches: u64,
-    /// Frequency offset that cells were last found at, in Hz, and searches in vain since.
-    offset_hz: f64,
-    in_vain: u32,
     observation: SsbObservation,
 }
 
-struct Cell<const A: usize> {
-    ssb_index: u8,
-    pci: u16,
-    tracker: Tracker<A>,
-    /// Periods after the last SSB seen that the next one is expected, and where.
-    periods: f64,
-    next_start: f64,
-    last_seen_s: f64,
-}
-
-impl<const A: usize> Cell<A> {
-    /// Moves on by some bursts; the clocks drift meanwhile as they were seen to.
-    fn skip(&mut self, bursts: f64, period: f64) {
-        self.periods += bursts;
-        self.next_start = self.tracker.expected_start(self.periods * period);
-    }
-
-    /// Begins to count anew: its SSB was seen.
-    fn seen(&mut self, time_s: f64, period: f64) {
-        self.last_seen_s = time_s;
-        self.periods = 0.0;
-        self.skip(1.0, period);
-    }
-
-    fn is_lost(&self, time_s: f64) -> bool {
-        self.tracker.misses() >= MISSES && time_s - self.last_seen_s >= ABSENT_S
-    }
-}
-
-impl<const A: usize> ArrayReceiver<A> {
+impl<const A: usize> Observer<A> {
     fn new(config: ReceiverConfig) -> Result<Self, ReceiveError> {
         let calibration = config.array.calibration();
         let unusable = |gain: &Complex64| !gain.norm_sqr().is_normal();
@@ -220,165 +348,41 @@ impl<const A: usize> ArrayReceiver<A> {
         let manifold = config.array.manifold::<A>()?;
         let calibration = <[Complex64; A]>::try_from(calibration);
         let calibration = calibration.map_err(|_| ReceiveError::Antennas { found, elements: A })?;
-        let search = SearchConfig {
-            ssb_freq_hz: Some(config.ssb_freq_hz),
-            ..SearchConfig::new(config.spacing, A)
-        };
         Ok(Self {
-            searcher: Searcher::new(search.clone())?,
-            search,
             calibration,
             finder: manifold.map(ArrayManifold::finder).transpose()?,
-            cells: Vec::new(),
-            last_search_s: f64::NEG_INFINITY,
-            searches: 0,
-            offset_hz: 0.0,
-            in_vain: 0,
             observation: SsbObservation::new(A),
             config,
         })
     }
 
-    /// Whether it is time to search. A receiver without cells looks at every frequency offset that
-    /// its oscillator may have at once, then now and then.
-    fn searches_now(&self, time_s: f64) -> bool {
-        let interval_s = if !self.cells.is_empty() {
-            SEARCH_INTERVAL_S
-        } else if self.in_vain < self.offsets() {
-            0.0
-        } else {
-            LOST_INTERVAL_S
-        };
-        time_s - self.last_search_s >= interval_s
+    /// What was seen, received at a time.
+    fn observe(&mut self, seen: &Seen<'_, A>, time_s: f64) -> &SsbObservation {
+        let (config, finder) = (&self.config, self.finder.as_ref());
+        let (tracker, ssb) = (&*seen.tracker, seen.ssb);
+        let into = &mut self.observation;
+        fill(
+            into,
+            config,
+            &self.calibration,
+            finder,
+            tracker,
+            ssb,
+            time_s,
+        );
+        into
     }
 
-    /// Frequency offsets, a subcarrier apart, that the oscillator may have.
-    fn offsets(&self) -> u32 {
-        let subcarriers =
-            1e-6 * OSCILLATOR_PPM * self.config.ssb_freq_hz / self.config.spacing.hz();
-        2 * (subcarriers - 0.5).ceil().clamp(0.0, 15.0) as u32 + 1
-    }
-
-    /// The frequency offset to search around: that of the cells there are, else the last one known,
-    /// one subcarrier above, one below, two above, and so on.
-    fn centre_hz(&self) -> f64 {
-        if let Some(cell) = self.cells.iter().min_by_key(|cell| cell.tracker.misses()) {
-            return cell.tracker.cfo_hz();
-        }
-        let turn = self.in_vain % self.offsets();
-        let away = f64::from(turn.div_ceil(2)) * self.config.spacing.hz();
-        self.offset_hz + if turn % 2 == 1 { away } else { -away }
-    }
-
-    fn search(&mut self, window: &Window<'_>) -> Result<(), ReceiveError> {
-        let period = self.config.period_s * self.config.spacing.base_rate_hz();
-        let too_short = |samples: &&[Complex32]| samples.len() < SSB_SAMPLES;
-        if window.antennas.iter().any(too_short) {
-            return Ok(());
-        }
-        self.last_search_s = window.time_s;
-        self.searches += 1;
-        self.searcher.centre(self.centre_hz())?;
-        self.in_vain = self.in_vain.saturating_add(1);
-        for found in self.searcher.search(window.antennas)? {
-            let pci = found.pci.get();
-            let wanted = self.config.cells.as_ref();
-            if wanted.is_some_and(|cells| !cells.contains(&pci)) {
-                continue;
-            }
-            (self.in_vain, self.offset_hz) = (0, found.cfo_hz);
-            let mut found = found.clone();
-            found.sample_start += window.start as f64;
-            let same = |cell: &&mut Cell<A>| (cell.pci, cell.ssb_index) == (pci, found.ssb_index);
-            match self.cells.iter_mut().find(same) {
-                Some(cell) if cell.tracker.misses() > 0 => {
-                    // Bursts since it was seen last.
-                    let late = (found.sample_start - cell.next_start) / period;
-                    let bursts = cell.periods + late.round();
-                    cell.tracker.found(&found, bursts.max(1.0) * period);
-                    (cell.periods, cell.next_start) = (0.0, found.sample_start);
-                }
-                Some(_) => {}
-                None => self.cells.push(Cell {
-                    ssb_index: found.ssb_index,
-                    pci,
-                    tracker: Tracker::new(&self.search, &found)?,
-                    periods: 0.0,
-                    next_start: found.sample_start,
-                    last_seen_s: window.time_s,
-                }),
-            }
-        }
-        Ok(())
-    }
-}
-
-impl<const A: usize> SsbReceiver for ArrayReceiver<A> {
-    fn config(&self) -> &ReceiverConfig {
-        &self.config
-    }
-
-    fn tracked(&self) -> usize {
-        self.cells.len()
-    }
-
-    fn searches(&self) -> u64 {
-        self.searches
-    }
-
-    fn receive(
+    fn observe_in_stream(
         &mut self,
-        window: &Window<'_>,
-        take: &mut dyn FnMut(&SsbObservation),
-    ) -> Result<(), ReceiveError> {
-        let antennas = <[&[Complex32]; A]>::try_from(window.antennas).map_err(|_| {
-            let found = window.antennas.len();
-            ReceiveError::Antennas { found, elements: A }
-        })?;
-        if self.searches_now(window.time_s) {
-            self.search(window)?;
-        }
-        let base_rate_hz = self.config.spacing.base_rate_hz();
-        let period = self.config.period_s * base_rate_hz;
-        let decode_pbch = matches!(self.config.pilots, Pilots::Ssb);
-        let first = window.start as f64 + GUARD;
-        let length = antennas.first().map_or(0, |samples| samples.len());
-        let last = (window.start as f64) + (length as f64) - SSB_SAMPLES as f64 - GUARD;
-        for cell in &mut self.cells {
-            if cell.next_start < first {
-                // Asleep meanwhile, or the window came late.
-                let drifted =
-                    cell.tracker.expected_start(period) - cell.tracker.expected_start(0.0);
-                let bursts = ((first - cell.next_start) / drifted).ceil();
-                cell.skip(bursts, period);
-            }
-            while cell.next_start <= last {
-                let start = cell.next_start;
-                let seen =
-                    cell.tracker
-                        .track(&antennas, window.start as f64, start, decode_pbch)?;
-                // The beam is told by DM-RS; another cell's SSB is not this one.
-                let seen = seen.filter(|seen| seen.ssb_index == cell.ssb_index);
-                let Some(seen) = seen else {
-                    cell.skip(1.0, period);
-                    continue;
-                };
-                cell.seen(window.time_s, period);
-                let elapsed_s = (seen.sample_start - window.start as f64) / base_rate_hz;
-                fill(
-                    &mut self.observation,
-                    &self.config,
-                    &self.calibration,
-                    self.finder.as_ref(),
-                    &cell.tracker,
-                    &seen,
-                    window.time_s + elapsed_s,
-                );
-                take(&self.observation);
-            }
-        }
-        self.cells.retain(|cell| !cell.is_lost(window.time_s));
-        Ok(())
+        seen: &Seen<'_, A>,
+        ratio: f64,
+        time_s: &dyn Fn(f64) -> f64,
+        take: &mut dyn FnMut(&SsbObservation, f64),
+    ) {
+        let untold_s = seen.untold / self.config.spacing.base_rate_hz();
+        let received_s = time_s(seen.ssb.sample_start * ratio) + untold_s;
+        take(self.observe(seen, received_s), untold_s);
     }
 }
 

@@ -1,6 +1,6 @@
 //! The road.
 
-use schemars::JsonSchema;
+use schemars::{JsonSchema, Schema, SchemaGenerator};
 use serde::{Deserialize, Serialize};
 use toml::{Table, Value};
 
@@ -42,21 +42,77 @@ pub struct RoadSettings {
 }
 
 /// A line or an arc.
-#[derive(Debug, Clone, Copy, PartialEq, Serialize, Deserialize, JsonSchema)]
-#[serde(deny_unknown_fields)]
+#[derive(Debug, Clone, Copy, PartialEq, Serialize, Deserialize)]
+#[serde(try_from = "WrittenSegment")]
 pub struct SegmentSettings {
     /// Length in metres.
-    #[schemars(range(min = 1e-6, max = 1e5))]
     pub length_m: f64,
     /// Turn over this length in radians; left is positive.
-    #[serde(default)]
-    #[schemars(range(min = -100.0, max = 100.0))]
     pub turn_rad: f64,
+    /// Whether the road is known to lie there.
+    pub surveyed: bool,
+}
+
+/// A segment as it may be written: a bend by its length, or by its radius.
+#[derive(Deserialize, JsonSchema)]
+#[serde(deny_unknown_fields)]
+#[schemars(rename = "SegmentSettings")]
+struct WrittenSegment {
+    /// Length in metres; of a bend its radius may be given instead.
+    #[schemars(range(min = 1e-6, max = 1e5))]
+    length_m: Option<f64>,
+    /// Radius of a bend in metres.
+    #[schemars(range(min = 0.01, max = 1e5))]
+    radius_m: Option<f64>,
+    /// Turn over this length in radians; left is positive.
+    #[schemars(range(min = -100.0, max = 100.0))]
+    turn_rad: Option<f64>,
+    /// The same in degrees.
+    #[schemars(range(min = -5000.0, max = 5000.0))]
+    turn_deg: Option<f64>,
     /// Whether the road is known to lie there. What is given of a stretch that was not surveyed
     /// is a guess, such as the chord between the ends of the survey, and must be straight. A
     /// tracker does not keep to it; a simulated vehicle does.
     #[serde(default = "surveyed")]
-    pub surveyed: bool,
+    surveyed: bool,
+}
+
+impl TryFrom<WrittenSegment> for SegmentSettings {
+    type Error = &'static str;
+
+    fn try_from(written: WrittenSegment) -> Result<Self, &'static str> {
+        let turn_rad = match (written.turn_rad, written.turn_deg) {
+            (Some(_), Some(_)) => return Err("only one of `turn_rad` and `turn_deg` is allowed"),
+            (turn_rad, turn_deg) => turn_rad.or(turn_deg.map(f64::to_radians)).unwrap_or(0.0),
+        };
+        let length_m = match (written.length_m, written.radius_m) {
+            (Some(length_m), None) => length_m,
+            (None, Some(radius_m)) if radius_m >= 0.01 && turn_rad != 0.0 => {
+                radius_m * turn_rad.abs()
+            }
+            (None, Some(_)) => {
+                return Err(
+                    "a bend needs a `radius_m` of 0.01 m or more and a `turn_deg` that is not 0",
+                );
+            }
+            _ => return Err("one of `length_m` and, of a bend, `radius_m` is needed"),
+        };
+        Ok(Self {
+            length_m,
+            turn_rad,
+            surveyed: written.surveyed,
+        })
+    }
+}
+
+impl JsonSchema for SegmentSettings {
+    fn schema_name() -> std::borrow::Cow<'static, str> {
+        WrittenSegment::schema_name()
+    }
+
+    fn json_schema(generator: &mut SchemaGenerator) -> Schema {
+        WrittenSegment::json_schema(generator)
+    }
 }
 
 /// Standard deviation of points that nothing is stated of (m).
@@ -167,5 +223,31 @@ impl RoadSettings {
             };
             check.error(&format!("{key}.{shape}{at}"), value, &error.to_string())
         })
+    }
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    fn read(text: &str) -> Result<SegmentSettings, String> {
+        toml::from_str(text).map_err(|error| error.to_string())
+    }
+
+    #[test]
+    fn a_bend_is_given_by_radius_and_angle_or_by_its_length() {
+        let bend = read("radius_m = 25.0\nturn_deg = -60.0").unwrap();
+        let same = read("length_m = 26.179938779914945\nturn_rad = -1.0471975511965976").unwrap();
+        assert!((bend.length_m - same.length_m).abs() < 1e-12);
+        assert!((bend.turn_rad - same.turn_rad).abs() < 1e-12);
+        for wrong in [
+            "turn_deg = 60.0",
+            "radius_m = 25.0",
+            "radius_m = -25.0\nturn_deg = 60.0",
+            "radius_m = 25.0\nlength_m = 3.0",
+            "length_m = 3.0\nturn_deg = 60.0\nturn_rad = 1.0",
+        ] {
+            assert!(read(wrong).unwrap_err().contains('`'), "{wrong}");
+        }
     }
 }

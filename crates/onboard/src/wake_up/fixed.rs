@@ -3,11 +3,7 @@
 use super::due::Due;
 use super::policy::{Situation, WakeUpPolicy};
 use crate::BoxError;
-use crate::observation::SensedSsb;
-
-/// All SSBs of a burst lie this close together: 64 of them, their own length less than half a frame
-/// (TS 38.213, 4.1).
-const BURST_S: f64 = 4.9e-3;
+use crate::observation::{BURST_S, SensedSsb};
 
 /// Due a constant time after the last estimate, on the same clock as Algorithm 1. What comes late,
 /// from before the last estimate or along with it, is taken: whether it would have served is not

@@ -1,7 +1,7 @@
 //! Wake-up as late as a bound on the error allows, and earlier where information is cheap.
 //!
 //! The paper's t_max keeps a position uncertainty x̃_max by a worst case: the distance driven at
-//! top speed. The tracker knows its error and how it grows, so the rule can be exact: wake up at
+//! top speed. The filter knows its error and how it grows, so the rule can be exact: wake up at
 //! the last SSB before the error would, with the stated confidence, exceed the bound, and take the
 //! fewest angles that keep it. Where not even all of them do, the bound is out of reach there, and
 //! [`WakeUpPolicy::keeps_bound`] says so.
@@ -22,8 +22,9 @@
 
 use super::policy::{SAME_TIME_S, Situation, WakeUpPolicy};
 use crate::BoxError;
+use crate::gaussian::RadialQuantile;
+use crate::localize::Ekf;
 use crate::localize::ekf::state::Belief;
-use crate::localize::{Ekf, RadialQuantile};
 use crate::observation::SensedSsb;
 use crate::radio_head::RadioHead;
 use crate::settings::{Site, UncertaintySettings, Vehicle};
@@ -75,8 +76,8 @@ impl UncertaintyDriven {
     }
 
     /// Whether the error keeps the bound until the SSB after `time_s` without another angle.
-    pub fn keeps(&self, tracker: &Ekf, time_s: f64) -> bool {
-        self.error_m(tracker, time_s + self.period_s) <= self.bound_m
+    pub fn keeps(&self, ekf: &Ekf, time_s: f64) -> bool {
+        self.error_m(ekf, time_s + self.period_s) <= self.bound_m
     }
 
     /// The angles to take, one bit for each radio head: as many as make the most of the energy of
@@ -84,17 +85,17 @@ impl UncertaintyDriven {
     /// the next SSB. Where nothing keeps it, those worth their energy. `snr_db` is what a radio head at a distance is received with.
     fn choice(
         &self,
-        tracker: &Ekf,
+        ekf: &Ekf,
         time_s: f64,
         heads: &[RadioHead],
         snr_db: impl Fn(&RadioHead, f64) -> f64,
     ) -> u64 {
-        let demanded = !self.keeps(tracker, time_s);
-        let mut belief = tracker.forecast(time_s);
-        let ahead_m = tracker.speed_mps() * (time_s - tracker.time_s()).max(0.0);
-        let ahead = tracker.transition(&belief, LOOK_AHEAD_M);
+        let demanded = !self.keeps(ekf, time_s);
+        let mut belief = ekf.forecast(time_s);
+        let ahead_m = ekf.speed_mps() * (time_s - ekf.time_s()).max(0.0);
+        let ahead = ekf.transition(&belief, LOOK_AHEAD_M);
         let spread = |belief: &Belief| ahead.principal_variances(belief).iter().sum::<f64>();
-        let next = tracker.transition(&belief, tracker.speed_mps() * self.period_s);
+        let next = ekf.transition(&belief, ekf.speed_mps() * self.period_s);
         let keeps = |belief: &Belief| {
             self.quantile.radius(next.principal_variances(belief)) <= self.bound_m
         };
@@ -107,7 +108,7 @@ impl UncertaintyDriven {
                 .filter_map(|(index, head)| {
                     let sigma_rad = |distance_m| self.thermal.sigma_rad(snr_db(head, distance_m));
                     let thermal = |distance_m| sigma_rad(distance_m).powi(2);
-                    let after = tracker.rehearse(&belief, ahead_m, head, thermal)?;
+                    let after = ekf.predicted_update(&belief, ahead_m, head, thermal)?;
                     Some((index, after, spread(&after)))
                 })
                 .min_by(|a, b| a.2.total_cmp(&b.2));
@@ -140,9 +141,9 @@ impl UncertaintyDriven {
 
     /// Time from `time_s` on for which the bound holds without another angle, in seconds: the
     /// latest wake-up.
-    fn wake_up_time_s(&self, tracker: &Ekf, time_s: f64) -> f64 {
+    fn wake_up_time_s(&self, ekf: &Ekf, time_s: f64) -> f64 {
         let holds =
-            |periods: f64| self.error_m(tracker, time_s + periods * self.period_s) <= self.bound_m;
+            |periods: f64| self.error_m(ekf, time_s + periods * self.period_s) <= self.bound_m;
         let (mut low, mut high) = (0.0, (HORIZON_S / self.period_s).ceil());
         if holds(high) {
             return high * self.period_s;
@@ -158,13 +159,13 @@ impl UncertaintyDriven {
         (low * self.period_s).max(self.period_s)
     }
 
-    fn error_m(&self, tracker: &Ekf, time_s: f64) -> f64 {
-        let belief = tracker.forecast(time_s);
+    fn error_m(&self, ekf: &Ekf, time_s: f64) -> f64 {
+        let belief = ekf.forecast(time_s);
         self.quantile.radius(Ekf::principal_variances(&belief))
     }
 }
 
-/// A localizer that is no tracker, or does not know yet where it is, takes every angle.
+/// A localizer that is no such filter, or does not know yet where it is, takes every angle.
 impl WakeUpPolicy for UncertaintyDriven {
     /// Whether the error would exceed the bound at the SSB after, or an angle is worth its energy
     /// anyway.
@@ -173,11 +174,11 @@ impl WakeUpPolicy for UncertaintyDriven {
         if !self.last_wake_up_s.is_none_or(is_free) {
             return Ok(false);
         }
-        let tracker = now.localizer.worst_case();
+        let ekf = now.localizer.worst_case();
         let headroom_db = self.snr_headroom_db.unwrap_or(0.0);
         let snr_db =
             |head: &RadioHead, distance_m| now.budget.snr_db(head, distance_m) + headroom_db;
-        Ok(tracker.is_none_or(|tracker| self.choice(tracker, now.now_s, now.heads, snr_db) != 0))
+        Ok(ekf.is_none_or(|ekf| self.choice(ekf, now.now_s, now.heads, snr_db) != 0))
     }
 
     fn decide(
@@ -187,7 +188,7 @@ impl WakeUpPolicy for UncertaintyDriven {
         chosen: &mut [bool],
     ) -> Result<f64, BoxError> {
         self.last_wake_up_s = Some(now.time_s);
-        let Some(tracker) = now.localizer.worst_case() else {
+        let Some(ekf) = now.localizer.worst_case() else {
             chosen.fill(true);
             return Ok(self.period_s);
         };
@@ -196,17 +197,17 @@ impl WakeUpPolicy for UncertaintyDriven {
             let ssb = (self.snr_headroom_db).and_then(|_| sensed.iter().find(sends));
             ssb.map_or_else(|| now.budget.snr_db(head, distance_m), |ssb| ssb.snr_db)
         };
-        let choice = self.choice(tracker, now.now_s, now.heads, snr_db);
+        let choice = self.choice(ekf, now.now_s, now.heads, snr_db);
         for (ssb, chosen) in sensed.iter().zip(chosen) {
             let sends = |head: &RadioHead| head.sends(ssb.pci, ssb.ssb_index);
             *chosen = (now.heads.iter().position(sends))
                 .is_some_and(|index| index < MOST_HEADS && choice >> index & 1 == 1);
         }
-        Ok(self.wake_up_time_s(tracker, now.now_s))
+        Ok(self.wake_up_time_s(ekf, now.now_s))
     }
 
     fn keeps_bound(&self, now: &Situation<'_>) -> Option<bool> {
-        let tracker = now.localizer.ekf()?;
-        Some(self.keeps(tracker, now.now_s))
+        let ekf = now.localizer.ekf()?;
+        Some(self.keeps(ekf, now.now_s))
     }
 }

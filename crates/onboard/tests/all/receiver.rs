@@ -51,6 +51,7 @@ impl Air {
             snapshots: 20,
             array: ArraySettings::default(),
             cells: None,
+            search_every_s: 1.0,
         })
         .unwrap()
     }

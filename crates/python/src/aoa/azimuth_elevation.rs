@@ -1,40 +1,34 @@
 //! Azimuth and elevation with arrays of any shape.
 
-use aoa::{ArbitraryArray, Batch, Direction, DirectionFinder, PseudoSpectrum, Real, bound};
+use aoa::{ArbitraryArray, Complex64, Direction, DirectionFinder, Manifold, bound};
 use numpy::{
-    AllowTypeChange, Element, IxDyn, PyArray1, PyArrayDyn, PyArrayLike1, PyArrayLike2,
-    PyArrayMethods,
+    AllowTypeChange, IxDyn, PyArray1, PyArrayDyn, PyArrayLike1, PyArrayLike2, PyArrayLikeDyn,
+    PyArrayMethods, PyUntypedArrayMethods,
 };
-use pyo3::IntoPyObjectExt;
 use pyo3::exceptions::PyValueError;
 use pyo3::prelude::*;
 
 use super::calibration_of;
-use super::samples::{Samples, Visitor, for_antennas, value_error};
+use super::result::{Estimates, repr_of};
+use super::samples::{Samples, for_antennas, value_error};
 
 /// Azimuth and elevation, with what is known about each.
 ///
-/// Every field is a number for a single item and an array for a batch.
+/// Every field is a number where one estimate was asked for. For a batch, or several sources, it is
+/// an array with one axis for the batch and, last, one for the sources, by ascending azimuth.
 #[pyclass(frozen, module = "access_av.aoa")]
 pub struct DirectionEstimate {
-    values: Vec<aoa::DirectionEstimate>,
-    /// `None` for a single item.
-    batch: Option<usize>,
+    estimates: Estimates<aoa::DirectionEstimate>,
 }
 
 impl DirectionEstimate {
-    fn field<'py, T>(
+    fn matrices<'py>(
         &self,
         py: Python<'py>,
-        field: impl Fn(&aoa::DirectionEstimate) -> T,
-    ) -> PyResult<Bound<'py, PyAny>>
-    where
-        T: Element + IntoPyObject<'py>,
-    {
-        match (self.batch, self.values.as_slice()) {
-            (None, [only]) => field(only).into_bound_py_any(py),
-            _ => Ok(PyArray1::from_iter(py, self.values.iter().map(field)).into_any()),
-        }
+        field: impl Fn(&aoa::DirectionEstimate) -> [[f64; 2]; 2],
+    ) -> PyResult<Bound<'py, PyArrayDyn<f64>>> {
+        let entries = self.estimates.as_slice().iter().flat_map(field).flatten();
+        PyArray1::from_iter(py, entries).reshape(IxDyn(&self.estimates.shape(&[2, 2])))
     }
 }
 
@@ -43,89 +37,274 @@ impl DirectionEstimate {
     /// Azimuth from the x axis in rad, counter-clockwise, in (-pi, pi].
     #[getter]
     fn azimuth_rad<'py>(&self, py: Python<'py>) -> PyResult<Bound<'py, PyAny>> {
-        self.field(py, |it| it.direction.azimuth_rad)
+        self.estimates.field(py, |it| it.direction.azimuth_rad)
     }
 
     /// Elevation from the horizontal in rad.
     #[getter]
     fn elevation_rad<'py>(&self, py: Python<'py>) -> PyResult<Bound<'py, PyAny>> {
-        self.field(py, |it| it.direction.elevation_rad)
+        self.estimates.field(py, |it| it.direction.elevation_rad)
     }
 
-    /// Standard deviation of `azimuth_rad`, from the Cramér–Rao bound at the estimated SNR.
+    /// Standard deviation of `azimuth_rad`: of noise and, where the model does not fit, of the misfit.
     #[getter]
     fn azimuth_sigma_rad<'py>(&self, py: Python<'py>) -> PyResult<Bound<'py, PyAny>> {
-        self.field(py, aoa::DirectionEstimate::azimuth_sigma_rad)
+        self.estimates
+            .field(py, aoa::DirectionEstimate::azimuth_sigma_rad)
     }
 
     /// Standard deviation of `elevation_rad`; 0 where the elevation was given.
     #[getter]
     fn elevation_sigma_rad<'py>(&self, py: Python<'py>) -> PyResult<Bound<'py, PyAny>> {
-        self.field(py, aoa::DirectionEstimate::elevation_sigma_rad)
+        self.estimates
+            .field(py, aoa::DirectionEstimate::elevation_sigma_rad)
     }
 
-    /// Covariance of azimuth and elevation in rad^2: `(2, 2)` or `(batch, 2, 2)`.
+    /// Covariance of azimuth and elevation in rad^2: `(..., 2, 2)`.
     #[getter]
     fn covariance<'py>(&self, py: Python<'py>) -> PyResult<Bound<'py, PyArrayDyn<f64>>> {
-        let entries = self.values.iter().flat_map(|it| it.covariance).flatten();
-        let shape: Vec<usize> = self.batch.into_iter().chain([2, 2]).collect();
-        PyArray1::from_iter(py, entries).reshape(IxDyn(&shape))
+        self.matrices(py, |it| it.covariance)
+    }
+
+    /// What of `covariance` noise alone makes.
+    #[getter]
+    fn noise_covariance<'py>(&self, py: Python<'py>) -> PyResult<Bound<'py, PyArrayDyn<f64>>> {
+        self.matrices(py, |it| it.noise_covariance)
     }
 
     /// Estimated SNR per antenna and snapshot.
     #[getter]
     fn snr_db<'py>(&self, py: Python<'py>) -> PyResult<Bound<'py, PyAny>> {
-        self.field(py, |it| it.snr_db)
+        self.estimates.field(py, |it| it.snr_db)
+    }
+
+    /// Probability that plane waves in white noise fit as badly as this or worse; of all sources together.
+    #[getter]
+    fn p_value<'py>(&self, py: Python<'py>) -> PyResult<Bound<'py, PyAny>> {
+        self.estimates.field(py, |it| it.fit.p_value())
     }
 
     /// Whether the estimate may be relied on.
     #[getter]
     fn resolved<'py>(&self, py: Python<'py>) -> PyResult<Bound<'py, PyAny>> {
-        match (self.batch, self.values.as_slice()) {
-            (None, [only]) => only.is_resolved().into_bound_py_any(py),
-            _ => self.field(py, aoa::DirectionEstimate::is_resolved),
-        }
+        self.estimates.flag(py, aoa::DirectionEstimate::is_resolved)
     }
 
     /// "resolved", or "unresolved: " and the reason.
     #[getter]
     fn verdict<'py>(&self, py: Python<'py>) -> PyResult<Bound<'py, PyAny>> {
-        let names = self.values.iter().map(|it| it.verdict.to_string());
-        match (self.batch, self.values.as_slice()) {
-            (None, [only]) => only.verdict.to_string().into_bound_py_any(py),
-            // An empty batch has a type too.
-            (_, []) => py
-                .import("numpy")?
-                .call_method1("array", (Vec::<String>::new(), "U")),
-            _ => {
-                let names: Vec<String> = names.collect();
-                py.import("numpy")?.call_method1("array", (names,))
-            }
-        }
+        self.estimates.verdicts(py, |it| it.verdict)
     }
 
     fn __repr__(&self, py: Python<'_>) -> PyResult<String> {
-        Ok(format!(
-            "DirectionEstimate(azimuth_rad={}, elevation_rad={}, snr_db={}, verdict={})",
-            self.azimuth_rad(py)?.repr()?,
-            self.elevation_rad(py)?.repr()?,
-            self.snr_db(py)?.repr()?,
-            self.verdict(py)?.repr()?,
-        ))
+        let fields = [
+            ("azimuth_rad", self.azimuth_rad(py)?),
+            ("elevation_rad", self.elevation_rad(py)?),
+            ("snr_db", self.snr_db(py)?),
+            ("verdict", self.verdict(py)?),
+        ];
+        repr_of("DirectionEstimate", &fields)
     }
 }
 
-/// Azimuth and elevation of one source by maximum likelihood, with antennas in any places.
+/// What an array receives from every direction, measured or computed: patterns and coupling included.
+///
+/// Parameters
+/// ----------
+/// responses : array_like
+///     Complex, `(azimuths, antennas)` or `(elevations, azimuths, antennas)`: azimuth ``2 pi i / azimuths``,
+///     four or more. Interpolated by cubics, which is good where a response changes by less than a radian
+///     from one entry to the next.
+/// elevations_rad : array_like
+///     Ascending in equal steps; beyond them the outermost holds.
+///
+/// Raises
+/// ------
+/// ValueError
+///     Wrong shape, responses that are not finite or zero, elevations not as said.
+///
+/// Examples
+/// --------
+/// >>> import numpy as np
+/// >>> from access_av import aoa
+/// >>> turns = np.arange(72) / 72 * 2 * np.pi
+/// >>> towards = np.stack([np.cos(turns), np.sin(turns)])
+/// >>> corner = np.array([[0, 0], [0.4, 0], [0, 0.4]])
+/// >>> table = aoa.MeasuredManifold(np.exp(2j * np.pi * corner @ towards).T)
+/// >>> table
+/// MeasuredManifold(antennas=3, azimuths=72, elevations=1)
+/// >>> snapshots = np.outer(np.exp(2j * np.pi * corner @ [0, 1]), [1, 1j])
+/// >>> found = aoa.direction(snapshots, table, elevations_rad=(0, 0))
+/// >>> round(float(np.degrees(found.azimuth_rad)), 3)
+/// 90.0
+#[pyclass(frozen, module = "access_av.aoa")]
+pub struct MeasuredManifold {
+    /// Row-major (elevation, azimuth, antenna).
+    responses: Vec<Complex64>,
+    elevations_rad: Vec<f64>,
+    antennas: usize,
+}
+
+#[pymethods]
+impl MeasuredManifold {
+    #[new]
+    #[pyo3(signature = (responses, elevations_rad=None))]
+    fn new(
+        responses: &Bound<'_, PyAny>,
+        elevations_rad: Option<&Bound<'_, PyAny>>,
+    ) -> PyResult<Self> {
+        let wrong = || {
+            PyValueError::new_err(
+                "responses must be complex, (azimuths, antennas) or (elevations, azimuths, antennas), \
+                 with one elevation for each of the first axis",
+            )
+        };
+        let elevations_rad = match elevations_rad {
+            Some(given) => finite(given, "elevations_rad")?,
+            None => vec![0.0],
+        };
+        let responses: PyArrayLikeDyn<'_, Complex64, AllowTypeChange> =
+            responses.extract().map_err(|_| wrong())?;
+        let (rows, antennas) = match *responses.shape() {
+            [_, antennas] => (1, antennas),
+            [elevations, _, antennas] => (elevations, antennas),
+            _ => return Err(wrong()),
+        };
+        if rows != elevations_rad.len() {
+            return Err(wrong());
+        }
+        let manifold = Self {
+            responses: responses.as_array().iter().copied().collect(),
+            elevations_rad,
+            antennas,
+        };
+        // Whatever is wrong with it is told here, not at its first use.
+        for_antennas!(antennas, N => manifold.core::<N>(None).map(|_| ()))?;
+        Ok(manifold)
+    }
+
+    fn __repr__(&self) -> String {
+        format!(
+            "MeasuredManifold(antennas={}, azimuths={}, elevations={})",
+            self.antennas,
+            self.azimuths(),
+            self.elevations_rad.len(),
+        )
+    }
+}
+
+impl MeasuredManifold {
+    fn azimuths(&self) -> usize {
+        self.responses.len() / (self.antennas * self.elevations_rad.len()).max(1)
+    }
+
+    /// With these gains of the channels on top of it.
+    fn core<const N: usize>(
+        &self,
+        gains: Option<&[Complex64; N]>,
+    ) -> PyResult<aoa::MeasuredManifold<N>> {
+        let mut responses = self.responses.as_chunks::<N>().0.to_vec();
+        if let Some(gains) = gains {
+            for (element, gain) in responses
+                .as_flattened_mut()
+                .iter_mut()
+                .zip(gains.iter().cycle())
+            {
+                *element *= gain;
+            }
+        }
+        aoa::MeasuredManifold::new(self.azimuths(), &self.elevations_rad, responses)
+            .map_err(value_error)
+    }
+}
+
+/// An array as the user describes it.
+enum Shape<'py> {
+    Places(Vec<[f64; 3]>),
+    Measured(PyRef<'py, MeasuredManifold>),
+}
+
+/// The same, for a known number of antennas.
+enum AnyManifold<const N: usize> {
+    Places(ArbitraryArray<N>),
+    Measured(aoa::MeasuredManifold<N>),
+}
+
+impl<const N: usize> Manifold<N> for AnyManifold<N> {
+    fn response(&self, direction: Direction) -> [Complex64; N] {
+        match self {
+            Self::Places(array) => array.response(direction),
+            Self::Measured(table) => table.response(direction),
+        }
+    }
+
+    fn resolution_rad(&self) -> f64 {
+        match self {
+            Self::Places(array) => array.resolution_rad(),
+            Self::Measured(table) => table.resolution_rad(),
+        }
+    }
+}
+
+impl<'py> Shape<'py> {
+    fn of(given: &Bound<'py, PyAny>) -> PyResult<Self> {
+        match given.cast::<MeasuredManifold>() {
+            Ok(table) => Ok(Self::Measured(table.borrow())),
+            Err(_) => places_of(given).map(Self::Places),
+        }
+    }
+
+    fn antennas(&self) -> usize {
+        match self {
+            Self::Places(places) => places.len(),
+            Self::Measured(table) => table.antennas,
+        }
+    }
+
+    fn manifold<const N: usize>(
+        &self,
+        calibration: Option<&Bound<'_, PyAny>>,
+    ) -> PyResult<AnyManifold<N>> {
+        let count = self.antennas();
+        let gains = calibration.map(calibration_of::<N>).transpose()?;
+        match self {
+            _ if count != N => Err(PyValueError::new_err(format!(
+                "places_wavelengths must have one row per antenna: {N}, not {count}"
+            ))),
+            Self::Measured(table) => {
+                let gains = gains.as_ref().map(aoa::Calibration::gains);
+                table.core::<N>(gains).map(AnyManifold::Measured)
+            }
+            Self::Places(places) => {
+                let places = std::array::from_fn(|n| places[n]);
+                let array = ArbitraryArray::new(places).map_err(value_error)?;
+                Ok(AnyManifold::Places(match gains {
+                    Some(gains) => array.with_calibration(gains),
+                    None => array,
+                }))
+            }
+        }
+    }
+}
+
+/// Azimuth and elevation by maximum likelihood, with antennas in any places.
 ///
 /// Parameters
 /// ----------
 /// snapshots : ndarray
 ///     Complex samples, `(antennas, snapshots)` or `(batch, antennas, snapshots)`.
-/// places_wavelengths : array_like
-///     Where the antennas are, in wavelengths: `(antennas, 3)`, or `(antennas, 2)` in a plane.
+/// places_wavelengths : array_like or MeasuredManifold
+///     Where the antennas are, in wavelengths: `(antennas, 3)`, or `(antennas, 2)` in a plane. Or what they
+///     receive from every direction.
 /// elevations_rad : (float, float)
 ///     Elevations to look at. A horizontal array does not tell above from below, and sees no elevation
 ///     at the horizon; with twice the same elevation only the azimuth is estimated.
+/// sources : int
+///     Number of sources, coherent ones too: up to half the antennas, and where only the azimuth is
+///     estimated up to all but one.
+/// noise_variance : float, optional
+///     Of one source: variance of the noise per antenna and snapshot, where it is known; the snapshots
+///     may then be a single one, as the blocks of `maximum_likelihood_pilots`.
 /// calibration : array_like, optional
 ///     Complex gain of each channel.
 ///
@@ -151,22 +330,33 @@ impl DirectionEstimate {
 /// >>> round(found.azimuth_rad, 6), round(found.elevation_rad, 6)
 /// (2.0, 0.5)
 #[pyfunction]
-#[pyo3(signature = (snapshots, places_wavelengths, *, elevations_rad=(0.0, std::f64::consts::FRAC_PI_2), calibration=None))]
+#[pyo3(signature = (snapshots, places_wavelengths, *, elevations_rad=(0.0, std::f64::consts::FRAC_PI_2), sources=1, noise_variance=None, calibration=None))]
 pub fn direction(
     snapshots: &Bound<'_, PyAny>,
     places_wavelengths: &Bound<'_, PyAny>,
     elevations_rad: (f64, f64),
+    sources: usize,
+    noise_variance: Option<f64>,
     calibration: Option<&Bound<'_, PyAny>>,
 ) -> PyResult<DirectionEstimate> {
+    if noise_variance.is_some() && sources != 1 {
+        return Err(PyValueError::new_err(
+            "noise_variance is for one source; leave it out for several",
+        ));
+    }
     let samples = Samples::of(snapshots)?;
-    let values = samples.visit(Finder {
-        places: places_of(places_wavelengths)?,
-        elevations_rad: elevations_rad.into(),
-        calibration,
-        py: snapshots.py(),
+    let shape = Shape::of(places_wavelengths)?;
+    let values = for_antennas!(samples.antennas, N => {
+        let finder = DirectionFinder::new(shape.manifold::<N>(calibration)?, elevations_rad.into());
+        let finder = finder.map_err(value_error)?;
+        let found = samples.map::<N, _>(snapshots.py(), |item| match noise_variance {
+            Some(_) => Ok(vec![finder.estimate_pilots(&item.snapshots(), noise_variance)?]),
+            None => finder.estimate_several(&item.covariance()?, sources),
+        });
+        found.map(|it| it.concat())
     })?;
-    let batch = samples.batch;
-    Ok(DirectionEstimate { values, batch })
+    let estimates = Estimates::new(values, samples.shape((sources > 1).then_some(sources)));
+    Ok(DirectionEstimate { estimates })
 }
 
 /// Spectrum over azimuth and elevation, with antennas in any places.
@@ -214,15 +404,15 @@ pub fn direction_spectrum<'py>(
             .iter()
             .map(move |az| Direction::new(*az, elevation))
     };
-    let directions = elevations.iter().flat_map(|it| across(*it)).collect();
-    let values = samples.visit(Looker {
-        kind,
-        directions,
-        places: places_of(places_wavelengths)?,
-        calibration,
-        py: snapshots.py(),
+    let directions: Vec<_> = elevations.iter().flat_map(|it| across(*it)).collect();
+    let array = Shape::of(places_wavelengths)?;
+    let values = for_antennas!(samples.antennas, N => {
+        let array = array.manifold::<N>(calibration)?;
+        samples.map::<N, _>(snapshots.py(), |item| {
+            kind.over_directions(&item.covariance()?, &array, &directions)
+        })
     })?;
-    PyArray1::from_vec(snapshots.py(), values).reshape(IxDyn(&shape))
+    PyArray1::from_vec(snapshots.py(), values.concat()).reshape(IxDyn(&shape))
 }
 
 /// Cramér–Rao bound of azimuth and elevation: standard deviations in rad that no unbiased estimator
@@ -268,77 +458,14 @@ pub fn direction_crb_rad(
             "direction and SNR must be finite, snapshots at least 1",
         ));
     }
-    let places = places_of(places_wavelengths)?;
+    let shape = Shape::of(places_wavelengths)?;
     let direction = Direction::new(azimuth_rad, elevation_rad);
     let snr = 10.0_f64.powf(snr_db / 10.0);
-    let [[azimuth, _], [_, elevation]] = for_antennas!(places.len(), N => {
-        array_of::<N>(&places, None)
-            .map(|array| bound::azimuth_elevation(&array, direction, snr, snapshots))
+    let [[azimuth, _], [_, elevation]] = for_antennas!(shape.antennas(), N => {
+        let array = shape.manifold::<N>(None);
+        array.map(|array| bound::azimuth_elevation(&array, direction, snr, snapshots))
     })?;
     Ok((azimuth.sqrt(), elevation.sqrt()))
-}
-
-struct Finder<'a, 'py> {
-    places: Vec<[f64; 3]>,
-    elevations_rad: [f64; 2],
-    calibration: Option<&'a Bound<'py, PyAny>>,
-    py: Python<'py>,
-}
-
-impl Visitor for Finder<'_, '_> {
-    type Output = Vec<aoa::DirectionEstimate>;
-
-    fn visit<T: Real, const N: usize>(self, batch: Batch<'_, T, N>) -> PyResult<Self::Output> {
-        let array = array_of::<N>(&self.places, self.calibration)?;
-        let finder = DirectionFinder::new(array, self.elevations_rad).map_err(value_error)?;
-        let found = self.py.detach(|| {
-            let each = batch.covariances().map(|it| finder.estimate(&it?));
-            each.collect::<Result<Vec<_>, aoa::Error>>()
-        });
-        found.map_err(value_error)
-    }
-}
-
-struct Looker<'a, 'py> {
-    kind: PseudoSpectrum,
-    directions: Vec<Direction>,
-    places: Vec<[f64; 3]>,
-    calibration: Option<&'a Bound<'py, PyAny>>,
-    py: Python<'py>,
-}
-
-impl Visitor for Looker<'_, '_> {
-    type Output = Vec<f64>;
-
-    fn visit<T: Real, const N: usize>(self, batch: Batch<'_, T, N>) -> PyResult<Vec<f64>> {
-        let array = array_of::<N>(&self.places, self.calibration)?;
-        let (kind, directions) = (self.kind, &self.directions);
-        let spectra = self.py.detach(|| {
-            let mut values = Vec::with_capacity(batch.len() * directions.len());
-            for covariance in batch.covariances() {
-                values.extend(kind.over_directions(&covariance?, &array, directions)?);
-            }
-            Ok(values)
-        });
-        spectra.map_err(|error: aoa::Error| value_error(error))
-    }
-}
-
-fn array_of<const N: usize>(
-    places: &[[f64; 3]],
-    calibration: Option<&Bound<'_, PyAny>>,
-) -> PyResult<ArbitraryArray<N>> {
-    let count = places.len();
-    let places: [[f64; 3]; N] = places.try_into().map_err(|_| {
-        PyValueError::new_err(format!(
-            "places_wavelengths must have one row per antenna: {N}, not {count}"
-        ))
-    })?;
-    let array = ArbitraryArray::new(places).map_err(value_error)?;
-    Ok(match calibration {
-        Some(gains) => array.with_calibration(calibration_of(gains)?),
-        None => array,
-    })
 }
 
 fn places_of(places: &Bound<'_, PyAny>) -> PyResult<Vec<[f64; 3]>> {

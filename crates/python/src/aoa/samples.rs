@@ -1,6 +1,6 @@
 //! Samples as NumPy hands them over.
 
-use aoa::{Batch, Real};
+use aoa::{Batch, Complex64, Covariance, Real};
 use num_complex::Complex;
 use numpy::{
     Element, PyArrayDyn, PyArrayMethods, PyReadonlyArrayDyn, PyUntypedArray, PyUntypedArrayMethods,
@@ -25,22 +25,16 @@ macro_rules! for_antennas {
 }
 pub(super) use for_antennas;
 
-/// Something done to samples of any precision and any number of antennas.
-pub(super) trait Visitor {
-    type Output;
-    fn visit<T: Real, const N: usize>(self, batch: Batch<'_, T, N>) -> PyResult<Self::Output>;
-}
-
 /// Samples `(antennas, snapshots)` or `(batch, antennas, snapshots)`, row-major.
 pub(super) struct Samples<'py> {
-    array: Array<'py>,
+    pub(super) array: SampleArray<'py>,
     /// `None` if the caller gave a single item.
     pub(super) batch: Option<usize>,
     pub(super) antennas: usize,
     pub(super) snapshots: usize,
 }
 
-enum Array<'py> {
+pub(super) enum SampleArray<'py> {
     Double(PyReadonlyArrayDyn<'py, Complex<f64>>),
     Single(PyReadonlyArrayDyn<'py, Complex<f32>>),
 }
@@ -49,9 +43,9 @@ impl<'py> Samples<'py> {
     /// Takes a view; only an array that is not row-major is copied.
     pub(super) fn of(object: &Bound<'py, PyAny>) -> PyResult<Self> {
         if let Ok(array) = object.cast::<PyArrayDyn<Complex<f64>>>() {
-            Self::view(array, Array::Double)
+            Self::view(array, SampleArray::Double)
         } else if let Ok(array) = object.cast::<PyArrayDyn<Complex<f32>>>() {
-            Self::view(array, Array::Single)
+            Self::view(array, SampleArray::Single)
         } else {
             let given = match object.cast::<PyUntypedArray>() {
                 Ok(array) => format!("dtype {}", array.dtype()),
@@ -65,7 +59,7 @@ impl<'py> Samples<'py> {
 
     fn view<T: Element>(
         array: &Bound<'py, PyArrayDyn<T>>,
-        wrap: impl Fn(PyReadonlyArrayDyn<'py, T>) -> Array<'py>,
+        wrap: impl Fn(PyReadonlyArrayDyn<'py, T>) -> SampleArray<'py>,
     ) -> PyResult<Self> {
         let (batch, antennas, snapshots) = match *array.shape() {
             [antennas, snapshots] => (None, antennas, snapshots),
@@ -96,31 +90,75 @@ impl<'py> Samples<'py> {
         self.batch.into_iter().chain(axes).collect()
     }
 
-    /// Hands the samples over with their types known.
-    #[inline]
-    pub(super) fn visit<V: Visitor>(&self, visitor: V) -> PyResult<V::Output> {
+    /// What becomes of each item, other threads of Python running meanwhile.
+    pub(super) fn map<const N: usize, O: Send>(
+        &self,
+        py: Python<'_>,
+        each: impl Fn(Item<'_, N>) -> Result<O, aoa::Error> + Sync,
+    ) -> PyResult<Vec<O>> {
         match &self.array {
-            Array::Double(array) => self.visit_typed(array, visitor),
-            Array::Single(array) => self.visit_typed(array, visitor),
+            SampleArray::Double(array) => self.map_typed(py, slice(array)?, each, Item::Double),
+            SampleArray::Single(array) => self.map_typed(py, slice(array)?, each, Item::Single),
         }
     }
 
-    #[inline]
-    fn visit_typed<T: Real + Element, V: Visitor>(
+    fn map_typed<'a, T: Real, const N: usize, O: Send>(
         &self,
-        array: &PyReadonlyArrayDyn<'py, Complex<T>>,
-        visitor: V,
-    ) -> PyResult<V::Output>
-    where
-        Complex<T>: Element,
-    {
-        let samples = array
-            .as_slice()
-            .map_err(|error| PyValueError::new_err(error.to_string()))?;
-        for_antennas!(self.antennas, N => {
-            visitor.visit(Batch::<T, N>::new(samples, self.snapshots).map_err(value_error)?)
-        })
+        py: Python<'_>,
+        samples: &'a [Complex<T>],
+        each: impl Fn(Item<'a, N>) -> Result<O, aoa::Error> + Sync,
+        wrap: impl Fn([&'a [Complex<T>]; N]) -> Item<'a, N> + Sync,
+    ) -> PyResult<Vec<O>> {
+        let snapshots = self.snapshots;
+        Batch::<T, N>::new(samples, snapshots).map_err(value_error)?;
+        let outcomes = py.detach(|| {
+            let items = samples.chunks_exact(N * snapshots).map(|item| {
+                let mut channels = item.chunks_exact(snapshots);
+                each(wrap(std::array::from_fn(|_| {
+                    channels.next().unwrap_or_default()
+                })))
+            });
+            items.collect::<Result<_, _>>()
+        });
+        outcomes.map_err(value_error)
     }
+}
+
+/// The channels of one item.
+#[derive(Clone, Copy)]
+pub(super) enum Item<'a, const N: usize> {
+    Double([&'a [Complex<f64>]; N]),
+    Single([&'a [Complex<f32>]; N]),
+}
+
+impl<const N: usize> Item<'_, N> {
+    pub(super) fn covariance(&self) -> Result<Covariance<N>, aoa::Error> {
+        match self {
+            Self::Double(channels) => Covariance::from_channels(*channels),
+            Self::Single(channels) => Covariance::from_channels(*channels),
+        }
+    }
+
+    /// Snapshot after snapshot.
+    pub(super) fn snapshots(&self) -> Vec<[Complex64; N]> {
+        let wide = |it: Complex<f32>| Complex64::new(it.re.into(), it.im.into());
+        let count = match self {
+            Self::Double(channels) => channels[0].len(),
+            Self::Single(channels) => channels[0].len(),
+        };
+        let snapshot = |t: usize| match self {
+            Self::Double(channels) => channels.map(|channel| channel[t]),
+            Self::Single(channels) => channels.map(|channel| wide(channel[t])),
+        };
+        (0..count).map(snapshot).collect()
+    }
+}
+
+/// Row-major samples as a slice.
+pub(super) fn slice<'a, T: Element>(array: &'a PyReadonlyArrayDyn<'_, T>) -> PyResult<&'a [T]> {
+    array
+        .as_slice()
+        .map_err(|error| PyValueError::new_err(error.to_string()))
 }
 
 /// An error of the core as Python's.

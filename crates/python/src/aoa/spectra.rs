@@ -1,12 +1,12 @@
 //! Spectra over the direction.
 
-use aoa::{Array, Batch, PseudoSpectrum, Real};
+use aoa::{Array, PseudoSpectrum};
 use numpy::{AllowTypeChange, IxDyn, PyArray1, PyArrayDyn, PyArrayLike1, PyArrayMethods};
 use pyo3::exceptions::PyValueError;
 use pyo3::prelude::*;
 
 use super::calibrated_array;
-use super::samples::{Samples, Visitor, value_error};
+use super::samples::{Samples, for_antennas, value_error};
 
 /// Spectrum over the angle of arrival, to look at or to search oneself.
 ///
@@ -56,15 +56,19 @@ pub fn spectrum<'py>(
     let angles_rad = angles_rad.as_array().to_vec();
     let samples = Samples::of(snapshots)?;
     let shape = samples.shape([angles_rad.len()]);
-    let values = samples.visit(Looker {
-        kind,
-        angles_rad,
-        spacing_wavelengths,
-        forward_backward,
-        calibration,
-        py: snapshots.py(),
+    let py = snapshots.py();
+    let values: Vec<Vec<f64>> = for_antennas!(samples.antennas, N => {
+        let array = calibrated_array::<N>(spacing_wavelengths, calibration)?;
+        let ideal = Array::<N>::new(spacing_wavelengths).map_err(value_error)?;
+        samples.map::<N, _>(py, |item| {
+            let mut covariance = item.covariance()?.calibrated(&array);
+            if forward_backward {
+                covariance = covariance.forward_backward();
+            }
+            kind.at(&covariance, &ideal, &angles_rad)
+        })
     })?;
-    PyArray1::from_vec(snapshots.py(), values).reshape(IxDyn(&shape))
+    PyArray1::from_vec(py, values.concat()).reshape(IxDyn(&shape))
 }
 
 /// The spectrum of this name.
@@ -76,38 +80,5 @@ pub(super) fn kind_of(method: &str, sources: usize) -> PyResult<PseudoSpectrum> 
         other => Err(PyValueError::new_err(format!(
             "method must be 'bartlett', 'capon' or 'music', not '{other}'"
         ))),
-    }
-}
-
-struct Looker<'a, 'py> {
-    kind: PseudoSpectrum,
-    angles_rad: Vec<f64>,
-    spacing_wavelengths: f64,
-    forward_backward: bool,
-    calibration: Option<&'a Bound<'py, PyAny>>,
-    py: Python<'py>,
-}
-
-impl Visitor for Looker<'_, '_> {
-    type Output = Vec<f64>;
-
-    fn visit<T: Real, const N: usize>(self, batch: Batch<'_, T, N>) -> PyResult<Vec<f64>> {
-        let array = calibrated_array::<N>(self.spacing_wavelengths, self.calibration)?;
-        let ideal = Array::<N>::new(self.spacing_wavelengths).map_err(value_error)?;
-        let Self {
-            kind, angles_rad, ..
-        } = &self;
-        let spectra = self.py.detach(|| {
-            let mut values = Vec::with_capacity(batch.len() * angles_rad.len());
-            for covariance in batch.covariances() {
-                let mut covariance = covariance?.calibrated(&array);
-                if self.forward_backward {
-                    covariance = covariance.forward_backward();
-                }
-                values.extend(kind.at(&covariance, &ideal, angles_rad)?);
-            }
-            Ok(values)
-        });
-        spectra.map_err(|error: aoa::Error| value_error(error))
     }
 }

@@ -1,6 +1,6 @@
 //! Covariances, the number of sources, calibration, bounds.
 
-use aoa::{Array, Batch, Calibration, Complex64, Covariance, Criterion, Real};
+use aoa::{Array, Calibration, Complex64, Criterion};
 use numpy::{
     AllowTypeChange, IxDyn, PyArray1, PyArrayDyn, PyArrayLikeDyn, PyArrayMethods,
     PyUntypedArrayMethods,
@@ -9,7 +9,7 @@ use pyo3::IntoPyObjectExt;
 use pyo3::exceptions::PyValueError;
 use pyo3::prelude::*;
 
-use super::samples::{Samples, Visitor, value_error};
+use super::samples::{Samples, for_antennas, value_error};
 
 /// Sample covariance of the antennas, mean not removed.
 ///
@@ -36,25 +36,11 @@ pub fn covariance<'py>(
     let samples = Samples::of(snapshots)?;
     let shape = samples.shape([samples.antennas; 2]);
     let py = snapshots.py();
-    let entries = samples.visit(Entries(py))?;
+    let entries = for_antennas!(samples.antennas, N => {
+        let matrices = samples.map::<N, _>(py, |item| Ok(item.covariance()?.matrix()));
+        matrices.map(|it| it.into_flattened().into_flattened())
+    })?;
     PyArray1::from_vec(py, entries).reshape(IxDyn(&shape))
-}
-
-struct Entries<'py>(Python<'py>);
-
-impl Visitor for Entries<'_> {
-    type Output = Vec<Complex64>;
-
-    fn visit<T: Real, const N: usize>(self, batch: Batch<'_, T, N>) -> PyResult<Vec<Complex64>> {
-        let entries = self.0.detach(|| {
-            let mut entries = Vec::with_capacity(batch.len() * N * N);
-            for covariance in batch.covariances() {
-                entries.extend(covariance?.matrix().into_iter().flatten());
-            }
-            Ok(entries)
-        });
-        entries.map_err(|error: aoa::Error| value_error(error))
-    }
 }
 
 /// Forward–backward average of a covariance: ``(R + J conj(R) J) / 2``, ``J`` reversing the antennas.
@@ -148,27 +134,12 @@ pub fn estimate_sources<'py>(
             )));
         }
     };
-    let counts = samples.visit(Counts { criterion, py })?;
+    let counts: Vec<i64> = for_antennas!(samples.antennas, N => samples.map::<N, _>(py, |item| {
+        aoa::source_count(criterion, &item.covariance()?).map(|sources| sources as i64)
+    }))?;
     match (samples.batch, counts.as_slice()) {
         (None, [only]) => only.into_bound_py_any(py),
         _ => PyArray1::from_vec(py, counts).into_bound_py_any(py),
-    }
-}
-
-struct Counts<'py> {
-    criterion: Criterion,
-    py: Python<'py>,
-}
-
-impl Visitor for Counts<'_> {
-    type Output = Vec<i64>;
-
-    fn visit<T: Real, const N: usize>(self, batch: Batch<'_, T, N>) -> PyResult<Vec<i64>> {
-        let count = |covariance: Result<Covariance<N>, aoa::Error>| {
-            aoa::source_count(self.criterion, &covariance?).map(|sources| sources as i64)
-        };
-        let counts = (self.py).detach(|| batch.covariances().map(count).collect::<Result<_, _>>());
-        counts.map_err(value_error)
     }
 }
 
@@ -209,30 +180,15 @@ pub fn calibrate<'py>(
             "a reference burst has the shape (antennas, snapshots)",
         ));
     }
-    let gains = samples.visit(Reference {
-        angle_rad,
-        spacing_wavelengths,
+    let py = snapshots.py();
+    let gains = for_antennas!(samples.antennas, N => {
+        let array = Array::<N>::new(spacing_wavelengths).map_err(value_error)?;
+        let gains = samples.map::<N, _>(py, |item| {
+            let covariance = item.covariance()?;
+            let found = Calibration::from_reference_covariance(&covariance, &array, angle_rad)?;
+            Ok(*found.gains())
+        });
+        gains.map(Vec::into_flattened)
     })?;
-    Ok(PyArray1::from_vec(snapshots.py(), gains))
-}
-
-struct Reference {
-    angle_rad: f64,
-    spacing_wavelengths: f64,
-}
-
-impl Visitor for Reference {
-    type Output = Vec<Complex64>;
-
-    fn visit<T: Real, const N: usize>(self, batch: Batch<'_, T, N>) -> PyResult<Vec<Complex64>> {
-        let array = Array::<N>::new(self.spacing_wavelengths).map_err(value_error)?;
-        let mut gains = Vec::with_capacity(N);
-        for covariance in batch.covariances() {
-            let covariance = covariance.map_err(value_error)?;
-            let calibration =
-                Calibration::from_reference_covariance(&covariance, &array, self.angle_rad);
-            gains.extend_from_slice(calibration.map_err(value_error)?.gains());
-        }
-        Ok(gains)
-    }
+    Ok(PyArray1::from_vec(py, gains))
 }

@@ -31,11 +31,15 @@ use crate::recording::RecordingError;
 ///     From one burst set to the next, 0.005 to 0.16.
 /// search_every_s : float
 ///     How often is searched for cells and beams that are not yet tracked.
+/// cfo_ppm : float, optional
+///     Largest error of receiver's and cell's oscillators together, 20 without. Every frequency offset within it is
+///     searched until a cell is found: that of 20 ppm within a fifth of a second at 20 ms.
 ///
 /// Raises
 /// ------
 /// RecordingError
-///     A rate, band, number of antennas or setting that is not possible.
+///     A rate, band, number of antennas or setting that is not possible; a `cfo_ppm` beyond the 15
+///     subcarriers that can be searched.
 ///
 /// Examples
 /// --------
@@ -60,7 +64,8 @@ pub struct Receiver(Mutex<Core>);
 #[pymethods]
 impl Receiver {
     #[new]
-    #[pyo3(signature = (sample_rate_hz, *, centre_frequency_hz, ssb_freq_hz, scs_khz, antennas, period_s = 0.02, search_every_s = 1.0))]
+    #[pyo3(signature = (sample_rate_hz, *, centre_frequency_hz, ssb_freq_hz, scs_khz, antennas, period_s = 0.02, search_every_s = 1.0, cfo_ppm = None))]
+    #[allow(clippy::too_many_arguments)] // Python's keywords
     fn new(
         sample_rate_hz: f64,
         centre_frequency_hz: f64,
@@ -69,19 +74,16 @@ impl Receiver {
         antennas: usize,
         period_s: f64,
         search_every_s: f64,
+        cfo_ppm: Option<f64>,
     ) -> PyResult<Self> {
+        let usual = ReceiverConfig::new(ssb_freq_hz, subcarrier_spacing(scs_khz)?, antennas);
         let config = ReceiverConfig {
             period_s,
             search_every_s,
-            ..ReceiverConfig::new(
-                sample_rate_hz,
-                centre_frequency_hz,
-                ssb_freq_hz,
-                subcarrier_spacing(scs_khz)?,
-                antennas,
-            )
+            oscillator_ppm: cfo_ppm.unwrap_or(usual.oscillator_ppm),
+            ..usual
         };
-        Core::new(config)
+        Core::new(config, sample_rate_hz, centre_frequency_hz)
             .map(|receiver| Self(Mutex::new(receiver)))
             .map_err(receiver_error)
     }
@@ -96,7 +98,7 @@ impl Receiver {
     /// Returns
     /// -------
     /// list of Cell
-    ///     The SSBs that are complete with them; two periods at most are held back. `sample_start`
+    ///     The SSBs that are complete with them; what is searched is held back by 6 ms. `sample_start`
     ///     counts from the first sample of the stream. They have no angle.
     ///
     /// Raises
@@ -149,7 +151,7 @@ impl Receiver {
             let mut receiver = self.0.lock().unwrap_or_else(PoisonError::into_inner);
             let search = &receiver.config().search;
             let (ssb_freq_hz, spacing) = (search.ssb_freq_hz.unwrap_or_default(), search.spacing);
-            let base = receiver.config().sample_rate_hz / spacing.base_rate_hz();
+            let base = receiver.sample_rate_hz() / spacing.base_rate_hz();
             let mut cells = Vec::new();
             call(&mut receiver, &mut |ssb| {
                 cells.push(Cell::heard(ssb, ssb_freq_hz, spacing, base));

@@ -313,7 +313,7 @@ fn print_trace(drive: &Drive, poses: &[LocatedPose]) {
             c[1][1].sqrt(),
             wrap_angle(is.heading_rad - truth.heading_rad),
             c[2][2].sqrt(),
-            pose.calibration.map(|it| it.mounting.by_rad),
+            pose.constants.map(|it| it.mounting_rad.departure()),
         );
     }
 }

@@ -13,7 +13,6 @@ use crate::file::Partial;
 use crate::replay::{LocatedDrive, LocatedPose, Remark};
 use onboard::Execution;
 use onboard::localize::IntegrityState;
-use onboard::localize::ekf::Calibration;
 
 /// Topic of the poses.
 const POSE_TOPIC: &str = "/access_av/odometry";
@@ -127,7 +126,7 @@ fn diagnosis(pose: &LocatedPose, lately: &[&Execution]) -> DiagnosticStatus {
             DiagnosticLevel::Error,
             "no angle accepted in the last second",
         ),
-        _ if pose.calibration.is_some_and(|found| found.alarms()) => (
+        _ if pose.constants.is_some_and(|found| found.array_departs()) => (
             DiagnosticLevel::Warn,
             "the array's mounting or calibration does not hold",
         ),
@@ -142,11 +141,14 @@ fn diagnosis(pose: &LocatedPose, lately: &[&Execution]) -> DiagnosticStatus {
         ("accepted".to_owned(), accepted.to_string()),
         ("cells".to_owned(), format!("{cells:?}")),
     ];
-    if let Some(Calibration { mounting, phase }) = pose.calibration {
-        for (name, departure) in [("mounting_rad", mounting), ("phase_rad", phase)] {
+    if let Some(found) = pose.constants {
+        for (name, constant) in [
+            ("mounting_rad", found.mounting_rad),
+            ("phase_rad", found.phase_rad),
+        ] {
             // What is taken as surveyed has nothing to tell.
-            if departure.std_rad > 0.0 {
-                let value = format!("{:.4} ± {:.4}", departure.by_rad, departure.std_rad);
+            if constant.std > 0.0 {
+                let value = format!("{:.4} ± {:.4}", constant.departure(), constant.std);
                 values.push((name.to_owned(), value));
             }
         }

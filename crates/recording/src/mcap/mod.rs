@@ -1,6 +1,6 @@
 //! MCAP as ROS 2 tools write and read it: profile `ros2`, messages in CDR, schemas in `ros2msg`.
 //!
-//! Written are `nav_msgs/msg/Odometry` with covariance and twist, `diagnostic_msgs/msg/
+//! Written are `nav_msgs/msg/Odometry` with covariance and twist, `tf2_msgs/msg/TFMessage`, `diagnostic_msgs/msg/
 //! DiagnosticArray` and [`access_av_msgs/msg/AngleVerdict`](McapWriter::verdict); read are odometry and
 //! `sensor_msgs/msg/Imu`, of one file or of the files of a rosbag2 folder.
 

@@ -24,3 +24,8 @@ pub const VERDICT: Schema = Schema {
     name: "access_av_msgs/msg/AngleVerdict",
     definition: include_str!("definitions/access_av_msgs-AngleVerdict.msg"),
 };
+/// See its definition.
+pub const TRANSFORMS: Schema = Schema {
+    name: "tf2_msgs/msg/TFMessage",
+    definition: include_str!("definitions/tf2_msgs-TFMessage.msg"),
+};

@@ -3,7 +3,7 @@
 use onboard::BoxError;
 use onboard::estimator;
 use onboard::localize::ekf::EkfConfig;
-use onboard::receive::{Receiver, ReceiverConfig};
+use onboard::receive::ReceiverConfig;
 use onboard::settings::{Check, Site, Vehicle, check_together};
 use onboard::thermal::ThermalNoise;
 
@@ -39,18 +39,13 @@ pub fn estimate_angles(
     let file = &vehicle.name;
     check_together(site, vehicle, Check { file })?;
     let file = recording.data_file().display().to_string();
-    let receive_failed = |source| ReplayError::Receive {
-        file: file.clone(),
-        source,
-    };
     let config = ReceiverConfig::new(site, vehicle);
-    let mut receiver = Receiver::new(config).map_err(receive_failed)?;
     let custom = |error| ReplayError::Custom(BoxError::from(error));
     let mut estimator = estimator::built_in(vehicle).map_err(custom)?;
     let (measurand, thermal) = (vehicle.array.measurand(), ThermalNoise::new(site, vehicle));
     let scatter_rad = scatter_sigma_rad(site, vehicle);
     let mut found = RecordedAngles::default();
-    receive_recording(&mut receiver, recording, start_time_s, |observations| {
+    receive_recording(config, recording, start_time_s, |observations| {
         for observation in observations {
             let ssb = observation.ssb;
             let estimated = estimator.estimate(observation);

@@ -1,5 +1,6 @@
 //! A drive being replayed.
 
+use onboard::burst::{Burst, OfSsb, first_burst};
 use onboard::geometry::Pose;
 use onboard::localize::OdometryVerdict;
 use onboard::localize::Recovered;
@@ -8,7 +9,6 @@ use onboard::observation::OdometrySample;
 use onboard::settings::{Platform, Site, Vehicle};
 use onboard::{Custom, Execution, Onboard};
 
-use super::bursts::{Burst, OfSsb, first_burst};
 use super::error::ReplayError;
 use super::located::{Diagnosis, LocatedDrive, LocatedPose, Remark, gathered};
 use crate::library::load;
@@ -94,8 +94,8 @@ impl<'a> Replay<'a> {
     }
 
     /// Remarks on what the drive showed of the vehicle that its settings do not say.
-    fn remark_on_findings(&mut self) {
-        let Some(findings) = self.drive.findings else {
+    fn remark_on_constants(&mut self) {
+        let Some(constants) = self.drive.constants else {
             return;
         };
         if self.drive.suspicions().next().is_some() {
@@ -111,7 +111,7 @@ impl<'a> Replay<'a> {
             lateness_s,
             mounting_rad,
             ..
-        } = findings;
+        } = constants;
         if odometer_scale.is_remarkable(LEAST_SCALE) {
             let text = format!(
                 "the odometer reads {:.3} ± {:.3} m per metre driven; check odometer.scale",
@@ -174,8 +174,8 @@ impl<'a> Replay<'a> {
     /// [`ReplayError::Custom`].
     pub fn finish(mut self) -> Result<LocatedDrive, ReplayError> {
         self.odometry_until(f64::INFINITY)?;
-        self.drive.findings = self.onboard.findings();
-        self.remark_on_findings();
+        self.drive.constants = self.onboard.constants();
+        self.remark_on_constants();
         self.drive.remarks = gathered(self.drive.remarks);
         Ok(self.drive)
     }
@@ -282,7 +282,7 @@ impl<'a> Replay<'a> {
                 yaw_rate_radps: sample.yaw_rate_radps,
                 searching: self.onboard.searching(),
                 is_lost: self.onboard.is_lost(),
-                calibration: self.onboard.calibration(),
+                constants: self.onboard.constants(),
             });
         }
         Ok(())

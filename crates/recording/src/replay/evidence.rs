@@ -1,8 +1,8 @@
 //! How well a way of reading a drive predicts its angles, by the innovations of a localizer.
 
 use std::collections::{BTreeMap, BTreeSet};
-use std::f64::consts::TAU;
 
+use onboard::gaussian::with_outliers;
 use onboard::geometry::Pose;
 use onboard::localize::Localizer;
 
@@ -12,8 +12,9 @@ use super::innovations::{Met, Step, replay_angles};
 use super::stated::with_phase;
 use crate::angle_log::LoggedAngle;
 
-/// Share of angles that come from anywhere, by a reflection say; the others are Gaussian.
-const FROM_ANYWHERE: f64 = 0.1;
+/// Share of angles that come from anywhere, by a reflection say, where not even the settings are certain; the others
+/// are Gaussian.
+pub const OUTLIERS: f64 = 0.1;
 
 /// Angles to one radio head within this time count as one (s).
 const INDEPENDENT_S: f64 = 1.0;
@@ -81,7 +82,7 @@ impl Evidence {
         for (Step { met, .. }, logged) in steps.iter().zip(angles.iter()) {
             let sigma_rad = with_phase(logged, &measurand).measured.phase_sigma_rad;
             evidence.log_likelihood += log_likelihood(met.as_ref(), sigma_rad);
-            let misfits = |met: &Met| met.residual_rad.powi(2) > FITS * met.variance;
+            let misfits = |met: &Met| met.innovation.mahalanobis2() > FITS;
             let head = evidence.heads.entry(head_of(logged)).or_default();
             for count in [&mut evidence.all, head] {
                 count.angles += 1;
@@ -96,10 +97,8 @@ impl Evidence {
 
 /// Of an angle, per standard deviation of its measurement: so it does not matter in what it is told.
 fn log_likelihood(met: Option<&Met>, sigma_rad: f64) -> f64 {
-    let gaussian = met.map_or(0.0, |met| {
-        (-0.5 * met.residual_rad.powi(2) / met.variance).exp() / (TAU * met.variance).sqrt()
-    });
-    (sigma_rad * ((1.0 - FROM_ANYWHERE) * gaussian + FROM_ANYWHERE / TAU)).ln()
+    let density = met.map_or(0.0, |met| met.innovation.density());
+    (sigma_rad * with_outliers(density, OUTLIERS)).ln()
 }
 
 /// Share of the angles that count as independent.

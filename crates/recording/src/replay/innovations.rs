@@ -2,6 +2,7 @@
 
 use std::sync::Arc;
 
+use onboard::gaussian::Innovation;
 use onboard::geometry::Pose;
 use onboard::localize::ekf::EkfConfig;
 use onboard::localize::{self, Ekf, InitialPose, Localizer};
@@ -16,10 +17,8 @@ use crate::odometry::OdometryLog;
 /// An angle as the localizer met it.
 #[derive(Debug, Clone, Copy, PartialEq)]
 pub struct Met {
-    /// Measured electrical angle minus the predicted one (rad).
-    pub residual_rad: f64,
-    /// Variance of that as the localizer believes it (rad²).
-    pub variance: f64,
+    /// Of the electrical angle (rad).
+    pub innovation: Innovation,
     /// Whether the localizer used it.
     pub used: bool,
 }
@@ -32,7 +31,7 @@ pub struct Step {
     pub met: Option<Met>,
 }
 
-/// Drives with a tracker that neither searches nor guards itself, and tells what it met; `None` for
+/// Drives with a filter that neither searches nor guards itself, and tells what it met; `None` for
 /// an angle that told it nothing. Where `used` says which angles count, exactly those do, however
 /// far they are from what was expected; without, its gate decides.
 ///
@@ -48,15 +47,15 @@ pub fn innovations(
     angles: &[LoggedAngle],
     used: Option<&[bool]>,
 ) -> Result<Vec<Option<Met>>, ReplayError> {
-    let mut tracker = plain_filter(site, vehicle)?;
+    let mut ekf = plain_filter(site, vehicle)?;
     if used.is_some() {
-        tracker.set_gate(f64::INFINITY);
+        ekf.set_gate(f64::INFINITY);
     }
-    let steps = replay_angles(&mut tracker, site, vehicle, odometry, angles, used)?;
+    let steps = replay_angles(&mut ekf, site, vehicle, odometry, angles, used)?;
     Ok(steps.into_iter().map(|step| step.met).collect())
 }
 
-/// A tracker at the known start that neither searches nor guards itself.
+/// A filter at the known start that neither searches nor guards itself.
 ///
 /// # Errors
 /// As [`innovations`].
@@ -98,7 +97,7 @@ fn known_start(vehicle: &Vehicle) -> Result<Pose, ReplayError> {
 const MOST_LOST: f64 = 0.2;
 
 /// Drives with a localizer: its belief at each angle, and how it met it, up to where it was lost for
-/// long (a search costs as much as a hundred trackers).
+/// long (a search costs as much as a hundred filters).
 ///
 /// # Errors
 /// [`ReplayError::Custom`] where the localizer fails.
@@ -135,8 +134,7 @@ pub fn replay_angles(
                     .map_err(ReplayError::Custom)?
                     .accepted;
             step.met = innovation.map(|innovation| Met {
-                residual_rad: innovation.residual,
-                variance: innovation.variance,
+                innovation,
                 used: accepted,
             });
         }

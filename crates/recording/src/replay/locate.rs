@@ -6,7 +6,7 @@ use std::collections::BTreeMap;
 use onboard::geometry::Pose;
 use onboard::localize::UpdateReason;
 use onboard::observation::SensedSsb;
-use onboard::receive::{Receiver, ReceiverConfig};
+use onboard::receive::ReceiverConfig;
 use onboard::settings::{IntegritySettings, Site, Vehicle, WakeUpSettings};
 use onboard::{Custom, Execution};
 
@@ -14,11 +14,9 @@ use super::data_quality::warnings;
 use super::diagnosis::diagnose;
 use super::drive::Replay;
 use super::error::ReplayError;
-use super::evidence::HeadId;
 use super::hypotheses::Drive;
 use super::located::{LocatedDrive, LocatedPose};
 use super::receive::receive_recording;
-use super::sample_gaps::{SampleGap, lost_before_s, sample_gaps};
 use super::start::{StartChoice, starting};
 use super::stated::with_phase;
 use crate::angle_log::{AngleLog, LoggedAngle};
@@ -77,17 +75,10 @@ pub fn locate_recording(
     let (vehicle, start) = starting(site, vehicle, start)?;
     let mut replay = Replay::new(site, &vehicle, start, Custom::default(), odometry)?;
     let file = recording.data_file().display().to_string();
-    let mut receiver = Receiver::new(ReceiverConfig::new(site, &vehicle)).map_err(|source| {
-        ReplayError::Receive {
-            file: file.clone(),
-            source,
-        }
-    })?;
+    let config = ReceiverConfig::new(site, &vehicle);
     let (mut heard_s, mut together) = (None, false);
-    let mut times_s: Vec<(HeadId, f64)> = Vec::new();
-    receive_recording(&mut receiver, recording, start_time_s, |ssbs| {
+    let gaps = receive_recording(config, recording, start_time_s, |ssbs| {
         for it in ssbs {
-            times_s.push(((it.ssb.pci, it.ssb.ssb_index), it.ssb.time_s));
             let [first_s, _] = heard_s.unwrap_or([it.ssb.time_s; 2]);
             heard_s = Some([first_s, it.ssb.time_s]);
             together |= odometry.covers(it.ssb.time_s);
@@ -103,50 +94,21 @@ pub fn locate_recording(
     if heard_s.is_none() {
         return Err(ReplayError::NoSsb { file });
     }
-    let mut heard: Vec<LoggedAngle> = replay.executions().iter().filter_map(as_logged).collect();
-    let gaps = sample_gaps(&times_s);
-    if !gaps.is_empty() {
-        replay = relocate(site, &vehicle, start, odometry, &gaps, &mut heard)?;
+    for gap in gaps {
+        let text = format!(
+            "samples before {:.2} s: {:.2} ms are missing, by the times of the SSBs, and were added to \
+             the times of all that follow; write a capture with core:global_index after each gap",
+            gap.before_s,
+            1e3 * gap.lost_s
+        );
+        replay.remark(gap.before_s, text);
     }
+    let heard: Vec<LoggedAngle> = replay.executions().iter().filter_map(as_logged).collect();
     for warning in recording.warnings() {
         replay.remark(f64::NEG_INFINITY, warning.to_string());
     }
     explain(&mut replay, site, &in_time(&vehicle), odometry, &heard)?;
     finish(replay, site, &vehicle, start, odometry, smooth)
-}
-
-/// Locates a drive once more, by the angles that were heard, in whose recording samples are missing:
-/// each at the time that the SSBs tell.
-fn relocate<'a>(
-    site: &Site,
-    vehicle: &Vehicle,
-    start: Pose,
-    odometry: &'a OdometryLog,
-    gaps: &[SampleGap],
-    heard: &mut [LoggedAngle],
-) -> Result<Replay<'a>, ReplayError> {
-    for angle in heard.iter_mut() {
-        let late_s = lost_before_s(gaps, angle.ssb.time_s);
-        angle.ssb.time_s += late_s;
-        angle.measured.time_s += late_s;
-    }
-    let all_heard = Vehicle {
-        wake_up: Some(WakeUpSettings::EVERY_SSB),
-        ..in_time(vehicle)
-    };
-    let mut replay = Replay::new(site, &all_heard, start, Custom::default(), odometry)?;
-    for gap in gaps {
-        let [_, at_s] = gap.between_s;
-        let text = format!(
-            "samples at {:.2} s: {:.2} ms are missing, by the times of the SSBs, and were added to \
-             the times of all that follow; write a capture with core:global_index after each gap",
-            at_s,
-            1e3 * gap.lost_s
-        );
-        replay.remark(at_s, text);
-    }
-    replay.hear(heard)?;
-    Ok(replay)
 }
 
 /// Takes in the rest of the odometry, and says what is wrong with the drive as it was given.

@@ -5,7 +5,7 @@ use std::collections::btree_map::Entry;
 
 use onboard::Execution;
 use onboard::localize::PoseEstimate;
-use onboard::localize::ekf::{Calibration, EstimatedConstants};
+use onboard::localize::ekf::EstimatedConstants;
 
 /// Where the vehicle was at one instant.
 #[derive(Debug, Clone, Copy, PartialEq)]
@@ -22,7 +22,7 @@ pub struct LocatedPose {
     /// Whether the angles came from elsewhere than expected, so that the pose is not to be relied on.
     pub is_lost: bool,
     /// How far the array has come from its survey.
-    pub calibration: Option<Calibration>,
+    pub constants: Option<EstimatedConstants>,
 }
 
 /// What is remarkable about one item of the input.
@@ -73,7 +73,7 @@ pub struct LocatedDrive {
     /// The poses as seen from the end of the drive, from the first known one on, where asked for.
     pub smoothed: Vec<LocatedPose>,
     /// What the drive showed of the vehicle by its end, where the localizer looks for it.
-    pub findings: Option<EstimatedConstants>,
+    pub constants: Option<EstimatedConstants>,
     /// What was remarkable about single items of the input, in order of time.
     pub remarks: Vec<Remark>,
     /// What is wrong with the input as it was given; these are among the remarks too.

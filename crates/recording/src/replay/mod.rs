@@ -1,7 +1,6 @@
 //! A recorded drive through the pipeline: odometry and SSBs, or angles, in order of time.
 
 mod angles;
-mod bursts;
 mod data_quality;
 mod diagnosis;
 mod drive;
@@ -13,7 +12,6 @@ mod locate;
 mod located;
 mod moved_head;
 mod receive;
-mod sample_gaps;
 mod start;
 mod stated;
 mod yaw_rate;
@@ -24,6 +22,6 @@ pub use error::ReplayError;
 pub use innovations::{Met, innovations};
 pub use locate::{locate_angles, locate_recording};
 pub use located::{Diagnosis, LocatedDrive, LocatedPose, Remark};
-pub use receive::receive_recording;
+pub use receive::{UntoldGap, receive_recording};
 pub use start::{StartChoice, starting};
-pub use stated::as_stated;
+pub use stated::{as_stated, with_phase};

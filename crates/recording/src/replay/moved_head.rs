@@ -1,16 +1,12 @@
 //! Where a radio head stands by its own angles, along a path that the others tell.
 
-use std::f64::consts::TAU;
-
+use onboard::gaussian::{Innovation, with_outliers};
 use onboard::geometry::{Point, Pose, wrap_angle};
 use onboard::manifold::Measurand;
 
-use super::evidence::{HeadId, head_of};
+use super::evidence::{HeadId, OUTLIERS, head_of};
 use super::hypotheses::Drive;
 use super::stated::with_phase;
-
-/// Share of angles that come from anywhere.
-const FROM_ANYWHERE: f64 = 0.1;
 
 /// What the path adds to an angle's deviation (rad).
 const PATH_STD_RAD: f64 = 0.1;
@@ -106,10 +102,12 @@ fn log_likelihood(sighted: &[Sighted], place: Point, rise_m: f64, measurand: &Me
         let ground_m = it.from.distance_m(place);
         let level = ground_m / ground_m.hypot(rise_m).max(f64::MIN_POSITIVE);
         let predicted = measurand.value_rad(it.from.bearing_rad(place) - it.axis_rad, level);
-        let residual = wrap_angle(it.phase_rad - predicted);
-        let gaussian =
-            (-0.5 * residual * residual / it.variance).exp() / (TAU * it.variance).sqrt();
-        ((1.0 - FROM_ANYWHERE) * gaussian + FROM_ANYWHERE / TAU).ln()
+        let innovation = Innovation {
+            residual: wrap_angle(it.phase_rad - predicted),
+            variance: it.variance,
+            measurement_variance: it.variance,
+        };
+        with_outliers(innovation.density(), OUTLIERS).ln()
     };
     sighted.iter().map(of_angle).sum()
 }

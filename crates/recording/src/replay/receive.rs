@@ -1,10 +1,11 @@
 //! A recording through the receiver, block by block. A recording that was switched off between the
 //! bursts has a capture for each stretch, with its place in time in `core:global_index`.
 
-use nr_ssb::front_end::FrontEnd;
+use nr_ssb::receiver::ReceiverError;
 use num_complex::Complex32;
+use onboard::live::{LiveError, SampleStream, StreamConfig};
 use onboard::observation::SsbObservation;
-use onboard::receive::{ReceiveError, Receiver, SSB_SAMPLES, Window};
+use onboard::receive::{ReceiveError, ReceiverConfig};
 
 use super::error::ReplayError;
 use crate::sigmf::{Capture, Recording};
@@ -21,80 +22,88 @@ struct Stretch {
     global_index: u64,
 }
 
-/// Receives a whole recording and hands the SSBs to `take`, in order of time, those of a block at
-/// once.
+/// Samples that are missing from a recording and that it says nothing of, by the times of its SSBs.
+#[derive(Debug, Clone, Copy, PartialEq)]
+pub struct UntoldGap {
+    /// Time of the first SSB after it, in seconds; it and all later times are corrected.
+    pub before_s: f64,
+    /// How long it is, but for whole periods of the SSB, in seconds.
+    pub lost_s: f64,
+}
+
+/// Receives a whole recording and hands the SSBs to `take`, those of a burst at once, in order of time. The
+/// gaps that the recording does not tell of are returned.
 ///
 /// # Errors
 /// [`ReplayError`] when the recording cannot be read or does not suit the receiver, and whatever
 /// `take` fails with.
 pub fn receive_recording(
-    receiver: &mut Receiver,
+    config: ReceiverConfig,
     recording: &mut Recording,
     start_time_s: f64,
     mut take: impl FnMut(&[SsbObservation]) -> Result<(), ReplayError>,
-) -> Result<(), ReplayError> {
+) -> Result<Vec<UntoldGap>, ReplayError> {
     let file = recording.data_file().display().to_string();
-    let receive_failed = |source| ReplayError::Receive {
-        file: file.clone(),
-        source,
+    let failed = |error| match error {
+        LiveError::Receive(ReceiveError::Ssb(ReceiverError::FrontEnd(source))) => {
+            ReplayError::FrontEnd {
+                file: file.clone(),
+                source,
+            }
+        }
+        LiveError::Receive(source) => ReplayError::Receive {
+            file: file.clone(),
+            source,
+        },
+        other => ReplayError::Custom(other.into()),
     };
-    let elements = usize::from(receiver.config().array.elements);
+    let elements = usize::from(config.array.elements);
     let found = recording.channels();
     if found != elements {
-        return Err(receive_failed(ReceiveError::Antennas { found, elements }));
+        let error = ReceiveError::Antennas { found, elements };
+        return Err(failed(error.into()));
     }
-    let front_end_failed = |source| ReplayError::FrontEnd {
-        file: file.clone(),
-        source,
-    };
     let rate_hz = recording.sample_rate_hz();
-    let spacing = receiver.config().spacing;
-    let ssb_freq_hz = receiver.config().ssb_freq_hz;
     // Where the recording does not say, the SSB was tuned to.
-    let centre_hz = recording.centre_frequency_hz().unwrap_or(ssb_freq_hz);
-    let mut front_end = FrontEnd::new(rate_hz, ssb_freq_hz - centre_hz, spacing.hz(), elements)
-        .map_err(front_end_failed)?;
-    let ratio = front_end.input_per_output();
+    let centre_hz = recording.centre_frequency_hz();
+    let centre_hz = centre_hz.unwrap_or(config.ssb_freq_hz);
+    let stream = StreamConfig { rate_hz, centre_hz };
+    let mut stream = SampleStream::new(stream, config).map_err(&failed)?;
     let block = ((BLOCK_S * rate_hz) as u64).max(1);
     let mut raw = Vec::new();
-    let mut observations: Vec<SsbObservation> = Vec::new();
+    let (mut gaps, mut untold_s) = (Vec::new(), 0.0);
+    let mut hear = |stream: &mut SampleStream| {
+        while let Some(first) = stream.burst().first() {
+            let before_s = first.ssb.time_s;
+            let burst = stream.burst();
+            take(burst)?;
+            let number = burst.len();
+            stream.forget(number);
+            let lost_s = stream.counts().untold_s - untold_s;
+            if lost_s > 0.0 {
+                gaps.push(UntoldGap { before_s, lost_s });
+                untold_s += lost_s;
+            }
+        }
+        Ok::<(), ReplayError>(())
+    };
     for stretch in stretches(recording) {
-        let mut base: Vec<Vec<Complex32>> = vec![Vec::new(); elements];
-        let mut base_start = (stretch.global_index as f64 / ratio).round() as u64;
         let mut at = stretch.from;
         while at < stretch.to {
             let count = block.min(stretch.to - at);
             recording.read(at, count as usize, &mut raw)?;
+            let sample = stretch.global_index + (at - stretch.from);
+            let antennas: Vec<&[Complex32]> = raw.iter().map(Vec::as_slice).collect();
+            let time_s = start_time_s + sample as f64 / rate_hz;
+            stream.push(time_s, &antennas, false).map_err(&failed)?;
             at += count;
-            front_end.push(&raw, &mut base).map_err(front_end_failed)?;
-            if at == stretch.to {
-                front_end.finish(&mut base);
-            }
-            let antennas: Vec<&[Complex32]> = base.iter().map(Vec::as_slice).collect();
-            let window = Window {
-                start: base_start,
-                time_s: start_time_s + base_start as f64 / spacing.base_rate_hz(),
-                antennas: &antennas,
-            };
-            observations.clear();
-            receiver
-                .receive(&window, |observation| {
-                    observations.push(observation.clone());
-                })
-                .map_err(receive_failed)?;
-            observations.sort_by(|a, b| a.ssb.time_s.total_cmp(&b.ssb.time_s));
-            take(&observations)?;
-            let length = base.first().map_or(0, Vec::len);
-            let gone = length.saturating_sub(2 * SSB_SAMPLES);
-            for samples in &mut base {
-                samples.drain(..gone);
-            }
-            base_start += gone as u64;
+            hear(&mut stream)?;
         }
     }
-    Ok(())
+    stream.break_off().map_err(&failed)?;
+    hear(&mut stream)?;
+    Ok(gaps)
 }
-
 fn stretches(recording: &Recording) -> Vec<Stretch> {
     let captures = &recording.metadata().captures;
     let global_index = |capture: &Capture| {

@@ -7,7 +7,7 @@ use onboard::settings::{DriveKind, Site, Vehicle};
 
 use crate::angle_log::LoggedAngle;
 
-/// Share of a stated variance that stays from look to look. On the sensors that were looked into,
+/// Share of a stated variance that stays from angle to angle. On the sensors that were looked into,
 /// cameras and a laser, whose data sheets are cautious, it is 0.08 to 0.2.
 const USUAL_SHARE: f64 = 0.25;
 

@@ -5,14 +5,14 @@ mod array_view;
 mod diagnosis;
 mod error;
 mod iq_source;
-mod looked;
 mod scanner;
+mod search_scope;
 mod ssb_search;
 
 pub use array_view::{ArraySetup, FoundAngle};
 pub use diagnosis::ChannelFault;
 pub use error::ScanError;
 pub use iq_source::{IqSource, SampleBlock};
-pub use looked::{Looked, Places};
 pub use scanner::{Scan, ScanSettings, scan};
+pub use search_scope::{Places, SearchScope};
 pub use ssb_search::{FoundSsb, SsbSearch, SsbSearchConfig};

@@ -8,10 +8,10 @@ use super::array_view::ArraySetup;
 use super::diagnosis::{ChannelFault, ExchangeVotes, faults_of_samples};
 use super::error::ScanError;
 use super::iq_source::IqSource;
-use super::looked::{Looked, Places};
+use super::search_scope::{Places, SearchScope};
 use super::ssb_search::{BLOCK_S, FALSE_ALARM, FoundSsb, SsbSearch, SsbSearchConfig};
 
-/// Looked through for unknown frequencies, in two steps: the usual period, and the longest (TS
+/// Searched for unknown frequencies, in two steps: the usual period, and the longest (TS
 /// 38.331).
 const WINDOWS_S: [f64; 2] = [0.02, 0.16];
 /// Off the raster, work grows with duration and with the bandwidth's square: 20 ms at 46 Msps are
@@ -41,8 +41,8 @@ pub struct Scan {
     pub ssbs: Vec<FoundSsb>,
     /// What is wrong with single channels.
     pub faults: Vec<ChannelFault>,
-    /// Where was looked.
-    pub looked: Vec<Looked>,
+    /// Where was searched.
+    pub searched: Vec<SearchScope>,
 }
 
 /// Finds every SSB of a recording, in order of time.
@@ -77,15 +77,17 @@ pub fn scan(source: &mut dyn IqSource, settings: &ScanSettings) -> Result<Scan, 
     let places = if let Some(hz) = settings.ssb_freq_hz {
         let places = given_places(rate_hz, hz, settings.spacing);
         let duration_s = source.length() as f64 / rate_hz;
-        found.looked.extend(places.iter().map(|place| Looked {
-            spacing: place.spacing,
-            places: Places::Given {
-                ssb_freq_hz: hz,
-                cfo_hz: cfo_range_hz(settings, place),
-            },
-            duration_s,
-            channels: slices.len(),
-        }));
+        found
+            .searched
+            .extend(places.iter().map(|place| SearchScope {
+                spacing: place.spacing,
+                places: Places::Given {
+                    ssb_freq_hz: hz,
+                    cfo_hz: cfo_range_hz(settings, place),
+                },
+                duration_s,
+                channels: slices.len(),
+            }));
         places
     } else {
         let faults = found.faults.iter();
@@ -96,7 +98,7 @@ pub fn scan(source: &mut dyn IqSource, settings: &ScanSettings) -> Result<Scan, 
             spacing: settings.spacing,
             sound_channel: sound.unwrap_or(0),
         };
-        search.places(source, &mut found.looked)?
+        search.places(source, &mut found.searched)?
     };
     // Shared among the places looked at.
     let false_alarm = FALSE_ALARM / places.len() as f64;
@@ -175,7 +177,7 @@ impl BandSearch {
     fn places(
         &self,
         source: &mut dyn IqSource,
-        looked: &mut Vec<Looked>,
+        searched: &mut Vec<SearchScope>,
     ) -> Result<Vec<Place>, ScanError> {
         let rate_hz = source.sample_rate_hz();
         let file = source.name();
@@ -214,40 +216,40 @@ impl BandSearch {
             );
             finds.retain(|find| self.spacing.is_none_or(|it| it == find.spacing));
             places = finds.iter().map(Place::from).collect();
-            *looked = self.looked(rate_hz, [count, one[0].len()], slices.len());
+            *searched = self.scopes(rate_hz, [count, one[0].len()], slices.len());
         }
         Ok(places)
     }
 
     /// What looking at so many samples, on the raster and off it, comes to.
-    fn looked(&self, rate_hz: f64, samples: [usize; 2], channels: usize) -> Vec<Looked> {
+    fn scopes(&self, rate_hz: f64, samples: [usize; 2], channels: usize) -> Vec<SearchScope> {
         let [on_raster_s, off_raster_s] = samples.map(|samples| samples as f64 / rate_hz);
         let range = SubcarrierSpacing::of_range(self.centre_hz.unwrap_or(0.0));
         let spacings = range.into_iter().filter(|one| {
             self.spacing.is_none_or(|it| it == *one) && raster::reach_hz(rate_hz, *one) >= 0.0
         });
-        let mut looked = Vec::new();
+        let mut scopes = Vec::new();
         for spacing in spacings {
             let centre_hz = self.centre_hz.unwrap_or(0.0);
             let reach_hz = raster::reach_hz(rate_hz, spacing);
             let (low_hz, high_hz) = (centre_hz - reach_hz, centre_hz + reach_hz);
             if self.centre_hz.is_some() {
                 let points = raster::synchronization_raster(low_hz, high_hz).count();
-                looked.push(Looked {
+                scopes.push(SearchScope {
                     spacing,
                     places: Places::Raster(points),
                     duration_s: on_raster_s,
                     channels,
                 });
             }
-            looked.push(Looked {
+            scopes.push(SearchScope {
                 spacing,
                 places: Places::Anywhere { low_hz, high_hz },
                 duration_s: off_raster_s,
                 channels: 1,
             });
         }
-        looked
+        scopes
     }
 }
 

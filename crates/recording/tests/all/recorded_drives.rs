@@ -310,7 +310,8 @@ fn angle_logs_come_back_and_bad_lines_are_left_out() {
             resolved: true,
         },
     };
-    let angles = [angle(0.0), angle(0.02)];
+    let mut angles = [angle(0.0), angle(0.02)];
+    angles[1].measured.resolved = false;
     write_angle_log(&file, &angles).unwrap();
     assert_eq!(read_angle_log(&file).unwrap().angles, angles);
 
@@ -318,7 +319,7 @@ fn angle_logs_come_back_and_bad_lines_are_left_out() {
     let bad = "0.04,1008,0,0,0.1,1,0\n0.04,1,-1,0,0.1,1,0\n0.04,1,0,0,-0.1,1,0\n0.04,1,0,0,0,1,0\n\
                0.04,1,0,NaN,0.1,1,0\n0.04,1,0,0,inf,1,0\n0.04,1,0,,0.1,1,0\n0.04,1.5,0,0,0.1,1,0\n\
                1.7e18,1,0,0,0.1,1,0\n";
-    fs::write(&file, good + bad).unwrap();
+    fs::write(&file, good + &bad.replace('\n', ",1\n")).unwrap();
     let log = read_angle_log(&file).unwrap();
     assert_eq!(log.angles, angles);
     let lines: Vec<usize> = log.remarks.iter().map(|remark| remark.line).collect();

@@ -1,5 +1,7 @@
 //! Scanning recordings: the real ones, and every kind of unsuitable one.
 
+use aoa::Verdict;
+
 use crate::common;
 use nr_ssb::diagnose::Fault;
 use nr_ssb::{BchPayload, Beam, Burst, Case, Lmax, Mib, Numerology, Ofdm, Pci, SubcarrierSpacing};
@@ -134,7 +136,13 @@ fn cells_under_a_stronger_one_have_angles_and_know_how_good_they_are() {
         for ((pci, phase_rad, _), square) in cells.iter().zip(&mut squares) {
             let cell = found.iter().find(|it| it.ssb.pci.get() == *pci).unwrap();
             let angle = cell.angle.unwrap().from_row().unwrap();
-            assert!(angle.is_resolved(), "trial {trial}: {pci} {angle:?}");
+            // Cells that send at once are sources more than the one that is asked for, and may be said to be.
+            let verdict = angle.verdict;
+            let is_seen = matches!(verdict, Verdict::Unresolved(reason) if reason.is_misfit());
+            assert!(
+                verdict == Verdict::Resolved || is_seen,
+                "trial {trial}: {pci} {angle:?}"
+            );
             *square += ((angle.phase_rad - phase_rad) / angle.phase_sigma_rad).powi(2);
         }
     }
@@ -294,7 +302,7 @@ fn a_scan_says_where_it_has_looked() {
     source.centre_frequency_hz = Some(3_699.84e6);
     let looked = |found: recording::scan::Scan| -> Vec<String> {
         assert!(found.ssbs.is_empty());
-        found.looked.iter().map(ToString::to_string).collect()
+        found.searched.iter().map(ToString::to_string).collect()
     };
     let found = scan(&mut source, &ScanSettings::default()).unwrap();
     assert_eq!(

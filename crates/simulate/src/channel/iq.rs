@@ -68,6 +68,13 @@ pub struct IqBurst {
 }
 
 impl IqAir {
+    /// Frequency offset that the oscillators give the SSB of radio head `index`, in Hz; that of its speed
+    /// comes on top, path by path.
+    pub fn cfo_hz(&self, index: usize) -> f64 {
+        let oscillator = self.head_oscillators.get(index).copied().unwrap_or(0.0);
+        (oscillator - self.oscillator) * self.ssb_freq_hz
+    }
+
     /// The air of the run that `streams` belongs to. What it sends is as the site plans it; where
     /// from and how strong the channels say.
     ///
@@ -81,7 +88,8 @@ impl IqAir {
         let settings = scenario.iq;
         let mut hardware = streams.generator(Purpose::ReceiverHardware, 0);
         let mut normal = || hardware.sample::<f64, _>(StandardNormal);
-        let oscillator = 1e-6 * settings.oscillator_ppm * normal();
+        let drawn_ppm = settings.oscillator_ppm * normal();
+        let oscillator = 1e-6 * settings.oscillator_error_ppm.unwrap_or(drawn_ppm);
         let channel_gains = (0..elements).map(|_| {
             let gain = 10f64.powf(0.05 * settings.channel_gain_db * normal());
             Complex64::from_polar(gain, settings.channel_phase_rad * normal())
@@ -223,8 +231,7 @@ impl IqAir {
         let place = (start - self.burst.start as f64).floor();
         // What is left of the delay becomes a phase ramp over the subcarriers.
         let fraction = start - self.burst.start as f64 - place;
-        let oscillator = self.head_oscillators.get(index).copied().unwrap_or(0.0);
-        let cfo = (oscillator - self.oscillator) * self.ssb_freq_hz / rate_hz;
+        let cfo = self.cfo_hz(index) / rate_hz;
         let symbol_len = self.numerology.ssb_symbol_len();
         let elements = self.channel_gains.len();
         for (l, subcarriers) in grid.symbols().enumerate() {

@@ -11,7 +11,11 @@ pub struct IqSettings {
     /// once per run. It shifts the carrier and stretches the sampling clock alike.
     #[schemars(range(min = 0.0, max = 20.0))]
     pub oscillator_ppm: f64,
-    /// The same of each radio head's (TS 38.104 allows 0.05).
+    /// Its error itself in place of one that is drawn; positive is too fast.
+    #[serde(skip_serializing_if = "Option::is_none")]
+    #[schemars(range(min = -60.0, max = 60.0))]
+    pub oscillator_error_ppm: Option<f64>,
+    /// Standard deviation of the error of each radio head's (TS 38.104 allows 0.05).
     #[schemars(range(min = 0.0, max = 0.2))]
     pub head_oscillator_ppm: f64,
     /// Bits of the converter, for each of I and Q.
@@ -32,6 +36,7 @@ impl Default for IqSettings {
     fn default() -> Self {
         Self {
             oscillator_ppm: 0.5,
+            oscillator_error_ppm: None,
             head_oscillator_ppm: 0.02,
             adc_bits: 12,
             adc_headroom_db: 12.0,

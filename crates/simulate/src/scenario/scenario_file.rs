@@ -70,7 +70,7 @@ pub enum Fidelity {
     Iq,
 }
 
-fn named_or_held<T: JsonSchema>(generator: &mut SchemaGenerator) -> Schema {
+pub(super) fn named_or_held<T: JsonSchema>(generator: &mut SchemaGenerator) -> Schema {
     let held = generator.subschema_for::<T>();
     json_schema!({
         "oneOf": [
@@ -169,7 +169,7 @@ impl TomlFile for Scenario {
 }
 
 /// Puts a site or vehicle in the place of its name.
-fn hold<T: TomlFile>(
+pub(super) fn hold<T: TomlFile>(
     table: &mut Table,
     origin: &str,
     library: &dyn Library,

@@ -115,7 +115,7 @@ fn a_localizer_of_ones_own_drives_and_may_give_up() {
             .point()
             .distance_m(record.steps[0].truth.point());
         assert!((straight_m - 300.0).abs() < 5.0, "{straight_m}");
-        assert_eq!((last.covariance, record.calibration), (None, None));
+        assert_eq!((last.covariance, record.constants), (None, None));
 
         let error = run_with(&scenario, &straight_on(100)).unwrap_err();
         assert!(

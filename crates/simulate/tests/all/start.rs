@@ -1,8 +1,8 @@
 //! Starts from scratch: the vehicle is somewhere on its road and finds out where.
 
 use crate::common;
+use onboard::gaussian::principal_variances;
 use onboard::localize::IntegrityState;
-use onboard::localize::gaussian::principal_variances;
 use onboard::settings::{Check, SettingsError, Shipped, TomlFile};
 use rand::Rng as _;
 use recording::replay::{LocatedDrive, StartChoice, locate_angles};

@@ -1,6 +1,5 @@
 //! The tracker on simulated drives.
 
-use onboard::localize::ekf::Calibration;
 use onboard::settings::{ArraySettings, GyroscopeSettings};
 use simulate::bound::Bound;
 use simulate::random::Streams;
@@ -236,19 +235,19 @@ fn mounting_and_calibration_are_found_while_driving() {
         for run in 0..runs {
             let record = simulation.run(SEED, run, NONE).unwrap();
             let truth = array_at_the_end(&simulation, run);
-            let Calibration { mounting, phase } = record.calibration.unwrap();
-            for (sum, (found, truth)) in normalised
-                .iter_mut()
-                .zip([(mounting, truth.mounting_rad), (phase, truth.phase_rad)])
-            {
-                let error = (found.by_rad - truth) / found.std_rad;
+            let found = record.constants.unwrap();
+            for (sum, (found, truth)) in normalised.iter_mut().zip([
+                (found.mounting_rad, truth.mounting_rad),
+                (found.phase_rad, truth.phase_rad),
+            ]) {
+                let error = (found.departure() - truth) / found.std;
                 // 64 draws are beyond four standard deviations with a probability of 0.4 %.
                 assert!(error.abs() < 4.0, "{found:?} {truth}");
-                assert!(found.std_rad < 0.5 * found.surveyed_std_rad, "{found:?}");
+                assert!(found.std < 0.5 * found.stated_std, "{found:?}");
                 *sum += error * error / runs as f64;
             }
-            let holds = !record.calibration.unwrap().alarms();
-            assert!(holds || drifting > 0.0, "{:?}", record.calibration);
+            let holds = !found.array_departs();
+            assert!(holds || drifting > 0.0, "{found:?}");
         }
         // The mean of squared standard normals deviates by √(2/n).
         for mean in normalised {
@@ -277,11 +276,11 @@ fn an_array_that_has_left_its_survey_is_noticed() {
     for run in 0..8 {
         let found = simulation.run(SEED, run, NONE).unwrap();
         let off_rad = array_at_the_end(&simulation, run).phase_rad;
-        let found = found.calibration.unwrap();
+        let found = found.constants.unwrap();
         // The alarm is for departures beyond 3 · (0.01 + σ); σ may err by four of itself.
-        let limit_rad = 3.0 * (0.01 + found.phase.std_rad);
-        if off_rad.abs() > limit_rad + 4.0 * found.phase.std_rad {
-            assert!(found.alarms(), "{off_rad} {found:?}");
+        let limit_rad = 3.0 * (0.01 + found.phase_rad.std);
+        if off_rad.abs() > limit_rad + 4.0 * found.phase_rad.std {
+            assert!(found.array_departs(), "{off_rad} {found:?}");
             noticed += 1;
         }
     }

@@ -1,8 +1,8 @@
 //! The uncertainty-driven wake-up on simulated drives: what it saves, and that it keeps its bound.
 
 use crate::common;
-use onboard::localize::RadialQuantile;
-use onboard::localize::gaussian::principal_variances;
+use onboard::gaussian::RadialQuantile;
+use onboard::gaussian::principal_variances;
 use onboard::settings::{Shipped, TomlFile, UncertaintySettings, WakeUpSettings};
 use simulate::scenario::Scenario;
 use simulate::{RunRecord, RunSummary, Step};

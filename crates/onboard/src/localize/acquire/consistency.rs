@@ -1,7 +1,7 @@
 //! Whether the innovations of most radio heads are consistent with the filter.
 
 use crate::clone_in_place::clone_in_place;
-use crate::localize::measurement::{UpdateReason, UpdateVerdict};
+use crate::localize::output::{UpdateReason, UpdateVerdict};
 use crate::radio_head::RadioHead;
 
 /// Weight of the newest angle of a radio head.

@@ -10,14 +10,13 @@ use std::f64::consts::TAU;
 use std::sync::Arc;
 
 use crate::clone_in_place::clone_in_place;
-use crate::geometry::{Point, Pose, wrap_angle};
+use crate::geometry::{Area, Point, Pose, wrap_angle};
 use crate::localize::ekf::state::{ACROSS, ALONG, HEADING, STATES};
 use crate::localize::ekf::{Ekf, EkfConfig};
-use crate::localize::measurement::{
-    AngleMeasurement, OdometryVerdict, UpdateReason, UpdateVerdict,
-};
 use crate::localize::modes::log_likelihood;
-use crate::localize::pose_estimate::{InitialPose, PoseEstimate};
+use crate::localize::output::{InitialPose, PoseEstimate};
+use crate::localize::output::{OdometryVerdict, UpdateReason, UpdateVerdict};
+use crate::observation::AngleMeasurement;
 use crate::observation::OdometrySample;
 use crate::radio_head::RadioHead;
 use crate::road::Road;
@@ -47,57 +46,6 @@ const MOST_HYPOTHESES: f64 = 4000.0;
 /// angles may make it the best, and where it is is then five deviations away at most.
 const LEAST_WEIGHT: f64 = 0.05;
 
-/// A rectangle along the axes of the map.
-#[derive(Clone, Copy, Debug, PartialEq)]
-pub struct Area {
-    from: Point,
-    to: Point,
-}
-
-impl Area {
-    /// The square with this middle.
-    pub fn around(middle: Point, half_side_m: f64) -> Self {
-        Self {
-            from: Point::new(middle.x_m - half_side_m, middle.y_m - half_side_m),
-            to: Point::new(middle.x_m + half_side_m, middle.y_m + half_side_m),
-        }
-    }
-
-    /// Where the radio heads are, and a quarter of that to each side.
-    pub fn of_heads(heads: &[RadioHead]) -> Self {
-        let bounds = |along: fn(&RadioHead) -> f64| {
-            let values = || heads.iter().map(along);
-            let least = values().fold(f64::INFINITY, f64::min);
-            let most = values().fold(f64::NEG_INFINITY, f64::max);
-            (least, most)
-        };
-        let (west, east) = bounds(|head| head.position.x_m);
-        let (south, north) = bounds(|head| head.position.y_m);
-        let margin_m = 0.25 * (east - west).max(north - south);
-        Self {
-            from: Point::new(west - margin_m, south - margin_m),
-            to: Point::new(east + margin_m, north + margin_m),
-        }
-    }
-
-    /// Distance between places of which there are at most so many, but at least `least_m`.
-    pub fn spacing_m(&self, most_places: f64, least_m: f64) -> f64 {
-        let square_m2 = (self.to.x_m - self.from.x_m) * (self.to.y_m - self.from.y_m);
-        (square_m2 / most_places).sqrt().max(least_m)
-    }
-
-    /// The middles of its squares.
-    pub fn places(&self, spacing_m: f64) -> impl Iterator<Item = Point> {
-        let count = move |length_m: f64| (length_m / spacing_m).ceil().max(1.0) as u32;
-        let middle = move |number: u32| (f64::from(number) + 0.5) * spacing_m;
-        let (from, to) = (self.from, self.to);
-        let (columns, rows) = (count(to.x_m - from.x_m), count(to.y_m - from.y_m));
-        (0..columns).flat_map(move |column| {
-            (0..rows).map(move |row| Point::new(from.x_m + middle(column), from.y_m + middle(row)))
-        })
-    }
-}
-
 /// Where the vehicle may be.
 #[derive(Clone, Debug)]
 enum Ground {
@@ -126,16 +74,19 @@ impl Hypothesis {
         )
     }
 
+    /// How far the state of another one is from its own.
+    fn apart(&self, other: &Self) -> [f64; STATES] {
+        let (own, theirs) = (&self.ekf.belief().mean, &other.ekf.belief().mean);
+        let mut apart: [f64; STATES] = std::array::from_fn(|state| theirs[state] - own[state]);
+        apart[HEADING] = wrap_angle(apart[HEADING]);
+        apart
+    }
+
     /// Whether another one in the plane is within a deviation of it in each direction.
     fn meets(&self, other: &Self) -> bool {
-        let (mine, yours) = (self.ekf.belief(), other.ekf.belief());
-        [ALONG, ACROSS, HEADING].into_iter().all(|state| {
-            let mut apart = mine.mean[state] - yours.mean[state];
-            if state == HEADING {
-                apart = wrap_angle(apart);
-            }
-            apart * apart < mine.covariance[state][state]
-        })
+        let (apart, covariance) = (self.apart(other), &self.ekf.belief().covariance);
+        let is_within = |state: usize| apart[state] * apart[state] < covariance[state][state];
+        [ALONG, ACROSS, HEADING].into_iter().all(is_within)
     }
 
     /// Takes in another hypothesis on the same road: the Gaussian of the same mean and covariance
@@ -143,12 +94,7 @@ impl Hypothesis {
     fn absorb(&mut self, other: &Self) {
         let ratio = (other.log_likelihood - self.log_likelihood).exp();
         let weight = ratio / (1.0 + ratio);
-        let (mut one, two) = (*self.ekf.belief(), other.ekf.belief());
-        let mut apart = two.mean;
-        for (apart, mean) in apart.iter_mut().zip(one.mean) {
-            *apart -= mean;
-        }
-        apart[HEADING] = wrap_angle(apart[HEADING]);
+        let (mut one, two, apart) = (*self.ekf.belief(), other.ekf.belief(), self.apart(other));
         for i in 0..STATES {
             one.mean[i] += weight * apart[i];
             for j in 0..STATES {
@@ -174,12 +120,25 @@ clone_in_place! {
 }
 
 impl GaussianSum {
-    /// The vehicle may be anywhere on `road`, driving along it or, where `either_direction`, also
-    /// against it.
-    pub fn new(config: EkfConfig, road: Road, either_direction: bool, heads: &[RadioHead]) -> Self {
+    /// The vehicle may be anywhere on `road`, driving along it or, where `either_direction`, also against it; without a
+    /// road anywhere about the radio heads.
+    pub fn new(
+        config: EkfConfig,
+        road: Option<Road>,
+        either_direction: bool,
+        heads: &[RadioHead],
+    ) -> Self {
+        let Some(road) = road else {
+            return Self::in_plane(config, Self::about(heads), heads);
+        };
         let against = either_direction.then(|| Arc::new(road.reversed()));
         let roads = [Arc::new(road)].into_iter().chain(against).collect();
         Self::on(&config, Ground::Roads(roads), heads)
+    }
+
+    /// Where the vehicle is without a road.
+    fn about(heads: &[RadioHead]) -> Area {
+        Area::about(heads.iter().map(|head| head.position))
     }
 
     /// The vehicle may be anywhere in an area, heading anywhere.
@@ -187,9 +146,9 @@ impl GaussianSum {
         Self::on(&config, Ground::Plane(area), heads)
     }
 
-    /// Whether all of an area is searched as finely as is useful.
-    pub fn is_small(area: Area) -> bool {
-        area.spacing_m(MOST_HYPOTHESES / f64::from(HEADINGS), SPACING_M) <= SPACING_M
+    /// Whether all about these radio heads is searched as finely as is useful.
+    pub fn is_small(heads: &[RadioHead]) -> bool {
+        Self::about(heads).spacing_m(MOST_HYPOTHESES / f64::from(HEADINGS), SPACING_M) <= SPACING_M
     }
 
     /// Whether its filters have the states that a filter has which they are compared with.
@@ -216,49 +175,46 @@ impl GaussianSum {
     }
 
     fn restart(&mut self) {
-        let roads = match &self.ground {
-            Ground::Roads(roads) => roads,
+        let (config, heads) = (self.config, &self.heads);
+        let hypothesis = |road: usize, map: Option<&Arc<Road>>, start: InitialPose| Hypothesis {
+            road,
+            ekf: Ekf::new(config, map.cloned(), heads, &start),
+            log_likelihood: 0.0,
+        };
+        match &self.ground {
+            Ground::Roads(roads) => {
+                for (number, road) in roads.iter().enumerate() {
+                    let count = (road.length_m() / SPACING_M).ceil().max(1.0);
+                    let spacing_m = road.length_m() / count;
+                    self.hypotheses.extend((0..count as usize).map(|index| {
+                        let start = InitialPose {
+                            pose: road.pose((index as f64 + 0.5) * spacing_m),
+                            position_std_m: 0.5 * spacing_m,
+                            heading_std_rad: 1.0,
+                        };
+                        hypothesis(number, Some(road), start)
+                    }));
+                }
+            }
             Ground::Plane(area) => {
                 let spacing_m = area.spacing_m(MOST_HYPOTHESES / f64::from(HEADINGS), SPACING_M);
                 let turn_rad = TAU / f64::from(HEADINGS);
-                for place in area.places(spacing_m) {
+                for Point { x_m, y_m } in area.places(spacing_m) {
                     self.hypotheses.extend((0..HEADINGS).map(|number| {
+                        let heading_rad = wrap_angle(f64::from(number) * turn_rad);
                         let start = InitialPose {
                             pose: Pose {
-                                x_m: place.x_m,
-                                y_m: place.y_m,
-                                heading_rad: wrap_angle(f64::from(number) * turn_rad),
+                                x_m,
+                                y_m,
+                                heading_rad,
                             },
                             position_std_m: 0.5 * spacing_m,
                             heading_std_rad: 0.5 * turn_rad,
                         };
-                        Hypothesis {
-                            road: 0,
-                            ekf: Ekf::new(self.config, None, &self.heads, &start),
-                            log_likelihood: 0.0,
-                        }
+                        hypothesis(0, None, start)
                     }));
                 }
-                return;
             }
-        };
-        for (number, road) in roads.iter().enumerate() {
-            let count = (road.length_m() / SPACING_M).ceil().max(1.0);
-            let spacing_m = road.length_m() / count;
-            let heads = &self.heads;
-            let hypothesis = |index: usize| {
-                let start = InitialPose {
-                    pose: road.pose((index as f64 + 0.5) * spacing_m),
-                    position_std_m: 0.5 * spacing_m,
-                    heading_std_rad: 1.0,
-                };
-                Hypothesis {
-                    road: number,
-                    ekf: Ekf::new(self.config, Some(road.clone()), heads, &start),
-                    log_likelihood: 0.0,
-                }
-            };
-            self.hypotheses.extend((0..count as usize).map(hypothesis));
         }
     }
 
@@ -417,18 +373,7 @@ impl GaussianSum {
         for (weight, estimate) in weighed() {
             let weight = weight.max(least_weight);
             total += weight;
-            let pose = estimate.pose;
-            let off = [
-                pose.x_m - mean.x_m,
-                pose.y_m - mean.y_m,
-                wrap_angle(pose.heading_rad - mean.heading_rad),
-            ];
-            let own = estimate.covariance.unwrap_or_default();
-            for (row, (own, a)) in covariance.iter_mut().zip(own.iter().zip(off)) {
-                for (value, (own, b)) in row.iter_mut().zip(own.iter().zip(off)) {
-                    *value += weight * (own + a * b);
-                }
-            }
+            estimate.add_about(mean, weight, &mut covariance);
         }
         let covariance = covariance.map(|row| row.map(|value| value / total));
         PoseEstimate {
@@ -458,7 +403,7 @@ mod tests {
         let heads = RadioHead::heard(&site, &vehicle);
         let map = site.build_road().unwrap().unwrap();
         let start_m = rng.random::<f64>() * 200.0;
-        let mut search = GaussianSum::new(config, map.clone(), false, &heads);
+        let mut search = GaussianSum::new(config, Some(map.clone()), false, &heads);
         for step in 0..1000 {
             let time_s = f64::from(step) * 0.02;
             let distance_m = 4.0 * time_s;

@@ -4,7 +4,6 @@ mod consistency;
 mod gaussian_sum;
 mod relocalization_test;
 mod relocalizer;
-mod solution;
 
-pub use gaussian_sum::{Area, GaussianSum};
+pub use gaussian_sum::GaussianSum;
 pub use relocalizer::Relocalizer;

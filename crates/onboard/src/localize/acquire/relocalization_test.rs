@@ -6,21 +6,12 @@ use std::cmp::Ordering;
 use super::gaussian_sum::GaussianSum;
 use crate::clone_in_place::clone_in_place;
 use crate::localize::ekf::Ekf;
-use crate::localize::measurement::AngleMeasurement;
-use crate::localize::modes::log_likelihood;
+use crate::localize::modes::{CERTAIN, log_likelihood};
+use crate::observation::AngleMeasurement;
 use crate::radio_head::RadioHead;
-
-/// Log-likelihood ratio at which it decides: wrong once in three million (e⁻¹⁵).
-const BETTER: f64 = 15.0;
 
 /// Way to be driven before a find is believed (m): a vehicle that stands hears the same errors again and again.
 const LEAST_WAY_M: f64 = 0.5;
-
-/// After this time with angles and without a find it is patient no more (s).
-const PATIENCE_S: f64 = 20.0;
-
-/// After this way a confirmation by few angles has taken long (m).
-const LONG_WAY_M: f64 = 100.0;
 
 /// Angles of one radio head within this way share their errors: clusters keep an angle wrong for so long (m).
 const INDEPENDENT_M: f64 = 10.0;
@@ -43,10 +34,10 @@ clone_in_place! {
         of_filter: f64,
         /// Distance driven when it began, and driven since (m).
         since_m: f64,
-        way_m: f64,
+        pub way_m: f64,
         /// When the last angle was heard, and for how long with angles (s).
         heard_s: f64,
-        listened_s: f64,
+        pub listened_s: f64,
         /// Angles, how many of them are independent, and after which way each radio head had its last such one (m).
         angles: u32,
         independent: u32,
@@ -103,37 +94,26 @@ impl RelocalizationTest {
         if is_confirming || self.may_mislead {
             ratio = ratio * f64::from(self.independent) / f64::from(self.angles.max(1));
         }
-        if ratio > BETTER {
+        if ratio > CERTAIN {
             Ordering::Greater
-        } else if ratio < -BETTER {
+        } else if ratio < -CERTAIN {
             Ordering::Less
         } else {
             Ordering::Equal
         }
     }
 
-    /// Whether enough way was driven to believe it.
-    pub fn has_moved(&self) -> bool {
-        let least_m = if self.may_mislead {
+    /// The least way to be driven before a find is believed (m).
+    pub const fn least_way_m(&self) -> f64 {
+        if self.may_mislead {
             INDEPENDENT_M
         } else {
             LEAST_WAY_M
-        };
-        self.way_m >= least_m
-    }
-
-    /// Whether it was a long way.
-    pub fn has_moved_far(&self) -> bool {
-        self.way_m > LONG_WAY_M
+        }
     }
 
     /// It is reported from the newest odometry on, and begins to be patient anew.
     pub const fn report(&mut self, odometry_s: f64) {
         (self.reported_s, self.listened_s) = (odometry_s, 0.0);
-    }
-
-    /// Whether angles were heard for long.
-    pub fn is_patient(&self) -> bool {
-        self.listened_s > PATIENCE_S
     }
 }

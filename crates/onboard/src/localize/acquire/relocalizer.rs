@@ -15,19 +15,19 @@ use std::cmp::Ordering;
 use std::sync::Arc;
 
 use super::consistency::ConsistencyMonitor;
-use super::gaussian_sum::{Area, GaussianSum};
+use super::gaussian_sum::GaussianSum;
 use super::relocalization_test::RelocalizationTest;
-use super::solution::Solution;
 use crate::BoxError;
 use crate::clone_in_place::clone_in_place;
-use crate::geometry::wrap_angle;
+use crate::gaussian::RadialQuantile;
+use crate::geometry::Area;
 use crate::localize::ekf::Ekf;
+use crate::localize::integrity::IntegrityMonitor;
 use crate::localize::localizer::{Localizer, Recovered, copy_into};
-use crate::localize::measurement::{
-    AngleMeasurement, OdometryVerdict, UpdateReason, UpdateVerdict,
-};
-use crate::localize::pose_estimate::{Integrity, IntegrityState, PoseEstimate};
-use crate::localize::quantile::RadialQuantile;
+use crate::localize::modes::may_mislead;
+use crate::localize::output::{Integrity, IntegrityState, PoseEstimate};
+use crate::localize::output::{OdometryVerdict, UpdateReason, UpdateVerdict};
+use crate::observation::AngleMeasurement;
 use crate::observation::OdometrySample;
 use crate::radio_head::RadioHead;
 use crate::road::Road;
@@ -41,6 +41,12 @@ const MOST_NEARBY_M: f64 = 10.0;
 
 /// After a search that found no better place the next one waits so long (s).
 const REST_S: f64 = 10.0;
+
+/// After this time with angles and without a find a search is patient no more (s).
+const PATIENCE_S: f64 = 20.0;
+
+/// After this way a confirmation by few angles has taken long (m).
+const LONG_WAY_M: f64 = 100.0;
 
 /// Radio heads without which a place in the plane cannot be told from others.
 const LEAST_HEADS: usize = 3;
@@ -150,6 +156,104 @@ struct Setup {
     quantile: RadialQuantile,
 }
 
+/// One filter, or a monitored bank of them.
+#[derive(Debug)]
+enum Solution {
+    Bare(Box<Ekf>),
+    Monitored(Box<IntegrityMonitor>),
+}
+
+impl Clone for Solution {
+    fn clone(&self) -> Self {
+        match self {
+            Self::Bare(ekf) => Self::Bare(ekf.clone()),
+            Self::Monitored(monitor) => Self::Monitored(monitor.clone()),
+        }
+    }
+
+    fn clone_from(&mut self, source: &Self) {
+        match (self, source) {
+            (Self::Bare(mine), Self::Bare(theirs)) => (**mine).clone_from(theirs),
+            (Self::Monitored(mine), Self::Monitored(theirs)) => (**mine).clone_from(theirs),
+            (mine, theirs) => *mine = theirs.clone(),
+        }
+    }
+}
+
+impl Solution {
+    /// Of a filter that was given its place, or found it at a time (s).
+    fn new(ekf: Ekf, setup: &Setup, found_s: Option<f64>) -> Self {
+        match setup.integrity {
+            Some(settings) => Self::Monitored(Box::new(IntegrityMonitor::new(
+                &ekf,
+                &setup.heads,
+                settings,
+                found_s,
+            ))),
+            None => Self::Bare(Box::new(ekf)),
+        }
+    }
+
+    const fn monitor(&self) -> Option<&IntegrityMonitor> {
+        match self {
+            Self::Bare(_) => None,
+            Self::Monitored(monitor) => Some(monitor),
+        }
+    }
+
+    /// The filter that uses every sound source.
+    fn ekf(&self) -> &Ekf {
+        match self {
+            Self::Bare(ekf) => ekf,
+            Self::Monitored(monitor) => monitor.ekf(),
+        }
+    }
+
+    /// When it began anew last by itself (s), if ever.
+    fn begun_s(&self) -> f64 {
+        (self.monitor()).map_or(f64::NEG_INFINITY, IntegrityMonitor::begun_s)
+    }
+
+    /// Whether angles may be off as if the vehicle were lost.
+    fn may_mislead(&self) -> bool {
+        let bare = || may_mislead(self.ekf().config());
+        (self.monitor()).map_or_else(bare, |it| it.bank().may_mislead())
+    }
+
+    /// How much more the angles vary than stated, as far as anybody listens to that.
+    fn noise_ratio(&self) -> f64 {
+        (self.monitor()).map_or(1.0, |it| it.bank().noise_ratio())
+    }
+
+    fn odometry(&mut self, sample: &OdometrySample) -> OdometryVerdict {
+        match self {
+            Self::Bare(ekf) => ekf.odometry(sample),
+            Self::Monitored(monitor) => monitor.odometry(sample),
+        }
+    }
+
+    fn update(&mut self, head: &RadioHead, measured: &AngleMeasurement) -> UpdateVerdict {
+        match self {
+            Self::Bare(ekf) => ekf.update(head, measured),
+            Self::Monitored(monitor) => monitor.update(head, measured),
+        }
+    }
+
+    fn pose(&self, time_s: f64) -> PoseEstimate {
+        match self {
+            Self::Bare(ekf) => ekf.pose(time_s),
+            Self::Monitored(monitor) => monitor.pose(time_s),
+        }
+    }
+
+    /// Keeps a journal, where there is no bank, whose filters take each other's place.
+    fn keep_journal(&mut self) {
+        if let Self::Bare(ekf) = self {
+            ekf.keep_journal();
+        }
+    }
+}
+
 clone_in_place! {
     /// The built-in localizer.
     #[derive(Debug)]
@@ -182,10 +286,9 @@ impl Relocalizer {
         } else {
             Phase::Tracking
         };
-        Self {
-            solution: Some(Solution::new(ekf, heads, integrity, None)),
-            ..Self::new(phase, road, heads, integrity)
-        }
+        let mut made = Self::new(phase, road, heads, integrity);
+        made.solution = Some(Solution::new(ekf, &made.setup, None));
+        made
     }
 
     /// Searches for the first pose.
@@ -194,11 +297,9 @@ impl Relocalizer {
         road: Option<Road>,
         integrity: Option<IntegritySettings>,
     ) -> Self {
-        let made = Self::new(Phase::Searching, road, search.heads(), integrity);
-        Self {
-            search: Some(search),
-            ..made
-        }
+        let mut made = Self::new(Phase::Searching, road, search.heads(), integrity);
+        made.search = Some(search);
+        made
     }
 
     fn new(
@@ -227,8 +328,7 @@ impl Relocalizer {
 
     /// Tracks from now on what was found at a time (s).
     fn track(&mut self, found: Ekf, now_s: f64) {
-        let setup = &self.setup;
-        let mut solution = Solution::new(found, &setup.heads, setup.integrity, Some(now_s));
+        let mut solution = Solution::new(found, &self.setup, Some(now_s));
         if self.keeps_journal {
             solution.keep_journal();
         }
@@ -264,12 +364,12 @@ impl Relocalizer {
         if config.heard_noise_ratio.is_some() {
             config.set_noise_ratio(Some(solution.noise_ratio()));
         }
-        let all = || Area::of_heads(heads);
-        let mut search = match &self.setup.road {
-            Some(road) => GaussianSum::new(config, road.clone(), true, heads),
+        let road = self.setup.road.as_ref();
+        let mut search = match road {
+            Some(_) => GaussianSum::new(config, road.cloned(), true, heads),
             None if heads.len() < LEAST_HEADS => return None,
-            None if is_wide || GaussianSum::is_small(all()) => {
-                GaussianSum::in_plane(config, all(), heads)
+            None if is_wide || GaussianSum::is_small(heads) => {
+                GaussianSum::new(config, None, true, heads)
             }
             None => {
                 let here = solution.pose(now_s);
@@ -284,20 +384,20 @@ impl Relocalizer {
     }
 
     fn evidence(&self, solution: &Solution, now_s: f64) -> Evidence {
-        let (test, odometry_s) = (self.test.as_ref(), solution.ekf().time_s());
-        let is = |what: fn(&RelocalizationTest) -> bool| test.is_some_and(what);
-        let is_confirming = self.phase == Phase::Confirming;
+        let odometry_s = solution.ekf().time_s();
+        let is = |what: &dyn Fn(&RelocalizationTest) -> bool| self.test.as_ref().is_some_and(what);
+        let compared = |it: &RelocalizationTest| it.compare(self.phase == Phase::Confirming);
         Evidence {
             is_lost: self.consistency.is_lost(),
             is_consistent: self.consistency.is_sure(),
             may_mislead: solution.may_mislead(),
             is_rested: now_s >= self.rests_until_s,
-            search: test.map_or(Ordering::Equal, |it| it.compare(is_confirming)),
-            is_found: is(|it| it.search.found().is_some()),
-            is_just_reported: test.is_some_and(|it| it.reported_s == odometry_s),
-            has_moved: is(RelocalizationTest::has_moved),
-            has_moved_far: is(RelocalizationTest::has_moved_far),
-            is_patient: is(RelocalizationTest::is_patient),
+            search: self.test.as_ref().map_or(Ordering::Equal, compared),
+            is_found: is(&|it| it.search.found().is_some()),
+            is_just_reported: is(&|it| it.reported_s == odometry_s),
+            has_moved: is(&|it| it.way_m >= it.least_way_m()),
+            has_moved_far: is(&|it| it.way_m > LONG_WAY_M),
+            is_patient: is(&|it| it.listened_s > PATIENCE_S),
         }
     }
 
@@ -324,11 +424,12 @@ impl Relocalizer {
             }
             Transition::TakeOver => {
                 if let Some(found) = self.test.as_ref().and_then(|it| it.search.found()) {
-                    let (from, to) = (solution.pose(now_s).pose, found.pose(now_s).pose);
+                    let from = solution.pose(now_s).pose;
+                    let [x_m, y_m, turned_rad] = from.offset_of(found.pose(now_s).pose);
                     self.recovered = Some(Recovered {
                         time_s: now_s,
-                        moved_m: from.point().distance_m(to.point()),
-                        turned_rad: wrap_angle(to.heading_rad - from.heading_rad),
+                        moved_m: x_m.hypot(y_m),
+                        turned_rad,
                     });
                     self.track(found, now_s);
                 }
@@ -443,7 +544,9 @@ impl Localizer for Relocalizer {
     }
 
     fn worst_case(&self) -> Option<&Ekf> {
-        self.solution.as_ref().map(Solution::worst_case)
+        let solution = self.solution.as_ref()?;
+        let monitor = solution.monitor().map(IntegrityMonitor::worst_case);
+        Some(monitor.unwrap_or_else(|| solution.ekf()))
     }
 
     fn keep_journal(&mut self) {

@@ -8,9 +8,9 @@
 
 use super::jump_process::{JumpHypotheses, JumpProcess, MOST_VARIANCE};
 use crate::clone_in_place::clone_in_place;
-use crate::localize::ekf::smoother::Journal;
+use crate::gaussian::smoother::Journal;
+use crate::gaussian::{Innovation, Matrix, dot};
 use crate::localize::ekf::state::{Belief, STATES};
-use crate::localize::gaussian::{Innovation, Matrix, dot};
 
 /// Covariance of something with an angle: with the bias of its radio head, and without.
 pub(super) type CrossCovariance = [f64; 2];
@@ -375,11 +375,9 @@ mod tests {
     use rand_chacha::ChaCha8Rng;
     use rand_distr::StandardNormal;
 
-    use super::super::jump_process::{
-        LEVEL_M, LEVELS, LEVELS_RAD, SOON_M, VALUE_M, VARIANCES, share,
-    };
+    use super::super::jump_process::{LEVEL_M, LEVELS, SOON_M, VALUE_M, VARIANCES, share};
     use super::*;
-    use crate::localize::gaussian::{Gaussian, identity};
+    use crate::gaussian::{Gaussian, identity};
 
     const OWN_VARIANCE: f64 = 1e-4;
 
@@ -538,7 +536,7 @@ mod tests {
                 random.random::<f64>() > (-way_m / within_m).exp()
             };
             if happens(LEVEL_M, random) {
-                self.level = LEVELS_RAD[random.random_range(0..LEVELS)];
+                self.level = VARIANCES[random.random_range(0..LEVELS)].sqrt();
             }
             if happens(VALUE_M, random) {
                 self.value_rad = self.level * random.sample::<f64, _>(StandardNormal);
@@ -560,7 +558,7 @@ mod tests {
                 let (mut errors, mut belief) = (CorrelatedBias::new(2, EVEN), unknown());
                 let truth: f64 = random.sample(StandardNormal);
                 let mut drawn = [0, 1].map(|_| Drawn {
-                    level: LEVELS_RAD[random.random_range(0..LEVELS)],
+                    level: VARIANCES[random.random_range(0..LEVELS)].sqrt(),
                     value_rad: 0.0,
                 });
                 for head in &mut drawn {

@@ -5,20 +5,14 @@
 //! that is kept, or drawn anew from one of a few levels, and the level is another one after some way (a
 //! hidden Markov model). Besides, each angle has an error of the same size that is soon forgotten. By way and not by
 //! time: a vehicle that stands sees the same error again. The value is estimated with the state, see
-//! [`CorrelatedBias`](super::staying_errors::StayingErrors); here it is weighed which of the jump hypotheses an angle
+//! [`CorrelatedBias`](super::correlated_bias::CorrelatedBias); here it is weighed which of the jump hypotheses an angle
 //! speaks for, by Bayes.
 
-use crate::localize::gaussian::Innovation;
+use crate::gaussian::Innovation;
 
-/// How many levels there are, and their deviations (rad): from what calibration leaves to no more than a side.
+/// How many levels there are, and their variances (rad²): from what calibration leaves to no more than a side.
 pub(super) const LEVELS: usize = 4;
-pub(super) const LEVELS_RAD: [f64; LEVELS] = [0.02, 0.1, 0.3, 1.0];
-
-/// Their variances (rad²).
-pub(super) const VARIANCES: [f64; LEVELS] = {
-    let [a, b, c, d] = LEVELS_RAD;
-    [a * a, b * b, c * c, d * d]
-};
+pub(super) const VARIANCES: [f64; LEVELS] = [0.02 * 0.02, 0.1 * 0.1, 0.3 * 0.3, 1.0];
 
 /// From this level on a radio head says next to nothing, and an angle beyond it is an outlier.
 const LARGE: usize = 2;

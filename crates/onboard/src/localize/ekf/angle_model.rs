@@ -2,8 +2,8 @@
 //! correction by the state.
 
 use super::state::{ACROSS, ALONG, CURVATURE, DATUM, HEADING, MOUNTING, PHASE, STATES};
+use crate::gaussian::{Matrix, dot};
 use crate::geometry::Pose;
-use crate::localize::gaussian::{Matrix, dot};
 use crate::manifold::Measurand;
 use crate::radio_head::RadioHead;
 use crate::road::Road;

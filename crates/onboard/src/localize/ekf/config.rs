@@ -2,13 +2,11 @@
 
 use super::angle_model::{AngleModel, ArrayModel};
 use super::motion::{MotionNoise, PathBend, Yaw};
-use crate::localize::quantile::normal_quantile;
+use crate::gaussian::normal_quantile;
 use crate::road::LaneKeeping;
 use crate::settings::{DriveKind, LocalizerSettings, RoadSettings, Site, TrackerSettings, Vehicle};
 
-/// The best that the filter takes for granted where nothing is said.
-const LEAST_ODOMETER_SCALE_STD: f64 = 0.001;
-const LEAST_ODOMETER_NOISE_M_PER_SQRT_M: f64 = 0.003;
+/// The best lane keeping that the filter takes for granted, whatever is said (m).
 const LEAST_LANE_RMS_M: f64 = 0.02;
 
 /// It turns back to the middle of the lane with a yaw rate within so many deviations.
@@ -136,41 +134,57 @@ impl PhaseBias {
     }
 }
 
-/// How a vehicle with differential drive turns as it drives, and as it stands, where no yaw rate
-/// tells: by half a radian over a metre, and over a second.
-const UNKNOWN_TURN_RAD2_PER_M: f64 = 0.25;
-const UNKNOWN_TURN_RAD2_PER_S: f64 = 0.25;
+/// How a vehicle with differential drive turns where no yaw rate tells, per metre driven and per second: by half a
+/// radian (rad²).
+const UNKNOWN_TURN_RAD2: f64 = 0.25;
 
-/// A gyroscope that nothing is stated of: angle random walk (rad/√s) and bias (rad/s).
+/// Angle random walk (rad/√s) and bias (rad/s) of a yaw rate that nothing is stated of: a gyroscope's, and that of two
+/// wheels.
 const USUAL_GYROSCOPE: [f64; 2] = [1e-3, 1e-3];
-
-/// Wheels that nothing is stated of, on which a differential drive turns: random walk (m/√m) and
-/// scale of the distance, random walk (rad/√s) and bias (rad/s) of the turn.
-const USUAL_WHEELS: [f64; 2] = [0.05, 0.05];
 const USUAL_WHEELS_TURN: [f64; 2] = [0.05, 0.01];
 
-/// Their random walk over time, and not only over the way: they start late, creep, and what they
-/// read as they stand is not always zero (m/√s).
-const USUAL_WHEELS_NOISE_M_PER_SQRT_S: f64 = 0.02;
-
-/// How far the scale of such wheels walks, as they grip as the floor lets them (per √m).
-const USUAL_SCALE_WALK_PER_SQRT_M: f64 = 0.03;
-
-/// Mounting angle of an array on such a vehicle, where no deviation is stated (rad).
-const USUAL_MOUNTING_STD_RAD: f64 = 0.02;
-
 /// An array of which nothing is stated: mounting angle (rad) and phase (rad per element).
-const UNSTATED_MOUNTING_STD_RAD: f64 = 0.005;
-const UNSTATED_PHASE_STD_RAD: f64 = 0.02;
+const UNSTATED_ARRAY_STD_RAD: [f64; 2] = [0.005, 0.02];
 
-/// Lateness of angles on a differential drive, where nothing is stated (s): at walking pace its
-/// turns show it.
-const USUAL_LATENESS_STD_S: f64 = 0.1;
+/// What is assumed where nothing is stated, which a zero is, too.
+struct Usual {
+    odometer_scale_std: f64,
+    odometer_m_per_sqrt_m: f64,
+    /// Not only over the way: wheels start late, creep, and what they read as they stand is not always zero.
+    odometer_m_per_sqrt_s: f64,
+    /// Wheels grip as the floor lets them.
+    scale_per_sqrt_m: f64,
+    mounting_std_rad: f64,
+    /// At walking pace turns show it.
+    lateness_std_s: f64,
+    /// Probability that errors of a radio head's angles stay over metres: a differential drive is as often lost, and
+    /// would take the one for the other.
+    bias_probability: f64,
+}
 
-/// Probability that errors of a radio head's angles stay over metres, where nothing is stated of it: on a
-/// road, as a differential drive is as often lost, and would take the one for the other. And from which on
-/// it is usual, so that every filter is to find them.
-const UNKNOWN_BIAS_PROBABILITY: f64 = 0.1;
+/// On a road, and the best that is taken for granted of any odometer.
+const ROAD: Usual = Usual {
+    odometer_scale_std: 0.001,
+    odometer_m_per_sqrt_m: 0.003,
+    odometer_m_per_sqrt_s: 0.0,
+    scale_per_sqrt_m: 0.0,
+    mounting_std_rad: 0.0,
+    lateness_std_s: 0.0,
+    bias_probability: 0.1,
+};
+
+/// With differential drive.
+const DIFFERENTIAL: Usual = Usual {
+    odometer_scale_std: 0.05,
+    odometer_m_per_sqrt_m: 0.05,
+    odometer_m_per_sqrt_s: 0.02,
+    scale_per_sqrt_m: 0.03,
+    mounting_std_rad: 0.02,
+    lateness_std_s: 0.1,
+    bias_probability: 0.0,
+};
+
+/// From this probability on a bias is usual, so that every filter is to find it.
 const LEAST_USUAL_BIAS_PROBABILITY: f64 = 0.5;
 
 impl EkfConfig {
@@ -194,43 +208,35 @@ impl EkfConfig {
         });
         let gyroscope = vehicle.gyroscope.as_ref();
         let wheels = vehicle.drive == DriveKind::Differential;
-        let usual = if wheels || odometer.track_width_m.is_some() {
+        let usual_turn = if wheels || odometer.track_width_m.is_some() {
             USUAL_WHEELS_TURN
         } else {
             USUAL_GYROSCOPE
         };
-        let [yaw_noise, yaw_bias_std] = gyroscope.map_or(usual, |gyroscope| {
+        let [yaw_noise, yaw_bias_std] = gyroscope.map_or(usual_turn, |gyroscope| {
             [gyroscope.noise_rad_per_sqrt_s, gyroscope.bias_std_radps]
         });
-        // What is zero is not stated.
-        let or_usual = |stated: f64, usual: f64, least: f64| {
-            if wheels && stated == 0.0 {
-                usual
+        let usual = if wheels { DIFFERENTIAL } else { ROAD };
+        let or_usual = |stated: f64, of: fn(&Usual) -> f64| {
+            if stated == 0.0 {
+                of(&usual)
             } else {
-                stated.max(least)
+                stated.max(of(&ROAD))
             }
         };
-        let odometer_scale_std = or_usual(
-            odometer.scale_std,
-            USUAL_WHEELS[1],
-            LEAST_ODOMETER_SCALE_STD,
-        );
+        let odometer_scale_std = or_usual(odometer.scale_std, |it| it.odometer_scale_std);
         // A track that is wider than stated turns less.
         let track_share = |width_m| odometer.track_width_std_m / width_m;
         let track_share = odometer.track_width_m.map_or(0.0, track_share);
         let mounting_is_unstated = array.mounting_std_rad.is_none() && !wheels;
         let phase_is_unstated = array.phase_std_rad.is_none() && array.shape.is_row();
         let unstated = [
-            (mounting_is_unstated, UNSTATED_MOUNTING_STD_RAD),
-            (phase_is_unstated, UNSTATED_PHASE_STD_RAD),
+            (mounting_is_unstated, UNSTATED_ARRAY_STD_RAD[0]),
+            (phase_is_unstated, UNSTATED_ARRAY_STD_RAD[1]),
         ]
         .map(|(is_unstated, std_rad)| if is_unstated { std_rad } else { 0.0 });
         let receiver = &vehicle.receiver;
-        let bias_probability = (receiver.phase_bias_probability).unwrap_or(if wheels {
-            0.0
-        } else {
-            UNKNOWN_BIAS_PROBABILITY
-        });
+        let bias_probability = (receiver.phase_bias_probability).unwrap_or(usual.bias_probability);
         // Without integrity monitoring there is no filter beside this one.
         let is_alone =
             vehicle.integrity_monitor().is_none() && receiver.phase_bias_probability.is_some();
@@ -254,21 +260,15 @@ impl EkfConfig {
                 steering_rad_per_sqrt_m: lane_keeping.steering_rad_per_sqrt_m(),
             },
             noise: MotionNoise {
-                odometer_m_per_sqrt_m: or_usual(
-                    odometer.noise_m_per_sqrt_m,
-                    USUAL_WHEELS[0],
-                    LEAST_ODOMETER_NOISE_M_PER_SQRT_M,
-                ),
-                odometer_m_per_sqrt_s: or_usual(
-                    odometer.noise_m_per_sqrt_s,
-                    USUAL_WHEELS_NOISE_M_PER_SQRT_S,
-                    0.0,
-                ),
-                scale_per_sqrt_m: or_usual(
-                    settings.odometer_scale_walk_per_sqrt_m,
-                    USUAL_SCALE_WALK_PER_SQRT_M,
-                    0.0,
-                ),
+                odometer_m_per_sqrt_m: or_usual(odometer.noise_m_per_sqrt_m, |it| {
+                    it.odometer_m_per_sqrt_m
+                }),
+                odometer_m_per_sqrt_s: or_usual(odometer.noise_m_per_sqrt_s, |it| {
+                    it.odometer_m_per_sqrt_s
+                }),
+                scale_per_sqrt_m: or_usual(settings.odometer_scale_walk_per_sqrt_m, |it| {
+                    it.scale_per_sqrt_m
+                }),
                 yaw_bias_radps_per_sqrt_s: gyroscope
                     .map_or(0.0, |it| it.bias_walk_radps_per_sqrt_s),
                 mounting_rad_per_sqrt_m: array.mounting_drift_rad_per_sqrt_m,
@@ -281,11 +281,7 @@ impl EkfConfig {
             yaw_rate_bias_radps: gyroscope.map_or(0.0, |gyroscope| gyroscope.bias_radps),
             yaw_rate_bias_std_radps: yaw_bias_std,
             yaw_rate_scale_std: if wheels { odometer_scale_std } else { 0.0 }.hypot(track_share),
-            mounting_std_rad: array.mounting_std_rad.unwrap_or(if wheels {
-                USUAL_MOUNTING_STD_RAD
-            } else {
-                0.0
-            }),
+            mounting_std_rad: array.mounting_std_rad.unwrap_or(usual.mounting_std_rad),
             phase_rad: array.phase_rad,
             phase_std_rad: array.phase_std_rad.unwrap_or(0.0),
             unstated_array_std_rad: unstated,
@@ -300,11 +296,7 @@ impl EkfConfig {
                 .max(SIGMAS_OF_SWING * keeping.pull_per_m() * vehicle.top_speed_mps()),
             yaw_noise_rad_per_sqrt_m: gyroscope.map_or(0.0, |it| it.noise_rad_per_sqrt_m),
             yaw_noise_rad_per_sqrt_rad: gyroscope.map_or(0.0, |it| it.noise_rad_per_sqrt_rad),
-            lateness_std_s: receiver.lateness_std_s.unwrap_or(if wheels {
-                USUAL_LATENESS_STD_S
-            } else {
-                0.0
-            }),
+            lateness_std_s: receiver.lateness_std_s.unwrap_or(usual.lateness_std_s),
             phase_bias: PhaseBias {
                 std_rad: receiver.phase_bias_std_rad,
                 share: receiver.phase_bias_share.unwrap_or(0.0),
@@ -362,7 +354,7 @@ impl EkfConfig {
 
     /// The same by all that several angles share: scatter and the surveys, whose errors stay until
     /// the radio head is seen from another side, after about its distance.
-    pub fn look_variance(&self, travelled_m: f64, angle_model: &AngleModel) -> f64 {
+    pub fn shared_variance(&self, travelled_m: f64, angle_model: &AngleModel) -> f64 {
         let mut variance =
             self.scatter_variance(travelled_m, angle_model.aperture, angle_model.toward);
         if angle_model.survey_variance > 0.0 {
@@ -385,8 +377,7 @@ impl EkfConfig {
             turn_rad: self.yaw_rate_bias_radps * duration_s,
             duration_s,
             is_told: false,
-            variance: UNKNOWN_TURN_RAD2_PER_M * length_m.abs()
-                + UNKNOWN_TURN_RAD2_PER_S * duration_s,
+            variance: UNKNOWN_TURN_RAD2 * length_m.abs() + UNKNOWN_TURN_RAD2 * duration_s,
         }
     }
 

@@ -6,14 +6,14 @@ use super::config::PhaseBias;
 use super::filter::Ekf;
 use super::motion::{Reading, Step};
 use super::predict::MOST_STEPS;
-use super::smoother::Journal;
 use super::state::{Belief, SCALE, STATES};
-use crate::localize::bias;
-use crate::localize::gaussian::{
+use crate::gaussian::smoother::Journal;
+use crate::gaussian::{
     Innovation, Matrix, dot, identity, principal_variances, product, transformed,
 };
-use crate::localize::measurement::AngleMeasurement;
-use crate::localize::pose_estimate::PoseEstimate;
+use crate::localize::bias;
+use crate::localize::output::PoseEstimate;
+use crate::observation::AngleMeasurement;
 use crate::radio_head::RadioHead;
 
 /// Longest step of a forecast (m), where millimetres do not matter.
@@ -143,7 +143,7 @@ impl Ekf {
     /// What an angle of thermal variance `thermal(distance)` to `head` would make of a belief
     /// `ahead_m` further on than the newest odometry; `None` of a radio head that is not used, or would
     /// rather repeat itself.
-    pub fn rehearse(
+    pub fn predicted_update(
         &self,
         belief: &Belief,
         ahead_m: f64,
@@ -163,7 +163,7 @@ impl Ekf {
             .config
             .phase_bias
             .variance(own, f64::INFINITY, (travelled_m, 0.0))
-            + self.config.look_variance(travelled_m, &angle_model);
+            + self.config.shared_variance(travelled_m, &angle_model);
         let predicted = belief.variance_along(&angle_model.row) + variance;
         let by_bias = self.bias.variance(number, travelled_m, predicted);
         if bias::repeats(travelled_m) && by_bias > variance {

@@ -2,10 +2,7 @@
 
 use super::filter::{Ekf, OffMap};
 use super::state::{ACROSS, ALONG, CURVATURE, HEADING, STATES};
-use crate::localize::gaussian::identity;
-
-/// Deviations of the place along the road that count as certain.
-const SIGMAS: f64 = 3.0;
+use crate::gaussian::{CERTAIN_SIGMAS, identity};
 
 /// Least deviation from the lane, in metres or radians, of a vehicle said to keep it exactly.
 const LEAST_LANE_STD: f64 = 1e-6;
@@ -16,7 +13,7 @@ impl Ekf {
     fn off_map(&self) -> Option<OffMap> {
         let map = self.map.as_deref()?;
         let along_m = self.belief.mean[ALONG];
-        let margin_m = SIGMAS * self.belief.covariance[ALONG][ALONG].sqrt();
+        let margin_m = CERTAIN_SIGMAS * self.belief.covariance[ALONG][ALONG].sqrt();
         let by_m = (along_m - map.length_m()).max(-along_m);
         if by_m > margin_m {
             return Some(OffMap::Beyond { by_m });

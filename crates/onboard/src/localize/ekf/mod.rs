@@ -8,7 +8,6 @@
 
 pub mod angle_model;
 mod config;
-mod constants;
 mod filter;
 mod forecast;
 mod lane;
@@ -16,14 +15,12 @@ pub mod motion;
 mod odometer;
 mod predict;
 mod prior;
-pub mod smoother;
 pub mod state;
 mod update;
 
 pub use angle_model::ArrayModel;
 pub use config::EkfConfig;
-pub use constants::{Calibration, Departure, EstimatedConstant, EstimatedConstants};
-pub use filter::Ekf;
+pub use filter::{Ekf, EstimatedConstant, EstimatedConstants};
 pub(in crate::localize) use forecast::ExcludedInnovation;
 pub use motion::{MotionNoise, PathBend};
 pub(in crate::localize) use predict::MOST_SLIP;

@@ -14,8 +14,8 @@ use super::state::{
     ACROSS, ALONG, Belief, CURVATURE, HEADING, MOUNTING, PHASE, SCALE, STATES, YAW_RATE_BIAS,
     YAW_RATE_SCALE,
 };
+use crate::gaussian::{Matrix, identity};
 use crate::geometry::Pose;
-use crate::localize::gaussian::{Matrix, identity};
 use crate::road::{Bending, LaneKeeping};
 
 /// How the path bends where no map tells.
@@ -323,9 +323,7 @@ impl Step {
             jacobian: f,
             noise: q,
             turn_rad,
-            turn_row: [0.0; STATES],
-            turn_shared: [0.0; STATES],
-            turn_variance: 0.0,
+            ..Self::standing(start)
         }
     }
 
@@ -374,14 +372,11 @@ impl Step {
     /// noise of the turn, so it is decorrelated (Anderson & Moore, Optimal Filtering, 5.5).
     #[must_use]
     pub fn informed(mut self, start: &[f64; STATES], yaw: &Yaw) -> Self {
-        let total = self.turn_variance + yaw.variance;
+        let (surprise, row, total) = self.turn_seen(start, yaw);
         if total <= 0.0 {
             return self;
         }
         let shared = self.turn_shared;
-        let mut row = self.turn_row;
-        row[YAW_RATE_BIAS] = yaw.duration_s;
-        let surprise = yaw.turn_rad - self.turn_rad - start[YAW_RATE_BIAS] * yaw.duration_s;
         for i in 0..STATES {
             let gain = shared[i] / total;
             self.mean[i] += gain * surprise;

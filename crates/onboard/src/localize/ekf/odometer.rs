@@ -12,19 +12,13 @@ const UNUSUAL: f64 = 5.0;
 pub(super) struct SpeedJumps {
     /// Mean square of the steps (m²/s²).
     mean_square: f64,
-    /// By which share of the speed the newest one jumped; 0 where it is none.
-    speed_jump: f64,
+    /// By which share of the speed the newest one jumped, where it was above the least that jumps and none of the usual
+    /// ones; 0 otherwise.
+    pub speed_jump: f64,
 }
 
 impl SpeedJumps {
-    /// By which share of the speed the newest step jumped, where it was above the least that jumps and
-    /// none of the usual ones; 0 otherwise.
-    pub const fn speed_jump(&self) -> f64 {
-        self.speed_jump
-    }
-
-    /// Takes a step, which jumps where it is above `least_mps` and none of the usual ones; see
-    /// [`speed_jump`](Self::speed_jump).
+    /// Takes a step, which jumps where it is above `least_mps` and none of the usual ones.
     pub fn step(&mut self, from_mps: f64, to_mps: f64, least_mps: f64) {
         self.speed_jump = 0.0;
         let fastest_mps = from_mps.abs().max(to_mps.abs());

@@ -3,7 +3,8 @@
 use super::filter::{Ekf, OffMap};
 use super::motion::{Reading, Step, Yaw};
 use super::state::{ACROSS, ALONG, Belief, HEADING, SCALE, STATES, YAW_RATE_BIAS};
-use crate::localize::measurement::OdometryVerdict;
+use crate::gaussian::CERTAIN_SIGMAS;
+use crate::localize::output::OdometryVerdict;
 use crate::observation::OdometrySample;
 use crate::road::Gap;
 use crate::settings::DriveKind;
@@ -24,9 +25,6 @@ pub(in crate::localize) const MOST_SLIP: f64 = 0.3;
 
 /// What was driven is taken from the speeds where it is within these shares of what is read.
 const DRIVEN_BY_READ: [f64; 2] = [0.5, 1e3];
-
-/// Deviations within which the place is known where a bend may begin.
-const SIGMAS_OF_BEND: f64 = 3.0;
 
 /// How far the scale walks of an odometer that may slip without a jump of the speed (per √m).
 const SLIP_WALK_PER_SQRT_M: f64 = 0.1;
@@ -150,7 +148,7 @@ impl Ekf {
         self.slip(if unseen {
             MOST_SLIP
         } else {
-            self.speed_jumps.speed_jump()
+            self.speed_jumps.speed_jump
         });
     }
 
@@ -178,8 +176,8 @@ impl Ekf {
         };
         let (mean, covariance) = (&self.belief.mean, &self.belief.covariance);
         let reach_m =
-            SIGMAS_OF_BEND * covariance[ALONG][ALONG].sqrt() + speed_mps.abs() * duration_s;
-        let aside_m = mean[ACROSS].abs() + SIGMAS_OF_BEND * covariance[ACROSS][ACROSS].sqrt();
+            CERTAIN_SIGMAS * covariance[ALONG][ALONG].sqrt() + speed_mps.abs() * duration_s;
+        let aside_m = mean[ACROSS].abs() + CERTAIN_SIGMAS * covariance[ACROSS][ACROSS].sqrt();
         let [before, after] = [-reach_m, reach_m].map(|by| map.curvature_per_m(mean[ALONG] + by));
         (after - before).abs() * aside_m * speed_mps.abs()
     }

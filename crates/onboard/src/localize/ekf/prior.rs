@@ -9,9 +9,9 @@ use super::state::{
     ACROSS, ALONG, Belief, CURVATURE, DATUM, HEADING, LATENESS, MOUNTING, PHASE, SCALE, STATES,
     YAW_RATE_BIAS, YAW_RATE_SCALE,
 };
-use crate::geometry::wrap_angle;
+use crate::geometry::{Pose, wrap_angle};
 use crate::localize::bias::CorrelatedBias;
-use crate::localize::pose_estimate::InitialPose;
+use crate::localize::output::InitialPose;
 use crate::radio_head::RadioHead;
 use crate::road::Road;
 
@@ -37,45 +37,49 @@ impl Ekf {
         mean[YAW_RATE_BIAS] = config.yaw_rate_bias_radps;
         mean[MOUNTING] = config.mounting_rad;
         mean[PHASE] = config.phase_rad;
-        let Some(map) = map else {
-            mean[ALONG] = start.pose.x_m;
-            mean[ACROSS] = start.pose.y_m;
-            mean[HEADING] = start.pose.heading_rad;
-            sigma[ALONG] = start.position_std_m;
+        let Pose {
+            x_m,
+            y_m,
+            heading_rad,
+        } = start.pose;
+        let place = map.map(|map| (map, map.project(start.pose.point())));
+        let (given, lane) = place.map_or(([x_m, y_m, heading_rad], None), |(map, place)| {
+            let along_m = place.along_m;
+            let heading_rad = wrap_angle(heading_rad - map.pose(along_m).heading_rad);
+            let in_lane = map.gap_between(along_m, along_m).is_none();
+            let given = [along_m, place.lateral_m, heading_rad];
+            (given, in_lane.then_some(map))
+        });
+        sigma[ALONG] = start.position_std_m;
+        let Some(map) = lane else {
+            // No lane to keep to: what is given is all there is.
+            for (state, value) in [ALONG, ACROSS, HEADING].into_iter().zip(given) {
+                mean[state] = value;
+            }
             sigma[ACROSS] = start.position_std_m;
             sigma[HEADING] = start.heading_std_rad;
-            sigma[CURVATURE] = config.curvature_variance().sqrt();
+            if map.is_none() {
+                sigma[CURVATURE] = config.curvature_variance().sqrt();
+            }
             return Belief::independent(mean, sigma);
         };
-        let place = map.project(start.pose.point());
-        let heading_rad = wrap_angle(start.pose.heading_rad - map.pose(place.along_m).heading_rad);
-        if map.gap_between(place.along_m, place.along_m).is_some() {
-            // No lane to keep to: what is given is all there is.
-            mean[ALONG] = place.along_m;
-            mean[ACROSS] = place.lateral_m;
-            mean[HEADING] = heading_rad;
-            sigma[ALONG] = start.position_std_m;
-            sigma[ACROSS] = start.position_std_m;
-            sigma[HEADING] = start.heading_std_rad;
-            return Belief::independent(mean, sigma);
-        }
+        let [along_m, lateral_m, heading_rad] = given;
         let [offset_variance, heading_variance] = config.lane_keeping.stationary();
-        mean[ALONG] = place.along_m;
-        sigma[ALONG] = start.position_std_m;
+        mean[ALONG] = along_m;
         sigma[ACROSS] = offset_variance.sqrt();
         sigma[HEADING] = heading_variance.sqrt();
         let mut belief = Belief::independent(mean, sigma);
         // The given pose is a measurement beside what lane keeping already says. Where the road
         // bends, the heading tells of the place along it.
-        let curvature_per_m = map.curvature_per_m(place.along_m);
+        let curvature_per_m = map.curvature_per_m(along_m);
         for (state, value, std, by_along) in [
-            (ACROSS, place.lateral_m, start.position_std_m, 0.0),
+            (ACROSS, lateral_m, start.position_std_m, 0.0),
             (HEADING, heading_rad, start.heading_std_rad, curvature_per_m),
         ] {
             let mut row = [0.0; STATES];
             row[state] = 1.0;
             row[ALONG] = by_along;
-            let expected = belief.mean[state] + by_along * (belief.mean[ALONG] - place.along_m);
+            let expected = belief.mean[state] + by_along * (belief.mean[ALONG] - along_m);
             belief.update(value - expected, &row, (std * std).max(LEAST_VARIANCE));
         }
         belief
@@ -140,10 +144,9 @@ impl Ekf {
         noise.odometer_m_per_sqrt_s *= times;
     }
 
-    /// The same filter begun anew where it is, every source in use, its place known to
-    /// `position_std_m` and its heading by the road alone, or by a quarter turn where no map tells
-    /// how the road lies.
-    pub(in crate::localize) fn restarted(&self, position_std_m: f64) -> Self {
+    /// A filter of this configuration begun anew where this one is, every source in use, its place known to
+    /// `position_std_m` and its heading by the road alone, or to 0.3 rad where no map tells how the road lies.
+    pub(in crate::localize) fn restarted(&self, config: &EkfConfig, position_std_m: f64) -> Self {
         let along_m = self.belief.mean[ALONG];
         let surveyed = |map: &&Arc<Road>| map.gap_between(along_m, along_m).is_none();
         let road = self.map.as_ref().filter(surveyed);
@@ -157,7 +160,7 @@ impl Ekf {
             heading_std_rad: if road.is_some() { 1.0 } else { 0.3 },
         };
         let heads: Vec<RadioHead> = self.heads.iter().map(|head| head.known).collect();
-        let mut restarted = Self::new(self.config, self.map.clone(), &heads, &start);
+        let mut restarted = Self::new(*config, self.map.clone(), &heads, &start);
         // Where the road crosses itself its nearest place may be another one.
         if self.map.is_some() {
             restarted.belief.mean[ALONG] = along_m;

@@ -1,7 +1,7 @@
 //! What the filter knows about: twelve states, the same with and without a map. A state that a
 //! setting switches off has zero variance and never moves.
 
-use crate::localize::gaussian::Gaussian;
+use crate::gaussian::Gaussian;
 
 /// Number of states.
 pub const STATES: usize = 12;

@@ -1,15 +1,14 @@
 //! The measurement update: an angle's prediction and innovation, its gate, and the corrected belief.
 
-use std::f64::consts::TAU;
-
 use super::angle_model::{AngleModel, locate};
 use super::filter::Ekf;
 use super::motion::Reading;
 use super::state::{ACROSS, ALONG, HEADING, LATENESS, SCALE, STATES, YAW_RATE_BIAS};
+use crate::gaussian::{Innovation, with_outliers};
 use crate::geometry::wrap_angle;
 use crate::localize::bias::{self, JumpHypotheses, MOST_VARIANCE};
-use crate::localize::gaussian::Innovation;
-use crate::localize::measurement::{AngleMeasurement, UpdateReason, UpdateVerdict};
+use crate::localize::output::{UpdateReason, UpdateVerdict};
+use crate::observation::AngleMeasurement;
 use crate::radio_head::RadioHead;
 
 /// Most that angles can be later than stated (s).
@@ -25,8 +24,8 @@ const WRONG_IF_UNRESOLVED: f64 = 0.5;
 /// belief was: such an angle says nothing.
 fn equivalent(innovation: &Innovation, wrong: f64) -> Option<(f64, f64)> {
     let (residual, total) = (innovation.residual, innovation.variance);
-    let holds = (1.0 - wrong) * innovation.density();
-    let holds = holds / (holds + wrong / TAU);
+    let density = innovation.density();
+    let holds = (1.0 - wrong) * density / with_outliers(density, wrong);
     // With the gain K = P Hᵀ/S the mixture has the mean p K r and the covariance
     // P − p (S − (1 − p) r²) K Kᵀ, p being the probability that the angle holds.
     let narrowing = holds * (total - (1.0 - holds) * residual * residual);
@@ -105,7 +104,7 @@ impl Ekf {
         let bend = angle_model.bend(&self.belief.covariance);
         let place_m = self.driven_m + ahead_m;
         let travelled_m = place_m - head.last_update_m;
-        let shared = (self.config).look_variance(travelled_m, &angle_model);
+        let shared = (self.config).shared_variance(travelled_m, &angle_model);
         let elapsed_s = measured.time_s - head.last_update_s;
         let turned_rad = self.turned_rad - head.last_update_rad;
         let moved = (travelled_m, turned_rad);
@@ -280,8 +279,10 @@ impl Ekf {
 
 #[cfg(test)]
 mod tests {
+    use std::f64::consts::TAU;
+
     use super::*;
-    use crate::localize::gaussian::Gaussian;
+    use crate::gaussian::Gaussian;
 
     #[test]
     fn the_belief_has_the_moments_of_the_mixture() {

@@ -1,37 +1,29 @@
 //! Integrity monitoring of a bank of filters: protection level and state, recovery where a fault cannot be identified,
 //! and the handover between solutions.
 //!
-//! If one radio head is at fault, the filter without it is right within its own covariance, wherever the full solution
-//! may be: the protection level is the radius about the reported solution that holds for all hypotheses of the
-//! [`Bank`] together, each at its probability ([`LevelEquation`]). All
-//! of it is of angles as noisy as they are heard to be.
-//!
-//! The state is `unavailable` where half of the radio heads or more are at fault or in doubt; `degraded` where a mode
-//! leads that is a fault, or did within `recovery_s`, where a radio head is in doubt or a bank is begun anew, where the
-//! odometer's scale has departed from what is stated, and where the level is above the alert limit.
-//!
-//! With a single radio head odometry and road are all there is to compare it with: the protection level then is what
-//! those two can vouch for, grows with the distance driven, and passes the alert limit unless they
-//! are good.
+//! Under each hypothesis of the [`Bank`] one of its filters is right within its own covariance, wherever the reported
+//! solution may be: the protection level is the radius about that which holds for all of them together
+//! ([`LevelEquation`]), of angles as noisy as they are heard to be. With a single radio head it is what odometry and
+//! road can vouch for, grows with the distance driven, and passes the alert limit unless they are good. The states are
+//! those of `docs/integrity.md`.
 
 use std::cell::RefCell;
 
 use super::protection_level::{Hypothesis, LevelEquation};
 use crate::clone_in_place::clone_in_place;
-use crate::geometry::{Pose, wrap_angle};
+use crate::gaussian::CERTAIN_SIGMAS;
+use crate::geometry::Pose;
 use crate::localize::ekf::Ekf;
-use crate::localize::measurement::{AngleMeasurement, OdometryVerdict, UpdateVerdict};
 use crate::localize::modes::{Bank, ModeId, RECOVERY_S};
-use crate::localize::pose_estimate::{Integrity, IntegrityState, PoseEstimate};
+use crate::localize::output::{Integrity, IntegrityState, PoseEstimate};
+use crate::localize::output::{OdometryVerdict, UpdateVerdict};
+use crate::observation::AngleMeasurement;
 use crate::observation::OdometrySample;
 use crate::radio_head::RadioHead;
 use crate::settings::IntegritySettings;
 
 /// Share of the risk that is not worth the effort.
 const NEGLIGIBLE: f64 = 0.1;
-
-/// Squared deviations by which two positions are apart that are not both right.
-const APART2: f64 = 9.0;
 
 /// The previous solution, relative to the one that is reported since. Where a radio head is excluded, another mode leads
 /// or a restarted bank takes over, the position may be another at one angle; as long as that may be taken back, the
@@ -50,18 +42,12 @@ impl Handover {
         let [[xx, xy, _], [_, yy, _], _] = covariance;
         let [[own_xx, own_xy, _], [_, own_yy, _], _] = now.covariance?;
         let (xx, xy, yy) = (xx + own_xx, xy + own_xy, yy + own_yy);
-        let (x_m, y_m) = (
-            before.pose.x_m - now.pose.x_m,
-            before.pose.y_m - now.pose.y_m,
-        );
+        let apart = now.pose.offset_of(before.pose);
+        let [x_m, y_m, _] = apart;
         let apart2 = yy * x_m * x_m - 2.0 * xy * x_m * y_m + xx * y_m * y_m;
-        (apart2 > APART2 * (xx * yy - xy * xy)).then(|| Self {
+        (apart2 > CERTAIN_SIGMAS.powi(2) * (xx * yy - xy * xy)).then_some(Self {
             since_s: now.time_s,
-            apart: [
-                x_m,
-                y_m,
-                wrap_angle(before.pose.heading_rad - now.pose.heading_rad),
-            ],
+            apart,
             covariance,
         })
     }
@@ -108,7 +94,7 @@ clone_in_place! {
 }
 
 clone_in_place! {
-    /// Trackers begun anew from a vague pose.
+    /// A bank begun anew from a vague pose.
     #[derive(Debug)]
     struct Restarted {
         bank: Bank,
@@ -168,14 +154,9 @@ impl IntegrityMonitor {
         self.begun_s
     }
 
-    /// Whether angles may be off by the mode that leads as if the vehicle were lost.
-    pub fn may_mislead(&self) -> bool {
-        self.bank.may_mislead()
-    }
-
-    /// How much more the angles vary than stated.
-    pub const fn noise_ratio(&self) -> f64 {
-        self.bank.noise_ratio()
+    /// The bank that is reported.
+    pub(in crate::localize) const fn bank(&self) -> &Bank {
+        &self.bank
     }
 
     /// Moves every filter.

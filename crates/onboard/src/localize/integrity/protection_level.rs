@@ -8,8 +8,8 @@
 
 use std::f64::consts::TAU;
 
-use crate::localize::gaussian::principal_variances;
-use crate::localize::pose_estimate::PoseEstimate;
+use crate::gaussian::principal_variances;
+use crate::localize::output::PoseEstimate;
 
 /// Directions over which a probability is summed.
 const DIRECTIONS: usize = 32;
@@ -277,8 +277,8 @@ mod tests {
     use rand_distr::StandardNormal;
 
     use super::*;
+    use crate::gaussian::{RadialQuantile, normal_quantile};
     use crate::geometry::Pose;
-    use crate::localize::quantile::{RadialQuantile, normal_quantile};
 
     fn estimate(x_m: f64, y_m: f64, covariance: [[f64; 2]; 2]) -> PoseEstimate {
         let [[xx, xy], [_, yy]] = covariance;

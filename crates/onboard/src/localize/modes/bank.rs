@@ -11,16 +11,14 @@
 //! radio head is excluded, filters that have never heard it are ready to take over, together with
 //! those that have heard neither it nor one of the others.
 
-use super::head_test::{CLEARED, DETECTED, HeadTest, RECOVERY_S};
 use super::likelihood::{LEAST_ODDS, LikelihoodRatio, SPEED_JUMP};
 use super::noise_ratio::NoiseRatio;
-use super::subsets::{Subsets, exclude};
+use super::subsets::{CLEARED, DETECTED, HeadTest, RECOVERY_S, Subsets, exclude};
 use super::table::{Carry, Mode, ModeId, TABLE, Verdict, Weight};
 use crate::clone_in_place::clone_in_place;
 use crate::localize::ekf::{Ekf, PredictedMeasurement};
-use crate::localize::measurement::{
-    AngleMeasurement, OdometryVerdict, UpdateReason, UpdateVerdict,
-};
+use crate::localize::output::{OdometryVerdict, UpdateReason, UpdateVerdict};
+use crate::observation::AngleMeasurement;
 use crate::observation::OdometrySample;
 use crate::radio_head::RadioHead;
 use crate::settings::{FaultProbability, IntegritySettings};
@@ -181,9 +179,10 @@ impl Bank {
         &self.nominal
     }
 
-    /// The bank begun anew from a vague pose where the leading filter is; nothing is known of it at `now_s`.
+    /// The bank begun anew from a vague pose where the leading filter is, about what is nominal, whatever leads;
+    /// nothing is known of it at `now_s`.
     pub fn restarted(&self, position_std_m: f64, now_s: f64) -> Self {
-        let start = self.leader().restarted(position_std_m);
+        let start = (self.leader()).restarted(self.nominal.config(), position_std_m);
         let mut modes = ModeFilter::all(&start, &self.settings.fault_probability);
         for it in &mut modes {
             let before = self
@@ -285,7 +284,7 @@ impl Bank {
     /// modes weighed by their posteriors, and, as far as none of those that are faults holds, one or two of the sound
     /// radio heads at fault.
     pub fn hypotheses(&self) -> impl Iterator<Item = (f64, &Ekf)> + Clone {
-        let total = self.total_odds();
+        let total = 1.0 + self.modes.iter().map(ModeFilter::odds).sum::<f64>();
         let faults = (self.modes.iter()).filter(|it| it.mode.verdict != Verdict::Ok);
         let fault_free = 1.0 - faults.map(ModeFilter::odds).sum::<f64>() / total;
         let heads = (self.subsets.iter())
@@ -298,24 +297,22 @@ impl Bank {
                 };
                 (fault_free * self.head_prior * both, &subset.ekf)
             });
-        let odds = std::iter::once((1.0, &self.nominal))
-            .chain(self.modes.iter().map(|it| (it.odds(), &it.ekf)));
+        let odds = self.weighed(|_| true);
         odds.map(move |(odds, ekf)| (odds / total, ekf))
             .chain(heads)
     }
 
     /// The modes that may lead, each with its posterior among them and its filter: the estimate is one of those.
     pub fn mixture(&self) -> impl Iterator<Item = (f64, &Ekf)> + Clone {
-        let may_lead = |it: &&ModeFilter| it.mode.verdict != Verdict::Unled;
-        let odds = std::iter::once((1.0, &self.nominal))
-            .chain((self.modes.iter().filter(may_lead)).map(|it| (it.odds(), &it.ekf)));
+        let odds = self.weighed(|it| it.mode.verdict != Verdict::Unled);
         let total = 1.0 + odds.clone().skip(1).map(|(odds, _)| odds).sum::<f64>();
         odds.map(move |(odds, ekf)| (odds / total, ekf))
     }
 
-    /// The odds of all modes, the nominal one among them.
-    fn total_odds(&self) -> f64 {
-        1.0 + self.modes.iter().map(ModeFilter::odds).sum::<f64>()
+    /// The nominal mode and others, each with its odds to that and its filter.
+    fn weighed(&self, which: fn(&ModeFilter) -> bool) -> impl Iterator<Item = (f64, &Ekf)> + Clone {
+        let others = self.modes.iter().filter(move |it| which(it));
+        std::iter::once((1.0, &self.nominal)).chain(others.map(|it| (it.odds(), &it.ekf)))
     }
 
     /// The filters without a radio head in doubt, one of which may take over soon.
@@ -553,7 +550,7 @@ mod tests {
     use super::*;
     use crate::geometry::Pose;
     use crate::localize::ekf::EkfConfig;
-    use crate::localize::pose_estimate::InitialPose;
+    use crate::localize::output::InitialPose;
     use crate::settings::{Shipped, Site, TomlFile, Vehicle};
 
     /// A minute of driving past four radio heads, of which number 2 is off by `bias_rad`; what was

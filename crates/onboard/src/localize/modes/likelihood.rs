@@ -2,8 +2,9 @@
 
 use std::f64::consts::TAU;
 
+use crate::gaussian::with_outliers;
 use crate::localize::ekf::{Ekf, PredictedMeasurement};
-use crate::localize::measurement::UpdateReason;
+use crate::localize::output::UpdateReason;
 
 /// Share of the angles that are outliers, from any direction, where scatter makes no more of them.
 const OUTLIERS: f64 = 2e-3;
@@ -11,9 +12,9 @@ const OUTLIERS: f64 = 2e-3;
 /// Odds to the nominal mode from which on a mode leads: the pose of two about as probable would jump to and fro.
 pub(super) const LEAST_ODDS: f64 = 10.0;
 
-/// Largest logarithm of a likelihood ratio, for or against (an error of 3e-7 by Wald's test, as a fault of a radio head
-/// has): what more evidence there is must be forgotten some time.
-const CERTAIN: f64 = 15.0;
+/// Logarithm of a likelihood ratio at which a sequential test is decided: wrong once in three million (e⁻¹⁵; Wald 1945),
+/// as a fault of a radio head has it. No mode's grows beyond: what more evidence there is must be forgotten some time.
+pub(in crate::localize) const CERTAIN: f64 = 15.0;
 
 /// That of a jump of the speed that no vehicle can do: slip, unless a reading is wild.
 pub(super) const SPEED_JUMP: f64 = 6.0;
@@ -127,5 +128,5 @@ fn density(ekf: &Ekf, predicted: &PredictedMeasurement) -> f64 {
         |hypotheses| hypotheses.density,
     );
     let outliers = ekf.config().wrong_lobe.unwrap_or(OUTLIERS);
-    outliers / TAU + (1.0 - outliers) * inlier
+    with_outliers(inlier, outliers)
 }

@@ -2,16 +2,15 @@
 //! them, the test of each radio head, and how noisy the angles are heard to be.
 
 mod bank;
-mod head_test;
 mod likelihood;
 mod noise_ratio;
 mod subsets;
 mod table;
 
 pub(in crate::localize) use bank::Bank;
-pub use head_test::HeadTest;
-pub(in crate::localize) use head_test::RECOVERY_S;
-pub(in crate::localize) use likelihood::log_likelihood;
+pub(in crate::localize) use likelihood::{CERTAIN, log_likelihood};
+pub use subsets::HeadTest;
+pub(in crate::localize) use subsets::RECOVERY_S;
 #[cfg(test)]
 pub(in crate::localize) use table::trip;
 pub(in crate::localize) use table::{ModeId, may_mislead};

@@ -140,7 +140,7 @@ mod tests {
     use rand_distr::StandardNormal;
 
     use super::*;
-    use crate::localize::gaussian::Innovation;
+    use crate::gaussian::Innovation;
 
     /// An angle of 0.1 rad of stated deviation.
     fn predict_measurement(place_wavelengths: f64, residual: f64) -> ExcludedInnovation {

@@ -5,24 +5,6 @@
 use crate::localize::ekf::{Ekf, EkfConfig, MOST_SLIP};
 use crate::settings::{DriveKind, FaultProbability};
 
-/// Prior probability of an array that is off where nothing is stated of it, and of angles noisier than stated. The
-/// likelihoods soon outweigh both.
-const UNCALIBRATED: f64 = 0.1;
-const NOISIER_ANGLES: f64 = 0.02;
-
-/// An odometer noisier than stated is so many times as probable as slip, and so many times as noisy.
-const NOISY_TO_SLIP: f64 = 30.0;
-const ODOMETER_NOISE: f64 = 3.0;
-
-/// No fault has a larger prior probability.
-const MOST_PROBABLE: f64 = 0.5;
-
-/// Standard deviation of the displacement of a site plan, in x and y (m).
-const DISPLACEMENT_STD_M: f64 = 1.5;
-
-/// Odds to the nominal mode from which on an array is certainly not calibrated.
-const CERTAIN_ODDS: f64 = 100.0;
-
 /// What a mode is called.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
 pub(in crate::localize) enum ModeId {
@@ -162,15 +144,16 @@ pub(in crate::localize) static TABLE: [Mode; 9] = [
         verdict: Verdict::Unled,
         ..SLIP
     },
+    // The likelihoods soon outweigh this prior, and that of noisier angles.
     Mode {
         id: ModeId::UncalibratedArray,
         applies: |nominal, _| {
             let config = nominal.config();
             config.unstated_array_std_rad != [0.0; 2] && !config.estimates_bias()
         },
-        prior: |_, _| UNCALIBRATED,
+        prior: |_, _| 0.1,
         alter: Ekf::uncalibrate_array,
-        becomes_nominal_at: Some(CERTAIN_ODDS),
+        becomes_nominal_at: Some(100.0),
         ..ROW
     },
     // The wheels of a differential drive slip a little with every metre.
@@ -180,8 +163,9 @@ pub(in crate::localize) static TABLE: [Mode; 9] = [
             let config = nominal.config();
             config.drive == DriveKind::Road && !config.estimates_bias()
         },
-        prior: |_, faults| (NOISY_TO_SLIP * faults.odometer).min(MOST_PROBABLE),
-        alter: |ekf| ekf.scale_odometer_noise(ODOMETER_NOISE),
+        // So many times as probable as slip, but no likelier than not.
+        prior: |_, faults| (30.0 * faults.odometer).min(0.5),
+        alter: |ekf| ekf.scale_odometer_noise(3.0),
         on_rebase: Carry::Nothing,
         ..ROW
     },
@@ -195,7 +179,7 @@ pub(in crate::localize) static TABLE: [Mode; 9] = [
         prior: |_, faults| faults.all_radio_heads,
         alter: |ekf| {
             ekf.uncalibrate_array();
-            ekf.displace_site(DISPLACEMENT_STD_M);
+            ekf.displace_site(1.5);
         },
         verdict: Verdict::Degraded,
         on_exclude: Carry::All,
@@ -203,20 +187,23 @@ pub(in crate::localize) static TABLE: [Mode; 9] = [
     },
     Mode {
         id: ModeId::NoisyAngles,
-        prior: |_, _| NOISIER_ANGLES,
+        prior: |_, _| 0.02,
         alter: |ekf| ekf.set_noise_ratio(Some(1.0)),
         adapt: |ekf, ratio| ekf.set_noise_ratio(Some(ratio)),
         on_rebase: Carry::Nothing,
         misleads: true,
         ..ROW
     },
-    // Estimated already by a filter that a search has found with it.
+    // Estimated already by a filter that a search has found with it; that may have been of noisier angles, too.
     Mode {
         id: ModeId::CorrelatedBias,
         applies: |nominal, _| nominal.config().rare_bias_probability > 0.0,
         prior: |config, _| config.rare_bias_probability,
         seed: Ekf::clone,
-        alter: Ekf::estimate_rare_bias,
+        alter: |ekf| {
+            ekf.set_noise_ratio(None);
+            ekf.estimate_rare_bias();
+        },
         verdict: Verdict::Degraded,
         on_exclude: Carry::Filter,
         on_restart: Carry::Filter,
@@ -243,8 +230,8 @@ pub(in crate::localize) mod trip {
     use std::sync::Arc;
 
     use crate::localize::ekf::{Ekf, EkfConfig};
-    use crate::localize::measurement::AngleMeasurement;
-    use crate::localize::pose_estimate::InitialPose;
+    use crate::localize::output::InitialPose;
+    use crate::observation::AngleMeasurement;
     use crate::radio_head::RadioHead;
     use crate::road::Road;
     use crate::settings::{Shipped, Site, TomlFile, Vehicle};
@@ -471,6 +458,28 @@ mod tests {
         assert!(odds(0.0) < 1e-3);
         assert!(odds(0.2) > 100.0);
         assert!(odds(-0.2) > 100.0);
+    }
+
+    #[test]
+    fn a_bank_begun_anew_is_about_what_is_stated_whatever_leads() {
+        let world = World {
+            scale: (0.2, 0.0),
+            ..World::default()
+        };
+        let (bank, _) = drive(&world, 30.0, EXACT);
+        assert_eq!(bank.leading_id(), Some(ModeId::Slip));
+        let again = bank.restarted(1.0, 30.0).restarted(1.0, 30.0);
+        assert_eq!(again.nominal().config(), trip().2.config());
+    }
+
+    #[test]
+    fn a_bias_is_estimated_beside_the_stated_noise_whatever_a_search_reckoned_with() {
+        let (heads, _, mut found) = trip();
+        found.set_noise_ratio(Some(3.0));
+        let bank = Bank::new(&found, &heads, &IntegritySettings::default(), 0.0);
+        let (_, with_bias) = bank.mode(ModeId::CorrelatedBias).unwrap();
+        assert_eq!(with_bias.config().heard_noise_ratio, None);
+        assert!(with_bias.is_with_bias());
     }
 
     #[test]

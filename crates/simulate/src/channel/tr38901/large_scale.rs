@@ -1,6 +1,6 @@
 //! Large-scale parameters: table 7.5-6, and how they hang together.
 
-use onboard::localize::gaussian::{Matrix, identity};
+use onboard::gaussian::{Matrix, identity};
 
 use super::environment::{Environment, Kind};
 use crate::cholesky::cholesky;

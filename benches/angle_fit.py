@@ -1,0 +1,185 @@
+"""What an angle's standard deviation and verdict are worth, case by case.
+
+For each case: how many estimates are named as not to be relied on, the root mean square of error
+over standard deviation of the others (1 if they are as wrong as they say), the same of all, and the
+median error. Simulated cases draw directions anew; an echo has the source's waveform and a phase at
+random. Real ones need recordings of others, at ``ACCESS_AV_DATA`` or ``../shared/data``, and are
+left out without::
+
+    python benches/angle_fit.py --seeds 2000
+"""
+
+from __future__ import annotations
+
+import argparse
+import csv
+import os
+from collections import defaultdict
+from pathlib import Path
+from typing import TYPE_CHECKING
+
+import numpy as np
+from access_av.recorded_angles import estimate_bursts
+from rich.console import Console
+from rich.table import Table
+
+from access_av import aoa, nr
+
+if TYPE_CHECKING:
+    from collections.abc import Iterator
+
+    from numpy.typing import NDArray
+
+    Case = tuple[str, NDArray[np.float64], NDArray[np.float64], NDArray[np.bool_]]
+
+ANTENNAS, SNAPSHOTS = 4, 20
+# Nearer than this an echo from beside the source arrives as one plane wave: a fifth of the beam.
+APART_DEG = 10.0
+
+
+def gaussian(rng: np.random.Generator, *shape: int) -> NDArray[np.complex128]:
+    """Circular, of unit variance."""
+    return (rng.normal(size=(*shape, 2)) @ [1, 1j]) / np.sqrt(2)
+
+
+def directions(
+    rng: np.random.Generator, count: int, apart_deg: float
+) -> tuple[NDArray[np.float64], NDArray[np.float64]]:
+    """Electrical angles of sources, and of others at least so far from them."""
+    first = rng.uniform(20, 160, count)
+    second = rng.uniform(20, 160, count)
+    while (close := np.abs(first - second) < apart_deg).any():
+        second[close] = rng.uniform(20, 160, close.sum())
+    return np.pi * np.cos(np.radians(first)), np.pi * np.cos(np.radians(second))
+
+
+def simulated(count: int) -> Iterator[Case]:
+    """One plane wave; a reflection; two sources that are taken for one."""
+    steering = np.arange(ANTENNAS)
+    rng = np.random.default_rng(count)
+    cases: list[tuple[str, float, float | None, str, float]] = []
+    for snr_db in (0.0, 10.0, 20.0, 30.0):
+        cases.append(("plane wave", snr_db, None, "", APART_DEG))
+        cases += [("echo", snr_db, db, "", APART_DEG) for db in (-3.0, -6.0, -9.0, -12.0)]
+        cases += [("second source", snr_db, db, "", APART_DEG) for db in (0.0, -6.0)]
+    cases += [("echo", 20.0, -6.0, ", any direction", 0.0)]
+    for kind, snr_db, other_db, where, apart_deg in cases:
+        first, second = directions(rng, count, apart_deg)
+        a, b = (np.exp(1j * phase[:, None, None] * steering[:, None]) for phase in (first, second))
+        scale = 10 ** (snr_db / 20)
+        waveform = scale * gaussian(rng, count, 1, SNAPSHOTS)
+        received = a * waveform + gaussian(rng, count, ANTENNAS, SNAPSHOTS)
+        name = f"{kind}, SNR {snr_db:.0f} dB{where}"
+        if other_db is not None:
+            gain = 10 ** (other_db / 20) * np.exp(2j * np.pi * rng.uniform(size=(count, 1, 1)))
+            other = waveform if kind == "echo" else scale * gaussian(rng, count, 1, SNAPSHOTS)
+            received += gain * b * other
+            name = f"{kind} {other_db:.0f} dB, SNR {snr_db:.0f} dB{where}"
+        found = aoa.maximum_likelihood(received)
+        errors = (np.asarray(found.phase_rad) - first + np.pi) % (2 * np.pi) - np.pi
+        yield name, errors, np.asarray(found.phase_sigma_rad), np.asarray(found.resolved)
+
+
+def real_arrays(data: Path) -> Iterator[Case]:
+    """Four antennas, 30 places each, an unmodulated carrier."""
+    for path in sorted((data / "captures").glob("aoa4_day1_array*.sigmf-meta")):
+        bursts = [it for it in estimate_bursts(path) if it.truth_deg is not None]
+        errors = [it.azimuth_from_broadside_deg - (it.truth_deg or 0.0) for it in bursts]
+        yield (
+            path.stem,
+            np.radians(errors),
+            np.radians([it.sigma_deg for it in bursts]),
+            np.array([it.verdict == "resolved" for it in bursts]),
+        )
+
+
+def two_channels(path: Path) -> Iterator[Case]:
+    """Two receivers' channels over the carriers, at set angles from broadside."""
+    responses: dict[float, dict[str, list[complex]]] = defaultdict(
+        lambda: defaultdict(lambda: [0j, 0j])
+    )
+    with path.open() as file:
+        for row in csv.DictReader(file):
+            value = complex(float(row["re"]), float(row["im"]))
+            if value:
+                place = responses[float(row["angle_deg"])][row["carrier"]]
+                place[int(row["channel"])] = value
+    channels = [
+        np.array([it for it in place.values() if all(it)]).T for place in responses.values()
+    ]
+    truth = -np.pi * np.sin(np.radians(list(responses)))
+    found = [aoa.maximum_likelihood(it) for it in channels]
+    errors = (np.array([it.phase_rad for it in found]) - truth + np.pi) % (2 * np.pi) - np.pi
+    yield (
+        "two measured channels",
+        errors,
+        np.array([it.phase_sigma_rad for it in found], float),
+        np.array([it.resolved for it in found], bool),
+    )
+
+
+def channel_estimates(count: int) -> Iterator[Case]:
+    """What `nr` tells of one SSB in noise: its channel estimate, smoothed over the subcarriers."""
+    rng = np.random.default_rng(count + 1)
+    burst = nr.build_burst(42, ssb_indices=[1], sfn=6, ssb_freq_hz=3.7008e9)
+    power = np.mean(np.abs(burst[np.abs(burst) > 0]) ** 2)
+    for snr_db in (-5.0, 10.0):
+        found: dict[str, list[tuple[float, float, bool]]] = defaultdict(list)
+        for _ in range(count):
+            phase = float(rng.uniform(-2.8, 2.8))
+            received = np.outer(np.exp(1j * phase * np.arange(ANTENNAS)), burst)
+            noise = gaussian(rng, *received.shape) * np.sqrt(power) * 10 ** (-snr_db / 20)
+            cells = nr.search(
+                (received + noise).astype(np.complex64),
+                7.68e6,
+                centre_frequency_hz=3.7008e9,
+                ssb_freq_hz=3.7008e9,
+                scs_khz=30,
+            )
+            for cell in cells[:1]:
+                smoothed = aoa.maximum_likelihood(cell.channel)
+                for name, angle in (("smoothed channel", smoothed), ("the cell's angle", cell)):
+                    error = (angle.phase_rad - phase + np.pi) % (2 * np.pi) - np.pi
+                    told = angle.verdict == "resolved"
+                    found[name].append((error, angle.phase_sigma_rad, told))
+        for name, values in found.items():
+            errors, sigmas, resolved = (np.array(it) for it in zip(*values, strict=True))
+            yield f"{name}, SNR {snr_db:.0f} dB", errors, sigmas, resolved
+
+
+def rms(values: NDArray[np.float64]) -> str:
+    """Root mean square; a dash of nothing."""
+    return f"{np.sqrt(np.mean(values**2)):.2f}" if values.size else "–"
+
+
+def main() -> None:
+    """Print the table."""
+    parser = argparse.ArgumentParser(description=__doc__)
+    parser.add_argument("--seeds", type=int, default=1000, help="estimates of each simulated case")
+    count = parser.parse_args().seeds
+    root = Path(__file__).resolve().parents[1]
+    data = Path(os.environ.get("ACCESS_AV_DATA", root / ".." / "shared" / "data"))
+    table = Table("case", "estimates", "named", "z-RMS not named", "z-RMS", "median error rad")
+
+    def cases() -> Iterator[Case]:
+        yield from simulated(count)
+        yield from channel_estimates(max(count // 50, 10))
+        if data.is_dir():
+            yield from real_arrays(data)
+            yield from two_channels(data / "two_channels" / "cfr.csv")
+
+    for name, errors, sigmas, resolved in cases():
+        z = errors / sigmas
+        table.add_row(
+            name,
+            str(errors.size),
+            f"{1 - resolved.mean():.1%}",
+            rms(z[resolved]),
+            rms(z),
+            f"{np.median(np.abs(errors)):.4f}",
+        )
+    Console(width=110).print(table)
+
+
+if __name__ == "__main__":
+    main()

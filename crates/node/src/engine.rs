@@ -1,0 +1,426 @@
+//! The thread that owns the pipeline: takes what comes in, hands on what comes of it.
+
+use std::collections::VecDeque;
+use std::sync::Arc;
+use std::sync::atomic::{AtomicBool, Ordering};
+use std::time::{Duration, Instant};
+
+use num_complex::Complex32;
+use onboard::live::{LiveError, Outcome, StreamConfig};
+use onboard::observation::{MAX_ELEMENTS, OdometrySample};
+use onboard::settings::{Platform, Site, Vehicle};
+use onboard::{Custom, Live, OdometryDefect};
+
+use crate::clock::DriveClock;
+use crate::gate::{Gate, Windows};
+use crate::inbox::{Block, Command, Inbox, Input, Level};
+use crate::sink::{By, PoseRecord, Queue, Record};
+use crate::statistics::{Punctuality, SourceHealth};
+use crate::web::Board;
+
+/// The engine looks at the time this often, whatever comes.
+const TICK: Duration = Duration::from_millis(50);
+/// Odometry so much earlier than the last is of a drive that began anew.
+const RESTART_S: f64 = 1.0;
+/// Status and diagnoses come once a second (REP-107).
+const STATUS_S: f64 = 1.0;
+/// Arrivals of blocks remembered, to tell when an SSB's last sample came.
+const ARRIVALS: usize = 64;
+/// Length of an SSB in symbols of 1/14 ms at 15 kHz.
+const SSB_MS_AT_15_KHZ: f64 = 4.0 / 14.0;
+
+/// What the vehicle is, and where.
+pub struct Setup {
+    /// The site.
+    pub site: Site,
+    /// The vehicle.
+    pub vehicle: Vehicle,
+    /// Its platform.
+    pub platform: Platform,
+    /// Its samples.
+    pub stream: Option<StreamConfig>,
+}
+
+impl Setup {
+    /// The pipeline at the start of a drive.
+    ///
+    /// # Errors
+    /// [`LiveError`] where these do not go together.
+    pub fn live(&self) -> Result<Live, LiveError> {
+        let Self {
+            site,
+            vehicle,
+            platform,
+            stream,
+        } = self;
+        Live::new(site, vehicle, platform, None, *stream, Custom::default())
+    }
+}
+
+/// The pipeline and everything around it that does not care where its input comes from.
+pub struct Engine {
+    setup: Setup,
+    live: Live,
+    records: Arc<Queue>,
+    board: Arc<Board>,
+    punctuality: Arc<Punctuality>,
+    clock: DriveClock,
+    gate: Arc<Gate>,
+    windows: Windows,
+    sleeps: bool,
+    period_s: f64,
+    ssb_s: f64,
+    /// Samples that the pipeline has not got yet.
+    pending: Block,
+    /// Ends of blocks in the stream's time, and when they arrived.
+    arrivals: VecDeque<(f64, Instant)>,
+    last_pose: Option<(f64, Instant)>,
+    last_status_s: f64,
+    /// Silent sources that were named.
+    silent: Vec<&'static str>,
+}
+
+impl Engine {
+    /// At the start of a drive.
+    ///
+    /// # Errors
+    /// As [`Setup::live`].
+    pub fn new(
+        setup: Setup,
+        records: Arc<Queue>,
+        board: Arc<Board>,
+        punctuality: Arc<Punctuality>,
+        gate: Arc<Gate>,
+        sleeps: bool,
+    ) -> Result<Self, LiveError> {
+        Ok(Self {
+            live: setup.live()?,
+            windows: Windows::new(&setup.site),
+            ssb_s: SSB_MS_AT_15_KHZ * 1e-3 * 15.0 / setup.site.ssb.subcarrier_spacing_khz,
+            period_s: setup.site.ssb.period_s(),
+            pending: Block::default(),
+            setup,
+            records,
+            board,
+            punctuality,
+            clock: DriveClock::default(),
+            gate,
+            sleeps,
+            arrivals: VecDeque::with_capacity(ARRIVALS),
+            last_pose: None,
+            last_status_s: f64::NEG_INFINITY,
+            silent: Vec::new(),
+        })
+    }
+
+    /// The pipeline itself.
+    pub const fn live_mut(&mut self) -> &mut Live {
+        &mut self.live
+    }
+
+    /// Runs until `stop`, or until all sources have ended.
+    ///
+    /// # Errors
+    /// [`LiveError`] for what cannot go on at all.
+    pub fn run(
+        &mut self,
+        inbox: &Inbox,
+        sources: &[Arc<SourceHealth>],
+        silent_after: Duration,
+        stop: &AtomicBool,
+    ) -> Result<(), LiveError> {
+        while !stop.load(Ordering::Acquire) {
+            match inbox.take(TICK) {
+                Some((_, Input::End)) => break,
+                Some((came, input)) => self.take(came, input, inbox)?,
+                None => {}
+            }
+            self.watch(sources, silent_after);
+            self.tick()?;
+        }
+        self.receive(true)?;
+        self.live.settle()?;
+        self.publish_heard(None)
+    }
+
+    fn take(&mut self, came: Instant, input: Input, inbox: &Inbox) -> Result<(), LiveError> {
+        match input {
+            Input::Samples(block) => self.samples(block, came, inbox)?,
+            Input::Slept(until_s) => {
+                self.clock.see(until_s);
+                let is_over = |[_, end_s]: [f64; 2]| until_s >= end_s;
+                if self.gate.wanted().is_some_and(is_over) {
+                    self.receive(true)?;
+                    self.publish_heard(Some(came))?;
+                    self.sleep_until_next(until_s)?;
+                }
+            }
+            Input::Odometry(sample) => self.odometry(&sample, Some(came))?,
+            Input::Angle(angle) => {
+                self.clock.see(angle.time_s);
+                if let Err(error) = self.live.angle(&angle) {
+                    self.refused("angles", &error);
+                }
+                self.publish_heard(Some(came))?;
+            }
+            Input::Command(command) => self.command(command),
+            Input::Remark {
+                level,
+                source,
+                text,
+            } => self.event(level, source, text),
+            Input::End => {}
+        }
+        Ok(())
+    }
+
+    fn samples(&mut self, block: Block, came: Instant, inbox: &Inbox) -> Result<(), LiveError> {
+        let end_s = block.time_s + block.length() as f64 / self.rate_hz();
+        self.clock.see(end_s);
+        if self.arrivals.len() == ARRIVALS {
+            self.arrivals.pop_front();
+        }
+        self.arrivals.push_back((end_s, came));
+        let pending_s = self.pending.length() as f64 / self.rate_hz();
+        let is_next = (self.pending.time_s + pending_s - block.time_s).abs() < 0.5 / self.rate_hz();
+        if pending_s > 0.0 && !is_next {
+            self.receive(true)?;
+        }
+        self.pending.append(&block);
+        inbox.give_back(block.antennas);
+        if self.gate.wanted().is_none() && end_s - self.pending.time_s >= self.period_s {
+            self.receive(false)?;
+            self.publish_heard(Some(came))?;
+            self.sleep_until_next(end_s)?;
+        }
+        Ok(())
+    }
+
+    fn rate_hz(&self) -> f64 {
+        self.setup.stream.map_or(1.0, |it| it.rate_hz)
+    }
+
+    /// Hands the samples of a window, or of a period, to the pipeline, all at once: whoever searches for cells
+    /// must see a whole burst.
+    fn receive(&mut self, ends: bool) -> Result<(), LiveError> {
+        let mut antennas: [&[Complex32]; MAX_ELEMENTS] = [&[]; MAX_ELEMENTS];
+        for (antenna, samples) in antennas.iter_mut().zip(&self.pending.antennas) {
+            *antenna = samples;
+        }
+        let antennas = antennas
+            .get(..self.pending.antennas.len())
+            .unwrap_or_default();
+        let taken = if self.pending.length() > 0 {
+            self.live
+                .receive(self.pending.time_s, antennas, ends)
+                .map(drop)
+        } else {
+            self.live.end_stretch()
+        };
+        self.pending.antennas.iter_mut().for_each(Vec::clear);
+        if let Err(error) = taken {
+            self.refused("samples", &error);
+        }
+        self.live.hear_before(f64::INFINITY)
+    }
+
+    /// Closes the gate up to the next burst that is wanted.
+    fn sleep_until_next(&mut self, now_s: f64) -> Result<(), LiveError> {
+        if !self.sleeps {
+            return Ok(());
+        }
+        let mut burst_s = self.live.next_wake_up_s(now_s)?;
+        if burst_s <= now_s {
+            self.gate.open();
+            return Ok(());
+        }
+        let [mut from_s, _] = self.windows.around(burst_s);
+        if from_s < now_s {
+            // Part of it is gone already.
+            burst_s = self.live.next_wake_up_s(burst_s)?;
+            [from_s, _] = self.windows.around(burst_s);
+        }
+        if from_s < now_s {
+            self.gate.open();
+        } else {
+            self.gate.set(self.windows.around(burst_s));
+        }
+        Ok(())
+    }
+
+    /// Takes in odometry, and hands on the pose by it.
+    ///
+    /// # Errors
+    /// [`LiveError`] for what cannot go on at all.
+    pub fn odometry(
+        &mut self,
+        sample: &OdometrySample,
+        came: Option<Instant>,
+    ) -> Result<(), LiveError> {
+        match self.live.odometry(sample) {
+            Ok(_) => {}
+            Err(LiveError::Odometry(OdometryDefect::TimeReversed))
+                if self
+                    .clock
+                    .now_s()
+                    .is_some_and(|now_s| sample.time_s < now_s - RESTART_S) =>
+            {
+                let text = format!(
+                    "odometry goes back to {:.3} s: everything begins anew",
+                    sample.time_s
+                );
+                self.event(Level::Warn, "odometry", text);
+                self.restart()?;
+                self.live.odometry(sample)?;
+            }
+            Err(error) => {
+                self.refused("odometry", &error);
+                return Ok(());
+            }
+        }
+        self.clock.see(sample.time_s);
+        let status = self.live.status(sample.time_s)?;
+        if let Some(came) = came {
+            let now = Instant::now();
+            let seconds = |since: Instant| now.saturating_duration_since(since).as_secs_f64();
+            self.punctuality.odometry_to_pose.add(seconds(came));
+            if let Some((last_s, last)) = self.last_pose {
+                let jitter_s = (seconds(last) - (sample.time_s - last_s)).abs();
+                self.punctuality.jitter.add(jitter_s);
+            }
+            self.last_pose = Some((sample.time_s, now));
+        }
+        let by = By::Odometry;
+        self.records.put(Record::Pose(PoseRecord { status, by }));
+        Ok(())
+    }
+
+    fn restart(&mut self) -> Result<(), LiveError> {
+        self.live = self.setup.live()?;
+        self.clock.reset();
+        self.arrivals.clear();
+        self.pending = Block::default();
+        (self.last_pose, self.last_status_s) = (None, f64::NEG_INFINITY);
+        self.gate.open();
+        Ok(())
+    }
+
+    fn command(&mut self, command: Command) {
+        let done = match command {
+            Command::SetPose {
+                time_s,
+                pose,
+                covariance,
+            } => {
+                let newest_s = self.live.onboard().newest_odometry().map(|it| it.time_s);
+                let time_s = time_s.or(newest_s).unwrap_or(0.0);
+                self.live.set_pose(time_s, pose, covariance)
+            }
+            Command::Reset => self.live.reset(),
+            Command::Exclude(pci) => self.live.exclude(pci),
+            Command::Readmit(pci) => self.live.readmit(pci),
+        };
+        match done {
+            Ok(()) => {
+                self.gate.open();
+                self.event(Level::Info, "messages", format!("done: {command:?}"));
+            }
+            Err(error) => self.refused("messages", &error),
+        }
+    }
+
+    /// What was heard since the last time, and the pose after it.
+    ///
+    /// # Errors
+    /// [`LiveError::Custom`].
+    pub fn publish_heard(&mut self, came: Option<Instant>) -> Result<(), LiveError> {
+        let mut last: Option<Outcome> = None;
+        while let Some(outcome) = self.live.next_outcome() {
+            if came.is_some() {
+                let end_s = outcome.execution.ssb.time_s + self.ssb_s;
+                if let Some(arrived) = self.arrival_of(end_s) {
+                    let late = Instant::now().saturating_duration_since(arrived);
+                    self.punctuality.ssb_to_pose.add(late.as_secs_f64());
+                }
+            }
+            self.records.put(Record::Verdict(outcome));
+            last = Some(outcome);
+        }
+        if let Some(last) = last {
+            let status = self.live.status(last.after.time_s)?;
+            let by = By::Angles;
+            self.records.put(Record::Pose(PoseRecord { status, by }));
+        }
+        Ok(())
+    }
+
+    /// When the sample of this time arrived, or would have if samples came one by one.
+    fn arrival_of(&self, time_s: f64) -> Option<Instant> {
+        let (end_s, came) = self.arrivals.iter().find(|(end_s, _)| *end_s >= time_s)?;
+        came.checked_sub(Duration::try_from_secs_f64(end_s - time_s).ok()?)
+    }
+
+    /// Names sources that are silent, and those that are no longer.
+    fn watch(&mut self, sources: &[Arc<SourceHealth>], silent_after: Duration) {
+        for source in sources {
+            let silent = source.silent_for();
+            let told = self.silent.contains(&source.name);
+            if silent >= silent_after && !told {
+                self.silent.push(source.name);
+                let text = format!("nothing has come for {:.1} s", silent.as_secs_f64());
+                self.event(Level::Warn, source.name, text);
+            } else if silent < silent_after && told {
+                self.silent.retain(|it| *it != source.name);
+                self.event(Level::Info, source.name, "is there again".to_owned());
+            }
+        }
+    }
+
+    /// What is due by the clock: a status a second, and what the page shows.
+    ///
+    /// # Errors
+    /// [`LiveError::Custom`].
+    pub fn tick(&mut self) -> Result<(), LiveError> {
+        let Some(now_s) = self.clock.now_s() else {
+            return Ok(());
+        };
+        if self.board.is_due() {
+            let (heads, energy) = (self.live.heads(), self.live.energy());
+            let taken_s = self.live.stream_counts().taken_s;
+            self.board
+                .show(now_s, &self.live.status(now_s)?, heads, &energy, taken_s);
+        }
+        if now_s - self.last_status_s >= STATUS_S {
+            self.last_status_s = now_s;
+            self.records.put(Record::Status {
+                status: self.live.status(now_s)?,
+                heads: self.live.heads().to_vec(),
+                energy: self.live.energy(),
+                time_s: now_s,
+            });
+        }
+        Ok(())
+    }
+
+    /// Input that was refused is an event.
+    fn refused(&mut self, source: &'static str, error: &LiveError) {
+        self.event(Level::Warn, source, format!("left out: {error}"));
+    }
+
+    /// Hands on an event.
+    pub fn event(&mut self, level: Level, source: &'static str, text: String) {
+        let time_s = self.clock.now_s();
+        self.board.event(time_s, level, source, &text);
+        self.records.put(Record::Event {
+            time_s,
+            level,
+            source,
+            text,
+        });
+    }
+
+    /// Notes a time of the drive.
+    pub fn see(&mut self, time_s: f64) {
+        self.clock.see(time_s);
+    }
+}

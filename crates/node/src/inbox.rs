@@ -1,0 +1,290 @@
+//! What has come in and not been taken yet: bounded, the oldest samples are dropped first.
+
+use std::collections::VecDeque;
+use std::sync::{Condvar, Mutex, MutexGuard, PoisonError};
+use std::time::{Duration, Instant};
+
+use num_complex::Complex32;
+use onboard::geometry::Pose;
+use onboard::live::AngleObservation;
+use onboard::observation::OdometrySample;
+use serde::Serialize;
+
+/// Bytes of samples that wait at most: 0.1 s of four antennas at 3.84 Msps.
+pub const MOST_SAMPLE_BYTES: usize = 12 << 20;
+/// Other things that wait at most.
+pub const MOST_OTHERS: usize = 4096;
+/// Buffers of blocks kept for reuse.
+const MOST_SPARE: usize = 8;
+
+/// Samples of every antenna of the array, in its order.
+#[derive(Debug, Default)]
+pub struct Block {
+    /// Time of the first in seconds.
+    pub time_s: f64,
+    /// As many of each antenna.
+    pub antennas: Vec<Vec<Complex32>>,
+}
+
+impl Block {
+    /// Samples of each antenna.
+    pub fn length(&self) -> usize {
+        self.antennas.first().map_or(0, Vec::len)
+    }
+
+    /// Adds the samples that come after these.
+    pub fn append(&mut self, next: &Self) {
+        if self.length() == 0 {
+            self.time_s = next.time_s;
+        }
+        self.antennas.resize_with(next.antennas.len(), Vec::new);
+        for (samples, more) in self.antennas.iter_mut().zip(&next.antennas) {
+            samples.extend_from_slice(more);
+        }
+    }
+
+    fn bytes(&self) -> usize {
+        let samples: usize = self.antennas.iter().map(Vec::len).sum();
+        samples * size_of::<Complex32>()
+    }
+}
+
+/// How serious an event is.
+#[derive(Debug, Clone, Copy, PartialEq, Eq, Serialize)]
+#[serde(rename_all = "lowercase")]
+pub enum Level {
+    /// Good to know.
+    Info,
+    /// Something needs watching.
+    Warn,
+}
+
+/// What is asked of the node by message.
+#[derive(Debug, Clone, Copy, PartialEq)]
+pub enum Command {
+    /// The pose is this, with the covariance of (x, y, heading) where it is known.
+    SetPose {
+        /// At this time; now without.
+        time_s: Option<f64>,
+        /// The pose.
+        pose: Pose,
+        /// Covariance of (x, y, heading), row-major.
+        covariance: Option<[[f64; 3]; 3]>,
+    },
+    /// Everything is forgotten and the pose searched for.
+    Reset,
+    /// A cell is left out ...
+    Exclude(u16),
+    /// ... or taken in again.
+    Readmit(u16),
+}
+
+/// Something that came in.
+#[derive(Debug)]
+pub enum Input {
+    /// Samples.
+    Samples(Block),
+    /// The sources dropped what was not wanted, up to this time (s).
+    Slept(f64),
+    /// Odometry.
+    Odometry(OdometrySample),
+    /// An angle.
+    Angle(AngleObservation),
+    /// A command.
+    Command(Command),
+    /// Something about a source that somebody should know.
+    Remark {
+        /// How serious it is.
+        level: Level,
+        /// Which source.
+        source: &'static str,
+        /// What.
+        text: String,
+    },
+    /// A source has come to its end, and no more will come.
+    End,
+}
+
+impl Input {
+    /// Something that needs watching.
+    pub const fn warning(source: &'static str, text: String) -> Self {
+        let level = Level::Warn;
+        Self::Remark {
+            level,
+            source,
+            text,
+        }
+    }
+}
+
+/// What waits to be taken.
+#[derive(Default)]
+struct Waiting {
+    inputs: VecDeque<(Instant, Input)>,
+    sample_bytes: usize,
+    others: usize,
+    spare: Vec<Vec<Vec<Complex32>>>,
+    dropped_blocks: u64,
+    dropped_others: u64,
+    is_closed: bool,
+}
+
+/// A queue from all sources to the pipeline.
+#[derive(Default)]
+pub struct Inbox {
+    waiting: Mutex<Waiting>,
+    came: Condvar,
+}
+
+impl Inbox {
+    fn lock(&self) -> MutexGuard<'_, Waiting> {
+        self.waiting.lock().unwrap_or_else(PoisonError::into_inner)
+    }
+
+    /// Puts something in; drops the oldest of its kind where there is no room.
+    pub fn put(&self, input: Input) {
+        let mut waiting = self.lock();
+        let waiting = &mut *waiting;
+        match (&input, waiting.inputs.back_mut()) {
+            (Input::Slept(new_s), Some((_, Input::Slept(until_s)))) => {
+                *until_s = *new_s;
+                return;
+            }
+            (Input::Samples(block), _) => {
+                waiting.sample_bytes += block.bytes();
+                while waiting.sample_bytes > MOST_SAMPLE_BYTES && waiting.drop_oldest(true) {}
+            }
+            _ => {
+                waiting.others += 1;
+                while waiting.others > MOST_OTHERS && waiting.drop_oldest(false) {}
+            }
+        }
+        waiting.inputs.push_back((Instant::now(), input));
+        self.came.notify_one();
+    }
+
+    /// Takes the oldest, with when it came in; `None` where nothing comes for so long, or the queue was closed and is empty.
+    pub fn take(&self, wait: Duration) -> Option<(Instant, Input)> {
+        let mut waiting = self.lock();
+        if waiting.inputs.is_empty() && !waiting.is_closed {
+            let (woken, _) = self
+                .came
+                .wait_timeout(waiting, wait)
+                .unwrap_or_else(PoisonError::into_inner);
+            waiting = woken;
+        }
+        let (came, input) = waiting.inputs.pop_front()?;
+        match &input {
+            Input::Samples(block) => waiting.sample_bytes -= block.bytes(),
+            _ => waiting.others -= 1,
+        }
+        Some((came, input))
+    }
+
+    /// Ends the waiting of whoever takes.
+    pub fn close(&self) {
+        self.lock().is_closed = true;
+        self.came.notify_all();
+    }
+
+    /// Whether it was closed.
+    pub fn is_closed(&self) -> bool {
+        self.lock().is_closed
+    }
+
+    /// Empty buffers of so many antennas, used before where there are such.
+    pub fn buffers(&self, antennas: usize) -> Vec<Vec<Complex32>> {
+        let mut buffers = self.lock().spare.pop().unwrap_or_default();
+        buffers.resize_with(antennas, Vec::new);
+        buffers
+    }
+
+    /// Gives the buffers of a block back.
+    pub fn give_back(&self, mut antennas: Vec<Vec<Complex32>>) {
+        antennas.iter_mut().for_each(Vec::clear);
+        let mut waiting = self.lock();
+        if waiting.spare.len() < MOST_SPARE {
+            waiting.spare.push(antennas);
+        }
+    }
+
+    /// Blocks of samples and other things that were dropped since the start.
+    pub fn dropped(&self) -> [u64; 2] {
+        let waiting = self.lock();
+        [waiting.dropped_blocks, waiting.dropped_others]
+    }
+}
+
+impl Waiting {
+    /// Drops the oldest block of samples, or the oldest of anything else; `false` where there is none.
+    fn drop_oldest(&mut self, samples: bool) -> bool {
+        let of_kind = |(_, it): &(Instant, Input)| matches!(it, Input::Samples(_)) == samples;
+        let Some(place) = self.inputs.iter().position(of_kind) else {
+            return false;
+        };
+        if let Some((_, Input::Samples(block))) = self.inputs.remove(place) {
+            self.sample_bytes -= block.bytes();
+            self.dropped_blocks += 1;
+        } else {
+            self.others -= 1;
+            self.dropped_others += 1;
+        }
+        true
+    }
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    fn block(time_s: f64) -> Input {
+        Input::Samples(Block {
+            time_s,
+            antennas: vec![vec![Complex32::ZERO; 65_536]; 4],
+        })
+    }
+
+    #[test]
+    fn the_oldest_samples_are_dropped_and_counted_and_odometry_is_not() {
+        let inbox = Inbox::default();
+        inbox.put(Input::Odometry(OdometrySample::of_speed(0.0, 1.0, None)));
+        for number in 0..12 {
+            inbox.put(block(f64::from(number)));
+        }
+        // A block is 2 MiB: six fit.
+        assert_eq!(inbox.dropped(), [6, 0]);
+        let wait = Duration::ZERO;
+        assert!(matches!(inbox.take(wait), Some((_, Input::Odometry(_)))));
+        for number in 6..12 {
+            let Some((_, Input::Samples(block))) = inbox.take(wait) else {
+                panic!("no samples");
+            };
+            assert_eq!(block.time_s, f64::from(number));
+            inbox.give_back(block.antennas);
+        }
+        assert!(inbox.take(wait).is_none());
+        assert!(
+            inbox
+                .buffers(4)
+                .iter()
+                .all(|it| it.is_empty() && it.capacity() > 0)
+        );
+    }
+
+    #[test]
+    fn what_slept_is_one_thing_however_often_it_is_said() {
+        let inbox = Inbox::default();
+        for number in 0..10_000 {
+            inbox.put(Input::Slept(f64::from(number)));
+        }
+        assert!(matches!(
+            inbox.take(Duration::ZERO),
+            Some((_, Input::Slept(9999.0)))
+        ));
+        assert!(inbox.take(Duration::ZERO).is_none());
+        for _ in 0..MOST_OTHERS + 3 {
+            inbox.put(Input::Command(Command::Reset));
+        }
+        assert_eq!(inbox.dropped(), [0, 3]);
+    }
+}

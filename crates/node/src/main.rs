@@ -1,0 +1,236 @@
+//! `access-av-node`: the localizer on the vehicle, live.
+
+use std::io::Write;
+use std::path::PathBuf;
+use std::process::ExitCode;
+use std::sync::Arc;
+use std::sync::atomic::{AtomicBool, Ordering};
+use std::time::Duration;
+
+use access_av_node::engine::{Engine, Setup};
+use access_av_node::inbox::Level;
+use access_av_node::playback;
+use access_av_node::settings::{NodeSettings, PageSettings};
+use access_av_node::sink::{self, Queue, Sinks};
+use access_av_node::source::{self, Sources};
+use access_av_node::statistics::Punctuality;
+use access_av_node::web::{self, Board, Counters};
+use anyhow::{Context, Result};
+use clap::Parser;
+use onboard::settings::{Platform, Site, TomlFile, Vehicle};
+use recording::load;
+use recording::replay::{as_stated, with_phase};
+use tokio::signal::unix::{SignalKind, signal};
+
+/// Says where the vehicle is: samples and odometry in, poses out, a page to look at.
+#[derive(Parser)]
+#[command(version, about)]
+struct Arguments {
+    /// Site: a shipped name, or a path.
+    #[arg(long)]
+    site: String,
+    /// Vehicle: a shipped name, or a path.
+    #[arg(long)]
+    vehicle: String,
+    /// What comes from where and goes whereto.
+    node: PathBuf,
+    /// Says what is missing or unlikely, and ends.
+    #[arg(long)]
+    dry_run: bool,
+}
+
+fn main() -> ExitCode {
+    // The schema needs no other argument.
+    if std::env::args().nth(1).as_deref() == Some("schema") {
+        return say(&NodeSettings::schema_json());
+    }
+    let arguments = Arguments::parse();
+    match run(&arguments) {
+        Ok(text) => say(&text),
+        Err(error) => {
+            let _ = writeln!(std::io::stderr(), "error: {error:#}");
+            ExitCode::from(2)
+        }
+    }
+}
+
+fn say(text: &str) -> ExitCode {
+    if !text.is_empty() {
+        // Whoever closed standard output does not want to know.
+        let _ = writeln!(std::io::stdout(), "{text}");
+    }
+    ExitCode::SUCCESS
+}
+
+/// Reads a node file; paths in it count from its folder.
+fn node_settings(path: &std::path::Path) -> Result<NodeSettings> {
+    let origin = path.display().to_string();
+    let settings: NodeSettings = load(&origin)?;
+    Ok(settings.beside(&origin))
+}
+
+fn run(arguments: &Arguments) -> Result<String> {
+    let settings = node_settings(&arguments.node)?;
+    let site: Site = load(&arguments.site)?;
+    let vehicle: Vehicle = load(&arguments.vehicle)?;
+    let platform: Platform = load(&vehicle.platform.name)?;
+    let antennas = usize::from(vehicle.array.elements);
+    let mut sources = Sources::open(&settings, antennas, vehicle.odometer.track_width_m)?;
+    let measurand = vehicle.array.measurand();
+    for angle in &mut sources.files.angles {
+        *angle = with_phase(angle, &measurand);
+    }
+    // What others state of their angles' errors is taken for all of it.
+    let (site, vehicle) = match settings.samples {
+        None => as_stated(&site, &vehicle),
+        Some(_) => (site, vehicle),
+    };
+    let setup = Setup {
+        site,
+        vehicle,
+        platform,
+        stream: sources.stream,
+    };
+    let live = setup.live()?;
+    drop(live);
+    if arguments.dry_run {
+        return Ok(report(&settings, &setup));
+    }
+    drive(&settings, setup, sources)?;
+    Ok(String::new())
+}
+
+/// What a dry run says.
+fn report(settings: &NodeSettings, setup: &Setup) -> String {
+    let mut lines = Vec::new();
+    let (site, vehicle) = (&setup.site, &setup.vehicle);
+    if let Some(stream) = setup.stream {
+        lines.push(format!(
+            "samples: {} of {} antennas, {:.2} Msps at {:.3} MHz; the SSB is at {:.3} MHz",
+            settings.samples.as_ref().map_or("", |it| it.name()),
+            vehicle.array.elements,
+            1e-6 * stream.rate_hz,
+            1e-6 * stream.centre_hz,
+            site.carrier_mhz,
+        ));
+    }
+    for warning in onboard::plausible::of_both(site, vehicle) {
+        lines.push(format!("warning: {warning}"));
+    }
+    let outputs = &settings.output;
+    let nothing = outputs.json.is_none()
+        && outputs.tum.is_none()
+        && outputs.mcap.is_none()
+        && outputs.mqtt.is_none()
+        && settings.page.is_none();
+    if nothing {
+        lines.push("warning: no [output] and no [page]: nobody is told the pose".to_owned());
+    }
+    if vehicle.start.pose.is_none() {
+        lines.push("the start is not known: the vehicle searches for it".to_owned());
+    }
+    lines.push("ready".to_owned());
+    lines.join("\n")
+}
+
+fn drive(settings: &NodeSettings, setup: Setup, mut sources: Sources) -> Result<()> {
+    let is_playback = settings.is_playback();
+    let records = Arc::new(Queue::new(is_playback));
+    let punctuality = Arc::new(Punctuality::default());
+    let page_s = settings.page.as_ref().map_or(1.0, |it| 1.0 / it.rate_hz);
+    let heads = setup.site.radio_heads.iter();
+    let board = Arc::new(Board::new(
+        Duration::from_secs_f64(page_s),
+        Counters {
+            inbox: Arc::clone(&sources.inbox),
+            records: Arc::clone(&records),
+            punctuality: Arc::clone(&punctuality),
+            sources: sources.health.clone(),
+            rate_hz: sources.stream.map_or(0.0, |it| it.rate_hz),
+            heads: heads
+                .map(|it| (it.pci, it.ssb_index, it.name.clone()))
+                .collect(),
+        },
+    ));
+    let stop = Arc::new(AtomicBool::new(false));
+    let sinks = Sinks::open(&settings.output, &settings.name, &sources.inbox)?;
+    let site = web::site_json(&setup.site, &settings.name);
+    let gate = Arc::clone(&sources.gate);
+    let mut engine = Engine::new(
+        setup,
+        Arc::clone(&records),
+        Arc::clone(&board),
+        punctuality,
+        gate,
+        settings.sleep && !is_playback,
+    )?;
+    serve(settings.page.as_ref(), &board, site, &stop)?;
+    let writing = sink::start(sinks, Arc::clone(&records))?;
+    engine.event(Level::Info, "node", format!("{} begins", settings.name));
+    let driven = if is_playback {
+        playback::play(
+            &mut engine,
+            sources.files,
+            &sources.health,
+            settings.pace,
+            &stop,
+        )
+    } else {
+        source::start(settings, &mut sources)?;
+        let silent_after = Duration::from_secs_f64(settings.silent_after_s);
+        let run = engine.run(&sources.inbox, &sources.health, silent_after, &stop);
+        run.map_err(Into::into)
+    };
+    engine.event(Level::Info, "node", format!("{} ends", settings.name));
+    sources.inbox.close();
+    records.close();
+    match writing.join() {
+        Ok(written) => written?,
+        Err(_) => anyhow::bail!("the thread that writes the output has panicked"),
+    }
+    driven
+}
+
+/// Serves the page if there is to be one, and heeds signals, on a thread of its own.
+fn serve(
+    page: Option<&PageSettings>,
+    board: &Arc<Board>,
+    site: serde_json::Value,
+    stop: &Arc<AtomicBool>,
+) -> Result<()> {
+    let runtime = tokio::runtime::Builder::new_current_thread()
+        .enable_all()
+        .build()?;
+    let listener = match page {
+        Some(page) => {
+            let listener = runtime.block_on(web::open(page))?;
+            let address = listener.local_addr()?;
+            let _ = writeln!(std::io::stderr(), "page: http://{address}/");
+            Some((listener, page.clone()))
+        }
+        None => None,
+    };
+    let (board, stop) = (Arc::clone(board), Arc::clone(stop));
+    let work = move || -> Result<()> {
+        runtime.block_on(async {
+            let mut terminated = signal(SignalKind::terminate())?;
+            let mut interrupted = signal(SignalKind::interrupt())?;
+            let serving = async {
+                match listener {
+                    Some((listener, page)) => web::serve(listener, &page, board, &site).await,
+                    None => std::future::pending().await,
+                }
+            };
+            tokio::select! {
+                _ = terminated.recv() => {}
+                _ = interrupted.recv() => {}
+                served = serving => served?,
+            }
+            stop.store(true, Ordering::Release);
+            Ok(())
+        })
+    };
+    let thread = std::thread::Builder::new().name("page".to_owned());
+    thread.spawn(move || work().context("page"))?;
+    Ok(())
+}

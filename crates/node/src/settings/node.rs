@@ -1,0 +1,194 @@
+//! The file itself.
+
+use std::path::Path;
+
+use onboard::settings::{Check, SettingsError, TomlFile};
+use schemars::JsonSchema;
+use serde::{Deserialize, Serialize};
+
+use super::outputs::{Outputs, PageSettings};
+use super::samples::SampleSource;
+use crate::address::Address;
+
+/// `node.toml`
+#[derive(Debug, Clone, PartialEq, Serialize, Deserialize, JsonSchema)]
+#[serde(deny_unknown_fields)]
+pub struct NodeSettings {
+    /// Short name; the page shows it.
+    pub name: String,
+    /// How files are played back.
+    #[serde(default)]
+    pub pace: Pace,
+    /// Samples of all antennas; without, angles come by `messages` or `angles`.
+    #[serde(default, skip_serializing_if = "Option::is_none")]
+    pub samples: Option<SampleSource>,
+    /// Newline JSON comes here: odometry, angles, poses to begin from.
+    #[serde(default, skip_serializing_if = "Vec::is_empty")]
+    #[schemars(length(max = 16))]
+    pub messages: Vec<Address>,
+    /// Odometry of a file.
+    #[serde(default, skip_serializing_if = "Option::is_none")]
+    pub odometry: Option<OdometryFile>,
+    /// Angles of a file.
+    #[serde(default, skip_serializing_if = "Option::is_none")]
+    pub angles: Option<AngleFile>,
+    /// Whether samples are dropped unseen where no SSB is wanted, and the radio is switched off.
+    #[serde(default = "yes")]
+    pub sleep: bool,
+    /// A source that is silent for so long is named, in seconds.
+    #[serde(default = "half")]
+    #[schemars(range(min = 0.05, max = 60.0))]
+    pub silent_after_s: f64,
+    /// Where poses go.
+    #[serde(default)]
+    pub output: Outputs,
+    /// The page to look at, with metrics; none without.
+    #[serde(default, skip_serializing_if = "Option::is_none")]
+    pub page: Option<PageSettings>,
+}
+
+const fn yes() -> bool {
+    true
+}
+const fn half() -> f64 {
+    0.5
+}
+
+/// How files are played back.
+#[derive(Debug, Clone, Copy, PartialEq, Eq, Default, Serialize, Deserialize, JsonSchema)]
+#[serde(rename_all = "kebab-case")]
+pub enum Pace {
+    /// As it was recorded.
+    #[default]
+    RealTime,
+    /// As fast as possible; all that comes must come from files.
+    Fast,
+}
+
+/// `[odometry]`
+#[derive(Debug, Clone, PartialEq, Serialize, Deserialize, JsonSchema)]
+#[serde(deny_unknown_fields)]
+pub struct OdometryFile {
+    /// CSV, MCAP, or the folder of a rosbag2; a path counts from this file.
+    pub file: String,
+    /// Topic of the odometry where a bag has several.
+    #[serde(default, skip_serializing_if = "Option::is_none")]
+    pub topic: Option<String>,
+    /// Topic of the IMU that tells the yaw rate, where it is not to be the odometry.
+    #[serde(default, skip_serializing_if = "Option::is_none")]
+    pub imu_topic: Option<String>,
+}
+
+/// `[angles]`
+#[derive(Debug, Clone, PartialEq, Serialize, Deserialize, JsonSchema)]
+#[serde(deny_unknown_fields)]
+pub struct AngleFile {
+    /// CSV; a path counts from this file.
+    pub file: String,
+}
+
+impl NodeSettings {
+    /// Whether all that comes in comes from files.
+    pub fn is_playback(&self) -> bool {
+        let from_file = |it: &SampleSource| matches!(it, SampleSource::Sigmf { .. });
+        self.messages.is_empty() && self.samples.as_ref().is_none_or(from_file)
+    }
+
+    /// The same with the paths of what is read counted from the folder of `origin`.
+    #[must_use]
+    pub fn beside(mut self, origin: &str) -> Self {
+        let folder = Path::new(origin).parent().unwrap_or(Path::new(""));
+        let place = |name: &mut String| *name = folder.join(&*name).display().to_string();
+        if let Some(SampleSource::Sigmf { recording, .. }) = &mut self.samples {
+            place(recording);
+        }
+        if let Some(odometry) = &mut self.odometry {
+            place(&mut odometry.file);
+        }
+        if let Some(angles) = &mut self.angles {
+            place(&mut angles.file);
+        }
+        self
+    }
+}
+
+impl TomlFile for NodeSettings {
+    const WHAT: &'static str = "node";
+    const SHIPPED: &'static [(&'static str, &'static str)] = &[];
+
+    fn name(&self) -> &str {
+        &self.name
+    }
+
+    fn check(&self, check: Check<'_>) -> Result<(), SettingsError> {
+        let hears = self.samples.is_some() || self.angles.is_some() || !self.messages.is_empty();
+        check.that(
+            hears,
+            "samples",
+            "missing",
+            "there must be [samples], [angles], or messages with angles",
+        )?;
+        check.that(
+            self.samples.is_none() || self.angles.is_none(),
+            "angles.file",
+            "there beside [samples]",
+            "angles come from one or the other",
+        )?;
+        check.that(
+            self.odometry.is_some() || !self.messages.is_empty(),
+            "odometry",
+            "missing",
+            "there must be [odometry] with a file, or messages with odometry",
+        )?;
+        check.that(
+            self.pace == Pace::RealTime || self.is_playback(),
+            "pace",
+            "fast",
+            "only files can be played faster than they were recorded: no messages, and samples of a \
+             recording or none",
+        )?;
+        if let Some(SampleSource::Zeromq { endpoints, .. }) = &self.samples {
+            for (index, endpoint) in endpoints.iter().enumerate() {
+                let key = format!("samples.endpoints[{index}]");
+                let good = matches!(endpoint, Address::Tcp(_));
+                check.that(good, &key, endpoint, "it must be tcp://HOST:PORT")?;
+            }
+        }
+        if let Some(SampleSource::Raw { address, .. }) = &self.samples {
+            let good = !matches!(address, Address::Udp(_));
+            let allowed =
+                "samples that are lost on the way would go unnoticed: use TCP, Unix or `-`";
+            check.that(good, "samples.address", address, allowed)?;
+        }
+        let standard = |it: &Address| *it == Address::Standard;
+        let samples = match &self.samples {
+            Some(SampleSource::Raw { address, .. }) => usize::from(standard(address)),
+            _ => 0,
+        };
+        let readers = samples + self.messages.iter().filter(|it| standard(it)).count();
+        let allowed = "standard input is read by one of them only";
+        check.that(readers <= 1, "messages", "-", allowed)?;
+        if let Some(stream) = self.samples.as_ref().and_then(SampleSource::stream) {
+            let mut sorted = stream.antennas.clone();
+            sorted.sort_unstable();
+            let each_once = (0..)
+                .zip(&sorted)
+                .all(|(k, antenna): (u8, _)| k == *antenna);
+            check.that(
+                each_once,
+                "samples.stream.antennas",
+                format!("{:?}", stream.antennas),
+                "each antenna must stand there once, from 0 on",
+            )?;
+            if let Some(SampleSource::Zeromq { endpoints, .. }) = &self.samples {
+                check.that(
+                    endpoints.len() == stream.antennas.len(),
+                    "samples.endpoints",
+                    format!("a list of {}", endpoints.len()),
+                    "there must be one for each of samples.stream.antennas",
+                )?;
+            }
+        }
+        Ok(())
+    }
+}

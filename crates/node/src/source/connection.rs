@@ -1,0 +1,199 @@
+//! Streams of bytes from wherever they come, opened again when they end.
+
+use std::fs::File;
+use std::io::{self, ErrorKind, Read};
+use std::net::{TcpListener, TcpStream, ToSocketAddrs, UdpSocket};
+use std::os::unix::net::{UnixListener, UnixStream};
+use std::path::Path;
+use std::time::Duration;
+
+use crate::address::Address;
+use crate::inbox::{Inbox, Input, Level};
+
+/// A reader looks this often whether the node ends.
+const LOOK: Duration = Duration::from_millis(200);
+/// Time between two attempts to connect.
+const RETRY: Duration = Duration::from_millis(300);
+/// Bytes read at once.
+const CHUNK: usize = 1 << 18;
+
+/// What happens to a stream.
+pub enum Event<'a> {
+    /// It begins, or begins anew.
+    Begin,
+    /// It brings bytes.
+    Bytes(&'a [u8]),
+}
+
+/// Reads an address until the node ends, or a file or standard input does, and hands all to `take`.
+pub fn read(
+    address: &Address,
+    source: &'static str,
+    inbox: &Inbox,
+    mut take: impl FnMut(Event<'_>),
+) {
+    let remark = |text: String| inbox.put(Input::warning(source, text));
+    let mut said = String::new();
+    let mut opener = Opener::default();
+    while !inbox.is_closed() {
+        match opener.open(address) {
+            Ok(Some(mut stream)) => {
+                if !said.is_empty() {
+                    let (level, text) = (Level::Info, format!("{address}: connected"));
+                    inbox.put(Input::Remark {
+                        level,
+                        source,
+                        text,
+                    });
+                    said.clear();
+                }
+                take(Event::Begin);
+                let ended = drain(&mut *stream, inbox, &mut take);
+                let text = match ended {
+                    Ok(()) => format!("{address}: ended"),
+                    Err(error) => format!("{address}: {error}"),
+                };
+                let is_over = matches!(address, Address::Standard | Address::File(_));
+                if is_over || inbox.is_closed() {
+                    break;
+                }
+                remark(text.clone());
+                said = text;
+            }
+            Ok(None) => {} // nobody has connected yet
+            Err(error) => {
+                let text = format!("{address}: {error}");
+                if text != said {
+                    remark(text.clone());
+                    said = text;
+                }
+                if matches!(address, Address::File(_)) {
+                    break;
+                }
+            }
+        }
+        std::thread::sleep(RETRY);
+    }
+}
+
+fn drain(stream: &mut dyn Read, inbox: &Inbox, take: &mut impl FnMut(Event<'_>)) -> io::Result<()> {
+    let mut bytes = vec![0; CHUNK];
+    while !inbox.is_closed() {
+        match stream.read(&mut bytes) {
+            Ok(0) => break,
+            Ok(count) => take(Event::Bytes(bytes.get(..count).unwrap_or_default())),
+            Err(error) if is_idle(&error) => {}
+            Err(error) => return Err(error),
+        }
+    }
+    Ok(())
+}
+
+/// Whether nothing is wrong but that nothing has come.
+pub fn is_idle(error: &io::Error) -> bool {
+    matches!(
+        error.kind(),
+        ErrorKind::WouldBlock | ErrorKind::TimedOut | ErrorKind::Interrupted
+    )
+}
+
+/// Connects, and keeps what it listens at.
+#[derive(Default)]
+struct Opener {
+    tcp: Option<TcpListener>,
+    unix: Option<UnixListener>,
+}
+
+impl Opener {
+    /// The stream; `None` where nobody has connected yet.
+    fn open(&mut self, address: &Address) -> io::Result<Option<Box<dyn Read>>> {
+        Ok(Some(match address {
+            Address::Standard => Box::new(io::stdin()),
+            Address::File(path) => Box::new(File::open(path)?),
+            Address::Tcp(socket) => Box::new(connect(socket)?),
+            Address::TcpListen(socket) => {
+                let listener = self
+                    .tcp
+                    .take()
+                    .map_or_else(|| TcpListener::bind(socket), Ok)?;
+                listener.set_nonblocking(true)?;
+                let accepted = listener.accept();
+                self.tcp = Some(listener);
+                match accepted {
+                    Ok((stream, _)) => Box::new(timed(stream)?),
+                    Err(error) if is_idle(&error) => return Ok(None),
+                    Err(error) => return Err(error),
+                }
+            }
+            Address::Udp(socket) => {
+                let socket = UdpSocket::bind(socket)?;
+                socket.set_read_timeout(Some(LOOK))?;
+                Box::new(Datagrams(socket))
+            }
+            Address::Unix(path) => Box::new(timed_unix(UnixStream::connect(path)?)?),
+            Address::UnixListen(path) => {
+                let listener = self.unix.take().map_or_else(|| listen_at(path), Ok)?;
+                listener.set_nonblocking(true)?;
+                let accepted = listener.accept();
+                self.unix = Some(listener);
+                match accepted {
+                    Ok((stream, _)) => Box::new(timed_unix(stream)?),
+                    Err(error) if is_idle(&error) => return Ok(None),
+                    Err(error) => return Err(error),
+                }
+            }
+        }))
+    }
+}
+
+/// Listens at a path; a socket that nobody listens at any more is left from a run before.
+fn listen_at(path: &Path) -> io::Result<UnixListener> {
+    use std::os::unix::fs::FileTypeExt;
+    let is_socket = path
+        .symlink_metadata()
+        .is_ok_and(|it| it.file_type().is_socket());
+    if is_socket && UnixStream::connect(path).is_err() {
+        std::fs::remove_file(path)?;
+    }
+    UnixListener::bind(path)
+}
+
+/// Connects within two seconds.
+pub fn connect(socket: &str) -> io::Result<TcpStream> {
+    let mut last = io::Error::new(ErrorKind::NotFound, "no such host");
+    for address in socket.to_socket_addrs()? {
+        match TcpStream::connect_timeout(&address, Duration::from_secs(2)) {
+            Ok(stream) => return timed(stream),
+            Err(error) => last = error,
+        }
+    }
+    Err(last)
+}
+
+fn timed(stream: TcpStream) -> io::Result<TcpStream> {
+    stream.set_nonblocking(false)?;
+    stream.set_read_timeout(Some(LOOK))?;
+    stream.set_write_timeout(Some(LOOK))?;
+    stream.set_nodelay(true)?;
+    Ok(stream)
+}
+
+fn timed_unix(stream: UnixStream) -> io::Result<UnixStream> {
+    stream.set_nonblocking(false)?;
+    stream.set_read_timeout(Some(LOOK))?;
+    Ok(stream)
+}
+
+/// Each datagram is a line or several, whether or not a newline ends it.
+struct Datagrams(UdpSocket);
+
+impl Read for Datagrams {
+    fn read(&mut self, bytes: &mut [u8]) -> io::Result<usize> {
+        let room = bytes.len().saturating_sub(1);
+        let count = self.0.recv(bytes.get_mut(..room).unwrap_or_default())?;
+        if let Some(end) = bytes.get_mut(count) {
+            *end = b'\n';
+        }
+        Ok(count + 1)
+    }
+}

@@ -1,0 +1,355 @@
+//! Bytes of samples to blocks of them: antennas in their order, timed, and only where they are wanted.
+
+use std::sync::Arc;
+
+use num_complex::Complex32;
+
+use crate::clock::{ArrivalClock, Finding, unix_s};
+use crate::gate::Gate;
+use crate::inbox::{Block, Inbox, Input};
+use crate::settings::{Clock, SampleFormat, Stream};
+use crate::statistics::SourceHealth;
+
+/// Most samples of a channel in one block.
+const MOST_FRAMES: usize = 1 << 15;
+
+impl SampleFormat {
+    /// Bytes of one complex sample.
+    pub const fn bytes(self) -> usize {
+        match self {
+            Self::Cf32 => 8,
+            Self::Ci16 => 4,
+            Self::Ci8 => 2,
+        }
+    }
+
+    /// The sample that `bytes` begin with; `None` for one that is no number, or where they are too few.
+    fn decode(self, bytes: &[u8]) -> Option<Complex32> {
+        let sample = match self {
+            Self::Cf32 => {
+                let [a, b, c, d, e, f, g, h] = *bytes.first_chunk()?;
+                let part = f32::from_le_bytes;
+                Complex32::new(part([a, b, c, d]), part([e, f, g, h]))
+            }
+            Self::Ci16 => {
+                let [a, b, c, d] = *bytes.first_chunk()?;
+                let part = |bytes| f32::from(i16::from_le_bytes(bytes)) / 32768.0;
+                Complex32::new(part([a, b]), part([c, d]))
+            }
+            Self::Ci8 => {
+                let [a, b] = *bytes.first_chunk()?;
+                let part = |byte: u8| f32::from(byte.cast_signed()) / 128.0;
+                Complex32::new(part(a), part(b))
+            }
+        };
+        (sample.re.is_finite() && sample.im.is_finite()).then_some(sample)
+    }
+}
+
+/// Samples of one channel among bytes.
+#[derive(Debug, Clone, Copy)]
+pub struct View<'a> {
+    /// From its first sample on.
+    pub bytes: &'a [u8],
+    /// Bytes from one of its samples to the next.
+    pub stride: usize,
+}
+
+/// Makes blocks of a stream.
+pub struct Framing {
+    format: SampleFormat,
+    rate_hz: f64,
+    /// Antenna of each channel.
+    antennas: Vec<u8>,
+    clock: Times,
+    counted: u64,
+    gate: Arc<Gate>,
+    inbox: Arc<Inbox>,
+    health: Arc<SourceHealth>,
+    told_of_defects: bool,
+    /// Bytes of a sample, of all channels in turn, that is not yet complete.
+    begun: Vec<u8>,
+}
+
+enum Times {
+    Arrival(ArrivalClock),
+    Counted(f64),
+}
+
+impl Framing {
+    /// For a stream as the settings state it.
+    pub fn new(
+        stream: &Stream,
+        format: SampleFormat,
+        gate: Arc<Gate>,
+        inbox: Arc<Inbox>,
+        health: Arc<SourceHealth>,
+    ) -> Self {
+        let rate_hz = stream.rate_msps * 1e6;
+        Self {
+            format,
+            rate_hz,
+            antennas: stream.antennas.clone(),
+            clock: match stream.clock {
+                Clock::Arrival => Times::Arrival(ArrivalClock::new(rate_hz)),
+                Clock::StartTimeS(start_s) => Times::Counted(start_s),
+            },
+            counted: 0,
+            gate,
+            inbox,
+            health,
+            told_of_defects: false,
+            begun: Vec::new(),
+        }
+    }
+
+    /// Bytes of one sample of one channel.
+    pub const fn sample_bytes(&self) -> usize {
+        self.format.bytes()
+    }
+
+    /// The stream begins anew: its counting does, and what of it is not complete is forgotten.
+    pub fn restart(&mut self) {
+        self.begun.clear();
+        self.counted = 0;
+        if let Times::Arrival(clock) = &mut self.clock {
+            *clock = ArrivalClock::new(self.rate_hz);
+        }
+    }
+
+    /// Takes in bytes of all channels in turn, cut anywhere.
+    pub fn interleaved(&mut self, mut bytes: &[u8]) {
+        let (sample, channels) = (self.format.bytes(), self.antennas.len());
+        let frame = sample * channels;
+        if !self.begun.is_empty() {
+            let missing = (frame - self.begun.len()).min(bytes.len());
+            let (head, rest) = bytes.split_at(missing);
+            self.begun.extend_from_slice(head);
+            bytes = rest;
+            if self.begun.len() < frame {
+                return;
+            }
+            let begun = std::mem::take(&mut self.begun);
+            self.interleaved_whole(&begun, 1);
+            self.begun = begun;
+            self.begun.clear();
+        }
+        let frames = bytes.len() / frame;
+        let (whole, rest) = bytes.split_at(frames * frame);
+        self.interleaved_whole(whole, frames);
+        self.begun.extend_from_slice(rest);
+    }
+
+    fn interleaved_whole(&mut self, bytes: &[u8], frames: usize) {
+        let (sample, channels) = (self.format.bytes(), self.antennas.len());
+        let views: Vec<View<'_>> = (0..channels)
+            .map(|channel| View {
+                bytes: bytes.get(channel * sample..).unwrap_or_default(),
+                stride: channels * sample,
+            })
+            .collect();
+        self.take(&views, frames);
+    }
+
+    /// Takes in so many samples of each channel.
+    pub fn take(&mut self, channels: &[View<'_>], frames: usize) {
+        if frames > 0 {
+            let start_s = self.start_s(frames);
+            self.cut(frames, start_s, |it, first, count, time_s| {
+                it.decode(channels, first, count, time_s);
+            });
+        }
+    }
+
+    /// Takes in samples of each channel, equally many, the first of which was received at `time_s`.
+    #[cfg(feature = "soapy")]
+    pub fn take_samples(&mut self, channels: &[&[Complex32]], time_s: f64) {
+        let frames = channels.first().map_or(0, |samples| samples.len());
+        self.cut(frames, time_s, |it, first, count, time_s| {
+            let mut antennas = it.inbox.buffers(it.antennas.len());
+            for (samples, antenna) in channels.iter().zip(&it.antennas) {
+                if let Some(into) = antennas.get_mut(usize::from(*antenna)) {
+                    into.clear();
+                    into.extend_from_slice(samples.get(first..first + count).unwrap_or_default());
+                }
+            }
+            it.inbox.put(Input::Samples(Block { time_s, antennas }));
+        });
+    }
+
+    /// Hands what is wanted of so many samples to `take`, with its first, its number and its time.
+    fn cut(
+        &mut self,
+        frames: usize,
+        start_s: f64,
+        mut take: impl FnMut(&mut Self, usize, usize, f64),
+    ) {
+        self.health.came(frames as u64);
+        let rate_hz = self.rate_hz;
+        let mut first = 0;
+        while first < frames {
+            let count = MOST_FRAMES.min(frames - first);
+            let block_s = start_s + first as f64 / rate_hz;
+            let place =
+                |time_s: f64| ((time_s - block_s) * rate_hz).clamp(0.0, count as f64) as usize;
+            let wanted = self.gate.wanted();
+            let [from, until] = wanted.map_or([0, count], |stretch| stretch.map(place));
+            if from < until {
+                let time_s = block_s + from as f64 / rate_hz;
+                take(self, first + from, until - from, time_s);
+            }
+            if until < count {
+                let end_s = block_s + count as f64 / rate_hz;
+                self.inbox.put(Input::Slept(end_s));
+            }
+            first += count;
+        }
+    }
+
+    fn start_s(&mut self, frames: usize) -> f64 {
+        match &mut self.clock {
+            Times::Counted(zero_s) => {
+                let start_s = *zero_s + self.counted as f64 / self.rate_hz;
+                self.counted += frames as u64;
+                start_s
+            }
+            Times::Arrival(clock) => {
+                let (start_s, finding) = clock.block(frames, unix_s());
+                if let Some(finding) = finding {
+                    let text = match finding {
+                        Finding::Missing(lost_s) => {
+                            format!("samples of {:.1} ms are missing", 1e3 * lost_s)
+                        }
+                        Finding::WrongRate(excess) => format!(
+                            "{:.2} million samples a second come, not the {:.2} of \
+                             samples.stream.rate_msps",
+                            1e-6 * self.rate_hz * (1.0 + excess),
+                            1e-6 * self.rate_hz
+                        ),
+                    };
+                    let source = self.health.name;
+                    self.inbox.put(Input::warning(source, text));
+                }
+                start_s
+            }
+        }
+    }
+
+    fn decode(&mut self, channels: &[View<'_>], first: usize, count: usize, time_s: f64) {
+        let mut antennas = self.inbox.buffers(self.antennas.len());
+        let mut all_numbers = true;
+        for (view, antenna) in channels.iter().zip(&self.antennas) {
+            let bytes = view.bytes.get(first * view.stride..).unwrap_or_default();
+            let samples = bytes.chunks(view.stride).take(count);
+            let samples = samples.map(|bytes| {
+                self.format.decode(bytes).unwrap_or_else(|| {
+                    all_numbers = false;
+                    Complex32::ZERO
+                })
+            });
+            if let Some(into) = antennas.get_mut(usize::from(*antenna)) {
+                into.clear();
+                into.extend(samples);
+            }
+        }
+        if !all_numbers {
+            self.health.defect();
+            if !std::mem::replace(&mut self.told_of_defects, true) {
+                let text =
+                    "samples that are no numbers were set to 0; check samples.format".to_owned();
+                let source = self.health.name;
+                self.inbox.put(Input::warning(source, text));
+            }
+        }
+        self.inbox.put(Input::Samples(Block { time_s, antennas }));
+    }
+}
+
+#[cfg(test)]
+mod tests {
+    use std::time::Duration;
+
+    use super::*;
+
+    fn framing(format: SampleFormat, antennas: &[u8]) -> Framing {
+        let stream = Stream {
+            rate_msps: 1.0,
+            centre_mhz: 3500.0,
+            antennas: antennas.to_vec(),
+            clock: Clock::StartTimeS(5.0),
+        };
+        let health = Arc::new(SourceHealth::new("raw"));
+        Framing::new(&stream, format, Arc::default(), Arc::default(), health)
+    }
+
+    fn blocks(framing: &Framing) -> Vec<Block> {
+        std::iter::from_fn(|| framing.inbox.take(Duration::ZERO))
+            .filter_map(|(_, input)| match input {
+                Input::Samples(block) => Some(block),
+                _ => None,
+            })
+            .collect()
+    }
+
+    #[test]
+    fn channels_come_to_their_antennas_wherever_the_bytes_are_cut() {
+        // Sample k of channel c is k + 100c + 0i.
+        let bytes: Vec<u8> = (0..50_i16)
+            .flat_map(|k| [k, 0, k + 100, 0, k + 200, 0])
+            .flat_map(i16::to_le_bytes)
+            .collect();
+        for piece in [1, 5, 12, 13, 600] {
+            let mut framing = framing(SampleFormat::Ci16, &[2, 0, 1]);
+            bytes.chunks(piece).for_each(|it| framing.interleaved(it));
+            let mut antennas = vec![Vec::new(); 3];
+            for block in blocks(&framing) {
+                let expected_s = 5.0 + antennas[0].len() as f64 * 1e-6;
+                assert!((block.time_s - expected_s).abs() < 1e-9);
+                for (all, new) in antennas.iter_mut().zip(&block.antennas) {
+                    all.extend(new.iter().map(|it| (it.re * 32768.0) as i16));
+                }
+            }
+            for (antenna, first) in [(2, 0), (0, 100), (1, 200)] {
+                let expected: Vec<i16> = (first..first + 50).collect();
+                assert_eq!(antennas[antenna], expected, "{piece}");
+            }
+        }
+    }
+
+    #[test]
+    fn formats_and_what_is_no_number() {
+        let one = Complex32::new(0.5, -1.0);
+        for (format, bytes) in [
+            (
+                SampleFormat::Cf32,
+                [0.5f32.to_le_bytes(), (-1.0f32).to_le_bytes()].concat(),
+            ),
+            (
+                SampleFormat::Ci16,
+                [16384i16.to_le_bytes(), (-32768i16).to_le_bytes()].concat(),
+            ),
+            (SampleFormat::Ci8, vec![64, 128]),
+        ] {
+            let mut framing = framing(format, &[0]);
+            framing.interleaved(&bytes);
+            assert_eq!(blocks(&framing)[0].antennas, [[one]]);
+        }
+        let mut framing = framing(SampleFormat::Cf32, &[0]);
+        framing.interleaved(&[f32::NAN.to_le_bytes(), 1f32.to_le_bytes()].concat());
+        assert_eq!(blocks(&framing)[0].antennas, [[Complex32::ZERO]]);
+        assert_eq!(framing.health.defects(), 1);
+    }
+
+    #[test]
+    fn only_what_is_wanted_is_handed_on() {
+        let mut framing = framing(SampleFormat::Ci8, &[0]);
+        framing.gate.set([5.0 + 100e-6, 5.0 + 300e-6]);
+        for _ in 0..10 {
+            framing.interleaved(&[1; 2 * 64]);
+        }
+        let found = blocks(&framing);
+        let count: usize = found.iter().map(|it| it.antennas[0].len()).sum();
+        assert!((199..=201).contains(&count), "{count}");
+        assert!((found[0].time_s - (5.0 + 100e-6)).abs() < 1.5e-6);
+    }
+}

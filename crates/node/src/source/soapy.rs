@@ -1,0 +1,97 @@
+//! A radio that SoapySDR drives, switched off between the bursts where it can tell the time.
+
+use std::sync::Arc;
+use std::thread;
+use std::time::Duration;
+
+use num_complex::Complex32;
+use soapysdr::{Device, Direction, Error, ErrorCode, RxStream};
+
+use super::framing::Framing;
+use crate::clock::{ArrivalClock, unix_s};
+use crate::gate::Gate;
+use crate::inbox::{Inbox, Input};
+use crate::settings::Radio;
+
+/// Time that a radio takes to begin, in seconds: it is switched off only for longer.
+const BEGINS_S: f64 = 0.03;
+const TIMEOUT_US: i64 = 200_000;
+const RETRY: Duration = Duration::from_secs(1);
+
+/// Receives until the node ends; a radio that vanishes is opened again.
+pub fn run(radio: &Radio, mut framing: Framing, gate: &Arc<Gate>, inbox: &Inbox) {
+    let mut said = String::new();
+    while !inbox.is_closed() {
+        if let Err(error) = session(radio, &mut framing, gate, inbox) {
+            let text = format!("samples.device is {:?}: {error}", radio.device);
+            if text != said {
+                inbox.put(Input::warning("samples", text.clone()));
+                said = text;
+            }
+            thread::sleep(RETRY);
+        }
+    }
+}
+
+fn open(radio: &Radio) -> Result<RxStream<Complex32>, Error> {
+    let device = Device::new(radio.device.as_str())?;
+    let channels: Vec<usize> = (0..radio.stream.antennas.len()).collect();
+    for &channel in &channels {
+        let way = Direction::Rx;
+        device.set_sample_rate(way, channel, radio.stream.rate_msps * 1e6)?;
+        device.set_frequency(way, channel, radio.stream.centre_mhz * 1e6, ())?;
+        if let Some(gain_db) = radio.gain_db {
+            device.set_gain(way, channel, gain_db)?;
+        }
+    }
+    device.rx_stream(&channels)
+}
+
+fn session(
+    radio: &Radio,
+    framing: &mut Framing,
+    gate: &Arc<Gate>,
+    inbox: &Inbox,
+) -> Result<(), Error> {
+    let mut stream = open(radio)?;
+    let length = stream.mtu()?.clamp(1, 1 << 15);
+    let rate_hz = radio.stream.rate_msps * 1e6;
+    let mut buffers = vec![vec![Complex32::ZERO; length]; radio.stream.antennas.len()];
+    // Time of the radio's clock at 0, and its time where it tells none.
+    let (mut zero_s, mut counted) = (None, ArrivalClock::new(rate_hz));
+    stream.activate(None)?;
+    while !inbox.is_closed() {
+        let mut into: Vec<&mut [Complex32]> = buffers.iter_mut().map(Vec::as_mut_slice).collect();
+        let count = match stream.read(&mut into, TIMEOUT_US) {
+            Ok(count) => count,
+            // Samples were lost, or none came: the next ones tell their time.
+            Err(error) if matches!(error.code, ErrorCode::Overflow | ErrorCode::Timeout) => {
+                continue;
+            }
+            Err(error) => return Err(error),
+        };
+        let told_s = stream.time_ns() as f64 * 1e-9;
+        let now_s = unix_s();
+        let time_s = if told_s > 0.0 {
+            told_s + *zero_s.get_or_insert(now_s - count as f64 / rate_hz - told_s)
+        } else {
+            counted.block(count, now_s).0
+        };
+        let samples: Vec<&[Complex32]> = buffers
+            .iter()
+            .map(|it| it.get(..count).unwrap_or_default())
+            .collect();
+        framing.take_samples(&samples, time_s);
+        let end_s = time_s + count as f64 / rate_hz;
+        // Without the radio's own clock the count would be lost.
+        if let (Some([from_s, _]), true) = (gate.wanted(), zero_s.is_some())
+            && from_s - end_s > 2.0 * BEGINS_S
+        {
+            stream.deactivate(None)?;
+            let off_s = from_s - end_s - BEGINS_S;
+            thread::sleep(Duration::try_from_secs_f64(off_s).unwrap_or_default());
+            stream.activate(None)?;
+        }
+    }
+    Ok(())
+}

@@ -1,0 +1,272 @@
+//! Starts every source that the settings name.
+
+use std::sync::Arc;
+use std::thread;
+use std::time::{Duration, Instant};
+
+use anyhow::{Context, Result, bail};
+use onboard::live::StreamConfig;
+use recording::{LoggedAngle, OdometryChoice, OdometryLog, Recording};
+
+use super::connection::{Event, read};
+use super::framing::Framing;
+use super::lines::Lines;
+use super::{message, raw, recording as played, zeromq};
+use crate::address::Address;
+use crate::gate::Gate;
+use crate::inbox::{Inbox, Input};
+use crate::settings::{NodeSettings, SampleSource};
+use crate::statistics::SourceHealth;
+
+/// What the sources share with the pipeline, and the files among them, opened.
+pub struct Sources {
+    /// What comes in.
+    pub inbox: Arc<Inbox>,
+    /// Which samples are wanted.
+    pub gate: Arc<Gate>,
+    /// Health of each.
+    pub health: Vec<Arc<SourceHealth>>,
+    /// What the samples are; `None` where there are none.
+    pub stream: Option<StreamConfig>,
+    /// Odometry and angles of files, and a recording.
+    pub files: Files,
+}
+
+/// Files that are played back.
+#[derive(Default)]
+pub struct Files {
+    /// A recording, and the time of its first sample.
+    pub recording: Option<(Recording, f64)>,
+    /// Odometry of a file.
+    pub odometry: OdometryLog,
+    /// Angles of a file.
+    pub angles: Vec<LoggedAngle>,
+}
+
+impl Sources {
+    /// Opens what files there are, for a vehicle with so many antennas.
+    ///
+    /// # Errors
+    /// What is wrong with a file, or with samples that are not of this vehicle.
+    pub fn open(
+        settings: &NodeSettings,
+        antennas: usize,
+        track_width_m: Option<f64>,
+    ) -> Result<Self> {
+        let mut files = Files::default();
+        let mut stream = None;
+        let mut health = Vec::new();
+        if let Some(samples) = &settings.samples {
+            if matches!(samples, SampleSource::Soapy(_)) && cfg!(not(feature = "soapy")) {
+                bail!(
+                    "samples.source is soapy; this program was built without the feature `soapy`: \
+                     cargo build --release -p access-av-node --features soapy"
+                );
+            }
+            health.push("samples");
+            let found = match samples.stream() {
+                Some(stated) => {
+                    stream = Some(StreamConfig {
+                        rate_hz: stated.rate_msps * 1e6,
+                        centre_hz: stated.centre_mhz * 1e6,
+                    });
+                    stated.antennas.len()
+                }
+                None => 0,
+            };
+            let found = if let SampleSource::Sigmf {
+                recording,
+                start_time_s,
+            } = samples
+            {
+                let recording = Recording::open_unverified(recording)?;
+                let centre_hz = recording.centre_frequency_hz().with_context(|| {
+                    let file = recording.data_file().display();
+                    format!("{file}: no capture states core:frequency; without it the SSB is not to be found")
+                })?;
+                stream = Some(StreamConfig {
+                    rate_hz: recording.sample_rate_hz(),
+                    centre_hz,
+                });
+                let found = recording.channels();
+                files.recording = Some((recording, *start_time_s));
+                found
+            } else {
+                found
+            };
+            if found != antennas {
+                bail!("samples: {found} channels, and the vehicle's array has {antennas} antennas");
+            }
+        }
+        if !settings.messages.is_empty() {
+            health.push("messages");
+        }
+        if let Some(odometry) = &settings.odometry {
+            let choice = OdometryChoice {
+                topic: odometry.topic.as_deref(),
+                imu_topic: odometry.imu_topic.as_deref(),
+                track_width_m,
+            };
+            files.odometry = recording::read_odometry(odometry.file.as_ref(), &choice)?;
+            health.push("odometry");
+        }
+        if let Some(angles) = &settings.angles {
+            files.angles = recording::read_angle_log(angles.file.as_ref())?.angles;
+            health.push("angles");
+        }
+        Ok(Self {
+            inbox: Arc::default(),
+            gate: Arc::default(),
+            health: health
+                .into_iter()
+                .map(|name| Arc::new(SourceHealth::new(name)))
+                .collect(),
+            stream,
+            files,
+        })
+    }
+
+    fn health(&self, name: &str) -> Option<Arc<SourceHealth>> {
+        self.health.iter().find(|it| it.name == name).cloned()
+    }
+}
+
+/// Starts the threads of all sources; what files there are is played in real time. When those that end have all
+/// ended, [`Input::End`] comes.
+///
+/// # Errors
+/// Where a thread cannot be started.
+pub fn start(settings: &NodeSettings, sources: &mut Sources) -> Result<()> {
+    let files = std::mem::take(&mut sources.files);
+    let mut threads = Vec::new();
+    let mut spawn = |name: &str, work: Box<dyn FnOnce(&Inbox) + Send>| -> Result<()> {
+        let inbox = Arc::clone(&sources.inbox);
+        let named = thread::Builder::new().name(name.to_owned());
+        threads.push(named.spawn(move || work(&inbox))?);
+        Ok(())
+    };
+    if let (Some(samples), Some(health)) = (&settings.samples, sources.health("samples")) {
+        let inbox = Arc::clone(&sources.inbox);
+        let gate = Arc::clone(&sources.gate);
+        match samples {
+            SampleSource::Sigmf { .. } => {
+                if let Some((recording, start_s)) = files.recording {
+                    let work = move |inbox: &Inbox| played::run(recording, start_s, inbox, &health);
+                    spawn("samples", Box::new(work))?;
+                }
+            }
+            SampleSource::Raw {
+                address,
+                format,
+                stream,
+            } => {
+                let framing = Framing::new(stream, *format, gate, inbox, health);
+                let address = address.clone();
+                spawn(
+                    "samples",
+                    Box::new(move |inbox| raw::run(&address, framing, inbox)),
+                )?;
+            }
+            SampleSource::Zeromq {
+                endpoints,
+                format,
+                stream,
+            } => {
+                let framing = Framing::new(stream, *format, gate, inbox, health);
+                let endpoints = endpoints.clone();
+                spawn(
+                    "samples",
+                    Box::new(move |inbox| zeromq::run(&endpoints, framing, inbox)),
+                )?;
+            }
+            #[cfg(feature = "soapy")]
+            SampleSource::Soapy(radio) => {
+                // The format is that of Soapy's own conversion.
+                let format = crate::settings::SampleFormat::Cf32;
+                let framing = Framing::new(&radio.stream, format, Arc::clone(&gate), inbox, health);
+                let radio = radio.clone();
+                let work = move |inbox: &Inbox| super::soapy::run(&radio, framing, &gate, inbox);
+                spawn("samples", Box::new(work))?;
+            }
+            #[cfg(not(feature = "soapy"))]
+            SampleSource::Soapy(_) => {} // refused where the files are opened
+        }
+    }
+    for address in &settings.messages {
+        if let Some(health) = sources.health("messages") {
+            let address = address.clone();
+            let work = move |inbox: &Inbox| messages(&address, inbox, &health);
+            spawn("messages", Box::new(work))?;
+        }
+    }
+    if let Some(health) = sources.health("odometry") {
+        let log = files.odometry.samples.into_iter();
+        let log = log.map(|it| (it.time_s, Input::Odometry(it))).collect();
+        spawn("odometry", Box::new(move |inbox| play(log, inbox, &health)))?;
+    }
+    if let Some(health) = sources.health("angles") {
+        let log = files
+            .angles
+            .iter()
+            .map(|it| (it.ssb.time_s, Input::Angle(it.into())))
+            .collect();
+        spawn("angles", Box::new(move |inbox| play(log, inbox, &health)))?;
+    }
+    let inbox = Arc::clone(&sources.inbox);
+    thread::Builder::new()
+        .name("sources".to_owned())
+        .spawn(move || {
+            for thread in threads {
+                // A source that panicked has ended like any other.
+                let _ = thread.join();
+            }
+            inbox.put(Input::End);
+        })?;
+    Ok(())
+}
+
+/// Plays timed inputs in real time from the first on.
+fn play(log: Vec<(f64, Input)>, inbox: &Inbox, health: &SourceHealth) {
+    let began = Instant::now();
+    let first_s = log.first().map_or(0.0, |(time_s, _)| *time_s);
+    for (time_s, input) in log {
+        let due = Duration::try_from_secs_f64(time_s - first_s).unwrap_or_default();
+        thread::sleep(due.saturating_sub(began.elapsed()));
+        if inbox.is_closed() {
+            return;
+        }
+        health.came(1);
+        inbox.put(input);
+    }
+}
+
+/// Reads newline JSON until it or the node ends.
+fn messages(address: &Address, inbox: &Inbox, health: &SourceHealth) {
+    let mut lines = Lines::default();
+    let mut take = |line: Option<&[u8]>| {
+        let parsed = match line {
+            Some(line) => message::parse(line),
+            None => Err("a line of more than 64 KiB".to_owned()),
+        };
+        match parsed {
+            Ok(None) => {}
+            Ok(Some(input)) => {
+                health.came(1);
+                inbox.put(input);
+            }
+            Err(why) => {
+                health.defect();
+                // The first few tell enough.
+                if health.defects() <= 10 || health.defects().is_multiple_of(1000) {
+                    let (source, text) = ("messages", format!("{address}: left out, {why}"));
+                    inbox.put(Input::warning(source, text));
+                }
+            }
+        }
+    };
+    read(address, "messages", inbox, |event| match event {
+        Event::Begin => lines = Lines::default(),
+        Event::Bytes(bytes) => lines.push(bytes, &mut take),
+    });
+    lines.finish(&mut take);
+}

@@ -1,0 +1,252 @@
+//! The requesting end of ZMTP 3.0, ZeroMQ's protocol (rfc.zeromq.org/spec/23), without security.
+//!
+//! By hand, for it is small: the Rust libraries take whatever length a frame says it has for the memory to set
+//! aside.
+
+use std::io::{self, ErrorKind, Read, Write};
+
+/// Bytes of the longest frame that is taken: 4 million complex floats.
+pub const LONGEST: u64 = 32 << 20;
+
+/// What makes room for a frame as it comes.
+const CHUNK: u64 = 1 << 16;
+/// Time limits of reads that may pass in the middle of a frame.
+const MOST_IDLE: u32 = 10;
+
+const MORE: u8 = 1;
+const LONG: u8 = 2;
+const COMMAND: u8 = 4;
+const READY: &[u8] = b"\x05READY\x0bSocket-Type\0\0\0\x03REQ\x08Identity\0\0\0\0";
+
+/// Greets the peer; it must be one that answers requests.
+///
+/// # Errors
+/// Those of the stream, [`ErrorKind::InvalidData`] for what is no such peer.
+pub fn greet(stream: &mut (impl Read + Write)) -> io::Result<()> {
+    let mut greeting = [0_u8; 64];
+    for (place, bytes) in [(0, &b"\xff"[..]), (9, b"\x7f\x03\0"), (12, b"NULL")] {
+        if let Some(into) = greeting.get_mut(place..place + bytes.len()) {
+            into.copy_from_slice(bytes);
+        }
+    }
+    stream.write_all(&greeting)?;
+    let mut theirs = [0_u8; 64];
+    read_exact(stream, &mut theirs)?;
+    let [
+        0xff,
+        _,
+        _,
+        _,
+        _,
+        _,
+        _,
+        _,
+        _,
+        0x7f,
+        version,
+        _,
+        mechanism @ ..,
+    ] = &theirs
+    else {
+        return Err(invalid("what answers is no ZeroMQ"));
+    };
+    if *version < 3 {
+        return Err(invalid("what answers is ZeroMQ of a version before 3"));
+    }
+    if !mechanism.starts_with(b"NULL\0") {
+        return Err(invalid("the transmitter demands security"));
+    }
+    stream.write_all(&[COMMAND, READY.len() as u8])?;
+    stream.write_all(READY)?;
+    let mut answer = Vec::new();
+    let flags = read_frame(stream, &mut answer)?;
+    if flags & COMMAND == 0 || !answer.starts_with(b"\x05READY") {
+        return Err(invalid("the transmitter refuses the connection"));
+    }
+    let answers = |kind: &[u8]| answer.windows(kind.len()).any(|it| it == kind);
+    if !answers(b"\0\0\0\x03REP") && !answers(b"\0\0\0\x06ROUTER") {
+        return Err(invalid("the transmitter's socket is not of the type REP"));
+    }
+    Ok(())
+}
+
+/// Asks for samples.
+///
+/// # Errors
+/// Those of the stream.
+pub fn request(stream: &mut impl Write) -> io::Result<()> {
+    // The empty frame before the request, and its one byte.
+    stream.write_all(&[MORE, 0, 0, 1, 0xff])
+}
+
+/// Appends what answers the request; how many bytes.
+///
+/// # Errors
+/// Those of the stream, [`ErrorKind::InvalidData`] for what is no answer.
+pub fn answer(stream: &mut impl Read, into: &mut Vec<u8>) -> io::Result<usize> {
+    let before = into.len();
+    let mut in_body = false;
+    loop {
+        let start = into.len();
+        let flags = read_frame(stream, into)?;
+        if flags & COMMAND != 0 {
+            into.truncate(start); // nothing that concerns an answer
+            continue;
+        }
+        if !in_body && into.len() != start {
+            return Err(invalid("an answer must begin with an empty frame"));
+        }
+        let is_body = std::mem::replace(&mut in_body, true);
+        if flags & MORE == 0 {
+            if !is_body {
+                return Err(invalid("an answer without samples"));
+            }
+            return Ok(into.len() - before);
+        }
+        if into.len() - before > LONGEST as usize {
+            return Err(invalid("an answer that does not end"));
+        }
+    }
+}
+
+/// Appends the body of a frame, and says its flags.
+///
+/// # Errors
+/// Those of the stream, [`ErrorKind::InvalidData`] for a frame that is too long or of no known kind.
+pub fn read_frame(stream: &mut impl Read, into: &mut Vec<u8>) -> io::Result<u8> {
+    let mut flags = [0];
+    read_exact(stream, &mut flags)?;
+    let [flags] = flags;
+    if flags & !(MORE | LONG | COMMAND) != 0 || flags & (MORE | COMMAND) == MORE | COMMAND {
+        return Err(invalid("no frame of ZeroMQ"));
+    }
+    let length = if flags & LONG == 0 {
+        let mut length = [0];
+        read_exact(stream, &mut length)?;
+        u64::from(length[0])
+    } else {
+        let mut length = [0; 8];
+        read_exact(stream, &mut length)?;
+        u64::from_be_bytes(length)
+    };
+    if length > LONGEST {
+        return Err(invalid("a frame of more than 32 MiB"));
+    }
+    let mut missing = length;
+    let mut idle = 0;
+    while missing > 0 {
+        let start = into.len();
+        // Appends without filling the room with zeros first.
+        let read = stream.by_ref().take(missing.min(CHUNK)).read_to_end(into);
+        let came = (into.len() - start) as u64;
+        missing -= came;
+        match read {
+            Ok(0) => return Err(ErrorKind::UnexpectedEof.into()),
+            Ok(_) => idle = 0,
+            Err(error) if super::connection::is_idle(&error) && idle < MOST_IDLE => idle += 1,
+            Err(error) => return Err(error),
+        }
+    }
+    Ok(flags)
+}
+
+/// Reads all of it. A peer that is silent for a read's time limit is waited for if nothing was read yet only by
+/// whoever asks again; in the middle of a frame, here.
+fn read_exact(stream: &mut impl Read, mut into: &mut [u8]) -> io::Result<()> {
+    let whole = into.len();
+    let mut idle = 0;
+    while !into.is_empty() {
+        match stream.read(into) {
+            Ok(0) => return Err(ErrorKind::UnexpectedEof.into()),
+            Ok(count) => into = into.get_mut(count..).unwrap_or_default(),
+            Err(error) if error.kind() == ErrorKind::Interrupted => {}
+            Err(error)
+                if super::connection::is_idle(&error) && into.len() < whole && idle < MOST_IDLE =>
+            {
+                idle += 1;
+            }
+            Err(error) => return Err(error),
+        }
+    }
+    Ok(())
+}
+
+fn invalid(why: &str) -> io::Error {
+    io::Error::new(ErrorKind::InvalidData, why)
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    /// A peer that says this, whatever it is told.
+    struct Peer<'a>(&'a [u8]);
+
+    impl Read for Peer<'_> {
+        fn read(&mut self, bytes: &mut [u8]) -> io::Result<usize> {
+            self.0.read(bytes)
+        }
+    }
+
+    impl Write for Peer<'_> {
+        fn write(&mut self, bytes: &[u8]) -> io::Result<usize> {
+            Ok(bytes.len())
+        }
+
+        fn flush(&mut self) -> io::Result<()> {
+            Ok(())
+        }
+    }
+
+    #[test]
+    fn answers_of_one_frame_or_several() {
+        let mut samples = Vec::new();
+        let long = [&[LONG, 0, 0, 0, 0, 0, 0, 1, 0][..], &[7; 256]].concat();
+        let told = [&[MORE, 0][..], &long, &[MORE, 0, MORE, 2, 1, 2, 0, 1, 3]].concat();
+        let mut peer = Peer(&told);
+        assert_eq!(answer(&mut peer, &mut samples).unwrap(), 256);
+        assert_eq!(answer(&mut peer, &mut samples).unwrap(), 3);
+        assert_eq!(samples[256..], [1, 2, 3]);
+        assert!(answer(&mut peer, &mut samples).is_err());
+    }
+
+    #[test]
+    fn what_is_no_answer_is_refused_before_room_is_made_for_it() {
+        let endless = [&[MORE, 0, LONG][..], &u64::MAX.to_be_bytes()].concat();
+        let cut = [&[MORE, 0, LONG][..], &LONGEST.to_be_bytes(), &[0; 10]].concat();
+        for told in [
+            &endless[..],
+            &cut,
+            &[0, 3, 1, 2, 3],
+            &[0, 0],
+            &[0x80, 0],
+            &[MORE, 0],
+        ] {
+            let mut samples = Vec::new();
+            assert!(answer(&mut Peer(told), &mut samples).is_err(), "{told:?}");
+            assert!(samples.capacity() <= 2 << 16);
+        }
+    }
+
+    #[test]
+    fn a_peer_must_greet_and_answer_requests() {
+        let mut greeting = [0; 64];
+        greeting[0] = 0xff;
+        greeting[9..12].copy_from_slice(&[0x7f, 3, 1]);
+        greeting[12..16].copy_from_slice(b"NULL");
+        let ready = |kind: &[u8]| {
+            let mut body = b"\x05READY\x0bSocket-Type\0\0\0".to_vec();
+            body.push(kind.len() as u8);
+            body.extend(kind);
+            [&greeting[..], &[COMMAND, body.len() as u8], &body].concat()
+        };
+        assert!(greet(&mut Peer(&ready(b"REP"))).is_ok());
+        for told in [
+            ready(b"PUB"),
+            b"HTTP/1.1 200 OK\r\n".to_vec().repeat(8),
+            greeting.to_vec(),
+        ] {
+            assert!(greet(&mut Peer(&told)).is_err());
+        }
+    }
+}

@@ -1,0 +1,209 @@
+//! Metrics in the text format of Prometheus.
+
+use std::fmt::Write;
+
+use super::board::Board;
+use crate::statistics::Histogram;
+use onboard::live::State;
+
+const STATES: [State; 7] = [
+    State::Waiting,
+    State::Searching,
+    State::Lost,
+    State::Unavailable,
+    State::Degraded,
+    State::Ok,
+    State::Unmonitored,
+];
+
+struct Text(String);
+
+impl Text {
+    fn family(&mut self, name: &str, kind: &str, help: &str) {
+        // Writing into a string does not fail.
+        let _ = writeln!(
+            self.0,
+            "# HELP access_av_{name} {help}\n# TYPE access_av_{name} {kind}"
+        );
+    }
+
+    fn sample(&mut self, name: &str, labels: &[(&str, &str)], value: f64) {
+        let labels: Vec<String> = labels
+            .iter()
+            .map(|(name, value)| format!("{name}=\"{}\"", escaped(value)))
+            .collect();
+        let labels = match labels.len() {
+            0 => String::new(),
+            _ => format!("{{{}}}", labels.join(",")),
+        };
+        let _ = writeln!(self.0, "access_av_{name}{labels} {value}");
+    }
+
+    fn one(&mut self, name: &str, kind: &str, help: &str, value: f64) {
+        self.family(name, kind, help);
+        self.sample(name, &[], value);
+    }
+
+    fn histogram(&mut self, name: &str, help: &str, histogram: &Histogram) {
+        self.family(name, "histogram", help);
+        let buckets = histogram.cumulative();
+        for (upper_s, count) in &buckets {
+            let upper = format!("{upper_s:.3e}");
+            self.sample(&format!("{name}_bucket"), &[("le", &upper)], *count as f64);
+        }
+        let all = buckets.last().map_or(0, |(_, count)| *count) as f64;
+        self.sample(&format!("{name}_bucket"), &[("le", "+Inf")], all);
+        self.sample(&format!("{name}_sum"), &[], histogram.sum_s());
+        self.sample(&format!("{name}_count"), &[], all);
+    }
+}
+
+/// All metrics of a node.
+pub fn text(board: &Board) -> String {
+    let mut text = Text(String::with_capacity(8192));
+    let counters = &board.counters;
+    let punctuality = &counters.punctuality;
+    text.histogram(
+        "ssb_to_pose_seconds",
+        "From the arrival of an SSB's last sample to the pose with its angle.",
+        &punctuality.ssb_to_pose,
+    );
+    text.histogram(
+        "odometry_to_pose_seconds",
+        "From the arrival of odometry to the pose by it.",
+        &punctuality.odometry_to_pose,
+    );
+    text.histogram(
+        "pose_jitter_seconds",
+        "Difference between the time from pose to pose and that from odometry to odometry.",
+        &punctuality.jitter,
+    );
+    let [blocks, messages] = counters.inbox.dropped();
+    text.family(
+        "dropped_total",
+        "counter",
+        "What could not be taken in time.",
+    );
+    for (what, count) in [
+        ("blocks", blocks),
+        ("messages", messages),
+        ("records", counters.records.dropped()),
+    ] {
+        text.sample("dropped_total", &[("what", what)], count as f64);
+    }
+    for (name, kind, help) in [
+        (
+            "source_items_total",
+            "counter",
+            "Samples per channel, or messages, of a source.",
+        ),
+        (
+            "source_defects_total",
+            "counter",
+            "Items of a source that could not be used.",
+        ),
+        (
+            "source_silent_seconds",
+            "gauge",
+            "Time since a source brought something.",
+        ),
+    ] {
+        text.family(name, kind, help);
+        for source in &counters.sources {
+            let value = match name {
+                "source_items_total" => source.items() as f64,
+                "source_defects_total" => source.defects() as f64,
+                _ => source.silent_for().as_secs_f64(),
+            };
+            text.sample(name, &[("source", source.name)], value);
+        }
+    }
+    let Some(shown) = board.shown() else {
+        return text.0;
+    };
+    let status = &shown.status;
+    text.family("state", "gauge", "1 for the state that the pose is in.");
+    for state in STATES {
+        let value = f64::from(u8::from(state == status.state));
+        text.sample("state", &[("state", state.name())], value);
+    }
+    if let Some(pose) = status.pose {
+        text.family("position_meters", "gauge", "Place in the map's frame.");
+        text.sample("position_meters", &[("axis", "x")], pose.x_m);
+        text.sample("position_meters", &[("axis", "y")], pose.y_m);
+        let help = "Heading, counter-clockwise from the map's x axis.";
+        text.one("heading_radians", "gauge", help, pose.heading_rad);
+    }
+    if let Some(level_m) = status.protection_level_m {
+        let help = "Horizontal protection level.";
+        text.one("protection_level_meters", "gauge", help, level_m);
+    }
+    for (name, kind, help) in [
+        (
+            "head_snr_decibels",
+            "gauge",
+            "SNR of a radio head's last SSB.",
+        ),
+        (
+            "head_residual_radians",
+            "gauge",
+            "Residual of a radio head's last angle.",
+        ),
+        (
+            "head_accepted_total",
+            "counter",
+            "Angles of a radio head that were accepted.",
+        ),
+        (
+            "head_refused_total",
+            "counter",
+            "Angles of a radio head that were not.",
+        ),
+        (
+            "head_faulty",
+            "gauge",
+            "1 for a radio head that is found faulty.",
+        ),
+    ] {
+        text.family(name, kind, help);
+        for head in &shown.heads {
+            let value = match name {
+                "head_snr_decibels" => head.snr_db,
+                "head_residual_radians" => head.residual_rad,
+                "head_accepted_total" => Some(head.accepted as f64),
+                "head_refused_total" => Some(head.refused as f64),
+                _ => Some(f64::from(u8::from(head.is_faulty))),
+            };
+            let (pci, beam) = (head.head.pci, head.head.ssb_index);
+            let known = counters.heads.iter().find(|it| (it.0, it.1) == (pci, beam));
+            let named = known.map_or("", |(_, _, name)| name.as_str());
+            if let Some(value) = value {
+                let (pci, beam) = (pci.to_string(), beam.to_string());
+                let labels = [("head", named), ("pci", &*pci), ("ssb_index", &*beam)];
+                text.sample(name, &labels, value);
+            }
+        }
+    }
+    let energy = &shown.energy;
+    let help = "SSB bursts listened to.";
+    text.one("bursts_total", "counter", help, energy.listened as f64);
+    let help = "Angles estimated.";
+    text.one("angles_total", "counter", help, energy.executions as f64);
+    if let Some(joules) = energy.energy {
+        let help = "Energy since the start, by the platform's model.";
+        text.one("energy_joules_total", "counter", help, joules.total_j());
+    }
+    if let Some(duty) = board.duty(&shown) {
+        let help = "Share of the samples that were looked at.";
+        text.one("duty_ratio", "gauge", help, duty);
+    }
+    text.0
+}
+
+/// A label's value as Prometheus has it.
+fn escaped(value: &str) -> String {
+    value
+        .replace('\\', "\\\\")
+        .replace('"', "\\\"")
+        .replace('\n', "\\n")
+}

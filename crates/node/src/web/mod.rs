@@ -1,0 +1,11 @@
+//! The page to look at, and metrics.
+
+mod board;
+mod metrics;
+mod server;
+mod site;
+
+pub use board::{Board, Counters};
+pub use metrics::text as metrics_text;
+pub use server::{open, serve};
+pub use site::site_json;

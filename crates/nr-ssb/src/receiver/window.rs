@@ -1,0 +1,286 @@
+//! The receiver of windows: searches until it has found a beam, tracks, and searches again.
+//!
+//! A receiver without beams looks at every frequency offset that the oscillators may have, a
+//! subcarrier apart, from the last one known or none outwards: at up to four of them in one burst, so that
+//! the work of a burst is bounded and the longest period does not make the search long. Then it rests
+//! for a moment and begins anew. With beams it searches about their own offset for others, now and
+//! then; at once where none of them came.
+
+use num_complex::Complex32;
+
+use super::beam::Beam;
+use super::config::ReceiverConfig;
+use super::error::ReceiverError;
+use crate::dsp::base_rate::SSB_SAMPLES;
+use crate::search::{SearchError, Searcher};
+use crate::track::{Tracked, Tracker};
+
+/// Samples at the base rate that there must be to either side of an SSB: half a cyclic prefix and the filter's reach.
+pub(super) const GUARD: f64 = 16.0;
+/// Time after which a search that found nothing at any offset begins anew, and beams are searched for of which
+/// none came, in seconds.
+const LOST_INTERVAL_S: f64 = 0.1;
+/// Offsets that a burst is searched at where no beam is known: one for so much of a period (s), at most so many.
+const PERIOD_OF_OFFSET_S: f64 = 0.04;
+const MOST_OFFSETS: f64 = 4.0;
+/// Samples by which a beam that is found again may come off its period: beyond any drift of its clock.
+const OFF_PERIOD: f64 = 100.0;
+
+/// Samples at the base rate.
+#[derive(Debug, Clone, Copy)]
+pub struct Window<'a> {
+    /// Number of the first sample, counted by the receiver's clock.
+    pub start: i64,
+    /// The samples of each antenna, equally many.
+    pub antennas: &'a [&'a [Complex32]],
+}
+
+impl Window<'_> {
+    /// Number of the sample after the last.
+    pub(super) fn end(&self) -> f64 {
+        let length = self.antennas.iter().map(|samples| samples.len()).min();
+        self.start as f64 + length.unwrap_or(0) as f64
+    }
+}
+
+/// One SSB that was seen, and its tracker, to ask for what it has received.
+pub struct Seen<'a, const A: usize> {
+    /// What tracking says of it.
+    pub ssb: &'a Tracked<A>,
+    /// Its tracker.
+    pub tracker: &'a mut Tracker<A>,
+    /// Looked at where it was expected; `false` of the first after a search has found its beam.
+    pub is_followed: bool,
+    /// Samples at the base rate that were missing untold before it, but for whole periods: all beams came off
+    /// their period at once. They are not counted in `sample_start`.
+    pub untold: f64,
+}
+
+/// Keeps to the beams on one frequency, for windows of samples however they came about: cut from a
+/// stream, or around each burst.
+pub struct WindowReceiver<const A: usize> {
+    config: ReceiverConfig,
+    searcher: Searcher,
+    beams: Vec<Beam<A>>,
+    /// Where a search last began (samples), and up to where it goes on.
+    search_begun: f64,
+    search_until: f64,
+    searches: u64,
+    /// Frequency offset that beams were last found at, in Hz, and number of offsets searched in vain since.
+    offset_hz: f64,
+    in_vain: u32,
+    /// Samples that were missing untold so far.
+    untold: f64,
+}
+
+impl<const A: usize> WindowReceiver<A> {
+    /// A receiver that knows no beam yet.
+    ///
+    /// # Errors
+    /// [`ReceiverError::Search`] for impossible settings, or unless they are for `A` antennas.
+    pub fn new(config: ReceiverConfig) -> Result<Self, ReceiverError> {
+        config.check()?;
+        let (given, expected) = (config.search.antennas, A);
+        if given != expected {
+            return Err(SearchError::AntennaCount { given, expected }.into());
+        }
+        Ok(Self {
+            searcher: Searcher::new(config.search.clone())?,
+            beams: Vec::new(),
+            search_begun: f64::NEG_INFINITY,
+            search_until: f64::NEG_INFINITY,
+            searches: 0,
+            offset_hz: 0.0,
+            in_vain: 0,
+            untold: 0.0,
+            config,
+        })
+    }
+
+    /// The settings.
+    pub const fn config(&self) -> &ReceiverConfig {
+        &self.config
+    }
+
+    /// Beams that are tracked now.
+    pub fn tracked(&self) -> usize {
+        self.beams.len()
+    }
+
+    /// Windows that were searched.
+    pub const fn searches(&self) -> u64 {
+        self.searches
+    }
+
+    /// Forgets all beams, but not the oscillators' offset: the count of samples begins anew.
+    pub fn reset(&mut self) {
+        self.beams.clear();
+        (self.search_begun, self.search_until) = (f64::NEG_INFINITY, f64::NEG_INFINITY);
+        (self.in_vain, self.untold) = (0, 0.0);
+    }
+
+    /// Searches the window where it is time to, and shows `take` the SSBs that lie in it, in order of time.
+    ///
+    /// # Errors
+    /// [`ReceiverError`] for another number of antennas or unequal lengths.
+    pub fn receive(
+        &mut self,
+        window: &Window<'_>,
+        take: &mut dyn FnMut(Seen<'_, A>),
+    ) -> Result<(), ReceiverError> {
+        if self.searches_at(window.start as f64) {
+            self.search(window)?;
+            self.search_until = f64::NEG_INFINITY; // all of a burst is in a window
+            self.count_in_vain();
+        }
+        while self.track_next(window, take)? {}
+        Ok(())
+    }
+
+    /// Whether the samples from `start` on are to be searched: a search goes on for a period.
+    pub(super) fn searches_at(&mut self, start: f64) -> bool {
+        if start < self.search_until {
+            return true;
+        }
+        if self.search_until.is_finite() {
+            self.search_until = f64::NEG_INFINITY;
+            self.count_in_vain();
+        }
+        let came = self.beams.iter().any(|beam| beam.tracker.misses() == 0);
+        let interval_s = if came {
+            self.config.search_every_s
+        } else if self.beams.is_empty() && self.in_vain < self.config.offsets() {
+            0.0
+        } else {
+            LOST_INTERVAL_S
+        };
+        let interval = interval_s * self.config.search.spacing.base_rate_hz();
+        let is_due = start - self.search_begun >= interval;
+        if is_due {
+            (self.search_begun, self.search_until) = (start, start + self.config.period());
+        }
+        is_due
+    }
+
+    /// A search has been through a period.
+    fn count_in_vain(&mut self) {
+        if self.beams.is_empty() {
+            self.in_vain = self.in_vain.saturating_add(self.at_once());
+        }
+    }
+
+    /// Frequency offsets searched at once.
+    fn at_once(&self) -> u32 {
+        let offsets = (self.config.period_s / PERIOD_OF_OFFSET_S).round();
+        (offsets.clamp(1.0, MOST_OFFSETS) as u32).min(self.config.offsets())
+    }
+
+    /// The frequency offset to search around: that of the beams there are, else the last one known,
+    /// one subcarrier above, one below, two above, and so on.
+    fn centre_hz(&self, number: u32) -> f64 {
+        if let Some(beam) = self.beams.iter().min_by_key(|beam| beam.tracker.misses()) {
+            return beam.tracker.cfo_hz();
+        }
+        let turn = (self.in_vain + number) % self.config.offsets();
+        let away = f64::from(turn.div_ceil(2)) * self.config.search.spacing.hz();
+        self.offset_hz + if turn % 2 == 1 { away } else { -away }
+    }
+
+    /// Searches a window for beams.
+    pub(super) fn search(&mut self, window: &Window<'_>) -> Result<(), ReceiverError> {
+        let too_short = |samples: &&[Complex32]| samples.len() < SSB_SAMPLES;
+        if window.antennas.iter().any(too_short) {
+            return Ok(());
+        }
+        self.searches += 1;
+        for number in 0..self.at_once() {
+            self.search_around(self.centre_hz(number), window)?;
+            if !self.beams.is_empty() {
+                break;
+            }
+        }
+        Ok(())
+    }
+
+    fn search_around(&mut self, cfo_hz: f64, window: &Window<'_>) -> Result<(), ReceiverError> {
+        let period = self.config.period();
+        self.searcher.centre(cfo_hz)?;
+        let mut none_came = self.beams.iter().all(|beam| beam.tracker.misses() > 0);
+        for found in self.searcher.search(window.antennas)? {
+            let wanted = self.config.cells.as_ref();
+            if wanted.is_some_and(|cells| !cells.contains(&found.pci.get())) {
+                continue;
+            }
+            (self.in_vain, self.offset_hz) = (0, found.cfo_hz);
+            let mut found = found.clone();
+            found.sample_start += window.start as f64;
+            let same =
+                |beam: &&mut Beam<A>| (beam.pci, beam.ssb_index) == (found.pci, found.ssb_index);
+            match self.beams.iter_mut().find(same) {
+                Some(beam) if beam.tracker.misses() > 0 => {
+                    let off = beam.found(&found, period);
+                    if none_came && off.abs() > OFF_PERIOD {
+                        self.untold += (-off).rem_euclid(period);
+                    }
+                    none_came = false; // the others tell of the same
+                }
+                Some(_) => {}
+                None => self.beams.push(Beam::new(&self.config.search, &found)?),
+            }
+        }
+        Ok(())
+    }
+
+    /// Where the next SSB is expected.
+    pub(super) fn next_start(&self) -> f64 {
+        let starts = self.beams.iter().map(|beam| beam.next_start);
+        starts.fold(f64::INFINITY, f64::min)
+    }
+
+    /// Looks at the first SSB expected in the window; `false` where there is none.
+    pub(super) fn track_next(
+        &mut self,
+        window: &Window<'_>,
+        take: &mut dyn FnMut(Seen<'_, A>),
+    ) -> Result<bool, ReceiverError> {
+        let antennas = <&[&[Complex32]; A]>::try_from(window.antennas).map_err(|_| {
+            let (given, expected) = (window.antennas.len(), A);
+            SearchError::AntennaCount { given, expected }
+        })?;
+        let period = self.config.period();
+        let first = window.start as f64 + GUARD;
+        let last = window.end() - SSB_SAMPLES as f64 - GUARD;
+        for beam in &mut self.beams {
+            beam.skip_to(first, period);
+        }
+        let by_start = |(_, a): &(usize, &mut Beam<A>), (_, b): &(usize, &mut Beam<A>)| {
+            a.next_start.total_cmp(&b.next_start)
+        };
+        let next = self.beams.iter_mut().enumerate().min_by(by_start);
+        let Some((index, beam)) = next.filter(|(_, beam)| beam.next_start <= last) else {
+            return Ok(false);
+        };
+        let (start, decode) = (window.start as f64, self.config.decode_pbch);
+        let seen = beam
+            .tracker
+            .track(antennas, start, beam.next_start, decode)?;
+        // The beam is told by DM-RS; another's SSB is not this one.
+        if let Some(ssb) = seen.filter(|seen| seen.ssb_index == beam.ssb_index) {
+            let is_followed = beam.is_followed;
+            beam.seen(ssb.sample_start, period);
+            take(Seen {
+                ssb: &ssb,
+                tracker: &mut beam.tracker,
+                is_followed,
+                untold: self.untold,
+            });
+        } else {
+            beam.skip(1.0, period);
+            let lost_after = self.config.lost_after_s * self.config.search.spacing.base_rate_hz();
+            if beam.is_lost(lost_after) {
+                self.beams.remove(index);
+            }
+        }
+        Ok(true)
+    }
+}

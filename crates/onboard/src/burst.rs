@@ -1,0 +1,82 @@
+//! SSBs that belong together, as the pipeline hears them.
+
+use crate::BoxError;
+use crate::localize::AngleMeasurement;
+use crate::observation::{BURST_S, SensedSsb, SsbObservation};
+use crate::pipeline::{Observed, SsbSource};
+
+/// Something that came with one SSB.
+pub trait OfSsb {
+    /// The SSB.
+    fn ssb(&self) -> &SensedSsb;
+    /// What the pipeline is to make an angle of.
+    fn observed(&self) -> Observed<'_>;
+}
+
+impl OfSsb for SsbObservation {
+    fn ssb(&self) -> &SensedSsb {
+        &self.ssb
+    }
+
+    fn observed(&self) -> Observed<'_> {
+        Observed::Snapshots(self)
+    }
+}
+
+impl OfSsb for (SensedSsb, AngleMeasurement) {
+    fn ssb(&self) -> &SensedSsb {
+        &self.0
+    }
+
+    fn observed(&self) -> Observed<'_> {
+        Observed::Angle(self.1)
+    }
+}
+
+/// A burst that was received.
+pub struct Burst<'a, T>(pub &'a [T]);
+
+impl<T: OfSsb> SsbSource for Burst<'_, T> {
+    fn sense(&mut self, sensed: &mut Vec<SensedSsb>) -> Result<(), BoxError> {
+        sensed.extend(self.0.iter().map(OfSsb::ssb));
+        Ok(())
+    }
+
+    fn observe(&mut self, index: usize) -> Result<Observed<'_>, BoxError> {
+        let ssb = self.0.get(index).ok_or("no such SSB in the burst")?;
+        Ok(ssb.observed())
+    }
+}
+
+/// Number of the first SSBs that are of one burst: within half a frame of the first.
+pub fn first_burst<T: OfSsb>(ssbs: &[T]) -> usize {
+    let Some(first_s) = ssbs.first().map(|first| first.ssb().time_s) else {
+        return 0;
+    };
+    let of_burst = |it: &&T| (it.ssb().time_s - first_s).abs() < BURST_S;
+    ssbs.iter().take_while(of_burst).count().max(1)
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    #[test]
+    fn bursts_every_half_frame_are_told_apart() {
+        let ssb = |time_s| {
+            let mut observation = SsbObservation::new(4);
+            observation.restart(SensedSsb {
+                time_s,
+                ..observation.ssb
+            });
+            observation
+        };
+        for number in 0..100 {
+            let start_s = f64::from(number) * 0.005;
+            let next_s = f64::from(number + 1) * 0.005;
+            let ssbs = [start_s, start_s + 4.67e-3, next_s].map(ssb);
+            assert_eq!(first_burst(&ssbs), 2, "{start_s}");
+        }
+        assert_eq!(first_burst::<SsbObservation>(&[]), 0);
+    }
+}

@@ -1,0 +1,661 @@
+//! The live pipeline.
+
+use std::collections::VecDeque;
+
+use num_complex::Complex32;
+
+use super::error::LiveError;
+use super::outcome::{HeadStatus, Outcome, Sight};
+use super::start::starting_at;
+use super::status::{Reason, State, Status};
+use super::stream::{SampleStream, StreamConfig, StreamCounts};
+use super::stream_clock::Continuity;
+use crate::BoxError;
+use crate::burst::{Burst, OfSsb};
+use crate::energy::{Energy, EnergyModel};
+use crate::geometry::Pose;
+use crate::localize::{
+    self, AngleMeasurement, HISTORY_S, IntegrityState, OdometryVerdict, PoseEstimate, UpdateReason,
+};
+use crate::observation::{BURST_S, OdometrySample, SensedSsb};
+use crate::pipeline::{Custom, Onboard};
+use crate::radio_head::RadioHead;
+use crate::receive::ReceiverConfig;
+use crate::settings::{Boundary, Extent, Platform, Site, Vehicle};
+
+/// Outcomes kept until they are asked for.
+const OUTCOMES: usize = 256;
+
+/// Angles of a burst at most.
+const ANGLES: usize = 64;
+
+/// Odometry that is older does not vouch for a pose (s).
+const SILENT_S: f64 = 0.5;
+
+/// Time without an accepted angle that is a reason of its own (s).
+const NO_ANGLE_S: f64 = 5.0;
+
+/// How far ahead the next wake-up is looked for (s).
+const LOOK_AHEAD_S: f64 = 1.0;
+
+/// SNR (dB) of an angle of which none is stated: good enough for any policy.
+const UNSTATED_SNR_DB: f64 = 20.0;
+
+/// An angle that was estimated elsewhere.
+#[derive(Debug, Clone, Copy, PartialEq)]
+pub struct AngleObservation {
+    /// Physical cell identity.
+    pub pci: u16,
+    /// Index of the SSB in its burst.
+    pub ssb_index: u8,
+    /// Reception time in seconds.
+    pub time_s: f64,
+    /// Electrical angle ω = 2π(d/λ)·cos θ between neighbours in a row, or azimuth from the axis of any
+    /// other array, in radians.
+    pub phase_rad: f64,
+    /// Its standard deviation in radians.
+    pub sigma_rad: f64,
+    /// SNR per antenna in dB, where known.
+    pub snr_db: Option<f64>,
+    /// Whether the estimator vouches for it: that it is Gaussian with this standard deviation.
+    pub resolved: bool,
+}
+
+/// What was done since the start, and the energy of it.
+#[derive(Debug, Clone, Copy, PartialEq)]
+pub struct LiveEnergy {
+    /// Time since the first that came in, in seconds.
+    pub duration_s: f64,
+    /// Angles estimated.
+    pub executions: usize,
+    /// Bursts listened to.
+    pub listened: usize,
+    /// How long the receiver was to be on for those, as the platform's file has it, in seconds.
+    pub on_time_s: f64,
+    /// The energy; `None` where the platform says nothing of the vehicle's method.
+    pub energy: Option<Energy>,
+    /// What its sum counts.
+    pub boundary: Option<Boundary>,
+}
+
+/// The pipeline on a vehicle, fed as things come in.
+pub struct Live {
+    site: Site,
+    vehicle: Vehicle,
+    onboard: Onboard,
+    has_own_localizer: bool,
+    sight: Sight,
+    stream: Option<SampleStream>,
+    /// Angles of a burst that is not yet complete.
+    angles: Vec<(SensedSsb, AngleMeasurement)>,
+    outcomes: VecDeque<Outcome>,
+    heads: Vec<HeadStatus>,
+    last_angle_s: Option<f64>,
+    last_burst_s: Option<f64>,
+    energy: Option<EnergyModel>,
+    executions: usize,
+    listened: usize,
+    /// First and newest of all times.
+    interval_s: Option<[f64; 2]>,
+}
+
+impl Live {
+    /// The pipeline of a vehicle at a site, at `start`, else where the vehicle's settings say, else in
+    /// search of its start. Without `stream` it takes angles only.
+    ///
+    /// # Errors
+    /// [`LiveError`] when site, vehicle, platform and stream do not go together, or a start is
+    /// missing and cannot be found.
+    pub fn new(
+        site: &Site,
+        vehicle: &Vehicle,
+        platform: &Platform,
+        start: Option<Pose>,
+        stream: Option<StreamConfig>,
+        custom: Custom,
+    ) -> Result<Self, LiveError> {
+        let (vehicle, start) = starting_at(site, vehicle, start)?;
+        let has_own_localizer = custom.localizer.is_some();
+        let onboard = Onboard::new(site, &vehicle, platform, start, custom)?;
+        let receiver = || ReceiverConfig::new(site, &vehicle);
+        let stream = stream.map(|config| SampleStream::new(config, receiver()));
+        Ok(Self {
+            sight: Sight::new(&vehicle),
+            stream: stream.transpose()?,
+            angles: Vec::with_capacity(ANGLES),
+            outcomes: VecDeque::with_capacity(OUTCOMES),
+            heads: (RadioHead::heard(site, &vehicle).into_iter())
+                .map(HeadStatus::new)
+                .collect(),
+            last_angle_s: None,
+            last_burst_s: None,
+            energy: EnergyModel::new(&vehicle, platform, Extent::Value)?,
+            executions: 0,
+            listened: 0,
+            interval_s: None,
+            has_own_localizer,
+            onboard,
+            site: site.clone(),
+            vehicle,
+        })
+    }
+
+    /// Takes in the next samples of every antenna, of any length, the first of which was received at
+    /// `time_s` by the sample clock; what became of the SSBs in them is then among the
+    /// [`outcomes`](Self::next_outcome). Samples that are missing, there twice, or of a stream that began
+    /// anew, are told by that time.
+    ///
+    /// # Errors
+    /// [`LiveError`] for another number of antennas, unequal lengths or a time that is not finite.
+    pub fn samples(
+        &mut self,
+        time_s: f64,
+        antennas: &[&[Complex32]],
+    ) -> Result<Continuity, LiveError> {
+        let continuity = self.receive(time_s, antennas, false)?;
+        self.hear_before(f64::INFINITY)?;
+        Ok(continuity)
+    }
+
+    /// As [`samples`](Self::samples), but nothing is heard before [`hear_before`](Self::hear_before) says so: for
+    /// recordings, whose odometry is known before it is its turn. `ends` says that samples are missing after
+    /// these.
+    ///
+    /// # Errors
+    /// As [`samples`](Self::samples).
+    pub fn receive(
+        &mut self,
+        time_s: f64,
+        antennas: &[&[Complex32]],
+        ends: bool,
+    ) -> Result<Continuity, LiveError> {
+        finite("the time of samples", time_s)?;
+        let stream = self.stream.as_mut().ok_or(LiveError::NoStream)?;
+        let continuity = stream.push(time_s, antennas, ends)?;
+        if let Some(end_s) = stream.next_s() {
+            self.see(end_s);
+        }
+        Ok(continuity)
+    }
+
+    /// Hears the bursts that are complete and began before `time_s`.
+    ///
+    /// # Errors
+    /// [`LiveError::Custom`] where the user's own code fails.
+    pub fn hear_before(&mut self, time_s: f64) -> Result<(), LiveError> {
+        while let Some(stream) = &mut self.stream {
+            let burst = stream.burst();
+            let number = burst.len();
+            if burst
+                .first()
+                .is_none_or(|first| first.ssb().time_s >= time_s)
+            {
+                break;
+            }
+            let heard = hear(&mut self.onboard, burst);
+            stream.forget(number);
+            self.book(heard)?;
+        }
+        Ok(())
+    }
+
+    /// Ends a stretch of samples after which some will be missing, so that its last SSBs are found at once.
+    ///
+    /// # Errors
+    /// [`LiveError::Receive`].
+    pub fn end_stretch(&mut self) -> Result<(), LiveError> {
+        match &mut self.stream {
+            Some(stream) => stream.break_off(),
+            None => Ok(()),
+        }
+    }
+
+    /// Takes in odometry, and says what the localizer made of it. Its speed alone is enough: see
+    /// [`OdometrySample::of_speed`].
+    ///
+    /// # Errors
+    /// [`LiveError::Odometry`] for a time that is not after the last one's, or a value that is not finite.
+    pub fn odometry(&mut self, sample: &OdometrySample) -> Result<OdometryVerdict, LiveError> {
+        if let Some((first, _)) = self.angles.first()
+            && first.time_s + BURST_S <= sample.time_s
+        {
+            self.hear_angles()?;
+        }
+        let sample = self.with_distance(sample);
+        let verdict = self
+            .onboard
+            .odometry(&sample)
+            .map_err(LiveError::Custom)??;
+        self.see(sample.time_s);
+        Ok(verdict)
+    }
+
+    /// Takes in an angle that was estimated elsewhere. Those of a burst, of SSBs within half a frame, are
+    /// heard together: once odometry, a later angle or [`settle`](Self::settle) says that it is complete.
+    ///
+    /// # Errors
+    /// [`LiveError::Value`] for a value that is not possible.
+    pub fn angle(&mut self, angle: &AngleObservation) -> Result<(), LiveError> {
+        finite("the time of an angle", angle.time_s)?;
+        finite("an angle", angle.phase_rad)?;
+        finite("the SNR of an angle", angle.snr_db.unwrap_or_default())?;
+        let sigma_rad = angle.sigma_rad;
+        if !(sigma_rad > 0.0 && sigma_rad.is_finite()) {
+            return Err(LiveError::Value {
+                what: "the standard deviation of an angle",
+                value: sigma_rad,
+                allowed: "it must be positive",
+            });
+        }
+        if let Some((first, _)) = self.angles.first()
+            && ((angle.time_s - first.time_s).abs() >= BURST_S || self.angles.len() == ANGLES)
+        {
+            self.hear_angles()?;
+        }
+        let snr_db = angle.snr_db.unwrap_or(UNSTATED_SNR_DB);
+        let ssb = SensedSsb {
+            pci: angle.pci,
+            ssb_index: angle.ssb_index,
+            time_s: angle.time_s,
+            snr_db,
+        };
+        let measured = AngleMeasurement {
+            time_s: angle.time_s,
+            phase_rad: angle.phase_rad,
+            phase_sigma_rad: sigma_rad,
+            angle_rad: self.sight.measurand().angle_rad(angle.phase_rad),
+            snr_db,
+            resolved: angle.resolved,
+        };
+        self.angles.push((ssb, measured));
+        Ok(())
+    }
+
+    /// Hears what has come of a burst without waiting for more of it, as at the end of a drive.
+    ///
+    /// # Errors
+    /// [`LiveError::Custom`] where the user's own code fails.
+    pub fn settle(&mut self) -> Result<(), LiveError> {
+        self.end_stretch()?;
+        self.hear_before(f64::INFINITY)?;
+        self.hear_angles()
+    }
+
+    /// What became of the angles since this was asked last, oldest first; beyond 256 the oldest are
+    /// forgotten.
+    pub fn next_outcome(&mut self) -> Option<Outcome> {
+        self.outcomes.pop_front()
+    }
+
+    /// The pose is this at `time_s`, with the covariance of (x, y, heading), or as uncertain as the
+    /// vehicle's settings say of a start. What was learnt while driving is forgotten.
+    ///
+    /// # Errors
+    /// [`LiveError`] for values that are not possible, for a time more than half a second from the
+    /// newest odometry, and where the localizer is the user's own.
+    pub fn set_pose(
+        &mut self,
+        time_s: f64,
+        pose: Pose,
+        covariance: Option<[[f64; 3]; 3]>,
+    ) -> Result<(), LiveError> {
+        finite("the time of a pose", time_s)?;
+        for value in [pose.x_m, pose.y_m, pose.heading_rad] {
+            finite("a pose", value)?;
+        }
+        if self.has_own_localizer {
+            return Err(LiveError::OwnLocalizer);
+        }
+        let mut vehicle = self.vehicle.clone();
+        vehicle.start.known = true;
+        if let Some(covariance) = covariance {
+            let (position_std_m, heading_std_rad) = deviations(&covariance)?;
+            vehicle.start.position_std_m = position_std_m;
+            vehicle.start.heading_std_rad = heading_std_rad;
+        }
+        let mut now = pose;
+        if let Some(newest) = self.onboard.newest_odometry() {
+            let elapsed_s = newest.time_s - time_s;
+            if elapsed_s.abs() > HISTORY_S {
+                return Err(LiveError::Value {
+                    what: "the time of a pose from the newest odometry's",
+                    value: -elapsed_s,
+                    allowed: "it must be within 0.5 s",
+                });
+            }
+            let turn_rad = newest.yaw_rate_radps.unwrap_or(0.0) * elapsed_s;
+            now = pose.along_chord(newest.speed_mps * elapsed_s, turn_rad);
+        }
+        self.begin(&vehicle, now)
+    }
+
+    /// Forgets pose, odometry and all that was learnt, and searches for the pose as from the start of a
+    /// drive; times may be earlier than before from now on.
+    ///
+    /// # Errors
+    /// [`LiveError::Settings`] where the vehicle cannot be found by searching
+    /// ([`set_pose`](Self::set_pose) then), [`LiveError::OwnLocalizer`].
+    pub fn reset(&mut self) -> Result<(), LiveError> {
+        if self.has_own_localizer {
+            return Err(LiveError::OwnLocalizer);
+        }
+        let mut unknown = self.vehicle.clone();
+        unknown.start.pose = None;
+        let (unknown, anywhere) = starting_at(&self.site, &unknown, None)?;
+        self.onboard.forget_odometry();
+        self.begin(&unknown, anywhere)?;
+        (self.last_angle_s, self.last_burst_s) = (None, None);
+        self.interval_s = None;
+        (self.executions, self.listened) = (0, 0);
+        Ok(())
+    }
+
+    fn begin(&mut self, vehicle: &Vehicle, start: Pose) -> Result<(), LiveError> {
+        let localizer = localize::built_in(&self.site, vehicle, start)?;
+        self.angles.clear();
+        self.onboard
+            .replace_localizer(localizer)
+            .map_err(LiveError::Custom)
+    }
+
+    /// Leaves a cell out from now on.
+    ///
+    /// # Errors
+    /// [`LiveError::UnknownCell`].
+    pub fn exclude(&mut self, pci: u16) -> Result<(), LiveError> {
+        self.set_excluded(pci, true)
+    }
+
+    /// Takes a cell in again that was left out.
+    ///
+    /// # Errors
+    /// [`LiveError::UnknownCell`].
+    pub fn readmit(&mut self, pci: u16) -> Result<(), LiveError> {
+        self.set_excluded(pci, false)
+    }
+
+    fn set_excluded(&mut self, pci: u16, excluded: bool) -> Result<(), LiveError> {
+        if !self.onboard.exclude(pci, excluded) {
+            return Err(LiveError::UnknownCell { pci });
+        }
+        for status in self.heads.iter_mut().filter(|it| it.head.pci == pci) {
+            status.is_excluded = excluded;
+        }
+        Ok(())
+    }
+
+    /// What is known of each radio head that the vehicle listens to.
+    pub fn heads(&self) -> &[HeadStatus] {
+        &self.heads
+    }
+
+    /// What has come of the samples.
+    pub fn stream_counts(&self) -> StreamCounts {
+        let counts = self.stream.as_ref().map(SampleStream::counts);
+        counts.unwrap_or_default()
+    }
+
+    /// The pipeline, to ask it for calibration and findings.
+    pub const fn onboard(&self) -> &Onboard {
+        &self.onboard
+    }
+
+    /// How the vehicle stands at `now_s`. A pose is told for half a second beyond the newest odometry at
+    /// most.
+    ///
+    /// # Errors
+    /// [`LiveError::Value`] for a time that is not finite, [`LiveError::Custom`].
+    pub fn status(&self, now_s: f64) -> Result<Status, LiveError> {
+        finite("the time of a status", now_s)?;
+        let newest = self.onboard.newest_odometry();
+        let age_s = newest.map(|it| now_s - it.time_s);
+        let end_s = self.stream.as_ref().and_then(SampleStream::next_s);
+        let mut status = Status {
+            time_s: now_s,
+            pose: None,
+            covariance: None,
+            speed_mps: newest.map_or(0.0, |it| it.speed_mps),
+            yaw_rate_radps: newest.and_then(|it| it.yaw_rate_radps),
+            state: State::Waiting,
+            reason: Reason::NoOdometry,
+            protection_level_m: None,
+            faulty: 0,
+            last_angle_s: self.last_angle_s,
+            odometry_age_s: age_s,
+            samples_age_s: end_s.map(|end_s| now_s - end_s),
+            tracked: self.stream.as_ref().map_or(0, SampleStream::tracked),
+        };
+        let (Some(newest), Some(age_s)) = (newest, age_s) else {
+            return Ok(status);
+        };
+        status.time_s = newest.time_s + age_s.clamp(0.0, SILENT_S);
+        if (0.0..=SILENT_S).contains(&age_s) {
+            status.time_s = now_s;
+        }
+        let estimate = self
+            .onboard
+            .pose(status.time_s)
+            .map_err(LiveError::Custom)?;
+        status.pose = Some(estimate.pose);
+        status.covariance = estimate.covariance;
+        let integrity = estimate.integrity;
+        status.protection_level_m = integrity.map(|it| it.protection_level_m);
+        status.faulty = integrity.map_or(0, |it| it.faulty);
+        (status.state, status.reason) = if age_s > SILENT_S {
+            (State::Unavailable, Reason::OdometrySilent { age_s })
+        } else {
+            self.judge(&estimate, now_s)
+        };
+        Ok(status)
+    }
+
+    /// State and reason of a pose with odometry behind it.
+    fn judge(&self, estimate: &PoseEstimate, now_s: f64) -> (State, Reason) {
+        if let Some(places) = self.onboard.searching() {
+            let reason = match self.last_angle_s {
+                None => Reason::NoAngle,
+                Some(_) => Reason::SeveralPlaces { places },
+            };
+            return (State::Searching, reason);
+        }
+        if self.onboard.is_lost() {
+            return (State::Lost, Reason::AnglesElsewhere);
+        }
+        let Some(integrity) = estimate.integrity else {
+            return (State::Unmonitored, Reason::NotMonitored);
+        };
+        let faulty = integrity.faulty;
+        match integrity.state {
+            IntegrityState::Ok if faulty > 0 => (State::Ok, Reason::FaultyHeads { heads: faulty }),
+            IntegrityState::Ok => (State::Ok, Reason::Nominal),
+            IntegrityState::Unavailable => (State::Unavailable, Reason::SourcesDisagree),
+            IntegrityState::Degraded => {
+                let level_m = integrity.protection_level_m;
+                let monitor = self.vehicle.integrity_monitor().unwrap_or_default();
+                let limit_m = monitor.alert_limit_m;
+                let silent_s = self.last_angle_s.map(|last_s| now_s - last_s);
+                let reason = match silent_s {
+                    _ if level_m <= limit_m && faulty > 0 => Reason::FaultyHeads { heads: faulty },
+                    _ if level_m <= limit_m => Reason::FaultSuspected,
+                    None => Reason::NoAngle,
+                    Some(age_s) if age_s > NO_ANGLE_S => Reason::AnglesSilent { age_s },
+                    Some(_) => Reason::LevelAboveLimit { level_m, limit_m },
+                };
+                (State::Degraded, reason)
+            }
+        }
+    }
+
+    /// Whether the burst at `time_s` is wanted, as things stand now.
+    ///
+    /// # Errors
+    /// [`LiveError::Custom`] where the user's own policy fails.
+    pub fn listens(&mut self, time_s: f64) -> Result<bool, LiveError> {
+        finite("the time of a burst", time_s)?;
+        self.onboard.listens(time_s).map_err(LiveError::Custom)
+    }
+
+    /// When the receiver has to be on next, after `now_s`: at the beginning of the next burst that is
+    /// wanted if the vehicle drives on as it does. Where none is within a second, when to ask again. `now_s`
+    /// itself while no SSB is known, or the place is searched for.
+    ///
+    /// # Errors
+    /// As [`listens`](Self::listens).
+    pub fn next_wake_up_s(&mut self, now_s: f64) -> Result<f64, LiveError> {
+        finite("the time of a wake-up", now_s)?;
+        let untracked = self.stream.as_ref().is_some_and(|it| it.tracked() == 0);
+        let is_searching = self.onboard.searching().is_some() || self.onboard.is_lost();
+        let Some(last_s) = self.last_burst_s.filter(|_| !untracked && !is_searching) else {
+            return Ok(now_s);
+        };
+        let period_s = self.site.ssb.period_s();
+        let first = ((now_s - last_s) / period_s).floor() + 1.0;
+        let mut burst_s = last_s + first * period_s;
+        let mut ahead = 1.0;
+        while burst_s < now_s + LOOK_AHEAD_S && !self.listens(burst_s)? {
+            burst_s = last_s + (first + ahead) * period_s;
+            ahead += 1.0;
+        }
+        Ok(burst_s)
+    }
+
+    /// What was done since the start or the last reset, and the energy of it by the platform's model.
+    pub fn energy(&self) -> LiveEnergy {
+        let duration_s = self
+            .interval_s
+            .map_or(0.0, |[first_s, last_s]| last_s - first_s);
+        let (executions, listened) = (self.executions, self.listened);
+        let model = self.energy.as_ref();
+        LiveEnergy {
+            duration_s,
+            executions,
+            listened,
+            on_time_s: model.map_or(0.0, |model| listened as f64 * model.on_time_s),
+            energy: model.map(|model| model.of_run(executions, listened, duration_s)),
+            boundary: model.map(|model| model.boundary),
+        }
+    }
+
+    /// Notes a time that came in.
+    fn see(&mut self, time_s: f64) {
+        let [first_s, last_s] = self.interval_s.unwrap_or([time_s; 2]);
+        self.interval_s = Some([first_s.min(time_s), last_s.max(time_s)]);
+    }
+
+    /// A sample whose distance is not known drives on by its speed.
+    fn with_distance(&self, sample: &OdometrySample) -> OdometrySample {
+        if !sample.distance_m.is_nan() {
+            return *sample;
+        }
+        let distance_m = self.onboard.newest_odometry().map_or(0.0, |last| {
+            let elapsed_s = sample.time_s - last.time_s;
+            last.distance_m + 0.5 * (last.speed_mps + sample.speed_mps) * elapsed_s
+        });
+        OdometrySample {
+            distance_m,
+            ..*sample
+        }
+    }
+
+    fn hear_angles(&mut self) -> Result<(), LiveError> {
+        if self.angles.is_empty() {
+            return Ok(());
+        }
+        let heard = hear(&mut self.onboard, &self.angles);
+        self.angles.clear();
+        self.book(heard)
+    }
+
+    /// Writes down what became of a burst.
+    fn book(&mut self, heard: Result<(f64, bool), BoxError>) -> Result<(), LiveError> {
+        let (time_s, listened) = heard.map_err(LiveError::Custom)?;
+        self.see(time_s);
+        self.last_burst_s = Some(time_s);
+        self.listened += usize::from(listened);
+        let newest_s = self.onboard.newest_odometry().map(|it| it.time_s);
+        let after_s = newest_s.unwrap_or(time_s).max(time_s);
+        let after = self.onboard.pose(after_s).map_err(LiveError::Custom)?;
+        for &execution in self.onboard.executions() {
+            self.executions += 1;
+            let (ssb, verdict) = (execution.ssb, execution.verdict);
+            let sends = |it: &&mut HeadStatus| it.head.sends(ssb.pci, ssb.ssb_index);
+            let mut status = self.heads.iter_mut().find(sends);
+            let residual_rad = (status.as_ref())
+                .zip(execution.measured)
+                .map(|(it, measured)| {
+                    let value_rad = measured.phase_rad;
+                    self.sight.residual_rad(after.pose, &it.head, value_rad)
+                });
+            if verdict.accepted {
+                self.last_angle_s = Some(ssb.time_s);
+            }
+            if let Some(status) = &mut status {
+                status.is_faulty = !status.is_excluded && verdict.reason == UpdateReason::Excluded;
+                status.snr_db = Some(ssb.snr_db);
+                status.last_heard_s = Some(ssb.time_s);
+                status.residual_rad = residual_rad;
+                status.accepted += u64::from(verdict.accepted);
+                status.refused += u64::from(!verdict.accepted);
+                if verdict.accepted {
+                    status.last_accepted_s = Some(ssb.time_s);
+                }
+            }
+            if self.outcomes.len() == OUTCOMES {
+                self.outcomes.pop_front();
+            }
+            self.outcomes.push_back(Outcome {
+                execution,
+                residual_rad,
+                after,
+            });
+        }
+        Ok(())
+    }
+}
+
+/// The time of a burst, and whether it was listened to.
+fn hear<T: OfSsb>(onboard: &mut Onboard, burst: &[T]) -> Result<(f64, bool), BoxError> {
+    let time_s = burst.first().map_or(0.0, |first| first.ssb().time_s);
+    let heard = onboard.hear(time_s, &mut Burst(burst))?;
+    Ok((time_s, heard.listened))
+}
+
+fn finite(what: &'static str, value: f64) -> Result<(), LiveError> {
+    let allowed = "it must be a finite number";
+    if value.is_finite() {
+        return Ok(());
+    }
+    Err(LiveError::Value {
+        what,
+        value,
+        allowed,
+    })
+}
+
+/// Standard deviations of place, the larger of its axes (m), and heading (rad).
+fn deviations(covariance: &[[f64; 3]; 3]) -> Result<(f64, f64), LiveError> {
+    let variances = PoseEstimate {
+        time_s: 0.0,
+        pose: Pose::default(),
+        covariance: Some(*covariance),
+        integrity: None,
+    }
+    .principal_variances();
+    let [.., [.., heading]] = *covariance;
+    let [largest, least] = variances;
+    for (what, value) in [
+        ("the variance of a place in m²", largest),
+        ("the variance of a place in m²", least),
+        ("the variance of a heading in rad²", heading),
+    ] {
+        if !(0.0..=1e8).contains(&value) {
+            let allowed = "it must be from 0 to 1e8";
+            return Err(LiveError::Value {
+                what,
+                value,
+                allowed,
+            });
+        }
+    }
+    Ok((largest.sqrt(), heading.sqrt().min(std::f64::consts::PI)))
+}

@@ -1,0 +1,51 @@
+//! The pipeline as a program on a vehicle uses it: samples, odometry and angles in as they come, status
+//! out at any time.
+//!
+//! [`Live`] joins receiver and pipeline and keeps the books: which samples are missing, what was heard
+//! of each radio head, when, and what it cost. It has no clock of its own, no threads, and allocates
+//! nothing once warm; a new pose or a reset does.
+//!
+//! ```
+//! use onboard::live::{AngleObservation, State};
+//! use onboard::observation::OdometrySample;
+//! use onboard::settings::{Platform, Shipped, Site, TomlFile, Vehicle};
+//! use onboard::{Custom, Live};
+//!
+//! let site = Site::from_library("yard", &Shipped)?;
+//! let vehicle = Vehicle::from_library("tugger", &Shipped)?;
+//! let platform = Platform::from_library(&vehicle.platform.name, &Shipped)?;
+//! // In search of its start, by angles of its own: no samples.
+//! let mut live = Live::new(&site, &vehicle, &platform, None, None, Custom::default())?;
+//! live.odometry(&OdometrySample::of_speed(0.0, 1.5, None))?;
+//! live.angle(&AngleObservation {
+//!     pci: site.radio_heads[0].pci,
+//!     ssb_index: 0,
+//!     time_s: 0.01,
+//!     phase_rad: 0.3,
+//!     sigma_rad: 0.02,
+//!     snr_db: None,
+//!     resolved: true,
+//! })?;
+//! let status = live.status(0.02)?;
+//! assert_eq!(status.state, State::Searching);
+//! println!("{}; {}", status.reason, status.reason.what_to_do());
+//! # Ok::<(), Box<dyn std::error::Error>>(())
+//! ```
+
+mod error;
+mod feed;
+mod outcome;
+mod samples;
+mod start;
+mod status;
+mod stream;
+mod stream_clock;
+
+pub use error::LiveError;
+pub use feed::{AngleObservation, Live, LiveEnergy};
+pub use outcome::{HeadStatus, Outcome};
+pub use samples::{cf32, ci8, ci16};
+pub use start::starting_at;
+pub use status::{Reason, State, Status};
+pub use stream::{SampleStream, StreamConfig, StreamCounts};
+pub use stream_clock::Continuity;

@@ -1,0 +1,36 @@
+//! Where a drive begins.
+
+use crate::geometry::Pose;
+use crate::settings::{Check, LocalizerSettings, SettingsError, Site, Vehicle};
+
+/// The vehicle with the start of a drive, and that start: `start`, else where its settings say, else
+/// anywhere that it can be found.
+///
+/// # Errors
+/// [`SettingsError`] when the start is not known, and not what finding the vehicle takes.
+pub fn starting_at(
+    site: &Site,
+    vehicle: &Vehicle,
+    start: Option<Pose>,
+) -> Result<(Vehicle, Pose), SettingsError> {
+    let pose = start.or(vehicle.start.pose);
+    let mut vehicle = vehicle.clone();
+    vehicle.start.pose = pose;
+    vehicle.start.known = pose.is_some();
+    let heard = site.radio_heads.iter();
+    let heard = heard
+        .filter(|head| vehicle.receiver.hears(head.pci))
+        .count();
+    let along_road = site.road.is_some() && vehicle.follows_road();
+    let tracks = matches!(vehicle.localizer, LocalizerSettings::Tracker(_));
+    let findable = tracks && heard > if along_road { 1 } else { 2 };
+    let file = &vehicle.name;
+    Check { file }.that(
+        pose.is_some() || findable,
+        "start.pose",
+        "missing",
+        "without it the vehicle is found by a tracker (localizer.kind), along a road that it follows \
+         by two radio heads or more, elsewhere by three",
+    )?;
+    Ok((vehicle, pose.unwrap_or_default()))
+}

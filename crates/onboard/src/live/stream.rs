@@ -1,0 +1,211 @@
+//! The samples of a stream as bursts of SSBs.
+
+use nr_ssb::front_end::FrontEndError;
+use nr_ssb::receiver::ReceiverError;
+use num_complex::Complex32;
+
+use super::error::LiveError;
+use super::stream_clock::{Continuity, StreamClock};
+use crate::burst::first_burst;
+use crate::observation::{BURST_S, MAX_ELEMENTS, SsbObservation};
+use crate::receive::{ReceiveError, ReceiverConfig, StreamReceiver};
+
+/// What a stream of samples is.
+#[derive(Debug, Clone, Copy, PartialEq)]
+pub struct StreamConfig {
+    /// Samples per second and antenna.
+    pub rate_hz: f64,
+    /// Absolute frequency that stands at 0 Hz in the samples, Hz.
+    pub centre_hz: f64,
+}
+
+/// What has come of a stream of samples since its start.
+#[derive(Debug, Clone, Copy, PartialEq, Default)]
+pub struct StreamCounts {
+    /// Samples taken in, in seconds.
+    pub taken_s: f64,
+    /// Gaps by the times of the blocks ...
+    pub gaps: u64,
+    /// ... and their length together, in seconds.
+    pub lost_s: f64,
+    /// Gaps that the blocks' times do not tell of, by the times of the SSBs ...
+    pub untold_gaps: u64,
+    /// ... and their length together, but for whole periods of the SSB, in seconds. The times of all
+    /// that follows are later by it.
+    pub untold_s: f64,
+    /// Blocks that began before the last one ended.
+    pub overlaps: u64,
+    /// Streams that began anew.
+    pub restarts: u64,
+}
+
+/// Receiver of a stream, and the observations that are not yet of a whole burst.
+pub struct SampleStream {
+    clock: StreamClock,
+    receiver: StreamReceiver,
+    elements: usize,
+    bursts: Bursts,
+    counts: StreamCounts,
+}
+
+/// Observations in order of time; the first of them are `held`, the others are memory.
+#[derive(Default)]
+struct Bursts {
+    observations: Vec<SsbObservation>,
+    held: usize,
+    /// Samples (s) that were missing untold before the newest.
+    untold_s: f64,
+    untold_gaps: u64,
+    /// Until when all SSBs have come; infinite where a stretch of samples has ended.
+    heard_until_s: f64,
+}
+
+impl Bursts {
+    fn take(&mut self, observation: &SsbObservation, untold_s: f64) {
+        if untold_s != self.untold_s {
+            (self.untold_s, self.untold_gaps) = (untold_s, self.untold_gaps + 1);
+        }
+        match self.observations.get_mut(self.held) {
+            Some(room) => room.copy_from(observation),
+            None => self.observations.push(observation.clone()),
+        }
+        self.held += 1;
+    }
+}
+
+impl SampleStream {
+    /// Before the first sample.
+    ///
+    /// # Errors
+    /// [`LiveError::Receive`] for a rate, frequency or array that is not possible.
+    pub fn new(config: StreamConfig, receiver: ReceiverConfig) -> Result<Self, LiveError> {
+        let StreamConfig { rate_hz, centre_hz } = config;
+        Ok(Self {
+            clock: StreamClock::new(rate_hz),
+            elements: receiver.array.elements.into(),
+            receiver: StreamReceiver::new(receiver, rate_hz, centre_hz)?,
+            bursts: Bursts::default(),
+            counts: StreamCounts::default(),
+        })
+    }
+
+    /// SSBs that are tracked.
+    pub fn tracked(&self) -> usize {
+        self.receiver.tracked()
+    }
+
+    /// What has come.
+    pub fn counts(&self) -> StreamCounts {
+        StreamCounts {
+            untold_gaps: self.bursts.untold_gaps,
+            untold_s: self.bursts.untold_s,
+            ..self.counts
+        }
+    }
+
+    /// Time of the first sample that has not come.
+    pub fn next_s(&self) -> Option<f64> {
+        (self.counts.taken_s > 0.0).then(|| self.clock.time_s(self.clock.next() as f64))
+    }
+
+    /// Takes in the next samples of every antenna, the first of them received at `time_s`; `ends` says that
+    /// none follow them without a gap.
+    ///
+    /// # Errors
+    /// [`LiveError::Receive`] for another number of antennas or unequal lengths.
+    pub fn push(
+        &mut self,
+        time_s: f64,
+        antennas: &[&[Complex32]],
+        ends: bool,
+    ) -> Result<Continuity, LiveError> {
+        let (found, elements) = (antennas.len(), self.elements);
+        if found != elements {
+            return Err(ReceiveError::Antennas { found, elements }.into());
+        }
+        let length = antennas.first().map_or(0, |samples| samples.len());
+        if let Some(other) = antennas.iter().find(|samples| samples.len() != length) {
+            let (first, other) = (length, other.len());
+            let error = ReceiverError::FrontEnd(FrontEndError::UnequalLengths { first, other });
+            return Err(ReceiveError::from(error).into());
+        }
+        let before = self.clock.clone();
+        let (continuity, left_out) = self.clock.block(time_s, length);
+        match continuity {
+            Continuity::First | Continuity::Contiguous => {}
+            Continuity::Overlap { .. } => self.counts.overlaps += 1,
+            Continuity::Gap { lost_s } => {
+                self.counts.gaps += 1;
+                self.counts.lost_s += lost_s;
+                self.gap_to(self.clock.next() - length as u64, &before)?;
+            }
+            Continuity::Restart => {
+                self.counts.restarts += 1;
+                self.gap_to(before.next(), &before)?;
+                self.receiver.reset();
+            }
+        }
+        let mut new: [&[Complex32]; MAX_ELEMENTS] = [&[]; MAX_ELEMENTS];
+        for (new, samples) in new.iter_mut().zip(antennas) {
+            *new = samples.get(left_out..).unwrap_or_default();
+        }
+        let new = new.get(..elements).unwrap_or_default();
+        self.counts.taken_s += (length - left_out) as f64 / self.clock.rate_hz();
+        let Self {
+            clock,
+            receiver,
+            bursts,
+            ..
+        } = self;
+        let time_s = |sample| clock.time_s(sample);
+        receiver.push(new, &time_s, &mut |it, untold_s| bursts.take(it, untold_s))?;
+        bursts.heard_until_s = clock.time_s(receiver.heard_until()) + bursts.untold_s;
+        if ends {
+            self.break_off()?;
+        }
+        Ok(continuity)
+    }
+
+    /// Looks at all that is held back: nothing follows it without a gap.
+    ///
+    /// # Errors
+    /// None that [`push`](Self::push) has not.
+    pub fn break_off(&mut self) -> Result<(), LiveError> {
+        self.gap_to(self.clock.next(), &self.clock.clone())?;
+        self.bursts.heard_until_s = f64::INFINITY;
+        Ok(())
+    }
+
+    fn gap_to(&mut self, sample: u64, clock: &StreamClock) -> Result<(), LiveError> {
+        let (receiver, bursts) = (&mut self.receiver, &mut self.bursts);
+        let time_s = |sample| clock.time_s(sample);
+        receiver.gap_to(sample, &time_s, &mut |it, untold_s| {
+            bursts.take(it, untold_s);
+        })?;
+        Ok(())
+    }
+
+    /// SSBs of the first burst, if no more of it can come.
+    pub fn burst(&self) -> &[SsbObservation] {
+        let held = self.bursts.observations.get(..self.bursts.held);
+        let held = held.unwrap_or_default();
+        match held.first() {
+            Some(first) if first.ssb.time_s + BURST_S <= self.bursts.heard_until_s => {
+                let number = first_burst(held);
+                let alone = held.iter().take(number).position(|it| it.is_first);
+                let number = alone.map_or(number, |place| place.max(1));
+                held.get(..number).unwrap_or_default()
+            }
+            _ => &[],
+        }
+    }
+
+    /// Forgets the first SSBs.
+    pub fn forget(&mut self, number: usize) {
+        let number = number.min(self.bursts.held);
+        if let Some(held) = self.bursts.observations.get_mut(..self.bursts.held) {
+            held.rotate_left(number);
+        }
+        self.bursts.held -= number;
+    }
+}

@@ -1,0 +1,459 @@
+//! The pipeline on a vehicle, fed as things come in.
+
+use std::sync::{Mutex, MutexGuard, PoisonError};
+
+use onboard::Custom;
+use onboard::geometry::Pose;
+use onboard::live::{
+    AngleObservation, Continuity, HeadStatus as CoreHead, Live as Core, LiveError,
+    Outcome as CoreOutcome, Status as CoreStatus, StreamConfig,
+};
+use onboard::localize::OdometryVerdict;
+use onboard::observation::OdometrySample;
+use pyo3::exceptions::PyValueError;
+use pyo3::prelude::*;
+use recording::load;
+
+use crate::message::brief;
+use crate::nr::{complex_samples, rows};
+use crate::settings::{Site, Vehicle, settings_error};
+
+#[allow(clippy::needless_pass_by_value)] // the shape that `map_err` wants
+fn live_error(error: LiveError) -> PyErr {
+    match error {
+        LiveError::Settings(error) => settings_error(error),
+        other => PyValueError::new_err(brief(other)),
+    }
+}
+
+/// How the vehicle stands at a time.
+#[pyclass(frozen, get_all, module = "access_av._core")]
+pub struct LiveStatus {
+    /// Time of the pose in seconds: the time asked for, or the last one that odometry vouches for.
+    time_s: f64,
+    /// Place and heading, x and y in metres, radians counter-clockwise from +x; while it is searched for,
+    /// the mean of where it may be. `None` before any odometry.
+    pose: Option<(f64, f64, f64)>,
+    /// Covariance of (x, y, heading), row-major, in m², m·rad and rad².
+    covariance: Option<[[f64; 3]; 3]>,
+    /// Speed by the odometer in m/s.
+    speed_mps: f64,
+    /// Yaw rate in rad/s, counter-clockwise, where something tells it.
+    yaw_rate_radps: Option<f64>,
+    /// `waiting`, `searching`, `lost`, `unavailable`, `degraded`, `ok` or `unmonitored`.
+    state: &'static str,
+    /// Whether the pose is one place that was found and not refuted.
+    is_localized: bool,
+    /// Why, in words.
+    reason: String,
+    /// What to do about it, in words.
+    what_to_do: &'static str,
+    /// Horizontal protection level in metres, where there is one.
+    protection_level_m: Option<f64>,
+    /// Number of radio heads found faulty.
+    faulty: usize,
+    /// Time of the last angle accepted, in seconds.
+    last_angle_s: Option<f64>,
+    /// Age of the newest odometry in seconds.
+    odometry_age_s: Option<f64>,
+    /// Age of the newest sample in seconds.
+    samples_age_s: Option<f64>,
+    /// SSBs that the receiver keeps to.
+    tracked: usize,
+}
+
+impl From<CoreStatus> for LiveStatus {
+    fn from(status: CoreStatus) -> Self {
+        Self {
+            time_s: status.time_s,
+            pose: status.pose.map(|it| (it.x_m, it.y_m, it.heading_rad)),
+            covariance: status.covariance,
+            speed_mps: status.speed_mps,
+            yaw_rate_radps: status.yaw_rate_radps,
+            state: status.state.name(),
+            is_localized: status.state.is_localized(),
+            reason: status.reason.to_string(),
+            what_to_do: status.reason.what_to_do(),
+            protection_level_m: status.protection_level_m,
+            faulty: status.faulty,
+            last_angle_s: status.last_angle_s,
+            odometry_age_s: status.odometry_age_s,
+            samples_age_s: status.samples_age_s,
+            tracked: status.tracked,
+        }
+    }
+}
+
+/// One angle and what became of it.
+#[pyclass(frozen, get_all, module = "access_av._core")]
+pub struct LiveOutcome {
+    /// Reception time in seconds.
+    time_s: f64,
+    /// Physical cell identity.
+    pci: u16,
+    /// Index of the SSB in the burst.
+    ssb_index: u8,
+    /// SNR per antenna and resource element in dB.
+    snr_db: f64,
+    /// Electrical angle, or azimuth of an array that is no row, in radians; `None` where there is none.
+    phase_rad: Option<f64>,
+    /// Its standard deviation in radians.
+    phase_sigma_rad: Option<f64>,
+    /// Whether it changed the pose.
+    accepted: bool,
+    /// Why, or why not.
+    reason: &'static str,
+    /// By how much it lies from where the radio head is seen from the pose after it, in radians.
+    residual_rad: Option<f64>,
+    /// The pose after it, as of the status.
+    pose: (f64, f64, f64),
+}
+
+impl From<CoreOutcome> for LiveOutcome {
+    fn from(outcome: CoreOutcome) -> Self {
+        let (ssb, verdict) = (outcome.execution.ssb, outcome.execution.verdict);
+        let (measured, pose) = (outcome.execution.measured, outcome.after.pose);
+        Self {
+            time_s: ssb.time_s,
+            pci: ssb.pci,
+            ssb_index: ssb.ssb_index,
+            snr_db: ssb.snr_db,
+            phase_rad: measured.map(|it| it.phase_rad),
+            phase_sigma_rad: measured.map(|it| it.phase_sigma_rad),
+            accepted: verdict.accepted,
+            reason: verdict.reason.name(),
+            residual_rad: outcome.residual_rad,
+            pose: (pose.x_m, pose.y_m, pose.heading_rad),
+        }
+    }
+}
+
+/// What is known of the reception of one radio head.
+#[pyclass(frozen, get_all, module = "access_av._core")]
+pub struct LiveHead {
+    /// Physical cell identity.
+    pci: u16,
+    /// Index of its SSB in the burst.
+    ssb_index: u8,
+    /// Whether it is left out by `exclude`.
+    is_excluded: bool,
+    /// Whether it was found faulty.
+    is_faulty: bool,
+    /// SNR of its last SSB in dB.
+    snr_db: Option<f64>,
+    /// Time of the last SSB an angle was estimated of, in seconds.
+    last_heard_s: Option<f64>,
+    /// Time of the last one whose angle was accepted, in seconds.
+    last_accepted_s: Option<f64>,
+    /// Residual of its last angle in radians.
+    residual_rad: Option<f64>,
+    /// Number of its angles that were accepted.
+    accepted: u64,
+    /// Number of those that were not.
+    refused: u64,
+}
+
+impl From<&CoreHead> for LiveHead {
+    fn from(it: &CoreHead) -> Self {
+        Self {
+            pci: it.head.pci,
+            ssb_index: it.head.ssb_index,
+            is_excluded: it.is_excluded,
+            is_faulty: it.is_faulty,
+            snr_db: it.snr_db,
+            last_heard_s: it.last_heard_s,
+            last_accepted_s: it.last_accepted_s,
+            residual_rad: it.residual_rad,
+            accepted: it.accepted,
+            refused: it.refused,
+        }
+    }
+}
+
+/// What was done since the start, and the energy of it by the platform's model.
+#[pyclass(frozen, get_all, module = "access_av._core")]
+pub struct LiveEnergy {
+    /// Time since the first that came in, in seconds.
+    duration_s: f64,
+    /// Angles estimated.
+    executions: usize,
+    /// Bursts listened to.
+    listened: usize,
+    /// How long the receiver was to be on for those, in seconds.
+    on_time_s: f64,
+    /// Joules of estimating, receiver and idle board together; `None` where the platform does not know.
+    total_j: Option<f64>,
+}
+
+/// The pipeline on a vehicle: samples, angles and odometry in as they come, a status at any time.
+///
+/// Times are of one clock, in seconds. What is refused raises and changes nothing. Other threads run
+/// while samples are worked on.
+///
+/// Parameters
+/// ----------
+/// site : Site
+///     Radio heads and road.
+/// vehicle : Vehicle
+///     Array, odometer, localizer, wake-up, platform.
+/// start : tuple of (x_m, y_m, heading_rad), optional
+///     Initial pose; without it where the vehicle's file says, else it is searched for.
+/// rate_hz, centre_hz : float, optional
+///     Rate of the samples and the absolute frequency at their 0 Hz; without them angles only.
+///
+/// Raises
+/// ------
+/// SettingsError
+///     Site, vehicle and start do not go together.
+/// ValueError
+///     A rate or frequency that does not suit.
+///
+/// Examples
+/// --------
+/// >>> import access_av
+/// >>> site, vehicle = access_av.Site.load("yard"), access_av.Vehicle.load("tugger")
+/// >>> live = access_av.Live(site, vehicle, start=(-59.0, 0.0, 0.0))
+/// >>> for step in range(50):
+/// ...     _ = live.odometry(0.02 * step, 1.5, yaw_rate_radps=0.0)
+/// >>> status = live.status(1.0)
+/// >>> status.state, status.reason
+/// ('ok', 'nothing is wrong')
+/// >>> round(status.pose[0], 1)
+/// -57.5
+#[pyclass(frozen, module = "access_av._core")]
+pub struct Live(Mutex<Core>);
+
+impl Live {
+    fn core(&self) -> MutexGuard<'_, Core> {
+        self.0.lock().unwrap_or_else(PoisonError::into_inner)
+    }
+}
+
+#[pymethods]
+impl Live {
+    #[new]
+    #[pyo3(signature = (site, vehicle, *, start = None, rate_hz = None, centre_hz = None))]
+    fn new(
+        site: &Site,
+        vehicle: &Vehicle,
+        start: Option<(f64, f64, f64)>,
+        rate_hz: Option<f64>,
+        centre_hz: Option<f64>,
+    ) -> PyResult<Self> {
+        let stream = match (rate_hz, centre_hz) {
+            (Some(rate_hz), Some(centre_hz)) => Some(StreamConfig { rate_hz, centre_hz }),
+            (None, None) => None,
+            _ => {
+                let said = "rate_hz and centre_hz must both be given, or neither";
+                return Err(PyValueError::new_err(said));
+            }
+        };
+        let platform = load(&vehicle.0.platform.name).map_err(settings_error)?;
+        let start = start.map(pose);
+        let live = Core::new(
+            &site.0,
+            &vehicle.0,
+            &platform,
+            start,
+            stream,
+            Custom::default(),
+        );
+        Ok(Self(Mutex::new(live.map_err(live_error)?)))
+    }
+
+    /// Take the next samples, of any length.
+    ///
+    /// Parameters
+    /// ----------
+    /// time_s : float
+    ///     When the first of them was received, by the sample clock: by counting, or a radio's own time. What
+    ///     is missing, there twice, or of a stream that began anew, is told by it.
+    /// samples : ndarray
+    ///     Complex samples, `(antennas, samples)`.
+    ///
+    /// Returns
+    /// -------
+    /// str
+    ///     How they go on: `first`, `contiguous`, `gap`, `overlap` or `restart`.
+    fn samples(
+        &self,
+        py: Python<'_>,
+        time_s: f64,
+        samples: &Bound<'_, PyAny>,
+    ) -> PyResult<&'static str> {
+        let samples = complex_samples(samples)?;
+        let antennas = rows(&samples)?;
+        let taken = py.detach(|| self.core().samples(time_s, &antennas));
+        Ok(match taken.map_err(live_error)? {
+            Continuity::First => "first",
+            Continuity::Contiguous => "contiguous",
+            Continuity::Gap { .. } => "gap",
+            Continuity::Overlap { .. } => "overlap",
+            Continuity::Restart => "restart",
+        })
+    }
+
+    /// Take odometry; its speed alone is enough.
+    ///
+    /// Returns
+    /// -------
+    /// bool
+    ///     Whether all of it was used; a distance that jumps is not, nor a yaw rate that no vehicle has.
+    ///
+    /// Raises
+    /// ------
+    /// ValueError
+    ///     A time that is not after the last one's, or a value that is not finite.
+    #[pyo3(signature = (time_s, speed_mps, *, distance_m = None, yaw_rate_radps = None))]
+    fn odometry(
+        &self,
+        py: Python<'_>,
+        time_s: f64,
+        speed_mps: f64,
+        distance_m: Option<f64>,
+        yaw_rate_radps: Option<f64>,
+    ) -> PyResult<bool> {
+        if distance_m.is_some_and(|it| !it.is_finite()) {
+            return Err(PyValueError::new_err("distance_m is not a finite number"));
+        }
+        let sample = OdometrySample {
+            distance_m: distance_m.unwrap_or(f64::NAN),
+            ..OdometrySample::of_speed(time_s, speed_mps, yaw_rate_radps)
+        };
+        let verdict = py.detach(|| self.core().odometry(&sample));
+        Ok(!matches!(
+            verdict.map_err(live_error)?,
+            OdometryVerdict::DistanceJump { .. } | OdometryVerdict::YawRateRefused { .. }
+        ))
+    }
+
+    /// Take an angle that was estimated elsewhere. Those of a burst are heard together, once odometry, a
+    /// later angle or `settle` says that it is complete.
+    ///
+    /// Parameters
+    /// ----------
+    /// pci : int
+    ///     Physical cell identity.
+    /// time_s : float
+    ///     Reception time.
+    /// phase_rad, sigma_rad : float
+    ///     Electrical angle ω = 2π(d/λ)·cos θ of a row, or azimuth of any other array, and its standard
+    ///     deviation.
+    /// ssb_index : int
+    ///     Index of the SSB in its burst.
+    /// snr_db : float, optional
+    ///     SNR per antenna.
+    /// resolved : bool
+    ///     Whether the estimator vouches for it.
+    #[pyo3(signature = (pci, time_s, phase_rad, sigma_rad, *, ssb_index = 0, snr_db = None, resolved = true))]
+    #[allow(clippy::too_many_arguments)] // Python's keywords
+    fn angle(
+        &self,
+        py: Python<'_>,
+        pci: u16,
+        time_s: f64,
+        phase_rad: f64,
+        sigma_rad: f64,
+        ssb_index: u8,
+        snr_db: Option<f64>,
+        resolved: bool,
+    ) -> PyResult<()> {
+        let angle = AngleObservation {
+            pci,
+            ssb_index,
+            time_s,
+            phase_rad,
+            sigma_rad,
+            snr_db,
+            resolved,
+        };
+        py.detach(|| self.core().angle(&angle)).map_err(live_error)
+    }
+
+    /// Hear what has come of a burst without waiting for more of it.
+    fn settle(&self, py: Python<'_>) -> PyResult<()> {
+        py.detach(|| self.core().settle()).map_err(live_error)
+    }
+
+    /// What became of the angles since this was asked last, oldest first; the last 256 at most.
+    fn outcomes(&self) -> Vec<LiveOutcome> {
+        let mut core = self.core();
+        let next = std::iter::from_fn(|| core.next_outcome());
+        next.map(LiveOutcome::from).collect()
+    }
+
+    /// The pose at a time near the newest odometry's, with the covariance of (x, y, heading), or as
+    /// uncertain as the vehicle's file says of a start. What was learnt is forgotten.
+    #[pyo3(signature = (time_s, pose, covariance = None))]
+    fn set_pose(
+        &self,
+        py: Python<'_>,
+        time_s: f64,
+        pose: (f64, f64, f64),
+        covariance: Option<[[f64; 3]; 3]>,
+    ) -> PyResult<()> {
+        let pose = self::pose(pose);
+        let set = py.detach(|| self.core().set_pose(time_s, pose, covariance));
+        set.map_err(live_error)
+    }
+
+    /// Forget pose, odometry and all that was learnt, and search for the pose; times may be earlier from now
+    /// on.
+    fn reset(&self, py: Python<'_>) -> PyResult<()> {
+        py.detach(|| self.core().reset()).map_err(live_error)
+    }
+
+    /// Leave a cell out from now on.
+    fn exclude(&self, pci: u16) -> PyResult<()> {
+        self.core().exclude(pci).map_err(live_error)
+    }
+
+    /// Take a cell in again that was left out.
+    fn readmit(&self, pci: u16) -> PyResult<()> {
+        self.core().readmit(pci).map_err(live_error)
+    }
+
+    /// How the vehicle stands at a time.
+    fn status(&self, py: Python<'_>, now_s: f64) -> PyResult<LiveStatus> {
+        let status = py.detach(|| self.core().status(now_s));
+        status.map(LiveStatus::from).map_err(live_error)
+    }
+
+    /// What is known of each radio head that the vehicle listens to.
+    fn heads(&self) -> Vec<LiveHead> {
+        self.core().heads().iter().map(LiveHead::from).collect()
+    }
+
+    /// Whether the burst at a time is wanted, as things stand now.
+    fn listens(&self, py: Python<'_>, time_s: f64) -> PyResult<bool> {
+        py.detach(|| self.core().listens(time_s))
+            .map_err(live_error)
+    }
+
+    /// When the receiver has to be on next: the next burst that is wanted, `now_s` itself while nothing is
+    /// tracked or the place is searched for; where none is wanted within a second, when to ask again.
+    fn next_wake_up_s(&self, py: Python<'_>, now_s: f64) -> PyResult<f64> {
+        let next_s = py.detach(|| self.core().next_wake_up_s(now_s));
+        next_s.map_err(live_error)
+    }
+
+    /// What was done since the start or the last reset, and the energy of it.
+    fn energy(&self) -> LiveEnergy {
+        let energy = self.core().energy();
+        LiveEnergy {
+            duration_s: energy.duration_s,
+            executions: energy.executions,
+            listened: energy.listened,
+            on_time_s: energy.on_time_s,
+            total_j: energy.energy.map(|it| it.total_j()),
+        }
+    }
+}
+
+const fn pose((x_m, y_m, heading_rad): (f64, f64, f64)) -> Pose {
+    Pose {
+        x_m,
+        y_m,
+        heading_rad,
+    }
+}

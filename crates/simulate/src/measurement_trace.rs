@@ -1,0 +1,249 @@
+//! Measurement traces of drives: what comes to the vehicle, to be driven again with another localizer or wake-up
+//! policy.
+//!
+//! What an SSB brings does not depend on which others were heard, its noise included
+//! ([`HeadChannel::observe`]). So the angle of every SSB is estimated once, and whoever chooses among
+//! them has the record of a drive of its own, to the last bit, for a small part of its computing.
+
+use onboard::geometry::Pose;
+use onboard::localize::AngleMeasurement;
+use onboard::observation::{OdometrySample, SensedSsb, SsbObservation};
+use onboard::settings::EstimatorMethod;
+use onboard::{BoxError, Custom, Observed, Onboard, SsbSource, estimator};
+use rayon::prelude::*;
+
+use crate::campaign::{Campaign, CampaignOptions, thread_pool};
+use crate::channel::HeadChannel;
+use crate::error::SimulationError;
+use crate::random::Streams;
+use crate::record::RunRecord;
+use crate::run::Simulation;
+use crate::world::Faults;
+
+/// Runs of a world, each as its measurements.
+pub struct MeasurementTraces {
+    simulation: Simulation,
+    methods: Vec<EstimatorMethod>,
+    runs: Vec<MeasurementTrace>,
+}
+
+/// One run: what comes to the vehicle.
+pub(crate) struct MeasurementTrace {
+    run: u64,
+    pub told_start: Pose,
+    pub odometry: Vec<OdometrySample>,
+    bursts: Vec<Burst>,
+    /// What is sensed, burst by burst.
+    sensed: Vec<SensedSsb>,
+    /// Their angles, by method.
+    angles: Vec<Vec<Option<AngleMeasurement>>>,
+}
+
+/// A burst of SSBs, and the vehicle when it comes.
+struct Burst {
+    time_s: f64,
+    truth: Pose,
+    snr_db: f64,
+    /// Where its SSBs end among all that are sensed.
+    end: usize,
+}
+
+impl MeasurementTraces {
+    /// MeasurementTraces of the first `runs` runs of a scenario, with the angles of these methods; `None` where
+    /// it matters to an SSB which others are listened to, or when.
+    ///
+    /// # Errors
+    /// [`SimulationError`] when there are no such threads, or an estimator refuses the array.
+    pub fn record(
+        simulation: &Simulation,
+        methods: &[EstimatorMethod],
+        options: &CampaignOptions<'_>,
+    ) -> Result<Option<Self>, SimulationError> {
+        if !simulation.world().is_independent_of_listening() {
+            return Ok(None);
+        }
+        let (seed, first) = (options.seed, options.first_run);
+        let numbers = first..first + options.runs as u64;
+        let runs: Vec<_> = thread_pool(options.threads)?.install(|| {
+            (numbers.into_par_iter())
+                .map(|run| {
+                    MeasurementTrace::record(simulation, methods, Streams::new(seed, run), run)
+                })
+                .collect()
+        });
+        Ok(Some(Self {
+            simulation: simulation.clone(),
+            methods: methods.to_vec(),
+            runs: runs.into_iter().collect::<Result<_, _>>()?,
+        }))
+    }
+
+    /// Whether a simulation is of the same world, and its method in the traces: all may differ that
+    /// only localizer, wake-up policy and computer go by.
+    pub fn serve(&self, other: &Simulation) -> bool {
+        let grid_deg = |it: &Simulation| it.scenario().vehicle.estimator.music_grid_deg;
+        self.methods
+            .contains(&other.scenario().vehicle.estimator.method)
+            && grid_deg(&self.simulation) == grid_deg(other)
+            && self.simulation.world().sounds_like(other.world())
+    }
+
+    /// The campaign of a simulation that the traces serve, over their runs.
+    ///
+    /// # Errors
+    /// [`SimulationError`], as [`Simulation::campaign`] has them.
+    pub fn campaign(
+        &self,
+        simulation: &Simulation,
+        options: &CampaignOptions<'_>,
+    ) -> Result<Campaign, SimulationError> {
+        let wanted = simulation.scenario().vehicle.estimator.method;
+        let method = self.methods.iter().position(|&method| method == wanted);
+        simulation.campaign_of(options, self.runs.len(), |number| {
+            let trace = self.runs.get(number).zip(method);
+            let (trace, method) = trace.ok_or(SimulationError::NotTraced)?;
+            trace.drive(simulation, method)
+        })
+    }
+}
+
+impl MeasurementTrace {
+    /// The angles of a method, in order of time.
+    pub fn angles_of(&self, method: usize) -> impl Iterator<Item = (SensedSsb, AngleMeasurement)> {
+        let angles = self.angles.get(method).into_iter().flatten();
+        let heard = self.sensed.iter().zip(angles);
+        heard.filter_map(|(&ssb, angle)| Some((ssb, (*angle)?)))
+    }
+
+    /// When bursts come, and where the vehicle is then.
+    pub fn truth(&self) -> impl Iterator<Item = (f64, Pose)> {
+        self.bursts.iter().map(|burst| (burst.time_s, burst.truth))
+    }
+
+    /// Records a run, with the angles of these methods.
+    pub fn record(
+        simulation: &Simulation,
+        methods: &[EstimatorMethod],
+        streams: Streams,
+        run: u64,
+    ) -> Result<Self, SimulationError> {
+        let scenario = simulation.scenario();
+        let mut estimators = (methods.iter())
+            .map(|&method| {
+                let mut vehicle = scenario.vehicle.clone();
+                vehicle.estimator.method = method;
+                estimator::built_in(&vehicle).map_err(|error| SimulationError::Custom(error.into()))
+            })
+            .collect::<Result<Vec<_>, _>>()?;
+        let measurand = scenario.vehicle.array.measurand();
+        let mut truth = simulation.world().draw(streams);
+        let mut channels = HeadChannel::all(&mut truth, streams);
+        let mut faults = Faults::new(&scenario.faults);
+        let mut observation = SsbObservation::new(scenario.vehicle.array.elements.into());
+        let mut trace = Self {
+            run,
+            told_start: truth.told_start,
+            odometry: Vec::new(),
+            bursts: Vec::with_capacity(simulation.steps()),
+            sensed: Vec::with_capacity(simulation.steps() * channels.len()),
+            angles: vec![Vec::with_capacity(simulation.steps() * channels.len()); methods.len()],
+        };
+        for number in 0..simulation.steps() {
+            let time_s = simulation.time_s(number);
+            while let Some(sample_s) = truth.odometer.next_s(time_s) {
+                let sample = truth.odometer.sample(truth.path.at(sample_s));
+                trace.odometry.extend(sample.map(|it| faults.slip(it)));
+            }
+            let vehicle = truth
+                .path
+                .heard_at(time_s, truth.vehicle.receiver.lateness_s);
+            let mut strongest_db = f64::NEG_INFINITY;
+            for (index, channel) in channels.iter_mut().enumerate() {
+                let snr_db = channel.next_snr_db(&vehicle);
+                strongest_db = strongest_db.max(snr_db);
+                let mut reception = channel.receive(&vehicle, snr_db);
+                let (head, array) = (channel.head(), channel.array());
+                faults.distort(index, head, array, &vehicle, reception.gains_mut());
+                if !reception.is_heard() {
+                    continue;
+                }
+                channel.observe(number as u64, &reception, &mut observation);
+                trace.sensed.push(reception.ssb);
+                for (estimator, angles) in estimators.iter_mut().zip(&mut trace.angles) {
+                    let estimated = estimator.estimate(&observation);
+                    let estimated = estimated.map_err(SimulationError::Custom)?;
+                    // The built-in estimators all tell their standard deviation.
+                    let bound_rad = || f64::NAN;
+                    angles.push(estimated.and_then(|it| {
+                        estimator::measurement(&reception.ssb, it, &measurand, bound_rad)
+                    }));
+                }
+            }
+            trace.bursts.push(Burst {
+                time_s,
+                truth: truth.path.at(time_s).pose,
+                snr_db: strongest_db,
+                end: trace.sensed.len(),
+            });
+        }
+        Ok(trace)
+    }
+
+    fn drive(&self, simulation: &Simulation, method: usize) -> Result<RunRecord, SimulationError> {
+        let scenario = simulation.scenario();
+        let (site, vehicle) = (&scenario.site, &scenario.vehicle);
+        let platform = simulation.platform();
+        let custom = Custom::default();
+        let mut onboard = Onboard::new(site, vehicle, platform, self.told_start, custom)?;
+        let mut record = RunRecord::new(self.run, self.bursts.len());
+        let mut silence = SsbObservation::new(vehicle.array.elements.into());
+        let mut odometry = self.odometry.iter().peekable();
+        let angles = self.angles.get(method).map_or(&[][..], Vec::as_slice);
+        let mut end = 0;
+        for burst in &self.bursts {
+            let time_s = burst.time_s;
+            while let Some(sample) = odometry.next_if(|sample| sample.time_s <= time_s) {
+                // A simulated odometer neither repeats itself nor returns NaN.
+                let _ = (onboard.odometry(sample)).map_err(SimulationError::Custom)?;
+            }
+            let here = end..burst.end;
+            end = burst.end;
+            let mut played = Played {
+                sensed: self.sensed.get(here.clone()).unwrap_or_default(),
+                angles: angles.get(here).unwrap_or_default(),
+                silence: &mut silence,
+            };
+            let heard = onboard.hear(time_s, &mut played);
+            record.add(&heard.map_err(SimulationError::of_drive)?);
+            record.add_step(&onboard, time_s, burst.truth, burst.snr_db)?;
+        }
+        record.constants = onboard.constants();
+        Ok(record)
+    }
+}
+
+/// A burst from trace.
+struct Played<'a> {
+    sensed: &'a [SensedSsb],
+    angles: &'a [Option<AngleMeasurement>],
+    /// What an SSB without an angle is given as: without snapshots it has none.
+    silence: &'a mut SsbObservation,
+}
+
+impl SsbSource for Played<'_> {
+    fn sense(&mut self, sensed: &mut Vec<SensedSsb>) -> Result<(), BoxError> {
+        sensed.extend_from_slice(self.sensed);
+        Ok(())
+    }
+
+    fn observe(&mut self, index: usize) -> Result<Observed<'_>, BoxError> {
+        let found = self.sensed.get(index).zip(self.angles.get(index));
+        let (&ssb, angle) = found.ok_or("no such SSB in the burst")?;
+        Ok(if let Some(angle) = angle {
+            Observed::Angle(*angle)
+        } else {
+            self.silence.restart(ssb);
+            Observed::Snapshots(self.silence)
+        })
+    }
+}

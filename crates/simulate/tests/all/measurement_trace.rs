@@ -1,0 +1,104 @@
+//! Drives from trace are the drives themselves, to the last bit.
+
+use onboard::settings::{EstimatorMethod, TomlFile};
+use recording::Files;
+use simulate::scenario::Scenario;
+use simulate::{CampaignOptions, MeasurementTraces, Simulation};
+use toml::Value;
+
+const RUNS: usize = 3;
+
+fn simulation(name: &str, overrides: &[(&str, Value)]) -> Simulation {
+    let scenario = Scenario::from_library(name, &Files).unwrap();
+    let overrides = overrides.iter().cloned();
+    Simulation::on_its_platform(&scenario.with_overrides(overrides, &Files).unwrap()).unwrap()
+}
+
+fn options() -> CampaignOptions<'static> {
+    CampaignOptions {
+        seed: 5,
+        first_run: 2,
+        runs: RUNS,
+        keep_records: true,
+        errors_every: Some(5),
+        ..CampaignOptions::default()
+    }
+}
+
+fn record(simulation: &Simulation, methods: &[EstimatorMethod]) -> MeasurementTraces {
+    let traces = MeasurementTraces::record(simulation, methods, &options()).unwrap();
+    traces.expect("it is independent of listening")
+}
+
+#[test]
+fn every_policy_and_method_drives_as_by_itself() {
+    let methods = [EstimatorMethod::Music, EstimatorMethod::Esprit];
+    let traces = record(&simulation("paper", &[]), &methods);
+    let tracker = ("vehicle.localizer.kind", Value::from("tracker"));
+    let policy = |name: &str| ("vehicle.wake_up.policy", Value::from(name));
+    let esprit = ("vehicle.estimator.method", Value::from("esprit"));
+    let bound = ("vehicle.wake_up.bound_m", Value::from(0.3));
+    let asleep = ("vehicle.wake_up.sensing", Value::from("wake-up"));
+    for changes in [
+        &[][..],
+        &[policy("fixed"), esprit],
+        &[policy("pid"), asleep],
+        &[tracker, policy("uncertainty"), bound],
+    ] {
+        let simulation = simulation("paper", changes);
+        assert!(traces.serve(&simulation), "{changes:?}");
+        let own = simulation.campaign(&options()).unwrap();
+        assert!(own.runs.iter().all(|run| run.executions > 5));
+        assert_eq!(traces.campaign(&simulation, &options()).unwrap(), own);
+    }
+}
+
+#[test]
+fn several_radio_heads_and_faults_too() {
+    let simulation = simulation(
+        "nlos-and-faults",
+        &[("vehicle.receiver.snr_noise_db", Value::from(0.0))],
+    );
+    let traces = record(&simulation, &[EstimatorMethod::MaximumLikelihood]);
+    let own = simulation.campaign(&options()).unwrap();
+    assert_eq!(traces.campaign(&simulation, &options()).unwrap(), own);
+}
+
+#[test]
+fn another_world_is_not_on_the_tape() {
+    let traces = record(&simulation("paper", &[]), &[EstimatorMethod::Music]);
+    for (key, value) in [
+        ("site.rician_k_db", Value::from(7.0)),
+        ("site.radio_heads[0].eirp_dbm", Value::from(0.0)),
+        ("channel.scatter", Value::from("rays")),
+        ("vehicle.receiver.snapshots", Value::from(10)),
+        ("vehicle.odometer.scale", Value::from(1.01)),
+        ("truth.vehicle.array.mounting_rad", Value::from(0.1)),
+        ("motion.start_at_m", Value::from(10.0)),
+        ("vehicle.estimator.method", Value::from("esprit")),
+    ] {
+        let other = simulation("paper", &[(key, value)]);
+        assert!(!traces.serve(&other), "{key}");
+    }
+    // What is believed of the radiated power is not the power.
+    let believed = [
+        ("site.radio_heads[0].eirp_dbm", Value::from(-10.0)),
+        (
+            "truth.site.radio_heads.roadside.eirp_dbm",
+            Value::from(-17.3),
+        ),
+    ];
+    assert!(traces.serve(&simulation("paper", &believed)));
+}
+
+#[test]
+fn where_it_matters_when_the_vehicle_listens_there_is_no_tape() {
+    for (key, value) in [
+        ("ssb_latency_ms", Value::from(30.0)),
+        ("vehicle.receiver.snr_noise_db", Value::from(1.0)),
+    ] {
+        let simulation = simulation("paper", &[(key, value)]);
+        let traces = MeasurementTraces::record(&simulation, &[EstimatorMethod::Music], &options());
+        assert!(traces.unwrap().is_none(), "{key}");
+    }
+}

@@ -1,0 +1,29 @@
+"""From a recording to angles of arrival: samples, SSBs, angles, and what each is worth.
+
+The same as `crates/recording/examples/angles_of_a_recording.rs`, where nothing but the recording is
+known::
+
+    access-av synth yard --duration-s 2 --out drive
+    python examples/angles_of_a_recording.py drive/iq.sigmf-meta
+"""
+
+import sys
+
+from access_av import Recording, nr
+
+
+def main() -> None:
+    """Print one line for each SSB."""
+    if len(sys.argv) != 2:
+        sys.exit("give a recording")
+    print("sample_start,pci,ssb_index,phase_rad,phase_sigma_rad,snr_db,verdict")
+    for cell in nr.scan(Recording.open(sys.argv[1])).cells:
+        if cell.phase_rad is not None:
+            print(
+                f"{cell.sample_start:.0f},{cell.pci},{cell.ssb_index},{cell.phase_rad:.6f},"
+                f"{cell.phase_sigma_rad:.6f},{cell.snr_db:.1f},{cell.verdict}"
+            )
+
+
+if __name__ == "__main__":
+    main()

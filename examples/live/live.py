@@ -1,0 +1,71 @@
+"""A simulated yard drives in real time, through ZeroMQ, into `access-av-node`; its page opens.
+
+    python examples/live/live.py [--node PROGRAM] [--duration-s 60] [--no-browser]
+
+The drive is recorded once, in `results/live/`, and driven again and again until Ctrl-C.
+"""
+
+from __future__ import annotations
+
+import argparse
+import subprocess
+import sys
+import tempfile
+import webbrowser
+from pathlib import Path
+
+from transmitter import Drive, Transmitter, node_toml
+
+import access_av
+
+ROOT = Path(__file__).parents[2]
+SCENARIO = "yard"
+PORTS = {"port": 2000, "odometry_port": 2100}
+PAGE = "127.0.0.1:8400"
+
+
+def recorded(folder: Path, duration_s: float) -> Drive:
+    """The drive, recorded if it is not there yet."""
+    if not (folder / "iq.sigmf-meta").exists():
+        print(f"recording {duration_s:g} s of the scenario `{SCENARIO}` in {folder} …", flush=True)
+        access_av.synthesize(SCENARIO, folder, duration_s=duration_s)
+    return Drive(folder)
+
+
+def main() -> int:
+    """Drives until Ctrl-C."""
+    parser = argparse.ArgumentParser(description=__doc__.splitlines()[0])
+    parser.add_argument("--node", default=str(ROOT / "target/release/access-av-node"))
+    parser.add_argument("--duration-s", type=float, default=60.0)
+    parser.add_argument("--no-browser", action="store_true")
+    parser.add_argument("--once", action="store_true")
+    arguments = parser.parse_args()
+    folder = ROOT / f"results/live/{arguments.duration_s:g}s"
+    drive = recorded(folder, arguments.duration_s)
+    site, vehicle = folder / "site.toml", folder / "vehicle.toml"
+    with tempfile.TemporaryDirectory() as scratch:
+        transmitter = Transmitter(drive, **PORTS)
+        settings = Path(scratch) / "node.toml"
+        settings.write_text(node_toml(transmitter, PAGE), encoding="utf-8")
+        command = [arguments.node, "--site", str(site), "--vehicle", str(vehicle), str(settings)]
+        node = subprocess.Popen(command)
+        try:
+            if not arguments.no_browser:
+                webbrowser.open(f"http://{PAGE}/")
+            while node.poll() is None:
+                transmitter.run()
+                transmitter.close()
+                if arguments.once:
+                    break
+                transmitter = Transmitter(drive, **PORTS)
+        except KeyboardInterrupt:
+            pass
+        finally:
+            transmitter.close()
+            node.terminate()
+            node.wait()
+    return 0
+
+
+if __name__ == "__main__":
+    sys.exit(main())

@@ -1,0 +1,61 @@
+"""The command ``bound``: what accuracy a placement of radio heads can give."""
+
+from __future__ import annotations
+
+from typing import Annotated
+
+import typer
+
+from access_av.cli.options import AllowLarge, AsJson, Out, ScenarioArgument, load_scenario
+from access_av.cli.terminal import console, progress, show_bound
+
+app = typer.Typer()
+
+
+@app.command(
+    epilog="Example: [bold]access-av bound yard --map-step-m 10 --out results/yard-bound[/]",
+)
+def bound(
+    scenario: ScenarioArgument,
+    out: Out = None,
+    allow_large: AllowLarge = False,
+    map_step_m: Annotated[
+        float | None, typer.Option(help="Side of the map's squares; else a round length that fits.")
+    ] = None,
+    as_json: AsJson = False,
+) -> None:
+    """Tell how well any localizer can do, before anything is built.
+
+    The posterior Cramér-Rao bound of the horizontal error: along the route and over the site; which
+    3GPP service levels it allows, where it falls short of the next, and the cheapest change that
+    mends that.
+
+    Writes bound.parquet, map.parquet, report.html, scenario.toml and manifest.json.
+    """
+    from access_av.radio.upgrades import next_level
+    from access_av.report.placement import render_bound
+    from access_av.run.error_bound import bound as error_bound
+    from access_av.tables.results_directory import ResultsDirectory, json_text
+
+    chosen = load_scenario(scenario, allow_large=allow_large)
+    directory = ResultsDirectory.create(f"bound-{chosen.name}", out)
+    with progress("Bounding"):
+        found = error_bound(chosen, map_step_m=map_step_m)
+        missed = next_level(chosen)
+    directory.write_table("bound.parquet", found.route)
+    directory.write_table("map.parquet", found.site)
+    directory.write_text("report.html", render_bound(found, missed))
+    directory.write_text("scenario.toml", found.scenario.to_toml())
+    directory.write_manifest(
+        scenario=found.scenario.name, map_step_m=found.map_step_m, warnings=chosen.warnings()
+    )
+    summary = found.summary()
+    if as_json:
+        record = {**summary, "next_level": missed and missed.as_record()}
+        print(json_text({**record, "directory": str(directory.path)}))
+        return
+    show_bound(summary, found.verdicts)
+    if missed is not None:
+        console.print(missed.in_words())
+        console.print(f"Further radio heads: access-av plan {scenario}", soft_wrap=True)
+    console.print(f"Report: {directory.path / 'report.html'}", soft_wrap=True)

@@ -1,0 +1,73 @@
+"""The command ``codesign``: ours beside the paper's adaptive point, with the receiver counted."""
+
+from __future__ import annotations
+
+from dataclasses import asdict
+from typing import Annotated
+
+import typer
+
+from access_av.cli.options import AsJson, Runs, Seed, Threads
+from access_av.cli.terminal import console, progress, table
+
+app = typer.Typer()
+
+
+@app.command(
+    epilog="Example: [bold]access-av codesign --runs 20[/]",
+)
+def codesign(
+    reading: Annotated[str, typer.Option(help="Name of a reading of the paper.")] = "gate",
+    runs: Runs = 100,
+    seed: Seed = 1,
+    threads: Threads = None,
+    as_json: AsJson = False,
+) -> None:
+    """Lay our tracker, policy and engine beside the paper's adaptive point, in each power mode.
+
+    Energies of a trip count executions and the receiver. Ranges take every parameter of the
+    platform files from one end to the other. In the second row of each mode an execution of ours
+    costs what the paper's does; in the third its cycles at the mode's clock. A share is of the
+    paper's energy, where the range is worst for us.
+    """
+    from access_av.paper.codesign import compare
+    from access_av.tables.results_directory import json_text
+
+    with progress("Driving") as tick:
+        found = compare(reading, runs=runs, seed=seed, threads=threads, progress=tick)
+    if as_json:
+        records = [
+            {
+                **asdict(each),
+                "policy_ratio": each.policy_ratio,
+                "engine_ratio": each.engine_ratio,
+                "is_better": each.is_better,
+            }
+            for each in found
+        ]
+        print(json_text(records))
+        return
+    head = ["mode", "", "RMS m", "executions", "listened", "energy J", "share ≤"]
+    made = table(head, title=f"Reading {reading}, {runs} runs, seed {seed}", text=2)
+    for each in found:
+        for name, point, share in (
+            ("paper", each.paper, ""),
+            ("our policy", each.policy, f"{each.policy_ratio:.3f}"),
+            ("and engine", each.engine, f"{each.engine_ratio:.2g}"),
+        ):
+            low_j, value_j, high_j = point.energy_j
+            made.add_row(
+                str(each.mode) if name == "paper" else "",
+                name,
+                f"{point.rms_error_m:.3f}",
+                f"{point.executions:.0f}",
+                f"{point.listened:.0f}",
+                f"{value_j:.3g} ({low_j:.3g}…{high_j:.3g})",
+                share,
+            )
+    console.print(made)
+    better = sum(each.is_better for each in found)
+    console.print(
+        f"Better in error and energy at once in {better} of {len(found)} power modes. "
+        f"Boundary: {found[0].paper.boundary} (paper), {found[0].engine.boundary} (our engine)."
+    )

@@ -1,0 +1,35 @@
+"""The command ``columns``: what the columns of each table are."""
+
+from __future__ import annotations
+
+import json
+from typing import Annotated
+
+import typer
+
+from access_av.cli.options import AsJson
+from access_av.cli.terminal import show_columns
+from access_av.tables.columns.look_up import as_json, markdown, table
+from access_av.tables.columns.tables import TABLES
+
+app = typer.Typer()
+
+
+@app.command(epilog="Example: [bold]access-av columns trajectories[/]")
+def columns(
+    name: Annotated[
+        str | None, typer.Argument(metavar="TABLE", help="One table; else all of them.")
+    ] = None,
+    as_json_: AsJson = False,
+    as_markdown: Annotated[bool, typer.Option("--markdown", help="Print docs/columns.md.")] = False,
+) -> None:
+    """Tell name, unit and meaning of each column, and when its value is null."""
+    if as_markdown:
+        print(markdown(), end="")
+        return
+    chosen = list(TABLES.values()) if name is None else [table(name)]
+    if as_json_:
+        print(json.dumps(as_json(chosen), indent=2, ensure_ascii=False))
+        return
+    for one in chosen:
+        show_columns(one)

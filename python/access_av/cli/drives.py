@@ -1,0 +1,278 @@
+"""Commands that make and locate recorded drives: ``synth``, ``locate``."""
+
+from __future__ import annotations
+
+import math
+from pathlib import Path
+from typing import TYPE_CHECKING, Annotated, Any
+
+import typer
+
+from access_av.cli.options import (
+    AllowLarge,
+    AsJson,
+    Out,
+    Overrides,
+    ScenarioArgument,
+    load_scenario,
+    load_site_and_vehicle,
+    overridden,
+)
+from access_av.cli.terminal import console, errors, progress, show_warning
+from access_av.errors import InputError
+
+if TYPE_CHECKING:
+    from access_av.drives.recorded import Drive
+
+app = typer.Typer()
+
+MOST_REMARKS = 10
+
+# Exit code of a drive that was located, but not so that it could be relied on.
+UNRELIABLE = 3
+
+
+@app.command(
+    epilog="Example: [bold]access-av synth paper-real-odometry-2 --out drive --duration-s 20[/]",
+)
+def synth(
+    scenario: ScenarioArgument,
+    out: Annotated[Path, typer.Option(help="Directory for the files.")],
+    duration_s: Annotated[
+        float | None, typer.Option(min=0.02, help="From the start on; else the whole drive.")
+    ] = None,
+    seed: Annotated[int, typer.Option(min=0, help="Same seed, same samples.")] = 1,
+    run: Annotated[int, typer.Option(min=0, help="Number of the run.")] = 0,
+    continuous: Annotated[
+        bool, typer.Option("--continuous", help="Also the time between the bursts (large).")
+    ] = False,
+    datatype: Annotated[str, typer.Option(help="ci16_le or cf32_le.")] = "ci16_le",
+    angles: Annotated[
+        bool,
+        typer.Option("--angles", help="angles.csv in place of samples: far less."),
+    ] = False,
+    allow_large: AllowLarge = False,
+    overrides: Overrides = None,
+) -> None:
+    """Record a scenario's drive: samples of all antennas, odometry, site, vehicle, truth.
+
+    The samples are SigMF, so that any other receiver can be fed with them; the truth is in their
+    annotations and in truth.tum. Without --continuous the receiver sleeps between the bursts, and
+    each capture says where in time it belongs (core:global_index).
+    """
+    from access_av.drives import recorded as drives
+    from access_av.tables.results_directory import ResultsDirectory
+
+    given = overridden(overrides)
+    chosen = load_scenario(scenario, allow_large=allow_large, overrides=given)
+    directory = ResultsDirectory.create("synth", out)
+    if angles:
+        count = drives.log_angles(chosen, directory.path, seed=seed, run=run, duration_s=duration_s)
+        console.print(f"{count} angles: {directory.path / 'angles.csv'}", soft_wrap=True)
+        return
+    with progress("Recording") as tick:
+        made = drives.synthesize(
+            chosen,
+            directory.path,
+            seed=seed,
+            run=run,
+            duration_s=duration_s,
+            continuous=continuous,
+            datatype=datatype,
+            progress=lambda share: tick(round(100 * share), 100),
+        )
+    console.print(
+        f"{made.bursts} bursts, {made.samples} samples per antenna: {made.recording}",
+        soft_wrap=True,
+    )
+
+
+@app.command(
+    epilog="Example: [bold]access-av locate --recording drive/iq.sigmf-meta "
+    "--odometry drive/odometry.csv --site drive/site.toml --vehicle drive/vehicle.toml "
+    "--truth drive/truth.tum[/]",
+)
+def locate(
+    recording: Annotated[
+        Path,
+        typer.Option(help="SigMF recording of the array, or log of angles, CSV or Parquet."),
+    ],
+    odometry: Annotated[
+        Path, typer.Option(help="CSV; MCAP or rosbag2 folder with nav_msgs/Odometry.")
+    ],
+    site: Annotated[str, typer.Option(help="Radio heads and road: shipped name, or TOML file.")],
+    vehicle: Annotated[
+        str, typer.Option(help="Array, odometer, localizer: shipped name, or TOML file.")
+    ] = "default",
+    out: Out = None,
+    truth: Annotated[Path | None, typer.Option(help="TUM trajectory to compare with.")] = None,
+    topic: Annotated[str | None, typer.Option(help="Topic of the odometry in the bag.")] = None,
+    imu_topic: Annotated[
+        str | None,
+        typer.Option(help="Topic of the IMU for the yaw rate, in place of the odometry's own."),
+    ] = None,
+    start_time_s: Annotated[
+        float, typer.Option(help="Time of the first sample by the odometry's clock.")
+    ] = 0.0,
+    start: Annotated[
+        str | None,
+        typer.Option(
+            metavar="X,Y,HEADING",
+            help="Initial pose in m, m, rad, in place of the vehicle's; or the word scratch.",
+        ),
+    ] = None,
+    smooth: Annotated[
+        bool, typer.Option("--smooth", help="Also each pose by the angles that came after it.")
+    ] = False,
+    as_json: AsJson = False,
+) -> None:
+    """Locate a recorded drive.
+
+    Writes drive.mcap (poses with covariance and twist, verdicts, diagnostics), trajectory.tum,
+    poses.parquet, angles.parquet, findings.parquet, manifest.json and report.html. Items of the
+    input that cannot be used are named, and the rest is used. Without an initial pose, in the
+    vehicle file or by --start, the vehicle is found: along the road by two radio heads or more,
+    elsewhere by three. --smooth adds smoothed.tum, smoothed.parquet and the topic
+    /access_av/smoothed.
+
+    Odometry, CSV: time_s; distance_m or speed_mps or both; yaw_rate_radps where something tells
+    it. Or left_m and right_m, or left_mps and right_mps, of wheels odometer.track_width_m apart.
+
+    Odometry, MCAP or rosbag2: nav_msgs/Odometry; where its twist tells no yaw rate, that of a
+    sensor_msgs/Imu (z axis up) or of the turning of the pose's orientation.
+
+    Angles, CSV or Parquet: time_s; pci; phase_rad (electrical) and phase_sigma_rad, or angle_rad
+    (from the array's axis) and angle_sigma_rad; ssb_index and snr_db where known.
+
+    Truth, TUM: t x y z qx qy qz qw a line, at times of its own; a line that begins with # is a
+    comment.
+
+    Site, TOML: radio_heads, of each its pci and position_m; road only where there is one, by its
+    polyline_m, segments, or file (GeoJSON or CSV). docs/locate.md has examples of sites and
+    vehicles.
+
+    Exit code 0: located. 2: the input cannot be used. 3: never found, lost for more than a fifth of
+    the time or at the end, or something wrong in the input did harm; what to check is said.
+    """
+    from access_av.drives import recorded as drives
+    from access_av.report.located import render_located
+    from access_av.run.operation import Operation
+    from access_av.tables.results_directory import ResultsDirectory, json_text
+
+    from_scratch = start is not None and start.strip() == "scratch"
+    pose = None if start is None or from_scratch else _pose(start)
+    plant, carrier = load_site_and_vehicle(site, vehicle, pose)
+    directory = ResultsDirectory.create("locate", out)
+    with progress("Locating"):
+        drive = drives.locate(
+            plant,
+            odometry,
+            recording,
+            vehicle=carrier,
+            topic=topic,
+            imu_topic=imu_topic,
+            start_time_s=start_time_s,
+            start=pose,
+            from_scratch=from_scratch,
+            smooth=smooth,
+        )
+    if drive.smoothed is not None and drive.smoothed.is_empty() and not _lost(drive):
+        raise InputError(f"{vehicle}: --smooth needs localizer.kind = tracker")
+    numbers = drives.summary(drive, truth)
+    true = None if truth is None else drives.read_tum(truth)
+    drive.write_mcap(directory.path / "drive.mcap")
+    drive.write_tum(directory.path / "trajectory.tum")
+    directory.write_table("poses.parquet", drive.poses)
+    directory.write_table("angles.parquet", drive.angles)
+    directory.write_table("findings.parquet", drive.findings)
+    if drive.smoothed is not None:
+        directory.write_table("smoothed.parquet", drive.smoothed)
+        drive.write_smoothed_tum(directory.path / "smoothed.tum")
+    directory.write_text("report.html", render_located(drive, plant, carrier, numbers, true))
+    directory.write_text("site.toml", plant.to_toml())
+    directory.write_text("vehicle.toml", carrier.to_toml())
+    told: dict[str, Any] = {
+        **numbers,
+        "lost_share": drive.lost_share,
+        "remarks": drive.remarks,
+        "diagnoses": drive.diagnoses,
+        "suspicions": drive.suspicions,
+    }
+    directory.write_manifest(
+        recording=str(recording), odometry=str(odometry), **told, warnings=plant.warnings(carrier)
+    )
+    directory.link_latest()
+    if as_json:
+        print(json_text({**told, "directory": str(directory.path)}))
+    else:
+        _show(drive, numbers)
+        if (operation := Operation.under(carrier, drive.poses)) is not None:
+            console.print(f"{operation.in_words()} {operation.what_helps()}".strip())
+        console.print(f"Files: {directory.path}", soft_wrap=True)
+    if not drive.is_reliable:
+        errors.print(_unreliable(drive), style="red", soft_wrap=True)
+        raise typer.Exit(UNRELIABLE)
+
+
+def _show(drive: Drive, numbers: dict[str, float]) -> None:
+    # The verdict ends with the suspicions.
+    remarks = [remark for remark in drive.remarks if remark not in drive.suspicions]
+    for remark in remarks[:MOST_REMARKS]:
+        show_warning(remark)
+    if len(remarks) > MOST_REMARKS:
+        show_warning(f"{len(remarks) - MOST_REMARKS} more in report.html")
+    console.print(
+        f"{numbers['angles']:.0f} angles, {numbers['accepted']:.0f} accepted, "
+        f"in {numbers['duration_s']:.1f} s."
+    )
+    if "found_s" in numbers:
+        console.print(
+            f"Found after {numbers['found_m']:.1f} m and {numbers['found_s']:.1f} s from scratch."
+        )
+    if "rms_error_m" in numbers:
+        console.print(
+            f"Horizontal error: RMS {numbers['rms_error_m']:.3f} m, "
+            f"90th percentile {numbers['p90_error_m']:.3f} m."
+        )
+    if "smoothed_rms_error_m" in numbers:
+        console.print(f"Smoothed: RMS {numbers['smoothed_rms_error_m']:.3f} m.")
+
+
+def _unreliable(drive: Drive) -> str:
+    if _lost(drive):
+        happened = "the vehicle was never found. Give --start, or a longer drive. "
+    elif drive.lost_share:
+        at_end = ", the end included," if drive.poses["lost"][-1] else ""
+        happened = (
+            f"for {drive.lost_share:.0%} of the time{at_end} the angles came from elsewhere than "
+            "expected. "
+        )
+    else:
+        happened = ""
+    check = (
+        " ".join(f"{suspicion}." for suspicion in drive.suspicions)
+        if drive.suspicions
+        else "Check, in this order: start pose, array.mounting_rad (sign, mirrored array), places "
+        "and PCIs of the radio heads, drive (road or differential), yaw_rate_radps (unit, sign), "
+        "phase_rad against angle_rad, the clocks, odometer.scale."
+    )
+    return f"not to be relied on: {happened}{check}"
+
+
+def _lost(drive: Drive) -> bool:
+    return bool(drive.poses["searching"].all())
+
+
+def _pose(text: str) -> tuple[float, float, float]:
+    try:
+        x_m, y_m, heading_rad = (float(part) for part in text.split(","))
+    except ValueError as error:
+        raise InputError(
+            f"--start {text}: write x and y in metres and the heading in radians, as 12.5,-3,0.1, "
+            "or the word scratch"
+        ) from error
+    if not all(map(math.isfinite, (x_m, y_m, heading_rad))):
+        raise InputError(f"--start {text}: the numbers must be finite")
+    if abs(heading_rad) > math.tau:
+        raise InputError(f"--start {text}: the heading is beyond a whole turn; write it in radians")
+    return x_m, y_m, heading_rad

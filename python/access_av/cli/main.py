@@ -1,0 +1,127 @@
+"""The command line, ``access-av``. Bad input ends with exit code 2 and one message."""
+
+from __future__ import annotations
+
+import inspect
+import re
+import sys
+from contextlib import contextmanager
+from typing import TYPE_CHECKING, Annotated, Any
+
+import typer
+from typer.core import TyperGroup
+
+from access_av import interrupt
+from access_av._core import RecordingError, SettingsError, __version__, brief
+from access_av.cli import (
+    balance,
+    bound,
+    codesign,
+    columns,
+    designs,
+    drives,
+    files,
+    integrity,
+    new,
+    paper,
+    profile,
+    radio,
+    recordings,
+    run,
+    study,
+    survey,
+    tune,
+)
+from access_av.cli.terminal import (
+    console,
+    give_up_output,
+    plain,
+    show_error,
+    write_what_can_be_written,
+)
+from access_av.errors import InputError
+
+if TYPE_CHECKING:
+    from collections.abc import Iterator
+
+UsageError: Any = typer.BadParameter.__mro__[1]  # Typer names it by its heir alone
+
+
+@contextmanager
+def _brief_usage_errors() -> Iterator[None]:
+    try:
+        yield
+    except UsageError as error:
+        error.message = brief(plain(error.message))
+        raise
+
+
+class _Commands(TyperGroup):
+    """Commands whose usage errors do not repeat all that was typed, and whose help is filled."""
+
+    def get_command(self, context: Any, name: str) -> Any:
+        command = super().get_command(context, name)
+        if command and command.help:  # A line break of the source is none of the paragraph.
+            command.help = re.sub(r"(?<=\S)\n(?=\S)", " ", inspect.cleandoc(command.help))
+        return command
+
+    def make_context(self, *args: Any, **settings: Any) -> Any:
+        with _brief_usage_errors():
+            return super().make_context(*args, **settings)
+
+    def invoke(self, context: Any) -> Any:
+        with _brief_usage_errors():
+            return super().invoke(context)
+
+
+app = typer.Typer(
+    name="access-av",
+    cls=_Commands,
+    help="Localization of factory vehicles from 5G synchronization signal blocks: "
+    "accuracy and energy side by side.",
+    no_args_is_help=True,
+    rich_markup_mode="rich",
+    pretty_exceptions_enable=False,
+    context_settings={"help_option_names": ["-h", "--help"]},
+)
+
+
+def _show_version(wanted: bool) -> None:
+    if wanted:
+        console.print(f"access-av {__version__}")
+        raise typer.Exit
+
+
+@app.callback()
+def _options(
+    version: Annotated[
+        bool, typer.Option("--version", callback=_show_version, is_eager=True, help="Show it.")
+    ] = False,
+) -> None:
+    pass
+
+
+for _room in (
+    *(study, paper, codesign, run, bound, radio, integrity, designs, tune),
+    *(recordings, drives, survey, profile, balance, columns),
+):
+    app.add_typer(_room.app)
+app.add_typer(new.app, name="new", cls=_Commands)
+app.add_typer(new.export_app)
+for _what in ("site", "vehicle", "scenario", "platform", "plant"):
+    app.add_typer(files.files_app(_what), name=_what, cls=_Commands)
+
+
+def main() -> None:
+    """Entry point: turns every bad input into one message and exit code 2."""
+    write_what_can_be_written()
+    try:
+        try:
+            app()
+        finally:
+            sys.stdout.flush()
+    except (SettingsError, RecordingError, InputError, OSError) as error:
+        interrupt.clean()
+        show_error(error)
+        give_up_output()
+        sys.exit(2)

@@ -1,0 +1,209 @@
+"""The commands ``new``: files of one's own to begin with."""
+
+from __future__ import annotations
+
+from pathlib import Path
+from typing import Annotated, Any
+
+import typer
+
+from access_av.cli.terminal import console
+from access_av.errors import InputError
+from access_av.site_files.drawn import Drawn
+
+Target = Annotated[Path, typer.Argument(help="The file to write, for example mine.toml.")]
+Force = Annotated[bool, typer.Option("--force", help="Write over a file that is there.")]
+Road = Annotated[
+    Path | None,
+    typer.Option(help="CSV (x_m, y_m), GeoJSON (a LineString) or DXF (a polyline of one layer)."),
+]
+Heads = Annotated[
+    Path | None,
+    typer.Option(help="CSV (x_m, y_m, z_m, name, pci), GeoJSON (Points) or DXF (points, blocks)."),
+]
+OriginText = Annotated[
+    str | None,
+    typer.Option(
+        "--origin", metavar="LAT,LON", help="The map's zero, of GeoJSON in degrees; else the first."
+    ),
+]
+RoadLayer = Annotated[str, typer.Option(help="Layer of a DXF that holds the road.")]
+HeadsLayer = Annotated[str, typer.Option(help="Layer of a DXF that holds the radio heads.")]
+TwoPoints = Annotated[
+    str | None,
+    typer.Option(metavar="X1,Y1,X2,Y2", help="Two points of a DXF, with --length-m between them."),
+]
+Length = Annotated[
+    float | None, typer.Option("--length-m", min=0.0, help="Measured length between two points.")
+]
+MetresPerUnit = Annotated[
+    float | None, typer.Option(min=0.0, help="Of a DXF, where that is known: 0.001 of mm.")
+]
+
+app = typer.Typer(no_args_is_help=True, help="Begin a plant, site, vehicle or scenario file.")
+
+
+def _numbers(option: str, text: str, count: int) -> list[float]:
+    try:
+        found = [float(part) for part in text.split(",")]
+    except ValueError:
+        found = []
+    if len(found) != count:
+        raise InputError(f"{option} {text}: {count} numbers are needed, with commas between")
+    return found
+
+
+def _with_site(
+    kind: str,
+    file: Path,
+    force: bool,
+    road: Path | None,
+    heads: Path | None,
+    origin: str | None,
+    road_layer: str,
+    heads_layer: str,
+    two_points: str | None,
+    length_m: float | None,
+    metres_per_unit: float | None,
+) -> None:
+    from access_av.site_files import dxf
+    from access_av.site_files.read import Options, read
+
+    if (two_points is None) != (length_m is None):
+        raise InputError("--two-points and --length-m go together")
+    scale_m = metres_per_unit
+    if two_points is not None and length_m is not None:
+        if metres_per_unit is not None:
+            raise InputError("--metres-per-unit: not beside --two-points, which say it as well")
+        x1, y1, x2, y2 = _numbers("--two-points", two_points, 4)
+        scale_m = dxf.metres_per_unit((x1, y1, x2, y2), length_m)
+    place = None
+    if origin is not None:
+        latitude, longitude = _numbers("--origin", origin, 2)
+        if abs(latitude) > 90.0 or abs(longitude) > 180.0:
+            raise InputError(f"--origin {origin}: latitude, then longitude, in degrees")
+        place = (latitude, longitude)
+    options = Options(place, road_layer, heads_layer, scale_m)
+    _write(kind, file, force, read(road, heads, options) if road or heads else None)
+
+
+def _write(kind: str, file: Path, force: bool, drawn: Drawn | None = None) -> None:
+    from access_av import _core
+    from access_av.cli.options import announce
+    from access_av.site_files.templates import new
+    from access_av.tables.results_directory import write_whole
+
+    if file.is_dir():
+        raise InputError(f"{file}: is a folder; name the file to write")
+    if file.exists() and not force:
+        raise InputError(f"{file}: is there already; --force writes over it")
+    kinds: dict[str, Any] = {
+        "plant": _core.Plant,
+        "site": _core.Site,
+        "vehicle": _core.Vehicle,
+        "scenario": _core.Scenario,
+    }
+    name = "".join(it if it.isalnum() or it in "-_" else "-" for it in file.stem) or kind
+    text = new(kind, name, str(file), drawn)
+    read = kinds[kind].from_toml(text, str(file))
+    write_whole(file, text)
+    console.print(f"Written: {file}. Next: access-av {_next(kind, file)}", soft_wrap=True)
+    announce(str(file), read.warnings())
+
+
+def _next(kind: str, file: Path) -> str:
+    return {"plant": f"study {file}", "scenario": f"run {file}"}.get(kind, f"{kind} check {file}")
+
+
+@app.command(epilog="Example: [bold]access-av new plant mine.toml --road road.geojson[/]")
+def plant(
+    file: Target,
+    force: Force = False,
+    road: Road = None,
+    heads: Heads = None,
+    origin: OriginText = None,
+    road_layer: RoadLayer = "ROAD",
+    heads_layer: HeadsLayer = "HEADS",
+    two_points: TwoPoints = None,
+    length_m: Length = None,
+    metres_per_unit: MetresPerUnit = None,
+) -> None:
+    """Begin a plant file: site, vehicle, fleet, prices and the accuracy that is needed."""
+    drawing = (road_layer, heads_layer, two_points, length_m, metres_per_unit)
+    _with_site("plant", file, force, road, heads, origin, *drawing)
+
+
+@app.command(epilog="Example: [bold]access-av new site mine.toml --heads heads.csv[/]")
+def site(
+    file: Target,
+    force: Force = False,
+    road: Road = None,
+    heads: Heads = None,
+    origin: OriginText = None,
+    road_layer: RoadLayer = "ROAD",
+    heads_layer: HeadsLayer = "HEADS",
+    two_points: TwoPoints = None,
+    length_m: Length = None,
+    metres_per_unit: MetresPerUnit = None,
+) -> None:
+    """Begin a site file: a road and radio heads."""
+    drawing = (road_layer, heads_layer, two_points, length_m, metres_per_unit)
+    _with_site("site", file, force, road, heads, origin, *drawing)
+
+
+@app.command(epilog="Example: [bold]access-av new vehicle mine.toml[/]")
+def vehicle(file: Target, force: Force = False) -> None:
+    """Begin a vehicle file: antennas, odometer, wake-up and platform."""
+    _write("vehicle", file, force)
+
+
+@app.command(epilog="Example: [bold]access-av new scenario mine.toml[/]")
+def scenario(file: Target, force: Force = False) -> None:
+    """Begin a scenario file: a site, a vehicle, and the world around them."""
+    _write("scenario", file, force)
+
+
+export_app = typer.Typer()
+
+
+@export_app.command(epilog="Example: [bold]access-av export yard yard.geojson[/]")
+def export(
+    site: Annotated[
+        str, typer.Argument(help="Shipped name, or path of a TOML file, of a site or a plant.")
+    ],
+    file: Annotated[Path, typer.Argument(help="Name that ends in .geojson or .csv.")],
+    origin: OriginText = None,
+    german: Annotated[
+        bool, typer.Option("--german", help="CSV with semicolons and decimal commas.")
+    ] = False,
+) -> None:
+    """Write a site's road and radio heads for other programs.
+
+    GeoJSON holds both, in degrees with --origin, else in metres; CSV holds the road, and the radio
+    heads in a second file beside it, NAME-heads.csv.
+    """
+    from access_av import _core
+    from access_av.site_files import csv_file, geojson
+    from access_av.site_files.read import of_site
+    from access_av.tables import toml
+    from access_av.tables.results_directory import write_whole
+
+    is_plant = (
+        "fleet" in toml.read(Path(site)) if Path(site).is_file() else site not in _core.Site.names()
+    )
+    of = _core.Plant.load(site).scenario().site if is_plant else _core.Site.load(site)
+    drawn = of_site(of)
+    place = None
+    if origin is not None:
+        latitude, longitude = _numbers("--origin", origin, 2)
+        place = (latitude, longitude)
+    if file.suffix.lower() in (".geojson", ".json"):
+        write_whole(file, geojson.text(drawn, place))
+        console.print(f"Written: {file}", soft_wrap=True)
+    elif file.suffix.lower() == ".csv":
+        beside = file.with_name(f"{file.stem}-heads.csv")
+        write_whole(file, csv_file.road_text(drawn.road_m, german=german))
+        write_whole(beside, csv_file.heads_text(drawn.heads, german=german))
+        console.print(f"Written: {file}, {beside}", soft_wrap=True)
+    else:
+        raise InputError(f"{file}: its name must end in .geojson, .json or .csv")

@@ -1,0 +1,325 @@
+"""The commands ``evaluate``, ``readings``, ``chosen``, ``search``, ``explore`` and ``fit``."""
+
+from __future__ import annotations
+
+import math
+from pathlib import Path
+from typing import Annotated, Any
+
+import typer
+
+from access_av.cli.options import (
+    MISSED,
+    OTHER_SHARES,
+    AsJson,
+    DaskOption,
+    MaxError,
+    Out,
+    PercentileOption,
+    PlatformOption,
+    Runs,
+    Seed,
+    ShardOption,
+    Threads,
+)
+from access_av.cli.terminal import console, progress, show_points, table
+
+app = typer.Typer()
+
+ReadingOption = Annotated[str, typer.Option(help="Name of a reading, or path of a scenario file.")]
+
+
+@app.command(
+    epilog="Example: [bold]access-av evaluate --runs 20 --out results/quick[/]",
+)
+def evaluate(
+    reading: Annotated[
+        list[str] | None,
+        typer.Option(help="Only these readings: names, or paths of scenario files."),
+    ] = None,
+    scenario: Annotated[
+        str | None, typer.Option(help="Instead of readings: a scenario of the paper's trip.")
+    ] = None,
+    platform: PlatformOption = "jetson-agx-xavier",
+    runs: Runs = 100,
+    seed: Seed = 1,
+    seeds: Annotated[
+        int, typer.Option(min=1, help="Judge the claims with so many seeds, from --seed on.")
+    ] = 1,
+    unknowns: Annotated[
+        bool,
+        typer.Option(
+            "--unknowns", help="Also: on what the claims hang, thing by thing (takes minutes)."
+        ),
+    ] = False,
+    claims: Annotated[
+        Path | None, typer.Option(help="Claims to judge, as in paper.toml; else the paper's.")
+    ] = None,
+    threads: Threads = None,
+    dask: DaskOption = None,
+    out: Out = None,
+) -> None:
+    """Read the paper in every way it can be, judge its claims, write the report.
+
+    Three campaigns for each reading: every method at every SSB, every method at what the computer
+    manages, and adaptive MUSIC, each over all power modes. results/latest points to the files.
+    """
+    from access_av.cli.paper_tables import show_study
+    from access_av.report.paper import results
+    from access_av.run.campaign import Campaign, executor
+    from access_av.run.result_cache import Parts
+    from access_av.tables.results_directory import RESULTS
+
+    names = [*(reading or []), *([scenario] if scenario else [])]
+    with progress("Driving") as tick, executor(dask, threads) as (pool, workers):
+        made, directory = results.run(
+            names,
+            platform,
+            runs=runs,
+            seed=seed,
+            seeds=seeds,
+            threads=threads,
+            out=out,
+            unknowns=Campaign(Parts(RESULTS / "parts"), pool, workers) if unknowns else None,
+            stated=None if claims is None else _claims(claims),
+            progress=tick,
+        )
+    show_study(made)
+    console.print(
+        f"{runs} runs per setting in {made.duration_s:.1f} s. "
+        f"Report: {directory.path / 'report.html'}",
+        soft_wrap=True,
+    )
+
+
+def _claims(path: Path) -> dict[str, Any]:
+    from access_av.errors import InputError
+    from access_av.tables import toml
+
+    found = toml.read(path).get("claims")
+    if not isinstance(found, dict) or not found:
+        raise InputError(f"{path}: no table [claims]")
+    for name, entry in found.items():
+        if not isinstance(entry, dict):
+            raise InputError(f"{path}: claims.{name}: it must be a table")
+        needed = {"says", "where", "unit", "rule", "stated"}
+        if missing := sorted(needed - entry.keys()):
+            raise InputError(f"{path}: claims.{name}: {', '.join(missing)} missing")
+        if not {"rests_on", "evidence"} & entry.keys():
+            raise InputError(f"{path}: claims.{name}: it needs `rests_on` or `evidence`")
+    return dict(found)
+
+
+@app.command(
+    epilog="Example: [bold]access-av readings gate-t-max[/]",
+)
+def readings(
+    name: Annotated[str | None, typer.Argument(help="Print this one as a scenario.")] = None,
+) -> None:
+    """List the readings of the paper, or print one with every default written out."""
+    from access_av.paper import readings as known
+
+    if name is not None:
+        print(known.load(name).scenario.to_toml(), end="")
+        return
+    made = table(["reading", "what it is", "calibrated to the claims"], text=3)
+    for one in known.load_all():
+        made.add_row(one.name, one.scenario.description, ", ".join(one.chosen) or "nothing")
+    console.print(made)
+
+
+@app.command(
+    epilog="Example: [bold]access-av chosen --runs 100[/]",
+)
+def chosen(
+    platform: PlatformOption = "jetson-agx-xavier",
+    runs: Runs = 30,
+    seed: Seed = 1,
+    threads: Threads = None,
+    as_json: AsJson = False,
+) -> None:
+    """Print what the paper leaves open, what was chosen and why, and what another value does.
+
+    One thing is changed at a time, from the shipped reading in mode 0. What they do together:
+    access-av evaluate --unknowns.
+    """
+    from dataclasses import asdict
+
+    from access_av.cli.paper_tables import show_chosen
+    from access_av.device.platform import Platform
+    from access_av.paper.chosen import effects
+    from access_av.paper.driver import Driver
+    from access_av.tables.results_directory import json_text
+
+    with progress("Driving") as tick:
+        driver = Driver(Platform.load(platform), runs, seed, threads)
+        found = effects(driver, runs, progress=tick)
+    if as_json:
+        print(json_text([asdict(each) for each in found]))
+        return
+    show_chosen(found, runs)
+    for each in found:
+        if each.is_shipped:
+            console.print(f"{each.what}: {each.why}", markup=False)
+
+
+@app.command(
+    epilog="Example: [bold]access-av search --worlds 64 --controllers 32[/]",
+)
+def search(
+    platform: PlatformOption = "jetson-agx-xavier",
+    worlds: Annotated[int, typer.Option(min=1, help="Worlds to draw.")] = 64,
+    controllers: Annotated[int, typer.Option(min=1, help="Controllers in each.")] = 32,
+    runs: Runs = 20,
+    confirm: Annotated[
+        int, typer.Option(min=0, help="Drives per setting of the best and its neighbours.")
+    ] = 200,
+    seed: Seed = 1,
+    threads: Threads = None,
+    shard: ShardOption = "1/1",
+    dask: DaskOption = None,
+    out: Annotated[
+        Path | None, typer.Option(help="Write the best reading as a scenario file.")
+    ] = None,
+) -> None:
+    """Search for the reading of Algorithm 1 without a gate that meets most claims.
+
+    Draws from what the paper leaves open; no gate, t_max kept. A search that was stopped goes on
+    where it was (results/parts). The best one and its neighbours are driven again, more often.
+    """
+    from access_av.cli.paper_tables import show_search
+    from access_av.device.platform import Platform
+    from access_av.paper.sampled_readings import as_toml, confirmed, sample
+    from access_av.run.campaign import Campaign, Shard, executor
+    from access_av.run.result_cache import Parts
+    from access_av.tables.results_directory import RESULTS, write_whole
+
+    board = Platform.load(platform)
+    share = Shard.parse(shard)
+    with progress("Worlds") as tick, executor(dask, threads) as (pool, workers):
+        campaign = Campaign(Parts(RESULTS / "parts"), pool, workers, share)
+        found = sample(
+            campaign,
+            board,
+            worlds=worlds,
+            controllers=controllers,
+            runs=runs,
+            seed=seed,
+            progress=tick,
+        )
+        if found is None:
+            console.print(OTHER_SHARES.format(shard))
+            return
+        checked = confirmed(campaign, board, found, runs=confirm, seed=seed + 1) if confirm else []
+    show_search(found, checked)
+    if out is not None:
+        best = checked[0].values if checked else found.values(found.best()[0])
+        write_whole(out, as_toml(best))
+        console.print(f"Reading: {out}", soft_wrap=True)
+
+
+def _finite(value: float | None) -> float | None:
+    if value is not None and not math.isfinite(value):
+        raise typer.BadParameter(f"{value} is not a finite number")
+    return value
+
+
+def _bound(text: str) -> Any:
+    return typer.Option(min=0.0, callback=_finite, help=text)
+
+
+@app.command(
+    epilog="Example: [bold]access-av explore --max-energy-j 260 --max-rms-m 0.15[/]",
+)
+def explore(
+    max_energy_j: Annotated[float | None, _bound("Energy of a trip.")] = None,
+    max_error_m: MaxError = None,
+    percentile: PercentileOption = None,
+    max_rms_m: Annotated[float | None, _bound("RMS error over track and runs.")] = None,
+    max_worst_m: Annotated[float | None, _bound("Worst mean error, X and Y.")] = None,
+    max_executions: Annotated[float | None, _bound("Angle estimates in a trip.")] = None,
+    mode: Annotated[list[int] | None, typer.Option(help="Only these power modes.")] = None,
+    fixed: Annotated[bool, typer.Option("--fixed", help="Also the fixed wake-up times.")] = False,
+    reading: ReadingOption = "gate",
+    results: Annotated[
+        Path | None, typer.Option(help="Results of an evaluation; else results/latest.")
+    ] = None,
+    as_json: AsJson = False,
+) -> None:
+    """Find operating points of the paper's trip within an energy budget and an error bound.
+
+    Asks the last evaluation; where there is none, runs it first. For a trip of your own: access-av
+    designs. Exit code 3 where no operating point qualifies.
+    """
+    from access_av.designs.operating_points import Query
+    from access_av.designs.operating_points import explore as answer
+    from access_av.report.paper.results import operating_points
+    from access_av.statistics.percentiles import column, ends_text
+    from access_av.tables.results_directory import json_text
+
+    with progress("Operating points") as tick:
+        points = operating_points(results, reading, progress=tick)
+    if not fixed:
+        points = points.filter(adaptive=True)
+    bounds = (max_energy_j, max_rms_m, max_worst_m, max_executions, mode, max_error_m)
+    query = Query(*bounds) if percentile is None else Query(*bounds, percentile)
+    found = answer(points, query)
+    if as_json:
+        print(json_text(found.to_dicts()))
+    elif found.is_empty():
+        console.print(f"No operating point has {query}.")
+        nearest = points.sort("energy_j").head(1)
+        show_points(nearest, title="The one with the least energy")
+    if found.is_empty():
+        raise typer.Exit(MISSED)
+    if as_json:
+        return
+    show_points(found, title=f"Operating points with {query}")
+    best = found.row(0, named=True)
+    name = column(query.percentile)
+    ends = [best[name.replace("_error_m", f"_error_{end}_m")] for end in ("low", "high")]
+    console.print(
+        f"Least energy: mode {best['mode']}, {best['energy_j']:.1f} J "
+        f"(energy per execution: {best['energy_provenance']}); {query.percentile:g} % of errors "
+        f"within {best[name]:.3g} m (95 %: {ends_text(*ends)})."
+    )
+
+
+@app.command(
+    epilog="Example: [bold]access-av fit --runs 100 --out fitted.toml[/]",
+)
+def fit(
+    reading: ReadingOption = "gate",
+    platform: PlatformOption = "jetson-agx-xavier",
+    runs: Runs = 100,
+    seed: Seed = 1,
+    threads: Threads = None,
+    out: Annotated[
+        Path | None, typer.Option(help="Write the platform file with the fitted values.")
+    ] = None,
+) -> None:
+    """Fit the energy per execution of each mode and method to the paper's figures.
+
+    Simulates how often each setting executes, then solves for the energies that agree with the
+    sums the paper states. This is where the shipped platform's "fitted" values come from.
+    """
+    from access_av.paper import study
+    from access_av.paper.energy_fit import numbers
+    from access_av.paper.statements import METHODS
+    from access_av.signal.methods import label
+    from access_av.tables.results_directory import write_whole
+
+    with progress("Counting executions") as tick:
+        fitted = study.fit_platform(
+            reading, platform, runs=runs, seed=seed, threads=threads, progress=tick
+        )
+    made = table(["mode", *map(label, METHODS)], title="Energy per execution in J, fitted")
+    for mode in fitted.modes:
+        energies = (mode.energy_per_execution_j[method] for method in METHODS)
+        made.add_row(str(mode.number), *(f"{energy.value:.4f}" for energy in energies))
+    console.print(made)
+    free, solved = numbers()
+    console.print(f"{free} numbers were free, {solved} of them solved for from stated figures.")
+    if out is not None:
+        write_whole(out, fitted.to_toml())
+        console.print(f"Platform file: {out}", soft_wrap=True)

@@ -1,0 +1,100 @@
+"""The command ``run``: drive one scenario."""
+
+from __future__ import annotations
+
+import typer
+
+from access_av.cli.options import (
+    AllowLarge,
+    Compare,
+    Out,
+    Overrides,
+    Percents,
+    Runs,
+    ScenarioArgument,
+    Seed,
+    Threads,
+    Vary,
+    load_scenario,
+    overridden,
+)
+from access_av.cli.side_by_side import PERCENTS, show_compared, side_by_side, variants
+from access_av.cli.terminal import console, progress, show_simulation
+
+app = typer.Typer()
+
+
+@app.command(
+    epilog="Example: [bold]access-av run paper --runs 10 --set site.rician_k_db=10[/]",
+)
+def run(
+    scenario: ScenarioArgument,
+    runs: Runs = 1,
+    seed: Seed = 1,
+    threads: Threads = None,
+    out: Out = None,
+    allow_large: AllowLarge = False,
+    vary: Vary = None,
+    compare: Compare = None,
+    percentile: Percents = None,
+    overrides: Overrides = None,
+) -> None:
+    """Drive one scenario and write its trajectories.
+
+    Writes trajectories.parquet, executions.parquet, trajectory.tum and truth.tum (the first run),
+    report.html, scenario.toml with every default, and manifest.json; with --vary or --compare also
+    compared.parquet.
+    """
+    import polars as pl
+
+    from access_av.report.compared import compared_section
+    from access_av.report.drive import render_drive
+    from access_av.run.assumptions import energy_boundary, flattering, in_words
+    from access_av.run.simulation import simulate
+    from access_av.study.compare import table as compared_table
+    from access_av.tables.results_directory import ResultsDirectory, tum_trajectory
+
+    given = overridden(overrides)
+    chosen = load_scenario(scenario, allow_large=allow_large, overrides=given)
+    others = {name: load_scenario(name, allow_large=allow_large) for name in compare or ()}
+    scenarios = variants(chosen, vary, others)
+    directory = ResultsDirectory.create(f"run-{chosen.name}", out)
+    with progress("Driving") as tick:
+        result = simulate(
+            chosen, runs=runs, seed=seed, threads=threads, keep_trajectories=True, progress=tick
+        )
+    if result.trajectories is None or result.executions is None:  # they were asked for
+        raise RuntimeError("the simulation kept no trajectories")
+    directory.write_table("trajectories.parquet", result.trajectories)
+    directory.write_table("executions.parquet", result.executions)
+    first = result.trajectories.filter(run=0)
+    known = first.filter(~pl.col("searching"))
+    for name, poses, prefix in (("trajectory.tum", known, ""), ("truth.tum", first, "true_")):
+        columns = ("time_s", f"{prefix}x_m", f"{prefix}y_m", f"{prefix}heading_rad")
+        directory.write_text(name, tum_trajectory(*(poses[column] for column in columns)))
+    asked = percentile or PERCENTS
+    beside = side_by_side(scenarios, asked, runs, seed, threads)
+    if beside:
+        directory.write_table("compared.parquet", compared_table(beside))
+    page = render_drive(chosen, result, seed, compared_section(beside))
+    directory.write_text("report.html", page)
+    directory.write_text("scenario.toml", chosen.resolved().to_toml())
+    assumed = flattering(chosen)
+    directory.write_manifest(
+        repeat=("run", "scenario.toml", "--runs", runs, "--seed", seed),
+        scenario=chosen.name,
+        runs=runs,
+        seed=seed,
+        assumed=assumed,
+        warnings=chosen.warnings(),
+    )
+    directory.link_latest()
+
+    show_compared(beside)
+    title = f"{chosen.name}: {runs} runs, seed {seed}"
+    show_simulation(result, title, energy_boundary(chosen))
+    if assumed:
+        console.print(in_words(assumed), soft_wrap=True)
+    if (levels := result.service_levels) and not all(verdict.reached for verdict in levels):
+        console.print(f"What brings it further: access-av plan {scenario}", soft_wrap=True)
+    console.print(f"Report: {directory.path / 'report.html'}", soft_wrap=True)

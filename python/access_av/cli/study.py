@@ -1,0 +1,101 @@
+"""The command ``study``: a plant's question, a plant's answer."""
+
+from __future__ import annotations
+
+from typing import Annotated
+
+import typer
+
+from access_av._core import Plant
+from access_av.cli.options import AsJson, Compare, Out, Percents, Seed, Threads, Vary, announce
+from access_av.cli.side_by_side import show_compared, side_by_side, variants
+from access_av.cli.terminal import console, progress, table
+
+app = typer.Typer()
+
+
+@app.command(
+    epilog="Example: [bold]access-av new plant mine.toml; access-av study mine.toml[/]",
+)
+def study(
+    plant: Annotated[str, typer.Argument(help="Shipped name, or path of a plant's TOML file.")],
+    runs: Annotated[
+        int | None,
+        typer.Option(min=2, max=100_000, help="Trips as believed; else about a minute's worth."),
+    ] = None,
+    seed: Seed = 1,
+    threads: Threads = None,
+    out: Out = None,
+    always_mend: Annotated[
+        bool, typer.Option("--always-mend", help="Drive remedies also where the target is kept.")
+    ] = False,
+    vary: Vary = None,
+    compare: Compare = None,
+    percentile: Percents = None,
+    as_json: AsJson = False,
+) -> None:
+    """Tell whether a plant's localization is good enough, where not, what mends it and its cost.
+
+    Writes report.html, study.json, errors.parquet, drives.parquet, places.parquet, places.csv,
+    points.parquet, plant.toml with every default, and manifest.json; with --vary or --compare also
+    compared.parquet.
+    """
+    from access_av.report.compared import compared_section
+    from access_av.report.study import render_study
+    from access_av.study.answer import study_plant
+    from access_av.study.compare import table as compared_table
+    from access_av.tables.results_directory import ResultsDirectory, json_text
+
+    chosen = Plant.load(plant)
+    announce(plant, chosen.warnings())
+    others = {name: Plant.load(name).scenario() for name in compare or ()}
+    scenarios = variants(chosen.scenario(), vary, others)
+    directory = ResultsDirectory.create(f"study-{chosen.name}", out)
+    with progress("Driving") as tick:
+        found = study_plant(
+            plant, runs=runs, seed=seed, threads=threads, always_mend=always_mend, progress=tick
+        )
+    for name, rows in found.tables().items():
+        directory.write_table(f"{name}.parquet", rows)
+    directory.write_text("places.csv", found.places.write_csv(float_precision=4))
+    directory.write_json("study.json", found.summary())
+    asked = percentile or [50.0, found.percent]
+    beside = side_by_side(scenarios, asked, found.believed.runs, seed, threads)
+    if beside:
+        directory.write_table("compared.parquet", compared_table(beside))
+    directory.write_text("report.html", render_study(found, compared_section(beside)))
+    directory.write_text("plant.toml", chosen.to_toml())
+    directory.write_manifest(
+        repeat=("study", "plant.toml", "--seed", seed, "--runs", found.believed.runs),
+        plant=chosen.name,
+        seed=seed,
+        warnings=chosen.warnings(),
+    )
+    directory.link_latest()
+    if as_json:
+        print(json_text({**found.summary(), "directory": str(directory.path)}))
+        return
+    console.print(found.verdict)
+    for number, place in enumerate(found.worst, start=1):
+        console.print(
+            f"Worst place {number}: {place.along_m:.0f} m along the road, "
+            f"{place.error_m:.2f} m: {place.why}."
+        )
+    if found.mended:
+        made = table(
+            ["remedy", f"{found.percent:g} % within / m", "difference / m", "interval", ""], text=1
+        )
+        for it in found.mended:
+            less, low, high = it.less_m
+            made.add_row(
+                it.remedy.name,
+                f"{it.error.value:.3f}",
+                f"{less:+.3f}",
+                f"{low:+.3f} to {high:+.3f}",
+                it.outcome,
+            )
+        console.print(made)
+    show_compared(beside)
+    if found.point is not None:
+        console.print(f"Recommended: {found.point.name}.")
+    console.print(f"Report: {directory.path / 'report.html'}", soft_wrap=True)

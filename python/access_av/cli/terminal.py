@@ -1,0 +1,353 @@
+"""What the command line shows: tables that fit the terminal, progress, errors."""
+
+from __future__ import annotations
+
+import io
+import os
+import sys
+import time
+from contextlib import contextmanager
+from threading import Event, Thread
+from typing import TYPE_CHECKING, Any
+
+from rich import box
+from rich.console import Console
+from rich.progress import (
+    BarColumn,
+    MofNCompleteColumn,
+    Progress,
+    TextColumn,
+    TimeRemainingColumn,
+)
+from rich.table import Table as RichTable
+
+from access_av._core import brief
+from access_av.signal.methods import label
+from access_av.signal.recorded_angles import mean_absolute_error_deg
+from access_av.tables.numbers import unsigned_zero, value_text
+
+if TYPE_CHECKING:
+    from collections.abc import Callable, Iterator, Sequence
+
+    import polars as pl
+
+    from access_av.drives.angle_log import AngleLog
+    from access_av.radio.placement import Plan
+    from access_av.radio.upgrades import NextLevel
+    from access_av.run.service_levels import Verdict
+    from access_av.run.simulation import Simulation
+    from access_av.signal.recorded_angles import BurstAngle
+    from access_av.tables.columns.tables import Table
+
+# What is printed may come from files: it is text, never markup. Styles are given beside it.
+console = Console(highlight=False, markup=False)
+errors = Console(stderr=True, highlight=False, markup=False)
+
+NARROW = 80
+# Where there is no terminal: how long nothing is said of what goes on, at first and at most.
+FIRST_LINE_S, MOST_SILENT_S = 2.0, 60.0
+
+
+def is_narrow() -> bool:
+    """Whether tables should leave out what can be found in the files."""
+    return console.width < NARROW
+
+
+def write_what_can_be_written() -> None:
+    """Write a question mark where the terminal's encoding lacks a sign."""
+    for stream in (sys.stdout, sys.stderr):
+        if isinstance(stream, io.TextIOWrapper):
+            stream.reconfigure(errors="replace")
+
+
+def give_up_output() -> None:
+    """Write no more to a standard output that took nothing: at its end Python would try again."""
+    try:
+        sys.stdout.flush()
+    except OSError:
+        os.dup2(os.open(os.devnull, os.O_WRONLY), sys.stdout.fileno())
+
+
+@contextmanager
+def progress(title: str) -> Iterator[Callable[[int, int], None]]:
+    """Show a bar on the error stream; gives the function that moves it.
+
+    Where that is no terminal: a line after two seconds, and then ever more seldom.
+    """
+    if not errors.is_terminal:
+        with _lines(title) as tick:
+            yield tick
+        return
+    bar = Progress(
+        TextColumn("{task.description}"),
+        BarColumn(bar_width=None if not is_narrow() else 12),
+        MofNCompleteColumn(),
+        TimeRemainingColumn(compact=True),
+        console=errors,
+        transient=True,
+    )
+    with bar:
+        task = bar.add_task(title, total=None)
+        yield lambda done, total: bar.update(task, completed=done, total=total)
+
+
+@contextmanager
+def _lines(title: str) -> Iterator[Callable[[int, int], None]]:
+    """Progress as lines, for logs: each after half as much time again as has passed."""
+    known: list[tuple[int, int]] = []
+    ended, begun_s = Event(), time.monotonic()
+
+    def tell() -> None:
+        wait_s = FIRST_LINE_S
+        while not ended.wait(wait_s):
+            passed_s = time.monotonic() - begun_s
+            line = f"{title}: {passed_s:.0f} s"
+            if known and known[-1][1]:
+                done, total = known[-1]
+                left_s = f", about {passed_s * (total - done) / done:.0f} s left" if done else ""
+                line = f"{title}: {done:,} of {total:,}, {passed_s:.0f} s{left_s}"
+            errors.print(line, soft_wrap=True)
+            wait_s = min(0.5 * passed_s, MOST_SILENT_S)
+
+    thread = Thread(target=tell, daemon=True)
+    thread.start()
+    try:
+        yield lambda done, total: known.append((done, total))
+    finally:
+        ended.set()
+        thread.join()
+
+
+def table(head: Sequence[str], *, title: str = "", text: int = 1) -> RichTable:
+    """An empty table; the first ``text`` columns hold words, the others numbers."""
+    made = RichTable(title=title or None, box=box.SIMPLE_HEAD, title_justify="left", pad_edge=False)
+    for index, name in enumerate(head):
+        made.add_column(name, justify="left" if index < text else "right", overflow="fold")
+    return made
+
+
+def width(made: RichTable) -> int:
+    """Columns of the terminal that a table takes when no cell is wrapped."""
+    unbounded = console.options.update(max_width=10_000)
+    return console.measure(made, options=unbounded).maximum
+
+
+def show_error(error: Exception) -> None:
+    """One message for a bad input."""
+    if isinstance(error, OSError) and error.filename is not None:
+        message = f"{error.filename}: {error.strerror}"
+    else:
+        message = str(error)
+    errors.print("error:", style="bold red", end=" ")
+    errors.print(brief(plain(message)), soft_wrap=True)
+
+
+def show_warning(message: str) -> None:
+    """One message for an item that was left out, or is remarkable."""
+    errors.print("warning:", style="yellow", end=" ")
+    errors.print(brief(plain(message)), soft_wrap=True)
+
+
+def plain(text: str) -> str:
+    r"""Text with control characters written out: a terminal is to obey nobody's file.
+
+    Examples
+    --------
+    >>> plain("a\x1b[2Jb")
+    'a\\x1b[2Jb'
+    """
+    return "".join(
+        sign if sign.isprintable() or sign == "\n" else sign.encode("unicode_escape").decode()
+        for sign in text
+    )
+
+
+def show_points(points: pl.DataFrame, title: str = "") -> None:
+    """Operating points as a table."""
+    head = ["mode", "method", "energy J", "RMS m", "worst X m", "worst Y m", "executions"]
+    if is_narrow():
+        head = ["mode", "method", "J", "RMS m", "X m", "Y m"]
+    made = table(head, title=title, text=2)
+    for point in points.iter_rows(named=True):
+        cells = [
+            str(point["mode"]) if is_narrow() else f"{point['mode']} {point['mode_name']}",
+            label(point["method"], adaptive=point["adaptive"]),
+            f"{point['energy_j']:.1f}",
+            f"{point['rms_error_m']:.3f}",
+            f"{point['worst_error_x_m']:.3f}",
+            f"{point['worst_error_y_m']:.3f}",
+            f"{point['executions']:.0f}",
+        ]
+        made.add_row(*cells[: len(head)])
+    console.print(made)
+
+
+def show_simulation(result: Simulation, title: str, energy_boundary: str | None) -> None:
+    """Errors and executions of many drives, in one table, and what their joules count."""
+    steps, runs = result.steps, result.runs
+    made = table(["", "value", "95 % interval"], title=title)
+    rows: dict[str, tuple[Any, str]] = {
+        "RMS error / m": (result.rms_error_m, ""),
+        "mean error / m": (result.mean_error_m, ""),
+    }
+    for each in result.percentiles or ():
+        rows[f"{each.percent:g} % of errors within / m"] = each.value, each.interval
+    rows |= {
+        "worst mean error along the track, X / m": (steps["mean_abs_error_x_m"].max(), ""),
+        "worst mean error along the track, Y / m": (steps["mean_abs_error_y_m"].max(), ""),
+        "duration / s": (steps["time_s"].max(), ""),
+        "executions (angles estimated)": (runs["executions"].mean(), ""),
+        f"energy / J, {energy_boundary or 'not counted'}": (runs["energy_j"].mean(), ""),
+    }
+    if runs["found_s"].fill_null(1.0).max() != 0.0:
+        found = runs.height - runs["found_s"].null_count()
+        rows["runs in which the vehicle was found"] = found, ""
+        rows["driven until found, median / m"] = runs["found_m"].median(), ""
+        rows["driven until found, most / m"] = runs["found_m"].max(), ""
+    consistency = result.consistency
+    if consistency is not None and consistency.anees is not None:
+        interval = consistency.anees_interval if runs.height > 1 else None
+        rows["NEES per axis (1: errors as large as stated)"] = (
+            consistency.anees,
+            "" if interval is None else f"{interval[0]:.3g} to {interval[1]:.3g}",
+        )
+    integrity = result.integrity
+    if integrity is not None:
+        rows["protection level / error, median"] = integrity.median_level_over_error, ""
+    for name, (value, interval_text) in rows.items():
+        made.add_row(name, value_text(value), interval_text)
+    console.print(made)
+    if (operation := result.operation) is not None:
+        console.print(f"{operation.in_words()} {operation.what_helps()}".strip())
+    if levels := result.service_levels:
+        show_service_levels(levels)
+
+
+def show_service_levels(verdicts: Sequence[Verdict], title: str = "") -> None:
+    """Which 3GPP service levels are reached."""
+    head = ["3GPP level", "accuracy m", "asked", "within", "at least (95 %)", ""]
+    if is_narrow():
+        head = ["level", "m", "asked", "within", "at least", ""]
+    made = table(head, title=title)
+    for verdict in verdicts:
+        made.add_row(
+            verdict.level.name,
+            f"{verdict.level.accuracy_m:g}",
+            f"{verdict.level.availability:.1%}",
+            f"{verdict.share:.2%}",
+            f"{verdict.least_share:.2%}",
+            verdict.outcome,
+        )
+    console.print(made)
+
+
+def show_plan(found: Plan) -> None:
+    """The masts that were chosen, and the next best."""
+    console.print(
+        f"{found.scenario.name}: 90 % of the route within {found.before_m:.3f} m at best; with "
+        f"{', '.join(found.chosen)} within {found.after_m:.3f} m."
+    )
+    made = table(["mast", "alone: 90 % within m"])
+    for row in found.ranking.head(10).iter_rows(named=True):
+        made.add_row(row["name"], f"{row['p90_bound_m']:.3f}")
+    console.print(made)
+    show_service_levels(found.verdicts, title=f"with {', '.join(found.chosen)}")
+
+
+def show_next_level(found: NextLevel) -> None:
+    """Where the site falls short of the next service level, and what mends that."""
+    console.print(found.in_words())
+    made = table([f"what would mend that (as it is {found.share:.2%})", "within", "enough"])
+    for change in found.changes:
+        made.add_row(change.what, f"{change.share:.2%}", "yes" if change.reaches else "no")
+    console.print(made)
+
+
+def show_bound(summary: dict[str, Any], verdicts: Sequence[Verdict]) -> None:
+    """The bound along the route, and how each radio head is received there."""
+    made = table(["least RMS error of any localizer", "m"], title=summary["scenario"])
+    for name, key in (("median of the route", "median_m"), ("90 % of it below", "p90_m")):
+        made.add_row(name, f"{summary[key]:.3f}")
+    made.add_row("worst place", f"{summary['max_m']:.3f}")
+    console.print(made)
+    made = table(["radio head", "PCI", "SSB", "distance m", "SNR dB", "visible"])
+    for head in summary["heads"]:
+        made.add_row(
+            head["name"],
+            str(head["pci"]),
+            str(head["ssb_index"]),
+            f"{head['nearest_m']:.0f}–{head['farthest_m']:.0f}",
+            f"{head['least_expected_snr_db']:.0f} to {head['most_expected_snr_db']:.0f}",
+            f"{head['visible_share']:.1%}",
+        )
+    console.print(made)
+    show_service_levels(verdicts)
+
+
+def show_columns(columns: Table) -> None:
+    """The columns of one table."""
+    where = columns.where.replace("`", "")
+    console.print(columns.name, style="bold", end="")
+    console.print(f"  {columns.row}. {where}.")
+    made = table(["column", "unit", "meaning", "null when"], text=4)
+    for one in columns.records():
+        made.add_row(one["name"], one["unit"], one["meaning"], one["null"])
+    console.print(made)
+
+
+def show_angles(log: AngleLog) -> None:
+    """Angles of a recording by SSB, in the median."""
+    made = table(["PCI", "SSB", "angles", "resolved", "SNR dB", "σ rad", "σ noise rad"], text=0)
+    for row in log.by_ssb().iter_rows():
+        *counts, snr_db, sigma_rad, noise_rad = row
+        made.add_row(*map(str, counts), f"{snr_db:.1f}", f"{sigma_rad:.4f}", f"{noise_rad:.4f}")
+    console.print(made)
+
+
+def show_bursts(bursts: Sequence[BurstAngle]) -> None:
+    """Angles of a recording's bursts, with their errors where the truth is known."""
+    made = table(["sample", "azimuth °", "σ °", "SNR dB", "truth °", "error °", "verdict"], text=0)
+    for burst in bursts:
+        azimuth_deg, truth_deg = burst.azimuth_from_broadside_deg, burst.truth_deg
+        made.add_row(
+            str(burst.sample_start),
+            unsigned_zero(f"{azimuth_deg:.2f}"),
+            f"{burst.sigma_deg:.3f}",
+            f"{burst.snr_db:.1f}",
+            "" if truth_deg is None else f"{truth_deg:.2f}",
+            "" if truth_deg is None else unsigned_zero(f"{azimuth_deg - truth_deg:+.2f}"),
+            burst.verdict.removeprefix("unresolved: "),
+        )
+    console.print(made)
+    error_deg = mean_absolute_error_deg(bursts)
+    if error_deg is not None:
+        console.print(f"Mean absolute error {error_deg:.2f}° over {len(bursts)} bursts.")
+
+
+def show_cells(title: str, cells: Sequence[dict[str, Any]]) -> None:
+    """SSBs of one recording, one a row; a narrow terminal leaves out where on the air they were."""
+    with_angles = any("azimuth_deg" in cell for cell in cells)
+    columns = ["PCI", "SSB", "SFN", "SNR dB", "CFO Hz"]
+    if with_angles:
+        columns += ["azimuth °", "σ °"]
+    if not is_narrow():
+        columns += ["sample", "MHz", "kHz"] + ["verdict"] * with_angles
+    made = table(columns, title=title, text=0)
+    for cell in cells:
+        texts = {
+            "PCI": str(cell["pci"]),
+            "SSB": str(cell["ssb_index"]),
+            "SFN": "–" if cell["sfn"] is None else str(cell["sfn"]),
+            "SNR dB": f"{cell['snr_db']:.1f}",
+            "CFO Hz": unsigned_zero(f"{cell['cfo_hz']:.1f}"),
+            "azimuth °": unsigned_zero(f"{cell['azimuth_deg']:.2f}")
+            if "azimuth_deg" in cell
+            else "–",
+            "σ °": f"{cell['sigma_deg']:.3f}" if "sigma_deg" in cell else "–",
+            "verdict": cell.get("verdict", "–").removeprefix("unresolved: "),
+            "sample": str(cell["sample_start"]),
+            "MHz": f"{cell['ssb_freq_hz'] / 1e6:.3f}",
+            "kHz": str(cell["scs_khz"]),
+        }
+        made.add_row(*(texts[column] for column in columns))
+    console.print(made)

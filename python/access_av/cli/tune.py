@@ -1,0 +1,175 @@
+"""The command ``tune``: a wake-up policy for one's own road and objective."""
+
+from __future__ import annotations
+
+from typing import TYPE_CHECKING, Annotated
+
+import typer
+
+from access_av.cli.options import (
+    MISSED,
+    AsJson,
+    DaskOption,
+    MaxError,
+    MaxRms,
+    Out,
+    PercentileOption,
+    Runs,
+    ScenarioArgument,
+    Seed,
+    Threads,
+    load_scenario,
+)
+from access_av.cli.terminal import console, errors, progress, table
+
+if TYPE_CHECKING:
+    from access_av.designs.space import Space
+    from access_av.designs.tune import Tuned
+
+app = typer.Typer()
+
+# Of those that are known, the percentiles that a terminal is shown.
+SHOWN_PERCENTS = (50.0, 90.0, 99.0)
+
+
+@app.command(
+    epilog="Example: [bold]access-av tune yard --max-error-m 0.5 --percentile 99[/]",
+)
+def tune(
+    scenario: ScenarioArgument,
+    max_error_m: MaxError = None,
+    percentile: PercentileOption = None,
+    max_rms_m: MaxRms = None,
+    max_worst_m: Annotated[
+        float | None, typer.Option(min=0.0, help="Largest error of a run, in nine of ten runs.")
+    ] = None,
+    max_energy_j: Annotated[
+        float | None, typer.Option(min=0.0, help="Mean energy of a trip; then least error.")
+    ] = None,
+    platform: Annotated[
+        str, typer.Option(help="Computer whose energy counts: shipped name, or TOML file.")
+    ] = "jetson-agx-xavier-engine",
+    mode: Annotated[int, typer.Option(min=0, max=255, help="Its power mode.")] = 0,
+    designs: Annotated[
+        int, typer.Option(min=2, max=10_000, help="Points tried in each of three rounds.")
+    ] = 64,
+    runs: Runs = 20,
+    seed: Seed = 1,
+    dask: DaskOption = None,
+    threads: Threads = None,
+    out: Out = None,
+    as_json: AsJson = False,
+) -> None:
+    """Tune gains, weights and set points of a scenario's wake-up policy.
+
+    Least energy that keeps the error, or least error that keeps the energy. What is found is driven
+    again in runs that the search has not seen, beside what was there before, which stays where
+    nothing better is found. Writes vehicle.toml, tuned.json, scenario.toml (as it was) and
+    manifest.json; drives are kept in results/parts, so that a command that was stopped goes on.
+
+    Exit code 0: what is asked is kept, as far as the drives tell. 3: it is missed, also by what was
+    found; which of it, and by how much, is said.
+    """
+    from access_av.designs.table import Constraints, row_of
+    from access_av.designs.tune import space_of
+    from access_av.designs.tune import tune as search
+    from access_av.run.campaign import Campaign, executor
+    from access_av.run.result_cache import Parts
+    from access_av.tables.results_directory import RESULTS, ResultsDirectory, json_text
+
+    chosen = load_scenario(
+        scenario, overrides={"vehicle.platform": {"name": platform, "mode": mode}}
+    )
+    constraints = Constraints(max_energy_j, max_rms_m, max_worst_m, max_error_m, percentile)
+    with progress("Tuning") as tick, executor(dask, threads) as (pool, workers):
+        found = search(
+            Campaign(Parts(RESULTS / "parts"), pool, workers),
+            chosen,
+            constraints,
+            designs=designs,
+            runs=runs,
+            seed=seed,
+            progress=tick,
+        )
+    row = row_of(found.after)
+    is_kept, verdicts = constraints.keeps(row), constraints.in_words(row)
+    directory = ResultsDirectory.create(f"tune-{chosen.name}", out)
+    directory.write_text("vehicle.toml", found.after.design.scenario.vehicle.to_toml())
+    record = {
+        "values": dict(found.after.design.values),
+        "is_better": found.is_better,
+        "is_kept": is_kept,
+        "constraints": verdicts,
+        "energy_j": [found.before.mean_energy_j, found.after.mean_energy_j],
+        "rms_error_m": [found.before.rms_m, found.after.rms_m],
+        "before": row_of(found.before),
+        "after": row,
+        "energy_less_j": found.less[0].tolist(),
+        "square_less_m2": found.less[1].tolist(),
+        "drives": found.drives,
+    }
+    directory.write_json("tuned.json", record)
+    directory.write_text("scenario.toml", chosen.to_toml())
+    asked = {
+        "--max-error-m": max_error_m,
+        "--percentile": percentile,
+        "--max-rms-m": max_rms_m,
+        "--max-worst-m": max_worst_m,
+        "--max-energy-j": max_energy_j,
+        "--platform": platform,
+        "--mode": mode,
+        "--designs": designs,
+        "--runs": runs,
+        "--seed": seed,
+    }
+    given = [text for name, value in asked.items() if value is not None for text in (name, value)]
+    directory.write_manifest(
+        repeat=("tune", "scenario.toml", *given),
+        scenario=chosen.name,
+        runs=runs,
+        seed=seed,
+        warnings=chosen.warnings(),
+    )
+    if as_json:
+        print(json_text({**record, "directory": str(directory.path)}))
+    else:
+        _show(found, space_of(chosen))
+        for verdict in verdicts:
+            console.print(f"{verdict}.", soft_wrap=True)
+        console.print(f"{directory.path / 'vehicle.toml'}", soft_wrap=True)
+    if not is_kept:
+        errors.print(
+            "missed: no set point of this policy keeps what is asked; more radio heads, a better "
+            f"odometer or a surveyed road may: access-av plan {scenario}",
+            style="red",
+            soft_wrap=True,
+        )
+        raise typer.Exit(MISSED)
+
+
+def _show(found: Tuned, space: Space) -> None:
+    values = found.after.design.values
+    if found.is_better:
+        made = table(["", "range", "tuned"], title="Wake-up policy", text=2)
+        for dimension in space.dimensions:
+            ends = f"{dimension.low:g} to {dimension.high:g}"
+            key = dimension.key.removeprefix("vehicle.wake_up.")
+            made.add_row(key, ends, f"{values[dimension.key]:.4g}")
+        console.print(made)
+    both = (found.before, found.after) if found.is_better else (found.before,)
+    made = table(["in runs not seen before", "as it was", "tuned"][: 1 + len(both)])
+    made.add_row("energy of a trip / J", *(f"{it.mean_energy_j:.3f}" for it in both))
+    made.add_row("RMS error / m", *(f"{it.rms_m:.3f}" for it in both))
+    for each in zip(*(it.percentiles(SHOWN_PERCENTS) for it in both), strict=True):
+        name = f"{each[0].percent:g} % of errors within / m (95 %)"
+        made.add_row(name, *(f"{it.value:.3f} ({it.interval})" for it in each))
+    made.add_row("executions", *(f"{it.executions.mean():.0f}" for it in both))
+    console.print(made)
+    if not found.is_better:
+        console.print("Nothing better was found: the policy stays as it was.")
+        return
+    mean_j, low_j, high_j = found.less[0]
+    if mean_j >= 0.0:
+        console.print(f"Energy less by {mean_j:.3f} J (95 %: {low_j:.3f} to {high_j:.3f})")
+    else:
+        console.print(f"Energy more by {-mean_j:.3f} J (95 %: {-high_j:.3f} to {-low_j:.3f})")

@@ -1,1 +1,0 @@
-"""The command line's commands, a file per concern; ``access_av.cli`` puts them together."""

@@ -1,0 +1,267 @@
+"""Drives of designs: the same runs for each, so that differences are theirs and not chance's."""
+
+from __future__ import annotations
+
+import json
+from dataclasses import dataclass, replace
+from typing import TYPE_CHECKING, Any
+
+import numpy as np
+
+from access_av import _core
+from access_av._core import Scenario, SettingsError
+from access_av.designs.space import shown
+from access_av.device.platform import Platform
+from access_av.errors import InputError
+from access_av.run.campaign import Task
+from access_av.run.service_levels import INDEPENDENT_S
+from access_av.statistics.percentiles import PERCENTS, Percentile, percentiles
+
+if TYPE_CHECKING:
+    from collections.abc import Callable, Mapping, Sequence
+    from typing import TypeAlias
+
+    from numpy.typing import NDArray
+
+    from access_av.run.campaign import Campaign
+
+    # What runs of a scenario found, by name.
+    Part: TypeAlias = Mapping[str, NDArray[Any]]
+
+# Every so many SSBs, the error along the track is kept.
+TRACK_EVERY = 25
+# Of every so many SSBs the error of each run is kept: percentiles hardly depend on the others.
+ERROR_EVERY = 10
+# The computer in whose name all drive: only its energy figures would differ.
+ANY_BOARD = "jetson-agx-xavier"
+
+
+@dataclass(frozen=True)
+class Design:
+    """One choice of everything that varies.
+
+    Attributes
+    ----------
+    values
+        What was chosen, by key.
+    label
+        What of it differs from design to design, for people.
+    world
+        In what world it is driven; empty where there is only one.
+    """
+
+    values: Mapping[str, Any]
+    label: str
+    scenario: Scenario
+    platform: Platform
+    world: str = ""
+
+    @property
+    def driven(self) -> str:
+        """What decides its drives: the scenario, without the computer it has been resolved for."""
+        board = {"vehicle.platform.name": ANY_BOARD, "vehicle.platform.mode": 0}
+        return self.scenario.with_overrides(board).to_toml()
+
+
+@dataclass(frozen=True)
+class Driven:
+    """A design and what its drives found.
+
+    Attributes
+    ----------
+    square_m2, energy_j
+        Mean squared horizontal error and energy of each run, shape (runs,); infinite where the
+        vehicle was never found, or the platform has no figure.
+    worst_m
+        Largest error of each run.
+    error_m
+        Horizontal error of each run, shape (runs, times); infinite where the place is not known.
+    track_s, track_m2
+        Times, and mean squared error over the runs at them.
+    worlds
+        The same in each world, where it was driven in several. All else is then of the world in
+        which it is worst: energy of one, errors of one.
+    """
+
+    design: Design
+    square_m2: NDArray[np.float64]
+    energy_j: NDArray[np.float64]
+    worst_m: NDArray[np.float64]
+    error_m: NDArray[np.float32]
+    executions: NDArray[np.float64]
+    listened: NDArray[np.float64]
+    track_s: NDArray[np.float64]
+    track_m2: NDArray[np.float64]
+    worlds: tuple[Driven, ...] = ()
+
+    @property
+    def rms_m(self) -> float:
+        """Root mean square error over track and runs."""
+        return float(np.sqrt(np.mean(self.square_m2)))
+
+    @property
+    def p90_worst_m(self) -> float:
+        """Largest error of a run, in nine of ten."""
+        return float(np.quantile(self.worst_m, 0.9))
+
+    @property
+    def mean_energy_j(self) -> float:
+        """Mean energy of a trip."""
+        return float(np.mean(self.energy_j))
+
+    def percentiles(
+        self, percents: Sequence[float] = PERCENTS, *, of_seen: bool = False
+    ) -> list[Percentile]:
+        """Percentiles of the horizontal error; each of the world in which it is largest.
+
+        With ``of_seen`` the intervals are those of the bootstrap alone, which does not know that
+        what was not seen may yet happen: designs are compared by them.
+        """
+        if self.worlds:
+            each = [world.percentiles(percents, of_seen=of_seen) for world in self.worlds]
+            return [
+                max(of_worlds, key=lambda found: found.value)
+                for of_worlds in zip(*each, strict=True)
+            ]
+        driven_s = self.error_m.shape[0] * float(self.track_s[-1])
+        independent = None if of_seen else max(1, int(driven_s / INDEPENDENT_S))
+        return percentiles(self.error_m, percents, independent=independent)
+
+
+def in_worst(worlds: Sequence[Driven]) -> Driven:
+    """A design that was driven in several worlds, as it is in the worst of them.
+
+    Its energy is that of the world in which it takes most, its errors are those of the world in
+    which their mean square is largest.
+    """
+    if len(worlds) == 1:
+        return worlds[0]
+    worst = max(worlds, key=lambda each: each.rms_m)
+    most = max(worlds, key=lambda each: each.mean_energy_j)
+    return replace(worst, energy_j=most.energy_j, worlds=tuple(worlds))
+
+
+def designs_of(
+    scenario: Scenario,
+    choices: Sequence[Mapping[str, Any]],
+    given: Mapping[str, Any] | None = None,
+    world: str = "",
+) -> list[Design]:
+    """The scenario with each of the choices, in a world of that name and what is given in it.
+
+    Raises
+    ------
+    InputError
+        When a choice cannot be: names it, the key, and what is allowed.
+    """
+    platforms: dict[str, Platform] = {}
+    found = []
+    varying = [
+        key for key in (choices[0] if choices else {}) if len({str(it[key]) for it in choices}) > 1
+    ]
+    for values in choices:
+        try:
+            # Tables first: `vehicle.wake_up` before `vehicle.wake_up.bound_m`.
+            ordered = dict(sorted({**values, **(given or {})}.items()))
+            changed = scenario.with_overrides(ordered)
+            name = _platform_name(changed)
+            board = platforms.setdefault(name, Platform.load(name))
+            resolved = changed.resolved(board.core)
+            board.core.energy_j(resolved.vehicle, 0, 0, 0.0)
+        except SettingsError as error:
+            raise InputError(f"design {ordered}: {error}") from error
+        label = shown({key: values[key] for key in varying})
+        found.append(Design(values, label, resolved, board, world))
+    return found
+
+
+def in_worlds(
+    scenario: Scenario,
+    choices: Sequence[Mapping[str, Any]],
+    worlds: Mapping[str, Mapping[str, Any]],
+) -> list[tuple[Design, ...]]:
+    """The scenario with each of the choices, each in every world."""
+    by_world = [designs_of(scenario, choices, given, name) for name, given in worlds.items()]
+    return list(zip(*by_world, strict=True))
+
+
+def drive(
+    campaign: Campaign,
+    designs: Sequence[Design],
+    *,
+    first_run: int,
+    runs: int,
+    seed: int,
+    progress: Callable[[int, int], None] | None = None,
+) -> list[dict[str, NDArray[Any]] | None]:
+    """Drive each design in the runs from ``first_run`` on; designs that drive alike do it once."""
+    texts = [design.driven for design in designs]
+    different = list(dict.fromkeys(texts))
+    tasks = [
+        Task(
+            depends_on={
+                **{"drives": text, "seed": seed, "first_run": first_run, "runs": runs},
+                "error_every": ERROR_EVERY,
+            },
+            work=simulated,
+            arguments=(text, seed, first_run, runs),
+        )
+        for text in different
+    ]
+    parts = dict(zip(different, campaign.run(tasks, progress), strict=True))
+    return [parts[text] for text in texts]
+
+
+def simulated(scenario: str, seed: int, first_run: int, runs: int) -> dict[str, NDArray[Any]]:
+    """A part: runs of a scenario, on one thread."""
+    found = _core.simulate(
+        Scenario.from_toml(scenario),
+        runs,
+        seed,
+        first_run=first_run,
+        threads=1,
+        errors_every=ERROR_EVERY,
+    )
+    if found.errors_m is None:  # they were asked for
+        raise RuntimeError("the simulation kept no errors")
+    error_m = np.hypot(found.errors_m[..., 0], found.errors_m[..., 1])
+    columns = ("executions", "listened", "rms_error_m", "max_error_m")
+    track = slice(None, None, TRACK_EVERY)
+    return {
+        **{name: np.asarray(found.runs[name], dtype=np.float64) for name in columns},
+        "error_m": np.nan_to_num(error_m, nan=np.inf, posinf=np.inf).astype(np.float32),
+        "track_s": np.asarray(found.steps["time_s"], dtype=np.float64)[track],
+        "track_m2": np.asarray(found.steps["rms_error_m"], dtype=np.float64)[track] ** 2,
+    }
+
+
+def joined(design: Design, parts: Sequence[Part]) -> Driven:
+    """A design with all its parts, and the energy of each of its runs."""
+    executions, listened, rms_m, worst_m = (
+        np.concatenate([part[name] for part in parts])
+        for name in ("executions", "listened", "rms_error_m", "max_error_m")
+    )
+    weights = np.array([part["executions"].size for part in parts], dtype=np.float64)
+    track_s = parts[0]["track_s"]
+    track_m2 = np.average([part["track_m2"] for part in parts], axis=0, weights=weights)
+    core, vehicle = design.platform.core, design.scenario.vehicle
+    duration_s = float(track_s[-1])
+    energies = [
+        core.energy_j(vehicle, int(estimated), int(heard), duration_s)
+        for estimated, heard in zip(executions, listened, strict=True)
+    ]
+    return Driven(
+        design=design,
+        square_m2=np.nan_to_num(rms_m**2, nan=np.inf),
+        energy_j=np.array([np.inf if each is None else sum(each[:3]) for each in energies]),
+        worst_m=np.nan_to_num(worst_m, nan=np.inf),
+        error_m=np.concatenate([part["error_m"] for part in parts]),
+        executions=executions,
+        listened=listened,
+        track_s=track_s,
+        track_m2=track_m2,
+    )
+
+
+def _platform_name(scenario: Scenario) -> str:
+    return str(json.loads(scenario.vehicle.to_json())["platform"]["name"])

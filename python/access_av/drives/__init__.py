@@ -1,0 +1,46 @@
+"""Recorded drives: written from a scenario, located, compared with a truth.
+
+Examples
+--------
+>>> from access_av import drives
+>>> drives.DATATYPES
+('ci16_le', 'cf32_le')
+"""
+
+from __future__ import annotations
+
+from typing import TYPE_CHECKING
+
+from access_av.lazy import attach
+
+if TYPE_CHECKING:
+    from access_av.drives.recorded import (
+        DATATYPES,
+        FINDINGS,
+        MOST_TRUTH_GAP_S,
+        Drive,
+        SynthesizedDrive,
+        error_m,
+        locate,
+        log_angles,
+        read_tum,
+        summary,
+        synthesize,
+    )
+
+__all__ = [
+    "DATATYPES",
+    "FINDINGS",
+    "MOST_TRUTH_GAP_S",
+    "Drive",
+    "SynthesizedDrive",
+    "error_m",
+    "locate",
+    "log_angles",
+    "read_tum",
+    "summary",
+    "synthesize",
+]
+
+if not TYPE_CHECKING:
+    __getattr__, __dir__ = attach(__name__, {"access_av.drives.recorded": __all__})

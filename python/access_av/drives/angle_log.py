@@ -1,0 +1,145 @@
+"""Logs of angles: made of a recording's samples, written, and read where they are Parquet."""
+
+from __future__ import annotations
+
+import json
+from dataclasses import dataclass
+from pathlib import Path
+from typing import TYPE_CHECKING
+
+import numpy as np
+import polars as pl
+
+from access_av import _core
+from access_av.errors import InputError
+from access_av.tables import validation
+from access_av.tables.columns.tables import TABLES
+
+if TYPE_CHECKING:
+    from numpy.typing import NDArray
+
+    from access_av._core import Site, Vehicle
+
+# Of a log's columns those that are used to locate.
+USED = (
+    "time_s", "pci", "ssb_index", "phase_rad", "phase_sigma_rad", "angle_rad", "angle_sigma_rad",
+    "snr_db", "resolved",
+)  # fmt: skip
+
+
+@dataclass(frozen=True)
+class AngleLog:
+    """The angles of a recording.
+
+    Attributes
+    ----------
+    angles
+        One row per angle. ``phase_sigma_rad`` is all of the error that is believed, the receiver's
+        noise and the site's scatter; ``phase_noise_sigma_rad`` is the former alone. How well the
+        array is mounted and calibrated is in neither. An angle that is not ``resolved`` is used
+        with caution.
+    site
+        Whose radio heads were listened to.
+    vehicle
+        The vehicle, its receiver set so that these deviations are taken as they are meant.
+    warnings
+        What looks wrong with the recording.
+    """
+
+    angles: pl.DataFrame
+    site: Site
+    vehicle: Vehicle
+    warnings: list[str]
+
+    def by_ssb(self) -> pl.DataFrame:
+        """Number of angles of each SSB, how many are resolved, medians of SNR and deviations."""
+        return (
+            self.angles.group_by("pci", "ssb_index")
+            .agg(
+                pl.len().alias("angles"),
+                pl.sum("resolved"),
+                pl.median("snr_db", "phase_sigma_rad", "phase_noise_sigma_rad"),
+            )
+            .sort("pci", "ssb_index")
+        )
+
+    def csv(self) -> str:
+        """The angles as CSV; comments before the header say what the deviations hold."""
+        rician_k_db = json.loads(self.site.to_json())["rician_k_db"]
+        return (
+            "# phase_sigma_rad: all of the error that is believed, receiver noise and the site's "
+            f"scatter (rician_k_db = {rician_k_db:g})\n"
+            "# phase_noise_sigma_rad: receiver noise alone\n"
+            "# the array's mounting and calibration are in neither, but in the vehicle's file\n"
+            f"{self.angles.cast({'resolved': pl.UInt8}).write_csv()}"
+        )
+
+
+def estimate_angles(
+    site: Site | str | Path,
+    recording: str | Path,
+    *,
+    vehicle: Vehicle | str | Path = "default",
+    start_time_s: float = 0.0,
+) -> AngleLog:
+    """Estimate the angles of a recording as the vehicle's receiver finds them, and locate nothing.
+
+    Parameters
+    ----------
+    site
+        Radio heads, carrier and scatter; or the name or path of a site file.
+    recording
+        SigMF recording of the array's samples.
+    vehicle
+        Array, receiver and estimator; or the name or path of a vehicle file.
+    start_time_s
+        Time of the recording's first sample by the odometry's clock.
+
+    Raises
+    ------
+    RecordingError
+        When the recording cannot be used, or holds no SSB of the site.
+    SettingsError
+        When the site or vehicle file cannot be used.
+
+    Examples
+    --------
+    >>> import tempfile
+    >>> import access_av
+    >>> with tempfile.TemporaryDirectory() as drive:
+    ...     _ = access_av.synthesize("paper-real-odometry-2", drive, duration_s=1.0)
+    ...     log = estimate_angles(
+    ...         f"{drive}/site.toml", f"{drive}/iq.sigmf-meta", vehicle=f"{drive}/vehicle.toml"
+    ...     )
+    >>> log.angles["pci"].unique().sort().to_list()
+    [1, 2]
+    """
+    plant = site if isinstance(site, _core.Site) else _core.Site.load(str(site))
+    carrier = vehicle if isinstance(vehicle, _core.Vehicle) else _core.Vehicle.load(str(vehicle))
+    columns, told, warnings = _core.estimate_angles(
+        plant, carrier, recording, start_time_s=start_time_s
+    )
+    angles = pl.DataFrame(columns).with_columns(pl.col("resolved").cast(pl.Boolean))
+    return AngleLog(angles.select(TABLES["recorded_angles"].columns), plant, told, warnings)
+
+
+def columns_of(path: str | Path) -> dict[str, NDArray[np.float64]] | None:
+    """The columns of a log that is Parquet, NaN where there is no value; ``None`` of other files.
+
+    Raises
+    ------
+    InputError
+        When it is damaged, or a column that is used holds no numbers.
+    """
+    path = Path(path)
+    if path.suffix.lower() != ".parquet":
+        return None
+    table = validation.read(path, "log of angles")
+    for name in USED:
+        found = table.schema.get(name)
+        if found is not None and not (found.is_numeric() or found in (pl.Boolean(), pl.Null())):
+            raise InputError(f"{path}: `{name}` is {found}; it must be numbers")
+    numbers = table.select(
+        pl.col(name).cast(pl.Float64).fill_null(float("nan")) for name in USED if name in table
+    )
+    return {name: np.ascontiguousarray(numbers[name].to_numpy()) for name in numbers.columns}

@@ -1,0 +1,418 @@
+"""Recorded drives: write them from a scenario, find out where the vehicle was."""
+
+from __future__ import annotations
+
+from dataclasses import dataclass
+from typing import TYPE_CHECKING, Any
+
+import polars as pl
+
+from access_av import _core
+from access_av.drives import angle_log
+from access_av.errors import InputError
+
+if TYPE_CHECKING:
+    from collections.abc import Callable, Mapping
+    from pathlib import Path
+
+    from access_av._core import Scenario, Site, Vehicle
+
+
+# Longest time between two poses of the truth between which it is taken for a straight line (s).
+MOST_TRUTH_GAP_S = 1.0
+
+FINDINGS = {"constant": pl.String, "constant_unit": pl.String}
+
+DATATYPES = ("ci16_le", "cf32_le")
+
+
+@dataclass(frozen=True)
+class SynthesizedDrive:
+    """A drive that was written.
+
+    Attributes
+    ----------
+    recording
+        The SigMF metadata.
+    bursts
+        SSB bursts in it.
+    samples
+        Samples per antenna.
+    """
+
+    recording: Path
+    bursts: int
+    samples: int
+
+
+def synthesize(
+    scenario: Scenario | str,
+    directory: str | Path,
+    *,
+    seed: int = 1,
+    run: int = 0,
+    duration_s: float | None = None,
+    continuous: bool = False,
+    datatype: str = "ci16_le",
+    progress: Callable[[float], object] | None = None,
+) -> SynthesizedDrive:
+    """Record a scenario's drive as somebody on the vehicle would have.
+
+    Writes ``iq.sigmf-meta`` and ``iq.sigmf-data`` (all antennas, the truth in the annotations),
+    ``odometry.csv``, ``site.toml``, ``vehicle.toml``, ``scenario.toml`` and ``truth.tum``.
+
+    Parameters
+    ----------
+    scenario
+        What is driven, or its name or path.
+    directory
+        Where the files go; made if it is not there.
+    seed, run
+        The random streams.
+    duration_s
+        Seconds from the start on; the whole drive without.
+    continuous
+        Also the time between the SSB bursts, which makes the files many times larger.
+    datatype
+        ``ci16_le`` or ``cf32_le``.
+    progress
+        Called with the share of the drive that is recorded, from 0 to 1.
+
+    Raises
+    ------
+    SettingsError
+        When the scenario cannot be sent as samples.
+    InputError
+        When the datatype is another one.
+
+    Examples
+    --------
+    >>> import tempfile
+    >>> import access_av
+    >>> with tempfile.TemporaryDirectory() as drive:
+    ...     access_av.synthesize("paper-real-odometry-2", drive, duration_s=2.0).bursts
+    101
+    """
+    if datatype not in DATATYPES:
+        raise InputError(f"datatype is {datatype!r}; allowed: {', '.join(DATATYPES)}")
+    chosen = _core.Scenario.load(scenario) if isinstance(scenario, str) else scenario
+    made = _core.synthesize(
+        chosen,
+        directory,
+        seed=seed,
+        run=run,
+        duration_s=duration_s,
+        continuous=continuous,
+        datatype=datatype,
+        progress=progress,
+    )
+    return SynthesizedDrive(*made)
+
+
+def log_angles(
+    scenario: Scenario | str,
+    directory: str | Path,
+    *,
+    seed: int = 1,
+    run: int = 0,
+    duration_s: float | None = None,
+) -> int:
+    """Record a scenario's drive as the angles that the vehicle's receiver finds in it.
+
+    Writes ``angles.csv`` with the angle of every SSB, ``odometry.csv``, ``site.toml``,
+    ``vehicle.toml``, ``scenario.toml`` and ``truth.tum``.
+
+    Parameters
+    ----------
+    scenario, directory, seed, run, duration_s
+        As for :func:`synthesize`.
+
+    Returns
+    -------
+    int
+        Number of angles.
+
+    Raises
+    ------
+    SettingsError
+        When what an SSB brings hangs on when it is heard (samples, latency, noisy SNR).
+
+    Examples
+    --------
+    >>> import tempfile
+    >>> with tempfile.TemporaryDirectory() as drive:
+    ...     log_angles("yard", drive, duration_s=2.0)
+    404
+    """
+    chosen = _core.Scenario.load(scenario) if isinstance(scenario, str) else scenario
+    return _core.log_angles(chosen, directory, seed=seed, run=run, duration_s=duration_s)
+
+
+@dataclass(frozen=True)
+class Drive:
+    """A located drive. :mod:`access_av.columns` says what each table's columns are.
+
+    Attributes
+    ----------
+    poses
+        One row per odometry sample. ``searching`` as long as the first pose is not known; the
+        pose is then the mean of where the vehicle may be.
+    angles
+        One row per angle: SSB, angle, and what the localizer did with it.
+    remarks
+        What was wrong with the input, or remarkable about the drive; of remarks that differ in
+        numbers only the first stands for all.
+    diagnoses
+        Those of the remarks that name what is wrong with the input as it was given, confirmed by
+        the localizer itself.
+    suspicions
+        Those of the diagnoses that did harm: the drive is not to be relied on.
+    findings
+        What the drive showed of the vehicle by its end: one row per constant, as stated and as
+        found, with its standard deviation; none where the localizer does not look for it.
+    smoothed
+        ``poses`` as seen from the end of the drive, from the first known one on; ``None`` unless
+        asked for. Protection levels are not smoothed.
+    """
+
+    poses: pl.DataFrame
+    angles: pl.DataFrame
+    remarks: list[str]
+    diagnoses: list[str]
+    suspicions: list[str]
+    findings: pl.DataFrame
+    _core: _core.LocatedDrive
+    smoothed: pl.DataFrame | None = None
+
+    @property
+    def lost_share(self) -> float:
+        """Share of the time that the angles came from elsewhere than expected.
+
+        1 where the vehicle was never found.
+        """
+        return self._core.lost_share
+
+    @property
+    def is_reliable(self) -> bool:
+        """Whether it was found, not lost for long or at its end, and nothing wrong did harm."""
+        return not (self._core.is_lost_for_long or self.suspicions)
+
+    def write_mcap(self, path: str | Path) -> None:
+        """Write poses, verdicts and diagnostics as MCAP (ROS 2); no poses while searching."""
+        self._core.write_mcap(path)
+
+    def write_tum(self, path: str | Path) -> None:
+        """Write the poses, from the first that is known on, as a TUM trajectory."""
+        self._core.write_tum(path)
+
+    def write_smoothed_tum(self, path: str | Path) -> None:
+        """Write the smoothed poses as a TUM trajectory."""
+        self._core.write_smoothed_tum(path)
+
+
+def locate(
+    site: Site | str | Path,
+    odometry: str | Path,
+    recording: str | Path,
+    *,
+    vehicle: Vehicle | str | Path = "default",
+    topic: str | None = None,
+    imu_topic: str | None = None,
+    start_time_s: float = 0.0,
+    start: tuple[float, float, float] | None = None,
+    from_scratch: bool = False,
+    smooth: bool = False,
+) -> Drive:
+    """Locate a recorded drive.
+
+    Parameters
+    ----------
+    site
+        Radio heads and, where there is one, the road; or the name or path of a site file.
+    odometry
+        CSV with the columns ``time_s``, ``distance_m`` or ``speed_mps`` or both and, from a
+        gyroscope or from the wheels, ``yaw_rate_radps``; or of left and right wheel ``left_m`` and
+        ``right_m``, or ``left_mps`` and ``right_mps``, where the vehicle states
+        ``odometer.track_width_m``; or an MCAP file or a rosbag2 folder with
+        ``nav_msgs/msg/Odometry``. Where the twist of that tells no yaw rate, it is taken from a
+        ``sensor_msgs/msg/Imu`` beside it, or of the pose's orientation; the remarks say which.
+    recording
+        SigMF recording of the array's samples, or a log of angles, CSV or Parquet, with the columns
+        ``time_s``, ``pci`` and either ``phase_rad`` (electrical angle) with ``phase_sigma_rad``, or
+        ``angle_rad`` (from the array's axis) with ``angle_sigma_rad``; ``ssb_index`` and ``snr_db``
+        may be there.
+        What is stated as the deviation is taken for all of the error: the site's ``rician_k_db``
+        adds nothing.
+    vehicle
+        Array, odometer, and how the vehicle locates itself; or the name or path of a vehicle
+        file. Its wake-up policy is honoured.
+    topic
+        Topic of the odometry in a bag with several.
+    imu_topic
+        Topic of the IMU that tells the yaw rate, also where the odometry does.
+    start_time_s
+        Time of the recording's first sample by the odometry's clock.
+    start
+        Initial pose (x in metres, y in metres, heading in radians) in place of the vehicle's.
+        Without any, the vehicle is found: along the road by two radio heads or more, elsewhere by
+        three.
+    from_scratch
+        Find the vehicle along the road even if its file has an initial pose.
+    smooth
+        Also look back from the end of the drive: every pose by all angles, before it and after.
+
+    Raises
+    ------
+    RecordingError
+        When the recording or the odometry cannot be used.
+    SettingsError
+        When the site or vehicle file cannot be used.
+
+    Examples
+    --------
+    >>> import tempfile
+    >>> import access_av
+    >>> with tempfile.TemporaryDirectory() as drive:
+    ...     _ = access_av.synthesize("paper-real-odometry-2", drive, duration_s=2.0)
+    ...     located = access_av.locate(
+    ...         f"{drive}/site.toml",
+    ...         f"{drive}/odometry.csv",
+    ...         f"{drive}/iq.sigmf-meta",
+    ...         vehicle=f"{drive}/vehicle.toml",
+    ...     )
+    >>> located.poses.height
+    101
+    """
+    located = _core.locate(
+        site if isinstance(site, _core.Site) else _core.Site.load(str(site)),
+        vehicle if isinstance(vehicle, _core.Vehicle) else _core.Vehicle.load(str(vehicle)),
+        odometry,
+        recording,
+        angles=angle_log.columns_of(recording),
+        topic=topic,
+        imu_topic=imu_topic,
+        start_time_s=start_time_s,
+        start=start,
+        from_scratch=from_scratch,
+        smooth=smooth,
+    )
+    angles = pl.DataFrame(located.angles).with_columns(pl.col(pl.Float64).fill_nan(None))
+    smoothed = _poses(located.smoothed) if smooth else None
+    return Drive(
+        poses=_poses(located.poses),
+        angles=angles,
+        remarks=located.remarks,
+        diagnoses=located.diagnoses,
+        suspicions=located.suspicions,
+        findings=pl.DataFrame(located.findings, schema_overrides=FINDINGS),
+        smoothed=smoothed,
+        _core=located,
+    )
+
+
+def _poses(columns: Mapping[str, Any]) -> pl.DataFrame:
+    table = pl.DataFrame(columns, schema_overrides={"integrity": pl.String})
+    return table.with_columns(pl.col(pl.Float64).fill_nan(None))
+
+
+def read_tum(file: str | Path) -> pl.DataFrame:
+    """A TUM trajectory as ``time_s``, ``x_m``, ``y_m``, ``heading_rad``; ``#`` begins a comment.
+
+    Raises
+    ------
+    RecordingError
+        When the file is no TUM trajectory.
+    """
+    return pl.DataFrame(_core.read_tum(file)).sort("time_s")
+
+
+def error_m(poses: pl.DataFrame, truth: str | Path | pl.DataFrame) -> pl.DataFrame:
+    """Horizontal error at the poses' times, the truth between its own times on a straight line.
+
+    Parameters
+    ----------
+    poses
+        Poses of a located drive; those before the first known one are passed over, and those that
+        are before, after or in a gap of more than a second of the truth.
+    truth
+        TUM trajectory, at times of its own, or what :func:`read_tum` made of it.
+
+    Raises
+    ------
+    RecordingError
+        When the file is no TUM trajectory.
+    InputError
+        When it shares no time with the drive.
+    """
+    known = poses.filter(~pl.col("searching")).sort("time_s")
+    true = truth if isinstance(truth, pl.DataFrame) else read_tum(truth)
+    true = true.select("time_s", "x_m", "y_m")
+    before = true.rename({"x_m": "x0", "y_m": "y0"}).with_columns(t0="time_s")
+    after = true.rename({"x_m": "x1", "y_m": "y1"}).with_columns(t1="time_s")
+    both = (
+        known.join_asof(before, on="time_s", strategy="backward")
+        .join_asof(after, on="time_s", strategy="forward")
+        .filter(pl.col("t1") - pl.col("t0") <= MOST_TRUTH_GAP_S)
+    )
+    if both.is_empty():
+        which = "the truth" if isinstance(truth, pl.DataFrame) else truth
+        if true.is_empty():
+            raise InputError(f"{which}: holds no pose")
+        raise InputError(
+            f"{which}: no time in common with the drive: it is from {_interval_s(true)}, the drive "
+            f"from {_interval_s(known)}; both must be told by one clock, in seconds"
+        )
+    span = pl.col("t1") - pl.col("t0")
+    share = pl.when(span > 0).then((pl.col("time_s") - pl.col("t0")) / span).otherwise(0.0)
+    dx = pl.col("x_m") - pl.col("x0") - share * (pl.col("x1") - pl.col("x0"))
+    dy = pl.col("y_m") - pl.col("y0") - share * (pl.col("y1") - pl.col("y0"))
+    return both.select("time_s", error_m=(dx**2 + dy**2).sqrt(), error_x_m=dx, error_y_m=dy)
+
+
+def _interval_s(of: pl.DataFrame) -> str:
+    return f"{of['time_s'][0]:.3f} to {of['time_s'][-1]:.3f} s"
+
+
+def summary(drive: Drive, truth: str | Path | None = None) -> dict[str, float]:
+    """The drive in a few numbers; errors only where the truth is known."""
+    numbers = {
+        "duration_s": float(drive.poses["time_s"][-1] - drive.poses["time_s"][0]),
+        "angles": float(drive.angles.height),
+        "accepted": float(drive.angles["accepted"].sum()),
+        "remarks": float(len(drive.remarks)),
+    }
+    known = drive.poses.filter(~pl.col("searching"))
+    if known.height < drive.poses.height and not known.is_empty():
+        numbers["found_s"] = float(known["time_s"][0] - drive.poses["time_s"][0])
+        steps = drive.poses.select("time_s", "speed_mps").with_columns(
+            driven_m=(pl.col("time_s").diff().fill_null(0.0) * pl.col("speed_mps").abs()).cum_sum()
+        )
+        numbers["found_m"] = float(steps.filter(time_s=known["time_s"][0])["driven_m"][0])
+    if truth is not None and not known.is_empty():
+        against = error_m(drive.poses, truth)
+        errors = against["error_m"]
+        numbers |= _honesty(drive.poses, against)
+        numbers["rms_error_m"] = float((errors**2).mean() ** 0.5)  # type: ignore[operator]
+        numbers["p90_error_m"] = float(errors.quantile(0.9, "linear") or 0.0)
+        if drive.smoothed is not None and not drive.smoothed.is_empty():
+            errors = error_m(drive.smoothed, truth)["error_m"]
+            numbers["smoothed_rms_error_m"] = float((errors**2).mean() ** 0.5)  # type: ignore[operator]
+    return numbers
+
+
+def _honesty(poses: pl.DataFrame, against: pl.DataFrame) -> dict[str, float]:
+    """Compare what the localizer said of its error with the error.
+
+    Mean NEES over both axes; shares of the time ``ok`` and, of all time, beyond the protection
+    level while ``ok``.
+    """
+    xx, xy, yy = (pl.col(f"covariance_{it}_m2") for it in ("xx", "xy", "yy"))
+    dx, dy = pl.col("error_x_m"), pl.col("error_y_m")
+    squared = (yy * dx**2 - 2 * xy * dx * dy + xx * dy**2) / (xx * yy - xy**2)
+    ok = pl.col("integrity") == "ok"
+    row = poses.join(against, on="time_s").select(
+        nees_per_axis=squared.filter(squared.is_finite()).mean() / 2,
+        ok_share=ok.mean(),
+        beyond_while_ok=(ok & (pl.col("error_m") > pl.col("protection_level_m"))).mean(),
+    )
+    return {name: value for name, value in row.row(0, named=True).items() if value is not None}

@@ -1,0 +1,1 @@
+"""Money, carbon and energy of a fleet, with the sources of every figure."""

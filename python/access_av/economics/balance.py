@@ -1,0 +1,249 @@
+"""Cost, energy and carbon of a fleet, two ways side by side, with the user's own figures.
+
+Every figure is a range of low, central and high. A difference takes the least of one against the
+most of the other, so that its range holds whatever the figures turn out to be.
+"""
+
+from __future__ import annotations
+
+from dataclasses import dataclass
+from importlib import resources
+from typing import TYPE_CHECKING, Any
+
+from access_av.economics.carbon import KWH_IN_J, Range, grids
+from access_av.errors import InputError
+from access_av.tables import toml
+from access_av.tables.toml import shipped
+
+if TYPE_CHECKING:
+    from collections.abc import Mapping
+    from pathlib import Path
+
+FLEET = ("vehicles", "hours_per_day", "days_per_year", "years")
+# One of these says how often a vehicle drives.
+TRIPS = ("trips_per_day", "trip_s")
+ITEM = ("units", "price", "yearly", "power_w", "embodied_kg")
+DAY_S = 86_400.0
+
+
+@dataclass(frozen=True)
+class Way:
+    """One way to localize the fleet.
+
+    Attributes
+    ----------
+    capital, yearly
+        Money to buy it and to run it for a year, electricity included.
+    energy_day_kj
+        Energy of one vehicle on a day of work: its own equipment and its trips.
+    fleet_day_mj
+        Energy of the fleet and the infrastructure on such a day.
+    embodied_kg, use_kg_per_year
+        CO2 equivalents of production, and of a year's electricity.
+    """
+
+    capital: Range
+    yearly: Range
+    energy_day_kj: Range
+    fleet_day_mj: Range
+    embodied_kg: Range
+    use_kg_per_year: Range
+
+
+@dataclass(frozen=True)
+class Balance:
+    """Two ways, and what the second saves against the first.
+
+    Attributes
+    ----------
+    saved
+        Money over the years of use.
+    saved_kg
+        CO2 equivalents over them.
+    payback_years
+        After how long the second has cost no more; ``None`` where it may never be so.
+    """
+
+    currency: str
+    years: float
+    before: Way
+    after: Way
+    saved: Range
+    saved_kg: Range
+    payback_years: Range | None
+
+
+def read(file: Path | None) -> Mapping[str, Any]:
+    """The figures of a file, or the example's.
+
+    Raises
+    ------
+    InputError
+        When it is no TOML.
+    """
+    return shipped("economics", "balance.toml") if file is None else toml.read(file)
+
+
+def text() -> str:
+    """The example file."""
+    return resources.files("access_av").joinpath("economics", "balance.toml").read_text("utf-8")
+
+
+def balance(figures: Mapping[str, Any]) -> Balance:
+    """Add up both ways.
+
+    Raises
+    ------
+    InputError
+        When a figure is missing or cannot be; names its key and what is allowed.
+
+    Examples
+    --------
+    >>> found = balance(read(None))
+    >>> found.saved.low > 0.0, found.payback_years.high
+    (True, 0.0)
+    """
+    _only(
+        figures,
+        "",
+        {"currency", "grid", "grid_g_per_kwh", "electricity_per_kwh", "fleet", "before", "after"},
+    )
+    fleet = figures.get("fleet", {})
+    _only(fleet, "fleet.", {*FLEET, *TRIPS})
+    use = {name: _range(fleet, f"fleet.{name}").central for name in FLEET}
+    if not 0.0 <= use["hours_per_day"] <= 24.0:
+        raise InputError("fleet.hours_per_day: it must be from 0 to 24")
+    use["trips"] = _trips(fleet, use["hours_per_day"])
+    price = _range(figures, "electricity_per_kwh")
+    grams = _grid(figures)
+    before, after = (_way(figures, name, use, price, grams) for name in ("before", "after"))
+    years = use["years"]
+    saved = before.capital.minus(after.capital).plus(
+        before.yearly.minus(after.yearly).scaled(years)
+    )
+    saved_kg = before.embodied_kg.minus(after.embodied_kg).plus(
+        before.use_kg_per_year.minus(after.use_kg_per_year).scaled(years)
+    )
+    return Balance(
+        currency=str(figures.get("currency", "USD")),
+        years=years,
+        before=before,
+        after=after,
+        saved=saved,
+        saved_kg=saved_kg,
+        payback_years=_payback(
+            after.capital.minus(before.capital), before.yearly.minus(after.yearly)
+        ),
+    )
+
+
+def _trips(fleet: Mapping[str, Any], hours: float) -> float:
+    """Trips of one vehicle on a day of work: as stated, or one after the other."""
+    given = [name for name in TRIPS if name in fleet]
+    if len(given) != 1:
+        raise InputError(
+            "fleet: give either trips_per_day, or trip_s where trip follows upon trip all day"
+        )
+    value = _range(fleet, f"fleet.{given[0]}").central
+    if given == ["trips_per_day"]:
+        return value
+    if value <= 0.0:
+        raise InputError("fleet.trip_s: it must be above 0")
+    return hours * 3600.0 / value
+
+
+def _payback(more: Range, saved_yearly: Range) -> Range | None:
+    """Years until a larger capital is saved; 0 where it is not larger."""
+
+    def years(capital: float, yearly: float) -> float | None:
+        if capital <= 0.0:
+            return 0.0
+        return capital / yearly if yearly > 0.0 else None
+
+    ends = (
+        years(more.low, saved_yearly.high),
+        years(more.central, saved_yearly.central),
+        years(more.high, saved_yearly.low),
+    )
+    low, central, high = ends
+    return None if low is None or central is None or high is None else Range(low, central, high)
+
+
+def _way(
+    figures: Mapping[str, Any], name: str, use: Mapping[str, float], price: Range, grams: Range
+) -> Way:
+    way = figures.get(name, {})
+    _only(way, f"{name}.", {"infrastructure", "onboard", "energy_j_per_trip"})
+    hours, days, vehicles = use["hours_per_day"], use["days_per_year"], use["vehicles"]
+    none = Range(0.0, 0.0, 0.0)
+    capital = yearly = embodied_kg = onboard_w = fixed_w = none
+    for place, count in (("infrastructure", 1.0), ("onboard", vehicles)):
+        items = way.get(place, [])
+        if not isinstance(items, list):
+            raise InputError(f"{name}.{place}: a list of tables is needed")
+        for index, item in enumerate(items):
+            key = f"{name}.{place}[{index}]"
+            _only(item, f"{key}.", {*ITEM, "name", "source"})
+            if not item.get("source"):
+                raise InputError(f"{key}.source: missing; say where its figures are from")
+            units = _range(item, f"{key}.units").scaled(count)
+            capital = capital.plus(units.times(_range(item, f"{key}.price")))
+            yearly = yearly.plus(units.times(_range(item, f"{key}.yearly")))
+            embodied_kg = embodied_kg.plus(units.times(_range(item, f"{key}.embodied_kg")))
+            power_w = _range(item, f"{key}.units").times(_range(item, f"{key}.power_w"))
+            if place == "onboard":
+                onboard_w = onboard_w.plus(power_w)
+            else:
+                fixed_w = fixed_w.plus(power_w)
+    vehicle_j = onboard_w.scaled(hours * 3600.0).plus(
+        _range(way, f"{name}.energy_j_per_trip").scaled(use["trips"])
+    )
+    # Infrastructure is on all day and every day, vehicles while they work.
+    fixed_j = fixed_w.scaled(DAY_S)
+    kwh_per_year = (
+        vehicle_j.scaled(vehicles * days).plus(fixed_j.scaled(365.0)).scaled(1.0 / KWH_IN_J)
+    )
+    return Way(
+        capital=capital,
+        yearly=yearly.plus(kwh_per_year.times(price)),
+        energy_day_kj=vehicle_j.scaled(1e-3),
+        fleet_day_mj=vehicle_j.scaled(vehicles).plus(fixed_j).scaled(1e-6),
+        embodied_kg=embodied_kg,
+        use_kg_per_year=kwh_per_year.times(grams).scaled(1e-3),
+    )
+
+
+def _grid(figures: Mapping[str, Any]) -> Range:
+    """Carbon intensity in gCO2e per kWh."""
+    if "grid_g_per_kwh" in figures:
+        return _range(figures, "grid_g_per_kwh")
+    name = figures.get("grid")
+    if not isinstance(name, str) or name not in grids():
+        there = ", ".join(grids())
+        raise InputError(f"grid: {name!r}; allowed are {there}, or give grid_g_per_kwh")
+    return Range(*[grids()[name]] * 3)
+
+
+def _range(table: Mapping[str, Any], key: str) -> Range:
+    """One number, or low, central and high."""
+    value = table.get(key.rpartition(".")[2])
+    try:
+        ends: list[Any] = (
+            [value[name] for name in ("low", "central", "high")]
+            if isinstance(value, dict)
+            else [value] * 3
+        )
+    except KeyError as error:
+        raise InputError(f"{key}.{error.args[0]}: missing") from error
+    if not all(isinstance(end, (int, float)) and not isinstance(end, bool) for end in ends):
+        raise InputError(f"{key}: {value!r}; write a number, or low, central and high")
+    if not 0.0 <= ends[0] <= ends[1] <= ends[2] < float("inf"):
+        raise InputError(f"{key}: {value!r}; low, central, high must rise, from 0 on")
+    return Range(*map(float, ends))
+
+
+def _only(table: Any, path: str, allowed: set[str]) -> None:
+    if not isinstance(table, dict):
+        raise InputError(f"{path.rstrip('.')}: a table is needed")
+    if unknown := table.keys() - allowed:
+        raise InputError(f"{path}{min(unknown)}: unknown; allowed are {', '.join(sorted(allowed))}")

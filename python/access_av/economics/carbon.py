@@ -1,0 +1,106 @@
+"""Greenhouse gas: embodied and use apart, low to high, per grid.
+
+Every number carries its source (``carbon.toml``); nothing here is measured by this project.
+"""
+
+from __future__ import annotations
+
+from dataclasses import dataclass
+from typing import TYPE_CHECKING, Any
+
+from access_av.tables.toml import shipped
+
+if TYPE_CHECKING:
+    from collections.abc import Mapping
+
+KWH_IN_J = 3.6e6
+
+
+@dataclass(frozen=True)
+class Range:
+    """A quantity with its low, central and high value."""
+
+    low: float
+    central: float
+    high: float
+
+    @classmethod
+    def read(cls, entry: Mapping[str, float]) -> Range:
+        """Take the three values out of a fact."""
+        return cls(float(entry["low"]), float(entry["central"]), float(entry["high"]))
+
+    def scaled(self, factor: float) -> Range:
+        """All three values times a factor."""
+        return Range(self.low * factor, self.central * factor, self.high * factor)
+
+    def plus(self, other: Range) -> Range:
+        """The sum, end by end."""
+        return Range(self.low + other.low, self.central + other.central, self.high + other.high)
+
+    def minus(self, other: Range) -> Range:
+        """The difference: least minus most is its low end, most minus least its high one."""
+        return Range(self.low - other.high, self.central - other.central, self.high - other.low)
+
+    def times(self, other: Range) -> Range:
+        """Low times low, central times central, high times high."""
+        return Range(self.low * other.low, self.central * other.central, self.high * other.high)
+
+
+@dataclass(frozen=True)
+class Footprint:
+    """Emissions of equipment over its lifetime, in kgCO2e."""
+
+    embodied_kg: Range
+    use_kg: Range
+    source: str
+
+
+def grids() -> dict[str, float]:
+    """Carbon intensity of electricity by region, in gCO2e per kWh, lowest first."""
+    table = {k: float(v) for k, v in _facts()["grid"].items() if k != "source"}
+    return dict(sorted(table.items(), key=lambda item: item[1]))
+
+
+def footprint(thing: str, units: int, grid: str) -> Footprint:
+    """Lifetime footprint of a number of ``"roadside_unit"`` or ``"onboard_box"``.
+
+    Raises
+    ------
+    KeyError
+        When the thing is unknown, or the grid is not one of :func:`grids`.
+
+    Examples
+    --------
+    >>> round(footprint("onboard_box", 1, "germany").use_kg.central, 1)
+    133.5
+    """
+    entry = _facts()["things"][thing]
+    use_wh = Range.read(entry["power_w"]).times(Range.read(entry["lifetime_h"]))
+    return Footprint(
+        embodied_kg=Range.read(entry["embodied_kg"]).scaled(units),
+        use_kg=use_wh.scaled(units * grids()[grid] / 1e6),
+        source=(
+            f"Embodied: {entry['embodied_source']}. Power: {entry['power_source']}. "
+            f"Lifetime: {entry['lifetime_source']}."
+        ),
+    )
+
+
+def use_kg_per_year(energy_j_per_day: float, grid: str) -> float:
+    """Emissions of an energy per day, in a year, in kgCO2e.
+
+    Examples
+    --------
+    >>> use_kg_per_year(KWH_IN_J, "germany")
+    139.065
+    """
+    return energy_j_per_day * 365.0 / KWH_IN_J * grids()[grid] / 1e3
+
+
+def grid_source() -> str:
+    """Where :func:`grids` has its values from."""
+    return str(_facts()["grid"]["source"])
+
+
+def _facts() -> dict[str, Any]:
+    return shipped("economics", "carbon.toml")

@@ -1,0 +1,91 @@
+"""What the approach saves in money: roadside units, sensors, energy per day and per fleet."""
+
+from __future__ import annotations
+
+from dataclasses import dataclass
+from typing import Any
+
+from access_av.tables.toml import shipped
+
+
+@dataclass(frozen=True)
+class RoadsideUnitCost:
+    """Cost of roadside units that the 5G radio heads make unnecessary, in US dollars."""
+
+    units: int
+    capital_low_usd: float
+    capital_high_usd: float
+    yearly_usd: float
+    source: str
+
+    def total_usd(self, years: float) -> tuple[float, float]:
+        """Low and high cost over a number of years, without discounting."""
+        running = self.yearly_usd * years
+        return self.capital_low_usd + running, self.capital_high_usd + running
+
+
+def roadside_units(units: int) -> RoadsideUnitCost:
+    """Cost of a number of roadside units.
+
+    Examples
+    --------
+    >>> roadside_units(4).capital_low_usd
+    52000.0
+    """
+    entry = shipped("economics", "cost.toml")["roadside_unit"]
+    return RoadsideUnitCost(
+        units=units,
+        capital_low_usd=float(units * entry["capital_usd"]["low"]),
+        capital_high_usd=float(units * entry["capital_usd"]["high"]),
+        yearly_usd=float(units * entry["yearly_usd"]),
+        source=entry["source"],
+    )
+
+
+def sensors() -> list[dict[str, Any]]:
+    """Sensors with ``name``, ``price_usd`` and ``source``: a LiDAR and a 5G adapter."""
+    return list(shipped("economics", "cost.toml")["sensor"])
+
+
+def sensor_cost_ratio() -> float:
+    """How many 5G adapters one LiDAR costs."""
+    lidar, adapter = sensors()
+    return float(lidar["price_usd"] / adapter["price_usd"])
+
+
+@dataclass(frozen=True)
+class Saving:
+    """Energy that one way of driving saves against another, trip by trip.
+
+    Attributes
+    ----------
+    per_trip_j
+        Energy saved in one trip.
+    trip_s
+        Duration of the trip.
+    duty
+        Share of the day that is driven, trip after trip.
+
+    Examples
+    --------
+    >>> round(Saving(per_trip_j=100.0, trip_s=86.4, duty=0.5).fleet_per_day_mj(vehicles=100), 9)
+    5.0
+    """
+
+    per_trip_j: float
+    trip_s: float
+    duty: float = 1.0
+
+    @property
+    def trips_per_day(self) -> float:
+        """Trips of one vehicle in 24 hours."""
+        return 86_400.0 * self.duty / self.trip_s
+
+    @property
+    def per_day_kj(self) -> float:
+        """One vehicle, 24 hours."""
+        return self.per_trip_j * self.trips_per_day / 1e3
+
+    def fleet_per_day_mj(self, vehicles: int) -> float:
+        """A fleet, 24 hours."""
+        return self.per_day_kj * vehicles / 1e3

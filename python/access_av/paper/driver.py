@@ -1,0 +1,144 @@
+"""Drives of one setting after another, each simulated once."""
+
+from __future__ import annotations
+
+from dataclasses import dataclass, field, replace
+from typing import TYPE_CHECKING, Any
+
+import numpy as np
+import polars as pl
+
+from access_av._core import Tapes
+from access_av.paper.outcome import EVERY, Drives, Numbers, resamples
+from access_av.paper.statements import METHODS
+from access_av.run.service_levels import INDEPENDENT_S
+from access_av.run.simulation import Simulation, simulate
+from access_av.statistics.percentiles import percentiles
+
+if TYPE_CHECKING:
+    from collections.abc import Callable
+
+    from numpy.typing import NDArray
+
+    from access_av._core import Scenario
+    from access_av.device.platform import Platform
+    from access_av.statistics.percentiles import Percentile
+
+RESAMPLES = 200
+# Of the errors that are kept, every so many count for percentiles: half a second lies between them.
+SPARSE = 5
+# What every world is driven by: the paper's methods.
+TAPED = tuple(method.replace("_", "-") for method in METHODS)
+
+
+@dataclass(frozen=True)
+class Driven:
+    """A setting's drives, their statistics at each SSB, and some of their horizontal errors."""
+
+    drives: Drives
+    steps: pl.DataFrame
+    error_m: NDArray[np.float32]
+
+    def percentiles(self) -> list[Percentile]:
+        """Percentiles of the horizontal error, over all runs and times."""
+        driven_s = len(self.error_m) * float(self.steps["time_s"][-1])
+        independent = max(1, int(driven_s / INDEPENDENT_S))
+        return percentiles(self.error_m, independent=independent, resamples=RESAMPLES)
+
+
+@dataclass
+class Driver:
+    """Simulates settings on one platform with one seed, and remembers what it has driven."""
+
+    platform: Platform
+    runs: int
+    seed: int
+    threads: int | None = None
+    count: int = RESAMPLES
+    progress: Callable[[int, int], None] | None = None
+    planned: int = 0
+    methods: tuple[str, ...] = TAPED
+    known: dict[str, Driven] = field(default_factory=dict)
+    tapes: list[Tapes] = field(default_factory=list)
+
+    @property
+    def trip_s(self) -> float:
+        """Duration of the trip that was driven."""
+        steps = next(iter(self.known.values())).steps
+        return float(steps.select(pl.col("time_s").max()).item())
+
+    def drive(self, scenario: Scenario) -> Driven:
+        """Many drives of a scenario, from memory where another one is the same but for its name."""
+        first_mode = self.platform.modes[0].number
+        # A power mode acts by its base wake-up time, which is written out here.
+        scenario = scenario.resolved(self.platform.core).with_overrides(
+            {"name": "drive", "description": "", "vehicle.platform.mode": first_mode}
+        )
+        key = scenario.to_toml()
+        if key not in self.known:
+            self.known[key] = self._drive(scenario)
+            if self.progress is not None:
+                done = len(self.known) * self.runs
+                self.progress(done, max(done, self.planned * self.runs))
+        return self.known[key]
+
+    def _simulate(self, scenario: Scenario) -> Simulation:
+        """From tape, so that a world's angles are estimated once for all policies in it."""
+        core, threads = self.platform.core, self.threads
+        serving = [it for it in self.tapes if it.serve(scenario, platform=core)]
+        if not serving:
+            made = Tapes.record(
+                scenario,
+                self.runs,
+                self.seed,
+                methods=list(self.methods),
+                platform=core,
+                threads=threads,
+            )
+            serving = [it for it in [made] if it and it.serve(scenario, platform=core)]
+            # A tape takes 100 MB: the first world, which most readings are in, and the latest stay.
+            self.tapes = [*self.tapes[:1], *serving]
+        if not serving:
+            return simulate(
+                scenario,
+                runs=self.runs,
+                seed=self.seed,
+                platform=self.platform,
+                threads=threads,
+                errors_every=EVERY,
+            )
+        found = serving[0].simulate(scenario, platform=core, threads=threads, errors_every=EVERY)
+        return Simulation.of(found)
+
+    def _drive(self, scenario: Scenario) -> Driven:
+        found = self._simulate(scenario)
+        assert found.errors_m is not None
+        weights = self._weights()
+        drives = Drives.of_runs(
+            found.runs["executions"].to_numpy().astype(np.float64), found.errors_m, weights
+        )
+        # The sample as it is, at every SSB.
+        exact: dict[str, Any] = {}
+        for axis in "xy":
+            worst_m = getattr(drives, f"worst_{axis}_m").copy()
+            worst_m[0] = found.steps[f"mean_abs_error_{axis}_m"].max()
+            exact[f"worst_{axis}_m"] = worst_m
+        rms_m = drives.rms_error_m.copy()
+        rms_m[0] = found.rms_error_m
+        besides_j = found.runs.select(
+            (pl.col("energy_j") - pl.col("energy_executions_j")).mean()
+        ).item()
+        return Driven(
+            replace(
+                drives,
+                **exact,
+                rms_error_m=rms_m,
+                longest_gap_s=float(found.runs.select(pl.col("longest_gap_s").max()).item()),
+                besides_j=besides_j or 0.0,
+            ),
+            found.steps,
+            np.hypot(*np.moveaxis(found.errors_m[:, ::SPARSE], -1, 0)),
+        )
+
+    def _weights(self) -> Numbers:
+        return resamples(self.runs, self.count)

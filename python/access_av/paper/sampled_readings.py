@@ -1,0 +1,352 @@
+"""Many readings of the paper, drawn from what it leaves open and judged by its claims.
+
+Worlds are drawn first, and several controllers for each: the fixed campaigns are driven once a
+world. A world with its controllers is one part on disk, so that a search that was stopped goes on.
+"""
+
+from __future__ import annotations
+
+import json
+from dataclasses import dataclass, replace
+from typing import TYPE_CHECKING, Any
+
+import numpy as np
+
+from access_av import _core
+from access_av._core import Scenario
+from access_av.device.platform import Platform
+from access_av.paper.claims import margins
+from access_av.paper.driver import Driver
+from access_av.paper.evaluation import Case, cases, outcome_of
+from access_av.paper.open_choices import (
+    CONTROLLER,
+    GATE,
+    OPEN_CONTROLLER,
+    OPEN_WORLD,
+    SHIPPED_WORLD,
+    WORLD,
+    Dimension,
+    controller_changes,
+    latin_hypercube,
+    named,
+    world_changes,
+)
+from access_av.paper.outcome import Drives, Numbers
+from access_av.paper.readings import OPEN, Reading
+from access_av.paper.statements import stated_claims
+from access_av.run.campaign import Shard, Task
+
+if TYPE_CHECKING:
+    from collections.abc import Callable, Mapping, Sequence
+
+    from access_av.run.campaign import Campaign
+
+
+@dataclass(frozen=True)
+class Sample:
+    """Readings and how they do by the claims.
+
+    Attributes
+    ----------
+    dimensions
+        What was drawn.
+    coordinates
+        One row per reading, from 0 to 1.
+    world
+        Which world each reading is in.
+    margins
+        Of each claim, in the readings' order.
+    longest_gap_s
+        Longest time between two estimates in any mode.
+    executions
+        Of adaptive MUSIC in the platform's first mode.
+    worst_error_m
+        Worst error of adaptive MUSIC in any mode.
+    """
+
+    dimensions: tuple[Dimension, ...]
+    coordinates: Numbers
+    world: Numbers
+    margins: Mapping[str, Numbers]
+    longest_gap_s: Numbers
+    executions: Numbers
+    worst_error_m: Numbers
+
+    def held(self) -> Numbers:
+        """How many claims each reading meets."""
+        held = [margin >= 0.0 for margin in self.margins.values()]
+        return np.asarray(np.sum(held, axis=0), dtype=np.float64)
+
+    def best(self) -> list[int]:
+        """Readings in order: most claims first, of those the ones that miss the rest by least."""
+        short = np.sum([np.clip(margin, -1.0, 0.0) for margin in self.margins.values()], axis=0)
+        return [int(index) for index in np.lexsort((-short, -self.held()))]
+
+    def values(self, index: int) -> dict[str, Any]:
+        """What was drawn for a reading."""
+        return named(self.dimensions, self.coordinates[index].tolist())
+
+
+def sample(
+    campaign: Campaign,
+    platform: Platform,
+    *,
+    worlds: int,
+    controllers: int,
+    runs: int,
+    seed: int = 1,
+    everything: bool = False,
+    progress: Callable[[int, int], None] | None = None,
+) -> Sample | None:
+    """Draw readings, and judge each by the paper's claims.
+
+    Parameters
+    ----------
+    campaign
+        Who judges, and where each world with its controllers is kept.
+    worlds, controllers
+        How many worlds, and how many controllers in each.
+    runs
+        Drives per setting.
+    everything
+        Whether all that the paper leaves open is drawn, a gate and a real head's power included;
+        without, it is Algorithm 1 without a gate in worlds like the shipped one, which comes first.
+    progress
+        Called as ``progress(done, total)`` with numbers of worlds.
+
+    Returns
+    -------
+    Sample
+        ``None`` where parts are missing that another shard computes.
+    """
+    own = (*OPEN_CONTROLLER, GATE) if everything else CONTROLLER
+    world = OPEN_WORLD if everything else WORLD
+    world_points = latin_hypercube(worlds, len(world), seed)
+    if not everything:
+        world_points[0] = SHIPPED_WORLD
+    own_points = latin_hypercube(worlds * controllers, len(own), seed + 1)
+    own_points = own_points.reshape(worlds, controllers, len(own))
+    tasks = [
+        _task(
+            platform,
+            named(world, world_points[index].tolist()),
+            [named(own, point) for point in own_points[index].tolist()],
+            runs,
+            seed,
+        )
+        for index in range(worlds)
+    ]
+    parts = campaign.run(tasks, progress)
+    found = [part for part in parts if part is not None]
+    if len(found) < len(parts):
+        return None
+    repeated = np.repeat(world_points, controllers, axis=0)
+    return Sample(
+        dimensions=(*world, *own),
+        coordinates=np.hstack([repeated, own_points.reshape(-1, len(own))]),
+        world=np.repeat(np.arange(worlds), controllers),
+        margins={
+            name: np.concatenate([part[name] for part in found])
+            for name in found[0]
+            if name in stated_claims()
+        },
+        **{
+            name: np.concatenate([part[name] for part in found])
+            for name in ("longest_gap_s", "executions", "worst_error_m")
+        },
+    )
+
+
+def _task(
+    platform: Platform,
+    world: Mapping[str, Any],
+    controllers: Sequence[Mapping[str, Any]],
+    runs: int,
+    seed: int,
+) -> Task:
+    """A part: several controllers in one world."""
+    board = platform.to_toml()
+    return Task(
+        depends_on={
+            "world": world,
+            "controllers": controllers,
+            "runs": runs,
+            "seed": seed,
+            "platform": board,
+            "scenario": Scenario.load("paper").to_toml(),
+            "claims": {name: _rule(entry) for name, entry in stated_claims().items()},
+        },
+        work=judge,
+        arguments=(board, world, controllers, runs, seed),
+    )
+
+
+def _rule(entry: Mapping[str, Any]) -> dict[str, Any]:
+    """What of a claim decides its margin."""
+    return {key: entry.get(key) for key in ("rule", "stated", "tolerance", "query")}
+
+
+def judge(
+    board: str,
+    world: Mapping[str, Any],
+    controllers: Sequence[Mapping[str, Any]],
+    runs: int,
+    seed: int,
+) -> dict[str, Numbers]:
+    """Margins of all claims, and the longest gap, of several controllers in one world.
+
+    ``board`` is the platform as TOML: it may come from another machine. On one thread.
+    """
+    platform = Platform(_core.Platform.from_toml(board))
+    driver = Driver(platform, runs, seed, threads=1, count=0)
+    clock = {"vehicle.wake_up.due.serving_ssb": world.get("serving_ssb", "first-after")}
+    paper = Scenario.load("paper").with_overrides(world_changes(world) | clock)
+    scenarios = [paper.with_overrides(controller_changes(point, world)) for point in controllers]
+    drives: list[tuple[Case, Drives]] = []
+    for case in cases(platform):
+        if case.setting.adaptive and case.mode is not None:
+            mode = {"vehicle.platform.mode": case.mode.number}
+            each = [
+                driver.drive(case.setting.apply(scenario).with_overrides(mode)).drives
+                for scenario in scenarios
+            ]
+            drives.append((case, _side_by_side(each)))
+        else:
+            drives.append((case, driver.drive(case.setting.apply(paper)).drives))
+    outcome, _ = outcome_of(drives, platform, driver.trip_s, fit_each=True)
+    gaps_s = [np.atleast_1d(each.longest_gap_s) for each in outcome.adaptive.values()]
+    count = len(controllers)
+    first = outcome.adaptive[platform.modes[0].number]
+    return {
+        "longest_gap_s": np.max(gaps_s, axis=0),
+        "executions": first.executions,
+        "worst_error_m": np.max([each.worst_m for each in outcome.adaptive.values()], axis=0),
+        **{name: np.broadcast_to(margin, count) for name, margin in margins(outcome).items()},
+    }
+
+
+def _side_by_side(readings: list[Drives]) -> Drives:
+    """One setting under several readings, as variants."""
+
+    def joined(name: str) -> Any:
+        return np.concatenate([np.atleast_1d(getattr(each, name)) for each in readings])
+
+    return Drives(
+        **{
+            name: joined(name)
+            for name in ("executions", "worst_x_m", "worst_y_m", "rms_error_m", "horizontal_m")
+        },
+        longest_gap_s=joined("longest_gap_s"),
+    )
+
+
+def as_reading(values: Mapping[str, Any], name: str = "found") -> Reading:
+    """What was drawn, as a reading."""
+    scenario = Scenario.from_toml(as_toml(values, name))
+    return Reading(name, "Found by the search", scenario, OPEN, keeps_t_max=True)
+
+
+def as_toml(values: Mapping[str, Any], name: str = "found") -> str:
+    """What was drawn, as a file of a reading: laid over the paper's scenario."""
+    [head] = json.loads(Scenario.load("paper").to_json())["site"]["radio_heads"]
+    tables: dict[str, dict[str, Any]] = {"site": {}, "site.radio_heads": {}, "vehicle": {}}
+    changes = world_changes(values) | controller_changes(values, values)
+    for path, value in changes.items():
+        table, _, key = path.rpartition(".")
+        if isinstance(value, dict):
+            table, key = path, ""
+        tables.setdefault(table.replace("[0]", ""), {}).update({key: value} if key else value)
+    tables["vehicle"] = {"like": "paper", **tables["vehicle"]}
+    kept = ("name", "position_m", "pci")
+    tables["site.radio_heads"] = {it: head[it] for it in kept} | tables["site.radio_heads"]
+    lines = ['like = "paper"', f'name = "{name}"', 'description = "Found by access-av search"']
+    for table, entries in tables.items():
+        lines += ["", f"[[{table}]]" if table == "site.radio_heads" else f"[{table}]"]
+        lines += [f"{key} = {_toml(value)}" for key, value in entries.items()]
+    return "\n".join(lines) + "\n"
+
+
+def _toml(value: Any) -> str:
+    if isinstance(value, dict):
+        return "{ " + ", ".join(f"{key} = {_toml(each)}" for key, each in value.items()) + " }"
+    return json.dumps(value)
+
+
+# How many of the best are driven again: with few runs, the best of many owes some to luck.
+CANDIDATES = 8
+
+
+@dataclass(frozen=True)
+class Confirmed:
+    """A reading that was driven again.
+
+    Attributes
+    ----------
+    label
+        Its place in the search, or what was moved to be beside the best one.
+    held
+        How many claims it meets.
+    missed
+        Ids of the others.
+    """
+
+    label: str
+    values: Mapping[str, Any]
+    held: int
+    missed: list[str]
+
+
+def confirmed(
+    campaign: Campaign, platform: Platform, found: Sample, *, runs: int, seed: int
+) -> list[Confirmed]:
+    """Drive the best readings again, and then the neighbours of the one that remains the best.
+
+    A neighbour differs by a tenth of a controller's dimension, or by another choice. The one that
+    meets most claims comes first; of several, the one that the search had first.
+    """
+    whole = replace(campaign, shard=Shard())
+
+    def again(worlds: Sequence[Mapping[str, Mapping[str, Any]]]) -> list[list[Confirmed]]:
+        tasks = []
+        for labelled in worlds:
+            [*points] = labelled.values()
+            world = {dimension.name: points[0][dimension.name] for dimension in WORLD}
+            task = _task(platform, world, points, runs, seed)
+            tasks.append(replace(task, depends_on={**task.depends_on, "confirmed": True}))
+        return [
+            [
+                Confirmed(
+                    label=label,
+                    values=values,
+                    held=sum(bool(part[name][index] >= 0.0) for name in found.margins),
+                    missed=[name for name in found.margins if part[name][index] < 0.0],
+                )
+                for index, (label, values) in enumerate(labelled.items())
+            ]
+            for labelled, part in zip(worlds, whole.run(tasks), strict=True)
+            if part is not None
+        ]
+
+    best = found.best()[:CANDIDATES]
+    candidates = [
+        {f"number {place} of the search": found.values(index)}
+        for place, index in enumerate(best, start=1)
+    ]
+    driven = [one for [one] in again(candidates)]
+    index, first = max(zip(best, driven, strict=True), key=lambda item: item[1].held)
+    [beside] = again([_neighbours(found, index)])
+    rest = [one for one in driven if one is not first]
+    return [first, *sorted(beside + rest, key=lambda each: -each.held)]
+
+
+def _neighbours(found: Sample, index: int) -> dict[str, dict[str, Any]]:
+    start = found.coordinates[index]
+    neighbours = {}
+    for d, dimension in enumerate(found.dimensions):
+        if dimension in CONTROLLER:
+            there = start.copy()
+            step = 1.0 / len(dimension.choices) if dimension.choices else 0.1
+            there[d] += step if start[d] < 0.5 else -step
+            values = named(found.dimensions, there.tolist())
+            neighbours[f"beside it, {dimension.label}: {values[dimension.name]}"] = values
+    return neighbours

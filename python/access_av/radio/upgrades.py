@@ -1,0 +1,180 @@
+"""What would bring a site and a vehicle to the next positioning service level of 3GPP."""
+
+from __future__ import annotations
+
+import json
+from concurrent.futures import ThreadPoolExecutor
+from dataclasses import dataclass
+from typing import TYPE_CHECKING, Any
+
+from access_av import _core
+from access_av.run import service_levels
+from access_av.run.error_bound import along_route
+
+if TYPE_CHECKING:
+    import numpy as np
+    import polars as pl
+    from numpy.typing import NDArray
+
+    from access_av.radio.placement import Plan
+
+SHORTEST_PERIOD_MS = 5.0  # TS 38.331, ssb-periodicityServingCell
+MOST_ANTENNAS = 8  # of the bound
+
+
+@dataclass(frozen=True)
+class Change:
+    """One thing made better.
+
+    Attributes
+    ----------
+    what
+        In words.
+    share
+        Share of positions within the level's accuracy that the bound then allows.
+    reaches
+        Whether that is enough.
+    """
+
+    what: str
+    share: float
+    reaches: bool
+
+
+@dataclass(frozen=True)
+class NextLevel:
+    """The lowest level that the bound does not allow, and what would change that.
+
+    Attributes
+    ----------
+    level
+        The level.
+    share
+        Share of positions within its accuracy that the bound allows.
+    short_share
+        Share of the route where that is less than the level asks.
+    weakest_along_m, weakest_x_m, weakest_y_m
+        Where it is least: distance along the route, and place.
+    changes
+        Each by itself, from what is a setting of the cells to what has to be bought and mounted.
+    """
+
+    level: service_levels.Level
+    share: float
+    short_share: float
+    weakest_along_m: float
+    weakest_x_m: float
+    weakest_y_m: float
+    changes: list[Change]
+
+    @property
+    def cheapest(self) -> Change | None:
+        """The first change that is enough by itself."""
+        return next((change for change in self.changes if change.reaches), None)
+
+    def in_words(self) -> str:
+        """Where it falls short, and the cheapest change."""
+        cheapest = self.cheapest.what if self.cheapest else "none alone is enough"
+        return (
+            f"As it is, the site falls short of level {self.level.name} on {self.short_share:.1%} "
+            f"of the route, most of all {self.weakest_along_m:.0f} m along, at "
+            f"({self.weakest_x_m:.0f}, {self.weakest_y_m:.0f}) m. What mends that and is usually "
+            f"the cheapest: {cheapest}."
+        )
+
+    def as_record(self) -> dict[str, Any]:
+        """Plain values for JSON."""
+        return {
+            "level": self.level.name,
+            "share": self.share,
+            "short_share": self.short_share,
+            "weakest_along_m": self.weakest_along_m,
+            "weakest_m": [self.weakest_x_m, self.weakest_y_m],
+            "changes": [vars(change) for change in self.changes],
+            "cheapest": self.cheapest.what if self.cheapest else None,
+        }
+
+
+def next_level(scenario: _core.Scenario | str, planned: Plan | None = None) -> NextLevel | None:
+    """What would bring a scenario to the next service level.
+
+    Tried are, each by itself: SSBs twice as often, an odometer with half the errors, twice the
+    antennas, and the radio heads of a plan where there is one. The order is that of their usual
+    cost, which is assumed.
+
+    Parameters
+    ----------
+    scenario
+        A scenario, or the name or path of one.
+    planned
+        Radio heads to add to it.
+
+    Returns
+    -------
+    NextLevel or None
+        ``None`` where the bound allows every level.
+
+    Examples
+    --------
+    >>> from access_av.radio.placement import plan
+    >>> found = next_level("yard", plan("yard"))
+    >>> found.level.name, found.cheapest.what
+    ('5', '8 antennas')
+    """
+    if not isinstance(scenario, _core.Scenario):
+        scenario = _core.Scenario.load(scenario)
+    route = along_route(scenario)
+    verdicts = service_levels.of_bound(route["along_std_m"], route["across_std_m"])
+    missed = next((verdict for verdict in verdicts if not verdict.reached), None)
+    if missed is None:
+        return None
+    level = missed.level
+    tried = {
+        what: scenario.with_overrides(settings) for what, settings in _settings(scenario).items()
+    }
+
+    def share(one: _core.Scenario) -> float:
+        return float(_within(along_route(one), level).mean())
+
+    with ThreadPoolExecutor() as pool:
+        shares = dict(zip(tried, pool.map(share, tried.values()), strict=True))
+    if planned is not None:
+        heads = f"a radio head at {planned.chosen[0]}"
+        if len(planned.chosen) > 1:
+            heads = f"radio heads at {' and '.join(planned.chosen)}"
+        with_heads = (verdict.share for verdict in planned.verdicts if verdict.level == level)
+        shares[heads] = next(with_heads)
+    near = _within(route, level)
+    weakest = route.row(int(near.argmin()), named=True)
+    return NextLevel(
+        level=level,
+        share=missed.share,
+        short_share=float((near < level.availability).mean()),
+        weakest_along_m=weakest["along_m"],
+        weakest_x_m=weakest["x_m"],
+        weakest_y_m=weakest["y_m"],
+        changes=[
+            Change(what, share, share >= level.availability) for what, share in shares.items()
+        ],
+    )
+
+
+def _settings(scenario: _core.Scenario) -> dict[str, dict[str, Any]]:
+    """Changes in words, and the settings that make them."""
+    site, vehicle = (json.loads(part.to_json()) for part in (scenario.site, scenario.vehicle))
+    made = {}
+    period_ms = site["ssb"]["period_ms"] / 2.0
+    if period_ms >= SHORTEST_PERIOD_MS:
+        made[f"SSBs every {period_ms:g} ms"] = {"site.ssb.period_ms": period_ms}
+    made["half the odometer's errors"] = {
+        f"vehicle.odometer.{key}": 0.5 * vehicle["odometer"][key]
+        for key in ("scale_std", "noise_m_per_sqrt_m", "noise_m_per_sqrt_s")
+    }
+    antennas = 2 * vehicle["array"]["elements"]
+    if antennas <= MOST_ANTENNAS and "shape" not in vehicle["array"]:
+        made[f"{antennas} antennas"] = {"vehicle.array.elements": antennas}
+    return made
+
+
+def _within(route: pl.DataFrame, level: service_levels.Level) -> NDArray[np.float64]:
+    return service_levels.within(route["along_std_m"], route["across_std_m"], level.accuracy_m)

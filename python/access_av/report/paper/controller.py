@@ -1,0 +1,218 @@
+"""The report's sections on what the controller contributes, and on ours beside it."""
+
+from __future__ import annotations
+
+from html import escape
+from typing import TYPE_CHECKING
+
+import altair as alt
+import polars as pl
+
+from access_av.paper import summary
+from access_av.report.chart import BLUE, GREEN, GREY, ORANGE, PURPLE, finish
+from access_av.report.parts import badge, figure, table
+from access_av.tables.numbers import number
+
+if TYPE_CHECKING:
+    from access_av.paper.study import Study
+    from access_av.report.chart import Spec
+
+FIXED, READING, CONSTANT, OURS = "fixed interval", "reading", "constant instead", "ours"
+
+
+def contribution(study: Study, specs: dict[str, Spec]) -> str:
+    """Each reading with its controller and with a constant, and the front of fixed intervals."""
+    specs["ablation"] = _gain_chart(study)
+    specs["front"] = _front_chart(study)
+    titles = {each.reading.name: each.reading.title for each in study.evaluations}
+    rows = [
+        (
+            escape(titles[each.reading]),
+            str(each.mode),
+            f"{each.executions:.0f}",
+            f"{each.constant_executions:.0f} at {each.constant_ms:.0f} ms",
+            number(each.rms_error_m),
+            number(each.constant_rms_m),
+            f"{each.gain_m:+.3f} ({each.gain_low_m:+.3f} … {each.gain_high_m:+.3f})",
+            badge(
+                ("harms", "no difference", "helps")[each.matters + 1],
+                ("no", "fit", "yes")[each.matters + 1],
+            ),
+        )
+        for each in study.ablations
+    ]
+    head = (
+        "Reading",
+        "Mode",
+        "Executions",
+        "Constant: executions",
+        "RMS / m",
+        "Constant: RMS / m",
+        "Gain / m (95 %)",
+        "Algorithm 1",
+    )
+    details = table(head, rows, numbers=(1, 2, 4, 5))
+    return (
+        '<div class="charts">'
+        + figure("ablation", "RMS error with the constant less RMS error with Algorithm 1, same "
+                 "runs; right of zero it helps. Lines are paired 95 % intervals.",
+                 "Algorithm 1 against a constant of as many executions")
+        + figure("front", "Down and left is better. The line is MUSIC at fixed intervals.",
+                 "Error against executions")
+        + f"</div><details><summary>Every reading and mode as a table</summary>{details}</details>"
+    )  # fmt: skip
+
+
+def fair(study: Study) -> str:
+    """The shipped reading and ours, told the same."""
+    names = {
+        "paper": "the paper's reading",
+        "ours": "ours",
+        "one angle": "ours with one angle, at the start",
+        "bound": "bound: no localizer is better, with an angle at every SSB",
+    }
+    rows = [
+        (
+            "0.3 %, 1 cm/√m; start 0.1 m, 0.02 rad" if each.real_odometer else "exact, exact start",
+            "known" if each.knows_road else "not known",
+            names[each.who],
+            f"{each.executions:.0f}",
+            f"{each.rms_m:.4f}" if each.rms_m < 0.01 else f"{each.rms_m:.3f}",
+            f"{each.rms_low_m:.3f} … {each.rms_high_m:.3f}" if each.who != "bound" else "–",
+            number(each.worst_m),
+        )
+        for each in study.fair
+    ]
+    head = ("Odometer", "Road", "Who", "Executions", "RMS / m", "95 %", "Worst / m")
+    return f"<p>{escape(summary.fair_text(study))}</p>" + table(head, rows, numbers=(3, 4, 6))
+
+
+def ours(study: Study) -> str:
+    """Ours beside the paper's adaptive point in each mode."""
+    rows = [
+        (
+            str(each.mode) if each.map else f"{each.mode}, road unknown",
+            f"{each.executions:.0f} / {each.papers_executions:.0f}",
+            f"{number(each.energy_j, 1)} / {number(each.papers_energy_j, 1)}",
+            f"{each.worst_error_m:.3f} / {each.papers_worst_m:.3f}",
+            f"{each.rms_error_m:.3f} / {each.papers_rms_m:.3f}",
+            f"{each.error_less_m:+.3f} ({each.error_less_low_m:+.3f} … "
+            f"{each.error_less_high_m:+.3f})",
+            badge("better in both", "yes") if each.is_better else badge("not in both", "no"),
+        )
+        for each in study.ours
+    ]
+    head = (
+        "Mode",
+        "Executions, ours / paper's",
+        "Energy / J",
+        "Worst error / m",
+        "RMS / m",
+        "RMS less by / m (95 %)",
+        "Ours",
+    )
+    return f"<p>{escape(summary.ours_text(study))}</p>" + table(head, rows)
+
+
+def _gain_chart(study: Study) -> Spec:
+    titles = {each.reading.name: each.reading.title for each in study.evaluations}
+    rows = pl.DataFrame(
+        [
+            {
+                "reading": titles[each.reading],
+                "mode": each.mode,
+                "gain": each.gain_m,
+                "low": each.gain_low_m,
+                "high": each.gain_high_m,
+                "what": ("harms", "no difference", "helps")[each.matters + 1],
+            }
+            for each in study.ablations
+        ]
+    ).with_columns(pl.col(pl.Float64).round(4))
+    order = [each.reading.title for each in study.evaluations]
+    base = alt.Chart(rows).encode(
+        y=alt.Y("reading:N", sort=order, title=None, axis=alt.Axis(labelLimit=190)),
+        yOffset=alt.YOffset("mode:N"),
+        color=alt.Color(
+            "what:N",
+            scale=alt.Scale(
+                domain=["helps", "no difference", "harms"], range=[GREEN, GREY, ORANGE]
+            ),
+            legend=alt.Legend(title=None, orient="top"),
+        ),
+        tooltip=["reading:N", "mode:O", "gain:Q", "low:Q", "high:Q"],
+    )
+    scale = alt.Scale(type="symlog", constant=0.05)
+    span = base.mark_rule(strokeWidth=2).encode(
+        x=alt.X("low:Q", title="gain in RMS error / m", scale=scale), x2="high:Q"
+    )
+    dots = base.mark_circle(size=40).encode(x="gain:Q")
+    zero = alt.Chart(pl.DataFrame({"zero": [0.0]})).mark_rule(strokeDash=[4, 3]).encode(x="zero:Q")
+    return finish(
+        zero + span + dots,
+        height=34 * len(order) + 60,
+        description="What Algorithm 1 gains in RMS error over a constant, by reading and mode",
+    )
+
+
+def _front_chart(study: Study) -> Spec:
+    shown = study.shown.reading.name
+    rows = [
+        {"what": FIXED, "executions": float(drives.executions[0]),
+         "rms": float(drives.rms_error_m[0]), "name": f"{interval_ms:g} ms"}
+        for interval_ms, drives in study.front
+    ]  # fmt: skip
+    for each in study.evaluations:
+        if (
+            each.outcome.every_ssb["music"].rms_error_m[0]
+            != (study.shown.outcome.every_ssb["music"].rms_error_m[0])
+        ):
+            continue  # in another world
+        rows += [
+            {"what": READING, "executions": float(drives.executions[0]),
+             "rms": float(drives.rms_error_m[0]), "name": f"{each.reading.title}, mode {mode}"}
+            for mode, drives in each.outcome.adaptive.items()
+        ]  # fmt: skip
+    rows += [
+        {"what": CONSTANT, "executions": each.constant_executions, "rms": each.constant_rms_m,
+         "name": f"constant {each.constant_ms:.0f} ms in {each.reading}"}
+        for each in study.ablations if each.reading == shown
+    ]  # fmt: skip
+    rows += [
+        {"what": OURS, "executions": each.executions, "rms": each.rms_error_m,
+         "name": f"ours, mode {each.mode}" + ("" if each.map else ", road unknown")}
+        for each in study.ours
+    ]  # fmt: skip
+    points = pl.DataFrame(rows).with_columns(pl.col(pl.Float64).round(4))
+    x = alt.X("executions:Q", title="executions in a trip", scale=alt.Scale(type="log"))
+    y = alt.Y("rms:Q", title="RMS error / m", scale=alt.Scale(type="log"))
+    names = [FIXED, READING, CONSTANT, OURS]
+    dots = (
+        alt.Chart(points)
+        .mark_point(filled=True, size=60)
+        .encode(
+            x=x,
+            y=y,
+            color=alt.Color(
+                "what:N",
+                scale=alt.Scale(domain=names, range=[GREY, BLUE, ORANGE, GREEN]),
+                legend=alt.Legend(title=None, orient="top"),
+            ),
+            shape=alt.Shape(
+                "what:N",
+                scale=alt.Scale(domain=names),
+                legend=alt.Legend(title=None, orient="top"),
+            ),
+            tooltip=["name:N", "executions:Q", "rms:Q"],
+        )
+    )
+    line = (
+        alt.Chart(points.filter(what=FIXED))
+        .mark_line(color=PURPLE, strokeWidth=1)
+        .encode(x=x, y=y, order="executions:Q")
+    )
+    return finish(
+        line + dots,
+        height=320,
+        description="RMS error against executions: fixed intervals, readings, ours",
+    )

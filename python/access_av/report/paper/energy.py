@@ -1,0 +1,192 @@
+"""The report's section on energy and executions."""
+
+from __future__ import annotations
+
+from html import escape
+from typing import TYPE_CHECKING
+
+import altair as alt
+import polars as pl
+
+from access_av.paper.energy_fit import numbers
+from access_av.paper.findings import MissingFigureError, savings_percent
+from access_av.paper.statements import ADAPTIVE_LABEL, METHODS, paper_numbers
+from access_av.report.chart import finish
+from access_av.report.paper.lines import NAMES, by_mode, scale
+from access_av.report.parts import figure, table
+from access_av.signal.methods import LABELS, label
+from access_av.tables.numbers import number
+
+if TYPE_CHECKING:
+    from access_av.paper.evaluation import Evaluation
+    from access_av.paper.study import Study
+    from access_av.report.chart import Spec
+
+
+def energy_text(evaluation: Evaluation) -> str:
+    """What the energies are, and whose."""
+    free, solved = numbers(evaluation.freedoms)
+    return escape(
+        "Energy of a trip is the number of executions times the energy of one execution. "
+        f"Boundary: {evaluation.platform.energy_boundary}. Bars are ours; diamonds are the "
+        "values the paper states. "
+        + (
+            "Energies per execution were fitted to those and to the paper’s statements about the "
+            f"rest, under each reading anew: {free} numbers are free, {solved} of them solved for "
+            "from stated figures. So agreement here is a check of the executions, not of the power."
+            if evaluation.refitted
+            else "Energies per execution are the platform’s own."
+        )
+        + _missing(evaluation)
+    )
+
+
+def _missing(evaluation: Evaluation) -> str:
+    """Which energies the platform has no figure for."""
+    missing = [
+        f"{label(method)} in mode {mode.number}"
+        for mode in evaluation.platform.modes
+        for method in METHODS
+        if method not in mode.energy_per_execution_j
+    ]
+    return f" The platform has no figure for {', '.join(missing)}." if missing else ""
+
+
+def _savings(evaluation: Evaluation, mode: int) -> float | None:
+    try:
+        savings = savings_percent(evaluation.outcome, mode)
+    except MissingFigureError:
+        return None
+    return sum(float(value[0]) for value in savings.values()) / len(savings)
+
+
+def energy(evaluation: Evaluation, specs: dict[str, Spec]) -> str:
+    """Energy and executions of a trip in each mode."""
+    specs["energy-bars"] = _energy_chart(evaluation)
+    specs["executions"] = _executions_chart(evaluation)
+    bars = figure("energy-bars", title="Energy of a trip")
+    return f'<div class="charts">{bars}{figure("executions", title="Executions in a trip")}</div>'
+
+
+def freedoms(study: Study) -> str:
+    """What each freedom of the energy fit buys."""
+    if not study.bought:
+        return "<p>The platform's energies are its own: nothing was fitted.</p>"
+    titles = {each.reading.name: each.reading.title for each in study.evaluations}
+
+    def named(readings: tuple[str, ...]) -> str:
+        return escape(", ".join(titles[name] for name in readings) or "none")
+
+    rows = [
+        (
+            ("" if index == 0 else "and ")
+            + escape(each.says)
+            + (" <b>(judged by)</b>" if each.is_shipped else ""),
+            f"{each.free} / {each.solved}",
+            f"{each.met} ({each.by_construction} by construction)",
+            number(each.average_saving_percent, 1),
+            named(each.energy),
+            named(each.both),
+        )
+        for index, each in enumerate(study.bought)
+    ]
+    head = (
+        "Free in the fit",
+        "Numbers free / solved for",
+        f"Claims met, “{study.shown.reading.title}”",
+        "Average saving / %",
+        "Energy half kept by",
+        "Both halves kept by",
+    )
+    return table(head, rows)
+
+
+def energy_table(evaluation: Evaluation) -> str:
+    """Energies, savings and executions of each mode."""
+    paper = paper_numbers()["energy_j"]
+    rows = []
+    for mode in evaluation.platform.modes:
+        fixed = evaluation.campaign("Q").filter(pl.col("mode") == mode.number)
+        adaptive = evaluation.campaign("R").filter(pl.col("mode") == mode.number)
+        stated = paper.get(f"adaptive_mode_{mode.number}")
+        rows.append(
+            (
+                f"{mode.number} {escape(mode.name)}",
+                *(number(value, 1) for value in fixed["energy_j"]),
+                number(adaptive["energy_j"].item(), 1) + (f" (paper {stated})" if stated else ""),
+                number(_savings(evaluation, mode.number), 1),
+                number(adaptive["executions"].item(), 0),
+            )
+        )
+    head = (
+        "Mode",
+        *(f"{label(m)} / J" for m in METHODS),
+        "Adaptive / J",
+        "Saved / %",
+        "Executions",
+    )
+    return table(head, rows, numbers=range(1, 7))
+
+
+def _energy_chart(evaluation: Evaluation) -> Spec:
+    """Energy per mode (the paper's energy figure), with the values the paper states as diamonds."""
+    paper = paper_numbers()["energy_j"]
+    stated = [
+        {"mode": 0, "line": LABELS[method], "energy_j": value}
+        for method, value in paper["fixed_mode_0"].items()
+    ]
+    stated += [
+        {"mode": mode, "line": ADAPTIVE_LABEL, "energy_j": paper[f"adaptive_mode_{mode}"]}
+        for mode in (0, 7)
+    ]
+    marks = (
+        alt.Chart(pl.DataFrame(stated))
+        .mark_point(
+            shape="diamond", size=90, filled=True, color="#f5c518", stroke="#222", strokeWidth=1
+        )
+        .encode(
+            x="mode:O",
+            xOffset=alt.XOffset("line:N", sort=NAMES),
+            y="energy_j:Q",
+            tooltip=[
+                alt.Tooltip("line:N", title="the paper, method"),
+                alt.Tooltip("energy_j:Q", title="energy / J"),
+            ],
+        )
+    )
+    bars = _grouped_bars(evaluation, "energy_j", "energy of a trip / J", ".1f")
+    return finish(
+        bars + marks, height=260, description="Energy of one trip per power mode and method"
+    )
+
+
+def _executions_chart(evaluation: Evaluation) -> Spec:
+    """Angle estimates in a trip, per mode."""
+    bars = _grouped_bars(evaluation, "executions", "executions in a trip", ".0f")
+    return finish(
+        bars, height=230, description="Angle estimates in one trip per power mode and method"
+    )
+
+
+def _grouped_bars(evaluation: Evaluation, column: str, title: str, digits: str) -> alt.Chart:
+    table = by_mode(evaluation).select(
+        "mode", "line", pl.col(column).round(4), "base_wake_up_ms", "energy_provenance"
+    )
+    bars: alt.Chart = (
+        alt.Chart(table)
+        .mark_bar(cornerRadiusTopLeft=2, cornerRadiusTopRight=2)
+        .encode(
+            x=alt.X("mode:O", title="power mode", axis=alt.Axis(labelAngle=0)),
+            xOffset=alt.XOffset("line:N", sort=NAMES),
+            y=alt.Y(f"{column}:Q", title=title),
+            color=alt.Color("line:N", scale=scale(NAMES), legend=alt.Legend(title=None)),
+            tooltip=[
+                alt.Tooltip("mode:O", title="power mode"),
+                alt.Tooltip("line:N", title="method"),
+                alt.Tooltip(f"{column}:Q", title=title, format=digits),
+                alt.Tooltip("base_wake_up_ms:Q", title="base wake-up time / ms"),
+                alt.Tooltip("energy_provenance:N", title="energy per execution"),
+            ],
+        )
+    )
+    return bars

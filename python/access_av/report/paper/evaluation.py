@@ -1,0 +1,142 @@
+"""The report of the evaluation: one HTML file that works offline, on a phone and in print."""
+
+from __future__ import annotations
+
+from html import escape
+from importlib import resources
+from importlib.metadata import version
+from typing import TYPE_CHECKING
+
+from access_av.paper import summary
+from access_av.paper.statements import METHODS
+from access_av.report.page import fill
+from access_av.report.paper import (
+    accuracy,
+    controller,
+    design_space,
+    energy,
+    equipment,
+    readings,
+    unknowns,
+)
+from access_av.report.parts import badge, source, table, tile
+from access_av.signal.methods import label
+from access_av.tables.numbers import number
+
+if TYPE_CHECKING:
+    from access_av.paper.evaluation import Evaluation
+    from access_av.paper.study import Study
+    from access_av.report.chart import Spec
+
+TEMPLATE = resources.files(__package__).joinpath("evaluation.html")
+
+
+def render(study: Study, specs: dict[str, Spec] | None = None) -> str:
+    """The whole report as HTML.
+
+    Parameters
+    ----------
+    study
+        The paper under several readings; the shown one's charts are drawn in full.
+    specs
+        Takes the charts, by name.
+
+    Returns
+    -------
+    str
+        An HTML page that loads nothing.
+    """
+    specs = {} if specs is None else specs
+    evaluation = study.shown
+    return fill(
+        TEMPLATE.read_text(encoding="utf-8"),
+        specs,
+        shown=escape(evaluation.reading.title),
+        headline=escape(summary.headline(study)),
+        promise=escape(summary.PROMISE),
+        overview=readings.overview(study, specs),
+        chosen=readings.chosen(study),
+        freedoms=energy.freedoms(study),
+        fair=controller.fair(study),
+        lead=escape(summary.lead(study)),
+        tiles=_tiles(study),
+        meta=_meta(study),
+        runs=evaluation.runs,
+        readings=readings.readings(study),
+        matrix=readings.matrix(study),
+        seeds=escape(summary.seeds_text(study)),
+        claims=readings.claims(study),
+        contribution=controller.contribution(study, specs),
+        unknowns=unknowns.unknowns(study, specs),
+        ours=controller.ours(study),
+        signal=accuracy.signal(evaluation, specs),
+        accuracy=accuracy.accuracy(evaluation, specs),
+        accuracy_table=accuracy.accuracy_table(evaluation),
+        energy_text=energy.energy_text(evaluation),
+        energy=energy.energy(evaluation, specs),
+        energy_table=energy.energy_table(evaluation),
+        design=design_space.design(evaluation, specs),
+        queries=design_space.queries(evaluation),
+        cost_text=equipment.cost_text(evaluation),
+        cost=equipment.cost_section(specs),
+        carbon=equipment.carbon_section(evaluation, specs),
+        provenance=_provenance(evaluation),
+    )
+
+
+def _tiles(study: Study) -> str:
+    """By what its verdict is worth: claims met under the shown reading."""
+    name = study.shown.reading.title
+    met = summary.counts(study.of(study.shown.reading.name))
+    made = [
+        tile(f"{held} of {judged}", f"claims {kind}, met under “{name}”")
+        for kind, (held, judged) in met.items()
+        if judged
+    ]
+    without_map = [each for each in study.ours if not each.map]
+    better = sum(each.is_better for each in without_map)
+    made.append(
+        tile(
+            f"{better} of {len(without_map)}",
+            "modes in which ours is better in error and energy, the road known to neither",
+        )
+    )
+    return "".join(made)
+
+
+def _meta(study: Study) -> str:
+    evaluation = study.shown
+    return escape(
+        f"{len(study.evaluations)} readings, platform “{evaluation.platform.name}”, "
+        f"{evaluation.runs} runs per setting, seed {evaluation.seed}, "
+        f"version {version('access-av')}."
+    )
+
+
+def _provenance(evaluation: Evaluation) -> str:
+    rows = []
+    for mode in evaluation.platform.modes:
+        for method in METHODS:
+            figure = mode.energy_per_execution_j.get(method)
+            used_j = evaluation.outcome.energy_per_execution_j[mode.number].get(method)
+            rows.append(
+                (
+                    f"{mode.number} {escape(mode.name)}",
+                    escape(label(method)),
+                    number(None if used_j is None else float(used_j.flat[0]), 4),
+                    badge("fitted" if evaluation.refitted else figure.provenance, "fit")
+                    if figure
+                    else "the platform has none",
+                    escape(figure.source) if figure else "",
+                )
+            )
+    head = ("Mode", "Method", "J per execution", "Provenance", "Source")
+    return (
+        "<p>Errors, executions and SNR are simulated by this version from the scenario below "
+        "and the seed above. Prices and carbon factors carry their sources where they stand.</p>"
+        "<details><summary>Energy per execution, with its sources</summary>"
+        + table(head, rows, numbers=(2,))
+        + "</details>"
+        + source("Scenario, all defaults written out", evaluation.scenario.to_toml())
+        + source("Platform", evaluation.platform.to_toml())
+    )

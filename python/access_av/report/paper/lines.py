@@ -1,0 +1,43 @@
+"""The lines of the evaluation's charts: their names and colours."""
+
+from __future__ import annotations
+
+from typing import TYPE_CHECKING
+
+import altair as alt
+import polars as pl
+
+from access_av.paper.statements import ADAPTIVE_LABEL, METHODS
+from access_av.report.chart import PURPLE
+from access_av.signal.methods import LABELS, label
+
+if TYPE_CHECKING:
+    from access_av.paper.evaluation import Evaluation
+
+EVERY_SSB = "MUSIC, 20 ms"
+# The paper's: black, red, green and blue; its black is a slate that a dark page shows as well.
+COLOURS = {
+    LABELS["music"]: "#5b6470",
+    LABELS["esprit"]: "#d62728",
+    LABELS["root_music"]: "#2ca02c",
+    ADAPTIVE_LABEL: "#1f77e0",
+    EVERY_SSB: PURPLE,
+}
+# In the order of a chart's legend.
+NAMES = [*(LABELS[method] for method in METHODS), ADAPTIVE_LABEL]
+
+
+def scale(names: list[str]) -> alt.Scale:
+    """The colours of these lines."""
+    return alt.Scale(domain=names, range=[COLOURS[name] for name in names])
+
+
+def by_mode(evaluation: Evaluation) -> pl.DataFrame:
+    """Operating points of a power mode, with the name of their ``line``."""
+    return evaluation.points.filter(pl.col("mode").is_not_null()).with_columns(
+        pl.struct("method", "adaptive")
+        .map_elements(
+            lambda row: label(row["method"], adaptive=row["adaptive"]), return_dtype=pl.String
+        )
+        .alias("line")
+    )

@@ -1,0 +1,217 @@
+"""The report's first section: the readings, and the claims under each."""
+
+from __future__ import annotations
+
+from html import escape
+from typing import TYPE_CHECKING
+
+import altair as alt
+import polars as pl
+
+from access_av.paper import summary
+from access_av.paper.chosen import entries
+from access_av.paper.statements import half as half_of
+from access_av.paper.statements import of_claim
+from access_av.report.chart import BLUE, GREEN, GREY, ORANGE, finish
+from access_av.report.parts import badge, figure, table
+from access_av.tables.numbers import value_text
+
+if TYPE_CHECKING:
+    from access_av.paper.claims import Claim
+    from access_av.paper.study import Study
+    from access_av.report.chart import Spec
+
+# The worst error and the average saving: the first claim of one half, the last of the other.
+PROMISED = (("accuracy", 0), ("energy", -1))
+
+
+def readings(study: Study) -> str:
+    """What the readings are, which halves hold under each, and what carries them."""
+    rows = []
+    for index, half in enumerate(summary.halves(study), start=1):
+        claims = study.of(half.reading.name)
+        t_max = "kept" if half.keeps_t_max else "exceeded"
+        if half.reading.keeps_t_max and not half.keeps_t_max:
+            t_max = "claimed, and exceeded"
+        rows.append(
+            (
+                f"<b>{index} {escape(half.reading.title)}</b>"
+                f"<small>{escape(half.reading.scenario.description)} · "
+                f"<code>{escape(half.reading.name)}</code></small>",
+                _met(half.accuracy),
+                _met(half.energy),
+                f"{t_max}, {half.longest_gap_s:.2f} s",
+                escape(summary.controller_text(half.controller)),
+                escape(summary.counts_text(claims)),
+            )
+        )
+    head = (
+        "Reading",
+        "Accuracy half",
+        "Energy half",
+        "t_max",
+        "Algorithm 1",
+        "Claims met",
+    )
+    unusable = "".join(
+        f'<p class="note">Not evaluated: {escape(name)}: {escape(why)}</p>'
+        for name, why in study.unusable.items()
+    )
+    return table(head, rows) + unusable
+
+
+def overview(study: Study, specs: dict[str, Spec]) -> str:
+    """The one picture: what each reading obtains of the paper's two promises."""
+    rows = []
+    for index, half in enumerate(summary.halves(study), start=1):
+        by_id = {it.id: it.obtained for it in study.of(half.reading.name)}
+        worst_m, saving = (by_id[half_of(name)[at]] for name, at in PROMISED)
+        if worst_m is not None and saving is not None:
+            rows.append(
+                {
+                    "number": str(index),
+                    "reading": half.reading.title,
+                    "worst": worst_m,
+                    "saving": saving,
+                    "keeps": ("neither", "accuracy", "saving", "both")[
+                        half.accuracy + 2 * half.energy
+                    ],
+                }
+            )
+    if not rows:
+        return ""
+    bound_m, stated = (of_claim(half_of(name)[at]) for name, at in PROMISED)
+    tolerance = of_claim(half_of("energy")[-1], "tolerance")
+    y = {"low": stated * (1 - tolerance), "high": stated * (1 + tolerance)}
+    least_m = min(0.1, *(row["worst"] for row in rows))
+    promised = (
+        alt.Chart(pl.DataFrame([{"left": 0.9 * least_m, "right": bound_m, **y}]))
+        .mark_rect(opacity=0.18, color=GREEN)
+        .encode(
+            x=alt.X(
+                "left:Q",
+                title="worst error of adaptive MUSIC, any mode / m",
+                scale=alt.Scale(type="log", nice=False),
+            ),
+            x2="right:Q",
+            y=alt.Y("low:Q", title="energy saved, average / %", scale=alt.Scale(zero=False)),
+            y2="high:Q",
+        )
+    )
+    base = alt.Chart(pl.DataFrame(rows)).encode(
+        x="worst:Q",
+        y="saving:Q",
+        tooltip=["reading:N", alt.Tooltip("worst:Q", format=".3f"),
+                 alt.Tooltip("saving:Q", format=".1f"), "keeps:N"],
+    )  # fmt: skip
+    kinds = ["neither", "accuracy", "saving", "both"]
+    dots = base.mark_circle(size=130, opacity=1.0).encode(
+        color=alt.Color(
+            "keeps:N",
+            scale=alt.Scale(domain=kinds, range=[GREY, BLUE, ORANGE, GREEN]),
+            legend=alt.Legend(title="keeps", orient="top"),
+        )
+    )
+    numbers = base.mark_text(dx=11, dy=-9, fontSize=11).encode(text="number:N")
+    specs["overview"] = finish(
+        promised + dots + numbers,
+        height=300,
+        description="Worst error and average saving of each reading, and what the paper promises",
+    )
+    return figure(
+        "overview",
+        "Each dot is a reading, its number that of the table below; the green field is what the "
+        "paper promises of both. Accuracy and saving ask for a further claim each (a2, e3).",
+    )
+
+
+def chosen(study: Study) -> str:
+    """What the paper leaves open, what was chosen, and what another value does."""
+    head = ("What is open", "Chosen", "Why")
+    if not study.effects:
+        rows = [tuple(escape(it[key]) for key in ("what", "value", "why")) for it in entries()]
+        return table(head, rows)
+    driven = [
+        (
+            f"<b>{escape(each.what)}</b>" if each.is_shipped else "",
+            escape(each.value) if each.is_shipped else f"instead {escape(each.value)}",
+            escape(each.why) if each.is_shipped else "",
+            f"{each.executions:.0f}",
+            f"{each.worst_error_m:.2f}",
+            f"{each.rms_error_m:.3f} ± {each.rms_std_m:.3f}",
+            f"{each.fixed_rms_m:.3f}",
+            f"{each.every_ssb_rms_m:.3f}",
+        )
+        for each in study.effects
+    ]
+    results = (
+        "Executions",
+        "Worst / m",
+        "RMS / m",
+        "Every 80 ms: RMS / m",
+        "Every SSB: RMS / m",
+    )
+    return table((*head, *results), driven, numbers=(3, 4, 5, 6, 7))
+
+
+def matrix(study: Study) -> str:
+    """Every claim under every reading."""
+    columns = [study.of(each.reading.name) for each in study.evaluations]
+    head = ("Claim", "Paper", *(str(index) for index in range(1, len(columns) + 1)))
+    rows = [
+        (
+            f"<b>{escape(_short(claims[0]))}</b> <span>{escape(claims[0].says)}</span>",
+            f"<span>{escape(summary.shown_value(claims[0].stated))}</span>",
+            *(_cell(claim) for claim in claims),
+        )
+        for claims in zip(*columns, strict=True)
+    ]
+    return table(head, rows, kind="matrix")
+
+
+def claims(study: Study) -> str:
+    """The claims under the shown reading, with intervals and what each verdict is worth."""
+    rows = []
+    for claim in study.of(study.shown.reading.name):
+        kind = "fit" if not claim.is_judged else "yes" if claim.reproduced else "no"
+        turns = " " + badge("turns with the seed", "fit") if claim.turns_with_seed else ""
+        if claim.seeds_met:
+            turns += f"<small>met with {claim.seeds_met} seeds</small>"
+        obtained = escape(summary.shown_value(claim.obtained))
+        if isinstance(claim.interval, list):
+            low, high = (value_text(end) for end in claim.interval)
+            obtained += f"<small>{low} … {high}</small>"
+        rows.append(
+            (
+                f"<b>{escape(claim.says)}</b><small>{escape(claim.where)} · "
+                f"<code>{escape(claim.id)}</code></small><small>{escape(claim.note)}</small>",
+                escape(summary.shown_value(claim.stated)),
+                obtained,
+                escape(claim.unit),
+                escape(claim.evidence),
+                badge(claim.verdict, kind) + turns,
+            )
+        )
+    return table(("Claim", "Paper", "Obtained", "Unit", "Evidence", "Verdict"), rows)
+
+
+def _short(claim: Claim) -> str:
+    number, *words = claim.id.split("_")
+    # Two claims are e3: one of the saving, one of the executions.
+    return f"{number} {words[-1]}" if number == "e3" and words[-1] == "executions" else number
+
+
+def _met(held: bool) -> str:
+    return badge("holds", "yes") if held else badge("does not", "no")
+
+
+def _cell(claim: Claim) -> str:
+    """A claim's value and verdict in a small cell."""
+    if not claim.is_judged:
+        return badge("–", "fit")
+    sign = "✓" if claim.reproduced else "✗"
+    if claim.turns_with_seed:
+        sign += f" {claim.seeds_met or '?'}"
+    plain = isinstance(claim.obtained, (int, float))
+    value = f"<small>{escape(summary.shown_value(claim.obtained))}</small>" if plain else ""
+    return badge(sign, "yes" if claim.reproduced else "no") + value

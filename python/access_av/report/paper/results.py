@@ -1,0 +1,113 @@
+"""A study's results on disk: evaluated, written with the report, opened again."""
+
+from __future__ import annotations
+
+from typing import TYPE_CHECKING, Any
+
+import polars as pl
+
+from access_av.device.platform import Platform
+from access_av.errors import InputError
+from access_av.paper.claims import as_records
+from access_av.paper.readings import SHIPPED, load_all
+from access_av.paper.study import Study, study
+from access_av.report.paper.evaluation import render
+from access_av.report.paper.figures import figures
+from access_av.tables import validation
+from access_av.tables.results_directory import RESULTS, ResultsDirectory
+
+if TYPE_CHECKING:
+    from collections.abc import Callable, Sequence
+    from pathlib import Path
+
+    from access_av.report.chart import Spec
+
+POINTS_FILE = "operating_points.parquet"
+
+
+def write(made: Study, directory: ResultsDirectory) -> None:
+    """Write tables, claims, report, scenarios, platform and manifest."""
+    for name, table in made.tables().items():
+        directory.write_table(f"{name}.parquet", table)
+    directory.write_json("claims.json", as_records(made.claims))
+    specs: dict[str, Spec] = {}
+    directory.write_text("report.html", render(made, specs))
+    for name, picture in figures(specs).items():
+        directory.write_text(f"{name}.svg", picture)
+    shown = made.shown
+    directory.write_text("scenario.toml", shown.scenario.resolved(shown.platform.core).to_toml())
+    directory.write_text("platform.toml", shown.platform.to_toml())
+    directory.write_manifest(
+        readings=[each.reading.name for each in made.evaluations],
+        unusable=dict(made.unusable),
+        platform=shown.platform.name,
+        runs=shown.runs,
+        seed=shown.seed,
+        duration_s=round(made.duration_s, 3),
+    )
+    directory.link_latest()
+
+
+def run(
+    names: Sequence[str] = (),
+    platform: str = "jetson-agx-xavier",
+    *,
+    runs: int,
+    seed: int,
+    out: Path | None = None,
+    **how: Any,
+) -> tuple[Study, ResultsDirectory]:
+    """Evaluate these readings, or all that are shipped, and write the results."""
+    chosen, board = load_all(names), Platform.load(platform)
+    directory = ResultsDirectory.create("evaluate", out)
+    made = study(chosen, board, runs=runs, seed=seed, **how)
+    write(made, directory)
+    return made, directory
+
+
+def operating_points(
+    results: Path | None = None,
+    reading: str = SHIPPED,
+    *,
+    progress: Callable[[int, int], None] | None = None,
+) -> pl.DataFrame:
+    """Operating points of an earlier evaluation, or of a new one where there is none.
+
+    Parameters
+    ----------
+    results
+        Directory of an evaluation. ``None`` takes ``results/latest`` if that is one, else the
+        newest one in ``results/`` and, where there is none, runs the paper's.
+    reading
+        Under which reading.
+    progress
+        Called as ``progress(done, total)`` while a new one runs.
+
+    Raises
+    ------
+    InputError
+        When ``results`` holds no evaluation, or not of that reading.
+    """
+    if results is not None:
+        file = results / POINTS_FILE
+        if not file.is_file():
+            raise InputError(f"{results}: no evaluation here ({POINTS_FILE} is missing)")
+    else:
+        earlier = sorted(RESULTS.glob(f"*-evaluate/{POINTS_FILE}"))
+        earlier += RESULTS.glob(f"latest/{POINTS_FILE}")
+        if not earlier:
+            _, directory = run([reading], runs=100, seed=1, progress=progress)
+            earlier = [directory.path / POINTS_FILE]
+        file = earlier[-1]
+    points = _points(file)
+    there = points["reading"].unique(maintain_order=True).to_list()
+    if reading not in there:
+        raise InputError(f"{file.parent}: no reading {reading} here; there are: {', '.join(there)}")
+    return points.filter(pl.col("energy_j").is_not_null(), reading=reading)
+
+
+def _points(file: Path) -> pl.DataFrame:
+    """A table of operating points, with all its columns."""
+    points = validation.read(file, "table of operating points")
+    validation.check_types(points, str(file), "operating_points")
+    return points

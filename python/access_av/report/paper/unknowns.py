@@ -1,0 +1,128 @@
+"""The report's section on what the claims hang on."""
+
+from __future__ import annotations
+
+from html import escape
+from typing import TYPE_CHECKING
+
+import altair as alt
+import polars as pl
+
+from access_av.paper.open_choices import GATE, OPEN_CONTROLLER, OPEN_WORLD
+from access_av.paper.unknowns import MATTERS
+from access_av.report.chart import BLUE, GREY, finish
+from access_av.report.parts import figure, table
+
+if TYPE_CHECKING:
+    from access_av.paper.study import Study
+    from access_av.paper.unknowns import Unknowns
+    from access_av.report.chart import Spec
+
+DIMENSIONS = (*OPEN_WORLD, *OPEN_CONTROLLER, GATE)
+# Below this a total index is as good as none.
+LEAST_TOTAL = 0.05
+
+
+def unknowns(study: Study, specs: dict[str, Spec]) -> str:
+    """On what each claim hangs, and in how much of the space it holds."""
+    found = study.unknowns
+    if found is None:
+        return (
+            "<p>Not asked for. <code>access-av evaluate --unknowns</code> draws readings from what "
+            "the paper leaves open and says on what each claim hangs.</p>"
+        )
+    specs["sobol"] = _index_chart(found)
+    specs["share"] = _share_chart(found)
+    ranges = table(
+        ("What the paper leaves open", "Range"),
+        [(each.label, each.range_text) for each in DIMENSIONS],
+    )
+    return (
+        f"<p>{found.readings} readings of {found.runs} runs each, drawn from the ranges below. A "
+        "total index of 0.6 means: 60 % of what the claim's margin varies by involves that one "
+        "thing, by itself or together with others. Cells below "
+        f"{LEAST_TOTAL:.0%} are left empty; “unexplained” is what the expansion cannot say.</p>"
+        + f"<p>{escape(_width_text(found))}</p>"
+        + figure("sobol", "Total Sobol index of each claim's margin.", "On what the claims hang")
+        + figure(
+            "share",
+            "Bars are 95 % intervals over worlds.",
+            "Share of the drawn readings in which each claim holds",
+        )
+        + f"<details><summary>The ranges</summary>{ranges}</details>"
+    )
+
+
+def _width_text(found: Unknowns) -> str:
+    widest = max((each.half_width for each in found.matter), default=0.0)
+    return (
+        f"Of claims that are neither arithmetic nor solved for, {len(found.matter)} total indices "
+        f"are {MATTERS:g} or more; their 95 % intervals are at most ± {widest:.3f} wide."
+    )
+
+
+def _short(claim: str) -> str:
+    return claim.split("_")[0] + " " + " ".join(claim.split("_")[1:3])
+
+
+def _index_chart(found: Unknowns) -> Spec:
+    labels = {each.name: each.label for each in DIMENSIONS}
+    rows = [
+        {
+            "claim": _short(each.claim),
+            "dimension": labels[each.dimension],
+            "total": round(each.total, 3),
+            "first": round(each.first, 3),
+            "interval": f"{each.total_low:.2f} … {each.total_high:.2f}",
+        }
+        for each in found.indices
+    ]
+    rows += [
+        {"claim": _short(claim), "dimension": "unexplained", "total": round(1.0 - share, 3),
+         "first": 0.0, "interval": ""}
+        for claim, share in found.explained.items()
+    ]  # fmt: skip
+    table = pl.DataFrame(rows).filter(pl.col("total") >= LEAST_TOTAL)
+    order = [*labels.values(), "unexplained"]
+    base = alt.Chart(table).encode(
+        y=alt.Y("dimension:N", sort=order, title=None, axis=alt.Axis(labelLimit=170)),
+        x=alt.X("claim:N", title=None, sort=None, axis=alt.Axis(labelAngle=-40, labelLimit=130)),
+        tooltip=["claim:N", "dimension:N", "first:Q", "total:Q", "interval:N"],
+    )
+    cells = base.mark_rect().encode(
+        color=alt.Color(
+            "total:Q",
+            scale=alt.Scale(range=["#e6eef8", BLUE], domain=[0.0, 1.0]),
+            legend=alt.Legend(title="total index"),
+        )
+    )
+    numbers = base.mark_text(fontSize=10).encode(
+        text=alt.Text("total:Q", format=".2f"),
+        color=alt.condition("datum.total > 0.5", alt.value("white"), alt.value("#16202c")),
+    )
+    return finish(
+        cells + numbers, height=380, description="Total Sobol indices of the claims' margins"
+    )
+
+
+def _share_chart(found: Unknowns) -> Spec:
+    rows = pl.DataFrame(
+        [
+            {
+                "claim": _short(claim),
+                "share": round(share, 4),
+                "low": round(found.holds_interval[claim][0], 4),
+                "high": round(found.holds_interval[claim][1], 4),
+            }
+            for claim, share in found.holds.items()
+        ]
+    )
+    base = alt.Chart(rows).encode(
+        y=alt.Y("claim:N", sort=None, title=None, axis=alt.Axis(labelLimit=170)),
+        tooltip=["claim:N", "share:Q", "low:Q", "high:Q"],
+    )
+    bars = base.mark_bar(color=BLUE, cornerRadiusEnd=2).encode(
+        x=alt.X("share:Q", title="share of the readings", scale=alt.Scale(domain=[0.0, 1.0]))
+    )
+    ends = base.mark_rule(color=GREY, strokeWidth=3).encode(x="low:Q", x2="high:Q")
+    return finish(bars + ends, height=320, description="Share of readings in which a claim holds")

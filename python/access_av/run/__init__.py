@@ -1,0 +1,1 @@
+"""Scenarios driven: simulated, bounded, with faults injected, held against service levels."""

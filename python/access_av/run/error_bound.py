@@ -1,0 +1,195 @@
+"""How well any localizer can do in a scenario, before anything is built there."""
+
+from __future__ import annotations
+
+import json
+import math
+from dataclasses import dataclass
+from functools import cached_property
+from typing import TYPE_CHECKING, Any
+
+import numpy as np
+import polars as pl
+
+from access_av import _core
+from access_av.errors import InputError
+from access_av.run import service_levels
+
+if TYPE_CHECKING:
+    from numpy.typing import NDArray
+
+# An SSB is to be detected down to this Es/Iot (TS 38.133, side condition of intra-frequency
+# measurements).
+VISIBLE_SNR_DB = -6.0
+# The map is of a vehicle that has listened over so long a way, an independent angle per half
+# wavelength.
+MAP_TRAVEL_M = 1.0
+ANGLES_PER_WAVELENGTH = 2.0
+MARGIN_M = 20.0
+MAP_CELLS = 3000
+MOST_MAP_CELLS = 40_000
+SPEED_OF_LIGHT_MPS = 299_792_458.0
+
+
+@dataclass(frozen=True)
+class ErrorBound:
+    """The posterior Cramér–Rao bound of a scenario.
+
+    Attributes
+    ----------
+    scenario
+        The scenario.
+    route
+        One row per SSB of the drive; columns ``bound_route`` of :mod:`access_av.columns`.
+    heads
+        One row per radio head; columns ``bound_heads``.
+    site
+        The bound over the site, one row per square of ``map_step_m``; columns ``bound_map``. Of a
+        vehicle that has measured ``map_angles`` independent angles, knows its heading to
+        ``map_heading_std_rad`` and nothing of its place.
+    """
+
+    scenario: _core.Scenario
+    route: pl.DataFrame
+    heads: pl.DataFrame
+    site: pl.DataFrame
+    map_step_m: float
+    map_angles: float
+    map_heading_std_rad: float
+
+    def summary(self) -> dict[str, Any]:
+        """The numbers to judge a placement of radio heads by, without the tables."""
+        bound_m = self.route["bound_m"]
+        return {
+            "scenario": self.scenario.name,
+            "median_m": bound_m.median(),
+            "p90_m": bound_m.quantile(0.9, "linear"),
+            "max_m": bound_m.max(),
+            "duration_s": self.route["time_s"].max(),
+            "length_m": self.route["along_m"].max(),
+            "heads": self.heads.to_dicts(),
+            "service_levels": [verdict.as_record() for verdict in self.verdicts],
+        }
+
+    @cached_property
+    def verdicts(self) -> list[service_levels.Verdict]:
+        """The service levels that no localizer can better on this route."""
+        return service_levels.of_bound(self.route["along_std_m"], self.route["across_std_m"])
+
+
+def bound(scenario: _core.Scenario | str, *, map_step_m: float | None = None) -> ErrorBound:
+    """The least error of any localizer along a scenario's route, and over its site.
+
+    Parameters
+    ----------
+    scenario
+        A scenario, or the name or path of one.
+    map_step_m
+        Side of the map's squares in metres; when ``None``, a round length that makes about
+        :data:`MAP_CELLS` of them.
+
+    Returns
+    -------
+    ErrorBound
+        Tables.
+
+    Raises
+    ------
+    SettingsError
+        When the scenario cannot be used.
+    InputError
+        When the map would have more than :data:`MOST_MAP_CELLS` squares.
+
+    Examples
+    --------
+    >>> found = bound("paper-real-odometry-4", map_step_m=50.0)
+    >>> bool(found.route["bound_m"].max() < 0.3)
+    True
+    """
+    if not isinstance(scenario, _core.Scenario):
+        scenario = _core.Scenario.load(scenario)
+    settings = json.loads(scenario.site.to_json())
+    core = _core.Bound(scenario)
+    route = pl.DataFrame(core.along_route())
+    heads = _heads(core, settings["radio_heads"], route)
+    low, high = _extent(route, heads)
+    step_m = _round_step(low, high) if map_step_m is None else map_step_m
+    if not (math.isfinite(step_m) and step_m > 0.0):
+        raise InputError(f"--map-step-m {step_m}: a length above 0 is needed")
+    extent_m = float((high - low).max())
+    if step_m > extent_m:
+        raise InputError(f"--map-step-m {step_m:g}: the site is {extent_m:.0f} m across")
+    cells = math.prod(np.maximum(1.0, np.ceil((high - low) / step_m)).tolist())
+    if cells > MOST_MAP_CELLS:
+        raise InputError(
+            f"--map-step-m {step_m:g}: gives {cells:.3g} squares; "
+            f"allowed are at most {MOST_MAP_CELLS}, from {_least_step(low, high):.2g} m on"
+        )
+    wavelength_m = SPEED_OF_LIGHT_MPS / (settings["carrier_mhz"] * 1e6)
+    looks = max(1.0, MAP_TRAVEL_M * ANGLES_PER_WAVELENGTH / wavelength_m)
+    heading_std_rad = float(route.select(pl.col("heading_std_rad").median()).item())
+    x_m, y_m = (
+        grid.ravel()
+        for grid in np.meshgrid(
+            *(
+                np.arange(a + 0.5 * step_m, b + 0.5 * step_m, step_m)
+                for a, b in zip(low, high, strict=True)
+            )
+        )
+    )
+    bound_m = core.at(x_m, y_m, looks, heading_std_rad)
+    site = pl.DataFrame({"x_m": x_m, "y_m": y_m, "bound_m": bound_m})
+    return ErrorBound(
+        scenario=scenario,
+        route=route,
+        heads=heads,
+        site=site.with_columns(pl.col("bound_m").fill_nan(None)),
+        map_step_m=step_m,
+        map_angles=looks,
+        map_heading_std_rad=heading_std_rad,
+    )
+
+
+def along_route(scenario: _core.Scenario) -> pl.DataFrame:
+    """The bound at every SSB of the drive; columns ``bound_route`` of :mod:`access_av.columns`."""
+    return pl.DataFrame(_core.Bound(scenario).along_route())
+
+
+def _heads(core: _core.Bound, settings: list[dict[str, Any]], route: pl.DataFrame) -> pl.DataFrame:
+    x_m, y_m = route["x_m"].to_numpy(), route["y_m"].to_numpy()
+    snrs_db = core.snr_db(x_m, y_m)
+    rows = []
+    for number, (head, snr_db) in enumerate(zip(settings, snrs_db, strict=True), start=1):
+        head_x_m, head_y_m, _ = head["position_m"]
+        distance_m = np.hypot(x_m - head_x_m, y_m - head_y_m)
+        rows.append(
+            {
+                "name": head["name"] or f"head {number}",
+                "pci": head["pci"],
+                "ssb_index": head["ssb_index"],
+                "x_m": float(head_x_m),
+                "y_m": float(head_y_m),
+                "nearest_m": float(distance_m.min()),
+                "farthest_m": float(distance_m.max()),
+                "least_expected_snr_db": float(snr_db.min()),
+                "most_expected_snr_db": float(snr_db.max()),
+                "visible_share": float((snr_db >= VISIBLE_SNR_DB).mean()),
+            }
+        )
+    return pl.DataFrame(rows)
+
+
+def _extent(route: pl.DataFrame, heads: pl.DataFrame) -> tuple[NDArray[np.float64], ...]:
+    places = np.vstack([table.select("x_m", "y_m").to_numpy() for table in (route, heads)])
+    return places.min(axis=0) - MARGIN_M, places.max(axis=0) + MARGIN_M
+
+
+def _round_step(low: NDArray[np.float64], high: NDArray[np.float64]) -> float:
+    """The round step, 1, 2 or 5 times a power of ten, that makes no more than ``MAP_CELLS``."""
+    least_m = math.sqrt(float(np.prod(high - low)) / MAP_CELLS)
+    power = 10.0 ** math.floor(math.log10(least_m))
+    return next(step * power for step in (1.0, 2.0, 5.0, 10.0) if step * power >= least_m)
+
+
+def _least_step(low: NDArray[np.float64], high: NDArray[np.float64]) -> float:
+    return 1.1 * math.sqrt(float(np.prod(high - low)) / MOST_MAP_CELLS)

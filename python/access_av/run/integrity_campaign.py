@@ -1,0 +1,265 @@
+"""How integrity holds where the world is not as believed: mismatch by channel by radio heads."""
+
+from __future__ import annotations
+
+import json
+from dataclasses import dataclass
+from typing import TYPE_CHECKING, Any
+
+import numpy as np
+import polars as pl
+
+from access_av import _core
+from access_av.errors import InputError
+from access_av.run.campaign import Task
+from access_av.run.fault_injection import Overrides, hypotheses, mismatches
+from access_av.run.simulation import Simulation
+from access_av.statistics.alarms import Alarms
+from access_av.statistics.consistency import horizontal_error_m
+from access_av.statistics.extremes import ObtainedRisk
+from access_av.statistics.integrity import STATES, Integrity
+
+if TYPE_CHECKING:
+    from collections.abc import Callable, Mapping, Sequence
+
+    from numpy.typing import NDArray
+
+    from access_av.run.campaign import Campaign
+
+# Drives of a part: what is lost when a campaign is stopped.
+PART_RUNS = 5
+
+
+@dataclass(frozen=True)
+class Case:
+    """One cell of the campaign.
+
+    Attributes
+    ----------
+    mismatch, channel, heads, asked_risk_per_hour
+        How the world departs from what is believed, the channel, how many radio heads are listened
+        to, and the risk that the level is to leave.
+    scenario
+        All of it.
+    trajectories
+        ``run, time_s, error_x_m, error_y_m, protection_level_m, integrity`` of every step.
+    """
+
+    mismatch: str
+    channel: str
+    heads: int
+    asked_risk_per_hour: float
+    scenario: _core.Scenario
+    trajectories: pl.DataFrame
+
+    @property
+    def alert_limit_m(self) -> float:
+        """The guard's alert limit."""
+        return float(_settings(self.scenario)["alert_limit_m"])
+
+    def as_record(self) -> dict[str, Any]:
+        """A row of the table; columns ``integrity_cases`` of :mod:`access_av.columns`."""
+        found = Integrity.of(self.trajectories)
+        alarms = Alarms.of(self.trajectories, self.alert_limit_m)
+        if found is None or alarms is None:
+            raise InputError(f"{self.scenario.name}: no step has a protection level")
+        error_m = self.trajectories["error_x_m"].abs()
+        risk = ObtainedRisk.of(self.trajectories, _settings(self.scenario)["error_correlation_s"])
+        return {
+            "mismatch": self.mismatch,
+            "channel": self.channel,
+            "heads": self.heads,
+            "runs": found.runs,
+            "availability": found.availability,
+            "unavailable_share": found.state_shares["unavailable"],
+            "exceedances": found.exceedances,
+            "exceedance_share": found.exceedance_share,
+            "exceedance_share_low": found.exceedance_interval[0],
+            "exceedance_share_high": found.exceedance_interval[1],
+            "runs_with_exceedances": found.runs_with_exceedances,
+            "time_to_alert_s": alarms.longest_silence_s,
+            "level_over_error": found.median_level_over_error,
+            "asked_risk_per_hour": self.asked_risk_per_hour,
+            "risk_per_hour": risk and risk.per_hour,
+            "risk_per_hour_low": risk and risk.interval[0],
+            "risk_per_hour_high": risk and risk.interval[1],
+            "p90_error_m": error_m.quantile(0.9, "linear"),
+            "max_error_m": error_m.max(),
+        }
+
+
+def _settings(scenario: _core.Scenario) -> dict[str, Any]:
+    """``[integrity]`` of its vehicle, in which it is written out."""
+    found: dict[str, Any] = json.loads(scenario.vehicle.to_json())["integrity"]
+    return found
+
+
+def channels(names: Sequence[str]) -> dict[str, Overrides]:
+    """Channels by name: ``as set``, ``K=dB`` for a true Rician K, or a model.
+
+    Examples
+    --------
+    >>> channels(["K=5", "inf-sh"])
+    {'K=5': {'truth.site.rician_k_db': 5.0}, 'inf-sh': {'channel': {'model': 'inf-sh'}}}
+    """
+    found: dict[str, Overrides] = {}
+    for name in names:
+        kind, _, k_db = name.partition("=")
+        if name == "as set":
+            found[name] = {}
+        elif kind == "K":
+            try:
+                found[name] = {"truth.site.rician_k_db": float(k_db)}
+            except ValueError:
+                raise InputError(f"channel {name}: write K=5 for a Rician K of 5 dB") from None
+        else:
+            found[name] = {"channel": {"model": name}}
+    return found
+
+
+def drive(
+    campaign: Campaign,
+    scenario: _core.Scenario | str,
+    *,
+    runs: int = 20,
+    seed: int = 1,
+    only: Sequence[str] | None = None,
+    channel_names: Sequence[str] = ("as set",),
+    heads: Sequence[int] | None = None,
+    risks_per_hour: Sequence[float] | None = None,
+    progress: Callable[[int, int], None] | None = None,
+) -> list[Case] | None:
+    """Drive a guarded scenario under every mismatch, channel and number of radio heads.
+
+    Parameters
+    ----------
+    campaign
+        Who drives, and where drives are kept.
+    scenario
+        A scenario, or the name or path of one. A monitor that is switched off is switched on.
+    runs, seed
+        Drives of each case, and their seed.
+    only
+        Names out of :func:`~access_av.hypotheses.mismatches`, all of which are driven when
+        ``None``, and :func:`~access_av.hypotheses.hypotheses`.
+    channel_names
+        See :func:`channels`.
+    heads
+        Numbers of radio heads listened to, the first of the site; all of them when ``None``.
+    risks_per_hour
+        Target integrity risks; the vehicle's own when ``None``.
+    progress
+        Called as ``progress(done, total)``.
+
+    Returns
+    -------
+    list of Case
+        In the order mismatch, channel, heads, risk; ``None`` where parts are missing that another
+        shard computes.
+
+    Raises
+    ------
+    InputError
+        For a name or number that there is not.
+
+    Examples
+    --------
+    >>> import tempfile
+    >>> from pathlib import Path
+    >>> from access_av.run.campaign import Campaign
+    >>> from access_av.run.result_cache import Parts
+    >>> kept = Campaign(Parts(Path(tempfile.mkdtemp())))
+    >>> [case] = drive(kept, "paper-real-odometry-4", runs=1, only=["none"])
+    >>> case.as_record()["availability"] > 0.9
+    True
+    """
+    if not isinstance(scenario, _core.Scenario):
+        scenario = _core.Scenario.load(scenario)
+    scenario = scenario.with_overrides({"vehicle.integrity.enabled": True})
+    usual = mismatches(scenario)
+    known = {**usual, **hypotheses(scenario)} if only else usual
+    for name in only or ():
+        if name not in known:
+            raise InputError(f"mismatch {name!r}: there are {', '.join(known)}")
+    cells = [head["pci"] for head in json.loads(scenario.site.to_json())["radio_heads"]]
+    for count in heads or ():
+        if not 1 <= count <= len(cells):
+            raise InputError(f"{count} radio heads: the site has {len(cells)}")
+    grid = [
+        (
+            mismatch,
+            channel,
+            count,
+            risk,
+            scenario.with_overrides(
+                {
+                    **over,
+                    **known[mismatch],
+                    "vehicle.receiver.pci_allow_list": cells[:count],
+                    "vehicle.integrity.risk_per_hour": risk,
+                }
+            ),
+        )
+        for mismatch in only or usual
+        for channel, over in channels(channel_names).items()
+        for count in heads or (len(cells),)
+        for risk in risks_per_hour or (_settings(scenario)["risk_per_hour"],)
+    ]
+    tasks = [
+        Task(
+            depends_on={"integrity": text, "first_run": first, "runs": count, "seed": seed},
+            work=driven,
+            arguments=(text, first, count, seed),
+        )
+        for *_, chosen in grid
+        for text in (chosen.to_toml(),)
+        for first in range(0, runs, PART_RUNS)
+        for count in (min(PART_RUNS, runs - first),)
+    ]
+    parts = campaign.run(tasks, progress)
+    here = [part for part in parts if part is not None]
+    if len(here) < len(parts):
+        return None
+    each = len(parts) // len(grid)
+    return [
+        Case(*case, pl.concat(map(_table, here[number * each : (number + 1) * each])))
+        for number, case in enumerate(grid)
+    ]
+
+
+def driven(scenario: str, first_run: int, runs: int, seed: int) -> dict[str, NDArray[Any]]:
+    """A part: errors, levels and states of every step, on one thread."""
+    found = Simulation.of(
+        _core.simulate(
+            _core.Scenario.from_toml(scenario),
+            runs,
+            seed,
+            first_run=first_run,
+            threads=1,
+            keep_trajectories=True,
+        )
+    )
+    if found.trajectories is None:  # they were asked for
+        raise RuntimeError("the simulation kept no trajectories")
+    steps = found.trajectories.filter(pl.col("protection_level_m").is_not_null())
+    state = steps["integrity"].cast(pl.Enum(STATES)).to_physical()
+    return {
+        "run": steps["run"].to_numpy().astype(np.int32),
+        "time_s": steps["time_s"].to_numpy().astype(np.float32),
+        "error_m": steps.select(horizontal_error_m()).to_series().to_numpy().astype(np.float32),
+        "level_m": steps["protection_level_m"].to_numpy().astype(np.float32),
+        "state": state.to_numpy().astype(np.uint8),
+    }
+
+
+def _table(arrays: Mapping[str, NDArray[Any]]) -> pl.DataFrame:
+    return pl.DataFrame(
+        {
+            "run": arrays["run"],
+            "time_s": arrays["time_s"].astype(np.float64),
+            "error_x_m": arrays["error_m"].astype(np.float64),
+            "error_y_m": np.zeros(len(arrays["error_m"])),
+            "protection_level_m": arrays["level_m"].astype(np.float64),
+            "integrity": np.asarray(STATES)[arrays["state"]],
+        }
+    )

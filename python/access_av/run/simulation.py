@@ -1,0 +1,290 @@
+"""One scenario, many drives: the simulator, with tables instead of raw columns."""
+
+from __future__ import annotations
+
+import math
+from dataclasses import dataclass
+from html import escape
+from pathlib import Path
+from typing import TYPE_CHECKING, Any
+
+import numpy as np
+import polars as pl
+
+from access_av import _core
+from access_av.device.platform import Platform
+from access_av.run import service_levels
+from access_av.run.operation import Operation
+from access_av.statistics.consistency import Consistency, horizontal_error_m
+from access_av.statistics.integrity import Integrity
+from access_av.statistics.percentiles import Percentile, column, percentiles
+from access_av.tables.numbers import number
+
+if TYPE_CHECKING:
+    from collections.abc import Callable, Mapping, Sequence
+    from typing import TypeAlias
+
+    from numpy.typing import NDArray
+
+    Estimate: TypeAlias = float | tuple[float, float] | NDArray[np.float64] | None
+
+Scenario = _core.Scenario
+
+# The first ten seconds of SSBs every 20 ms.
+SETTLED_STEPS = 500
+
+
+@dataclass(frozen=True, eq=False, repr=False)
+class Simulation:
+    """What many drives found. :mod:`access_av.columns` says what each table's columns are.
+
+    Attributes
+    ----------
+    steps
+        Statistics over all runs, one row per SSB. Errors are of the runs that know their pose by
+        then.
+    runs
+        One row per run.
+    trajectories
+        Truth and estimate, one row per run and SSB. ``None`` unless kept.
+    executions
+        The angle estimates, one row each. ``None`` unless trajectories were kept.
+    integrity
+        How protection levels and errors went together; ``None`` where none were stated.
+    error_quantiles_m
+        Quantiles of the horizontal error over all runs and SSBs, by probability; out of a histogram
+        whose bins are 5.9 % wide. Exact ones, with intervals: :attr:`percentiles`.
+    errors_m
+        Estimate minus truth in x and y, of shape (runs, SSBs, 2); NaN as long as the first pose is
+        not known. ``None`` unless kept.
+    scenario, seed
+        What was driven, and by which seed: the same two give the same again.
+    """
+
+    steps: pl.DataFrame
+    runs: pl.DataFrame
+    trajectories: pl.DataFrame | None
+    executions: pl.DataFrame | None
+    integrity: Integrity | None
+    error_quantiles_m: Mapping[float, float]
+    errors_m: NDArray[np.float32] | None = None
+    scenario: Scenario | None = None
+    seed: int | None = None
+
+    def __repr__(self) -> str:
+        name = "" if self.scenario is None else f"{self.scenario.name}, "
+        return f"Simulation({name}{self.runs.height} runs, RMS error {self.rms_error_m:.3f} m)"
+
+    def _repr_html_(self) -> str:
+        rows = "".join(
+            f"<tr><td>{escape(name)}</td><td>{number(value)}</td></tr>"
+            for name, value in self.summary().items()
+        )
+        return f"<table><caption>{escape(repr(self))}</caption>{rows}</table>"
+
+    @classmethod
+    def of(
+        cls,
+        found: _core.SimulationResult,
+        scenario: Scenario | None = None,
+        seed: int | None = None,
+    ) -> Simulation:
+        """What the core found, as tables."""
+        return cls(
+            steps=_table(found.steps),
+            runs=_table(found.runs),
+            trajectories=None if found.trajectories is None else _table(found.trajectories),
+            executions=None if found.executions is None else _table(found.executions),
+            integrity=found.integrity and Integrity.of_runs(*found.integrity),
+            error_quantiles_m=found.error_quantiles_m,
+            errors_m=found.errors_m,
+            scenario=scenario,
+            seed=seed,
+        )
+
+    def summary(self) -> dict[str, float | None]:
+        """The drives in a few numbers; executions and energy are those of a run, on the mean.
+
+        Examples
+        --------
+        >>> list(simulate("paper", runs=2).summary())[:3]
+        ['rms_error_m', 'mean_error_m', 'p50_error_m']
+        """
+        exact = self.percentiles
+        errors_m = (
+            {column(100.0 * share): value for share, value in self.error_quantiles_m.items()}
+            if exact is None
+            else {column(each.percent): each.value for each in exact}
+        )
+        mean = self.runs.select("executions", "listened", "energy_j").mean().row(0, named=True)
+        return {
+            "rms_error_m": self.rms_error_m,
+            "mean_error_m": self.mean_error_m,
+            **errors_m,
+            **mean,
+            "duration_s": float(self.steps["time_s"][-1]),
+        }
+
+    @property
+    def percentiles(self) -> list[Percentile] | None:
+        """Percentiles of the horizontal error with intervals; ``None`` without trajectories.
+
+        Over all positions that are told, by :func:`access_av.statistics.percentiles`.
+        """
+        errors_m = self._horizontal_m()
+        if errors_m is None or np.isnan(errors_m).all():
+            return None
+        driven_s = len(errors_m) * float(self.steps["time_s"][-1])
+        independent = max(1, int(driven_s / service_levels.INDEPENDENT_S))
+        return percentiles(errors_m, independent=independent)
+
+    @property
+    def mean_error_m(self) -> float | None:
+        """Mean horizontal error over all positions that are told; ``None`` without trajectories."""
+        errors_m = self._horizontal_m()
+        if errors_m is None or np.isnan(errors_m).all():
+            return None
+        return float(np.nanmean(errors_m))
+
+    def _horizontal_m(self) -> NDArray[np.float64] | None:
+        """Horizontal errors of shape (runs, SSBs); NaN as long as the place is searched for."""
+        if self.trajectories is None:
+            return None
+        error_m = pl.when(~pl.col("searching")).then(horizontal_error_m())
+        errors_m = self.trajectories.sort("run", "time_s").select(error_m).to_numpy()
+        return np.asarray(errors_m.reshape(-1, self.steps.height))
+
+    @property
+    def operation(self) -> Operation | None:
+        """For how much of the time the vehicle may rely on its position, and why not else."""
+        if self.trajectories is None or self.scenario is None:
+            return None
+        steps = self.trajectories.with_columns(error_m=horizontal_error_m())
+        return Operation.under(self.scenario.vehicle, steps)
+
+    @property
+    def consistency(self) -> Consistency | None:
+        """Errors against what the localizer says of them; ``None`` without trajectories.
+
+        The first :data:`SETTLED_STEPS` are left out of the NEES: an exact start has no covariance.
+        """
+        if self.trajectories is None:
+            return None
+        return Consistency.of(self.trajectories, skip=min(SETTLED_STEPS, self.steps.height - 1))
+
+    @property
+    def service_levels(self) -> list[service_levels.Verdict] | None:
+        """The 3GPP service levels that the drives reach; ``None`` without trajectories."""
+        errors_m = self._horizontal_m()
+        if errors_m is None:
+            return None
+        step_s = float(self.steps["time_s"][-1]) / max(1, self.steps.height - 1)
+        return service_levels.of_runs(errors_m, step_s)
+
+    @property
+    def rms_error_m(self) -> float:
+        """Root mean square of the horizontal error over track and runs."""
+        rms_m = self.steps.select((pl.col("rms_error_m") ** 2).mean().sqrt()).item()
+        return math.nan if rms_m is None else float(rms_m)
+
+
+def simulate(
+    scenario: Scenario | str | Path,
+    *,
+    runs: int = 1,
+    seed: int = 1,
+    platform: Platform | None = None,
+    threads: int | None = None,
+    keep_trajectories: bool = False,
+    errors_every: int | None = None,
+    estimator: Callable[[NDArray[np.complex128]], Estimate] | None = None,
+    policy: Callable[[_core.Situation], bool | Sequence[bool]] | None = None,
+    localizer: Callable[[dict[str, Any], dict[str, Any], tuple[float, float, float]], Any]
+    | None = None,
+    progress: Callable[[int, int], None] | None = None,
+) -> Simulation:
+    """Drive a scenario many times.
+
+    Parameters
+    ----------
+    scenario
+        A scenario, or the name or path of one.
+    runs
+        Number of drives.
+    seed
+        Seed of all random streams: the same seed gives the same bytes.
+    platform
+        The onboard computer; the one the scenario names when ``None``.
+    threads
+        Worker threads, one per core at most and when ``None``. Results do not depend on it.
+    keep_trajectories
+        Whether to keep every drive's trajectory and executions, not only their statistics.
+    errors_every
+        Keep every drive's errors in x and y at each so many SSBs, for statistics over whole runs.
+    estimator
+        In place of the vehicle's angle estimator: takes complex snapshots of shape (antennas,
+        snapshots) and returns the angle from the array's axis in radians, 0 to π; or that angle
+        and its standard deviation; or the logarithm of its likelihood over the electrical angle,
+        at equally spaced values from −π on; or ``None`` where there is no angle. An angle without
+        standard deviation gets the Cramér–Rao bound at its SSB's SNR, which is said once. Its
+        attribute ``energy_per_execution_j`` or ``time_per_execution_s`` states what an estimate
+        takes; without one the runs have no energy.
+    policy
+        In place of the vehicle's wake-up policy: called with the :class:`Situation
+        <access_av._core.Situation>` at each burst that is listened to, it returns whether to
+        estimate the angles of its SSBs, or a list with an answer for each. If it has a method
+        ``listens``, that is asked first, with nothing sensed; else every burst is listened to.
+        An attribute ``wake_up_time_s`` is recorded with each execution.
+    localizer
+        In place of the vehicle's localizer: called as ``localizer(site, vehicle, start)`` at the
+        start of each run, with both settings as dictionaries and the initial pose (x and y in
+        metres, heading in radians) as the vehicle is told it. The object it returns needs the
+        methods ``odometry(time_s, distance_m, speed_mps, yaw_rate_radps)``, ``angle(time_s, head,
+        phase_rad, phase_sigma_rad)``, which may return whether the angle was used, and
+        ``pose(time_s)``, which returns x, y, heading and, if it is known, the 3 by 3 covariance of
+        the three. Late angles go to copies of it (:func:`copy.deepcopy`).
+    progress
+        Called as ``progress(done, total)`` with numbers of drives.
+
+    Returns
+    -------
+    Simulation
+        Tables.
+
+    Raises
+    ------
+    SettingsError
+        When the scenario cannot be used; names the key and what is allowed.
+    ValueError
+        When an estimator, policy or localizer returns what it must not; names the call.
+    OSError
+        When the system does not give so many threads.
+
+    Examples
+    --------
+    >>> result = simulate("paper", runs=2, seed=7)
+    >>> result.runs["run"].to_list()
+    [0, 1]
+    """
+    if not isinstance(scenario, Scenario):
+        scenario = Scenario.load(str(scenario))
+    found = _core.simulate(
+        scenario,
+        runs,
+        seed,
+        platform=platform.core if platform else None,
+        threads=threads,
+        keep_trajectories=keep_trajectories,
+        errors_every=errors_every,
+        estimator=estimator,
+        policy=policy,
+        localizer=localizer,
+        progress=progress,
+    )
+    return Simulation.of(found, scenario, seed)
+
+
+def _table(columns: Mapping[str, Any]) -> pl.DataFrame:
+    """A table with null for what is not known."""
+    words = {name: pl.String for name in ("integrity", "reason") if name in columns}
+    return pl.DataFrame(columns, schema_overrides=words).fill_nan(None)

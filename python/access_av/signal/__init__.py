@@ -1,0 +1,1 @@
+"""From samples to angles: SSBs, angle estimators, recordings of arrays."""

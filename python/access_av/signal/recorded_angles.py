@@ -1,0 +1,226 @@
+"""Angles of arrival from a recording of an array: calibrate, then estimate each burst.
+
+A recording's annotations say what is where. A burst whose label starts with ``reference`` was sent
+from broadside and calibrates the channels for the bursts after it; an annotation may also bring its
+own ``channel_calibration``. Every other annotated burst is estimated.
+"""
+
+from __future__ import annotations
+
+import json
+import math
+import re
+from dataclasses import asdict, dataclass
+from typing import TYPE_CHECKING, Any
+
+import numpy as np
+
+from access_av._core import Recording
+from access_av.errors import InputError
+from access_av.signal import aoa
+from access_av.signal.array_annotations import SPACINGS, ArrayTruth, from_broadside_deg
+
+if TYPE_CHECKING:
+    from collections.abc import Sequence
+    from pathlib import Path
+
+    from numpy.typing import NDArray
+
+SPEED_OF_LIGHT_MPS = 299_792_458.0
+
+# Longest burst that is taken for one: a tenth of a second at 100 MHz.
+MOST_SAMPLES = 10_000_000
+
+
+@dataclass(frozen=True)
+class BurstAngle:
+    """Where one burst came from.
+
+    Attributes
+    ----------
+    sample_start
+        First sample of the burst.
+    azimuth_from_broadside_deg
+        Counter-clockwise from the array's broadside, which is a quarter turn clockwise of its axis,
+        seen from above.
+    sigma_deg
+        Standard deviation: of noise and, where the verdict names reflections, of what they do.
+    snr_db
+        Per antenna and sample.
+    verdict
+        ``resolved``, or ``unresolved:`` and why it should not be relied on.
+    truth_deg
+        Measured azimuth, where annotated.
+    """
+
+    sample_start: int
+    azimuth_from_broadside_deg: float
+    sigma_deg: float
+    snr_db: float
+    label: str
+    verdict: str
+    truth_deg: float | None = None
+
+    def as_record(self) -> dict[str, Any]:
+        """Plain values for JSON; ``truth_deg`` only where it is known."""
+        return {key: value for key, value in asdict(self).items() if value is not None}
+
+
+def estimate_bursts(
+    path: str | Path, *, spacing_wavelengths: float | None = None
+) -> list[BurstAngle]:
+    """Estimate the angle of every annotated burst by one-source maximum likelihood.
+
+    Where the annotations state the antennas' places they are not in a row: azimuth and elevation
+    are then estimated together.
+
+    Parameters
+    ----------
+    path
+        SigMF recording: its name, its ``.sigmf-meta`` or its ``.sigmf-data``.
+    spacing_wavelengths
+        Distance between neighbouring antennas; taken from the metadata when ``None``.
+
+    Raises
+    ------
+    RecordingError
+        When the recording cannot be read.
+    InputError
+        When it has one channel only, no annotated burst, or does not state the spacing.
+
+    Notes
+    -----
+    Channel k sits at (k − 1.5)·d along the array, to the left of broadside for larger k, and
+    receives exp(−j2π·distance/λ). A wave from azimuth α to the left reaches larger k earlier, so
+    the phase step is 2π(d/λ) sin α = 2π(d/λ) cos θ with θ = 90° − α, the angle from the axis.
+
+    A plane wave is equally strong at every antenna. What differs between channels in a burst is
+    gain and multipath and says nothing of the direction, so every channel is brought to the same
+    power and only its phase is calibrated.
+    """
+    recording = Recording.open(path)
+    if recording.channels < 2:
+        raise InputError(f"{path}: one channel; an angle needs an array of at least two")
+    metadata = json.loads(recording.metadata_json())
+    annotations = metadata.get("annotations", [])
+    if not annotations:
+        raise InputError(f"{path}: no `annotations`, so it is not known where the bursts are")
+    truths = stated_truths(recording, metadata)
+    told = spacing_wavelengths is not None
+    if spacing_wavelengths is None:
+        spacing_wavelengths = stated_spacing(truths, metadata, recording.centre_frequency_hz)
+    places = None if told else stated_places(truths)
+    if spacing_wavelengths is None and places is None:
+        raise InputError(f"{path}: the metadata states no antenna spacing; give --spacing")
+
+    calibration: NDArray[np.complex128] | None = None
+    bursts = []
+    for annotation, truth in zip(annotations, truths, strict=True):
+        start = annotation["core:sample_start"]
+        count = annotation.get("core:sample_count", recording.length - start)
+        if not 0 < count <= MOST_SAMPLES:
+            raise InputError(
+                f"{path}: the annotation at sample {start} is of {count} samples; a burst has 1 to "
+                f"{MOST_SAMPLES}"
+            )
+        snapshots = recording.read(start, count)
+        label = str(annotation.get("core:label", ""))
+        if label.lower().startswith("reference") and spacing_wavelengths is not None:
+            gains = aoa.calibrate(snapshots, math.pi / 2, spacing_wavelengths=spacing_wavelengths)
+            calibration = gains / np.abs(gains)
+            continue
+        phases = calibration if truth.channel_phases is None else truth.channel_phases
+        azimuth_deg, sigma_rad, snr_db, verdict = _estimate(
+            _equalised(snapshots), places, spacing_wavelengths, phases
+        )
+        bursts.append(
+            BurstAngle(
+                sample_start=start,
+                azimuth_from_broadside_deg=azimuth_deg,
+                sigma_deg=math.degrees(sigma_rad),
+                snr_db=snr_db,
+                label=label,
+                verdict=verdict,
+                truth_deg=truth.azimuth_from_broadside_deg,
+            )
+        )
+    return bursts
+
+
+def _estimate(
+    snapshots: NDArray[np.complex64],
+    places: NDArray[np.float64] | None,
+    spacing_wavelengths: float | None,
+    phases: NDArray[np.complex128] | None,
+) -> tuple[float, float, float, str]:
+    """Azimuth from broadside (°), its standard deviation (rad), the SNR (dB), and the verdict."""
+    if places is not None:
+        source = aoa.direction(snapshots, places, calibration=phases)
+        azimuth_deg = from_broadside_deg(math.degrees(float(source.azimuth_rad)))
+        sigma_rad, snr_db = float(source.azimuth_sigma_rad), float(source.snr_db)
+        return azimuth_deg, sigma_rad, snr_db, str(source.verdict)
+    if spacing_wavelengths is None:
+        raise InputError("neither spacing nor places of the antennas are known")
+    found = aoa.maximum_likelihood(
+        snapshots, spacing_wavelengths=spacing_wavelengths, calibration=phases
+    )
+    return (
+        90.0 - math.degrees(float(found.angle_rad)),
+        float(found.sigma_rad),
+        float(found.snr_db),
+        str(found.verdict),
+    )
+
+
+def mean_absolute_error_deg(bursts: Sequence[BurstAngle]) -> float | None:
+    """Mean distance from the annotated truth; ``None`` where nothing is annotated."""
+    errors = [
+        abs((burst.azimuth_from_broadside_deg - burst.truth_deg + 180.0) % 360.0 - 180.0)
+        for burst in bursts
+        if burst.truth_deg is not None
+    ]
+    return sum(errors) / len(errors) if errors else None
+
+
+def stated_truths(recording: Recording, metadata: dict[str, Any]) -> list[ArrayTruth]:
+    """What each annotation of a recording states of the array.
+
+    Raises
+    ------
+    InputError
+        Naming the annotation that states what cannot be.
+    """
+    truths = []
+    for index, annotation in enumerate(metadata.get("annotations", [])):
+        try:
+            truths.append(ArrayTruth.of(annotation, recording.channels))
+        except InputError as error:
+            raise InputError(f"annotations[{index}]: {error}") from error
+    return truths
+
+
+def stated_places(truths: Sequence[ArrayTruth]) -> NDArray[np.float64] | None:
+    """Where the antennas are that are not in a row, by the first annotation that states it."""
+    places = (truth.element_places_wavelengths for truth in truths)
+    return next((it for it in places if it is not None), None)
+
+
+def stated_spacing(
+    truths: Sequence[ArrayTruth], metadata: dict[str, Any], frequency_hz: float | None
+) -> float | None:
+    """Spacing in wavelengths from an annotation's truth, or from the description's metres."""
+    for truth in truths:
+        if truth.element_spacing_wavelengths is not None:
+            return truth.element_spacing_wavelengths
+    description = str(metadata["global"].get("core:description", ""))
+    metres = re.search(r"element spacing (\d+\.\d+) m\b", description)
+    if metres is None or frequency_hz is None:
+        return None
+    spacing = float(metres[1]) * frequency_hz / SPEED_OF_LIGHT_MPS
+    return spacing if SPACINGS[0] <= spacing <= SPACINGS[1] else None
+
+
+def _equalised(snapshots: NDArray[np.complex64]) -> NDArray[np.complex64]:
+    """Every channel at unit mean power; a silent one stays as it is."""
+    power = np.mean(np.abs(snapshots) ** 2, axis=1, keepdims=True)
+    return (snapshots / np.sqrt(np.where(power > 0.0, power, 1.0))).astype(np.complex64)

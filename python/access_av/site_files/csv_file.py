@@ -1,0 +1,80 @@
+"""Roads and radio heads in CSV, also with semicolons and decimal commas."""
+
+from __future__ import annotations
+
+from typing import TYPE_CHECKING
+
+import polars as pl
+
+from access_av.errors import InputError
+from access_av.site_files.drawn import Drawn, Head
+from access_av.tables import validation
+
+if TYPE_CHECKING:
+    from collections.abc import Sequence
+    from pathlib import Path
+
+
+def read_road(path: Path) -> Drawn:
+    """Read the columns ``x_m`` and ``y_m``, a point of the road each row.
+
+    Raises
+    ------
+    InputError
+        When a column or number is missing.
+    """
+    rows = validation.read(path, "table of points")
+    validation.check(rows, str(path), numbers=("x_m", "y_m"), other=())
+    points = rows.select(pl.col("x_m", "y_m").cast(pl.Float64)).rows()
+    if len(points) < 2:
+        raise InputError(f"{path}: {len(points)} points; a road has two or more")
+    return Drawn(road_m=points)
+
+
+def read_heads(path: Path) -> Drawn:
+    """Read the columns ``x_m``, ``y_m``, ``z_m`` and, where they are, ``name`` and ``pci``.
+
+    Raises
+    ------
+    InputError
+        When a column or number is missing.
+    """
+    rows = validation.read(path, "table of radio heads", {"name": pl.String})
+    numbers = ("x_m", "y_m", "z_m", *(("pci",) if "pci" in rows.columns else ()))
+    validation.check(rows, str(path), numbers=numbers, other=())
+    return Drawn(
+        heads=[
+            Head(
+                name=str(row.get("name") or ""),
+                x_m=float(row["x_m"]),
+                y_m=float(row["y_m"]),
+                z_m=float(row["z_m"]),
+                pci=None if row.get("pci") is None else int(row["pci"]),
+            )
+            for row in rows.to_dicts()
+        ]
+    )
+
+
+def road_text(points_m: Sequence[tuple[float, float]], *, german: bool = False) -> str:
+    """Points of a road as CSV; ``german`` with semicolons and decimal commas."""
+    rows = [("x_m", "y_m"), *((f"{x_m:.4f}", f"{y_m:.4f}") for x_m, y_m in points_m)]
+    return _text(rows, german=german)
+
+
+def heads_text(heads: Sequence[Head], *, german: bool = False) -> str:
+    """Radio heads as CSV."""
+    rows = [("name", "x_m", "y_m", "z_m", "pci")]
+    for head in heads:
+        pci = "" if head.pci is None else str(head.pci)
+        name = '"' + head.name.replace('"', '""') + '"'
+        rows.append((name, f"{head.x_m:.4f}", f"{head.y_m:.4f}", f"{head.z_m:.4f}", pci))
+    return _text(rows, german=german)
+
+
+def _text(rows: Sequence[Sequence[str]], *, german: bool) -> str:
+    def cell(text: str) -> str:
+        return text.replace(".", ",") if german and text[:1] in "-0123456789" else text
+
+    separator = ";" if german else ","
+    return "".join(separator.join(map(cell, row)) + "\n" for row in rows)

@@ -1,0 +1,199 @@
+"""The error by place: metre by metre along the road, the worst places, and why they are."""
+
+from __future__ import annotations
+
+import json
+import math
+from dataclasses import dataclass
+from typing import TYPE_CHECKING, Any
+
+import numpy as np
+import polars as pl
+
+from access_av import _core
+from access_av.run.error_bound import VISIBLE_SNR_DB, along_route
+
+if TYPE_CHECKING:
+    from collections.abc import Mapping
+
+    from numpy.typing import NDArray
+
+    from access_av.study.trips import Driven
+
+# A percentile is of the errors so far before and behind a place: of one metre there are too few.
+WINDOW_M = 5.0
+# Worst places are told this far apart.
+APART_M = 40.0
+MOST_PLACES = 3
+# Until so far from its start a vehicle knows its place mostly from what it is told there.
+STARTING_M = 20.0
+# An odometer carries errors on for so long; so much more than usual is worth naming.
+CARRIED_M = 60.0
+MORE_THAN_USUAL = 1.25
+# Below this SNR noise is a large part of an angle's error.
+WEAK_SNR_DB = 5.0
+
+
+@dataclass(frozen=True)
+class WorstPlace:
+    """A place where the error is largest, and what is particular about it.
+
+    Attributes
+    ----------
+    along_m, x_m, y_m
+        Where.
+    error_m
+        The target's percentile there.
+    why
+        In words.
+    """
+
+    along_m: float
+    x_m: float
+    y_m: float
+    error_m: float
+    why: str
+
+
+def by_place(driven: Driven, percent: float, error_m: float) -> pl.DataFrame:
+    """Error, bound, geometry and signal at every metre of the road.
+
+    Parameters
+    ----------
+    driven
+        Drives along it.
+    percent, error_m
+        The target.
+
+    Returns
+    -------
+    polars.DataFrame
+        One row a metre; columns ``places`` of :mod:`access_av.columns`. The dilution along the
+        road is ``1 / sqrt(Σ (n·t)² / r²)`` over the visible radio heads, r being their distance,
+        n the normal of their line of sight and t the road's direction: by how many metres an error
+        of one degree in every angle shows along the road. Across it the map helps.
+    """
+    route = along_route(driven.scenario)
+    time_s, along_m, x_m, y_m = (
+        route[name].to_numpy() for name in ("time_s", "along_m", "x_m", "y_m")
+    )
+    at = np.interp(driven.time_s, time_s, along_m)
+    centres = np.arange(0.5, max(1.0, math.floor(along_m[-1])), 1.0)
+    low = np.searchsorted(at, centres - WINDOW_M)
+    high = np.maximum(np.searchsorted(at, centres + WINDOW_M, side="right"), low + 1)
+    low = np.minimum(low, len(at) - 1)
+    rows = []
+    for first, last in zip(low, high, strict=True):
+        near = driven.errors_m[:, first:last].ravel()
+        median, upper = np.quantile(near, [0.5, 0.01 * percent], method="inverted_cdf")
+        rows.append((median, upper, float((near <= error_m).mean())))
+    median_m, percentile_m, within = np.array(rows).T
+    here_x, here_y = (np.interp(centres, *_rising(along_m, it)) for it in (x_m, y_m))
+    bound_m = np.interp(centres, *_rising(along_m, route["bound_m"].to_numpy()))
+    snr_db = np.asarray(_core.Bound(driven.scenario).snr_db(here_x, here_y))
+    visible = snr_db >= VISIBLE_SNR_DB
+    return pl.DataFrame(
+        {
+            "along_m": centres,
+            "x_m": here_x,
+            "y_m": here_y,
+            "median_error_m": median_m,
+            "target_error_m": percentile_m,
+            "within_share": within,
+            "passes": percentile_m <= error_m,
+            "bound_m": bound_m,
+            "dilution_of_degree_m": _dilution(driven.scenario, here_x, here_y, visible),
+            "heads_visible": visible.sum(axis=0),
+            "best_snr_db": snr_db.max(axis=0),
+        }
+    ).with_columns(pl.col("dilution_of_degree_m").fill_nan(None))
+
+
+def _rising(along_m: NDArray[Any], values: NDArray[Any]) -> tuple[NDArray[Any], NDArray[Any]]:
+    """Distances that rise, and what is there: a vehicle that stands is at one place for long."""
+    moved = np.concatenate([[True], np.diff(along_m) > 1e-6])
+    return along_m[moved], values[moved]
+
+
+def _dilution(
+    scenario: _core.Scenario, x_m: NDArray[Any], y_m: NDArray[Any], visible: NDArray[Any]
+) -> NDArray[np.float64]:
+    heads = np.array([head["position_m"][:2] for head in radio_heads(scenario)])
+    dx, dy = heads[:, 0, None] - x_m, heads[:, 1, None] - y_m
+    heading = np.arctan2(np.gradient(y_m), np.gradient(x_m)) if len(x_m) > 1 else np.zeros(1)
+    # The normal of the line of sight against the road's direction.
+    across = (np.cos(heading) * dy - np.sin(heading) * dx) / (dx**2 + dy**2)
+    known = (np.where(visible, across, 0.0) ** 2).sum(axis=0)
+    with np.errstate(divide="ignore"):
+        return np.where(known > 1e-12, np.radians(1.0) / np.sqrt(known), np.nan)
+
+
+def radio_heads(scenario: _core.Scenario) -> list[Mapping[str, Any]]:
+    """The radio heads of a scenario's site, as they are set."""
+    heads: list[Mapping[str, Any]] = json.loads(scenario.site.to_json())["radio_heads"]
+    return heads
+
+
+def worst_places(places: pl.DataFrame, stops_m: list[float]) -> list[WorstPlace]:
+    """The places of the largest errors, so far apart that they are not one place."""
+    left = places.sort("target_error_m", descending=True, maintain_order=True)
+    found: list[WorstPlace] = []
+    for row in left.iter_rows(named=True):
+        if all(abs(row["along_m"] - place.along_m) >= APART_M for place in found):
+            found.append(
+                WorstPlace(
+                    along_m=row["along_m"],
+                    x_m=row["x_m"],
+                    y_m=row["y_m"],
+                    error_m=row["target_error_m"],
+                    why=_why(row, places, stops_m),
+                )
+            )
+        if len(found) == MOST_PLACES:
+            break
+    return found
+
+
+def _why(row: Mapping[str, Any], places: pl.DataFrame, stops_m: list[float]) -> str:
+    """What is particular about a place: of several reasons the weightiest."""
+    if not row["heads_visible"]:
+        return "no radio head is in reach: the odometer is alone"
+    if row["along_m"] < STARTING_M:
+        return "just set off: the vehicle knows its place mostly from what it is told at the start"
+    if row["dilution_of_degree_m"] is None:
+        return "every radio head in reach lies straight ahead or behind"
+    # The odometer carries the error of the way that was just driven.
+    here, usual = _carried(places, row["along_m"]), _usual(places)
+    if here > MORE_THAN_USUAL * usual:
+        return (
+            f"on the {CARRIED_M:g} m before, radio heads lie ahead, behind or far away: a degree "
+            f"of their angles is {here:.1f} m along the road, against {usual:.1f} m at the median "
+            "of the road"
+        )
+    if row["heads_visible"] == 1:
+        return "one radio head alone is in reach"
+    if row["best_snr_db"] < WEAK_SNR_DB:
+        return f"the strongest radio head is weak here ({row['best_snr_db']:.0f} dB)"
+    if any(0.0 <= row["along_m"] - stop_m < 2.0 * WINDOW_M for stop_m in stops_m):
+        return "at a stop: the error it arrives with stays as long as it stands"
+    bound = places["bound_m"].median()
+    if isinstance(bound, float) and row["bound_m"] <= bound:
+        return "drives that happened to be bad here: what could be reached here is as elsewhere"
+    return (
+        "nothing particular in the geometry: errors of odometer, array and radio heads’ places, "
+        "as large as they are stated"
+    )
+
+
+def _carried(places: pl.DataFrame, along_m: float) -> float:
+    """Root mean square of the dilution on the way to a place."""
+    before = pl.col("along_m").is_between(along_m - CARRIED_M, along_m)
+    square = (pl.col("dilution_of_degree_m").filter(before) ** 2).mean().sqrt()
+    found = places.select(square).item()
+    return math.inf if found is None else float(found)
+
+
+def _usual(places: pl.DataFrame) -> float:
+    """The median of that over the road."""
+    every = range(0, places.height, 10)
+    return float(np.median([_carried(places, places["along_m"][place]) for place in every]))

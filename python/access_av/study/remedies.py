@@ -1,0 +1,165 @@
+"""What could mend a plant's error: each a change of site or vehicle, with what it costs."""
+
+from __future__ import annotations
+
+import json
+from dataclasses import dataclass
+from typing import TYPE_CHECKING, Any
+
+from access_av.radio.placement import plan
+from access_av.run.error_bound import along_route
+
+if TYPE_CHECKING:
+    from collections.abc import Mapping
+
+    from access_av import _core
+
+# What is left of each error by the remedy.
+SURVEYED_STD_M = 0.02  # a total station or RTK-GNSS, in each of x and y
+CALIBRATED_MOUNTING_STD_RAD = 0.002
+CALIBRATED_PHASE_STD_RAD = 0.01
+REMEMBERED_SCALE_STD = 0.0005  # by how much tyres and load change it from one day to the next
+SHORTEST_PERIOD_MS = 5.0  # TS 38.331, ssb-periodicityServingCell
+
+
+@dataclass(frozen=True)
+class Remedy:
+    """One change by itself.
+
+    Attributes
+    ----------
+    name
+        What it is called in tables.
+    what
+        In words, with its numbers.
+    settings
+        The keys of the scenario that it changes, and their values.
+    price
+        Which of the plant's prices it is.
+    units
+        How often that is paid.
+    """
+
+    name: str
+    what: str
+    settings: Mapping[str, Any]
+    price: str
+    units: int
+
+
+def remedies(scenario: _core.Scenario, vehicles: int) -> list[Remedy]:
+    """Every remedy that changes something in a scenario, from settings to what has to be bought.
+
+    Parameters
+    ----------
+    scenario
+        A trip of the plant.
+    vehicles
+        How many vehicles there are.
+    """
+    site, vehicle = (json.loads(part.to_json()) for part in (scenario.site, scenario.vehicle))
+    found = [
+        _remember(vehicle),
+        _more_ssbs(site),
+        _calibrate(vehicle, vehicles),
+        _survey(site),
+        _odometer(vehicle, vehicles),
+        _move(scenario, site),
+        _mast(scenario),
+    ]
+    return [remedy for remedy in found if remedy is not None]
+
+
+def _remember(vehicle: Mapping[str, Any]) -> Remedy | None:
+    if vehicle["odometer"]["scale_std"] <= REMEMBERED_SCALE_STD:
+        return None
+    what = (
+        "the odometer’s scale kept from the last trip, so that "
+        f"{100.0 * REMEMBERED_SCALE_STD:g} % of it are open, not "
+        f"{100.0 * vehicle['odometer']['scale_std']:g} %"
+    )
+    settings = {"vehicle.odometer.scale_std": REMEMBERED_SCALE_STD}
+    return Remedy("remember the odometer’s scale", what, settings, "vehicle_settings", 1)
+
+
+def _more_ssbs(site: Mapping[str, Any]) -> Remedy | None:
+    period_ms = site["ssb"]["period_ms"]
+    if 0.5 * period_ms < SHORTEST_PERIOD_MS:
+        return None
+    what = f"SSBs every {0.5 * period_ms:g} ms, not every {period_ms:g} ms"
+    return Remedy(
+        "SSBs twice as often", what, {"site.ssb.period_ms": 0.5 * period_ms}, "cell_settings", 1
+    )
+
+
+def _calibrate(vehicle: Mapping[str, Any], vehicles: int) -> Remedy | None:
+    least = {
+        "mounting_std_rad": CALIBRATED_MOUNTING_STD_RAD,
+        "phase_std_rad": CALIBRATED_PHASE_STD_RAD,
+    }
+    settings = {
+        f"vehicle.array.{key}": value
+        for key, value in least.items()
+        if vehicle["array"].get(key, 0.0) > value
+    }
+    if not settings:
+        return None
+    what = (
+        f"mounting known to {1e3 * CALIBRATED_MOUNTING_STD_RAD:g} mrad and the antennas’ phases to "
+        f"{1e3 * CALIBRATED_PHASE_STD_RAD:g} mrad"
+    )
+    return Remedy("calibrate the antennas", what, settings, "calibration", vehicles)
+
+
+def _survey(site: Mapping[str, Any]) -> Remedy | None:
+    heads = site["radio_heads"]
+    settings = {
+        f"site.radio_heads[{index}].position_std_m": SURVEYED_STD_M
+        for index, head in enumerate(heads)
+        if head["position_std_m"] > SURVEYED_STD_M
+    }
+    if not settings:
+        return None
+    what = f"places of the radio heads known to {100.0 * SURVEYED_STD_M:g} cm"
+    return Remedy("survey the radio heads", what, settings, "survey", len(settings))
+
+
+def _odometer(vehicle: Mapping[str, Any], vehicles: int) -> Remedy | None:
+    settings = {
+        f"vehicle.odometer.{key}": 0.5 * vehicle["odometer"][key]
+        for key in ("scale_std", "noise_m_per_sqrt_m", "noise_m_per_sqrt_s", "speed_noise_mps")
+        if vehicle["odometer"][key] > 0.0
+    }
+    if not settings:
+        return None
+    return Remedy("a better odometer", "half the odometer’s errors", settings, "odometer", vehicles)
+
+
+def _move(scenario: _core.Scenario, site: Mapping[str, Any]) -> Remedy | None:
+    """The radio head whose move to the best place beside the weakest one helps the bound most."""
+    heads = site["radio_heads"]
+    if len(heads) < 2:
+        return None
+    place = plan(scenario).ranking.row(0, named=True)
+    position_m = [place["x_m"], place["y_m"], place["z_m"]]
+
+    def p90_m(index: int) -> float:
+        moved = scenario.with_overrides({f"site.radio_heads[{index}].position_m": position_m})
+        return float(along_route(moved)["bound_m"].quantile(0.9, "linear") or 0.0)
+
+    index = min(range(len(heads)), key=p90_m)
+    name = heads[index]["name"] or f"radio head {index + 1}"
+    what = f"“{name}” moved to ({position_m[0]:g}, {position_m[1]:g}) m, {position_m[2]:g} m high"
+    settings = {f"site.radio_heads[{index}].position_m": position_m}
+    return Remedy("move a radio head", what, settings, "move_radio_head", 1)
+
+
+def _mast(scenario: _core.Scenario) -> Remedy | None:
+    planned = plan(scenario)
+    heads = json.loads(planned.scenario.site.to_json())["radio_heads"]
+    heads[-1] |= {
+        key: heads[0][key] for key in ("position_std_m", "eirp_std_db") if heads[0].get(key)
+    }
+    x_m, y_m, z_m = heads[-1]["position_m"]
+    what = f"a further radio head at ({x_m:g}, {y_m:g}) m, {z_m:g} m high"
+    return Remedy("add a mast", what, {"site.radio_heads": heads}, "radio_head", 1)

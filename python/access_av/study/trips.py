@@ -1,0 +1,218 @@
+"""Drives of one variant of a plant, and what two variants differ by, drive by drive."""
+
+from __future__ import annotations
+
+import json
+from dataclasses import dataclass
+from typing import TYPE_CHECKING
+
+import numpy as np
+import polars as pl
+
+from access_av.device.platform import Platform
+from access_av.run.service_levels import INDEPENDENT_S
+from access_av.run.simulation import simulate
+from access_av.statistics.paired import paired_difference
+from access_av.statistics.percentiles import percentiles
+from access_av.statistics.proportions import clopper_pearson
+
+if TYPE_CHECKING:
+    from collections.abc import Callable
+
+    from numpy.typing import NDArray
+
+    from access_av import _core
+    from access_av.statistics.percentiles import Percentile
+
+# Errors are kept this often: a vehicle moves less than its own width meanwhile.
+KEPT_EVERY_S = 0.1
+EXTENTS = ("low", "value", "high")
+
+
+@dataclass(frozen=True)
+class Energy:
+    """Energy of a trip in joules, on the mean over the drives, at one end of the figures' ranges.
+
+    Attributes
+    ----------
+    estimates_j, listening_j
+        Angle estimates, and the receiver while it listens.
+    idle_j
+        The board that would idle, where the platform counts it; else 0.
+    """
+
+    estimates_j: float
+    listening_j: float
+    idle_j: float
+
+    @property
+    def total_j(self) -> float:
+        """All three."""
+        return self.estimates_j + self.listening_j + self.idle_j
+
+
+@dataclass(frozen=True, eq=False)
+class Driven:
+    """Many drives of one scenario.
+
+    Attributes
+    ----------
+    name
+        What it is called in tables.
+    scenario
+        What was driven.
+    errors_m
+        Horizontal errors, shape (runs, epochs); infinite as long as the place is searched for.
+    time_s
+        Times of the epochs.
+    executions, listened
+        Angle estimates, and SSB bursts listened to, of each run.
+    duration_s
+        Of a trip.
+    ok_share
+        Share of the time in which the position may be relied on (state ``ok``).
+    beyond
+        Errors beyond the protection level meanwhile.
+    """
+
+    name: str
+    scenario: _core.Scenario
+    errors_m: NDArray[np.float64]
+    time_s: NDArray[np.float64]
+    executions: NDArray[np.int64]
+    listened: NDArray[np.int64]
+    duration_s: float
+    ok_share: float | None
+    beyond: int | None
+
+    @property
+    def runs(self) -> int:
+        """Number of drives."""
+        return len(self.executions)
+
+    def first(self, runs: int) -> Driven:
+        """The same of the first so many drives, which is how pairs are made."""
+        return Driven(
+            self.name,
+            self.scenario,
+            self.errors_m[:runs],
+            self.time_s,
+            self.executions[:runs],
+            self.listened[:runs],
+            self.duration_s,
+            self.ok_share,
+            self.beyond,
+        )
+
+    @property
+    def independent(self) -> int:
+        """How many of the errors are as good as independent of each other."""
+        return max(1, int(self.runs * self.duration_s / INDEPENDENT_S))
+
+    def percentile(self, percent: float) -> Percentile:
+        """A percentile of the error with its 95 % interval."""
+        [found] = percentiles(self.errors_m, [percent], independent=self.independent)
+        return found
+
+    def within(self, error_m: float) -> tuple[float, float, float]:
+        """Share of the time within an error, and the ends of its 95 % interval.
+
+        The wider, at each end, of the bootstrap over whole drives, and of Clopper and Pearson's for
+        as many independent positions as there are.
+        """
+        shares = (self.errors_m <= error_m).mean(axis=1)
+        share = float(shares.mean())
+        low, high = clopper_pearson(int(share * self.independent), self.independent)
+        if self.runs > 1:
+            rng = np.random.default_rng(0)
+            drawn = rng.integers(0, self.runs, (2000, self.runs))
+            least, most = np.quantile(shares[drawn].mean(axis=1), [0.025, 0.975])
+            low, high = min(low, float(least)), max(high, float(most))
+        return share, low, max(high, share)
+
+    def less_than(self, other: Driven, percent: float) -> tuple[float, float, float]:
+        """By how many metres a percentile is larger than another's, in pairs of drives.
+
+        Returns
+        -------
+        tuple of float
+            The difference, negative where this one is better, and the ends of its 95 % interval.
+        """
+        runs = min(self.runs, other.runs)
+        mine, its = self.errors_m[:runs], other.errors_m[:runs]
+        return paired_difference(mine, its, percent)
+
+    def energy(self, platform: Platform | None = None) -> dict[str, Energy] | None:
+        """Energy of a trip by ``low``, ``value`` and ``high``; ``None`` without a figure."""
+        vehicle = self.scenario.vehicle
+        core = (platform or Platform.load(platform_name(self.scenario))).core
+        estimates, listened = (round(float(it.mean())) for it in (self.executions, self.listened))
+        found = {}
+        for extent in EXTENTS:
+            parts = core.energy_j(vehicle, estimates, listened, self.duration_s, extent)
+            if parts is None:
+                return None
+            found[extent] = Energy(*parts[:3])
+        return found
+
+    def table(self) -> pl.DataFrame:
+        """One row per drive and epoch: columns ``variant, run, time_s, error_m``."""
+        runs, epochs = self.errors_m.shape
+        return pl.DataFrame(
+            {
+                "variant": pl.Series([self.name]).extend_constant(self.name, runs * epochs - 1),
+                "run": np.repeat(np.arange(runs, dtype=np.uint32), epochs),
+                "time_s": np.tile(self.time_s, runs),
+                "error_m": self.errors_m.ravel().astype(np.float32),
+            }
+        )
+
+    def drives(self) -> pl.DataFrame:
+        """One row per drive: columns ``variant, run, executions, listened, duration_s``."""
+        return pl.DataFrame(
+            {
+                "variant": [self.name] * self.runs,
+                "run": np.arange(self.runs, dtype=np.uint32),
+                "executions": self.executions,
+                "listened": self.listened,
+                "duration_s": [self.duration_s] * self.runs,
+            }
+        )
+
+
+def drive(
+    name: str,
+    scenario: _core.Scenario,
+    runs: int,
+    seed: int,
+    threads: int | None = None,
+    progress: Callable[[int, int], None] | None = None,
+) -> Driven:
+    """Drive a scenario: the same seed gives each variant the same world, run by run."""
+    period_s = json.loads(scenario.site.to_json())["ssb"]["period_ms"] * 1e-3
+    every = max(1, round(KEPT_EVERY_S / period_s))
+    found = simulate(
+        scenario, runs=runs, seed=seed, threads=threads, errors_every=every, progress=progress
+    )
+    if found.errors_m is None:  # they were asked for
+        raise RuntimeError("the simulation kept no errors")
+    errors_m = np.hypot(found.errors_m[:, :, 0], found.errors_m[:, :, 1]).astype(np.float64)
+    errors_m[np.isnan(errors_m)] = np.inf
+    time_s = found.steps["time_s"].to_numpy()
+    integrity = found.integrity
+    return Driven(
+        name=name,
+        scenario=scenario,
+        errors_m=errors_m,
+        time_s=time_s[::every],
+        executions=found.runs["executions"].to_numpy().astype(np.int64),
+        listened=found.runs["listened"].to_numpy().astype(np.int64),
+        duration_s=float(time_s[-1]),
+        ok_share=None if integrity is None else float(integrity.state_shares["ok"]),
+        beyond=None if integrity is None else integrity.exceedances,
+    )
+
+
+def platform_name(scenario: _core.Scenario) -> str:
+    """Name of the platform that a scenario's vehicle computes on."""
+    return str(json.loads(scenario.vehicle.to_json())["platform"]["name"])

@@ -1,0 +1,482 @@
+"""The tables: what a row is, which names it has, and when a value is null."""
+
+from __future__ import annotations
+
+from dataclasses import dataclass, field
+from typing import TYPE_CHECKING
+
+from access_av.tables.columns.glossary import GLOSSARY
+
+if TYPE_CHECKING:
+    from collections.abc import Mapping
+
+
+@dataclass(frozen=True)
+class Table:
+    """A table: what a row is, where it is found, its columns in order, when a value is null."""
+
+    name: str
+    row: str
+    where: str
+    columns: tuple[str, ...]
+    null: Mapping[str, str] = field(default_factory=dict)
+
+    def records(self) -> list[dict[str, str]]:
+        """Name, unit, meaning and null-when of each column."""
+        return [
+            {**vars(GLOSSARY[name]), "null": self.null.get(name, "never")} for name in self.columns
+        ]
+
+
+_NO_COVARIANCE = "the localizer does not know its own error"
+_NOT_GUARDED = "the localizer is not guarded"
+_NO_ANGLE = "the snapshots carry no angle"
+_NOT_COMPARED = "the angle was not compared with a prediction"
+_NOT_FOUND = "the first pose was not found"
+_NONE_KNOWS = "no run knows its pose yet"
+_NO_MODE = "every SSB (campaign P): no power mode"
+_NO_FIGURE = "the platform has no figure for the method"
+_NO_ARRAY = "one channel only; the key is absent then"
+_UNDECODED = "the message was not decoded"
+
+_ERRORS = (
+    "mean_abs_error_x_m", "mean_abs_error_y_m", "rms_error_m", "rms_heading_error_rad",
+    "mean_true_snr_db", "p50_error_m", "p90_error_m", "p99_error_m",
+)  # fmt: skip
+_COVARIANCES = (
+    "covariance_xx_m2", "covariance_yy_m2", "covariance_heading_rad2", "covariance_xy_m2",
+    "covariance_x_heading_m_rad", "covariance_y_heading_m_rad",
+)  # fmt: skip
+_ANGLE = ("phase_rad", "phase_sigma_rad", "angle_rad")
+_COMPARED = ("mahalanobis_squared", "threshold")
+_RISKS = (
+    "asked_risk_per_hour", "risk_per_hour", "risk_per_hour_low", "risk_per_hour_high",
+)  # fmt: skip
+_LEVELS = ("protection_level_m", "protection_level_along_m", "protection_level_across_m")
+_PERCENTILES = tuple(
+    f"p{percent}_error{end}_m"
+    for percent in ("50", "90", "95", "99", "99_9")
+    for end in ("", "_low", "_high")
+)
+_IN_THE_WORST = (
+    "choice", "world", "runs", "energy_j", "rms_error_m", *_PERCENTILES, "p90_max_error_m",
+    "executions", "listened",
+)  # fmt: skip
+_PERCENTILES_NULL = {
+    **dict.fromkeys(
+        (name for name in _PERCENTILES if "low" not in name),
+        "for so much of the time the place is not known",
+    ),
+    **dict.fromkeys(
+        (name for name in _PERCENTILES if "low" in name or "high" in name),
+        "one run has no interval; or the drives are too few to say",
+    ),
+}
+_IN_THE_WORST_NULL = {
+    **dict.fromkeys(("rms_error_m", "p90_max_error_m"), "in some run it was not found"),
+    **_PERCENTILES_NULL,
+}
+_POSE = ("x_m", "y_m", "heading_rad")
+_POSES = (
+    "time_s", *_POSE, "speed_mps", "covariance_xx_m2", "covariance_xy_m2", "covariance_yy_m2",
+    "covariance_heading_rad2", *_LEVELS, "integrity", "searching", "lost",
+)  # fmt: skip
+_POSES_NULL = {
+    **{name: _NO_COVARIANCE for name in _POSES if name.startswith("covariance")},
+    **dict.fromkeys((*_LEVELS, "integrity"), _NOT_GUARDED),
+}
+_ENERGIES = ("energy_j", "energy_executions_j", "energy_listening_j", "energy_idle_j")
+
+TABLES: Mapping[str, Table] = {
+    table.name: table
+    for table in (
+        Table(
+            "steps",
+            "An SSB, over all runs",
+            "`access_av.simulate(…).steps`",
+            ("time_s", *_ERRORS),
+            {name: _NONE_KNOWS for name in _ERRORS if name != "mean_true_snr_db"},
+        ),
+        Table(
+            "runs",
+            "A run",
+            "`access_av.simulate(…).runs`",
+            (
+                "run", "executions", "listened", "longest_gap_s", *_ENERGIES, "rms_error_m",
+                "max_error_m", "final_error_m", "found_s", "found_m",
+            ),
+            {
+                **dict.fromkeys(_ENERGIES, _NO_FIGURE),
+                **dict.fromkeys(
+                    ("rms_error_m", "max_error_m", "final_error_m", "found_s", "found_m"),
+                    _NOT_FOUND,
+                ),
+            },
+        ),
+        Table(
+            "trajectories",
+            "An SSB of a run, with truth and estimate",
+            "`trajectories.parquet` of `access-av run`; `access_av.simulate(…).trajectories`",
+            (
+                "run", "time_s", *_POSE, "true_x_m", "true_y_m", "true_heading_rad", "error_x_m",
+                "error_y_m", "true_snr_db", *_COVARIANCES, *_LEVELS, "searching", "integrity",
+            ),
+            {
+                **dict.fromkeys(_COVARIANCES, _NO_COVARIANCE),
+                **dict.fromkeys((*_LEVELS, "integrity"), _NOT_GUARDED),
+            },
+        ),
+        Table(
+            "executions",
+            "An angle estimate, and what became of it",
+            "`executions.parquet` of `access-av run`; `access_av.simulate(…).executions`",
+            (
+                "run", "time_s", "pci", "ssb_index", "snr_db", *_ANGLE, "estimator_snr_db",
+                *_COMPARED, "wake_up_time_s", "resolved", "accepted", "reason",
+            ),
+            {
+                **dict.fromkeys((*_ANGLE, "estimator_snr_db"), _NO_ANGLE),
+                **dict.fromkeys(_COMPARED, _NOT_COMPARED),
+            },
+        ),
+        Table(
+            "nees",
+            "An SSB of a run",
+            "`access_av.statistics.nees(…)`",
+            ("run", "time_s", "nees"),
+            {"nees": f"{_NO_COVARIANCE}, or an area of it; or the first pose is not known yet"},
+        ),
+        Table(
+            "mean_nees",
+            "An SSB, over the runs that have a NEES",
+            "`access_av.statistics.mean_nees(…)`",
+            ("time_s", "runs", "mean_nees", "band_low", "band_high", "in_band"),
+        ),
+        Table(
+            "odometry",
+            "An odometry sample",
+            "`odometry.csv` of `access-av synth`; `access-av locate --odometry`",
+            ("time_s", "distance_m", "speed_mps", "yaw_rate_radps"),
+            {
+                "distance_m": "absent where the speeds tell it, or left and right wheel",
+                "speed_mps": "absent where the distances tell it, or left and right wheel",
+                "yaw_rate_radps": "there is no gyroscope; the column is absent then",
+            },
+        ),
+        Table(
+            "poses",
+            "An odometry sample, and where the vehicle was",
+            "`poses.parquet` of `access-av locate`; `access_av.locate(…).poses`",
+            _POSES,
+            _POSES_NULL,
+        ),
+        Table(
+            "smoothed",
+            "The same as seen from the end of the drive",
+            "`smoothed.parquet` of `access-av locate --smooth`; `access_av.locate(…).smoothed`",
+            _POSES,
+            {**_POSES_NULL, **dict.fromkeys((*_LEVELS, "integrity"), "always")},
+        ),
+        Table(
+            "angles",
+            "An angle, and what became of it",
+            "`angles.parquet` of `access-av locate`; `access_av.locate(…).angles`. A CSV log of "
+            "angles for `access-av locate --recording` has some of the first seven: docs/locate.md",
+            ("time_s", "pci", "ssb_index", "snr_db", *_ANGLE, "accepted", "reason", *_COMPARED),
+            {**dict.fromkeys(_ANGLE, _NO_ANGLE), **dict.fromkeys(_COMPARED, _NOT_COMPARED)},
+        ),
+        Table(
+            "recorded_angles",
+            "An angle of a recording, not located yet",
+            "`angles.csv` and `angles.parquet` of `access-av angles`; "
+            "`access_av.estimate_angles(…).angles`; `access-av locate --recording`",
+            ("time_s", "pci", "ssb_index", "snr_db", *_ANGLE, "phase_noise_sigma_rad", "resolved"),
+        ),
+        Table(
+            "findings",
+            "A constant of the vehicle that the localizer estimates",
+            "`findings.parquet` of `access-av locate`; `access_av.locate(…).findings`",
+            ("constant", "constant_unit", "stated_value", "found_value", "found_value_std"),
+        ),
+        Table(
+            "located_errors",
+            "A pose whose truth is known",
+            "`access_av.drives.error_m(…)`",
+            ("time_s", "error_m", "error_x_m", "error_y_m"),
+        ),
+        Table(
+            "bound_route",
+            "An SSB of the drive, every SSB being used",
+            "`bound.parquet` of `access-av bound`; `access_av.bound(…).route`",
+            (
+                "time_s", "along_m", "x_m", "y_m", "bound_m", "along_std_m", "across_std_m",
+                "heading_std_rad", "odometer_scale_std",
+            ),
+        ),
+        Table(
+            "bound_map",
+            "A square of the site, at its middle",
+            "`map.parquet` of `access-av bound`; `access_av.bound(…).site`",
+            ("x_m", "y_m", "bound_m"),
+            {"bound_m": "the radio heads leave a direction open"},
+        ),
+        Table(
+            "channel_drops",
+            "A link, dropped at random",
+            "`access_av.channel.drops(…)`",
+            (
+                "line_of_sight", "path_loss_db", "shadowing_db", "rician_k_db", "delay_spread_s",
+                "azimuth_spread_deg", "zenith_spread_deg", "paths_delay_spread_s",
+                "paths_azimuth_spread_deg",
+            ),
+            {"rician_k_db": "no line of sight"},
+        ),
+        Table(
+            "integrity_cases",
+            "A case of an integrity campaign",
+            "`integrity.parquet` of `access-av integrity`; `Case.as_record()`",
+            (
+                "mismatch", "channel", "heads", "runs", "availability", "unavailable_share",
+                "exceedances", "exceedance_share", "exceedance_share_low",
+                "exceedance_share_high", "runs_with_exceedances", "time_to_alert_s",
+                "level_over_error", *_RISKS, "p90_error_m", "max_error_m",
+            ),
+            dict.fromkeys(_RISKS[1:], "the drives are too short for a tail"),
+        ),
+        Table(
+            "masts",
+            "A candidate mast, as the only one that is added",
+            "`masts.parquet` of `access-av plan`; `access_av.plan(…).ranking`",
+            ("name", "x_m", "y_m", "z_m", "p90_bound_m"),
+        ),
+        Table(
+            "survey",
+            "A number of site or vehicle that was surveyed by driving",
+            "`survey.parquet` of `access-av survey`; `access_av.survey(…).table()`",
+            ("key", "unit", "before", "std_before", "found", "std", "is_learnt"),
+        ),
+        Table(
+            "bound_heads",
+            "A radio head",
+            "`access-av bound --json`; `access_av.bound(…).heads`",
+            (
+                "name", "pci", "ssb_index", "x_m", "y_m", "nearest_m", "farthest_m",
+                "least_expected_snr_db", "most_expected_snr_db", "visible_share",
+            ),
+        ),
+        Table(
+            "operating_points",
+            "An operating point of a reading of the paper",
+            "`operating_points.parquet` of `access-av evaluate`; `access-av explore --json`; all "
+            "but `reading`: `access_av.evaluate(…).points`",
+            (
+                "reading", "campaign", "mode", "mode_name", "method", "adaptive", "base_wake_up_ms",
+                "executions", "worst_error_x_m", "worst_error_y_m", "rms_error_m",
+                "energy_per_execution_j", "energy_j", "energy_provenance", *_PERCENTILES,
+            ),
+            {
+                **dict.fromkeys(("mode", "mode_name"), _NO_MODE),
+                **dict.fromkeys(
+                    ("energy_per_execution_j", "energy_j", "energy_provenance"),
+                    f"{_NO_MODE}; or {_NO_FIGURE}",
+                ),
+                **_PERCENTILES_NULL,
+            },
+        ),
+        Table(
+            "study_errors",
+            "An epoch of a drive of a study, ten of them a second",
+            "`errors.parquet` of `access-av study`",
+            ("variant", "run", "time_s", "error_m"),
+        ),
+        Table(
+            "study_drives",
+            "A drive of a study",
+            "`drives.parquet` of `access-av study`",
+            ("variant", "run", "executions", "listened", "duration_s"),
+        ),
+        Table(
+            "places",
+            "A metre of a plant's road",
+            "`places.parquet` and `places.csv` of `access-av study`",
+            (
+                "along_m", "x_m", "y_m", "median_error_m", "target_error_m", "within_share",
+                "passes", "bound_m", "dilution_of_degree_m", "heads_visible", "best_snr_db",
+            ),
+            {"dilution_of_degree_m": "no radio head in reach tells of the distance along the road"},
+        ),
+        Table(
+            "study_points",
+            "A way to operate the vehicle, in a power mode",
+            "`points.parquet` of `access-av study`",
+            (
+                "variant", "method", "wake_up", "mode", "mode_name", "target_error_m",
+                *(
+                    f"{part}_{extent}_j"
+                    for part in ("estimates", "listening", "idle")
+                    for extent in ("low", "value", "high")
+                ),
+                "idle_low_w", "idle_value_w", "idle_high_w", "on_front", "recommended",
+            ),
+            dict.fromkeys(
+                ("idle_low_w", "idle_value_w", "idle_high_w"), "the platform has no such figure"
+            ),
+        ),
+        Table(
+            "compared",
+            "A percentile of the error of one of several variants",
+            "`compared.parquet` of `access-av run` and `access-av study`, with --vary or --compare",
+            (
+                "variant", "runs", "percent", "percentile_m", "percentile_low_m",
+                "percentile_high_m", "more_m", "more_low_m", "more_high_m", "energy_j",
+            ),
+            {
+                "energy_j": _NO_FIGURE,
+                **dict.fromkeys(("more_m", "more_low_m", "more_high_m"), "the first variant"),
+                **dict.fromkeys(
+                    ("percentile_low_m", "percentile_high_m"), "one run has no interval"
+                ),
+            },
+        ),
+        Table(
+            "designs",
+            "A design of a scenario in the worst of its worlds, over the runs that all designs see",
+            "`designs.parquet` of `access-av designs`; `kept` of `access-av choose --json`",
+            ("design", *_IN_THE_WORST, "on_front"),
+            {"energy_j": _NO_FIGURE, **_IN_THE_WORST_NULL},
+        ),
+        Table(
+            "design_worlds",
+            "A design of a scenario in one of several worlds",
+            "`worlds.parquet` of `access-av designs`",
+            ("design", *_IN_THE_WORST),
+            {"energy_j": _NO_FIGURE, **_IN_THE_WORST_NULL},
+        ),
+        Table(
+            "errors",
+            "A setting of a reading and an SSB",
+            "`errors.parquet` of `access-av evaluate`; all but `reading`: "
+            "`access_av.evaluate(…).errors`",
+            (
+                "reading", "method", "adaptive", "base_wake_up_ms", "time_s", "mean_abs_error_x_m",
+                "mean_abs_error_y_m",
+            ),
+        ),
+        Table(
+            "snr",
+            "An SSB, over all runs",
+            "`snr.parquet` of `access-av evaluate`; `access_av.evaluate(…).snr`",
+            ("time_s", "mean_true_snr_db"),
+        ),
+        Table(
+            "claims",
+            "A claim of the paper under a reading",
+            "`claims.json` of `access-av evaluate`",
+            (
+                "reading", "id", "says", "where", "stated", "obtained", "interval", "unit",
+                "verdict", "turns_with_seed", "evidence", "note", "spread", "met_by_seed",
+            ),
+            {
+                "obtained": "it could not be judged, is not testable, or nothing is within the "
+                "budget",
+                "interval": "nothing in it is drawn, or it is of modes",
+            },
+        ),
+        Table(
+            "ablations",
+            "A reading and a power mode, with a constant in the controller's place",
+            "`ablations.parquet` of `access-av evaluate`",
+            (
+                "reading", "mode", "constant_ms", "executions", "constant_executions",
+                "rms_error_m", "constant_rms_m", "gain_m", "gain_low_m", "gain_high_m", "matters",
+            ),
+        ),
+        Table(
+            "fixed_front",
+            "MUSIC at a fixed interval",
+            "`fixed_front.parquet` of `access-av evaluate`",
+            (
+                "base_wake_up_ms", "executions", "worst_error_x_m", "worst_error_y_m",
+                "rms_error_m",
+            ),
+        ),
+        Table(
+            "ours",
+            "A power mode: our localizer and wake-up beside the paper's adaptive point",
+            "`ours.parquet` of `access-av evaluate`",
+            (
+                "mode", "map", "executions", "papers_executions", "energy_j", "papers_energy_j",
+                "worst_error_m", "papers_worst_m", "rms_error_m", "papers_rms_m", "error_less_m",
+                "error_less_low_m", "error_less_high_m", "executions_less", "executions_less_low",
+                "executions_less_high",
+            ),
+            dict.fromkeys(("energy_j", "papers_energy_j"), _NO_FIGURE),
+        ),
+        Table(
+            "fair",
+            "One way to localize in mode 0, with what it is told",
+            "`fair.parquet` of `access-av evaluate`",
+            (
+                "real_odometer", "map", "who", "executions", "rms_error_m", "rms_low_m",
+                "rms_high_m", "worst_error_m",
+            ),
+            {"worst_error_m": "it is the bound"},
+        ),
+        Table(
+            "freedoms",
+            "A freedom of the energy fit, beside those above it",
+            "`freedoms.parquet` of `access-av evaluate`",
+            (
+                "freedom", "free_numbers", "solved_numbers", "claims_met", "met_by_construction",
+                "average_saving_percent", "keep_energy", "keep_both",
+            ),
+            {"average_saving_percent": "it could not be judged"},
+        ),
+        Table(
+            "chosen",
+            "A value of something that the paper leaves open: the shipped one, or another",
+            "`chosen.parquet` of `access-av evaluate --unknowns`; `access-av chosen --json`",
+            (
+                "what", "value", "why", "is_shipped", "executions", "worst_error_m",
+                "rms_error_m", "rms_std_m", "fixed_rms_m", "every_ssb_rms_m",
+            ),
+        ),
+        Table(
+            "unknowns",
+            "A claim and something that the paper leaves open",
+            "`unknowns.parquet` of `access-av evaluate --unknowns`",
+            (
+                "claim", "dimension", "first", "total", "first_low", "first_high", "total_low",
+                "total_high",
+            ),
+        ),
+        Table(
+            "cells",
+            "An SSB found in a recording",
+            "`access-av scan --json`; all but `recording`: `access_av.nr.record(cell)`",
+            (
+                "recording", "pci", "ssb_index", "half_frame", "sfn", "cfo_hz", "snr_db",
+                "sample_start", "sample_offset", "mib_bits", "ssb_freq_hz", "scs_khz", "lmax",
+                "rsrp_dbfs", "rsrq_db", "sinr_db", "angle_deg", "azimuth_deg", "elevation_deg",
+                "sigma_deg", "verdict",
+            ),
+            {
+                **dict.fromkeys(("half_frame", "sfn", "mib_bits"), _UNDECODED),
+                "lmax": "neither band nor broadcast channel tell",
+                **dict.fromkeys(("azimuth_deg", "sigma_deg", "verdict"), _NO_ARRAY),
+                "angle_deg": f"{_NO_ARRAY}, or antennas not in a row",
+                "elevation_deg": "antennas in a row; the key is absent then",
+            },
+        ),
+        Table(
+            "bursts",
+            "An annotated burst of an array's recording",
+            "`access-av aoa --json`",
+            (
+                "sample_start", "azimuth_from_broadside_deg", "sigma_deg", "snr_db", "label",
+                "verdict", "truth_deg",
+            ),
+            {"truth_deg": "not annotated; the key is absent then"},
+        ),
+    )
+}  # fmt: skip

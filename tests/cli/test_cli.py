@@ -1,0 +1,267 @@
+from __future__ import annotations
+
+import json
+import re
+import time
+from itertools import pairwise
+from typing import TYPE_CHECKING
+
+import polars as pl
+import pytest
+
+from access_av.cli import terminal
+from access_av.paper.statements import stated_claims
+
+if TYPE_CHECKING:
+    from collections.abc import Callable
+    from pathlib import Path
+
+    from conftest import Finished
+
+    Cli = Callable[..., Finished]
+
+TRAJECTORY_COLUMNS = {
+    "run", "time_s", "x_m", "y_m", "heading_rad", "true_x_m", "true_y_m", "error_x_m", "error_y_m",
+}  # fmt: skip
+COMMANDS = [
+    "evaluate", "readings", "search", "run", "explore", "bound", "aoa", "scan", "synth", "locate",
+    "fit", "columns", "scenario", "platform",
+]  # fmt: skip
+
+
+def test_help_lists_every_command(access_av: Cli) -> None:
+    done = access_av("--help")
+    assert done.code == 0
+    for command in COMMANDS:
+        assert command in done.out
+
+
+@pytest.mark.parametrize(
+    "command",
+    [
+        "evaluate",
+        "readings",
+        "search",
+        "run",
+        "explore",
+        "bound",
+        "aoa",
+        "scan",
+        "synth",
+        "locate",
+        "fit",
+    ],
+)
+def test_help_of_each_command_has_an_example(access_av: Cli, command: str) -> None:
+    done = access_av(command, "--help", columns=60)
+    assert done.code == 0
+    assert f"access-av {command}" in done.out
+    assert "Example:" in done.out
+    assert max(map(len, done.out.splitlines())) <= 60
+
+
+@pytest.mark.parametrize("command", ["locate", "platform power"])
+def test_help_breaks_a_line_only_where_the_next_word_has_no_room(
+    access_av: Cli, command: str
+) -> None:
+    prose, _, _ = access_av(*command.split(), "--help", columns=60).out.partition("╭")
+    _, _, prose = prose.partition(f"{command} [OPTIONS]")
+    lines = [line.rstrip() for line in prose.splitlines()]
+    for line, following in pairwise(lines):
+        if line.strip() and following.strip():
+            assert len(line) + len(f" {following.split()[0]}") >= 59, line
+
+
+def test_run_writes_what_it_promises(access_av: Cli, tmp_path: Path) -> None:
+    done = access_av("run", "paper", "--runs", "2", "--seed", "3", "--out", tmp_path / "r")
+    assert done.code == 0, done.err
+    table = pl.read_parquet(tmp_path / "r/trajectories.parquet")
+    assert set(table.columns) >= TRAJECTORY_COLUMNS
+    assert table["run"].unique().sort().to_list() == [0, 1]
+    error = table["x_m"] - table["true_x_m"] - table["error_x_m"]
+    assert error.abs().max() < 1e-9
+    executions = pl.read_parquet(tmp_path / "r/executions.parquet")
+    assert set(executions.columns) >= {"run", "time_s"}
+    manifest = json.loads((tmp_path / "r/manifest.json").read_text())
+    assert manifest["seed"] == 3
+    assert access_av("scenario", "check", tmp_path / "r/scenario.toml").code == 0
+    # What the scenario leaves to the platform is written out.
+    assert "base_ms = 80.0" in (tmp_path / "r/scenario.toml").read_text()
+    assert not (tmp_path / "results").exists()
+    for name in ("trajectory.tum", "truth.tum"):
+        lines = (tmp_path / "r" / name).read_text().splitlines()
+        assert all(re.fullmatch(r"\d+\.\d{9}( -?\d+\.\d+){7}", line) for line in lines)
+        assert len(lines) == table.filter(run=0).height
+
+
+def test_run_is_the_same_for_one_and_two_threads(access_av: Cli, tmp_path: Path) -> None:
+    for threads in ("1", "2"):
+        access_av("run", "paper", "--runs", "3", "--threads", threads, "--out", tmp_path / threads)
+    for name in ("trajectories.parquet", "executions.parquet", "trajectory.tum"):
+        assert (tmp_path / "1" / name).read_bytes() == (tmp_path / "2" / name).read_bytes()
+
+
+def test_set_changes_one_key(access_av: Cli, tmp_path: Path) -> None:
+    done = access_av(
+        "run", "paper", "--set", "site.rician_k_db=7.5",
+        "--set", "vehicle.estimator.method=esprit",
+        "--out", tmp_path / "r",
+    )  # fmt: skip
+    assert done.code == 0, done.err
+    written = (tmp_path / "r/scenario.toml").read_text()
+    assert "rician_k_db = 7.5" in written
+    assert 'method = "esprit"' in written
+    assert "base_ms = " in written
+
+
+def test_evaluation_leaves_its_files(quick_study: Path) -> None:
+    names = {path.name for path in (quick_study / "latest").iterdir()}
+    assert names == {
+        "ablation.svg", "ablations.parquet", "claims.json", "errors.parquet", "fair.parquet",
+        "fixed_front.parquet", "freedoms.parquet", "front.svg", "manifest.json",
+        "operating_points.parquet", "ours.parquet", "platform.toml",
+        "report.html", "scenario.toml", "snr.parquet",
+    }  # fmt: skip
+    claims = json.loads((quick_study / "latest/claims.json").read_text())
+    assert len(claims) == 2 * len(stated_claims())
+
+
+def test_explore_answers_from_the_last_evaluation(
+    access_av: Cli, quick_study: Path, tmp_path: Path, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    (tmp_path / "results").symlink_to(quick_study)
+    monkeypatch.chdir(tmp_path)
+    done = access_av("explore", "--max-energy-j", "1000", "--json")
+    assert len(json.loads(done.out)) == 8
+    assert access_av("explore", "--max-energy-j", "1000", "--fixed", columns=60).code == 0
+    asked = ("explore", "--max-error-m", "9", "--percentile", "90", "--json")
+    found = json.loads(access_av(*asked).out)
+    assert all(each["p90_error_low_m"] <= each["p90_error_m"] for each in found)
+    assert access_av("explore", "--max-error-m", "1", "--percentile", "12").code == 2
+    none = access_av("explore", "--max-energy-j", "1")
+    assert none.code == 3
+    assert "No operating point has energy ≤ 1 J" in none.out
+
+
+def test_evaluate_shows_tables_in_a_narrow_terminal(access_av: Cli, tmp_path: Path) -> None:
+    arguments = ("--reading", "gate", "--runs", "1", "--out", str(tmp_path / "e"))
+    done = access_av("evaluate", *arguments, columns=60)
+    assert done.code == 0, done.err
+    assert "Claims met under" in done.out
+    tables = done.out.split("Claims of the paper")[0]
+    assert max(map(len, tables.splitlines())) <= 60
+
+
+def test_shipped_files_are_listed_shown_and_fine(access_av: Cli, tmp_path: Path) -> None:
+    for what in ("site", "vehicle", "scenario", "platform"):
+        names = access_av(what, "list").out.split()
+        assert names
+        for name in names:
+            shown = access_av(what, "show", name)
+            file = tmp_path / f"{name}.toml"
+            file.write_text(shown.out)
+            assert access_av(what, "check", str(file), name).code == 0
+        assert json.loads(access_av(what, "schema").out)["$schema"]
+
+
+SCENARIO = (
+    'name = "mine"\nvehicle = "paper"\n[site]\nname = "mine"\n'
+    "[site.road]\nsegments = [{ length_m = 300.0, turn_rad = 0.25 }]\n"
+)
+HEAD = "[[site.radio_heads]]\nposition_m = [205.0, 100.0, 0.0]\n"
+PID = '[vehicle]\nlike = "paper"\n[vehicle.wake_up.due]\nbase_ms = 300.0\n'
+
+
+@pytest.mark.parametrize(
+    ("text", "named"),
+    [
+        (SCENARIO + HEAD + "[chanel]\n", ["chanel", "channel"]),
+        (SCENARIO + HEAD + "[channel]\nray = 3\n", ["channel.ray", "rays"]),
+        (SCENARIO + HEAD + '[channel]\nrays = "ten"\n', ["channel.rays"]),
+        (SCENARIO + HEAD + "[channel]\nshadowing_std_db = nan\n", ["shadowing_std_db", "finite"]),
+        (SCENARIO.replace("300.0", "-300.0") + HEAD, ["site.road.segments[0].length_m", "-300"]),
+        (SCENARIO + HEAD.replace("[205.0, 100.0,", "[0.0, 0.0,"), ["site.radio_heads[0]"]),
+        (
+            SCENARIO.replace('vehicle = "paper"\n', "") + HEAD + PID,
+            ["vehicle.wake_up.due.position_uncertainty_m", "t_max of 240.0 ms"],
+        ),
+        (SCENARIO + HEAD + "[truth.vehicle.array]\nmountin_rad = 1\n",
+         ["truth.vehicle.array.mountin_rad", "mounting_rad"]),
+        (SCENARIO + HEAD + "[truth.vehicle.gyroscope]\nbias_radps = 1.0\n",
+         ["truth.vehicle.gyroscope", "nothing believes"]),
+        (SCENARIO + HEAD + '[truth.vehicle.localizer]\nkind = "tracker"\n',
+         ["truth.vehicle.localizer", "facts"]),
+        (SCENARIO.replace('vehicle = "paper"', 'vehicle = "papr"') + HEAD, ["vehicle", "papr"]),
+        (SCENARIO, ["radio_heads"]),
+        ("name = \n", ["TOML"]),
+    ],
+    ids=[
+        "table", "key", "type", "nan", "negative", "head-on-road", "t-max", "truth-key",
+        "truth-unbelieved", "truth-setting", "vehicle-name", "missing", "syntax",
+    ],
+)  # fmt: skip
+def test_bad_scenarios_end_with_2_and_name_file_and_key(
+    access_av: Cli, tmp_path: Path, text: str, named: list[str]
+) -> None:
+    file = tmp_path / "mine.toml"
+    file.write_text(text)
+    for arguments in (("run", file), ("scenario", "check", file)):
+        done = access_av(*map(str, arguments))
+        assert done.code == 2
+        for part in ("mine.toml", *named):
+            assert part in done.err
+        assert "Traceback" not in done.err
+
+
+@pytest.mark.parametrize(
+    ("arguments", "named"),
+    [
+        (["run", "papier"], ["papier", "paper"]),
+        (["run", "paper", "--set", "site.rician_k=3"], ["rician_k", "rician_k_db"]),
+        (["run", "paper", "--set", "nonsense"], ["KEY=VALUE"]),
+        (["run", "paper", "--runs", "0"], ["--runs"]),
+        (["run", "paper", "--seed", "-1"], ["--seed"]),
+        (["evaluate", "--platform", "jetson"], ["jetson", "jetson-agx-xavier"]),
+        (["evaluate", "--scenario", "nowhere.toml"], ["nowhere.toml"]),
+        (["explore", "--max-energy-j", "nan"], ["--max-energy-j"]),
+        (["explore", "--max-energy-j", "inf"], ["finite"]),
+        (["explore", "--max-rms-m", "-1"], ["--max-rms-m"]),
+        (["explore", "--results", "."], ["operating_points.parquet"]),
+        (["bound", "papier"], ["papier", "paper"]),
+        (["bound", "yard", "--map-step-m", "0"], ["--map-step-m", "above 0"]),
+        (["bound", "yard", "--map-step-m", "nan"], ["--map-step-m", "above 0"]),
+        (["bound", "yard", "--map-step-m", "0.01"], ["--map-step-m", "at most"]),
+        (["bound", "paper", "--out", "pyproject.toml"], ["--out takes a directory"]),
+        (["aoa", "nowhere"], ["nowhere", ".sigmf-meta"]),
+        (["frobnicate"], ["frobnicate"]),
+    ],
+    ids=" ".join,
+)
+def test_bad_arguments_end_with_2(access_av: Cli, arguments: list[str], named: list[str]) -> None:
+    done = access_av(*arguments)
+    assert done.code == 2
+    for part in named:
+        assert part in done.err
+    assert "Traceback" not in done.err
+
+
+def test_out_that_is_a_file(access_av: Cli, tmp_path: Path) -> None:
+    (tmp_path / "taken").write_text("")
+    done = access_av("run", "paper", "--out", str(tmp_path / "taken"))
+    assert done.code == 2
+    assert "--out takes a directory" in done.err
+
+
+def test_in_a_pipe_progress_is_told_in_lines(
+    monkeypatch: pytest.MonkeyPatch, capsys: pytest.CaptureFixture[str]
+) -> None:
+    monkeypatch.setattr("access_av.cli.terminal.FIRST_LINE_S", 0.05)
+    with terminal.progress("Driving") as tick:
+        tick(3, 12)
+        time.sleep(0.2)
+    lines = capsys.readouterr().err.splitlines()
+    assert lines
+    assert all(line.startswith("Driving: 3 of 12, 0 s, about ") for line in lines)
+    with terminal.progress("Soon over") as tick:
+        tick(1, 2)
+    assert capsys.readouterr().err == ""

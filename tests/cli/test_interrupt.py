@@ -1,0 +1,130 @@
+"""Ctrl-C at a random time: within a second, exit code 130, nothing half written."""
+
+from __future__ import annotations
+
+import os
+import random
+import signal
+import subprocess
+import sys
+import time
+from typing import TYPE_CHECKING, Any
+
+import pytest
+import typer.main
+
+import access_av
+from access_av.cli.main import app
+
+if TYPE_CHECKING:
+    from pathlib import Path
+
+# What each command has to do for longer than the latest interruption.
+LONG: dict[str, list[str]] = {
+    "run": ["run", "paper-real-odometry-4", "--runs", "400", "--out", "out"],
+    "evaluate": ["evaluate", "--out", "out"],
+    "search": ["search"],
+    "fit": ["fit", "--runs", "100000"],
+    "explore": ["explore"],
+    "bound": ["bound", "campus-handover", "--map-step-m", "3", "--out", "out"],
+    "synth": ["synth", "paper-real-odometry-4", "--out", "out"],
+    "locate": [
+        "locate", "--recording", "drive/iq.sigmf-meta", "--odometry", "drive/odometry.csv",
+        "--site", "drive/site.toml", "--vehicle", "drive/vehicle.toml", "--out", "out",
+    ],
+    "angles": [
+        "angles", "drive/iq.sigmf-meta", "--site", "drive/site.toml",
+        "--vehicle", "drive/vehicle.toml", "--out", "out",
+    ],
+    "scan": ["scan", "drive/iq.sigmf-meta"],
+    "aoa": ["aoa", "drive/iq.sigmf-meta"],
+    "profile": ["profile", "--out", "profiled.toml"],
+    "designs": ["designs", "paper", "--space", "space.toml", "--out", "out"],
+    "tune": ["tune", "yard", "--max-rms-m", "0.1", "--out", "out"],
+    "survey": [
+        "survey", *["logged"] * 8, "--site", "yard", "--vehicle", "logged/vehicle.toml",
+        "--out", "out",
+    ],
+    "plan": ["plan", "yard", "--masts", "masts.csv", "--out", "out"],
+    "integrity": ["integrity", "yard", "--out", "out"],
+    "codesign": ["codesign"],
+    "balance": ["balance"],
+    "choose": ["choose", "nowhere"],
+    "import-paths": [
+        "import-paths", "nowhere.csv", "--site", "yard", "--carrier-mhz", "3500", "--out", "x.npz",
+    ],
+    "readings": ["readings"],
+    "chosen": ["chosen", "--runs", "2000"],
+    "columns": ["columns"],
+    "scenario": ["scenario", "check", *access_av.Scenario.names() * 40],
+    "site": ["site", "check", *access_av.Site.names() * 40],
+    "vehicle": ["vehicle", "check", *access_av.Vehicle.names() * 40],
+    "platform": ["platform", "check", *access_av.Platform.names() * 40],
+    "plant": ["plant", "check", *access_av.Plant.names() * 40],
+    "study": ["study", "bends", "--out", "out"],
+    "new": ["new", "plant", "new-plant.toml"],
+    "export": ["export", "yard", "exported.geojson"],
+}  # fmt: skip
+LATEST_S = 2.0
+# What is over so soon was over when the signal was sent.
+LATE_S = 0.1
+# The interpreter starts before the program does; what Ctrl-C does then is Python's own.
+PYTHON_S = 0.15
+
+
+@pytest.fixture(scope="module")
+def place(tmp_path_factory: pytest.TempPathFactory) -> Path:
+    folder = tmp_path_factory.mktemp("interrupted")
+    access_av.synthesize("paper-real-odometry-4", folder / "drive", duration_s=20.0)
+    access_av.drives.log_angles("yard", folder / "logged", duration_s=60.0)
+    masts = "".join(f"mast-{n},{20 * n},{(-1) ** n * 45},8\n" for n in range(-5, 9))
+    (folder / "masts.csv").write_text("name,x_m,y_m,z_m\n" + masts)
+    (folder / "space.toml").write_text("[vehicle.wake_up.due]\nbase_ms = [80.0, 100.0, 150.0]\n")
+    return folder
+
+
+def test_every_command_is_interrupted() -> None:
+    commands: Any = typer.main.get_command(app)
+    assert commands.commands.keys() == LONG.keys()
+
+
+@pytest.mark.parametrize("command", LONG)
+def test_ctrl_c_ends_it_within_a_second(command: str, place: Path) -> None:
+    stream = random.Random(command)
+    before = {path for path in place.rglob("*") if path.is_file()}
+    python_s = PYTHON_S * (1.0 + busy_s())
+    times_s = [python_s + stream.random() * (LATEST_S - python_s) for _ in range(TIMES)]
+    for after_s in times_s:
+        process = subprocess.Popen(
+            [sys.executable, "-m", "access_av", *LONG[command]],
+            cwd=place,
+            stdout=subprocess.DEVNULL,
+            stderr=subprocess.PIPE,
+            text=True,
+        )
+        time.sleep(after_s)
+        finished = process.poll() is not None
+        process.send_signal(signal.SIGINT)
+        sent_s = time.monotonic()
+        _, said = process.communicate(timeout=20.0)
+        took_s = time.monotonic() - sent_s
+        # Before and after the program itself it is the interpreter that the signal ends: 130 too;
+        # or it comes too late to end anything.
+        ended = process.returncode in (130, -signal.SIGINT) or took_s < LATE_S * (1.0 + busy_s())
+        assert finished or ended, (after_s, process.returncode, said)
+        assert finished or took_s < 1.0 + busy_s(), (after_s, took_s)
+        assert "Traceback" not in said, (after_s, said)
+        partial = list(place.rglob("*.partial"))
+        assert not partial, (after_s, partial)
+    for written in {path for path in place.rglob("*") if path.is_file()} - before:
+        assert written.stat().st_size > 0
+
+
+# `ACCESS_AV_INTERRUPTIONS=20` is the whole of it.
+TIMES = int(os.environ.get("ACCESS_AV_INTERRUPTIONS", "1"))
+
+
+def busy_s() -> float:
+    """How long a machine that does much else takes to give the processor back."""
+    waiting = os.getloadavg()[0] / (os.cpu_count() or 1)
+    return waiting if waiting > 1.0 else 0.0

@@ -1,0 +1,561 @@
+"""What a user may type, plug in or feed: refused with a message, or done right; never worse.
+
+One test for each kind of harm that an attack by hand found once, in the order of this list. What is
+random is in ``attack/``, Ctrl-C in ``test_interrupt.py``.
+
+====  ==============================================  ==============================================
+kind  what went wrong                                 test
+====  ==============================================  ==============================================
+1     a tracker kilometres off                        test_a_short_wander_does_not_lead_far_away
+2     negative variances                              test_covariances_are_positive
+3     NaN in tables                                   test_tables_hold_no_nan
+4     start times and answers that cannot be          test_start_times_that_cannot_be, test_plug_ins
+5     finite nonsense                                 test_numbers_beyond_physics
+6     drives of any size                              test_drives_too_large
+7     threads, runs and seeds of any size             test_counts_too_large, test_threads_…
+8     very many radio heads                           test_too_many_radio_heads
+9     files without end                               test_files_without_end
+10    loops that do not end                           test_what_would_never_end
+11    tracebacks                                      test_truths_that_are_none, test_aoa_truth, …
+12    names that are paths                            test_names_that_are_no_names
+13    names that are markup                           test_names_that_are_no_names
+14    escape sequences to the terminal                test_no_escape_sequence_reaches_the_terminal
+15    names that are HTML                             test_names_that_are_html
+16    Ctrl-C                                          test_interrupt
+17    ``results/latest`` that cannot be made          test_latest_that_cannot_be_made
+18    two runs in one folder                          test_two_runs_in_one_folder
+19    a full disk                                     test_a_full_disk
+20    keys that are not named                         test_errors_name_the_key
+21    no pickle, copy or hash                         test_settings_are_values
+22    a forked child                                  test_the_page_on_plug_ins_names_fork
+23    readers shared by threads                       test_readers_serve_threads
+====  ==============================================  ==============================================
+"""
+
+from __future__ import annotations
+
+import copy
+import fcntl
+import json
+import os
+import pickle
+import resource
+import subprocess
+import sys
+import threading
+import time
+from typing import TYPE_CHECKING, Any
+
+import numpy as np
+import polars as pl
+import pytest
+
+import access_av
+from conftest import ROOT
+
+if TYPE_CHECKING:
+    from collections.abc import Callable
+    from pathlib import Path
+
+    from conftest import Finished
+
+    Cli = Callable[..., Finished]
+
+SHORT = {"motion.start_at_m": 290.0}
+LONGEST_MESSAGE = 520  # with "error: "
+
+
+@pytest.fixture(scope="module")
+def drive(tmp_path_factory: pytest.TempPathFactory) -> Path:
+    folder = tmp_path_factory.mktemp("drive")
+    access_av.synthesize("paper-real-odometry-2", folder, duration_s=0.3)
+    return folder
+
+
+def refused(done: Finished, *named: str) -> None:
+    assert done.code == 2, done.err
+    assert "Traceback" not in done.err
+    assert len(done.err) < LONGEST_MESSAGE, done.err[:1000]
+    for part in named:
+        assert part in done.err
+
+
+def test_a_short_wander_does_not_lead_far_away() -> None:
+    scenario = access_av.Scenario.from_toml(
+        """
+        name = "wander"
+        [site]
+        name = "wander"
+        [site.road]
+        segments = [
+            { length_m = 226.86 }, { length_m = 237.82 }, { length_m = 82.43, surveyed = false }
+        ]
+        [[site.radio_heads]]
+        position_m = [337.093, 78.58, 0.0]
+        [vehicle]
+        name = "wander"
+        localizer = { kind = "tracker" }
+        integrity.enabled = false
+        lane_keeping = { rms_m = 0.46, wavelength_m = 5.2176 }
+        """
+    )
+    found = access_av.simulate(scenario, runs=4, seed=108, keep_trajectories=True)
+    assert found.trajectories is not None
+    # The stretch that nobody surveyed, which an odometer alone does not see bend, and no more.
+    surveyed = found.trajectories.filter(pl.col("time_s") < 114.0)
+    error_m = (pl.col("error_x_m") ** 2 + pl.col("error_y_m") ** 2).sqrt()
+    assert surveyed.select(error_m.max()).item() < 5.0
+    assert found.trajectories.select(error_m.max()).item() < 1.5 * 82.43
+
+
+@pytest.mark.parametrize("seed", [1003, 1011, 1017])
+def test_covariances_are_positive(seed: int) -> None:
+    scenario = access_av.Scenario.load("paper-real-odometry").with_overrides(
+        {"vehicle.integrity.enabled": False}
+    )
+    found = access_av.simulate(scenario, seed=seed, keep_trajectories=True)
+    assert found.trajectories is not None
+    xx, yy, xy = (found.trajectories[f"covariance_{it}_m2"] for it in ("xx", "yy", "xy"))
+    assert xx.min() >= 0.0  # type: ignore[operator]
+    assert yy.min() >= 0.0  # type: ignore[operator]
+    # In units of what two roundings of the product leave.
+    assert ((xx * yy - xy * xy) / (xx * yy)).min() >= -1e-12  # type: ignore[operator]
+
+
+def test_a_heading_that_is_given_exactly_has_a_positive_variance() -> None:
+    # In a bend it tells of the place too: rounding took its variance below zero.
+    scenario = access_av.Scenario.load("yard").with_overrides(
+        {
+            "site.road": {"segments": [{"length_m": 90.0, "turn_rad": 1.5}]},
+            "motion": {},
+            "vehicle.start.position_std_m": 0.1,
+            "vehicle.start.heading_std_rad": 0.0,
+            "vehicle.lane_keeping": {"rms_m": 0.5, "wavelength_m": 20.0},
+        }
+    )
+    found = access_av.simulate(scenario, runs=6, keep_trajectories=True)
+    assert found.trajectories is not None
+    assert found.trajectories["covariance_heading_rad2"].min() > 0.9e-12  # type: ignore[operator]
+
+
+@pytest.mark.parametrize("name", access_av.Scenario.names())
+def test_tables_hold_no_nan(name: str) -> None:
+    scenario = access_av.Scenario.load(name)
+    end_m = {"paper": 290.0}.get(name, 0.0)
+    if end_m:
+        scenario = scenario.with_overrides({"motion.start_at_m": end_m})
+    found = access_av.simulate(scenario, keep_trajectories=True)
+    for table in (found.runs, found.steps, found.trajectories, found.executions):
+        assert table is not None
+        for column in table.select(pl.col(pl.Float64)):
+            assert column.is_finite().all(), column.name
+
+
+@pytest.mark.parametrize("start_s", ["-1e9", "1e9", "nan", "inf"])
+def test_start_times_that_cannot_be(access_av: Cli, drive: Path, start_s: str) -> None:
+    done = access_av(
+        "locate", "--recording", drive / "iq.sigmf-meta", "--odometry", drive / "odometry.csv",
+        "--site", drive / "site.toml", "--vehicle", drive / "vehicle.toml",
+        "--start-time-s", start_s,
+    )  # fmt: skip
+    refused(done)
+
+
+@pytest.mark.parametrize(
+    ("key", "value"),
+    [
+        ("vehicle.array.rx_gain_dbi", 1e9),
+        ("site.radio_heads[0].eirp_dbm", 1e9),
+        ("site.carrier_mhz", 1e300),
+        ("site.road.start.y_m", -1e308),
+        ("site.radio_heads[0].position_m", [1e200, 0.0, 0.0]),
+        ("vehicle.array.position_m", [0.0, 1e30, 0.0]),
+        ("vehicle.receiver.bandwidth_mhz", 1e-308),
+        ("vehicle.odometer.scale_std", 1e6),
+        ("site.road.segments[0].turn_rad", -1e308),
+        ("vehicle.array.elements", 2**40),
+        ("vehicle.start.pose", {"x_m": 1e12, "y_m": 0.0, "heading_rad": 0.0}),
+        ("site.road.start.heading_rad", 1e15),
+    ],
+)
+def test_numbers_beyond_physics(key: str, value: Any) -> None:
+    with pytest.raises(access_av.SettingsError, match=r"must|expected"):
+        access_av.Scenario.load("paper").with_overrides({key: value})
+
+
+@pytest.mark.parametrize(
+    ("key", "value"),
+    [
+        ("site.road.segments", [{"length_m": 1e6}]),
+        ("site.road.segments", [{"length_m": 1e5}] * 8),
+        ("motion.top_speed_kmh", 1e-3),
+        ("motion.acceleration_mps2", 1e-12),
+        ("motion.stops", [{"at_m": 100.0, "dwell_s": 1e9}]),
+        ("motion.stops", [{"at_m": 100.0, "dwell_s": 1e300}]),
+        ("motion.stops", [{"at_m": 100.0, "dwell_s": 8e4}]),
+    ],
+)
+def test_drives_too_large(key: str, value: Any) -> None:
+    with pytest.raises(access_av.SettingsError):
+        access_av.Scenario.load("paper").with_overrides({key: value})
+
+
+def test_what_is_too_large_can_be_meant(access_av: Cli, tmp_path: Path) -> None:
+    file = tmp_path / "long.toml"
+    file.write_text('like = "paper"\nmotion.stops = [{ at_m = 100.0, dwell_s = 8e4 }]\n')
+    refused(access_av("scenario", "check", file), "22", "allow_large", "stops")
+    assert access_av("scenario", "check", "--allow-large", file).code == 0
+
+
+@pytest.mark.parametrize(
+    "words",
+    [
+        ["--threads", "100000"],
+        ["--runs", "1000000000"],
+        ["--runs", "1000000"],
+        ["--runs", str(2**63)],
+        ["--runs", str(2**64)],
+        ["--seed", str(2**64)],
+    ],
+    ids=" ".join,
+)
+def test_counts_too_large(access_av: Cli, words: list[str]) -> None:
+    done = access_av("run", "paper", *words)
+    assert done.code == 2, done.err
+    assert "Traceback" not in done.err
+
+
+THREADS = """
+import os
+import threading
+import numpy as np
+from access_av import aoa, simulate
+batch = np.exp(1j * np.arange(4 * 20 * 256)).reshape(256, 4, 20)
+alone = aoa.music(batch)
+assert np.array_equal(aoa.music(batch, threads=1000).angle_rad, alone.angle_rad)
+simulate("paper", runs=1, threads=1)  # libraries have their threads from here on
+before = most = len(os.listdir("/proc/self/task"))
+drives = threading.Thread(target=lambda: simulate("paper", threads=1000))
+drives.start()
+while drives.is_alive():
+    most = max(most, len(os.listdir("/proc/self/task")))
+print(most - before)
+"""
+
+
+def test_threads_that_no_core_is_for() -> None:
+    done = subprocess.run(
+        [sys.executable, "-c", THREADS], capture_output=True, text=True, check=True
+    )
+    # Workers, one a core, the thread that asked for them, and a few of libraries; not a thousand.
+    assert 2 <= int(done.stdout) <= (os.cpu_count() or 1) + 16
+
+
+@pytest.mark.parametrize("words", [["fit", "x" * 2000], ["x" * 2000], ["--" + "x" * 2000]])
+def test_usage_errors_are_brief(access_av: Cli, words: list[str]) -> None:
+    done = access_av(*words)
+    assert done.code == 2
+    assert "xxx" in done.err
+    assert done.err.count("x") < 500
+    assert "\x1b" not in access_av("fit", "\x1b[2J").err
+
+
+def test_too_many_radio_heads(access_av: Cli, tmp_path: Path) -> None:
+    head = "[[radio_heads]]\nposition_m = [{}.0, 40.0, 8.0]\npci = {}\nssb_index = {}\n"
+    heads = (head.format(n, n % 1008, n // 1008) for n in range(16_000))
+    file = tmp_path / "site.toml"
+    file.write_text('name = "many"\n' + "".join(heads))
+    began_s = time.monotonic()
+    refused(access_av("site", "check", file), "radio_heads", "1000")
+    assert time.monotonic() - began_s < 10.0
+
+
+def test_files_without_end(access_av: Cli, drive: Path, tmp_path: Path) -> None:
+    refused(access_av("scenario", "check", "/dev/zero"), "/dev/zero", "regular file")
+    pipe = tmp_path / "pipe.csv"
+    os.mkfifo(pipe)
+    refused(access_av("site", "check", pipe), "regular file")
+    zeros = tmp_path / "zeros.toml"
+    zeros.write_bytes(bytes(1 << 20))
+    refused(access_av("site", "check", zeros), "zeros.toml")
+    with zeros.open("r+b") as file:
+        file.truncate(1 << 40)
+    refused(access_av("site", "check", zeros), "zeros.toml")
+    for option in ("--odometry", "--recording", "--truth"):
+        words = {
+            "--recording": drive / "iq.sigmf-meta",
+            "--odometry": drive / "odometry.csv",
+            "--site": drive / "site.toml",
+            "--vehicle": drive / "vehicle.toml",
+            option: pipe,
+        }
+        flat = [word for pair in words.items() for word in pair]
+        refused(access_av("locate", *flat, "--out", tmp_path / "out"), "regular file")
+
+
+def test_what_would_never_end(access_av: Cli, tmp_path: Path) -> None:
+    one, other = tmp_path / "one.toml", tmp_path / "other.toml"
+    one.write_text(f'like = "{other}"\n')
+    other.write_text(f'like = "{one}"\n')
+    refused(access_av("site", "check", one), "like")
+    one.write_text("a = " + "[" * 100_000)
+    refused(access_av("site", "check", one))
+    # A key with a dot in it, in a table that is read as a whole for its tag.
+    one.write_text('name = "x"\n[wake_up]\npolicy = "fixed"\n".." = 1\n')
+    refused(access_av("vehicle", "check", one), "wake_up")
+
+
+TUM = b"0.0 0 0 0 0 0 0 1\n0.1 0.1 0 0 0 0 0 1\n"
+
+
+@pytest.mark.parametrize(
+    ("truth", "code"),
+    [
+        (b"these are words\n", 2),
+        (TUM.decode().encode("utf-16"), 2),
+        (TUM.replace(b"0.1 0.1", b"0.1 nan"), 2),
+        (TUM.replace(b"0 1\n", b"0 0\n"), 2),
+        (b"", 2),
+        (b"\xef\xbb\xbf# a comment\n" + TUM, 0),
+    ],
+    ids=["words", "utf-16", "nan", "no-turn", "empty", "bom-and-comment"],
+)
+def test_truths_that_are_none(
+    access_av: Cli, drive: Path, tmp_path: Path, truth: bytes, code: int
+) -> None:
+    file = tmp_path / "truth.tum"
+    file.write_bytes(truth)
+    done = access_av(
+        "locate", "--recording", drive / "iq.sigmf-meta", "--odometry", drive / "odometry.csv",
+        "--site", drive / "site.toml", "--vehicle", drive / "vehicle.toml", "--truth", file,
+        "--out", tmp_path / "out",
+    )  # fmt: skip
+    assert done.code == code, done.err
+    assert "Traceback" not in done.err
+    assert code == 0 or "truth.tum" in done.err
+
+
+@pytest.mark.parametrize(
+    ("key", "value"),
+    [
+        ("aoa:truth", []),
+        ("aoa:truth", {"element_spacing_wavelengths": "half"}),
+        ("aoa:truth", {"element_spacing_wavelengths": -1.0}),
+        ("aoa:truth", {"azimuth_from_broadside_deg": "left"}),
+        ("aoa:truth", {"channel_calibration_re": [1, 1], "channel_calibration_im": [0]}),
+        ("aoa:truth", {"channel_calibration_re": [0] * 4, "channel_calibration_im": [0] * 4}),
+        ("core:sample_count", 10**15),
+    ],
+)
+def test_aoa_truth(access_av: Cli, drive: Path, tmp_path: Path, key: str, value: Any) -> None:
+    metadata = json.loads((drive / "iq.sigmf-meta").read_text())
+    metadata["annotations"][3][key] = value
+    (tmp_path / "iq.sigmf-meta").write_text(json.dumps(metadata))
+    (tmp_path / "iq.sigmf-data").symlink_to(drive / "iq.sigmf-data")
+    refused(access_av("aoa", tmp_path / "iq"))
+
+
+def test_a_map_of_one_square(access_av: Cli, tmp_path: Path) -> None:
+    done = access_av("bound", "yard", "--map-step-m", "1e300", "--out", tmp_path / "out")
+    assert done.code in (0, 2)
+    assert "Traceback" not in done.err
+
+
+def test_a_foreign_table(access_av: Cli, tmp_path: Path) -> None:
+    file = tmp_path / "operating_points.parquet"
+    pl.DataFrame({"mode": ["a"], "energy_j": ["b"]}).write_parquet(file)
+    refused(access_av("explore", "--results", tmp_path), "operating_points.parquet")
+    file.write_bytes(b"PAR1 and no more")
+    refused(access_av("explore", "--results", tmp_path), "operating_points.parquet")
+
+
+@pytest.mark.parametrize("encoding", ["ascii", "latin-1", "cp1252", "utf-8"])
+def test_terminals_of_any_encoding(encoding: str) -> None:
+    done = shell("columns", "trajectories", PYTHONIOENCODING=encoding)  # m², …
+    assert done.returncode == 0, done.stderr
+    name = shell("scenario", "check", "größe-日本", PYTHONIOENCODING=encoding)
+    assert name.returncode == 2, name.stderr
+    assert b"Traceback" not in name.stderr
+
+
+def shell(*words: object, **environment: str) -> subprocess.CompletedProcess[bytes]:
+    return subprocess.run(
+        [sys.executable, "-m", "access_av", *map(str, words)],
+        capture_output=True,
+        env={**os.environ, **environment},
+    )
+
+
+def test_a_folder_whose_name_is_no_text(tmp_path: Path) -> None:
+    folder = os.fsencode(tmp_path) + b"/\xff\xfe"
+    done = subprocess.run(
+        [sys.executable, "-m", "access_av", "bound", "yard", "--map-step-m", "50", "--out", folder],
+        capture_output=True,
+    )
+    assert done.returncode in (0, 2), done.stderr
+    assert b"Traceback" not in done.stderr
+
+
+@pytest.mark.parametrize("name", ["../../../x", "[/]", "[red]", "a/b", "", "x" * 65, "\x1b[2J"])
+def test_names_that_are_no_names(name: str) -> None:
+    with pytest.raises(access_av.SettingsError, match="name"):
+        access_av.Scenario.load("paper").with_overrides({"name": name})
+
+
+def test_no_escape_sequence_reaches_the_terminal(access_av: Cli, tmp_path: Path) -> None:
+    file = tmp_path / "x.toml"
+    file.write_text('name = "x"\n"\\u001b[2J" = 1\n[red]\n')
+    done = access_av("site", "check", file)
+    refused(done, "\\x1b[2J")
+    assert "\x1b" not in done.err
+
+
+def test_names_that_are_html(access_av: Cli, tmp_path: Path) -> None:
+    name = "</script><!--<script>"
+    scenario = access_av_scenario({"site.radio_heads[0].name": name})
+    file = tmp_path / "x.toml"
+    file.write_text(scenario.to_toml())
+    assert access_av("bound", file, "--out", tmp_path / "out").code == 0
+    page = (tmp_path / "out/report.html").read_text(encoding="utf-8")
+    assert name not in page
+
+
+def access_av_scenario(overrides: dict[str, Any]) -> access_av.Scenario:
+    return access_av.Scenario.load("paper").with_overrides(overrides)
+
+
+def test_latest_that_cannot_be_made(access_av: Cli, tmp_path: Path) -> None:
+    (tmp_path / "results/latest").mkdir(parents=True)
+    (tmp_path / "results/latest/kept").write_text("")
+    with pytest.warns(UserWarning, match="latest"):
+        done = access_av(
+            "run", "paper", "--set", "motion.start_at_m=290", "--out", tmp_path / "results/out"
+        )
+    assert done.code == 0, done.err
+
+
+def test_two_runs_in_one_folder(access_av: Cli, tmp_path: Path) -> None:
+    folder = os.open(tmp_path, os.O_RDONLY)
+    fcntl.flock(folder, fcntl.LOCK_EX)
+    try:
+        for words in (("run", "paper"), ("bound", "yard"), ("evaluate",), ("synth", "paper")):
+            refused(access_av(*words, "--out", tmp_path), "another run is writing here")
+    finally:
+        os.close(folder)
+    assert list(tmp_path.iterdir()) in ([], [tmp_path / "results"])
+
+
+# Written: a table, a recording, samples of more than this.
+FULL_BYTES = 20_000
+
+
+@pytest.mark.parametrize(
+    "words",
+    [
+        ("run", "paper-real-odometry-2", "--set", "motion.start_at_m=250"),
+        ("synth", "paper-real-odometry-2", "--duration-s", "1"),
+        ("bound", "yard"),
+    ],
+    ids=lambda words: words[0],
+)
+def test_a_full_disk(tmp_path: Path, words: tuple[str, ...]) -> None:
+    def fill() -> None:
+        resource.setrlimit(resource.RLIMIT_FSIZE, (FULL_BYTES, FULL_BYTES))
+
+    done = subprocess.run(
+        [sys.executable, "-m", "access_av", *words, "--out", str(tmp_path / "out")],
+        capture_output=True,
+        text=True,
+        preexec_fn=fill,
+    )
+    assert done.returncode == 2, done.stderr
+    assert "Traceback" not in done.stderr
+    assert str(tmp_path / "out") in done.stderr.replace("\n", "")
+    assert "File too large" in done.stderr.replace("\n", " ")
+    assert not list(tmp_path.rglob("*.partial"))
+
+
+def test_a_folder_that_may_not_be_written(access_av: Cli, tmp_path: Path) -> None:
+    (tmp_path / "file").write_text("")
+    refused(access_av("run", "paper", "--out", tmp_path / "file/out"), "file")
+    refused(access_av("bound", "yard", "--out", "/proc/none"), "/proc/none")
+    refused(access_av("fit", "--runs", "1", "--out", tmp_path / "none/x.toml"), "none/x.toml")
+
+
+def test_standard_output_that_takes_nothing() -> None:
+    with open("/dev/full", "w") as full:  # noqa: PTH123
+        done = subprocess.run(
+            [sys.executable, "-m", "access_av", "scenario", "show", "paper"],
+            stdout=full,
+            stderr=subprocess.PIPE,
+            text=True,
+        )
+    assert done.returncode == 2, done.stderr
+    assert "No space left" in done.stderr
+    assert "Exception ignored" not in done.stderr
+
+
+@pytest.mark.parametrize(("key", "value"), [("music", 3), ("a.b", 3), ("music", {"a.b": 1})])
+def test_errors_name_the_key(key: str, value: Any) -> None:
+    platform = access_av.Platform.load("jetson-agx-xavier").core
+    with pytest.raises(access_av.SettingsError, match="energy_per_execution_j") as raised:
+        platform.with_overrides({"modes[0].energy_per_execution_j": {key: value}})
+    assert "?" not in str(raised.value)
+    assert key in str(raised.value)
+
+
+@pytest.mark.parametrize(
+    "kind", [access_av.Scenario, access_av.Site, access_av.Vehicle, access_av.Platform]
+)
+def test_settings_are_values(kind: Any) -> None:
+    names = kind.names()
+    one, same = kind.load(names[0]), kind.load(names[0])
+    assert one == same
+    assert hash(one) == hash(same)
+    assert len({one, same}) == 1
+    for made in (pickle.loads(pickle.dumps(one)), copy.copy(one), copy.deepcopy(one)):
+        assert made == one
+        assert hash(made) == hash(one)
+    for other in names[1:2]:
+        assert kind.load(other) != one
+    assert one != "paper"
+
+
+def test_what_cannot_be_pickled_says_so(drive: Path) -> None:
+    recording = access_av.Recording.open(drive / "iq.sigmf-meta")
+    with pytest.raises(TypeError, match="Recording"):
+        pickle.dumps(recording)
+
+
+def test_the_page_on_plug_ins_names_fork() -> None:
+    page = (ROOT / "docs/plug-ins.md").read_text(encoding="utf-8")
+    assert "fork" in page
+    assert "spawn" in page
+
+
+def test_readers_serve_threads(drive: Path) -> None:
+    recording = access_av.Recording.open(drive / "iq.sigmf-meta")
+    expected = [recording.read(start, 500) for start in range(0, 4000, 500)]
+    searcher = access_av.nr.Searcher(
+        7.68e6, centre_frequency_hz=3.7008e9, ssb_freq_hz=3.7008e9, scs_khz=30, antennas=1
+    )
+    burst = access_av.nr.build_burst(42, ssb_indices=[1], sfn=7, ssb_freq_hz=3.7008e9)
+    wrong: list[object] = []
+
+    def work() -> None:
+        try:
+            for _ in range(20):
+                for number, samples in enumerate(expected):
+                    if not np.array_equal(recording.read(500 * number, 500), samples):
+                        wrong.append(number)
+                if [cell.pci for cell in searcher.search(burst)] != [42]:
+                    wrong.append("search")
+        except Exception as error:
+            wrong.append(error)
+
+    threads = [threading.Thread(target=work) for _ in range(4)]
+    for thread in threads:
+        thread.start()
+    for thread in threads:
+        thread.join()
+    assert not wrong

@@ -1,0 +1,598 @@
+"""Designs: spaces, campaigns that are stopped and go on, fronts, and what to change."""
+
+from __future__ import annotations
+
+import json
+import os
+import shlex
+import shutil
+import subprocess
+import sys
+import threading
+import time
+from concurrent.futures import Executor, Future, ProcessPoolExecutor, ThreadPoolExecutor
+from concurrent.futures.process import BrokenProcessPool
+from dataclasses import replace
+from pathlib import Path
+from typing import Any
+
+import numpy as np
+import pytest
+
+from access_av import Scenario, columns
+from access_av.designs import driven
+from access_av.designs.driven import Design, Driven, designs_of, in_worlds
+from access_av.designs.front import front, may_be_front
+from access_av.designs.search import Found, rounds, search
+from access_av.designs.space import Space, sobol
+from access_av.designs.suggested import suggested
+from access_av.designs.table import Constraints, rows_of, rows_of_worlds, what_to_change
+from access_av.device.platform import Platform
+from access_av.errors import InputError
+from access_av.report.designs import render_designs
+from access_av.run.campaign import Campaign, CampaignError, Shard, Task, executor
+from access_av.run.result_cache import Parts
+
+# Spaces.
+
+
+def test_sobol_points_are_spread_evenly() -> None:
+    points = sobol(256, 10)
+    for column in points.T:
+        assert sorted(np.floor(column * 256).astype(int)) == list(range(256))
+    for one, other in [(0, 1), (1, 2), (3, 7)]:
+        cells = np.floor(points[:, [one, other]] * 4).astype(int)
+        counts = np.unique(cells, axis=0, return_counts=True)[1]
+        assert counts.tolist() == [16] * 16, (one, other)
+
+
+def test_space_from_tables() -> None:
+    space = Space.of({"vehicle": {"platform": {"mode": [0, 2]}, "x": {"low": 1, "high": 4}}})
+    assert [dimension.key for dimension in space.dimensions] == [
+        "vehicle.platform.mode",
+        "vehicle.x",
+    ]
+    assert space.sobol(2) == [
+        {"vehicle.platform.mode": 0, "vehicle.x": 1.0},
+        {"vehicle.platform.mode": 2, "vehicle.x": 2.5},
+    ]
+
+
+@pytest.mark.parametrize(
+    ("table", "message"),
+    [
+        ({}, "no key"),
+        ({"a": []}, "a: the list is empty"),
+        ({"a": 1}, "a: 1 is one value"),
+        ({"a": {"low": 2, "high": 1}}, "a: `low` must be below `high`"),
+        ({"a": {"low": 0, "high": 1, "log": True}}, "positive where `log`"),
+        ({"a": {"low": 0, "high": 1, "step": 2}}, "a.step: unknown"),
+        ({"site": {"rician_k_db": [5.0, 9.0]}}, r"nobody chooses that; write \[world\]"),
+        ({"channel": {"model": ["umi"]}}, "channel.model: nobody chooses that"),
+        ({"a": [1], "world": {"b": {"low": 0, "high": 1}}}, "world.b: a grid needs a list"),
+        ({"a": [1], "world": {}}, "world: no key with a list"),
+    ],
+)
+def test_bad_spaces_name_the_key(table: dict[str, Any], message: str) -> None:
+    with pytest.raises(InputError, match=message):
+        Space.of(table)
+
+
+def test_a_design_that_cannot_be_names_key_and_what_is_allowed() -> None:
+    with pytest.raises(InputError, match=r"platform.mode.*has the modes 0, 1, 2"):
+        designs_of(Scenario.load("paper"), [{"vehicle.platform.mode": 9}])
+
+
+# Campaigns.
+
+
+def part(number: int, pause_s: float = 0.0) -> dict[str, np.ndarray]:
+    time.sleep(pause_s)
+    return {"x": np.random.default_rng(number).normal(size=500)}
+
+
+def tasks(count: int = 12, pause_s: float = 0.0) -> list[Task]:
+    return [Task({"number": number}, part, (number, pause_s)) for number in range(count)]
+
+
+def contents(path: Path) -> dict[str, bytes]:
+    return {file.name: file.read_bytes() for file in sorted(path.glob("*.npz"))}
+
+
+@pytest.fixture
+def whole(tmp_path: Path) -> dict[str, bytes]:
+    Campaign(Parts(tmp_path / "whole")).run(tasks())
+    return contents(tmp_path / "whole")
+
+
+def test_same_bytes_whoever_computes(tmp_path: Path, whole: dict[str, bytes]) -> None:
+    assert len(whole) == 12
+    for number, pool in enumerate([ThreadPoolExecutor(3), ProcessPoolExecutor(2)]):
+        with pool:
+            found = Campaign(Parts(tmp_path / str(number)), pool, 2).run(tasks())
+        assert contents(tmp_path / str(number)) == whole
+        assert all(np.array_equal(found[i]["x"], part(i)["x"]) for i in range(12))
+
+
+def test_shards_make_the_whole(tmp_path: Path, whole: dict[str, bytes]) -> None:
+    parts = Parts(tmp_path / "shards")
+    first = Campaign(parts, shard=Shard(1, 3)).run(tasks())
+    assert sum(each is None for each in first) == 8
+    for number in (2, 3):
+        last = Campaign(parts, shard=Shard(number, 3)).run(tasks())
+    assert None not in last
+    assert contents(parts.path) == whole
+
+
+@pytest.mark.parametrize("text", ["0/2", "3/2", "1", "a/b", "1/2/3", "-1/2"])
+def test_bad_shards_are_refused(text: str) -> None:
+    with pytest.raises(InputError, match="write I/N"):
+        Shard.parse(text)
+
+
+def test_two_campaigns_in_one_directory(tmp_path: Path, whole: dict[str, bytes]) -> None:
+    parts = Parts(tmp_path / "both")
+    both = [threading.Thread(target=Campaign(parts).run, args=(tasks(),)) for _ in range(2)]
+    for one in both:
+        one.start()
+    for one in both:
+        one.join()
+    assert contents(parts.path) == whole
+    assert not list(parts.path.glob("*.partial"))
+
+
+@pytest.mark.parametrize("damage", [b"", b"PK\x03\x04", None])
+def test_a_damaged_part_is_said_and_computed_again(
+    tmp_path: Path, whole: dict[str, bytes], damage: bytes | None
+) -> None:
+    parts = Parts(tmp_path / "whole")
+    name, text = next(iter(whole.items()))
+    bits = bytearray(text)
+    bits[len(bits) // 2] ^= 0xFF
+    (parts.path / name).write_bytes(bytes(bits) if damage is None else damage)
+    with pytest.warns(UserWarning, match=f"{name}: damaged"):
+        Campaign(parts).run(tasks())
+    assert contents(parts.path) == whole
+
+
+def test_a_full_disk_names_the_part_and_leaves_nothing(
+    tmp_path: Path, monkeypatch: pytest.MonkeyPatch, whole: dict[str, bytes]
+) -> None:
+    parts = Parts(tmp_path / "full")
+    Campaign(parts, shard=Shard(1, 2)).run(tasks())
+
+    def full(_: int) -> None:
+        raise OSError(28, "No space left on device")
+
+    with monkeypatch.context() as patch:
+        patch.setattr("access_av.tables.results_directory.os.fsync", full)
+        with pytest.raises(OSError, match="No space left") as caught:
+            Campaign(parts).run(tasks())
+    assert str(caught.value.filename).startswith(str(parts.path))
+    assert not list(parts.path.glob("*.partial"))
+    assert len(contents(parts.path)) == 6
+    Campaign(parts).run(tasks())
+    assert contents(parts.path) == whole
+
+
+class Dying(Executor):
+    """Workers that are gone after so many tasks."""
+
+    def __init__(self, after: int) -> None:
+        self.left = after
+
+    def submit(self, work: Any, /, *arguments: Any, **_: Any) -> Future[Any]:
+        future: Future[Any] = Future()
+        self.left -= 1
+        if self.left >= 0:
+            future.set_result(work(*arguments))
+        else:
+            future.set_exception(BrokenProcessPool("a worker died"))
+        return future
+
+
+def test_workers_that_die_lose_nothing_that_is_finished(
+    tmp_path: Path, whole: dict[str, bytes]
+) -> None:
+    parts = Parts(tmp_path / "dying")
+    with pytest.raises(CampaignError, match=r"workers are gone.*the same command goes on"):
+        Campaign(parts, Dying(5), 1).run(tasks())
+    assert 0 < len(contents(parts.path)) <= 5
+    Campaign(parts).run(tasks())
+    assert contents(parts.path) == whole
+
+
+def test_an_error_of_the_task_is_its_own(tmp_path: Path) -> None:
+    bad = Task({"bad": 1}, int, ("not a number",))
+    with ThreadPoolExecutor(1) as pool, pytest.raises(ValueError, match="invalid literal"):
+        Campaign(Parts(tmp_path), pool, 1).run([bad])
+
+
+# Forks a campaign, kills it after each of the instants, and then lets it finish.
+KILLER = """
+import os, signal, sys, time
+from pathlib import Path
+sys.path.insert(0, {tests!r})
+from access_av.run.campaign import Campaign
+from access_av.run.result_cache import Parts
+from test_designs import tasks
+campaign = Campaign(Parts(Path({parts!r})))
+for instant in {instants!r}:
+    child = os.fork()
+    if child == 0:
+        campaign.run(tasks(12, 0.02))
+        os._exit(0)
+    time.sleep(instant)
+    os.kill(child, signal.SIGKILL)
+    os.waitpid(child, 0)
+campaign.run(tasks(12, 0.02))
+"""
+
+
+def test_killed_at_20_random_instants_it_finishes_with_the_same_bytes(
+    tmp_path: Path, whole: dict[str, bytes]
+) -> None:
+    instants = np.random.default_rng(3).uniform(0.0, 0.05, 20)
+    parts = tmp_path / "killed"
+    text = KILLER.format(
+        tests=str(Path(__file__).parent), parts=str(parts), instants=instants.tolist()
+    )
+    subprocess.run([sys.executable, "-c", text], check=True, capture_output=True)
+    assert contents(parts) == whole
+
+
+def test_no_scheduler_is_said() -> None:
+    pytest.importorskip("distributed")
+    with pytest.raises(InputError, match="no scheduler there"), executor("tcp://127.0.0.1:1"):
+        pass
+
+
+def test_dask_gives_the_same_bytes(tmp_path: Path, whole: dict[str, bytes]) -> None:
+    distributed = pytest.importorskip("distributed")
+    with (
+        distributed.LocalCluster(
+            n_workers=2, processes=False, dashboard_address=None, threads_per_worker=1
+        ) as cluster,
+        executor(cluster.scheduler_address) as (pool, workers),
+    ):
+        assert workers == 2
+        Campaign(Parts(tmp_path / "dask"), pool, workers).run(tasks())
+    assert contents(tmp_path / "dask") == whole
+
+
+# A cluster of one's own, of which one process dies once three parts are there.
+DYING = """
+import json, subprocess, sys, threading, time
+from pathlib import Path
+sys.path.insert(0, {tests!r})
+from access_av.run.campaign import Campaign, CampaignError, executor
+from access_av.run.result_cache import Parts
+from test_designs import tasks
+parts, file = Path({parts!r}), Path({parts!r}) / "scheduler.json"
+parts.mkdir()
+def started(program, *more):
+    usual = ["--scheduler-file", str(file), "--no-dashboard", *more]
+    return subprocess.Popen([sys.executable, "-m", f"distributed.cli.dask_{{program}}", *usual])
+alone = ["--nthreads", "1", "--no-nanny", "--death-timeout", "9"]
+scheduler = started("scheduler", "--host", "127.0.0.1", "--port", "0")
+workers = [started("worker", *alone) for _ in range(2)]
+def kill():
+    while len(list(parts.glob("*.npz"))) < 3:
+        time.sleep(0.01)
+    (scheduler if {dies!r} == "scheduler" else workers[0]).kill()
+try:
+    while not file.exists():
+        time.sleep(0.05)
+    address = json.loads(file.read_text())["address"]
+    threading.Thread(target=kill, daemon=True).start()
+    with executor(address) as (pool, count):
+        Campaign(Parts(parts), pool, count).run(tasks(12, 0.2))
+    print("finished")
+except CampaignError as error:
+    print(error)
+finally:
+    for process in [scheduler, *workers]:
+        process.kill()
+"""
+
+
+@pytest.mark.parametrize(
+    ("dies", "says"),
+    [("worker", "finished"), ("scheduler", "the workers are gone")],
+)
+def test_of_a_cluster_any_process_may_die(
+    tmp_path: Path, whole: dict[str, bytes], dies: str, says: str
+) -> None:
+    pytest.importorskip("distributed")
+    tests, parts = str(Path(__file__).parent), tmp_path / "dask"
+    text = DYING.format(tests=tests, parts=str(parts), dies=dies)
+    done = subprocess.run(
+        [sys.executable, "-c", text],
+        env={**os.environ, "PYTHONPATH": tests},
+        capture_output=True,
+        text=True,
+        timeout=60,
+        check=True,
+    )
+    assert says in done.stdout, done.stderr
+    left = contents(parts)
+    assert len(left) == 12 if dies == "worker" else 3 <= len(left) < 12
+    Campaign(Parts(parts)).run(tasks())
+    assert contents(parts) == whole
+
+
+# Fronts. Designs whose energy and error are known, with noise that all of them share.
+
+
+def known(energy_j: float, rms_m: float, noise: np.ndarray, own: np.ndarray, label: str) -> Driven:
+    design = Design({}, label, Scenario.load("paper"), Platform.load("jetson-agx-xavier"))
+    square_m2 = rms_m**2 * (1.0 + 0.5 * noise + 0.02 * own)
+    return Driven(
+        design=design,
+        square_m2=square_m2,
+        energy_j=np.full(noise.size, energy_j),
+        worst_m=3.0 * np.sqrt(square_m2),
+        error_m=np.sqrt(square_m2)[:, None] * np.linspace(0.1, 2.0, 40, dtype=np.float32),
+        executions=np.ones(noise.size),
+        listened=np.ones(noise.size),
+        track_s=np.arange(3.0),
+        track_m2=np.ones(3),
+    )
+
+
+def cloud(runs: int, pairs: list[tuple[float, float]]) -> list[Driven]:
+    rng = np.random.default_rng(4)
+    noise = rng.uniform(-1.0, 1.0, runs)
+    return [
+        known(*pair, noise, rng.uniform(-1.0, 1.0, runs), f"design {number}")
+        for number, pair in enumerate(pairs)
+    ]
+
+
+PAIRS = [(1.0, 0.4), (2.0, 0.2), (2.1, 0.35), (4.0, 0.1), (4.1, 0.1), (8.0, 0.3)]
+
+
+def test_front_and_its_confidence() -> None:
+    driven = cloud(20, PAIRS)
+    assert set(front(driven)) - {4} == {0, 1, 3}
+    # What common random numbers cannot tell apart may be of the front; what is beaten is not.
+    assert {0, 1, 3} <= set(may_be_front(driven)) <= {0, 1, 3, 4}
+
+
+def test_page_of_many_designs_draws() -> None:
+    rng = np.random.default_rng(5)
+    few = cloud(4, PAIRS)
+    driven = [
+        replace(
+            few[0], energy_j=np.full(4, energy_j), track_s=np.arange(161.0), track_m2=np.ones(161)
+        )
+        for energy_j in rng.uniform(0.1, 9.0, 300)
+    ]
+    page = render_designs(Scenario.load("paper"), driven, rows_of(driven), rows_of_worlds(driven))
+    assert "energy of a trip / J" in page
+    assert len(page) < 6_000_000
+
+
+def test_the_table_is_what_is_said_of_it() -> None:
+    driven = cloud(4, PAIRS)
+    driven.append(replace(driven[0], energy_j=np.full(4, np.inf), square_m2=np.full(4, np.inf)))
+    rows = rows_of(driven)
+    assert rows.columns == list(columns.TABLES["designs"].columns)
+    assert rows["energy_j"].to_list()[-1] is rows["rms_error_m"].to_list()[-1] is None
+    assert rows["on_front"].to_list()[-1] is False
+
+
+def test_constraints_choose_the_least_energy() -> None:
+    rows = rows_of(cloud(20, PAIRS))
+    assert Constraints(max_rms_m=0.25).kept(rows)["design"][0] == 1
+    assert Constraints(max_energy_j=3.0, max_rms_m=0.15).kept(rows).is_empty()
+
+
+def test_where_nothing_fits_it_says_what_would() -> None:
+    rows = rows_of(cloud(20, PAIRS))
+    advice = what_to_change(Constraints(max_energy_j=3.0, max_rms_m=0.15), rows)
+    assert advice[0].startswith("energy 4 J instead of 3 J: design 3")
+    assert advice[1].startswith("RMS error 0.2")
+    assert " m instead of 0.15 m: " in advice[1]
+    assert "design 1" in advice[1]
+    advice = what_to_change(Constraints(max_energy_j=0.0, max_rms_m=0.0), rows)
+    assert advice[0].startswith("energy alone, however much is allowed, does not help")
+
+
+def test_a_design_is_judged_in_the_worst_of_its_worlds(
+    tmp_path: Path, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    """One design is better in one world and much worse in the other."""
+
+    def pretended(text: str, _seed: int, _first: int, runs: int) -> dict[str, np.ndarray]:
+        scenario = json.loads(Scenario.from_toml(text).to_json())
+        bold = scenario["vehicle"]["wake_up"]["interval_ms"] == 8000.0
+        scattered = scenario["site"]["rician_k_db"] < 10.0
+        rms_m = np.full(runs, (0.9 if scattered else 0.05) if bold else 0.2)
+        count = np.full(runs, 10.0 if bold else 40.0)
+        return {
+            "executions": count, "listened": count, "rms_error_m": rms_m, "max_error_m": rms_m,
+            "error_m": np.repeat(rms_m[:, None], 900, axis=1).astype(np.float32),
+            "track_s": np.arange(0.0, 9001.0, 10.0), "track_m2": np.ones(901),
+        }  # fmt: skip
+
+    monkeypatch.setattr(driven, "simulated", pretended)
+    space = Space.of(
+        {
+            "vehicle": {
+                "platform": {"name": ["jetson-agx-xavier-engine"]},
+                "wake_up": {"policy": ["fixed"], "interval_ms": [2000.0, 8000.0]},
+            },
+            "world": {"site": {"rician_k_db": [5.0, 15.0]}},
+        }
+    )
+    assert list(space.worlds) == ["rician_k_db 5", "rician_k_db 15"]
+    designs = in_worlds(Scenario.load("paper"), space.grid(), space.worlds)
+    found = search(Campaign(Parts(tmp_path)), designs, runs=3, seed=1)
+    assert found is not None
+    assert found.drives == 2 * 2 * 3
+    rows, of_worlds = rows_of(found.driven), rows_of_worlds(found.driven)
+    assert rows["p99_error_m"].to_list() == pytest.approx([0.2, 0.9])
+    assert rows["world"][1] == "rician_k_db 5"
+    assert of_worlds["p99_error_m"].to_list() == pytest.approx([0.2, 0.2, 0.9, 0.05])
+    kept = Constraints(max_error_m=0.3).kept(rows)
+    assert kept["choice"].to_list() == ["interval_ms 2000"]
+    page = render_designs(Scenario.load("paper"), found.driven, rows, of_worlds)
+    assert "Worst world" in page
+    assert "In each world" in page
+
+
+def test_what_too_few_drives_say_is_not_called_kept() -> None:
+    row = {"p99_error_m": 0.28, "p99_error_low_m": 0.2, "p99_error_high_m": 0.4}
+    bound = Constraints(max_error_m=0.3, percentile=99.0)
+    assert bound.keeps(row)
+    assert not bound.keeps_surely(row)
+    assert "too few drives to say" in bound.in_words(row)[0]
+    assert bound.in_words({**row, "p99_error_high_m": 0.29})[0].endswith("kept")
+    assert bound.in_words({**row, "p99_error_m": 0.31})[0].endswith("missed")
+    assert bound.in_words({**row, "p99_error_high_m": None})[0].endswith("too few drives to say")
+    with pytest.raises(InputError, match=r"percentile 42: it can be 50, 90, 95, 99, 99\.9"):
+        Constraints(max_error_m=0.3, percentile=42.0)
+
+
+def test_rounds_of_halving() -> None:
+    assert rounds(20, halving=True) == [2, 6, 20]
+    assert rounds(2, halving=True) == [2]
+    assert rounds(1, halving=True) == [1]
+
+
+def by_halving(tmp_path: Path, monkeypatch: pytest.MonkeyPatch, *, halving: bool) -> Found:
+    """120 designs of which the error falls and the executions grow with ``bound``, and a cost."""
+
+    def pretended(text: str, seed: int, first_run: int, runs: int) -> dict[str, np.ndarray]:
+        wake_up = Scenario.from_toml(text)
+        settings = json.loads(wake_up.vehicle.to_json())["wake_up"]
+        interval_ms = settings["interval_ms"]
+        spoilt = json.loads(wake_up.vehicle.to_json())["receiver"]["snr_noise_db"]
+        noise = np.array([np.random.default_rng([seed, run]).normal() for run in range(99)])
+        own = np.random.default_rng(round(interval_ms * 100 + spoilt * 7)).normal(size=99)
+        rms_m = 0.1 * (1.0 + spoilt) * np.sqrt(interval_ms / 1000.0)
+        square_m2 = rms_m**2 * np.exp(0.3 * noise + 0.03 * own)
+        mine = slice(first_run, first_run + runs)
+        count = np.full(runs, 80_000.0 / interval_ms)
+        return {
+            "executions": count, "listened": count, "rms_error_m": np.sqrt(square_m2[mine]),
+            "max_error_m": 3.0 * np.sqrt(square_m2[mine]), "track_s": np.arange(3.0),
+            "error_m": np.sqrt(square_m2[mine])[:, None] * np.ones((1, 4), dtype=np.float32),
+            "track_m2": np.ones(3),
+        }  # fmt: skip
+
+    monkeypatch.setattr(driven, "simulated", pretended)
+    space = Space.of(
+        {
+            "vehicle": {
+                "platform": {"name": ["jetson-agx-xavier-engine"]},
+                "wake_up": {
+                    "policy": ["fixed"],
+                    "interval_ms": [250.0 * 1.25**k for k in range(10)],
+                },
+                "receiver": {"snr_noise_db": [0.03 * k**2 for k in range(12)]},
+            }
+        }
+    )
+    designs = in_worlds(Scenario.load("paper"), space.grid(), space.worlds)
+    assert len(designs) == 120
+    campaign = Campaign(Parts(tmp_path / str(halving)))
+    found = search(campaign, designs, runs=20, seed=1, halving=halving)
+    assert found is not None
+    return found
+
+
+def test_halving_finds_the_front_of_the_grid_with_a_quarter_of_the_drives(
+    tmp_path: Path, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    grid = by_halving(tmp_path, monkeypatch, halving=False)
+    less = by_halving(tmp_path, monkeypatch, halving=True)
+    assert less.drives <= grid.drives / 4
+    sure = {grid.driven[index].design.label for index in may_be_front(grid.driven)}
+    best = {less.driven[index].design.label for index in front(less.driven)}
+    assert len(best) == 10
+    assert best <= sure
+    assert {grid.driven[index].design.label for index in front(grid.driven)} == best
+
+
+def test_optuna_suggests_the_same_designs_again(
+    tmp_path: Path, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    pytest.importorskip("optuna")
+    computed = []
+
+    def pretended(text: str, _seed: int, _first: int, runs: int) -> dict[str, np.ndarray]:
+        computed.append(text)
+        wake_up = json.loads(Scenario.from_toml(text).vehicle.to_json())["wake_up"]
+        count = np.full(runs, 80_000.0 / wake_up["interval_ms"])
+        rms_m = np.full(runs, 1e-3 * wake_up["interval_ms"] ** 0.5)
+        return {
+            "executions": count, "listened": count, "rms_error_m": rms_m, "max_error_m": rms_m,
+            "error_m": rms_m[:, None], "track_s": np.arange(3.0), "track_m2": np.ones(3),
+        }  # fmt: skip
+
+    monkeypatch.setattr(driven, "simulated", pretended)
+    space = Space.of(
+        {
+            "vehicle": {
+                "platform": {"name": ["jetson-agx-xavier-engine"]},
+                "wake_up": {"policy": ["fixed"], "interval_ms": {"low": 100, "high": 9000}},
+            }
+        }
+    )
+    campaign = Campaign(Parts(tmp_path))
+    tables = [
+        rows_of(suggested(campaign, Scenario.load("paper"), space, count=40, runs=2, seed=3).driven)
+        for _ in range(2)
+    ]
+    assert tables[0].equals(tables[1])
+    assert 16 < len(computed) <= 40
+    assert len(set(computed)) == len(computed)
+
+
+# The command.
+
+SPACE = """
+vehicle.platform = { name = ["jetson-agx-xavier-engine"], mode = [0, 2] }
+vehicle.localizer.kind = ["tracker"]
+vehicle.integrity.enabled = [false]
+vehicle.wake_up.policy = ["fixed"]
+vehicle.wake_up.interval_ms = [2000.0, 8000.0]
+"""
+
+
+def run(cwd: Path, *arguments: str) -> subprocess.CompletedProcess[str]:
+    command = [sys.executable, "-m", "access_av", *arguments]
+    return subprocess.run(command, cwd=cwd, capture_output=True, text=True, check=False)
+
+
+def test_command_on_any_scenario(tmp_path: Path) -> None:
+    (tmp_path / "space.toml").write_text(SPACE)
+    asked = ("yard", "--space", "space.toml", "--runs", "2", "--json", "--out", "o")
+    done = run(tmp_path, "designs", *asked)
+    assert done.returncode == 0, done.stderr
+    assert 1 <= len(json.loads(done.stdout)["front"]) <= 4
+    # A mode that changes no drive is not driven again: two parts for four designs.
+    assert len(list((tmp_path / "results/parts").glob("*.npz"))) == 2
+    assert (tmp_path / "o/report.html").stat().st_size > 10_000
+    some = run(tmp_path, "choose", "o", "--max-rms-m", "100", "--json")
+    assert len(json.loads(some.stdout)["kept"]) == 4
+    none = run(tmp_path, "choose", "o", "--max-rms-m", "0.0001", "--json")
+    assert "m instead of 0.0001 m" in json.loads(none.stdout)["advice"][0]
+    assert (some.returncode, none.returncode) == (0, 3)
+    told = json.loads((tmp_path / "o/manifest.json").read_text())
+    assert told["space"]["keys"]["vehicle.wake_up.interval_ms"] == [2000.0, 8000.0]
+    # What is to be typed in the directory asks for the same drives, and gives the same again.
+    shutil.copytree(tmp_path / "results", tmp_path / "o/results")
+    before = (tmp_path / "o/designs.parquet").read_bytes()
+    again = run(tmp_path / "o", *shlex.split(told["repeat"])[1:], "--out", "again")
+    assert again.returncode == 0, again.stderr
+    assert (tmp_path / "o/again/designs.parquet").read_bytes() == before
+    assert len(list((tmp_path / "o/results/parts").glob("*.npz"))) == 2
+    for bad, message in (
+        (("designs", *asked, "--shard", "5/2"), "write I/N"),
+        (("choose", "nowhere"), "no designs here"),
+    ):
+        done = run(tmp_path, *bad)
+        assert (done.returncode, message in done.stderr) == (2, True)

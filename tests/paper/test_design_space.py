@@ -1,0 +1,47 @@
+from __future__ import annotations
+
+import polars as pl
+import pytest
+
+import synthetic
+from access_av.designs.operating_points import Query, explore, pareto_front
+
+
+@pytest.fixture(scope="module")
+def points() -> pl.DataFrame:
+    return synthetic.evaluation().campaign("R")
+
+
+def test_budget_of_210_j_leaves_mode_7(points: pl.DataFrame) -> None:
+    assert explore(points, Query(max_energy_j=210.0))["mode"].to_list() == [7]
+
+
+def test_answers_come_by_energy(points: pl.DataFrame) -> None:
+    found = explore(points, Query())
+    assert found.height == 8
+    assert found["energy_j"].is_sorted()
+
+
+def test_every_bound_is_kept(points: pl.DataFrame) -> None:
+    found = explore(
+        points, Query(max_energy_j=260.0, max_rms_m=0.15, max_worst_m=0.2, max_executions=350)
+    )
+    assert sorted(found["mode"]) == [2, 3]
+
+
+def test_modes_can_be_chosen(points: pl.DataFrame) -> None:
+    assert sorted(explore(points, Query(modes=[1, 4]))["mode"]) == [1, 4]
+
+
+def test_nothing_may_qualify(points: pl.DataFrame) -> None:
+    assert explore(points, Query(max_energy_j=1.0)).is_empty()
+
+
+def test_a_query_reads_as_a_sentence() -> None:
+    assert str(Query(max_energy_j=260.0, max_rms_m=0.15)) == "energy ≤ 260 J and RMS error ≤ 0.15 m"
+    assert str(Query()) == "any operating point"
+
+
+def test_pareto_front_has_no_beaten_point() -> None:
+    points = pl.DataFrame({"energy_j": [3.0, 1.0, 2.0, 2.5], "rms_error_m": [0.1, 0.3, 0.2, 0.25]})
+    assert pareto_front(points)["energy_j"].to_list() == [1.0, 2.0, 3.0]

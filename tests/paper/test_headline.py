@@ -1,0 +1,81 @@
+"""The first sentence of the evaluation follows from its verdicts, and they from the energy fit."""
+
+from __future__ import annotations
+
+from typing import TYPE_CHECKING
+
+import pytest
+
+from access_av.device.platform import Platform
+from access_av.paper import summary
+from access_av.paper.driver import Driver
+from access_av.paper.energy_fit import FREEDOMS, SHIPPED
+from access_av.paper.evaluation import Evaluation, evaluate_with
+from access_av.paper.freedoms import LADDER, ladder, met_halves
+from access_av.paper.readings import load_all
+from access_av.paper.study import Study, judged
+
+if TYPE_CHECKING:
+    from collections.abc import Sequence
+
+BOTH = "Accuracy and saving hold together only if estimates wait for a better SSB"
+NONE = "The paper's accuracy and its saving do not hold together under this reading"
+
+
+@pytest.fixture(scope="module")
+def evaluations() -> list[Evaluation]:
+    driver = Driver(Platform.load("jetson-agx-xavier"), runs=12, seed=1)
+    return [evaluate_with(driver, reading) for reading in load_all(["gate", "every-ssb"])]
+
+
+def study(evaluations: Sequence[Evaluation], freedoms: Sequence[str]) -> Study:
+    fitted = [each.refit(freedoms) for each in evaluations]
+    claims = judged(fitted)
+    return Study(
+        evaluations=fitted,
+        claims=claims,
+        ablations=[],
+        front=[],
+        ours=[],
+        unknowns=None,
+        unusable={},
+        duration_s=0.0,
+        bought=ladder(fitted, claims, "gate"),
+    )
+
+
+@pytest.mark.parametrize("taken", [None, *FREEDOMS])
+def test_each_freedom_taken_away_changes_the_sentence_where_it_changes_verdicts(
+    taken: str | None, evaluations: list[Evaluation]
+) -> None:
+    made = study(evaluations[:1], [name for name in FREEDOMS if name != taken])
+    [half] = summary.halves(made)
+    assert half.accuracy, "no energy is in it"
+    assert half.energy == (taken not in ("ratio", "factor"))
+    assert summary.headline(made) == (BOTH if half.energy else NONE)
+
+
+def test_what_a_freedom_buys_is_what_judging_with_it_gives(evaluations: list[Evaluation]) -> None:
+    made = study(evaluations, SHIPPED)
+    assert [each.freedoms for each in made.bought] == list(LADDER)
+    for each in made.bought:
+        there = study(evaluations, each.freedoms)
+        claims = there.of("gate")
+        assert each.met == sum(claim.reproduced for claim in claims)
+        both = [it for it in ("gate", "every-ssb") if all(met_halves(there.of(it)))]
+        assert list(each.both) == both
+    [shipped] = [each for each in made.bought if each.is_shipped]
+    assert not shipped.both
+    assert summary.headline(made) == (
+        "The paper's accuracy and its saving hold together under none of 2 readings"
+    )
+    assert "one more freedom of the energy fit: another ratio in modes 1 to 5" in summary.lead(made)
+
+
+def test_a_subset_of_readings_has_a_headline_of_its_own(evaluations: list[Evaluation]) -> None:
+    for each in evaluations:
+        alone = study([each], SHIPPED)
+        assert summary.headline(alone) == NONE
+        assert each.reading.title in summary.lead(alone) or "none of the readings" in summary.lead(
+            alone
+        )

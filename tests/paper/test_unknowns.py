@@ -1,0 +1,154 @@
+"""Sampling what the paper leaves open: parts on disk, and indices of functions that are known."""
+
+from __future__ import annotations
+
+import json
+from typing import TYPE_CHECKING
+
+import numpy as np
+import pytest
+
+from access_av import Scenario
+from access_av.device.platform import Platform
+from access_av.paper import sampled_readings
+from access_av.paper.open_choices import (
+    GATE,
+    OPEN_CONTROLLER,
+    OPEN_WORLD,
+    SHIPPED_WORLD,
+    WORLD,
+    Dimension,
+    controller_changes,
+    latin_hypercube,
+    named,
+    world_changes,
+)
+from access_av.paper.unknowns import sobol
+from access_av.run.campaign import Campaign, Shard
+from access_av.run.result_cache import Parts
+
+if TYPE_CHECKING:
+    from pathlib import Path
+
+BOARD = Platform.load("jetson-agx-xavier")
+
+
+def sample(parts: Path) -> sampled_readings.Sample:
+    found = sampled_readings.sample(Campaign(Parts(parts)), BOARD, **SMALL)
+    assert found is not None
+    return found
+
+
+SMALL = {"worlds": 2, "controllers": 3, "runs": 1}
+
+
+def drawn(
+    margin: np.ndarray, points: np.ndarray, dimensions: tuple[Dimension, ...]
+) -> sampled_readings.Sample:
+    nothing = np.zeros(len(points))
+    worlds = np.arange(len(points))
+    return sampled_readings.Sample(
+        dimensions, points, worlds, {"c": margin}, nothing, nothing, nothing
+    )
+
+
+def test_indices_of_a_function_that_is_known() -> None:
+    """3 a + 2 ab + choice on (−1, 1): variances 3, 4/9 and 1, beside noise of 0.25; d is idle."""
+    dimensions = (
+        *(Dimension(name, name) for name in "ab"),
+        Dimension("c", "c", choices=("n", "y")),
+        *(Dimension(name, name) for name in "defgh"),
+    )
+    variances = {"a": 3.0, "ab": 4.0 / 9.0, "c": 1.0}
+    whole = sum(variances.values()) + 0.25
+    expected = {
+        "a": (3.0, 3.0 + variances["ab"]), "b": (0.0, variances["ab"]), "c": (1.0, 1.0),
+    }  # fmt: skip
+    covered, told = 0, 0
+    for draw in range(10):
+        points = latin_hypercube(512, len(dimensions), seed=draw)
+        one, two, choice = (2.0 * points - 1.0).T[:3]
+        noise = np.random.default_rng(draw).normal(0.0, 0.5, len(points))
+        counts_as = 0.1 * (3.0 * one + 2.0 * one * two + np.sign(choice) + noise)
+        margin = counts_as / (1.0 - np.abs(counts_as))
+        found = sobol(drawn(margin, points, dimensions), runs=1, seed=draw)
+        for each in found.indices:
+            if each.dimension not in expected:
+                assert each.total < 0.01, "it is idle"
+                continue
+            first, total = (value / whole for value in expected[each.dimension])
+            told += 2
+            covered += each.first_low - 1e-9 <= first <= each.first_high + 1e-9
+            covered += each.total_low <= total <= each.total_high
+            assert abs(each.total - total) < 0.05
+            assert each.total_high - each.total_low < 0.1
+        assert found.explained["c"] == pytest.approx(1.0 - 0.25 / whole, abs=0.02)
+        assert found.holds["c"] == pytest.approx(np.mean(margin >= 0.0))
+    # 95 % intervals: fewer than 45 of 60 in them has a probability below 1e-6.
+    assert told == 60
+    assert covered >= 45, covered
+
+
+def test_a_search_that_was_stopped_goes_on(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> None:
+    judged = []
+    judge = sampled_readings.judge
+
+    def stops(*arguments: object, **named: object) -> object:
+        judged.append(arguments)
+        if len(judged) == 2:
+            raise KeyboardInterrupt
+        return judge(*arguments, **named)
+
+    monkeypatch.setattr(sampled_readings, "judge", stops)
+    with pytest.raises(KeyboardInterrupt):
+        sample(tmp_path)
+    assert len(list(tmp_path.glob("*.npz"))) == 1
+    found = sample(tmp_path)
+    assert len(judged) == 3, "the first part is not computed again"
+    assert not list(tmp_path.glob("*.partial"))
+    again = sample(tmp_path)
+    assert len(judged) == 3
+    assert all((again.margins[name] == margin).all() for name, margin in found.margins.items())
+
+
+def test_shares_of_a_search_make_the_whole(tmp_path: Path) -> None:
+    whole = sample(tmp_path / "whole")
+    shares = Parts(tmp_path / "shares")
+    first, last = (
+        sampled_readings.sample(Campaign(shares, shard=Shard(number, 2)), BOARD, **SMALL)
+        for number in (1, 2)
+    )
+    assert first is None
+    assert last is not None
+    assert all((last.margins[name] == margin).all() for name, margin in whole.margins.items())
+
+
+def test_without_a_gate_t_max_is_kept_everywhere(tmp_path: Path) -> None:
+    found = sample(tmp_path)
+    assert GATE not in found.dimensions
+    assert (found.longest_gap_s < 0.26).all()
+    best = sampled_readings.as_reading(found.values(found.best()[0]))
+    assert not best.is_gated
+    assert best.keeps(float(found.longest_gap_s.max()))
+
+
+def test_the_shipped_world_is_in_the_space() -> None:
+    paper = json.loads(Scenario.load("paper").to_json())
+    values = named(WORLD, SHIPPED_WORLD)
+    assert values["eirp_dbm"] == paper["site"]["radio_heads"][0]["eirp_dbm"]
+    assert values["rician_k_db"] == paper["site"]["rician_k_db"]
+    assert values["scatter"] == paper["channel"]["scatter"]
+    assert values["heading"] == paper["vehicle"]["localizer"]["heading_between"]
+    assert values["snapshots"] == paper["vehicle"]["receiver"]["snapshots"]
+
+
+def test_every_point_of_the_space_is_a_scenario() -> None:
+    dimensions = (*OPEN_WORLD, *OPEN_CONTROLLER, GATE)
+    corners = [np.full(len(dimensions), end) for end in (0.0, 1.0 - 1e-9)]
+    for point in [*corners, *latin_hypercube(30, len(dimensions), seed=2)]:
+        values = named(dimensions, point.tolist())
+        reading = sampled_readings.as_reading(values)
+        assert reading.is_gated == (values["gate"] != "none")
+        drawn_from = world_changes(values) | controller_changes(values, values)
+        named_alike = {"name": "found", "description": reading.scenario.description}
+        assert reading.scenario == Scenario.load("paper").with_overrides(drawn_from | named_alike)

@@ -1,0 +1,65 @@
+"""The guide for plants: its commands and its Python run as they are written."""
+
+from __future__ import annotations
+
+import re
+import shlex
+import subprocess
+import sys
+from typing import TYPE_CHECKING, Any
+
+from access_av import Plant
+from conftest import ROOT
+
+if TYPE_CHECKING:
+    from collections.abc import Callable
+    from pathlib import Path
+
+    import pytest
+
+GUIDE = (ROOT / "docs" / "plant.md").read_text(encoding="utf-8")
+# A few trips of a short road stand for a minute of driving.
+FEW = ("--runs", "2")
+SHORT = (
+    ("length_m = 200.0", "length_m = 20.0"),
+    ("length_m = 180.0", "length_m = 5.0"),
+    (
+        "length_m = 162.4",
+        "length_m = 5.0",
+    ),
+    ("at_m = 320.0", "at_m = 15.0"),
+)
+
+
+def blocks(language: str) -> list[str]:
+    return re.findall(rf"```{language}\n(.*?)```", GUIDE, flags=re.DOTALL)
+
+
+def test_its_commands_and_its_python_run(
+    access_av: Callable[..., Any], tmp_path: Path, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    monkeypatch.chdir(tmp_path)
+    lines = [shlex.split(line) for block in blocks("sh") for line in block.splitlines()]
+    assert [line[1] for line in lines].count("study") == 2
+    for _, command, *arguments in lines:
+        if command in ("study", "run"):
+            kept = [it for it in arguments if it not in ("--runs", "4", "2")]
+            arguments = [*kept, *FEW]
+        if command == "export" and arguments[0] == "mine.toml":
+            Plant.load("mine.toml")
+        done = access_av(command, *arguments)
+        assert done.code == 0, (command, arguments, done.err)
+        if command == "new" and arguments[1] == "mine.toml":
+            text = (tmp_path / "mine.toml").read_text("utf-8")
+            for long, short in SHORT:
+                assert long in text
+                text = text.replace(long, short)
+            (tmp_path / "mine.toml").write_text(text, "utf-8")
+    assert (tmp_path / "study" / "report.html").is_file()
+    assert (tmp_path / "what-if" / "compared.parquet").is_file()
+
+    (example,) = blocks("python")
+    done = subprocess.run(
+        [sys.executable, "-c", example], cwd=tmp_path, capture_output=True, text=True, check=True
+    )
+    assert "the time the vehicle knows its position" in done.stdout

@@ -1,0 +1,248 @@
+"""Roads and radio heads from the files that plants have, and back."""
+
+from __future__ import annotations
+
+import json
+import math
+from typing import TYPE_CHECKING, Any
+
+import numpy as np
+import pytest
+
+from access_av import Plant, Scenario, Site
+from access_av.errors import InputError
+from access_av.run.error_bound import along_route
+from access_av.site_files import dxf, geojson
+from access_av.site_files.drawn import Drawn, Head, checked
+from access_av.site_files.read import Options, of_site, read
+
+if TYPE_CHECKING:
+    from collections.abc import Callable
+    from pathlib import Path
+
+    from numpy.typing import NDArray
+
+# Of the same road: a centimetre.
+SAME_M = 0.01
+
+
+def course(site: dict[str, Any]) -> NDArray[np.float64]:
+    """Points of a site's road, a few centimetres apart, as a vehicle drives it."""
+    scenario = Scenario.load("yard").with_overrides(
+        {"site": site, "motion": {"top_speed_kmh": 10.0}}
+    )
+    return along_route(scenario).select("x_m", "y_m").to_numpy()
+
+
+def apart_m(points: NDArray[np.float64], line: NDArray[np.float64]) -> float:
+    """How far from a line the farthest of some points is."""
+    start, along = line[:-1], np.diff(line, axis=0)
+    square = np.maximum((along**2).sum(axis=1), 1e-12)
+    farthest = 0.0
+    for point in points[::25]:
+        share = np.clip(((point - start) * along).sum(axis=1) / square, 0.0, 1.0)
+        nearest = np.hypot(*(start + share[:, None] * along - point).T).min()
+        farthest = max(farthest, float(nearest))
+    return farthest
+
+
+@pytest.fixture(scope="module")
+def bends() -> Site:
+    """Six hundred metres with bends by radius and angle."""
+    site = json.loads(Plant.load("bends").to_json())["site"]
+    return Site.load("yard").with_overrides(site)
+
+
+@pytest.fixture(scope="module")
+def reference(bends: Site) -> NDArray[np.float64]:
+    return course(json.loads(bends.to_json()))
+
+
+@pytest.mark.parametrize("file", ["degrees.geojson", "metres.geojson", "plain.csv", "german.csv"])
+def test_a_road_is_the_same_after_it_was_written_and_read(
+    access_av: Callable[..., Any],
+    tmp_path: Path,
+    bends: Site,
+    reference: NDArray[np.float64],
+    file: str,
+) -> None:
+    site = tmp_path / "site.toml"
+    site.write_text(bends.to_toml(), "utf-8")
+    written, again = tmp_path / file, tmp_path / "again.toml"
+    origin = ("--origin", "48.1,11.5") if file.startswith("degrees") else ()
+    german = ("--german",) if file.startswith("german") else ()
+    assert access_av("export", site, written, *origin, *german).code == 0
+    heads = written.with_name(f"{written.stem}-heads.csv") if file.endswith("csv") else written
+    new = access_av("new", "site", again, "--road", written, "--heads", heads, *origin)
+    assert new.code == 0, new.err
+    read_again = json.loads(Site.load(str(again)).to_json())
+    assert apart_m(course(read_again), reference) < SAME_M
+    assert apart_m(reference, course(read_again)) < SAME_M
+    before = json.loads(bends.to_json())["radio_heads"]
+    for mine, its in zip(read_again["radio_heads"], before, strict=True):
+        assert (mine["name"], mine["pci"]) == (its["name"], its["pci"])
+        assert mine["position_m"] == pytest.approx(its["position_m"], abs=1e-3)
+
+
+def drawing(path: Path, units: int = 4) -> None:
+    """The road of two bends as a polyline with arcs, and its radio heads, in millimetres."""
+    ezdxf = pytest.importorskip("ezdxf", reason="the extra `cad` is not installed")
+    made = ezdxf.new()
+    made.header["$INSUNITS"] = units
+    model = made.modelspace()
+    at, heading = (0.0, 0.0), 0.0
+    vertices = []
+    for length_m, turn_rad in (
+        (200.0, 0.0),
+        (25.0 * math.pi / 3, math.pi / 3),
+        (180.0, 0.0),
+        (30.0 * math.pi / 3, -math.pi / 3),
+        (162.4, 0.0),
+    ):
+        vertices.append((1e3 * at[0], 1e3 * at[1], math.tan(turn_rad / 4.0)))
+        chord = length_m if turn_rad == 0.0 else length_m * math.sin(turn_rad / 2) / (turn_rad / 2)
+        direction = heading + turn_rad / 2.0
+        at = (at[0] + chord * math.cos(direction), at[1] + chord * math.sin(direction))
+        heading += turn_rad
+    vertices.append((1e3 * at[0], 1e3 * at[1], 0.0))
+    model.add_lwpolyline(vertices, format="xyb", dxfattribs={"layer": "WAY"})
+    block = made.blocks.new("ANTENNA")
+    block.add_circle((0.0, 0.0), 100.0)
+    for x_m, y_m in ((60.0, 25.0), (240.0, 100.0), (430.0, 160.0)):
+        place = (1e3 * x_m, 1e3 * y_m, 8e3)
+        model.add_blockref("ANTENNA", place, dxfattribs={"layer": "CELLS"})
+    made.saveas(path)
+
+
+def test_a_drawing_gives_the_same_road(
+    access_av: Callable[..., Any], tmp_path: Path, reference: NDArray[np.float64]
+) -> None:
+    drawn, site = tmp_path / "plant.dxf", tmp_path / "site.toml"
+    drawing(drawn)
+    layers = ("--road-layer", "WAY", "--heads-layer", "CELLS")
+    files = ("--road", drawn, "--heads", drawn)
+    # From the start to the end of the first straight: 200 m.
+    scale = ("--two-points", "0,0,200000,0", "--length-m", "200")
+    done = access_av("new", "site", site, *files, *layers, *scale)
+    assert done.code == 0, done.err
+    read_again = json.loads(Site.load(str(site)).to_json())
+    assert apart_m(course(read_again), reference) < SAME_M
+    assert apart_m(reference, course(read_again)) < SAME_M
+    assert read_again["radio_heads"][1]["position_m"] == pytest.approx([240.0, 100.0, 8.0])
+
+
+@pytest.mark.parametrize(
+    ("units", "options", "said"),
+    [
+        (1, (), "inches"),
+        (6, (), "often wrong"),
+        (4, ("--metres-per-unit", "0.001"), "Layers:"),
+        (4, ("--metres-per-unit", "0.001", "--road-layer", "CELLS"), "0 polylines"),
+        (4, ("--two-points", "0,0,1,0"), "go together"),
+        (4, ("--two-points", "0,0,0,0", "--length-m", "5"), "two different points"),
+        (4, ("--metres-per-unit", "1", "--road-layer", "WAY"), "another unit"),
+    ],
+)
+def test_a_drawing_whose_scale_or_layer_is_not_sure_is_refused(
+    access_av: Callable[..., Any],
+    tmp_path: Path,
+    units: int,
+    options: tuple[str, ...],
+    said: str,
+) -> None:
+    drawn = tmp_path / "plant.dxf"
+    drawing(drawn, units)
+    done = access_av("new", "site", tmp_path / "site.toml", "--road", drawn, *options, columns=500)
+    assert done.code == 2
+    assert said in done.err
+    assert not (tmp_path / "site.toml").exists()
+
+
+ROAD = {"type": "LineString", "coordinates": [[11.5, 48.1], [11.503, 48.101]]}
+
+
+def head_at(*place: float) -> dict[str, Any]:
+    geometry = {"type": "Point", "coordinates": list(place)}
+    return {"type": "Feature", "geometry": geometry, "properties": {"height_m": 8.0}}
+
+
+@pytest.mark.parametrize(
+    ("road", "heads", "said"),
+    [
+        ({"type": "LineString", "coordinates": [[48.1, 11.5], [48.2, 11.6]]}, None, "exchanged"),
+        ({"type": "LineString", "coordinates": [[500.0, 4.0], [700.0, 9.0]]}, None, "EPSG"),
+        ({"type": "LineString", "coordinates": [[11.5, None], [1, 2]]}, None, "finite numbers"),
+        ({"type": "Polygon", "coordinates": []}, None, "LineString"),
+        (ROAD, head_at(11.9, 48.5), "km from the road"),
+        (ROAD, {"type": "Point", "coordinates": [11.5, 48.1]}, "no height"),
+        ("x_m,y_m\n0,0\n100,0\n", head_at(11.5, 48.1), "--origin"),
+        ("x_m,y\n0,0\n", None, "y_m"),
+        ("x_m,y_m\n0,0\n", None, "two or more"),
+        ("x_m,y_m\n0,0\n0.1,0\n", None, "another unit"),
+    ],
+)
+def test_files_that_are_no_plant_are_named(
+    access_av: Callable[..., Any],
+    tmp_path: Path,
+    road: dict[str, Any] | str,
+    heads: dict[str, Any] | None,
+    said: str,
+) -> None:
+    file = tmp_path / ("road.csv" if isinstance(road, str) else "road.geojson")
+    file.write_text(road if isinstance(road, str) else json.dumps(road), "utf-8")
+    more: tuple[Any, ...] = ()
+    if heads is not None:
+        its = tmp_path / "heads.geojson"
+        its.write_text(json.dumps(heads), "utf-8")
+        more = ("--heads", its)
+    done = access_av("new", "plant", tmp_path / "new.toml", "--road", file, *more, columns=500)
+    assert done.code == 2
+    assert said in done.err
+    assert str(tmp_path) in done.err
+
+
+def test_names_with_markup_stay_names(access_av: Callable[..., Any], tmp_path: Path) -> None:
+    name = 'a "mast" <script>alert(1)</script> [red]'
+    heads = tmp_path / "heads.geojson"
+    heads.write_text(geojson.text(Drawn(heads=[Head(name, 60.0, 25.0, 8.0, 5)]), None), "utf-8")
+    file = tmp_path / "new.toml"
+    assert access_av("new", "site", file, "--heads", heads).code == 0
+    assert json.loads(Site.load(str(file)).to_json())["radio_heads"][0]["name"] == name
+
+
+def test_new_files_are_not_written_over_others(
+    access_av: Callable[..., Any], tmp_path: Path
+) -> None:
+    file = tmp_path / "mine.toml"
+    for kind in ("plant", "site", "vehicle", "scenario"):
+        assert access_av("new", kind, file, "--force").code == 0
+        checked_again = access_av(kind, "check", file)
+        assert checked_again.code == 0
+        assert "fine" in checked_again.out, checked_again.out
+        assert "already" in access_av("new", kind, file).err
+    assert "folder" in access_av("new", "plant", tmp_path).err
+
+
+def test_a_scale_is_that_of_two_points() -> None:
+    assert dxf.metres_per_unit((0.0, 0.0, 3.0, 4.0), 10.0) == pytest.approx(2.0)
+    with pytest.raises(InputError, match="two different points"):
+        dxf.metres_per_unit((1.0, 1.0, 1.0, 1.0), 10.0)
+
+
+def test_heads_far_from_a_road_are_named() -> None:
+    drawn = Drawn(road_m=[(0.0, 0.0), (100.0, 0.0)], heads=[Head("far", 0.0, 9000.0, 8.0)])
+    with pytest.raises(InputError, match="9 km from the road"):
+        checked(drawn, "road.csv", "heads.csv")
+
+
+def test_sites_without_a_road_are_written_too(tmp_path: Path) -> None:
+    settings = json.loads(Site.load("yard").to_json())
+    del settings["road"]
+    site = Site.from_toml(
+        'name = "open"\n[[radio_heads]]\nname = "a"\nposition_m = [1.0, 2.0, 8.0]\n'
+    )
+    drawn = of_site(site)
+    assert not drawn.road_m
+    file = tmp_path / "open.geojson"
+    file.write_text(geojson.text(drawn, None), "utf-8")
+    assert read(None, file, Options()).heads[0].x_m == 1.0

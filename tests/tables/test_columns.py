@@ -1,0 +1,199 @@
+"""Every table has the columns that `access_av.columns` says, and nulls only where it says."""
+
+from __future__ import annotations
+
+import json
+import re
+import tempfile
+from pathlib import Path
+from typing import TYPE_CHECKING, Any
+
+import numpy as np
+import polars as pl
+import pytest
+
+from access_av import (
+    Scenario,
+    bound,
+    columns,
+    drives,
+    estimate_angles,
+    nr,
+    simulate,
+    statistics,
+)
+from access_av.device.platform import Platform
+from access_av.paper.sampled_readings import sample
+from access_av.paper.unknowns import sobol
+from access_av.run.campaign import Campaign
+from access_av.run.result_cache import Parts
+from conftest import ROOT
+
+if TYPE_CHECKING:
+    from collections.abc import Callable
+
+    from conftest import Finished
+
+UNITS = {
+    "m": "m", "m2": "m²", "s": "s", "ms": "ms", "rad": "rad", "rad2": "rad²", "deg": "°",
+    "db": "dB", "dbfs": "dB", "hz": "Hz", "khz": "kHz", "mps": "m/s", "radps": "rad/s",
+    "j": "J", "w": "W",
+}  # fmt: skip
+
+
+def check(name: str, found: pl.DataFrame | list[dict[str, Any]]) -> None:
+    table = columns.table(name)
+    if isinstance(found, pl.DataFrame):
+        assert found.columns == list(table.columns)
+        for series in found.iter_columns():
+            if series.dtype.is_float():
+                assert not series.is_nan().any(), series.name
+            assert series.name in table.null or series.null_count() == 0, series.name
+    else:
+        for record in found:
+            absent = {key for key, when in table.null.items() if "absent" in when}
+            assert [*record] == [key for key in table.columns if key in record]
+            assert set(table.columns) - record.keys() <= absent
+            assert {key for key, value in record.items() if value is None} <= table.null.keys()
+
+
+def test_every_name_is_in_a_table_and_explained() -> None:
+    used = {name for table in columns.TABLES.values() for name in table.columns}
+    assert used == columns.GLOSSARY.keys()
+    for table in columns.TABLES.values():
+        assert len(set(table.columns)) == len(table.columns), table.name
+        assert table.null.keys() <= set(table.columns), table.name
+
+
+def test_units_in_names_are_the_units() -> None:
+    for column in columns.GLOSSARY.values():
+        suffix = column.name.rsplit("_", 1)[-1]
+        if column.name.endswith("m_rad"):
+            assert column.unit == "m·rad"
+        elif suffix in UNITS:
+            assert column.unit == UNITS[suffix], column.name
+        else:
+            assert column.unit in ("1", "text", "true or false", "any"), column.name
+
+
+def test_the_page_is_made_from_the_table() -> None:
+    page = (ROOT / "docs/columns.md").read_text(encoding="utf-8")
+    assert page == columns.markdown(), "make docs"
+
+
+GUARDED = {"vehicle.integrity": {}}
+LOST = {"vehicle.start.known": False, "site.radio_heads[0].eirp_dbm": -140.0}
+
+
+@pytest.mark.parametrize(
+    ("scenario", "changes"),
+    [
+        ("paper", {}),
+        ("paper-real-odometry-2", GUARDED),
+        ("paper-real-odometry-2", LOST | {"site.radio_heads[1].eirp_dbm": -140.0}),
+        ("nlos-and-faults", {}),
+    ],
+    ids=["dead-reckoning", "guarded", "lost", "faults"],
+)
+def test_simulation(scenario: str, changes: dict[str, object]) -> None:
+    found = simulate(
+        Scenario.load(scenario).with_overrides(changes), runs=1, keep_trajectories=True
+    )
+    for name in ("steps", "runs", "trajectories", "executions"):
+        check(name, getattr(found, name))
+    assert found.trajectories is not None
+    check("nees", statistics.nees(found.trajectories))
+    check("mean_nees", statistics.mean_nees(found.trajectories))
+
+
+def test_located_drives(tmp_path: Path) -> None:
+    drives.synthesize("paper-real-odometry-2", tmp_path, duration_s=6.0)
+    site, odometry = tmp_path / "site.toml", tmp_path / "odometry.csv"
+    vehicle = tmp_path / "vehicle.toml"
+    drive = drives.locate(site, odometry, tmp_path / "iq", vehicle=vehicle, smooth=True)
+    assert drive.smoothed is not None
+    check("poses", drive.poses)
+    check("smoothed", drive.smoothed)
+    assert drive.smoothed["protection_level_m"].is_null().all()
+    check("angles", drive.angles)
+    check("findings", drive.findings)
+    found = estimate_angles(site, tmp_path / "iq", vehicle=vehicle)
+    check("recorded_angles", found.angles)
+    check("located_errors", drives.error_m(drive.poses, tmp_path / "truth.tum"))
+    without_gyroscope = pl.read_csv(odometry).columns
+    assert without_gyroscope == list(columns.TABLES["odometry"].columns[:3])
+    # What is written can be read: the log of angles has the columns that its table says.
+    log = tmp_path / "angles.csv"
+    drive.angles.select(columns.TABLES["angles"].columns[:7]).drop_nulls().write_csv(log)
+    assert drives.locate(site, odometry, log, vehicle=vehicle).angles.height > 0
+
+
+def test_bound() -> None:
+    for scenario in ("paper", "yard"):
+        found = bound(scenario, map_step_m=50.0)
+        check("bound_route", found.route)
+        check("bound_map", found.site)
+        check("bound_heads", found.heads)
+
+
+def test_evaluation(quick_study: Path) -> None:
+    names = ("operating_points", "errors", "snr", "ablations", "fixed_front", "ours", "fair",
+             "freedoms")  # fmt: skip
+    for name in names:
+        check(name, pl.read_parquet(quick_study / "latest" / f"{name}.parquet"))
+    check("claims", json.loads((quick_study / "latest/claims.json").read_text()))
+
+
+def test_chosen(access_av: Callable[..., Finished]) -> None:
+    done = access_av("chosen", "--runs", "1", "--json")
+    assert done.code == 0, done.err
+    found = json.loads(done.out)
+    check("chosen", found)
+    shipped = [one for one in found if one["is_shipped"]]
+    assert len({one["rms_error_m"] for one in shipped}) == 1, "the same reading each time"
+    assert len(found) > 2 * len(shipped) - 1, "each has an alternative"
+
+
+def test_unknowns() -> None:
+    platform = Platform.load("jetson-agx-xavier")
+    with tempfile.TemporaryDirectory() as parts:
+        kept = Campaign(Parts(Path(parts)))
+        drawn = sample(kept, platform, worlds=2, controllers=2, runs=1, everything=True)
+    assert drawn is not None
+    check("unknowns", pl.DataFrame([vars(it) for it in sobol(drawn, 1, count=3).indices]))
+
+
+def test_cells_and_bursts(access_av: Callable[..., Finished], data: Path) -> None:
+    captures = data / "captures"
+    one = access_av("scan", captures / "oai-n78.sigmf-meta", "--unconfirmed", "--json")
+    array = captures / "semireal4_singtel-n1_day1_array1.sigmf-meta"
+    several = access_av("scan", array, "--unconfirmed", "--json")
+    for done in (one, several):
+        check("cells", json.loads(done.out))
+    check("bursts", json.loads(access_av("aoa", captures / "aoa4_day1_array1", "--json").out))
+
+
+def test_cells_without_a_recording() -> None:
+    burst = nr.build_burst(42, ssb_freq_hz=3.7008e9)
+    noise = np.random.default_rng(1).normal(scale=1e-3, size=(burst.size, 2)) @ [1, 1j]
+    carrier = {"centre_frequency_hz": 3.7008e9, "ssb_freq_hz": 3.7008e9}
+    [cell] = nr.search((burst + noise)[None], 7.68e6, **carrier)
+    check("cells", [{"recording": "", **nr.record(cell)}])
+
+
+def test_command(access_av: Callable[..., Finished]) -> None:
+    done = access_av("columns", "executions", columns=100)
+    assert done.code == 0
+    for name in columns.TABLES["executions"].columns:
+        assert re.search(rf"^ {name} ", done.out, flags=re.MULTILINE)
+    assert "snapshots carry no angle" in done.out
+    told = json.loads(access_av("columns", "--json").out)
+    assert told.keys() == columns.TABLES.keys()
+    assert told["snr"]["columns"][0] == {
+        "name": "time_s", "unit": "s", "null": "never",
+        "meaning": "Time from the start of the drive, or by the recording's clock",
+    }  # fmt: skip
+    assert access_av("columns", columns=60).code == 0
+    wrong = access_av("columns", "executiones")
+    assert wrong.code == 2
+    assert "executions" in wrong.err

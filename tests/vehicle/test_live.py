@@ -1,0 +1,195 @@
+"""The pipeline fed as things come in, and the ROS 2 node made of it."""
+
+from __future__ import annotations
+
+import json
+import math
+import runpy
+import sys
+from types import ModuleType, SimpleNamespace
+from typing import TYPE_CHECKING, Any
+
+import numpy as np
+import polars as pl
+import pytest
+
+import access_av
+from conftest import ROOT
+
+if TYPE_CHECKING:
+    from pathlib import Path
+
+RATE_HZ = 3.84e6
+EVERY_SSB = {"wake_up": {"policy": "fixed", "interval_ms": 1.0}}
+
+
+@pytest.fixture(scope="module")
+def drive(tmp_path_factory: pytest.TempPathFactory) -> Path:
+    """A second of all samples, on a vehicle without monitor, which hears every SSB."""
+    out = tmp_path_factory.mktemp("live")
+    scenario = access_av.Scenario.load("paper-real-odometry-2").with_overrides(
+        {"vehicle.integrity.enabled": False}
+    )
+    access_av.synthesize(scenario, out, duration_s=1.0, continuous=True)
+    return out
+
+
+def believed(directory: Path) -> tuple[access_av.Site, access_av.Vehicle]:
+    vehicle = access_av.Vehicle.load(str(directory / "vehicle.toml"))
+    return (
+        access_av.Site.load(str(directory / "site.toml")),
+        vehicle.with_overrides(EVERY_SSB),
+    )
+
+
+def antennas(directory: Path) -> np.ndarray:
+    raw = np.fromfile(directory / "iq.sigmf-data", dtype="<i2").astype(np.float32) / 32768
+    return np.ascontiguousarray(raw.view(np.complex64).reshape(-1, 4).T)
+
+
+def test_samples_as_they_come_make_the_poses_of_locate(drive: Path) -> None:
+    site, vehicle = believed(drive)
+    recording, odometry_file = drive / "iq.sigmf-meta", drive / "odometry.csv"
+    located = access_av.locate(site, odometry_file, recording, vehicle=vehicle)
+    samples, odometry = antennas(drive), pl.read_csv(odometry_file)
+    live = access_av.Live(site, vehicle, rate_hz=RATE_HZ, centre_hz=3.5e9)
+    block, poses, angles = 19_200, [], []
+    rows = odometry.iter_rows(named=True)
+    row = next(rows, None)
+    for first in range(0, samples.shape[1], block):
+        while row is not None and row["time_s"] <= (first + block) / RATE_HZ:
+            yaw_rate_radps = row.get("yaw_rate_radps")
+            live.odometry(
+                row["time_s"],
+                row["speed_mps"],
+                distance_m=row["distance_m"],
+                yaw_rate_radps=yaw_rate_radps,
+            )
+            poses.append(live.status(row["time_s"]).pose)
+            row = next(rows, None)
+        live.samples(first / RATE_HZ, samples[:, first : first + block])
+        angles += live.outcomes()
+    live.settle()
+    angles += live.outcomes()
+    assert [it.phase_rad for it in angles] == located.angles["phase_rad"].to_list()
+    assert [it.accepted for it in angles] == located.angles["accepted"].to_list()
+    assert len(poses) > 40
+    assert poses == list(located.poses.select("x_m", "y_m", "heading_rad").iter_rows())
+    assert sum(head.accepted + head.refused for head in live.heads()) == len(angles)
+    assert live.energy().executions == len(angles)
+
+
+def test_what_cannot_be_is_refused_and_changes_nothing(drive: Path) -> None:
+    site, vehicle = believed(drive)
+    with pytest.raises(ValueError, match="both"):
+        access_av.Live(site, vehicle, rate_hz=RATE_HZ)
+    with pytest.raises(ValueError, match="0 Hz"):
+        access_av.Live(site, vehicle, rate_hz=0.0, centre_hz=3.5e9)
+    live = access_av.Live(site, vehicle)
+    live.odometry(1.0, 1.5)
+    before = live.status(1.0).pose
+    for refused in (
+        lambda: live.odometry(1.0, 1.5),
+        lambda: live.odometry(math.nan, 1.5),
+        lambda: live.odometry(1.1, math.inf),
+        lambda: live.odometry(1.1, 1.0, distance_m=math.nan),
+        lambda: live.angle(1, 1.1, 0.1, -0.1),
+        lambda: live.angle(1, math.nan, 0.1, 0.1),
+        lambda: live.samples(1.0, np.zeros((4, 8), np.complex64)),
+        lambda: live.exclude(999),
+        lambda: live.set_pose(1.0, (math.nan, 0.0, 0.0)),
+        lambda: live.set_pose(5.0, (0.0, 0.0, 0.0)),
+        lambda: live.status(math.nan),
+    ):
+        with pytest.raises(ValueError, match=r"."):
+            refused()
+    assert live.status(1.0).pose == before
+
+
+class Anything(SimpleNamespace):
+    """A message whose fields come to be as they are asked for."""
+
+    def __getattr__(self, name: str) -> Any:
+        if name.startswith("__"):
+            raise AttributeError(name)
+        made = [0.0] * 36 if name == "covariance" else Anything()
+        setattr(self, name, made)
+        return made
+
+
+def ros(monkeypatch: pytest.MonkeyPatch, now_s: list[float]) -> SimpleNamespace:
+    """An `rclpy` of whose node the callbacks can be called."""
+    seen = SimpleNamespace(callbacks={}, published={}, warned=[], timer=None)
+
+    def publisher(_kind: object, topic: str, _depth: int) -> SimpleNamespace:
+        return SimpleNamespace(publish=seen.published.setdefault(topic, []).append)
+
+    def stamp() -> Anything:
+        return Anything(sec=int(now_s[0]), nanosec=int(1e9 * (now_s[0] % 1.0)))
+
+    node = SimpleNamespace(
+        create_publisher=publisher,
+        create_subscription=lambda _kind, topic, call, _depth: seen.callbacks.update({topic: call}),
+        create_timer=lambda _period_s, call: setattr(seen, "timer", call),
+        get_clock=lambda: SimpleNamespace(now=lambda: SimpleNamespace(to_msg=stamp)),
+        get_logger=lambda: SimpleNamespace(warning=seen.warned.append),
+    )
+    for name, kinds in {
+        "rclpy": (),
+        "diagnostic_msgs": (),
+        "diagnostic_msgs.msg": ("DiagnosticStatus",),
+        "geometry_msgs": (),
+        "geometry_msgs.msg": ("PoseWithCovarianceStamped",),
+        "nav_msgs": (),
+        "nav_msgs.msg": ("Odometry",),
+        "std_msgs": (),
+        "std_msgs.msg": ("String",),
+    }.items():
+        module = ModuleType(name)
+        for kind in kinds:
+            setattr(module, kind, Anything)
+        monkeypatch.setitem(sys.modules, name, module)
+    rclpy: Any = sys.modules["rclpy"]
+    rclpy.init, rclpy.create_node, rclpy.spin = lambda: None, lambda _name: node, lambda _node: None
+    return seen
+
+
+def test_the_ros_node_follows_its_topics(monkeypatch: pytest.MonkeyPatch) -> None:
+    now_s = [1.0]
+    seen = ros(monkeypatch, now_s)
+    runpy.run_path(str(ROOT / "examples/rclpy_node.py"))["main"](["yard", "tugger"])
+    seen.timer()
+    assert "no odometry has come" in seen.published["access_av/status"][-1].message
+    assert not seen.published["access_av/pose"]
+
+    def header() -> Anything:
+        return Anything(stamp=Anything(sec=int(now_s[0]), nanosec=int(1e9 * (now_s[0] % 1.0))))
+
+    def drives() -> None:
+        message = Anything(header=header())
+        message.twist.twist.linear.x, message.twist.twist.angular.z = 1.5, 0.0
+        seen.callbacks["odom"](message)
+
+    drives()
+    given = Anything(header=header())
+    given.pose.pose.position.x, given.pose.pose.position.y = -50.0, 0.0
+    given.pose.pose.orientation.z, given.pose.pose.orientation.w = 0.0, 1.0
+    for axis in (0, 1, 5):
+        given.pose.covariance[7 * axis] = 0.01
+    seen.callbacks["initialpose"](given)
+    for _ in range(10):
+        now_s[0] += 0.1
+        drives()
+    angle = {"pci": 999, "time_s": now_s[0], "phase_rad": 0.1, "sigma_rad": 0.02}
+    seen.callbacks["angles"](SimpleNamespace(data=json.dumps(angle)))
+    assert not seen.warned
+    seen.timer()
+    pose = seen.published["access_av/pose"][-1]
+    assert pose.header.frame_id == "map"
+    assert pose.pose.pose.position.x == pytest.approx(-48.5, abs=0.3)
+    assert 0.005 < pose.pose.covariance[0] < 0.1
+    # What is refused is said, and the node goes on.
+    seen.callbacks["angles"](SimpleNamespace(data="{"))
+    seen.callbacks["angles"](SimpleNamespace(data='{"pci": -1}'))
+    drives()
+    assert len(seen.warned) == 3

@@ -1,0 +1,285 @@
+"""`access-av-node`, with peers that others wrote: ZeroMQ, MQTT, MCAP, Prometheus, a browser."""
+
+from __future__ import annotations
+
+import json
+import os
+import shutil
+import socket
+import subprocess
+import sys
+import threading
+import time
+import urllib.request
+from pathlib import Path
+from typing import Any
+
+import jsonschema
+import pytest
+from mcap.reader import make_reader
+from prometheus_client.parser import text_string_to_metric_families
+from rosbags.highlevel import AnyReader
+from rosbags.typesys import Stores, get_typestore
+
+import access_av
+from browser import Browser
+from conftest import ROOT
+
+sys.path.insert(0, str(ROOT / "examples/live"))
+from transmitter import Drive, Transmitter, node_toml
+
+NODE = Path(os.environ.get("ACCESS_AV_NODE", ROOT / "target/debug/access-av-node"))
+SCHEMAS = Path(os.environ.get("ACCESS_AV_DATA", ROOT / "../shared/data")) / "vda5050"
+CHROMIUM = shutil.which("chromium") or shutil.which("chromium-browser")
+DURATION_S = 5.0
+
+pytestmark = pytest.mark.skipif(
+    not NODE.exists(), reason=f"no {NODE}: `cargo build -p access-av-node` makes it"
+)
+
+
+@pytest.fixture(scope="module")
+def drive(tmp_path_factory: pytest.TempPathFactory) -> Path:
+    folder = tmp_path_factory.mktemp("drive")
+    access_av.synthesize("yard", folder, duration_s=DURATION_S)
+    return folder
+
+
+def command(drive: Path, settings: Path, *options: str) -> list[str]:
+    believed = ["--site", str(drive / "site.toml"), "--vehicle", str(drive / "vehicle.toml")]
+    return [str(NODE), *believed, *options, str(settings)]
+
+
+def lines(file: Path) -> list[dict[str, Any]]:
+    return [json.loads(line) for line in file.read_text(encoding="utf-8").splitlines()]
+
+
+def free_port() -> int:
+    with socket.create_server(("127.0.0.1", 0)) as server:
+        return int(server.getsockname()[1])
+
+
+def test_a_recording_played_back_gives_the_poses_of_locate(drive: Path, tmp_path: Path) -> None:
+    settings = tmp_path / "node.toml"
+    settings.write_text(
+        f"""
+        name = "playback"
+        pace = "fast"
+        samples = {{ source = "sigmf", recording = "{drive}/iq" }}
+        odometry.file = "{drive}/odometry.csv"
+        output.tum = "{tmp_path}/node.tum"
+        """,
+        encoding="utf-8",
+    )
+    done = subprocess.run(command(drive, settings), capture_output=True, text=True, timeout=120)
+    assert done.returncode == 0, done.stderr
+    located = access_av.locate(
+        recording=drive / "iq",
+        odometry=drive / "odometry.csv",
+        site=str(drive / "site.toml"),
+        vehicle=str(drive / "vehicle.toml"),
+    )
+    located.write_tum(tmp_path / "located.tum")
+    assert (tmp_path / "node.tum").read_bytes() == (tmp_path / "located.tum").read_bytes()
+
+
+class Live:
+    """A node that hears a transmitter, and everything that it said meanwhile."""
+
+    def __init__(self, drive: Path, folder: Path) -> None:
+        self.folder = folder
+        self.mqtt: list[dict[str, Any]] = []
+        self.state: dict[str, Any] = {}
+        self.metrics = ""
+        self.page = ""
+        self.widths: dict[int, list[int]] = {}
+        port = free_port()
+        broker = free_port()
+        transmitter = Transmitter(Drive(drive))
+        settings = folder / "node.toml"
+        settings.write_text(
+            node_toml(transmitter, f"127.0.0.1:{port}")
+            + f"""
+[output.json]
+address = "{folder}/node.jsonl"
+[output.mcap]
+folder = "{folder}/mcap"
+[output.mqtt]
+host = "127.0.0.1"
+port = {broker}
+topic = "fleet/position"
+map_id = "yard"
+rate_hz = 20.0
+localized_after_s = 0.5
+""",
+            encoding="utf-8",
+        )
+        listener = subprocess.Popen(
+            [sys.executable, str(ROOT / "tests/mqtt_broker.py"), str(broker), "fleet/position"],
+            stdout=subprocess.PIPE,
+            text=True,
+        )
+        assert listener.stdout is not None
+        assert listener.stdout.readline().strip() == "ready"
+        node = subprocess.Popen(command(drive, settings), stderr=subprocess.PIPE, text=True)
+        sending = threading.Thread(target=transmitter.run)
+        sending.start()
+        time.sleep(0.4 * DURATION_S)
+        address = f"http://127.0.0.1:{port}"
+        if CHROMIUM:
+            self.browse(address)
+        sending.join(60.0)
+        with urllib.request.urlopen(f"{address}/metrics") as answer:
+            self.metrics = answer.read().decode()
+        with urllib.request.urlopen(f"{address}/state.json") as answer:
+            self.state = json.load(answer)
+        # Silence is named within a second.
+        transmitter.close()
+        time.sleep(1.5)
+        node.terminate()
+        _, self.said = node.communicate(timeout=10.0)
+        self.exit_code = node.returncode
+        listener.terminate()
+        heard, _ = listener.communicate(timeout=10.0)
+        self.mqtt = [json.loads(line) for line in heard.splitlines() if line.startswith("{")]
+        self.records = lines(folder / "node.jsonl")
+
+    def browse(self, address: str) -> None:
+        """What the page says, and at some sizes how wide it is and how wide the window."""
+        assert CHROMIUM is not None
+        with Browser(CHROMIUM, f"{address}/") as browser:
+            browser.wait_for("document.querySelectorAll('#rows tr').length === 4")
+            browser.wait_for("document.getElementById('link').textContent === 'live'")
+            for width in (400, 900, 1600):
+                browser.resize(width, 900, dark=width == 900)
+                root = "document.documentElement"
+                self.widths[width] = browser.evaluate(f"[{root}.scrollWidth, {root}.clientWidth]")
+            self.page = browser.text()
+            assert not browser.errors
+
+
+@pytest.fixture(scope="module")
+def live(drive: Path, tmp_path_factory: pytest.TempPathFactory) -> Live:
+    return Live(drive, tmp_path_factory.mktemp("live"))
+
+
+def test_every_radio_head_is_heard_through_sockets_of_others(live: Live) -> None:
+    assert live.exit_code == 0, live.said
+    heads = live.state["heads"]
+    assert [head["pci"] for head in heads] == [11, 12, 13, 14]
+    assert all(head["accepted"] >= 3 for head in heads), heads
+    assert live.state["dropped"] == {"blocks": 0, "messages": 0, "records": 0}
+    # The samples between the bursts were not looked at.
+    assert live.state["duty"] < 0.5
+    poses = [it for it in live.records if it["type"] == "pose" and it["by"] == "odometry"]
+    assert len(poses) == round(DURATION_S / 0.02) + 1
+    truth = [
+        [float(value) for value in line.split()]
+        for line in (live.folder.parent / "drive0/truth.tum").read_text().splitlines()
+    ]
+    last = poses[-1]
+    _, x_m, y_m, *_ = truth[-1]
+    error_m = ((last["x_m"] - x_m) ** 2 + (last["y_m"] - y_m) ** 2) ** 0.5
+    assert error_m < last["protection_level_m"], last
+
+
+def test_sources_that_fall_silent_are_named(live: Live) -> None:
+    events = [it for it in live.records if it["type"] == "event"]
+    silent = {it["source"] for it in events if it["text"].startswith("nothing has come for")}
+    assert silent == {"samples", "messages"}
+    assert events[-1]["text"].endswith("ends")
+
+
+def test_mcap_is_whole_and_read_by_others(live: Live) -> None:
+    (file,) = (live.folder / "mcap").iterdir()
+    with file.open("rb") as stream:
+        summary = make_reader(stream).get_summary()
+    assert summary is not None
+    assert summary.statistics is not None
+    topics = {channel.topic for channel in summary.channels.values()}
+    assert topics == {"/access_av/odometry", "/tf", "/diagnostics", "/access_av/verdicts"}
+    with AnyReader([file], default_typestore=get_typestore(Stores.ROS2_HUMBLE)) as reader:
+        read: dict[str, list[Any]] = {}
+        for connection, _, raw in reader.messages():
+            message = reader.deserialize(raw, connection.msgtype)
+            read.setdefault(connection.topic, []).append(message)
+    transforms = read["/tf"][-1].transforms
+    frames = [(it.header.frame_id, it.child_frame_id) for it in transforms]
+    assert frames == [("map", "odom"), ("odom", "base_link")]
+    odometry = read["/access_av/odometry"][-1]
+    assert odometry.header.frame_id == "map"
+    assert odometry.twist.twist.linear.x > 0.0
+    names = {status.name for message in read["/diagnostics"] for status in message.status}
+    assert names == {"access_av: localizer", "access_av: input"}
+
+
+@pytest.mark.skipif(not SCHEMAS.exists(), reason=f"no {SCHEMAS} (ACCESS_AV_DATA)")
+def test_the_position_is_one_of_vda_5050(live: Live) -> None:
+    schema = json.loads((SCHEMAS / "state-3.0.schema").read_text(encoding="utf-8"))
+    position = {
+        "$ref": "#/definitions/mobileRobotPosition",
+        "definitions": schema["definitions"],
+    }
+    assert len(live.mqtt) > 10
+    validator = jsonschema.Draft7Validator(position)
+    for message in live.mqtt:
+        validator.validate(message)
+    assert live.mqtt[0]["localized"] is False
+    assert any(message["localized"] for message in live.mqtt)
+
+
+def test_metrics_are_read_by_prometheus(live: Live) -> None:
+    families = {it.name: it for it in text_string_to_metric_families(live.metrics)}
+    assert families["access_av_ssb_to_pose_seconds"].type == "histogram"
+    states = families["access_av_state"].samples
+    assert sum(sample.value for sample in states) == 1.0
+    accepted = families["access_av_head_accepted"].samples
+    assert {sample.labels["head"] for sample in accepted} == {"gate", "hall", "dock", "store"}
+
+
+@pytest.mark.skipif(CHROMIUM is None, reason="no Chromium")
+def test_the_page_shows_the_drive_in_a_browser(live: Live) -> None:
+    for words in ("live", "gate", "hall", "dock", "store", "Protection level", "simulated"):
+        assert words.lower() in live.page.lower(), words
+    for width, (page, window) in live.widths.items():
+        assert page <= window == width
+    source = (ROOT / "crates/node/src/web/page.html").read_bytes()
+    assert len(source) <= 200_000
+    # Nothing is loaded from elsewhere: the only address in it is the name of SVG.
+    assert source.count(b"http") == source.count(b"http://www.w3.org/2000/svg")
+
+
+@pytest.mark.parametrize(
+    ("change", "said"),
+    [
+        ("rate_msps = 3.84", "rate_msps"),
+        ("antennas = [0, 1, 1, 3]", "samples.stream.antennas"),
+        ("antennas = [0, 1, 2]", "3 channels"),
+        ('format = "ci12"', "ci12"),
+        ('address = "udp://127.0.0.1:5"', "samples.address"),
+        ('adress = "x"', "did you mean `address`"),
+    ],
+)
+def test_settings_that_cannot_be_meant_are_refused(
+    drive: Path, tmp_path: Path, change: str, said: str
+) -> None:
+    stream = {"rate_msps": "3.84", "centre_mhz": "3500.0", "antennas": "[0, 1, 2, 3]"}
+    samples = {"address": '"tcp://127.0.0.1:5"', "format": '"ci16_le"'}
+    key, value = change.split(" = ", 1)
+    if key == "rate_msps":
+        del stream[key]
+    elif key in stream:
+        stream[key] = value
+    else:
+        samples[key] = value
+    text = 'name = "bad"\nmessages = ["-"]\n[samples]\nsource = "raw"\n'
+    text += "".join(f"{key} = {value}\n" for key, value in samples.items())
+    text += "[samples.stream]\n" + "".join(f"{key} = {value}\n" for key, value in stream.items())
+    settings = tmp_path / "node.toml"
+    settings.write_text(text, encoding="utf-8")
+    done = subprocess.run(
+        command(drive, settings, "--dry-run"), capture_output=True, text=True, timeout=30
+    )
+    assert done.returncode == 2
+    assert said in done.stderr, done.stderr
+    assert "panicked" not in done.stderr
