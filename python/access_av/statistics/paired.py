@@ -6,12 +6,12 @@ from typing import TYPE_CHECKING, Any
 
 import numpy as np
 
+from access_av.statistics.percentiles import resampled
+
 if TYPE_CHECKING:
     from numpy.typing import ArrayLike, NDArray
 
 RESAMPLES = 400
-# Counts that are held at a time.
-MOST_COUNTS = 4_000_000
 
 
 def paired_difference(
@@ -78,10 +78,4 @@ def _less(first: float, second: float) -> float:
 def _resampled(errors: NDArray[Any], drawn: NDArray[Any], percent: float) -> NDArray[np.float64]:
     """The percentile in each resample, whose drives count as often as they were drawn."""
     order = np.argsort(errors, axis=None, kind="stable")
-    pooled, run = errors.ravel()[order], order // errors.shape[1]
-    found = []
-    for times in np.array_split(drawn, max(1, drawn.shape[0] * pooled.size // MOST_COUNTS)):
-        counted = np.cumsum(times[:, run], axis=1)
-        ranks = np.maximum(1.0, np.ceil(np.round(percent / 100.0 * counted[:, -1], 6)))
-        found.append(pooled[(counted < ranks[:, None]).sum(axis=1)])
-    return np.concatenate(found)
+    return resampled(errors.ravel()[order], order // errors.shape[1], drawn, percent)

@@ -165,18 +165,36 @@ def percentiles(
     rng = np.random.default_rng(seed)
     drawn = rng.multinomial(runs, np.full(runs, 1.0 / runs), size=resamples)
     outside = int(_beyond(runs) * resamples) if runs > 1 else 0
-    sizes = drawn @ np.bincount(run, minlength=runs)
     found = []
     for percent in percents:
         value = float(pooled[_ranks(percent, np.array([pooled.size]))[0] - 1])
         if runs == 1:
             found.append(Percentile(percent, value, None, None))
             continue
-        of_resamples = np.sort(pooled[_places(run, drawn, _ranks(percent, sizes))])
+        of_resamples = np.sort(resampled(pooled, run, drawn, percent))
         low, high = float(of_resamples[outside]), float(of_resamples[-1 - outside])
         if independent is not None:
             high = max(high, _seldom_seen(pooled, percent, independent))
         found.append(Percentile(percent, value, low, high))
+    return found
+
+
+def resampled(
+    pooled: NDArray[Any], run: NDArray[Any], drawn: NDArray[Any], percent: float
+) -> NDArray[Any]:
+    """A percentile in each resample.
+
+    Parameters
+    ----------
+    pooled, run
+        All errors in ascending order, and the run of each.
+    drawn
+        How often each resample has each run, shape (resamples, runs).
+    percent
+        The percentile, above 0 and at most 100.
+    """
+    sizes = drawn @ np.bincount(run, minlength=drawn.shape[1])
+    found: NDArray[Any] = pooled[_places(run, drawn, _ranks(percent, sizes))]
     return found
 
 
