@@ -210,13 +210,13 @@ impl Engine {
         let antennas = antennas
             .get(..self.pending.antennas.len())
             .unwrap_or_default();
-        let taken = if self.pending.length() > 0 {
-            self.live
-                .receive(self.pending.time_s, antennas, ends)
-                .map(drop)
-        } else {
-            self.live.end_stretch()
-        };
+        let mut taken = Ok(());
+        if self.pending.length() > 0 {
+            taken = self.live.receive(self.pending.time_s, antennas).map(drop);
+        }
+        if ends && taken.is_ok() {
+            taken = self.live.end_stretch();
+        }
         self.pending.antennas.iter_mut().for_each(Vec::clear);
         if let Err(error) = taken {
             self.refused("samples", &error);
@@ -234,16 +234,16 @@ impl Engine {
             self.gate.open();
             return Ok(());
         }
-        let [mut from_s, _] = self.windows.around(burst_s);
-        if from_s < now_s {
+        let mut window = self.windows.around(burst_s);
+        if window[0] < now_s {
             // Part of it is gone already.
             burst_s = self.live.next_wake_up_s(burst_s)?;
-            [from_s, _] = self.windows.around(burst_s);
+            window = self.windows.around(burst_s);
         }
-        if from_s < now_s {
+        if window[0] < now_s {
             self.gate.open();
         } else {
-            self.gate.set(self.windows.around(burst_s));
+            self.gate.set(window);
         }
         Ok(())
     }
@@ -384,18 +384,22 @@ impl Engine {
         let Some(now_s) = self.clock.now_s() else {
             return Ok(());
         };
-        if self.board.is_due() {
-            let (heads, energy) = (self.live.heads(), self.live.energy());
-            let taken_s = self.live.stream_counts().taken_s;
-            self.board
-                .show(now_s, &self.live.status(now_s)?, heads, &energy, taken_s);
+        let (shows, tells) = (self.board.is_due(), now_s - self.last_status_s >= STATUS_S);
+        if !(shows || tells) {
+            return Ok(());
         }
-        if now_s - self.last_status_s >= STATUS_S {
+        let (status, energy) = (self.live.status(now_s)?, self.live.energy());
+        let heads = self.live.heads();
+        if shows {
+            let taken_s = self.live.stream_counts().taken_s;
+            self.board.show(now_s, &status, heads, &energy, taken_s);
+        }
+        if tells {
             self.last_status_s = now_s;
             self.records.put(Record::Status {
-                status: self.live.status(now_s)?,
-                heads: self.live.heads().to_vec(),
-                energy: self.live.energy(),
+                status,
+                heads: heads.to_vec(),
+                energy,
                 time_s: now_s,
             });
         }

@@ -99,7 +99,10 @@ impl Player<'_> {
             let live = self.engine.live_mut();
             // Less than a sample of whatever rate is no gap.
             let ends = next_s.is_none_or(|next_s| next_s > block_s + length_s + 1e-8);
-            live.receive(block_s, &antennas, ends)?;
+            live.receive(block_s, &antennas)?;
+            if ends {
+                live.end_stretch()?;
+            }
             live.hear_before(time_s)?;
             self.engine.publish_heard(None)?;
             let samples = self.samples.first().map_or(0, Vec::len);

@@ -3,8 +3,8 @@
 use std::fmt::Write;
 
 use super::board::Board;
-use crate::statistics::Histogram;
-use onboard::live::State;
+use crate::statistics::{Histogram, SourceHealth};
+use onboard::live::{HeadStatus, State};
 
 const STATES: [State; 7] = [
     State::Waiting,
@@ -15,6 +15,9 @@ const STATES: [State; 7] = [
     State::Ok,
     State::Unmonitored,
 ];
+
+/// Name, kind and help of a family, and its value of a source or radio head.
+type Family<T, V> = (&'static str, &'static str, &'static str, fn(&T) -> V);
 
 struct Text(String);
 
@@ -91,31 +94,30 @@ pub fn text(board: &Board) -> String {
     ] {
         text.sample("dropped_total", &[("what", what)], count as f64);
     }
-    for (name, kind, help) in [
+    let of_sources: [Family<SourceHealth, f64>; 3] = [
         (
             "source_items_total",
             "counter",
             "Samples per channel, or messages, of a source.",
+            |it| it.items() as f64,
         ),
         (
             "source_defects_total",
             "counter",
             "Items of a source that could not be used.",
+            |it| it.defects() as f64,
         ),
         (
             "source_silent_seconds",
             "gauge",
             "Time since a source brought something.",
+            |it| it.silent_for().as_secs_f64(),
         ),
-    ] {
+    ];
+    for (name, kind, help, value) in of_sources {
         text.family(name, kind, help);
         for source in &counters.sources {
-            let value = match name {
-                "source_items_total" => source.items() as f64,
-                "source_defects_total" => source.defects() as f64,
-                _ => source.silent_for().as_secs_f64(),
-            };
-            text.sample(name, &[("source", source.name)], value);
+            text.sample(name, &[("source", source.name)], value(source));
         }
     }
     let Some(shown) = board.shown() else {
@@ -138,46 +140,45 @@ pub fn text(board: &Board) -> String {
         let help = "Horizontal protection level.";
         text.one("protection_level_meters", "gauge", help, level_m);
     }
-    for (name, kind, help) in [
+    let of_heads: [Family<HeadStatus, Option<f64>>; 5] = [
         (
             "head_snr_decibels",
             "gauge",
             "SNR of a radio head's last SSB.",
+            |it| it.snr_db,
         ),
         (
             "head_residual_radians",
             "gauge",
             "Residual of a radio head's last angle.",
+            |it| it.residual_rad,
         ),
         (
             "head_accepted_total",
             "counter",
             "Angles of a radio head that were accepted.",
+            |it| Some(it.accepted as f64),
         ),
         (
             "head_refused_total",
             "counter",
             "Angles of a radio head that were not.",
+            |it| Some(it.refused as f64),
         ),
         (
             "head_faulty",
             "gauge",
             "1 for a radio head that is found faulty.",
+            |it| Some(f64::from(u8::from(it.is_faulty))),
         ),
-    ] {
+    ];
+    for (name, kind, help, value) in of_heads {
         text.family(name, kind, help);
         for head in &shown.heads {
-            let value = match name {
-                "head_snr_decibels" => head.snr_db,
-                "head_residual_radians" => head.residual_rad,
-                "head_accepted_total" => Some(head.accepted as f64),
-                "head_refused_total" => Some(head.refused as f64),
-                _ => Some(f64::from(u8::from(head.is_faulty))),
-            };
             let (pci, beam) = (head.head.pci, head.head.ssb_index);
             let known = counters.heads.iter().find(|it| (it.0, it.1) == (pci, beam));
             let named = known.map_or("", |(_, _, name)| name.as_str());
-            if let Some(value) = value {
+            if let Some(value) = value(head) {
                 let (pci, beam) = (pci.to_string(), beam.to_string());
                 let labels = [("head", named), ("pci", &*pci), ("ssb_index", &*beam)];
                 text.sample(name, &labels, value);

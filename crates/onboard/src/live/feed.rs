@@ -152,14 +152,13 @@ impl Live {
         time_s: f64,
         antennas: &[&[Complex32]],
     ) -> Result<Continuity, LiveError> {
-        let continuity = self.receive(time_s, antennas, false)?;
+        let continuity = self.receive(time_s, antennas)?;
         self.hear_before(f64::INFINITY)?;
         Ok(continuity)
     }
 
     /// As [`samples`](Self::samples), but nothing is heard before [`hear_before`](Self::hear_before) says so: for
-    /// recordings, whose odometry is known before it is its turn. `ends` says that samples are missing after
-    /// these.
+    /// recordings, whose odometry is known before it is its turn.
     ///
     /// # Errors
     /// As [`samples`](Self::samples).
@@ -167,11 +166,10 @@ impl Live {
         &mut self,
         time_s: f64,
         antennas: &[&[Complex32]],
-        ends: bool,
     ) -> Result<Continuity, LiveError> {
         finite("the time of samples", time_s)?;
         let stream = self.stream.as_mut().ok_or(LiveError::NoStream)?;
-        let continuity = stream.push(time_s, antennas, ends)?;
+        let continuity = stream.push(time_s, antennas)?;
         if let Some(end_s) = stream.next_s() {
             self.see(end_s);
         }

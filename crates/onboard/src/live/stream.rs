@@ -108,8 +108,7 @@ impl SampleStream {
         (self.counts.taken_s > 0.0).then(|| self.clock.time_s(self.clock.next() as f64))
     }
 
-    /// Takes in the next samples of every antenna, the first of them received at `time_s`; `ends` says that
-    /// none follow them without a gap.
+    /// Takes in the next samples of every antenna, the first of them received at `time_s`.
     ///
     /// # Errors
     /// [`LiveError::Receive`] for another number of antennas or unequal lengths.
@@ -117,7 +116,6 @@ impl SampleStream {
         &mut self,
         time_s: f64,
         antennas: &[&[Complex32]],
-        ends: bool,
     ) -> Result<Continuity, LiveError> {
         let (found, elements) = (antennas.len(), self.elements);
         if found != elements {
@@ -160,9 +158,6 @@ impl SampleStream {
         let time_s = |sample| clock.time_s(sample);
         receiver.push(new, &time_s, &mut |it, untold_s| bursts.take(it, untold_s))?;
         bursts.heard_until_s = clock.time_s(receiver.heard_until()) + bursts.untold_s;
-        if ends {
-            self.break_off()?;
-        }
         Ok(continuity)
     }
 

@@ -1,10 +1,11 @@
 //! Azimuth and elevation with arrays of any shape.
 
-use aoa::{ArbitraryArray, Complex64, Direction, DirectionFinder, Manifold, bound};
+use aoa::{ArbitraryArray, Complex64, Direction, DirectionFinder, bound};
 use numpy::{
     AllowTypeChange, IxDyn, PyArray1, PyArrayDyn, PyArrayLike1, PyArrayLike2, PyArrayLikeDyn,
     PyArrayMethods, PyUntypedArrayMethods,
 };
+use onboard::manifold::ArrayManifold;
 use pyo3::exceptions::PyValueError;
 use pyo3::prelude::*;
 
@@ -224,28 +225,6 @@ enum Shape<'py> {
     Measured(PyRef<'py, MeasuredManifold>),
 }
 
-/// The same, for a known number of antennas.
-enum AnyManifold<const N: usize> {
-    Places(ArbitraryArray<N>),
-    Measured(aoa::MeasuredManifold<N>),
-}
-
-impl<const N: usize> Manifold<N> for AnyManifold<N> {
-    fn response(&self, direction: Direction) -> [Complex64; N] {
-        match self {
-            Self::Places(array) => array.response(direction),
-            Self::Measured(table) => table.response(direction),
-        }
-    }
-
-    fn resolution_rad(&self) -> f64 {
-        match self {
-            Self::Places(array) => array.resolution_rad(),
-            Self::Measured(table) => table.resolution_rad(),
-        }
-    }
-}
-
 impl<'py> Shape<'py> {
     fn of(given: &Bound<'py, PyAny>) -> PyResult<Self> {
         match given.cast::<MeasuredManifold>() {
@@ -264,7 +243,7 @@ impl<'py> Shape<'py> {
     fn manifold<const N: usize>(
         &self,
         calibration: Option<&Bound<'_, PyAny>>,
-    ) -> PyResult<AnyManifold<N>> {
+    ) -> PyResult<ArrayManifold<N>> {
         let count = self.antennas();
         let gains = calibration.map(calibration_of::<N>).transpose()?;
         match self {
@@ -273,12 +252,12 @@ impl<'py> Shape<'py> {
             ))),
             Self::Measured(table) => {
                 let gains = gains.as_ref().map(aoa::Calibration::gains);
-                table.core::<N>(gains).map(AnyManifold::Measured)
+                table.core::<N>(gains).map(ArrayManifold::Measured)
             }
             Self::Places(places) => {
                 let places = std::array::from_fn(|n| places[n]);
                 let array = ArbitraryArray::new(places).map_err(value_error)?;
-                Ok(AnyManifold::Places(match gains {
+                Ok(ArrayManifold::Places(match gains {
                     Some(gains) => array.with_calibration(gains),
                     None => array,
                 }))

@@ -95,7 +95,7 @@ pub fn receive_recording(
             let sample = stretch.global_index + (at - stretch.from);
             let antennas: Vec<&[Complex32]> = raw.iter().map(Vec::as_slice).collect();
             let time_s = start_time_s + sample as f64 / rate_hz;
-            stream.push(time_s, &antennas, false).map_err(&failed)?;
+            stream.push(time_s, &antennas).map_err(&failed)?;
             at += count;
             hear(&mut stream)?;
         }
