@@ -87,6 +87,7 @@ class Live:
     """A node that hears a transmitter, and everything that it said meanwhile."""
 
     def __init__(self, drive: Path, folder: Path) -> None:
+        self.drive = drive
         self.folder = folder
         self.mqtt: list[dict[str, Any]] = []
         self.state: dict[str, Any] = {}
@@ -175,7 +176,7 @@ def test_every_radio_head_is_heard_through_sockets_of_others(live: Live) -> None
     assert len(poses) == round(DURATION_S / 0.02) + 1
     truth = [
         [float(value) for value in line.split()]
-        for line in (live.folder.parent / "drive0/truth.tum").read_text().splitlines()
+        for line in (live.drive / "truth.tum").read_text().splitlines()
     ]
     last = poses[-1]
     _, x_m, y_m, *_ = truth[-1]
