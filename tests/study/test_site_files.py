@@ -15,6 +15,7 @@ from access_av.run.error_bound import along_route
 from access_av.site_files import dxf, geojson
 from access_av.site_files.drawn import Drawn, Head, checked
 from access_av.site_files.read import Options, of_site, read
+from access_av.tables.toml import tomllib
 
 if TYPE_CHECKING:
     from collections.abc import Callable
@@ -220,6 +221,9 @@ def test_new_files_are_not_written_over_others(
         assert checked_again.code == 0
         assert "fine" in checked_again.out, checked_again.out
         assert "already" in access_av("new", kind, file).err
+    said = access_av("new", "node", file, "--force", columns=500).out
+    assert f"access-av-node --site yard --vehicle tugger {file} --dry-run" in said
+    assert tomllib.loads(file.read_text("utf-8"))["name"] == "mine"
     assert "folder" in access_av("new", "plant", tmp_path).err
 
 

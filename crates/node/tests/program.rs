@@ -8,7 +8,8 @@ use std::path::{Path, PathBuf};
 use std::process::{Child, Command, Stdio};
 use std::time::{Duration, Instant};
 
-use onboard::settings::TomlFile;
+use access_av_node::settings::NodeSettings;
+use onboard::settings::{Shipped, TomlFile};
 use serde_json::{Value, json};
 
 fn scratch(name: &str) -> PathBuf {
@@ -205,4 +206,15 @@ fn the_schema_is_printed_and_names_every_key() {
     }
     let stated = access_av_node::settings::NodeSettings::schema_json();
     assert_eq!(schema, serde_json::from_str::<Value>(&stated).unwrap());
+}
+
+#[test]
+fn a_new_node_file_is_one_that_the_program_takes() {
+    let template = include_str!("../../../python/access_av/site_files/templates/node.toml");
+    let text = template
+        .replace("$name", "new")
+        .replace("$file", "node.toml");
+    let settings = NodeSettings::from_toml(&text, "node.toml", &Shipped).unwrap();
+    assert_eq!(settings.name, "new");
+    assert!(settings.samples.is_some() && settings.page.is_some());
 }

@@ -40,7 +40,7 @@ MetresPerUnit = Annotated[
     float | None, typer.Option(min=0.0, help="Of a DXF, where that is known: 0.001 of mm.")
 ]
 
-app = typer.Typer(no_args_is_help=True, help="Begin a plant, site, vehicle or scenario file.")
+app = typer.Typer(no_args_is_help=True, help="Begin a plant, site, vehicle, scenario or node file.")
 
 
 def _numbers(option: str, text: str, count: int) -> list[float]:
@@ -105,14 +105,20 @@ def _write(kind: str, file: Path, force: bool, drawn: Drawn | None = None) -> No
     }
     name = "".join(it if it.isalnum() or it in "-_" else "-" for it in file.stem) or kind
     text = new(kind, name, str(file), drawn)
-    read = kinds[kind].from_toml(text, str(file))
+    # A node's file is for access-av-node, which checks it itself.
+    warnings = kinds[kind].from_toml(text, str(file)).warnings() if kind in kinds else []
     write_whole(file, text)
-    console.print(f"Written: {file}. Next: access-av {_next(kind, file)}", soft_wrap=True)
-    announce(str(file), read.warnings())
+    console.print(f"Written: {file}. Next: {_next(kind, file)}", soft_wrap=True, markup=False)
+    announce(str(file), warnings)
 
 
 def _next(kind: str, file: Path) -> str:
-    return {"plant": f"study {file}", "scenario": f"run {file}"}.get(kind, f"{kind} check {file}")
+    commands = {
+        "plant": f"access-av study {file}",
+        "scenario": f"access-av run {file}",
+        "node": f"access-av-node --site yard --vehicle tugger {file} --dry-run",
+    }
+    return commands.get(kind, f"access-av {kind} check {file}")
 
 
 @app.command(epilog="Example: [bold]access-av new plant mine.toml --road road.geojson[/]")
@@ -161,6 +167,12 @@ def vehicle(file: Target, force: Force = False) -> None:
 def scenario(file: Target, force: Force = False) -> None:
     """Begin a scenario file: a site, a vehicle, and the world around them."""
     _write("scenario", file, force)
+
+
+@app.command(epilog="Example: [bold]access-av new node node.toml[/]")
+def node(file: Target, force: Force = False) -> None:
+    """Begin a node file: what access-av-node reads and writes on a vehicle."""
+    _write("node", file, force)
 
 
 export_app = typer.Typer()

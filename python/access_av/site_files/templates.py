@@ -12,7 +12,7 @@ from typing import TYPE_CHECKING
 if TYPE_CHECKING:
     from access_av.site_files.drawn import Drawn
 
-KINDS = ("plant", "site", "vehicle", "scenario")
+KINDS = ("plant", "site", "vehicle", "scenario", "node")
 # What a new radio head is taken to be where its file does not say.
 HEAD = "position_std_m = 0.1\n{cell}eirp_dbm = 10.0 # to be looked up\neirp_std_db = 2.0\n"
 SSB_INDICES = 8  # of a burst at most carriers below 6 GHz (TS 38.213, 4.1)
