@@ -4,7 +4,9 @@ from __future__ import annotations
 
 import html
 import json
+import os
 import re
+import subprocess
 import sys
 from typing import TYPE_CHECKING, Any
 
@@ -313,6 +315,32 @@ def test_the_command_names_what_it_cannot_use(
     done = access_av("study", "bends", "--vary", "site.rician_k_db", "--out", tmp_path / "out")
     assert done.code == 2
     assert "KEY=a,b,c" in done.err
+
+
+@pytest.mark.parametrize("more", [(), ("--json",)], ids=["text", "json"])
+def test_whoever_closes_the_pipe_still_gets_the_files(
+    tmp_path: Path, more: tuple[str, ...]
+) -> None:
+    (tmp_path / "short.toml").write_text(PLANT, "utf-8")
+    reading, writing = os.pipe()
+    os.close(reading)
+    command = [sys.executable, "-m", "access_av", "study", "short.toml", "--runs", "2"]
+    try:
+        done = subprocess.run(
+            [*command, "--out", "out", *more],
+            cwd=tmp_path,
+            stdout=writing,
+            stderr=subprocess.PIPE,
+            text=True,
+            timeout=240,
+            check=False,
+        )
+    finally:
+        os.close(writing)
+    assert "Traceback" not in done.stderr
+    assert "BrokenPipe" not in done.stderr
+    written = {it.name for it in (tmp_path / "out").iterdir()}
+    assert {"report.html", "study.json", "manifest.json", "plant.toml"} <= written
 
 
 def test_paired_intervals_hold_the_difference_as_often_as_they_say() -> None:
