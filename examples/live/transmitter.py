@@ -72,8 +72,10 @@ class Drive:
                 phase = (start * 7919) % (self.noise.shape[1] - ANSWER)
                 yield start + count, list(self.noise[:, phase : phase + count])
             recorded = self.samples[first:end].transpose(1, 0, 2).astype(np.float32) / FULL_SCALE
-            sent = index + end - first
-            yield sent, list(recorded)
+            for start in range(0, end - first, ANSWER):
+                part = recorded[:, start : start + ANSWER]
+                sent = index + start + part.shape[1]
+                yield sent, list(part)
 
 
 class Transmitter:

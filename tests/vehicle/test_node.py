@@ -11,8 +11,9 @@ import sys
 import threading
 import time
 import urllib.request
+from contextlib import ExitStack, contextmanager
 from pathlib import Path
-from typing import Any
+from typing import TYPE_CHECKING, Any
 
 import jsonschema
 import pytest
@@ -24,6 +25,9 @@ from rosbags.typesys import Stores, get_typestore
 import access_av
 from browser import Browser
 from conftest import ROOT
+
+if TYPE_CHECKING:
+    from collections.abc import Iterator
 
 sys.path.insert(0, str(ROOT / "examples/live"))
 from transmitter import Drive, Transmitter, node_toml
@@ -54,9 +58,10 @@ def lines(file: Path) -> list[dict[str, Any]]:
     return [json.loads(line) for line in file.read_text(encoding="utf-8").splitlines()]
 
 
-def free_port() -> int:
-    with socket.create_server(("127.0.0.1", 0)) as server:
-        return int(server.getsockname()[1])
+def free_port(kind: int = socket.SOCK_STREAM) -> int:
+    with socket.socket(type=kind) as probe:
+        probe.bind(("127.0.0.1", 0))
+        return int(probe.getsockname()[1])
 
 
 def test_a_recording_played_back_gives_the_poses_of_locate(drive: Path, tmp_path: Path) -> None:
@@ -83,6 +88,26 @@ def test_a_recording_played_back_gives_the_poses_of_locate(drive: Path, tmp_path
     assert (tmp_path / "node.tum").read_bytes() == (tmp_path / "located.tum").read_bytes()
 
 
+class Broker:
+    """An MQTT broker, and what is published to its topic."""
+
+    def __init__(self) -> None:
+        self.port = free_port()
+        self.process = subprocess.Popen(
+            [sys.executable, str(ROOT / "tests/mqtt_broker.py"), str(self.port), "fleet/position"],
+            stdout=subprocess.PIPE,
+            text=True,
+        )
+        assert self.process.stdout is not None
+        assert self.process.stdout.readline().strip() == "ready"
+
+    def heard(self) -> list[dict[str, Any]]:
+        """Ends it."""
+        self.process.terminate()
+        heard, _ = self.process.communicate(timeout=10.0)
+        return [json.loads(line) for line in heard.splitlines() if line.startswith("{")]
+
+
 class Live:
     """A node that hears a transmitter, and everything that it said meanwhile."""
 
@@ -95,7 +120,7 @@ class Live:
         self.page = ""
         self.widths: dict[int, list[int]] = {}
         port = free_port()
-        broker = free_port()
+        broker = Broker()
         transmitter = Transmitter(Drive(drive))
         settings = folder / "node.toml"
         settings.write_text(
@@ -107,7 +132,7 @@ address = "{folder}/node.jsonl"
 folder = "{folder}/mcap"
 [output.mqtt]
 host = "127.0.0.1"
-port = {broker}
+port = {broker.port}
 topic = "fleet/position"
 map_id = "yard"
 rate_hz = 20.0
@@ -115,13 +140,6 @@ localized_after_s = 0.5
 """,
             encoding="utf-8",
         )
-        listener = subprocess.Popen(
-            [sys.executable, str(ROOT / "tests/mqtt_broker.py"), str(broker), "fleet/position"],
-            stdout=subprocess.PIPE,
-            text=True,
-        )
-        assert listener.stdout is not None
-        assert listener.stdout.readline().strip() == "ready"
         node = subprocess.Popen(command(drive, settings), stderr=subprocess.PIPE, text=True)
         sending = threading.Thread(target=transmitter.run)
         sending.start()
@@ -140,9 +158,7 @@ localized_after_s = 0.5
         node.terminate()
         _, self.said = node.communicate(timeout=10.0)
         self.exit_code = node.returncode
-        listener.terminate()
-        heard, _ = listener.communicate(timeout=10.0)
-        self.mqtt = [json.loads(line) for line in heard.splitlines() if line.startswith("{")]
+        self.mqtt = broker.heard()
         self.records = lines(folder / "node.jsonl")
 
     def browse(self, address: str) -> None:
@@ -150,7 +166,7 @@ localized_after_s = 0.5
         assert CHROMIUM is not None
         with Browser(CHROMIUM, f"{address}/") as browser:
             browser.wait_for("document.querySelectorAll('#rows tr').length === 4")
-            browser.wait_for("document.getElementById('link').textContent === 'live'")
+            browser.wait_for("document.getElementById('link')?.textContent === 'live'")
             for width in (400, 900, 1600):
                 browser.resize(width, 900, dark=width == 900)
                 root = "document.documentElement"
@@ -248,6 +264,81 @@ def test_the_page_shows_the_drive_in_a_browser(live: Live) -> None:
     assert len(source) <= 200_000
     # Nothing is loaded from elsewhere: the only address in it is the name of SVG.
     assert source.count(b"http") == source.count(b"http://www.w3.org/2000/svg")
+
+
+@contextmanager
+def driven_by_udp(drive: Path, folder: Path, page: int, broker: Broker) -> Iterator[None]:
+    """A node that gets odometry alone, and tells a broker in the words of VDA 5050 2.1."""
+    messages = free_port(socket.SOCK_DGRAM)
+    settings = folder / "node.toml"
+    settings.write_text(
+        f"""
+        name = "wheels alone"
+        messages = ["udp://127.0.0.1:{messages}"]
+        page.listen = "127.0.0.1:{page}"
+        [output.mqtt]
+        host = "127.0.0.1"
+        port = {broker.port}
+        topic = "fleet/position"
+        map_id = "yard"
+        vda5050 = "2.1"
+        rate_hz = 20.0
+        """,
+        encoding="utf-8",
+    )
+    node = subprocess.Popen(command(drive, settings), stderr=subprocess.PIPE, text=True)
+    ended = threading.Event()
+
+    def wheels() -> None:
+        with socket.socket(type=socket.SOCK_DGRAM) as sender:
+            while not ended.wait(0.02):
+                odometry = {"type": "odometry", "speed_mps": 1.0, "yaw_rate_radps": 0.0}
+                sender.sendto(json.dumps(odometry).encode(), ("127.0.0.1", messages))
+
+    sending = threading.Thread(target=wheels)
+    sending.start()
+    try:
+        assert node.stderr is not None
+        assert "page:" in node.stderr.readline()
+        yield
+    finally:
+        ended.set()
+        sending.join()
+        node.terminate()
+        _, said = node.communicate(timeout=10.0)
+        assert node.returncode == 0, said
+
+
+@pytest.mark.skipif(CHROMIUM is None, reason="no Chromium")
+@pytest.mark.skipif(not SCHEMAS.exists(), reason=f"no {SCHEMAS} (ACCESS_AV_DATA)")
+def test_two_tabs_come_back_after_a_restart_and_vda_5050_2_1_is_told(
+    drive: Path, tmp_path: Path
+) -> None:
+    page, broker = free_port(), Broker()
+    live = "document.getElementById('link')?.textContent === 'live'"
+    lost = "document.getElementById('link')?.className === 'lost'"
+    assert CHROMIUM is not None
+    with ExitStack() as tabs:
+        with driven_by_udp(drive, tmp_path, page, broker):
+            address = f"http://127.0.0.1:{page}/"
+            both = [tabs.enter_context(Browser(CHROMIUM, address)) for _ in range(2)]
+            for tab in both:
+                tab.wait_for(live)
+        for tab in both:
+            tab.wait_for(lost)
+        with driven_by_udp(drive, tmp_path, page, broker):
+            for tab in both:
+                tab.wait_for(live, seconds=15.0)
+                assert not tab.errors
+    positions = broker.heard()
+    schema = json.loads((SCHEMAS / "state-2.1.schema").read_text(encoding="utf-8"))
+    validator = jsonschema.Draft7Validator(
+        {**schema["properties"]["agvPosition"], "additionalProperties": False}
+    )
+    assert len(positions) > 10
+    for position in positions:
+        validator.validate(position)
+    assert positions[0]["positionInitialized"] is False
 
 
 @pytest.mark.parametrize(

@@ -26,8 +26,6 @@ const RESTART_S: f64 = 1.0;
 const STATUS_S: f64 = 1.0;
 /// Arrivals of blocks remembered, to tell when an SSB's last sample came.
 const ARRIVALS: usize = 64;
-/// Length of an SSB in symbols of 1/14 ms at 15 kHz.
-const SSB_MS_AT_15_KHZ: f64 = 4.0 / 14.0;
 
 /// What the vehicle is, and where.
 pub struct Setup {
@@ -69,7 +67,6 @@ pub struct Engine {
     windows: Windows,
     sleeps: bool,
     period_s: f64,
-    ssb_s: f64,
     /// Samples that the pipeline has not got yet.
     pending: Block,
     /// Ends of blocks in the stream's time, and when they arrived.
@@ -96,7 +93,6 @@ impl Engine {
         Ok(Self {
             live: setup.live()?,
             windows: Windows::new(&setup.site),
-            ssb_s: SSB_MS_AT_15_KHZ * 1e-3 * 15.0 / setup.site.ssb.subcarrier_spacing_khz,
             period_s: setup.site.ssb.period_s(),
             pending: Block::default(),
             setup,
@@ -181,6 +177,11 @@ impl Engine {
             self.arrivals.pop_front();
         }
         self.arrivals.push_back((end_s, came));
+        let is_over = |[from_s, until_s]: [f64; 2]| end_s <= from_s || block.time_s >= until_s;
+        if self.gate.wanted().is_some_and(is_over) {
+            inbox.give_back(block.antennas); // on its way when the gate closed
+            return Ok(());
+        }
         let pending_s = self.pending.length() as f64 / self.rate_hz();
         let is_next = (self.pending.time_s + pending_s - block.time_s).abs() < 0.5 / self.rate_hz();
         if pending_s > 0.0 && !is_next {
@@ -192,6 +193,11 @@ impl Engine {
             self.receive(false)?;
             self.publish_heard(Some(came))?;
             self.sleep_until_next(end_s)?;
+            if self.gate.wanted().is_some() {
+                // What the receiver holds back would be heard with the next window only.
+                self.receive(true)?;
+                self.publish_heard(Some(came))?;
+            }
         }
         Ok(())
     }
@@ -230,15 +236,15 @@ impl Engine {
             return Ok(());
         }
         let mut burst_s = self.live.next_wake_up_s(now_s)?;
-        if burst_s <= now_s {
+        let Some(ssb_index) = self.live.last_ssb_index().filter(|_| burst_s > now_s) else {
             self.gate.open();
             return Ok(());
-        }
-        let mut window = self.windows.around(burst_s);
+        };
+        let mut window = self.windows.around(burst_s, ssb_index);
         if window[0] < now_s {
             // Part of it is gone already.
             burst_s = self.live.next_wake_up_s(burst_s)?;
-            window = self.windows.around(burst_s);
+            window = self.windows.around(burst_s, ssb_index);
         }
         if window[0] < now_s {
             self.gate.open();
@@ -337,7 +343,7 @@ impl Engine {
         let mut last: Option<Outcome> = None;
         while let Some(outcome) = self.live.next_outcome() {
             if came.is_some() {
-                let end_s = outcome.execution.ssb.time_s + self.ssb_s;
+                let end_s = outcome.execution.ssb.time_s + self.windows.ssb_s();
                 if let Some(arrived) = self.arrival_of(end_s) {
                     let late = Instant::now().saturating_duration_since(arrived);
                     self.punctuality.ssb_to_pose.add(late.as_secs_f64());

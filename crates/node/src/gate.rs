@@ -49,35 +49,41 @@ impl Gate {
     }
 }
 
-/// From the first to the last SSB of a burst that the site's radio heads send, in seconds.
-fn span_s(site: &Site) -> f64 {
-    let indices = || site.radio_heads.iter().map(|head| head.ssb_index);
-    let between = indices().max().unwrap_or(0) - indices().min().unwrap_or(0);
-    // Two SSBs to a slot of 14 symbols (TS 38.213, 4.1), at least; a slot is 1 ms at 15 kHz.
-    f64::from(between.div_ceil(2)) * 15e-3 / site.ssb.subcarrier_spacing_khz
+/// First symbol of an SSB in its half frame, in cases A and C (TS 38.213, 4.1); those of case B are apart by
+/// four symbols more or less at most, which [`GUARD_S`] has room for.
+fn first_symbol(ssb_index: u8) -> f64 {
+    f64::from(14 * (ssb_index / 2) + 2 + 6 * (ssb_index % 2))
 }
 
-/// The stretch of samples that holds a burst of which one SSB, whichever, begins at a time.
+/// The stretch of samples that holds a burst's SSBs, of which one begins at a time.
 #[derive(Debug, Clone, Copy)]
 pub struct Windows {
-    before_s: f64,
-    after_s: f64,
+    symbol_s: f64,
+    /// Lowest and highest index that the site's radio heads send.
+    indices: [u8; 2],
 }
 
 impl Windows {
     /// For the SSBs of a site.
     pub fn new(site: &Site) -> Self {
-        let ssb_s = 4.3e-3 / site.ssb.subcarrier_spacing_khz / 14.0 * 15.0;
-        let before_s = span_s(site) + GUARD_S;
+        let indices = || site.radio_heads.iter().map(|head| head.ssb_index);
         Self {
-            before_s,
-            after_s: before_s + ssb_s,
+            symbol_s: 15e-3 / 14.0 / site.ssb.subcarrier_spacing_khz,
+            indices: [indices().min().unwrap_or(0), indices().max().unwrap_or(0)],
         }
     }
 
-    /// The stretch.
-    pub fn around(&self, burst_s: f64) -> [f64; 2] {
-        [burst_s - self.before_s, burst_s + self.after_s]
+    /// Length of an SSB.
+    pub const fn ssb_s(&self) -> f64 {
+        4.0 * self.symbol_s
+    }
+
+    /// The stretch around the burst whose SSB of this index begins at `ssb_s`.
+    pub fn around(&self, ssb_s: f64, ssb_index: u8) -> [f64; 2] {
+        let begins_s =
+            |other: u8| ssb_s + (first_symbol(other) - first_symbol(ssb_index)) * self.symbol_s;
+        let [from_s, until_s] = self.indices.map(begins_s);
+        [from_s - GUARD_S, until_s + self.ssb_s() + GUARD_S]
     }
 }
 
@@ -93,12 +99,11 @@ mod tests {
         let windows = Windows::new(&site);
         // SSBs of indices 0 and 3 begin at symbols 2 and 22 at 15 kHz (case A), and are 4 symbols long.
         let symbol_s = 1e-3 / 14.0;
-        for (seen, other) in [(2.0, 22.0), (22.0, 2.0)] {
-            let [from_s, until_s] = windows.around(seen * symbol_s);
-            assert!(from_s < (other - 1.0) * symbol_s && until_s > (other + 5.0) * symbol_s);
+        for (index, symbol) in [(0, 2.0), (1, 8.0), (3, 22.0)] {
+            let [from_s, until_s] = windows.around(symbol * symbol_s, index);
+            assert!((from_s - (2.0 * symbol_s - GUARD_S)).abs() < 1e-9);
+            assert!((until_s - (26.0 * symbol_s + GUARD_S)).abs() < 1e-9);
         }
-        let [from_s, until_s] = windows.around(0.0);
-        assert!(until_s - from_s < 6e-3);
     }
 
     #[test]

@@ -47,7 +47,9 @@ fn session(endpoints: &[Address], framing: &mut Framing, inbox: &Inbox) -> (io::
     }
     let mut received = false;
     while !inbox.is_closed() {
-        for (channel, endpoint) in channels.iter_mut().zip(endpoints) {
+        // Transmitters send in order: when the last has come the others are there, and nothing is waited for four
+        // times.
+        for (channel, endpoint) in channels.iter_mut().zip(endpoints).rev() {
             match channel.fill(framing.sample_bytes(), inbox) {
                 Ok(()) => received = true,
                 Err(error) => return (named(endpoint, &error), received),

@@ -91,7 +91,8 @@ pub struct Live {
     outcomes: VecDeque<Outcome>,
     heads: Vec<HeadStatus>,
     last_angle_s: Option<f64>,
-    last_burst_s: Option<f64>,
+    /// The first SSB of the last burst: its time and its index.
+    last_burst: Option<(f64, u8)>,
     energy: Option<EnergyModel>,
     executions: usize,
     listened: usize,
@@ -128,7 +129,7 @@ impl Live {
                 .map(HeadStatus::new)
                 .collect(),
             last_angle_s: None,
-            last_burst_s: None,
+            last_burst: None,
             energy: EnergyModel::new(&vehicle, platform, Extent::Value)?,
             executions: 0,
             listened: 0,
@@ -342,7 +343,7 @@ impl Live {
         let (unknown, anywhere) = starting_at(&self.site, &unknown, None)?;
         self.onboard.forget_odometry();
         self.begin(&unknown, anywhere)?;
-        (self.last_angle_s, self.last_burst_s) = (None, None);
+        (self.last_angle_s, self.last_burst) = (None, None);
         self.interval_s = None;
         (self.executions, self.listened) = (0, 0);
         Ok(())
@@ -503,7 +504,7 @@ impl Live {
         finite("the time of a wake-up", now_s)?;
         let untracked = self.stream.as_ref().is_some_and(|it| it.tracked() == 0);
         let is_searching = self.onboard.searching().is_some() || self.onboard.is_lost();
-        let Some(last_s) = self.last_burst_s.filter(|_| !untracked && !is_searching) else {
+        let Some((last_s, _)) = self.last_burst.filter(|_| !untracked && !is_searching) else {
             return Ok(now_s);
         };
         let period_s = self.site.ssb.period_s();
@@ -515,6 +516,12 @@ impl Live {
             ahead += 1.0;
         }
         Ok(burst_s)
+    }
+
+    /// Index of the first SSB of the last burst, whose times [`next_wake_up_s`](Self::next_wake_up_s) goes
+    /// on from.
+    pub fn last_ssb_index(&self) -> Option<u8> {
+        self.last_burst.map(|(_, ssb_index)| ssb_index)
     }
 
     /// What was done since the start or the last reset, and the energy of it by the platform's model.
@@ -565,10 +572,14 @@ impl Live {
     }
 
     /// Writes down what became of a burst.
-    fn book(&mut self, heard: Result<(f64, bool), BoxError>) -> Result<(), LiveError> {
-        let (time_s, listened) = heard.map_err(LiveError::Custom)?;
+    fn book(&mut self, heard: Result<Heard, BoxError>) -> Result<(), LiveError> {
+        let Heard {
+            time_s,
+            ssb_index,
+            listened,
+        } = heard.map_err(LiveError::Custom)?;
         self.see(time_s);
-        self.last_burst_s = Some(time_s);
+        self.last_burst = Some((time_s, ssb_index));
         self.listened += usize::from(listened);
         let newest_s = self.onboard.newest_odometry().map(|it| it.time_s);
         let after_s = newest_s.unwrap_or(time_s).max(time_s);
@@ -611,11 +622,22 @@ impl Live {
     }
 }
 
-/// The time of a burst, and whether it was listened to.
-fn hear<T: OfSsb>(onboard: &mut Onboard, burst: &[T]) -> Result<(f64, bool), BoxError> {
-    let time_s = burst.first().map_or(0.0, |first| first.ssb().time_s);
-    let heard = onboard.hear(time_s, &mut Burst(burst))?;
-    Ok((time_s, heard.listened))
+/// Time and index of a burst's first SSB, and whether it was listened to.
+struct Heard {
+    time_s: f64,
+    ssb_index: u8,
+    listened: bool,
+}
+
+fn hear<T: OfSsb>(onboard: &mut Onboard, burst: &[T]) -> Result<Heard, BoxError> {
+    let first = burst.first().map(OfSsb::ssb);
+    let (time_s, ssb_index) = first.map_or((0.0, 0), |it| (it.time_s, it.ssb_index));
+    let listened = onboard.hear(time_s, &mut Burst(burst))?.listened;
+    Ok(Heard {
+        time_s,
+        ssb_index,
+        listened,
+    })
 }
 
 fn finite(what: &'static str, value: f64) -> Result<(), LiveError> {
