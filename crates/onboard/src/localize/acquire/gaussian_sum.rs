@@ -74,19 +74,24 @@ impl Hypothesis {
         )
     }
 
-    /// How far the state of another one is from its own.
-    fn apart(&self, other: &Self) -> [f64; STATES] {
-        let (own, theirs) = (&self.ekf.belief().mean, &other.ekf.belief().mean);
-        let mut apart: [f64; STATES] = std::array::from_fn(|state| theirs[state] - own[state]);
-        apart[HEADING] = wrap_angle(apart[HEADING]);
-        apart
+    /// How far another one is from its own in one state.
+    fn apart(&self, other: &Self, state: usize) -> f64 {
+        let apart = other.ekf.belief().mean[state] - self.ekf.belief().mean[state];
+        if state == HEADING {
+            wrap_angle(apart)
+        } else {
+            apart
+        }
     }
 
-    /// Whether another one in the plane is within a deviation of it in each direction.
+    /// Whether another one in the plane is within a deviation of it in each direction. Of all pairs: most
+    /// are told apart by the first.
     fn meets(&self, other: &Self) -> bool {
-        let (apart, covariance) = (self.apart(other), &self.ekf.belief().covariance);
-        let is_within = |state: usize| apart[state] * apart[state] < covariance[state][state];
-        [ALONG, ACROSS, HEADING].into_iter().all(is_within)
+        let covariance = &self.ekf.belief().covariance;
+        [ALONG, ACROSS, HEADING].into_iter().all(|state| {
+            let apart = self.apart(other, state);
+            apart * apart < covariance[state][state]
+        })
     }
 
     /// Takes in another hypothesis on the same road: the Gaussian of the same mean and covariance
@@ -94,7 +99,8 @@ impl Hypothesis {
     fn absorb(&mut self, other: &Self) {
         let ratio = (other.log_likelihood - self.log_likelihood).exp();
         let weight = ratio / (1.0 + ratio);
-        let (mut one, two, apart) = (*self.ekf.belief(), other.ekf.belief(), self.apart(other));
+        let (mut one, two) = (*self.ekf.belief(), other.ekf.belief());
+        let apart: [f64; STATES] = std::array::from_fn(|state| self.apart(other, state));
         for i in 0..STATES {
             one.mean[i] += weight * apart[i];
             for j in 0..STATES {
