@@ -19,11 +19,11 @@ from pathlib import Path
 from typing import TYPE_CHECKING
 
 import numpy as np
-from access_av.recorded_angles import estimate_bursts
 from rich.console import Console
 from rich.table import Table
 
 from access_av import aoa, nr
+from access_av.signal.recorded_angles import estimate_bursts
 
 if TYPE_CHECKING:
     from collections.abc import Iterator
@@ -77,7 +77,7 @@ def simulated(count: int) -> Iterator[Case]:
             name = f"{kind} {other_db:.0f} dB, SNR {snr_db:.0f} dB{where}"
         found = aoa.maximum_likelihood(received)
         errors = (np.asarray(found.phase_rad) - first + np.pi) % (2 * np.pi) - np.pi
-        yield name, errors, np.asarray(found.phase_sigma_rad), np.asarray(found.resolved)
+        yield name, errors, np.asarray(found.phase_sigma_rad), np.asarray(found.reliable)
 
 
 def real_arrays(data: Path) -> Iterator[Case]:
@@ -89,7 +89,7 @@ def real_arrays(data: Path) -> Iterator[Case]:
             path.stem,
             np.radians(errors),
             np.radians([it.sigma_deg for it in bursts]),
-            np.array([it.verdict == "resolved" for it in bursts]),
+            np.array([not it.doubt for it in bursts]),
         )
 
 
@@ -114,7 +114,7 @@ def two_channels(path: Path) -> Iterator[Case]:
         "two measured channels",
         errors,
         np.array([it.phase_sigma_rad for it in found], float),
-        np.array([it.resolved for it in found], bool),
+        np.array([it.reliable for it in found], bool),
     )
 
 
@@ -140,7 +140,7 @@ def channel_estimates(count: int) -> Iterator[Case]:
                 smoothed = aoa.maximum_likelihood(cell.channel)
                 for name, angle in (("smoothed channel", smoothed), ("the cell's angle", cell)):
                     error = (angle.phase_rad - phase + np.pi) % (2 * np.pi) - np.pi
-                    told = angle.verdict == "resolved"
+                    told = not angle.doubt
                     found[name].append((error, angle.phase_sigma_rad, told))
         for name, values in found.items():
             errors, sigmas, resolved = (np.array(it) for it in zip(*values, strict=True))

@@ -16,12 +16,12 @@ def main() -> None:
     """Print one line for each SSB."""
     if len(sys.argv) != 2:
         sys.exit("give a recording")
-    print("sample_start,pci,ssb_index,phase_rad,phase_sigma_rad,snr_db,verdict")
+    print("sample_start,pci,ssb_index,phase_rad,phase_sigma_rad,snr_db,doubt")
     for cell in nr.scan(Recording.open(sys.argv[1])).cells:
         if cell.phase_rad is not None:
             print(
                 f"{cell.sample_start:.0f},{cell.pci},{cell.ssb_index},{cell.phase_rad:.6f},"
-                f"{cell.phase_sigma_rad:.6f},{cell.snr_db:.1f},{cell.verdict}"
+                f"{cell.phase_sigma_rad:.6f},{cell.snr_db:.1f},{cell.doubt}"
             )
 
 

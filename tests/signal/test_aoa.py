@@ -41,8 +41,7 @@ def test_rmse_is_near_the_bound(method: Callable[..., Any], snr_db: float) -> No
     # The stated standard deviation is the true one.
     assert 0.9 < np.mean(((found.angle_rad - angles) / found.sigma_rad) ** 2) < 1.2
     assert np.median(found.snr_db) == pytest.approx(snr_db, abs=0.5)
-    # A model that holds is doubted once in a hundred times: four standard deviations of 4000.
-    assert found.resolved.mean() == pytest.approx(0.99, abs=0.0063)
+    assert found.resolved.mean() > 0.99
 
 
 @pytest.mark.parametrize("method", METHODS)
@@ -424,15 +423,15 @@ def test_what_is_no_plane_wave_is_named() -> None:
     direct, echo = (np.exp(1j * phase * np.arange(4))[:, None] for phase in (0.4, -1.3))
     clean = aoa.maximum_likelihood(direct * waveform + noise)
     # One in a hundred, but for chance.
-    assert clean.resolved.mean() == pytest.approx(0.99, abs=0.02)
+    assert clean.reliable.mean() == pytest.approx(0.99, abs=0.02)
     assert clean.p_value.mean() == pytest.approx(0.5, abs=0.1)
     named = aoa.maximum_likelihood((direct + 0.5j * echo) * waveform + noise)
-    assert not named.resolved.any()
-    assert np.char.startswith(named.verdict, "unresolved: no plane wave").mean() > 0.97
+    assert not named.reliable.any()
+    assert np.char.startswith(named.doubt, "no plane wave").mean() > 0.97
     assert (named.phase_sigma_rad > 2 * named.phase_noise_sigma_rad).all()
     other = 10 * (rng.normal(size=(count, 1, 20, 2)) @ [1, 1j]) / np.sqrt(2)
     two = aoa.maximum_likelihood(direct * waveform + echo * other + noise)
-    assert np.char.startswith(two.verdict, "unresolved: more than white noise is left").mean() > 0.9
+    assert np.char.startswith(two.doubt, "more than white noise is left").mean() > 0.9
     single = aoa.maximum_likelihood((direct + 0.5j * echo) * waveform[0] + noise[0])
     assert type(single.p_value) is float
     assert single.p_value < 0.01
@@ -455,7 +454,7 @@ def test_pilots_know_their_noise() -> None:
         z = (found.phase_rad - phases + np.pi) % (2 * np.pi) - np.pi
         # Four standard deviations of a mean of squares.
         assert np.mean((z / found.phase_sigma_rad) ** 2) == pytest.approx(1, abs=0.2)
-        assert found.resolved.mean() > 0.97
+        assert found.reliable.mean() > 0.97
     for wrong, message in (
         (-1.0, "noise_variance must be"),
         ([1.0, 1.0], "one number per antenna: 4, not 2"),
@@ -483,7 +482,7 @@ def test_a_measured_manifold_and_several_sources() -> None:
     batch = aoa.direction(np.stack([received] * 3), table, elevations_rad=(0, 0), sources=2)
     assert batch.azimuth_rad.shape == (3, 2)
     # Who leaves the coupling out is told so.
-    assert not aoa.direction(received, CIRCLE, elevations_rad=(0, 0), sources=2).resolved.any()
+    assert not aoa.direction(received, CIRCLE, elevations_rad=(0, 0), sources=2).reliable.any()
     with pytest.raises(ValueError, match="5 sources asked for, allowed are 1 to 4"):
         aoa.direction(received, table, elevations_rad=(0, 0), sources=5)
     for responses, elevations in ((np.ones((3, 5)), None), (np.ones(5), None), (table, None)):

@@ -2,12 +2,12 @@ from __future__ import annotations
 
 import json
 from concurrent.futures import ThreadPoolExecutor
-from typing import TYPE_CHECKING
+from typing import TYPE_CHECKING, Any
 
 import numpy as np
 import pytest
 
-from access_av import RecordingError, Scenario, nr, synthesize
+from access_av import RecordingError, Scenario, aoa, nr, synthesize
 
 if TYPE_CHECKING:
     from collections.abc import Callable
@@ -234,3 +234,24 @@ def test_annotated_calibration_and_spacing_are_believed(access_av: Cli, data: Pa
         errors_deg.append(abs(best["azimuth_deg"] - truth_deg))
     # Bartlett with perfect timing: 5.7, 0.1, 0.8 and 2.2 degrees.
     assert np.mean(errors_deg) < 1.3 * 2.2
+
+
+def test_what_a_receiver_hears_has_angles_as_good_as_they_say() -> None:
+    carrier: dict[str, Any] = {"centre_frequency_hz": 3.7008e9, "ssb_freq_hz": 3.7008e9}
+    receiver = nr.Receiver(7.68e6, scs_khz=30, antennas=4, **carrier)
+    rng, cells = np.random.default_rng(24), []
+    for number in range(60):
+        burst = nr.build_burst(42, ssb_indices=[1], sfn=2 * number, ssb_freq_hz=3.7008e9)
+        period = np.concatenate([burst, np.zeros(3 * burst.size, np.complex64)])
+        noise = rng.normal(scale=0.03, size=(4, period.size, 2)) @ [1, 1j]
+        cells += receiver.push(np.outer(np.exp(0.9j * np.arange(4)), period) + noise)
+    cells += receiver.finish()
+    assert len(cells) == 60
+    z = [(cell.phase_rad - 0.9) / cell.phase_sigma_rad for cell in cells]
+    # Four standard deviations of a mean of squares.
+    assert np.mean(np.square(z)) == pytest.approx(1, abs=4 * np.sqrt(2 / 60))
+    # More than four of sixty at one in a hundred have a probability of 4e-4.
+    assert sum(cell.doubt != "" for cell in cells) <= 4
+    again = aoa.maximum_likelihood_pilots(cells[0].blocks, noise_variance=1.0)
+    assert again.phase_rad == pytest.approx(cells[0].phase_rad)
+    assert again.phase_sigma_rad == pytest.approx(cells[0].phase_sigma_rad)

@@ -23,6 +23,7 @@ pub use azimuth_elevation::{
 pub use bounds::crb_rad;
 pub use result::AngleEstimate;
 use result::Estimates;
+pub use result::name_of;
 use samples::{SampleArray, Samples, for_antennas, slice, value_error};
 pub use spectra::spectrum;
 pub use statistics::{calibrate, covariance, estimate_sources, forward_backward};

@@ -11,7 +11,7 @@ pub use searcher::Searcher;
 
 use std::f64::consts::FRAC_PI_2;
 
-use channel::Channel;
+use channel::{Blocks, Channel};
 use nr_ssb::receiver::HeardSsb;
 use nr_ssb::search::DetectedSsb;
 use nr_ssb::{Lmax, SubcarrierSpacing};
@@ -24,9 +24,10 @@ use pyo3::prelude::*;
 use pyo3::types::PyDict;
 use recording::scan::{
     ArraySetup, FoundAngle, FoundSsb, IqSource, SampleBlock, Scan as CoreScan, ScanError,
-    ScanSettings,
+    ScanSettings, View,
 };
 
+use crate::aoa::name_of;
 use crate::message::brief;
 use crate::recording::{Recording, RecordingError};
 
@@ -69,10 +70,18 @@ use crate::recording::{Recording, RecordingError};
 /// elevation_rad, elevation_sigma_rad : float or None
 ///     From the horizontal upwards, of antennas that are not in a row.
 /// verdict : str or None
-///     `resolved`, or why the angle may not be relied on.
+///     `resolved`, or why noise and geometry leave it in doubt.
+/// doubt : str or None
+///     Why the angle may not be relied on: of the verdict, or of the fit; empty where it may.
+/// p_value : float or None
+///     Probability that a plane wave in white noise fits as badly as this or worse.
 /// channel : ndarray
 ///     complex64, `(antennas, 240)`: the channel on the SSB's subcarriers as it was received, delay
 ///     and frequency offset taken out. A tone of amplitude one has 256.
+/// blocks : ndarray
+///     complex128, `(antennas, 4)`: what the pilots of each symbol say together, calibrated, in noise of
+///     variance one that is independent from block to block, which that of `channel` is not:
+///     ``aoa.maximum_likelihood_pilots(cell.blocks, noise_variance=1.0)``. Empty of one antenna.
 /// noise_variance : list of float
 ///     Variance of the noise on a resource element, for each antenna, in that scale squared.
 #[pyclass(frozen, get_all, module = "access_av._core.nr")]
@@ -100,7 +109,10 @@ pub struct Cell {
     elevation_rad: Option<f64>,
     elevation_sigma_rad: Option<f64>,
     verdict: Option<String>,
+    doubt: Option<String>,
+    p_value: Option<f64>,
     channel: Channel,
+    blocks: Blocks,
     noise_variance: Vec<f64>,
 }
 
@@ -128,6 +140,8 @@ macro_rules! cell {
             elevation_rad: None,
             elevation_sigma_rad: None,
             verdict: None,
+            doubt: None,
+            p_value: None,
             $($given)*
         }
     }};
@@ -140,15 +154,22 @@ impl Cell {
         ssb_freq_hz: f64,
         spacing: SubcarrierSpacing,
         samples_per_base: f64,
+        view: Option<View>,
     ) -> Self {
-        cell!(ssb, &ssb.measurements,
+        let angle = view.as_ref().map(|view| view.angle);
+        let cell = cell!(ssb, &ssb.measurements,
             sample_start: ssb.sample_start,
             sample_count: SSB_SAMPLES as f64 * samples_per_base,
             ssb_freq_hz,
             scs_khz: spacing.khz(),
             channel: Channel(ssb.channel.clone()),
+            blocks: Blocks(view.map_or_else(Vec::new, |view| view.blocks)),
             noise_variance: ssb.noise_variance.clone(),
-        )
+        );
+        match angle {
+            Some(angle) => cell.with_angle(&angle),
+            None => cell,
+        }
     }
 
     fn with_angle(mut self, angle: &FoundAngle) -> Self {
@@ -160,6 +181,8 @@ impl Cell {
                 self.phase_sigma_rad = Some(found.phase_sigma_rad);
                 self.azimuth_rad = Some(FRAC_PI_2 - found.angle_rad);
                 self.verdict = Some(found.verdict.to_string());
+                self.doubt = Some(name_of(found.doubt()));
+                self.p_value = Some(found.fit.p_value());
             }
             FoundAngle::Direction(found) => {
                 self.sigma_rad = Some(found.azimuth_sigma_rad());
@@ -167,6 +190,8 @@ impl Cell {
                 self.elevation_rad = Some(found.direction.elevation_rad);
                 self.elevation_sigma_rad = Some(found.elevation_sigma_rad());
                 self.verdict = Some(found.verdict.to_string());
+                self.doubt = Some(name_of(found.doubt()));
+                self.p_value = Some(found.fit.p_value());
             }
         }
         self
@@ -182,6 +207,7 @@ impl From<&FoundSsb> for Cell {
             ssb_freq_hz: found.ssb_freq_hz,
             scs_khz: found.spacing.khz(),
             channel: Channel(found.channel.clone()),
+            blocks: Blocks(found.blocks.clone()),
             noise_variance: found.noise_variance.clone(),
         );
         match &found.angle {

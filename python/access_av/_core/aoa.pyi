@@ -56,8 +56,14 @@ class AngleEstimate:
     def p_value(self) -> _Values:
         """Probability that plane waves in white noise fit as badly as this or worse."""
     @property
+    def reliable(self) -> bool | NDArray[np.bool_]:
+        """Whether the estimate may be relied on: it is resolved, and the model fits."""
+    @property
+    def doubt(self) -> str | NDArray[np.str_]:
+        """Why it may not be relied on; empty where it may."""
+    @property
     def resolved(self) -> bool | NDArray[np.bool_]:
-        """Whether the estimate may be relied on."""
+        """Whether noise and geometry leave no doubt, if the model fits."""
     @property
     def verdict(self) -> str | NDArray[np.str_]:
         """`resolved`, or `unresolved: ` and the reason."""
@@ -94,8 +100,14 @@ class DirectionEstimate:
     def p_value(self) -> _Values:
         """Probability that plane waves in white noise fit as badly as this or worse."""
     @property
+    def reliable(self) -> bool | NDArray[np.bool_]:
+        """Whether the estimate may be relied on: it is resolved, and the model fits."""
+    @property
+    def doubt(self) -> str | NDArray[np.str_]:
+        """Why it may not be relied on; empty where it may."""
+    @property
     def resolved(self) -> bool | NDArray[np.bool_]:
-        """Whether the estimate may be relied on."""
+        """Whether noise and geometry leave no doubt, if the model fits."""
     @property
     def verdict(self) -> str | NDArray[np.str_]:
         """`resolved`, or `unresolved: ` and the reason."""

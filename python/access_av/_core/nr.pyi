@@ -80,7 +80,16 @@ class Cell:
         """Its standard deviation."""
     @property
     def verdict(self) -> str | None:
-        """`resolved`, or why the angle may not be relied on."""
+        """`resolved`, or why noise and geometry leave it in doubt."""
+    @property
+    def doubt(self) -> str | None:
+        """Why the angle may not be relied on: of the verdict or of the fit; empty where it may."""
+    @property
+    def p_value(self) -> float | None:
+        """Probability that a plane wave in white noise fits as badly as this or worse."""
+    @property
+    def blocks(self) -> NDArray[np.complex128]:
+        """Responses by symbol, `(antennas, 4)`, in unit noise: what angles are estimated from."""
     @property
     def channel(self) -> NDArray[np.complex64]:
         """Channel on the subcarriers as received, complex64 `(antennas, 240)`."""
@@ -120,6 +129,9 @@ class Receiver:
         period_s: float = 0.02,
         search_every_s: float = 1.0,
         cfo_ppm: float | None = None,
+        spacing_wavelengths: float = 0.5,
+        places_wavelengths: Sequence[tuple[float, float]] | None = None,
+        calibration: Sequence[complex] | None = None,
     ) -> Receiver: ...
     def push(self, samples: ArrayLike) -> list[Cell]:
         """SSBs completed by the next samples, `(samples,)` or `(antennas, samples)`."""

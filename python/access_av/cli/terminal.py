@@ -306,7 +306,7 @@ def show_angles(log: AngleLog) -> None:
 
 def show_bursts(bursts: Sequence[BurstAngle]) -> None:
     """Angles of a recording's bursts, with their errors where the truth is known."""
-    made = table(["sample", "azimuth °", "σ °", "SNR dB", "truth °", "error °", "verdict"], text=0)
+    made = table(["sample", "azimuth °", "σ °", "SNR dB", "truth °", "error °", "doubt"], text=0)
     for burst in bursts:
         azimuth_deg, truth_deg = burst.azimuth_from_broadside_deg, burst.truth_deg
         made.add_row(
@@ -316,7 +316,7 @@ def show_bursts(bursts: Sequence[BurstAngle]) -> None:
             f"{burst.snr_db:.1f}",
             "" if truth_deg is None else f"{truth_deg:.2f}",
             "" if truth_deg is None else unsigned_zero(f"{azimuth_deg - truth_deg:+.2f}"),
-            burst.verdict.removeprefix("unresolved: "),
+            burst.doubt or "–",
         )
     console.print(made)
     error_deg = mean_absolute_error_deg(bursts)
@@ -331,7 +331,7 @@ def show_cells(title: str, cells: Sequence[dict[str, Any]]) -> None:
     if with_angles:
         columns += ["azimuth °", "σ °"]
     if not is_narrow():
-        columns += ["sample", "MHz", "kHz"] + ["verdict"] * with_angles
+        columns += ["sample", "MHz", "kHz"] + ["doubt"] * with_angles
     made = table(columns, title=title, text=0)
     for cell in cells:
         texts = {
@@ -344,7 +344,7 @@ def show_cells(title: str, cells: Sequence[dict[str, Any]]) -> None:
             if "azimuth_deg" in cell
             else "–",
             "σ °": f"{cell['sigma_deg']:.3f}" if "sigma_deg" in cell else "–",
-            "verdict": cell.get("verdict", "–").removeprefix("unresolved: "),
+            "doubt": cell.get("doubt") or "–",
             "sample": str(cell["sample_start"]),
             "MHz": f"{cell['ssb_freq_hz'] / 1e6:.3f}",
             "kHz": str(cell["scs_khz"]),

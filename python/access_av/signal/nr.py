@@ -138,7 +138,7 @@ def record(cell: Cell) -> dict[str, Any]:
     }
     values |= {name: _degrees(angle) for name, angle in angles.items() if angle is not None}
     if cell.verdict is not None:
-        values["verdict"] = cell.verdict
+        values |= {"verdict": cell.verdict, "doubt": cell.doubt, "p_value": cell.p_value}
     return values
 
 

@@ -44,11 +44,15 @@ class BurstAngle:
         Counter-clockwise from the array's broadside, which is a quarter turn clockwise of its axis,
         seen from above.
     sigma_deg
-        Standard deviation: of noise and, where the verdict names reflections, of what they do.
+        Standard deviation: of noise and, where the doubt is of reflections, of what they do.
     snr_db
         Per antenna and sample.
     verdict
-        ``resolved``, or ``unresolved:`` and why it should not be relied on.
+        ``resolved``, or ``unresolved:`` and why noise and geometry leave it in doubt.
+    doubt
+        Why it should not be relied on, a plane wave that does not fit included; empty where it may.
+    p_value
+        Probability that a plane wave in white noise fits as badly as this or worse.
     truth_deg
         Measured azimuth, where annotated.
     """
@@ -59,6 +63,8 @@ class BurstAngle:
     snr_db: float
     label: str
     verdict: str
+    doubt: str
+    p_value: float
     truth_deg: float | None = None
 
     def as_record(self) -> dict[str, Any]:
@@ -130,7 +136,7 @@ def estimate_bursts(
             calibration = gains / np.abs(gains)
             continue
         phases = calibration if truth.channel_phases is None else truth.channel_phases
-        azimuth_deg, sigma_rad, snr_db, verdict = _estimate(
+        azimuth_deg, sigma_rad, found = _estimate(
             _equalised(snapshots), places, spacing_wavelengths, phases
         )
         bursts.append(
@@ -138,9 +144,11 @@ def estimate_bursts(
                 sample_start=start,
                 azimuth_from_broadside_deg=azimuth_deg,
                 sigma_deg=math.degrees(sigma_rad),
-                snr_db=snr_db,
+                snr_db=float(found.snr_db),
                 label=label,
-                verdict=verdict,
+                verdict=str(found.verdict),
+                doubt=str(found.doubt),
+                p_value=float(found.p_value),
                 truth_deg=truth.azimuth_from_broadside_deg,
             )
         )
@@ -152,24 +160,18 @@ def _estimate(
     places: NDArray[np.float64] | None,
     spacing_wavelengths: float | None,
     phases: NDArray[np.complex128] | None,
-) -> tuple[float, float, float, str]:
-    """Azimuth from broadside (°), its standard deviation (rad), the SNR (dB), and the verdict."""
+) -> tuple[float, float, aoa.DirectionEstimate | aoa.AngleEstimate]:
+    """Azimuth from broadside (°), its standard deviation (rad), and the estimate."""
     if places is not None:
         source = aoa.direction(snapshots, places, calibration=phases)
         azimuth_deg = from_broadside_deg(math.degrees(float(source.azimuth_rad)))
-        sigma_rad, snr_db = float(source.azimuth_sigma_rad), float(source.snr_db)
-        return azimuth_deg, sigma_rad, snr_db, str(source.verdict)
+        return azimuth_deg, float(source.azimuth_sigma_rad), source
     if spacing_wavelengths is None:
         raise InputError("neither spacing nor places of the antennas are known")
     found = aoa.maximum_likelihood(
         snapshots, spacing_wavelengths=spacing_wavelengths, calibration=phases
     )
-    return (
-        90.0 - math.degrees(float(found.angle_rad)),
-        float(found.sigma_rad),
-        float(found.snr_db),
-        str(found.verdict),
-    )
+    return 90.0 - math.degrees(float(found.angle_rad)), float(found.sigma_rad), found
 
 
 def mean_absolute_error_deg(bursts: Sequence[BurstAngle]) -> float | None:

@@ -11,9 +11,9 @@ use crate::error::Error;
 use crate::linalg::matrix::Matrix;
 use crate::method::maximum_likelihood::{residual_power, snr};
 use crate::result::azimuth_elevation::DirectionEstimate;
-use crate::result::direction::threshold_doubt;
+use crate::result::direction::{threshold_doubt, verdict};
 use crate::result::goodness_of_fit::{Model, Residual};
-use crate::result::verdict::{Reason, Verdict};
+use crate::result::verdict::Reason;
 
 /// Directions of the first search lie so far apart, in units of the array's resolution: from the nearest
 /// one a source is seen with at least nine tenths of its power.
@@ -172,13 +172,12 @@ impl<M: Manifold<N>, const N: usize> DirectionFinder<M, N> {
         let left = best.residual(matrix, usize::from(model.parameters));
         let tests = model.tests();
         let tested = tests.of(&left, noise_power, trace);
-        let misfit = tests.misfit(&tested);
+        let misfit = tests.misfit(tested.ratios());
         let weak = threshold_doubt(snr, bound::resolvable_snr::<N>(snapshots));
-        let reason = match weak {
-            None if alike => Some(Reason::Ambiguous),
-            _ => misfit
-                .or(weak)
-                .or(at_edge.then_some(Reason::EdgeOfElevations)),
+        let geometric = if alike {
+            Some(Reason::Ambiguous)
+        } else {
+            at_edge.then_some(Reason::EdgeOfElevations)
         };
         Ok(DirectionEstimate {
             direction: best.direction,
@@ -186,7 +185,7 @@ impl<M: Manifold<N>, const N: usize> DirectionFinder<M, N> {
             noise_covariance,
             snr_db: 10.0 * snr.log10(),
             fit: tests.fit(&tested),
-            verdict: reason.map_or(Verdict::Resolved, Verdict::Unresolved),
+            verdict: verdict(weak, geometric, misfit),
         })
     }
 

@@ -134,7 +134,6 @@ pub fn estimate_several_smoothed<const N: usize, const M: usize>(
         .map_or(Tested::NOTHING, |(left, noise)| {
             tests.of(&left, noise, power)
         });
-    let misfit = tests.misfit(&tested);
     let mut estimates = [None; M];
     for (k, place) in estimates[..sources].iter_mut().enumerate() {
         let (phase, sigma) = (phases[k], sigmas[k]);
@@ -142,9 +141,7 @@ pub fn estimate_several_smoothed<const N: usize, const M: usize>(
             let gap = wrap(phases[other] - phase).abs();
             other != k && gap < 2.0 * sigma.hypot(sigmas[other])
         });
-        let doubt = if misfit.is_some() && !correlated {
-            None
-        } else if (hidden || close || !separated) && correlated {
+        let doubt = if (hidden || close || !separated) && correlated {
             Some(Reason::Correlated)
         } else if hidden {
             let weakest = powers.weakest_snr(sources, noise_variance);

@@ -202,7 +202,7 @@ impl<M: Manifold<N>, const N: usize> DirectionFinder<M, N> {
         let tested = fit.residual().map_or(Tested::NOTHING, |(left, noise)| {
             tests.of(&left, noise, power)
         });
-        let misfit = tests.misfit(&tested);
+        let misfit = tests.misfit(tested.ratios());
         let mut sensitivities = Vec::with_capacity(parameters);
         let determined = fit.sensitivities(|h| sensitivities.push(product(h, matrix, [N; 3])));
         let described = directions.iter().enumerate().map(|(k, direction)| {
@@ -237,7 +237,7 @@ impl<M: Manifold<N>, const N: usize> DirectionFinder<M, N> {
                 noise_covariance,
                 snr_db: 10.0 * snr.log10(),
                 fit: tests.fit(&tested),
-                verdict: verdict(doubt, misfit.or(edge), misfit),
+                verdict: verdict(doubt, edge, misfit),
             }
         });
         Ok(described.collect())

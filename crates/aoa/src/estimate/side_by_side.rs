@@ -182,7 +182,7 @@ impl<const N: usize> SideBySide<'_, N> {
                 sigma_rad: sigma[w],
                 snr_db: snr_db[w],
                 fit: tests.fit(&tested),
-                verdict: verdict(doubt, geometric, tests.misfit(&tested)),
+                verdict: verdict(doubt, geometric, tests.misfit(tested.ratios())),
             };
         }
     }

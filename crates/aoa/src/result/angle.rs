@@ -13,7 +13,7 @@ pub struct AngleEstimate {
     /// depend on the direction, so filters should take this one.
     pub phase_rad: f64,
     /// Standard deviation of `phase_rad`: that of noise and, where the model does not fit
-    /// ([`Reason::is_misfit`]), what the misfit displaces.
+    /// ([`GoodnessOfFit::misfit`]), what the misfit displaces.
     pub phase_sigma_rad: f64,
     /// That of noise alone, of the method at the estimated SNR.
     pub phase_noise_sigma_rad: f64,
@@ -26,7 +26,7 @@ pub struct AngleEstimate {
     pub snr_db: f64,
     /// How well plane waves and white noise explain what was received; of all sources together.
     pub fit: GoodnessOfFit,
-    /// Whether the estimate may be relied on.
+    /// Whether noise and geometry leave a doubt of it.
     pub verdict: Verdict,
 }
 
@@ -34,6 +34,16 @@ impl AngleEstimate {
     /// Whether the verdict is [`Verdict::Resolved`].
     pub fn is_resolved(&self) -> bool {
         self.verdict == Verdict::Resolved
+    }
+
+    /// Why the estimate should not be relied on: it is not resolved, or the model does not fit.
+    pub fn doubt(&self) -> Option<Reason> {
+        self.verdict.reason().or_else(|| self.fit.misfit())
+    }
+
+    /// Whether the estimate may be relied on: it is resolved, and the model fits.
+    pub fn is_reliable(&self) -> bool {
+        self.doubt().is_none()
     }
 }
 

@@ -1,7 +1,7 @@
 //! What an estimate of azimuth and elevation says.
 
 use super::goodness_of_fit::GoodnessOfFit;
-use super::verdict::Verdict;
+use super::verdict::{Reason, Verdict};
 use crate::array::manifold::Direction;
 
 /// A direction in space, and how well it is known.
@@ -10,8 +10,7 @@ pub struct DirectionEstimate {
     /// Azimuth and elevation.
     pub direction: Direction,
     /// Covariance of (azimuth, elevation) in rad^2: that of noise and, where the model does not fit
-    /// ([`Reason::is_misfit`](crate::Reason::is_misfit)), what the misfit displaces. Zero where the
-    /// elevation is given.
+    /// ([`GoodnessOfFit::misfit`]), what the misfit displaces. Zero where the elevation is given.
     pub covariance: [[f64; 2]; 2],
     /// That of noise alone, from the bound at the estimated SNR.
     pub noise_covariance: [[f64; 2]; 2],
@@ -20,7 +19,7 @@ pub struct DirectionEstimate {
     pub snr_db: f64,
     /// How well one plane wave and white noise explain what was received.
     pub fit: GoodnessOfFit,
-    /// Whether the estimate may be relied on.
+    /// Whether noise and geometry leave a doubt of it.
     pub verdict: Verdict,
 }
 
@@ -38,5 +37,15 @@ impl DirectionEstimate {
     /// Whether the verdict is [`Verdict::Resolved`].
     pub fn is_resolved(&self) -> bool {
         self.verdict == Verdict::Resolved
+    }
+
+    /// Why the estimate should not be relied on: it is not resolved, or the model does not fit.
+    pub fn doubt(&self) -> Option<Reason> {
+        self.verdict.reason().or_else(|| self.fit.misfit())
+    }
+
+    /// Whether the estimate may be relied on: it is resolved, and the model fits.
+    pub fn is_reliable(&self) -> bool {
+        self.doubt().is_none()
     }
 }

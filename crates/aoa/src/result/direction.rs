@@ -40,11 +40,12 @@ pub(crate) fn describe<const N: usize>(found: &Found, array: &Array<N>) -> Angle
         sigma_rad,
         snr_db: 10.0 * log10::<false>(found.snr),
         fit: tests.fit(&tested),
-        verdict: verdict(found.doubt, geometric, tests.misfit(&tested)),
+        verdict: verdict(found.doubt, geometric, tests.misfit(tested.ratios())),
     }
 }
 
-/// Something wrong with the model explains why the SNR seems low, so it is named before that.
+/// Whether noise and geometry leave a doubt. Something wrong with the model explains why the SNR seems low,
+/// so it is named in the place of that.
 #[inline(always)]
 pub(crate) fn verdict(
     doubt: Option<Reason>,
@@ -52,7 +53,7 @@ pub(crate) fn verdict(
     misfit: Option<Reason>,
 ) -> Verdict {
     let reason = match doubt {
-        None => geometric.or(misfit),
+        None => geometric,
         Some(Reason::ThresholdSnr | Reason::TooFewSnapshots) => misfit.or(doubt),
         Some(_) => doubt,
     };

@@ -25,13 +25,15 @@ const FALSE_ALARM_DEVIATE: f64 = 2.575_829_303_548_901;
 /// How well the sources and white noise explain what was received.
 ///
 /// ```
-/// use aoa::{Array, Complex64, maximum_likelihood_pilots};
+/// use aoa::{Array, Reason, maximum_likelihood_pilots};
 ///
 /// let array = Array::<4>::half_wavelength();
 /// let [direct, echo] = [0.5, 1.8].map(|phase| array.steering_vector(phase));
 /// let block: [_; 4] = std::array::from_fn(|n| direct[n] + echo[n] * 0.5);
 /// let found = maximum_likelihood_pilots(&[block, block], Some(0.01), &array)?;
-/// assert!(found.fit.p_value() < 1e-6 && !found.is_resolved());
+/// assert!(found.is_resolved() && !found.is_reliable());
+/// assert_eq!(found.fit.misfit(), Some(Reason::Multipath));
+/// assert!(found.fit.p_value() < 1e-6);
 /// # Ok::<(), aoa::Error>(())
 /// ```
 #[derive(Debug, Clone, Copy, PartialEq)]
@@ -167,6 +169,10 @@ impl Tested {
         noise: 1.0,
         inflation: 1.0,
     };
+
+    pub(crate) const fn ratios(&self) -> [f64; 2] {
+        [self.coherent, self.noise]
+    }
 }
 
 impl Tests {
@@ -212,10 +218,10 @@ impl Tests {
 
     /// What is wrong with the model, if something is.
     #[inline(always)]
-    pub(crate) fn misfit(&self, tested: &Tested) -> Option<Reason> {
-        if tested.noise > self.noise_limit {
+    pub(crate) fn misfit(&self, [coherent, noise]: [f64; 2]) -> Option<Reason> {
+        if noise > self.noise_limit {
             Some(Reason::MoreSources)
-        } else if tested.coherent > self.coherent_limit {
+        } else if coherent > self.coherent_limit {
             Some(Reason::Multipath)
         } else {
             None
@@ -224,6 +230,18 @@ impl Tests {
 }
 
 impl GoodnessOfFit {
+    /// What is wrong with the model, if one of the tests finds fault with it: [`Reason::Multipath`] or
+    /// [`Reason::MoreSources`]. Of a model that holds it is said once in a hundred times.
+    pub fn misfit(&self) -> Option<Reason> {
+        let tests = self.model.tests();
+        tests.misfit([self.coherent, self.noise])
+    }
+
+    /// Whether plane waves in white noise explain what was received.
+    pub fn is_good(&self) -> bool {
+        self.misfit().is_none()
+    }
+
     /// The probability that a model that holds fits as badly as this or worse, from the worse of both
     /// ratios. 1 where nothing is left to test: a single snapshot, unless the noise is known.
     ///

@@ -1,8 +1,10 @@
-//! Whether an estimate may be relied on.
+//! Whether noise and geometry leave a doubt of an estimate.
 
 use std::fmt;
 
-/// Whether an estimate may be used as a Gaussian measurement with its standard deviation.
+/// Whether an estimate may be used as a Gaussian measurement with its standard deviation, if plane waves in
+/// white noise are what was received: that is told beside it, by the
+/// [`GoodnessOfFit`](crate::GoodnessOfFit).
 #[derive(Debug, Clone, Copy, PartialEq, Eq)]
 pub enum Verdict {
     /// It may.
@@ -54,6 +56,14 @@ impl Verdict {
         Self::Unresolved(Reason::MoreSources),
     ];
 
+    /// The reason, if there is one.
+    pub const fn reason(&self) -> Option<Reason> {
+        match self {
+            Self::Resolved => None,
+            Self::Unresolved(reason) => Some(*reason),
+        }
+    }
+
     /// Its place in [`Verdict::ALL`].
     pub const fn index(&self) -> usize {
         match self {
@@ -68,13 +78,6 @@ impl Verdict {
             Self::Unresolved(Reason::Multipath) => 8,
             Self::Unresolved(Reason::MoreSources) => 9,
         }
-    }
-}
-
-impl Reason {
-    /// Whether the [model does not fit](crate::GoodnessOfFit), noise aside.
-    pub const fn is_misfit(&self) -> bool {
-        matches!(self, Self::Multipath | Self::MoreSources)
     }
 }
 

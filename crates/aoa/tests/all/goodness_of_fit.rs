@@ -173,7 +173,7 @@ fn reflections_and_further_sources_are_named() {
             let (phase, snapshots) = with_echo(&mut random, &array, [20.0, echo_db], 0.17);
             let covariance = Covariance::from_snapshots(&snapshots).unwrap();
             let found = estimate(Method::MaximumLikelihood, &covariance, &array).unwrap();
-            named += u32::from(found.verdict == Verdict::Unresolved(Reason::Multipath));
+            named += u32::from(found.doubt() == Some(Reason::Multipath));
             let error = (found.phase_rad - phase + 3.0 * PI).rem_euclid(2.0 * PI) - PI;
             z.push((error / found.phase_sigma_rad).abs());
         }
@@ -198,7 +198,7 @@ fn reflections_and_further_sources_are_named() {
         let snapshots = random.snapshots(&array, &[(first, 20.0), (second, 20.0)], 20);
         let covariance = Covariance::from_snapshots(&snapshots).unwrap();
         let found = estimate(Method::Music, &covariance, &array).unwrap();
-        named += u32::from(found.verdict == Verdict::Unresolved(Reason::MoreSources));
+        named += u32::from(found.doubt() == Some(Reason::MoreSources));
     }
     assert!(f64::from(named) >= 0.95 * trials as f64, "{named}");
 }
@@ -235,7 +235,7 @@ fn the_reason_is_the_cause() {
         let covariance = Covariance::from_snapshots(&exact.repeat(count)).unwrap();
         for method in METHODS {
             let found = estimate(method, &covariance, &array).unwrap();
-            assert!(found.is_resolved(), "{found:?}");
+            assert!(found.is_reliable(), "{found:?}");
             assert!(found.fit.p_value() > 0.5, "{found:?}");
         }
     }
@@ -251,7 +251,7 @@ fn two_sources_of_any_array_are_as_good_as_they_say() {
     ] {
         let finder = DirectionFinder::new(array, elevations).unwrap();
         let mut random = Random::new(68);
-        let (trials, mut nees, mut resolved) = (80, [0.0; 2], 0);
+        let (trials, mut nees, mut reliable) = (80, [0.0; 2], 0);
         for _ in 0..trials {
             let first = random.uniform(-2.6, 0.0);
             let truth = [first, first + random.uniform(0.9, 2.2)];
@@ -270,16 +270,16 @@ fn two_sources_of_any_array_are_as_good_as_they_say() {
             for k in 0..2 {
                 let error = found[k].direction.azimuth_rad - truth[k];
                 nees[k] += error * error / found[k].covariance[0][0] / f64::from(trials);
-                resolved += u32::from(found[k].is_resolved());
+                reliable += u32::from(found[k].is_reliable());
             }
         }
-        println!("{elevations:?}, correlated {correlated}: NEES {nees:.2?}, {resolved} resolved");
+        println!("{elevations:?}, correlated {correlated}: NEES {nees:.2?}, {reliable} reliable");
         // Four standard deviations of the mean of squares.
         let chance = 4.0 * (2.0 / f64::from(trials)).sqrt();
         assert!(nees.iter().all(|it| (it - 1.0).abs() < chance), "{nees:?}");
         assert!(
-            f64::from(resolved) > 0.95 * 2.0 * f64::from(trials),
-            "{resolved}"
+            f64::from(reliable) > 0.95 * 2.0 * f64::from(trials),
+            "{reliable}"
         );
     }
 }

@@ -1,6 +1,6 @@
 //! What a receiver says of one SSB.
 
-use num_complex::Complex32;
+use num_complex::{Complex32, Complex64};
 
 use super::window::Seen;
 use crate::one_ssb::measure::Measurement;
@@ -32,6 +32,10 @@ pub struct HeardSsb {
     /// Per antenna the channel on the 240 subcarriers, delay and offset taken out, in the scale of an
     /// unnormalised transform of 256: a tone of amplitude one has 256.
     pub channel: Vec<[Complex32; SUBCARRIERS]>,
+    /// Per symbol and antenna what the pilots say together, in that scale: the noise has the variance that it
+    /// has on a resource element and is independent from block to block, which that of `channel` is not from
+    /// subcarrier to subcarrier. What angles are to be estimated from.
+    pub blocks: Vec<Vec<Complex64>>,
     /// Variance of the noise on a resource element, per antenna, in that scale squared.
     pub noise_variance: Vec<f64>,
     /// SS-RSRP, SS-RSRQ and SS-SINR per antenna.
@@ -56,6 +60,7 @@ impl HeardSsb {
             cfo_hz: ssb.cfo_hz,
             snr_db: ssb.snr_db,
             channel,
+            blocks: ssb.blocks.iter().map(|block| block.to_vec()).collect(),
             noise_variance: ssb.noise_variance.to_vec(),
             measurements: ssb.measurements.to_vec(),
             tracked: seen.is_followed,

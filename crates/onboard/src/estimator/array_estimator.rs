@@ -2,7 +2,7 @@
 
 use std::f64::consts::{PI, TAU};
 
-use aoa::{Array, Complex64, Covariance, DirectionFinder, Method, Reason, Verdict, bound};
+use aoa::{Array, Covariance, DirectionFinder, Method, Reason, Verdict};
 
 use super::angle_estimator::{AngleEstimator, EstimatedAngle};
 use super::likelihood::circular_gaussian;
@@ -76,9 +76,10 @@ impl<const N: usize> AngleEstimator for ArrayEstimator<N> {
         };
         Ok(estimate.ok().map(|estimate| EstimatedAngle::Angle {
             phase_rad: self.on_grid(estimate.phase_rad),
+            // Scatter, which makes a model misfit, is in the site's deviation of the angles.
             phase_sigma_rad: Some(estimate.phase_noise_sigma_rad),
             snr_db: Some(estimate.snr_db),
-            resolved: is_usable(estimate.verdict, estimate.snr_db, snapshots),
+            resolved: estimate.is_resolved(),
         }))
     }
 }
@@ -94,20 +95,12 @@ impl<const N: usize> AngleEstimator for AzimuthEstimator<N> {
             phase_rad: estimate.direction.azimuth_rad,
             phase_sigma_rad: Some(estimate.noise_covariance[0][0].sqrt()),
             snr_db: Some(estimate.snr_db),
-            resolved: is_usable(estimate.verdict, estimate.snr_db, snapshots),
+            // Near the horizon it is the elevation that is not known.
+            resolved: matches!(
+                estimate.verdict,
+                Verdict::Resolved | Verdict::Unresolved(Reason::EdgeOfElevations)
+            ),
         }))
-    }
-}
-
-/// Whether noise leaves no doubt of it. Scatter, which makes the model misfit, is in the site's
-/// deviation of the angles and is no reason to leave one out; nor is an elevation that is not known.
-fn is_usable<const N: usize>(verdict: Verdict, snr_db: f64, snapshots: &[[Complex64; N]]) -> bool {
-    match verdict {
-        Verdict::Resolved | Verdict::Unresolved(Reason::EdgeOfElevations) => true,
-        Verdict::Unresolved(reason) if reason.is_misfit() => {
-            10.0_f64.powf(0.1 * snr_db) >= bound::resolvable_snr::<N>(snapshots.len())
-        }
-        Verdict::Unresolved(_) => false,
     }
 }
 

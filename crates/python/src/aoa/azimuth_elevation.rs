@@ -85,7 +85,19 @@ impl DirectionEstimate {
         self.estimates.field(py, |it| it.fit.p_value())
     }
 
-    /// Whether the estimate may be relied on.
+    /// Whether the estimate may be relied on: it is resolved, and the model fits.
+    #[getter]
+    fn reliable<'py>(&self, py: Python<'py>) -> PyResult<Bound<'py, PyAny>> {
+        self.estimates.flag(py, aoa::DirectionEstimate::is_reliable)
+    }
+
+    /// Why it may not be relied on: the verdict's reason, or what does not fit. Empty where it may.
+    #[getter]
+    fn doubt<'py>(&self, py: Python<'py>) -> PyResult<Bound<'py, PyAny>> {
+        self.estimates.doubts(py, aoa::DirectionEstimate::doubt)
+    }
+
+    /// Whether noise and geometry leave no doubt, if the model fits.
     #[getter]
     fn resolved<'py>(&self, py: Python<'py>) -> PyResult<Bound<'py, PyAny>> {
         self.estimates.flag(py, aoa::DirectionEstimate::is_resolved)
@@ -103,6 +115,7 @@ impl DirectionEstimate {
             ("elevation_rad", self.elevation_rad(py)?),
             ("snr_db", self.snr_db(py)?),
             ("verdict", self.verdict(py)?),
+            ("reliable", self.reliable(py)?),
         ];
         repr_of("DirectionEstimate", &fields)
     }

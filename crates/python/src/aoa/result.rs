@@ -1,6 +1,6 @@
 //! What an estimator returns to Python.
 
-use aoa::Verdict;
+use aoa::{Reason, Verdict};
 use numpy::{Element, IxDyn, PyArray1, PyArrayMethods};
 use pyo3::IntoPyObjectExt;
 use pyo3::prelude::*;
@@ -71,16 +71,40 @@ impl<T> Estimates<T> {
         py: Python<'py>,
         verdict: impl Fn(&T) -> Verdict,
     ) -> PyResult<Bound<'py, PyAny>> {
+        self.named(py, verdict, Verdict::to_string)
+    }
+
+    /// Reasons not to rely on an estimate, empty where there is none.
+    pub(super) fn doubts<'py>(
+        &self,
+        py: Python<'py>,
+        doubt: impl Fn(&T) -> Option<Reason>,
+    ) -> PyResult<Bound<'py, PyAny>> {
+        let verdict = |value: &T| doubt(value).map_or(Verdict::Resolved, Verdict::Unresolved);
+        self.named(py, verdict, |verdict| name_of(verdict.reason()))
+    }
+
+    fn named<'py>(
+        &self,
+        py: Python<'py>,
+        verdict: impl Fn(&T) -> Verdict,
+        name: impl Fn(&Verdict) -> String,
+    ) -> PyResult<Bound<'py, PyAny>> {
         match self {
-            Self::One(value) => verdict(value).to_string().into_bound_py_any(py),
+            Self::One(value) => name(&verdict(value)).into_bound_py_any(py),
             Self::Many { .. } => {
-                let names: Vec<String> = Verdict::ALL.iter().map(Verdict::to_string).collect();
+                let names: Vec<String> = Verdict::ALL.iter().map(name).collect();
                 let codes = self.field(py, |value| verdict(value).index())?;
                 let names = py.import("numpy")?.call_method1("array", (names,))?;
                 names.call_method1("take", (codes,))
             }
         }
     }
+}
+
+/// A reason in words; empty without.
+pub fn name_of(doubt: Option<Reason>) -> String {
+    doubt.map_or_else(String::new, |reason| reason.to_string())
 }
 
 /// `Name(field=value, ...)`.
@@ -149,7 +173,19 @@ impl AngleEstimate {
         self.estimates.field(py, |estimate| estimate.fit.p_value())
     }
 
-    /// Whether the estimate may be relied on.
+    /// Whether the estimate may be relied on: it is resolved, and the model fits.
+    #[getter]
+    fn reliable<'py>(&self, py: Python<'py>) -> PyResult<Bound<'py, PyAny>> {
+        self.estimates.flag(py, aoa::AngleEstimate::is_reliable)
+    }
+
+    /// Why it may not be relied on: the verdict's reason, or what does not fit. Empty where it may.
+    #[getter]
+    fn doubt<'py>(&self, py: Python<'py>) -> PyResult<Bound<'py, PyAny>> {
+        self.estimates.doubts(py, aoa::AngleEstimate::doubt)
+    }
+
+    /// Whether noise and geometry leave no doubt, if the model fits.
     #[getter]
     fn resolved<'py>(&self, py: Python<'py>) -> PyResult<Bound<'py, PyAny>> {
         self.estimates.flag(py, aoa::AngleEstimate::is_resolved)
@@ -168,6 +204,7 @@ impl AngleEstimate {
             ("phase_rad", self.phase_rad(py)?),
             ("snr_db", self.snr_db(py)?),
             ("verdict", self.verdict(py)?),
+            ("reliable", self.reliable(py)?),
         ];
         repr_of("AngleEstimate", &fields)
     }

@@ -1,12 +1,27 @@
 //! Channels of an SSB as an array.
 
 use nr_ssb::grid::SUBCARRIERS;
-use num_complex::Complex32;
+use num_complex::{Complex32, Complex64};
 use numpy::{PyArray1, PyArray2, PyArrayMethods};
 use pyo3::prelude::*;
 
 /// Per antenna the channel on the subcarriers; in Python complex64 of shape `(antennas, 240)`.
 pub struct Channel(pub Vec<[Complex32; SUBCARRIERS]>);
+
+/// Per symbol the antennas' responses; in Python complex128 of shape `(antennas, symbols)`.
+pub struct Blocks(pub Vec<Vec<Complex64>>);
+
+impl<'py> IntoPyObject<'py> for &Blocks {
+    type Target = PyArray2<Complex64>;
+    type Output = Bound<'py, Self::Target>;
+    type Error = PyErr;
+
+    fn into_pyobject(self, py: Python<'py>) -> PyResult<Self::Output> {
+        let antennas = self.0.first().map_or(0, Vec::len);
+        let by_antenna = (0..antennas).flat_map(|n| self.0.iter().map(move |block| block[n]));
+        PyArray1::from_iter(py, by_antenna).reshape([antennas, self.0.len()])
+    }
+}
 
 impl<'py> IntoPyObject<'py> for &Channel {
     type Target = PyArray2<Complex32>;

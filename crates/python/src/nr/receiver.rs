@@ -3,10 +3,11 @@
 use std::sync::{Mutex, PoisonError};
 
 use nr_ssb::receiver::{HeardSsb, Receiver as Core, ReceiverConfig, ReceiverError};
-use num_complex::Complex32;
+use num_complex::{Complex32, Complex64};
 use pyo3::prelude::*;
+use recording::scan::{ArrayView, array_view};
 
-use super::{Cell, complex_samples, rows, subcarrier_spacing};
+use super::{Cell, array_setup, complex_samples, rows, scan_error, subcarrier_spacing};
 use crate::recording::RecordingError;
 
 /// Receive the SSBs of one frequency from a stream of samples, in blocks of any length.
@@ -34,11 +35,13 @@ use crate::recording::RecordingError;
 /// cfo_ppm : float, optional
 ///     Largest error of receiver's and cell's oscillators together, 20 without. Every frequency offset within it is
 ///     searched until a cell is found: that of 20 ppm within a fifth of a second at 20 ms.
+/// spacing_wavelengths, places_wavelengths, calibration
+///     The array, as for `scan`, for the angles of two antennas and more.
 ///
 /// Raises
 /// ------
 /// RecordingError
-///     A rate, band, number of antennas or setting that is not possible; a `cfo_ppm` beyond the 15
+///     A rate, band, number of antennas, array or setting that is not possible; a `cfo_ppm` beyond the 15
 ///     subcarriers that can be searched.
 ///
 /// Examples
@@ -58,13 +61,18 @@ use crate::recording::RecordingError;
 /// [(42, 1, 6, (2, 240)), (42, 1, 8, (2, 240)), (42, 1, 10, (2, 240))]
 /// >>> round(float(np.degrees(np.angle(cells[2].channel[1] / cells[2].channel[0]).mean())), 2)
 /// 90.0
+/// >>> round(float(np.degrees(cells[2].phase_rad)), 2), cells[2].doubt
+/// (90.0, '')
 #[pyclass(frozen, module = "access_av._core.nr")]
-pub struct Receiver(Mutex<Core>);
+pub struct Receiver {
+    core: Mutex<Core>,
+    view: Option<Box<dyn ArrayView>>,
+}
 
 #[pymethods]
 impl Receiver {
     #[new]
-    #[pyo3(signature = (sample_rate_hz, *, centre_frequency_hz, ssb_freq_hz, scs_khz, antennas, period_s = 0.02, search_every_s = 1.0, cfo_ppm = None))]
+    #[pyo3(signature = (sample_rate_hz, *, centre_frequency_hz, ssb_freq_hz, scs_khz, antennas, period_s = 0.02, search_every_s = 1.0, cfo_ppm = None, spacing_wavelengths = 0.5, places_wavelengths = None, calibration = None))]
     #[allow(clippy::too_many_arguments)] // Python's keywords
     fn new(
         sample_rate_hz: f64,
@@ -75,7 +83,11 @@ impl Receiver {
         period_s: f64,
         search_every_s: f64,
         cfo_ppm: Option<f64>,
+        spacing_wavelengths: f64,
+        places_wavelengths: Option<Vec<[f64; 2]>>,
+        calibration: Option<Vec<Complex64>>,
     ) -> PyResult<Self> {
+        let setup = array_setup(spacing_wavelengths, places_wavelengths, calibration);
         let usual = ReceiverConfig::new(ssb_freq_hz, subcarrier_spacing(scs_khz)?, antennas);
         let config = ReceiverConfig {
             period_s,
@@ -83,9 +95,12 @@ impl Receiver {
             oscillator_ppm: cfo_ppm.unwrap_or(usual.oscillator_ppm),
             ..usual
         };
-        Core::new(config, sample_rate_hz, centre_frequency_hz)
-            .map(|receiver| Self(Mutex::new(receiver)))
-            .map_err(receiver_error)
+        let core =
+            Core::new(config, sample_rate_hz, centre_frequency_hz).map_err(receiver_error)?;
+        Ok(Self {
+            core: Mutex::new(core),
+            view: array_view(antennas, &setup).map_err(|it| scan_error(it.into()))?,
+        })
     }
 
     /// Take the next samples.
@@ -99,7 +114,7 @@ impl Receiver {
     /// -------
     /// list of Cell
     ///     The SSBs that are complete with them; what is searched is held back by 6 ms. `sample_start`
-    ///     counts from the first sample of the stream. They have no angle.
+    ///     counts from the first sample of the stream.
     ///
     /// Raises
     /// ------
@@ -128,7 +143,7 @@ impl Receiver {
 
     fn __repr__(&self, py: Python<'_>) -> String {
         py.detach(|| {
-            let receiver = self.0.lock().unwrap_or_else(PoisonError::into_inner);
+            let receiver = self.core.lock().unwrap_or_else(PoisonError::into_inner);
             let search = &receiver.config().search;
             format!(
                 "Receiver(ssb_freq_hz={:.0}, scs_khz={}, antennas={})",
@@ -148,13 +163,15 @@ impl Receiver {
         call: impl FnOnce(&mut Core, &mut dyn FnMut(&HeardSsb)) -> PyResult<()> + Send,
     ) -> PyResult<Vec<Py<Cell>>> {
         let cells = py.detach(|| {
-            let mut receiver = self.0.lock().unwrap_or_else(PoisonError::into_inner);
+            let mut receiver = self.core.lock().unwrap_or_else(PoisonError::into_inner);
             let search = &receiver.config().search;
             let (ssb_freq_hz, spacing) = (search.ssb_freq_hz.unwrap_or_default(), search.spacing);
             let base = receiver.sample_rate_hz() / spacing.base_rate_hz();
             let mut cells = Vec::new();
             call(&mut receiver, &mut |ssb| {
-                cells.push(Cell::heard(ssb, ssb_freq_hz, spacing, base));
+                let view = self.view.as_ref();
+                let view = view.and_then(|it| it.of_blocks(&ssb.blocks, &ssb.noise_variance));
+                cells.push(Cell::heard(ssb, ssb_freq_hz, spacing, base, view));
             })?;
             PyResult::Ok(cells)
         })?;

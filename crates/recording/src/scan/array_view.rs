@@ -56,16 +56,20 @@ impl FoundAngle {
 
 /// Angle, and the array's response as it was received, calibration taken out.
 #[derive(Debug, Clone, PartialEq)]
-pub(super) struct View {
+pub struct View {
+    /// Where it comes from.
     pub angle: FoundAngle,
     /// One snapshot per OFDM symbol, noise power one.
     pub blocks: Vec<Vec<Complex64>>,
 }
 
-/// Angles of SSBs that a search has found.
-pub(super) trait ArrayView: Send + Sync {
+/// Angles of SSBs that a search has found, or a receiver has heard.
+pub trait ArrayView: Send + Sync {
     /// Looks at an SSB, all of whose known elements are pilots.
     fn view(&self, ssb: &ReceivedSsb<'_>) -> Option<View>;
+
+    /// Looks at what the pilots of each symbol say together, in noise of so much variance on each antenna.
+    fn of_blocks(&self, blocks: &[Vec<Complex64>], noise_variance: &[f64]) -> Option<View>;
 }
 
 /// The view of an array of so many antennas; `None` for a single one.
@@ -73,7 +77,7 @@ pub(super) trait ArrayView: Send + Sync {
 /// # Errors
 /// [`aoa::Error`] for an impossible spacing or gain; [`aoa::Error::CalibrationGain`] of the first
 /// missing channel where the calibration is too short.
-pub(super) fn array_view(
+pub fn array_view(
     antennas: usize,
     setup: &ArraySetup,
 ) -> Result<Option<Box<dyn ArrayView>>, aoa::Error> {
@@ -105,20 +109,17 @@ impl<const A: usize> Looker<A> {
             calibration,
         })
     }
-}
 
-impl<const A: usize> ArrayView for Looker<A> {
-    fn view(&self, ssb: &ReceivedSsb<'_>) -> Option<View> {
-        let elements = ssb.elements.first_chunk::<A>()?.each_ref();
-        let noise = ssb.noise_variance.iter().sum::<f64>() / A as f64;
+    /// What brings noise of the mean of these variances to power one, and equals the channels.
+    fn gains(&self, noise_variance: &[f64]) -> [Complex64; A] {
+        let noise = noise_variance.iter().sum::<f64>() / A as f64;
         let scale = noise.max(f64::MIN_POSITIVE).sqrt().recip();
-        let gains = self.calibration.gains().map(|gain| scale / gain);
-        let despread = Despread::new(elements, ssb.known, Pilots::Ssb, 0.0).scaled(&gains);
-        let blocks: Vec<[Complex64; A]> = despread.blocks().collect();
-        let finder = self.finder.as_ref();
-        let told = line_of_sight(&despread, finder).map(|told| [told.block]);
-        let looked_at = told.as_ref().map_or(&blocks[..], |block| block);
-        let angle = if let Some(finder) = finder {
+        self.calibration.gains().map(|gain| scale / gain)
+    }
+
+    /// The angle of the blocks that are looked at, beside all.
+    fn seen(&self, looked_at: &[[Complex64; A]], blocks: &[[Complex64; A]]) -> Option<View> {
+        let angle = if let Some(finder) = &self.finder {
             FoundAngle::Direction(finder.estimate_pilots(looked_at, Some(1.0)).ok()?)
         } else {
             let found = maximum_likelihood_pilots(looked_at, Some(1.0), &self.array);
@@ -126,5 +127,26 @@ impl<const A: usize> ArrayView for Looker<A> {
         };
         let blocks = blocks.iter().map(|block| block.to_vec()).collect();
         Some(View { angle, blocks })
+    }
+}
+
+impl<const A: usize> ArrayView for Looker<A> {
+    fn view(&self, ssb: &ReceivedSsb<'_>) -> Option<View> {
+        let elements = ssb.elements.first_chunk::<A>()?.each_ref();
+        let gains = self.gains(ssb.noise_variance);
+        let despread = Despread::new(elements, ssb.known, Pilots::Ssb, 0.0).scaled(&gains);
+        let blocks: Vec<[Complex64; A]> = despread.blocks().collect();
+        let told = line_of_sight(&despread, self.finder.as_ref()).map(|told| [told.block]);
+        self.seen(told.as_ref().map_or(&blocks[..], |block| block), &blocks)
+    }
+
+    fn of_blocks(&self, blocks: &[Vec<Complex64>], noise_variance: &[f64]) -> Option<View> {
+        let gains = self.gains(noise_variance);
+        let calibrated = blocks.iter().map(|block| {
+            let block = block.first_chunk::<A>()?;
+            Some(std::array::from_fn(|n| block[n] * gains[n]))
+        });
+        let blocks = calibrated.collect::<Option<Vec<[Complex64; A]>>>()?;
+        self.seen(&blocks, &blocks)
     }
 }

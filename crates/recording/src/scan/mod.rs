@@ -9,7 +9,7 @@ mod scanner;
 mod search_scope;
 mod ssb_search;
 
-pub use array_view::{ArraySetup, FoundAngle};
+pub use array_view::{ArraySetup, ArrayView, FoundAngle, View, array_view};
 pub use diagnosis::ChannelFault;
 pub use error::ScanError;
 pub use iq_source::{IqSource, SampleBlock};

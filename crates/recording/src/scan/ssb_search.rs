@@ -11,6 +11,7 @@ use super::diagnosis::ExchangeVotes;
 use super::error::ScanError;
 use super::iq_source::first_not_finite;
 use crate::error::RecordingError;
+use num_complex::Complex64;
 use onboard::receive::SSB_SAMPLES;
 
 /// Searched at once, in seconds.
@@ -83,6 +84,9 @@ pub struct FoundSsb {
     pub spacing: SubcarrierSpacing,
     /// Angle of arrival, with two antennas and more.
     pub angle: Option<FoundAngle>,
+    /// The array's response that it is estimated from, per symbol and antenna, noise power one; empty
+    /// without an array.
+    pub blocks: Vec<Vec<Complex64>>,
     /// Per antenna the channel on the SSB's subcarriers, as received, delay and offset taken out.
     pub channel: Vec<[Complex32; SUBCARRIERS]>,
     /// Variance of the noise on a resource element, per antenna, in the channel's scale squared.
@@ -262,7 +266,8 @@ impl SsbSearch {
                 sample_count: SSB_SAMPLES as f64 * ratio,
                 ssb_freq_hz: config.ssb_freq_hz,
                 spacing: config.spacing,
-                angle: view.map(|view| view.angle),
+                angle: view.as_ref().map(|view| view.angle),
+                blocks: view.map_or_else(Vec::new, |view| view.blocks),
                 channel,
                 noise_variance,
                 ssb: ssb.clone(),

@@ -1,7 +1,5 @@
 //! Scanning recordings: the real ones, and every kind of unsuitable one.
 
-use aoa::Verdict;
-
 use crate::common;
 use nr_ssb::diagnose::Fault;
 use nr_ssb::{BchPayload, Beam, Burst, Case, Lmax, Mib, Numerology, Ofdm, Pci, SubcarrierSpacing};
@@ -136,13 +134,7 @@ fn cells_under_a_stronger_one_have_angles_and_know_how_good_they_are() {
         for ((pci, phase_rad, _), square) in cells.iter().zip(&mut squares) {
             let cell = found.iter().find(|it| it.ssb.pci.get() == *pci).unwrap();
             let angle = cell.angle.unwrap().from_row().unwrap();
-            // Cells that send at once are sources more than the one that is asked for, and may be said to be.
-            let verdict = angle.verdict;
-            let is_seen = matches!(verdict, Verdict::Unresolved(reason) if reason.is_misfit());
-            assert!(
-                verdict == Verdict::Resolved || is_seen,
-                "trial {trial}: {pci} {angle:?}"
-            );
+            assert!(angle.is_resolved(), "trial {trial}: {pci} {angle:?}");
             *square += ((angle.phase_rad - phase_rad) / angle.phase_sigma_rad).powi(2);
         }
     }

@@ -248,9 +248,15 @@ _GLOSSARY = {
     "unit": ("text", "Unit of stated and obtained"),
     "verdict": (
         "text",
-        "Of a claim: reproduced, not reproduced, not judged; of an angle: resolved, or why it may "
-        "not be relied on",
+        "Of a claim: reproduced, not reproduced, not judged; of an angle: resolved, or why noise "
+        "and geometry leave it in doubt",
     ),
+    "doubt": (
+        "text",
+        "Why the angle may not be relied on: of the verdict, or a plane wave that does not fit; "
+        "empty where it may",
+    ),
+    "p_value": ("1", "Probability that a plane wave in white noise fits as badly or worse"),
     "interval": ("any", "95 % interval of obtained over the runs, in its shape"),
     "met_by_seed": ("any", "With each seed whether it is met; empty where it was judged with one"),
     "turns_with_seed": ("true or false", "Other runs may give another verdict"),
@@ -335,7 +341,7 @@ _GLOSSARY = {
     "azimuth_from_broadside_deg": ("°", "Azimuth from broadside, counter-clockwise"),
     "sigma_deg": (
         "°",
-        "Standard deviation of the angle: by noise and, where `verdict` names reflections, by what "
+        "Standard deviation of the angle: by noise and, where `doubt` names reflections, by what "
         "they displace; an array mounted askew is not in it",
     ),
     "label": ("text", "The annotation's label"),

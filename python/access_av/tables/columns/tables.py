@@ -458,12 +458,14 @@ TABLES: Mapping[str, Table] = {
                 "recording", "pci", "ssb_index", "half_frame", "sfn", "cfo_hz", "snr_db",
                 "sample_start", "sample_offset", "mib_bits", "ssb_freq_hz", "scs_khz", "lmax",
                 "rsrp_dbfs", "rsrq_db", "sinr_db", "angle_deg", "azimuth_deg", "elevation_deg",
-                "sigma_deg", "verdict",
+                "sigma_deg", "verdict", "doubt", "p_value",
             ),
             {
                 **dict.fromkeys(("half_frame", "sfn", "mib_bits"), _UNDECODED),
                 "lmax": "neither band nor broadcast channel tell",
-                **dict.fromkeys(("azimuth_deg", "sigma_deg", "verdict"), _NO_ARRAY),
+                **dict.fromkeys(
+                    ("azimuth_deg", "sigma_deg", "verdict", "doubt", "p_value"), _NO_ARRAY
+                ),
                 "angle_deg": f"{_NO_ARRAY}, or antennas not in a row",
                 "elevation_deg": "antennas in a row; the key is absent then",
             },
@@ -474,7 +476,7 @@ TABLES: Mapping[str, Table] = {
             "`access-av aoa --json`",
             (
                 "sample_start", "azimuth_from_broadside_deg", "sigma_deg", "snr_db", "label",
-                "verdict", "truth_deg",
+                "verdict", "doubt", "p_value", "truth_deg",
             ),
             {"truth_deg": "not annotated; the key is absent then"},
         ),
