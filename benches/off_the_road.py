@@ -7,7 +7,8 @@ The simulator and the filter (``tests/hall_drive.py``) are written from docs/loc
 is of all drives together, after half a minute where the place has to be found first; NEES is
 halved, so that 1 is honest; ``beyond`` is the share beyond the protection level among what is
 ``ok``, ``dark`` the time beyond it in any state later than three seconds after the tenth refused
-angle, ``distrust`` the longest time from that angle to another state.
+angle, ``distrust`` the longest time from that angle (from the start where fewer are refused) to the
+last epoch that is ``ok`` and wrong.
 """
 
 from __future__ import annotations
@@ -157,6 +158,8 @@ def locate(case: Case, seed: int, settings: list[str]) -> dict[str, float]:
     tenth = rows[9] if len(rows) > 9 else math.inf
     late = located.findings.filter(pl.col("constant") == "receiver.lateness_s")
     late_refused = min(tenth, LAP_S) + DISTRUST_S
+    refused_s = rows[9] if len(rows) > 9 else 0.0
+    wrong_ok = ok & (error > ALERT_LIMIT_M)
     dark = error > level  # beyond the level, whatever the state
     time_s = poses["time_s"].to_numpy()
     settles = RECOVERY_S if case.group in ("start", "scratch") else 0.1
@@ -168,10 +171,10 @@ def locate(case: Case, seed: int, settings: list[str]) -> dict[str, float]:
         "ok": float(np.mean(ok)),
         "beyond": float(np.sum(ok & dark)),
         "all_ok": float(np.sum(ok)),
-        "wrong_ok_s": hall_drive.STEP_S * float(np.sum(ok & (error > ALERT_LIMIT_M))),
+        "wrong_ok_s": hall_drive.STEP_S * float(np.sum(wrong_ok)),
         "dark_s": hall_drive.STEP_S * float(np.sum(dark & (time_s > late_refused))),
         "back": float(np.max(error[settled]) < WRONG_M),
-        "distrusted_s": float(np.min(time_s[~ok & (time_s >= tenth)], initial=LAP_S) - tenth),
+        "distrusted_s": float(np.max(time_s[wrong_ok], initial=refused_s) - refused_s),
         "late_s": float(late["found_value"][-1]) if late.height else math.nan,
         "exit_named": float(any("late" in it for it in [*located.remarks, *located.diagnoses])),
     }
