@@ -32,9 +32,9 @@ check: lint ## Check after a change: formats, lints, types, the fast tests of bo
 	$(PYTEST) -m "not slow"
 
 test: lint ## Run everything: formats, lints, types, every test of both languages
-	cargo test --workspace --quiet
-	@if [ -d "$(DATA)" ]; then ACCESS_AV_DATA="$(DATA)" cargo test --quiet -p nr-ssb -- --ignored; \
-	  else echo "not tested: reference vectors and recordings; no $(DATA) (ACCESS_AV_DATA)"; fi
+	@if [ -d "$(DATA)" ]; then ACCESS_AV_DATA="$(DATA)" cargo test --workspace --quiet -- --include-ignored; \
+	  else echo "not tested: reference vectors and recordings; no $(DATA) (ACCESS_AV_DATA)"; \
+	  cargo test --workspace --quiet; fi
 	$(PYTEST)
 
 attack: .venv/installed-test ## Attack it with random input, drives and plug-ins; SEED=… repeats an attack
