@@ -59,10 +59,10 @@
 //!
 //! Whether plane waves and white noise explain what was received is tested ([`GoodnessOfFit`]): a model
 //! that holds is doubted once in a hundred times. Reflections, antennas unlike those described and sources
-//! that were not looked for are named [beside](AngleEstimate::doubt) the [`Verdict`], and the standard deviation then holds what
-//! they displace, as far as the residual shows it. One thing cannot be known from one look: a reflection
-//! from nearly the source's own direction, within about a twentieth of the beam's width at 20 dB, arrives
-//! as one plane wave from between the two.
+//! that were not looked for are named [beside](AngleEstimate::doubt) the [`Verdict`], and the standard
+//! deviation then holds what they displace, as far as the residual shows it. One thing cannot be known from
+//! one look: a reflection from nearly the source's own direction, within about a twentieth of the beam's
+//! width at 20 dB, arrives as one plane wave from between the two.
 
 // Loops over vector registers must be compiled into the function that was chosen for the processor.
 #![allow(clippy::inline_always)]

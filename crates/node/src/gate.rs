@@ -2,6 +2,7 @@
 
 use std::sync::atomic::{AtomicBool, AtomicU64, Ordering};
 
+use nr_ssb::Case;
 use onboard::settings::Site;
 
 /// Samples before and after an SSB that the receiver needs, in seconds: the reach of its low-pass and of the
@@ -49,27 +50,29 @@ impl Gate {
     }
 }
 
-/// First symbol of an SSB in its half frame, in cases A and C (TS 38.213, 4.1); those of case B are apart by
-/// four symbols more or less at most, which [`GUARD_S`] has room for.
-fn first_symbol(ssb_index: u8) -> f64 {
-    f64::from(14 * (ssb_index / 2) + 2 + 6 * (ssb_index % 2))
-}
-
 /// The stretch of samples that holds a burst's SSBs, of which one begins at a time.
 #[derive(Debug, Clone, Copy)]
 pub struct Windows {
     symbol_s: f64,
-    /// Lowest and highest index that the site's radio heads send.
-    indices: [u8; 2],
+    /// Of 30 kHz case C; the SSBs of case B are apart by four symbols more or less at most, for which
+    /// [`GUARD_S`] has room.
+    case: Case,
+    /// First symbols of the first and the last SSB that the site's radio heads send.
+    symbols: [usize; 2],
 }
 
 impl Windows {
     /// For the SSBs of a site.
     pub fn new(site: &Site) -> Self {
-        let indices = || site.radio_heads.iter().map(|head| head.ssb_index);
+        let spacing_khz = site.ssb.subcarrier_spacing_khz;
+        let is_spaced = |case: &Case| f64::from(case.spacing().khz()) == spacing_khz;
+        let case = Case::ALL.into_iter().rfind(is_spaced).unwrap_or(Case::C);
+        let heads = || site.radio_heads.iter();
+        let symbols = || heads().filter_map(|head| case.start_symbol(head.ssb_index).ok());
         Self {
-            symbol_s: 15e-3 / 14.0 / site.ssb.subcarrier_spacing_khz,
-            indices: [indices().min().unwrap_or(0), indices().max().unwrap_or(0)],
+            symbol_s: 15e-3 / 14.0 / spacing_khz,
+            case,
+            symbols: [symbols().min().unwrap_or(0), symbols().max().unwrap_or(0)],
         }
     }
 
@@ -80,9 +83,9 @@ impl Windows {
 
     /// The stretch around the burst whose SSB of this index begins at `ssb_s`.
     pub fn around(&self, ssb_s: f64, ssb_index: u8) -> [f64; 2] {
-        let begins_s =
-            |other: u8| ssb_s + (first_symbol(other) - first_symbol(ssb_index)) * self.symbol_s;
-        let [from_s, until_s] = self.indices.map(begins_s);
+        let symbol = self.case.start_symbol(ssb_index).unwrap_or(self.symbols[0]) as f64;
+        let begins_s = |other: usize| ssb_s + (other as f64 - symbol) * self.symbol_s;
+        let [from_s, until_s] = self.symbols.map(begins_s);
         [from_s - GUARD_S, until_s + self.ssb_s() + GUARD_S]
     }
 }

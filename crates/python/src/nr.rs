@@ -166,34 +166,31 @@ impl Cell {
             blocks: Blocks(view.map_or_else(Vec::new, |view| view.blocks)),
             noise_variance: ssb.noise_variance.clone(),
         );
-        match angle {
-            Some(angle) => cell.with_angle(&angle),
-            None => cell,
-        }
+        cell.with_angle(angle.as_ref())
     }
 
-    fn with_angle(mut self, angle: &FoundAngle) -> Self {
-        match angle {
-            FoundAngle::FromRow(found) => {
+    fn with_angle(mut self, angle: Option<&FoundAngle>) -> Self {
+        let (verdict, doubt, fit) = match angle {
+            None => return self,
+            Some(FoundAngle::FromRow(found)) => {
                 self.angle_rad = Some(found.angle_rad);
                 self.sigma_rad = Some(found.sigma_rad);
                 self.phase_rad = Some(found.phase_rad);
                 self.phase_sigma_rad = Some(found.phase_sigma_rad);
                 self.azimuth_rad = Some(FRAC_PI_2 - found.angle_rad);
-                self.verdict = Some(found.verdict.to_string());
-                self.doubt = Some(name_of(found.doubt()));
-                self.p_value = Some(found.fit.p_value());
+                (found.verdict, found.doubt(), found.fit)
             }
-            FoundAngle::Direction(found) => {
+            Some(FoundAngle::Direction(found)) => {
                 self.sigma_rad = Some(found.azimuth_sigma_rad());
                 self.azimuth_rad = Some(found.direction.azimuth_rad);
                 self.elevation_rad = Some(found.direction.elevation_rad);
                 self.elevation_sigma_rad = Some(found.elevation_sigma_rad());
-                self.verdict = Some(found.verdict.to_string());
-                self.doubt = Some(name_of(found.doubt()));
-                self.p_value = Some(found.fit.p_value());
+                (found.verdict, found.doubt(), found.fit)
             }
-        }
+        };
+        self.verdict = Some(verdict.to_string());
+        self.doubt = Some(name_of(doubt));
+        self.p_value = Some(fit.p_value());
         self
     }
 }
@@ -210,10 +207,7 @@ impl From<&FoundSsb> for Cell {
             blocks: Blocks(found.blocks.clone()),
             noise_variance: found.noise_variance.clone(),
         );
-        match &found.angle {
-            Some(angle) => cell.with_angle(angle),
-            None => cell,
-        }
+        cell.with_angle(found.angle.as_ref())
     }
 }
 

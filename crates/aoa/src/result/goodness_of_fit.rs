@@ -233,13 +233,7 @@ impl GoodnessOfFit {
     /// What is wrong with the model, if one of the tests finds fault with it: [`Reason::Multipath`] or
     /// [`Reason::MoreSources`]. Of a model that holds it is said once in a hundred times.
     pub fn misfit(&self) -> Option<Reason> {
-        let tests = self.model.tests();
-        tests.misfit([self.coherent, self.noise])
-    }
-
-    /// Whether plane waves in white noise explain what was received.
-    pub fn is_good(&self) -> bool {
-        self.misfit().is_none()
+        self.model.tests().misfit([self.coherent, self.noise])
     }
 
     /// The probability that a model that holds fits as badly as this or worse, from the worse of both

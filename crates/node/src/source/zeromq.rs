@@ -47,8 +47,7 @@ fn session(endpoints: &[Address], framing: &mut Framing, inbox: &Inbox) -> (io::
     }
     let mut received = false;
     while !inbox.is_closed() {
-        // Transmitters send in order: when the last has come the others are there, and nothing is waited for four
-        // times.
+        // Transmitters send in order: when the last has come the others are there, and need no waiting.
         for (channel, endpoint) in channels.iter_mut().zip(endpoints).rev() {
             match channel.fill(framing.sample_bytes(), inbox) {
                 Ok(()) => received = true,
