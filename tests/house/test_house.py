@@ -22,7 +22,7 @@ CRATES = {
     "onboard": {"aoa-array", "nr-ssb"},
     "recording": {"onboard", "aoa-array", "nr-ssb"},
     "simulate": {"recording", "onboard", "aoa-array", "nr-ssb"},
-    "access-av-node": {"recording", "onboard"},
+    "access-av-node": {"recording", "onboard", "nr-ssb"},
     "access-av-python": {"simulate", "recording", "onboard", "aoa-array", "nr-ssb"},
 }
 # What runs on the vehicle draws no random numbers, starts no threads, opens no MCAP.
