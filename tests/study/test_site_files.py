@@ -112,6 +112,13 @@ def drawing(path: Path, units: int = 4) -> None:
     for x_m, y_m in ((60.0, 25.0), (240.0, 100.0), (430.0, 160.0)):
         place = (1e3 * x_m, 1e3 * y_m, 8e3)
         model.add_blockref("ANTENNA", place, dxfattribs={"layer": "CELLS"})
+    # A shed of two straight walls and a round one, 10 m in radius.
+    model.add_lwpolyline(
+        [(90e3, 10e3, 0.0), (150e3, 10e3, 0.0), (150e3, 40e3, 0.0)],
+        format="xyb",
+        dxfattribs={"layer": "WALLS"},
+    )
+    model.add_arc((90e3, 20e3), 10e3, 90.0, 270.0, dxfattribs={"layer": "WALLS"})
     made.saveas(path)
 
 
@@ -130,6 +137,21 @@ def test_a_drawing_gives_the_same_road(
     assert apart_m(course(read_again), reference) < SAME_M
     assert apart_m(reference, course(read_again)) < SAME_M
     assert read_again["radio_heads"][1]["position_m"] == pytest.approx([240.0, 100.0, 8.0])
+    assert "walls" not in read_again
+    walled = access_av("new", "site", site, *files, "--walls", drawn, *layers, *scale, "--force")
+    assert walled.code == 0, walled.err
+    straight, bent = (
+        np.array(it["points_m"]) for it in json.loads(Site.load(str(site)).to_json())["walls"]
+    )
+    assert straight == pytest.approx(np.array([[90.0, 10.0], [150.0, 10.0], [150.0, 40.0]]))
+    assert np.hypot(*(bent - [90.0, 20.0]).T) == pytest.approx(np.full(len(bent), 10.0), abs=SAME_M)
+    middle = 0.5 * (bent[1:] + bent[:-1])
+    assert np.hypot(*(middle - [90.0, 20.0]).T).min() > 10.0 - 0.05
+    missing = access_av(
+        "new", "site", site, "--walls", drawn, "--walls-layer", "X", *scale, "--force"
+    )
+    assert missing.code == 2
+    assert "'X' holds no lines" in missing.err
 
 
 @pytest.mark.parametrize(
@@ -236,7 +258,36 @@ def test_a_scale_is_that_of_two_points() -> None:
 def test_heads_far_from_a_road_are_named() -> None:
     drawn = Drawn(road_m=[(0.0, 0.0), (100.0, 0.0)], heads=[Head("far", 0.0, 9000.0, 8.0)])
     with pytest.raises(InputError, match="9 km from the road"):
-        checked(drawn, "road.csv", "heads.csv")
+        checked(drawn, "road.csv", "heads.csv", "walls.dxf")
+    drawn = Drawn(road_m=[(0.0, 0.0), (100.0, 0.0)], walls_m=[[(0.0, 9000.0), (1.0, 9000.0)]])
+    with pytest.raises(InputError, match=r"walls.dxf: a wall .* 9 km from the road"):
+        checked(drawn, "road.csv", "heads.csv", "walls.dxf")
+
+
+@pytest.mark.parametrize("origin", [(), ("--origin", "48.1,11.5")], ids=["metres", "degrees"])
+def test_walls_are_the_same_after_they_were_written_and_read(
+    access_av: Callable[..., Any], tmp_path: Path, bends: Site, origin: tuple[str, ...]
+) -> None:
+    corners = [[float(x_m), 12.0] for x_m in range(90, 240)]  # more than a table may have
+    walled = bends.with_overrides(
+        {"walls": [{"points_m": corners[:100]}, {"points_m": corners[99:]}]}
+    )
+    file, again = tmp_path / "site.geojson", tmp_path / "again.toml"
+    (tmp_path / "site.toml").write_text(walled.to_toml(), "utf-8")
+    assert access_av("export", tmp_path / "site.toml", file, *origin).code == 0
+    done = access_av(
+        "new", "site", again, *(f"--{it}={file}" for it in ("road", "heads", "walls")), *origin
+    )
+    assert done.code == 0, done.err
+    walls = json.loads(Site.load(str(again)).to_json())["walls"]
+    found = np.concatenate([walls[0]["points_m"], walls[1]["points_m"][1:]])
+    assert found == pytest.approx(np.array(corners), abs=1e-3)
+    only_a_road = tmp_path / "road.geojson"
+    only_a_road.write_text(json.dumps(ROAD), "utf-8")
+    beside = ("--road", only_a_road, "--walls", only_a_road)
+    done = access_av("new", "site", again, *beside, "--force")
+    assert done.code == 2
+    assert "a wall" in done.err
 
 
 def test_sites_without_a_road_are_written_too(tmp_path: Path) -> None:

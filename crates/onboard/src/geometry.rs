@@ -170,6 +170,16 @@ impl Pose {
     }
 }
 
+/// Whether two straight lines, each given by its ends, cross or touch. Parallel ones do not.
+pub fn cross([a, b]: [Point; 2], [c, d]: [Point; 2]) -> bool {
+    let product = |from: Point, to: Point, other: Point| {
+        (to.x_m - from.x_m) * (other.y_m - from.y_m) - (to.y_m - from.y_m) * (other.x_m - from.x_m)
+    };
+    let parted = |from, to, one, other| product(from, to, one) * product(from, to, other) <= 0.0;
+    let turn = (b.x_m - a.x_m) * (d.y_m - c.y_m) - (b.y_m - a.y_m) * (d.x_m - c.x_m);
+    turn != 0.0 && parted(a, b, c, d) && parted(c, d, a, b)
+}
+
 /// The angle in (−π, π] that differs from `angle_rad` by whole turns.
 pub fn wrap_angle(angle_rad: f64) -> f64 {
     if angle_rad > -PI && angle_rad <= PI {
@@ -218,6 +228,23 @@ mod tests {
             (places[0], places[23]),
             (Point::new(-3.0, 0.0), Point::new(7.0, 6.0))
         );
+    }
+
+    #[test]
+    fn lines_cross_between_their_ends_alone() {
+        let line =
+            |[x0, y0]: [f64; 2], [x1, y1]: [f64; 2]| [Point::new(x0, y0), Point::new(x1, y1)];
+        let across = line([0.0, -1.0], [0.0, 1.0]);
+        for (other, crossing) in [
+            (line([-1.0, 0.0], [1.0, 0.0]), true),
+            (line([-1.0, 1.0], [1.0, 1.0]), true), // touches its end
+            (line([-1.0, 1.1], [1.0, 1.1]), false),
+            (line([0.1, 0.0], [1.0, 0.0]), false),
+            (line([1.0, -1.0], [1.0, 1.0]), false),
+        ] {
+            assert_eq!(cross(across, other), crossing, "{other:?}");
+            assert_eq!(cross(other, across), crossing, "{other:?}");
+        }
     }
 
     #[test]

@@ -30,6 +30,7 @@ pub mod road;
 pub mod settings;
 pub mod thermal;
 pub mod wake_up;
+pub mod walls;
 
 pub use live::Live;
 pub use pipeline::{Custom, Execution, Heard, Observed, OdometryDefect, Onboard, SsbSource};

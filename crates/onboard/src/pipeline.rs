@@ -15,6 +15,7 @@ use crate::radio_head::RadioHead;
 use crate::settings::{Check, Platform, SettingsError, Site, Vehicle, check_together};
 use crate::thermal::ThermalNoise;
 use crate::wake_up::{self, Situation, WakeUpPolicy};
+use crate::walls::Walls;
 
 /// The pipeline on the vehicle. Nothing is allocated once it is warm.
 pub struct Onboard {
@@ -39,11 +40,27 @@ struct Surroundings {
     heads: Vec<RadioHead>,
     /// Those that the user has excluded.
     excluded: Vec<RadioHead>,
+    walls: Walls,
+    /// Of the radio heads those in sight of where the vehicle is believed to be, where there are walls.
+    seen: Vec<RadioHead>,
     budget: LinkBudget,
     height_m: f64,
 }
 
 impl Surroundings {
+    /// Looks about from where the vehicle is believed to be.
+    fn look(&mut self, time_s: f64, localizer: &History) -> Result<(), BoxError> {
+        if self.walls.is_empty() || is_searching(localizer.localizer()) {
+            return Ok(());
+        }
+        let place = localizer.localizer().pose(time_s)?.pose.point();
+        self.seen.clear();
+        let heads = self.heads.iter();
+        self.seen
+            .extend(heads.filter_map(|head| self.walls.seen(head, place)));
+        Ok(())
+    }
+
     fn at<'a>(
         &'a self,
         time_s: f64,
@@ -56,7 +73,11 @@ impl Surroundings {
             now_s: newest_s.max(time_s),
             speed_mps: odometry.map_or(0.0, |sample| sample.speed_mps),
             localizer: localizer.localizer(),
-            heads: &self.heads,
+            heads: if self.walls.is_empty() {
+                &self.heads
+            } else {
+                &self.seen
+            },
             budget: &self.budget,
             height_m: self.height_m,
         }
@@ -188,6 +209,8 @@ impl Onboard {
             burst: Vec::with_capacity(heads.len()),
             surroundings: Surroundings {
                 excluded: Vec::with_capacity(heads.len()),
+                walls: Walls::new(site),
+                seen: Vec::with_capacity(heads.len()),
                 heads,
                 budget: LinkBudget::new(site, vehicle),
                 height_m,
@@ -237,6 +260,12 @@ impl Onboard {
                 let chosen = &mut self.chosen;
                 self.wake_up_time_s = self.policy.decide(&now, &self.sensed, chosen)?;
             }
+            if !searching && !self.surroundings.walls.is_empty() {
+                // What comes from behind a wall says nothing of where it is sent.
+                for (chosen, ssb) in self.chosen.iter_mut().zip(&self.sensed) {
+                    *chosen &= now.head(ssb).is_some();
+                }
+            }
             for index in 0..self.sensed.len() {
                 let (Some(&ssb), Some(true)) = (self.sensed.get(index), self.chosen.get(index))
                 else {
@@ -272,6 +301,9 @@ impl Onboard {
     /// # Errors
     /// Whatever a user's policy fails with.
     pub fn listens(&mut self, time_s: f64) -> Result<bool, BoxError> {
+        let newest_s = self.odometry.map_or(time_s, |sample| sample.time_s);
+        self.surroundings
+            .look(newest_s.max(time_s), &self.localizer)?;
         let now = self.surroundings.at(time_s, self.odometry, &self.localizer);
         Ok(is_searching(now.localizer) || self.policy.listens(&now)?)
     }

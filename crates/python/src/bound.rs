@@ -4,6 +4,7 @@ use numpy::{PyArray1, PyArray2, PyReadonlyArray1};
 use onboard::geometry::Point;
 use onboard::link_budget::LinkBudget;
 use onboard::radio_head::RadioHead;
+use onboard::walls::Walls;
 use pyo3::exceptions::PyValueError;
 use pyo3::prelude::*;
 use pyo3::types::PyDict;
@@ -20,6 +21,7 @@ pub struct ErrorBound {
     bound: CoreBound,
     budget: LinkBudget,
     heads: Vec<RadioHead>,
+    walls: Walls,
     height_m: f64,
 }
 
@@ -38,6 +40,7 @@ impl ErrorBound {
                 .iter()
                 .map(RadioHead::from)
                 .collect(),
+            walls: Walls::new(&scenario.0.site),
             height_m: scenario.0.vehicle.array.position_m[2],
         })
     }
@@ -98,7 +101,7 @@ impl ErrorBound {
     }
 
     /// SNR per antenna and sample in dB by the link budget, of each radio head at each place:
-    /// shape (radio heads, places).
+    /// shape (radio heads, places). Minus infinity where walls leave it out of sight.
     #[allow(clippy::needless_pass_by_value)] // as Python passes them
     fn snr_db<'py>(
         &self,
@@ -113,7 +116,10 @@ impl ErrorBound {
             .map(|head| {
                 let snr_db = |place: &Point| {
                     let distance_m = head.distance_m(*place, self.height_m);
-                    self.budget.snr_db(head, distance_m)
+                    let seen = self.walls.seen(head, *place);
+                    seen.map_or(f64::NEG_INFINITY, |head| {
+                        self.budget.snr_db(&head, distance_m)
+                    })
                 };
                 places.iter().map(snr_db).collect()
             })

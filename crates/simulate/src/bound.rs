@@ -12,7 +12,7 @@
 //! [`ArrayModel::correlation`](onboard::localize::ekf::ArrayModel::correlation) says: its spectrum at the
 //! line of sight stands for white noise, as it may where the state changes little in a wavelength.
 //! Where the scenario has traced paths, K is theirs at each place, and a radio head without a line of
-//! sight says nothing.
+//! sight says nothing. Elsewhere walls take of the K that is expected what they take of the direct wave.
 
 use onboard::gaussian::{Gaussian, Matrix, identity, product};
 use onboard::geometry::{Point, Pose};
@@ -26,6 +26,7 @@ use onboard::radio_head::RadioHead;
 use onboard::road::Road;
 use onboard::settings::{Check, SettingsError};
 use onboard::thermal::ThermalNoise;
+use onboard::walls::Walls;
 
 use crate::channel::Paths;
 use crate::ideal_filter::IdealFilter;
@@ -65,6 +66,7 @@ pub struct Bound {
     start: InitialPose,
     period_s: f64,
     traced: Option<Traced>,
+    walls: Walls,
 }
 
 /// Traced paths, and the numbers of the radio heads in their file.
@@ -118,6 +120,7 @@ impl Bound {
             road,
             period_s: site.ssb.period_s(),
             traced,
+            walls: Walls::new(site),
         })
     }
 
@@ -233,10 +236,10 @@ impl Bound {
         for (number, head) in self.heads.iter().enumerate() {
             let array = &self.config.array;
             let angle_model = AngleModel::new(head, pose, &frame, &belief.mean, array);
-            let fading = self.fading(number, pose.point());
-            if let Some((angle_model, fading)) = angle_model.zip(fading) {
+            let seen = self.seen(number, head, pose.point());
+            if let Some((angle_model, (head, fading))) = angle_model.zip(seen) {
                 let row = angle_model.row;
-                let thermal = self.thermal_variance(head, &angle_model);
+                let thermal = self.thermal_variance(&head, &angle_model);
                 let variance = fading * scatter(&angle_model) + thermal;
                 let gain = belief.update(0.0, &row, variance);
                 // (I − K H) times the transition so far.
@@ -261,15 +264,17 @@ impl Bound {
         self.thermal.variance(head, angle_model.range_m) * (mean / angle_model.aperture)
     }
 
-    /// By how much the scatter's variance at a place is larger than at the K that is expected; none
-    /// where a radio head has no line of sight, and so says nothing of where it is.
-    fn fading(&self, head: usize, place: Point) -> Option<f64> {
+    /// A radio head as it is received at a place, and by how much the scatter's variance there is larger
+    /// than at the K that is expected; none where it has no line of sight, and so says nothing of
+    /// where it is.
+    fn seen(&self, number: usize, head: &RadioHead, place: Point) -> Option<(RadioHead, f64)> {
         let Some(traced) = &self.traced else {
-            return Some(1.0);
+            let passing = self.walls.passing(head.position, place);
+            return Some((self.walls.seen(head, place)?, passing.recip()));
         };
-        let number = traced.heads.get(head).copied().flatten()?;
+        let number = traced.heads.get(number).copied().flatten()?;
         let k = (traced.paths.rician_k(number, place)).filter(|k| *k > 0.0)?;
-        Some(self.config.rician_k / k)
+        Some((*head, self.config.rician_k / k))
     }
 
     fn point(&self, belief: &Belief, time_s: f64, along_m: f64) -> BoundPoint {
@@ -323,11 +328,11 @@ impl Bound {
             for (number, head) in self.heads.iter().enumerate() {
                 let angle_model =
                     AngleModel::new(head, pose, &RoadFrame::PLANE, &[0.0; STATES], array)?;
-                let Some(fading) = self.fading(number, place) else {
+                let Some((head, fading)) = self.seen(number, head, place) else {
                     continue;
                 };
                 let scatter = scatter_bound(self.config.rician_k, angle_model.aperture);
-                let thermal = self.thermal_variance(head, &angle_model);
+                let thermal = self.thermal_variance(&head, &angle_model);
                 belief.update(0.0, &angle_model.row, (fading * scatter + thermal) / looks);
             }
             let [along, across] = [ALONG, ACROSS].map(|i| belief.covariance[i][i]);

@@ -21,6 +21,12 @@ Heads = Annotated[
     Path | None,
     typer.Option(help="CSV (x_m, y_m, z_m, name, pci), GeoJSON (Points) or DXF (points, blocks)."),
 ]
+Walls = Annotated[
+    Path | None,
+    typer.Option(
+        help="GeoJSON (LineStrings, Polygons) or DXF (lines, polylines, arcs of a layer)."
+    ),
+]
 OriginText = Annotated[
     str | None,
     typer.Option(
@@ -29,6 +35,7 @@ OriginText = Annotated[
 ]
 RoadLayer = Annotated[str, typer.Option(help="Layer of a DXF that holds the road.")]
 HeadsLayer = Annotated[str, typer.Option(help="Layer of a DXF that holds the radio heads.")]
+WallsLayer = Annotated[str, typer.Option(help="Layer of a DXF that holds the walls.")]
 TwoPoints = Annotated[
     str | None,
     typer.Option(metavar="X1,Y1,X2,Y2", help="Two points of a DXF, with --length-m between them."),
@@ -53,38 +60,28 @@ def _numbers(option: str, text: str, count: int) -> list[float]:
     return found
 
 
-def _with_site(
-    kind: str,
-    file: Path,
-    force: bool,
-    road: Path | None,
-    heads: Path | None,
-    origin: str | None,
-    road_layer: str,
-    heads_layer: str,
-    two_points: str | None,
-    length_m: float | None,
-    metres_per_unit: float | None,
-) -> None:
+def _origin(text: str | None) -> tuple[float, float] | None:
+    if text is None:
+        return None
+    latitude, longitude = _numbers("--origin", text, 2)
+    if abs(latitude) > 90.0 or abs(longitude) > 180.0:
+        raise InputError(f"--origin {text}: latitude, then longitude, in degrees")
+    return latitude, longitude
+
+
+def _scale_m(
+    two_points: str | None, length_m: float | None, metres_per_unit: float | None
+) -> float | None:
     from access_av.site_files import dxf
-    from access_av.site_files.read import Options, read
 
     if (two_points is None) != (length_m is None):
         raise InputError("--two-points and --length-m go together")
-    scale_m = metres_per_unit
-    if two_points is not None and length_m is not None:
-        if metres_per_unit is not None:
-            raise InputError("--metres-per-unit: not beside --two-points, which say it as well")
-        x1, y1, x2, y2 = _numbers("--two-points", two_points, 4)
-        scale_m = dxf.metres_per_unit((x1, y1, x2, y2), length_m)
-    place = None
-    if origin is not None:
-        latitude, longitude = _numbers("--origin", origin, 2)
-        if abs(latitude) > 90.0 or abs(longitude) > 180.0:
-            raise InputError(f"--origin {origin}: latitude, then longitude, in degrees")
-        place = (latitude, longitude)
-    options = Options(place, road_layer, heads_layer, scale_m)
-    _write(kind, file, force, read(road, heads, options) if road or heads else None)
+    if two_points is None or length_m is None:
+        return metres_per_unit
+    if metres_per_unit is not None:
+        raise InputError("--metres-per-unit: not beside --two-points, which say it as well")
+    x1, y1, x2, y2 = _numbers("--two-points", two_points, 4)
+    return dxf.metres_per_unit((x1, y1, x2, y2), length_m)
 
 
 def _write(kind: str, file: Path, force: bool, drawn: Drawn | None = None) -> None:
@@ -121,40 +118,45 @@ def _next(kind: str, file: Path) -> str:
     return commands.get(kind, f"access-av {kind} check {file}")
 
 
-@app.command(epilog="Example: [bold]access-av new plant mine.toml --road road.geojson[/]")
-def plant(
-    file: Target,
-    force: Force = False,
-    road: Road = None,
-    heads: Heads = None,
-    origin: OriginText = None,
-    road_layer: RoadLayer = "ROAD",
-    heads_layer: HeadsLayer = "HEADS",
-    two_points: TwoPoints = None,
-    length_m: Length = None,
-    metres_per_unit: MetresPerUnit = None,
-) -> None:
-    """Begin a plant file: site, vehicle, fleet, prices and the accuracy that is needed."""
-    drawing = (road_layer, heads_layer, two_points, length_m, metres_per_unit)
-    _with_site("plant", file, force, road, heads, origin, *drawing)
+def _site_command(kind: str, begins: str, example: str) -> None:
+    """Add a command that begins a file with a site in it."""
+
+    def command(
+        file: Target,
+        force: Force = False,
+        road: Road = None,
+        heads: Heads = None,
+        walls: Walls = None,
+        origin: OriginText = None,
+        road_layer: RoadLayer = "ROAD",
+        heads_layer: HeadsLayer = "HEADS",
+        walls_layer: WallsLayer = "WALLS",
+        two_points: TwoPoints = None,
+        length_m: Length = None,
+        metres_per_unit: MetresPerUnit = None,
+    ) -> None:
+        from access_av.site_files.read import Options, read
+
+        options = Options(
+            _origin(origin),
+            road_layer,
+            heads_layer,
+            walls_layer,
+            _scale_m(two_points, length_m, metres_per_unit),
+        )
+        drawn = read(road, heads, options, walls) if road or heads or walls else None
+        _write(kind, file, force, drawn)
+
+    epilog = f"Example: [bold]access-av new {kind} mine.toml {example}[/]"
+    app.command(kind, epilog=epilog, help=begins)(command)
 
 
-@app.command(epilog="Example: [bold]access-av new site mine.toml --heads heads.csv[/]")
-def site(
-    file: Target,
-    force: Force = False,
-    road: Road = None,
-    heads: Heads = None,
-    origin: OriginText = None,
-    road_layer: RoadLayer = "ROAD",
-    heads_layer: HeadsLayer = "HEADS",
-    two_points: TwoPoints = None,
-    length_m: Length = None,
-    metres_per_unit: MetresPerUnit = None,
-) -> None:
-    """Begin a site file: a road and radio heads."""
-    drawing = (road_layer, heads_layer, two_points, length_m, metres_per_unit)
-    _with_site("site", file, force, road, heads, origin, *drawing)
+_site_command(
+    "plant",
+    "Begin a plant file: site, vehicle, fleet, prices and the accuracy that is needed.",
+    "--road road.geojson",
+)
+_site_command("site", "Begin a site file: a road, radio heads and walls.", "--heads heads.csv")
 
 
 @app.command(epilog="Example: [bold]access-av new vehicle mine.toml[/]")
@@ -189,10 +191,10 @@ def export(
         bool, typer.Option("--german", help="CSV with semicolons and decimal commas.")
     ] = False,
 ) -> None:
-    """Write a site's road and radio heads for other programs.
+    """Write a site's road, radio heads and walls for other programs.
 
-    GeoJSON holds both, in degrees with --origin, else in metres; CSV holds the road, and the radio
-    heads in a second file beside it, NAME-heads.csv.
+    GeoJSON holds them all, in degrees with --origin, else in metres; CSV holds the road, and the
+    radio heads in a second file beside it, NAME-heads.csv.
     """
     from access_av import _core
     from access_av.site_files import csv_file, geojson
@@ -205,12 +207,8 @@ def export(
     )
     of = _core.Plant.load(site).scenario().site if is_plant else _core.Site.load(site)
     drawn = of_site(of)
-    place = None
-    if origin is not None:
-        latitude, longitude = _numbers("--origin", origin, 2)
-        place = (latitude, longitude)
     if file.suffix.lower() in (".geojson", ".json"):
-        write_whole(file, geojson.text(drawn, place))
+        write_whole(file, geojson.text(drawn, _origin(origin)))
         console.print(f"Written: {file}", soft_wrap=True)
     elif file.suffix.lower() == ".csv":
         beside = file.with_name(f"{file.stem}-heads.csv")

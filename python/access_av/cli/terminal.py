@@ -277,7 +277,9 @@ def show_bound(summary: dict[str, Any], verdicts: Sequence[Verdict]) -> None:
             str(head["pci"]),
             str(head["ssb_index"]),
             f"{head['nearest_m']:.0f}–{head['farthest_m']:.0f}",
-            f"{head['least_expected_snr_db']:.0f} to {head['most_expected_snr_db']:.0f}",
+            "–"
+            if head["least_expected_snr_db"] is None
+            else f"{head['least_expected_snr_db']:.0f} to {head['most_expected_snr_db']:.0f}",
             f"{head['visible_share']:.1%}",
         )
     console.print(made)

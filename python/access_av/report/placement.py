@@ -44,7 +44,9 @@ def render_bound(bound: ErrorBound, missed: NextLevel | None = None) -> str:
             number(one["x_m"], 1),
             number(one["y_m"], 1),
             f"{one['nearest_m']:.0f} to {one['farthest_m']:.0f}",
-            f"{one['least_expected_snr_db']:.1f} to {one['most_expected_snr_db']:.1f}",
+            "–"
+            if one["least_expected_snr_db"] is None
+            else f"{one['least_expected_snr_db']:.1f} to {one['most_expected_snr_db']:.1f}",
             f"{one['visible_share']:.1%}",
         )
         for one in summary["heads"]

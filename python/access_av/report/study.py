@@ -156,7 +156,8 @@ def _where(study: Study) -> str:
         "Where is it not?",
         f"The road is coloured by the error that {study.percent:g} % of the positions within 5 m "
         f"of a place are within; {kept:.0%} of the road keep the target. Triangles are radio "
-        "heads, squares stops, numbers the worst places. places.csv has each metre. "
+        "heads, squares stops, grey lines walls, numbers the worst places. places.csv has each "
+        "metre. "
         "Drawn to scale on a wide screen.",
         figure("map")
         + table(head, rows, numbers=(1, 2, 3))

@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import itertools
 import json
 import math
 from typing import TYPE_CHECKING, Any
@@ -90,6 +91,11 @@ def road_map(study: Study) -> Spec:
     ).encode(tooltip=["name:N"])
     labels = mast.mark_text(dy=-15, fontSize=12, fontWeight="bold").encode(text="name:N")
     layers = drawn + masts + labels
+    if walls := _walls(study):
+        across_to = {"x": alt.X("x_m:Q", scale=across), "y": alt.Y("y_m:Q", scale=upward)}
+        ends = {"x2": "x2_m:Q", "y2": "y2_m:Q"}
+        lines = alt.Chart(pl.DataFrame(walls)).mark_rule(strokeWidth=3, color=GREY)
+        layers = lines.encode(**across_to, **ends) + layers
     stops = _at(study, [stop["at_m"] for stop in _stops(study)])
     if not stops.is_empty():
         layers += (
@@ -140,6 +146,15 @@ def _classes(target_m: float) -> list[str]:
         f"to {ends[1]} m, the target",
         f"to {ends[2]} m",
         f"above {ends[2]} m",
+    ]
+
+
+def _walls(study: Study) -> list[dict[str, float]]:
+    site = json.loads(study.believed.scenario.site.to_json())
+    return [
+        {"x_m": x_m, "y_m": y_m, "x2_m": x2_m, "y2_m": y2_m}
+        for wall in site.get("walls", ())
+        for (x_m, y_m), (x2_m, y2_m) in itertools.pairwise(wall["points_m"])
     ]
 
 

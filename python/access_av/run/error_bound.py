@@ -162,6 +162,7 @@ def _heads(core: _core.Bound, settings: list[dict[str, Any]], route: pl.DataFram
     for number, (head, snr_db) in enumerate(zip(settings, snrs_db, strict=True), start=1):
         head_x_m, head_y_m, _ = head["position_m"]
         distance_m = np.hypot(x_m - head_x_m, y_m - head_y_m)
+        in_sight_db = snr_db[np.isfinite(snr_db)]
         rows.append(
             {
                 "name": head["name"] or f"head {number}",
@@ -171,8 +172,8 @@ def _heads(core: _core.Bound, settings: list[dict[str, Any]], route: pl.DataFram
                 "y_m": float(head_y_m),
                 "nearest_m": float(distance_m.min()),
                 "farthest_m": float(distance_m.max()),
-                "least_expected_snr_db": float(snr_db.min()),
-                "most_expected_snr_db": float(snr_db.max()),
+                "least_expected_snr_db": float(in_sight_db.min()) if in_sight_db.size else None,
+                "most_expected_snr_db": float(in_sight_db.max()) if in_sight_db.size else None,
                 "visible_share": float((snr_db >= VISIBLE_SNR_DB).mean()),
             }
         )

@@ -1,10 +1,10 @@
-"""What a file of a plant holds: a road, radio heads; and what of it cannot be."""
+"""What a file of a plant holds: a road, radio heads, walls; and what of it cannot be."""
 
 from __future__ import annotations
 
 import itertools
 import math
-from dataclasses import dataclass, field
+from dataclasses import dataclass
 from typing import TYPE_CHECKING
 
 from access_av.errors import InputError
@@ -62,25 +62,24 @@ class Drawn:
         Lines and arcs that join without a kink.
     heads
         Radio heads.
+    walls_m
+        Corners of each wall.
     """
 
     road_m: Sequence[tuple[float, float]] = ()
     start: tuple[float, float, float] = (0.0, 0.0, 0.0)
     segments: Sequence[Segment] = ()
-    heads: Sequence[Head] = field(default_factory=tuple)
-
-    def joined(self, other: Drawn) -> Drawn:
-        """Road of one file, radio heads of another."""
-        return Drawn(self.road_m, self.start, self.segments, (*self.heads, *other.heads))
+    heads: Sequence[Head] = ()
+    walls_m: Sequence[Sequence[tuple[float, float]]] = ()
 
 
-def checked(drawn: Drawn, road_file: str, heads_file: str) -> Drawn:
+def checked(drawn: Drawn, road_file: str, heads_file: str, walls_file: str) -> Drawn:
     """Refuse what is no plant, and name the file.
 
     Raises
     ------
     InputError
-        For a road too short or too long, and radio heads kilometres from it.
+        For a road too short or too long, and radio heads or walls kilometres from it.
     """
     points = list(drawn.road_m)
     length_m = math.fsum(it.length_m for it in drawn.segments) or math.fsum(
@@ -93,12 +92,18 @@ def checked(drawn: Drawn, road_file: str, heads_file: str) -> Drawn:
         )
     near = points or [drawn.start[:2]]
     reach_m = FARTHEST_HEAD_M + (length_m if drawn.segments else 0.0)
-    for head in drawn.heads:
-        away_m = min(math.dist((head.x_m, head.y_m), point) for point in near)
+    heads = ((f"radio head {it.name or '(no name)'!r}", (it.x_m, it.y_m)) for it in drawn.heads)
+    walls = (("a wall", wall[0]) for wall in drawn.walls_m)
+    placed = itertools.chain(
+        zip(itertools.repeat(heads_file), heads, strict=False),
+        zip(itertools.repeat(walls_file), walls, strict=False),
+    )
+    for file, (what, at) in placed:
+        away_m = min(math.dist(at, point) for point in near)
         if (points or drawn.segments) and away_m > reach_m:
             raise InputError(
-                f"{heads_file}: radio head {head.name or '(no name)'!r} at ({head.x_m:.0f}, "
-                f"{head.y_m:.0f}) m is {away_m / 1000.0:,.0f} km from the road; at most "
+                f"{file}: {what} at ({at[0]:.0f}, {at[1]:.0f}) m is "
+                f"{away_m / 1000.0:,.0f} km from the road; at most "
                 f"{FARTHEST_HEAD_M / 1000.0:g} km are allowed: both files must be of one place, in "
                 "one system and unit"
             )

@@ -1,4 +1,4 @@
-"""Roads and radio heads in DXF drawings (extra ``cad``): layers are chosen, the scale confirmed."""
+"""Roads, radio heads, walls in DXF (extra ``cad``): layers are chosen, the scale confirmed."""
 
 from __future__ import annotations
 
@@ -24,6 +24,8 @@ UNITS = {
 }
 # Directions of two segments that meet, nearer than this, make no corner (rad).
 SMOOTH_RAD = 1e-3
+# Round walls become straight ones that leave them by no more.
+SAGITTA_M = 0.05
 
 
 def metres_per_unit(points: tuple[float, float, float, float], length_m: float) -> float:
@@ -45,9 +47,10 @@ def read(
     *,
     road_layer: str | None = None,
     heads_layer: str | None = None,
+    walls_layer: str | None = None,
     scale_m: float | None = None,
 ) -> Drawn:
-    """Read a polyline as the road, and points or block references as radio heads.
+    """Read a polyline as the road, points or block references as radio heads, lines as walls.
 
     Arcs of a polyline that join its lines without a kink stay what they are; elsewhere its corners
     become points. A radio head's name is the block's attribute ``NAME``, or the block's own name.
@@ -56,8 +59,8 @@ def read(
     ----------
     path
         The drawing.
-    road_layer, heads_layer
-        Layers; ``None`` for neither.
+    road_layer, heads_layer, walls_layer
+        Layers; ``None`` for none.
     scale_m
         Metres of a unit of the drawing. What the drawing itself says is often wrong and has to be
         confirmed.
@@ -71,6 +74,7 @@ def read(
     try:
         from ezdxf.filemanagement import readfile
         from ezdxf.lldxf.const import DXFError
+        from ezdxf.path import make_path
     except ImportError as error:
         raise InputError(f"{path}: DXF needs the extra: pip install 'access-av[cad]'") from error
     try:
@@ -98,7 +102,20 @@ def read(
         vertices = _vertices(found[0], scale_m)
         start, segments, points = _shape(path, vertices)
     heads = [] if heads_layer is None else _heads(path, model, heads_layer, scale_m, layers)
-    return Drawn(road_m=points, start=start, segments=segments, heads=heads)
+    walls = [
+        [
+            (scale_m * it.x, scale_m * it.y)
+            for it in make_path(entity).flattening(SAGITTA_M / scale_m)
+        ]
+        for entity in model.query("LINE LWPOLYLINE POLYLINE ARC CIRCLE")
+        if entity.dxf.layer == walls_layer
+    ]
+    if walls_layer is not None and not walls:
+        raise InputError(
+            f"{path}: layer {walls_layer!r} holds no lines, polylines or arcs; walls are such. "
+            f"Layers: {', '.join(map(repr, layers))}"
+        )
+    return Drawn(points, start, segments, heads, walls)
 
 
 def _unconfirmed(drawing: Any) -> str:

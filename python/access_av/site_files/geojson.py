@@ -1,7 +1,8 @@
-"""Roads and radio heads in GeoJSON: longitude and latitude, or metres where the file says so."""
+"""Roads, radio heads, walls in GeoJSON: degrees, or metres where the file says so."""
 
 from __future__ import annotations
 
+import itertools
 import json
 import math
 from typing import TYPE_CHECKING, Any
@@ -22,6 +23,55 @@ IN_DEGREES = ("CRS84", "4326", "4258", "4979")
 METRES_NAME = "urn:ogc:def:crs:OGC::Engineering"
 
 Origin = tuple[float, float]
+
+
+def read_walls(path: Path, origin: Origin | None, *, beside_road: bool) -> Drawn:
+    """Read every ``LineString``, and the rings of every ``Polygon``, as walls.
+
+    Parameters
+    ----------
+    path
+        The file.
+    origin
+        As of :func:`read`.
+    beside_road
+        Whether the first ``LineString`` is the road.
+
+    Raises
+    ------
+    InputError
+        When it is no GeoJSON, holds none, or its coordinates cannot be those of a plant.
+    """
+    held = _held(path)
+    shapes = [(geometry, where) for geometry, _, where in _shapes(held)]
+    lines = [(_list(it), where) for it, where in shapes if it["type"] == "LineString"]
+    rings = [(ring, where) for it, where in shapes if it["type"] == "Polygon" for ring in _list(it)]
+    walls = [
+        [_numbers(path, at, where) for at in line]
+        for line, where in (*lines[beside_road:], *rings)
+        if isinstance(line, list)
+    ]
+    walls = [wall for wall in walls if len(wall) > 1]
+    if not walls:
+        raise InputError(f"{path}: neither a LineString nor a Polygon (a wall) is in it")
+    if not _in_metres(held):
+        for at in itertools.chain(*walls):
+            _check_degrees(path, at)
+        zero = origin or (walls[0][0][1], walls[0][0][0])
+        walls = [[_to_metres(at, zero) for at in wall] for wall in walls]
+    return Drawn(walls_m=[[(at[0], at[1]) for at in wall] for wall in walls])
+
+
+def is_in_degrees(path: Path) -> bool:
+    """Whether a file's coordinates are longitude and latitude."""
+    return not _in_metres(_held(path))
+
+
+def _held(path: Path) -> Any:
+    try:
+        return json.loads(regular(path, MOST_BYTES).read_text(encoding="utf-8-sig"))
+    except (ValueError, RecursionError) as error:
+        raise InputError(f"{path}: not GeoJSON: {error}") from error
 
 
 def read(path: Path, origin: Origin | None = None) -> tuple[Drawn, Origin | None]:
@@ -48,10 +98,7 @@ def read(path: Path, origin: Origin | None = None) -> tuple[Drawn, Origin | None
     InputError
         When it is no GeoJSON, holds neither, or its coordinates cannot be those of a plant.
     """
-    try:
-        held = json.loads(regular(path, MOST_BYTES).read_text(encoding="utf-8-sig"))
-    except (ValueError, RecursionError) as error:
-        raise InputError(f"{path}: not GeoJSON: {error}") from error
+    held = _held(path)
     shapes = list(_shapes(held))
     lines = [(geometry, where) for geometry, _, where in shapes if geometry["type"] == "LineString"]
     points = [it for it in shapes if it[0]["type"] == "Point"]
@@ -162,7 +209,7 @@ def _head(path: Path, at: Sequence[float], properties: dict[str, Any], where: st
 
 
 def text(drawn: Drawn, origin: Origin | None) -> str:
-    """A road and radio heads as GeoJSON.
+    """A road, radio heads and walls as GeoJSON.
 
     Parameters
     ----------
@@ -186,6 +233,8 @@ def text(drawn: Drawn, origin: Origin | None) -> str:
     if drawn.road_m:
         line = [place(*at) for at in drawn.road_m]
         features.append(_feature("LineString", line, {"name": "road"}))
+    for wall in drawn.walls_m:
+        features.append(_feature("LineString", [place(*at) for at in wall], {"name": "wall"}))
     for head in drawn.heads:
         properties: dict[str, Any] = {"name": head.name, "height_m": head.z_m}
         if head.pci is not None:

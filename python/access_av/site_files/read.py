@@ -1,9 +1,9 @@
-"""A plant's road and radio heads out of the files that it has, each by its ending."""
+"""A plant's road, radio heads and walls out of the files that it has, each by its ending."""
 
 from __future__ import annotations
 
 import json
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 from typing import TYPE_CHECKING
 
 import numpy as np
@@ -31,7 +31,7 @@ class Options:
     ----------
     origin
         Latitude and longitude of the map's zero, of GeoJSON in degrees.
-    road_layer, heads_layer
+    road_layer, heads_layer, walls_layer
         Layers of a DXF drawing.
     scale_m
         Metres of a unit of it, confirmed.
@@ -40,11 +40,14 @@ class Options:
     origin: Origin | None = None
     road_layer: str = "ROAD"
     heads_layer: str = "HEADS"
+    walls_layer: str = "WALLS"
     scale_m: float | None = None
 
 
-def read(road: Path | None, heads: Path | None, options: Options) -> Drawn:
-    """Road and radio heads, in one frame.
+def read(
+    road: Path | None, heads: Path | None, options: Options, walls: Path | None = None
+) -> Drawn:
+    """Road, radio heads and walls, in one frame.
 
     Raises
     ------
@@ -59,20 +62,26 @@ def read(road: Path | None, heads: Path | None, options: Options) -> Drawn:
         origin = found or origin
         if not drawn.road_m and not drawn.segments:
             raise InputError(f"{road}: no road is in it")
+    for file in filter(None, (heads, walls)):
+        in_metres = road is not None and not in_degrees and options.origin is None
+        if in_metres and _ending(file) == "geojson" and geojson.is_in_degrees(file):
+            raise InputError(
+                f"{file}: in degrees, and {road} in metres: say where the metres’ zero is, "
+                "--origin LATITUDE,LONGITUDE"
+            )
     if heads is not None:
-        is_geojson = _ending(heads) == "geojson"
-        if road is not None and is_geojson and not in_degrees and options.origin is None:
-            _, degrees = geojson.read(heads)
-            if degrees is not None:
-                raise InputError(
-                    f"{heads}: in degrees, and {road} in metres: say where the metres’ zero is, "
-                    "--origin LATITUDE,LONGITUDE"
-                )
-        held, _ = _read(heads, "heads", options, origin)
+        held, found = _read(heads, "heads", options, origin)
+        origin = found or origin
         if not held.heads:
             raise InputError(f"{heads}: no radio head is in it")
-        drawn = Drawn(drawn.road_m, drawn.start, drawn.segments, held.heads)
-    return checked(drawn, str(road), str(heads if heads is not None else road))
+        drawn = replace(drawn, heads=held.heads)
+    if walls is not None:
+        if _ending(walls) == "geojson":
+            held = geojson.read_walls(walls, origin, beside_road=walls == road)
+        else:
+            held, _ = _read(walls, "walls", options, origin)
+        drawn = replace(drawn, walls_m=held.walls_m)
+    return checked(drawn, str(road), str(heads or road), str(walls))
 
 
 def _ending(path: Path) -> str:
@@ -87,17 +96,12 @@ def _read(
     if ending == "geojson":
         return geojson.read(path, origin)
     if ending == "dxf":
-        is_road = what == "road"
-        drawn = dxf.read(
-            path,
-            road_layer=options.road_layer if is_road else None,
-            heads_layer=None if is_road else options.heads_layer,
-            scale_m=options.scale_m,
-        )
-        return drawn, None
-    if ending == "csv":
+        layer = {f"{what}_layer": getattr(options, f"{what}_layer")}
+        return dxf.read(path, **layer, scale_m=options.scale_m), None
+    if ending == "csv" and what != "walls":
         return (csv_file.read_road if what == "road" else csv_file.read_heads)(path), None
-    raise InputError(f"{path}: its name must end in .csv, .geojson, .json or .dxf")
+    csv = "" if what == "walls" else ".csv, "
+    raise InputError(f"{path}: its name must end in {csv}.geojson, .json or .dxf")
 
 
 def of_site(site: _core.Site) -> Drawn:
@@ -115,8 +119,9 @@ def of_site(site: _core.Site) -> Drawn:
         for one in settings["radio_heads"]
         for x_m, y_m, z_m in [one["position_m"]]
     ]
+    walls = [[(x_m, y_m) for x_m, y_m in it["points_m"]] for it in settings.get("walls", ())]
     if settings.get("road") is None:
-        return Drawn(heads=heads)
+        return Drawn(heads=heads, walls_m=walls)
     scenario = _core.Scenario.from_toml('name = "road"\nsite = "yard"\nvehicle = "tugger"\n')
     slow = {"site": settings, "motion.top_speed_kmh": 10.0, "motion.acceleration_mps2": 20.0}
     route = along_route(scenario.with_overrides(slow))
@@ -125,4 +130,4 @@ def of_site(site: _core.Site) -> Drawn:
     kept = np.concatenate([[True], np.diff(step) > 0.0])
     kept[-1] = True
     points = list(zip(x_m[kept].tolist(), y_m[kept].tolist(), strict=True))
-    return Drawn(road_m=points, heads=heads)
+    return Drawn(road_m=points, heads=heads, walls_m=walls)

@@ -18,6 +18,7 @@ HEAD = "position_std_m = 0.1\n{cell}eirp_dbm = 10.0 # to be looked up\neirp_std_
 SSB_INDICES = 8  # of a burst at most carriers below 6 GHz (TS 38.213, 4.1)
 FIRST_PCI = 21
 EXAMPLE_STOP_M = 320.0
+WALL_POINTS = 100  # of a table (settings/walls.rs)
 
 
 def new(kind: str, name: str, file: str, drawn: Drawn | None = None) -> str:
@@ -32,7 +33,7 @@ def new(kind: str, name: str, file: str, drawn: Drawn | None = None) -> str:
     file
         What the file is called, for the commands that its comments name.
     drawn
-        Road and radio heads in place of the example's, of a plant or a site.
+        Road, radio heads and walls in place of the example's, of a plant or a site.
     """
     prefix = "site." if kind == "plant" else ""
     example = Template(_read("example_site.toml")).substitute(prefix=prefix)
@@ -44,7 +45,8 @@ def new(kind: str, name: str, file: str, drawn: Drawn | None = None) -> str:
         stop_m = round(0.5 * _length_m(drawn), 1)
     if drawn is not None and drawn.heads:
         heads = _heads(drawn, prefix)
-    site = f"{road.rstrip()}\n\n{heads.rstrip()}\n"
+    walls = "" if drawn is None else _walls(drawn, prefix)
+    site = f"{road.rstrip()}\n\n{heads.rstrip()}\n{walls}"
     return Template(_read(f"{kind}.toml")).substitute(
         name=name, file=file, site=site, stop_m=f"{stop_m:.1f}"
     )
@@ -77,6 +79,17 @@ def _road(drawn: Drawn, prefix: str) -> str:
             "]",
         ]
     return "\n".join(lines)
+
+
+def _walls(drawn: Drawn, prefix: str) -> str:
+    """Tables of walls; long ones in pieces of as many corners as a table may have."""
+    made = ""
+    for wall in drawn.walls_m:
+        for first in range(0, len(wall) - 1, WALL_POINTS - 1):
+            corners = wall[first : first + WALL_POINTS]
+            points = ", ".join(f"[{x_m:.4f}, {y_m:.4f}]" for x_m, y_m in corners)
+            made += f"\n[[{prefix}walls]] # loss_db: that of concrete\npoints_m = [{points}]\n"
+    return made
 
 
 def _heads(drawn: Drawn, prefix: str) -> str:

@@ -106,7 +106,10 @@ def by_place(driven: Driven, percent: float, error_m: float) -> pl.DataFrame:
             "heads_visible": visible.sum(axis=0),
             "best_snr_db": snr_db.max(axis=0),
         }
-    ).with_columns(pl.col("dilution_of_degree_m").fill_nan(None))
+    ).with_columns(
+        pl.col("dilution_of_degree_m").fill_nan(None),
+        pl.col("best_snr_db").replace(-math.inf, None),  # every radio head is behind walls
+    )
 
 
 def _rising(along_m: NDArray[Any], values: NDArray[Any]) -> tuple[NDArray[Any], NDArray[Any]]:
@@ -157,7 +160,7 @@ def worst_places(places: pl.DataFrame, stops_m: list[float]) -> list[WorstPlace]
 def _why(row: Mapping[str, Any], places: pl.DataFrame, stops_m: list[float]) -> str:
     """What is particular about a place: of several reasons the weightiest."""
     if not row["heads_visible"]:
-        return "no radio head is in reach: the odometer is alone"
+        return "no radio head is in reach and in sight: the odometer is alone"
     if row["along_m"] < STARTING_M:
         return "just set off: the vehicle knows its place mostly from what it is told at the start"
     if row["dilution_of_degree_m"] is None:

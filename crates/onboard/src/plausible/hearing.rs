@@ -7,6 +7,7 @@ use crate::link_budget::LinkBudget;
 use crate::radio_head::RadioHead;
 use crate::road::Road;
 use crate::settings::{Site, Vehicle};
+use crate::walls::Walls;
 
 /// An SSB is found down to so much above noise, or above what else is on the air at its time, with
 /// four antennas (dB; `cargo test -p nr-ssb --test all detection`).
@@ -70,6 +71,7 @@ struct Air {
     /// Their numbers in the site.
     numbers: Vec<usize>,
     budget: LinkBudget,
+    walls: Walls,
     array_m: f64,
 }
 
@@ -84,6 +86,7 @@ impl Air {
             heads,
             numbers,
             budget: LinkBudget::new(site, vehicle),
+            walls: Walls::new(site),
             array_m: vehicle.array.position_m[2],
         }
     }
@@ -98,34 +101,49 @@ impl Air {
 
     fn snr_db(&self, head: &RadioHead, place: Point) -> f64 {
         let distance_m = head.distance_m(place, self.array_m).max(NEAREST_M);
-        self.budget.snr_db(head, distance_m)
+        let seen = self.walls.seen(head, place);
+        seen.map_or(f64::NEG_INFINITY, |head| {
+            self.budget.snr_db(&head, distance_m)
+        })
+    }
+
+    fn hidden(&self, head: &RadioHead, places: &[Point]) -> bool {
+        let mut others = places.iter().filter(|place| **place != head.position);
+        !self.walls.is_empty() && !others.any(|place| self.walls.seen(head, *place).is_some())
     }
 
     fn unheard(&self, places: &[Point], where_: &str) -> Vec<Warning> {
-        let heads = self.heads.iter().zip(&self.numbers);
-        heads
-            .filter_map(|(head, number)| {
-                let others = places.iter().filter(|place| **place != head.position);
-                let distance_m = others
-                    .map(|place| head.distance_m(*place, self.array_m))
-                    .reduce(f64::min)?
-                    .max(NEAREST_M);
-                let snr_db = self.budget.snr_db(head, distance_m);
-                (snr_db < FOUND_DB).then(|| Warning {
-                    key: format!("radio_heads[{number}].position_m"),
-                    value: format!("[{}, {}]", head.position.x_m, head.position.y_m),
-                    why: format!(
-                        "it is heard nowhere {where_}: {distance_m:.0} m away at the nearest, its \
+        let heads = || self.heads.iter().zip(&self.numbers);
+        let hidden = heads().filter(|(head, _)| self.hidden(head, places));
+        let hidden = hidden.map(|(head, number)| Warning {
+            key: format!("radio_heads[{number}].position_m"),
+            value: format!("[{}, {}]", head.position.x_m, head.position.y_m),
+            why: format!("walls keep it out of sight everywhere {where_}"),
+            write: "write its place, and the walls' points_m, in one frame; leave doors out"
+                .to_owned(),
+        });
+        let far = heads().filter_map(|(head, number)| {
+            let others = places.iter().filter(|place| **place != head.position);
+            let distance_m = others
+                .map(|place| head.distance_m(*place, self.array_m))
+                .reduce(f64::min)?
+                .max(NEAREST_M);
+            let snr_db = self.budget.snr_db(head, distance_m);
+            (snr_db < FOUND_DB).then(|| Warning {
+                key: format!("radio_heads[{number}].position_m"),
+                value: format!("[{}, {}]", head.position.x_m, head.position.y_m),
+                why: format!(
+                    "it is heard nowhere {where_}: {distance_m:.0} m away at the nearest, its \
                          SNR is {snr_db:.0} dB at best, and an SSB is found down to {FOUND_DB} dB"
-                    ),
-                    write: format!(
-                        "write all places in metres in one frame (no degrees, no grid of a map), or \
+                ),
+                write: format!(
+                    "write all places in metres in one frame (no degrees, no grid of a map), or \
                          an eirp_dbm that reaches: now {}",
-                        head.eirp_dbm
-                    ),
-                })
+                    head.eirp_dbm
+                ),
             })
-            .collect()
+        });
+        far.chain(hidden).collect()
     }
 
     fn drowned(&self, site: &Site, places: &[Point]) -> Vec<Warning> {

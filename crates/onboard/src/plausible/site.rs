@@ -4,7 +4,7 @@ use std::f64::consts::TAU;
 
 use super::usual::{Usual, as_degrees, as_millimetres, rounded, unusual};
 use super::warning::Warning;
-use crate::geometry::Point;
+use crate::geometry::{Point, cross};
 use crate::road::Road;
 use crate::settings::Site;
 
@@ -83,6 +83,9 @@ const LOCAL_M: f64 = 1e5;
 const DEGREES: f64 = 0.3;
 /// Nearer than antennas of one mast stand to each other (m).
 const SAME_PLACE_M: f64 = 0.05;
+/// A road is followed in steps of so much, and at most so many (m).
+const STEP_M: f64 = 1.0;
+const MOST_STEPS: f64 = 2000.0;
 /// No bend of a vehicle's road is as narrow (m).
 const LEAST_RADIUS_M: f64 = 0.3;
 
@@ -94,6 +97,7 @@ pub(super) fn written(site: &Site, road: Option<&Road>) -> Vec<Warning> {
     found.extend(indices(site));
     found.extend(twins(site));
     found.extend(bends(site));
+    found.extend(road.into_iter().flat_map(|road| across(site, road)));
     found
 }
 
@@ -244,6 +248,38 @@ fn bends(site: &Site) -> Vec<Warning> {
                 it.length_m / it.turn_rad.abs()
             ),
             write: as_degrees(it.turn_rad),
+        })
+        .collect()
+}
+
+/// Walls that stand across the road.
+fn across(site: &Site, road: &Road) -> Vec<Warning> {
+    if site.walls.is_empty() {
+        return Vec::new();
+    }
+    let steps = (road.length_m() / STEP_M).ceil().clamp(1.0, MOST_STEPS);
+    let way: Vec<(f64, Point)> = (0..=steps as usize)
+        .map(|step| road.length_m() * step as f64 / steps)
+        .map(|along_m| (along_m, road.pose(along_m).point()))
+        .collect();
+    let blocked_m = |ends: &[[f64; 2]]| {
+        let wall = [ends[0].into(), ends[1].into()];
+        let mut steps = way.windows(2);
+        steps
+            .find(|step| cross(wall, [step[0].1, step[1].1]))
+            .map(|step| step[0].0)
+    };
+    let walls = site.walls.iter().enumerate();
+    walls
+        .filter_map(|(index, wall)| {
+            let along_m = wall.points_m.windows(2).find_map(blocked_m)?;
+            Some(Warning {
+                key: format!("walls[{index}].points_m"),
+                value: format!("a wall of {} points", wall.points_m.len()),
+                why: format!("it stands across the road, {along_m:.0} m along it"),
+                write: "write it in the frame of the road, and as two walls beside a door"
+                    .to_owned(),
+            })
         })
         .collect()
 }

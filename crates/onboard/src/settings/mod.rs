@@ -28,6 +28,7 @@ mod start;
 mod toml_file;
 mod vehicle;
 mod wake_up;
+mod walls;
 
 pub use array::ArraySettings;
 pub use array_shape::{ArrayShape, MeasuredShape};
@@ -53,3 +54,4 @@ pub use wake_up::{
     DeltaT, DueSettings, FixedSettings, GatedSettings, PidSettings, SensingMode, ServingSsb,
     SnrSetPoint, UncertaintySettings, WakeUpSettings,
 };
+pub use walls::WallSettings;

@@ -11,6 +11,7 @@ use super::error::SettingsError;
 use super::radio::{RadioHeadSettings, SsbSettings};
 use super::road::RoadSettings;
 use super::toml_file::{Library, TomlFile};
+use super::walls::WallSettings;
 use crate::geometry::Point;
 use crate::road::Road;
 
@@ -40,6 +41,10 @@ pub struct Site {
     /// The radio heads.
     #[schemars(length(min = 1, max = 1000))]
     pub radio_heads: Vec<RadioHeadSettings>,
+    /// Walls in lines of sight.
+    #[serde(default, skip_serializing_if = "Vec::is_empty")]
+    #[schemars(length(max = 1000))]
+    pub walls: Vec<WallSettings>,
 }
 
 const fn mid_band() -> f64 {

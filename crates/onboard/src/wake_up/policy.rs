@@ -23,7 +23,7 @@ pub struct Situation<'a> {
     pub speed_mps: f64,
     /// The localizer, which knows where the vehicle is and, if it is the tracker, how well.
     pub localizer: &'a dyn Localizer,
-    /// The radio heads of the site.
+    /// The radio heads of the site that are in sight, with the power that walls leave of theirs.
     pub heads: &'a [RadioHead],
     /// What their SSBs should be received with.
     pub budget: &'a LinkBudget,
@@ -32,7 +32,7 @@ pub struct Situation<'a> {
 }
 
 impl Situation<'_> {
-    /// The radio head that sends an SSB, if the site has it.
+    /// The radio head that sends an SSB, if the site has it and it is in sight.
     pub fn head(&self, ssb: &SensedSsb) -> Option<&RadioHead> {
         let mut heads = self.heads.iter();
         heads.find(|head| head.sends(ssb.pci, ssb.ssb_index))

@@ -1,10 +1,13 @@
-//! What stands in the line of sight for a while and moves on.
+//! What stands in the line of sight: walls, and what moves on after a while.
 
+use onboard::geometry::Point;
+use onboard::walls::Walls;
 use rand::RngExt;
 
 use super::propagation::Link;
 use crate::random::Purpose;
 use crate::scenario::BlockageSettings;
+use crate::world::LineOfSight;
 
 /// When the line of sight of a link is blocked: a Poisson process in time, each blocker staying
 /// exponentially long.
@@ -13,15 +16,21 @@ pub struct Blockage {
     /// From when until when, in seconds; in order of their beginnings.
     times_s: Vec<[f64; 2]>,
     amplitude: f64,
+    walls: Walls,
+    head: Point,
 }
 
 impl Blockage {
     /// The blockage of a link.
     pub fn new(settings: Option<BlockageSettings>, link: &Link<'_>) -> Self {
+        let (walls, head) = (Walls::new(link.site), link.radio_head());
+        let head = head.map_or_else(Point::default, |head| head.position);
         let Some(settings) = settings else {
             return Self {
                 times_s: Vec::new(),
                 amplitude: 1.0,
+                walls,
+                head,
             };
         };
         let mut rng = link.streams.generator(Purpose::Blockage, link.head);
@@ -36,11 +45,18 @@ impl Blockage {
         Self {
             times_s,
             amplitude: 10f64.powf(-0.05 * settings.loss_db),
+            walls,
+            head,
         }
     }
 
     /// What is left of the line of sight's amplitude.
-    pub fn amplitude(&self, time_s: f64) -> f64 {
+    pub fn amplitude(&self, sight: &LineOfSight) -> f64 {
+        self.moving(sight.time_s) * self.walls.passing(self.head, sight.place).sqrt()
+    }
+
+    /// The same without the walls.
+    pub fn moving(&self, time_s: f64) -> f64 {
         let begun = self
             .times_s
             .partition_point(|[from_s, _]| *from_s <= time_s);

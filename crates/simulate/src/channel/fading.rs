@@ -109,7 +109,7 @@ impl Propagation for RicianPropagation {
     ) {
         let elements = antennas.elements();
         let turn = -self.wavenumber_per_m * sight.distance_m;
-        let passing = self.blockage.amplitude(sight.time_s);
+        let passing = self.blockage.amplitude(sight);
         let direct = Complex64::from_polar(self.line_of_sight * passing, turn);
         into.fill(Complex64::ZERO);
         for gains in into.chunks_exact_mut(elements) {

@@ -19,7 +19,7 @@ pub struct TruthSettings {
     /// By what every standard deviation is multiplied that is drawn from.
     #[schemars(range(min = 0.0, max = 1000.0))]
     pub std_factor: f64,
-    /// What of the site is otherwise: `road`, `radio_heads`, `rician_k_db`.
+    /// What of the site is otherwise: `road`, `radio_heads`, `rician_k_db`, `walls`.
     #[serde(skip_serializing_if = "Table::is_empty")]
     #[schemars(with = "serde_json::Map<String, serde_json::Value>")]
     pub site: Table,
@@ -53,7 +53,7 @@ impl Default for TruthSettings {
 }
 
 /// What of a site and of a vehicle is a fact of the world; the rest is how the vehicle is set.
-const SITE_FACTS: [&str; 3] = ["road", "radio_heads", "rician_k_db"];
+const SITE_FACTS: [&str; 4] = ["road", "radio_heads", "rician_k_db", "walls"];
 const VEHICLE_FACTS: [&str; 7] = [
     "array",
     "odometer",
@@ -165,6 +165,8 @@ fn believed_in(
     for (key, value) in over {
         let path = format!("{path}.{key}");
         match (base.get(key), value) {
+            // A wall may stand where nobody has told of one.
+            (None, Value::Array(_)) if key == "walls" => {}
             (None, _) => {
                 return Err(check.error(&path, "given", "nothing believes in such a thing"));
             }

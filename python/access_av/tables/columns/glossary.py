@@ -227,8 +227,14 @@ _GLOSSARY = {
     "odometer_scale_std": ("1", "Least root mean square of the error of the odometer's scale"),
     "nearest_m": ("m", "Least distance from the route"),
     "farthest_m": ("m", "Largest distance from the route"),
-    "least_expected_snr_db": ("dB", "Least SNR on the route by the link budget alone"),
-    "most_expected_snr_db": ("dB", "Largest SNR on the route by the link budget alone"),
+    "least_expected_snr_db": (
+        "dB",
+        "Least SNR on the route, where it is in sight, by the link budget alone",
+    ),
+    "most_expected_snr_db": (
+        "dB",
+        "Largest SNR on the route, where it is in sight, by the link budget alone",
+    ),
     "visible_share": ("1", "Share of the route's SSBs that 3GPP wants detected (−6 dB or more)"),
     # Operating points and claims.
     "reading": ("text", "Name of the reading of the paper"),

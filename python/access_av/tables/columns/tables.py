@@ -263,6 +263,10 @@ TABLES: Mapping[str, Table] = {
                 "name", "pci", "ssb_index", "x_m", "y_m", "nearest_m", "farthest_m",
                 "least_expected_snr_db", "most_expected_snr_db", "visible_share",
             ),
+            dict.fromkeys(
+                ("least_expected_snr_db", "most_expected_snr_db"),
+                "walls keep it out of sight all along",
+            ),
         ),
         Table(
             "operating_points",
@@ -303,7 +307,11 @@ TABLES: Mapping[str, Table] = {
                 "along_m", "x_m", "y_m", "median_error_m", "target_error_m", "within_share",
                 "passes", "bound_m", "dilution_of_degree_m", "heads_visible", "best_snr_db",
             ),
-            {"dilution_of_degree_m": "no radio head in reach tells of the distance along the road"},
+            {
+                "dilution_of_degree_m": "no radio head in reach tells of the distance along the "
+                "road",
+                "best_snr_db": "walls keep every radio head out of sight",
+            },
         ),
         Table(
             "study_points",

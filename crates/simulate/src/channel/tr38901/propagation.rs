@@ -140,7 +140,7 @@ impl Propagation for Tr38901Propagation {
         let elements = antennas.elements();
         let mix = self.mix(sight);
         let turn = phasor(-self.wavenumber_per_m * sight.distance_m);
-        let direct = turn * mix.direct * self.blockage.amplitude(sight.time_s);
+        let direct = turn * mix.direct * self.blockage.amplitude(sight);
         into.fill(Complex64::ZERO);
         for gains in into.chunks_exact_mut(elements) {
             antennas.add(direct, sight.towards, gains);

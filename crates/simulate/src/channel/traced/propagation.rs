@@ -68,7 +68,8 @@ impl Propagation for TracedPropagation {
             return;
         };
         let scale = power(paths).sqrt().recip();
-        let passing = self.blockage.amplitude(sight.time_s);
+        // Its walls are in the paths already.
+        let passing = self.blockage.moving(sight.time_s);
         let (sin, cos) = sight.axis_rad.sin_cos();
         let [x, y] = [east_m, north_m].map(|part_m| self.wavenumber_per_m * part_m);
         let first_hz = -((into.len() / elements / 2) as f64) * step_hz;

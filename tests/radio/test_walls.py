@@ -1,0 +1,123 @@
+"""A wall hides a radio head: from the channel, the wake-up and the bound alike."""
+
+from __future__ import annotations
+
+import json
+from typing import TYPE_CHECKING, Any
+
+import numpy as np
+import polars as pl
+import pytest
+
+from access_av import Plant, Scenario, SettingsError, simulate
+from access_av._core import Bound, Site
+from access_av.run.error_bound import along_route, bound
+
+if TYPE_CHECKING:
+    from collections.abc import Sequence
+
+# Between the straight of 200 m and the first radio head, at (60, 25).
+WALL = {"points_m": [[40.0, 10.0], [80.0, 10.0]]}
+GATE_PCI = 21
+
+
+def trip(**more: Any) -> Scenario:
+    """The first 150 m or so of the plant with bends."""
+    scenario = Plant.load("bends").scenario()
+    every_ssb = {"policy": "fixed", "interval_ms": 20.0}
+    return scenario.with_overrides({"motion.stops": [], "vehicle.wake_up": every_ssb, **more})
+
+
+GATE_M = (60.0, 25.0)
+
+
+def hidden(x_m: Any, head_m: Sequence[float] = GATE_M) -> Any:
+    """Whether the wall is between a place on the straight (y = 0) and a radio head."""
+    crossing_m = x_m + 10.0 / head_m[1] * (head_m[0] - x_m)  # where the line is at y = 10
+    return np.abs(crossing_m - 60.0) <= 20.0
+
+
+@pytest.fixture(scope="module")
+def walled() -> Scenario:
+    return trip(**{"site.walls": [WALL]})
+
+
+def test_no_angle_is_taken_through_a_wall(walled: Scenario) -> None:
+    found = simulate(walled, runs=1, seed=3, keep_trajectories=True)
+    assert found.executions is not None
+    assert found.trajectories is not None
+    places = found.trajectories.select("time_s", "true_x_m").sort("time_s")
+    taken = found.executions.filter(pci=GATE_PCI).sort("time_s")
+    taken = taken.join_asof(places, on="time_s", strategy="nearest")
+    straight = taken.filter(pl.col("true_x_m") < 190.0)["true_x_m"].to_numpy()
+    assert len(straight) > 100
+    # It knows its place to a metre or so, and its array is not where it counts its place.
+    assert not hidden(straight[(straight > 30.0) & (straight < 90.0)]).any()
+
+
+def test_the_channel_loses_the_direct_wave_behind_it() -> None:
+    """Where nobody told the vehicle of the wall, it hears the radio head weakly, and errs."""
+    as_told = {"truth.draw": "none", "site.rician_k_db": 60.0}
+    open_air = trip(**as_told)
+    behind = trip(**as_told, **{"truth.site.walls": [WALL]})
+    assert behind.resolved() != open_air.resolved()
+    levels = {}
+    for name, scenario in (("open", open_air), ("behind", behind)):
+        found = simulate(scenario, runs=1, seed=3, keep_trajectories=True)
+        assert found.executions is not None
+        levels[name] = found.executions.filter(pci=GATE_PCI).select("time_s", "snr_db")
+    both = levels["open"].join(levels["behind"], on="time_s", suffix="_behind")
+    lost_db = (both["snr_db"] - both["snr_db_behind"]).to_numpy()
+    # Concrete at 3.5 GHz: 19 dB of a wave that is all of what comes; elsewhere nothing.
+    assert lost_db.max() == pytest.approx(19.0, abs=0.5)
+    assert (np.abs(lost_db) < 1e-9).mean() > 0.4
+
+
+def test_the_bound_hears_what_the_vehicle_hears(walled: Scenario) -> None:
+    x_m = np.arange(0.0, 190.0, 3.7)
+    y_m = np.zeros_like(x_m)
+    open_db, walled_db = (Bound(it).snr_db(x_m, y_m) for it in (trip(), walled))
+    heads = json.loads(walled.site.to_json())["radio_heads"]
+    behind = np.array([hidden(x_m, head["position_m"]) for head in heads])
+    assert behind[0].any()
+    assert np.array_equal(walled_db, np.where(behind, -np.inf, open_db))
+    before, after = (along_route(it)["bound_m"].to_numpy() for it in (trip(), walled))
+    assert (after >= before - 1e-12).all()
+    assert after.max() > 1.05 * before[after.argmax()]
+    shares = [bound(it, map_step_m=50.0).heads["visible_share"][0] for it in (walled, trip())]
+    assert shares[0] < shares[1]
+
+
+def test_glass_weakens_and_does_not_hide() -> None:
+    glass = trip(**{"site.walls": [{**WALL, "loss_db": 3.0}]})
+    weaker_db = Bound(trip()).snr_db(np.array([60.0]), np.zeros(1)) - Bound(glass).snr_db(
+        np.array([60.0]), np.zeros(1)
+    )
+    # (10 / 10^0.3 + 1) / 11 of the power.
+    assert weaker_db[0, 0] == pytest.approx(2.624, abs=1e-3)
+
+
+def test_walls_that_cannot_be_are_named() -> None:
+    site = json.loads(trip().site.to_json())
+
+    def said(*walls: dict[str, Any]) -> list[str]:
+        found = Site.load("yard").with_overrides({**site, "walls": list(walls)}).warnings()
+        return [f"{it.key}: {it.why}" for it in found]
+
+    assert not said(WALL)
+    across = {"points_m": [[100.0, -10.0], [100.0, 10.0]]}
+    assert said(WALL, across) == ["walls[1].points_m: it stands across the road, 100 m along it"]
+    x_m, y_m, _ = site["radio_heads"][0]["position_m"]
+    ring = [
+        [x_m + dx_m, y_m + dy_m] for dx_m, dy_m in ((-5, -5), (5, -5), (5, 5), (-5, 5), (-5, -5))
+    ]
+    assert any(
+        "radio_heads[0].position_m: walls keep it out" in it for it in said({"points_m": ring})
+    )
+    for wall, key in (
+        ({"points_m": [[0.0, 0.0]]}, r"walls\[0\].points_m"),
+        ({**WALL, "loss_db": -3.0}, r"walls\[0\].loss_db"),
+        ({**WALL, "height_m": 3.0}, "height_m"),
+    ):
+        with pytest.raises(SettingsError, match=key):
+            said(wall)
