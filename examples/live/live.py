@@ -24,12 +24,12 @@ PORTS = {"port": 2000, "odometry_port": 2100}
 PAGE = "127.0.0.1:8400"
 
 
-def recorded(folder: Path, duration_s: float) -> Drive:
-    """The drive, recorded if it is not there yet."""
+def recorded(folder: Path, duration_s: float, *, continuous: bool = False) -> Path:
+    """The drive's folder, recorded if it is not there yet: all of it, or its SSBs alone."""
     if not (folder / "iq.sigmf-meta").exists():
         print(f"recording {duration_s:g} s of the scenario `{SCENARIO}` in {folder} …", flush=True)
-        access_av.synthesize(SCENARIO, folder, duration_s=duration_s)
-    return Drive(folder)
+        access_av.synthesize(SCENARIO, folder, duration_s=duration_s, continuous=continuous)
+    return folder
 
 
 def main() -> int:
@@ -41,7 +41,7 @@ def main() -> int:
     parser.add_argument("--once", action="store_true")
     arguments = parser.parse_args()
     folder = ROOT / f"results/live/{arguments.duration_s:g}s"
-    drive = recorded(folder, arguments.duration_s)
+    drive = Drive(recorded(folder, arguments.duration_s))
     site, vehicle = folder / "site.toml", folder / "vehicle.toml"
     with tempfile.TemporaryDirectory() as scratch:
         transmitter = Transmitter(drive, **PORTS)

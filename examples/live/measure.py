@@ -1,10 +1,15 @@
-"""What a node takes while a simulated drive comes through sockets: processor, memory, latencies.
+"""What a node takes while a simulated drive comes in: processor, memory, latencies.
 
     python examples/live/measure.py [--node PROGRAM] [--duration-s 60] [--every-ssb]
+        [--stream-off | --times 8 [--speed 0.25]] [--core 1]
 
-Prints the share of one core by the node's own processor time, per second of the drive, its memory,
-and from the arrival of an SSB's last sample to the pose with its angle. Measure on a computer that
-does nothing else.
+Samples come by ZeroMQ; with `--stream-off` as a recording played in real time, which is not read
+where the node wants nothing, as a radio that is switched off (61 MB a second on disk); with
+`--times` by one TCP stream of integers at so many times 3.84 Msps. Prints the share of one core by
+the node's own processor time, per second of the drive, over all and once it tracks, thread by
+thread; its memory; and from the arrival of an SSB's last sample to the pose with its angle. Measure
+on a computer that does nothing else; `--speed` below 1 where it is not fast enough for transmitter
+and node.
 """
 
 from __future__ import annotations
@@ -12,19 +17,32 @@ from __future__ import annotations
 import argparse
 import json
 import os
+import re
 import subprocess
 import tempfile
 import threading
 import time
 import urllib.request
 from pathlib import Path
+from typing import Any
 
 from live import ROOT, recorded
-from transmitter import Transmitter, node_toml
+from transmitter import (
+    Drive,
+    RawTransmitter,
+    Transmitter,
+    Wheels,
+    node_toml,
+    odometry_of,
+    settings_of,
+    stream_toml,
+)
 
 import access_av
 
-PAGE = "127.0.0.1:8401"
+# By then the SSBs are found and the pose is.
+TRACKS_S = 8.0
+ANY_PORT = "127.0.0.1:0"
 
 
 def resident_mib(process: int) -> float:
@@ -33,16 +51,40 @@ def resident_mib(process: int) -> float:
     return pages * os.sysconf("SC_PAGE_SIZE") / 2**20
 
 
-def busy_s(process: int) -> float:
-    """Processor time of a process."""
-    fields = Path(f"/proc/{process}/stat").read_text(encoding="ascii").rpartition(")")[2].split()
-    return (int(fields[11]) + int(fields[12])) / os.sysconf("SC_CLK_TCK")
+def busy_s(process: int) -> dict[str, float]:
+    """Processor time of a process, by the names of its threads."""
+    used: dict[str, float] = {}
+    for thread in Path(f"/proc/{process}/task").iterdir():
+        stat = (thread / "stat").read_text(encoding="ascii")
+        name = stat[stat.index("(") + 1 : stat.rindex(")")]
+        fields = stat.rpartition(")")[2].split()
+        took_s = (int(fields[11]) + int(fields[12])) / os.sysconf("SC_CLK_TCK")
+        used[name] = used.get(name, 0.0) + took_s
+    return used
 
 
-def state() -> dict[str, object]:
-    """How the node stands."""
-    with urllib.request.urlopen(f"http://{PAGE}/state.json") as answer:
-        return dict(json.load(answer))
+class Node:
+    """A node that runs, and its page."""
+
+    def __init__(self, program: str, arguments: list[str], core: int | None) -> None:
+        pinned = [] if core is None else ["taskset", "-c", str(core)]
+        self.process = subprocess.Popen(
+            [*pinned, program, *arguments], stderr=subprocess.PIPE, text=True
+        )
+        assert self.process.stderr is not None
+        found = re.search(r"http://\S+", self.process.stderr.readline())
+        assert found, self.process.stderr.read()
+        self.page = found.group()
+
+    def state(self) -> dict[str, Any]:
+        """How it stands."""
+        with urllib.request.urlopen(f"{self.page}state.json") as answer:
+            return dict(json.load(answer))
+
+    def end(self) -> None:
+        """Ends it."""
+        self.process.terminate()
+        self.process.communicate()
 
 
 def main() -> None:
@@ -51,42 +93,72 @@ def main() -> None:
     parser.add_argument("--node", default=str(ROOT / "target/release/access-av-node"))
     parser.add_argument("--duration-s", type=float, default=60.0)
     parser.add_argument("--every-ssb", action="store_true")
+    parser.add_argument("--interval-s", type=float, help="a burst every so many seconds")
+    parser.add_argument("--stream-off", action="store_true")
+    parser.add_argument("--times", type=int)
+    parser.add_argument("--speed", type=float, default=1.0)
+    parser.add_argument("--core", type=int)
     arguments = parser.parse_args()
     folder = ROOT / f"results/live/{arguments.duration_s:g}s"
-    drive = recorded(folder, arguments.duration_s)
-    vehicle = access_av.Vehicle.load(str(folder / "vehicle.toml"))
-    if arguments.every_ssb:
-        every = {"wake_up.policy": "fixed", "wake_up.interval_ms": 20.0}
-        vehicle = vehicle.with_overrides(every)
-    transmitter = Transmitter(drive)
     with tempfile.TemporaryDirectory() as scratch:
         settings = Path(scratch) / "node.toml"
-        settings.write_text(node_toml(transmitter, PAGE), encoding="utf-8")
+        sender: Transmitter | RawTransmitter | Wheels
+        if arguments.stream_off:
+            whole = folder.with_name(folder.name + "-whole")
+            folder = recorded(whole, arguments.duration_s, continuous=True)
+            sender = Wheels(odometry_of(folder))
+            samples = f'source = "sigmf"\nrecording = "{folder}/iq"\n'
+            settings.write_text(settings_of(samples, sender.address, ANY_PORT), encoding="utf-8")
+            send = sender.run
+        elif arguments.times:
+            drive = Drive(recorded(folder, arguments.duration_s))
+            sender = RawTransmitter(drive, arguments.times)
+            samples = f'source = "raw"\nformat = "ci16_le"\naddress = "{sender.address}"\n'
+            samples += stream_toml(drive, arguments.times)
+            told = settings_of(samples, sender.wheels.address, ANY_PORT)
+            settings.write_text(told, encoding="utf-8")
+            send = sender.run
+        else:
+            sender = Transmitter(Drive(recorded(folder, arguments.duration_s)))
+            settings.write_text(node_toml(sender, ANY_PORT), encoding="utf-8")
+            send = sender.run
+        vehicle = access_av.Vehicle.load(str(folder / "vehicle.toml"))
+        interval_s = 0.02 if arguments.every_ssb else arguments.interval_s
+        if interval_s:
+            fixed = {"wake_up.policy": "fixed", "wake_up.interval_ms": 1e3 * interval_s}
+            vehicle = vehicle.with_overrides(fixed)
         believed = Path(scratch) / "vehicle.toml"
         believed.write_text(vehicle.to_toml(), encoding="utf-8")
         site = str(folder / "site.toml")
-        command = [arguments.node, "--site", site, "--vehicle", str(believed), str(settings)]
-        node = subprocess.Popen(command)
+        options = ["--site", site, "--vehicle", str(believed), str(settings)]
+        node = Node(arguments.node, options, arguments.core)
+        process = node.process.pid
+        speed = {} if arguments.stream_off else {"speed": arguments.speed}
+        sending = threading.Thread(target=send, kwargs=speed)
         began = time.monotonic()
-        sending = threading.Thread(target=transmitter.run)
         sending.start()
-        memory_mib = []
+        memory_mib, tracking = [], None
         while sending.is_alive():
             sending.join(1.0)
-            memory_mib.append(resident_mib(node.pid))
-        took_s = time.monotonic() - began
-        used_s = busy_s(node.pid)
-        told = state()
-        node.terminate()
-        node.wait()
-        transmitter.close()
-    drive_s = drive.length / drive.rate_hz
+            memory_mib.append(resident_mib(process))
+            if tracking is None and time.monotonic() - began >= TRACKS_S / arguments.speed:
+                tracking = (time.monotonic(), busy_s(process))
+        ended, used, told = time.monotonic(), busy_s(process), node.state()
+        node.end()
+        sender.close()
+    drive_s = arguments.speed * (ended - began)
+    print(f"{drive_s:.0f} s of the drive in {ended - began:.0f} s")
+    print(f"processor: {100 * sum(used.values()) / drive_s:.1f} % of a core")
+    if tracking is not None:
+        since_s = arguments.speed * (ended - tracking[0])
+        shares = {name: 100 * (used[name] - tracking[1].get(name, 0.0)) / since_s for name in used}
+        parts = ", ".join(f"{name} {share:.1f} %" for name, share in shares.items())
+        print(f"from {TRACKS_S:g} s on: {sum(shares.values()):.1f} % ({parts})")
     half = memory_mib[len(memory_mib) // 2 :]
-    print(f"{drive_s:.0f} s of the drive in {took_s:.0f} s")
-    print(f"processor: {100 * used_s / drive_s:.1f} % of a core")
     at = f"{half[0]:.0f} at half, {half[-1]:.0f} at the end"
     print(f"memory: {max(memory_mib):.0f} MiB at most, {at}")
-    print(f"samples looked at: {100 * told['duty']:.1f} %")
+    print(f"samples looked at: {100 * told['duty']:.1f} %, angles: {told['energy']['executions']}")
+    print(f"state: {told['pose']['state']}, {told['pose']['tracked']} SSBs tracked")
     print(f"dropped: {told['dropped']}")
     for name, figures in told["latency"].items():
         print(f"{name}: {figures}")

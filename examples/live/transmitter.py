@@ -3,6 +3,8 @@
 Samples: a REP socket for each antenna, which answers every request by cf32 samples, as the drivers
 of srsRAN, OCUDU and OpenAirInterface do; between the recorded bursts there is noise. Odometry:
 newline JSON to whoever connects. Both run in real time from when the first samples are asked for.
+Others of `Transmitter`'s kind: `Wheels`, odometry alone, and `RawTransmitter`, samples by one TCP
+stream.
 
     python examples/live/transmitter.py DRIVE [--port 2000] [--odometry-port 2100] [--once]
 
@@ -12,8 +14,10 @@ DRIVE is a folder that `access-av synth` wrote. Antenna k is at port + k.
 from __future__ import annotations
 
 import argparse
+import contextlib
 import csv
 import json
+import math
 import socket
 import threading
 import time
@@ -22,6 +26,7 @@ from typing import TYPE_CHECKING
 
 import numpy as np
 import zmq
+from scipy.signal import resample_poly
 
 if TYPE_CHECKING:
     from collections.abc import Iterator
@@ -31,6 +36,13 @@ if TYPE_CHECKING:
 FULL_SCALE = 32768.0
 # Samples of each answer: 1 ms at 3.84 Msps, as a base station's slot.
 ANSWER = 3840
+
+
+def odometry_of(folder: Path) -> list[dict[str, float]]:
+    """Odometry of a drive that was written by `access-av synth`."""
+    with (folder / "odometry.csv").open(encoding="utf-8") as file:
+        rows = csv.DictReader(file)
+        return [{key: float(row[key]) for key in row if row[key]} for row in rows]
 
 
 class Drive:
@@ -51,9 +63,7 @@ class Drive:
         ends = [start for start, _ in self.captures[1:]] + [len(self.samples)]
         self.ends = ends
         self.length = self.captures[-1][1] + ends[-1] - self.captures[-1][0]
-        with (folder / "odometry.csv").open(encoding="utf-8") as file:
-            rows = csv.DictReader(file)
-            self.odometry = [{key: float(row[key]) for key in row if row[key]} for row in rows]
+        self.odometry = odometry_of(folder)
         # Noise as it stands between two SSBs: the quieter half of the first burst tells its power.
         first = self.samples[: ends[0]].astype(np.float32) / FULL_SCALE
         power = np.sort((first**2).sum(axis=2).mean(axis=1))[: len(first) // 4].mean()
@@ -78,69 +88,43 @@ class Drive:
                 yield sent, list(part)
 
 
-class Transmitter:
-    """Sends a drive, again and again or once."""
+class Wheels:
+    """Sends odometry as newline JSON to whoever has connected."""
 
-    def __init__(self, drive: Drive, port: int = 0, odometry_port: int = 0) -> None:
-        self.drive = drive
-        self.context = zmq.Context()
-        self.sockets = []
-        for antenna in range(drive.antennas):
-            rep = self.context.socket(zmq.REP)
-            rep.setsockopt(zmq.LINGER, 0)
-            rep.setsockopt(zmq.RCVTIMEO, 200)
-            rep.bind(f"tcp://127.0.0.1:{port + antenna if port else '*'}")
-            self.sockets.append(rep)
-        self.server = socket.create_server(("127.0.0.1", odometry_port))
+    def __init__(self, odometry: list[dict[str, float]], port: int = 0) -> None:
+        self.odometry = odometry
+        self.sent = 0
+        self.server = socket.create_server(("127.0.0.1", port))
         self.server.settimeout(0.0)
         self.peer: socket.socket | None = None
         self.stopped = threading.Event()
 
     @property
-    def endpoints(self) -> list[str]:
-        """What the node connects to for samples, antenna by antenna."""
-        return [rep.getsockopt_string(zmq.LAST_ENDPOINT) for rep in self.sockets]
-
-    @property
-    def odometry(self) -> str:
-        """What the node connects to for odometry."""
+    def address(self) -> str:
+        """What the node connects to."""
         host, port = self.server.getsockname()
         return f"tcp://{host}:{port}"
 
-    def run(self, *, speed: float = 1.0) -> None:
-        """Sends the drive once, at so many times real time; slower where the computer is."""
-        if not all(self._asked(rep) for rep in self.sockets):
-            return
-        began = time.monotonic()
-        odometry = iter(self.drive.odometry)
-        sample = next(odometry, None)
-        for sent, block in self.drive.answers():
-            now_s = sent / self.drive.rate_hz
-            ahead_s = now_s / speed - (time.monotonic() - began)
-            if ahead_s > 0.0:
-                time.sleep(ahead_s)
-            for rep, samples in zip(self.sockets, block, strict=True):
-                rep.send(np.ascontiguousarray(samples))
-            while sample is not None and sample["time_s"] <= now_s:
-                self._send(sample)
-                sample = next(odometry, None)
-            if not all(self._asked(rep) for rep in self.sockets):
-                return
-        while sample is not None:
-            self._send(sample)
-            sample = next(odometry, None)
+    def send_until(self, now_s: float) -> None:
+        """Sends what the wheels have told up to a time."""
+        while self.sent < len(self.odometry) and self.odometry[self.sent]["time_s"] <= now_s:
+            self._send(self.odometry[self.sent])
+            self.sent += 1
 
-    def _asked(self, rep: zmq.Socket[bytes]) -> bool:
-        while not self.stopped.is_set():
-            try:
-                rep.recv()
-            except zmq.Again:
-                continue
-            return True
-        return False
+    def run(self) -> None:
+        """Sends all of it in real time, from when somebody connects on."""
+        self.server.settimeout(0.2)
+        while self.peer is None and not self.stopped.is_set():
+            with contextlib.suppress(TimeoutError):
+                self.peer, _ = self.server.accept()
+        began = time.monotonic()
+        for sample in self.odometry:
+            ahead_s = sample["time_s"] - (time.monotonic() - began)
+            if self.stopped.wait(max(ahead_s, 0.0)):
+                return
+            self.send_until(sample["time_s"])
 
     def _send(self, sample: dict[str, float]) -> None:
-        """Odometry to whoever has connected."""
         line = json.dumps({"type": "odometry", **sample}) + "\n"
         try:
             if self.peer is None:
@@ -158,34 +142,164 @@ class Transmitter:
     def close(self) -> None:
         """Closes all sockets."""
         self.stop()
-        for rep in self.sockets:
-            rep.close()
-        self.context.term()
         if self.peer is not None:
             self.peer.close()
         self.server.close()
 
 
-def node_toml(transmitter: Transmitter, page: str) -> str:
-    """Settings of a node that listens to a transmitter."""
-    antennas = list(range(transmitter.drive.antennas))
+class Transmitter:
+    """Sends a drive, again and again or once."""
+
+    def __init__(self, drive: Drive, port: int = 0, odometry_port: int = 0) -> None:
+        self.drive = drive
+        self.context = zmq.Context()
+        self.sockets = []
+        for antenna in range(drive.antennas):
+            rep = self.context.socket(zmq.REP)
+            rep.setsockopt(zmq.LINGER, 0)
+            rep.setsockopt(zmq.RCVTIMEO, 200)
+            rep.bind(f"tcp://127.0.0.1:{port + antenna if port else '*'}")
+            self.sockets.append(rep)
+        self.wheels = Wheels(drive.odometry, odometry_port)
+        self.stopped = threading.Event()
+
+    @property
+    def endpoints(self) -> list[str]:
+        """What the node connects to for samples, antenna by antenna."""
+        return [rep.getsockopt_string(zmq.LAST_ENDPOINT) for rep in self.sockets]
+
+    @property
+    def odometry(self) -> str:
+        """What the node connects to for odometry."""
+        return self.wheels.address
+
+    def run(self, *, speed: float = 1.0) -> None:
+        """Sends the drive once, at so many times real time; slower where the computer is."""
+        if not all(self._asked(rep) for rep in self.sockets):
+            return
+        began = time.monotonic()
+        for sent, block in self.drive.answers():
+            now_s = sent / self.drive.rate_hz
+            ahead_s = now_s / speed - (time.monotonic() - began)
+            if ahead_s > 0.0:
+                time.sleep(ahead_s)
+            for rep, samples in zip(self.sockets, block, strict=True):
+                rep.send(np.ascontiguousarray(samples))
+            self.wheels.send_until(now_s)
+            if not all(self._asked(rep) for rep in self.sockets):
+                return
+        self.wheels.send_until(math.inf)
+
+    def _asked(self, rep: zmq.Socket[bytes]) -> bool:
+        while not self.stopped.is_set():
+            try:
+                rep.recv()
+            except zmq.Again:
+                continue
+            return True
+        return False
+
+    def stop(self) -> None:
+        """Ends `run`, from another thread."""
+        self.stopped.set()
+
+    def close(self) -> None:
+        """Closes all sockets."""
+        self.stop()
+        for rep in self.sockets:
+            rep.close()
+        self.context.term()
+        self.wheels.close()
+
+
+class RawTransmitter:
+    """Sends a drive by one TCP stream of 16-bit integers, at a whole multiple of its rate."""
+
+    def __init__(self, drive: Drive, times: int) -> None:
+        self.drive = drive
+        self.times = times
+        self.wheels = Wheels(drive.odometry)
+        self.server = socket.create_server(("127.0.0.1", 0))
+        self.server.settimeout(0.2)
+        self.stopped = threading.Event()
+
+    @property
+    def address(self) -> str:
+        """What the node connects to for samples."""
+        host, port = self.server.getsockname()
+        return f"tcp://{host}:{port}"
+
+    def _integers(self, samples: NDArray[np.float32]) -> bytes:
+        """Samples of every antenna, [antenna, sample, part], in turn and at the higher rate."""
+        finer = resample_poly(samples, self.times, 1, axis=1) if self.times > 1 else samples
+        scaled = np.clip(np.rint(finer * FULL_SCALE), -FULL_SCALE, FULL_SCALE - 1)
+        return scaled.astype("<i2").transpose(1, 0, 2).tobytes()
+
+    def run(self, *, speed: float = 1.0) -> None:
+        """Sends the drive once, at so many times real time; slower where the computer is."""
+        peer: socket.socket | None = None
+        while peer is None and not self.stopped.is_set():
+            with contextlib.suppress(TimeoutError):
+                peer, _ = self.server.accept()
+        # Made before it is needed: resampling takes longer than the drive.
+        noise = memoryview(self._integers(self.drive.noise[:, : 1 << 16]))
+        sample_bytes = 4 * self.drive.antennas * self.times
+        began, before = time.monotonic(), 0
+        for sent, block in self.drive.answers():
+            now_s = sent / self.drive.rate_hz
+            count = sent - before
+            before = sent
+            is_noise = np.shares_memory(block[0], self.drive.noise)
+            part = noise[: count * sample_bytes] if is_noise else self._integers(np.stack(block))
+            ahead_s = now_s / speed - (time.monotonic() - began)
+            if ahead_s > 0.0:
+                time.sleep(ahead_s)
+            if peer is None or self.stopped.is_set():
+                break
+            try:
+                peer.sendall(part)
+            except OSError:
+                break
+            self.wheels.send_until(now_s)
+        if peer is not None:
+            peer.close()
+
+    def close(self) -> None:
+        """Closes all sockets."""
+        self.stopped.set()
+        self.server.close()
+        self.wheels.close()
+
+
+def settings_of(samples: str, messages: str, page: str) -> str:
+    """Settings of a node with such samples, odometry of `messages`, and a page."""
     return f"""\
 name = "simulated"
-messages = ["{transmitter.odometry}"]
+messages = ["{messages}"]
 
 [samples]
-source = "zeromq"
-endpoints = {json.dumps(transmitter.endpoints)}
-
-[samples.stream]
-rate_msps = {transmitter.drive.rate_hz / 1e6}
-centre_mhz = {transmitter.drive.centre_mhz}
-antennas = {antennas}
-clock.start-time-s = 0.0
-
+{samples}
 [page]
 listen = "{page}"
 """
+
+
+def stream_toml(drive: Drive, times: int = 1) -> str:
+    """What the samples of a drive are."""
+    return f"""
+[samples.stream]
+rate_msps = {times * drive.rate_hz / 1e6}
+centre_mhz = {drive.centre_mhz}
+antennas = {list(range(drive.antennas))}
+clock.start-time-s = 0.0
+"""
+
+
+def node_toml(transmitter: Transmitter, page: str) -> str:
+    """Settings of a node that listens to a transmitter."""
+    samples = f'source = "zeromq"\nendpoints = {json.dumps(transmitter.endpoints)}\n'
+    samples += stream_toml(transmitter.drive)
+    return settings_of(samples, transmitter.odometry, page)
 
 
 def main() -> None:

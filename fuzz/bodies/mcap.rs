@@ -1,9 +1,9 @@
-//! Odometry and IMU of arbitrary MCAP files, alone and as one of two files of a bag.
+//! Odometry, IMU and angles of arbitrary MCAP files, alone and as one of two files of a bag.
 
 use std::path::PathBuf;
 use std::sync::atomic::{AtomicUsize, Ordering};
 
-use recording::{OdometryLog, RecordingError, read_odometry_mcap};
+use recording::{OdometryLog, RecordingError, read_angles_mcap, read_odometry_mcap};
 
 static NEXT: AtomicUsize = AtomicUsize::new(0);
 
@@ -27,6 +27,14 @@ pub fn run(input: &[u8]) {
         let twice = read_odometry_mcap(bag, None, None);
         for read in [&alone, &asked, &twice] {
             check(read);
+        }
+        if let Ok(log) = read_angles_mcap(&first, None) {
+            assert!(
+                log.angles
+                    .iter()
+                    .all(|it| it.measured.phase_rad.is_finite())
+            );
+            assert!(log.remarks.iter().all(|it| !it.to_string().is_empty()));
         }
         // The same messages once more add nothing but remarks.
         if let (Ok(alone), Ok(twice)) = (&alone, &twice) {

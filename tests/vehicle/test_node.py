@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import csv
 import json
 import os
 import shutil
@@ -16,6 +17,7 @@ from pathlib import Path
 from typing import TYPE_CHECKING, Any
 
 import jsonschema
+import numpy as np
 import pytest
 from mcap.reader import make_reader
 from prometheus_client.parser import text_string_to_metric_families
@@ -23,6 +25,7 @@ from rosbags.highlevel import AnyReader
 from rosbags.typesys import Stores, get_typestore
 
 import access_av
+from access_av.drives.recorded import log_angles
 from browser import Browser
 from conftest import ROOT
 
@@ -30,12 +33,14 @@ if TYPE_CHECKING:
     from collections.abc import Iterator
 
 sys.path.insert(0, str(ROOT / "examples/live"))
-from transmitter import Drive, Transmitter, node_toml
+from transmitter import Drive, Transmitter, Wheels, node_toml, odometry_of, settings_of
 
 NODE = Path(os.environ.get("ACCESS_AV_NODE", ROOT / "target/debug/access-av-node"))
 SCHEMAS = Path(os.environ.get("ACCESS_AV_DATA", ROOT / "../shared/data")) / "vda5050"
 CHROMIUM = shutil.which("chromium") or shutil.which("chromium-browser")
 DURATION_S = 5.0
+# Of MCAP, by its writer: a file is measured once a chunk is complete.
+CHUNK_BYTES = 768 << 10
 
 pytestmark = pytest.mark.skipif(
     not NODE.exists(), reason=f"no {NODE}: `cargo build -p access-av-node` makes it"
@@ -86,6 +91,124 @@ def test_a_recording_played_back_gives_the_poses_of_locate(drive: Path, tmp_path
     )
     located.write_tum(tmp_path / "located.tum")
     assert (tmp_path / "node.tum").read_bytes() == (tmp_path / "located.tum").read_bytes()
+
+
+def played(folder: Path, messages: list[dict[str, Any]], more: str) -> None:
+    """Drives a node by messages as fast as it can."""
+    drive = folder / "drive.jsonl"
+    drive.write_text("".join(json.dumps(it) + "\n" for it in messages), encoding="utf-8")
+    settings = folder / "node.toml"
+    settings.write_text(
+        f'name = "day"\npace = "fast"\nmessages = ["{drive}"]\n{more}', encoding="utf-8"
+    )
+    done = subprocess.run(
+        [str(NODE), "--site", "yard", "--vehicle", "tugger", str(settings)],
+        capture_output=True,
+        text=True,
+        timeout=120,
+    )
+    assert done.returncode == 0, done.stderr
+
+
+@pytest.mark.parametrize("rotation", ["rotate_s = 30.0", "rotate_mb = 0.1"])
+def test_each_file_of_a_day_is_whole_and_together_they_hold_all(
+    tmp_path: Path, rotation: str
+) -> None:
+    start = {"type": "set-pose", "x_m": -100.0, "y_m": 0.0, "heading_rad": 0.0}
+    # A wheel speed that never repeats is the worst that a file that is compressed can get.
+    wheels = [
+        {"type": "odometry", "time_s": 0.02 * k, "speed_mps": 1.0 + 0.1 * float(np.sin(k * k))}
+        for k in range(10_001)
+    ]
+    more = f'[output.mcap]\nfolder = "{tmp_path}/mcap"\npose_hz = 50.0\n{rotation}\n'
+    played(tmp_path, [wheels[0], start, *wheels[1:]], more)
+    files = sorted((tmp_path / "mcap").iterdir())
+    assert len(files) >= 3
+    counts: dict[str, int] = {}
+    times_s: list[float] = []
+    for file in files:
+        with file.open("rb") as stream:
+            reader = make_reader(stream, validate_crcs=True)
+            summary = reader.get_summary()
+            assert summary is not None
+            assert summary.statistics is not None
+            read = 0
+            for _, channel, message in reader.iter_messages():
+                counts[channel.topic] = counts.get(channel.topic, 0) + 1
+                times_s.append(message.log_time * 1e-9)
+                read += 1
+            assert read == summary.statistics.message_count
+        if rotation.startswith("rotate_mb"):
+            assert file.stat().st_size < 1e5 + CHUNK_BYTES
+    # Every pose, and a status a second.
+    assert abs(counts["/access_av/odometry"] - 10_000) <= 1
+    assert counts["/tf"] == counts["/access_av/odometry"]
+    assert abs(counts["/diagnostics"] - 200) <= 2
+    assert times_s == sorted(times_s)
+
+
+def test_angles_recorded_by_a_node_are_played_back(tmp_path: Path) -> None:
+    source = tmp_path / "source"
+    log_angles("yard", source, duration_s=20.0)
+    vehicle = access_av.Vehicle.load(str(source / "vehicle.toml"))
+    every = {"wake_up.policy": "fixed", "wake_up.interval_ms": 20.0}
+    (source / "vehicle.toml").write_text(vehicle.with_overrides(every).to_toml(), encoding="utf-8")
+    # Times of MCAP are whole nanoseconds: an angle of the same time as odometry may come before it.
+    odometry = [{**it, "time_s": it["time_s"] + 0.007} for it in odometry_of(source)]
+    with (source / "odometry.csv").open("w", encoding="utf-8") as file:
+        writer = csv.DictWriter(file, odometry[0])
+        writer.writeheader()
+        writer.writerows(odometry)
+    trajectories = []
+    for name, angles in (("first", source / "angles.csv"), ("again", tmp_path / "first")):
+        settings = tmp_path / f"{name}.toml"
+        settings.write_text(
+            f"""
+            name = "{name}"
+            pace = "fast"
+            angles.file = "{angles}"
+            odometry.file = "{source}/odometry.csv"
+            output.tum = "{tmp_path}/{name}.tum"
+            output.mcap = {{ folder = "{tmp_path}/{name}", verdict_hz = 10000.0, rotate_s = 6.0 }}
+            """,
+            encoding="utf-8",
+        )
+        done = subprocess.run(command(source, settings), capture_output=True, text=True, timeout=60)
+        assert done.returncode == 0, done.stderr
+        trajectories.append(np.loadtxt(tmp_path / f"{name}.tum"))
+    assert len(list((tmp_path / "first").iterdir())) >= 3
+    first, again = trajectories
+    # In a nanosecond the vehicle drives a nanometre.
+    assert np.abs(first - again).max() < 1e-6
+
+
+def test_a_recording_in_real_time_is_not_read_where_nothing_is_wanted(tmp_path: Path) -> None:
+    drive = tmp_path / "drive"
+    access_av.synthesize("yard", drive, duration_s=9.0)
+    vehicle = access_av.Vehicle.load(str(drive / "vehicle.toml"))
+    seldom = {"wake_up.policy": "fixed", "wake_up.interval_ms": 3000.0}
+    (drive / "vehicle.toml").write_text(vehicle.with_overrides(seldom).to_toml(), encoding="utf-8")
+    wheels, page = Wheels(odometry_of(drive)), free_port()
+    settings = tmp_path / "node.toml"
+    samples = f'source = "sigmf"\nrecording = "{drive}/iq"\n'
+    told = settings_of(samples, wheels.address, f"127.0.0.1:{page}")
+    settings.write_text(told + f'[output.json]\naddress = "{tmp_path}/node.jsonl"\n')
+    node = subprocess.Popen(command(drive, settings), stderr=subprocess.PIPE, text=True)
+    wheels.run()
+    node.terminate()
+    _, said = node.communicate(timeout=10.0)
+    wheels.close()
+    assert node.returncode == 0, said
+    records = lines(tmp_path / "node.jsonl")
+    heard = sorted({round(it["time_s"]) for it in records if it["type"] == "verdict"})
+    # Found at the start, and after three seconds' sleep each in the one window there is.
+    assert heard[0] == 0
+    assert heard[-2:] == [heard[-1] - 3, heard[-1]]
+    later = [it for it in records if it["type"] == "verdict" and it["time_s"] > 1.0]
+    assert all(it["accepted"] for it in later), later
+    # A source that is switched off is not silent.
+    silent = [it for it in records if "nothing has come" in it.get("text", "")]
+    assert not [it for it in silent if it["source"] == "samples" and it["time_s"] < 8.5], silent
 
 
 class Broker:

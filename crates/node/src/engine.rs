@@ -16,6 +16,7 @@ use crate::gate::{Gate, Windows};
 use crate::inbox::{Block, Command, Inbox, Input, Level};
 use crate::sink::{By, PoseRecord, Queue, Record};
 use crate::statistics::{Punctuality, SourceHealth};
+use crate::supervisor::Watchdog;
 use crate::web::Board;
 
 /// The engine looks at the time this often, whatever comes.
@@ -75,6 +76,7 @@ pub struct Engine {
     last_status_s: f64,
     /// Silent sources that were named.
     silent: Vec<&'static str>,
+    watchdog: Watchdog,
 }
 
 impl Engine {
@@ -106,6 +108,7 @@ impl Engine {
             last_pose: None,
             last_status_s: f64::NEG_INFINITY,
             silent: Vec::new(),
+            watchdog: Watchdog::from_environment(),
         })
     }
 
@@ -248,8 +251,11 @@ impl Engine {
         }
         if window[0] < now_s {
             self.gate.open();
-        } else {
+        } else if self.live.listens(burst_s)? {
             self.gate.set(window);
+        } else {
+            // None is wanted as far as one can see: it is time to ask again then, and not to listen.
+            self.gate.set([window[0]; 2]);
         }
         Ok(())
     }
@@ -387,6 +393,7 @@ impl Engine {
     /// # Errors
     /// [`LiveError::Custom`].
     pub fn tick(&mut self) -> Result<(), LiveError> {
+        self.watchdog.alive();
         let Some(now_s) = self.clock.now_s() else {
             return Ok(());
         };
@@ -402,6 +409,8 @@ impl Engine {
         }
         if tells {
             self.last_status_s = now_s;
+            self.watchdog
+                .say(format!("{}: {}", status.state.name(), status.reason));
             self.records.put(Record::Status {
                 status,
                 heads: heads.to_vec(),
@@ -410,6 +419,11 @@ impl Engine {
             });
         }
         Ok(())
+    }
+
+    /// Says that the pipeline is alive, where it waits.
+    pub fn alive(&mut self) {
+        self.watchdog.alive();
     }
 
     /// Input that was refused is an event.

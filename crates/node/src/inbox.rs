@@ -1,4 +1,5 @@
-//! What has come in and not been taken yet: bounded, the oldest samples are dropped first.
+//! What has come in and not been taken yet: bounded. The oldest are dropped where there is no room, or whoever puts
+//! waits where nothing comes by itself.
 
 use std::collections::VecDeque;
 use std::sync::{Condvar, Mutex, MutexGuard, PoisonError};
@@ -134,16 +135,30 @@ struct Waiting {
 pub struct Inbox {
     waiting: Mutex<Waiting>,
     came: Condvar,
+    taken: Condvar,
+    /// Whether whoever puts something in waits for room, as it may where it reads files.
+    waits: bool,
 }
 
 impl Inbox {
+    /// An empty queue; whoever puts something in other than samples waits for room where `waits` is true.
+    pub fn new(waits: bool) -> Self {
+        Self {
+            waits,
+            ..Self::default()
+        }
+    }
+
     fn lock(&self) -> MutexGuard<'_, Waiting> {
         self.waiting.lock().unwrap_or_else(PoisonError::into_inner)
     }
 
-    /// Puts something in; drops the oldest of its kind where there is no room.
+    /// Puts something in; drops the oldest of its kind where there is no room, or waits for it.
     pub fn put(&self, input: Input) {
         let mut waiting = self.lock();
+        while self.waits && waiting.others >= MOST_OTHERS && !waiting.is_closed {
+            waiting = (self.taken.wait(waiting)).unwrap_or_else(PoisonError::into_inner);
+        }
         let waiting = &mut *waiting;
         match (&input, waiting.inputs.back_mut()) {
             (Input::Slept(new_s), Some((_, Input::Slept(until_s)))) => {
@@ -178,6 +193,9 @@ impl Inbox {
             Input::Samples(block) => waiting.sample_bytes -= block.bytes(),
             _ => waiting.others -= 1,
         }
+        if self.waits {
+            self.taken.notify_one();
+        }
         Some((came, input))
     }
 
@@ -185,6 +203,7 @@ impl Inbox {
     pub fn close(&self) {
         self.lock().is_closed = true;
         self.came.notify_all();
+        self.taken.notify_all();
     }
 
     /// Whether it was closed.
@@ -269,6 +288,27 @@ mod tests {
                 .iter()
                 .all(|it| it.is_empty() && it.capacity() > 0)
         );
+    }
+
+    #[test]
+    fn who_reads_files_waits_for_room_and_nothing_is_dropped() {
+        let inbox = Inbox::new(true);
+        let sent = MOST_OTHERS + 1000;
+        std::thread::scope(|scope| {
+            scope.spawn(|| {
+                for number in 0..sent {
+                    let sample = OdometrySample::of_speed(number as f64, 1.0, None);
+                    inbox.put(Input::Odometry(sample));
+                }
+            });
+            for number in 0..sent {
+                let Some((_, Input::Odometry(sample))) = inbox.take(Duration::from_secs(10)) else {
+                    panic!("no odometry");
+                };
+                assert_eq!(sample.time_s, number as f64);
+            }
+        });
+        assert_eq!(inbox.dropped(), [0, 0]);
     }
 
     #[test]

@@ -19,4 +19,5 @@ pub mod settings;
 pub mod sink;
 pub mod source;
 pub mod statistics;
+pub mod supervisor;
 pub mod web;

@@ -14,6 +14,7 @@ use access_av_node::settings::{NodeSettings, PageSettings};
 use access_av_node::sink::{self, Queue, Sinks};
 use access_av_node::source::{self, Sources};
 use access_av_node::statistics::Punctuality;
+use access_av_node::supervisor;
 use access_av_node::web::{self, Board, Counters};
 use anyhow::{Context, Result};
 use clap::Parser;
@@ -135,7 +136,7 @@ fn report(settings: &NodeSettings, setup: &Setup) -> String {
 
 fn drive(settings: &NodeSettings, setup: Setup, mut sources: Sources) -> Result<()> {
     let is_playback = settings.is_playback();
-    let records = Arc::new(Queue::new(is_playback));
+    let records = Arc::new(Queue::new(settings.waits()));
     let punctuality = Arc::new(Punctuality::default());
     let page_s = settings.page.as_ref().map_or(1.0, |it| 1.0 / it.rate_hz);
     let heads = setup.site.radio_heads.iter();
@@ -168,6 +169,7 @@ fn drive(settings: &NodeSettings, setup: Setup, mut sources: Sources) -> Result<
     let writing = sink::start(sinks, Arc::clone(&records))?;
     engine.event(Level::Info, "node", format!("{} begins", settings.name));
     let driven = if is_playback {
+        supervisor::ready();
         playback::play(
             &mut engine,
             sources.files,
@@ -177,10 +179,12 @@ fn drive(settings: &NodeSettings, setup: Setup, mut sources: Sources) -> Result<
         )
     } else {
         source::start(settings, &mut sources)?;
+        supervisor::ready();
         let silent_after = Duration::from_secs_f64(settings.silent_after_s);
         let run = engine.run(&sources.inbox, &sources.health, silent_after, &stop);
         run.map_err(Into::into)
     };
+    supervisor::stopping();
     engine.event(Level::Info, "node", format!("{} ends", settings.name));
     sources.inbox.close();
     records.close();

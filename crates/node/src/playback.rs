@@ -19,6 +19,8 @@ use crate::statistics::SourceHealth;
 
 /// Samples that are looked at together, in seconds, as where a recording is located.
 const BLOCK_S: f64 = 0.02;
+/// Whoever waits for its time looks this often whether the node ends.
+const LOOK: Duration = Duration::from_millis(200);
 /// How far samples are read beyond the time that bursts are wanted up to: a burst, and the receiver's reach.
 const AHEAD_S: f64 = 0.01;
 
@@ -145,7 +147,14 @@ impl Player<'_> {
         let first_s = *self.first_s.get_or_insert(time_s);
         if let Some(began) = self.pace {
             let due = Duration::try_from_secs_f64(time_s - first_s).unwrap_or_default();
-            std::thread::sleep(due.saturating_sub(began.elapsed()));
+            // In a gap of the drive the node is alive, and can be ended.
+            while !self.stop.load(Ordering::Acquire)
+                && let left = due.saturating_sub(began.elapsed())
+                && !left.is_zero()
+            {
+                std::thread::sleep(left.min(LOOK));
+                self.engine.alive();
+            }
         }
     }
 }

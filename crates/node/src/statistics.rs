@@ -139,6 +139,14 @@ impl SourceHealth {
         self.items.fetch_add(items, Ordering::Relaxed);
     }
 
+    /// It is switched off for so long, and silent on purpose; so many items would have come.
+    pub fn rests(&self, items: u64, duration: Duration) {
+        let until = self.began.elapsed() + duration;
+        self.last_ns
+            .store(until.as_nanos() as u64 + 1, Ordering::Relaxed);
+        self.items.fetch_add(items, Ordering::Relaxed);
+    }
+
     /// Something came that cannot be used.
     pub fn defect(&self) {
         self.defects.fetch_add(1, Ordering::Relaxed);
@@ -150,7 +158,7 @@ impl SourceHealth {
         self.began.elapsed().saturating_sub(last)
     }
 
-    /// Items that came: samples per channel, or messages.
+    /// Items that came, or would have while it was switched off: samples per channel, or messages.
     pub fn items(&self) -> u64 {
         self.items.load(Ordering::Relaxed)
     }

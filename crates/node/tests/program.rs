@@ -4,6 +4,7 @@
 use std::fs;
 use std::io::{BufRead, BufReader, Write};
 use std::net::{TcpListener, TcpStream};
+use std::os::unix::net::UnixDatagram;
 use std::path::{Path, PathBuf};
 use std::process::{Child, Command, Stdio};
 use std::time::{Duration, Instant};
@@ -27,13 +28,24 @@ struct Node {
 
 impl Node {
     fn start(folder: &Path, messages: &str, more: &str) -> Self {
+        Self::start_with(folder, messages, more, &[])
+    }
+
+    fn start_with(folder: &Path, messages: &str, more: &str, environment: &[(&str, &str)]) -> Self {
+        // What is in a file is to be had at once.
+        let pace = if Path::new(messages).is_file() {
+            "fast"
+        } else {
+            "real-time"
+        };
         let settings = format!(
-            "name = \"test\"\nmessages = [{messages:?}]\n{more}\n[output.json]\naddress = \"-\"\n"
+            "name = \"test\"\npace = {pace:?}\nmessages = [{messages:?}]\n{more}\n[output.json]\naddress = \"-\"\n"
         );
         fs::write(folder.join("node.toml"), settings).unwrap();
         let mut process = Command::new(env!("CARGO_BIN_EXE_access-av-node"))
             .args(["--site", "yard", "--vehicle", "tugger"])
             .arg(folder.join("node.toml"))
+            .envs(environment.iter().copied())
             .stdin(Stdio::piped())
             .stdout(Stdio::piped())
             .stderr(Stdio::null())
@@ -192,6 +204,69 @@ fn mcap_files_are_begun_anew_and_each_is_whole() {
             log.samples.len()
         );
     }
+}
+
+#[test]
+fn what_files_bring_is_taken_as_fast_as_it_can_be_and_nothing_is_dropped() {
+    let folder = scratch("fast");
+    // Twice what waits at most; status comes by the drive's time.
+    let seconds: u32 = 200;
+    let lines: String = (0..=50 * seconds)
+        .map(|number| odometry(0.02 * f64::from(number)))
+        .collect();
+    fs::write(folder.join("drive.jsonl"), lines).unwrap();
+    let file = folder.join("drive.jsonl").display().to_string();
+    let began = Instant::now();
+    let node = Node::start(&folder, &file, "");
+    let told: Vec<Value> = node
+        .lines
+        .lines()
+        .map(|line| serde_json::from_str(&line.unwrap()).unwrap())
+        .collect();
+    let count = |kind: &str| told.iter().filter(|it| it["type"] == kind).count();
+    assert_eq!(count("pose"), 50 * seconds as usize + 1);
+    assert!(count("status").abs_diff(seconds as usize) <= 2);
+    assert!(began.elapsed() < Duration::from_secs(seconds.into()) / 4);
+}
+
+#[test]
+fn a_service_manager_is_told_of_beginning_life_and_end() {
+    let folder = scratch("service");
+    let socket = folder.join("notify");
+    let manager = UnixDatagram::bind(&socket).unwrap();
+    manager
+        .set_read_timeout(Some(Duration::from_secs(10)))
+        .unwrap();
+    let socket = socket.display().to_string();
+    let environment = [("NOTIFY_SOCKET", &*socket), ("WATCHDOG_USEC", "400000")];
+    let mut node = Node::start_with(&folder, "-", "", &environment);
+    let told = || {
+        let mut bytes = [0; 1000];
+        let count = manager.recv(&mut bytes).unwrap();
+        String::from_utf8_lossy(&bytes[..count]).trim().to_owned()
+    };
+    let until = |wanted: &str| {
+        let mut before = Vec::new();
+        loop {
+            let said = told();
+            if said.starts_with(wanted) {
+                return (said, before);
+            }
+            before.push(said);
+        }
+    };
+    until("READY=1");
+    // Nothing comes, and the pipeline is alive.
+    let began = Instant::now();
+    (0..5).for_each(|_| drop(until("WATCHDOG=1")));
+    assert!(began.elapsed() < 5 * Duration::from_millis(400));
+    let mut input = node.process.stdin.take().unwrap();
+    input.write_all(odometry(0.0).as_bytes()).unwrap();
+    let (said, _) = until("STATUS=");
+    assert!(said.starts_with("STATUS=searching: "), "{said}");
+    node.terminate();
+    let (_, before) = until("STOPPING=1");
+    assert!(before.iter().all(|it| it != "READY=1"), "{before:?}");
 }
 
 #[test]

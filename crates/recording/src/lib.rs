@@ -4,7 +4,7 @@
 //! | what | format | |
 //! |---|---|---|
 //! | IQ of one or more antennas | [SigMF](sigmf); one raw file per antenna | read, written; read |
-//! | angles of arrival | [CSV](read_angle_log) | read, written |
+//! | angles of arrival | [CSV](read_angle_log); [verdicts](read_angles_mcap) | read, written |
 //! | odometry, IMU | [CSV](read_odometry_csv); [MCAP, rosbag2](mcap) | read; odometry written |
 //! | trajectories | [TUM](write_tum) | read, written |
 //! | poses, verdicts, diagnoses | [MCAP](mcap) | written |
@@ -13,6 +13,7 @@
 //! A file that cannot be used at all is a [`RecordingError`]; single bad items in it are left out
 //! and reported beside what was read.
 
+mod angle_file;
 mod angle_log;
 mod error;
 mod file;
@@ -30,13 +31,14 @@ mod table;
 mod text;
 mod tum;
 
+pub use angle_file::read_angles;
 pub use angle_log::{
     AngleLog, AngleRemark, LoggedAngle, angle_log_of_columns, read_angle_log, write_angle_log,
 };
 pub use error::RecordingError;
 pub use file::write as write_file;
 pub use library::{Files, load};
-pub use mcap::{McapWriter, read_odometry_mcap, write_drive_mcap};
+pub use mcap::{McapWriter, read_angles_mcap, read_odometry_mcap, write_drive_mcap};
 pub use odometry::{OdometryIssue, OdometryLog, OdometryRemark};
 pub use odometry_csv::{read_odometry_csv, read_wheel_odometry_csv, write_odometry_csv};
 pub use odometry_file::{OdometryChoice, read_odometry};

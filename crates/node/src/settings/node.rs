@@ -61,7 +61,7 @@ pub enum Pace {
     /// As it was recorded.
     #[default]
     RealTime,
-    /// As fast as possible; all that comes must come from files.
+    /// As fast as possible; all that comes must come from files, or as messages of one file or standard input.
     Fast,
 }
 
@@ -83,8 +83,11 @@ pub struct OdometryFile {
 #[derive(Debug, Clone, PartialEq, Serialize, Deserialize, JsonSchema)]
 #[serde(deny_unknown_fields)]
 pub struct AngleFile {
-    /// CSV; a path counts from this file.
+    /// CSV, or MCAP or the folder of a rosbag2 with verdicts that a node recorded; a path counts from this file.
     pub file: String,
+    /// Topic of the verdicts where not all of them are meant.
+    #[serde(default, skip_serializing_if = "Option::is_none")]
+    pub topic: Option<String>,
 }
 
 impl NodeSettings {
@@ -92,6 +95,19 @@ impl NodeSettings {
     pub fn is_playback(&self) -> bool {
         let from_file = |it: &SampleSource| matches!(it, SampleSource::Sigmf { .. });
         self.messages.is_empty() && self.samples.as_ref().is_none_or(from_file)
+    }
+
+    /// Whether what comes in waits until it is taken, for it comes by no clock of its own; else it is dropped where it
+    /// cannot be taken in time.
+    pub fn waits(&self) -> bool {
+        self.is_playback() || self.pace == Pace::Fast
+    }
+
+    /// Whether all that comes in are messages of one file or standard input, which are in order.
+    fn is_one_file_of_messages(&self) -> bool {
+        let nothing_else =
+            self.samples.is_none() && self.odometry.is_none() && self.angles.is_none();
+        nothing_else && matches!(&self.messages[..], [Address::Standard | Address::File(_)])
     }
 
     /// The same with the paths of what is read counted from the folder of `origin`.
@@ -141,11 +157,11 @@ impl TomlFile for NodeSettings {
             "there must be [odometry] with a file, or messages with odometry",
         )?;
         check.that(
-            self.pace == Pace::RealTime || self.is_playback(),
+            self.pace == Pace::RealTime || self.is_playback() || self.is_one_file_of_messages(),
             "pace",
             "fast",
-            "only files can be played faster than they were recorded: no messages, and samples of a \
-             recording or none",
+            "only files can be played faster than they were recorded: no messages and samples of a \
+             recording or none, or nothing but the messages of one file or of `-`",
         )?;
         if let Some(SampleSource::Zeromq { endpoints, .. }) = &self.samples {
             for (index, endpoint) in endpoints.iter().enumerate() {

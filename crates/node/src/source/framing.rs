@@ -177,6 +177,13 @@ impl Framing {
         });
     }
 
+    /// The radio is off for so long.
+    #[cfg(feature = "soapy")]
+    pub fn rests(&self, off: std::time::Duration) {
+        let missing = (off.as_secs_f64() * self.rate_hz) as u64;
+        self.health.rests(missing, off);
+    }
+
     /// Hands what is wanted of so many samples to `take`, with its first, its number and its time.
     fn cut(
         &mut self,

@@ -6,6 +6,7 @@ use std::time::{Duration, Instant};
 use num_complex::Complex32;
 use recording::{Capture, Recording, RecordingError};
 
+use crate::gate::Gate;
 use crate::inbox::{Block, Inbox, Input};
 use crate::statistics::SourceHealth;
 
@@ -45,10 +46,35 @@ impl Blocks {
     }
 
     fn time_s(&self, sample: u64) -> f64 {
+        self.start_s + self.index(sample) as f64 / self.rate_hz
+    }
+
+    /// Number of a sample of the file among all there were, with those that are missing.
+    fn index(&self, sample: u64) -> u64 {
         let captures = &self.recording.metadata().captures;
         let capture = captures.iter().rfind(|it| it.sample_start <= sample);
-        let index = capture.map_or(sample, |it| global_index(it) + (sample - it.sample_start));
-        self.start_s + index as f64 / self.rate_hz
+        capture.map_or(sample, |it| global_index(it) + (sample - it.sample_start))
+    }
+
+    /// End of the capture that the next sample is of.
+    fn capture_end(&self) -> u64 {
+        let captures = self.recording.metadata().captures.iter();
+        let starts = captures.map(|it| it.sample_start);
+        let next = starts.filter(|start| *start > self.at).min();
+        next.unwrap_or(u64::MAX).min(self.recording.length())
+    }
+
+    /// Leaves unread what was received before `time_s`, and says how many samples.
+    pub fn skip_to(&mut self, time_s: f64) -> u64 {
+        let (first, wanted) = (self.at, (time_s - self.start_s) * self.rate_hz);
+        while self.at < self.recording.length() {
+            let missing = (wanted - self.index(self.at) as f64).ceil();
+            if missing <= 0.0 {
+                break;
+            }
+            self.at += (missing as u64).min(self.capture_end() - self.at);
+        }
+        self.at - first
     }
 
     /// Reads the next block and says its time; `None` at the end.
@@ -59,11 +85,7 @@ impl Blocks {
         let Some(time_s) = self.next_s() else {
             return Ok(None);
         };
-        let captures = self.recording.metadata().captures.iter();
-        let ends = captures.map(|it| it.sample_start);
-        let end = ends.filter(|start| *start > self.at).min();
-        let end = end.unwrap_or(u64::MAX).min(self.recording.length());
-        let count = self.block.min(end - self.at);
+        let count = self.block.min(self.capture_end() - self.at);
         self.recording.read(self.at, count as usize, into)?;
         self.at += count;
         Ok(Some(time_s))
@@ -76,21 +98,46 @@ fn global_index(capture: &Capture) -> u64 {
     stated.unwrap_or(capture.sample_start)
 }
 
-/// Plays a recording in real time until it or the node ends.
-pub fn run(recording: Recording, start_s: f64, inbox: &Inbox, health: &Arc<SourceHealth>) {
+/// Plays a recording in real time until it or the node ends. What the gate does not want is not read, as if a
+/// radio were switched off meanwhile.
+pub fn run(
+    recording: Recording,
+    start_s: f64,
+    gate: &Gate,
+    inbox: &Inbox,
+    health: &Arc<SourceHealth>,
+) {
     let channels = recording.channels();
     let mut blocks = Blocks::new(recording, start_s, BLOCK_S);
     let began = Instant::now();
     let first_s = blocks.next_s().unwrap_or(start_s);
-    while !inbox.is_closed() {
+    let until = |time_s: f64| {
+        let due = Duration::try_from_secs_f64(time_s - first_s).unwrap_or_default();
+        due.saturating_sub(began.elapsed())
+    };
+    while let Some(next_s) = blocks.next_s()
+        && !inbox.is_closed()
+    {
+        let on_s = match gate.wanted() {
+            Some([from_s, _]) if from_s > next_s => from_s,
+            // The window is over, and the pipeline has not said yet what it wants next.
+            Some([_, until_s]) if until_s <= next_s => next_s + BLOCK_S,
+            _ => next_s,
+        };
+        if on_s > next_s {
+            let off = until(on_s);
+            health.rests(blocks.skip_to(on_s), off);
+            std::thread::sleep(off);
+            inbox.put(Input::Slept(on_s));
+            continue;
+        }
         let mut antennas = inbox.buffers(channels);
         match blocks.read(&mut antennas) {
             Ok(None) => break,
             Ok(Some(time_s)) => {
                 let count = antennas.first().map_or(0, Vec::len);
                 let end_s = time_s + blocks.length_s(&antennas);
-                let due = Duration::try_from_secs_f64(end_s - first_s).unwrap_or_default();
-                std::thread::sleep(due.saturating_sub(began.elapsed()));
+                std::thread::sleep(until(end_s));
                 health.came(count as u64);
                 inbox.put(Input::Samples(Block { time_s, antennas }));
             }

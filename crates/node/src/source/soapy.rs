@@ -89,7 +89,9 @@ fn session(
         {
             stream.deactivate(None)?;
             let off_s = from_s - end_s - BEGINS_S;
-            thread::sleep(Duration::try_from_secs_f64(off_s).unwrap_or_default());
+            let off = Duration::try_from_secs_f64(off_s).unwrap_or_default();
+            framing.rests(off);
+            thread::sleep(off);
             stream.activate(None)?;
         }
     }

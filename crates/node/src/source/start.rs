@@ -111,11 +111,12 @@ impl Sources {
             health.push("odometry");
         }
         if let Some(angles) = &settings.angles {
-            files.angles = recording::read_angle_log(angles.file.as_ref())?.angles;
+            let topic = angles.topic.as_deref();
+            files.angles = recording::read_angles(angles.file.as_ref(), topic)?.angles;
             health.push("angles");
         }
         Ok(Self {
-            inbox: Arc::default(),
+            inbox: Arc::new(Inbox::new(settings.waits())),
             gate: Arc::default(),
             health: health
                 .into_iter()
@@ -151,7 +152,9 @@ pub fn start(settings: &NodeSettings, sources: &mut Sources) -> Result<()> {
         match samples {
             SampleSource::Sigmf { .. } => {
                 if let Some((recording, start_s)) = files.recording {
-                    let work = move |inbox: &Inbox| played::run(recording, start_s, inbox, &health);
+                    let work = move |inbox: &Inbox| {
+                        played::run(recording, start_s, &gate, inbox, &health);
+                    };
                     spawn("samples", Box::new(work))?;
                 }
             }

@@ -71,6 +71,19 @@ impl<'a> Decoder<'a> {
         })
     }
 
+    pub fn u8(&mut self) -> Option<u8> {
+        self.take().map(u8::from_le_bytes)
+    }
+
+    pub fn u16(&mut self) -> Option<u16> {
+        let bytes = self.take()?;
+        Some(if self.little_endian {
+            u16::from_le_bytes(bytes)
+        } else {
+            u16::from_be_bytes(bytes)
+        })
+    }
+
     pub fn u32(&mut self) -> Option<u32> {
         let bytes = self.take()?;
         Some(if self.little_endian {

@@ -1,4 +1,4 @@
-//! The messages of an MCAP file that tell of the vehicle's motion.
+//! The messages of an MCAP file that tell of the vehicle's motion, and of angles.
 
 use std::collections::HashMap;
 use std::io::{BufReader, ErrorKind, Read};
@@ -8,7 +8,7 @@ use std::path::Path;
 use mcap::records::op;
 use mcap::sans_io::{LinearReadEvent, LinearReader, LinearReaderOptions};
 
-use super::schema::ODOMETRY;
+use super::schema::{ODOMETRY, VERDICT};
 use crate::error::RecordingError;
 use crate::file as files;
 
@@ -26,6 +26,8 @@ pub enum Kind {
     Odometry,
     /// `sensor_msgs/msg/Imu`.
     Imu,
+    /// `access_av_msgs/msg/AngleVerdict`.
+    Verdict,
 }
 
 /// Hands every CDR message of a [`Kind`] to `take`, with its topic, in the order of the file.
@@ -122,6 +124,8 @@ impl Channels {
                     self.schemas.insert(id, Kind::Odometry);
                 } else if name == b"sensor_msgs/msg/Imu" {
                     self.schemas.insert(id, Kind::Imu);
+                } else if name == VERDICT.name.as_bytes() {
+                    self.schemas.insert(id, Kind::Verdict);
                 }
             }
             op::CHANNEL => {

@@ -1,9 +1,10 @@
 //! MCAP as ROS 2 tools write and read it: profile `ros2`, messages in CDR, schemas in `ros2msg`.
 //!
 //! Written are `nav_msgs/msg/Odometry` with covariance and twist, `tf2_msgs/msg/TFMessage`, `diagnostic_msgs/msg/
-//! DiagnosticArray` and [`access_av_msgs/msg/AngleVerdict`](McapWriter::verdict); read are odometry and
-//! `sensor_msgs/msg/Imu`, of one file or of the files of a rosbag2 folder.
+//! DiagnosticArray` and [`access_av_msgs/msg/AngleVerdict`](McapWriter::verdict); read are odometry,
+//! `sensor_msgs/msg/Imu` and the angles of such verdicts, of one file or of the files of a rosbag2 folder.
 
+mod angles;
 mod bag;
 mod cdr;
 mod drive;
@@ -13,6 +14,7 @@ mod schema;
 mod turn_rate;
 mod writer;
 
+pub use angles::read_angles_mcap;
 pub use drive::write_drive_mcap;
 pub use reader::read_odometry_mcap;
 pub use writer::{DiagnosticLevel, DiagnosticStatus, Frames, McapWriter, Twist};

@@ -69,7 +69,7 @@ pub fn read_odometry_mcap(
             }
             return;
         }
-        if topic.is_some_and(|topic| topic != message_topic) {
+        if kind != Kind::Odometry || topic.is_some_and(|topic| topic != message_topic) {
             return;
         }
         if !topics.iter().any(|topic| topic == message_topic) {
@@ -332,7 +332,7 @@ fn decode_imu(message: &[u8]) -> Option<(f64, f64)> {
     (first != -1.0).then_some((time_s, yaw_rate_radps))
 }
 
-fn stamp_s(decoder: &mut Decoder<'_>) -> Option<f64> {
+pub(super) fn stamp_s(decoder: &mut Decoder<'_>) -> Option<f64> {
     let (seconds, nanoseconds) = (decoder.i32()?, decoder.u32()?);
     Some(f64::from(seconds) + 1e-9 * f64::from(nanoseconds))
 }

@@ -8,14 +8,15 @@ use std::path::Path;
 use mcap::{Compression, MessageStream, WriteOptions};
 use proptest::prelude::*;
 
+use onboard::Execution;
 use onboard::geometry::Pose;
-use onboard::localize::{AngleMeasurement, PoseEstimate};
+use onboard::localize::{AngleMeasurement, PoseEstimate, UpdateReason, UpdateVerdict};
 use onboard::observation::{OdometrySample, SensedSsb};
 use recording::mcap::{Frames, Twist};
 use recording::{
-    LoggedAngle, McapWriter, OdometryIssue, RecordingError, TimedPose, read_angle_log,
-    read_odometry_csv, read_odometry_mcap, read_tum, write_angle_log, write_odometry_csv,
-    write_tum,
+    LoggedAngle, McapWriter, OdometryIssue, RecordingError, TimedPose, read_angle_log, read_angles,
+    read_angles_mcap, read_odometry_csv, read_odometry_mcap, read_tum, write_angle_log,
+    write_odometry_csv, write_tum,
 };
 
 fn sample(time_s: f64) -> OdometrySample {
@@ -327,6 +328,73 @@ fn angle_logs_come_back_and_bad_lines_are_left_out() {
     assert_eq!(lines, (5..14).collect::<Vec<_>>());
     let nanoseconds = log.remarks.last().unwrap().to_string();
     assert!(nanoseconds.contains("it must be seconds"), "{nanoseconds}");
+}
+
+#[test]
+fn angles_are_read_from_the_verdicts_of_mcap_and_those_without_an_angle_passed_over() {
+    let folder = common::scratch("angles-mcap");
+    let file = folder.join("drive.mcap");
+    let verdict = |time_s: f64, angle: Option<(f64, bool)>| {
+        let (phase_rad, resolved) = angle.unzip();
+        let ssb = SensedSsb {
+            pci: 300,
+            ssb_index: 7,
+            time_s,
+            snr_db: 12.5,
+        };
+        let measured = phase_rad.map(|phase_rad| AngleMeasurement {
+            time_s,
+            phase_rad,
+            phase_sigma_rad: 0.02,
+            angle_rad: 1.0,
+            snr_db: 12.5,
+            resolved: resolved == Some(true),
+        });
+        Execution {
+            ssb,
+            measured,
+            verdict: UpdateVerdict::unused(UpdateReason::Outlier),
+            wake_up_time_s: 0.02,
+        }
+    };
+    let told = [
+        verdict(1.5, Some((0.25, true))),
+        verdict(1.52, None),
+        verdict(1.54, Some((-0.5, false))),
+    ];
+    let mut writer = McapWriter::compressed(File::create(&file).unwrap()).unwrap();
+    for execution in &told {
+        writer.verdict("/access_av/verdicts", execution).unwrap();
+    }
+    writer.finish().unwrap();
+    for read in [
+        read_angles_mcap(&file, None).unwrap(),
+        read_angles(&folder, Some("/access_av/verdicts")).unwrap(),
+    ] {
+        assert_eq!(read.remarks, []);
+        let [first, second] = &read.angles[..] else {
+            panic!("{read:?}");
+        };
+        for (found, expected) in [(first, &told[0]), (second, &told[2])] {
+            assert_eq!(
+                (found.ssb.pci, found.ssb.ssb_index, found.ssb.snr_db),
+                (300, 7, 12.5)
+            );
+            assert!((found.ssb.time_s - expected.ssb.time_s).abs() < 1e-9);
+            let measured = expected.measured.unwrap();
+            assert_eq!(found.measured.phase_rad, measured.phase_rad);
+            assert_eq!(found.measured.phase_sigma_rad, 0.02);
+            assert_eq!(found.measured.resolved, measured.resolved);
+        }
+    }
+    let error = read_angles_mcap(&file, Some("/elsewhere")).unwrap_err();
+    assert!(error.to_string().contains("/elsewhere"), "{error}");
+    write_mcap(&file, &["/odom"], 0.0);
+    let error = read_angles_mcap(&file, None).unwrap_err().to_string();
+    assert!(error.contains("AngleVerdict"), "{error}");
+    let csv = folder.join("angles.csv");
+    let error = read_angles(&csv, Some("/t")).unwrap_err().to_string();
+    assert!(error.contains("topics"), "{error}");
 }
 
 #[test]

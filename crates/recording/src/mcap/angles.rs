@@ -1,0 +1,69 @@
+//! Angles out of the verdicts of MCAP files.
+
+use std::path::Path;
+
+use super::bag::files_of;
+use super::cdr::Decoder;
+use super::messages::{Kind, each_message};
+use super::reader::stamp_s;
+use crate::angle_log::{AngleLog, Columns, angle};
+use crate::error::RecordingError;
+
+/// Reads the angles that `access_av_msgs/msg/AngleVerdict` messages of an MCAP file or a rosbag2 folder tell, of
+/// one topic where it is named: those that a node or `access-av locate` has recorded. Verdicts without an angle
+/// are passed over; files from before verdicts told `resolved` hold none in doubt.
+///
+/// # Errors
+/// [`RecordingError`] when a file is no MCAP, is cut off or damaged, or there is no such message. Single
+/// messages are only remarked upon.
+pub fn read_angles_mcap(bag: &Path, topic: Option<&str>) -> Result<AngleLog, RecordingError> {
+    let mut log = AngleLog::default();
+    let mut item = 0;
+    for file in files_of(bag)? {
+        each_message(&file, |kind, message_topic, data| {
+            if kind != Kind::Verdict || topic.is_some_and(|topic| topic != message_topic) {
+                return;
+            }
+            item += 1;
+            match decode(data) {
+                Some(columns) if columns.phase_rad.is_some_and(f64::is_nan) => {}
+                Some(columns) => log.add(item, angle(&columns)),
+                None => {
+                    let why = "no complete access_av_msgs/msg/AngleVerdict".to_owned();
+                    log.add(item, Err(why));
+                }
+            }
+        })?;
+    }
+    if item == 0 {
+        return Err(RecordingError::Missing {
+            file: bag.display().to_string(),
+            key: topic
+                .unwrap_or("a topic of access_av_msgs/msg/AngleVerdict")
+                .to_owned(),
+            allowed: "there must be access_av_msgs/msg/AngleVerdict in CDR on it".to_owned(),
+        });
+    }
+    Ok(log)
+}
+
+fn decode(message: &[u8]) -> Option<Columns> {
+    let mut decoder = Decoder::new(message)?;
+    let time_s = stamp_s(&mut decoder)?;
+    decoder.skip_string()?;
+    let (pci, ssb_index, _accepted) = (decoder.u16()?, decoder.u8()?, decoder.u8()?);
+    decoder.skip_string()?;
+    let [phase_rad, phase_sigma_rad, snr_db] = decoder.f64s()?;
+    let _mahalanobis_threshold_and_wake_up: [f64; 3] = decoder.f64s()?;
+    let is_resolved = decoder.u8().is_none_or(|it| it != 0);
+    Some(Columns {
+        time_s: Some(time_s),
+        pci: Some(f64::from(pci)),
+        ssb_index: Some(f64::from(ssb_index)),
+        phase_rad: Some(phase_rad),
+        phase_sigma_rad: Some(phase_sigma_rad),
+        snr_db: Some(snr_db),
+        resolved: Some(f64::from(u8::from(is_resolved))),
+        ..Columns::default()
+    })
+}

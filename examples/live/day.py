@@ -1,0 +1,138 @@
+"""A day of driving as fast as the computer can: it must not leak, and its counters must add up.
+
+    python examples/live/day.py [--node PROGRAM] [--hours 24]
+
+A drive of the scenario `yard` comes again and again as newline JSON on standard input, angles and
+odometry; each time the vehicle is found anew. Prints the memory over the hours, what came, what was
+dropped, and the size of the MCAP files; each is read, and must be whole.
+"""
+
+from __future__ import annotations
+
+import argparse
+import csv
+import json
+import os
+import re
+import subprocess
+import sys
+import tempfile
+import time
+import urllib.request
+from pathlib import Path
+from typing import TYPE_CHECKING, Any
+
+from live import ROOT, SCENARIO
+from mcap.reader import make_reader
+from transmitter import odometry_of
+
+from access_av.drives.recorded import log_angles
+
+if TYPE_CHECKING:
+    from collections.abc import Iterator
+
+
+def messages_of(folder: Path) -> list[tuple[float, str]]:
+    """Angles and odometry in order of time: the time, and what follows it in the line."""
+    told: list[tuple[float, dict[str, Any]]] = []
+    for odometry in odometry_of(folder):
+        told.append((odometry.pop("time_s"), {"type": "odometry", **odometry}))
+    with (folder / "angles.csv").open(encoding="utf-8") as file:
+        for row in csv.DictReader(line for line in file if not line.startswith("#")):
+            angle: dict[str, Any] = {"type": "angle", "pci": int(row["pci"])}
+            angle["ssb_index"] = int(row["ssb_index"])
+            angle["resolved"] = row["resolved"] == "1"
+            for key in ("phase_rad", "phase_sigma_rad", "snr_db"):
+                angle[key] = float(row[key])
+            told.append((float(row["time_s"]), angle))
+    told.sort(key=lambda it: it[0])
+    return [(time_s, json.dumps(message)[1:]) for time_s, message in told]
+
+
+def hours_of(lap: list[tuple[float, str]], hours: float) -> Iterator[tuple[str, int]]:
+    """Text of one drive after the other and its number of messages, until they fill the hours."""
+    begins_s = 0.0
+    while begins_s < 3600.0 * hours:
+        lines = [f'{{"time_s":{begins_s + time_s:.9f},{rest}\n' for time_s, rest in lap]
+        # Only what has driven can be searched for again.
+        lines.insert(0, '{"type":"reset"}\n')
+        yield "".join(lines), len(lines)
+        begins_s += lap[-1][0] + 0.02
+
+
+def resident_mib(process: int) -> float:
+    """Memory of a process."""
+    pages = int(Path(f"/proc/{process}/statm").read_text(encoding="ascii").split()[1])
+    return pages * os.sysconf("SC_PAGE_SIZE") / 2**20
+
+
+def main() -> int:
+    """Drives for a day."""
+    parser = argparse.ArgumentParser(description=__doc__.splitlines()[0])
+    parser.add_argument("--node", default=str(ROOT / "target/release/access-av-node"))
+    parser.add_argument("--hours", type=float, default=24.0)
+    arguments = parser.parse_args()
+    with tempfile.TemporaryDirectory() as scratch:
+        folder, files = Path(scratch), Path(scratch) / "mcap"
+        log_angles(SCENARIO, folder)
+        lap = messages_of(folder)
+        settings = folder / "node.toml"
+        settings.write_text(
+            'name = "day"\npace = "fast"\nmessages = ["-"]\n'
+            f'[output.mcap]\nfolder = "{files}"\n[page]\nlisten = "127.0.0.1:0"\n',
+            encoding="utf-8",
+        )
+        believed = ["--site", str(folder / "site.toml"), "--vehicle", str(folder / "vehicle.toml")]
+        node = subprocess.Popen(
+            [arguments.node, *believed, str(settings)],
+            stdin=subprocess.PIPE,
+            stderr=subprocess.PIPE,
+            text=True,
+        )
+        assert node.stdin is not None
+        assert node.stderr is not None
+        found = re.search(r"http://\S+", node.stderr.readline())
+        assert found, node.stderr.read()
+
+        def state() -> dict[str, Any]:
+            with urllib.request.urlopen(f"{found.group()}state.json") as answer:
+                return dict(json.load(answer))
+
+        sent, memory_mib, began = 0, [], time.monotonic()
+        for text, count in hours_of(lap, arguments.hours):
+            node.stdin.write(text)
+            sent += count
+            memory_mib.append(resident_mib(node.pid))
+        node.stdin.flush()
+        while (told := state())["sources"][0]["items"] < sent:
+            time.sleep(0.2)
+        time.sleep(1.0)
+        told = state()
+        memory_mib.append(resident_mib(node.pid))
+        node.stdin.close()
+        node.wait()
+        drive_s, took_s = told["now_s"], time.monotonic() - began
+        size, read = 0, {}
+        for file in sorted(files.iterdir()):
+            size += file.stat().st_size
+            with file.open("rb") as stream:
+                for _, channel, _ in make_reader(stream, validate_crcs=True).iter_messages():
+                    read[channel.topic] = read.get(channel.topic, 0) + 1
+        number = len(list(files.iterdir()))
+    quarter = max(1, len(memory_mib) // 4)
+    print(f"{drive_s / 3600:.2f} h of driving, {len(memory_mib) - 1} drives, in {took_s:.0f} s")
+    print(f"messages: {sent} sent, {told['sources'][0]['items']} taken, {told['dropped']} dropped")
+    print(
+        f"memory: {memory_mib[quarter - 1]:.1f} MiB after a quarter, {memory_mib[-1]:.1f} at the "
+        f"end, {max(memory_mib):.1f} at most"
+    )
+    print(f"MCAP: {number} files, {size / 1e6:.1f} MB, {size / drive_s * 0.0864:.0f} MB a day")
+    print(f"read of them: {read}")
+    lost = sum(told["dropped"].values()) + sent - told["sources"][0]["items"]
+    # A status a second of the drive.
+    whole = abs(read["/diagnostics"] - drive_s) <= 2 + 2 * len(memory_mib)
+    return 0 if lost == 0 and whole else 1
+
+
+if __name__ == "__main__":
+    sys.exit(main())
