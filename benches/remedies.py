@@ -1,0 +1,72 @@
+"""Remedies of a plant: does the order that a study gives them agree with many paired drives?
+
+    python benches/remedies.py                       # bends, 200 drives each
+    python benches/remedies.py yard --drives 50
+
+The study drives as many as it does of itself. Here each remedy, and the plant as it is, is driven
+in the same worlds, other ones than the study's. Of two remedies the one is surely the better where
+the 95 % interval of their paired difference leaves 0 out; such a pair agrees where the study has it
+in the same order.
+"""
+
+from __future__ import annotations
+
+import argparse
+import itertools
+import json
+import time
+
+import access_av
+from access_av.study.remedies import remedies
+from access_av.study.trips import drive
+
+STUDY_SEED, SEED = 1, 1001
+
+
+def main() -> None:
+    """Print the paired differences, and the pairs that agree."""
+    parser = argparse.ArgumentParser(description=__doc__.splitlines()[0])
+    parser.add_argument("plant", nargs="?", default="bends", help="shipped name, or a file")
+    parser.add_argument("--drives", type=int, default=200)
+    asked = parser.parse_args()
+    plant = access_av.Plant.load(asked.plant)
+    scenario, (_, percent) = plant.scenario(), plant.target
+    began_s = time.monotonic()
+    studied = access_av.study_plant(plant, seed=STUDY_SEED, always_mend=True)
+    place = {it.remedy.name: number for number, it in enumerate(studied.mended, start=1)}
+    runs = studied.mended[0].driven.runs
+    print(f"{plant.name}: study of {runs} pairs, {time.monotonic() - began_s:.0f} s")
+
+    began_s = time.monotonic()
+    base = drive("as it is", scenario, asked.drives, SEED)
+    vehicles = json.loads(plant.to_json())["fleet"]["vehicles"]
+    driven = {
+        it.name: drive(it.name, scenario.with_overrides(dict(it.settings)), asked.drives, SEED)
+        for it in remedies(scenario, vehicles)
+    }
+    print(f"{asked.drives} drives each, {time.monotonic() - began_s:.0f} s")
+    print(f"as it is: {percent:g} % within {base.percentile(percent).value:.3f} m")
+    less = {name: it.less_than(base, percent) for name, it in driven.items()}
+    for number, name in enumerate(sorted(less, key=lambda it: less[it][0]), start=1):
+        found, low, high = less[name]
+        print(
+            f"{number} (study {place[name]})  {name:<32} {found:+.3f} ({low:+.3f} to {high:+.3f}) m"
+        )
+
+    agree = sure = 0
+    for one, other in itertools.combinations(driven, 2):
+        _, low, high = driven[one].less_than(driven[other], percent)
+        if low <= 0.0 <= high:
+            continue
+        sure += 1
+        agrees = (high < 0.0) == (place[one] < place[other])
+        agree += agrees
+        if not agrees:
+            better, worse = (one, other) if high < 0.0 else (other, one)
+            print(f"the study has it otherwise: “{better}” is surely better than “{worse}”")
+    pairs = len(driven) * (len(driven) - 1) // 2
+    print(f"{sure} of {pairs} pairs are sure; the study agrees in {agree} of them")
+
+
+if __name__ == "__main__":
+    main()
