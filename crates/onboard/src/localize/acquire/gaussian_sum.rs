@@ -10,10 +10,11 @@ use std::f64::consts::TAU;
 use std::sync::Arc;
 
 use crate::clone_in_place::clone_in_place;
+use crate::gaussian::CERTAIN_SIGMAS;
 use crate::geometry::{Area, Point, Pose, wrap_angle};
 use crate::localize::ekf::state::{ACROSS, ALONG, HEADING, STATES};
 use crate::localize::ekf::{Ekf, EkfConfig};
-use crate::localize::modes::log_likelihood;
+use crate::localize::modes::{log_likelihood, log_likelihood_as_stated};
 use crate::localize::output::{InitialPose, PoseEstimate};
 use crate::localize::output::{OdometryVerdict, UpdateReason, UpdateVerdict};
 use crate::observation::AngleMeasurement;
@@ -76,7 +77,11 @@ impl Hypothesis {
 
     /// How far another one is from its own in one state.
     fn apart(&self, other: &Self, state: usize) -> f64 {
-        let apart = other.ekf.belief().mean[state] - self.ekf.belief().mean[state];
+        self.apart_of(&other.ekf, state)
+    }
+
+    fn apart_of(&self, other: &Ekf, state: usize) -> f64 {
+        let apart = other.belief().mean[state] - self.ekf.belief().mean[state];
         if state == HEADING {
             wrap_angle(apart)
         } else {
@@ -122,6 +127,10 @@ clone_in_place! {
         ground: Ground,
         heads: Vec<RadioHead>,
         hypotheses: Vec<Hypothesis>,
+        /// How many there were at first.
+        places: usize,
+        /// Whether they are judged by what is stated alone.
+        is_as_stated: bool,
     }
 }
 
@@ -140,6 +149,15 @@ impl GaussianSum {
         let against = either_direction.then(|| Arc::new(road.reversed()));
         let roads = [Arc::new(road)].into_iter().chain(against).collect();
         Self::on(&config, Ground::Roads(roads), heads)
+    }
+
+    /// The same in the plane, where places are judged by what is stated alone.
+    pub(super) fn as_stated(config: &EkfConfig, heads: &[RadioHead]) -> Self {
+        let search = Self::new(*config, None, true, heads);
+        Self {
+            is_as_stated: true,
+            ..search
+        }
     }
 
     /// Where the vehicle is without a road.
@@ -168,6 +186,8 @@ impl GaussianSum {
             ground,
             heads: heads.to_vec(),
             hypotheses: Vec::new(),
+            places: 0,
+            is_as_stated: false,
         };
         made.restart();
         made
@@ -222,6 +242,7 @@ impl GaussianSum {
                 }
             }
         }
+        self.places = self.hypotheses.len();
     }
 
     /// Moves every hypothesis.
@@ -235,6 +256,11 @@ impl GaussianSum {
     /// Judges every hypothesis by an angle. The verdict is that of the likeliest.
     pub fn update(&mut self, head: &RadioHead, measured: &AngleMeasurement) -> UpdateVerdict {
         let mut first = UpdateVerdict::unused(UpdateReason::Unusable);
+        let log_likelihood = if self.is_as_stated {
+            log_likelihood_as_stated
+        } else {
+            log_likelihood
+        };
         for (rank, hypothesis) in self.hypotheses.iter_mut().enumerate() {
             let predicted = hypothesis.ekf.predict_measurement(head, measured);
             hypothesis.log_likelihood += log_likelihood(&hypothesis.ekf, &predicted);
@@ -313,6 +339,28 @@ impl GaussianSum {
             .map_or(f64::NEG_INFINITY, |best| best.log_likelihood)
     }
 
+    /// Log-likelihood of the angles if the vehicle began at any of the places, all as probable.
+    pub(super) fn evidence(&self) -> f64 {
+        let best = self.best();
+        let all = self
+            .hypotheses
+            .iter()
+            .map(|it| (it.log_likelihood - best).exp());
+        best + (all.sum::<f64>() / self.places.max(1) as f64).ln()
+    }
+
+    /// Whether a filter's place is within what is certain of every hypothesis that is left.
+    pub(super) fn is_about(&self, ekf: &Ekf) -> bool {
+        self.hypotheses.iter().all(|it| {
+            let (one, other) = (it.ekf.belief(), ekf.belief());
+            [ALONG, ACROSS, HEADING].into_iter().all(|state| {
+                let apart = it.apart_of(ekf, state);
+                let variance = one.covariance[state][state] + other.covariance[state][state];
+                apart * apart < CERTAIN_SIGMAS * CERTAIN_SIGMAS * variance
+            })
+        })
+    }
+
     /// One filter for all hypotheses that are left, once they know the position.
     pub fn found(&self) -> Option<Ekf> {
         let all = self.mixture(f64::NEG_INFINITY, 0.0);
@@ -324,7 +372,9 @@ impl GaussianSum {
                 variance < FOUND_STD_RAD * FOUND_STD_RAD
             }
         };
-        if !(is_placed && heading_known) {
+        // As stated, any other place is less probable than one in 10¹¹, however far the one that is left is known.
+        let is_only = self.is_as_stated && self.hypotheses.len() == 1;
+        if !((is_placed || is_only) && heading_known) {
             return None;
         }
         let mut one = self.hypotheses.first()?.clone();

@@ -5,9 +5,9 @@ use std::cmp::Ordering;
 
 use super::gaussian_sum::GaussianSum;
 use crate::clone_in_place::clone_in_place;
-use crate::localize::ekf::Ekf;
-use crate::localize::modes::{CERTAIN, log_likelihood};
-use crate::observation::AngleMeasurement;
+use crate::localize::ekf::{Ekf, EkfConfig};
+use crate::localize::modes::{CERTAIN, log_likelihood, log_likelihood_as_stated};
+use crate::observation::{AngleMeasurement, OdometrySample};
 use crate::radio_head::RadioHead;
 
 /// Way to be driven before a find is believed (m): a vehicle that stands hears the same errors again and again.
@@ -15,6 +15,10 @@ const LEAST_WAY_M: f64 = 0.5;
 
 /// Angles of one radio head within this way share their errors: clusters keep an angle wrong for so long (m).
 const INDEPENDENT_M: f64 = 10.0;
+
+/// Probability that a start which is given is another one, anywhere about the radio heads: as that of a fault of a radio
+/// head.
+const WRONG_START: f64 = 0.01;
 
 /// Longer silences do not count as time with angles (s).
 const SILENCE_S: f64 = 1.0;
@@ -24,6 +28,11 @@ clone_in_place! {
     #[derive(Debug)]
     pub(super) struct RelocalizationTest {
         pub search: GaussianSum,
+        /// The filter of a start that is given, as it is stated: what the bank's filters learn from angles that contradict
+        /// them explains those away. None where the vehicle is lost later.
+        given: Option<Box<Ekf>>,
+        /// What the filter expects that is searched beside.
+        config: EkfConfig,
         /// Time of the newest odometry when it began to be reported (s).
         pub reported_s: f64,
         /// Whether the filter is refuted, so that its place is not reported any more beside the search's.
@@ -51,6 +60,8 @@ impl RelocalizationTest {
         let heads = search.heads().len();
         Self {
             search,
+            given: None,
+            config: *ekf.config(),
             reported_s: ekf.time_s(),
             refutes: false,
             may_mislead,
@@ -63,6 +74,41 @@ impl RelocalizationTest {
             independent: 0,
             independent_m: vec![f64::NEG_INFINITY; heads],
         }
+    }
+
+    /// Of a start that is given, with a search wherever else it may be.
+    pub fn of_start(search: GaussianSum, given: &Ekf) -> Self {
+        Self {
+            given: Some(Box::new(given.as_stated())),
+            ..Self::new(search, given, false)
+        }
+    }
+
+    /// What the search has found. Biases of the angles, which a search of a start does without, are unknown there.
+    pub fn found(&self) -> Option<Ekf> {
+        let mut found = self.search.found()?;
+        if self.is_of_start() {
+            found.expect_bias_as(&self.config);
+        }
+        Some(found)
+    }
+
+    /// Whether the search has found that the start is where it is said to be.
+    pub fn confirms_start(&self) -> bool {
+        (self.given.as_ref()).is_some_and(|given| self.search.is_about(given))
+    }
+
+    /// Whether it is of a start that is given.
+    pub const fn is_of_start(&self) -> bool {
+        self.given.is_some()
+    }
+
+    /// Moves all places.
+    pub fn odometry(&mut self, sample: &OdometrySample) {
+        if let Some(given) = &mut self.given {
+            given.odometry(sample);
+        }
+        self.search.odometry(sample);
     }
 
     /// Takes in an angle, before the filter does.
@@ -82,25 +128,60 @@ impl RelocalizationTest {
                 self.independent = self.independent.saturating_add(1);
             }
         }
-        self.of_filter += log_likelihood(ekf, &ekf.predict_measurement(head, measured));
+        if let Some(given) = &mut self.given {
+            let predicted = given.predict_measurement(head, measured);
+            self.of_filter += log_likelihood_as_stated(given, &predicted);
+            given.update_predicted(predicted, measured);
+        } else {
+            self.of_filter += log_likelihood(ekf, &ekf.predict_measurement(head, measured));
+        }
         self.search.update(head, measured);
     }
 
     /// Greater where the angles are certainly likelier at the search's best place, less where they are at the
     /// filter's. A filter that is only to be confirmed, or whose angles may mislead, is compared by independent
-    /// angles.
+    /// angles. A start that is given stands until it is refuted: less as soon as it is the more probable.
     pub fn compare(&self, is_confirming: bool) -> Ordering {
-        let mut ratio = self.search.best() - self.of_filter;
-        if is_confirming || self.may_mislead {
-            ratio = ratio * f64::from(self.independent) / f64::from(self.angles.max(1));
-        }
+        let (ratio, less) = if self.is_of_start() {
+            (self.log_odds(), 0.0)
+        } else {
+            let ratio = self.search.best() - self.of_filter;
+            let independent = f64::from(self.independent) / f64::from(self.angles.max(1));
+            let share = if is_confirming || self.may_mislead {
+                independent
+            } else {
+                1.0
+            };
+            (ratio * share, -CERTAIN)
+        };
         if ratio > CERTAIN {
             Ordering::Greater
-        } else if ratio < -CERTAIN {
+        } else if ratio < less {
             Ordering::Less
         } else {
             Ordering::Equal
         }
+    }
+
+    /// Logarithm of the odds that the vehicle began elsewhere than given.
+    fn log_odds(&self) -> f64 {
+        (WRONG_START / (1.0 - WRONG_START)).ln() + self.against_start()
+    }
+
+    /// Logarithm of by how much likelier the angles are elsewhere. What speaks for that counts by independent angles.
+    fn against_start(&self) -> f64 {
+        let ratio = self.search.evidence() - self.of_filter;
+        let independent = f64::from(self.independent) / f64::from(self.angles.max(1));
+        if ratio > 0.0 {
+            ratio * independent
+        } else {
+            ratio
+        }
+    }
+
+    /// Whether the angles speak against the start that is given.
+    pub fn doubts_start(&self) -> bool {
+        self.is_of_start() && self.against_start() > 0.0
     }
 
     /// The least way to be driven before a find is believed (m).

@@ -85,6 +85,8 @@ struct Evidence {
     search: Ordering,
     /// The search is of one place.
     is_found: bool,
+    /// It is of a start that was given.
+    is_of_start: bool,
     /// No odometry since the search is reported: before anything moves the covariance covers both.
     is_just_reported: bool,
     /// Enough way was driven for a find; a long one.
@@ -123,9 +125,16 @@ impl Phase {
             },
             Self::Confirming => {
                 let is_long = by.is_patient || (by.may_mislead && by.has_moved_far);
+                let is_over = if by.is_of_start {
+                    // Until one place is left another may yet be the right one; what takes long is not worth its cost.
+                    by.search == Ordering::Less
+                        && (by.is_found || by.is_patient || by.has_moved_far)
+                } else {
+                    !is_ahead && (is_confirmed || is_long || by.is_found)
+                };
                 if (is_ahead && by.has_moved) || (by.is_lost && !by.may_mislead) {
                     Transition::Report
-                } else if !is_ahead && (is_confirmed || is_long || by.is_found) {
+                } else if is_over {
                     Transition::End {
                         rests: by.may_mislead,
                     }
@@ -341,6 +350,37 @@ impl Relocalizer {
         (self.phase, self.test) = (Phase::Tracking, None);
     }
 
+    /// Begins a search wherever else the vehicle may have begun than where it is said to have; where that is all nearby,
+    /// one as later.
+    fn begin_of_start(&mut self, now_s: f64) {
+        let heads = self.setup.heads.as_slice();
+        let (true, Some(solution)) = (self.setup.road.is_none(), &self.solution) else {
+            return self.begin(Phase::Confirming, now_s);
+        };
+        if heads.len() < LEAST_HEADS || GaussianSum::is_small(heads) {
+            return self.begin(Phase::Confirming, now_s);
+        }
+        let given = solution.ekf();
+        let mut search = GaussianSum::as_stated(given.as_stated().config(), heads);
+        search.resume(given);
+        self.test = Some(RelocalizationTest::of_start(search, given));
+        self.phase = Phase::Confirming;
+    }
+
+    /// Whether a search is of the start that was given.
+    fn is_of_start(&self) -> bool {
+        self.test
+            .as_ref()
+            .is_some_and(RelocalizationTest::is_of_start)
+    }
+
+    /// Whether the angles speak against that.
+    fn doubts_start(&self) -> bool {
+        self.test
+            .as_ref()
+            .is_some_and(RelocalizationTest::doubts_start)
+    }
+
     /// Begins a search beside the solution.
     fn begin(&mut self, phase: Phase, now_s: f64) {
         let is_wide = phase == Phase::Relocalizing { wide: true };
@@ -387,13 +427,20 @@ impl Relocalizer {
         let odometry_s = solution.ekf().time_s();
         let is = |what: &dyn Fn(&RelocalizationTest) -> bool| self.test.as_ref().is_some_and(what);
         let compared = |it: &RelocalizationTest| it.compare(self.phase == Phase::Confirming);
+        let search = self.test.as_ref().map_or(Ordering::Equal, compared);
+        let is_of_start = self.is_of_start();
         Evidence {
             is_lost: self.consistency.is_lost(),
             is_consistent: self.consistency.is_sure(),
             may_mislead: solution.may_mislead(),
             is_rested: now_s >= self.rests_until_s,
-            search: self.test.as_ref().map_or(Ordering::Equal, compared),
-            is_found: is(&|it| it.search.found().is_some()),
+            search,
+            // A start stands where that is the place that is found.
+            is_found: is(&|it| match (it.is_of_start(), search) {
+                (true, Ordering::Less) => it.confirms_start(),
+                _ => it.search.found().is_some(),
+            }),
+            is_of_start,
             is_just_reported: is(&|it| it.reported_s == odometry_s),
             has_moved: is(&|it| it.way_m >= it.least_way_m()),
             has_moved_far: is(&|it| it.way_m > LONG_WAY_M),
@@ -417,13 +464,14 @@ impl Relocalizer {
             Transition::Stay => {}
             Transition::Begin(phase) => self.begin(phase, now_s),
             Transition::Report => {
-                self.phase = Phase::Relocalizing { wide: false };
+                let wide = self.is_of_start();
+                self.phase = Phase::Relocalizing { wide };
                 if let Some(test) = &mut self.test {
                     test.report(odometry_s);
                 }
             }
             Transition::TakeOver => {
-                if let Some(found) = self.test.as_ref().and_then(|it| it.search.found()) {
+                if let Some(found) = self.test.as_ref().and_then(RelocalizationTest::found) {
                     let from = solution.pose(now_s).pose;
                     let [x_m, y_m, turned_rad] = from.offset_of(found.pose(now_s).pose);
                     self.recovered = Some(Recovered {
@@ -451,7 +499,7 @@ impl Localizer for Relocalizer {
             return Ok(search.odometry(sample));
         }
         if let Some(test) = &mut self.test {
-            test.search.odometry(sample);
+            test.odometry(sample);
         }
         let solution = self.solution.as_mut();
         Ok(solution.map_or(OdometryVerdict::NotFinite, |it| it.odometry(sample)))
@@ -474,7 +522,9 @@ impl Localizer for Relocalizer {
         let is_of_other_model = |test: &RelocalizationTest| {
             (self.solution.as_ref()).is_some_and(|it| !test.search.is_of_the_model_of(it.ekf()))
         };
-        if self.phase == Phase::Given || self.test.as_ref().is_some_and(is_of_other_model) {
+        if self.phase == Phase::Given {
+            self.begin_of_start(now_s);
+        } else if !self.is_of_start() && self.test.as_ref().is_some_and(is_of_other_model) {
             self.begin(Phase::Confirming, now_s);
         }
         let Some(solution) = &mut self.solution else {
@@ -486,7 +536,7 @@ impl Localizer for Relocalizer {
         let begun_s = solution.begun_s();
         let verdict = solution.update(head, measured);
         let (has_begun_anew, noise_ratio) = (solution.begun_s() > begun_s, solution.noise_ratio());
-        if has_begun_anew && self.is_lost() {
+        if has_begun_anew && self.is_lost() && !self.is_of_start() {
             // The filter that was lost is no more.
             self.end_search();
             self.consistency.reset();
@@ -505,10 +555,11 @@ impl Localizer for Relocalizer {
             return Ok(estimate);
         };
         let mut estimate = solution.pose(time_s);
-        if let (Phase::Relocalizing { wide }, Some(test)) = (self.phase, &self.test) {
+        if let (true, Some(test)) = (self.is_lost(), &self.test) {
             let searched = test.search.pose(time_s);
             // Along all of a road, or far about, its best place may be anywhere.
-            let is_near = self.setup.road.is_none() && !wide;
+            let is_near =
+                self.setup.road.is_none() && self.phase == Phase::Relocalizing { wide: false };
             if is_near && test.refutes {
                 (estimate.pose, estimate.covariance) = (searched.pose, searched.covariance);
             } else {
@@ -532,7 +583,7 @@ impl Localizer for Relocalizer {
     }
 
     fn is_lost(&self) -> bool {
-        matches!(self.phase, Phase::Relocalizing { .. })
+        matches!(self.phase, Phase::Relocalizing { .. }) || self.doubts_start()
     }
 
     fn recovered(&self) -> Option<Recovered> {
@@ -569,6 +620,7 @@ mod tests {
         is_rested: true,
         search: Ordering::Equal,
         is_found: false,
+        is_of_start: false,
         is_just_reported: false,
         has_moved: false,
         has_moved_far: false,
@@ -631,6 +683,21 @@ mod tests {
             (Confirming, ahead(moved), Report),
             (Confirming, is_found, End { rests: false }),
             (Confirming, behind(NONE), Stay),
+            (
+                Confirming,
+                behind(is(|it| (it.is_of_start, it.is_consistent) = (true, true))),
+                Stay,
+            ),
+            (
+                Confirming,
+                behind(is(|it| (it.is_of_start, it.is_found) = (true, true))),
+                End { rests: false },
+            ),
+            (
+                Confirming,
+                is(|it| (it.is_of_start, it.is_patient) = (true, true)),
+                Stay,
+            ),
             (
                 Confirming,
                 behind(is(|it| it.is_consistent = true)),

@@ -101,6 +101,18 @@ impl Ekf {
         ekf
     }
 
+    /// The filter by what is stated of the angles alone: it estimates no bias, however usual.
+    pub(in crate::localize) fn as_stated(&self) -> Self {
+        let mut ekf = self.nominal();
+        ekf.begin_bias(0.0);
+        ekf
+    }
+
+    /// Goes on with what another configuration of the same vehicle expects of the angles' bias, of which nothing is known.
+    pub(in crate::localize) fn expect_bias_as(&mut self, config: &EkfConfig) {
+        self.begin_bias(config.bias_probability);
+    }
+
     /// Estimates a bias that is rare, unless it does.
     pub(in crate::localize) fn estimate_rare_bias(&mut self) {
         if !self.is_with_bias() {

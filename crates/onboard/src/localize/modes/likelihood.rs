@@ -101,6 +101,22 @@ pub(in crate::localize) fn log_likelihood(
     -0.5 * (innovation.mahalanobis2() + growth.ln())
 }
 
+/// The same where what a place does not know well counts against it: the bend of its prediction and its odometry are its
+/// own, not the angle's noise. By the other measure a place so vague that it explains everything costs nothing.
+pub(in crate::localize) fn log_likelihood_as_stated(
+    ekf: &Ekf,
+    predicted: &Result<PredictedMeasurement, UpdateReason>,
+) -> f64 {
+    match predicted {
+        Ok(angle) if !(ekf.is_with_bias() || angle.excluded) => {
+            let own = angle.bend_variance + angle.coasted_variance;
+            let exact = TAU * (angle.innovation.measurement_variance - own);
+            (with_outliers(angle.innovation.density(), OUTLIERS) * exact.sqrt()).ln()
+        }
+        _ => log_likelihood(ekf, predicted),
+    }
+}
+
 /// Variance (rad²) of an angle by all but the belief, were the radio head not heard before.
 fn first_variance(ekf: &Ekf, predicted: &PredictedMeasurement) -> f64 {
     ekf.first_variance(predicted) + ekf.systematic_variance(predicted)

@@ -8,7 +8,7 @@ mod subsets;
 mod table;
 
 pub(in crate::localize) use bank::Bank;
-pub(in crate::localize) use likelihood::{CERTAIN, log_likelihood};
+pub(in crate::localize) use likelihood::{CERTAIN, log_likelihood, log_likelihood_as_stated};
 pub use subsets::HeadTest;
 pub(in crate::localize) use subsets::RECOVERY_S;
 #[cfg(test)]
