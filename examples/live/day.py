@@ -12,18 +12,16 @@ from __future__ import annotations
 import argparse
 import csv
 import json
-import os
-import re
 import subprocess
 import sys
 import tempfile
 import time
-import urllib.request
 from pathlib import Path
 from typing import TYPE_CHECKING, Any
 
 from live import ROOT, SCENARIO
 from mcap.reader import make_reader
+from measure import Node, resident_mib
 from transmitter import odometry_of
 
 from access_av.drives.recorded import log_angles
@@ -60,12 +58,6 @@ def hours_of(lap: list[tuple[float, str]], hours: float) -> Iterator[tuple[str, 
         begins_s += lap[-1][0] + 0.02
 
 
-def resident_mib(process: int) -> float:
-    """Memory of a process."""
-    pages = int(Path(f"/proc/{process}/statm").read_text(encoding="ascii").split()[1])
-    return pages * os.sysconf("SC_PAGE_SIZE") / 2**20
-
-
 def main() -> int:
     """Drives for a day."""
     parser = argparse.ArgumentParser(description=__doc__.splitlines()[0])
@@ -83,34 +75,22 @@ def main() -> int:
             encoding="utf-8",
         )
         believed = ["--site", str(folder / "site.toml"), "--vehicle", str(folder / "vehicle.toml")]
-        node = subprocess.Popen(
-            [arguments.node, *believed, str(settings)],
-            stdin=subprocess.PIPE,
-            stderr=subprocess.PIPE,
-            text=True,
-        )
-        assert node.stdin is not None
-        assert node.stderr is not None
-        found = re.search(r"http://\S+", node.stderr.readline())
-        assert found, node.stderr.read()
-
-        def state() -> dict[str, Any]:
-            with urllib.request.urlopen(f"{found.group()}state.json") as answer:
-                return dict(json.load(answer))
-
+        options = [*believed, str(settings)]
+        node = Node(arguments.node, options, stdin=subprocess.PIPE)
+        assert node.process.stdin is not None
         sent, memory_mib, began = 0, [], time.monotonic()
         for text, count in hours_of(lap, arguments.hours):
-            node.stdin.write(text)
+            node.process.stdin.write(text)
             sent += count
-            memory_mib.append(resident_mib(node.pid))
-        node.stdin.flush()
-        while (told := state())["sources"][0]["items"] < sent:
+            memory_mib.append(resident_mib(node.process.pid))
+        node.process.stdin.flush()
+        while (told := node.state())["sources"][0]["items"] < sent:
             time.sleep(0.2)
         time.sleep(1.0)
-        told = state()
-        memory_mib.append(resident_mib(node.pid))
-        node.stdin.close()
-        node.wait()
+        told = node.state()
+        memory_mib.append(resident_mib(node.process.pid))
+        node.process.stdin.close()
+        node.process.wait()
         drive_s, took_s = told["now_s"], time.monotonic() - began
         size, read = 0, {}
         for file in sorted(files.iterdir()):

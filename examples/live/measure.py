@@ -66,10 +66,16 @@ def busy_s(process: int) -> dict[str, float]:
 class Node:
     """A node that runs, and its page."""
 
-    def __init__(self, program: str, arguments: list[str], core: int | None) -> None:
+    def __init__(
+        self,
+        program: str,
+        arguments: list[str],
+        core: int | None = None,
+        stdin: int | None = None,
+    ) -> None:
         pinned = [] if core is None else ["taskset", "-c", str(core)]
         self.process = subprocess.Popen(
-            [*pinned, program, *arguments], stderr=subprocess.PIPE, text=True
+            [*pinned, program, *arguments], stdin=stdin, stderr=subprocess.PIPE, text=True
         )
         assert self.process.stderr is not None
         found = re.search(r"http://\S+", self.process.stderr.readline())

@@ -20,7 +20,7 @@ use crate::supervisor::Watchdog;
 use crate::web::Board;
 
 /// The engine looks at the time this often, whatever comes.
-const TICK: Duration = Duration::from_millis(50);
+pub(crate) const TICK: Duration = Duration::from_millis(50);
 /// Odometry so much earlier than the last is of a drive that began anew.
 const RESTART_S: f64 = 1.0;
 /// Status and diagnoses come once a second (REP-107).

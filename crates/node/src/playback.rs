@@ -12,15 +12,13 @@ use onboard::live::AngleObservation;
 use onboard::observation::OdometrySample;
 use recording::LoggedAngle;
 
-use crate::engine::Engine;
+use crate::engine::{Engine, TICK};
 use crate::settings::Pace;
 use crate::source::{Blocks, Files};
 use crate::statistics::SourceHealth;
 
 /// Samples that are looked at together, in seconds, as where a recording is located.
 const BLOCK_S: f64 = 0.02;
-/// Whoever waits for its time looks this often whether the node ends.
-const LOOK: Duration = Duration::from_millis(200);
 /// How far samples are read beyond the time that bursts are wanted up to: a burst, and the receiver's reach.
 const AHEAD_S: f64 = 0.01;
 
@@ -152,7 +150,7 @@ impl Player<'_> {
                 && let left = due.saturating_sub(began.elapsed())
                 && !left.is_zero()
             {
-                std::thread::sleep(left.min(LOOK));
+                std::thread::sleep(left.min(TICK));
                 self.engine.alive();
             }
         }

@@ -135,7 +135,7 @@ pub fn read_angle_log(file: &Path) -> Result<AngleLog, RecordingError> {
     }
     let mut log = AngleLog::default();
     for row in table.rows {
-        log.add(row.line, row.values.and_then(|values| angle_of(&values)));
+        log.add(row.line, row.values.and_then(|values| angle(&values)));
     }
     Ok(log)
 }
@@ -167,7 +167,7 @@ pub fn angle_log_of_columns(
     for row in 0..rows.unwrap_or(0) {
         let value = |column: Option<&Vec<f64>>| column?.get(row).copied();
         let known = wanted.iter().map(|it| value(*it).filter(|it| !it.is_nan()));
-        log.add(row + 1, angle_of(&known.collect::<Vec<_>>()));
+        log.add(row + 1, angle(&known.collect::<Vec<_>>()));
     }
     Ok(log)
 }
@@ -203,22 +203,8 @@ impl AngleLog {
     }
 }
 
-/// What is told of an angle, as far as it is.
-#[derive(Debug, Clone, Copy, Default)]
-pub(crate) struct Columns {
-    pub time_s: Option<f64>,
-    pub pci: Option<f64>,
-    pub ssb_index: Option<f64>,
-    pub phase_rad: Option<f64>,
-    pub phase_sigma_rad: Option<f64>,
-    pub angle_rad: Option<f64>,
-    pub angle_sigma_rad: Option<f64>,
-    pub snr_db: Option<f64>,
-    pub resolved: Option<f64>,
-}
-
-/// The angle of the columns [`REQUIRED`] and [`OPTIONAL`].
-fn angle_of(values: &[Option<f64>]) -> Result<LoggedAngle, String> {
+/// The angle of the columns [`REQUIRED`] and [`OPTIONAL`], or why there is none.
+pub(crate) fn angle(values: &[Option<f64>]) -> Result<LoggedAngle, String> {
     let &[
         time_s,
         pci,
@@ -233,32 +219,6 @@ fn angle_of(values: &[Option<f64>]) -> Result<LoggedAngle, String> {
     else {
         return Err("too few columns".to_owned());
     };
-    angle(&Columns {
-        time_s,
-        pci,
-        ssb_index,
-        phase_rad,
-        phase_sigma_rad,
-        angle_rad,
-        angle_sigma_rad,
-        snr_db,
-        resolved,
-    })
-}
-
-/// The angle that is told, or why there is none.
-pub(crate) fn angle(columns: &Columns) -> Result<LoggedAngle, String> {
-    let &Columns {
-        time_s,
-        pci,
-        ssb_index,
-        phase_rad,
-        phase_sigma_rad,
-        angle_rad,
-        angle_sigma_rad,
-        snr_db,
-        resolved,
-    } = columns;
     let finite = |value: Option<f64>, name: &str| match value {
         Some(value) if !value.is_finite() => Err(format!("{name} is not finite")),
         value => Ok(value),

@@ -3,7 +3,7 @@
 use std::path::Path;
 
 use crate::error::RecordingError;
-use crate::mcap::read_odometry_mcap;
+use crate::mcap::{is_bag, read_odometry_mcap};
 use crate::odometry::OdometryLog;
 use crate::odometry_csv::read_wheel_odometry_csv;
 
@@ -26,11 +26,7 @@ pub fn read_odometry(
     path: &Path,
     choice: &OdometryChoice<'_>,
 ) -> Result<OdometryLog, RecordingError> {
-    let ends_with = |extension: &str| {
-        let found = path.extension();
-        found.is_some_and(|it| it.eq_ignore_ascii_case(extension))
-    };
-    if path.is_dir() || ends_with("mcap") || ends_with("db3") {
+    if is_bag(path) {
         return read_odometry_mcap(path, choice.topic, choice.imu_topic);
     }
     for (key, topic) in [("topic", choice.topic), ("imu_topic", choice.imu_topic)] {

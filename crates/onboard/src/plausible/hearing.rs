@@ -58,11 +58,21 @@ pub(super) fn unheard_at_start(site: &Site, vehicle: &Vehicle) -> Option<Warning
     })
 }
 
-fn along(road: &Road) -> Vec<Point> {
-    let steps = (road.length_m() / STEP_M).ceil().clamp(1.0, MOST_PLACES);
+/// Places along a road, a step apart or as many as there may be at most; before each the distance along it (m).
+pub(super) fn steps_along(
+    road: &Road,
+    step_m: f64,
+    most: f64,
+) -> impl Iterator<Item = (f64, Point)> {
+    let steps = (road.length_m() / step_m).ceil().clamp(1.0, most);
     (0..=steps as usize)
-        .map(|step| road.pose(road.length_m() * step as f64 / steps).point())
-        .collect()
+        .map(move |step| road.length_m() * step as f64 / steps)
+        .map(|along_m| (along_m, road.pose(along_m).point()))
+}
+
+fn along(road: &Road) -> Vec<Point> {
+    let steps = steps_along(road, STEP_M, MOST_PLACES);
+    steps.map(|(_, place)| place).collect()
 }
 
 /// The radio heads that a vehicle listens to, and how strong they are where.

@@ -2,6 +2,7 @@
 
 use std::f64::consts::TAU;
 
+use super::hearing::steps_along;
 use super::usual::{Usual, as_degrees, as_millimetres, rounded, unusual};
 use super::warning::Warning;
 use crate::geometry::{Point, cross};
@@ -257,11 +258,7 @@ fn across(site: &Site, road: &Road) -> Vec<Warning> {
     if site.walls.is_empty() {
         return Vec::new();
     }
-    let steps = (road.length_m() / STEP_M).ceil().clamp(1.0, MOST_STEPS);
-    let way: Vec<(f64, Point)> = (0..=steps as usize)
-        .map(|step| road.length_m() * step as f64 / steps)
-        .map(|along_m| (along_m, road.pose(along_m).point()))
-        .collect();
+    let way: Vec<(f64, Point)> = steps_along(road, STEP_M, MOST_STEPS).collect();
     let blocked_m = |ends: &[[f64; 2]]| {
         let wall = [ends[0].into(), ends[1].into()];
         let mut steps = way.windows(2);

@@ -6,7 +6,7 @@ use super::bag::files_of;
 use super::cdr::Decoder;
 use super::messages::{Kind, each_message};
 use super::reader::stamp_s;
-use crate::angle_log::{AngleLog, Columns, angle};
+use crate::angle_log::{AngleLog, angle};
 use crate::error::RecordingError;
 
 /// Reads the angles that `access_av_msgs/msg/AngleVerdict` messages of an MCAP file or a rosbag2 folder tell, of
@@ -26,8 +26,8 @@ pub fn read_angles_mcap(bag: &Path, topic: Option<&str>) -> Result<AngleLog, Rec
             }
             item += 1;
             match decode(data) {
-                Some(columns) if columns.phase_rad.is_some_and(f64::is_nan) => {}
-                Some(columns) => log.add(item, angle(&columns)),
+                Some((phase_rad, _)) if phase_rad.is_nan() => {}
+                Some((_, columns)) => log.add(item, angle(&columns)),
                 None => {
                     let why = "no complete access_av_msgs/msg/AngleVerdict".to_owned();
                     log.add(item, Err(why));
@@ -47,7 +47,8 @@ pub fn read_angles_mcap(bag: &Path, topic: Option<&str>) -> Result<AngleLog, Rec
     Ok(log)
 }
 
-fn decode(message: &[u8]) -> Option<Columns> {
+/// The phase, which is not a number where there is no angle, and all columns of an angle log.
+fn decode(message: &[u8]) -> Option<(f64, [Option<f64>; 9])> {
     let mut decoder = Decoder::new(message)?;
     let time_s = stamp_s(&mut decoder)?;
     decoder.skip_string()?;
@@ -56,14 +57,16 @@ fn decode(message: &[u8]) -> Option<Columns> {
     let [phase_rad, phase_sigma_rad, snr_db] = decoder.f64s()?;
     let _mahalanobis_threshold_and_wake_up: [f64; 3] = decoder.f64s()?;
     let is_resolved = decoder.u8().is_none_or(|it| it != 0);
-    Some(Columns {
-        time_s: Some(time_s),
-        pci: Some(f64::from(pci)),
-        ssb_index: Some(f64::from(ssb_index)),
-        phase_rad: Some(phase_rad),
-        phase_sigma_rad: Some(phase_sigma_rad),
-        snr_db: Some(snr_db),
-        resolved: Some(f64::from(u8::from(is_resolved))),
-        ..Columns::default()
-    })
+    let columns = [
+        Some(time_s),
+        Some(f64::from(pci)),
+        Some(f64::from(ssb_index)),
+        Some(phase_rad),
+        Some(phase_sigma_rad),
+        None,
+        None,
+        Some(snr_db),
+        Some(f64::from(u8::from(is_resolved))),
+    ];
+    Some((phase_rad, columns))
 }

@@ -10,6 +10,11 @@ use crate::file as files;
 /// A bag of many thousand files has a shorter `metadata.yaml`.
 const MOST_METADATA_BYTES: u64 = 16 << 20;
 
+/// Whether a path is a rosbag2 folder or a file of one, by its name.
+pub fn is_bag(path: &Path) -> bool {
+    path.is_dir() || ends_with(path, "mcap") || ends_with(path, "db3")
+}
+
 /// The MCAP files of a bag in order of time; a file is a bag by itself.
 ///
 /// What a folder holds is read, whether or not its recorder lived to write `metadata.yaml`; a file that

@@ -76,21 +76,11 @@ impl<'a> Decoder<'a> {
     }
 
     pub fn u16(&mut self) -> Option<u16> {
-        let bytes = self.take()?;
-        Some(if self.little_endian {
-            u16::from_le_bytes(bytes)
-        } else {
-            u16::from_be_bytes(bytes)
-        })
+        self.number(u16::from_le_bytes, u16::from_be_bytes)
     }
 
     pub fn u32(&mut self) -> Option<u32> {
-        let bytes = self.take()?;
-        Some(if self.little_endian {
-            u32::from_le_bytes(bytes)
-        } else {
-            u32::from_be_bytes(bytes)
-        })
+        self.number(u32::from_le_bytes, u32::from_be_bytes)
     }
 
     pub fn i32(&mut self) -> Option<i32> {
@@ -98,12 +88,7 @@ impl<'a> Decoder<'a> {
     }
 
     pub fn f64(&mut self) -> Option<f64> {
-        let bytes = self.take()?;
-        Some(if self.little_endian {
-            f64::from_le_bytes(bytes)
-        } else {
-            f64::from_be_bytes(bytes)
-        })
+        self.number(f64::from_le_bytes, f64::from_be_bytes)
     }
 
     /// As many numbers in an array.
@@ -122,6 +107,19 @@ impl<'a> Decoder<'a> {
             .checked_add(length)
             .filter(|end| *end <= self.body.len())?;
         Some(())
+    }
+
+    fn number<const N: usize, T>(
+        &mut self,
+        from_little: fn([u8; N]) -> T,
+        from_big: fn([u8; N]) -> T,
+    ) -> Option<T> {
+        let from = if self.little_endian {
+            from_little
+        } else {
+            from_big
+        };
+        self.take().map(from)
     }
 
     fn take<const N: usize>(&mut self) -> Option<[u8; N]> {

@@ -15,6 +15,7 @@ mod turn_rate;
 mod writer;
 
 pub use angles::read_angles_mcap;
+pub(crate) use bag::is_bag;
 pub use drive::write_drive_mcap;
 pub use reader::read_odometry_mcap;
 pub use writer::{DiagnosticLevel, DiagnosticStatus, Frames, McapWriter, Twist};

@@ -146,9 +146,8 @@ impl RelocalizationTest {
             (self.log_odds(), 0.0)
         } else {
             let ratio = self.search.best() - self.of_filter;
-            let independent = f64::from(self.independent) / f64::from(self.angles.max(1));
             let share = if is_confirming || self.may_mislead {
-                independent
+                self.independent_share()
             } else {
                 1.0
             };
@@ -171,12 +170,15 @@ impl RelocalizationTest {
     /// Logarithm of by how much likelier the angles are elsewhere. What speaks for that counts by independent angles.
     fn against_start(&self) -> f64 {
         let ratio = self.search.evidence() - self.of_filter;
-        let independent = f64::from(self.independent) / f64::from(self.angles.max(1));
         if ratio > 0.0 {
-            ratio * independent
+            ratio * self.independent_share()
         } else {
             ratio
         }
+    }
+
+    fn independent_share(&self) -> f64 {
+        f64::from(self.independent) / f64::from(self.angles.max(1))
     }
 
     /// Whether the angles speak against the start that is given.
