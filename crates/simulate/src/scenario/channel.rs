@@ -31,6 +31,10 @@ pub struct ChannelSettings {
     /// `fidelity = "iq"` only; the standard deviation of each angle then tells of the scatter too.
     #[schemars(range(min = 0.0, max = 1e5))]
     pub delay_spread_ns: f64,
+    /// Whether radio heads are heard only where they have a line of sight, with the models of TR
+    /// 38.901: what is left of the error when a vehicle is told which angles to leave out.
+    #[serde(skip_serializing_if = "std::ops::Not::not")]
+    pub line_of_sight_only: bool,
     /// What stands in the line of sight and moves on; nothing does by default.
     #[serde(skip_serializing_if = "Option::is_none")]
     pub blockage: Option<BlockageSettings>,
@@ -49,6 +53,7 @@ impl Default for ChannelSettings {
             scatter: ScatterModel::PerAntenna,
             rays: 8,
             delay_spread_ns: 0.0,
+            line_of_sight_only: false,
             blockage: None,
             hall: None,
         }
@@ -169,8 +174,15 @@ impl ChannelSettings {
                 "each side must be between 1 and 10000",
             )?;
         }
+        check.that(
+            factory || self.model == Umi || !self.line_of_sight_only,
+            "channel.line_of_sight_only",
+            "true",
+            "only a `model` of TR 38.901 draws lines of sight",
+        )?;
         let mine = Self {
             model: self.model,
+            line_of_sight_only: self.line_of_sight_only,
             paths: self.paths.clone(),
             blockage: self.blockage,
             hall: self.hall,

@@ -263,6 +263,39 @@ fn a_blocked_line_of_sight_comes_back() {
 }
 
 #[test]
+fn told_of_its_lines_of_sight_a_vehicle_hears_the_same_there_and_nothing_elsewhere() {
+    let told = ChannelSettings {
+        line_of_sight_only: true,
+        ..ChannelSettings::default()
+    };
+    let (mut heard, mut expected, mut places) = (0.0, 0.0, 0.0);
+    for run in 0..40 {
+        let [mut told, mut all] =
+            [&told, &ChannelSettings::default()].map(|it| along_a_road("umi", it, run));
+        // Where there is a line of sight now and then.
+        for along_m in (800..1200).map(f64::from) {
+            let sight = sight(along_m);
+            let [here, of_all] = [&mut told, &mut all].map(|it| it.next_gain_db(&sight));
+            let place = Place {
+                level_m: sight.distance_m,
+                head_m: 10.0,
+                array_m: 1.5,
+            };
+            places += 1.0;
+            expected += environment("umi").line_of_sight_probability(&place);
+            if here > f64::NEG_INFINITY {
+                assert_eq!(here.to_bits(), of_all.to_bits());
+                heard += 1.0;
+            }
+        }
+    }
+    // Eight correlation distances in each of 40 drives: at most 0.5 / √320, and three of that.
+    let (heard, expected): (f64, f64) = (heard / places, expected / places);
+    println!("{heard:.3} of the way, {expected:.3} expected");
+    assert!((heard - expected).abs() < 0.084 && expected > 0.2);
+}
+
+#[test]
 fn a_drive_is_the_same_again_and_by_samples_too() {
     for model in ["umi", "inf-sh"] {
         let short = [
@@ -321,6 +354,9 @@ fn what_a_model_has_no_place_for_is_refused() {
             .to_string();
         assert!(error.contains(message), "{error}");
     }
+    let overrides = [("channel.line_of_sight_only", true.into())];
+    let error = yard.with_overrides(overrides, &Shipped).unwrap_err();
+    assert!(error.to_string().contains("TR 38.901"), "{error}");
     let overrides = [
         ("channel.model", "inf-sl".into()),
         ("channel.hall", common::value(hall)),

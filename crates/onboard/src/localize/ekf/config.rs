@@ -326,6 +326,12 @@ impl EkfConfig {
         self.wrong_lobe = Some(wrong_lobe).filter(|&it| it > self.outlier_probability);
     }
 
+    /// How many times the stated variance noise may have: until scatter is as strong as the direct wave (a Rician K of
+    /// 0 dB). What strays farther does not scatter about a line of sight, and is not averaged out.
+    pub const fn most_noise_ratio(&self) -> f64 {
+        self.rician_k.max(1.0)
+    }
+
     /// Whether a time-correlated bias of the angles is estimated.
     pub const fn estimates_bias(&self) -> bool {
         self.bias_probability > 0.0

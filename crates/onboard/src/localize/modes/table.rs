@@ -189,7 +189,10 @@ pub(in crate::localize) static TABLE: [Mode; 9] = [
         id: ModeId::NoisyAngles,
         prior: |_, _| 0.02,
         alter: |ekf| ekf.set_noise_ratio(Some(1.0)),
-        adapt: |ekf, ratio| ekf.set_noise_ratio(Some(ratio)),
+        adapt: |ekf, ratio| {
+            let most = ekf.config().most_noise_ratio();
+            ekf.set_noise_ratio(Some(ratio.min(most)));
+        },
         on_rebase: Carry::Nothing,
         misleads: true,
         ..ROW
@@ -407,6 +410,20 @@ mod tests {
         let variance = |ekf: &Ekf| ekf.belief().covariance[ALONG][ALONG];
         assert!(variance(bank.leader()) > 2.0 * variance(bank.nominal()));
         assert!(off_m(bank.leader()) < 4.0 * variance(bank.leader()).sqrt());
+    }
+
+    #[test]
+    fn angles_noisier_than_scatter_about_a_line_of_sight_are_not_averaged_as_noise() {
+        let noise = 100.0;
+        let world = World {
+            noise,
+            ..World::default()
+        };
+        let (bank, _) = drive(&world, 30.0, EXACT);
+        assert!(bank.noise_ratio() > 20.0);
+        let (_, noisy) = bank.mode(ModeId::NoisyAngles).unwrap();
+        // Of a K of 10 dB that is stated.
+        assert!((noisy.config().noise_ratio() - 10.0).abs() < 1e-9);
     }
 
     #[test]

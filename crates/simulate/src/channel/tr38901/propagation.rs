@@ -22,6 +22,9 @@ use crate::world::{Antennas, LineOfSight};
 /// Scatter that is weaker than the rest by so much is not computed.
 const NEGLIGIBLE: f64 = 1e-4;
 
+/// Soft state from which on there is a line of sight rather than none.
+const LINE_OF_SIGHT: f64 = 0.5;
+
 /// The propagation from one radio head in one run.
 ///
 /// Line of sight and what there is without one are two channels, mixed by a soft state of the line
@@ -33,6 +36,7 @@ pub struct Tr38901Propagation {
     head: RadioHead,
     array_m: f64,
     wavenumber_per_m: f64,
+    line_of_sight_only: bool,
     blockage: Blockage,
     state: Track,
     clear: Channel,
@@ -87,6 +91,7 @@ impl Tr38901Propagation {
             head,
             array_m,
             wavenumber_per_m: TAU / link.site.wavelength_m(),
+            line_of_sight_only: settings.line_of_sight_only,
             blockage: Blockage::new(settings.blockage, link),
             state,
             clear,
@@ -116,8 +121,10 @@ impl Tr38901Propagation {
         let clear = soft * soft * clear.0;
         let hidden = (1.0 - soft * soft) * hidden.0;
         let total = clear + hidden;
+        let is_silent = self.line_of_sight_only && soft < LINE_OF_SIGHT;
+        let gain = if is_silent { 0.0 } else { total };
         Mix {
-            gain_db: 10.0 * total.log10() + self.budget.path_loss_db(sight.distance_m),
+            gain_db: 10.0 * gain.log10() + self.budget.path_loss_db(sight.distance_m),
             direct: (clear / total * k / (k + 1.0)).sqrt(),
             clear: (clear / total / (k + 1.0)).sqrt(),
             hidden: (hidden / total).sqrt(),
