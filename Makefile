@@ -31,10 +31,14 @@ check: lint ## Check after a change: formats, lints, types, the fast tests of bo
 	cargo test --workspace --quiet --lib
 	$(PYTEST) -m "not slow"
 
+# Examples are compiled by clippy, and here by nobody: linking them takes longer than the doc tests run.
+TESTED := --workspace --quiet --lib --bins --tests
+
 test: lint ## Run everything: formats, lints, types, every test of both languages
-	@if [ -d "$(DATA)" ]; then ACCESS_AV_DATA="$(DATA)" cargo test --workspace --quiet -- --include-ignored; \
+	@if [ -d "$(DATA)" ]; then ACCESS_AV_DATA="$(DATA)" cargo test $(TESTED) -- --include-ignored; \
 	  else echo "not tested: reference vectors and recordings; no $(DATA) (ACCESS_AV_DATA)"; \
-	  cargo test --workspace --quiet; fi
+	  cargo test $(TESTED); fi
+	cargo test --workspace --quiet --doc
 	$(PYTEST)
 
 attack: .venv/installed-test ## Attack it with random input, drives and plug-ins; SEED=… repeats an attack

@@ -14,7 +14,7 @@ from concurrent.futures import Executor, Future, ProcessPoolExecutor, ThreadPool
 from concurrent.futures.process import BrokenProcessPool
 from dataclasses import replace
 from pathlib import Path
-from typing import Any
+from typing import TYPE_CHECKING, Any
 
 import numpy as np
 import pytest
@@ -32,6 +32,11 @@ from access_av.errors import InputError
 from access_av.report.designs import render_designs
 from access_av.run.campaign import Campaign, CampaignError, Shard, Task, executor
 from access_av.run.result_cache import Parts
+
+if TYPE_CHECKING:
+    from collections.abc import Callable
+
+    from conftest import Finished
 
 # Spaces.
 
@@ -562,32 +567,41 @@ vehicle.wake_up.interval_ms = [2000.0, 8000.0]
 """
 
 
-def run(cwd: Path, *arguments: str) -> subprocess.CompletedProcess[str]:
-    command = [sys.executable, "-m", "access_av", *arguments]
-    return subprocess.run(command, cwd=cwd, capture_output=True, text=True, check=False)
+@pytest.fixture
+def run(
+    access_av: Callable[..., Finished], monkeypatch: pytest.MonkeyPatch
+) -> Callable[..., Finished]:
+    """The command as it is typed in a directory, in this process."""
+
+    def inside(cwd: Path, *arguments: str) -> Finished:
+        monkeypatch.chdir(cwd)
+        monkeypatch.setattr("access_av.tables.results_directory.RESULTS", cwd / "results")
+        return access_av(*arguments)
+
+    return inside
 
 
-def test_command_on_any_scenario(tmp_path: Path) -> None:
+def test_command_on_any_scenario(tmp_path: Path, run: Callable[..., Finished]) -> None:
     (tmp_path / "space.toml").write_text(SPACE)
     asked = ("yard", "--space", "space.toml", "--runs", "2", "--json", "--out", "o")
     done = run(tmp_path, "designs", *asked)
-    assert done.returncode == 0, done.stderr
-    assert 1 <= len(json.loads(done.stdout)["front"]) <= 4
+    assert done.code == 0, done.err
+    assert 1 <= len(json.loads(done.out)["front"]) <= 4
     # A mode that changes no drive is not driven again: two parts for four designs.
     assert len(list((tmp_path / "results/parts").glob("*.npz"))) == 2
     assert (tmp_path / "o/report.html").stat().st_size > 10_000
     some = run(tmp_path, "choose", "o", "--max-rms-m", "100", "--json")
-    assert len(json.loads(some.stdout)["kept"]) == 4
+    assert len(json.loads(some.out)["kept"]) == 4
     none = run(tmp_path, "choose", "o", "--max-rms-m", "0.0001", "--json")
-    assert "m instead of 0.0001 m" in json.loads(none.stdout)["advice"][0]
-    assert (some.returncode, none.returncode) == (0, 3)
+    assert "m instead of 0.0001 m" in json.loads(none.out)["advice"][0]
+    assert (some.code, none.code) == (0, 3)
     told = json.loads((tmp_path / "o/manifest.json").read_text())
     assert told["space"]["keys"]["vehicle.wake_up.interval_ms"] == [2000.0, 8000.0]
     # What is to be typed in the directory asks for the same drives, and gives the same again.
     shutil.copytree(tmp_path / "results", tmp_path / "o/results")
     before = (tmp_path / "o/designs.parquet").read_bytes()
     again = run(tmp_path / "o", *shlex.split(told["repeat"])[1:], "--out", "again")
-    assert again.returncode == 0, again.stderr
+    assert again.code == 0, again.err
     assert (tmp_path / "o/again/designs.parquet").read_bytes() == before
     assert len(list((tmp_path / "o/results/parts").glob("*.npz"))) == 2
     for bad, message in (
@@ -595,4 +609,4 @@ def test_command_on_any_scenario(tmp_path: Path) -> None:
         (("choose", "nowhere"), "no designs here"),
     ):
         done = run(tmp_path, *bad)
-        assert (done.returncode, message in done.stderr) == (2, True)
+        assert (done.code, message in done.err) == (2, True)

@@ -6,8 +6,6 @@ import json
 import os
 import signal
 import stat
-import subprocess
-import sys
 import time
 from pathlib import Path
 from typing import TYPE_CHECKING
@@ -31,6 +29,8 @@ from access_av.device.workload import Timing, repeat
 
 if TYPE_CHECKING:
     from collections.abc import Callable
+
+    from conftest import Finished
 
 RAILS = {"VDD_GPU_SOC": 3.0, "VDD_CPU_CV": 2.0, "VIN_SYS_5V0": 4.0}
 
@@ -446,19 +446,16 @@ def test_a_sensor_that_does_not_see_the_load_keeps_its_windows(
     assert found.warnings == (f"mode 0, ssb-chain: energy not measured: {each.why_not}",)
 
 
-def run(*arguments: str) -> subprocess.CompletedProcess[str]:
-    command = [sys.executable, "-m", "access_av", "profile", *arguments]
-    return subprocess.run(command, capture_output=True, text=True, check=False)
-
-
-def test_command_on_a_machine_without_sensor(tmp_path: Path) -> None:
-    done = run(
-        "--sysfs-root", str(tmp_path), "--window-s", "0.05", "--json",
+def test_command_on_a_machine_without_sensor(
+    access_av: Callable[..., Finished], tmp_path: Path
+) -> None:
+    done = access_av(
+        "profile", "--sysfs-root", str(tmp_path), "--window-s", "0.05", "--json",
         "--out", str(tmp_path / "board.toml"),
     )  # fmt: skip
-    assert done.returncode == 0, done.stderr
-    assert "energy not measured: no power sensor" in done.stderr
-    report = json.loads(done.stdout)
+    assert done.code == 0, done.err
+    assert "energy not measured: no power sensor" in done.err
+    report = json.loads(done.out)
     assert {each["energy_j"] for each in report["measured"]} == {None}
     assert all(each["p99_s"] >= each["median_s"] > 0.0 for each in report["measured"])
     board = Platform.load(str(tmp_path / "board.toml"))
@@ -468,11 +465,13 @@ def test_command_on_a_machine_without_sensor(tmp_path: Path) -> None:
     assert board.modes[0].energy_per_execution_j == {}
 
 
-def test_bad_input_ends_with_one_message(tmp_path: Path) -> None:
-    done = run("--sysfs-root", str(tmp_path / "none"))
-    assert (done.returncode, "no such directory" in done.stderr) == (2, True)
-    done = run("--sysfs-root", str(tmp_path), "--mode", "9")
-    assert (done.returncode, "this machine has 0" in done.stderr) == (2, True)
+def test_bad_input_ends_with_one_message(
+    access_av: Callable[..., Finished], tmp_path: Path
+) -> None:
+    done = access_av("profile", "--sysfs-root", tmp_path / "none")
+    assert (done.code, "no such directory" in done.err) == (2, True)
+    done = access_av("profile", "--sysfs-root", tmp_path, "--mode", "9")
+    assert (done.code, "this machine has 0" in done.err) == (2, True)
 
 
 def test_repeated_work_is_timed() -> None:

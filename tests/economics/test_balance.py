@@ -3,8 +3,6 @@
 from __future__ import annotations
 
 import copy
-import subprocess
-import sys
 from typing import TYPE_CHECKING, Any
 
 import pytest
@@ -14,7 +12,10 @@ from access_av.errors import InputError
 from access_av.tables.toml import tomllib
 
 if TYPE_CHECKING:
+    from collections.abc import Callable
     from pathlib import Path
+
+    from conftest import Finished
 
 ROUND = """
 currency = "EUR"
@@ -130,13 +131,14 @@ def test_every_item_needs_a_source_and_every_grid_a_name() -> None:
         balance(bad)
 
 
-def test_the_example_is_a_file_of_ones_own(tmp_path: Path) -> None:
+def test_the_example_is_a_file_of_ones_own(
+    access_av: Callable[..., Finished], tmp_path: Path
+) -> None:
     mine = tmp_path / "mine.toml"
     mine.write_text(text())
     assert balance(read(mine)) == balance(read(None))
-    command = [sys.executable, "-m", "access_av", "balance", str(mine)]
-    done = subprocess.run(command, capture_output=True, text=True, check=True)
-    assert "Payback: 0 years" in done.stdout
+    done = access_av("balance", mine)
+    assert (done.code, "Payback: 0 years" in done.out) == (0, True)
     mine.write_text("fleet = [")
-    done = subprocess.run(command, capture_output=True, text=True, check=False)
-    assert (done.returncode, str(mine) in done.stderr) == (2, True)
+    done = access_av("balance", mine)
+    assert (done.code, str(mine) in done.err.replace("\n", "")) == (2, True)

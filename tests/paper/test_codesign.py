@@ -4,8 +4,6 @@ from __future__ import annotations
 
 import csv
 import json
-import subprocess
-import sys
 from typing import TYPE_CHECKING
 
 import numpy as np
@@ -16,7 +14,10 @@ from access_av.device.platform import Platform
 from access_av.paper.codesign import compare
 
 if TYPE_CHECKING:
+    from collections.abc import Callable
     from pathlib import Path
+
+    from conftest import Finished
 
 ENGINE = "jetson-agx-xavier-engine"
 
@@ -102,10 +103,9 @@ def test_ours_is_better_in_error_and_energy_in_every_mode() -> None:
         assert each.paper.listened == 4018
 
 
-def test_json_of_a_single_run_has_no_interval() -> None:
-    command = [sys.executable, "-m", "access_av", "codesign", "--runs", "1", "--json"]
-    done = subprocess.run(command, capture_output=True, text=True, check=True)
-    records = json.loads(done.stdout)
+def test_json_of_a_single_run_has_no_interval(access_av: Callable[..., Finished]) -> None:
+    done = access_av("codesign", "--runs", "1", "--json")
+    records = json.loads(done.out)
     assert [each["mode"] for each in records] == list(range(8))
     assert {each["is_better"] for each in records} == {False}
     mean_m, low_m, high_m = records[0]["error_less_m"]
@@ -113,12 +113,9 @@ def test_json_of_a_single_run_has_no_interval() -> None:
     assert (low_m, high_m) == (None, None)
 
 
-def test_power_command() -> None:
-    command = [sys.executable, "-m", "access_av", "platform", "power", ENGINE]
-    done = subprocess.run(command, capture_output=True, text=True, check=True)
-    rows = [
-        line for line in done.stdout.splitlines() if line.rstrip().endswith(tuple("0123456789"))
-    ]
+def test_power_command(access_av: Callable[..., Finished]) -> None:
+    done = access_av("platform", "power", ENGINE)
+    rows = [line for line in done.out.splitlines() if line.rstrip().endswith(tuple("0123456789"))]
     off = [float(line.split()[-1]) for line in rows]
     assert len(off) == 5
     assert max(map(abs, off)) < 10.0

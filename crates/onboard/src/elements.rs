@@ -2,10 +2,9 @@
 
 /// Evaluates `$body` with the constant `$N` equal to `$count`, which a checked vehicle has between
 /// 2 and [`MAX_ELEMENTS`](crate::observation::MAX_ELEMENTS); a larger one counts as that.
-#[macro_export]
 macro_rules! for_elements {
     ($count:expr, $N:ident => $body:expr) => {
-        $crate::for_elements!($count, $N => $body; 3 4 5 6 7 8 9 10 11 12 13 14 15)
+        for_elements!($count, $N => $body; 3 4 5 6 7 8 9 10 11 12 13 14 15)
     };
     ($count:expr, $N:ident => $body:expr; $($n:literal)*) => {
         match $count {

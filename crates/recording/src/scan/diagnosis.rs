@@ -7,7 +7,7 @@ use nr_ssb::Complex32;
 use nr_ssb::diagnose::{Fault, diagnose};
 use num_complex::Complex64;
 
-use super::array_view::{FoundAngle, View};
+use onboard::receive::array_view::{FoundAngle, View};
 
 /// Channels are judged exchanged only on SSBs of at least this SNR per symbol, in dB.
 const SWAP_SNR_DB: f64 = 10.0;

@@ -1,7 +1,6 @@
 //! Whatever cells are in a recording that nobody has described, with angles where there are several
 //! antennas.
 
-mod array_view;
 mod diagnosis;
 mod error;
 mod iq_source;
@@ -9,10 +8,10 @@ mod scanner;
 mod search_scope;
 mod ssb_search;
 
-pub use array_view::{ArraySetup, ArrayView, FoundAngle, View, array_view};
 pub use diagnosis::ChannelFault;
 pub use error::ScanError;
 pub use iq_source::{IqSource, SampleBlock};
+pub use onboard::receive::array_view::{ArraySetup, ArrayView, FoundAngle, View, array_view};
 pub use scanner::{Scan, ScanSettings, scan};
 pub use search_scope::{Places, SearchScope};
 pub use ssb_search::{FoundSsb, SsbSearch, SsbSearchConfig};

@@ -4,12 +4,12 @@ use nr_ssb::front_end::FrontEnd;
 use nr_ssb::raster;
 use nr_ssb::{Complex32, SubcarrierSpacing};
 
-use super::array_view::ArraySetup;
 use super::diagnosis::{ChannelFault, ExchangeVotes, faults_of_samples};
 use super::error::ScanError;
 use super::iq_source::IqSource;
 use super::search_scope::{Places, SearchScope};
 use super::ssb_search::{BLOCK_S, FALSE_ALARM, FoundSsb, SsbSearch, SsbSearchConfig};
+use onboard::receive::array_view::ArraySetup;
 
 /// Searched for unknown frequencies, in two steps: the usual period, and the longest (TS
 /// 38.331).

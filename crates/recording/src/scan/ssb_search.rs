@@ -6,13 +6,13 @@ use nr_ssb::grid::SUBCARRIERS;
 use nr_ssb::search::{DetectedSsb, SearchConfig, SearchError, Searcher};
 use nr_ssb::{Complex32, Pci, SubcarrierSpacing};
 
-use super::array_view::{ArraySetup, ArrayView, FoundAngle, View, array_view};
 use super::diagnosis::ExchangeVotes;
 use super::error::ScanError;
 use super::iq_source::first_not_finite;
 use crate::error::RecordingError;
 use num_complex::Complex64;
 use onboard::receive::SSB_SAMPLES;
+use onboard::receive::array_view::{ArraySetup, ArrayView, FoundAngle, View, array_view};
 
 /// Searched at once, in seconds.
 pub(super) const BLOCK_S: f64 = 0.02;

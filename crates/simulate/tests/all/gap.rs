@@ -83,7 +83,7 @@ fn error(pose: &LocatedPose, record: &RunRecord) -> (f64, f64) {
 
 #[test]
 fn through_the_gap_and_after_it_as_wrong_as_it_says() {
-    let runs = 64;
+    let runs = 32;
     // The gap lasts from 24 to 46 s.
     let after_s = [47.0, 50.0, 55.0, 60.0, 65.0];
     let mut nees = [[0.0; 5]; 2];

@@ -1,4 +1,6 @@
 //! The angle of one SSB, for arrays of any number of antennas that the crates know.
+//!
+//! Here and not where it is used, as the estimators of each number of antennas are compiled here anyway.
 
 use aoa::{
     AngleEstimate, Array, Calibration, DirectionEstimate, DirectionFinder,
@@ -7,12 +9,12 @@ use aoa::{
 use nr_ssb::search::ReceivedSsb;
 use num_complex::Complex64;
 
-use onboard::for_elements;
-use onboard::manifold::ArrayManifold;
-use onboard::observation::MAX_ELEMENTS;
-use onboard::receive::despread::Despread;
-use onboard::receive::wideband::line_of_sight;
-use onboard::settings::{ArrayShape, Pilots};
+use super::despread::Despread;
+use super::wideband::line_of_sight;
+use crate::elements::for_elements;
+use crate::manifold::ArrayManifold;
+use crate::observation::MAX_ELEMENTS;
+use crate::settings::{ArrayShape, Pilots};
 
 /// The receiving array.
 #[derive(Debug, Clone, PartialEq)]
