@@ -1,15 +1,15 @@
 """What a node takes while a simulated drive comes in: processor, memory, latencies.
 
     python examples/live/measure.py [--node PROGRAM] [--duration-s 60] [--every-ssb]
-        [--stream-off | --times 8 [--speed 0.25]] [--core 1]
+        [--stream-off | --times 8 [--speed 0.25]] [--core 1] [--first]
 
 Samples come by ZeroMQ; with `--stream-off` as a recording played in real time, which is not read
 where the node wants nothing, as a radio that is switched off (61 MB a second on disk); with
 `--times` by one TCP stream of integers at so many times 3.84 Msps. Prints the share of one core by
 the node's own processor time, per second of the drive, over all and once it tracks, thread by
 thread; its memory; and from the arrival of an SSB's last sample to the pose with its angle. Measure
-on a computer that does nothing else; `--speed` below 1 where it is not fast enough for transmitter
-and node.
+on a computer that does nothing else; `--first` puts transmitter and node before all others that
+run there (SCHED_FIFO, for root), `--speed` below 1 is for one that is not fast enough for them.
 """
 
 from __future__ import annotations
@@ -104,7 +104,10 @@ def main() -> None:
     parser.add_argument("--times", type=int)
     parser.add_argument("--speed", type=float, default=1.0)
     parser.add_argument("--core", type=int)
+    parser.add_argument("--first", action="store_true")
     arguments = parser.parse_args()
+    if arguments.first:
+        os.sched_setscheduler(0, os.SCHED_FIFO, os.sched_param(10))
     folder = ROOT / f"results/live/{arguments.duration_s:g}s"
     with tempfile.TemporaryDirectory() as scratch:
         settings = Path(scratch) / "node.toml"
@@ -143,17 +146,21 @@ def main() -> None:
         sending = threading.Thread(target=send, kwargs=speed)
         began = time.monotonic()
         sending.start()
-        memory_mib, tracking = [], None
+        memory_mib, tracking, used = [], None, {}
         while sending.is_alive():
             sending.join(1.0)
             memory_mib.append(resident_mib(process))
+            # That of a thread that has ended is not told any more.
+            used |= busy_s(process)
             if tracking is None and time.monotonic() - began >= TRACKS_S / arguments.speed:
-                tracking = (time.monotonic(), busy_s(process))
-        ended, used, told = time.monotonic(), busy_s(process), node.state()
+                tracking = (time.monotonic(), used.copy())
+        ended, told = time.monotonic(), node.state()
+        used |= busy_s(process)
         node.end()
         sender.close()
     drive_s = arguments.speed * (ended - began)
-    print(f"{drive_s:.0f} s of the drive in {ended - began:.0f} s")
+    load = os.getloadavg()[0]
+    print(f"{drive_s:.0f} s of the drive in {ended - began:.0f} s, at a load of {load:.1f}")
     print(f"processor: {100 * sum(used.values()) / drive_s:.1f} % of a core")
     if tracking is not None:
         since_s = arguments.speed * (ended - tracking[0])
@@ -165,6 +172,7 @@ def main() -> None:
     print(f"memory: {max(memory_mib):.0f} MiB at most, {at}")
     print(f"samples looked at: {100 * told['duty']:.1f} %, angles: {told['energy']['executions']}")
     print(f"state: {told['pose']['state']}, {told['pose']['tracked']} SSBs tracked")
+    print(f"SSBs found by a search: {told['found_by_search']}, all others where expected")
     print(f"dropped: {told['dropped']}")
     for name, figures in told["latency"].items():
         print(f"{name}: {figures}")

@@ -218,6 +218,8 @@ class RawTransmitter:
     def __init__(self, drive: Drive, times: int) -> None:
         self.drive = drive
         self.times = times
+        # All of it is made before it is needed: resampling takes longer than the drive.
+        self.parts = self._parts()
         self.wheels = Wheels(drive.odometry)
         self.server = socket.create_server(("127.0.0.1", 0))
         self.server.settimeout(0.2)
@@ -228,6 +230,20 @@ class RawTransmitter:
         """What the node connects to for samples."""
         host, port = self.server.getsockname()
         return f"tcp://{host}:{port}"
+
+    def _parts(self) -> list[tuple[float, bytes | memoryview]]:
+        """The whole stream: until when each part lasts, and its bytes."""
+        noise = memoryview(self._integers(self.drive.noise[:, : 1 << 16]))
+        sample_bytes = 4 * self.drive.antennas * self.times
+        parts: list[tuple[float, bytes | memoryview]] = []
+        before = 0
+        for sent, block in self.drive.answers():
+            count = sent - before
+            before = sent
+            is_noise = np.shares_memory(block[0], self.drive.noise)
+            part = noise[: count * sample_bytes] if is_noise else self._integers(np.stack(block))
+            parts.append((sent / self.drive.rate_hz, part))
+        return parts
 
     def _integers(self, samples: NDArray[np.float32]) -> bytes:
         """Samples of every antenna, [antenna, sample, part], in turn and at the higher rate."""
@@ -241,16 +257,8 @@ class RawTransmitter:
         while peer is None and not self.stopped.is_set():
             with contextlib.suppress(TimeoutError):
                 peer, _ = self.server.accept()
-        # Made before it is needed: resampling takes longer than the drive.
-        noise = memoryview(self._integers(self.drive.noise[:, : 1 << 16]))
-        sample_bytes = 4 * self.drive.antennas * self.times
-        began, before = time.monotonic(), 0
-        for sent, block in self.drive.answers():
-            now_s = sent / self.drive.rate_hz
-            count = sent - before
-            before = sent
-            is_noise = np.shares_memory(block[0], self.drive.noise)
-            part = noise[: count * sample_bytes] if is_noise else self._integers(np.stack(block))
+        began = time.monotonic()
+        for now_s, part in self.parts:
             ahead_s = now_s / speed - (time.monotonic() - began)
             if ahead_s > 0.0:
                 time.sleep(ahead_s)

@@ -79,6 +79,35 @@ def test_samples_as_they_come_make_the_poses_of_locate(drive: Path) -> None:
     assert live.energy().executions == len(angles)
 
 
+def test_samples_missing_untold_cost_no_accuracy(drive: Path) -> None:
+    site, vehicle = believed(drive)
+    samples, odometry = antennas(drive), pl.read_csv(drive / "odometry.csv")
+    lost = round(7e-3 * RATE_HZ)
+    at = round(0.45 * RATE_HZ)
+    angles, poses = [], []
+    for given in (samples, np.concatenate([samples[:, :at], samples[:, at + lost :]], axis=1)):
+        live = access_av.Live(site, vehicle, rate_hz=RATE_HZ, centre_hz=3.5e9)
+        block = 19_200
+        rows = list(odometry.iter_rows(named=True))
+        for first in range(0, given.shape[1], block):
+            while rows and rows[0]["time_s"] <= (first + block) / RATE_HZ:
+                row = rows.pop(0)
+                live.odometry(row["time_s"], row["speed_mps"], distance_m=row["distance_m"])
+            live.samples(first / RATE_HZ, given[:, first : first + block])
+        live.settle()
+        angles.append({(it.pci, round(it.time_s, 3)): it for it in live.outcomes()})
+        poses.append(live.status(float(odometry["time_s"][-1])).pose)
+    whole, cut = angles
+    # A search notices it, at most 0.1 s and two periods later.
+    late = {key for key in whole if key[1] > 0.6}
+    assert len(late) >= 30
+    assert late <= set(cut)
+    for key in late:
+        assert cut[key].accepted
+        assert abs(cut[key].time_s - whole[key].time_s) < 1e-6
+    assert math.dist(poses[0][:2], poses[1][:2]) < 0.02
+
+
 def test_what_cannot_be_is_refused_and_changes_nothing(drive: Path) -> None:
     site, vehicle = believed(drive)
     with pytest.raises(ValueError, match="both"):

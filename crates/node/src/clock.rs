@@ -61,6 +61,11 @@ impl ArrivalClock {
         }
     }
 
+    /// Time of the next sample, as far as is known; `None` before the first.
+    pub fn next_s(&self) -> Option<f64> {
+        Some(self.zero_s? + self.counted as f64 / self.rate_hz)
+    }
+
     /// Time of the first of `length` samples that have arrived at `now_s`.
     pub fn block(&mut self, length: usize, now_s: f64) -> (f64, Option<Finding>) {
         let duration_s = length as f64 / self.rate_hz;

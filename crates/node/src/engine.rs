@@ -404,8 +404,8 @@ impl Engine {
         let (status, energy) = (self.live.status(now_s)?, self.live.energy());
         let heads = self.live.heads();
         if shows {
-            let taken_s = self.live.stream_counts().taken_s;
-            self.board.show(now_s, &status, heads, &energy, taken_s);
+            let counts = self.live.stream_counts();
+            self.board.show(now_s, &status, heads, &energy, counts);
         }
         if tells {
             self.last_status_s = now_s;

@@ -174,8 +174,11 @@ impl Inbox {
                 while waiting.others > MOST_OTHERS && waiting.drop_oldest(false) {}
             }
         }
+        // Whoever takes waits for the first alone; to wake it takes a call of the system.
+        if waiting.inputs.is_empty() {
+            self.came.notify_one();
+        }
         waiting.inputs.push_back((Instant::now(), input));
-        self.came.notify_one();
     }
 
     /// Takes the oldest, with when it came in; `None` where nothing comes for so long, or the queue was closed and is empty.

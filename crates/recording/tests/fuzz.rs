@@ -14,6 +14,8 @@ mod mcap;
 mod short_run;
 #[path = "../../../fuzz/bodies/sigmf.rs"]
 mod sigmf;
+#[path = "../../../fuzz/bodies/tables.rs"]
+mod tables;
 
 #[test]
 fn no_files_make_the_sigmf_reader_panic() {
@@ -23,6 +25,20 @@ fn no_files_make_the_sigmf_reader_panic() {
 #[test]
 fn no_files_make_the_mcap_reader_panic() {
     short_run::run(&seeds("mcap"), 1_000, mcap::run);
+}
+
+#[test]
+fn no_files_make_the_readers_of_tables_panic() {
+    let seeds = [
+        "\0time_s,distance_m,speed_mps,yaw_rate_radps\n0,0,1,0\n0.02,0.02,1,0.1\n",
+        "\x01time_s;left_mps;right_mps\n0;1,0;1,1\n0,02;1,0;1,1\n",
+        "\x02time_s,pci,ssb_index,phase_rad,phase_sigma_rad,snr_db,resolved\n0.5,11,0,0.1,0.02,20,1\n",
+        "\x03# t x y z qx qy qz qw\n0.0 1.0 2.0 0 0 0 0.0 1.0\n1 2 3 0 0 0 1 0\n",
+        "\x04x_m,y_m\n0,0\n10,0\n10,20\n",
+        "\x05{\"type\":\"LineString\",\"coordinates\":[[7.1,50.7],[7.2,50.8]]}",
+    ];
+    let seeds = seeds.map(|it| it.as_bytes().to_vec());
+    short_run::run(&seeds, 20_000, tables::run);
 }
 
 fn seeds(target: &str) -> Vec<Vec<u8>> {

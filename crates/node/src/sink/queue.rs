@@ -49,8 +49,13 @@ impl Queue {
             waiting.records.pop_front();
             waiting.dropped += 1;
         }
+        // Whoever takes waits for the first alone; to wake it takes a call of the system.
+        let is_first = waiting.records.is_empty();
         waiting.records.push_back(record);
-        self.came.notify_one();
+        drop(waiting);
+        if is_first {
+            self.came.notify_one();
+        }
     }
 
     /// Takes all there are, waiting so long for the first; `false` once it is closed and nothing is left.
@@ -61,7 +66,9 @@ impl Queue {
             (waiting, _) = woken.unwrap_or_else(PoisonError::into_inner);
         }
         into.append(&mut waiting.records);
-        self.taken.notify_one();
+        if self.waits {
+            self.taken.notify_one();
+        }
         !(waiting.is_closed && into.is_empty())
     }
 

@@ -12,6 +12,8 @@ use crate::statistics::SourceHealth;
 
 /// Most samples of a channel in one block.
 const MOST_FRAMES: usize = 1 << 15;
+/// So often it is said that samples are dropped before a window, in seconds: the pipeline has nothing to do then.
+const SAID_S: f64 = 0.02;
 
 impl SampleFormat {
     /// Bytes of one complex sample.
@@ -67,6 +69,8 @@ pub struct Framing {
     inbox: Arc<Inbox>,
     health: Arc<SourceHealth>,
     told_of_defects: bool,
+    /// Up to when it was last said that samples were dropped.
+    said_s: f64,
     /// Bytes of a sample, of all channels in turn, that is not yet complete.
     begun: Vec<u8>,
 }
@@ -99,6 +103,7 @@ impl Framing {
             inbox,
             health,
             told_of_defects: false,
+            said_s: f64::NEG_INFINITY,
             begun: Vec::new(),
         }
     }
@@ -108,10 +113,16 @@ impl Framing {
         self.format.bytes()
     }
 
+    /// How long so many bytes of one channel last, in seconds.
+    pub fn duration_s(&self, bytes: usize) -> f64 {
+        (bytes / self.format.bytes()) as f64 / self.rate_hz
+    }
+
     /// The stream begins anew: its counting does, and what of it is not complete is forgotten.
     pub fn restart(&mut self) {
         self.begun.clear();
         self.counted = 0;
+        self.said_s = f64::NEG_INFINITY;
         if let Times::Arrival(clock) = &mut self.clock {
             *clock = ArrivalClock::new(self.rate_hz);
         }
@@ -161,6 +172,40 @@ impl Framing {
         }
     }
 
+    /// Samples of each channel, from the next one on, that are not wanted as things stand.
+    pub fn unwanted(&self) -> usize {
+        self.up_to(|[from_s, _]| from_s)
+    }
+
+    /// Samples of each channel, from the next one on, that nobody waits for as things stand: a window is handed to the
+    /// pipeline at its end.
+    pub fn unhurried(&self) -> usize {
+        self.up_to(|[_, until_s]| until_s)
+    }
+
+    /// Samples from the next one on up to a time of the window, all that is to come where the window is over and the
+    /// pipeline has not said yet what it wants next, none where everything is wanted.
+    fn up_to(&self, time_s: impl Fn([f64; 2]) -> f64) -> usize {
+        let next_s = match &self.clock {
+            Times::Counted(zero_s) => Some(zero_s + self.counted as f64 / self.rate_hz),
+            Times::Arrival(clock) => clock.next_s(),
+        };
+        match (next_s, self.gate.wanted()) {
+            (Some(next_s), Some([_, until_s])) if next_s >= until_s => MOST_FRAMES,
+            (Some(next_s), Some(window_s)) => {
+                ((time_s(window_s) - next_s) * self.rate_hz).max(0.0) as usize
+            }
+            _ => 0,
+        }
+    }
+
+    /// Counts samples of each channel that were not wanted and not read.
+    pub fn pass_over(&mut self, frames: usize) {
+        let start_s = self.start_s(frames);
+        self.health.came(frames as u64);
+        self.slept(start_s + frames as f64 / self.rate_hz);
+    }
+
     /// Takes in samples of each channel, equally many, the first of which was received at `time_s`.
     #[cfg(feature = "soapy")]
     pub fn take_samples(&mut self, channels: &[&[Complex32]], time_s: f64) {
@@ -207,9 +252,18 @@ impl Framing {
             }
             if until < count {
                 let end_s = block_s + count as f64 / rate_hz;
-                self.inbox.put(Input::Slept(end_s));
+                self.slept(end_s);
             }
             first += count;
+        }
+    }
+
+    /// Says that nothing was handed on up to this time: where a window is over, and now and then.
+    fn slept(&mut self, until_s: f64) {
+        let is_over = |[_, end_s]: [f64; 2]| until_s >= end_s;
+        if until_s - self.said_s >= SAID_S || self.gate.wanted().is_none_or(is_over) {
+            self.said_s = until_s;
+            self.inbox.put(Input::Slept(until_s));
         }
     }
 
@@ -358,5 +412,32 @@ mod tests {
         let count: usize = found.iter().map(|it| it.antennas[0].len()).sum();
         assert!((199..=201).contains(&count), "{count}");
         assert!((found[0].time_s - (5.0 + 100e-6)).abs() < 1.5e-6);
+    }
+
+    #[test]
+    fn what_is_passed_over_is_counted_and_told_at_a_window_s_end() {
+        let mut framing = framing(SampleFormat::Ci8, &[0]);
+        assert_eq!([framing.unwanted(), framing.unhurried()], [0, 0]);
+        framing.gate.set([5.0 + 100.5e-6, 5.0 + 300.5e-6]);
+        assert_eq!([framing.unwanted(), framing.unhurried()], [100, 300]);
+        framing.pass_over(60);
+        framing.pass_over(30);
+        assert_eq!([framing.unwanted(), framing.unhurried()], [10, 210]);
+        framing.interleaved(&[1; 2 * 210]);
+        assert_eq!([framing.unwanted(), framing.unhurried()], [0, 0]);
+        framing.pass_over(10);
+        assert_eq!(framing.unwanted(), MOST_FRAMES);
+        // The first, that there is something to take, what was wanted, and that the window is over.
+        let told: Vec<f64> = std::iter::from_fn(|| framing.inbox.take(Duration::ZERO))
+            .map(|(_, input)| match input {
+                Input::Slept(until_s) => until_s,
+                Input::Samples(block) => block.time_s,
+                other => panic!("{other:?}"),
+            })
+            .collect();
+        for (told_s, expected) in told.iter().zip([60.0, 100.0, 310.0]) {
+            assert!((told_s - 5.0 - 1e-6 * expected).abs() < 2e-6, "{told:?}");
+        }
+        assert_eq!(told.len(), 3);
     }
 }

@@ -10,15 +10,17 @@ use crate::gate::Gate;
 use crate::inbox::{Block, Inbox, Input};
 use crate::statistics::SourceHealth;
 
-/// Samples of a block in seconds.
+/// Samples of a block in seconds, where all are wanted and in a window: that is read at its end, as a whole.
 const BLOCK_S: f64 = 1e-3;
+const WINDOW_S: f64 = 10e-3;
 
 /// A recording block by block, in order of time; where samples are missing between its captures none come.
 pub struct Blocks {
     recording: Recording,
     rate_hz: f64,
     start_s: f64,
-    block: u64,
+    /// Seconds of a block at most.
+    pub block_s: f64,
     at: u64,
 }
 
@@ -29,7 +31,7 @@ impl Blocks {
         Self {
             rate_hz,
             start_s,
-            block: ((block_s * rate_hz) as u64).max(1),
+            block_s,
             at: 0,
             recording,
         }
@@ -85,7 +87,8 @@ impl Blocks {
         let Some(time_s) = self.next_s() else {
             return Ok(None);
         };
-        let count = self.block.min(self.capture_end() - self.at);
+        let block = ((self.block_s * self.rate_hz) as u64).max(1);
+        let count = block.min(self.capture_end() - self.at);
         self.recording.read(self.at, count as usize, into)?;
         self.at += count;
         Ok(Some(time_s))
@@ -118,7 +121,11 @@ pub fn run(
     while let Some(next_s) = blocks.next_s()
         && !inbox.is_closed()
     {
-        let on_s = match gate.wanted() {
+        let wanted = gate.wanted();
+        blocks.block_s = wanted.map_or(BLOCK_S, |[_, until_s]| {
+            (until_s - next_s).clamp(BLOCK_S, WINDOW_S)
+        });
+        let on_s = match wanted {
             Some([from_s, _]) if from_s > next_s => from_s,
             // The window is over, and the pipeline has not said yet what it wants next.
             Some([_, until_s]) if until_s <= next_s => next_s + BLOCK_S,
@@ -131,13 +138,12 @@ pub fn run(
             inbox.put(Input::Slept(on_s));
             continue;
         }
+        std::thread::sleep(until(next_s + blocks.block_s));
         let mut antennas = inbox.buffers(channels);
         match blocks.read(&mut antennas) {
             Ok(None) => break,
             Ok(Some(time_s)) => {
                 let count = antennas.first().map_or(0, Vec::len);
-                let end_s = time_s + blocks.length_s(&antennas);
-                std::thread::sleep(until(end_s));
                 health.came(count as u64);
                 inbox.put(Input::Samples(Block { time_s, antennas }));
             }

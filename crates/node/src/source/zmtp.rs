@@ -3,13 +3,13 @@
 //! By hand, for it is small: the Rust libraries take whatever length a frame says it has for the memory to set
 //! aside.
 
-use std::io::{self, ErrorKind, Read, Write};
+use std::io::{self, BufRead, ErrorKind, Read, Write};
 
 /// Bytes of the longest frame that is taken: 4 million complex floats.
-pub const LONGEST: u64 = 32 << 20;
+pub const LONGEST: usize = 32 << 20;
 
 /// What makes room for a frame as it comes.
-const CHUNK: u64 = 1 << 16;
+const CHUNK: usize = 1 << 16;
 /// Time limits of reads that may pass in the middle of a frame.
 const MOST_IDLE: u32 = 10;
 
@@ -59,7 +59,8 @@ pub fn greet(stream: &mut (impl Read + Write)) -> io::Result<()> {
     stream.write_all(&[COMMAND, READY.len() as u8])?;
     stream.write_all(READY)?;
     let mut answer = Vec::new();
-    let flags = read_frame(stream, &mut answer)?;
+    let Header { flags, length } = read_header(stream)?;
+    read_body(stream, length, &mut answer)?;
     if flags & COMMAND == 0 || !answer.starts_with(b"\x05READY") {
         return Err(invalid("the transmitter refuses the connection"));
     }
@@ -70,50 +71,64 @@ pub fn greet(stream: &mut (impl Read + Write)) -> io::Result<()> {
     Ok(())
 }
 
-/// Asks for samples.
+/// Asks for samples, so many times.
 ///
 /// # Errors
 /// Those of the stream.
-pub fn request(stream: &mut impl Write) -> io::Result<()> {
+pub fn request(stream: &mut impl Write, times: usize) -> io::Result<()> {
     // The empty frame before the request, and its one byte.
-    stream.write_all(&[MORE, 0, 0, 1, 0xff])
+    stream.write_all(&[MORE, 0, 0, 1, 0xff].repeat(times))
 }
 
-/// Appends what answers the request; how many bytes.
+/// Appends what answers the request, or passes over it where `is_wanted`, told its length, says no; how many bytes
+/// were passed over.
 ///
 /// # Errors
 /// Those of the stream, [`ErrorKind::InvalidData`] for what is no answer.
-pub fn answer(stream: &mut impl Read, into: &mut Vec<u8>) -> io::Result<usize> {
+pub fn answer(
+    peer: &mut impl BufRead,
+    into: &mut Vec<u8>,
+    is_wanted: impl Fn(usize) -> bool,
+) -> io::Result<usize> {
     let before = into.len();
     let mut in_body = false;
     loop {
-        let start = into.len();
-        let flags = read_frame(stream, into)?;
+        let Header { flags, length } = read_header(peer)?;
         if flags & COMMAND != 0 {
-            into.truncate(start); // nothing that concerns an answer
+            pass_over(peer, length)?; // nothing that concerns an answer
             continue;
         }
-        if !in_body && into.len() != start {
+        if !in_body && length != 0 {
             return Err(invalid("an answer must begin with an empty frame"));
         }
+        let is_last = flags & MORE == 0;
+        if is_last && in_body && into.len() == before && !is_wanted(length) {
+            pass_over(peer, length)?;
+            return Ok(length);
+        }
+        read_body(peer, length, into)?;
         let is_body = std::mem::replace(&mut in_body, true);
-        if flags & MORE == 0 {
+        if is_last {
             if !is_body {
                 return Err(invalid("an answer without samples"));
             }
-            return Ok(into.len() - before);
+            return Ok(0);
         }
-        if into.len() - before > LONGEST as usize {
+        if into.len() - before > LONGEST {
             return Err(invalid("an answer that does not end"));
         }
     }
 }
 
-/// Appends the body of a frame, and says its flags.
-///
+/// What a frame begins with.
+struct Header {
+    flags: u8,
+    length: usize,
+}
+
 /// # Errors
 /// Those of the stream, [`ErrorKind::InvalidData`] for a frame that is too long or of no known kind.
-pub fn read_frame(stream: &mut impl Read, into: &mut Vec<u8>) -> io::Result<u8> {
+fn read_header(stream: &mut impl Read) -> io::Result<Header> {
     let mut flags = [0];
     read_exact(stream, &mut flags)?;
     let [flags] = flags;
@@ -129,25 +144,48 @@ pub fn read_frame(stream: &mut impl Read, into: &mut Vec<u8>) -> io::Result<u8> 
         read_exact(stream, &mut length)?;
         u64::from_be_bytes(length)
     };
-    if length > LONGEST {
-        return Err(invalid("a frame of more than 32 MiB"));
-    }
+    let length = usize::try_from(length).ok().filter(|it| *it <= LONGEST);
+    let length = length.ok_or_else(|| invalid("a frame of more than 32 MiB"))?;
+    Ok(Header { flags, length })
+}
+
+/// Appends so many bytes. Room is made for what may come at once, not for all that is announced.
+fn read_body(stream: &mut impl Read, length: usize, into: &mut Vec<u8>) -> io::Result<()> {
+    piece_by_piece(length, |missing| {
+        let start = into.len();
+        into.resize(start + missing, 0);
+        let read = stream.read(into.get_mut(start..).unwrap_or_default());
+        into.truncate(start + read.as_ref().map_or(0, |count| *count));
+        read
+    })
+}
+
+fn pass_over(peer: &mut impl BufRead, length: usize) -> io::Result<()> {
+    piece_by_piece(length, |missing| {
+        let came = peer.fill_buf()?.len().min(missing);
+        peer.consume(came);
+        Ok(came)
+    })
+}
+
+/// Calls `next` with how much is missing, at most [`CHUNK`], until all has come; in the middle of a frame a peer
+/// that is silent is waited for.
+fn piece_by_piece(
+    length: usize,
+    mut next: impl FnMut(usize) -> io::Result<usize>,
+) -> io::Result<()> {
     let mut missing = length;
     let mut idle = 0;
     while missing > 0 {
-        let start = into.len();
-        // Appends without filling the room with zeros first.
-        let read = stream.by_ref().take(missing.min(CHUNK)).read_to_end(into);
-        let came = (into.len() - start) as u64;
-        missing -= came;
-        match read {
+        match next(missing.min(CHUNK)) {
             Ok(0) => return Err(ErrorKind::UnexpectedEof.into()),
-            Ok(_) => idle = 0,
+            Ok(count) => (missing, idle) = (missing.saturating_sub(count), 0),
+            Err(error) if error.kind() == ErrorKind::Interrupted => {}
             Err(error) if super::connection::is_idle(&error) && idle < MOST_IDLE => idle += 1,
             Err(error) => return Err(error),
         }
     }
-    Ok(flags)
+    Ok(())
 }
 
 /// Reads all of it. A peer that is silent for a read's time limit is waited for if nothing was read yet only by
@@ -188,6 +226,16 @@ mod tests {
         }
     }
 
+    impl BufRead for Peer<'_> {
+        fn fill_buf(&mut self) -> io::Result<&[u8]> {
+            Ok(self.0)
+        }
+
+        fn consume(&mut self, count: usize) {
+            self.0 = &self.0[count..];
+        }
+    }
+
     impl Write for Peer<'_> {
         fn write(&mut self, bytes: &[u8]) -> io::Result<usize> {
             Ok(bytes.len())
@@ -204,16 +252,32 @@ mod tests {
         let long = [&[LONG, 0, 0, 0, 0, 0, 0, 1, 0][..], &[7; 256]].concat();
         let told = [&[MORE, 0][..], &long, &[MORE, 0, MORE, 2, 1, 2, 0, 1, 3]].concat();
         let mut peer = Peer(&told);
-        assert_eq!(answer(&mut peer, &mut samples).unwrap(), 256);
-        assert_eq!(answer(&mut peer, &mut samples).unwrap(), 3);
+        assert_eq!(answer(&mut peer, &mut samples, |_| true).unwrap(), 0);
+        assert_eq!(samples, [7; 256]);
+        assert_eq!(answer(&mut peer, &mut samples, |_| true).unwrap(), 0);
         assert_eq!(samples[256..], [1, 2, 3]);
-        assert!(answer(&mut peer, &mut samples).is_err());
+        assert!(answer(&mut peer, &mut samples, |_| true).is_err());
+        // What is not wanted is passed over where it is one frame; of several the first are not the whole.
+        let mut peer = Peer(&told);
+        samples.clear();
+        assert_eq!(
+            answer(&mut peer, &mut samples, |it| it != 256).unwrap(),
+            256
+        );
+        assert_eq!(answer(&mut peer, &mut samples, |_| false).unwrap(), 0);
+        assert_eq!(samples, [1, 2, 3]);
+        assert!(peer.0.is_empty());
     }
 
     #[test]
     fn what_is_no_answer_is_refused_before_room_is_made_for_it() {
         let endless = [&[MORE, 0, LONG][..], &u64::MAX.to_be_bytes()].concat();
-        let cut = [&[MORE, 0, LONG][..], &LONGEST.to_be_bytes(), &[0; 10]].concat();
+        let cut = [
+            &[MORE, 0, LONG][..],
+            &(LONGEST as u64).to_be_bytes(),
+            &[0; 10],
+        ]
+        .concat();
         for told in [
             &endless[..],
             &cut,
@@ -223,8 +287,15 @@ mod tests {
             &[MORE, 0],
         ] {
             let mut samples = Vec::new();
-            assert!(answer(&mut Peer(told), &mut samples).is_err(), "{told:?}");
+            assert!(
+                answer(&mut Peer(told), &mut samples, |_| true).is_err(),
+                "{told:?}"
+            );
             assert!(samples.capacity() <= 2 << 16);
+            assert!(
+                answer(&mut Peer(told), &mut samples, |_| false).is_err(),
+                "{told:?}"
+            );
         }
     }
 

@@ -4,7 +4,7 @@ use std::collections::VecDeque;
 use std::sync::{Arc, Mutex, MutexGuard, PoisonError};
 use std::time::{Duration, Instant};
 
-use onboard::live::{HeadStatus, LiveEnergy, Status};
+use onboard::live::{HeadStatus, LiveEnergy, Status, StreamCounts};
 use serde_json::{Value, json};
 
 use crate::inbox::{Inbox, Level};
@@ -45,8 +45,8 @@ pub struct Shown {
     pub heads: Vec<HeadStatus>,
     /// What was done.
     pub energy: LiveEnergy,
-    /// Samples that the pipeline was given, in seconds.
-    pub taken_s: f64,
+    /// What came of the samples that the pipeline was given.
+    pub counts: StreamCounts,
 }
 
 #[derive(Default)]
@@ -105,7 +105,7 @@ impl Board {
         status: &Status,
         heads: &[HeadStatus],
         energy: &LiveEnergy,
-        taken_s: f64,
+        counts: StreamCounts,
     ) {
         let mut state = self.lock();
         if let Some(pose) = status.pose
@@ -119,7 +119,7 @@ impl Board {
             status: *status,
             heads: heads.to_vec(),
             energy: *energy,
-            taken_s,
+            counts,
         });
     }
 
@@ -185,6 +185,7 @@ impl Board {
                 .collect();
             value["energy"] = crate::sink::energy_json(&shown.energy);
             value["duty"] = json!(self.duty(&shown));
+            value["found_by_search"] = json!(shown.counts.found);
         }
         value
     }
@@ -197,7 +198,7 @@ impl Board {
             .iter()
             .find(|it| it.name == "samples")?;
         let came_s = samples.items() as f64 / self.counters.rate_hz;
-        (came_s > 0.0).then(|| (shown.taken_s / came_s).min(1.0))
+        (came_s > 0.0).then(|| (shown.counts.taken_s / came_s).min(1.0))
     }
 }
 

@@ -194,6 +194,12 @@ pub fn text(board: &Board) -> String {
         let help = "Energy since the start, by the platform's model.";
         text.one("energy_joules_total", "counter", help, joules.total_j());
     }
+    text.one(
+        "ssbs_found_total",
+        "counter",
+        "SSBs that a search has found; all others came where they were expected.",
+        shown.counts.found as f64,
+    );
     if let Some(duty) = board.duty(&shown) {
         let help = "Share of the samples that were looked at.";
         text.one("duty_ratio", "gauge", help, duty);

@@ -4,7 +4,8 @@
 //! Overlap-save in the frequency domain: a block of the input is transformed once, the bins around
 //! the SSB are weighted with a zero-phase raised-cosine low-pass and transformed back at the base
 //! rate. Mixing costs nothing (it is the choice of bins), and output sample `j` belongs exactly to
-//! input time `j · M / L`.
+//! input time `j · M / L`. What comes at the base rate with the SSB at 0 Hz passes as it is: the filter
+//! would take eight subcarriers off either side, which demodulation keeps apart anyway.
 
 use std::f64::consts::TAU;
 use std::sync::Arc;
@@ -201,7 +202,8 @@ impl FrontEnd {
     }
 
     /// Takes the next samples of every antenna and appends what can be computed to `output`,
-    /// one vector per antenna. About 4096 samples at the base rate are held back.
+    /// one vector per antenna. About 4096 samples at the base rate are held back where there is something
+    /// to convert.
     ///
     /// # Errors
     /// [`FrontEndError::AntennaCount`], [`FrontEndError::UnequalLengths`].
@@ -223,12 +225,28 @@ impl FrontEnd {
         for output in outputs.iter() {
             length = self.common_length(antennas, output)?;
         }
+        self.consumed_input += length as u64;
+        if let ([tuning], [output]) = (tunings, &mut *outputs)
+            && self.passes(tuning)
+        {
+            for (output, input) in output.iter_mut().zip(antennas) {
+                output.extend_from_slice(input.as_ref());
+            }
+            self.produced = self.consumed_input;
+            return Ok(());
+        }
         for (pending, input) in self.pending.iter_mut().zip(antennas) {
             pending.extend_from_slice(input.as_ref());
         }
-        self.consumed_input += length as u64;
         self.run_blocks(tunings, outputs);
         Ok(())
+    }
+
+    /// Whether there is nothing to convert.
+    fn passes(&self, tuning: &Tuning) -> bool {
+        self.interpolation == self.decimation
+            && tuning.centre_bin == 0
+            && tuning.residual_cycles == 0.0
     }
 
     /// Ends the stream: appends the samples held back. The front end is then ready for another.

@@ -23,6 +23,9 @@ pub struct ReceiverConfig {
     pub lost_after_s: f64,
     /// Cells to listen to; all without.
     pub cells: Option<Vec<u16>>,
+    /// Cell and index of each beam that there is, where that is known: while all of them come, none is searched
+    /// for. Empty otherwise.
+    pub beams: Vec<(u16, u8)>,
     /// Whether the PBCH of tracked SSBs is decoded: for what it says, and for its elements as pilots.
     pub decode_pbch: bool,
 }
@@ -41,6 +44,7 @@ impl ReceiverConfig {
             search_every_s: 1.0,
             lost_after_s: 2.0,
             cells: None,
+            beams: Vec::new(),
             decode_pbch: true,
         }
     }

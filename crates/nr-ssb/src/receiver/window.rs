@@ -146,6 +146,9 @@ impl<const A: usize> WindowReceiver<A> {
             self.search_until = f64::NEG_INFINITY;
             self.count_in_vain();
         }
+        if self.all_come() {
+            return false;
+        }
         let came = self.beams.iter().any(|beam| beam.tracker.misses() == 0);
         let interval_s = if came {
             self.config.search_every_s
@@ -160,6 +163,20 @@ impl<const A: usize> WindowReceiver<A> {
             (self.search_begun, self.search_until) = (start, start + self.config.period());
         }
         is_due
+    }
+
+    /// Whether there is no other beam to be found, and how far off in frequency they are.
+    fn all_come(&mut self) -> bool {
+        let (beams, known) = (&self.beams, &self.config.beams);
+        let comes = |known: &(u16, u8)| {
+            let is_it = |it: &&Beam<A>| (it.pci.get(), it.ssb_index) == *known;
+            (beams.iter().find(is_it)).is_some_and(|it| it.tracker.misses() == 0)
+        };
+        let all_come = !known.is_empty() && known.iter().all(comes);
+        if let (true, Some(beam)) = (all_come, beams.first()) {
+            self.offset_hz = beam.tracker.cfo_hz();
+        }
+        all_come
     }
 
     /// A search has been through a period.

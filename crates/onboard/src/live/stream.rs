@@ -37,6 +37,8 @@ pub struct StreamCounts {
     pub overlaps: u64,
     /// Streams that began anew.
     pub restarts: u64,
+    /// SSBs that a search has found; all others came where they were expected.
+    pub found: u64,
 }
 
 /// Receiver of a stream, and the observations that are not yet of a whole burst.
@@ -99,6 +101,7 @@ impl SampleStream {
         StreamCounts {
             untold_gaps: self.bursts.untold_gaps,
             untold_s: self.bursts.untold_s,
+            found: self.receiver.found(),
             ..self.counts
         }
     }

@@ -43,6 +43,9 @@ pub struct ReceiverConfig {
     pub array: ArraySettings,
     /// Cells to listen to; all without.
     pub cells: Option<Vec<u16>>,
+    /// Cell and index of each SSB that there is, where that is known: while all of them come, none is searched
+    /// for. Empty otherwise.
+    pub beams: Vec<(u16, u8)>,
     /// How often a receiver that has cells looks for others, in seconds.
     pub search_every_s: f64,
 }
@@ -55,7 +58,9 @@ impl ReceiverConfig {
         } else {
             SubcarrierSpacing::Khz15
         };
-        let heads = site.radio_heads.iter().map(|head| head.pci);
+        let heads = site.radio_heads.iter();
+        let heard = heads.filter(|head| vehicle.receiver.hears(head.pci));
+        let beams: Vec<_> = heard.map(|head| (head.pci, head.ssb_index)).collect();
         Self {
             ssb_freq_hz: site.carrier_mhz * 1e6,
             spacing,
@@ -63,7 +68,8 @@ impl ReceiverConfig {
             pilots: vehicle.receiver.pilots,
             snapshots: vehicle.receiver.snapshots.into(),
             array: vehicle.array.clone(),
-            cells: Some(heads.filter(|pci| vehicle.receiver.hears(*pci)).collect()),
+            cells: Some(beams.iter().map(|(pci, _)| *pci).collect()),
+            beams,
             search_every_s: 1.0,
         }
     }
@@ -76,6 +82,7 @@ impl ReceiverConfig {
             period_s: self.period_s,
             oscillator_ppm: OSCILLATOR_PPM.min(widest_ppm),
             cells: self.cells.clone(),
+            beams: self.beams.clone(),
             search_every_s: self.search_every_s,
             decode_pbch: matches!(self.pilots, Pilots::Ssb),
             ..ssb::ReceiverConfig::new(self.ssb_freq_hz, self.spacing, antennas)
@@ -186,6 +193,11 @@ impl StreamReceiver {
         self.0.heard_until()
     }
 
+    /// Number of SSBs that a search has found; all others came where they were expected.
+    pub fn found(&self) -> u64 {
+        self.0.found()
+    }
+
     /// Takes the next samples and hands every SSB that they complete to `take`, in order of time. `time_s`
     /// says when a sample of the input was received, the first of all being number 0; beside the
     /// observation `take` gets the samples that were missing untold before it, in seconds, and are
@@ -262,6 +274,7 @@ impl<const A: usize> OfWindows for (WindowReceiver<A>, Observer<A>) {
 trait OfStream: Send {
     fn tracked(&self) -> usize;
     fn heard_until(&self) -> f64;
+    fn found(&self) -> u64;
     fn push(
         &mut self,
         antennas: &[&[Complex32]],
@@ -284,6 +297,10 @@ impl<const A: usize> OfStream for (ssb::StreamReceiver<A>, Observer<A>) {
 
     fn heard_until(&self) -> f64 {
         self.0.heard_until() * self.0.input_per_output()
+    }
+
+    fn found(&self) -> u64 {
+        self.1.found
     }
 
     fn push(
@@ -335,6 +352,8 @@ struct Observer<const A: usize> {
     /// Of antennas that are not in a row.
     finder: Option<DirectionFinder<ArrayManifold<A>, A>>,
     observation: SsbObservation,
+    /// SSBs that a search has found.
+    found: u64,
 }
 
 impl<const A: usize> Observer<A> {
@@ -352,12 +371,14 @@ impl<const A: usize> Observer<A> {
             calibration,
             finder: manifold.map(ArrayManifold::finder).transpose()?,
             observation: SsbObservation::new(A),
+            found: 0,
             config,
         })
     }
 
     /// What was seen, received at a time.
     fn observe(&mut self, seen: &Seen<'_, A>, time_s: f64) -> &SsbObservation {
+        self.found += u64::from(!seen.is_followed);
         let (config, finder) = (&self.config, self.finder.as_ref());
         let (tracker, ssb) = (&*seen.tracker, seen.ssb);
         let into = &mut self.observation;

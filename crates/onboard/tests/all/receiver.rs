@@ -43,7 +43,13 @@ impl Air {
     }
 
     fn receiver(&self) -> Receiver {
+        self.receiver_of(&[])
+    }
+
+    /// A receiver that is told which beams there are.
+    fn receiver_of(&self, beams: &[u8]) -> Receiver {
         Receiver::new(ReceiverConfig {
+            beams: beams.iter().map(|beam| (self.cell.pci, *beam)).collect(),
             ssb_freq_hz: self.cell.ssb_freq_hz,
             spacing: self.cell.spacing,
             period_s: PERIOD_S,
@@ -125,6 +131,30 @@ fn a_beam_that_vanishes_costs_nothing_and_is_heard_again_when_it_returns() {
     for number in back + 1..back + 20 {
         assert_eq!(air.heard(&mut receiver, number), all, "burst {number}");
     }
+}
+
+#[test]
+fn while_all_beams_that_are_known_come_none_is_searched_for() {
+    let mut air = Air::new(SubcarrierSpacing::Khz30, 3.0, 8.0, 1);
+    let all: Vec<u8> = (0..8).collect();
+    let mut receiver = air.receiver_of(&all);
+    for number in 0..150 {
+        assert_eq!(air.heard(&mut receiver, number), all, "burst {number}");
+    }
+    assert_eq!(receiver.searches(), 1);
+    // One is gone for longer than it is kept, and found again as by who knows of none.
+    air.send((1..8).collect());
+    for number in 150..280 {
+        air.heard(&mut receiver, number);
+    }
+    assert_eq!(receiver.tracked(), 7);
+    assert!(
+        (3..=4).contains(&receiver.searches()),
+        "{}",
+        receiver.searches()
+    );
+    air.send(all.clone());
+    assert!((280..332).any(|number| air.heard(&mut receiver, number) == all));
 }
 
 #[test]
