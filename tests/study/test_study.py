@@ -17,6 +17,7 @@ import pytest
 import layout
 from access_av import Plant, SettingsError, study_plant
 from access_av.errors import InputError
+from access_av.run.error_bound import along_route
 from access_av.statistics.paired import paired_difference
 from access_av.tables.columns.tables import TABLES
 
@@ -213,6 +214,14 @@ def test_places_are_those_of_the_road(results: Path, said: dict[str, Any]) -> No
     worst = max(said["worst"], key=lambda it: it["error_m"])
     assert worst["error_m"] == pytest.approx(places["target_error_m"].max(), abs=1e-4)
     assert all(it["why"] for it in said["worst"])
+    # Levels and reliability, again from the errors' table.
+    route = along_route(Plant.from_toml(PLANT).scenario())
+    rows = pl.read_parquet(results / "errors.parquet").filter(variant="as it is")
+    along_m = np.interp(rows["time_s"], route["time_s"], route["along_m"])
+    near = rows.filter(pl.Series(np.abs(along_m - 10.5) <= 5.0))["protection_level_m"]
+    at = places.row(10, named=True)
+    assert at["reliable_share"] == pytest.approx(1.0 - near.null_count() / len(near), abs=1e-4)
+    assert at["level_m"] == pytest.approx(near.quantile(0.5, "lower"), abs=1e-3)
     # Straight ahead to the first bend: the way and its points agree.
     straight = places.filter(pl.col("along_m") < 29.0)
     assert np.allclose(straight["x_m"], straight["along_m"], atol=1e-3)

@@ -32,6 +32,7 @@ def render_located(
     vehicle: Vehicle,
     numbers: dict[str, float],
     truth: pl.DataFrame | None = None,
+    beside: str = "",
 ) -> str:
     """A located drive as an HTML page that loads nothing.
 
@@ -45,6 +46,8 @@ def render_located(
         What :func:`access_av.drives.summary` returned.
     truth
         What :func:`access_av.drives.read_tum` returned, where the truth is known.
+    beside
+        A section on other variants, as HTML.
     """
     specs: dict[str, Spec] = {}
     sections = []
@@ -83,6 +86,7 @@ def render_located(
                 places + _by_head(drive.angles),
             )
         )
+    sections.append(beside)
     believed = source("Site, all defaults written out", site.to_toml())
     believed += source("Vehicle, all defaults written out", vehicle.to_toml())
     sections.append(section("Provenance", "", believed))
