@@ -348,7 +348,7 @@ def test_the_report_shows_what_was_found(access_av: Cli, tmp_path: Path) -> None
     specs = json.loads(re.search(r"const charts = (\{.*\});", page).group(1))  # type: ignore[union-attr]
     assert specs.keys() == {"track", "error", "angles", "heads"}
     drawn = {name: json.dumps(spec) for name, spec in specs.items()}
-    for line in ("truth", "as driven", "smoothed", *map(str, HEADS_M)):
+    for line in ("truth", "as driven", "smoothed", *(f"PCI {pci}" for pci in HEADS_M)):
         assert f'"{line}"' in drawn["track"], line
     for line in ("error", "error, smoothed", "deviation", "protection level"):
         assert f'"{line}"' in drawn["error"], line

@@ -7,7 +7,17 @@ from typing import Annotated
 import typer
 
 from access_av._core import Plant
-from access_av.cli.options import AsJson, Compare, Out, Percents, Seed, Threads, Vary, announce
+from access_av.cli.options import (
+    AsJson,
+    Compare,
+    Out,
+    Percents,
+    Seed,
+    Threads,
+    Vary,
+    announce,
+    look_for_underlay,
+)
 from access_av.cli.side_by_side import (
     of_scenario,
     records,
@@ -43,8 +53,8 @@ def study(
     """Tell whether a plant's localization is good enough, where not, what mends it and its cost.
 
     Writes report.html, study.json, errors.parquet, drives.parquet, places.parquet, places.csv,
-    points.parquet, plant.toml with every default, and manifest.json; with --vary or --compare also
-    compared.parquet.
+    points.parquet, trajectories.parquet (the drive that the page plays), plant.toml with every
+    default, and manifest.json; with --vary or --compare also compared.parquet.
     """
     from access_av.report.compared import compared_section
     from access_av.report.study import render_study
@@ -52,6 +62,7 @@ def study(
     from access_av.tables.results_directory import ResultsDirectory, json_text
 
     chosen = Plant.load(plant)
+    look_for_underlay(chosen.scenario().site)
     announce(plant, chosen.warnings())
     others = {name: Plant.load(name).scenario() for name in compare or ()}
     scenarios = of_scenario(chosen.scenario(), vary, others)

@@ -116,7 +116,8 @@ TABLES: Mapping[str, Table] = {
         Table(
             "trajectories",
             "An SSB of a run, with truth and estimate",
-            "`trajectories.parquet` of `access-av run`; `access_av.simulate(…).trajectories`",
+            "`trajectories.parquet` of `access-av run` and `study`; "
+            "`access_av.simulate(…).trajectories`",
             (
                 "run", "time_s", *_POSE, "true_x_m", "true_y_m", "true_heading_rad", "error_x_m",
                 "error_y_m", "true_snr_db", *_COVARIANCES, *_LEVELS, "searching", "integrity",
