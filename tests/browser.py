@@ -81,12 +81,13 @@ class Browser:
         """What the page says."""
         return str(self.evaluate("document.body.innerText"))
 
-    def resize(self, width: int, height: int, *, dark: bool = False) -> None:
-        """Another size of the window, and light or dark colours."""
+    def resize(self, width: int, height: int, *, look: str = "light") -> None:
+        """Another size of the window; in ``light`` or ``dark`` colours, or as in ``print``."""
         metrics = {"width": width, "height": height, "deviceScaleFactor": 1, "mobile": False}
         self.call("Emulation.setDeviceMetricsOverride", **metrics)
-        scheme = {"name": "prefers-color-scheme", "value": "dark" if dark else "light"}
-        self.call("Emulation.setEmulatedMedia", features=[scheme])
+        scheme = {"name": "prefers-color-scheme", "value": "dark" if look == "dark" else "light"}
+        media = "print" if look == "print" else ""
+        self.call("Emulation.setEmulatedMedia", media=media, features=[scheme])
 
     def picture(self, file: Path) -> None:
         """Writes a picture of the window."""

@@ -2,28 +2,27 @@
 
 from __future__ import annotations
 
-import html
-import json
-import re
+import os
 import shutil
-import subprocess
+from pathlib import Path
 from typing import TYPE_CHECKING, Any
 
 if TYPE_CHECKING:
-    from pathlib import Path
+    from browser import Browser
 
 # Inside the page: text that lies over other text, text cut by its box or by the drawing it is part
 # of, and a page wider than its window.
 MEASURE = """
-<script>
-addEventListener("load", () => setTimeout(() => {
+(() => {
   const found = [];
   const name = (it) => (it.textContent || "").trim().slice(0, 40);
   if (document.documentElement.scrollWidth > innerWidth + 1)
     found.push(`page is ${document.documentElement.scrollWidth} px wide in ${innerWidth}`);
   for (const svg of document.querySelectorAll("svg.marks")) {
     const edge = svg.getBoundingClientRect();
-    const texts = [...svg.querySelectorAll("text")].filter((it) => it.textContent.trim());
+    // Labels that would overlap are there, and seen by nobody.
+    const texts = [...svg.querySelectorAll("text")].filter((it) => it.textContent.trim()
+      && getComputedStyle(it).opacity !== "0");
     const boxes = texts.map((it) => [it, it.getBoundingClientRect()]);
     for (const [it, box] of boxes)
       if (box.width && (box.left < edge.left - 2 || box.right > edge.right + 2
@@ -44,14 +43,24 @@ addEventListener("load", () => setTimeout(() => {
   for (const it of document.querySelectorAll(".table"))
     if (it.scrollWidth > it.clientWidth + 2)
       found.push(`table is ${it.scrollWidth} px wide in ${it.clientWidth}: ${name(it)}`);
-  const all = { width: innerWidth, found: [...new Set(found)],
+  return { width: innerWidth, found: [...new Set(found)],
+    paper: getComputedStyle(document.body).backgroundColor,
     charts: document.querySelectorAll("svg.marks").length };
-  const told = document.createElement("pre");
-  told.id = "measured";
-  told.textContent = JSON.stringify(all);
-  document.body.append(told);
-}, 1500));
-</script>
+})()
+"""
+DRAWN = (
+    "document.readyState === 'complete' && document.querySelectorAll('svg.marks').length"
+    " === document.querySelectorAll('.chart').length"
+)
+HEIGHT_PX = 3000
+# Windows, and what a PDF has: a sheet of A4 between margins of a centimetre, at 96 px an inch.
+PAPER_PX = 718
+VIEWS = [*((width, look) for width in (1300, 800, 400) for look in ("light", "dark"))]
+VIEWS.append((PAPER_PX, "print"))
+AXE = """
+axe.run(document, { resultTypes: ["violations"] }).then((it) => it.violations
+  .filter(({ impact }) => ["serious", "critical"].includes(impact))
+  .map(({ id, nodes }) => `${id}: ${nodes.map((node) => node.target).join(", ")}`))
 """
 
 
@@ -60,35 +69,20 @@ def chromium() -> str | None:
     return shutil.which("chromium") or shutil.which("chromium-browser")
 
 
-def measure(page: Path, folder: Path, width: int, *, dark: bool = False) -> dict[str, Any]:
-    """What a browser finds of a page in a window of some width."""
-    copy = folder / f"{page.stem}-{width}-{dark}.html"
-    text = page.read_text("utf-8")
-    body, _, end = text.rpartition("</body>")  # the code that draws charts speaks of it, too
-    copy.write_text(f"{body}{MEASURE}</body>{end}", "utf-8")
-    # A browser's own window has a least width; a frame has none.
-    frame = folder / f"frame-{width}-{dark}.html"
-    frame.write_text(
-        f'<body style="margin:0"><iframe id="it" style="border:0;width:{width}px;height:3000px" '
-        f'src="{copy.name}"></iframe><script>setTimeout(() => document.body.append(Object.assign('
-        'document.createElement("pre"), {textContent: document.getElementById("it")'
-        '.contentDocument.getElementById("measured").textContent})), 4000)</script></body>',
-        "utf-8",
-    )
-    scheme = ["--blink-settings=preferredColorScheme=0"] if dark else []
-    done = subprocess.run(
-        [
-            str(chromium()),
-            *("--headless", "--no-sandbox", "--disable-gpu", "--allow-file-access-from-files"),
-            *("--window-size=1400,3000", "--virtual-time-budget=8000", *scheme, "--dump-dom"),
-            frame.as_uri(),
-        ],
-        capture_output=True,
-        text=True,
-        timeout=240,
-        check=True,
-    )
-    told = re.search(r"<pre>(\{.*?\})</pre>", done.stdout, re.S)
-    assert told, done.stdout[-500:] + done.stderr[-500:]
-    found: dict[str, Any] = json.loads(html.unescape(told[1]))
+def measure(browser: Browser, width: int, look: str) -> dict[str, Any]:
+    """What a browser finds of its page in a window of some width, light, dark or printed."""
+    browser.resize(width, HEIGHT_PX, look="dark" if look == "dark" else "light")
+    browser.evaluate("window.isBefore = true")
+    browser.call("Page.reload")  # a page is laid out for the window in which it is opened
+    browser.wait_for(f"!window.isBefore && {DRAWN}", seconds=60.0)
+    browser.resize(width, HEIGHT_PX, look=look)
+    browser.evaluate("new Promise((done) => setTimeout(done, 1000))")
+    found: dict[str, Any] = browser.evaluate(MEASURE)
+    return found
+
+
+def hindrances(browser: Browser) -> list[str]:
+    """Serious and critical findings of axe, where ``ACCESS_AV_AXE`` names its ``axe.min.js``."""
+    browser.evaluate(Path(os.environ["ACCESS_AV_AXE"]).read_text("utf-8") + ";0")
+    found: list[str] = browser.evaluate(AXE)
     return found

@@ -1,6 +1,7 @@
 from __future__ import annotations
 
 import json
+import math
 import re
 import subprocess
 import sys
@@ -13,6 +14,7 @@ from mcap.reader import make_reader
 
 from access_av import Site, Vehicle, drives
 from access_av._core import RecordingError
+from access_av.tables.columns.tables import TABLES
 from access_av.tables.toml import tomllib
 from conftest import ROOT
 from robot import HEADS_M, RATE_HZ, TRACK_M, robot
@@ -346,7 +348,7 @@ def test_the_report_shows_what_was_found(access_av: Cli, tmp_path: Path) -> None
     specs = json.loads(re.search(r"const charts = (\{.*\});", page).group(1))  # type: ignore[union-attr]
     assert specs.keys() == {"track", "error", "angles", "heads"}
     drawn = {name: json.dumps(spec) for name, spec in specs.items()}
-    for line in ("truth", "as driven", "smoothed", *map(str, HEADS_M)):
+    for line in ("truth", "as driven", "smoothed", *(f"PCI {pci}" for pci in HEADS_M)):
         assert f'"{line}"' in drawn["track"], line
     for line in ("error", "error, smoothed", "deviation", "protection level"):
         assert f'"{line}"' in drawn["error"], line
@@ -378,3 +380,46 @@ def test_the_files_of_the_docs_can_be_used(access_av: Cli, tmp_path: Path) -> No
     for row in re.findall(r"^\| (?:odometry|the same|angles).*$", page, re.MULTILINE):
         for column in re.findall(r"`(\w+_(?:s|m|mps|rad|radps|db)|pci|ssb_index)`", row):
             assert column in shown or column == "rician_k_db", column
+
+
+def test_a_drive_is_located_by_variants_side_by_side(access_av: Cli, tmp_path: Path) -> None:
+    logged = tmp_path / "logged"
+    drives.log_angles(SCENARIO, logged, duration_s=45.0)
+    other = tmp_path / "other.toml"
+    other.write_text((logged / "vehicle.toml").read_text("utf-8"), "utf-8")
+    command = [
+        "locate", "--recording", logged / "angles.csv", "--odometry", logged / "odometry.csv",
+        "--site", logged / "site.toml", "--vehicle", logged / "vehicle.toml",
+        "--vary", "vehicle.odometer.scale=1.03", "--compare", other, "--percentile", "90",
+        "--out", tmp_path / "out",
+    ]  # fmt: skip
+    refused = access_av(*command)
+    assert refused.code == 2
+    assert "--truth" in refused.err
+    command += ["--truth", logged / "truth.tum"]
+    done = access_av(*command, columns=160)
+    assert done.code == 0, done.err
+    assert "Side by side, 4 stretches of 10 s of one drive each" in done.out
+    compared = pl.read_parquet(tmp_path / "out" / "compared.parquet")
+    assert tuple(compared.columns) == TABLES["compared"].columns
+    assert compared["variant"].to_list() == [
+        "as it is",
+        "vehicle.odometer.scale = 1.03",
+        str(other),
+    ]
+    assert compared["runs"].to_list() == [4, 4, 4]
+    first, worse, same = compared.iter_rows(named=True)
+    poses = pl.read_parquet(tmp_path / "out" / "poses.parquet")
+    errors_m = drives.error_m(poses, logged / "truth.tum")["error_m"]
+    errors_m = errors_m.head(4 * (errors_m.len() // 4)).sort()  # in four stretches of one length
+    assert first["percentile_m"] == errors_m[math.ceil(0.9 * errors_m.len()) - 1]
+    assert first["more_m"] is None
+    # An odometer told 3 % wrong is ten stated deviations off; the same file is the same drive.
+    assert worse["more_m"] == pytest.approx(worse["percentile_m"] - first["percentile_m"])
+    assert worse["more_m"] > 0.0
+    assert (same["more_m"], same["more_low_m"], same["more_high_m"]) == (0.0, 0.0, 0.0)
+    assert "Side by side" in (tmp_path / "out" / "report.html").read_text("utf-8")
+
+    refused = access_av(*command, "--vary", "odometer.scale=1.03")
+    assert refused.code == 2
+    assert "site. or vehicle." in refused.err

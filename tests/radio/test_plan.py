@@ -196,6 +196,35 @@ def test_an_integrity_campaign_goes_on_where_it_stopped(
         assert max(map(len, lines[1:-1])) <= wide
 
 
+def test_cases_of_an_integrity_campaign_stand_side_by_side(
+    tmp_path: Path, access_av: Callable[..., Finished]
+) -> None:
+    (tmp_path / "short.toml").write_text(SHORT.to_toml())
+    done = access_av(
+        "integrity", tmp_path / "short.toml", "--runs", "2", "--mismatch", "none",
+        "--mismatch", "array 1 degree off", "--vary", "vehicle.integrity.risk_per_hour=1e-3",
+        "--percentile", "90", "--out", tmp_path / "out", "--json",
+    )  # fmt: skip
+    assert done.code == 0, done.err
+    cases = json.loads(done.out)["cases"]
+    varied = "vehicle.integrity.risk_per_hour = 0.001"
+    assert [case["variant"] for case in cases] == ["as it is"] * 2 + [varied] * 2
+    compared = pl.read_parquet(tmp_path / "out" / "compared.parquet")
+    assert tuple(compared.columns) == columns.TABLES["compared"].columns
+    # Each case beside its own.
+    assert compared["variant"].to_list() == [
+        f"{case}, as set, 4 radio heads: {variant}"
+        for case in ("none", "array 1 degree off")
+        for variant in ("as it is", varied)
+    ]
+    as_it_is, other = (compared["percentile_m"].gather_every(2, at) for at in (0, 1))
+    assert compared["more_m"].to_list()[::2] == [None, None]
+    assert compared["more_m"].to_list()[1::2] == pytest.approx((other - as_it_is).to_list())
+    page = (tmp_path / "out" / "report.html").read_text()
+    assert f"array 1 degree off; {varied}; as set; 4 radio heads" in page
+    assert "Side by side" in page
+
+
 def test_hypotheses_are_of_three_sizes_and_can_be_driven(tmp_path: Path) -> None:
     for name in ("yard", "paper", "campus-handover"):
         scenario = Scenario.load(name)

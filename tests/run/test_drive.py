@@ -65,7 +65,7 @@ def test_page_has_every_chart_and_loads_nothing(guarded: Simulation) -> None:
     assert "Service levels" in page
     specs = json.loads(page.split("const charts = ")[1].split(";\n")[0])
     places = set(re.findall(r'class="chart" id="([^"]+)"', page))
-    assert set(specs) == places == {"error", "executions", "stanford"}
+    assert set(specs) == places == {"map", "error", "executions", "stanford"}
     markup = re.sub(r"(<script>).*?(</script>)", r"\1\2", page, flags=re.DOTALL)
     assert not re.search(r"<(link|img|iframe|script)[^>]*\b(src|href)=", markup)
     assert not re.search(r"@import|url\(|https?:", markup)

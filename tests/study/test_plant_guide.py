@@ -39,10 +39,11 @@ def test_its_commands_and_its_python_run(
     access_av: Callable[..., Any], tmp_path: Path, monkeypatch: pytest.MonkeyPatch
 ) -> None:
     monkeypatch.chdir(tmp_path)
-    lines = [shlex.split(line) for block in blocks("sh") for line in block.splitlines()]
+    whole = [block.replace("\\\n", " ") for block in blocks("sh")]
+    lines = [shlex.split(line) for block in whole for line in block.splitlines()]
     assert [line[1] for line in lines].count("study") == 2
     for _, command, *arguments in lines:
-        if command in ("study", "run"):
+        if command in ("study", "run", "integrity"):
             kept = [it for it in arguments if it not in ("--runs", "4", "2")]
             arguments = [*kept, *FEW]
         if command == "export" and arguments[0] == "mine.toml":
@@ -56,7 +57,8 @@ def test_its_commands_and_its_python_run(
                 text = text.replace(long, short)
             (tmp_path / "mine.toml").write_text(text, "utf-8")
     assert (tmp_path / "study" / "report.html").is_file()
-    assert (tmp_path / "what-if" / "compared.parquet").is_file()
+    for folder in ("what-if", "elements", "levels", "located"):
+        assert (tmp_path / folder / "compared.parquet").is_file()
 
     (example,) = blocks("python")
     done = subprocess.run(

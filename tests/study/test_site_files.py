@@ -2,8 +2,10 @@
 
 from __future__ import annotations
 
+import base64
 import json
 import math
+import zlib
 from typing import TYPE_CHECKING, Any
 
 import numpy as np
@@ -14,6 +16,7 @@ from access_av.errors import InputError
 from access_av.run.error_bound import along_route
 from access_av.site_files import dxf, geojson
 from access_av.site_files.drawn import Drawn, Head, checked
+from access_av.site_files.picture import size_px, underlay
 from access_av.site_files.read import Options, of_site, read
 from access_av.tables.toml import tomllib
 
@@ -301,3 +304,106 @@ def test_sites_without_a_road_are_written_too(tmp_path: Path) -> None:
     file = tmp_path / "open.geojson"
     file.write_text(geojson.text(drawn, None), "utf-8")
     assert read(None, file, Options()).heads[0].x_m == 1.0
+
+
+def picture(width: int, height: int) -> bytes:
+    """A PNG of grey pixels."""
+
+    def chunk(kind: bytes, data: bytes) -> bytes:
+        sum_ = zlib.crc32(kind + data).to_bytes(4, "big")
+        return len(data).to_bytes(4, "big") + kind + data + sum_
+
+    head = width.to_bytes(4, "big") + height.to_bytes(4, "big") + bytes([8, 0, 0, 0, 0])
+    rows = zlib.compress((b"\0" + b"\xcc" * width) * height)
+    chunks = chunk(b"IHDR", head) + chunk(b"IDAT", rows) + chunk(b"IEND", b"")
+    return b"\x89PNG\r\n\x1a\n" + chunks
+
+
+# The head of a JPEG of 300 by 200 pixels: application data, a fill byte, a frame.
+JPEG = bytes.fromhex("ffd8ffe000104a46494600010100000100010000ffffc0000b0800c8012c01011100")
+
+
+def test_a_picture_lies_under_a_site_where_two_points_and_a_length_say(
+    access_av: Callable[..., Any], tmp_path: Path, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    (tmp_path / "drawings").mkdir()
+    name = "<b>hall & yard</b>.png"
+    (tmp_path / "drawings" / name.replace("/", "")).write_bytes(picture(300, 200))
+    monkeypatch.chdir(tmp_path)
+    shown = f"drawings/{name.replace('/', '')}"
+    of_picture = ("--underlay", shown, "--underlay-points", "50,100,250,100")
+    done = access_av("new", "site", "site.toml", *of_picture, "--underlay-length-m", "400")
+    assert done.code == 0, done.err
+    assert tomllib.loads((tmp_path / "site.toml").read_text("utf-8"))["underlay"] == {
+        "file": shown,
+        "metres_per_pixel": 2.0,
+        "zero_px": [0.0, 200.0],
+    }
+    site = Site.load("site.toml")
+    placed = underlay(site)
+    assert placed is not None
+    # The lower left corner is the map's zero, y goes upward.
+    assert (placed.left_m, placed.right_m) == (0.0, 600.0)
+    assert (placed.low_m, placed.high_m) == (0.0, 400.0)
+    assert base64.b64decode(placed.url.removeprefix("data:image/png;base64,")) == picture(300, 200)
+    # What was resolved stands anywhere: its path is whole.
+    (tmp_path / "elsewhere").mkdir()
+    (tmp_path / "elsewhere" / "again.toml").write_text(site.to_toml(), "utf-8")
+    monkeypatch.chdir(tmp_path / "elsewhere")
+    assert underlay(Site.load("again.toml")) == placed
+    short = {"site": json.loads(site.to_json()), "motion": {"start_at_m": 580.0}}
+    (tmp_path / "short.toml").write_text(
+        Scenario.load("yard").with_overrides(short).to_toml(), "utf-8"
+    )
+    assert access_av("run", tmp_path / "short.toml", "--out", "out").code == 0
+    page = (tmp_path / "elsewhere" / "out" / "report.html").read_text("utf-8")
+    assert placed.url in page
+    assert "<b>hall" not in page
+    (tmp_path / shown).unlink()
+    gone = access_av("run", tmp_path / "short.toml", "--out", "never")
+    assert gone.code == 2
+    assert "No such file" in gone.err
+    assert not (tmp_path / "elsewhere" / "never").exists()
+
+
+@pytest.mark.parametrize(
+    ("given", "said"),
+    [
+        (("--underlay", "plan.png"), "say how large it is"),
+        (("--underlay-metres-per-pixel", "1"), "--underlay is missing"),
+        (("--underlay", "plan.png", "--underlay-points", "0,0,9,0"), "go together"),
+        (("--underlay", "none.png", "--underlay-metres-per-pixel", "1"), "No such file"),
+        (("--underlay", ".", "--underlay-metres-per-pixel", "1"), "not a regular file"),
+        (("--underlay", "plan.svg", "--underlay-metres-per-pixel", "1"), "neither a PNG nor"),
+        (("--underlay", "cut.png", "--underlay-metres-per-pixel", "1"), "neither a PNG nor"),
+        (("--underlay", "cut.jpg", "--underlay-metres-per-pixel", "1"), "neither a PNG nor"),
+        (("--underlay", "large.png", "--underlay-metres-per-pixel", "1"), "at most 393216"),
+        (("--underlay", "plan.png", "--underlay-metres-per-pixel", "1e6"), "metres_per_pixel"),
+        (
+            ("--underlay", "plan.png", "--underlay-metres-per-pixel", "1", "--underlay-zero", "1"),
+            "2 numbers",
+        ),
+    ],
+)
+def test_pictures_that_cannot_be_used_are_named(
+    access_av: Callable[..., Any],
+    tmp_path: Path,
+    monkeypatch: pytest.MonkeyPatch,
+    given: tuple[str, ...],
+    said: str,
+) -> None:
+    monkeypatch.chdir(tmp_path)
+    (tmp_path / "plan.png").write_bytes(picture(30, 20))
+    (tmp_path / "cut.png").write_bytes(picture(30, 20)[:20])
+    (tmp_path / "cut.jpg").write_bytes(JPEG[:26])
+    (tmp_path / "large.png").write_bytes(picture(30, 20) + bytes(400_000))
+    (tmp_path / "plan.svg").write_text("<svg onload='alert(1)'/>", "utf-8")
+    done = access_av("new", "site", "site.toml", *given)
+    assert done.code == 2
+    assert said in done.err
+    assert not (tmp_path / "site.toml").exists()
+
+
+def test_a_jpeg_says_its_size_in_its_frame(tmp_path: Path) -> None:
+    (tmp_path / "plan.jpg").write_bytes(JPEG)
+    assert size_px(tmp_path / "plan.jpg") == (300, 200)

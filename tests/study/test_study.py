@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import base64
 import html
 import json
 import os
@@ -15,10 +16,13 @@ import polars as pl
 import pytest
 
 import layout
-from access_av import Plant, SettingsError, study_plant
+from access_av import Plant, SettingsError, drives, study_plant
 from access_av.errors import InputError
+from access_av.run.error_bound import along_route
 from access_av.statistics.paired import paired_difference
 from access_av.tables.columns.tables import TABLES
+from access_av.tables.toml import tomllib
+from browser import Browser
 
 if TYPE_CHECKING:
     from collections.abc import Callable
@@ -59,6 +63,10 @@ lidar = 3000.0
 survey = { low = 10.0, value = 20.0, high = 40.0, source = "offer of <i>somebody</i>" }
 """
 RUNS = 4
+# Two grey pixels.
+PICTURE = base64.b64decode(
+    "iVBORw0KGgoAAAANSUhEUgAAAAIAAAABCAAAAADRSSBWAAAAC0lEQVR4nGM4cxcAAngBqtw5YnsAAAAASUVORK5CYII="
+)
 
 
 @pytest.fixture(scope="module")
@@ -76,6 +84,54 @@ def results(tmp_path_factory: pytest.TempPathFactory) -> Path:
             main()
     assert not stopped.value.code
     return folder / "out"
+
+
+@pytest.fixture(scope="module")
+def pages(tmp_path_factory: pytest.TempPathFactory) -> dict[str, Path]:
+    """Pages of other commands, of short drives over a picture."""
+    from access_av.cli.main import main
+
+    folder = tmp_path_factory.mktemp("pages")
+    (folder / "plan.png").write_bytes(PICTURE)
+    site = tomllib.loads(PLANT)["site"]
+    scenario = (
+        Plant.from_toml(PLANT)
+        .scenario()
+        .with_overrides(
+            {
+                "site": {
+                    **site,
+                    "underlay": {
+                        "file": str(folder / "plan.png"),
+                        "metres_per_pixel": 40.0,
+                        "zero_px": [0.0, 1.0],
+                    },
+                }
+            }
+        )
+    )
+    (folder / "short.toml").write_text(scenario.to_toml(), "utf-8")
+    logged = folder / "logged"
+    drives.log_angles(scenario, logged)
+    located = [
+        *("locate", "--recording", logged / "angles.csv", "--odometry", logged / "odometry.csv"),
+        *("--site", logged / "site.toml", "--vehicle", logged / "vehicle.toml"),
+        *("--truth", logged / "truth.tum"),
+    ]
+    commands = {
+        "run": ["run", folder / "short.toml", "--runs", "2"],
+        "bound": ["bound", folder / "short.toml"],
+        "integrity": ["integrity", folder / "short.toml", "--runs", "1", "--mismatch", "none"],
+        "locate": located,
+    }
+    for name, command in commands.items():
+        with pytest.MonkeyPatch.context() as patch:
+            arguments = ["access-av", *command, "--out", folder / name]
+            patch.setattr(sys, "argv", [str(it) for it in arguments])
+            with pytest.raises(SystemExit) as stopped:
+                main()
+            assert not stopped.value.code, name
+    return {name: folder / name / "report.html" for name in commands}
 
 
 @pytest.fixture(scope="module")
@@ -213,6 +269,14 @@ def test_places_are_those_of_the_road(results: Path, said: dict[str, Any]) -> No
     worst = max(said["worst"], key=lambda it: it["error_m"])
     assert worst["error_m"] == pytest.approx(places["target_error_m"].max(), abs=1e-4)
     assert all(it["why"] for it in said["worst"])
+    # Levels and reliability, again from the errors' table.
+    route = along_route(Plant.from_toml(PLANT).scenario())
+    rows = pl.read_parquet(results / "errors.parquet").filter(variant="as it is")
+    along_m = np.interp(rows["time_s"], route["time_s"], route["along_m"])
+    near = rows.filter(pl.Series(np.abs(along_m - 10.5) <= 5.0))["protection_level_m"]
+    at = places.row(10, named=True)
+    assert at["reliable_share"] == pytest.approx(1.0 - near.null_count() / len(near), abs=1e-4)
+    assert at["level_m"] == pytest.approx(near.quantile(0.5, "lower"), abs=1e-3)
     # Straight ahead to the first bend: the way and its points agree.
     straight = places.filter(pl.col("along_m") < 29.0)
     assert np.allclose(straight["x_m"], straight["along_m"], atol=1e-3)
@@ -233,14 +297,70 @@ def test_variants_stand_side_by_side(results: Path, page: str) -> None:
     assert "site.rician_k_db = 3" in page
 
 
-@pytest.mark.parametrize("width", [1300, 800, 400])
-def test_nothing_of_the_page_overlaps_or_is_cut(results: Path, tmp_path: Path, width: int) -> None:
-    if layout.chromium() is None:
+def test_nothing_of_the_pages_overlaps_or_is_cut(results: Path, pages: dict[str, Path]) -> None:
+    if (program := layout.chromium()) is None:
         pytest.skip("no chromium to measure the page with")
-    found = layout.measure(results / "report.html", tmp_path, width)
-    assert found["width"] == width
-    assert found["charts"] == 4
-    assert found["found"] == []
+    papers = set()
+    for name, page in {"study": results / "report.html", **pages}.items():
+        with Browser(program, page.as_uri()) as browser:
+            for width, look in layout.VIEWS:
+                found = layout.measure(browser, width, look)
+                assert found["width"] == width
+                assert found["found"] == [], (name, width, look)
+                papers.add(found["paper"])
+                if look != "print" and "ACCESS_AV_AXE" in os.environ:
+                    assert layout.hindrances(browser) == [], (name, width, look)
+            assert browser.errors == []
+    assert len(papers) == 2  # dark, and not
+
+
+def test_a_drive_is_played_and_whoever_wants_less_motion_has_the_slider(results: Path) -> None:
+    if (program := layout.chromium()) is None:
+        pytest.skip("no chromium to play it with")
+    told, at_s = "document.querySelector('#map .role-title').textContent", "input[name=at_s]"
+    with Browser(program, (results / "report.html").as_uri()) as browser:
+        browser.wait_for("document.querySelector('.vega-bind button')", seconds=60.0)
+        first = browser.evaluate(told)
+        assert first.startswith("0.0 s: ")
+        browser.evaluate("document.querySelector('.vega-bind button').click()")
+        browser.wait_for(f"document.querySelector('{at_s}').value > 1")
+        browser.evaluate("document.querySelector('.vega-bind button').click()")
+        assert browser.evaluate("document.querySelector('.vega-bind button').textContent") == "Play"
+        assert browser.evaluate(told) != first
+        less = {"name": "prefers-reduced-motion", "value": "reduce"}
+        browser.call("Emulation.setEmulatedMedia", features=[less])
+        browser.evaluate("window.isBefore = true")
+        browser.call("Page.reload")
+        browser.wait_for(f"!window.isBefore && document.querySelector('{at_s}')", seconds=60.0)
+        browser.evaluate("new Promise((done) => setTimeout(done, 500))")
+        assert browser.evaluate("document.querySelector('.vega-bind button')") is None
+        browser.evaluate(f"document.querySelector('{at_s}').focus()")
+        for kind in ("keyDown", "keyUp"):
+            key = {"key": "ArrowRight", "windowsVirtualKeyCode": 39}
+            browser.call("Input.dispatchKeyEvent", type=kind, **key)
+        browser.wait_for(f"!{told}.startsWith('0.0 s: ')")
+
+
+def test_the_played_drive_is_the_first_one(results: Path) -> None:
+    text = (results / "report.html").read_text("utf-8")
+    specs = json.loads(re.findall(r"const charts = (\{.*\});\n", text)[0])
+    [steps] = [
+        layer["data"]["values"]
+        for layer in specs["map"]["layer"]
+        if layer.get("data", {}).get("name") == "played"
+    ]
+    driven = pl.read_parquet(results / "trajectories.parquet")
+    assert 100 < len(steps) <= 302
+    for step in (0, len(steps) // 2):
+        at_s, off_m, level_m = map(float, re.findall(r"\d+\.\d+", steps[step]["told"]))
+        row = driven.row(by_predicate=(pl.col("time_s") - at_s).abs() < 1e-6, named=True)
+        assert off_m == pytest.approx(np.hypot(row["error_x_m"], row["error_y_m"]), abs=0.006)
+        assert level_m == pytest.approx(row["protection_level_m"], abs=0.006)
+        assert steps[step]["x_m"] == pytest.approx(row["true_x_m"], abs=0.06)
+    mine = errors(results, "as it is")[0]
+    assert np.hypot(*driven.select("error_x_m", "error_y_m").to_numpy().T)[::5] == pytest.approx(
+        mine, abs=1e-6
+    )
 
 
 @pytest.mark.parametrize(
@@ -251,6 +371,7 @@ def test_nothing_of_the_page_overlaps_or_is_cut(results: Path, tmp_path: Path, w
         ("places", "places"),
         ("points", "study_points"),
         ("compared", "compared"),
+        ("trajectories", "trajectories"),
     ],
 )
 def test_columns_are_those_that_are_documented(results: Path, file: str, table: str) -> None:
@@ -302,6 +423,22 @@ def test_nothing_unguarded_is_studied() -> None:
     assert all(
         Plant.load(name).scenario().vehicle.alert_limit_m is not None for name in Plant.names()
     )
+
+
+@pytest.mark.parametrize("name", Plant.names())
+def test_each_shipped_plant_is_told_a_point_of_the_front(name: str) -> None:
+    """On the last stretch of its road; `benches/shipped_plants.py` drives all of it."""
+    plant = Plant.load(name)
+    road_m = along_route(plant.scenario())["along_m"].max()
+    assert isinstance(road_m, float)
+    last = {"motion.start_at_m": round(0.97 * road_m), "motion.stops": []}
+    found = study_plant(plant.with_overrides(last), runs=2)
+    assert found.recommended in found.front
+    assert found.point is not None
+    driven = [found.believed, found.poor, *(it.driven for it in found.mended)]
+    driven += [it.driven for it in found.points]
+    assert all(it.scenario.vehicle.alert_limit_m is not None for it in driven)
+    assert all(it.ok_share is not None for it in driven)
 
 
 def test_the_command_names_what_it_cannot_use(

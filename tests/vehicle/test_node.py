@@ -291,7 +291,7 @@ localized_after_s = 0.5
             browser.wait_for("document.querySelectorAll('#rows tr').length === 4")
             browser.wait_for("document.getElementById('link')?.textContent === 'live'")
             for width in (400, 900, 1600):
-                browser.resize(width, 900, dark=width == 900)
+                browser.resize(width, 900, look="dark" if width == 900 else "light")
                 root = "document.documentElement"
                 self.widths[width] = browser.evaluate(f"[{root}.scrollWidth, {root}.clientWidth]")
             self.page = browser.text()

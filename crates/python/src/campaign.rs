@@ -8,7 +8,7 @@ use ::simulate::{
     Campaign, CampaignOptions, IntegritySummary, MeasurementTraces, RunRecord, RunSummary,
     Simulation, SimulationError, Step, StepStatistics,
 };
-use numpy::{Element, PyArray1, PyArray3, PyArrayMethods};
+use numpy::{Element, PyArray1, PyArray2, PyArray3, PyArrayMethods};
 use onboard::energy::EstimateCost;
 use onboard::geometry::Pose;
 use onboard::localize::AngleMeasurement;
@@ -48,6 +48,9 @@ pub struct SimulationResult {
     /// Errors in x and y in metres, of shape (runs, SSBs, 2), NaN as long as the first pose is not
     /// known; `None` unless kept.
     errors_m: Option<Py<PyArray3<f32>>>,
+    /// Protection levels in metres, of shape (runs, SSBs), NaN where the pose may not be relied on;
+    /// `None` unless errors are kept.
+    levels_m: Option<Py<PyArray2<f32>>>,
 }
 
 /// Drive a scenario many times.
@@ -161,6 +164,7 @@ fn result(
             .transpose()?,
         error_quantiles_m: error_quantiles(py, campaign)?,
         errors_m: errors_every.map(|_| errors(py, campaign)).transpose()?,
+        levels_m: errors_every.map(|_| levels(py, campaign)).transpose()?,
     })
 }
 
@@ -245,6 +249,13 @@ fn errors(py: Python<'_>, campaign: &Campaign) -> PyResult<Py<PyArray3<f32>>> {
     let runs = campaign.runs.len();
     let shape = [runs, campaign.errors_m.len() / runs, 2];
     let flat = PyArray1::from_slice(py, campaign.errors_m.as_flattened());
+    Ok(flat.reshape(shape)?.unbind())
+}
+
+fn levels(py: Python<'_>, campaign: &Campaign) -> PyResult<Py<PyArray2<f32>>> {
+    let runs = campaign.runs.len();
+    let shape = [runs, campaign.levels_m.len() / runs];
+    let flat = PyArray1::from_slice(py, &campaign.levels_m);
     Ok(flat.reshape(shape)?.unbind())
 }
 

@@ -44,6 +44,12 @@ impl Library for Files {
     fn points_m(&self, name: &str, beside: &str) -> Result<Vec<[f64; 2]>, SettingsError> {
         read_points_m(&relative_to(beside, name))
     }
+
+    fn path(&self, name: &str, beside: &str) -> String {
+        let path = relative_to(beside, name);
+        let whole = std::path::absolute(&path).unwrap_or(path);
+        whole.display().to_string()
+    }
 }
 
 fn relative_to(beside: &str, name: &str) -> PathBuf {

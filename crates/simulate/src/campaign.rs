@@ -28,7 +28,7 @@ pub struct CampaignOptions<'a> {
     pub keep_records: bool,
     /// Whether to find the errors' quantiles, which takes a histogram for each step.
     pub quantiles: bool,
-    /// Keeps each run's errors at every so many SSBs, which takes far less than its record.
+    /// Keeps each run's errors and levels at every so many SSBs, which takes far less than its record.
     pub errors_every: Option<usize>,
     /// The user's own code, made anew for each run.
     pub custom: &'a MakeCustom<'a>,
@@ -124,6 +124,8 @@ pub struct Campaign {
     pub records: Vec<RunRecord>,
     /// Errors in x and y in metres of each run at every so many SSBs, run by run, where asked for.
     pub errors_m: Vec<[f32; 2]>,
+    /// Protection levels in metres at the same SSBs; NaN where the pose may not be relied on.
+    pub levels_m: Vec<f32>,
 }
 
 #[derive(Default, Clone)]
@@ -175,7 +177,7 @@ impl Simulation {
         let mut runs = Vec::new();
         let mut integrity = Vec::new();
         let mut records = Vec::new();
-        let mut errors_m = Vec::new();
+        let (mut errors_m, mut levels_m) = (Vec::new(), Vec::new());
         let integrity_settings = self.scenario().vehicle.integrity_monitor();
         let alert_limit_m = integrity_settings.map_or(f64::INFINITY, |it| it.alert_limit_m);
         while runs.len() < count {
@@ -191,7 +193,8 @@ impl Simulation {
                 integrity.extend(IntegritySummary::new(&record, alert_limit_m));
                 if let Some(every) = options.errors_every {
                     let kept = record.steps.iter().step_by(every.max(1));
-                    errors_m.extend(kept.map(Step::error_xy_m));
+                    errors_m.extend(kept.clone().map(Step::error_xy_m));
+                    levels_m.extend(kept.map(Step::level_while_ok_m));
                 }
                 if options.keep_records {
                     records.push(record);
@@ -211,6 +214,7 @@ impl Simulation {
             integrity,
             records,
             errors_m,
+            levels_m,
         })
     }
 }
@@ -234,6 +238,7 @@ impl Campaign {
             integrity: Vec::new(),
             records: Vec::new(),
             errors_m: Vec::new(),
+            levels_m: Vec::new(),
         };
         for record in records {
             if sums.is_empty() {

@@ -272,6 +272,7 @@ class SimulationResult:
     executions: Final[dict[str, Any] | None]
     error_quantiles_m: Final[dict[float, float]]
     errors_m: Final[NDArray[np.float32] | None]
+    levels_m: Final[NDArray[np.float32] | None]
 
 @final
 class Bound:

@@ -11,18 +11,26 @@ import typer
 from access_av.cli.options import (
     AllowLarge,
     AsJson,
+    Compare,
     Out,
     Overrides,
+    Percents,
     ScenarioArgument,
+    Vary,
     load_scenario,
     load_site_and_vehicle,
     overridden,
 )
+from access_av.cli.side_by_side import PERCENTS, records, show_compared, variants, write_compared
 from access_av.cli.terminal import console, errors, progress, show_warning
 from access_av.errors import InputError
 
 if TYPE_CHECKING:
+    import polars as pl
+
+    from access_av._core import Site, Vehicle
     from access_av.drives.recorded import Drive
+    from access_av.study.compare import Compared
 
 app = typer.Typer()
 
@@ -124,6 +132,9 @@ def locate(
     smooth: Annotated[
         bool, typer.Option("--smooth", help="Also each pose by the angles that came after it.")
     ] = False,
+    vary: Vary = None,
+    compare: Compare = None,
+    percentile: Percents = None,
     as_json: AsJson = False,
 ) -> None:
     """Locate a recorded drive.
@@ -151,10 +162,15 @@ def locate(
     polyline_m, segments, or file (GeoJSON or CSV). docs/locate.md has examples of sites and
     vehicles.
 
+    --vary changes a key that begins with site. or vehicle., --compare names another vehicle; both
+    locate the drive once more, compare the errors with --truth, and write compared.parquet.
+
     Exit code 0: located. 2: the input cannot be used. 3: never found, lost for more than a fifth of
     the time or at the end, or something wrong in the input did harm; what to check is said.
     """
     from access_av.drives import recorded as drives
+    from access_av.drives.recorded import Drive
+    from access_av.report.compared import compared_section
     from access_av.report.located import render_located
     from access_av.run.operation import Operation
     from access_av.tables.results_directory import ResultsDirectory, json_text
@@ -162,24 +178,34 @@ def locate(
     from_scratch = start is not None and start.strip() == "scratch"
     pose = None if start is None or from_scratch else _pose(start)
     plant, carrier = load_site_and_vehicle(site, vehicle, pose)
+    others = {name: load_site_and_vehicle(site, name, pose) for name in compare or ()}
+    beliefs = variants((plant, carrier), vary, others, _changed)
+    if len(beliefs) > 1 and truth is None:
+        raise InputError("--vary, --compare: errors are compared, so give --truth FILE")
+    true = None if truth is None else drives.read_tum(truth)
     directory = ResultsDirectory.create("locate", out)
-    with progress("Locating"):
-        drive = drives.locate(
-            plant,
-            odometry,
-            recording,
-            vehicle=carrier,
-            topic=topic,
-            imu_topic=imu_topic,
-            start_time_s=start_time_s,
-            start=pose,
-            from_scratch=from_scratch,
-            smooth=smooth,
-        )
+    located = dict[str, Drive]()
+    with progress("Locating") as tick:
+        for label, (believed_site, believed_vehicle) in beliefs.items():
+            located[label] = drives.locate(
+                believed_site,
+                odometry,
+                recording,
+                vehicle=believed_vehicle,
+                topic=topic,
+                imu_topic=imu_topic,
+                start_time_s=start_time_s,
+                start=pose,
+                from_scratch=from_scratch,
+                smooth=smooth and not located,
+            )
+            tick(len(located), len(beliefs))
+    drive = next(iter(located.values()))
+    beside = _beside(located, true, sorted(percentile or PERCENTS))
     if drive.smoothed is not None and drive.smoothed.is_empty() and not _lost(drive):
         raise InputError(f"{vehicle}: --smooth needs localizer.kind = tracker")
     numbers = drives.summary(drive, truth)
-    true = None if truth is None else drives.read_tum(truth)
+    write_compared(beside, directory)
     drive.write_mcap(directory.path / "drive.mcap")
     drive.write_tum(directory.path / "trajectory.tum")
     directory.write_table("poses.parquet", drive.poses)
@@ -188,7 +214,8 @@ def locate(
     if drive.smoothed is not None:
         directory.write_table("smoothed.parquet", drive.smoothed)
         drive.write_smoothed_tum(directory.path / "smoothed.tum")
-    directory.write_text("report.html", render_located(drive, plant, carrier, numbers, true))
+    page = render_located(drive, plant, carrier, numbers, true, compared_section(beside))
+    directory.write_text("report.html", page)
     directory.write_text("site.toml", plant.to_toml())
     directory.write_text("vehicle.toml", carrier.to_toml())
     told: dict[str, Any] = {
@@ -203,15 +230,41 @@ def locate(
     )
     directory.link_latest()
     if as_json:
-        print(json_text({**told, "directory": str(directory.path)}))
+        more = {"compared": records(beside), "directory": str(directory.path)}
+        print(json_text({**told, **more}))
     else:
         _show(drive, numbers)
+        show_compared(beside)
         if (operation := Operation.under(carrier, drive.poses)) is not None:
             console.print(f"{operation.in_words()} {operation.what_helps()}".strip())
         console.print(f"Files: {directory.path}", soft_wrap=True)
     if not drive.is_reliable:
         errors.print(_unreliable(drive), style="red", soft_wrap=True)
         raise typer.Exit(UNRELIABLE)
+
+
+def _changed(belief: tuple[Site, Vehicle], keys: dict[str, Any]) -> tuple[Site, Vehicle]:
+    """A site and a vehicle with keys of theirs changed."""
+    parts: dict[str, dict[str, Any]] = {"site": {}, "vehicle": {}}
+    for key, value in keys.items():
+        part, _, rest = key.partition(".")
+        if part not in parts or not rest:
+            raise InputError(f"--vary {key}: keys of a recorded drive begin with site. or vehicle.")
+        parts[part][rest] = value
+    site, vehicle = belief
+    return site.with_overrides(parts["site"]), vehicle.with_overrides(parts["vehicle"])
+
+
+def _beside(
+    located: dict[str, Drive], truth: pl.DataFrame | None, percents: list[float]
+) -> list[Compared]:
+    """A drive as located by each variant; nothing where there is but one."""
+    from access_av.drives.recorded import in_stretches
+    from access_av.study.compare import beside_first
+
+    if truth is None or len(located) == 1:
+        return []
+    return beside_first([in_stretches(it, truth, name) for name, it in located.items()], percents)
 
 
 def _show(drive: Drive, numbers: dict[str, float]) -> None:

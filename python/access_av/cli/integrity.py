@@ -2,7 +2,9 @@
 
 from __future__ import annotations
 
+from collections import Counter
 from collections.abc import Callable
+from dataclasses import replace
 from typing import TYPE_CHECKING, Annotated, Any
 
 import typer
@@ -10,19 +12,27 @@ import typer
 from access_av.cli.options import (
     OTHER_SHARES,
     AsJson,
+    Compare,
     DaskOption,
     Out,
+    Percents,
     Runs,
     ScenarioArgument,
     Seed,
     ShardOption,
     Threads,
+    Vary,
     load_scenario,
 )
+from access_av.cli.side_by_side import PERCENTS, of_scenario, show_compared, write_compared
+from access_av.cli.side_by_side import records as as_records
 from access_av.cli.terminal import console, progress, table, width
 
 if TYPE_CHECKING:
     from collections.abc import Sequence
+
+    from access_av.run.integrity_campaign import Case
+    from access_av.study.compare import Compared
 
 app = typer.Typer()
 
@@ -53,6 +63,9 @@ def integrity(
         list[float] | None,
         typer.Option(help="Target integrity risk per hour, not the vehicle's; may be repeated."),
     ] = None,
+    vary: Vary = None,
+    compare: Compare = None,
+    percentile: Percents = None,
     shard: ShardOption = "1/1",
     dask: DaskOption = None,
     out: Out = None,
@@ -65,10 +78,12 @@ def integrity(
     Prints the share of the time that is ok, the share of that with an error beyond the level, the
     longest time beyond the alert limit without an alarm, the integrity risk per hour, and level by
     error; ≤ is the end of a 95 % interval. In a narrow terminal the last of them are left out.
-    Writes integrity.parquet, report.html (table and Stanford diagrams), parts/ and manifest.json.
+    Writes integrity.parquet, report.html (table and Stanford diagrams), parts/ and manifest.json;
+    with --vary or --compare, which drive every case of other values or files too, compared.parquet.
     """
     import polars as pl
 
+    from access_av.report.compared import compared_section
     from access_av.report.integrity import render_integrity
     from access_av.run import integrity_campaign
     from access_av.run.campaign import Campaign, Shard, executor
@@ -77,34 +92,68 @@ def integrity(
     from access_av.tables.results_directory import ResultsDirectory, json_text
 
     chosen = load_scenario(scenario)
+    others = {name: load_scenario(name) for name in compare or ()}
+    variants = of_scenario(chosen, vary, others)
     directory = ResultsDirectory.create("integrity", out)
     share = Shard.parse(shard)
     if hypotheses:
         mismatch = [*(mismatch or ()), *sized(chosen)]
     with progress("Driving") as tick, executor(dask, threads) as (pool, workers):
-        cases = integrity_campaign.drive(
-            Campaign(Parts(directory.path / "parts"), pool, workers, share),
-            chosen,
-            runs=runs,
-            seed=seed,
-            only=mismatch,
-            channel_names=channel or ("as set",),
-            heads=heads,
-            risks_per_hour=risk,
-            progress=tick,
-        )
-    if cases is None:
-        console.print(OTHER_SHARES.format(shard))
-        return
+        campaign = Campaign(Parts(directory.path / "parts"), pool, workers, share)
+        driven = {
+            label: integrity_campaign.drive(
+                campaign,
+                variant,
+                runs=runs,
+                seed=seed,
+                only=mismatch,
+                channel_names=channel or ("as set",),
+                heads=heads,
+                risks_per_hour=risk,
+                progress=tick,
+            )
+            for label, variant in variants.items()
+        }
+    cases = []
+    for label, its in driven.items():
+        if its is None:
+            console.print(OTHER_SHARES.format(shard))
+            return
+        cases += [replace(case, variant=label) for case in its]
+    beside = _beside(cases, sorted(percentile or PERCENTS))
+    write_compared(beside, directory)
     records = [case.as_record() for case in cases]
     directory.write_table("integrity.parquet", pl.DataFrame(records))
-    directory.write_text("report.html", render_integrity(cases, records, runs, seed))
+    page = render_integrity(cases, records, runs, seed, compared_section(beside))
+    directory.write_text("report.html", page)
     directory.write_manifest(scenario=scenario, runs=runs, seed=seed, warnings=chosen.warnings())
     if as_json:
-        print(json_text({"cases": records, "directory": str(directory.path)}))
+        told = {"cases": records, "compared": as_records(beside), "directory": str(directory.path)}
+        print(json_text(told))
         return
     _show(records)
+    show_compared(beside)
     console.print(f"Report: {directory.path / 'report.html'}", soft_wrap=True)
+
+
+def _beside(cases: Sequence[Case], percents: list[float]) -> list[Compared]:
+    """Each case beside the same one of the first variant; nothing where there is but one."""
+    from access_av.study.compare import beside_first
+
+    if len({case.variant for case in cases}) == 1:
+        return []
+    # By place among a variant's own: number of radio heads and risk may be what is varied.
+    seen: Counter[tuple[str, str, str]] = Counter()
+    of_case: dict[tuple[str, str, int], list[Case]] = {}
+    for case in cases:
+        kind = (case.variant, case.mismatch, case.channel)
+        of_case.setdefault((case.mismatch, case.channel, seen[kind]), []).append(case)
+        seen[kind] += 1
+    found = []
+    for (mismatch, channel, _), its in of_case.items():
+        where = "" if len(of_case) == 1 else f"{mismatch}, {channel}, {its[0].heads} radio heads: "
+        found += beside_first([it.errors(f"{where}{it.variant}") for it in its], percents)
+    return found
 
 
 Cell = Callable[[dict[str, Any]], str]
@@ -116,6 +165,7 @@ def _power_of_ten(key: str) -> Cell:
 
 # Cells of a case. What all cases have in common stands above the table.
 _SETTINGS: tuple[tuple[str, Cell], ...] = (
+    ("variant", lambda one: one["variant"]),
     ("channel", lambda one: one["channel"]),
     ("heads", lambda one: str(one["heads"])),
     ("asked/h", _power_of_ten("asked_risk_per_hour")),
@@ -137,7 +187,7 @@ def _show(records: Sequence[dict[str, Any]]) -> None:
     common = [
         f"{name} {cell(records[0])}"
         for name, cell in _SETTINGS
-        if len({cell(one) for one in records}) == 1
+        if name != "variant" and len({cell(one) for one in records}) == 1
     ]
     columns: list[tuple[str, Cell]] = [
         ("world", lambda one: "as stated" if one["mismatch"] == "none" else one["mismatch"]),

@@ -2,14 +2,18 @@
 
 from __future__ import annotations
 
+import os
 from pathlib import Path
-from typing import Annotated, Any
+from typing import TYPE_CHECKING, Annotated, Any
 
 import typer
 
 from access_av.cli.terminal import console
 from access_av.errors import InputError
 from access_av.site_files.drawn import Drawn
+
+if TYPE_CHECKING:
+    from access_av.site_files.picture import Placed
 
 Target = Annotated[Path, typer.Argument(help="The file to write, for example mine.toml.")]
 Force = Annotated[bool, typer.Option("--force", help="Write over a file that is there.")]
@@ -25,6 +29,30 @@ Walls = Annotated[
     Path | None,
     typer.Option(
         help="GeoJSON (LineStrings, Polygons) or DXF (lines, polylines, arcs of a layer)."
+    ),
+]
+Picture = Annotated[
+    Path | None, typer.Option("--underlay", help="PNG or JPEG to lie under the site's maps.")
+]
+PicturePoints = Annotated[
+    str | None,
+    typer.Option(
+        "--underlay-points",
+        metavar="X1,Y1,X2,Y2",
+        help="Two pixels of it, from its upper left corner, --underlay-length-m apart.",
+    ),
+]
+PictureLength = Annotated[
+    float | None, typer.Option("--underlay-length-m", min=0.0, help="Measured length between them.")
+]
+PictureScale = Annotated[
+    float | None,
+    typer.Option("--underlay-metres-per-pixel", min=0.0, help="Of it, where that is known."),
+]
+PictureZero = Annotated[
+    str | None,
+    typer.Option(
+        "--underlay-zero", metavar="X,Y", help="Pixel of the map's zero; else its lower left."
     ),
 ]
 OriginText = Annotated[
@@ -70,21 +98,58 @@ def _origin(text: str | None) -> tuple[float, float] | None:
 
 
 def _scale_m(
-    two_points: str | None, length_m: float | None, metres_per_unit: float | None
+    two_points: str | None,
+    length_m: float | None,
+    metres_per_unit: float | None,
+    options: tuple[str, str, str] = ("--two-points", "--length-m", "--metres-per-unit"),
 ) -> float | None:
     from access_av.site_files import dxf
 
+    of_points, of_length, of_unit = options
     if (two_points is None) != (length_m is None):
-        raise InputError("--two-points and --length-m go together")
+        raise InputError(f"{of_points} and {of_length} go together")
     if two_points is None or length_m is None:
         return metres_per_unit
     if metres_per_unit is not None:
-        raise InputError("--metres-per-unit: not beside --two-points, which say it as well")
-    x1, y1, x2, y2 = _numbers("--two-points", two_points, 4)
+        raise InputError(f"{of_unit}: not beside {of_points}, which say it as well")
+    x1, y1, x2, y2 = _numbers(of_points, two_points, 4)
     return dxf.metres_per_unit((x1, y1, x2, y2), length_m)
 
 
-def _write(kind: str, file: Path, force: bool, drawn: Drawn | None = None) -> None:
+def _placed(
+    file: Path,
+    picture: Path | None,
+    points: str | None,
+    length_m: float | None,
+    metres_per_pixel: float | None,
+    zero: str | None,
+) -> Placed | None:
+    """Where a picture lies under the maps of the site in a file; its path counts from there."""
+    from access_av.site_files.picture import Placed, size_px
+
+    options = ("--underlay-points", "--underlay-length-m", "--underlay-metres-per-pixel")
+    scale_m = _scale_m(points, length_m, metres_per_pixel, options)
+    if picture is None:
+        if scale_m is not None or zero is not None:
+            raise InputError("--underlay is missing: it names the picture")
+        return None
+    if scale_m is None:
+        raise InputError(
+            f"{picture}: say how large it is: --underlay-points X1,Y1,X2,Y2 with "
+            "--underlay-length-m, or --underlay-metres-per-pixel"
+        )
+    _, height_px = size_px(picture)
+    x_px, y_px = (0.0, float(height_px)) if zero is None else _numbers("--underlay-zero", zero, 2)
+    return Placed(os.path.relpath(picture, file.parent), scale_m, (x_px, y_px))
+
+
+def _write(
+    kind: str,
+    file: Path,
+    force: bool,
+    drawn: Drawn | None = None,
+    placed: Placed | None = None,
+) -> None:
     from access_av import _core
     from access_av.cli.options import announce
     from access_av.site_files.templates import new
@@ -101,7 +166,7 @@ def _write(kind: str, file: Path, force: bool, drawn: Drawn | None = None) -> No
         "scenario": _core.Scenario,
     }
     name = "".join(it if it.isalnum() or it in "-_" else "-" for it in file.stem) or kind
-    text = new(kind, name, str(file), drawn)
+    text = new(kind, name, str(file), drawn, placed)
     # A node's file is for access-av-node, which checks it itself.
     warnings = kinds[kind].from_toml(text, str(file)).warnings() if kind in kinds else []
     write_whole(file, text)
@@ -134,6 +199,11 @@ def _site_command(kind: str, begins: str, example: str) -> None:
         two_points: TwoPoints = None,
         length_m: Length = None,
         metres_per_unit: MetresPerUnit = None,
+        underlay: Picture = None,
+        underlay_points: PicturePoints = None,
+        underlay_length_m: PictureLength = None,
+        underlay_metres_per_pixel: PictureScale = None,
+        underlay_zero: PictureZero = None,
     ) -> None:
         from access_av.site_files.read import Options, read
 
@@ -145,7 +215,15 @@ def _site_command(kind: str, begins: str, example: str) -> None:
             _scale_m(two_points, length_m, metres_per_unit),
         )
         drawn = read(road, heads, options, walls) if road or heads or walls else None
-        _write(kind, file, force, drawn)
+        placed = _placed(
+            file,
+            underlay,
+            underlay_points,
+            underlay_length_m,
+            underlay_metres_per_pixel,
+            underlay_zero,
+        )
+        _write(kind, file, force, drawn, placed)
 
     epilog = f"Example: [bold]access-av new {kind} mine.toml {example}[/]"
     app.command(kind, epilog=epilog, help=begins)(command)

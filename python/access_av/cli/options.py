@@ -95,6 +95,7 @@ def load_scenario(
     scenario = read_scenario(name, allow_large=allow_large)
     if overrides:
         scenario = scenario.with_overrides(dict(overrides))
+    look_for_underlay(scenario.site)
     announce(name, scenario.warnings())
     return scenario
 
@@ -102,6 +103,7 @@ def load_scenario(
 def load_site(name: str) -> Site:
     """A shipped site, or a file's, for a command to run; what is doubtful of it is said."""
     site = Site.load(name)
+    look_for_underlay(site)
     announce(name, site.warnings())
     return site
 
@@ -111,6 +113,7 @@ def load_site_and_vehicle(
 ) -> tuple[Site, Vehicle]:
     """The same of a site and a vehicle on it; ``start`` is its pose where not its file's."""
     plant, carrier = Site.load(site), Vehicle.load(vehicle)
+    look_for_underlay(plant)
     there = carrier
     if start is not None:
         pose = dict(zip(("x_m", "y_m", "heading_rad"), start, strict=True))
@@ -125,6 +128,13 @@ def read_scenario(name: str, *, allow_large: bool) -> Scenario:
         return Scenario.load(name)
     like = str(Path(name).absolute()) if Path(name).exists() else name
     return Scenario.from_toml(f"like = {json.dumps(like)}\nallow_large = true\n", name)
+
+
+def look_for_underlay(site: Site) -> None:
+    """Refuse a picture that is missing or broken at once, and not when the page is written."""
+    from access_av.site_files.picture import underlay
+
+    underlay(site)
 
 
 def announce(name: str, warnings: Iterable[SettingsWarning]) -> None:

@@ -18,7 +18,13 @@ from access_av.cli.options import (
     load_scenario,
     overridden,
 )
-from access_av.cli.side_by_side import PERCENTS, show_compared, side_by_side, variants
+from access_av.cli.side_by_side import (
+    PERCENTS,
+    of_scenario,
+    show_compared,
+    side_by_side,
+    write_compared,
+)
 from access_av.cli.terminal import console, progress, show_simulation
 
 app = typer.Typer()
@@ -51,13 +57,12 @@ def run(
     from access_av.report.drive import render_drive
     from access_av.run.assumptions import energy_boundary, flattering, in_words
     from access_av.run.simulation import simulate
-    from access_av.study.compare import table as compared_table
     from access_av.tables.results_directory import ResultsDirectory, tum_trajectory
 
     given = overridden(overrides)
     chosen = load_scenario(scenario, allow_large=allow_large, overrides=given)
     others = {name: load_scenario(name, allow_large=allow_large) for name in compare or ()}
-    scenarios = variants(chosen, vary, others)
+    scenarios = of_scenario(chosen, vary, others)
     directory = ResultsDirectory.create(f"run-{chosen.name}", out)
     with progress("Driving") as tick:
         result = simulate(
@@ -74,8 +79,7 @@ def run(
         directory.write_text(name, tum_trajectory(*(poses[column] for column in columns)))
     asked = percentile or PERCENTS
     beside = side_by_side(scenarios, asked, runs, seed, threads)
-    if beside:
-        directory.write_table("compared.parquet", compared_table(beside))
+    write_compared(beside, directory)
     page = render_drive(chosen, result, seed, compared_section(beside))
     directory.write_text("report.html", page)
     directory.write_text("scenario.toml", chosen.resolved().to_toml())

@@ -2,29 +2,43 @@
 
 from __future__ import annotations
 
-from typing import TYPE_CHECKING
+from typing import TYPE_CHECKING, TypeVar
 
-from access_av import _core
 from access_av.cli.terminal import console, progress, table
 
 if TYPE_CHECKING:
-    from collections.abc import Mapping, Sequence
+    from collections.abc import Callable, Mapping, Sequence
+    from typing import Any
 
+    from access_av import _core
     from access_av.study.compare import Compared
+    from access_av.tables.results_directory import ResultsDirectory
 
 PERCENTS = (50.0, 90.0, 99.0)
+T = TypeVar("T")
 
 
 def variants(
+    as_it_is: T,
+    vary: Sequence[str] | None,
+    others: Mapping[str, T],
+    changed: Callable[[T, dict[str, Any]], T],
+) -> dict[str, T]:
+    """What is driven, the same with other values of its keys, and others, by their labels."""
+    from access_av.run.pairs import AS_IT_IS
+    from access_av.study.compare import varied
+
+    of_keys = {label: changed(as_it_is, it) for label, it in varied(vary or ())}
+    return {AS_IT_IS: as_it_is, **of_keys, **others}
+
+
+def of_scenario(
     scenario: _core.Scenario,
     vary: Sequence[str] | None,
     others: Mapping[str, _core.Scenario],
 ) -> dict[str, _core.Scenario]:
-    """A scenario, other values of its keys, and other scenarios, by their labels."""
-    from access_av.study.compare import AS_IT_IS, varied
-
-    of_keys = {label: scenario.with_overrides(it) for label, it in varied(vary or ())}
-    return {AS_IT_IS: scenario, **of_keys, **others}
+    """The same of a scenario."""
+    return variants(scenario, vary, others, lambda it, keys: it.with_overrides(keys))
 
 
 def side_by_side(
@@ -50,18 +64,34 @@ def side_by_side(
         )
 
 
+def write_compared(found: Sequence[Compared], directory: ResultsDirectory) -> None:
+    """Write ``compared.parquet``; nothing without variants."""
+    from access_av.study.compare import table as rows_of
+
+    if found:
+        directory.write_table("compared.parquet", rows_of(found))
+
+
+def records(found: Sequence[Compared]) -> list[dict[str, Any]]:
+    """Variants for JSON, as ``compared.parquet`` has them."""
+    from access_av.study.compare import table as rows_of
+
+    return rows_of(found).to_dicts() if found else []
+
+
 def show_compared(found: Sequence[Compared]) -> None:
     """Show variants in the terminal; nothing without any."""
-    if len(found) < 2:
+    if not found:
         return
-    percents = found[0].percents
+    percents, driven = found[0].percents, found[0].driven
     head = ["variant", *(f"{it:g} % within / m" for it in percents), "energy / J", "difference"]
-    made = table(head, text=1, title=f"Side by side, {found[0].driven.runs} drives each")
+    made = table(head, text=1, title=f"Side by side, {driven.runs} {driven.rows} each")
     for it in found:
+        energy_j = it.driven.energy_j
         made.add_row(
             it.driven.name,
             *(f"{it.driven.percentile(percent).value:.3f}" for percent in percents),
-            "–" if it.energy_j is None else f"{it.energy_j:.2f}",
+            "–" if energy_j is None else f"{energy_j:.2f}",
             it.in_words(),
         )
     console.print(made)

@@ -7,8 +7,24 @@ from typing import Annotated
 import typer
 
 from access_av._core import Plant
-from access_av.cli.options import AsJson, Compare, Out, Percents, Seed, Threads, Vary, announce
-from access_av.cli.side_by_side import show_compared, side_by_side, variants
+from access_av.cli.options import (
+    AsJson,
+    Compare,
+    Out,
+    Percents,
+    Seed,
+    Threads,
+    Vary,
+    announce,
+    look_for_underlay,
+)
+from access_av.cli.side_by_side import (
+    of_scenario,
+    records,
+    show_compared,
+    side_by_side,
+    write_compared,
+)
 from access_av.cli.terminal import console, progress, table
 
 app = typer.Typer()
@@ -37,19 +53,19 @@ def study(
     """Tell whether a plant's localization is good enough, where not, what mends it and its cost.
 
     Writes report.html, study.json, errors.parquet, drives.parquet, places.parquet, places.csv,
-    points.parquet, plant.toml with every default, and manifest.json; with --vary or --compare also
-    compared.parquet.
+    points.parquet, trajectories.parquet (the drive that the page plays), plant.toml with every
+    default, and manifest.json; with --vary or --compare also compared.parquet.
     """
     from access_av.report.compared import compared_section
     from access_av.report.study import render_study
     from access_av.study.answer import study_plant
-    from access_av.study.compare import table as compared_table
     from access_av.tables.results_directory import ResultsDirectory, json_text
 
     chosen = Plant.load(plant)
+    look_for_underlay(chosen.scenario().site)
     announce(plant, chosen.warnings())
     others = {name: Plant.load(name).scenario() for name in compare or ()}
-    scenarios = variants(chosen.scenario(), vary, others)
+    scenarios = of_scenario(chosen.scenario(), vary, others)
     directory = ResultsDirectory.create(f"study-{chosen.name}", out)
     with progress("Driving") as tick:
         found = study_plant(
@@ -61,8 +77,7 @@ def study(
     directory.write_json("study.json", found.summary())
     asked = percentile or [50.0, found.percent]
     beside = side_by_side(scenarios, asked, found.believed.runs, seed, threads)
-    if beside:
-        directory.write_table("compared.parquet", compared_table(beside))
+    write_compared(beside, directory)
     directory.write_text("report.html", render_study(found, compared_section(beside)))
     directory.write_text("plant.toml", chosen.to_toml())
     directory.write_manifest(
@@ -73,7 +88,8 @@ def study(
     )
     directory.link_latest()
     if as_json:
-        print(json_text({**found.summary(), "directory": str(directory.path)}))
+        told = {**found.summary(), "compared": records(beside), "directory": str(directory.path)}
+        print(json_text(told))
         return
     console.print(found.verdict)
     for number, place in enumerate(found.worst, start=1):

@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import math
 from dataclasses import dataclass
 from typing import TYPE_CHECKING, Any
 
@@ -10,6 +11,8 @@ import polars as pl
 from access_av import _core
 from access_av.drives import angle_log
 from access_av.errors import InputError
+from access_av.run.pairs import STRETCHES, Errors
+from access_av.run.service_levels import INDEPENDENT_S
 
 if TYPE_CHECKING:
     from collections.abc import Callable, Mapping
@@ -371,6 +374,38 @@ def error_m(poses: pl.DataFrame, truth: str | Path | pl.DataFrame) -> pl.DataFra
 
 def _interval_s(of: pl.DataFrame) -> str:
     return f"{of['time_s'][0]:.3f} to {of['time_s'][-1]:.3f} s"
+
+
+def in_stretches(drive: Drive, truth: pl.DataFrame, name: str) -> Errors:
+    """A drive's errors in stretches, which pair with those of the same drive located otherwise.
+
+    Of one drive alone: an error that stays for all of it, such as that of a plan of the site, is
+    in every stretch alike. So the interval of a difference says whether it is more than chance on
+    this drive, and not what it is on others.
+
+    Parameters
+    ----------
+    drive
+        A located drive.
+    truth
+        What :func:`read_tum` made of the truth.
+    name
+        What the variant is called.
+
+    Raises
+    ------
+    InputError
+        When truth and drive share no time.
+    """
+    searching = drive.poses.select("time_s", still="searching")
+    poses = drive.poses.with_columns(searching=pl.lit(value=False))
+    every = error_m(poses, truth).join(searching, on="time_s", maintain_order="left")
+    errors_m = every.select(pl.when("still").then(math.inf).otherwise("error_m")).to_numpy()
+    duration_s = float(every["time_s"][-1] - every["time_s"][0])
+    count = max(1, int(duration_s / INDEPENDENT_S))
+    epochs = every.height // count
+    errors_m = errors_m[: count * epochs].reshape(count, epochs)
+    return Errors(name=name, errors_m=errors_m, duration_s=duration_s / count, rows=STRETCHES)
 
 
 def summary(drive: Drive, truth: str | Path | None = None) -> dict[str, float]:

@@ -16,7 +16,7 @@ if TYPE_CHECKING:
 
 def compared_section(found: Sequence[Compared]) -> str:
     """A section of the page; nothing without variants."""
-    if len(found) < 2:
+    if not found:
         return ""
     percents = found[0].percents
     rows = [
@@ -24,17 +24,17 @@ def compared_section(found: Sequence[Compared]) -> str:
             escape(it.driven.name),
             *(f"{it.driven.percentile(percent).value:.3f} m" for percent in percents),
             escape(it.in_words()),
-            "–" if it.energy_j is None else f"{number(it.energy_j, 2)} J",
+            "–" if it.driven.energy_j is None else f"{number(it.driven.energy_j, 2)} J",
         )
         for it in found
     ]
     head = (
         "Variant", *(f"{percent:g} % within" for percent in percents),
-        f"{percents[-1]:g} %, against the first", "energy of a trip",
+        f"{percents[-1]:g} %, against the first", "Energy of a trip",
     )  # fmt: skip
     return section(
         "Side by side",
-        f"Each driven in the same {found[0].driven.runs} worlds; differences are of pairs of "
-        "drives, with 95 % intervals.",
+        f"{found[0].driven.runs} {found[0].driven.rows} of each, in the same worlds; differences "
+        "are of pairs of them, with 95 % intervals.",
         table(head, rows, numbers=range(1, len(percents) + 1)),
     )

@@ -11,6 +11,7 @@ from access_av.errors import InputError
 from access_av.report import drive_charts as charts
 from access_av.report.page import sheet
 from access_av.report.parts import figure, section, service_levels, source, table, tile, warnings
+from access_av.report.played import CAPTION as PLAYED
 from access_av.run.assumptions import energy_boundary, flattering, in_words
 from access_av.tables.numbers import value_text
 
@@ -43,13 +44,17 @@ def render_drive(scenario: Scenario, result: Simulation, seed: int, beside: str 
         raise InputError("the page of a drive needs its trajectories: keep_trajectories=True")
     operation = result.operation
     runs, duration_s = result.runs.height, float(result.steps["time_s"][-1])
-    specs: dict[str, Spec] = {"error": charts.error_against_time(result.steps)}
+    specs: dict[str, Spec] = {
+        "map": charts.drive_on_map(scenario, result),
+        "error": charts.error_against_time(result.steps),
+    }
     sections = [
         section(
             "In operation",
             "" if operation is None else f"{operation.in_words()} {operation.what_helps()}".strip(),
             _errors(result),
         ),
+        section("On the map", f"The first drive. {PLAYED}", figure("map")),
         section(
             "Error over the drive",
             "Distance between estimate and truth at each SSB, over the runs.",

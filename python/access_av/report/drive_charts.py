@@ -8,17 +8,23 @@ from typing import TYPE_CHECKING
 import altair as alt
 import polars as pl
 
-from access_av.report.chart import BLUE, GREEN, LEAST_M, ORANGE, finish, thinned, to_scale
+from access_av.report.chart import BLUE, GREEN, LEAST_M, ORANGE, finish, thinned
+from access_av.report.played import heard_of, played, steps_of
+from access_av.report.site_map import Frame, heads_of
 from access_av.statistics.consistency import horizontal_error_m
 
 if TYPE_CHECKING:
+    from access_av._core import Scenario
     from access_av.report.chart import Spec
     from access_av.run.error_bound import ErrorBound
+    from access_av.run.simulation import Simulation
 
 # Bins of the Stanford diagram per factor of ten: 12 % wide.
 BINS_PER_DECADE = 20
 TALLEST_MAP_PX = 900.0
 ROAD_STEP_M = 2.0
+POINTS_PER_WAY = 800
+MARGIN_M = 25.0
 
 
 def error_against_time(steps: pl.DataFrame) -> Spec:
@@ -155,15 +161,14 @@ def bound_over_site(bound: ErrorBound) -> Spec:
     places, half = bound.site.select("x_m", "y_m").to_numpy(), 0.5 * step_m
     left_m, low_m = (places.min(axis=0) - half).tolist()
     right_m, high_m = (places.max(axis=0) + half).tolist()
-    *domains, height = to_scale((left_m, right_m), (low_m, high_m), TALLEST_MAP_PX)
-    across, upward = (alt.Scale(domain=it, nice=False) for it in domains)
+    frame = Frame.between((left_m, right_m), (low_m, high_m), TALLEST_MAP_PX)
     heat = (
         alt.Chart(squares)
         .mark_rect()
         .encode(
-            x=alt.X("left_m:Q", title="x / m", scale=across),
+            x=alt.X("left_m:Q", title="x / m", scale=frame.across),
             x2="right_m:Q",
-            y=alt.Y("low_m:Q", title="y / m", scale=upward),
+            y=alt.Y("low_m:Q", title="y / m", scale=frame.upward),
             y2="high_m:Q",
             color=alt.Color(
                 "bound_m:Q",
@@ -173,27 +178,34 @@ def bound_over_site(bound: ErrorBound) -> Spec:
             tooltip=[alt.Tooltip("bound_m:Q", title="bound / m", format=".3f")],
         )
     )
-    road = (
-        alt.Chart(_road(bound.route))
-        .mark_line(color="#ffffff", stroke="#11161d", strokeWidth=2.5)
-        .encode(
-            x=alt.X("x_m:Q", scale=across),
-            y=alt.Y("y_m:Q", scale=upward),
-            order="along_m:Q",
-        )
+    road = alt.Chart(_road(bound.route)).mark_line(
+        color="#ffffff", stroke="#11161d", strokeWidth=2.5
     )
-    heads = alt.Chart(bound.heads.select("name", "pci", "x_m", "y_m")).encode(
-        x=alt.X("x_m:Q", scale=across), y=alt.Y("y_m:Q", scale=upward)
-    )
-    marks = heads.mark_point(
-        shape="triangle-up", filled=True, size=170, color=ORANGE, stroke="#ffffff", opacity=1.0
-    ).encode(tooltip=["name:N", "pci:Q"])
-    names = heads.mark_text(dy=-14, fontSize=12, fontWeight="bold").encode(text="name:N")
-    drawn = road + marks + names
+    layers = [
+        *([] if squares.is_empty() else [heat]),
+        *frame.beneath(bound.scenario.site),
+        frame.put(road, order="along_m:Q"),
+        *frame.masts(bound.heads.select("name", "pci", "x_m", "y_m"), ORANGE),
+    ]
     return finish(
-        drawn if squares.is_empty() else heat + drawn,
-        height=height,
+        alt.LayerChart(layer=layers),
+        height=frame.height_px,
         description="Map of the least RMS error over the site, with the road and the radio heads",
+    )
+
+
+def drive_on_map(scenario: Scenario, result: Simulation) -> Spec:
+    """Where the first drive went, and that drive played along time."""
+    site = scenario.site
+    heads, steps = heads_of(site), steps_of(result)
+    way = thinned(steps.select("time_s", "x_m", "y_m"), POINTS_PER_WAY)
+    frame = Frame.about([way, heads], MARGIN_M, TALLEST_MAP_PX)
+    line = alt.Chart(way).mark_line(color=BLUE, strokeWidth=2.5)
+    layers = [*frame.beneath(site), frame.put(line, order="time_s:Q"), *frame.masts(heads)]
+    return finish(
+        played(frame, alt.LayerChart(layer=layers), steps, heard_of(result), heads),
+        height=frame.height_px,
+        description="Map of a drive, with the radio heads",
     )
 
 

@@ -9,6 +9,7 @@ from typing import TYPE_CHECKING, Any
 from access_av.report import drive_charts as charts
 from access_av.report.page import sheet
 from access_av.report.parts import figure, source, table, tile, warnings
+from access_av.run.pairs import AS_IT_IS
 from access_av.tables.numbers import number
 
 if TYPE_CHECKING:
@@ -24,14 +25,19 @@ HEAD = (
 
 
 def _world(case: dict[str, Any]) -> str:
-    """How the world of a case departs from what is believed."""
-    return "all as stated" if case["mismatch"] == "none" else str(case["mismatch"])
+    """How the world of a case departs from what is believed, and by which variant."""
+    world = "all as stated" if case["mismatch"] == "none" else str(case["mismatch"])
+    return world if case["variant"] == AS_IT_IS else f"{world}; {case['variant']}"
 
 
 def render_integrity(
-    cases: Sequence[Case], records: Sequence[dict[str, Any]], runs: int, seed: int
+    cases: Sequence[Case],
+    records: Sequence[dict[str, Any]],
+    runs: int,
+    seed: int,
+    beside: str = "",
 ) -> str:
-    """The campaign, and its rows in the table, as an HTML page that loads nothing."""
+    """The campaign, its rows in the table, and a section on variants, as a page by itself."""
     rows = [
         (
             escape(_world(one)),
@@ -74,6 +80,7 @@ def render_integrity(
         meta=escape(f"{runs} drives of each case, seed {seed}, version {version('access-av')}."),
         sections=warnings(first.warnings())
         + f"<section><h2>Cases</h2>{table(HEAD, rows, numbers=range(2, 13))}</section>"
-        f"<section><h2>Stanford diagrams</h2>{diagrams}</section><section><h2>Provenance</h2>"
+        + beside
+        + f"<section><h2>Stanford diagrams</h2>{diagrams}</section><section><h2>Provenance</h2>"
         f"{source('Scenario of the first case', first.to_toml())}</section>",
     )

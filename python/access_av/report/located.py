@@ -2,7 +2,6 @@
 
 from __future__ import annotations
 
-import json
 from html import escape
 from importlib.metadata import version
 from typing import TYPE_CHECKING
@@ -13,6 +12,7 @@ from access_av.drives import recorded as drives
 from access_av.report import located_charts as charts
 from access_av.report.page import sheet
 from access_av.report.parts import figure, section, source, table, tile, warnings
+from access_av.report.played import CAPTION as PLAYED
 from access_av.run.operation import Operation
 from access_av.tables.numbers import number
 
@@ -23,7 +23,7 @@ if TYPE_CHECKING:
 
 MOST_REMARKS = 50
 UNRELIABLE = "Not to be relied on"
-TRACK_TEXT = "Where the vehicle was, in the map's frame; drawn to scale on a wide screen."
+TRACK_TEXT = "Where the vehicle was, in the map's frame; drawn to scale on a wide screen. " + PLAYED
 
 
 def render_located(
@@ -32,6 +32,7 @@ def render_located(
     vehicle: Vehicle,
     numbers: dict[str, float],
     truth: pl.DataFrame | None = None,
+    beside: str = "",
 ) -> str:
     """A located drive as an HTML page that loads nothing.
 
@@ -45,6 +46,8 @@ def render_located(
         What :func:`access_av.drives.summary` returned.
     truth
         What :func:`access_av.drives.read_tum` returned, where the truth is known.
+    beside
+        A section on other variants, as HTML.
     """
     specs: dict[str, Spec] = {}
     sections = []
@@ -56,7 +59,9 @@ def render_located(
         sections.append(section("Remarks", "", _list(drive.remarks)))
     known = drive.poses.filter(~pl.col("searching"))
     if not known.is_empty():
-        specs["track"] = charts.track(_tracks(drive, known, truth), _heads(site))
+        specs["track"] = charts.track(
+            drive, _tracks(drive, known, truth), site, _steps(drive, truth)
+        )
         specs["error"] = charts.error(_errors(drive, known, truth))
         sections += [
             section("Track", TRACK_TEXT, figure("track")),
@@ -83,6 +88,7 @@ def render_located(
                 places + _by_head(drive.angles),
             )
         )
+    sections.append(beside)
     believed = source("Site, all defaults written out", site.to_toml())
     believed += source("Vehicle, all defaults written out", vehicle.to_toml())
     sections.append(section("Provenance", "", believed))
@@ -167,19 +173,15 @@ def _error_text(drive: Drive, numbers: dict[str, float]) -> str:
     return text + "."
 
 
-def _heads(site: Site) -> pl.DataFrame:
-    heads = json.loads(site.to_json())["radio_heads"]
-    return pl.DataFrame(
-        [
-            {
-                "name": head.get("name") or str(head["pci"]),
-                "x_m": float(head["position_m"][0]),
-                "y_m": float(head["position_m"][1]),
-            }
-            for head in heads
-        ],
-        schema={"name": pl.String, "x_m": pl.Float64, "y_m": pl.Float64},
+def _steps(drive: Drive, truth: pl.DataFrame | None) -> pl.DataFrame:
+    """The drive as it is played: where it was located, and how far off where that is known."""
+    poses = drive.poses.select(
+        "time_s", "x_m", "y_m", "searching", "integrity", "protection_level_m"
     )
+    if truth is None:
+        return poses.with_columns(error_m=pl.lit(None, pl.Float64))
+    off = drives.error_m(drive.poses, truth).select("time_s", "error_m")
+    return poses.join(off, on="time_s", how="left", maintain_order="left")
 
 
 def _compared(angles: pl.DataFrame) -> pl.DataFrame:

@@ -17,10 +17,13 @@ from access_av.report.chart import (
     finish,
     thinned,
     time_axis,
-    to_scale,
 )
+from access_av.report.played import played
+from access_av.report.site_map import Frame, heads_of
 
 if TYPE_CHECKING:
+    from access_av._core import Site
+    from access_av.drives.recorded import Drive
     from access_av.report.chart import Spec
 
 TALLEST_MAP_PX = 700.0
@@ -37,43 +40,41 @@ ERRORS = {
 }
 
 
-def track(lines: dict[str, pl.DataFrame], heads: pl.DataFrame) -> Spec:
-    """Where the vehicle was, in the map's frame, and the radio heads.
+def track(drive: Drive, lines: dict[str, pl.DataFrame], site: Site, steps: pl.DataFrame) -> Spec:
+    """Where the vehicle was, in the map's frame, and that played along time.
 
     Parameters
     ----------
+    drive
+        The located drive.
     lines
         Poses by their name in ``TRACKS``.
-    heads
-        ``name``, ``x_m`` and ``y_m`` of each radio head.
+    site
+        What is believed of the site.
+    steps
+        The drive, as :func:`access_av.report.played.played` takes it.
     """
+    heads = heads_of(site)
     table = pl.concat(
         thinned(line.select("time_s", "x_m", "y_m"), POINTS_PER_TRACK).with_columns(
             line=pl.lit(name)
         )
         for name, line in lines.items()
     )
-    bounds = {}
-    for axis in ("x_m", "y_m"):
-        values = pl.concat([table[axis], heads[axis]])
-        low, high = float(values.min()), float(values.max())  # type: ignore[arg-type]
-        margin = max(0.5, 0.05 * (high - low))
-        bounds[axis] = (low - margin, high + margin)
-    *domains, height = to_scale(bounds["x_m"], bounds["y_m"], TALLEST_MAP_PX)
-    across, upward = (alt.Scale(domain=it, nice=False, zero=False) for it in domains)
-    x = alt.X("x_m:Q", title="x / m", scale=across)
-    y = alt.Y("y_m:Q", title="y / m", scale=upward)
-    driven = (
-        alt.Chart(table)
-        .mark_line(strokeWidth=1.6)
-        .encode(x=x, y=y, order="time_s:Q", color=_colours(TRACKS, lines))
+    every = pl.concat([table.select("x_m", "y_m"), heads.select("x_m", "y_m")])
+    across_m, upward_m = (every.max() - every.min()).row(0)
+    margin_m = max(0.5, 0.05 * max(across_m, upward_m))
+    frame = Frame.about([every], margin_m, TALLEST_MAP_PX)
+    driven = frame.put(
+        alt.Chart(table).mark_line(strokeWidth=1.6),
+        order="time_s:Q",
+        color=_colours(TRACKS, lines),
     )
-    places = alt.Chart(heads).encode(x=x, y=y, tooltip=["name:N", "x_m:Q", "y_m:Q"])
-    marks = places.mark_point(shape="triangle-up", filled=True, size=130, color=ORANGE, opacity=1.0)
-    names = places.mark_text(dy=-13, fontSize=11).encode(text="name:N")
+    layers = alt.LayerChart(layer=[*frame.beneath(site), driven, *frame.masts(heads, ORANGE)])
+    heard = drive.angles.filter("accepted").select("time_s", "pci", "ssb_index")
     return finish(
-        driven + marks + names,
-        height=height,
+        played(frame, layers, steps, heard, heads),
+        height=frame.height_px,
         description="Track of the vehicle, with the radio heads",
     )
 

@@ -10,6 +10,7 @@ from typing import TYPE_CHECKING
 from access_av.report import study_charts as charts
 from access_av.report.page import sheet
 from access_av.report.parts import badge, figure, section, source, table, tile, warnings
+from access_av.report.played import CAPTION as PLAYED
 from access_av.run.assumptions import energy_boundary, flattering, in_words
 from access_av.study import economy
 
@@ -49,12 +50,13 @@ def render_study(study: Study, beside: str = "") -> str:
         specs["ways"] = charts.ways_to_operate(study)
     scenario = study.believed.scenario
     assumed = in_words(flattering(scenario))
+    described = f"{study.plant.description}." if study.plant.description else ""
     return sheet(
         specs,
         title=f"ACCESS-AV study: {escape(study.plant.name)}",
         kicker=f"ACCESS-AV study: {escape(study.plant.name)}",
         headline=_headline(study),
-        lead=escape(f"{study.verdict} {study.plant.description}. {assumed}".strip()),
+        lead=escape(f"{study.verdict} {described} {assumed}".strip()),
         tiles=_tiles(study),
         meta=escape(
             f"Simulated: {study.believed.runs} trips of {study.believed.duration_s:.0f} s as "
@@ -70,8 +72,8 @@ def render_study(study: Study, beside: str = "") -> str:
         + _unstated(study)
         + section(
             "Provenance",
-            "errors.parquet, drives.parquet, places.csv and points.parquet beside this page hold "
-            "what its figures are computed from.",
+            "errors.parquet, drives.parquet, places.csv, points.parquet and trajectories.parquet "
+            "(the drive that is played) beside this page hold what its figures are made of.",
             source("Plant, all defaults written out", study.plant.to_toml()),
         ),
     )
@@ -158,11 +160,16 @@ def _where(study: Study) -> str:
         f"of a place are within; {kept:.0%} of the road keep the target. Triangles are radio "
         "heads, squares stops, grey lines walls, numbers the worst places. places.csv has each "
         "metre. "
-        "Drawn to scale on a wide screen.",
+        f"Drawn to scale on a wide screen. {PLAYED}",
         figure("map")
         + table(head, rows, numbers=(1, 2, 3))
         + '<div class="charts">'
-        + figure("along", "Dashed: the target.", "Error along the road")
+        + figure(
+            "along",
+            "Levels are protection levels while the position may be relied on; the least RMS error "
+            "is that of any localizer. Dashed: the target.",
+            "Error along the road",
+        )
         + figure(
             "signal",
             "Dilution: by how many metres an error of one degree in every angle shows along the "

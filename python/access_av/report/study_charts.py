@@ -2,7 +2,6 @@
 
 from __future__ import annotations
 
-import itertools
 import json
 import math
 from typing import TYPE_CHECKING, Any
@@ -10,9 +9,10 @@ from typing import TYPE_CHECKING, Any
 import altair as alt
 import polars as pl
 
-from access_av.report.chart import BLUE, GREEN, GREY, ORANGE, finish, thinned, to_scale
+from access_av.report.chart import BLUE, GREEN, GREY, ORANGE, PURPLE, finish, thinned
+from access_av.report.played import heard_of, played, steps_of
+from access_av.report.site_map import Frame, heads_of
 from access_av.study.economy import trip_j
-from access_av.study.places import radio_heads
 
 if TYPE_CHECKING:
     from access_av.report.chart import Spec
@@ -27,18 +27,9 @@ STRETCHES = 300
 
 
 def road_map(study: Study) -> Spec:
-    """The road coloured by the target's percentile, radio heads, stops and the worst places."""
-    heads = pl.DataFrame(
-        [
-            {
-                "name": head["name"] or f"head {number}",
-                "x_m": float(head["position_m"][0]),
-                "y_m": float(head["position_m"][1]),
-            }
-            for number, head in enumerate(radio_heads(study.believed.scenario), start=1)
-        ]
-    )
-    places = study.places
+    """The road coloured by the target's percentile, what stands about it, and a drive played."""
+    site = study.believed.scenario.site
+    heads, places = heads_of(site), study.places
     step = max(1, places.height // STRETCHES)
     road = (
         places.with_columns(stretch=pl.int_range(pl.len()) // step)
@@ -54,59 +45,26 @@ def road_map(study: Study) -> Spec:
         )
         .with_columns(pl.col(pl.Float64).round(3))
     )
-    every = pl.concat([places.select("x_m", "y_m"), heads.select("x_m", "y_m")])
-    ends = every.select(
-        *(pl.col(it).min().alias(f"{it}_low") for it in ("x_m", "y_m")),
-        *(pl.col(it).max().alias(f"{it}_high") for it in ("x_m", "y_m")),
-    ).row(0, named=True)
-    *domains, height = to_scale(
-        (ends["x_m_low"] - MARGIN_M, ends["x_m_high"] + MARGIN_M),
-        (ends["y_m_low"] - MARGIN_M, ends["y_m_high"] + MARGIN_M),
-        TALLEST_MAP_PX,
+    frame = Frame.about([places, heads], MARGIN_M, TALLEST_MAP_PX)
+    drawn = frame.put(
+        alt.Chart(road).mark_rule(strokeWidth=7, strokeCap="round"),
+        ends=True,
+        color=alt.Color(
+            "class_:N",
+            scale=alt.Scale(domain=_classes(study.error_m), range=list(COLOURS)),
+            legend=alt.Legend(title=None),
+        ),
+        tooltip=[
+            alt.Tooltip("along_m:Q", title="along the road / m", format=".0f"),
+            alt.Tooltip("target_error_m:Q", title=f"{study.percent:g} % within / m"),
+        ],
     )
-    across, upward = (alt.Scale(domain=it, nice=False) for it in domains)
-    names = _classes(study.error_m)
-    drawn = (
-        alt.Chart(road)
-        .mark_rule(strokeWidth=7, strokeCap="round")
-        .encode(
-            x=alt.X("x_m:Q", title="x / m", scale=across),
-            x2="x2_m:Q",
-            y=alt.Y("y_m:Q", title="y / m", scale=upward),
-            y2="y2_m:Q",
-            color=alt.Color(
-                "class_:N",
-                scale=alt.Scale(domain=names, range=list(COLOURS)),
-                legend=alt.Legend(title=None),
-            ),
-            tooltip=[
-                alt.Tooltip("along_m:Q", title="along the road / m", format=".0f"),
-                alt.Tooltip("target_error_m:Q", title=f"{study.percent:g} % within / m"),
-            ],
-        )
-    )
-    mast = alt.Chart(heads).encode(x=alt.X("x_m:Q", scale=across), y=alt.Y("y_m:Q", scale=upward))
-    masts = mast.mark_point(
-        shape="triangle-up", filled=True, size=170, color=GREEN, opacity=1.0
-    ).encode(tooltip=["name:N"])
-    labels = mast.mark_text(dy=-15, fontSize=12, fontWeight="bold").encode(text="name:N")
-    layers = drawn + masts + labels
-    if walls := _walls(study):
-        across_to = {"x": alt.X("x_m:Q", scale=across), "y": alt.Y("y_m:Q", scale=upward)}
-        ends = {"x2": "x2_m:Q", "y2": "y2_m:Q"}
-        lines = alt.Chart(pl.DataFrame(walls)).mark_rule(strokeWidth=3, color=GREY)
-        layers = lines.encode(**across_to, **ends) + layers
+    layers = [*frame.beneath(site), drawn, *frame.masts(heads)]
     stops = _at(study, [stop["at_m"] for stop in _stops(study)])
     if not stops.is_empty():
-        layers += (
-            alt.Chart(stops)
-            .mark_point(shape="square", size=120, color=GREY, strokeWidth=2)
-            .encode(
-                x=alt.X("x_m:Q", scale=across),
-                y=alt.Y("y_m:Q", scale=upward),
-                tooltip=[alt.Tooltip("along_m:Q", title="stop, along the road / m")],
-            )
-        )
+        square = alt.Chart(stops).mark_point(shape="square", size=120, color=GREY, strokeWidth=2)
+        said = [alt.Tooltip("along_m:Q", title="stop, along the road / m")]
+        layers.append(frame.put(square, tooltip=said))
     worst = pl.DataFrame(
         [
             {"number": str(number), "x_m": place.x_m, "y_m": place.y_m}
@@ -114,18 +72,15 @@ def road_map(study: Study) -> Spec:
         ]
     )
     if not worst.is_empty():
-        marked = alt.Chart(worst).encode(
-            x=alt.X("x_m:Q", scale=across), y=alt.Y("y_m:Q", scale=upward)
-        )
-        layers += marked.mark_point(
+        disc = alt.Chart(worst).mark_point(
             shape="circle", filled=True, size=330, color="#16202c", stroke="#ffffff", opacity=1.0
         )
-        layers += marked.mark_text(fontSize=12, fontWeight="bold", color="#ffffff", dy=1).encode(
-            text="number:N"
-        )
+        number = alt.Chart(worst).mark_text(fontSize=12, fontWeight="bold", color="#ffffff", dy=1)
+        layers += [frame.put(disc), frame.put(number, text="number:N")]
+    steps, heard = steps_of(study.played), heard_of(study.played)
     return finish(
-        layers,
-        height=height,
+        played(frame, alt.LayerChart(layer=layers), steps, heard, heads),
+        height=frame.height_px,
         description="Map of the road, coloured by the error that the target speaks of",
     )
 
@@ -149,15 +104,6 @@ def _classes(target_m: float) -> list[str]:
     ]
 
 
-def _walls(study: Study) -> list[dict[str, float]]:
-    site = json.loads(study.believed.scenario.site.to_json())
-    return [
-        {"x_m": x_m, "y_m": y_m, "x2_m": x2_m, "y2_m": y2_m}
-        for wall in site.get("walls", ())
-        for (x_m, y_m), (x2_m, y2_m) in itertools.pairwise(wall["points_m"])
-    ]
-
-
 def _stops(study: Study) -> list[dict[str, float]]:
     stops: list[dict[str, float]] = json.loads(study.plant.to_json())["motion"]["stops"]
     return stops
@@ -170,11 +116,12 @@ def _at(study: Study, along_m: list[float]) -> pl.DataFrame:
 
 
 def along_road(study: Study) -> Spec:
-    """The error along the road, driven and bounded, and the target."""
+    """Error and protection level along the road, the bound, and the target."""
     names = {
         "target_error_m": f"{study.percent:g} % of errors within",
         "median_error_m": "half of them within",
-        "bound_m": "least RMS error of any localizer",
+        "level_m": "half of the levels within",
+        "bound_m": "least RMS error",
     }
     rows = (
         thinned(study.places.select("along_m", *names))
@@ -189,8 +136,8 @@ def along_road(study: Study) -> Spec:
             y=alt.Y("error_m:Q", title="horizontal error / m"),
             color=alt.Color(
                 "line:N",
-                scale=alt.Scale(domain=list(names.values()), range=[ORANGE, BLUE, GREEN]),
-                legend=alt.Legend(title=None),
+                scale=alt.Scale(domain=list(names.values()), range=[ORANGE, BLUE, PURPLE, GREEN]),
+                legend=alt.Legend(title=None, columns=2),
             ),
             tooltip=["line:N", "along_m:Q", alt.Tooltip("error_m:Q", format=".3f")],
         )

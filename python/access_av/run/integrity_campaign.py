@@ -13,6 +13,7 @@ from access_av import _core
 from access_av.errors import InputError
 from access_av.run.campaign import Task
 from access_av.run.fault_injection import Overrides, hypotheses, mismatches
+from access_av.run.pairs import AS_IT_IS, Errors
 from access_av.run.simulation import Simulation
 from access_av.statistics.alarms import Alarms
 from access_av.statistics.consistency import horizontal_error_m
@@ -43,6 +44,8 @@ class Case:
         All of it.
     trajectories
         ``run, time_s, error_x_m, error_y_m, protection_level_m, integrity`` of every step.
+    variant
+        What of several was driven.
     """
 
     mismatch: str
@@ -51,6 +54,7 @@ class Case:
     asked_risk_per_hour: float
     scenario: _core.Scenario
     trajectories: pl.DataFrame
+    variant: str = AS_IT_IS
 
     @property
     def alert_limit_m(self) -> float:
@@ -66,6 +70,7 @@ class Case:
         error_m = self.trajectories["error_x_m"].abs()
         risk = ObtainedRisk.of(self.trajectories, _settings(self.scenario)["error_correlation_s"])
         return {
+            "variant": self.variant,
             "mismatch": self.mismatch,
             "channel": self.channel,
             "heads": self.heads,
@@ -86,6 +91,18 @@ class Case:
             "p90_error_m": error_m.quantile(0.9, "linear"),
             "max_error_m": error_m.max(),
         }
+
+    def errors(self, name: str) -> Errors:
+        """Its errors, drive by drive; infinite as long as the place is searched for."""
+        by_run = [
+            part["error_x_m"].to_numpy()
+            for part in self.trajectories.partition_by("run", maintain_order=True)
+        ]
+        errors_m = np.full((len(by_run), max(map(len, by_run))), np.inf)
+        for row, found_m in zip(errors_m, by_run, strict=True):
+            row[len(row) - len(found_m) :] = np.abs(found_m)
+        duration_s = float(self.trajectories["time_s"].max())  # type: ignore[arg-type]
+        return Errors(name=name, errors_m=errors_m, duration_s=duration_s)
 
 
 def _settings(scenario: _core.Scenario) -> dict[str, Any]:

@@ -68,6 +68,7 @@ class Simulation:
     integrity: Integrity | None
     error_quantiles_m: Mapping[float, float]
     errors_m: NDArray[np.float32] | None = None
+    levels_m: NDArray[np.float32] | None = None
     scenario: Scenario | None = None
     seed: int | None = None
 
@@ -98,6 +99,7 @@ class Simulation:
             integrity=found.integrity and Integrity.of_runs(*found.integrity),
             error_quantiles_m=found.error_quantiles_m,
             errors_m=found.errors_m,
+            levels_m=found.levels_m,
             scenario=scenario,
             seed=seed,
         )
@@ -220,7 +222,8 @@ def simulate(
     keep_trajectories
         Whether to keep every drive's trajectory and executions, not only their statistics.
     errors_every
-        Keep every drive's errors in x and y at each so many SSBs, for statistics over whole runs.
+        Keep every drive's errors in x and y, and its protection levels, at each so many SSBs, for
+        statistics over whole runs.
     estimator
         In place of the vehicle's angle estimator: takes complex snapshots of shape (antennas,
         snapshots) and returns the angle from the array's axis in radians, 0 to π; or that angle

@@ -11,6 +11,7 @@ from typing import TYPE_CHECKING
 
 if TYPE_CHECKING:
     from access_av.site_files.drawn import Drawn
+    from access_av.site_files.picture import Placed
 
 KINDS = ("plant", "site", "vehicle", "scenario", "node")
 # What a new radio head is taken to be where its file does not say.
@@ -21,7 +22,9 @@ EXAMPLE_STOP_M = 320.0
 WALL_POINTS = 100  # of a table (settings/walls.rs)
 
 
-def new(kind: str, name: str, file: str, drawn: Drawn | None = None) -> str:
+def new(
+    kind: str, name: str, file: str, drawn: Drawn | None = None, placed: Placed | None = None
+) -> str:
     """The text of a new file.
 
     Parameters
@@ -34,6 +37,8 @@ def new(kind: str, name: str, file: str, drawn: Drawn | None = None) -> str:
         What the file is called, for the commands that its comments name.
     drawn
         Road, radio heads and walls in place of the example's, of a plant or a site.
+    placed
+        A picture under its maps.
     """
     prefix = "site." if kind == "plant" else ""
     example = Template(_read("example_site.toml")).substitute(prefix=prefix)
@@ -46,7 +51,8 @@ def new(kind: str, name: str, file: str, drawn: Drawn | None = None) -> str:
     if drawn is not None and drawn.heads:
         heads = _heads(drawn, prefix)
     walls = "" if drawn is None else _walls(drawn, prefix)
-    site = f"{road.rstrip()}\n\n{heads.rstrip()}\n{walls}"
+    picture = "" if placed is None else _picture(placed, prefix)
+    site = f"{road.rstrip()}\n\n{heads.rstrip()}\n{walls}{picture}"
     return Template(_read(f"{kind}.toml")).substitute(
         name=name, file=file, site=site, stop_m=f"{stop_m:.1f}"
     )
@@ -90,6 +96,17 @@ def _walls(drawn: Drawn, prefix: str) -> str:
             points = ", ".join(f"[{x_m:.4f}, {y_m:.4f}]" for x_m, y_m in corners)
             made += f"\n[[{prefix}walls]] # loss_db: that of concrete\npoints_m = [{points}]\n"
     return made
+
+
+def _picture(placed: Placed, prefix: str) -> str:
+    x_px, y_px = placed.zero_px
+    return (
+        "\n# A picture that lies under its maps; nothing is computed from it.\n"
+        f"[{prefix}underlay]\n"
+        f"file = {json.dumps(placed.file, ensure_ascii=False)}\n"
+        f"metres_per_pixel = {placed.metres_per_pixel:.9g}\n"
+        f"zero_px = [{x_px:.3f}, {y_px:.3f}] # the map's zero, from the upper left corner\n"
+    )
 
 
 def _heads(drawn: Drawn, prefix: str) -> str:

@@ -12,6 +12,7 @@ import polars as pl
 from access_av import _core
 from access_av.errors import InputError
 from access_av.run.service_levels import INDEPENDENT_S
+from access_av.run.simulation import Simulation, simulate
 from access_av.study import economy
 from access_av.study.places import WorstPlace, by_place, worst_places
 from access_av.study.points import Point, front, points, recommended, tried
@@ -91,6 +92,8 @@ class Study:
         Prices, energy of a fleet's day, and money and carbon of each way to localize.
     unstated
         What nobody at the plant has stated.
+    played
+        The first of the drives as believed, step by step.
     """
 
     plant: _core.Plant
@@ -109,6 +112,7 @@ class Study:
     day: economy.Day | None
     ways: dict[str, Way]
     unstated: list[Unstated]
+    played: Simulation
 
     def __repr__(self) -> str:
         return f"Study({self.plant.name}: {self.verdict})"
@@ -143,6 +147,13 @@ class Study:
             f"knows its position {self.in_words(self.believed)}; {self.error_m:g} m is asked. "
             f"Where lines of sight are poor: {self.judged(self.poor)}, {self.in_words(self.poor)}."
         )
+
+    @property
+    def trajectory(self) -> pl.DataFrame:
+        """Truth and estimate of the drive that is played, step by step."""
+        if self.played.trajectories is None:  # they were asked for
+            raise RuntimeError("the simulation kept no trajectories")
+        return self.played.trajectories
 
     def summary(self) -> dict[str, Any]:
         """Every figure of the page, as plain values for JSON."""
@@ -236,6 +247,7 @@ class Study:
             "drives": pl.concat(driven.drives() for driven in drives),
             "places": self.places,
             "points": pl.DataFrame(rows),
+            "trajectories": self.trajectory,
         }
 
 
@@ -351,6 +363,7 @@ def study_plant(
         day=None if point is None else economy.day(plant, point),
         ways={} if point is None else economy.ways(plant, point, prices),
         unstated=unstated(scenario, named),
+        played=simulate(scenario, runs=1, seed=seed, threads=threads, keep_trajectories=True),
     )
 
 

@@ -3,13 +3,15 @@
 from __future__ import annotations
 
 import itertools
+import math
 from dataclasses import dataclass
 from typing import TYPE_CHECKING, Any
 
 import polars as pl
 
 from access_av.errors import InputError
-from access_av.study.trips import Driven, drive
+from access_av.run.pairs import Errors
+from access_av.study.trips import drive
 from access_av.tables.toml import tomllib
 
 if TYPE_CHECKING:
@@ -18,7 +20,6 @@ if TYPE_CHECKING:
     from access_av import _core
 
 MOST_VARIANTS = 24
-AS_IT_IS = "as it is"
 
 
 @dataclass(frozen=True)
@@ -36,21 +37,17 @@ class Compared:
         the 95 % interval; ``None`` of the first one itself.
     """
 
-    driven: Driven
+    driven: Errors
     percents: Sequence[float]
     less_m: Sequence[tuple[float, float, float]] | None
-
-    @property
-    def energy_j(self) -> float | None:
-        """Energy of a trip; ``None`` where the platform has no figure."""
-        energy = self.driven.energy()
-        return None if energy is None else energy["value"].total_j
 
     def in_words(self, place: int = -1) -> str:
         """How one of the percentiles differs from the first variant's."""
         if self.less_m is None:
             return "what the others are compared with"
         less, low, high = self.less_m[place]
+        if math.isinf(low):
+            return f"{less:+.3f} m; of one of the {self.driven.rows} there is no interval"
         if low <= 0.0 <= high:
             return f"not surely different ({low:+.3f} to {high:+.3f} m)"
         kind = "better" if less < 0.0 else "worse"
@@ -124,18 +121,25 @@ def compare(
     percents
         Which percentiles of the error.
     """
-    total, found = runs * len(scenarios), list[Compared]()
+    total, found = runs * len(scenarios), list[Errors]()
     for number, (label, scenario) in enumerate(scenarios.items()):
 
         def tell(done: int, _: int, before: int = number * runs) -> None:
             if progress is not None:
                 progress(before + done, total)
 
-        driven = drive(label, scenario, runs, seed, threads, tell)
-        first = found[0].driven if found else None
-        less = None if first is None else [driven.less_than(first, it) for it in percents]
-        found.append(Compared(driven, percents, less))
-    return found
+        found.append(drive(label, scenario, runs, seed, threads, tell))
+    return beside_first(found, percents)
+
+
+def beside_first(found: Sequence[Errors], percents: Sequence[float]) -> list[Compared]:
+    """What was driven in the same worlds, each beside the first."""
+    return [
+        Compared(it, percents, [it.less_than(found[0], percent) for percent in percents])
+        if it is not found[0]
+        else Compared(it, percents, None)
+        for it in found
+    ]
 
 
 def table(found: Sequence[Compared]) -> pl.DataFrame:
@@ -154,7 +158,7 @@ def table(found: Sequence[Compared]) -> pl.DataFrame:
                     "percentile_low_m": known.low,
                     "percentile_high_m": known.high,
                     **dict(zip(("more_m", "more_low_m", "more_high_m"), more, strict=True)),
-                    "energy_j": it.energy_j,
+                    "energy_j": it.driven.energy_j,
                 }
             )
     return pl.DataFrame(rows, infer_schema_length=None)

@@ -86,8 +86,12 @@ def by_place(driven: Driven, percent: float, error_m: float) -> pl.DataFrame:
     for first, last in zip(low, high, strict=True):
         near = driven.errors_m[:, first:last].ravel()
         median, upper = np.quantile(near, [0.5, 0.01 * percent], method="inverted_cdf")
-        rows.append((median, upper, float((near <= error_m).mean())))
-    median_m, percentile_m, within = np.array(rows).T
+        levels_m = driven.levels_m[:, first:last].ravel()
+        levels_m = levels_m[~np.isnan(levels_m)]
+        level = np.quantile(levels_m, 0.5, method="inverted_cdf") if len(levels_m) else math.nan
+        within = float((near <= error_m).mean())
+        rows.append((median, upper, within, level, len(levels_m) / len(near)))
+    median_m, percentile_m, within_share, level_m, reliable_share = np.array(rows).T
     here_x, here_y = (np.interp(centres, *_rising(along_m, it)) for it in (x_m, y_m))
     bound_m = np.interp(centres, *_rising(along_m, route["bound_m"].to_numpy()))
     snr_db = np.asarray(_core.Bound(driven.scenario).snr_db(here_x, here_y))
@@ -99,15 +103,17 @@ def by_place(driven: Driven, percent: float, error_m: float) -> pl.DataFrame:
             "y_m": here_y,
             "median_error_m": median_m,
             "target_error_m": percentile_m,
-            "within_share": within,
+            "within_share": within_share,
             "passes": percentile_m <= error_m,
+            "level_m": level_m,
+            "reliable_share": reliable_share,
             "bound_m": bound_m,
             "dilution_of_degree_m": _dilution(driven.scenario, here_x, here_y, visible),
             "heads_visible": visible.sum(axis=0),
             "best_snr_db": snr_db.max(axis=0),
         }
     ).with_columns(
-        pl.col("dilution_of_degree_m").fill_nan(None),
+        pl.col("dilution_of_degree_m", "level_m").fill_nan(None),
         pl.col("best_snr_db").replace(-math.inf, None),  # every radio head is behind walls
     )
 

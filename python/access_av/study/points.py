@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 import json
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 from typing import TYPE_CHECKING, Any
 
 import numpy as np
@@ -136,7 +136,7 @@ def points(drives: Sequence[tuple[str, str, Driven]], percent: float) -> list[Po
 
 
 def _with(driven: Driven, scenario: _core.Scenario) -> Driven:
-    return Driven(**{**vars(driven), "scenario": scenario})
+    return replace(driven, scenario=scenario)
 
 
 def idle_w(platform: Platform, number: int) -> dict[str, float] | None:

@@ -3,17 +3,15 @@
 from __future__ import annotations
 
 import json
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 from typing import TYPE_CHECKING
 
 import numpy as np
 import polars as pl
 
 from access_av.device.platform import Platform
-from access_av.run.service_levels import INDEPENDENT_S
+from access_av.run.pairs import Errors
 from access_av.run.simulation import simulate
-from access_av.statistics.paired import paired_difference
-from access_av.statistics.percentiles import percentiles
 from access_av.statistics.proportions import clopper_pearson
 
 if TYPE_CHECKING:
@@ -22,7 +20,6 @@ if TYPE_CHECKING:
     from numpy.typing import NDArray
 
     from access_av import _core
-    from access_av.statistics.percentiles import Percentile
 
 # Errors are kept this often: a vehicle moves less than its own width meanwhile.
 KEPT_EVERY_S = 0.1
@@ -51,68 +48,49 @@ class Energy:
         return self.estimates_j + self.listening_j + self.idle_j
 
 
-@dataclass(frozen=True, eq=False)
-class Driven:
+@dataclass(frozen=True, eq=False, kw_only=True)
+class Driven(Errors):
     """Many drives of one scenario.
 
     Attributes
     ----------
-    name
-        What it is called in tables.
     scenario
         What was driven.
-    errors_m
-        Horizontal errors, shape (runs, epochs); infinite as long as the place is searched for.
+    levels_m
+        Protection levels, shape (runs, epochs); NaN where the position may not be relied on.
     time_s
         Times of the epochs.
     executions, listened
         Angle estimates, and SSB bursts listened to, of each run.
-    duration_s
-        Of a trip.
     ok_share
         Share of the time in which the position may be relied on (state ``ok``).
     beyond
         Errors beyond the protection level meanwhile.
     """
 
-    name: str
     scenario: _core.Scenario
-    errors_m: NDArray[np.float64]
+    levels_m: NDArray[np.float32]
     time_s: NDArray[np.float64]
     executions: NDArray[np.int64]
     listened: NDArray[np.int64]
-    duration_s: float
     ok_share: float | None
     beyond: int | None
 
     @property
-    def runs(self) -> int:
-        """Number of drives."""
-        return len(self.executions)
+    def energy_j(self) -> float | None:
+        """Energy of a trip, on the mean; ``None`` where the platform has no figure."""
+        energy = self.energy()
+        return None if energy is None else energy["value"].total_j
 
     def first(self, runs: int) -> Driven:
         """The same of the first so many drives, which is how pairs are made."""
-        return Driven(
-            self.name,
-            self.scenario,
-            self.errors_m[:runs],
-            self.time_s,
-            self.executions[:runs],
-            self.listened[:runs],
-            self.duration_s,
-            self.ok_share,
-            self.beyond,
+        return replace(
+            self,
+            errors_m=self.errors_m[:runs],
+            levels_m=self.levels_m[:runs],
+            executions=self.executions[:runs],
+            listened=self.listened[:runs],
         )
-
-    @property
-    def independent(self) -> int:
-        """How many of the errors are as good as independent of each other."""
-        return max(1, int(self.runs * self.duration_s / INDEPENDENT_S))
-
-    def percentile(self, percent: float) -> Percentile:
-        """A percentile of the error with its 95 % interval."""
-        [found] = percentiles(self.errors_m, [percent], independent=self.independent)
-        return found
 
     def within(self, error_m: float) -> tuple[float, float, float]:
         """Share of the time within an error, and the ends of its 95 % interval.
@@ -130,18 +108,6 @@ class Driven:
             low, high = min(low, float(least)), max(high, float(most))
         return share, low, max(high, share)
 
-    def less_than(self, other: Driven, percent: float) -> tuple[float, float, float]:
-        """By how many metres a percentile is larger than another's, in pairs of drives.
-
-        Returns
-        -------
-        tuple of float
-            The difference, negative where this one is better, and the ends of its 95 % interval.
-        """
-        runs = min(self.runs, other.runs)
-        mine, its = self.errors_m[:runs], other.errors_m[:runs]
-        return paired_difference(mine, its, percent)
-
     def energy(self, platform: Platform | None = None) -> dict[str, Energy] | None:
         """Energy of a trip by ``low``, ``value`` and ``high``; ``None`` without a figure."""
         vehicle = self.scenario.vehicle
@@ -156,7 +122,7 @@ class Driven:
         return found
 
     def table(self) -> pl.DataFrame:
-        """One row per drive and epoch: columns ``variant, run, time_s, error_m``."""
+        """One row per drive and epoch: columns ``study_errors`` of :mod:`access_av.columns`."""
         runs, epochs = self.errors_m.shape
         return pl.DataFrame(
             {
@@ -164,8 +130,9 @@ class Driven:
                 "run": np.repeat(np.arange(runs, dtype=np.uint32), epochs),
                 "time_s": np.tile(self.time_s, runs),
                 "error_m": self.errors_m.ravel().astype(np.float32),
+                "protection_level_m": self.levels_m.ravel(),
             }
-        )
+        ).with_columns(pl.col("protection_level_m").fill_nan(None))
 
     def drives(self) -> pl.DataFrame:
         """One row per drive: columns ``variant, run, executions, listened, duration_s``."""
@@ -194,7 +161,7 @@ def drive(
     found = simulate(
         scenario, runs=runs, seed=seed, threads=threads, errors_every=every, progress=progress
     )
-    if found.errors_m is None:  # they were asked for
+    if found.errors_m is None or found.levels_m is None:  # they were asked for
         raise RuntimeError("the simulation kept no errors")
     errors_m = np.hypot(found.errors_m[:, :, 0], found.errors_m[:, :, 1]).astype(np.float64)
     errors_m[np.isnan(errors_m)] = np.inf
@@ -204,6 +171,7 @@ def drive(
         name=name,
         scenario=scenario,
         errors_m=errors_m,
+        levels_m=found.levels_m,
         time_s=time_s[::every],
         executions=found.runs["executions"].to_numpy().astype(np.int64),
         listened=found.runs["listened"].to_numpy().astype(np.int64),

@@ -26,6 +26,7 @@ mod shipped;
 mod site;
 mod start;
 mod toml_file;
+mod underlay;
 mod vehicle;
 mod wake_up;
 mod walls;
@@ -49,6 +50,7 @@ pub use shipped::Shipped;
 pub use site::{SPEED_OF_LIGHT_MPS, Site};
 pub use start::StartSettings;
 pub use toml_file::{Library, NamedText, TomlFile};
+pub use underlay::UnderlaySettings;
 pub use vehicle::{PlatformSettings, Vehicle, check_together};
 pub use wake_up::{
     DeltaT, DueSettings, FixedSettings, GatedSettings, PidSettings, SensingMode, ServingSsb,

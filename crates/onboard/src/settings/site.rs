@@ -11,6 +11,7 @@ use super::error::SettingsError;
 use super::radio::{RadioHeadSettings, SsbSettings};
 use super::road::RoadSettings;
 use super::toml_file::{Library, TomlFile};
+use super::underlay::UnderlaySettings;
 use super::walls::WallSettings;
 use crate::geometry::Point;
 use crate::road::Road;
@@ -45,6 +46,9 @@ pub struct Site {
     #[serde(default, skip_serializing_if = "Vec::is_empty")]
     #[schemars(length(max = 1000))]
     pub walls: Vec<WallSettings>,
+    /// A picture under its maps.
+    #[serde(default, skip_serializing_if = "Option::is_none")]
+    pub underlay: Option<UnderlaySettings>,
 }
 
 const fn mid_band() -> f64 {
@@ -114,6 +118,9 @@ impl TomlFile for Site {
         origin: &str,
         library: &dyn Library,
     ) -> Result<(), SettingsError> {
+        if let Some(Value::Table(underlay)) = table.get_mut("underlay") {
+            UnderlaySettings::resolve(underlay, origin, library);
+        }
         match table.get_mut("road") {
             Some(Value::Table(road)) => RoadSettings::resolve(road, "road", origin, library),
             _ => Ok(()),

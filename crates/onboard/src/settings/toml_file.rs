@@ -47,6 +47,12 @@ pub trait Library {
     /// # Errors
     /// [`SettingsError`] where there is none, or it cannot be read.
     fn points_m(&self, name: &str, beside: &str) -> Result<Vec<[f64; 2]>, SettingsError>;
+
+    /// The whole path of a file that the file `beside` names and that nobody here opens; as it was
+    /// named where there is no file system.
+    fn path(&self, name: &str, _beside: &str) -> String {
+        name.to_owned()
+    }
 }
 
 /// A kind of settings file. Any of them may say `like = "another"` and lay its own keys over those

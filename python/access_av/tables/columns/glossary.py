@@ -53,6 +53,11 @@ _GLOSSARY = {
     "target_error_m": ("m", "So many of the horizontal errors as the target asks are no larger"),
     "within_share": ("1", "Share of the errors within 5 m of the place that are within the target"),
     "passes": ("true or false", "target_error_m is within the target"),
+    "level_m": (
+        "m",
+        "Half of the protection levels within 5 m of the place, while ok, are lower",
+    ),
+    "reliable_share": ("1", "Share of the time within 5 m of the place that the state is ok"),
     "dilution_of_degree_m": (
         "m",
         "By how much an error of one degree in every angle shows along the road",

@@ -116,7 +116,8 @@ TABLES: Mapping[str, Table] = {
         Table(
             "trajectories",
             "An SSB of a run, with truth and estimate",
-            "`trajectories.parquet` of `access-av run`; `access_av.simulate(…).trajectories`",
+            "`trajectories.parquet` of `access-av run` and `study`; "
+            "`access_av.simulate(…).trajectories`",
             (
                 "run", "time_s", *_POSE, "true_x_m", "true_y_m", "true_heading_rad", "error_x_m",
                 "error_y_m", "true_snr_db", *_COVARIANCES, *_LEVELS, "searching", "integrity",
@@ -236,8 +237,8 @@ TABLES: Mapping[str, Table] = {
             "A case of an integrity campaign",
             "`integrity.parquet` of `access-av integrity`; `Case.as_record()`",
             (
-                "mismatch", "channel", "heads", "runs", "availability", "unavailable_share",
-                "exceedances", "exceedance_share", "exceedance_share_low",
+                "variant", "mismatch", "channel", "heads", "runs", "availability",
+                "unavailable_share", "exceedances", "exceedance_share", "exceedance_share_low",
                 "exceedance_share_high", "runs_with_exceedances", "time_to_alert_s",
                 "level_over_error", *_RISKS, "p90_error_m", "max_error_m",
             ),
@@ -291,7 +292,8 @@ TABLES: Mapping[str, Table] = {
             "study_errors",
             "An epoch of a drive of a study, ten of them a second",
             "`errors.parquet` of `access-av study`",
-            ("variant", "run", "time_s", "error_m"),
+            ("variant", "run", "time_s", "error_m", "protection_level_m"),
+            {"protection_level_m": "the position may not be relied on"},
         ),
         Table(
             "study_drives",
@@ -305,9 +307,11 @@ TABLES: Mapping[str, Table] = {
             "`places.parquet` and `places.csv` of `access-av study`",
             (
                 "along_m", "x_m", "y_m", "median_error_m", "target_error_m", "within_share",
-                "passes", "bound_m", "dilution_of_degree_m", "heads_visible", "best_snr_db",
+                "passes", "level_m", "reliable_share", "bound_m", "dilution_of_degree_m",
+                "heads_visible", "best_snr_db",
             ),
             {
+                "level_m": "the position may never be relied on there",
                 "dilution_of_degree_m": "no radio head in reach tells of the distance along the "
                 "road",
                 "best_snr_db": "walls keep every radio head out of sight",
@@ -333,7 +337,8 @@ TABLES: Mapping[str, Table] = {
         Table(
             "compared",
             "A percentile of the error of one of several variants",
-            "`compared.parquet` of `access-av run` and `access-av study`, with --vary or --compare",
+            "`compared.parquet` of `access-av run`, `study`, `locate` and `integrity`, with --vary "
+            "or --compare",
             (
                 "variant", "runs", "percent", "percentile_m", "percentile_low_m",
                 "percentile_high_m", "more_m", "more_low_m", "more_high_m", "energy_j",
