@@ -105,7 +105,10 @@ def vehicle_toml(case: Case, settings: list[str]) -> str:
             f"noise_rad_per_sqrt_s = {hall_drive.TURN_NOISE_RAD}",
             f"bias_std_radps = {hall_drive.BIAS_STD_RADPS}",
         ],
-        "lane_keeping": ["rms_m = 0.06", "wavelength_m = 25.0"],
+        "lane_keeping": [
+            f"rms_m = {hall_drive.LANE_RMS_M}",
+            f"wavelength_m = {hall_drive.LANE_WAVE_M}",
+        ],
         "start": [
             f"position_std_m = {hall_drive.START_STD[0]}",
             f"heading_std_rad = {hall_drive.START_STD[1]}",

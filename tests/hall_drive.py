@@ -12,6 +12,7 @@ LEGS_M_RAD = [(100.0, 0.0), (25.0, math.pi / 2), (50.0, 0.0), (25.0, math.pi / 2
 STEP_S, EVERY, LAP_S = 0.02, 10, 105.0
 SIGMA_RAD, MOUNTING_STD_RAD = 0.05, 0.01
 SCALE_STD, NOISE_M, TURN_NOISE_RAD, BIAS_STD_RADPS = 0.01, 0.02, 0.003, 0.002
+LANE_RMS_M, LANE_WAVE_M = 0.06, 25.0
 START_STD = (0.3, 0.05)  # metres, radians
 
 
@@ -52,17 +53,21 @@ def simulate(world: World) -> HallDrive:
     time_s = np.arange(0.0, LAP_S, STEP_S)
     speed = 3.0 + 0.5 * np.sin(0.2 * time_s) - 3.0 * np.exp(-(((time_s - 45.0) / 3.0) ** 4))
     speed = np.maximum(speed, 0.0) * np.minimum(time_s / 3.0, 1.0)
-    way = np.cumsum(speed) * STEP_S
-    ends = np.cumsum([length for length, _ in LEGS_M_RAD])
-    bends = np.array([turn / length for length, turn in LEGS_M_RAD])
-    swing = 0.02 * np.sin(2 * math.pi * way / 25.0 + rng.uniform(0, 2 * math.pi))
-    bend = bends[np.minimum(np.searchsorted(ends, way), len(bends) - 1)]
-    heading = np.cumsum(speed * bend) * STEP_S + swing
+    along = np.cumsum(speed) * STEP_S  # in the middle of the road, beside which the lane swings
+    ends = np.cumsum([0.0, *(length for length, _ in LEGS_M_RAD)])
+    turns = np.cumsum([0.0, *(turn for _, turn in LEGS_M_RAD)])
+    fine = np.arange(0.0, along[-1] + 1.0, 1e-3)
+    middle = np.interp(fine + 5e-4, ends, turns)
+    road = np.cumsum(np.stack([np.cos(middle), np.sin(middle)]) * 1e-3, axis=1)
+    swing = 2 * math.pi * along / LANE_WAVE_M + rng.uniform(0, 2 * math.pi)
+    aside = math.sqrt(2) * LANE_RMS_M * np.array([1, 2 * math.pi / LANE_WAVE_M])
+    lane, aside = np.interp(along, ends, turns), aside * np.stack([np.sin(swing), np.cos(swing)]).T
+    xy = np.stack([np.interp(along, fine + 1e-3, axis) for axis in road])
+    xy += np.stack([-np.sin(lane), np.cos(lane)]) * aside[:, 0]
+    heading = lane + np.arctan(aside[:, 1])
     rate = np.diff(heading, prepend=heading[0]) / STEP_S
-    middle = heading - 0.5 * rate * STEP_S
-    xy = np.cumsum(np.stack([np.cos(middle), np.sin(middle)]) * speed * STEP_S, axis=1)
-    truth = np.column_stack([xy.T, heading])
-    steps = speed * STEP_S + NOISE_M * np.sqrt(speed * STEP_S) * rng.normal(size=speed.size)
+    truth, moved = np.column_stack([xy.T, heading]), np.hypot(*np.diff(xy, prepend=xy[:, :1]))
+    steps = moved + NOISE_M * np.sqrt(moved) * rng.normal(size=speed.size)
     distance = np.cumsum(steps) * (1 + SCALE_STD * rng.normal())
     noise = TURN_NOISE_RAD / math.sqrt(STEP_S) * rng.normal(size=speed.size)
     yaw = rate + BIAS_STD_RADPS * rng.normal() + noise
@@ -71,8 +76,8 @@ def simulate(world: World) -> HallDrive:
     angles, late, last = [], round(world.late_s / STEP_S), 0.0
     for k in range(EVERY, time_s.size - late, EVERY):
         passed = EVERY * STEP_S / world.stays_s if world.stays_s else 0.0
-        passed += (way[k] - last) / world.stays_m if world.stays_m else 0.0
-        kept, last = math.exp(-passed), way[k]
+        passed += (along[k] - last) / world.stays_m if world.stays_m else 0.0
+        kept, last = math.exp(-passed), along[k]
         for pci, head in HEADS_M.items():
             stays[pci] = kept * stays[pci] + math.sqrt(1 - kept**2) * rng.normal()
             error = math.sqrt(share) * stays[pci] + math.sqrt(1 - share) * rng.normal()
