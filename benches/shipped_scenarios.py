@@ -3,8 +3,8 @@
     python benches/shipped_scenarios.py [--runs 20] [--seed 1] [--only NAME] [--channel NAME]
 
 Asked: 99 % of the errors within 1 m, and beyond the level while ok at most 1e-2; a ``*`` marks what
-falls short. Beside that, 99 % of the errors of a vehicle that is told which radio heads have a line of
-sight and hears no others, where the channel draws that: what no treatment of the others can better.
+falls short. Beside that, 99 % of the errors of a vehicle that is told which radio heads have a line
+of sight and hears no others, where the channel draws that: all that their treatment can gain.
 """
 
 from __future__ import annotations
@@ -50,8 +50,8 @@ def main() -> int:
             print(
                 f"{name:24} {channel:7} {quantiles_m[0.9]:.2f}  {quantiles_m[0.99]:.2f} "
                 f"{100.0 * kept.availability:5.1f}  {kept.exceedance_share:8.1e} "
-                f"{kept.median_level_over_error:6.1f}  {found.runs['energy_j'].mean():10.1f} {told:>6}"
-                f"{' *' if fails else ''}",
+                f"{kept.median_level_over_error:6.1f}  {found.runs['energy_j'].mean():10.1f} "
+                f"{told:>6}{' *' if fails else ''}",
                 flush=True,
             )
     return 1 if short else 0
