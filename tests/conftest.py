@@ -16,6 +16,9 @@ ROOT = Path(__file__).parent.parent
 for size in ("COLUMNS", "LINES"):
     os.environ.pop(size, None)
 
+# A worker a core: threads of linear algebra beside them spend ten times the work on waiting.
+os.environ.setdefault("OPENBLAS_NUM_THREADS", "1")
+
 
 # Files of tests that drive, attack or start programs for longer than a person waits after a change.
 SLOW = {

@@ -301,7 +301,7 @@ fn a_drive_is_the_same_again_and_by_samples_too() {
         let short = [
             (
                 "site.road.polyline_m",
-                common::value("[[-140.0, 0.0], [-80.0, 0.0]]"),
+                common::value("[[-140.0, 0.0], [-110.0, 0.0]]"),
             ),
             ("motion.stops", common::value("[]")),
             ("channel.model", model.into()),
