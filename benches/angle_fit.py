@@ -119,7 +119,10 @@ def two_channels(path: Path) -> Iterator[Case]:
 
 
 def channel_estimates(count: int) -> Iterator[Case]:
-    """What `nr` tells of one SSB in noise: its channel estimate, smoothed over the subcarriers."""
+    """What `nr` tells of one SSB in noise: its channel estimate, smoothed over the subcarriers.
+
+    Taken for 240 snapshots, whitened by its covariance, and the angle that `nr` gives itself.
+    """
     rng = np.random.default_rng(count + 1)
     burst = nr.build_burst(42, ssb_indices=[1], sfn=6, ssb_freq_hz=3.7008e9)
     power = np.mean(np.abs(burst[np.abs(burst) > 0]) ** 2)
@@ -137,8 +140,17 @@ def channel_estimates(count: int) -> Iterator[Case]:
                 scs_khz=30,
             )
             for cell in cells[:1]:
-                smoothed = aoa.maximum_likelihood(cell.channel)
-                for name, angle in (("smoothed channel", smoothed), ("the cell's angle", cell)):
+                looks = aoa.whiten(cell.channel, cell.channel_covariance)
+                variance = float(np.mean(cell.noise_variance))
+                for name, angle in (
+                    ("smoothed channel", aoa.maximum_likelihood(cell.channel)),
+                    ("whitened channel", aoa.maximum_likelihood(looks)),
+                    (
+                        "whitened, noise told",
+                        aoa.maximum_likelihood_pilots(looks, noise_variance=variance),
+                    ),
+                    ("the cell's angle", cell),
+                ):
                     error = (angle.phase_rad - phase + np.pi) % (2 * np.pi) - np.pi
                     told = not angle.doubt
                     found[name].append((error, angle.phase_sigma_rad, told))

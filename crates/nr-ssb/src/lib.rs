@@ -177,6 +177,7 @@ mod standard;
 pub mod track;
 mod transmit;
 
+pub use dsp::channel_covariance::ChannelCovariance;
 pub use error::Error;
 pub use input::{diagnose, front_end};
 pub use num_complex::Complex32;

@@ -11,7 +11,7 @@ pub use searcher::Searcher;
 
 use std::f64::consts::FRAC_PI_2;
 
-use channel::{Blocks, Channel};
+use channel::{Blocks, Channel, Covariance};
 use nr_ssb::receiver::HeardSsb;
 use nr_ssb::search::DetectedSsb;
 use nr_ssb::{Lmax, SubcarrierSpacing};
@@ -78,6 +78,10 @@ use crate::recording::{Recording, RecordingError};
 /// channel : ndarray
 ///     complex64, `(antennas, 240)`: the channel on the SSB's subcarriers as it was received, delay
 ///     and frequency offset taken out. A tone of amplitude one has 256.
+/// channel_covariance : ndarray
+///     complex64, `(240, 240)`: how the noise of `channel`, which is smoothed, hangs together from subcarrier
+///     to subcarrier on each antenna, over `noise_variance`: ``aoa.whiten(cell.channel, cell.channel_covariance)``
+///     is as good as snapshots.
 /// blocks : ndarray
 ///     complex128, `(antennas, 4)`: what the pilots of each symbol say together, calibrated, in noise of
 ///     variance one that is independent from block to block, which that of `channel` is not:
@@ -112,6 +116,7 @@ pub struct Cell {
     doubt: Option<String>,
     p_value: Option<f64>,
     channel: Channel,
+    channel_covariance: Covariance,
     blocks: Blocks,
     noise_variance: Vec<f64>,
 }
@@ -163,6 +168,7 @@ impl Cell {
             ssb_freq_hz,
             scs_khz: spacing.khz(),
             channel: Channel(ssb.channel.clone()),
+            channel_covariance: Covariance(Some(ssb.channel_covariance.clone())),
             blocks: Blocks(view.map_or_else(Vec::new, |view| view.blocks)),
             noise_variance: ssb.noise_variance.clone(),
         );
@@ -204,6 +210,7 @@ impl From<&FoundSsb> for Cell {
             ssb_freq_hz: found.ssb_freq_hz,
             scs_khz: found.spacing.khz(),
             channel: Channel(found.channel.clone()),
+            channel_covariance: Covariance(found.channel_covariance.clone()),
             blocks: Blocks(found.blocks.clone()),
             noise_variance: found.noise_variance.clone(),
         );

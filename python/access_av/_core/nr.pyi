@@ -94,6 +94,9 @@ class Cell:
     def channel(self) -> NDArray[np.complex64]:
         """Channel on the subcarriers as received, complex64 `(antennas, 240)`."""
     @property
+    def channel_covariance(self) -> NDArray[np.complex64]:
+        """Covariance of its noise over `noise_variance`, complex64 `(240, 240)`: `aoa.whiten`."""
+    @property
     def noise_variance(self) -> list[float]:
         """Noise variance of a resource element, each antenna's, in the channel's scale squared."""
 

@@ -13,15 +13,12 @@ use num_complex::{Complex32, Complex64};
 
 use super::base_rate::SYMBOL_FFT;
 use super::cfo::SymbolPairs;
+use super::channel_covariance::{ChannelCovariance, FIRST_TAP, TAPS};
 use super::received_grid::ReceivedGrid;
 use crate::numeric::hermitian;
 use crate::numeric::sums::{complex_product, energy};
 use crate::standard::grid::{SUBCARRIERS, SYMBOLS, SsbGrid};
 
-/// Taps of the channel model, one per sample at the base rate.
-const TAPS: usize = 16;
-/// Delay of the first tap, samples.
-const FIRST_TAP: i32 = -4;
 /// Times the tap powers are learned anew.
 const ITERATIONS: usize = 3;
 
@@ -42,6 +39,8 @@ pub(crate) struct ChannelEstimator {
     pub(crate) noise_variance: Vec<f64>,
     matched: Vec<[Complex64; TAPS]>,
     taps: Vec<[Complex64; TAPS]>,
+    /// Noise over power of each tap, by which it was estimated last.
+    damping: [f64; TAPS],
 }
 
 impl ChannelEstimator {
@@ -63,6 +62,7 @@ impl ChannelEstimator {
             noise_variance: vec![0.0; antennas],
             matched: vec![[Complex64::ZERO; TAPS]; antennas],
             taps: vec![[Complex64::ZERO; TAPS]; antennas],
+            damping: [0.0; TAPS],
         }
     }
 
@@ -156,11 +156,8 @@ impl ChannelEstimator {
         let floor = 1e-3 * mean_noise / known;
         let mut powers = received.map(|power| (power - mean_noise / known).max(floor));
         for _ in 0..ITERATIONS {
-            let mut system = gram;
-            for (tap, power) in powers.iter().enumerate() {
-                system[tap][tap] += mean_noise / power;
-            }
-            let Some(factor) = hermitian::cholesky(&system) else {
+            self.damping = powers.map(|power| mean_noise / power);
+            let Some(factor) = self.factor(&gram) else {
                 return;
             };
             for (taps, matched) in self.taps.iter_mut().zip(&self.matched) {
@@ -182,6 +179,32 @@ impl ChannelEstimator {
             self.noise_variance[antenna] = residual / (known - freedom).max(1.0);
             self.expand(antenna);
         }
+    }
+
+    /// Factor of the system that the taps solve.
+    fn factor(&self, gram: &Matrix) -> Option<Matrix> {
+        let mut system = *gram;
+        for (tap, damping) in self.damping.iter().enumerate() {
+            system[tap][tap] += damping;
+        }
+        hermitian::cholesky(&system)
+    }
+
+    /// How the noise of the last estimate hangs together; nothing where there was none.
+    pub(crate) fn covariance(&self) -> ChannelCovariance {
+        let mut taps = [[Complex64::ZERO; TAPS]; TAPS];
+        let gram = self.gram();
+        if let Some(factor) = self.factor(&gram) {
+            // W G W, W being Hermitian as G is: what W makes of the rows of G, and of the columns of that.
+            let half = gram.map(|row| hermitian::solve(&factor, &row.map(|it| it.conj())));
+            for (i, row) in taps.iter_mut().enumerate() {
+                *row = hermitian::solve(&factor, &half.map(|of| of[i].conj()));
+            }
+            for row in &mut taps {
+                *row = row.map(|it| it.conj());
+            }
+        }
+        ChannelCovariance::new(&taps)
     }
 
     /// Correlations between the symbols, from which the step of phase per symbol is read: known

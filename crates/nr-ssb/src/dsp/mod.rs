@@ -4,6 +4,7 @@ pub(crate) mod alignment;
 pub(crate) mod base_rate;
 pub(crate) mod cancel;
 pub(crate) mod cfo;
+pub(crate) mod channel_covariance;
 pub(crate) mod channel_estimate;
 pub(crate) mod demodulate;
 pub(crate) mod hypotheses;

@@ -3,6 +3,7 @@
 use num_complex::{Complex32, Complex64};
 
 use super::window::Seen;
+use crate::dsp::channel_covariance::ChannelCovariance;
 use crate::one_ssb::measure::Measurement;
 use crate::standard::grid::SUBCARRIERS;
 use crate::standard::message::payload::BchPayload;
@@ -32,6 +33,8 @@ pub struct HeardSsb {
     /// Per antenna the channel on the 240 subcarriers, delay and offset taken out, in the scale of an
     /// unnormalised transform of 256: a tone of amplitude one has 256.
     pub channel: Vec<[Complex32; SUBCARRIERS]>,
+    /// How its noise hangs together from subcarrier to subcarrier.
+    pub channel_covariance: ChannelCovariance,
     /// Per symbol and antenna what the pilots say together, in that scale: the noise has the variance that it
     /// has on a resource element and is independent from block to block, which that of `channel` is not from
     /// subcarrier to subcarrier. What angles are to be estimated from.
@@ -49,7 +52,7 @@ impl HeardSsb {
     pub(super) fn new<const A: usize>(seen: &mut Seen<'_, A>, ratio: f64) -> Self {
         let ssb = seen.ssb;
         let mut channel = vec![[Complex32::ZERO; SUBCARRIERS]; A];
-        seen.tracker.channel(ssb.residual_delay, &mut channel);
+        let channel_covariance = seen.tracker.channel(ssb.residual_delay, &mut channel);
         Self {
             pci: ssb.pci,
             ssb_index: ssb.ssb_index,
@@ -60,6 +63,7 @@ impl HeardSsb {
             cfo_hz: ssb.cfo_hz,
             snr_db: ssb.snr_db,
             channel,
+            channel_covariance,
             blocks: ssb.blocks.iter().map(|block| block.to_vec()).collect(),
             noise_variance: ssb.noise_variance.to_vec(),
             measurements: ssb.measurements.to_vec(),

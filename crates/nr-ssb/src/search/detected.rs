@@ -2,6 +2,7 @@
 
 use num_complex::Complex32;
 
+use crate::dsp::channel_covariance::ChannelCovariance;
 use crate::dsp::received_grid::{MAX_ANTENNAS, ReceivedGrid};
 use crate::one_ssb::measure::Measurement;
 use crate::standard::grid::{SUBCARRIERS, SsbGrid};
@@ -60,6 +61,8 @@ pub struct ReceivedSsb<'a> {
     pub known: &'a SsbGrid,
     /// The channel on the 240 subcarriers, per antenna.
     pub channel: &'a [[Complex32; SUBCARRIERS]],
+    /// How its noise hangs together from subcarrier to subcarrier.
+    pub channel_covariance: &'a ChannelCovariance,
     /// Variance of the noise on a resource element, per antenna.
     pub noise_variance: &'a [f64],
 }

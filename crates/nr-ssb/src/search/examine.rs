@@ -188,6 +188,7 @@ impl Examiner {
         self.report(block_start, &acquired, broadcast.as_ref());
         if let Some(ssb) = self.found.last() {
             let received = ReceivedSsb {
+                channel_covariance: &self.acquirer.estimate.covariance(),
                 elements: &self.acquirer.grids,
                 known: &self.acquirer.reference,
                 channel: &self.acquirer.estimate.channel,

@@ -14,6 +14,7 @@ use super::late::REACH;
 use super::tracked::Tracked;
 use crate::dsp::alignment::Alignment;
 use crate::dsp::base_rate::{CYCLIC_PREFIX, SYMBOL_FFT};
+use crate::dsp::channel_covariance::ChannelCovariance;
 use crate::dsp::timing;
 use crate::numeric::decibel::decibel;
 use crate::one_ssb::acquire::{Acquired, Acquirer};
@@ -200,8 +201,12 @@ impl<const A: usize> Tracker<A> {
     }
 
     /// The channel on the 240 subcarriers of every antenna, by all that is known of the last SSB, with
-    /// its `residual_delay` taken out.
-    pub fn channel(&mut self, residual_delay: f64, channel: &mut [[Complex32; SUBCARRIERS]]) {
+    /// its `residual_delay` taken out, and how its noise hangs together from subcarrier to subcarrier.
+    pub fn channel(
+        &mut self,
+        residual_delay: f64,
+        channel: &mut [[Complex32; SUBCARRIERS]],
+    ) -> ChannelCovariance {
         let Acquirer {
             estimate,
             grids,
@@ -213,6 +218,7 @@ impl<const A: usize> Tracker<A> {
         for (slot, estimate) in channel.iter_mut().zip(&estimate.channel) {
             *slot = std::array::from_fn(|k| estimate[k] * ramp[k]);
         }
+        estimate.covariance().delayed(residual_delay)
     }
 
     /// SSBs of a burst set, told or taken for the likelier.

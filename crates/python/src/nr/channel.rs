@@ -1,5 +1,6 @@
 //! Channels of an SSB as an array.
 
+use nr_ssb::ChannelCovariance;
 use nr_ssb::grid::SUBCARRIERS;
 use num_complex::{Complex32, Complex64};
 use numpy::{PyArray1, PyArray2, PyArrayMethods};
@@ -7,6 +8,21 @@ use pyo3::prelude::*;
 
 /// Per antenna the channel on the subcarriers; in Python complex64 of shape `(antennas, 240)`.
 pub struct Channel(pub Vec<[Complex32; SUBCARRIERS]>);
+
+/// How the channel's noise hangs together; in Python complex64 of shape `(240, 240)`.
+pub struct Covariance(pub Option<ChannelCovariance>);
+
+impl<'py> IntoPyObject<'py> for &Covariance {
+    type Target = PyArray2<Complex32>;
+    type Output = Bound<'py, Self::Target>;
+    type Error = PyErr;
+
+    fn into_pyobject(self, py: Python<'py>) -> PyResult<Self::Output> {
+        let rows = self.0.as_ref().map(ChannelCovariance::rows);
+        let rows = rows.unwrap_or_default();
+        PyArray1::from_slice(py, rows.as_flattened()).reshape([rows.len(), SUBCARRIERS])
+    }
+}
 
 /// Per symbol the antennas' responses; in Python complex128 of shape `(antennas, symbols)`.
 pub struct Blocks(pub Vec<Vec<Complex64>>);

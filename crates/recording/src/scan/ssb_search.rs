@@ -4,7 +4,7 @@
 use nr_ssb::front_end::FrontEnd;
 use nr_ssb::grid::SUBCARRIERS;
 use nr_ssb::search::{DetectedSsb, SearchConfig, SearchError, Searcher};
-use nr_ssb::{Complex32, Pci, SubcarrierSpacing};
+use nr_ssb::{ChannelCovariance, Complex32, Pci, SubcarrierSpacing};
 
 use super::diagnosis::ExchangeVotes;
 use super::error::ScanError;
@@ -89,6 +89,8 @@ pub struct FoundSsb {
     pub blocks: Vec<Vec<Complex64>>,
     /// Per antenna the channel on the SSB's subcarriers, as received, delay and offset taken out.
     pub channel: Vec<[Complex32; SUBCARRIERS]>,
+    /// How its noise hangs together from subcarrier to subcarrier.
+    pub channel_covariance: Option<ChannelCovariance>,
     /// Variance of the noise on a resource element, per antenna, in the channel's scale squared.
     pub noise_variance: Vec<f64>,
 }
@@ -99,6 +101,7 @@ struct Seen {
     sample_start: f64,
     view: Option<View>,
     channel: Vec<[Complex32; SUBCARRIERS]>,
+    channel_covariance: ChannelCovariance,
     noise_variance: Vec<f64>,
 }
 
@@ -247,6 +250,7 @@ impl SsbSearch {
                     sample_start: ssb.sample_start,
                     view,
                     channel: received.channel.to_vec(),
+                    channel_covariance: received.channel_covariance.clone(),
                     noise_variance: received.noise_variance.to_vec(),
                 });
             })
@@ -258,9 +262,11 @@ impl SsbSearch {
                 .iter()
                 .position(same)
                 .map(|place| seen.swap_remove(place));
-            let (view, channel, noise_variance) = seen.map_or_else(Default::default, |it| {
-                (it.view, it.channel, it.noise_variance)
-            });
+            let (view, channel, channel_covariance, noise_variance) =
+                seen.map_or_else(Default::default, |it| {
+                    let covariance = Some(it.channel_covariance);
+                    (it.view, it.channel, covariance, it.noise_variance)
+                });
             FoundSsb {
                 sample_start: ssb.sample_start * ratio,
                 sample_count: SSB_SAMPLES as f64 * ratio,
@@ -269,6 +275,7 @@ impl SsbSearch {
                 angle: view.as_ref().map(|view| view.angle),
                 blocks: view.map_or_else(Vec::new, |view| view.blocks),
                 channel,
+                channel_covariance,
                 noise_variance,
                 ssb: ssb.clone(),
             }
