@@ -195,6 +195,8 @@ def test_a_recording_in_real_time_is_not_read_where_nothing_is_wanted(tmp_path: 
     settings.write_text(told + f'[output.json]\naddress = "{tmp_path}/node.jsonl"\n')
     node = subprocess.Popen(command(drive, settings), stderr=subprocess.PIPE, text=True)
     wheels.run()
+    with urllib.request.urlopen(f"http://127.0.0.1:{page}/state.json") as answer:
+        state = json.load(answer)
     node.terminate()
     _, said = node.communicate(timeout=10.0)
     wheels.close()
@@ -206,6 +208,8 @@ def test_a_recording_in_real_time_is_not_read_where_nothing_is_wanted(tmp_path: 
     assert heard[-2:] == [heard[-1] - 3, heard[-1]]
     later = [it for it in records if it["type"] == "verdict" and it["time_s"] > 1.0]
     assert all(it["accepted"] for it in later), later
+    # Each radio head by the search at the start, and then where it is expected.
+    assert state["found_by_search"] == 4
     # A source that is switched off is not silent.
     silent = [it for it in records if "nothing has come" in it.get("text", "")]
     assert not [it for it in silent if it["source"] == "samples" and it["time_s"] < 8.5], silent
@@ -433,10 +437,7 @@ def driven_by_udp(drive: Path, folder: Path, page: int, broker: Broker) -> Itera
 
 
 @pytest.mark.skipif(CHROMIUM is None, reason="no Chromium")
-@pytest.mark.skipif(not SCHEMAS.exists(), reason=f"no {SCHEMAS} (ACCESS_AV_DATA)")
-def test_two_tabs_come_back_after_a_restart_and_vda_5050_2_1_is_told(
-    drive: Path, tmp_path: Path
-) -> None:
+def test_two_tabs_come_back_after_a_restart(drive: Path, tmp_path: Path) -> None:
     page, broker = free_port(), Broker()
     live = "document.getElementById('link')?.textContent === 'live'"
     lost = "document.getElementById('link')?.className === 'lost'"
@@ -453,6 +454,14 @@ def test_two_tabs_come_back_after_a_restart_and_vda_5050_2_1_is_told(
             for tab in both:
                 tab.wait_for(live, seconds=15.0)
                 assert not tab.errors
+    broker.heard()
+
+
+@pytest.mark.skipif(not SCHEMAS.exists(), reason=f"no {SCHEMAS} (ACCESS_AV_DATA)")
+def test_the_position_is_one_of_vda_5050_2_1(drive: Path, tmp_path: Path) -> None:
+    broker = Broker()
+    with driven_by_udp(drive, tmp_path, free_port(), broker):
+        time.sleep(1.5)
     positions = broker.heard()
     schema = json.loads((SCHEMAS / "state-2.1.schema").read_text(encoding="utf-8"))
     validator = jsonschema.Draft7Validator(
