@@ -33,7 +33,10 @@ def main() -> None:
         both_s = 0.5 * (after.user - before.user + after.system - before.system)
         guarded = all(
             it.scenario.vehicle.alert_limit_m is not None
-            for it in [found.believed, found.poor, *(point.driven for point in found.points)]
+            for it in [
+                *(found.believed, found.poor),
+                *(one.driven for one in [*found.mended, *found.points]),
+            ]
         )
         on_front = found.recommended in found.front
         short |= both_s > MOST_S or not (guarded and on_front)

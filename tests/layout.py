@@ -15,6 +15,7 @@ if TYPE_CHECKING:
 MEASURE = """
 (() => {
   const found = [];
+  document.querySelectorAll("details").forEach((it) => { it.open = true; });
   const name = (it) => (it.textContent || "").trim().slice(0, 40);
   if (document.documentElement.scrollWidth > innerWidth + 1)
     found.push(`page is ${document.documentElement.scrollWidth} px wide in ${innerWidth}`);

@@ -262,13 +262,16 @@ def test_money_and_carbon_add_up(said: dict[str, Any], page: str) -> None:
     assert "EUR" in page
 
 
-def test_places_are_those_of_the_road(results: Path, said: dict[str, Any]) -> None:
+def test_places_are_those_of_the_road(results: Path, said: dict[str, Any], page: str) -> None:
     places = pl.read_csv(results / "places.csv")
     assert places["along_m"].to_list()[:3] == [0.5, 1.5, 2.5]
     assert (places["passes"] == (places["target_error_m"] <= 0.2)).all()
     worst = max(said["worst"], key=lambda it: it["error_m"])
     assert worst["error_m"] == pytest.approx(places["target_error_m"].max(), abs=1e-4)
     assert all(it["why"] for it in said["worst"])
+    assert "These figures every 3 m" in page
+    for name in ("target_error_m", "median_error_m", "bound_m"):
+        assert f"{places[name][9]:.3f} m" in page
     # Levels and reliability, again from the errors' table.
     route = along_route(Plant.from_toml(PLANT).scenario())
     rows = pl.read_parquet(results / "errors.parquet").filter(variant="as it is")

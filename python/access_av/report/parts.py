@@ -95,4 +95,6 @@ def warnings(found: Iterable[object]) -> str:
 
 def source(title: str, text: str) -> str:
     """A file to unfold."""
-    return f"<details><summary>{escape(title)}</summary><pre>{escape(text)}</pre></details>"
+    # What scrolls can be reached by keyboard.
+    shown = f'<pre tabindex="0">{escape(text)}</pre>'
+    return f"<details><summary>{escape(title)}</summary>{shown}</details>"

@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import json
+import math
 from html import escape
 from importlib.metadata import version
 from typing import TYPE_CHECKING
@@ -28,6 +29,8 @@ _KINDS = {
     "probably not good enough": "fit",
     "not good enough": "no",
 }
+# Rows of the table along the road.
+MOST_PLACES = 30
 _OUTCOMES = {"helps": "yes", "not sure": "fit", "makes it worse": "no"}
 
 
@@ -176,7 +179,34 @@ def _where(study: Study) -> str:
             "road. It is geometry alone; the error is what the odometer makes of it besides.",
             "Geometry and signal",
         )
-        + "</div>",
+        + f"</div>{_places(study)}",
+    )
+
+
+def _places(study: Study) -> str:
+    """What the charts along the road show, as a table to unfold."""
+    step = math.ceil(study.places.height / MOST_PLACES)
+    rows = [
+        (
+            f"{place['along_m']:.0f} m",
+            badge("kept", "yes") if place["passes"] else badge("missed", "no"),
+            f"{place['target_error_m']:.3f} m",
+            f"{place['median_error_m']:.3f} m",
+            "–" if place["level_m"] is None else f"{place['level_m']:.2f} m",
+            f"{place['reliable_share']:.0%}",
+            f"{place['bound_m']:.3f} m",
+            "–" if (it := place["dilution_of_degree_m"]) is None else f"{it:.2f} m",
+            "–" if (it := place["best_snr_db"]) is None else f"{it:.0f} dB",
+        )
+        for place in study.places.gather_every(step).iter_rows(named=True)
+    ]
+    head = (
+        "Along the road", "Target", f"{study.percent:g} % within", "half within", "level",
+        "reliable", "least RMS", "dilution", "SNR",
+    )  # fmt: skip
+    return (
+        f"<details><summary>These figures every {step} m</summary>"
+        f"{table(head, rows, numbers=range(2, 9))}</details>"
     )
 
 

@@ -36,7 +36,8 @@ def road_map(study: Study) -> Spec:
         .group_by("stretch", maintain_order=True)
         .agg(
             pl.first("along_m", "x_m", "y_m"),
-            pl.max("target_error_m"),
+            pl.max("target_error_m", "level_m"),
+            pl.min("reliable_share", "best_snr_db"),
         )
         .with_columns(
             x2_m=pl.col("x_m").shift(-1).fill_null(places["x_m"][-1]),
@@ -57,6 +58,9 @@ def road_map(study: Study) -> Spec:
         tooltip=[
             alt.Tooltip("along_m:Q", title="along the road / m", format=".0f"),
             alt.Tooltip("target_error_m:Q", title=f"{study.percent:g} % within / m"),
+            alt.Tooltip("level_m:Q", title="protection level / m"),
+            alt.Tooltip("reliable_share:Q", title="reliable", format=".0%"),
+            alt.Tooltip("best_snr_db:Q", title="SNR of the strongest / dB", format=".0f"),
         ],
     )
     layers = [*frame.beneath(site), drawn, *frame.masts(heads)]
