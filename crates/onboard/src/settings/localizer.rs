@@ -51,8 +51,9 @@ pub struct TrackerSettings {
     /// Distance over which the curvature is forgotten, in metres.
     #[schemars(range(min = 1e-3, max = 1e6))]
     pub curvature_correlation_m: f64,
-    /// How the odometer's scale walks, per root of a metre driven; 0 is a constant scale on a road,
-    /// and 0.05 for a differential drive.
+    /// How the odometer's scale walks, per root of a metre driven; 0 is a constant scale on a road and
+    /// where the odometer's scale deviation and noise are stated, and 0.03 for any other differential
+    /// drive.
     #[schemars(range(min = 0.0, max = 1.0))]
     pub odometer_scale_walk_per_sqrt_m: f64,
     /// Probability with which a good angle is taken for an outlier.

@@ -2,6 +2,7 @@
 
 use onboard::geometry::Pose;
 use onboard::localize::built_in;
+use onboard::localize::ekf::EkfConfig;
 use onboard::observation::OdometrySample;
 use onboard::settings::{Shipped, Site, TomlFile, Vehicle};
 
@@ -83,4 +84,17 @@ fn turns_on_the_spot() {
 fn without_a_yaw_rate_it_does_not_know_where_it_heads() {
     let (pose, [_, y_std_m, heading_std_rad]) = end(false);
     assert!(heading_std_rad > 1.5 && (pose.y_m - 5.0).abs() < 3.0 * y_std_m);
+}
+
+#[test]
+fn a_scale_walks_unless_all_of_the_odometer_is_told() {
+    let site = Site::from_library("trip-2", &Shipped).unwrap();
+    let walk_of = |vehicle: &str| {
+        let vehicle = Vehicle::from_toml(vehicle, "agv", &Shipped).unwrap();
+        EkfConfig::new(&site, &vehicle).noise.scale_per_sqrt_m
+    };
+    assert_eq!(walk_of(VEHICLE), 0.0);
+    for told in ["scale_std = 0.003\n", "noise_m_per_sqrt_m = 0.01\n"] {
+        assert!(walk_of(&VEHICLE.replace(told, "")) > 0.0, "{told}");
+    }
 }

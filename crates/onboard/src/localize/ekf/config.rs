@@ -225,6 +225,13 @@ impl EkfConfig {
             }
         };
         let odometer_scale_std = or_usual(odometer.scale_std, |it| it.odometer_scale_std);
+        // A data sheet that tells scale and noise tells all; one of them alone does not make the rest exact.
+        let is_told = odometer.scale_std > 0.0 && odometer.noise_m_per_sqrt_m > 0.0;
+        let walk: fn(&Usual) -> f64 = if is_told {
+            |_| 0.0
+        } else {
+            |it| it.scale_per_sqrt_m
+        };
         // A track that is wider than stated turns less.
         let track_share = |width_m| odometer.track_width_std_m / width_m;
         let track_share = odometer.track_width_m.map_or(0.0, track_share);
@@ -266,9 +273,7 @@ impl EkfConfig {
                 odometer_m_per_sqrt_s: or_usual(odometer.noise_m_per_sqrt_s, |it| {
                     it.odometer_m_per_sqrt_s
                 }),
-                scale_per_sqrt_m: or_usual(settings.odometer_scale_walk_per_sqrt_m, |it| {
-                    it.scale_per_sqrt_m
-                }),
+                scale_per_sqrt_m: or_usual(settings.odometer_scale_walk_per_sqrt_m, walk),
                 yaw_bias_radps_per_sqrt_s: gyroscope
                     .map_or(0.0, |it| it.bias_walk_radps_per_sqrt_s),
                 mounting_rad_per_sqrt_m: array.mounting_drift_rad_per_sqrt_m,
