@@ -1,5 +1,6 @@
 //! How soon a cell is found whose oscillator is off, and whether its beams are told apart: by a receiver of a
-//! stream, as Python's is, and by one of windows about the bursts, as a vehicle that sleeps in between has.
+//! stream that searches 20 ppm, as Python's is, and by one of windows about the bursts that searches 60 ppm, as a
+//! vehicle that sleeps in between has.
 //!
 //! ```sh
 //! cargo run --release -p nr-ssb --example oscillators -- 5    # trials of each setting
@@ -22,6 +23,8 @@ const SOON: usize = 3;
 const SOON_S: f64 = 0.25;
 const MORE: usize = 3;
 const SSB_FREQ_HZ: f64 = 3.6e9;
+/// What the receiver on a vehicle searches.
+const VEHICLE_PPM: f64 = 60.0;
 
 /// What was heard: number of the burst, beam.
 type Heard = Vec<(usize, u8)>;
@@ -73,7 +76,12 @@ fn trial(spacing: SubcarrierSpacing, period_s: f64, ppm: f64, seed: u64) -> [(He
     let usual = ReceiverConfig::new(SSB_FREQ_HZ, spacing, ANTENNAS);
     let config = ReceiverConfig { period_s, ..usual };
     let mut stream = Receiver::new(config.clone(), spacing.base_rate_hz(), SSB_FREQ_HZ).unwrap();
-    let mut windows = WindowReceiver::<ANTENNAS>::new(config).unwrap();
+    let widest_ppm = ReceiverConfig::widest_ppm(SSB_FREQ_HZ, spacing);
+    let of_vehicle = ReceiverConfig {
+        oscillator_ppm: VEHICLE_PPM.min(widest_ppm),
+        ..config
+    };
+    let mut windows = WindowReceiver::<ANTENNAS>::new(of_vehicle).unwrap();
     let mut heard = [(Heard::new(), 0), (Heard::new(), 0)];
     let mut note = |which: usize, sample_start: f64, ssb_index: u8| {
         let (right, wrong) = &mut heard[which];
