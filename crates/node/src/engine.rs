@@ -408,7 +408,13 @@ impl Engine {
             self.board.show(now_s, &status, heads, &energy, counts);
         }
         if tells {
-            self.last_status_s = now_s;
+            // In step, not a second from whatever came first after the last was due.
+            let due_s = self.last_status_s + STATUS_S;
+            self.last_status_s = if now_s - due_s < STATUS_S {
+                due_s
+            } else {
+                now_s
+            };
             self.watchdog
                 .say(format!("{}: {}", status.state.name(), status.reason));
             self.records.put(Record::Status {
