@@ -105,6 +105,8 @@ def whiten(
 
     Examples
     --------
+    >>> import numpy as np
+    >>> from access_av.aoa import whiten
     >>> channel = np.outer(np.exp(0.7j * np.arange(4)), np.ones(240))
     >>> mean = np.full((240, 240), 1 / 240)  # over all subcarriers: one look
     >>> whiten(channel, mean).shape
