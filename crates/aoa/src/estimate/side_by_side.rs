@@ -84,7 +84,6 @@ impl<const N: usize> SideBySide<'_, N> {
         self.of_covariances_generic::<true, W>(covariances, estimates)
     }
 
-    /// An item alone has no lanes to fill: longer vectors bring it nothing.
     #[cfg(target_arch = "x86_64")]
     #[target_feature(enable = "avx2,fma,avx512f")]
     fn of_covariances_avx512<const W: usize>(
@@ -92,11 +91,7 @@ impl<const N: usize> SideBySide<'_, N> {
         covariances: &Hermitians<N, W>,
         estimates: &mut [AngleEstimate],
     ) -> Result<(), (usize, Error)> {
-        if W == 1 {
-            self.of_covariances_avx2(covariances, estimates)
-        } else {
-            self.of_covariances_generic::<true, W>(covariances, estimates)
-        }
+        self.of_covariances_generic::<true, W>(covariances, estimates)
     }
 
     #[inline(always)]
