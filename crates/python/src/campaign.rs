@@ -255,8 +255,9 @@ fn errors(py: Python<'_>, campaign: &Campaign) -> PyResult<Py<PyArray3<f32>>> {
 fn levels(py: Python<'_>, campaign: &Campaign) -> PyResult<Py<PyArray2<f32>>> {
     let runs = campaign.runs.len();
     let shape = [runs, campaign.levels_m.len() / runs];
-    let flat = PyArray1::from_slice(py, &campaign.levels_m);
-    Ok(flat.reshape(shape)?.unbind())
+    let levels_m = campaign.levels_m.iter();
+    let flat = levels_m.map(|it| it.unwrap_or(f32::NAN));
+    Ok(PyArray1::from_iter(py, flat).reshape(shape)?.unbind())
 }
 
 fn python_error(error: SimulationError) -> PyErr {

@@ -124,8 +124,8 @@ pub struct Campaign {
     pub records: Vec<RunRecord>,
     /// Errors in x and y in metres of each run at every so many SSBs, run by run, where asked for.
     pub errors_m: Vec<[f32; 2]>,
-    /// Protection levels in metres at the same SSBs; NaN where the pose may not be relied on.
-    pub levels_m: Vec<f32>,
+    /// Protection levels in metres at the same SSBs; none where the pose may not be relied on.
+    pub levels_m: Vec<Option<f32>>,
 }
 
 #[derive(Default, Clone)]

@@ -36,11 +36,11 @@ impl Step {
         [estimate.x_m - truth.x_m, estimate.y_m - truth.y_m].map(|error_m| error_m as f32)
     }
 
-    /// Protection level in metres; NaN where the pose may not be relied on.
-    pub fn level_while_ok_m(&self) -> f32 {
+    /// Protection level in metres; `None` where the pose may not be relied on.
+    pub fn level_while_ok_m(&self) -> Option<f32> {
         let relied_on = |it: &Integrity| it.state == IntegrityState::Ok && !self.searching;
         let level_m = self.integrity.filter(relied_on);
-        level_m.map_or(f32::NAN, |it| it.protection_level_m as f32)
+        level_m.map(|it| it.protection_level_m as f32)
     }
 
     /// Horizontal error in metres.
