@@ -25,6 +25,7 @@ from rosbags.highlevel import AnyReader
 from rosbags.typesys import Stores, get_typestore
 
 import access_av
+import layout
 from access_av.drives.recorded import log_angles
 from browser import Browser
 from conftest import ROOT
@@ -454,6 +455,8 @@ def test_two_tabs_come_back_after_a_restart(drive: Path, tmp_path: Path) -> None
             for tab in both:
                 tab.wait_for(live, seconds=15.0)
                 assert not tab.errors
+                if "ACCESS_AV_AXE" in os.environ:
+                    assert layout.hindrances(tab) == []
     broker.heard()
 
 
