@@ -10,8 +10,9 @@ use crate::gate::Gate;
 use crate::inbox::{Block, Inbox, Input};
 use crate::statistics::SourceHealth;
 
-/// Samples of a block in seconds, where all are wanted and in a window: that is read at its end, as a whole.
+/// Samples of a block in seconds where all are wanted.
 const BLOCK_S: f64 = 1e-3;
+/// The same in a window, at most: that is read at its end, as a whole; a burst of SSBs is over in half a frame (5 ms).
 const WINDOW_S: f64 = 10e-3;
 
 /// A recording block by block, in order of time; where samples are missing between its captures none come.

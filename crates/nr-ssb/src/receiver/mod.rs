@@ -1,8 +1,9 @@
 //! One receiver: samples of any rate in, SSBs with the channel of every antenna out.
 //!
 //! Until a beam is found, and from then on once in [`search_every_s`](ReceiverConfig::search_every_s) unless
-//! all [`beams`](ReceiverConfig::beams) that are known come, all samples of a period are searched; between searches an SSB is looked at only where it is expected. That is
-//! [`WindowReceiver`], which takes windows of samples at the base rate; [`StreamReceiver`] puts the [front
+//! all [`beams`](ReceiverConfig::beams) that are known come, all samples of a period are searched; between
+//! searches an SSB is looked at only where it is expected. That is [`WindowReceiver`], which takes windows of
+//! samples at the base rate; [`StreamReceiver`] puts the [front
 //! end](crate::front_end) before it, for samples of any rate in blocks of any length, with gaps; and
 //! [`Receiver`] is that of a number of antennas which is not part of its type.
 //!
