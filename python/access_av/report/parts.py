@@ -58,7 +58,7 @@ def table(
         for row in rows
     )
     return (
-        f'<div class="table"><table class="{kind}"><thead><tr>{top}</tr></thead>'
+        f'<div class="table" tabindex="0"><table class="{kind}"><thead><tr>{top}</tr></thead>'
         f"<tbody>{body}</tbody></table></div>"
     )
 

@@ -11,7 +11,7 @@ import polars as pl
 
 from access_av.designs.operating_points import Query, explore
 from access_av.paper.statements import ADAPTIVE_LABEL, of_claim
-from access_av.report.chart import finish
+from access_av.report.chart import finish, with_labels
 from access_av.report.paper.lines import COLOURS, NAMES, by_mode, scale
 from access_av.report.parts import figure, table
 
@@ -38,7 +38,14 @@ def _projection(evaluation: Evaluation, axis: str) -> Spec:
     """The adaptive points of all modes, seen along one of the paper's two error axes."""
     points = evaluation.campaign("R").filter(pl.col("energy_j").is_not_null())
     columns = ("mode", "energy_j", "worst_error_x_m", "worst_error_y_m")
-    base = alt.Chart(points.select(columns).with_columns(pl.col(pl.Float64).round(4))).encode(
+    named = with_labels(
+        points.select(columns).with_columns(pl.col(pl.Float64).round(4)),
+        "mode",
+        pl.col("energy_j"),
+        pl.col(f"worst_error_{axis}_m"),
+        [(energy_j, 0.0) for energy_j in points["energy_j"].head(1)],
+    )
+    base = alt.Chart(named).encode(
         x=alt.X("energy_j:Q", title="energy of a trip / J", scale=alt.Scale(zero=False)),
         y=alt.Y(f"worst_error_{axis}_m:Q", title=f"worst error in {axis.upper()} / m"),
         tooltip=[
@@ -49,7 +56,7 @@ def _projection(evaluation: Evaluation, axis: str) -> Spec:
         ],
     )
     dots = base.mark_circle(size=110, color=COLOURS[ADAPTIVE_LABEL])
-    numbers = base.mark_text(dy=-11, fontSize=11).encode(text="mode:O")
+    numbers = base.mark_text(dy=-11, fontSize=11).encode(text="label:N")
     return finish(
         dots + numbers,
         height=240,
@@ -109,6 +116,8 @@ def _chart(evaluation: Evaluation) -> Spec:
         bind=alt.binding_range(min=0.05, max=round(most_m, 2), step=0.01, name="RMS at most / m "),
     )
     meets = f"datum.energy_j <= {budget.name} && datum.rms_error_m <= {bound.name}"
+    corner = [(energy_j, 0.0) for energy_j in table["energy_j"].head(1)]
+    table = with_labels(table, "mode", pl.col("energy_j"), pl.col("rms_error_m"), corner)
     base = alt.Chart(table).encode(
         x=alt.X("energy_j:Q", title="energy of a trip / J", scale=alt.Scale(zero=False)),
         y=alt.Y("rms_error_m:Q", title="RMS error / m", scale=alt.Scale(zero=True)),
@@ -131,7 +140,7 @@ def _chart(evaluation: Evaluation) -> Spec:
         )
         .add_params(budget, bound)
     )
-    numbers = base.mark_text(dy=-11, fontSize=11).encode(text="mode:O")
+    numbers = base.mark_text(dy=-11, fontSize=11).encode(text="label:N")
     limits = alt.Chart(pl.DataFrame({"any": [0]})).mark_rule(strokeDash=[4, 3])
     vertical = limits.transform_calculate(limit=budget.name).encode(x="limit:Q")
     horizontal = limits.transform_calculate(limit=bound.name).encode(y="limit:Q")

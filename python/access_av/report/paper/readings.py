@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import math
 from html import escape
 from typing import TYPE_CHECKING
 
@@ -12,7 +13,7 @@ from access_av.paper import summary
 from access_av.paper.chosen import entries
 from access_av.paper.statements import half as half_of
 from access_av.paper.statements import of_claim
-from access_av.report.chart import BLUE, GREEN, GREY, ORANGE, finish
+from access_av.report.chart import BLUE, GREEN, GREY, ORANGE, finish, with_labels
 from access_av.report.parts import badge, figure, table
 from access_av.tables.numbers import value_text
 
@@ -98,7 +99,11 @@ def overview(study: Study, specs: dict[str, Spec]) -> str:
             y2="high:Q",
         )
     )
-    base = alt.Chart(pl.DataFrame(rows)).encode(
+    corners = [(math.log(0.9 * least_m), y["low"]), (math.log(bound_m), y["high"])]
+    named = with_labels(
+        pl.DataFrame(rows), "number", pl.col("worst").log(), pl.col("saving"), corners
+    )
+    base = alt.Chart(named).encode(
         x="worst:Q",
         y="saving:Q",
         tooltip=["reading:N", alt.Tooltip("worst:Q", format=".3f"),
@@ -112,7 +117,7 @@ def overview(study: Study, specs: dict[str, Spec]) -> str:
             legend=alt.Legend(title="keeps", orient="top"),
         )
     )
-    numbers = base.mark_text(dx=11, dy=-9, fontSize=11).encode(text="number:N")
+    numbers = base.mark_text(dx=11, dy=-9, fontSize=11).encode(text="label:N")
     specs["overview"] = finish(
         promised + dots + numbers,
         height=300,
