@@ -5,6 +5,9 @@ SHELL := bash
 BIN := .venv/bin
 SOURCES := $(shell find crates sites vehicles scenarios platforms plants -type f 2>/dev/null) Cargo.toml Cargo.lock pyproject.toml
 
+# Nothing is compiled twice by make: what incremental builds keep for that costs time, and what they build is slower.
+export CARGO_INCREMENTAL ?= 0
+
 # Tests of a file stay in one process: they share what it has driven.
 PYTEST := $(BIN)/python -m pytest --numprocesses auto --dist loadscope
 
@@ -12,7 +15,7 @@ PYTEST := $(BIN)/python -m pytest --numprocesses auto --dist loadscope
 DATA := $(abspath $(or $(ACCESS_AV_DATA),../shared/data))
 
 .DEFAULT_GOAL := help
-.PHONY: help demo live check test attack test-aarch64 count-aarch64 package lint lint-python docs figures picture bench clean
+.PHONY: help demo live check test attack test-radio test-aarch64 count-aarch64 package lint lint-python docs figures picture bench clean
 
 help: ## List these commands
 	@sed -n 's/^\([a-z0-9-]*\):.*## /  make \1\t/p' $(MAKEFILE_LIST) | expand -t 20
@@ -20,12 +23,12 @@ help: ## List these commands
 demo: .venv/installed ## Install into .venv, evaluate the paper under every reading, write results/latest/report.html
 	$(BIN)/access-av evaluate
 
-NODE := target/release/access-av-node
+NODE := target/debug/access-av-node
 live: .venv/installed-live $(NODE) ## Drive a simulated yard in real time into the node, and open its page (Ctrl-C ends it)
 	$(BIN)/python examples/live/live.py --node $(NODE) $(LIVE)
 
 $(NODE): $(SOURCES)
-	cargo build --release --package access-av-node
+	cargo build --package access-av-node
 
 check: lint ## Check after a change: formats, lints, types, the fast tests of both languages
 	cargo test --workspace --quiet --lib
@@ -43,6 +46,10 @@ test: lint ## Run everything: formats, lints, types, every test of both language
 
 attack: .venv/installed-test ## Attack it with random input, drives and plug-ins; SEED=… repeats an attack
 	$(BIN)/python -m attack $(if $(SEED),--seed $(SEED)) $(ATTACK)
+
+test-radio: .venv/installed-test ## Build the node with SoapySDR (Debian: libsoapysdr-dev) and test it with a radio that plays a drive
+	cargo build --package access-av-node --features soapy
+	$(BIN)/python -m pytest tests/vehicle/test_radio.py
 
 AARCH64 := aarch64-unknown-linux-gnu
 # What the compiler of another processor needs (Debian: rustc-web cargo-web libstd-rust-web-dev:arm64
@@ -107,27 +114,31 @@ clean: ## Remove what was built (results stay)
 
 # Says what is being built, and all of it where that fails.
 define install
-	@$(BIN)/python -m pip install --verbose --editable $(1) 2>&1 | tee .venv/install.log \
+	@$(BIN)/python -m pip install --verbose --editable $(1) --config-settings build-args='--profile $(2)' 2>&1 \
+	  | tee .venv/install.log \
 	  | { grep --line-buffered -oE "(Downloading|Compiling) [^ ]+|Finished .release.*|Finished .dev.*" || true; } \
 	  || { tail -n 60 .venv/install.log; exit 2; }
-	@rm -f .venv/installed .venv/installed-test
 	@touch $@
 endef
 
-# The fast build, as wheels have it.
+# Built once for all but benchmarks, as Rust's own tests are: in half the time, and it checks for overflow.
 .venv/installed: .venv/bin/python $(SOURCES)
-	@echo "Building the Rust core with every optimisation: some minutes, once"
-	$(call install,.)
+	@echo "Building the Rust core: some minutes, once"
+	$(call install,.,dev)
+	@rm -f .venv/installed-bench
 
-# For tests what Rust's own tests compile anyway: in seconds after a change, and it checks for overflow.
 .venv/installed-test: .venv/bin/python $(SOURCES)
-	@echo "Building the Rust core as its tests compile it"
-	$(call install,'.[test]' --config-settings build-args='--profile dev')
+	@echo "Building the Rust core: some minutes, once"
+	$(call install,'.[test]',dev)
+	@rm -f .venv/installed-bench
+	@touch .venv/installed
 
 .venv/installed-live: .venv/installed
-	$(BIN)/python -m pip install --quiet --editable '.[live]'
+	$(BIN)/python -m pip install --quiet --editable '.[live]' --config-settings build-args='--profile dev'
 	@touch $@
 
-.venv/installed-bench: .venv/installed
-	$(BIN)/python -m pip install --quiet --editable '.[bench]'
-	@touch $@
+# As wheels are.
+.venv/installed-bench: .venv/bin/python $(SOURCES)
+	@echo "Building the Rust core with every optimisation: some minutes, once"
+	$(call install,'.[bench]',release)
+	@rm -f .venv/installed .venv/installed-test

@@ -1,10 +1,11 @@
 """What a node takes while a simulated drive comes in: processor, memory, latencies.
 
     python examples/live/measure.py [--node PROGRAM] [--duration-s 60] [--every-ssb]
-        [--stream-off | --times 8 [--speed 0.25]] [--core 1] [--first]
+        [--stream-off | --radio | --times 8 [--speed 0.25]] [--core 1] [--first]
 
 Samples come by ZeroMQ; with `--stream-off` as a recording played in real time, which is not read
 where the node wants nothing, as a radio that is switched off (61 MB a second on disk); with
+`--radio` from a SoapySDR module that plays it, for a node built with the feature `soapy`; with
 `--times` by one TCP stream of integers at so many times 3.84 Msps. Prints the share of one core by
 the node's own processor time, per second of the drive, over all and once it tracks, thread by
 thread; its memory; and from the arrival of an SSB's last sample to the pose with its angle. Measure
@@ -39,6 +40,7 @@ from transmitter import (
 )
 
 import access_av
+from radio import Radio
 
 # By then the SSBs are found and the pose is.
 TRACKS_S = 8.0
@@ -101,6 +103,7 @@ def main() -> None:
     parser.add_argument("--every-ssb", action="store_true")
     parser.add_argument("--interval-s", type=float, help="a burst every so many seconds")
     parser.add_argument("--stream-off", action="store_true")
+    parser.add_argument("--radio", action="store_true")
     parser.add_argument("--times", type=int)
     parser.add_argument("--speed", type=float, default=1.0)
     parser.add_argument("--core", type=int)
@@ -111,10 +114,16 @@ def main() -> None:
     folder = ROOT / f"results/live/{arguments.duration_s:g}s"
     with tempfile.TemporaryDirectory() as scratch:
         settings = Path(scratch) / "node.toml"
-        sender: Transmitter | RawTransmitter | Wheels
-        if arguments.stream_off:
+        sender: Transmitter | RawTransmitter | Wheels | Radio
+        if arguments.stream_off or arguments.radio:
             whole = folder.with_name(folder.name + "-whole")
             folder = recorded(whole, arguments.duration_s, continuous=True)
+        if arguments.radio:
+            sender = Radio(folder, Path(scratch))
+            told = settings_of(sender.samples, sender.odometry, ANY_PORT)
+            settings.write_text(told, encoding="utf-8")
+            send = sender.run
+        elif arguments.stream_off:
             sender = Wheels(odometry_of(folder))
             samples = f'source = "sigmf"\nrecording = "{folder}/iq"\n'
             settings.write_text(settings_of(samples, sender.address, ANY_PORT), encoding="utf-8")
@@ -142,7 +151,8 @@ def main() -> None:
         options = ["--site", site, "--vehicle", str(believed), str(settings)]
         node = Node(arguments.node, options, arguments.core)
         process = node.process.pid
-        speed = {} if arguments.stream_off else {"speed": arguments.speed}
+        in_time = arguments.stream_off or arguments.radio
+        speed = {} if in_time else {"speed": arguments.speed}
         sending = threading.Thread(target=send, kwargs=speed)
         began = time.monotonic()
         sending.start()
@@ -158,6 +168,7 @@ def main() -> None:
         used |= busy_s(process)
         node.end()
         sender.close()
+        on_s = [ended - began for began, ended in sender.on()] if isinstance(sender, Radio) else []
     drive_s = arguments.speed * (ended - began)
     load = os.getloadavg()[0]
     print(f"{drive_s:.0f} s of the drive in {ended - began:.0f} s, at a load of {load:.1f}")
@@ -170,6 +181,8 @@ def main() -> None:
     half = memory_mib[len(memory_mib) // 2 :]
     at = f"{half[0]:.0f} at half, {half[-1]:.0f} at the end"
     print(f"memory: {max(memory_mib):.0f} MiB at most, {at}")
+    if on_s:
+        print(f"radio on: {100 * sum(on_s) / drive_s:.1f} % of the time, {len(on_s)} times")
     print(f"samples looked at: {100 * told['duty']:.1f} %, angles: {told['energy']['executions']}")
     print(f"state: {told['pose']['state']}, {told['pose']['tracked']} SSBs tracked")
     print(f"SSBs found by a search: {told['found_by_search']}, all others where expected")

@@ -111,15 +111,15 @@ class Wheels:
             self._send(self.odometry[self.sent])
             self.sent += 1
 
-    def run(self) -> None:
-        """Sends all of it in real time, from when somebody connects on."""
+    def run(self, *, began_s: float | None = None) -> None:
+        """Sends all of it in real time, from when somebody connects on, or counted from a time."""
         self.server.settimeout(0.2)
         while self.peer is None and not self.stopped.is_set():
             with contextlib.suppress(TimeoutError):
                 self.peer, _ = self.server.accept()
-        began = time.monotonic()
+        began = time.time() if began_s is None else began_s
         for sample in self.odometry:
-            ahead_s = sample["time_s"] - (time.monotonic() - began)
+            ahead_s = sample["time_s"] - (time.time() - began)
             if self.stopped.wait(max(ahead_s, 0.0)):
                 return
             self.send_until(sample["time_s"])

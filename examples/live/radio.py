@@ -1,0 +1,64 @@
+"""A radio that is none: `replay_radio.cpp` for SoapySDR, and the wheels of its drive."""
+
+from __future__ import annotations
+
+import os
+import subprocess
+import time
+from pathlib import Path
+
+from transmitter import Wheels, odometry_of
+
+SOURCE = Path(__file__).with_name("replay_radio.cpp")
+
+
+class Radio:
+    """Plays a drive that `access-av synth --continuous` recorded to who opens it by SoapySDR."""
+
+    def __init__(self, recording: Path, scratch: Path) -> None:
+        module = scratch / "libreplay.so"
+        compiler = os.environ.get("CXX", "c++")
+        options = ["-O2", "-shared", "-fPIC", "-o", str(module), str(SOURCE), "-lSoapySDR"]
+        subprocess.run([compiler, *options], check=True)
+        os.environ["SOAPY_SDR_PLUGIN_PATH"] = str(scratch)
+        self.log = scratch / "radio.log"
+        self.device = (
+            f"driver=replay,path={recording / 'iq.sigmf-data'},log={self.log},"
+            "rate=3840000,channels=4"
+        )
+        self.wheels = Wheels(odometry_of(recording))
+        self.odometry = self.wheels.address
+
+    @property
+    def samples(self) -> str:
+        """Of node.toml."""
+        return f"""
+source = "soapy"
+device = "{self.device}"
+[samples.stream]
+rate_msps = 3.84
+centre_mhz = 3500.0
+antennas = [0, 1, 2, 3]
+"""
+
+    def run(self) -> None:
+        """Sends the odometry in step with the radio, by this computer's clock."""
+        while not (self.log.exists() and self.log.read_text(encoding="ascii").endswith("\n")):
+            time.sleep(0.01)
+        zero_s = float(self.log.read_text(encoding="ascii").splitlines()[0])
+        wheels = self.wheels
+        wheels.odometry = [{**it, "time_s": zero_s + it["time_s"]} for it in wheels.odometry]
+        wheels.run(began_s=0.0)
+
+    def on(self) -> list[tuple[float, float]]:
+        """From when to when it was on, in seconds since it was opened."""
+        rows = [line.split() for line in self.log.read_text(encoding="ascii").splitlines()[1:]]
+        return [(float(began), float(ended)) for began, ended in rows]
+
+    def stop(self) -> None:
+        """Ends `run`, from another thread."""
+        self.wheels.stop()
+
+    def close(self) -> None:
+        """Closes its socket."""
+        self.wheels.close()
