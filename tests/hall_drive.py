@@ -74,7 +74,7 @@ def simulate(world: World) -> HallDrive:
     mounting, stays = MOUNTING_STD_RAD * rng.normal(), {pci: rng.normal() for pci in HEADS_M}
     share = 0.5 if world.stays_s or world.stays_m else 0.0
     angles, late, last = [], round(world.late_s / STEP_S), 0.0
-    for k in range(EVERY, time_s.size - late, EVERY):
+    for k in range(max(EVERY, -late), time_s.size - max(late, 0), EVERY):
         passed = EVERY * STEP_S / world.stays_s if world.stays_s else 0.0
         passed += (along[k] - last) / world.stays_m if world.stays_m else 0.0
         kept, last = math.exp(-passed), along[k]

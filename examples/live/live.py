@@ -20,6 +20,8 @@ import access_av
 
 ROOT = Path(__file__).parents[2]
 SCENARIO = "yard"
+# So long it takes at 15 km/h (s); a drive that is to last longer is slower.
+LASTS_S = 420.0
 PORTS = {"port": 2000, "odometry_port": 2100}
 PAGE = "127.0.0.1:8400"
 
@@ -28,7 +30,9 @@ def recorded(folder: Path, duration_s: float, *, continuous: bool = False) -> Pa
     """The drive's folder, recorded if it is not there yet: all of it, or its SSBs alone."""
     if not (folder / "iq.sigmf-meta").exists():
         print(f"recording {duration_s:g} s of the scenario `{SCENARIO}` in {folder} …", flush=True)
-        access_av.synthesize(SCENARIO, folder, duration_s=duration_s, continuous=continuous)
+        slower = {"vehicle.top_speed_kmh": 15.0 * min(LASTS_S / duration_s, 1.0) ** 1.5}
+        scenario = access_av.Scenario.load(SCENARIO).with_overrides(slower)
+        access_av.synthesize(scenario, folder, duration_s=duration_s, continuous=continuous)
     return folder
 
 

@@ -1,11 +1,21 @@
-"""The textbook filter of ``benches/off_the_road.py`` is right itself."""
+"""Another's hall (``benches/off_the_road.py``): its textbook filter, and two clocks."""
 
 from __future__ import annotations
 
+import sys
+
 import numpy as np
+import pytest
 
 import hall_drive
+from conftest import ROOT
 from hall_drive import World, simulate
+
+sys.path.insert(0, str(ROOT / "benches"))
+from off_the_road import Case, locate
+
+# Standard deviations of what a lap tells of the lateness (s): a road leaves turns alone to tell it.
+LATENESS_STD_S = {False: 0.02, True: 0.035}
 
 
 def test_the_textbook_filter_is_as_wrong_as_it_says() -> None:
@@ -17,3 +27,21 @@ def test_the_textbook_filter_is_as_wrong_as_it_says() -> None:
         nees.append(np.einsum("ki,kij,kj->k", error, np.linalg.inv(covariances[1:]), error).mean())
     # Errors of a drive hang together: as good as twenty independent drives of one error each.
     assert 0.6 < np.mean(nees) / 2 < 1.5
+
+
+@pytest.mark.parametrize("road", [False, True])
+@pytest.mark.parametrize("late_s", [0.3, 1.0, -0.3])
+def test_late_angles_are_found_named_and_set_back(road: bool, late_s: float) -> None:
+    located = locate(Case("late", "late", {"late_s": late_s}, road), 101, [])
+    assert located["exit_named"]
+    assert abs(located["late_s"] - late_s) < 3.0 * LATENESS_STD_S[road]
+    in_time = locate(Case("late", "in time", {}, road), 101, [])
+    assert not in_time["exit_named"]
+    assert in_time["late_s"] == 0.0
+    assert located["square"] < 1.3**2 * in_time["square"]
+
+
+def test_clocks_that_are_said_to_be_one_are() -> None:
+    case = Case("late", "late", {"late_s": 1.0})
+    located = locate(case, 101, ["receiver.lateness_std_s=0.0"])
+    assert not located["exit_named"]

@@ -105,7 +105,7 @@ pub fn diagnose(given: &Drive<'_>, located: &LocatedDrive) -> Result<Vec<Diagnos
 }
 
 /// The drive by as many angles as it takes to judge it, in order of time.
-fn spread<'a>(given: &Drive<'a>) -> Drive<'a> {
+pub fn spread<'a>(given: &Drive<'a>) -> Drive<'a> {
     let heads = RadioHead::heard(&given.site, &given.vehicle);
     let mut given = given.clone();
     let angles = given.angles.to_mut();
@@ -140,13 +140,13 @@ fn spread<'a>(given: &Drive<'a>) -> Drive<'a> {
 }
 
 /// Whether angles come from where they are expected, those of each radio head too.
-fn is_understood(evidence: &Evidence) -> bool {
+pub fn is_understood(evidence: &Evidence) -> bool {
     let is_off = |it: &Count| it.angles >= LEAST_OF_HEAD && it.misfit_share() > MOST_MISFITS;
     evidence.all.refused_share() < MOST_REFUSED && !evidence.heads.values().any(is_off)
 }
 
 /// What a plain filter makes of a drive: all that it takes to tell what is worth more.
-fn screened(drive: &Drive<'_>) -> Result<Option<Evidence>, ReplayError> {
+pub fn screened(drive: &Drive<'_>) -> Result<Option<Evidence>, ReplayError> {
     Evidence::by(&mut plain_filter(&drive.site, &drive.vehicle)?, drive)
 }
 

@@ -9,15 +9,14 @@ use onboard::observation::OdometrySample;
 use onboard::settings::{Platform, Site, Vehicle};
 use onboard::{Custom, Execution, Onboard};
 
+use super::clock::{LEAST_LATENESS_S, Lateness};
 use super::error::ReplayError;
 use super::located::{Diagnosis, LocatedDrive, LocatedPose, Remark, gathered};
 use crate::library::load;
 use crate::odometry::OdometryLog;
 
-/// Departures of the odometer's scale, of the angles' lateness (s) and of the array's mounting (rad),
-/// below which nobody minds.
+/// Departures of the odometer's scale and of the array's mounting (rad) below which nobody minds.
 const LEAST_SCALE: f64 = 0.03;
-const LEAST_LATENESS_S: f64 = 0.03;
 const LEAST_MOUNTING_RAD: f64 = 0.05;
 
 /// A drive being located.
@@ -32,6 +31,8 @@ pub struct Replay<'a> {
     beyond_map: bool,
     /// Where the gaps of the road begin that were remarked on (m).
     gaps_m: Vec<f64>,
+    /// What was taken off the angles' times.
+    lateness: Option<Lateness>,
 }
 
 impl<'a> Replay<'a> {
@@ -59,6 +60,7 @@ impl<'a> Replay<'a> {
             recovered: None,
             beyond_map: false,
             gaps_m: Vec::new(),
+            lateness: None,
             odometry: odometry.samples.iter().peekable(),
             drive: LocatedDrive {
                 remarks: odometry
@@ -72,6 +74,11 @@ impl<'a> Replay<'a> {
                 ..LocatedDrive::default()
             },
         })
+    }
+
+    /// The angles' times come with a lateness taken off that their settings do not state.
+    pub const fn set_back(&mut self, lateness: Lateness) {
+        self.lateness = Some(lateness);
     }
 
     /// Takes in SSBs, or angles, in the order they are given, after the odometry up to each burst.
@@ -128,8 +135,9 @@ impl<'a> Replay<'a> {
         }
         if lateness_s.is_remarkable(LEAST_LATENESS_S) {
             let text = format!(
-                "angles are {:.0} ± {:.0} ms later than stated, by the odometry's clock; check \
-                 receiver.lateness_s, and whether the odometry is of commands",
+                "angles are {:.0} ± {:.0} ms later than stated, by the odometry's clock, and are \
+                 taken as that; check the clocks, receiver.lateness_s, and whether the odometry is \
+                 of commands",
                 1e3 * (lateness_s.found - lateness_s.stated),
                 1e3 * lateness_s.std
             );
@@ -175,6 +183,11 @@ impl<'a> Replay<'a> {
     pub fn finish(mut self) -> Result<LocatedDrive, ReplayError> {
         self.odometry_until(f64::INFINITY)?;
         self.drive.constants = self.onboard.constants();
+        if let (Some(constants), Some(lateness)) = (&mut self.drive.constants, self.lateness) {
+            let of_angles = &mut constants.lateness_s;
+            of_angles.found += lateness.found_s;
+            of_angles.std = of_angles.std.hypot(lateness.std_s);
+        }
         self.remark_on_constants();
         self.drive.remarks = gathered(self.drive.remarks);
         Ok(self.drive)

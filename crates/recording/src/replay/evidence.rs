@@ -22,6 +22,9 @@ const INDEPENDENT_S: f64 = 1.0;
 /// Squared Mahalanobis distance of an angle that fits: within three standard deviations.
 const FITS: f64 = 9.0;
 
+/// Squared Mahalanobis distance beyond which an angle is as good as any.
+const FARTHEST: f64 = 16.0;
+
 /// A radio head by its PCI and SSB index.
 pub type HeadId = (u16, u8);
 
@@ -51,6 +54,9 @@ impl Count {
 pub struct Evidence {
     /// Sum over the angles, those that are not independent counted as one.
     pub log_likelihood: f64,
+    /// The same relative to angles that are predicted exactly, and each as independent as its variance says: comparable
+    /// where nothing differs but when they were taken, which changes how many the variances count for one.
+    pub relative_log_likelihood: f64,
     pub all: Count,
     pub heads: BTreeMap<HeadId, Count>,
     /// Believed pose at each angle.
@@ -75,6 +81,7 @@ impl Evidence {
         let measurand = vehicle.array.measurand();
         let mut evidence = Self {
             log_likelihood: 0.0,
+            relative_log_likelihood: 0.0,
             all: Count::default(),
             heads: BTreeMap::new(),
             path: steps.iter().map(|step| step.pose).collect(),
@@ -82,6 +89,7 @@ impl Evidence {
         for (Step { met, .. }, logged) in steps.iter().zip(angles.iter()) {
             let sigma_rad = with_phase(logged, &measurand).measured.phase_sigma_rad;
             evidence.log_likelihood += log_likelihood(met.as_ref(), sigma_rad);
+            evidence.relative_log_likelihood += relative_log_likelihood(met.as_ref());
             let misfits = |met: &Met| met.innovation.mahalanobis2() > FITS;
             let head = evidence.heads.entry(head_of(logged)).or_default();
             for count in [&mut evidence.all, head] {
@@ -99,6 +107,14 @@ impl Evidence {
 fn log_likelihood(met: Option<&Met>, sigma_rad: f64) -> f64 {
     let density = met.map_or(0.0, |met| met.innovation.density());
     (sigma_rad * with_outliers(density, OUTLIERS)).ln()
+}
+
+/// One that is far off counts as one at the edge.
+fn relative_log_likelihood(met: Option<&Met>) -> f64 {
+    met.map_or(-0.5 * FARTHEST, |Met { innovation, .. }| {
+        let growth = innovation.variance / innovation.measurement_variance;
+        -0.5 * (innovation.mahalanobis2().min(FARTHEST) + growth.ln())
+    })
 }
 
 /// Share of the angles that count as independent.

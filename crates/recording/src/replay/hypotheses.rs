@@ -14,7 +14,7 @@ use crate::odometry::OdometryLog;
 
 /// Log-odds that a hypothesis must have beside one with nothing free in it: a place that is fitted
 /// may be anywhere within 100 m, and is told to some metres; a robot may turn in any way.
-const FREEDOM_LOG_ODDS: f64 = 8.0;
+pub const FREEDOM_LOG_ODDS: f64 = 8.0;
 
 /// A drive as it was given, or as it may have been meant.
 #[derive(Clone)]

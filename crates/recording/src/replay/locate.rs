@@ -10,6 +10,7 @@ use onboard::receive::ReceiverConfig;
 use onboard::settings::{IntegritySettings, Site, Vehicle, WakeUpSettings};
 use onboard::{Custom, Execution};
 
+use super::clock::{earlier, lateness};
 use super::data_quality::warnings;
 use super::diagnosis::diagnose;
 use super::drive::Replay;
@@ -44,14 +45,18 @@ pub fn locate_angles(
     for remark in &angles.remarks {
         replay.remark(remark.time_s, remark.to_string());
     }
-    let logged = angles.angles.as_slice();
+    let mut logged = Cow::Borrowed(angles.angles.as_slice());
+    if let Some(late) = lateness(&as_given(site, &vehicle, odometry, &logged))? {
+        logged = Cow::Owned(earlier(&logged, late.found_s));
+        replay.set_back(late);
+    }
     let measurand = vehicle.array.measurand();
     let angles: Vec<LoggedAngle> = logged.iter().map(|it| with_phase(it, &measurand)).collect();
     for (time_s, text) in warnings(site, &vehicle, odometry, &angles)? {
         replay.remark(time_s, text);
     }
     replay.hear(&angles)?;
-    explain(&mut replay, site, &vehicle, odometry, logged)?;
+    explain(&mut replay, site, &vehicle, odometry, &logged)?;
     finish(replay, site, &vehicle, start, odometry, smooth)
 }
 
@@ -94,6 +99,14 @@ pub fn locate_recording(
     if heard_s.is_none() {
         return Err(ReplayError::NoSsb { file });
     }
+    let mut heard: Vec<LoggedAngle> = replay.executions().iter().filter_map(as_logged).collect();
+    let heard_by = in_time(&vehicle);
+    if let Some(late) = lateness(&as_given(site, &heard_by, odometry, &heard))? {
+        heard = earlier(&heard, late.found_s);
+        replay = Replay::new(site, &as_chosen(&heard_by), start, Custom::default(), odometry)?;
+        replay.set_back(late);
+        replay.hear(&heard)?;
+    }
     for gap in gaps {
         let text = format!(
             "samples before {:.2} s: {:.2} ms are missing, by the times of the SSBs, and were added to \
@@ -103,11 +116,10 @@ pub fn locate_recording(
         );
         replay.remark(gap.before_s, text);
     }
-    let heard: Vec<LoggedAngle> = replay.executions().iter().filter_map(as_logged).collect();
     for warning in recording.warnings() {
         replay.remark(f64::NEG_INFINITY, warning.to_string());
     }
-    explain(&mut replay, site, &in_time(&vehicle), odometry, &heard)?;
+    explain(&mut replay, site, &heard_by, odometry, &heard)?;
     finish(replay, site, &vehicle, start, odometry, smooth)
 }
 
@@ -120,16 +132,25 @@ fn explain(
     angles: &[LoggedAngle],
 ) -> Result<(), ReplayError> {
     replay.drive_on()?;
-    let given = Drive {
-        site: Cow::Borrowed(site),
-        vehicle: Cow::Borrowed(vehicle),
-        odometry: Cow::Borrowed(odometry),
-        angles: Cow::Borrowed(angles),
-    };
+    let given = as_given(site, vehicle, odometry, angles);
     for diagnosis in diagnose(&given, replay.located())? {
         replay.diagnose(diagnosis);
     }
     Ok(())
+}
+
+fn as_given<'a>(
+    site: &'a Site,
+    vehicle: &'a Vehicle,
+    odometry: &'a OdometryLog,
+    angles: &'a [LoggedAngle],
+) -> Drive<'a> {
+    Drive {
+        site: Cow::Borrowed(site),
+        vehicle: Cow::Borrowed(vehicle),
+        odometry: Cow::Borrowed(odometry),
+        angles: Cow::Borrowed(angles),
+    }
 }
 
 /// An angle as it was heard; its lateness is taken off.
@@ -140,6 +161,14 @@ fn as_logged(execution: &Execution) -> Option<LoggedAngle> {
         ..execution.ssb
     };
     Some(LoggedAngle { ssb, measured })
+}
+
+/// The vehicle for angles that its wake-up policy has chosen already.
+fn as_chosen(vehicle: &Vehicle) -> Vehicle {
+    Vehicle {
+        wake_up: Some(WakeUpSettings::EVERY_SSB),
+        ..vehicle.clone()
+    }
 }
 
 /// The vehicle for angles whose lateness is taken off already.
@@ -175,8 +204,7 @@ fn look_back(
 ) -> Result<Vec<LocatedPose>, ReplayError> {
     let unguarded = Vehicle {
         integrity: Some(IntegritySettings::off()),
-        wake_up: Some(WakeUpSettings::EVERY_SSB), // whatever was chosen then is heard again
-        ..in_time(vehicle)
+        ..as_chosen(&in_time(vehicle))
     };
     let mut mistrusted_until_s = BTreeMap::new();
     for execution in executions {

@@ -1,6 +1,7 @@
 //! A recorded drive through the pipeline: odometry and SSBs, or angles, in order of time.
 
 mod angles;
+mod clock;
 mod data_quality;
 mod diagnosis;
 mod drive;

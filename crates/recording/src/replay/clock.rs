@@ -1,0 +1,152 @@
+//! Whether angles and odometry are of one clock: how much later angles come than they say, before any is located.
+//!
+//! A plain filter predicts the angles, each set back by so many seconds; what it says of them all together is the
+//! likelihood of the lateness (Schweppe, IEEE Trans. IT 11(1), 1965), searched on a grid and then by golden section
+//! (Kiefer, Proc. AMS 4, 1953). Speed that changes and turns tell it: while a vehicle drives straight on, late angles are
+//! those of a place further back.
+
+use std::borrow::Cow;
+
+use onboard::gaussian::CERTAIN_SIGMAS;
+use onboard::localize::ekf::EkfConfig;
+use onboard::settings::LocalizerSettings;
+
+use super::diagnosis::{is_understood, screened, spread};
+use super::error::ReplayError;
+use super::hypotheses::{Drive, FREEDOM_LOG_ODDS};
+use crate::angle_log::LoggedAngle;
+
+/// Largest lateness that is looked for, either way, where no deviation is stated (s), and the grid's spacing: less than
+/// over which speed changes.
+const MOST_S: f64 = 1.5;
+const GRID_S: f64 = 0.5;
+
+/// How closely it is found (s).
+const FINEST_S: f64 = 0.005;
+
+/// From the best to where the curvature of the likelihood is taken (s).
+const ASIDE_S: f64 = 0.1;
+
+/// Smallest lateness that anybody minds (s).
+pub const LEAST_LATENESS_S: f64 = 0.03;
+
+/// Time from the first angle on by which it is judged (s): two clocks run apart.
+const SPAN_S: f64 = 300.0;
+
+/// How much later angles come than they say, by the odometry's clock.
+#[derive(Debug, Clone, Copy, PartialEq)]
+pub struct Lateness {
+    /// The lateness (s).
+    pub found_s: f64,
+    /// Its standard deviation (s).
+    pub std_s: f64,
+}
+
+/// The lateness of a drive's angles, where it is more than anybody minds, explains them, and is as much likelier than none
+/// as anything that is free must be. It is looked for within three of the stated deviations; nothing where that is zero.
+///
+/// # Errors
+/// [`ReplayError::Settings`] for a road that cannot be built.
+pub fn lateness(given: &Drive<'_>) -> Result<Option<Lateness>, ReplayError> {
+    let vehicle = &given.vehicle;
+    let is_tracker = matches!(vehicle.localizer, LocalizerSettings::Tracker(_));
+    let stated_std_s = vehicle.receiver.lateness_std_s;
+    let most_s = stated_std_s.map_or(MOST_S, |std_s| CERTAIN_SIGMAS * std_s);
+    if !is_tracker || !vehicle.start.known || most_s == 0.0 {
+        return Ok(None);
+    }
+    let mut given = spread(given);
+    let first_s = given.angles.first().map_or(0.0, |it| it.measured.time_s);
+    given
+        .angles
+        .to_mut()
+        .retain(|it| it.measured.time_s - first_s < SPAN_S);
+    // Within three of its deviations the localizer's filter finds it by itself.
+    let of_filter_s = CERTAIN_SIGMAS * EkfConfig::new(&given.site, vehicle).lateness_std_s;
+    // What is searched for is no state of the filter as well.
+    given.vehicle.to_mut().receiver.lateness_std_s = Some(0.0);
+    let of = |late_s: f64| screened(&set_back(&given, late_s));
+    let likelihood = |late_s: f64| -> Result<f64, ReplayError> {
+        Ok(of(late_s)?.map_or(f64::NEG_INFINITY, |it| it.relative_log_likelihood))
+    };
+    let mut best = (0.0, likelihood(0.0)?);
+    let in_time = best.1;
+    let steps = (most_s / GRID_S).ceil() as i32;
+    for step in (-steps..=steps).filter(|step| *step != 0) {
+        let late_s = (GRID_S * f64::from(step)).clamp(-most_s, most_s);
+        let tried = (late_s, likelihood(late_s)?);
+        if tried.1 > best.1 {
+            best = tried;
+        }
+    }
+    let around_s = [-GRID_S, GRID_S].map(|by_s| (best.0 + by_s).clamp(-most_s, most_s));
+    let found_s = highest(around_s, &likelihood)?;
+    if found_s.abs() < LEAST_LATENESS_S.max(of_filter_s) {
+        return Ok(None);
+    }
+    let Some(at_best) = of(found_s)?.filter(is_understood) else {
+        return Ok(None);
+    };
+    let at_best = at_best.relative_log_likelihood;
+    if at_best - in_time < FREEDOM_LOG_ODDS {
+        return Ok(None);
+    }
+    let beside = likelihood(found_s - ASIDE_S)? + likelihood(found_s + ASIDE_S)?;
+    let curvature = (2.0 * at_best - beside) / (ASIDE_S * ASIDE_S);
+    // Never wider than where it was looked for by then.
+    let std_s = curvature.max(0.0).sqrt().recip().min(GRID_S);
+    Ok(Some(Lateness { found_s, std_s }))
+}
+
+/// The drive with angles that were taken so much earlier (s).
+fn set_back<'a>(given: &Drive<'a>, late_s: f64) -> Drive<'a> {
+    Drive {
+        angles: Cow::Owned(earlier(&given.angles, late_s)),
+        ..given.clone()
+    }
+}
+
+/// Angles that were taken so much earlier (s).
+pub fn earlier(angles: &[LoggedAngle], late_s: f64) -> Vec<LoggedAngle> {
+    let mut angles = angles.to_vec();
+    for angle in &mut angles {
+        angle.ssb.time_s -= late_s;
+        angle.measured.time_s -= late_s;
+    }
+    angles
+}
+
+/// Where a function with one maximum in between has it.
+fn highest(
+    [mut low, mut high]: [f64; 2],
+    of: &impl Fn(f64) -> Result<f64, ReplayError>,
+) -> Result<f64, ReplayError> {
+    let share = 0.5 * (3.0 - 5f64.sqrt());
+    let at = |low: f64, high: f64, share: f64| low + share * (high - low);
+    let (mut left, mut right) = (at(low, high, share), at(low, high, 1.0 - share));
+    let (mut of_left, mut of_right) = (of(left)?, of(right)?);
+    while high - low > FINEST_S {
+        if of_left > of_right {
+            (high, right, of_right) = (right, left, of_left);
+            left = at(low, high, share);
+            of_left = of(left)?;
+        } else {
+            (low, left, of_left) = (left, right, of_right);
+            right = at(low, high, 1.0 - share);
+            of_right = of(right)?;
+        }
+    }
+    Ok(0.5 * (low + high))
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    #[test]
+    fn the_highest_place_is_found() {
+        let of = |x: f64| Ok(-(x - 0.123).powi(2));
+        let found = highest([-0.5, 0.5], &of).unwrap();
+        assert!((found - 0.123).abs() < FINEST_S);
+    }
+}
