@@ -52,20 +52,24 @@ test-radio: .venv/installed-test ## Build the node with SoapySDR (Debian: libsoa
 	$(BIN)/python -m pytest tests/vehicle/test_radio.py
 
 AARCH64 := aarch64-unknown-linux-gnu
-# What the compiler of another processor needs (Debian: rustc-web cargo-web libstd-rust-web-dev:arm64
-# gcc-aarch64-linux-gnu libc6:arm64 qemu-user); a rustup with that target serves as well.
+# What the compiler of another processor needs (Debian: gcc-aarch64-linux-gnu libc6-dev-arm64-cross qemu-user, and a rustup
+# with that target; or rustc-web cargo-web libstd-rust-web-dev:arm64 libc6:arm64).
 EMULATED := CARGO_TARGET_AARCH64_UNKNOWN_LINUX_GNU_LINKER=aarch64-linux-gnu-gcc \
-	CARGO_TARGET_AARCH64_UNKNOWN_LINUX_GNU_RUNNER="qemu-aarch64 -L /"
+	CARGO_TARGET_AARCH64_UNKNOWN_LINUX_GNU_RUNNER=qemu-aarch64
+export QEMU_LD_PREFIX ?= $(or $(wildcard /usr/aarch64-linux-gnu),/)
 ifneq ($(wildcard /usr/lib/rustlib/$(AARCH64)),)
 EMULATED += RUSTC=/usr/bin/rustc /usr/bin/cargo
 else
 EMULATED += cargo
 endif
 
-test-aarch64: ## Build what runs on the vehicle for aarch64 and test it, emulated on another processor
+test-aarch64: .venv/installed-test ## Build what runs on the vehicle for aarch64 and test it, emulated on another processor
 	@command -v aarch64-linux-gnu-gcc >/dev/null && command -v qemu-aarch64 >/dev/null || { echo \
-	  "not tested: gcc-aarch64-linux-gnu, qemu-user, libc6:arm64, a Rust for $(AARCH64) needed"; exit 2; }
-	$(EMULATED) test --quiet --release --target $(AARCH64) -p aoa-array -p nr-ssb -p onboard
+	  "not tested: gcc-aarch64-linux-gnu, qemu-user, libc6-dev-arm64-cross, a Rust for $(AARCH64) needed"; exit 2; }
+	cargo build --quiet --package access-av-node
+	$(EMULATED) build --quiet --target $(AARCH64) -p access-av-node
+	$(BIN)/python -m pytest tests/vehicle/test_aarch64.py
+	$(EMULATED) test --quiet --target $(AARCH64) -p aoa-array -p nr-ssb -p onboard
 
 count-aarch64: ## Count the instructions per estimate on aarch64, NEON against portable code
 	$(filter-out /usr/bin/cargo cargo,$(EMULATED)) $(PYTHON) benches/aarch64_instructions.py $(lastword $(EMULATED))

@@ -28,7 +28,8 @@ SLOW = {
     *("test_bound", "test_drive", "test_plug_ins", "test_scatter", "test_truth"),
     *("test_codesign", "test_outlook", "test_readings", "test_second_implementation"),
     *("test_headline", "test_unknowns", "test_cli", "test_columns"),
-    *("test_node", "test_live", "test_off_the_road", "test_study", "test_plant_guide"),
+    *("test_node", "test_radio", "test_aarch64", "test_live", "test_off_the_road"),
+    *("test_study", "test_plant_guide"),
 }
 
 

@@ -1,7 +1,7 @@
 """What a node takes while a simulated drive comes in: processor, memory, latencies.
 
     python examples/live/measure.py [--node PROGRAM] [--duration-s 60] [--every-ssb]
-        [--stream-off | --radio | --times 8 [--speed 0.25]] [--core 1] [--first]
+        [--stream-off | --radio | --times 8 [--speed 0.25]] [--core 1] [--first] [--tabs 2]
 
 Samples come by ZeroMQ; with `--stream-off` as a recording played in real time, which is not read
 where the node wants nothing, as a radio that is switched off (61 MB a second on disk); with
@@ -10,12 +10,14 @@ where the node wants nothing, as a radio that is switched off (61 MB a second on
 the node's own processor time, per second of the drive, over all and once it tracks, thread by
 thread; its memory; and from the arrival of an SSB's last sample to the pose with its angle. Measure
 on a computer that does nothing else; `--first` puts transmitter and node before all others that
-run there (SCHED_FIFO, for root), `--speed` below 1 is for one that is not fast enough for them.
+run there (SCHED_FIFO, for root), `--speed` below 1 is for one that is not fast enough for them;
+`--tabs` looks at the page as so many browsers do.
 """
 
 from __future__ import annotations
 
 import argparse
+import contextlib
 import json
 import os
 import re
@@ -84,6 +86,12 @@ class Node:
         assert found, self.process.stderr.read()
         self.page = found.group()
 
+    def look(self) -> None:
+        """Reads the page's events until the node ends."""
+        with contextlib.suppress(OSError), urllib.request.urlopen(f"{self.page}events") as events:
+            for _ in events:
+                pass
+
     def state(self) -> dict[str, Any]:
         """How it stands."""
         with urllib.request.urlopen(f"{self.page}state.json") as answer:
@@ -107,6 +115,7 @@ def main() -> None:
     parser.add_argument("--times", type=int)
     parser.add_argument("--speed", type=float, default=1.0)
     parser.add_argument("--core", type=int)
+    parser.add_argument("--tabs", type=int, default=0)
     parser.add_argument("--first", action="store_true")
     arguments = parser.parse_args()
     if arguments.first:
@@ -152,6 +161,8 @@ def main() -> None:
         node = Node(arguments.node, options, arguments.core)
         process = node.process.pid
         in_time = arguments.stream_off or arguments.radio
+        for _ in range(arguments.tabs):
+            threading.Thread(target=node.look, daemon=True).start()
         speed = {} if in_time else {"speed": arguments.speed}
         sending = threading.Thread(target=send, kwargs=speed)
         began = time.monotonic()

@@ -1,0 +1,53 @@
+"""`access-av-node` on another processor, emulated: `make test-aarch64` builds and runs it."""
+
+from __future__ import annotations
+
+import os
+import shutil
+import subprocess
+from pathlib import Path
+
+import numpy as np
+import pytest
+
+import access_av
+from access_av.drives.recorded import log_angles
+from conftest import ROOT
+
+HERE = Path(os.environ.get("ACCESS_AV_NODE", ROOT / "target/debug/access-av-node"))
+THERE = ROOT / "target/aarch64-unknown-linux-gnu/debug/access-av-node"
+EMULATOR = shutil.which("qemu-aarch64")
+# What samples of single precision leave, multiplied and added in another order.
+SAMPLES_M = 2e-8
+
+pytestmark = pytest.mark.skipif(
+    EMULATOR is None or not (HERE.exists() and THERE.exists()),
+    reason=f"no emulator, {HERE} or {THERE}: `make test-aarch64` says what is needed",
+)
+
+
+def poses(command: list[str | Path], drive: Path, folder: Path, sources: str) -> bytes:
+    """The trajectory that a node writes, played back as fast as it can."""
+    settings, tum = folder / "node.toml", folder / "node.tum"
+    odometry = f'odometry.file = "{drive}/odometry.csv"\n'
+    text = f'name = "played"\npace = "fast"\n{odometry}{sources}output.tum = "{tum}"\n'
+    settings.write_text(text, encoding="utf-8")
+    believed = ["--site", drive / "site.toml", "--vehicle", drive / "vehicle.toml"]
+    subprocess.run([*command, *believed, settings], check=True, timeout=120)
+    return tum.read_bytes()
+
+
+def test_poses_are_the_same_on_another_processor(tmp_path: Path) -> None:
+    emulated = [str(EMULATOR), THERE]
+    log_angles("yard", tmp_path / "log", duration_s=60.0)
+    angles = f'angles.file = "{tmp_path}/log/angles.csv"\n'
+    by_angles = poses([HERE], tmp_path / "log", tmp_path, angles)
+    assert poses(emulated, tmp_path / "log", tmp_path, angles) == by_angles
+
+    access_av.synthesize("yard", tmp_path / "iq", duration_s=10.0)
+    samples = f'samples = {{ source = "sigmf", recording = "{tmp_path}/iq/iq" }}\n'
+    by_samples, there = (
+        np.loadtxt(poses(node, tmp_path / "iq", tmp_path, samples).decode().splitlines())
+        for node in ([HERE], emulated)
+    )
+    assert np.abs(by_samples - there).max() < SAMPLES_M
