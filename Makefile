@@ -9,7 +9,8 @@ SOURCES := $(shell find crates sites vehicles scenarios platforms plants -type f
 export CARGO_INCREMENTAL ?= 0
 
 # Tests of a file stay in one process: they share what it has driven.
-PYTEST := $(BIN)/python -m pytest --numprocesses auto --dist loadscope
+# One more than there are cores: some only wait.
+PYTEST := $(BIN)/python -m pytest --numprocesses $(shell expr $$(nproc) + 1) --dist loadscope
 
 # Reference vectors and recordings, beside the project.
 DATA := $(abspath $(or $(ACCESS_AV_DATA),../shared/data))

@@ -9,6 +9,7 @@ from pathlib import Path
 
 from transmitter import Wheels, odometry_of
 
+OPENED_WITHIN_S = 10.0
 SOURCE = Path(__file__).with_name("replay_radio.cpp")
 
 
@@ -43,7 +44,10 @@ antennas = [0, 1, 2, 3]
 
     def run(self) -> None:
         """Sends the odometry in step with the radio, by this computer's clock."""
+        until = time.monotonic() + OPENED_WITHIN_S
         while not (self.log.exists() and self.log.read_text(encoding="ascii").endswith("\n")):
+            if time.monotonic() > until:
+                raise TimeoutError(f"nobody has opened {self.device}")
             time.sleep(0.01)
         zero_s = float(self.log.read_text(encoding="ascii").splitlines()[0])
         wheels = self.wheels

@@ -17,6 +17,8 @@ from conftest import ROOT
 HERE = Path(os.environ.get("ACCESS_AV_NODE", ROOT / "target/debug/access-av-node"))
 THERE = ROOT / "target/aarch64-unknown-linux-gnu/debug/access-av-node"
 EMULATOR = shutil.which("qemu-aarch64")
+# Where the other processor's libraries are: Debian's cross compiler, or a system of both.
+LIBRARIES = next(it for it in ("/usr/aarch64-linux-gnu", "/") if Path(it).exists())
 # What samples of single precision leave, multiplied and added in another order.
 SAMPLES_M = 2e-8
 
@@ -38,7 +40,7 @@ def poses(command: list[str | Path], drive: Path, folder: Path, sources: str) ->
 
 
 def test_poses_are_the_same_on_another_processor(tmp_path: Path) -> None:
-    emulated = [str(EMULATOR), THERE]
+    emulated = [str(EMULATOR), "-L", LIBRARIES, THERE]
     log_angles("yard", tmp_path / "log", duration_s=60.0)
     angles = f'angles.file = "{tmp_path}/log/angles.csv"\n'
     by_angles = poses([HERE], tmp_path / "log", tmp_path, angles)

@@ -36,7 +36,9 @@ def test_a_radio_is_on_for_the_bursts_alone(tmp_path: Path) -> None:
     settings = tmp_path / "node.toml"
     drive = tmp_path / "drive"
     believed = ["--site", "yard", "--vehicle", "carrier"]
-    stub = 'name = "radio"\n[samples]\nsource = "soapy"\ndevice = "driver=replay"\n'
+    stub = (
+        'name = "radio"\nmessages = ["-"]\n[samples]\nsource = "soapy"\ndevice = "driver=replay"\n'
+    )
     stub += "[samples.stream]\nrate_msps = 3.84\ncentre_mhz = 3500.0\nantennas = [0, 1, 2, 3]\n"
     settings.write_text(stub, encoding="utf-8")
     if not can_soapy(settings, believed):
