@@ -37,7 +37,7 @@ pub fn built_in(
     let road = site.build_road()?.filter(|_| vehicle.follows_road());
     if !vehicle.start.known {
         let either = vehicle.start.either_direction;
-        let search = GaussianSum::new(config, road.clone(), either, &heads);
+        let search = GaussianSum::from_scratch(config, road.clone(), either, &heads);
         return Ok(Box::new(Relocalizer::searching(search, road, integrity)));
     }
     let start = InitialPose {

@@ -39,6 +39,9 @@ const OTHER_WAY: f64 = 1e-5;
 /// Standard deviation of the heading at which it is found in the plane (rad).
 const FOUND_STD_RAD: f64 = 0.2;
 
+/// Radio heads without which a place in the plane cannot be told from others.
+pub(super) const LEAST_HEADS: usize = 3;
+
 /// Headings of the first hypotheses in each square of the plane, and the most hypotheses.
 const HEADINGS: u32 = 12;
 const MOST_HYPOTHESES: f64 = 4000.0;
@@ -129,8 +132,8 @@ clone_in_place! {
         hypotheses: Vec<Hypothesis>,
         /// How many there were at first.
         places: usize,
-        /// Whether they are judged by what is stated alone.
-        is_as_stated: bool,
+        /// Where they are judged by what is stated alone: what is expected of the angles' bias once it is found.
+        as_stated: Option<EkfConfig>,
     }
 }
 
@@ -151,13 +154,33 @@ impl GaussianSum {
         Self::on(&config, Ground::Roads(roads), heads)
     }
 
-    /// The same in the plane, where places are judged by what is stated alone.
-    pub(super) fn as_stated(config: &EkfConfig, heads: &[RadioHead]) -> Self {
-        let search = Self::new(*config, None, true, heads);
+    /// The search for a first pose that nothing is known of: in the plane, unless all of it is searched finely or too few
+    /// radio heads tell places apart, as [`Self::as_stated`].
+    pub fn from_scratch(
+        config: EkfConfig,
+        road: Option<Road>,
+        either_direction: bool,
+        heads: &[RadioHead],
+    ) -> Self {
+        if road.is_none() && Self::serves_as_stated(heads) {
+            return Self::as_stated(config, heads);
+        }
+        Self::new(config, road, either_direction, heads)
+    }
+
+    /// In the plane, where places are judged by what is stated alone: what a place does not know well counts against it, and
+    /// no bias is estimated before it is found.
+    pub(super) fn as_stated(config: EkfConfig, heads: &[RadioHead]) -> Self {
+        let search = Self::new(config.as_stated(), None, true, heads);
         Self {
-            is_as_stated: true,
+            as_stated: Some(config),
             ..search
         }
+    }
+
+    /// Whether these radio heads tell places apart by what is stated alone.
+    pub(super) fn serves_as_stated(heads: &[RadioHead]) -> bool {
+        heads.len() >= LEAST_HEADS && !Self::is_small(heads)
     }
 
     /// Where the vehicle is without a road.
@@ -187,7 +210,7 @@ impl GaussianSum {
             heads: heads.to_vec(),
             hypotheses: Vec::new(),
             places: 0,
-            is_as_stated: false,
+            as_stated: None,
         };
         made.restart();
         made
@@ -256,7 +279,7 @@ impl GaussianSum {
     /// Judges every hypothesis by an angle. The verdict is that of the likeliest.
     pub fn update(&mut self, head: &RadioHead, measured: &AngleMeasurement) -> UpdateVerdict {
         let mut first = UpdateVerdict::unused(UpdateReason::Unusable);
-        let log_likelihood = if self.is_as_stated {
+        let log_likelihood = if self.as_stated.is_some() {
             log_likelihood_as_stated
         } else {
             log_likelihood
@@ -373,7 +396,7 @@ impl GaussianSum {
             }
         };
         // As stated, any other place is less probable than one in 10¹¹, however far the one that is left is known.
-        let is_only = self.is_as_stated && self.hypotheses.len() == 1;
+        let is_only = self.as_stated.is_some() && self.hypotheses.len() == 1;
         if !((is_placed || is_only) && heading_known) {
             return None;
         }
@@ -386,6 +409,9 @@ impl GaussianSum {
             } else {
                 other_way += (hypothesis.log_likelihood - best).exp();
             }
+        }
+        if let Some(config) = &self.as_stated {
+            one.ekf.expect_bias_as(config);
         }
         (other_way < OTHER_WAY).then_some(one.ekf)
     }

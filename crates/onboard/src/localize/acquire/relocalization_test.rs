@@ -5,7 +5,7 @@ use std::cmp::Ordering;
 
 use super::gaussian_sum::GaussianSum;
 use crate::clone_in_place::clone_in_place;
-use crate::localize::ekf::{Ekf, EkfConfig};
+use crate::localize::ekf::Ekf;
 use crate::localize::modes::{CERTAIN, log_likelihood, log_likelihood_as_stated};
 use crate::observation::{AngleMeasurement, OdometrySample};
 use crate::radio_head::RadioHead;
@@ -31,8 +31,6 @@ clone_in_place! {
         /// The filter of a start that is given, as it is stated: what the bank's filters learn from angles that contradict
         /// them explains those away. None where the vehicle is lost later.
         given: Option<Box<Ekf>>,
-        /// What the filter expects that is searched beside.
-        config: EkfConfig,
         /// Time of the newest odometry when it began to be reported (s).
         pub reported_s: f64,
         /// Whether the filter is refuted, so that its place is not reported any more beside the search's.
@@ -61,7 +59,6 @@ impl RelocalizationTest {
         Self {
             search,
             given: None,
-            config: *ekf.config(),
             reported_s: ekf.time_s(),
             refutes: false,
             may_mislead,
@@ -82,15 +79,6 @@ impl RelocalizationTest {
             given: Some(Box::new(given.as_stated())),
             ..Self::new(search, given, false)
         }
-    }
-
-    /// What the search has found. Biases of the angles, which a search of a start does without, are unknown there.
-    pub fn found(&self) -> Option<Ekf> {
-        let mut found = self.search.found()?;
-        if self.is_of_start() {
-            found.expect_bias_as(&self.config);
-        }
-        Some(found)
     }
 
     /// Whether the search has found that the start is where it is said to be.

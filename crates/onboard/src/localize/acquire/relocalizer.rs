@@ -15,7 +15,7 @@ use std::cmp::Ordering;
 use std::sync::Arc;
 
 use super::consistency::ConsistencyMonitor;
-use super::gaussian_sum::GaussianSum;
+use super::gaussian_sum::{GaussianSum, LEAST_HEADS};
 use super::relocalization_test::RelocalizationTest;
 use crate::BoxError;
 use crate::clone_in_place::clone_in_place;
@@ -47,9 +47,6 @@ const PATIENCE_S: f64 = 20.0;
 
 /// After this way a confirmation by few angles has taken long (m).
 const LONG_WAY_M: f64 = 100.0;
-
-/// Radio heads without which a place in the plane cannot be told from others.
-const LEAST_HEADS: usize = 3;
 
 /// What the localizer is at.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
@@ -357,11 +354,11 @@ impl Relocalizer {
         let (true, Some(solution)) = (self.setup.road.is_none(), &self.solution) else {
             return self.begin(Phase::Confirming, now_s);
         };
-        if heads.len() < LEAST_HEADS || GaussianSum::is_small(heads) {
+        if !GaussianSum::serves_as_stated(heads) {
             return self.begin(Phase::Confirming, now_s);
         }
         let given = solution.ekf();
-        let mut search = GaussianSum::as_stated(given.as_stated().config(), heads);
+        let mut search = GaussianSum::as_stated(*given.config(), heads);
         search.resume(given);
         self.test = Some(RelocalizationTest::of_start(search, given));
         self.phase = Phase::Confirming;
@@ -471,7 +468,7 @@ impl Relocalizer {
                 }
             }
             Transition::TakeOver => {
-                if let Some(found) = self.test.as_ref().and_then(RelocalizationTest::found) {
+                if let Some(found) = self.test.as_ref().and_then(|it| it.search.found()) {
                     let from = solution.pose(now_s).pose;
                     let [x_m, y_m, turned_rad] = from.offset_of(found.pose(now_s).pose);
                     self.recovered = Some(Recovered {

@@ -337,6 +337,14 @@ impl EkfConfig {
         self.rician_k.max(1.0)
     }
 
+    /// The same by what is stated of the angles alone: no bias is estimated, however usual.
+    #[must_use]
+    pub fn as_stated(mut self) -> Self {
+        self.set_noise_ratio(None);
+        self.bias_probability = 0.0;
+        self
+    }
+
     /// Whether a time-correlated bias of the angles is estimated.
     pub const fn estimates_bias(&self) -> bool {
         self.bias_probability > 0.0
