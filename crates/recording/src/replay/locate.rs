@@ -103,7 +103,13 @@ pub fn locate_recording(
     let heard_by = in_time(&vehicle);
     if let Some(late) = lateness(&as_given(site, &heard_by, odometry, &heard))? {
         heard = earlier(&heard, late.found_s);
-        replay = Replay::new(site, &as_chosen(&heard_by), start, Custom::default(), odometry)?;
+        replay = Replay::new(
+            site,
+            &as_chosen(&heard_by),
+            start,
+            Custom::default(),
+            odometry,
+        )?;
         replay.set_back(late);
         replay.hear(&heard)?;
     }

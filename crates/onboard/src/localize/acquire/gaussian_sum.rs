@@ -163,17 +163,17 @@ impl GaussianSum {
         heads: &[RadioHead],
     ) -> Self {
         if road.is_none() && Self::serves_as_stated(heads) {
-            return Self::as_stated(config, heads);
+            return Self::as_stated(&config, heads);
         }
         Self::new(config, road, either_direction, heads)
     }
 
     /// In the plane, where places are judged by what is stated alone: what a place does not know well counts against it, and
     /// no bias is estimated before it is found.
-    pub(super) fn as_stated(config: EkfConfig, heads: &[RadioHead]) -> Self {
+    pub(super) fn as_stated(config: &EkfConfig, heads: &[RadioHead]) -> Self {
         let search = Self::new(config.as_stated(), None, true, heads);
         Self {
-            as_stated: Some(config),
+            as_stated: Some(*config),
             ..search
         }
     }

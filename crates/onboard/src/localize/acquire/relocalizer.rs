@@ -358,7 +358,7 @@ impl Relocalizer {
             return self.begin(Phase::Confirming, now_s);
         }
         let given = solution.ekf();
-        let mut search = GaussianSum::as_stated(*given.config(), heads);
+        let mut search = GaussianSum::as_stated(given.config(), heads);
         search.resume(given);
         self.test = Some(RelocalizationTest::of_start(search, given));
         self.phase = Phase::Confirming;

