@@ -30,8 +30,8 @@ pub struct ReceiverSettings {
     #[schemars(range(min = -1.0, max = 0.4))]
     pub lateness_s: f64,
     /// Standard deviation of that, within which it is found while driving, in seconds; without, 0
-    /// on a road and 0.1 s for a differential drive. Of recorded drives it is found beforehand, within
-    /// three of these deviations, or 1.5 s without; 0 says that the clocks are one.
+    /// on a road and 0.1 s for a differential drive, and of recorded drives it is found beforehand,
+    /// up to 1.5 s. 0 says that the clocks are one.
     #[serde(skip_serializing_if = "Option::is_none")]
     #[schemars(range(min = 0.0, max = 0.5))]
     pub lateness_std_s: Option<f64>,

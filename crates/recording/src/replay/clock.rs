@@ -16,8 +16,7 @@ use super::error::ReplayError;
 use super::hypotheses::{Drive, FREEDOM_LOG_ODDS};
 use crate::angle_log::LoggedAngle;
 
-/// Largest lateness that is looked for, either way, where no deviation is stated (s), and the grid's spacing: less than
-/// over which speed changes.
+/// Largest lateness that is looked for, either way (s), and the grid's spacing: less than over which speed changes.
 const MOST_S: f64 = 1.5;
 const GRID_S: f64 = 0.5;
 
@@ -43,16 +42,15 @@ pub struct Lateness {
 }
 
 /// The lateness of a drive's angles, where it is more than anybody minds, explains them, and is as much likelier than none
-/// as anything that is free must be. It is looked for within three of the stated deviations; nothing where that is zero.
+/// as anything that is free must be. Where its deviation is stated the localizer's filter finds it within that.
 ///
 /// # Errors
 /// [`ReplayError::Settings`] for a road that cannot be built.
 pub fn lateness(given: &Drive<'_>) -> Result<Option<Lateness>, ReplayError> {
     let vehicle = &given.vehicle;
     let is_tracker = matches!(vehicle.localizer, LocalizerSettings::Tracker(_));
-    let stated_std_s = vehicle.receiver.lateness_std_s;
-    let most_s = stated_std_s.map_or(MOST_S, |std_s| CERTAIN_SIGMAS * std_s);
-    if !is_tracker || !vehicle.start.known || most_s == 0.0 {
+    let is_stated = vehicle.receiver.lateness_std_s.is_some();
+    if !is_tracker || !vehicle.start.known || is_stated {
         return Ok(None);
     }
     let mut given = spread(given);
@@ -61,7 +59,7 @@ pub fn lateness(given: &Drive<'_>) -> Result<Option<Lateness>, ReplayError> {
         .angles
         .to_mut()
         .retain(|it| it.measured.time_s - first_s < SPAN_S);
-    // Within three of its deviations the localizer's filter finds it by itself.
+    // Within three of the deviations that a filter begins with anyway it finds it by itself, too.
     let of_filter_s = CERTAIN_SIGMAS * EkfConfig::new(&given.site, vehicle).lateness_std_s;
     // What is searched for is no state of the filter as well.
     given.vehicle.to_mut().receiver.lateness_std_s = Some(0.0);
@@ -71,15 +69,15 @@ pub fn lateness(given: &Drive<'_>) -> Result<Option<Lateness>, ReplayError> {
     };
     let mut best = (0.0, likelihood(0.0)?);
     let in_time = best.1;
-    let steps = (most_s / GRID_S).ceil() as i32;
+    let steps = (MOST_S / GRID_S) as i32;
     for step in (-steps..=steps).filter(|step| *step != 0) {
-        let late_s = (GRID_S * f64::from(step)).clamp(-most_s, most_s);
+        let late_s = GRID_S * f64::from(step);
         let tried = (late_s, likelihood(late_s)?);
         if tried.1 > best.1 {
             best = tried;
         }
     }
-    let around_s = [-GRID_S, GRID_S].map(|by_s| (best.0 + by_s).clamp(-most_s, most_s));
+    let around_s = [best.0 - GRID_S, best.0 + GRID_S];
     let found_s = highest(around_s, &likelihood)?;
     if found_s.abs() < LEAST_LATENESS_S.max(of_filter_s) {
         return Ok(None);
