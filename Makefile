@@ -10,7 +10,7 @@ export CARGO_INCREMENTAL ?= 0
 
 # Tests of a file stay in one process: they share what it has driven.
 # One more than there are cores: some only wait.
-PYTEST := $(BIN)/python -m pytest --numprocesses $(shell expr $$(nproc) + 1) --dist loadscope
+PYTEST := $(BIN)/python -m pytest --numprocesses $(shell expr $$(nproc 2>/dev/null || echo 1) + 1) --dist loadscope
 
 # Reference vectors and recordings, beside the project.
 DATA := $(abspath $(or $(ACCESS_AV_DATA),../shared/data))
