@@ -139,8 +139,7 @@ endef
 	@touch .venv/installed
 
 .venv/installed-live: .venv/installed
-	$(BIN)/python -m pip install --quiet --editable '.[live]' --config-settings build-args='--profile dev'
-	@touch $@
+	$(call install,'.[live]',dev)
 
 # As wheels are.
 .venv/installed-bench: .venv/bin/python $(SOURCES)

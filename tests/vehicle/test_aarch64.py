@@ -2,7 +2,6 @@
 
 from __future__ import annotations
 
-import os
 import shutil
 import subprocess
 from pathlib import Path
@@ -13,9 +12,9 @@ import pytest
 import access_av
 from access_av.drives.recorded import log_angles
 from conftest import ROOT
+from node import NODE
 
-HERE = Path(os.environ.get("ACCESS_AV_NODE", ROOT / "target/debug/access-av-node"))
-THERE = ROOT / "target/aarch64-unknown-linux-gnu/debug/access-av-node"
+TNODE = ROOT / "target/aarch64-unknown-linux-gnu/debug/access-av-node"
 EMULATOR = shutil.which("qemu-aarch64")
 # Where the other processor's libraries are: Debian's cross compiler, or a system of both.
 LIBRARIES = next(it for it in ("/usr/aarch64-linux-gnu", "/") if Path(it).exists())
@@ -23,8 +22,8 @@ LIBRARIES = next(it for it in ("/usr/aarch64-linux-gnu", "/") if Path(it).exists
 SAMPLES_M = 2e-8
 
 pytestmark = pytest.mark.skipif(
-    EMULATOR is None or not (HERE.exists() and THERE.exists()),
-    reason=f"no emulator, {HERE} or {THERE}: `make test-aarch64` says what is needed",
+    EMULATOR is None or not (NODE.exists() and TNODE.exists()),
+    reason=f"no emulator, {NODE} or {TNODE}: `make test-aarch64` says what is needed",
 )
 
 
@@ -40,16 +39,16 @@ def poses(command: list[str | Path], drive: Path, folder: Path, sources: str) ->
 
 
 def test_poses_are_the_same_on_another_processor(tmp_path: Path) -> None:
-    emulated = [str(EMULATOR), "-L", LIBRARIES, THERE]
+    emulated = [str(EMULATOR), "-L", LIBRARIES, TNODE]
     log_angles("yard", tmp_path / "log", duration_s=60.0)
     angles = f'angles.file = "{tmp_path}/log/angles.csv"\n'
-    by_angles = poses([HERE], tmp_path / "log", tmp_path, angles)
+    by_angles = poses([NODE], tmp_path / "log", tmp_path, angles)
     assert poses(emulated, tmp_path / "log", tmp_path, angles) == by_angles
 
     access_av.synthesize("yard", tmp_path / "iq", duration_s=10.0)
     samples = f'samples = {{ source = "sigmf", recording = "{tmp_path}/iq/iq" }}\n'
     by_samples, there = (
         np.loadtxt(poses(node, tmp_path / "iq", tmp_path, samples).decode().splitlines())
-        for node in ([HERE], emulated)
+        for node in ([NODE], emulated)
     )
     assert np.abs(by_samples - there).max() < SAMPLES_M

@@ -29,6 +29,7 @@ import layout
 from access_av.drives.recorded import log_angles
 from browser import Browser
 from conftest import ROOT
+from node import NODE, command, wake_up_every
 
 if TYPE_CHECKING:
     from collections.abc import Iterator
@@ -36,7 +37,6 @@ if TYPE_CHECKING:
 sys.path.insert(0, str(ROOT / "examples/live"))
 from transmitter import Drive, Transmitter, Wheels, node_toml, odometry_of, settings_of
 
-NODE = Path(os.environ.get("ACCESS_AV_NODE", ROOT / "target/debug/access-av-node"))
 SCHEMAS = Path(os.environ.get("ACCESS_AV_DATA", ROOT / "../shared/data")) / "vda5050"
 CHROMIUM = shutil.which("chromium") or shutil.which("chromium-browser")
 DURATION_S = 5.0
@@ -53,11 +53,6 @@ def drive(tmp_path_factory: pytest.TempPathFactory) -> Path:
     folder = tmp_path_factory.mktemp("drive")
     access_av.synthesize("yard", folder, duration_s=DURATION_S)
     return folder
-
-
-def command(drive: Path, settings: Path, *options: str) -> list[str]:
-    believed = ["--site", str(drive / "site.toml"), "--vehicle", str(drive / "vehicle.toml")]
-    return [str(NODE), *believed, *options, str(settings)]
 
 
 def lines(file: Path) -> list[dict[str, Any]]:
@@ -151,9 +146,7 @@ def test_each_file_of_a_day_is_whole_and_together_they_hold_all(
 def test_angles_recorded_by_a_node_are_played_back(tmp_path: Path) -> None:
     source = tmp_path / "source"
     log_angles("yard", source, duration_s=20.0)
-    vehicle = access_av.Vehicle.load(str(source / "vehicle.toml"))
-    every = {"wake_up.policy": "fixed", "wake_up.interval_ms": 20.0}
-    (source / "vehicle.toml").write_text(vehicle.with_overrides(every).to_toml(), encoding="utf-8")
+    wake_up_every(source, 0.02)
     # Times of MCAP are whole nanoseconds: an angle of the same time as odometry may come before it.
     odometry = [{**it, "time_s": it["time_s"] + 0.007} for it in odometry_of(source)]
     with (source / "odometry.csv").open("w", encoding="utf-8") as file:
@@ -186,9 +179,7 @@ def test_angles_recorded_by_a_node_are_played_back(tmp_path: Path) -> None:
 def test_a_recording_in_real_time_is_not_read_where_nothing_is_wanted(tmp_path: Path) -> None:
     drive = tmp_path / "drive"
     access_av.synthesize("yard", drive, duration_s=9.0)
-    vehicle = access_av.Vehicle.load(str(drive / "vehicle.toml"))
-    seldom = {"wake_up.policy": "fixed", "wake_up.interval_ms": 3000.0}
-    (drive / "vehicle.toml").write_text(vehicle.with_overrides(seldom).to_toml(), encoding="utf-8")
+    wake_up_every(drive, 3.0)
     wheels, page = Wheels(odometry_of(drive)), free_port()
     settings = tmp_path / "node.toml"
     samples = f'source = "sigmf"\nrecording = "{drive}/iq"\n'

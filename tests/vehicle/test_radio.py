@@ -3,24 +3,26 @@
 from __future__ import annotations
 
 import json
-import os
 import subprocess
 import sys
 import time
 import urllib.request
-from pathlib import Path
+from typing import TYPE_CHECKING
 
 import pytest
 
 import access_av
 from conftest import ROOT
+from node import NODE, command, wake_up_every
 
 sys.path.insert(0, str(ROOT / "examples/live"))
 from transmitter import settings_of
 
 from radio import Radio
 
-NODE = Path(os.environ.get("ACCESS_AV_NODE", ROOT / "target/debug/access-av-node"))
+if TYPE_CHECKING:
+    from pathlib import Path
+
 DURATION_S = 8.0
 INTERVAL_S = 0.5
 
@@ -44,14 +46,11 @@ def test_a_radio_is_on_for_the_bursts_alone(tmp_path: Path) -> None:
     if not can_soapy(settings, believed):
         pytest.skip(f"{NODE} is built without the feature `soapy`; `make test-radio` builds it")
     access_av.synthesize("yard", drive, duration_s=DURATION_S, continuous=True)
-    vehicle = access_av.Vehicle.load(str(drive / "vehicle.toml"))
-    seldom = {"wake_up.policy": "fixed", "wake_up.interval_ms": 1e3 * INTERVAL_S}
-    (drive / "vehicle.toml").write_text(vehicle.with_overrides(seldom).to_toml(), encoding="utf-8")
+    wake_up_every(drive, INTERVAL_S)
     radio = Radio(drive, tmp_path)
     told = settings_of(radio.samples, radio.odometry, "127.0.0.1:0")
     settings.write_text(told + f'[output.json]\naddress = "{tmp_path}/node.jsonl"\n')
-    believed = ["--site", str(drive / "site.toml"), "--vehicle", str(drive / "vehicle.toml")]
-    node = subprocess.Popen([NODE, *believed, settings], stderr=subprocess.PIPE, text=True)
+    node = subprocess.Popen(command(drive, settings), stderr=subprocess.PIPE, text=True)
     assert node.stderr is not None
     page = node.stderr.readline().split()[-1].rstrip("/")
     radio.run()

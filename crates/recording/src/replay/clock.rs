@@ -5,28 +5,28 @@
 //! (Kiefer, Proc. AMS 4, 1953). Speed that changes and turns tell it: while a vehicle drives straight on, late angles are
 //! those of a place further back.
 
-use std::borrow::Cow;
-
 use onboard::gaussian::CERTAIN_SIGMAS;
 use onboard::localize::ekf::EkfConfig;
 use onboard::settings::LocalizerSettings;
 
 use super::diagnosis::{is_understood, screened, spread};
 use super::error::ReplayError;
+use super::evidence::Evidence;
 use super::hypotheses::{Drive, FREEDOM_LOG_ODDS};
 use crate::angle_log::LoggedAngle;
 
-/// Largest lateness that is looked for, either way (s), and the grid's spacing: less than over which speed changes.
+/// Largest lateness that is looked for, either way (s; assumed: buffers and drivers take up to a second), and the grid's
+/// spacing: less than over which speed changes.
 const MOST_S: f64 = 1.5;
 const GRID_S: f64 = 0.5;
 
-/// How closely it is found (s).
+/// How closely it is found (s): a drive of two minutes tells it to some 0.02 s.
 const FINEST_S: f64 = 0.005;
 
-/// From the best to where the curvature of the likelihood is taken (s).
+/// From the best to where the curvature of the likelihood is taken (s): several odometry samples, between which it ripples.
 const ASIDE_S: f64 = 0.1;
 
-/// Smallest lateness that anybody minds (s).
+/// Smallest lateness that anybody minds (s): at walking pace 0.04 m.
 pub const LEAST_LATENESS_S: f64 = 0.03;
 
 /// Time from the first angle on by which it is judged (s): two clocks run apart.
@@ -63,10 +63,14 @@ pub fn lateness(given: &Drive<'_>) -> Result<Option<Lateness>, ReplayError> {
     let of_filter_s = CERTAIN_SIGMAS * EkfConfig::new(&given.site, vehicle).lateness_std_s;
     // What is searched for is no state of the filter as well.
     given.vehicle.to_mut().receiver.lateness_std_s = Some(0.0);
-    let of = |late_s: f64| screened(&set_back(&given, late_s));
-    let likelihood = |late_s: f64| -> Result<f64, ReplayError> {
-        Ok(of(late_s)?.map_or(f64::NEG_INFINITY, |it| it.relative_log_likelihood))
+    let stated_s = given.vehicle.receiver.lateness_s;
+    let mut of = |late_s: f64| {
+        given.vehicle.to_mut().receiver.lateness_s = stated_s + late_s;
+        screened(&given)
     };
+    let log_likelihood =
+        |of: Option<Evidence>| of.map_or(f64::NEG_INFINITY, |it| it.relative_log_likelihood);
+    let mut likelihood = |late_s: f64| Ok(log_likelihood(of(late_s)?));
     let mut best = (0.0, likelihood(0.0)?);
     let in_time = best.1;
     let steps = (MOST_S / GRID_S) as i32;
@@ -78,7 +82,7 @@ pub fn lateness(given: &Drive<'_>) -> Result<Option<Lateness>, ReplayError> {
         }
     }
     let around_s = [best.0 - GRID_S, best.0 + GRID_S];
-    let found_s = highest(around_s, &likelihood)?;
+    let found_s = highest(around_s, &mut likelihood)?;
     if found_s.abs() < LEAST_LATENESS_S.max(of_filter_s) {
         return Ok(None);
     }
@@ -89,19 +93,11 @@ pub fn lateness(given: &Drive<'_>) -> Result<Option<Lateness>, ReplayError> {
     if at_best - in_time < FREEDOM_LOG_ODDS {
         return Ok(None);
     }
-    let beside = likelihood(found_s - ASIDE_S)? + likelihood(found_s + ASIDE_S)?;
+    let beside = log_likelihood(of(found_s - ASIDE_S)?) + log_likelihood(of(found_s + ASIDE_S)?);
     let curvature = (2.0 * at_best - beside) / (ASIDE_S * ASIDE_S);
     // Never wider than where it was looked for by then.
     let std_s = curvature.max(0.0).sqrt().recip().min(GRID_S);
     Ok(Some(Lateness { found_s, std_s }))
-}
-
-/// The drive with angles that were taken so much earlier (s).
-fn set_back<'a>(given: &Drive<'a>, late_s: f64) -> Drive<'a> {
-    Drive {
-        angles: Cow::Owned(earlier(&given.angles, late_s)),
-        ..given.clone()
-    }
 }
 
 /// Angles that were taken so much earlier (s).
@@ -117,7 +113,7 @@ pub fn earlier(angles: &[LoggedAngle], late_s: f64) -> Vec<LoggedAngle> {
 /// Where a function with one maximum in between has it.
 fn highest(
     [mut low, mut high]: [f64; 2],
-    of: &impl Fn(f64) -> Result<f64, ReplayError>,
+    of: &mut impl FnMut(f64) -> Result<f64, ReplayError>,
 ) -> Result<f64, ReplayError> {
     let share = 0.5 * (3.0 - 5f64.sqrt());
     let at = |low: f64, high: f64, share: f64| low + share * (high - low);
@@ -143,8 +139,8 @@ mod tests {
 
     #[test]
     fn the_highest_place_is_found() {
-        let of = |x: f64| Ok(-(x - 0.123).powi(2));
-        let found = highest([-0.5, 0.5], &of).unwrap();
+        let mut of = |x: f64| Ok(-(x - 0.123).powi(2));
+        let found = highest([-0.5, 0.5], &mut of).unwrap();
         assert!((found - 0.123).abs() < FINEST_S);
     }
 }

@@ -129,8 +129,9 @@ impl Hypothesis {
 /// of r the Taylor polynomial.
 #[inline]
 fn exp_of_negative(x: f64) -> f64 {
-    /// Added to a number it leaves that rounded to a whole one, in its lowest bits.
+    /// 1.5 · 2⁵²: added to a number it leaves that rounded to a whole one, in its lowest bits.
     const ROUND: f64 = 6_755_399_441_055_744.0;
+    /// From about here on the result is no normal number any more (-708).
     const LEAST: f64 = -700.0;
     const TAYLOR: [f64; 7] = [
         1.0 / 720.0,
