@@ -39,8 +39,9 @@ pub struct ReceiverSettings {
     /// radians.
     #[schemars(range(min = 0.0, max = 3.2))]
     pub phase_bias_std_rad: f64,
-    /// Share of an angle's stated variance that stays so; 0.25 for logged angles where it is not
-    /// stated, and 0 for the receiver's own, whose deviation is that of thermal noise.
+    /// Largest share of an angle's stated variance that stays so; how much does is found while driving.
+    /// 0.25 for logged angles where it is not stated, and 0 for the receiver's own, whose deviation
+    /// is that of thermal noise.
     #[serde(skip_serializing_if = "Option::is_none")]
     #[schemars(range(min = 0.0, max = 1.0))]
     pub phase_bias_share: Option<f64>,

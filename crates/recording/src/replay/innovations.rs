@@ -67,7 +67,8 @@ pub fn plain_filter(site: &Site, vehicle: &Vehicle) -> Result<Ekf, ReplayError> 
     };
     let heads = RadioHead::heard(site, vehicle);
     let road = site.build_road()?.filter(|_| vehicle.follows_road());
-    let config = EkfConfig::new(site, vehicle);
+    let mut config = EkfConfig::new(site, vehicle);
+    config.phase_bias.is_found = false;
     Ok(Ekf::new(config, road.map(Arc::new), &heads, &start))
 }
 

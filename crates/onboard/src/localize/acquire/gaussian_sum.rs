@@ -293,7 +293,20 @@ impl GaussianSum {
             }
         }
         self.prune();
+        // Angles are those of one receiver: were they worth more at one place than at another, neither were the likelier.
+        if let Some((best, others)) = self.hypotheses.split_first_mut() {
+            for it in others {
+                it.ekf.hear_as(&best.ekf);
+            }
+        }
         first
+    }
+
+    /// A filter beside it hears as its own do.
+    pub(super) fn teach(&self, ekf: &mut Ekf) {
+        if let Some(best) = self.hypotheses.first() {
+            ekf.hear_as(&best.ekf);
+        }
     }
 
     fn prune(&mut self) {
@@ -372,15 +385,17 @@ impl GaussianSum {
         best + (all.sum::<f64>() / self.places.max(1) as f64).ln()
     }
 
-    /// Whether a filter's place is within what is certain of every hypothesis that is left.
-    pub(super) fn is_about(&self, ekf: &Ekf) -> bool {
+    /// Whether every hypothesis that is left knows its place, and a filter's is within what is certain of it.
+    pub(super) fn is_at(&self, ekf: &Ekf) -> bool {
         self.hypotheses.iter().all(|it| {
+            let [most_m2, _] = Ekf::principal_variances(it.ekf.belief());
             let (one, other) = (it.ekf.belief(), ekf.belief());
-            [ALONG, ACROSS, HEADING].into_iter().all(|state| {
+            let is_near = |state| {
                 let apart = it.apart_of(ekf, state);
                 let variance = one.covariance[state][state] + other.covariance[state][state];
                 apart * apart < CERTAIN_SIGMAS * CERTAIN_SIGMAS * variance
-            })
+            };
+            most_m2 < FOUND_STD_M * FOUND_STD_M && [ALONG, ACROSS, HEADING].into_iter().all(is_near)
         })
     }
 

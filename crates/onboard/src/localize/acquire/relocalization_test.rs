@@ -83,7 +83,7 @@ impl RelocalizationTest {
 
     /// Whether the search has found that the start is where it is said to be.
     pub fn confirms_start(&self) -> bool {
-        (self.given.as_ref()).is_some_and(|given| self.search.is_about(given))
+        (self.given.as_ref()).is_some_and(|given| self.search.is_at(given))
     }
 
     /// Whether it is of a start that is given.
@@ -124,6 +124,9 @@ impl RelocalizationTest {
             self.of_filter += log_likelihood(ekf, &ekf.predict_measurement(head, measured));
         }
         self.search.update(head, measured);
+        if let Some(given) = &mut self.given {
+            self.search.teach(given);
+        }
     }
 
     /// Greater where the angles are certainly likelier at the search's best place, less where they are at the

@@ -82,8 +82,10 @@ struct Evidence {
     search: Ordering,
     /// The search is of one place.
     is_found: bool,
-    /// It is of a start that was given.
+    /// It is of a start that was given,
     is_of_start: bool,
+    /// against which the angles speak.
+    doubts_start: bool,
     /// No odometry since the search is reported: before anything moves the covariance covers both.
     is_just_reported: bool,
     /// Enough way was driven for a find; a long one.
@@ -123,9 +125,11 @@ impl Phase {
             Self::Confirming => {
                 let is_long = by.is_patient || (by.may_mislead && by.has_moved_far);
                 let is_over = if by.is_of_start {
-                    // Until one place is left another may yet be the right one; what takes long is not worth its cost.
+                    // Until one place is left another may yet be the right one; what takes long is not worth its cost,
+                    // unless the angles speak for another.
                     by.search == Ordering::Less
-                        && (by.is_found || by.is_patient || by.has_moved_far)
+                        && (by.is_found
+                            || (!by.doubts_start && (by.is_patient || by.has_moved_far)))
                 } else {
                     !is_ahead && (is_confirmed || is_long || by.is_found)
                 };
@@ -142,7 +146,10 @@ impl Phase {
             Self::Relocalizing { .. } if by.is_just_reported => Transition::Stay,
             Self::Relocalizing { .. } if is_ahead && !by.has_moved => Transition::Stay,
             Self::Relocalizing { .. } if is_ahead && by.is_found => Transition::TakeOver,
-            Self::Relocalizing { .. } if is_confirmed || (!is_ahead && by.is_found) => {
+            // A start that is in doubt has its search go on until either is certain.
+            Self::Relocalizing { .. }
+                if is_confirmed || (!is_ahead && by.is_found && !by.doubts_start) =>
+            {
                 Transition::End { rests: true }
             }
             Self::Relocalizing { wide: false } if by.is_patient => {
@@ -438,6 +445,7 @@ impl Relocalizer {
                 _ => it.search.found().is_some(),
             }),
             is_of_start,
+            doubts_start: self.doubts_start(),
             is_just_reported: is(&|it| it.reported_s == odometry_s),
             has_moved: is(&|it| it.way_m >= it.least_way_m()),
             has_moved_far: is(&|it| it.way_m > LONG_WAY_M),
@@ -618,6 +626,7 @@ mod tests {
         search: Ordering::Equal,
         is_found: false,
         is_of_start: false,
+        doubts_start: false,
         is_just_reported: false,
         has_moved: false,
         has_moved_far: false,
@@ -693,6 +702,18 @@ mod tests {
             (
                 Confirming,
                 is(|it| (it.is_of_start, it.is_patient) = (true, true)),
+                Stay,
+            ),
+            (
+                Confirming,
+                behind(is(|it| (it.is_of_start, it.is_patient) = (true, true))),
+                End { rests: false },
+            ),
+            (
+                Confirming,
+                behind(is(|it| {
+                    (it.is_of_start, it.is_patient, it.doubts_start) = (true, true, true);
+                })),
                 Stay,
             ),
             (

@@ -104,8 +104,11 @@ const FORGETTING_TURN_RAD: f64 = 0.5;
 pub struct PhaseBias {
     /// Stationary deviation (rad).
     pub std_rad: f64,
-    /// Share of each angle's own variance that is of this kind.
+    /// Share of each angle's own variance that is of this kind, at most.
     pub share: f64,
+    /// Whether it is found while driving how much of that is. Where likelihoods are compared it is not: by what each finds,
+    /// one angle would count for more here than there.
+    pub is_found: bool,
     /// Time over which it is forgotten (s).
     pub correlation_s: f64,
     /// Distance over which it is forgotten (m).
@@ -113,6 +116,15 @@ pub struct PhaseBias {
 }
 
 impl PhaseBias {
+    /// How much it has been forgotten so long and so far after (s; m, rad), in time constants. Neither time nor way alone
+    /// forgets: a vehicle that stands sees the same error, and one that drives on is not another's sensor. Turning shows the
+    /// radio head to another part of it.
+    pub(super) fn steps(&self, elapsed_s: f64, (travelled_m, turned_rad): (f64, f64)) -> f64 {
+        let by_way =
+            travelled_m.abs() / self.correlation_m + turned_rad.abs() / FORGETTING_TURN_RAD;
+        (elapsed_s.abs() / self.correlation_s).min(by_way)
+    }
+
     /// Variance (rad²) of an angle of the stated deviation, so long and so far after the radio head's
     /// last one, as if angles were independent: with the correlation `ρ = e^{−Δ}` between neighbours
     /// the mean of many angles has `(1 + ρ)/(1 − ρ) = coth Δ/2` times the variance that independent
@@ -123,12 +135,7 @@ impl PhaseBias {
         if stays + shared == 0.0 {
             return own;
         }
-        // Neither time nor way alone forgets: a vehicle that stands sees the same error, and one that drives on is
-        // not another's sensor. Turning shows the radio head to another part of it.
-        let (travelled_m, turned_rad) = moved;
-        let by_way =
-            travelled_m.abs() / self.correlation_m + turned_rad.abs() / FORGETTING_TURN_RAD;
-        let steps = (elapsed_s.abs() / self.correlation_s).min(by_way);
+        let steps = self.steps(elapsed_s, moved);
         // At the same instant nothing new is learnt, but the variance must stay a number.
         own - shared + (stays + shared) / (0.5 * steps.max(1e-4)).tanh()
     }
@@ -305,6 +312,7 @@ impl EkfConfig {
             phase_bias: PhaseBias {
                 std_rad: receiver.phase_bias_std_rad,
                 share: receiver.phase_bias_share.unwrap_or(0.0),
+                is_found: true,
                 correlation_s: receiver.phase_bias_correlation_s,
                 correlation_m: receiver.phase_bias_correlation_m,
             },

@@ -7,6 +7,7 @@ use super::odometer::{SampleInterval, SpeedJumps};
 use super::state::{
     Belief, LATENESS, MOUNTING, PHASE, SCALE, STATES, YAW_RATE_BIAS, YAW_RATE_SCALE,
 };
+use super::white_share::{Residual, WhiteShare};
 use crate::clone_in_place::clone_in_place;
 use crate::gaussian::CERTAIN_SIGMAS;
 use crate::gaussian::smoother::Journal;
@@ -36,8 +37,10 @@ pub(super) struct Head {
     pub last_update_m: f64,
     /// ... the time then (s) ...
     pub last_update_s: f64,
-    /// ... and the angle turned (rad).
+    /// ... the angle turned (rad) ...
     pub last_update_rad: f64,
+    /// ... and what that is off by since.
+    pub last_residual: Option<Residual>,
 }
 
 impl Head {
@@ -66,6 +69,8 @@ clone_in_place! {
         pub(super) speed_jumps: SpeedJumps,
         /// What the speeds say was driven (m) since the odometer last moved.
         pub(super) unread_m: f64,
+        /// What of the angles' errors does not stay.
+        pub(super) white: WhiteShare,
     }
 }
 
@@ -84,6 +89,7 @@ impl Ekf {
             last_update_m: f64::NEG_INFINITY,
             last_update_s: f64::NEG_INFINITY,
             last_update_rad: f64::NEG_INFINITY,
+            last_residual: None,
         };
         let mut ekf = Self {
             config,
@@ -99,6 +105,7 @@ impl Ekf {
             sample_interval: SampleInterval::default(),
             speed_jumps: SpeedJumps::default(),
             unread_m: 0.0,
+            white: WhiteShare::new(config.phase_bias.share),
         };
         ekf.update_off_map();
         ekf

@@ -78,7 +78,7 @@ impl Ekf {
             variance,
             measurement_variance,
         } = predicted.innovation;
-        let bias = self.config.phase_bias;
+        let bias = self.phase_bias();
         let unbiased = PhaseBias {
             std_rad: 0.0,
             ..bias
@@ -160,8 +160,7 @@ impl Ekf {
         let travelled_m = self.driven_m + ahead_m - known.last_update_m;
         let own = (self.config.noise_ratio() * thermal(angle_model.range_m)).sqrt();
         let mut variance = self
-            .config
-            .phase_bias
+            .phase_bias()
             .variance(own, f64::INFINITY, (travelled_m, 0.0))
             + self.config.shared_variance(travelled_m, &angle_model);
         let predicted = belief.variance_along(&angle_model.row) + variance;

@@ -17,6 +17,7 @@ mod predict;
 mod prior;
 pub mod state;
 mod update;
+mod white_share;
 
 pub use angle_model::ArrayModel;
 pub use config::EkfConfig;

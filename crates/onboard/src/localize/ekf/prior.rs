@@ -85,10 +85,16 @@ impl Ekf {
         belief
     }
 
-    /// Counts distances on from where another filter of the same vehicle does.
+    /// Counts distances on from where another filter of the same vehicle does, which knows its angles.
     pub(in crate::localize) fn resume(&mut self, other: &Self) {
         self.odometry = other.odometry;
         self.driven_m = other.driven_m;
+        self.hear_as(other);
+    }
+
+    /// Knows of what stays of the angles' errors what another filter of the same receiver does.
+    pub(in crate::localize) const fn hear_as(&mut self, other: &Self) {
+        self.white = other.white;
     }
 
     /// The filter by what is stated: angles are as noisy as that, and a bias that is rare is not estimated.

@@ -1,9 +1,11 @@
 //! The measurement update: an angle's prediction and innovation, its gate, and the corrected belief.
 
 use super::angle_model::{AngleModel, locate};
+use super::config::PhaseBias;
 use super::filter::Ekf;
 use super::motion::Reading;
 use super::state::{ACROSS, ALONG, HEADING, LATENESS, SCALE, STATES, YAW_RATE_BIAS};
+use super::white_share::Residual;
 use crate::gaussian::{Innovation, with_outliers};
 use crate::geometry::wrap_angle;
 use crate::localize::bias::{self, JumpHypotheses, MOST_VARIANCE};
@@ -108,7 +110,7 @@ impl Ekf {
         let elapsed_s = measured.time_s - head.last_update_s;
         let turned_rad = self.turned_rad - head.last_update_rad;
         let moved = (travelled_m, turned_rad);
-        let stated = (self.config.phase_bias).variance(sigma, elapsed_s, moved);
+        let stated = self.phase_bias().variance(sigma, elapsed_s, moved);
         let (row, strayed) = (ahead.as_ref()).map_or((angle_model.row, 0.0), |ahead| {
             ahead.seen_before(&angle_model.row)
         });
@@ -216,8 +218,9 @@ impl Ekf {
             };
             (residual, variance) = likely;
         }
+        let before = self.belief.mean;
         self.measure(residual, &predicted.row, variance);
-        self.note_update(&predicted, measured);
+        self.note_update(&predicted, measured, &before);
         self.verdict(UpdateReason::Consistent, Some(mahalanobis2))
     }
 
@@ -233,6 +236,7 @@ impl Ekf {
         seen.variance += MOST_VARIANCE;
         let mahalanobis2 = seen.mahalanobis2();
         let is_known = self.bias.is_large(predicted.head);
+        let before = self.belief.mean;
         let (way_m, journal) = (predicted.moved.0.abs(), self.journal.as_mut());
         (self.bias).take(
             &mut self.belief,
@@ -242,17 +246,47 @@ impl Ekf {
             hypotheses,
             journal,
         );
-        self.note_update(predicted, measured);
+        self.note_update(predicted, measured, &before);
         if mahalanobis2 > self.config.gate {
             return self.verdict(UpdateReason::Outlier, (!is_known).then_some(mahalanobis2));
         }
         self.verdict(UpdateReason::Consistent, Some(mahalanobis2))
     }
 
-    /// Remembers when and where a radio head was used.
-    fn note_update(&mut self, predicted: &PredictedMeasurement, measured: &AngleMeasurement) {
+    /// What stays of the errors of angles, as far as is known.
+    pub(super) fn phase_bias(&self) -> PhaseBias {
+        let mut bias = self.config.phase_bias;
+        if bias.is_found {
+            bias.share = self.white.stays(bias.share);
+        }
+        bias
+    }
+
+    /// Remembers when and where a radio head was used, and learns what of its angles stays; `before` is the state that
+    /// the angle has corrected.
+    fn note_update(
+        &mut self,
+        predicted: &PredictedMeasurement,
+        measured: &AngleMeasurement,
+        before: &[f64; STATES],
+    ) {
+        let corrected = self.belief.mean.iter().zip(before).zip(&predicted.row);
+        let corrected_rad: f64 = corrected
+            .map(|((now, before), by)| by * (now - before))
+            .sum();
         self.keep_bounds();
+        let stated = self.config.phase_bias;
+        let stays = stated.steps(predicted.elapsed_s, predicted.moved) < 1.0;
         if let Some(head) = self.heads.get_mut(predicted.head) {
+            let mut residual = Residual {
+                residual_rad: predicted.innovation.residual,
+                variance: predicted.own_variance,
+            };
+            if let (true, Some(last)) = (stays, &head.last_residual) {
+                self.white.see(last, &residual);
+            }
+            residual.residual_rad -= corrected_rad;
+            head.last_residual = Some(residual);
             head.last_update_m = predicted.place_m;
             head.last_update_s = measured.time_s;
             head.last_update_rad = self.turned_rad;
