@@ -14,7 +14,7 @@ from access_av.drives.recorded import log_angles
 from conftest import ROOT
 from node import NODE
 
-TNODE = ROOT / "target/aarch64-unknown-linux-gnu/debug/access-av-node"
+EMULATED_NODE = ROOT / "target/aarch64-unknown-linux-gnu/debug/access-av-node"
 EMULATOR = shutil.which("qemu-aarch64")
 # Where the other processor's libraries are: Debian's cross compiler, or a system of both.
 LIBRARIES = next(it for it in ("/usr/aarch64-linux-gnu", "/") if Path(it).exists())
@@ -22,8 +22,8 @@ LIBRARIES = next(it for it in ("/usr/aarch64-linux-gnu", "/") if Path(it).exists
 SAMPLES_M = 2e-8
 
 pytestmark = pytest.mark.skipif(
-    EMULATOR is None or not (NODE.exists() and TNODE.exists()),
-    reason=f"no emulator, {NODE} or {TNODE}: `make test-aarch64` says what is needed",
+    EMULATOR is None or not (NODE.exists() and EMULATED_NODE.exists()),
+    reason=f"no emulator, {NODE} or {EMULATED_NODE}: `make test-aarch64` says what is needed",
 )
 
 
@@ -39,7 +39,7 @@ def poses(command: list[str | Path], drive: Path, folder: Path, sources: str) ->
 
 
 def test_poses_are_the_same_on_another_processor(tmp_path: Path) -> None:
-    emulated = [str(EMULATOR), "-L", LIBRARIES, TNODE]
+    emulated = [str(EMULATOR), "-L", LIBRARIES, EMULATED_NODE]
     log_angles("yard", tmp_path / "log", duration_s=60.0)
     angles = f'angles.file = "{tmp_path}/log/angles.csv"\n'
     by_angles = poses([NODE], tmp_path / "log", tmp_path, angles)

@@ -262,31 +262,41 @@ impl Ekf {
         bias
     }
 
-    /// Remembers when and where a radio head was used, and learns what of its angles stays; `before` is the state that
-    /// the angle has corrected.
+    /// Learns what of a radio head's angles stays; `before` is the state that the angle has corrected.
+    fn learn_what_stays(&mut self, predicted: &PredictedMeasurement, before: &[f64; STATES]) {
+        let stated = self.config.phase_bias;
+        let Some(head) = self.heads.get_mut(predicted.head) else {
+            return;
+        };
+        if !(stated.is_found && stated.share > 0.0) {
+            return; // nobody asks
+        }
+        let corrected = self.belief.mean.iter().zip(before).zip(&predicted.row);
+        let corrected_rad: f64 = corrected
+            .map(|((now, before), by)| by * (now - before))
+            .sum();
+        let stays = stated.steps(predicted.elapsed_s, predicted.moved) < 1.0;
+        let mut residual = Residual {
+            residual_rad: predicted.innovation.residual,
+            variance: predicted.own_variance,
+        };
+        if let (true, Some(last)) = (stays, &head.last_residual) {
+            self.white.see(last, &residual);
+        }
+        residual.residual_rad -= corrected_rad;
+        head.last_residual = Some(residual);
+    }
+
+    /// Remembers when and where a radio head was used, and learns from its angle, which has corrected the state `before`.
     fn note_update(
         &mut self,
         predicted: &PredictedMeasurement,
         measured: &AngleMeasurement,
         before: &[f64; STATES],
     ) {
-        let corrected = self.belief.mean.iter().zip(before).zip(&predicted.row);
-        let corrected_rad: f64 = corrected
-            .map(|((now, before), by)| by * (now - before))
-            .sum();
+        self.learn_what_stays(predicted, before);
         self.keep_bounds();
-        let stated = self.config.phase_bias;
-        let stays = stated.steps(predicted.elapsed_s, predicted.moved) < 1.0;
         if let Some(head) = self.heads.get_mut(predicted.head) {
-            let mut residual = Residual {
-                residual_rad: predicted.innovation.residual,
-                variance: predicted.own_variance,
-            };
-            if let (true, Some(last)) = (stays, &head.last_residual) {
-                self.white.see(last, &residual);
-            }
-            residual.residual_rad -= corrected_rad;
-            head.last_residual = Some(residual);
             head.last_update_m = predicted.place_m;
             head.last_update_s = measured.time_s;
             head.last_update_rad = self.turned_rad;

@@ -15,7 +15,8 @@ const MOST: f64 = 9.0;
 const OF_MOST: f64 = 0.973_345;
 
 /// Half the mean squared difference of successive angles over their stated variance (von Neumann 1941). What stays from
-/// the one to the next, an error as well as where the vehicle is believed to be, is not in it.
+/// the one to the next, an error as well as where the vehicle is believed to be, is not in it. `NoiseRatio` of the bank
+/// asks the other question, by filters that lack the radio head and counting tails: by how much angles are noisier than stated.
 #[derive(Clone, Copy, Debug, PartialEq)]
 pub(super) struct WhiteShare {
     share: f64,
