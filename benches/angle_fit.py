@@ -3,10 +3,10 @@
 For each case: how many estimates are named as not to be relied on, the root mean square of error
 over standard deviation of the others (1 if they are as wrong as they say), the same of all, and the
 median error. Simulated cases draw directions anew; an echo has the source's waveform and a phase at
-random. Beside them what nobody can do better than: how many a test names that accuses one plane wave
-in a hundred, as ours does, and knows all but the noise (directions, waveforms, the echo's phase), and
-the z-RMS of what escapes it. Real ones need recordings of others, at ``ACCESS_AV_DATA`` or ``../shared/data``, and are
-left out without::
+random. Beside them what nobody can do better than: how many are named by a test that accuses one
+plane wave in a hundred, as ours does, and knows all but the noise (directions, waveforms, the
+echo's phase), and the z-RMS of what escapes it. Real ones need recordings of others, at
+``ACCESS_AV_DATA`` or ``../shared/data``, and are left out without::
 
     python benches/angle_fit.py --seeds 2000
 """

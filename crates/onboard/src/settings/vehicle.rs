@@ -15,6 +15,10 @@ use super::start::StartSettings;
 use super::toml_file::TomlFile;
 use super::wake_up::{UncertaintySettings, WakeUpSettings};
 
+/// Lateness of angles that is left to the filter on a road (s): only speed that changes and bends tell it there. Of 20
+/// drives of two minutes the search of a log finds lateness to 0.06 s, and 0.1 s at a third of the odds it asks.
+const LATENESS_ON_ROAD_STD_S: f64 = 0.1;
+
 /// A vehicle file.
 #[derive(Debug, Clone, PartialEq, Serialize, Deserialize, JsonSchema)]
 #[serde(deny_unknown_fields)]
@@ -138,6 +142,18 @@ impl Vehicle {
     pub fn follows_road(&self) -> bool {
         let maps = matches!(&self.localizer, LocalizerSettings::Tracker(tracker) if tracker.map);
         maps && self.drive == DriveKind::Road
+    }
+
+    /// This vehicle with angles and odometry from outside, each by a clock of its own: what is not stated of that is a state of
+    /// its localizer on a road, too.
+    #[must_use]
+    pub fn of_two_clocks(&self, site: &Site) -> Self {
+        let mut vehicle = self.clone();
+        if site.road.is_some() && self.follows_road() {
+            let lateness_std_s = &mut vehicle.receiver.lateness_std_s;
+            lateness_std_s.get_or_insert(LATENESS_ON_ROAD_STD_S);
+        }
+        vehicle
     }
 }
 

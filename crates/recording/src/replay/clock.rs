@@ -29,6 +29,9 @@ const ASIDE_S: f64 = 0.1;
 /// Smallest lateness that anybody minds (s): at walking pace 0.04 m.
 pub const LEAST_LATENESS_S: f64 = 0.03;
 
+/// How far a start may be off (m) that a lateness is not to explain.
+const DOUBTED_START_STD_M: f64 = 10.0;
+
 /// Time from the first angle on by which it is judged (s): two clocks run apart.
 const SPAN_S: f64 = 300.0;
 
@@ -63,14 +66,17 @@ pub fn lateness(given: &Drive<'_>) -> Result<Option<Lateness>, ReplayError> {
     let of_filter_s = CERTAIN_SIGMAS * EkfConfig::new(&given.site, vehicle).lateness_std_s;
     // What is searched for is no state of the filter as well.
     given.vehicle.to_mut().receiver.lateness_std_s = Some(0.0);
-    let stated_s = given.vehicle.receiver.lateness_s;
-    let mut of = |late_s: f64| {
-        given.vehicle.to_mut().receiver.lateness_s = stated_s + late_s;
-        screened(&given)
+    let of = |late_s: f64, start_std_m: f64| {
+        let mut meant = given.clone();
+        let vehicle = meant.vehicle.to_mut();
+        vehicle.receiver.lateness_s += late_s;
+        vehicle.start.position_std_m = start_std_m;
+        screened(&meant)
     };
     let log_likelihood =
         |of: Option<Evidence>| of.map_or(f64::NEG_INFINITY, |it| it.relative_log_likelihood);
-    let mut likelihood = |late_s: f64| Ok(log_likelihood(of(late_s)?));
+    let start_std_m = vehicle.start.position_std_m;
+    let mut likelihood = |late_s: f64| Ok(log_likelihood(of(late_s, start_std_m)?));
     let mut best = (0.0, likelihood(0.0)?);
     let in_time = best.1;
     let steps = (MOST_S / GRID_S) as i32;
@@ -86,15 +92,20 @@ pub fn lateness(given: &Drive<'_>) -> Result<Option<Lateness>, ReplayError> {
     if found_s.abs() < LEAST_LATENESS_S.max(of_filter_s) {
         return Ok(None);
     }
-    let Some(at_best) = of(found_s)?.filter(is_understood) else {
+    let Some(at_best) = of(found_s, start_std_m)?.filter(is_understood) else {
         return Ok(None);
     };
     let at_best = at_best.relative_log_likelihood;
     if at_best - in_time < FREEDOM_LOG_ODDS {
         return Ok(None);
     }
-    let beside = log_likelihood(of(found_s - ASIDE_S)?) + log_likelihood(of(found_s + ASIDE_S)?);
+    let beside = likelihood(found_s - ASIDE_S)? + likelihood(found_s + ASIDE_S)?;
     let curvature = (2.0 * at_best - beside) / (ASIDE_S * ASIDE_S);
+    let doubted_m = start_std_m.max(DOUBTED_START_STD_M);
+    let doubted = log_likelihood(of(found_s, doubted_m)?) - log_likelihood(of(0.0, doubted_m)?);
+    if doubted < FREEDOM_LOG_ODDS {
+        return Ok(None);
+    }
     // Never wider than where it was looked for by then.
     let std_s = curvature.max(0.0).sqrt().recip().min(GRID_S);
     Ok(Some(Lateness { found_s, std_s }))

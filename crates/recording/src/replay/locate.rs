@@ -37,16 +37,18 @@ pub fn locate_angles(
     smooth: bool,
 ) -> Result<LocatedDrive, ReplayError> {
     let (vehicle, start) = starting(site, vehicle, start)?;
-    let mut replay = Replay::new(site, &vehicle, start, Custom::default(), odometry)?;
     if angles.angles.is_empty() {
         let why = angles.remarks.first().map(ToString::to_string);
         return Err(ReplayError::NoAngle { why });
     }
+    let mut logged = Cow::Borrowed(angles.angles.as_slice());
+    let late = lateness(&as_given(site, &vehicle, odometry, &logged))?;
+    let vehicle = vehicle.of_two_clocks(site);
+    let mut replay = Replay::new(site, &vehicle, start, Custom::default(), odometry)?;
     for remark in &angles.remarks {
         replay.remark(remark.time_s, remark.to_string());
     }
-    let mut logged = Cow::Borrowed(angles.angles.as_slice());
-    if let Some(late) = lateness(&as_given(site, &vehicle, odometry, &logged))? {
+    if let Some(late) = late {
         logged = Cow::Owned(earlier(&logged, late.found_s));
         replay.set_back(late);
     }
@@ -77,7 +79,8 @@ pub fn locate_recording(
     if !start_time_s.is_finite() {
         return Err(ReplayError::StartTime { start_time_s });
     }
-    let (vehicle, start) = starting(site, vehicle, start)?;
+    let (as_stated, start) = starting(site, vehicle, start)?;
+    let vehicle = as_stated.of_two_clocks(site);
     let mut replay = Replay::new(site, &vehicle, start, Custom::default(), odometry)?;
     let file = recording.data_file().display().to_string();
     let config = ReceiverConfig::new(site, &vehicle);
@@ -101,7 +104,8 @@ pub fn locate_recording(
     }
     let mut heard: Vec<LoggedAngle> = replay.executions().iter().filter_map(as_logged).collect();
     let heard_by = in_time(&vehicle);
-    if let Some(late) = lateness(&as_given(site, &heard_by, odometry, &heard))? {
+    let late = lateness(&as_given(site, &in_time(&as_stated), odometry, &heard))?;
+    if let Some(late) = late {
         heard = earlier(&heard, late.found_s);
         replay = Replay::new(
             site,
