@@ -15,9 +15,8 @@ use super::start::StartSettings;
 use super::toml_file::TomlFile;
 use super::wake_up::{UncertaintySettings, WakeUpSettings};
 
-/// Lateness of angles that is left to the filter on a road (s): only speed that changes and bends tell it there. Of 20
-/// drives of two minutes the search of a log finds lateness to 0.06 s, and 0.1 s at a third of the odds it asks.
-const LATENESS_ON_ROAD_STD_S: f64 = 0.1;
+/// Lateness of angles from outside of which nothing is stated (s; assumed: buffers of both streams).
+const UNSTATED_LATENESS_STD_S: f64 = 0.1;
 
 /// A vehicle file.
 #[derive(Debug, Clone, PartialEq, Serialize, Deserialize, JsonSchema)]
@@ -145,14 +144,12 @@ impl Vehicle {
     }
 
     /// This vehicle with angles and odometry from outside, each by a clock of its own: what is not stated of that is a state of
-    /// its localizer on a road, too.
+    /// its localizer.
     #[must_use]
-    pub fn of_two_clocks(&self, site: &Site) -> Self {
+    pub fn of_two_clocks(&self) -> Self {
         let mut vehicle = self.clone();
-        if site.road.is_some() && self.follows_road() {
-            let lateness_std_s = &mut vehicle.receiver.lateness_std_s;
-            lateness_std_s.get_or_insert(LATENESS_ON_ROAD_STD_S);
-        }
+        let lateness_std_s = &mut vehicle.receiver.lateness_std_s;
+        lateness_std_s.get_or_insert(UNSTATED_LATENESS_STD_S);
         vehicle
     }
 }

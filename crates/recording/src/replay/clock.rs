@@ -7,7 +7,7 @@
 
 use onboard::gaussian::CERTAIN_SIGMAS;
 use onboard::localize::ekf::EkfConfig;
-use onboard::settings::LocalizerSettings;
+use onboard::settings::{LocalizerSettings, Site, Vehicle};
 
 use super::diagnosis::{is_understood, screened, spread};
 use super::error::ReplayError;
@@ -109,6 +109,16 @@ pub fn lateness(given: &Drive<'_>) -> Result<Option<Lateness>, ReplayError> {
     // Never wider than where it was looked for by then.
     let std_s = curvature.max(0.0).sqrt().recip().min(GRID_S);
     Ok(Some(Lateness { found_s, std_s }))
+}
+
+/// The vehicle by whose localizer a log is located. On a road, where only speed that changes and bends tell lateness, the search
+/// leaves 0.06 s of it (one deviation of some 20 drives of two minutes) and what it does not find.
+pub fn with_what_is_left(site: &Site, vehicle: &Vehicle) -> Vehicle {
+    if site.road.is_some() && vehicle.follows_road() {
+        vehicle.of_two_clocks()
+    } else {
+        vehicle.clone()
+    }
 }
 
 /// Angles that were taken so much earlier (s).

@@ -10,7 +10,7 @@ use onboard::receive::ReceiverConfig;
 use onboard::settings::{IntegritySettings, Site, Vehicle, WakeUpSettings};
 use onboard::{Custom, Execution};
 
-use super::clock::{earlier, lateness};
+use super::clock::{earlier, lateness, with_what_is_left};
 use super::data_quality::warnings;
 use super::diagnosis::diagnose;
 use super::drive::Replay;
@@ -43,7 +43,7 @@ pub fn locate_angles(
     }
     let mut logged = Cow::Borrowed(angles.angles.as_slice());
     let late = lateness(&as_given(site, &vehicle, odometry, &logged))?;
-    let vehicle = vehicle.of_two_clocks(site);
+    let vehicle = with_what_is_left(site, &vehicle);
     let mut replay = Replay::new(site, &vehicle, start, Custom::default(), odometry)?;
     for remark in &angles.remarks {
         replay.remark(remark.time_s, remark.to_string());
@@ -80,7 +80,7 @@ pub fn locate_recording(
         return Err(ReplayError::StartTime { start_time_s });
     }
     let (as_stated, start) = starting(site, vehicle, start)?;
-    let vehicle = as_stated.of_two_clocks(site);
+    let vehicle = with_what_is_left(site, &as_stated);
     let mut replay = Replay::new(site, &vehicle, start, Custom::default(), odometry)?;
     let file = recording.data_file().display().to_string();
     let config = ReceiverConfig::new(site, &vehicle);
