@@ -25,10 +25,10 @@ EVERY_SSB = {"wake_up": {"policy": "fixed", "interval_ms": 1.0}}
 
 @pytest.fixture(scope="module")
 def drive(tmp_path_factory: pytest.TempPathFactory) -> Path:
-    """A second of all samples, on a vehicle without monitor, which hears every SSB."""
+    """A second of all samples, on a vehicle of one clock and without monitor, which hears every SSB."""
     out = tmp_path_factory.mktemp("live")
     scenario = access_av.Scenario.load("paper-real-odometry-2").with_overrides(
-        {"vehicle.integrity.enabled": False}
+        {"vehicle.integrity.enabled": False, "vehicle.receiver.lateness_std_s": 0.0}
     )
     access_av.synthesize(scenario, out, duration_s=1.0, continuous=True)
     return out

@@ -115,7 +115,7 @@ impl Live {
         stream: Option<StreamConfig>,
         custom: Custom,
     ) -> Result<Self, LiveError> {
-        let (vehicle, start) = starting_at(site, &vehicle.of_two_clocks(), start)?;
+        let (vehicle, start) = starting_at(site, vehicle, start)?;
         let has_own_localizer = custom.localizer.is_some();
         let onboard = Onboard::new(site, &vehicle, platform, start, custom)?;
         let receiver = || ReceiverConfig::new(site, &vehicle);

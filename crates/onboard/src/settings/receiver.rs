@@ -29,9 +29,9 @@ pub struct ReceiverSettings {
     /// How much older than its time stamp an angle is, in seconds.
     #[schemars(range(min = -1.0, max = 0.4))]
     pub lateness_s: f64,
-    /// Standard deviation of that, within which it is found while driving, in seconds. Without, 0.1 s:
-    /// live, of recorded drives on a road, and for a differential drive; else 0. Of recorded drives it
-    /// is found beforehand, up to 1.5 s. 0 says that the clocks are one.
+    /// Standard deviation of that, within which it is found while driving, in seconds; without, 0
+    /// on a road and 0.1 s for a differential drive, and of recorded drives it is found beforehand,
+    /// up to 1.5 s. 0 says that the clocks are one.
     #[serde(skip_serializing_if = "Option::is_none")]
     #[schemars(range(min = 0.0, max = 0.5))]
     pub lateness_std_s: Option<f64>,

@@ -15,9 +15,6 @@ use super::start::StartSettings;
 use super::toml_file::TomlFile;
 use super::wake_up::{UncertaintySettings, WakeUpSettings};
 
-/// Lateness of angles from outside of which nothing is stated (s; assumed: buffers of both streams).
-const UNSTATED_LATENESS_STD_S: f64 = 0.1;
-
 /// A vehicle file.
 #[derive(Debug, Clone, PartialEq, Serialize, Deserialize, JsonSchema)]
 #[serde(deny_unknown_fields)]
@@ -141,16 +138,6 @@ impl Vehicle {
     pub fn follows_road(&self) -> bool {
         let maps = matches!(&self.localizer, LocalizerSettings::Tracker(tracker) if tracker.map);
         maps && self.drive == DriveKind::Road
-    }
-
-    /// This vehicle with angles and odometry from outside, each by a clock of its own: what is not stated of that is a state of
-    /// its localizer.
-    #[must_use]
-    pub fn of_two_clocks(&self) -> Self {
-        let mut vehicle = self.clone();
-        let lateness_std_s = &mut vehicle.receiver.lateness_std_s;
-        lateness_std_s.get_or_insert(UNSTATED_LATENESS_STD_S);
-        vehicle
     }
 }
 

@@ -7,7 +7,7 @@
 
 use onboard::gaussian::CERTAIN_SIGMAS;
 use onboard::localize::ekf::EkfConfig;
-use onboard::settings::{LocalizerSettings, Site, Vehicle};
+use onboard::settings::LocalizerSettings;
 
 use super::diagnosis::{is_understood, screened, spread};
 use super::error::ReplayError;
@@ -29,23 +29,31 @@ const ASIDE_S: f64 = 0.1;
 /// Smallest lateness that anybody minds (s): at walking pace 0.04 m.
 pub const LEAST_LATENESS_S: f64 = 0.03;
 
-/// How far a start may be off (m) that a lateness is not to explain.
+/// How far off a start may be (m).
 const DOUBTED_START_STD_M: f64 = 10.0;
 
 /// Time from the first angle on by which it is judged (s): two clocks run apart.
 const SPAN_S: f64 = 300.0;
 
+/// Log-odds from which two clocks are in doubt: two deviations of the one that is free, as one drive in 22 has in time
+/// (Wilks, Ann. Math. Statist. 9(1), 1938), were its errors white.
+const DOUBT_LOG_ODDS: f64 = 2.0;
+
+/// Lateness that is left to the filter where it is in doubt (s; assumed): what a road hides, whose bends alone tell it.
+const DOUBTED_STD_S: f64 = 0.1;
+
 /// How much later angles come than they say, by the odometry's clock.
-#[derive(Debug, Clone, Copy, PartialEq)]
+#[derive(Debug, Clone, Copy, Default, PartialEq)]
 pub struct Lateness {
     /// The lateness (s).
     pub found_s: f64,
-    /// Its standard deviation (s).
-    pub std_s: f64,
+    /// Standard deviation of what is left of it to the localizer's filter (s).
+    pub left_std_s: f64,
 }
 
 /// The lateness of a drive's angles, where it is more than anybody minds, explains them, and is as much likelier than none
-/// as anything that is free must be. Where its deviation is stated the localizer's filter finds it within that.
+/// as anything that is free must be; where it is somewhat likelier all of it is left. Where its deviation is stated the
+/// localizer's filter finds it within that.
 ///
 /// # Errors
 /// [`ReplayError::Settings`] for a road that cannot be built.
@@ -96,29 +104,26 @@ pub fn lateness(given: &Drive<'_>) -> Result<Option<Lateness>, ReplayError> {
         return Ok(None);
     };
     let at_best = at_best.relative_log_likelihood;
-    if at_best - in_time < FREEDOM_LOG_ODDS {
+    if at_best - in_time < DOUBT_LOG_ODDS {
         return Ok(None);
+    }
+    // A lateness is not to explain a wrong start.
+    let doubted_m = start_std_m.max(DOUBTED_START_STD_M);
+    let elsewhere = log_likelihood(of(found_s, doubted_m)?) - log_likelihood(of(0.0, doubted_m)?);
+    if elsewhere.min(at_best - in_time) < FREEDOM_LOG_ODDS {
+        return Ok(Some(Lateness {
+            found_s: 0.0,
+            left_std_s: DOUBTED_STD_S,
+        }));
     }
     let beside = likelihood(found_s - ASIDE_S)? + likelihood(found_s + ASIDE_S)?;
     let curvature = (2.0 * at_best - beside) / (ASIDE_S * ASIDE_S);
-    let doubted_m = start_std_m.max(DOUBTED_START_STD_M);
-    let doubted = log_likelihood(of(found_s, doubted_m)?) - log_likelihood(of(0.0, doubted_m)?);
-    if doubted < FREEDOM_LOG_ODDS {
-        return Ok(None);
-    }
     // Never wider than where it was looked for by then.
-    let std_s = curvature.max(0.0).sqrt().recip().min(GRID_S);
-    Ok(Some(Lateness { found_s, std_s }))
-}
-
-/// The vehicle by whose localizer a log is located. On a road, where only speed that changes and bends tell lateness, the search
-/// leaves 0.06 s of it (one deviation of some 20 drives of two minutes) and what it does not find.
-pub fn with_what_is_left(site: &Site, vehicle: &Vehicle) -> Vehicle {
-    if site.road.is_some() && vehicle.follows_road() {
-        vehicle.of_two_clocks()
-    } else {
-        vehicle.clone()
-    }
+    let left_std_s = curvature.max(0.0).sqrt().recip().min(GRID_S);
+    Ok(Some(Lateness {
+        found_s,
+        left_std_s,
+    }))
 }
 
 /// Angles that were taken so much earlier (s).

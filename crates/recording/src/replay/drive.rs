@@ -9,7 +9,7 @@ use onboard::observation::OdometrySample;
 use onboard::settings::{Platform, Site, Vehicle};
 use onboard::{Custom, Execution, Onboard};
 
-use super::clock::{LEAST_LATENESS_S, Lateness};
+use super::clock::LEAST_LATENESS_S;
 use super::error::ReplayError;
 use super::located::{Diagnosis, LocatedDrive, LocatedPose, Remark, gathered};
 use crate::library::load;
@@ -32,7 +32,7 @@ pub struct Replay<'a> {
     /// Where the gaps of the road begin that were remarked on (m).
     gaps_m: Vec<f64>,
     /// What was taken off the angles' times.
-    lateness: Option<Lateness>,
+    set_back_s: f64,
 }
 
 impl<'a> Replay<'a> {
@@ -60,7 +60,7 @@ impl<'a> Replay<'a> {
             recovered: None,
             beyond_map: false,
             gaps_m: Vec::new(),
-            lateness: None,
+            set_back_s: 0.0,
             odometry: odometry.samples.iter().peekable(),
             drive: LocatedDrive {
                 remarks: odometry
@@ -76,9 +76,9 @@ impl<'a> Replay<'a> {
         })
     }
 
-    /// The angles' times come with a lateness taken off that their settings do not state.
-    pub const fn set_back(&mut self, lateness: Lateness) {
-        self.lateness = Some(lateness);
+    /// The angles' times come with a lateness (s) taken off that their settings do not state.
+    pub const fn set_back(&mut self, lateness_s: f64) {
+        self.set_back_s = lateness_s;
     }
 
     /// Takes in SSBs, or angles, in the order they are given, after the odometry up to each burst.
@@ -183,10 +183,8 @@ impl<'a> Replay<'a> {
     pub fn finish(mut self) -> Result<LocatedDrive, ReplayError> {
         self.odometry_until(f64::INFINITY)?;
         self.drive.constants = self.onboard.constants();
-        if let (Some(constants), Some(lateness)) = (&mut self.drive.constants, self.lateness) {
-            let of_angles = &mut constants.lateness_s;
-            of_angles.found += lateness.found_s;
-            of_angles.std = of_angles.std.hypot(lateness.std_s);
+        if let Some(constants) = &mut self.drive.constants {
+            constants.lateness_s.found += self.set_back_s;
         }
         self.remark_on_constants();
         self.drive.remarks = gathered(self.drive.remarks);

@@ -10,7 +10,7 @@ use onboard::receive::ReceiverConfig;
 use onboard::settings::{IntegritySettings, Site, Vehicle, WakeUpSettings};
 use onboard::{Custom, Execution};
 
-use super::clock::{earlier, lateness, with_what_is_left};
+use super::clock::{earlier, lateness};
 use super::data_quality::warnings;
 use super::diagnosis::diagnose;
 use super::drive::Replay;
@@ -36,21 +36,21 @@ pub fn locate_angles(
     angles: &AngleLog,
     smooth: bool,
 ) -> Result<LocatedDrive, ReplayError> {
-    let (vehicle, start) = starting(site, vehicle, start)?;
+    let (mut vehicle, start) = starting(site, vehicle, start)?;
     if angles.angles.is_empty() {
         let why = angles.remarks.first().map(ToString::to_string);
         return Err(ReplayError::NoAngle { why });
     }
     let mut logged = Cow::Borrowed(angles.angles.as_slice());
     let late = lateness(&as_given(site, &vehicle, odometry, &logged))?;
-    let vehicle = with_what_is_left(site, &vehicle);
-    let mut replay = Replay::new(site, &vehicle, start, Custom::default(), odometry)?;
-    for remark in &angles.remarks {
-        replay.remark(remark.time_s, remark.to_string());
-    }
     if let Some(late) = late {
         logged = Cow::Owned(earlier(&logged, late.found_s));
-        replay.set_back(late);
+        vehicle.receiver.lateness_std_s = Some(late.left_std_s);
+    }
+    let mut replay = Replay::new(site, &vehicle, start, Custom::default(), odometry)?;
+    replay.set_back(late.unwrap_or_default().found_s);
+    for remark in &angles.remarks {
+        replay.remark(remark.time_s, remark.to_string());
     }
     let measurand = vehicle.array.measurand();
     let angles: Vec<LoggedAngle> = logged.iter().map(|it| with_phase(it, &measurand)).collect();
@@ -79,8 +79,7 @@ pub fn locate_recording(
     if !start_time_s.is_finite() {
         return Err(ReplayError::StartTime { start_time_s });
     }
-    let (as_stated, start) = starting(site, vehicle, start)?;
-    let vehicle = with_what_is_left(site, &as_stated);
+    let (mut vehicle, start) = starting(site, vehicle, start)?;
     let mut replay = Replay::new(site, &vehicle, start, Custom::default(), odometry)?;
     let file = recording.data_file().display().to_string();
     let config = ReceiverConfig::new(site, &vehicle);
@@ -103,18 +102,15 @@ pub fn locate_recording(
         return Err(ReplayError::NoSsb { file });
     }
     let mut heard: Vec<LoggedAngle> = replay.executions().iter().filter_map(as_logged).collect();
-    let heard_by = in_time(&vehicle);
-    let late = lateness(&as_given(site, &in_time(&as_stated), odometry, &heard))?;
-    if let Some(late) = late {
+    let mut heard_by = in_time(&vehicle);
+    if let Some(late) = lateness(&as_given(site, &heard_by, odometry, &heard))? {
         heard = earlier(&heard, late.found_s);
-        replay = Replay::new(
-            site,
-            &as_chosen(&heard_by),
-            start,
-            Custom::default(),
-            odometry,
-        )?;
-        replay.set_back(late);
+        for vehicle in [&mut vehicle, &mut heard_by] {
+            vehicle.receiver.lateness_std_s = Some(late.left_std_s);
+        }
+        let chosen = as_chosen(&heard_by);
+        replay = Replay::new(site, &chosen, start, Custom::default(), odometry)?;
+        replay.set_back(late.found_s);
         replay.hear(&heard)?;
     }
     for gap in gaps {

@@ -29,6 +29,7 @@ struct Recorded {
     centre_hz: f64,
 }
 
+/// By one clock: of a log two are searched for.
 fn scenario() -> Scenario {
     changed(
         "paper-real-odometry-2",
@@ -38,6 +39,7 @@ fn scenario() -> Scenario {
                 value("[{ length_m = 60.0, turn_rad = 0.1 }]"),
             ),
             ("site.radio_heads[1].ssb_index", 2.into()),
+            ("vehicle.receiver.lateness_std_s", 0.0.into()),
         ],
     )
 }
@@ -161,6 +163,8 @@ fn angles_as_they_come_make_the_poses_of_the_log() {
     let (odometry, angles, _) = logs(&scenario, 3);
     let (site, mut vehicle) = (scenario.site.clone(), scenario.vehicle.clone());
     vehicle.wake_up = Some(WakeUpSettings::EVERY_SSB);
+    // Of a log two clocks are searched for.
+    vehicle.receiver.lateness_std_s = Some(0.0);
     vehicle.start.pose = Some(
         scenario
             .path(onboard::settings::Check { file: "test" })
