@@ -16,8 +16,6 @@ from off_the_road import Case, locate
 
 # Standard deviations of what a lap tells of the lateness (s): a road leaves turns alone to tell it.
 LATENESS_STD_S = {False: 0.02, True: 0.035}
-# Below this nobody minds it: at walking pace 0.04 m.
-LEAST_LATENESS_S = 0.03
 
 
 def test_the_textbook_filter_is_as_wrong_as_it_says() -> None:
@@ -39,7 +37,7 @@ def test_late_angles_are_found_named_and_set_back(road: bool, late_s: float) -> 
     assert abs(located["late_s"] - late_s) < 3.0 * LATENESS_STD_S[road]
     in_time = locate(Case("late", "in time", {}, road), 101, [])
     assert not in_time["exit_named"]
-    assert abs(in_time["late_s"]) < LEAST_LATENESS_S
+    assert in_time["late_s"] == 0.0
     assert located["square"] < 1.3**2 * in_time["square"]
 
 

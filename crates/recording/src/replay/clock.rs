@@ -29,7 +29,7 @@ const ASIDE_S: f64 = 0.1;
 /// Smallest lateness that anybody minds (s): at walking pace 0.04 m.
 pub const LEAST_LATENESS_S: f64 = 0.03;
 
-/// How far off a start may be (m).
+/// How far off a start may be that a lateness is not to explain (m; assumed: the place, not the spot, is known).
 const DOUBTED_START_STD_M: f64 = 10.0;
 
 /// Time from the first angle on by which it is judged (s): two clocks run apart.
@@ -39,11 +39,12 @@ const SPAN_S: f64 = 300.0;
 /// (Wilks, Ann. Math. Statist. 9(1), 1938), were its errors white.
 const DOUBT_LOG_ODDS: f64 = 2.0;
 
-/// Lateness that is left to the filter where it is in doubt (s; assumed): what a road hides, whose bends alone tell it.
+/// Lateness that is left to the filter where it is in doubt (s): by drives of two minutes, what a road hides, whose bends
+/// and changes of speed alone tell it (docs/experiments.md).
 const DOUBTED_STD_S: f64 = 0.1;
 
 /// How much later angles come than they say, by the odometry's clock.
-#[derive(Debug, Clone, Copy, Default, PartialEq)]
+#[derive(Debug, Clone, Copy, PartialEq)]
 pub struct Lateness {
     /// The lateness (s).
     pub found_s: f64,
@@ -104,13 +105,14 @@ pub fn lateness(given: &Drive<'_>) -> Result<Option<Lateness>, ReplayError> {
         return Ok(None);
     };
     let at_best = at_best.relative_log_likelihood;
-    if at_best - in_time < DOUBT_LOG_ODDS {
+    let log_odds = at_best - in_time;
+    if log_odds < DOUBT_LOG_ODDS {
         return Ok(None);
     }
     // A lateness is not to explain a wrong start.
     let doubted_m = start_std_m.max(DOUBTED_START_STD_M);
     let elsewhere = log_likelihood(of(found_s, doubted_m)?) - log_likelihood(of(0.0, doubted_m)?);
-    if elsewhere.min(at_best - in_time) < FREEDOM_LOG_ODDS {
+    if elsewhere.min(log_odds) < FREEDOM_LOG_ODDS {
         return Ok(Some(Lateness {
             found_s: 0.0,
             left_std_s: DOUBTED_STD_S,

@@ -31,7 +31,7 @@ pub struct Replay<'a> {
     beyond_map: bool,
     /// Where the gaps of the road begin that were remarked on (m).
     gaps_m: Vec<f64>,
-    /// What was taken off the angles' times.
+    /// What was taken off the angles' times (s).
     set_back_s: f64,
 }
 

@@ -48,7 +48,9 @@ pub fn locate_angles(
         vehicle.receiver.lateness_std_s = Some(late.left_std_s);
     }
     let mut replay = Replay::new(site, &vehicle, start, Custom::default(), odometry)?;
-    replay.set_back(late.unwrap_or_default().found_s);
+    if let Some(late) = late {
+        replay.set_back(late.found_s);
+    }
     for remark in &angles.remarks {
         replay.remark(remark.time_s, remark.to_string());
     }
@@ -105,9 +107,8 @@ pub fn locate_recording(
     let mut heard_by = in_time(&vehicle);
     if let Some(late) = lateness(&as_given(site, &heard_by, odometry, &heard))? {
         heard = earlier(&heard, late.found_s);
-        for vehicle in [&mut vehicle, &mut heard_by] {
-            vehicle.receiver.lateness_std_s = Some(late.left_std_s);
-        }
+        vehicle.receiver.lateness_std_s = Some(late.left_std_s);
+        heard_by = in_time(&vehicle);
         let chosen = as_chosen(&heard_by);
         replay = Replay::new(site, &chosen, start, Custom::default(), odometry)?;
         replay.set_back(late.found_s);
