@@ -91,8 +91,9 @@ lint: .venv/installed-test ## Check formats, lints and types of both languages
 	$(BIN)/mypy
 	$(BIN)/stubtest access_av._core
 
-docs: .venv/installed ## Write docs/columns.md from the table of columns
+docs: .venv/installed-docs ## Build the documentation site target/docs/site/index.html; warnings are errors
 	$(BIN)/access-av columns --markdown > docs/columns.md
+	$(BIN)/python docs/site/build.py
 
 CHROMIUM ?= chromium
 figures: .venv/installed ## Evaluate the paper in full (some 10 minutes) and take the figures of README and docs/paper.md from it
@@ -140,6 +141,9 @@ endef
 
 .venv/installed-live: .venv/installed
 	$(call install,'.[live]',dev)
+
+.venv/installed-docs: .venv/installed
+	$(call install,'.[docs]',dev)
 
 # As wheels are.
 .venv/installed-bench: .venv/bin/python $(SOURCES)

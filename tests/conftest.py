@@ -22,7 +22,7 @@ os.environ.setdefault("OPENBLAS_NUM_THREADS", "1")
 
 # Files of tests that drive, attack or start programs for longer than a person waits after a change.
 SLOW = {
-    *("test_attack", "test_interrupt", "test_robustness", "test_readme"),
+    *("test_attack", "test_interrupt", "test_robustness", "test_readme", "test_site"),
     *("test_bags", "test_locate", "test_locate_mistakes", "test_real_drives", "test_survey"),
     *("test_channel", "test_plan", "test_designs", "test_tune", "test_profile"),
     *("test_bound", "test_drive", "test_plug_ins", "test_scatter", "test_truth"),

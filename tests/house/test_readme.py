@@ -1,4 +1,4 @@
-"""The README's examples run as they are written."""
+"""The examples of the README and of the pages that it links to run as they are written."""
 
 from __future__ import annotations
 
@@ -17,15 +17,24 @@ if TYPE_CHECKING:
     from pathlib import Path
 
 DOCS = sorted((ROOT / "docs").glob("*.md"))
-README = (ROOT / "README.md").read_text(encoding="utf-8")
+README = ROOT / "README.md"
+COMMAND_LINE = ROOT / "docs/command-line.md"
+PYTHON = ROOT / "docs/python.md"
 
 
-def blocks(language: str) -> list[str]:
-    return re.findall(rf"```{language}\n(.*?)```", README, flags=re.DOTALL)
+def blocks(page: Path, language: str) -> list[str]:
+    text = page.read_text(encoding="utf-8")
+    fenced = re.findall(r"^```(\w*)\n(.*?)^```$", text, flags=re.DOTALL | re.MULTILINE)
+    return [block for name, block in fenced if name == language]
+
+
+def commands(page: Path) -> list[list[str]]:
+    lines = [line for block in blocks(page, "sh") for line in block.splitlines()]
+    return [shlex.split(line, comments=True)[1:] for line in lines if ".venv/bin/access-av" in line]
 
 
 def test_python_example(tmp_path: Path) -> None:
-    (example,) = blocks("python")
+    (example,) = blocks(PYTHON, "python")
     done = subprocess.run(
         [sys.executable, "-c", example], cwd=tmp_path, capture_output=True, text=True, check=True
     )
@@ -33,11 +42,10 @@ def test_python_example(tmp_path: Path) -> None:
 
 
 def test_command_line_examples(tmp_path: Path, quick_study: Path) -> None:
-    lines = [line for block in blocks("sh") for line in block.splitlines()]
-    commands = [shlex.split(line)[1:] for line in lines if ".venv/bin/access-av" in line]
-    assert [command[0] for command in commands] == ["run", "explore", "bound"]
+    examples = commands(COMMAND_LINE)
+    assert [command[0] for command in examples] == ["run", "explore", "bound"]
     shutil.copytree(quick_study, tmp_path / "results", symlinks=True)
-    for command in commands:
+    for command in examples:
         done = subprocess.run(
             [sys.executable, "-m", "access_av", *command],
             cwd=tmp_path,
@@ -52,9 +60,29 @@ def test_command_line_examples(tmp_path: Path, quick_study: Path) -> None:
     assert (tmp_path / "results/yard-bound/report.html").is_file()
 
 
+def test_readme_prints_the_output_of_its_command(tmp_path: Path) -> None:
+    (command,) = commands(README)
+    done = subprocess.run(
+        [sys.executable, "-m", "access_av", *command],
+        cwd=tmp_path,
+        capture_output=True,
+        text=True,
+        check=True,
+    )
+    (output,) = blocks(README, "")
+    printed = {" ".join(line.split()) for line in done.stdout.splitlines()}
+    for line in output.splitlines():
+        assert " ".join(line.split()) in printed, line
+
+
+def test_readme_fits_one_screen() -> None:
+    assert len(README.read_text(encoding="utf-8").splitlines()) <= 70
+
+
 def test_make_commands_exist() -> None:
     makefile = (ROOT / "Makefile").read_text(encoding="utf-8")
-    for target in re.findall(r"^make ([a-z]+)", "\n".join(blocks("sh")), flags=re.MULTILINE):
+    text = README.read_text(encoding="utf-8")
+    for target in re.findall(r"(?:^|`)make ([a-z-]+)", text, flags=re.MULTILINE):
         assert re.search(rf"^{target}:", makefile, flags=re.MULTILINE)
 
 

@@ -40,7 +40,7 @@ const SPAN_S: f64 = 300.0;
 const DOUBT_LOG_ODDS: f64 = 2.0;
 
 /// Lateness that is left to the filter where it is in doubt (s): by drives of two minutes, what a road hides, whose bends
-/// and changes of speed alone tell it (docs/experiments.md).
+/// and changes of speed alone tell it (notes/experiments.md).
 const DOUBTED_STD_S: f64 = 0.1;
 
 /// How much later angles come than they say, by the odometry's clock.

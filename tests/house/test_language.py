@@ -1,0 +1,124 @@
+"""Texts that are written in plain technical English stay so: a reject list of words and openings.
+
+`PLAIN` lists the files that have been rewritten. A new text file belongs on the list; a file leaves
+it only by being deleted. `notes/` and quotations are excluded.
+"""
+
+from __future__ import annotations
+
+import ast
+import io
+import re
+import tokenize
+from typing import TYPE_CHECKING
+
+import pytest
+
+from conftest import ROOT
+
+if TYPE_CHECKING:
+    from pathlib import Path
+
+PLAIN = [
+    "README.md",
+    "docs/README.md",
+    "docs/command-line.md",
+    "docs/designs.md",
+    "docs/energy.md",
+    "docs/estimator.md",
+    "docs/profile.md",
+    "docs/python.md",
+    "docs/site/*.py",
+    "tests/house/test_language.py",
+]
+
+# Words that a reader of the field does not understand at first reading, or that have a name.
+REJECTED_WORDS = re.compile(
+    r"\b(anew|beside|besides|lateness|hear|hears|heard|told|tells|tell|untold|believed|believes|"
+    r"surely|likelier|nobody|vouch\w*|mend|mends|mended|guarded|whereto|whereof|"
+    r"hangs (on|together)|is worth|by how much|so many|as it is|what is asked)\b",
+    re.IGNORECASE,
+)
+REJECTED_OPENINGS = re.compile(r"^(Of|By|That|Those|What|The same|So)\b(?! the model)")
+WORDS_PER_SENTENCE = 30
+
+
+def sentences(text: str) -> list[str]:
+    """Splits prose into sentences."""
+    text = re.sub(r"\s+", " ", text)
+    parts = re.split(r"(?<=[.!?:;])\s+", text)
+    return [part.strip() for part in parts if part.strip()]
+
+
+def markdown_texts(text: str) -> list[str]:
+    """Paragraphs, list items and table cells of a page, without code."""
+    text = re.sub(r"^```.*?^```$", "", text, flags=re.DOTALL | re.MULTILINE)
+    text = re.sub(r"!?\[([^]]*)\]\([^)]*\)", r"\1", text)
+    text = re.sub(r"`[^`]*`", "code", text)
+    # A heading, a table row and a list item are texts of their own.
+    text = re.sub(r"^(#+ .*|\|.*|\s*[-*] )", r"\n\n\1", text, flags=re.MULTILINE)
+    texts = []
+    for block in re.split(r"\n\s*\n", text):
+        if block.startswith("|"):
+            texts += block.split("|")
+        else:
+            texts.append(re.sub(r"^(#+|\s*[-*]) ", "", block.strip()))
+    return [item.strip() for item in texts if item.strip()]
+
+
+def python_texts(text: str) -> list[str]:
+    """Docstrings and comments of a Python file."""
+    texts = []
+    for node in ast.walk(ast.parse(text)):
+        if isinstance(node, ast.Module | ast.ClassDef | ast.FunctionDef | ast.AsyncFunctionDef):
+            texts.append(re.sub(r"`[^`]*`", "code", ast.get_docstring(node) or ""))
+    for token in tokenize.generate_tokens(io.StringIO(text).readline):
+        if token.type == tokenize.COMMENT:
+            texts.append(token.string.lstrip("# "))
+    return [item for item in texts if item]
+
+
+def rust_texts(text: str) -> list[str]:
+    """Comment blocks of a Rust file, without code."""
+    blocks, block = [], []
+    for line in [*text.splitlines(), ""]:
+        comment = re.match(r"\s*//[/!]?\s?(.*)", line)
+        if comment:
+            block.append(comment[1])
+        elif block:
+            blocks.append("\n".join(block))
+            block = []
+    return [item for block in blocks for item in markdown_texts(block)]
+
+
+READERS = {".md": markdown_texts, ".py": python_texts, ".rs": rust_texts}
+FILES = sorted({file for pattern in PLAIN for file in ROOT.glob(pattern)})
+
+
+@pytest.mark.parametrize("file", FILES, ids=lambda file: str(file.relative_to(ROOT)))
+def test_text_is_plain(file: Path) -> None:
+    texts = READERS[file.suffix](file.read_text(encoding="utf-8"))
+    found = [text for text in texts if REJECTED_WORDS.search(text)]
+    opened = [item for text in texts for item in sentences(text) if REJECTED_OPENINGS.match(item)]
+    assert not found, found
+    assert not opened, opened
+    if file.suffix == ".md":
+        long = [
+            item
+            for text in texts
+            for item in sentences(text)
+            if len(item.split()) > WORDS_PER_SENTENCE
+        ]
+        assert not long, long
+
+
+def test_every_entry_names_a_file() -> None:
+    assert all(any(ROOT.glob(pattern)) for pattern in PLAIN)
+
+
+@pytest.mark.parametrize(
+    "text",
+    ["A start that nobody vouches for.", "Of odometry the speed alone is enough."],
+)
+def test_rejects_the_private_grammar(text: str) -> None:
+    assert REJECTED_WORDS.search(text) or any(map(REJECTED_OPENINGS.match, sentences(text)))
