@@ -147,4 +147,8 @@ def main() -> None:
 
 
 if __name__ == "__main__":
+    if sys.argv[1:2] == ["node"]:
+        from attack.node import campaign
+
+        sys.exit(campaign.main(sys.argv[2:]))
     main()

@@ -1,0 +1,122 @@
+"""``python -m attack node``: run the fault campaign and print its table; exit code 1: violation."""
+
+from __future__ import annotations
+
+import argparse
+import json
+import os
+import statistics
+import sys
+import tempfile
+import time
+from concurrent.futures import ProcessPoolExecutor
+from multiprocessing import get_context
+from pathlib import Path
+from typing import TYPE_CHECKING
+
+from rich.console import Console
+from rich.table import Table
+
+from attack.node.faults import FAULTS
+from attack.node.node import has_small_disk
+from attack.node.run import Run
+from attack.node.verdict import Verdict, judge
+
+if TYPE_CHECKING:
+    from attack.node.fault import Fault
+
+
+# Repetitions of a run whose messages were sent late because the computer was busy.
+ATTEMPTS = 3
+# Nice value of the campaign with `--first`.
+FIRST_NICE = -10
+
+
+def run_one(name: str, seed: int, repetition: int, scratch: Path) -> Verdict:
+    """Runs and judges one repetition; repeats it if the computer was too busy."""
+    fault = next(it for it in FAULTS if it.name == name)
+    for attempt in range(ATTEMPTS):
+        folder = scratch / f"{FAULTS.index(fault)}-{repetition}-{attempt}"
+        verdict = judge(Run(fault, seed, repetition, folder).execute())
+        if not verdict.was_busy:
+            break
+    return verdict
+
+
+def run_all(
+    faults: list[Fault], seed: int, repetitions: int, at_once: int, scratch: Path
+) -> list[Verdict]:
+    """Runs all repetitions of all faults, several nodes at once."""
+    # A process of its own for each run, because one interpreter is too slow to keep all times.
+    with ProcessPoolExecutor(at_once, get_context("spawn")) as pool:
+        cases = [(it.name, seed, number) for number in range(repetitions) for it in faults]
+        # Long runs first, because the last ones decide when the campaign ends.
+        cases.sort(key=lambda it: -next(f.lasts_s for f in faults if f.name == it[0]))
+        futures = [pool.submit(run_one, *case, scratch) for case in cases]
+        order = [it.name for it in faults]
+        verdicts = [it.result() for it in futures]
+    return sorted(verdicts, key=lambda it: order.index(it.fault))
+
+
+def _worst(values: list[float | None]) -> str:
+    known = [it for it in values if it is not None]
+    if not known:
+        return "–"
+    missing = len(values) - len(known)
+    text = f"{statistics.median(known):.2f} / {max(known):.2f}"
+    return text + (f" ({missing} none)" if missing else "")
+
+
+def table(verdicts: list[Verdict]) -> Table:
+    """Table with one line a fault: median and maximum of each figure."""
+    made = Table(title="Fault campaign of access-av-node: median / maximum, seconds")
+    for column in ("fault", "runs", "reported", "ok beyond level", "recovery", "localized above"):
+        made.add_column(column, justify="left" if column == "fault" else "right")
+    made.add_column("violations")
+    for name in dict.fromkeys(it.fault for it in verdicts):
+        own = [it for it in verdicts if it.fault == name]
+        failed = [it for it in own if it.violations]
+        kinds = list(dict.fromkeys(text for it in failed for text in it.violations))
+        text = f"{len(failed)}: " + "; ".join(kinds[:3]) if failed else "none"
+        made.add_row(
+            name,
+            str(len(own)),
+            _worst([it.report_s for it in own]),
+            _worst([it.wrong_ok_s for it in own]),
+            _worst([it.recovery_s for it in own]),
+            _worst([it.localized_above_limit_s for it in own]),
+            text,
+            style="red" if failed else "",
+        )
+    return made
+
+
+def main(arguments: list[str]) -> int:
+    """Exit code 1 if a bound is exceeded."""
+    options = argparse.ArgumentParser(prog="python -m attack node", description=__doc__)
+    options.add_argument("--seed", type=int, default=1, help="seed of the runs [1]")
+    options.add_argument("--repetitions", type=int, default=10, help="runs of each fault [10]")
+    options.add_argument("--at-once", type=int, default=4, help="nodes at once [4]")
+    options.add_argument("--first", action="store_true", help="run before others (needs root)")
+    options.add_argument("--only", metavar="TEXT", help="faults whose name contains this")
+    options.add_argument("--out", type=Path, help="JSON file of all verdicts")
+    options.add_argument("--keep", type=Path, help="folder that keeps the files of each run")
+    chosen = options.parse_args(arguments)
+    faults = [it for it in FAULTS if chosen.only is None or chosen.only in it.name]
+    if chosen.first:
+        os.nice(FIRST_NICE)
+    skipped = [] if has_small_disk() else [it for it in faults if "disk" in it.outputs]
+    for fault in skipped:
+        print(f"not run: {fault.name}: no tmpfs can be mounted (unshare -rm)")
+    faults = [it for it in faults if it not in skipped]
+    with tempfile.TemporaryDirectory() as scratch:
+        folder = chosen.keep or Path(scratch)
+        began_s = time.monotonic()
+        verdicts = run_all(faults, chosen.seed, chosen.repetitions, chosen.at_once, folder)
+        took_s = time.monotonic() - began_s
+    Console(width=None if sys.stdout.isatty() else 180).print(table(verdicts))
+    print(f"{len(verdicts)} runs of {len(faults)} faults in {took_s:.0f} s")
+    if chosen.out:
+        made = {"seed": chosen.seed, "runs": [it.to_json() for it in verdicts]}
+        chosen.out.write_text(json.dumps(made, indent=1), encoding="utf-8")
+    return 1 if any(it.violations for it in verdicts) else 0

@@ -1,0 +1,215 @@
+"""Table of the fault types."""
+
+from __future__ import annotations
+
+from attack.node import actions, changes
+from attack.node.fault import Fault
+
+ODOMETRY = r"odomet|speed|distance"
+TIME = r"odomet|time|clock"
+
+FAULTS = (
+    Fault("none", "", reported=False, harmless=True, lasts_s=5.0),
+    # Odometry values.
+    Fault(
+        "odometry frozen at zero, vehicle drives",
+        ODOMETRY,
+        lasts_s=6.0,
+        change=changes.odometry_steps(0.0, 0.0),
+    ),
+    Fault(
+        "odometry frozen at its speed, vehicle stops",
+        ODOMETRY,
+        lasts_s=6.0,
+        change=changes.odometry_steps(None, None),
+        stands=True,
+    ),
+    Fault("odometry reversed", ODOMETRY, lasts_s=5.0, change=changes.odometry_steps(-1.0, -1.0)),
+    Fault(
+        "distance contradicts speed",
+        ODOMETRY,
+        lasts_s=5.0,
+        change=changes.odometry_steps(1.0, 0.5),
+    ),
+    Fault(
+        "one speed of 1e6 m/s",
+        ODOMETRY,
+        change=changes.one("odometry", speed_mps=1e6, time_s=lambda it: it - 0.01),
+        by_event=True,
+    ),
+    Fault(
+        "NaN, null and infinite speeds", "odomet|messages", lasts_s=4.0, change=changes.nan_fields
+    ),
+    # Time stamps.
+    Fault(
+        "one odometry message repeated 5 times a second",
+        TIME,
+        lasts_s=5.0,
+        change=changes.repeated,
+        by_event=True,
+        harmless=True,
+    ),
+    Fault("odometry stuck at one message", TIME, lasts_s=5.0, change=changes.stuck),
+    Fault(
+        "one odometry message 2 s in the future",
+        TIME,
+        change=changes.one("odometry", time_s=lambda it: it + 2.0),
+        by_event=True,
+        harmless=True,
+    ),
+    Fault(
+        "one odometry message at 1e300 s",
+        TIME,
+        change=changes.one("odometry", time_s=1e300),
+        by_event=True,
+        harmless=True,
+    ),
+    Fault(
+        "one angle at 1e300 s",
+        r"angle|time",
+        change=changes.one("angle", time_s=1e300),
+        by_event=True,
+        harmless=True,
+    ),
+    Fault(
+        "one angle 2 s in the future",
+        r"angle|time",
+        change=changes.one("angle", time_s=lambda it: it + 2.0),
+        by_event=True,
+        harmless=True,
+    ),
+    Fault("odometry time in milliseconds", TIME, lasts_s=5.0, change=changes.milliseconds),
+    Fault("odometry clock back by 5 s", TIME, lasts_s=6.0, change=changes.shifted_clock(-5.0)),
+    Fault("odometry clock ahead by 60 s", TIME, lasts_s=6.0, change=changes.shifted_clock(60.0)),
+    # Absent messages.
+    Fault("odometry absent for 8 s", ODOMETRY, lasts_s=8.0, change=changes.absent("odometry")),
+    Fault("angles absent for 6 s", "angle", lasts_s=6.0, change=changes.absent("angle")),
+    Fault("all messages absent for 8 s", "nothing|no ", lasts_s=8.0, change=changes.absent(None)),
+    # Radio heads.
+    Fault(
+        "radio head off the site",
+        "99|cell|head",
+        lasts_s=5.0,
+        change=changes.extra_head(changes.STRANGER, 6),
+        by_event=True,
+        harmless=True,
+    ),
+    Fault(
+        "one PCI used by two radio heads",
+        "PCI|head|cell",
+        lasts_s=5.0,
+        change=changes.extra_head(changes.DUPLICATE, 1),
+    ),
+    Fault("angles of one head off by 0.5 rad", "head", lasts_s=5.0, change=changes.biased_head),
+    # Bytes and connections.
+    Fault(
+        "random bytes on the message socket",
+        "messages|left out|line",
+        lasts_s=4.0,
+        change=changes.garbage,
+        by_event=True,
+    ),
+    Fault(
+        "random bytes on page and JSON sockets",
+        "",
+        begin=actions.garbage_everywhere,
+        reported=False,
+        harmless=True,
+    ),
+    Fault(
+        "message of 1 MB",
+        "long|bytes|left out",
+        lasts_s=2.0,
+        change=changes.raw(b"x" * changes.OVERSIZE + b"\n", 1.0),
+        by_event=True,
+        harmless=True,
+    ),
+    Fault(
+        "every fifth message cut off", "messages|left out", lasts_s=4.0, change=changes.truncated
+    ),
+    Fault(
+        "message connection closed 10 times",
+        "ended|connect|messages",
+        lasts_s=4.0,
+        begin=actions.reconnect,
+    ),
+    # Process.
+    Fault(
+        "SIGKILL, restart after 1 s",
+        "begin|start|resume",
+        lasts_s=1.0,
+        begin=actions.kill,
+        end=actions.start,
+        stops_node=True,
+    ),
+    Fault(
+        "process stopped for 3 s",
+        "",
+        lasts_s=3.0,
+        begin=actions.stop,
+        end=actions.resume,
+        stops_node=True,
+    ),
+    Fault(
+        "SIGHUP with an invalid site file",
+        "site|period",
+        lasts_s=3.0,
+        begin=actions.break_site,
+        end=actions.repair_site,
+        by_event=True,
+        harmless=True,
+    ),
+    # Outputs.
+    Fault(
+        "disk full under MCAP",
+        "mcap|space|disk",
+        lasts_s=4.0,
+        begin=actions.fill_disk,
+        end=actions.empty_disk,
+        outputs=("mcap", "disk"),
+        sink="mcap",
+        by_event=True,
+        harmless=True,
+    ),
+    Fault(
+        "disk full under TUM",
+        "tum|space|disk",
+        lasts_s=4.0,
+        begin=actions.fill_disk,
+        end=actions.empty_disk,
+        outputs=("tum", "disk"),
+        sink="tum",
+        by_event=True,
+        harmless=True,
+    ),
+    Fault(
+        "log folder removed",
+        "mcap|log|file|folder",
+        begin=actions.remove_logs,
+        outputs=("mcap", "disk"),
+        sink="mcap",
+        by_event=True,
+        harmless=True,
+    ),
+    Fault(
+        "reader of the JSON output closed",
+        "json|pipe",
+        lasts_s=4.0,
+        begin=actions.call("close-json"),
+        end=actions.call("open-json"),
+        outputs=("fifo",),
+        sink="json",
+        by_event=True,
+        harmless=True,
+    ),
+    Fault(
+        "MQTT broker gone for 4 s",
+        "mqtt|broker",
+        lasts_s=4.0,
+        begin=actions.call("kill-broker"),
+        end=actions.call("restart-broker"),
+        sink="mqtt",
+        by_event=True,
+        harmless=True,
+    ),
+)

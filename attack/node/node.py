@@ -1,0 +1,163 @@
+"""The node under test: its settings, its process and its input socket."""
+
+from __future__ import annotations
+
+import contextlib
+import os
+import shutil
+import signal
+import socket
+import subprocess
+import sys
+import time
+from pathlib import Path
+from typing import NamedTuple
+
+ROOT = Path(__file__).parents[2]
+PROGRAM = Path(os.environ.get("ACCESS_AV_NODE", ROOT / "target/debug/access-av-node"))
+# Time in which the node must end after SIGTERM (s).
+END_S = 5.0
+# Capacity of the small disk in MiB.
+DISK_MIB = 4
+
+
+def free_port() -> int:
+    """A free TCP port."""
+    with socket.socket() as probe:
+        probe.bind(("127.0.0.1", 0))
+        return int(probe.getsockname()[1])
+
+
+def has_small_disk() -> bool:
+    """Whether a tmpfs can be mounted in a namespace of its own."""
+    command = ["unshare", "-rm", "mount", "-t", "tmpfs", "none", "/mnt"]
+    if shutil.which("unshare") is None:
+        return False
+    return subprocess.run(command, capture_output=True, check=False).returncode == 0
+
+
+class Resources(NamedTuple):
+    """Memory and open files of a process."""
+
+    resident_mib: float
+    files: int
+
+
+class Node:
+    """A node process, started as often as needed with the same settings."""
+
+    def __init__(self, folder: Path, command: list[str], *, small_disk: bool = False) -> None:
+        self.folder = folder
+        self.disk = folder / "disk"
+        self.disk.mkdir(exist_ok=True)
+        self.command = command
+        if small_disk:
+            mount = f'mount -t tmpfs -o size={DISK_MIB}m none "$0" && exec "$@"'
+            self.command = ["unshare", "-rm", "sh", "-c", mount, str(self.disk), *command]
+        self.process: subprocess.Popen[bytes] | None = None
+        # Exit codes that no fault has caused.
+        self.unexpected_exits: list[int] = []
+        self.is_hung = False
+
+    def start(self) -> None:
+        """Starts the process."""
+        with (self.folder / "stderr.txt").open("ab") as errors:
+            self.process = subprocess.Popen(
+                self.command, stdin=subprocess.DEVNULL, stdout=subprocess.DEVNULL, stderr=errors
+            )
+
+    @property
+    def pid(self) -> int:
+        """Process identifier."""
+        assert self.process is not None
+        return self.process.pid
+
+    def disk_path(self) -> Path:
+        """The disk as the node sees it."""
+        return Path(f"/proc/{self.pid}/root{self.disk}")
+
+    def kill(self) -> None:
+        """Kills it with SIGKILL."""
+        assert self.process is not None
+        self.process.kill()
+        self.process.wait()
+
+    def signal(self, number: signal.Signals) -> None:
+        """Sends a signal."""
+        with contextlib.suppress(ProcessLookupError):
+            os.kill(self.pid, number)
+
+    def watch(self) -> None:
+        """Notes an exit that no fault has caused, once."""
+        if self.process is not None and self.process.poll() is not None:
+            self.unexpected_exits.append(self.process.returncode)
+            self.process = None
+
+    def resources(self) -> Resources | None:
+        """Memory and open files; `None` if the process is gone."""
+        try:
+            pages = int(Path(f"/proc/{self.pid}/statm").read_text(encoding="ascii").split()[1])
+            files = sum(1 for _ in Path(f"/proc/{self.pid}/fd").iterdir())
+        except (OSError, AssertionError, IndexError):
+            return None
+        return Resources(pages * os.sysconf("SC_PAGE_SIZE") / 2**20, files)
+
+    def end(self) -> None:
+        """Ends it with SIGTERM; a node that does not end is killed and counts as hung."""
+        self.watch()
+        if self.process is None:
+            return
+        self.process.send_signal(signal.SIGCONT)
+        self.process.terminate()
+        try:
+            code = self.process.wait(END_S)
+            if code != 0:
+                self.unexpected_exits.append(code)
+        except subprocess.TimeoutExpired:
+            self.is_hung = True
+            self.kill()
+        self.process = None
+
+    def errors(self) -> str:
+        """What the process wrote to standard error."""
+        return (self.folder / "stderr.txt").read_text(encoding="utf-8", errors="replace")
+
+
+class Client:
+    """TCP connection to the node's message input, opened again whenever it is lost."""
+
+    # Pause between two attempts (s).
+    RETRY_S = 0.05
+
+    def __init__(self, port: int) -> None:
+        self.port = port
+        self.peer: socket.socket | None = None
+        self._retry_s = 0.0
+
+    def send(self, content: bytes) -> bool:
+        """Sends bytes; returns `False` where there is no connection, and the bytes are lost."""
+        if self.peer is None and time.monotonic() >= self._retry_s:
+            self._retry_s = time.monotonic() + self.RETRY_S
+            with contextlib.suppress(OSError):
+                self.peer = socket.create_connection(("127.0.0.1", self.port), timeout=0.2)
+        if self.peer is None:
+            return False
+        try:
+            self.peer.sendall(content)
+        except OSError:
+            self.close()
+            return False
+        return True
+
+    def close(self) -> None:
+        """Closes the connection."""
+        if self.peer is not None:
+            self.peer.close()
+            self.peer = None
+
+
+def main_program() -> list[str]:
+    """The program, or an error that says how to build it."""
+    if not PROGRAM.exists():
+        sys.exit(f"error: no {PROGRAM}: `cargo build -p access-av-node` makes it")
+    return [str(PROGRAM)]
