@@ -45,8 +45,9 @@ test: lint ## Run everything: formats, lints, types, every test of both language
 	cargo test --workspace --quiet --doc
 	$(PYTEST)
 
-attack: .venv/installed-test ## Attack it with random input, drives and plug-ins; SEED=… repeats an attack
+attack: .venv/installed-test $(NODE) ## Attack it with random input, drives and plug-ins (SEED=… repeats), then inject faults into the running node
 	$(BIN)/python -m attack $(if $(SEED),--seed $(SEED)) $(ATTACK)
+	$(BIN)/python -m attack node $(if $(SEED),--seed $(SEED)) --out results/fault-campaign.json
 
 test-radio: .venv/installed-test ## Build the node with SoapySDR (Debian: libsoapysdr-dev) and test it with a radio that plays a drive
 	cargo build --package access-av-node --features soapy

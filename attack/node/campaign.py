@@ -17,6 +17,7 @@ from typing import TYPE_CHECKING
 from rich.console import Console
 from rich.table import Table
 
+from attack.node import sample_run, samples
 from attack.node.faults import FAULTS
 from attack.node.node import has_small_disk
 from attack.node.run import Run
@@ -28,31 +29,50 @@ if TYPE_CHECKING:
 
 # Repetitions of a run whose messages were sent late because the computer was busy.
 ATTEMPTS = 3
+# Drive time before a fault (s): the start is confirmed by then.
+BEFORE_S = 8.0
+# Folder of the recorded drive.
+RECORDED = "drive"
 # Nice value of the campaign with `--first`.
 FIRST_NICE = -10
 
 
-def run_one(name: str, seed: int, repetition: int, scratch: Path) -> Verdict:
+def run_one(name: str, seed: int, repetition: int, scratch: Path, before_s: float) -> Verdict:
     """Runs and judges one repetition; repeats it if the computer was too busy."""
     fault = next(it for it in FAULTS if it.name == name)
     for attempt in range(ATTEMPTS):
         folder = scratch / f"{FAULTS.index(fault)}-{repetition}-{attempt}"
-        verdict = judge(Run(fault, seed, repetition, folder).execute())
+        if fault.uses_samples:
+            recorded = sample_run.execute(fault, seed, repetition, folder, scratch / RECORDED)
+        else:
+            recorded = Run(fault, seed, repetition, folder, before_s).execute()
+        verdict = judge(recorded)
         if not verdict.was_busy:
             break
     return verdict
 
 
 def run_all(
-    faults: list[Fault], seed: int, repetitions: int, at_once: int, scratch: Path
+    faults: list[Fault],
+    seed: int,
+    repetitions: int,
+    at_once: int,
+    scratch: Path,
+    before_s: float = BEFORE_S,
 ) -> list[Verdict]:
     """Runs all repetitions of all faults, several nodes at once."""
+    if any(it.uses_samples for it in faults):
+        samples.record(scratch / RECORDED)
     # A process of its own for each run, because one interpreter is too slow to keep all times.
     with ProcessPoolExecutor(at_once, get_context("spawn")) as pool:
-        cases = [(it.name, seed, number) for number in range(repetitions) for it in faults]
+        cases = [
+            (it.name, seed, number)
+            for it in faults
+            for number in range(it.repetitions * repetitions)
+        ]
         # Long runs first, because the last ones decide when the campaign ends.
         cases.sort(key=lambda it: -next(f.lasts_s for f in faults if f.name == it[0]))
-        futures = [pool.submit(run_one, *case, scratch) for case in cases]
+        futures = [pool.submit(run_one, *case, scratch, before_s) for case in cases]
         order = [it.name for it in faults]
         verdicts = [it.result() for it in futures]
     return sorted(verdicts, key=lambda it: order.index(it.fault))

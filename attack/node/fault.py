@@ -11,7 +11,8 @@ if TYPE_CHECKING:
 
     from attack.node.environment import Motion
     from attack.node.message import Message
-    from attack.node.run import Run
+    from attack.node.run import Recorded, Run
+    from attack.node.samples import SampleChange
 
 
 class Window(NamedTuple):
@@ -66,5 +67,21 @@ class Fault:
     sink: str = ""
     # Whether a report is required.
     reported: bool = True
-    # Bytes of the node's state that are lost with the fault are none: `kind` of the input.
-    kind: str = "angles"
+    # Width of the interval from which the begin is drawn (s).
+    spread_s: float = 1.0
+    # Minimum number of repetitions, as a multiple of the campaign's.
+    repetitions: int = 1
+    # Further violations that are found after the run.
+    check: Callable[[Recorded], list[str]] | None = None
+    # Change of the samples; such a fault is played back.
+    samples: SampleChange | None = None
+    # Pattern of withheld samples: whether they are, by the time since the begin of the fault (s).
+    withheld: Callable[[float], bool] | None = None
+
+    # Maximum time to the first SSB after withheld samples are back (s).
+    reception_s: float | None = None
+
+    @property
+    def uses_samples(self) -> bool:
+        """Whether the node processes samples, not angle messages."""
+        return self.samples is not None or self.withheld is not None

@@ -2,11 +2,12 @@
 
 from __future__ import annotations
 
-from attack.node import actions, changes
+from attack.node import actions, changes, resume, samples
 from attack.node.fault import Fault
 
 ODOMETRY = r"odomet|speed|distance"
 TIME = r"odomet|time|clock"
+CHANNEL = r"channel|antenna|array"
 
 FAULTS = (
     Fault("none", "", reported=False, harmless=True, lasts_s=5.0),
@@ -135,12 +136,16 @@ FAULTS = (
     ),
     # Process.
     Fault(
-        "SIGKILL, restart after 1 s",
+        "SIGKILL at a random time, restart after 1 s",
         "begin|start|resume",
         lasts_s=1.0,
         begin=actions.kill,
         end=actions.start,
         stops_node=True,
+        outputs=("mcap",),
+        spread_s=8.0,
+        repetitions=3,
+        check=resume.check,
     ),
     Fault(
         "process stopped for 3 s",
@@ -211,5 +216,29 @@ FAULTS = (
         sink="mqtt",
         by_event=True,
         harmless=True,
+    ),
+    # Samples.
+    Fault(
+        "samples played back unchanged",
+        "",
+        4.0,
+        samples=lambda *_: None,
+        reported=False,
+        harmless=True,
+    ),
+    Fault("one channel without signal", CHANNEL, 4.0, samples=samples.dead_channel, by_event=True),
+    Fault("one channel of noise", CHANNEL, 4.0, samples=samples.noisy_channel),
+    Fault(
+        "two channels exchanged", CHANNEL, 4.0, samples=samples.exchanged_channels, by_event=True
+    ),
+    Fault("one channel inverted", CHANNEL, 4.0, samples=samples.inverted_channel, by_event=True),
+    Fault(
+        "samples absent for 6 s", "samples|SSB|angle", 6.0, withheld=lambda _: True, reception_s=1.0
+    ),
+    Fault(
+        "30 ms of samples lost twice a second",
+        "samples|missing",
+        4.0,
+        withheld=lambda since_s: since_s % 0.5 < 0.03,
     ),
 )

@@ -7,7 +7,8 @@ import os
 import time
 import zlib
 from dataclasses import dataclass, field
-from typing import TYPE_CHECKING
+from pathlib import Path
+from typing import TYPE_CHECKING, Protocol
 
 import numpy as np
 
@@ -19,10 +20,7 @@ from attack.node.recorder import Arrival, Recorder
 
 if TYPE_CHECKING:
     from collections.abc import Callable
-    from pathlib import Path
 
-# Drive time before a fault (s): the start is confirmed by then. A random part of 1 s is added.
-BEFORE_S = 8.0
 # Drive time after a fault (s): recovery is required within 5 s.
 AFTER_S = 7.0
 # Time from the start of the process to drive time 0 (s): sockets are open by then.
@@ -31,12 +29,19 @@ SETTLE_S = 1.0
 MQTT_PERIOD_S = 0.1
 
 
+class HasPose(Protocol):
+    """True motion."""
+
+    def pose(self, time_s: float) -> environment.Pose:
+        """Pose at a drive time (s)."""
+
+
 @dataclass
 class Recorded:
     """Everything that is known after a run. All times are Unix times in seconds."""
 
     fault: Fault
-    motion: environment.Motion
+    motion: HasPose
     epoch_s: float
     window: Window
     ended_s: float
@@ -48,18 +53,22 @@ class Recorded:
     # Maximum delay of a message against its time of sending (s).
     lateness_s: float
     # Times at which the sink under test was found working again.
+    # Folder of the run.
+    folder: Path = Path()
     sink_works_s: list[float] = field(default_factory=list)
 
 
 class Run:
     """One repetition of a fault."""
 
-    def __init__(self, fault: Fault, seed: int, repetition: int, folder: Path) -> None:
+    def __init__(
+        self, fault: Fault, seed: int, repetition: int, folder: Path, before_s: float
+    ) -> None:
         self.fault, self.folder = fault, folder
         folder.mkdir(parents=True)
         named = zlib.crc32(fault.name.encode())
         self.random = np.random.default_rng([seed, named, repetition])
-        begin_s = BEFORE_S + float(self.random.uniform(0.0, 1.0))
+        begin_s = before_s + float(self.random.uniform(0.0, fault.spread_s))
         self.window = Window(begin_s, begin_s + fault.lasts_s)
         self.duration_s = self.window.end_s + AFTER_S
         stop_s = (begin_s, self.window.end_s) if fault.stands else None
@@ -149,6 +158,7 @@ rate_hz = {1.0 / MQTT_PERIOD_S}
             resources=resources,
             errors=self.node.errors(),
             lateness_s=self.lateness_s,
+            folder=self.folder,
             sink_works_s=self.sink_works_s,
         )
 

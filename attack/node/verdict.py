@@ -43,6 +43,8 @@ class Verdict:
     report_s: float | None = None
     wrong_ok_s: float = 0.0
     recovery_s: float | None = None
+    # From the return of absent samples to the first received SSB.
+    reception_s: float | None = None
     localized_above_limit_s: float = 0.0
     max_error_ok_m: float = 0.0
     json_gap_s: float | None = None
@@ -196,7 +198,7 @@ def judge(run: Recorded) -> Verdict:
             violate("not reported")
         elif verdict.report_s > REPORT_S + TOLERANCE_S:
             violate(f"reported after {verdict.report_s:.1f} s")
-    elif fault.name == "none":
+    elif fault.harmless and fault.change is fault.begin is None:
         seconds, text = _report(run, begin_s)
         if seconds is not None:
             violate(f"false report: {text}")
@@ -221,6 +223,12 @@ def judge(run: Recorded) -> Verdict:
     following = [it.at_s for it in points if it.is_good and it.at_s > max(last_bad_s, end_s)]
     if following and run.ended_s - following[0] >= 1.0:
         verdict.recovery_s = following[0] - end_s
+    if fault.reception_s is not None:
+        verdict.reception_s = _reception_s(run, end_s)
+        if verdict.reception_s is None:
+            violate("no SSB received after the fault")
+        elif verdict.reception_s > fault.reception_s + TOLERANCE_S:
+            violate(f"first SSB received after {verdict.reception_s:.1f} s")
     if fault.sink:
         recovered = _sink_recovery_s(run, end_s)
         verdict.recovery_s = recovered
@@ -236,7 +244,16 @@ def judge(run: Recorded) -> Verdict:
 
     _judge_outputs(run, verdict, begin_s)
     _judge_process(run, verdict)
+    if fault.check is not None:
+        verdict.violations += fault.check(run)
     return verdict
+
+
+def _reception_s(run: Recorded, end_s: float) -> float | None:
+    """Time from the end of the fault to the first received SSB (s)."""
+    verdicts = (it for it in run.arrivals if it.content.get("type") == "verdict")
+    times_s = (it.at_s for it in verdicts if it.content["time_s"] > end_s)
+    return next((it - end_s for it in times_s), None)
 
 
 def _sink_recovery_s(run: Recorded, end_s: float) -> float | None:
@@ -255,7 +272,8 @@ def _judge_outputs(run: Recorded, verdict: Verdict, begin_s: float) -> None:
     until_s = begin_s if fault.stops_node else run.ended_s
     from_s = begin_s - BASELINE_S
     for name in ("json", "mqtt"):
-        if fault.sink == name:
+        # A playback has no MQTT output.
+        if fault.sink == name or (name == "mqtt" and fault.samples is not None):
             continue
         times_s = [it.at_s for it in run.arrivals if it.output == name]
         gap_s = _gap_s(times_s, from_s, until_s)

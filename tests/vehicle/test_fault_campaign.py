@@ -1,0 +1,77 @@
+"""Short fault campaign: one run of each fault that the node handles within its bounds."""
+
+from __future__ import annotations
+
+from typing import TYPE_CHECKING
+
+import pytest
+from attack.node import campaign
+from attack.node.faults import FAULTS
+from attack.node.node import PROGRAM, has_small_disk
+
+if TYPE_CHECKING:
+    from pathlib import Path
+
+# Seed of the short campaign: its runs are the same each time.
+SEED = 1
+# Nodes at once: a run waits most of the time.
+AT_ONCE = 10
+# Drive time before a fault (s), shorter than that of the full campaign.
+BEFORE_S = 4.0
+# Faults that exceed a bound: docs/node.md lists them with their figures.
+SHORTFALLS = {
+    "odometry frozen at zero, vehicle drives",
+    "odometry frozen at its speed, vehicle stops",
+    "odometry reversed",
+    "distance contradicts speed",
+    "one speed of 1e6 m/s",
+    "one odometry message repeated 5 times a second",
+    "odometry stuck at one message",
+    "one odometry message 2 s in the future",
+    "one odometry message at 1e300 s",
+    "one angle at 1e300 s",
+    "one angle 2 s in the future",
+    "odometry time in milliseconds",
+    "odometry clock back by 5 s",
+    "odometry clock ahead by 60 s",
+    "odometry absent for 8 s",
+    "angles absent for 6 s",
+    "all messages absent for 8 s",
+    "radio head off the site",
+    "one PCI used by two radio heads",
+    "angles of one head off by 0.5 rad",
+    "random bytes on the message socket",
+    "random bytes on page and JSON sockets",
+    "every fifth message cut off",
+    "SIGKILL at a random time, restart after 1 s",
+    "process stopped for 3 s",
+    "SIGHUP with an invalid site file",
+    "disk full under MCAP",
+    "disk full under TUM",
+    "log folder removed",
+    "reader of the JSON output closed",
+}
+
+pytestmark = pytest.mark.skipif(
+    not PROGRAM.exists(), reason=f"no {PROGRAM}: `cargo build -p access-av-node` makes it"
+)
+
+
+def test_every_fault_is_reported_and_recovered_from_within_its_bounds(tmp_path: Path) -> None:
+    names = {it.name for it in FAULTS}
+    assert names >= SHORTFALLS
+    small_disk = has_small_disk()
+    # Recordings take longer to make than all runs together: they belong to the full campaign.
+    chosen = [
+        it
+        for it in FAULTS
+        if it.name not in SHORTFALLS
+        and not it.uses_samples
+        and (small_disk or "disk" not in it.outputs)
+    ]
+    verdicts = campaign.run_all(chosen, SEED, 1, AT_ONCE, tmp_path, before_s=BEFORE_S)
+    too_busy = [it.fault for it in verdicts if it.was_busy]
+    wrong = {it.fault: it.violations for it in verdicts if it.violations and not it.was_busy}
+    assert not wrong
+    # A busy computer may spoil single runs, not the campaign.
+    assert len(too_busy) <= len(chosen) // 4, too_busy
