@@ -20,12 +20,15 @@ if TYPE_CHECKING:
     from pathlib import Path
 
 PLAIN = [
+    "CONTRIBUTING.md",
     "README.md",
     "docs/README.md",
     "docs/command-line.md",
     "docs/designs.md",
     "docs/energy.md",
     "docs/estimator.md",
+    "docs/outlook.md",
+    "docs/paper.md",
     "docs/profile.md",
     "docs/python.md",
     "docs/site/*.py",
