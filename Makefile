@@ -16,7 +16,7 @@ PYTEST := $(BIN)/python -m pytest --numprocesses $(shell expr $$(nproc 2>/dev/nu
 DATA := $(abspath $(or $(ACCESS_AV_DATA),../shared/data))
 
 .DEFAULT_GOAL := help
-.PHONY: help demo live check test attack test-radio test-aarch64 count-aarch64 package lint lint-python docs figures picture bench clean
+.PHONY: help demo live check test attack test-radio test-aarch64 count-aarch64 dist package lint lint-python docs figures picture bench clean
 
 help: ## List these commands
 	@sed -n 's/^\([a-z0-9-]*\):.*## /  make \1\t/p' $(MAKEFILE_LIST) | expand -t 20
@@ -75,6 +75,11 @@ test-aarch64: .venv/installed-test ## Build what runs on the vehicle for aarch64
 
 count-aarch64: ## Count the instructions per estimate on aarch64, NEON against portable code
 	$(filter-out /usr/bin/cargo cargo,$(EMULATED)) $(PYTHON) benches/aarch64_instructions.py $(lastword $(EMULATED))
+
+DIST :=
+dist: .venv/bin/python ## Build wheels, node binaries and Debian packages for x86-64 and aarch64 into dist/
+	$(BIN)/python -m pip install --quiet 'maturin>=1.9,<2' 'ziglang>=0.13' 'cargo-zigbuild>=0.20'
+	$(BIN)/python packaging/dist.py $(DIST)
 
 ALONE := aoa-array nr-ssb
 package: ## Pack the crates that others may use alone, and build and test each from its package
