@@ -29,7 +29,7 @@ import layout
 from access_av.drives.recorded import log_angles
 from browser import Browser
 from conftest import ROOT
-from node import NODE, command, wake_up_every
+from node import NODE, SCHEMAS, Broker, command, free_port, wake_up_every
 
 if TYPE_CHECKING:
     from collections.abc import Iterator
@@ -37,7 +37,6 @@ if TYPE_CHECKING:
 sys.path.insert(0, str(ROOT / "examples/live"))
 from transmitter import Drive, Transmitter, Wheels, node_toml, odometry_of, settings_of
 
-SCHEMAS = Path(os.environ.get("ACCESS_AV_DATA", ROOT / "../shared/data")) / "vda5050"
 CHROMIUM = shutil.which("chromium") or shutil.which("chromium-browser")
 DURATION_S = 5.0
 # Of MCAP, by its writer: a file is measured once a chunk is complete.
@@ -60,12 +59,6 @@ def drive(tmp_path_factory: pytest.TempPathFactory) -> Path:
 
 def lines(file: Path) -> list[dict[str, Any]]:
     return [json.loads(line) for line in file.read_text(encoding="utf-8").splitlines()]
-
-
-def free_port(kind: int = socket.SOCK_STREAM) -> int:
-    with socket.socket(type=kind) as probe:
-        probe.bind(("127.0.0.1", 0))
-        return int(probe.getsockname()[1])
 
 
 def test_a_recording_played_back_gives_the_poses_of_locate(drive: Path, tmp_path: Path) -> None:
@@ -210,26 +203,6 @@ def test_a_recording_in_real_time_is_not_read_where_nothing_is_wanted(tmp_path: 
     assert not [it for it in silent if it["source"] == "samples" and it["time_s"] < 8.5], silent
 
 
-class Broker:
-    """An MQTT broker, and what is published to its topic."""
-
-    def __init__(self) -> None:
-        self.port = free_port()
-        self.process = subprocess.Popen(
-            [sys.executable, str(ROOT / "tests/mqtt_broker.py"), str(self.port), "fleet/position"],
-            stdout=subprocess.PIPE,
-            text=True,
-        )
-        assert self.process.stdout is not None
-        assert self.process.stdout.readline().strip() == "ready"
-
-    def heard(self) -> list[dict[str, Any]]:
-        """Ends it."""
-        self.process.terminate()
-        heard, _ = self.process.communicate(timeout=10.0)
-        return [json.loads(line) for line in heard.splitlines() if line.startswith("{")]
-
-
 class Live:
     """A node that hears a transmitter, and everything that it said meanwhile."""
 
@@ -349,7 +322,7 @@ def test_mcap_is_whole_and_read_by_others(live: Live) -> None:
     assert odometry.header.frame_id == "map"
     assert odometry.twist.twist.linear.x > 0.0
     names = {status.name for message in read["/diagnostics"] for status in message.status}
-    assert names == {"access_av: localizer", "access_av: input"}
+    assert names == {"access_av: localizer", "access_av: input", "access_av: outputs"}
 
 
 @pytest.mark.skipif(not SCHEMAS.exists(), reason=f"no {SCHEMAS} (ACCESS_AV_DATA)")
@@ -374,6 +347,35 @@ def test_metrics_are_read_by_prometheus(live: Live) -> None:
     assert sum(sample.value for sample in states) == 1.0
     accepted = families["access_av_head_accepted"].samples
     assert {sample.labels["head"] for sample in accepted} == {"gate", "hall", "dock", "store"}
+
+
+def test_all_messages_match_the_schema_that_the_program_prints(live: Live) -> None:
+    printed = subprocess.run(
+        [str(NODE), "schema", "--outputs"], capture_output=True, text=True, check=True, timeout=30
+    )
+    schema = json.loads(printed.stdout)
+    jsonschema.Draft202012Validator.check_schema(schema)
+
+    def of_type(name: str) -> jsonschema.Draft202012Validator:
+        return jsonschema.Draft202012Validator({**schema["$defs"][name], "$defs": schema["$defs"]})
+
+    names = {it: f"{it.capitalize()}Message" for it in ("pose", "verdict", "status", "event")}
+    validators = {kind: of_type(name) for kind, name in names.items()}
+    assert {it["type"] for it in live.records} == set(validators)
+    for record in live.records:
+        validators[record["type"]].validate(record)
+    position = of_type("MobileRobotPosition")
+    for message in live.mqtt:
+        position.validate(message)
+    whole = jsonschema.Draft202012Validator(schema)
+    for message in (live.records[0], live.records[-1], live.mqtt[0]):
+        whole.validate(message)
+    # A value out of range, a field that is missing and a field that is unknown are found.
+    pose = next(it for it in live.records if it["type"] == "pose")
+    without = {key: value for key, value in pose.items() if key != "state"}
+    for wrong in ({**pose, "heading_rad": 4.0}, without, {**pose, "more": 1}):
+        assert not validators["pose"].is_valid(wrong)
+        assert not whole.is_valid(wrong)
 
 
 @pytest.mark.skipif(CHROMIUM is None, reason="no Chromium")
@@ -461,9 +463,12 @@ def test_the_position_is_one_of_vda_5050_2_1(drive: Path, tmp_path: Path) -> Non
         time.sleep(1.5)
     positions = broker.heard()
     schema = json.loads((SCHEMAS / "state-2.1.schema").read_text(encoding="utf-8"))
-    validator = jsonschema.Draft7Validator(
-        {**schema["properties"]["agvPosition"], "additionalProperties": False}
-    )
+    # The time stamp is that of the header of a message of VDA 5050.
+    position = schema["properties"]["agvPosition"]
+    properties = {**position["properties"], "timestamp": schema["properties"]["timestamp"]}
+    required = [*position["required"], "timestamp"]
+    strict = {"properties": properties, "required": required, "additionalProperties": False}
+    validator = jsonschema.Draft7Validator({**position, **strict})
     assert len(positions) > 10
     for position in positions:
         validator.validate(position)

@@ -12,11 +12,13 @@ use onboard::settings::{Platform, Site, Vehicle};
 use onboard::{Custom, Live, OdometryDefect};
 
 use crate::clock::DriveClock;
+use crate::events::{Collapse, Report};
 use crate::gate::{Gate, Windows};
+use crate::health::failures_text;
 use crate::inbox::{Block, Command, Inbox, Input, Level};
-use crate::sink::{By, PoseRecord, Queue, Record};
+use crate::sink::{By, Distributor, PoseRecord, Record};
 use crate::statistics::{Punctuality, SourceHealth};
-use crate::supervisor::Watchdog;
+use crate::supervisor::{self, Watchdog};
 use crate::web::Board;
 
 /// The engine looks at the time this often, whatever comes.
@@ -60,7 +62,7 @@ impl Setup {
 pub struct Engine {
     setup: Setup,
     live: Live,
-    records: Arc<Queue>,
+    records: Arc<Distributor>,
     board: Arc<Board>,
     punctuality: Arc<Punctuality>,
     clock: DriveClock,
@@ -77,6 +79,9 @@ pub struct Engine {
     /// Silent sources that were named.
     silent: Vec<&'static str>,
     watchdog: Watchdog,
+    began: Instant,
+    /// Repeated events.
+    repeated: Collapse,
 }
 
 impl Engine {
@@ -86,7 +91,7 @@ impl Engine {
     /// As [`Setup::live`].
     pub fn new(
         setup: Setup,
-        records: Arc<Queue>,
+        records: Arc<Distributor>,
         board: Arc<Board>,
         punctuality: Arc<Punctuality>,
         gate: Arc<Gate>,
@@ -109,6 +114,8 @@ impl Engine {
             last_status_s: f64::NEG_INFINITY,
             silent: Vec::new(),
             watchdog: Watchdog::from_environment(),
+            began: Instant::now(),
+            repeated: Collapse::default(),
         })
     }
 
@@ -394,6 +401,8 @@ impl Engine {
     /// [`LiveError::Custom`].
     pub fn tick(&mut self) -> Result<(), LiveError> {
         self.watchdog.alive();
+        self.report_outputs();
+        self.report_repeated(false);
         let Some(now_s) = self.clock.now_s() else {
             return Ok(());
         };
@@ -415,12 +424,14 @@ impl Engine {
             } else {
                 now_s
             };
+            let outputs = self.records.status();
             self.watchdog
-                .say(format!("{}: {}", status.state.name(), status.reason));
+                .set_vehicle(format!("{}: {}", status.state.name(), status.reason));
             self.records.put(Record::Status {
                 status,
                 heads: heads.to_vec(),
                 energy,
+                outputs,
                 time_s: now_s,
             });
         }
@@ -437,16 +448,62 @@ impl Engine {
         self.event(Level::Warn, source, format!("left out: {error}"));
     }
 
-    /// Hands on an event.
+    /// Reports an event; repetitions of one cause are counted and reported together.
     pub fn event(&mut self, level: Level, source: &'static str, text: String) {
-        let time_s = self.clock.now_s();
-        self.board.event(time_s, level, source, &text);
-        self.records.put(Record::Event {
-            time_s,
+        self.board
+            .event(self.clock.now_s(), level, source, text.clone());
+        let report = self
+            .repeated
+            .add(self.now_of_events_s(), level, source, text);
+        if let Some(report) = report {
+            self.put_event(report);
+        }
+    }
+
+    /// Reports repeated events that are due; all of them if `all`.
+    pub fn report_repeated(&mut self, all: bool) {
+        for report in self.repeated.due(self.now_of_events_s(), all) {
+            self.put_event(report);
+        }
+    }
+
+    fn put_event(&mut self, report: Report) {
+        let Report {
             level,
             source,
             text,
+            count,
+        } = report;
+        self.records.put(Record::Event {
+            time_s: self.clock.now_s(),
+            level,
+            source,
+            text,
+            count,
         });
+    }
+
+    /// Time by which repeated events are reported: real time, or that of the drive in playback.
+    fn now_of_events_s(&self) -> f64 {
+        if self.records.waits() {
+            self.clock.now_s().unwrap_or(0.0)
+        } else {
+            self.began.elapsed().as_secs_f64()
+        }
+    }
+
+    /// Reports outputs that have failed or work again.
+    fn report_outputs(&mut self) {
+        let changes = self.records.changes();
+        if changes.is_empty() {
+            return;
+        }
+        self.watchdog
+            .set_outputs(failures_text(&self.records.status()));
+        for change in changes {
+            supervisor::log(&format!("output {}: {}", change.name, change.text));
+            self.event(change.level, change.name, change.text);
+        }
     }
 
     /// Notes a time of the drive.

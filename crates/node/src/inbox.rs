@@ -9,6 +9,7 @@ use num_complex::Complex32;
 use onboard::geometry::Pose;
 use onboard::live::AngleObservation;
 use onboard::observation::OdometrySample;
+use schemars::JsonSchema;
 use serde::Serialize;
 
 /// Bytes of samples that wait at most: 0.1 s of four antennas at 3.84 Msps.
@@ -51,7 +52,7 @@ impl Block {
 }
 
 /// How serious an event is.
-#[derive(Debug, Clone, Copy, PartialEq, Eq, Serialize)]
+#[derive(Debug, Clone, Copy, PartialEq, Eq, Serialize, JsonSchema)]
 #[serde(rename_all = "lowercase")]
 pub enum Level {
     /// Good to know.

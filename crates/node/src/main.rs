@@ -11,7 +11,7 @@ use access_av_node::engine::{Engine, Setup};
 use access_av_node::inbox::Level;
 use access_av_node::playback;
 use access_av_node::settings::{NodeSettings, PageSettings};
-use access_av_node::sink::{self, Queue, Sinks};
+use access_av_node::sink::{self, Distributor};
 use access_av_node::source::{self, Sources};
 use access_av_node::statistics::Punctuality;
 use access_av_node::supervisor;
@@ -41,9 +41,10 @@ struct Arguments {
 }
 
 fn main() -> ExitCode {
-    // The schema needs no other argument.
-    if std::env::args().nth(1).as_deref() == Some("schema") {
-        return say(&NodeSettings::schema_json());
+    // The schemas need no other argument.
+    let mut arguments = std::env::args().skip(1);
+    if arguments.next().as_deref() == Some("schema") {
+        return print_schema(&arguments.collect::<Vec<_>>());
     }
     let arguments = Arguments::parse();
     match run(&arguments) {
@@ -55,9 +56,27 @@ fn main() -> ExitCode {
     }
 }
 
+/// Prints the schema of the node file, or of the outputs.
+fn print_schema(arguments: &[String]) -> ExitCode {
+    let arguments: Vec<&str> = arguments.iter().map(String::as_str).collect();
+    match arguments[..] {
+        [] => say(&NodeSettings::schema_json()),
+        ["--outputs"] => say(&format!("{:#}", sink::schema())),
+        ["--outputs", "--markdown"] => say(sink::reference().trim_end()),
+        _ => {
+            let usage = "usage: access-av-node schema [--outputs [--markdown]]";
+            let _ = writeln!(
+                std::io::stderr(),
+                "error: {arguments:?} is not an option; {usage}"
+            );
+            ExitCode::from(2)
+        }
+    }
+}
+
 fn say(text: &str) -> ExitCode {
     if !text.is_empty() {
-        // Whoever closed standard output does not want to know.
+        // A closed standard output is not an error.
         let _ = writeln!(std::io::stdout(), "{text}");
     }
     ExitCode::SUCCESS
@@ -136,7 +155,11 @@ fn report(settings: &NodeSettings, setup: &Setup) -> String {
 
 fn drive(settings: &NodeSettings, setup: Setup, mut sources: Sources) -> Result<()> {
     let is_playback = settings.is_playback();
-    let records = Arc::new(Queue::new(settings.waits()));
+    let monitor = setup.vehicle.integrity_monitor();
+    let alert_limit_m = monitor.unwrap_or_default().alert_limit_m;
+    let sinks = sink::sinks(&settings.output, &settings.name, alert_limit_m);
+    let names: Vec<&str> = sinks.iter().map(|(name, _)| *name).collect();
+    let records = Arc::new(Distributor::new(&names, settings.waits()));
     let punctuality = Arc::new(Punctuality::default());
     let page_s = settings.page.as_ref().map_or(1.0, |it| 1.0 / it.rate_hz);
     let heads = setup.site.radio_heads.iter();
@@ -154,7 +177,6 @@ fn drive(settings: &NodeSettings, setup: Setup, mut sources: Sources) -> Result<
         },
     ));
     let stop = Arc::new(AtomicBool::new(false));
-    let sinks = Sinks::open(&settings.output, &settings.name, &sources.inbox)?;
     let site = web::site_json(&setup.site, &settings.name);
     let gate = Arc::clone(&sources.gate);
     let mut engine = Engine::new(
@@ -166,7 +188,7 @@ fn drive(settings: &NodeSettings, setup: Setup, mut sources: Sources) -> Result<
         settings.sleep && !is_playback,
     )?;
     serve(settings.page.as_ref(), &board, site, &stop)?;
-    let writing = sink::start(sinks, Arc::clone(&records))?;
+    let writing = sink::start(sinks, &records)?;
     engine.event(Level::Info, "node", format!("{} begins", settings.name));
     let driven = if is_playback {
         supervisor::ready();
@@ -185,14 +207,16 @@ fn drive(settings: &NodeSettings, setup: Setup, mut sources: Sources) -> Result<
         run.map_err(Into::into)
     };
     supervisor::stopping();
+    engine.report_repeated(true);
     engine.event(Level::Info, "node", format!("{} ends", settings.name));
     sources.inbox.close();
     records.close();
-    match writing.join() {
-        Ok(written) => written?,
-        Err(_) => anyhow::bail!("the thread that writes the output has panicked"),
+    let failed = writing.finish();
+    driven?;
+    if !failed.is_empty() {
+        anyhow::bail!("{}", failed.join("\nerror: "));
     }
-    driven
+    Ok(())
 }
 
 /// Serves the page if there is to be one, and heeds signals, on a thread of its own.

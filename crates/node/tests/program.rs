@@ -1,103 +1,21 @@
 //! The program itself: sockets that come and go, signals, files that are whole.
 #![allow(clippy::unwrap_used, clippy::expect_used, missing_docs)]
 
+mod common;
+
 use std::fs;
-use std::io::{BufRead, BufReader, Write};
+use std::io::{BufRead, Write};
 use std::net::{TcpListener, TcpStream};
 use std::os::unix::net::UnixDatagram;
-use std::path::{Path, PathBuf};
-use std::process::{Child, Command, Stdio};
+use std::path::PathBuf;
+use std::process::Command;
 use std::time::{Duration, Instant};
 
 use access_av_node::settings::NodeSettings;
 use onboard::settings::{Shipped, TomlFile};
 use serde_json::{Value, json};
 
-fn scratch(name: &str) -> PathBuf {
-    let folder = Path::new(env!("CARGO_TARGET_TMPDIR")).join(name);
-    let _ = fs::remove_dir_all(&folder);
-    fs::create_dir_all(&folder).unwrap();
-    folder
-}
-
-/// A node that hears angles and odometry by newline JSON, of the shipped yard's tugger on its road.
-struct Node {
-    process: Child,
-    lines: BufReader<std::process::ChildStdout>,
-}
-
-impl Node {
-    fn start(folder: &Path, messages: &str, more: &str) -> Self {
-        Self::start_with(folder, messages, more, &[])
-    }
-
-    fn start_with(folder: &Path, messages: &str, more: &str, environment: &[(&str, &str)]) -> Self {
-        // What is in a file is to be had at once.
-        let pace = if Path::new(messages).is_file() {
-            "fast"
-        } else {
-            "real-time"
-        };
-        let settings = format!(
-            "name = \"test\"\npace = {pace:?}\nmessages = [{messages:?}]\n{more}\n[output.json]\naddress = \"-\"\n"
-        );
-        fs::write(folder.join("node.toml"), settings).unwrap();
-        let mut process = Command::new(env!("CARGO_BIN_EXE_access-av-node"))
-            .args(["--site", "yard", "--vehicle", "tugger"])
-            .arg(folder.join("node.toml"))
-            .envs(environment.iter().copied())
-            .stdin(Stdio::piped())
-            .stdout(Stdio::piped())
-            .stderr(Stdio::null())
-            .spawn()
-            .unwrap();
-        let lines = BufReader::new(process.stdout.take().unwrap());
-        Self { process, lines }
-    }
-
-    /// Reads on until a line is as wanted.
-    fn until(&mut self, wanted: impl Fn(&Value) -> bool) -> Value {
-        loop {
-            let mut line = String::new();
-            assert!(
-                self.lines.read_line(&mut line).unwrap() > 0,
-                "the node has ended"
-            );
-            let value: Value = serde_json::from_str(&line).unwrap();
-            if wanted(&value) {
-                return value;
-            }
-        }
-    }
-
-    fn until_event(&mut self, source: &str, said: &str) -> Value {
-        let is_it = |it: &Value| {
-            it["source"] == source && it["text"].as_str().is_some_and(|it| it.contains(said))
-        };
-        self.until(is_it)
-    }
-
-    fn terminate(mut self) -> Vec<Value> {
-        let id = self.process.id().to_string();
-        assert!(
-            Command::new("kill")
-                .args(["-TERM", &id])
-                .status()
-                .unwrap()
-                .success()
-        );
-        assert!(self.process.wait().unwrap().success());
-        let rest = self
-            .lines
-            .lines()
-            .map(|line| serde_json::from_str(&line.unwrap()).unwrap());
-        rest.collect()
-    }
-}
-
-fn odometry(time_s: f64) -> String {
-    json!({"type": "odometry", "time_s": time_s, "speed_mps": 1.5}).to_string() + "\n"
-}
+use common::{Node, odometry, scratch};
 
 #[test]
 fn sources_vanish_and_return_and_each_silence_is_named_within_a_second() {
@@ -281,6 +199,44 @@ fn the_schema_is_printed_and_names_every_key() {
     }
     let stated = access_av_node::settings::NodeSettings::schema_json();
     assert_eq!(schema, serde_json::from_str::<Value>(&stated).unwrap());
+}
+
+/// Standard output of `access-av-node schema` with these options.
+fn printed_schema(options: &[&str]) -> String {
+    let done = Command::new(env!("CARGO_BIN_EXE_access-av-node"))
+        .arg("schema")
+        .args(options)
+        .output()
+        .unwrap();
+    assert!(done.status.success());
+    String::from_utf8(done.stdout).unwrap()
+}
+
+#[test]
+fn the_schema_of_the_outputs_has_a_description_of_every_field() {
+    let schema: Value = serde_json::from_str(&printed_schema(&["--outputs"])).unwrap();
+    let definitions = schema["$defs"].as_object().unwrap();
+    for name in ["PoseMessage", "StatusMessage", "MobileRobotPosition", "AgvPosition"] {
+        assert!(definitions.contains_key(name), "{name}");
+    }
+    for (name, definition) in definitions {
+        for (field, property) in definition["properties"].as_object().into_iter().flatten() {
+            assert!(property["description"].is_string(), "{name}.{field}");
+        }
+    }
+    let done = Command::new(env!("CARGO_BIN_EXE_access-av-node"))
+        .args(["schema", "--inputs"])
+        .output()
+        .unwrap();
+    assert_eq!(done.status.code(), Some(2));
+}
+
+#[test]
+fn the_reference_page_of_the_messages_is_up_to_date() {
+    let page = include_str!("../../../docs/node-messages.md");
+    let printed = printed_schema(&["--outputs", "--markdown"]);
+    let command = "access-av-node schema --outputs --markdown > docs/node-messages.md";
+    assert!(printed == page, "run `{command}`");
 }
 
 #[test]

@@ -71,6 +71,8 @@ pub enum OdometryIssue {
         /// Time since the sample before, in seconds.
         gap_s: f64,
     },
+    /// The file was not closed, so that its last items may be missing; the text names the file.
+    Truncated(String),
     /// A column is made of something else.
     Derived {
         /// The column.
@@ -104,7 +106,7 @@ impl OdometryIssue {
     pub const fn used(&self) -> bool {
         matches!(
             self,
-            Self::Gap { .. } | Self::Derived { .. } | Self::Unused { .. }
+            Self::Gap { .. } | Self::Derived { .. } | Self::Unused { .. } | Self::Truncated(_)
         )
     }
 }
@@ -112,12 +114,15 @@ impl OdometryIssue {
 impl fmt::Display for OdometryRemark {
     fn fmt(&self, f: &mut fmt::Formatter<'_>) -> fmt::Result {
         match self.issue {
-            OdometryIssue::Derived { .. } | OdometryIssue::Unused { .. } => {
+            OdometryIssue::Derived { .. }
+            | OdometryIssue::Unused { .. }
+            | OdometryIssue::Truncated(_) => {
                 f.write_str("odometry: ")?;
             }
             _ => write!(f, "odometry {} {}: ", self.kind, self.item)?,
         }
         match &self.issue {
+            OdometryIssue::Truncated(text) => f.write_str(text),
             OdometryIssue::Malformed(message) => write!(f, "left out, {message}"),
             OdometryIssue::NotFinite { column } => {
                 write!(f, "left out, {column} is missing or not finite")

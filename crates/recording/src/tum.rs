@@ -5,7 +5,7 @@ use std::path::Path;
 
 use crate::error::RecordingError;
 use crate::file as files;
-use onboard::geometry::Pose;
+use onboard::geometry::{Pose, wrap_angle};
 
 /// A day of poses at 50 Hz.
 const MOST_BYTES: u64 = 512 << 20;
@@ -23,8 +23,8 @@ pub struct TimedPose {
 pub fn tum_text(poses: &[TimedPose]) -> String {
     let mut text = String::with_capacity(poses.len() * 80);
     for TimedPose { time_s, pose } in poses {
-        // A turn about z by ψ is the quaternion (0, 0, sin ψ/2, cos ψ/2).
-        let (qz, qw) = (0.5 * pose.heading_rad).sin_cos();
+        // A rotation about z by ψ is the quaternion (0, 0, sin ψ/2, cos ψ/2); a wrapped ψ makes it unique.
+        let (qz, qw) = (0.5 * wrap_angle(pose.heading_rad)).sin_cos();
         // Writing into a string does not fail.
         let _ = writeln!(
             text,

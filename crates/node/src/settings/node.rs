@@ -176,6 +176,14 @@ impl TomlFile for NodeSettings {
                 "samples that are lost on the way would go unnoticed: use TCP, Unix or `-`";
             check.that(good, "samples.address", address, allowed)?;
         }
+        if let Some(json) = &self.output.json {
+            let good = matches!(
+                json.address,
+                Address::Standard | Address::File(_) | Address::TcpListen(_) | Address::Udp(_)
+            );
+            let allowed = "it must be `-`, tcp-listen://, udp:// or a path";
+            check.that(good, "output.json.address", &json.address, allowed)?;
+        }
         let standard = |it: &Address| *it == Address::Standard;
         let samples = match &self.samples {
             Some(SampleSource::Raw { address, .. }) => usize::from(standard(address)),

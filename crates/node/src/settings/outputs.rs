@@ -1,4 +1,4 @@
-//! Where poses go.
+//! Settings of the outputs and of the page.
 
 use std::path::PathBuf;
 
@@ -11,16 +11,16 @@ use crate::address::Address;
 #[derive(Debug, Clone, PartialEq, Default, Serialize, Deserialize, JsonSchema)]
 #[serde(default, deny_unknown_fields)]
 pub struct Outputs {
-    /// Everything as newline JSON.
+    /// All messages as newline JSON.
     #[serde(skip_serializing_if = "Option::is_none")]
     pub json: Option<JsonOutput>,
-    /// Poses as a TUM trajectory, in this file.
+    /// File for the poses as a TUM trajectory.
     #[serde(skip_serializing_if = "Option::is_none")]
     pub tum: Option<PathBuf>,
     /// MCAP files for ROS 2 tools.
     #[serde(skip_serializing_if = "Option::is_none")]
     pub mcap: Option<McapOutput>,
-    /// The pose to a fleet's MQTT broker, as VDA 5050 has it.
+    /// The position object of VDA 5050 to an MQTT broker.
     #[serde(skip_serializing_if = "Option::is_none")]
     pub mqtt: Option<MqttOutput>,
 }
@@ -29,9 +29,9 @@ pub struct Outputs {
 #[derive(Debug, Clone, PartialEq, Serialize, Deserialize, JsonSchema)]
 #[serde(deny_unknown_fields)]
 pub struct JsonOutput {
-    /// `-` (standard output), `tcp-listen://` (whoever connects is told), `udp://`, or the path of a file.
+    /// `-` (standard output), `tcp-listen://` (for clients that connect), `udp://`, or the path of a file or FIFO.
     pub address: Address,
-    /// Poses per second at most.
+    /// Maximum number of poses per second.
     #[serde(default = "every")]
     #[schemars(range(min = 0.1, max = 1000.0))]
     pub rate_hz: f64,
@@ -45,25 +45,30 @@ const fn every() -> f64 {
 #[derive(Debug, Clone, PartialEq, Serialize, Deserialize, JsonSchema)]
 #[serde(deny_unknown_fields)]
 pub struct McapOutput {
-    /// Folder that the files are made in.
+    /// Folder of the files.
     pub folder: PathBuf,
-    /// Poses and transforms per second at most.
+    /// Maximum number of poses and transforms per second.
     #[serde(default = "five")]
     #[schemars(range(min = 0.1, max = 1000.0))]
     pub pose_hz: f64,
-    /// Verdicts on angles per second and radio head at most.
+    /// Maximum number of verdicts per second and radio head.
     #[serde(default = "one")]
     #[schemars(range(min = 0.0, max = 10_000.0))]
     pub verdict_hz: f64,
-    /// Size in MB at which the next file is begun.
+    /// Size in MB at which the next file begins.
     #[serde(default = "hundred")]
     #[schemars(range(min = 0.1, max = 100_000.0))]
     pub rotate_mb: f64,
-    /// Time in seconds after which the next file is begun.
+    /// Duration of a file in seconds, after which the next file begins.
     #[serde(default = "hour")]
     #[schemars(range(min = 1.0, max = 1e6))]
     pub rotate_s: f64,
-    /// Files kept; the oldest is removed beyond. All without.
+    /// Minimum free space on the disk in MB. With less, the oldest of these files are deleted; if that is not enough,
+    /// writing stops and the failure is reported. 0 is no limit.
+    #[serde(default)]
+    #[schemars(range(min = 0.0, max = 1e9))]
+    pub min_free_mb: f64,
+    /// Maximum number of files; the oldest is deleted. All files are kept without it.
     #[serde(default, skip_serializing_if = "Option::is_none")]
     #[schemars(range(min = 1, max = 100_000))]
     pub keep: Option<usize>,
@@ -79,7 +84,7 @@ const fn hour() -> f64 {
     3600.0
 }
 
-/// Which VDA 5050.
+/// Version of VDA 5050.
 #[derive(Debug, Clone, Copy, PartialEq, Eq, Default, Serialize, Deserialize, JsonSchema)]
 pub enum VdaVersion {
     /// `agvPosition` with `positionInitialized`.
@@ -97,12 +102,12 @@ pub enum VdaVersion {
 pub struct MqttOutput {
     /// Host of the broker.
     pub host: String,
-    /// Its port.
+    /// Port of the broker.
     #[serde(default = "mqtt_port")]
     pub port: u16,
-    /// Topic that the position object is published to.
+    /// Topic of the position object.
     pub topic: String,
-    /// Which VDA 5050.
+    /// Version of VDA 5050.
     #[serde(default)]
     pub vda5050: VdaVersion,
     /// `mapId` of the position.
@@ -111,15 +116,11 @@ pub struct MqttOutput {
     #[serde(default = "one")]
     #[schemars(range(min = 0.1, max = 30.0))]
     pub rate_hz: f64,
-    /// How long the pose must have been one to rely on before it is called localized, in seconds.
+    /// Time that the pose must have been valid before the vehicle is reported as localized, in seconds. A pose is
+    /// valid while its protection level is at most the alert limit.
     #[serde(default = "one")]
     #[schemars(range(min = 0.0, max = 600.0))]
     pub localized_after_s: f64,
-    /// How long it must not have been one before it is no longer called localized, in seconds: a fleet manager
-    /// stops the vehicle then.
-    #[serde(default = "one")]
-    #[schemars(range(min = 0.0, max = 600.0))]
-    pub lost_after_s: f64,
 }
 
 const fn mqtt_port() -> u16 {
@@ -133,7 +134,7 @@ const fn one() -> f64 {
 #[derive(Debug, Clone, PartialEq, Serialize, Deserialize, JsonSchema)]
 #[serde(default, deny_unknown_fields)]
 pub struct PageSettings {
-    /// Address and port it is served at; port 0 is any that is free.
+    /// Address and port of the page; port 0 is any free port.
     pub listen: String,
     /// Updates per second.
     #[schemars(range(min = 0.1, max = 20.0))]

@@ -1,23 +1,27 @@
-//! Newline JSON to standard output, a file or whoever listens.
+//! Newline JSON to standard output, a file, a FIFO or network clients.
 
 use std::io::{self, ErrorKind, Write};
 use std::net::{TcpListener, TcpStream, UdpSocket};
 
 use anyhow::{Context, Result, bail};
 
-use super::file::create;
+use super::file::GrowingFile;
+use super::message::Message;
+use super::output::Sink;
 use super::record::Record;
 use crate::address::Address;
 use crate::settings::JsonOutput;
 
-/// Listeners at once.
-const MOST_CLIENTS: usize = 16;
-/// Bytes that wait for a listener that does not read before it is let go.
-const MOST_WAITING: usize = 1 << 18;
+/// Maximum number of TCP clients.
+const MAX_CLIENTS: usize = 16;
+/// Maximum number of bytes that wait for a TCP client. A client that does not read is disconnected.
+const MAX_WAITING_BYTES: usize = 1 << 18;
 
-/// Where the lines go.
-enum Way {
-    Write(Box<dyn Write + Send>),
+/// Destination of the lines.
+enum Destination {
+    /// Standard output, with lines that have not been written yet.
+    Standard(Vec<u8>),
+    File(GrowingFile),
     Clients(TcpListener, Vec<Client>),
     Datagrams(UdpSocket, String),
 }
@@ -29,26 +33,33 @@ struct Client {
 
 /// Newline JSON.
 pub struct Json {
-    way: Way,
+    address: Address,
+    destination: Option<Destination>,
     period_s: f64,
     last_pose_s: f64,
     line: Vec<u8>,
 }
 
 impl Json {
-    /// Opens the way.
-    ///
-    /// # Errors
-    /// Those of file or socket, with its name.
-    pub fn new(settings: &JsonOutput) -> Result<Self> {
-        let named = || format!("output.json.address: {}", settings.address);
-        let way = match &settings.address {
-            Address::Standard => Way::Write(Box::new(io::stdout())),
-            Address::File(path) => Way::Write(Box::new(create(path)?)),
+    /// Newline JSON as the settings describe it; nothing is opened yet.
+    pub fn new(settings: &JsonOutput) -> Self {
+        Self {
+            address: settings.address.clone(),
+            destination: None,
+            period_s: 1.0 / settings.rate_hz,
+            last_pose_s: f64::NEG_INFINITY,
+            line: Vec::new(),
+        }
+    }
+
+    fn connect(&self) -> Result<Destination> {
+        Ok(match &self.address {
+            Address::Standard => Destination::Standard(Vec::new()),
+            Address::File(path) => Destination::File(GrowingFile::create(path)?),
             Address::TcpListen(socket) => {
-                let listener = TcpListener::bind(socket).with_context(named)?;
-                listener.set_nonblocking(true).with_context(named)?;
-                Way::Clients(listener, Vec::new())
+                let listener = TcpListener::bind(socket)?;
+                listener.set_nonblocking(true)?;
+                Destination::Clients(listener, Vec::new())
             }
             Address::Udp(socket) => {
                 let any = if socket.starts_with('[') {
@@ -56,46 +67,66 @@ impl Json {
                 } else {
                     "0.0.0.0:0"
                 };
-                let from = UdpSocket::bind(any).with_context(named)?;
-                from.set_nonblocking(true).with_context(named)?;
-                Way::Datagrams(from, socket.clone())
+                let from = UdpSocket::bind(any)?;
+                from.set_nonblocking(true)?;
+                Destination::Datagrams(from, socket.clone())
             }
-            _ => bail!(
-                "{}: it must be `-`, tcp-listen://, udp:// or a path",
-                named()
-            ),
-        };
-        Ok(Self {
-            way,
-            period_s: 1.0 / settings.rate_hz,
-            last_pose_s: f64::NEG_INFINITY,
-            line: Vec::new(),
+            _ => bail!("it must be `-`, tcp-listen://, udp:// or a path"),
         })
     }
 
-    /// Writes a record as a line.
-    pub fn take(&mut self, record: &Record) -> Result<()> {
-        if let Record::Pose(pose) = record {
-            let time_s = pose.status.time_s;
-            // A period less the odometry's own jitter.
-            if (self.last_pose_s..self.last_pose_s + 0.99 * self.period_s).contains(&time_s)
-                && time_s > self.last_pose_s
-            {
-                return Ok(());
-            }
-            self.last_pose_s = time_s;
+    fn named(&self) -> String {
+        format!("output.json.address {}", self.address)
+    }
+
+    /// Whether a pose is left out because the configured rate is lower than that of the odometry.
+    fn is_left_out(&mut self, record: &Record) -> bool {
+        let Record::Pose(pose) = record else {
+            return false;
+        };
+        let time_s = pose.status.time_s;
+        // One percent less than a period, because odometry has jitter.
+        let next_s = self.last_pose_s + 0.99 * self.period_s;
+        if time_s > self.last_pose_s && time_s < next_s {
+            return true;
+        }
+        self.last_pose_s = time_s;
+        false
+    }
+}
+
+impl Sink for Json {
+    fn open(&mut self) -> Result<()> {
+        if let Some(Destination::File(file)) = &mut self.destination
+            && file.repair()
+        {
+            return Ok(());
+        }
+        // A FIFO is closed first, so that lines that its last reader did not read are discarded.
+        self.destination = None;
+        let destination = self.connect().with_context(|| self.named())?;
+        self.destination = Some(destination);
+        Ok(())
+    }
+
+    fn take(&mut self, record: &Record) -> Result<()> {
+        if self.is_left_out(record) {
+            return Ok(());
         }
         self.line.clear();
-        serde_json::to_writer(&mut self.line, &record.to_json())?;
+        serde_json::to_writer(&mut self.line, &Message::from(record))?;
         self.line.push(b'\n');
-        match &mut self.way {
-            Way::Write(writer) => writer.write_all(&self.line)?,
-            Way::Datagrams(socket, to) => {
-                // Nobody need be there.
-                let _ = socket.send_to(&self.line, to.as_str());
+        let line = &self.line;
+        let done = match &mut self.destination {
+            None => Ok(()),
+            Some(Destination::Standard(lines)) => {
+                lines.extend_from_slice(line);
+                Ok(())
             }
-            Way::Clients(listener, clients) => {
-                while clients.len() < MOST_CLIENTS
+            Some(Destination::File(file)) => file.write_all(line),
+            Some(Destination::Datagrams(socket, to)) => send(socket, to, line),
+            Some(Destination::Clients(listener, clients)) => {
+                while clients.len() < MAX_CLIENTS
                     && let Ok((stream, _)) = listener.accept()
                 {
                     if stream.set_nonblocking(true).is_ok() {
@@ -103,24 +134,63 @@ impl Json {
                         clients.push(Client { stream, waiting });
                     }
                 }
-                let line = &self.line;
                 clients.retain_mut(|client| client.send(line));
+                Ok(())
             }
-        }
-        Ok(())
+        };
+        done.with_context(|| self.named())
     }
 
-    /// Sends all that waits.
-    pub fn flush(&mut self) -> Result<()> {
-        if let Way::Write(writer) = &mut self.way {
-            writer.flush()?;
+    fn flush(&mut self) -> Result<bool> {
+        match &mut self.destination {
+            Some(Destination::Standard(lines)) => {
+                let mut standard = io::stdout().lock();
+                let done = standard.write_all(lines).and_then(|()| standard.flush());
+                lines.clear();
+                done.context("standard output")?;
+            }
+            Some(Destination::File(file)) => {
+                let done = file.flush();
+                done.with_context(|| format!("output.json.address {}", self.address))?;
+                file.check_exists()?;
+            }
+            _ => {}
         }
-        Ok(())
+        Ok(true)
+    }
+
+    fn abandon(&mut self) {
+        let is_repaired = match &mut self.destination {
+            Some(Destination::File(file)) => file.repair(),
+            _ => false,
+        };
+        if !is_repaired {
+            self.destination = None;
+        }
+    }
+
+    fn close(&mut self) -> Result<()> {
+        self.flush().map(drop)
+    }
+}
+
+/// Sends a datagram. A receiver need not exist, and a full socket buffer loses the datagram.
+fn send(socket: &UdpSocket, to: &str, line: &[u8]) -> io::Result<()> {
+    match socket.send_to(line, to) {
+        Err(error)
+            if !matches!(
+                error.kind(),
+                ErrorKind::ConnectionRefused | ErrorKind::WouldBlock | ErrorKind::Interrupted
+            ) =>
+        {
+            Err(error)
+        }
+        _ => Ok(()),
     }
 }
 
 impl Client {
-    /// Sends what can be sent at once; `false` where the listener is gone, or too slow.
+    /// Sends what can be sent at once; returns `false` if the client has disconnected or is too slow.
     fn send(&mut self, line: &[u8]) -> bool {
         self.waiting.extend_from_slice(line);
         loop {
@@ -133,7 +203,7 @@ impl Client {
                     }
                 }
                 Err(error) if error.kind() == ErrorKind::WouldBlock => {
-                    return self.waiting.len() <= MOST_WAITING;
+                    return self.waiting.len() <= MAX_WAITING_BYTES;
                 }
                 Err(error) if error.kind() == ErrorKind::Interrupted => {}
                 Err(_) => return false,

@@ -1,24 +1,27 @@
-//! MCAP files for ROS 2 tools, a new one by size and time.
+//! MCAP files for ROS 2 tools; a new file begins by size and time.
 
 use std::collections::HashMap;
-use std::fs::{self, File};
-use std::io::BufWriter;
-use std::path::PathBuf;
+use std::fs;
+use std::path::{Path, PathBuf};
+use std::time::{Duration, Instant};
 
-use anyhow::{Context, Result};
+use anyhow::{Context, Result, bail};
 use onboard::geometry::Pose;
 use onboard::live::{HeadStatus, State, Status};
 use recording::McapWriter;
-use recording::mcap::{DiagnosticLevel, DiagnosticStatus, Frames, Twist};
+use recording::mcap::{DiagnosticLevel, DiagnosticStatus, Frames, NoSeek, Twist};
 
-use super::file::{create, keep_newest};
+use super::file::{GrowingFile, Tail, files_of, free_mb, keep_newest};
+use super::output::Sink;
 use super::record::{By, PoseRecord, Record};
+use crate::health::{OutputStatus, failures_text};
 use crate::inbox::Level;
 use crate::settings::McapOutput;
 
 const POSE_TOPIC: &str = "/access_av/odometry";
 const VERDICT_TOPIC: &str = "/access_av/verdicts";
 const PREFIX: &str = "access-av-";
+const ENDING: &str = ".mcap";
 const MAP_TO_ODOM: Frames<'_> = Frames {
     parent: "map",
     child: "odom",
@@ -27,12 +30,24 @@ const MAP_TO_ODOM: Frames<'_> = Frames {
 const SPEED_VARIANCE: f64 = 1e-4;
 const YAW_RATE_VARIANCE: f64 = 1e-4;
 
-/// Files being written, one after the other.
+/// Maximum time between two chunks: after `kill -9` the file is readable up to this time before its end, and up
+/// to the time that records wait for their thread.
+const CHUNK: Duration = Duration::from_secs(1);
+/// Maximum number of events in one diagnostic message.
+const MAX_EVENTS: usize = 100;
+/// End of an MCAP file without a summary: DataEnd, Footer, magic.
+const END: &[u8] = b"\x0f\x04\0\0\0\0\0\0\0\0\0\0\0\
+    \x02\x14\0\0\0\0\0\0\0\0\0\0\0\0\0\0\0\0\0\0\0\0\0\0\0\0\0\0\0\
+    \x89MCAP0\r\n";
+
+type Writer = McapWriter<NoSeek<GrowingFile>>;
+
+/// MCAP files, written one after the other.
 pub struct Mcap {
     settings: McapOutput,
     file: Option<Open>,
     number: u32,
-    /// Where odometry alone would have it: what `map` → `odom` is told by.
+    /// Pose by odometry alone, which gives the transform `map` → `odom`.
     odom: Pose,
     odom_s: Option<f64>,
     last_pose_s: f64,
@@ -42,20 +57,18 @@ pub struct Mcap {
 
 struct Open {
     path: PathBuf,
-    writer: McapWriter<BufWriter<File>>,
+    writer: Writer,
+    tail: Tail,
     began_s: f64,
+    flushed: Instant,
+    /// Whether messages are in a chunk that is not complete.
+    is_dirty: bool,
 }
 
 impl Mcap {
-    /// Nothing is written yet; the folder is made.
-    ///
-    /// # Errors
-    /// Those of the file system.
-    pub fn new(settings: &McapOutput) -> Result<Self> {
-        let folder = &settings.folder;
-        let named = || format!("output.mcap.folder: {}", folder.display());
-        fs::create_dir_all(folder).with_context(named)?;
-        Ok(Self {
+    /// Files as the settings describe them; nothing is opened yet.
+    pub fn new(settings: &McapOutput) -> Self {
+        Self {
             settings: settings.clone(),
             file: None,
             number: 0,
@@ -64,46 +77,33 @@ impl Mcap {
             last_pose_s: f64::NEG_INFINITY,
             last_verdict_s: HashMap::new(),
             events: Vec::new(),
-        })
+        }
     }
 
-    /// Writes a record.
-    pub fn take(&mut self, record: &Record) -> Result<()> {
-        match record {
-            Record::Pose(pose) if pose.by == By::Odometry => self.pose(pose),
-            Record::Pose(_) => Ok(()),
-            Record::Verdict(outcome) => {
-                let ssb = outcome.execution.ssb;
-                let head = (ssb.pci, ssb.ssb_index);
-                let last_s = self.last_verdict_s.entry(head).or_insert(f64::NEG_INFINITY);
-                if !is_due(*last_s, ssb.time_s, self.settings.verdict_hz) {
-                    return Ok(());
-                }
-                *last_s = ssb.time_s;
-                let writer = self.writer(ssb.time_s)?;
-                Ok(writer.verdict(VERDICT_TOPIC, &outcome.execution)?)
+    /// Removes the oldest complete files until `min_free_mb` are free.
+    ///
+    /// # Errors
+    /// If less is free after that, or those of the file system.
+    fn ensure_space(&self) -> Result<()> {
+        let (folder, limit_mb) = (&self.settings.folder, self.settings.min_free_mb);
+        if limit_mb <= 0.0 || free_mb(folder)? >= limit_mb {
+            return Ok(());
+        }
+        for file in files_of(folder, PREFIX, ENDING)? {
+            if self.file.as_ref().is_some_and(|open| open.path == file) {
+                continue;
             }
-            Record::Status {
-                status,
-                heads,
-                time_s,
-                ..
-            } => {
-                let input = self.input();
-                let writer = self.writer(*time_s)?;
-                writer.diagnostics(*time_s, &[diagnosis(status, heads), input])?;
-                self.rotate(*time_s)
-            }
-            Record::Event {
-                level,
-                source,
-                text,
-                ..
-            } => {
-                self.events.push((*level, format!("{source}: {text}")));
-                Ok(())
+            fs::remove_file(&file)?;
+            if free_mb(folder)? >= limit_mb {
+                return Ok(());
             }
         }
+        let free_mb = free_mb(folder)?;
+        bail!(
+            "{}: {free_mb:.1} MB are free, less than output.mcap.min_free_mb = {limit_mb}; no older file is left to \
+             delete",
+            folder.display()
+        );
     }
 
     fn pose(&mut self, record: &PoseRecord) -> Result<()> {
@@ -122,7 +122,7 @@ impl Mcap {
         ) else {
             return Ok(());
         };
-        // Nothing is published before the pose is known.
+        // No pose is published before the first one is found.
         if matches!(status.state, State::Waiting | State::Searching) {
             return Ok(());
         }
@@ -145,24 +145,29 @@ impl Mcap {
         Ok(writer.transforms(status.time_s, &transforms)?)
     }
 
-    /// The file being written; one is begun where there is none.
-    fn writer(&mut self, time_s: f64) -> Result<&mut McapWriter<BufWriter<File>>> {
+    /// Returns the file that is written; begins one if there is none.
+    fn writer(&mut self, time_s: f64) -> Result<&mut Writer> {
         if self.file.is_none() {
             let since = crate::clock::unix_s();
-            let name = format!("{PREFIX}{:011}-{:05}.mcap", since as u64, self.number);
+            let name = format!("{PREFIX}{:011}-{:05}{ENDING}", since as u64, self.number);
             let path = self.settings.folder.join(name);
             self.number += 1;
-            let writer = McapWriter::compressed(create(&path)?)?;
+            let file = GrowingFile::create(&path)?;
+            let tail = file.tail()?;
             self.file = Some(Open {
                 path,
-                writer,
+                writer: McapWriter::appending(file)?,
+                tail,
                 began_s: time_s,
+                flushed: Instant::now(),
+                is_dirty: false,
             });
             if let Some(keep) = self.settings.keep {
-                keep_newest(&self.settings.folder, PREFIX, ".mcap", keep)?;
+                keep_newest(&self.settings.folder, PREFIX, ENDING, keep)?;
             }
         }
         let open = self.file.as_mut().context("no file is open")?;
+        open.is_dirty = true;
         Ok(&mut open.writer)
     }
 
@@ -180,16 +185,28 @@ impl Mcap {
         Ok(())
     }
 
-    /// Completes the file.
-    pub fn finish(&mut self) -> Result<()> {
-        if let Some(open) = self.file.take() {
-            let named = || open.path.display().to_string();
-            open.writer.finish().with_context(named)?;
+    /// Completes the file with a summary.
+    fn finish(&mut self) -> Result<()> {
+        let Some(mut open) = self.file.take() else {
+            return Ok(());
+        };
+        let path = open.path.display().to_string();
+        let flushed = open.writer.flush();
+        if let Err(error) = flushed {
+            self.file = Some(open); // completed by `abandon`
+            return Err(error).context(path);
         }
-        Ok(())
+        let Open {
+            writer, tail, path, ..
+        } = open;
+        let finished = writer.finish();
+        if finished.is_err() {
+            complete(&path, tail);
+        }
+        finished.with_context(|| path.display().to_string())
     }
 
-    /// What was remarkable since the last diagnosis.
+    /// Returns the events since the last diagnostic message.
     fn input(&mut self) -> DiagnosticStatus {
         let events = std::mem::take(&mut self.events);
         let warns = events
@@ -197,9 +214,9 @@ impl Mcap {
             .filter(|(level, _)| *level == Level::Warn)
             .count();
         let (level, message) = match warns {
-            0 => (DiagnosticLevel::Ok, "nothing to remark".to_owned()),
-            1 => (DiagnosticLevel::Warn, "1 remarkable item".to_owned()),
-            count => (DiagnosticLevel::Warn, format!("{count} remarkable items")),
+            0 => (DiagnosticLevel::Ok, "no warnings".to_owned()),
+            1 => (DiagnosticLevel::Warn, "1 warning".to_owned()),
+            count => (DiagnosticLevel::Warn, format!("{count} warnings")),
         };
         let values = (1..).map(|number: usize| number.to_string());
         DiagnosticStatus {
@@ -213,13 +230,148 @@ impl Mcap {
     }
 }
 
-/// Whether so many a second are due again; the drive may have begun anew.
+impl Sink for Mcap {
+    fn open(&mut self) -> Result<()> {
+        let folder = &self.settings.folder;
+        fs::create_dir_all(folder)
+            .with_context(|| format!("output.mcap.folder: {}", folder.display()))?;
+        self.ensure_space()
+    }
+
+    fn take(&mut self, record: &Record) -> Result<()> {
+        match record {
+            Record::Pose(pose) if pose.by == By::Odometry => self.pose(pose),
+            Record::Pose(_) => Ok(()),
+            Record::Verdict(outcome) => {
+                let ssb = outcome.execution.ssb;
+                let head = (ssb.pci, ssb.ssb_index);
+                let last_s = self.last_verdict_s.entry(head).or_insert(f64::NEG_INFINITY);
+                if !is_due(*last_s, ssb.time_s, self.settings.verdict_hz) {
+                    return Ok(());
+                }
+                *last_s = ssb.time_s;
+                let writer = self.writer(ssb.time_s)?;
+                Ok(writer.verdict(VERDICT_TOPIC, &outcome.execution)?)
+            }
+            Record::Status {
+                status,
+                heads,
+                outputs,
+                time_s,
+                ..
+            } => {
+                if let Err(error) = self.ensure_space() {
+                    self.finish()?;
+                    return Err(error);
+                }
+                let statuses = [
+                    diagnosis(status, heads),
+                    self.input(),
+                    diagnosis_of_outputs(outputs),
+                ];
+                self.writer(*time_s)?.diagnostics(*time_s, &statuses)?;
+                self.rotate(*time_s)
+            }
+            Record::Event {
+                level,
+                source,
+                text,
+                count,
+                ..
+            } => {
+                let times = if *count > 1 {
+                    format!(" ({count} times)")
+                } else {
+                    String::new()
+                };
+                if self.events.len() < MAX_EVENTS {
+                    self.events
+                        .push((*level, format!("{source}: {text}{times}")));
+                }
+                Ok(())
+            }
+        }
+    }
+
+    fn flush(&mut self) -> Result<bool> {
+        let Some(open) = &mut self.file else {
+            return Ok(true);
+        };
+        if open.is_dirty && open.flushed.elapsed() >= CHUNK {
+            let done = open.writer.flush();
+            done.with_context(|| open.path.display().to_string())?;
+            (open.flushed, open.is_dirty) = (Instant::now(), false);
+        }
+        open.tail.check_exists()?;
+        Ok(!open.is_dirty)
+    }
+
+    fn abandon(&mut self) {
+        if let Some(open) = self.file.take() {
+            let Open {
+                path, writer, tail, ..
+            } = open;
+            // Dropping the writer would otherwise complete the file with data that were counted as lost.
+            tail.stop();
+            drop(writer);
+            complete(&path, tail);
+        }
+    }
+
+    fn close(&mut self) -> Result<()> {
+        self.finish()
+    }
+}
+
+/// Ends a file after a failure: with its last complete chunk, or removes a file without any.
+fn complete(path: &Path, tail: Tail) {
+    tail.stop();
+    // Either may fail on a full or missing disk. Readers accept a file without an end.
+    if tail.flushed() == 0 {
+        let _ = fs::remove_file(path);
+    } else {
+        let _ = tail.complete(END);
+    }
+}
+
+/// Returns the health of the outputs as a diagnostic status.
+fn diagnosis_of_outputs(outputs: &[OutputStatus]) -> DiagnosticStatus {
+    let failed = failures_text(outputs);
+    let level = match failed {
+        None => DiagnosticLevel::Ok,
+        Some(_) => DiagnosticLevel::Error,
+    };
+    let value = |it: &OutputStatus| {
+        let state = it.cause.as_deref().unwrap_or("ok");
+        let OutputStatus {
+            failures,
+            retries,
+            written,
+            dropped,
+            ..
+        } = it;
+        format!(
+            "{state}; {failures} failures, {retries} retries, {written} written, {dropped} dropped"
+        )
+    };
+    DiagnosticStatus {
+        level,
+        name: "access_av: outputs".to_owned(),
+        message: failed.unwrap_or_else(|| "all outputs work".to_owned()),
+        values: outputs
+            .iter()
+            .map(|it| (it.name.to_owned(), value(it)))
+            .collect(),
+    }
+}
+
+/// Whether the next message is due at this rate. Time may have gone back, after a restart of the drive.
 fn is_due(last_s: f64, time_s: f64, rate_hz: f64) -> bool {
-    // A hundredth less, for the jitter of what comes.
+    // One percent less than a period, because odometry has jitter.
     rate_hz > 0.0 && (time_s < last_s || time_s - last_s >= 0.99 / rate_hz)
 }
 
-/// Pose of the frame `odom` in the map, from a pose told in both.
+/// Returns the pose of the frame `odom` in the map, given one pose in both frames.
 fn between(in_map: Pose, in_odom: Pose) -> Pose {
     let heading_rad = onboard::geometry::wrap_angle(in_map.heading_rad - in_odom.heading_rad);
     let (sin, cos) = heading_rad.sin_cos();

@@ -1,46 +1,76 @@
-//! Poses as a TUM trajectory, one for each odometry sample.
+//! Poses as a TUM trajectory: one line for each odometry sample.
 
-use std::fs::File;
-use std::io::{BufWriter, Write};
-use std::path::Path;
+use std::io::Write;
+use std::path::{Path, PathBuf};
 
-use anyhow::Result;
+use anyhow::{Context, Result};
 use onboard::live::State;
 use recording::{TimedPose, tum_text};
 
-use super::file::create;
+use super::file::GrowingFile;
+use super::output::Sink;
 use super::record::{By, PoseRecord, Record};
 
-/// A trajectory being written.
-pub struct Tum(BufWriter<File>);
+/// A TUM trajectory.
+pub struct Tum {
+    path: PathBuf,
+    file: Option<GrowingFile>,
+}
 
 impl Tum {
-    /// Begins the file.
-    ///
-    /// # Errors
-    /// Those of the file system.
-    pub fn new(path: &Path) -> Result<Self> {
-        Ok(Self(create(path)?))
+    /// A trajectory in this file.
+    pub fn new(path: &Path) -> Self {
+        Self {
+            path: path.to_owned(),
+            file: None,
+        }
+    }
+}
+
+impl Sink for Tum {
+    fn open(&mut self) -> Result<()> {
+        // After a failure the file continues behind its last complete line.
+        if !self.file.as_mut().is_some_and(GrowingFile::repair) {
+            self.file = None;
+            self.file = Some(GrowingFile::create(&self.path)?);
+        }
+        Ok(())
     }
 
-    /// Writes a pose; none while the first is searched for.
-    pub fn take(&mut self, record: &Record) -> Result<()> {
+    fn take(&mut self, record: &Record) -> Result<()> {
+        // No pose is written while the first pose is searched for.
         if let Record::Pose(PoseRecord {
             status,
             by: By::Odometry,
         }) = record
             && let Some(pose) = status.pose
             && !matches!(status.state, State::Waiting | State::Searching)
+            && let Some(file) = &mut self.file
         {
             let time_s = status.time_s;
-            self.0
-                .write_all(tum_text(&[TimedPose { time_s, pose }]).as_bytes())?;
+            let line = tum_text(&[TimedPose { time_s, pose }]);
+            file.write_all(line.as_bytes())
+                .with_context(|| self.path.display().to_string())?;
         }
         Ok(())
     }
 
-    /// Writes all to the disk.
-    pub fn flush(&mut self) -> Result<()> {
-        Ok(self.0.flush()?)
+    fn flush(&mut self) -> Result<bool> {
+        if let Some(file) = &mut self.file {
+            file.flush()
+                .with_context(|| self.path.display().to_string())?;
+            file.check_exists()?;
+        }
+        Ok(true)
+    }
+
+    fn abandon(&mut self) {
+        if let Some(file) = &mut self.file {
+            file.repair();
+        }
+    }
+
+    fn close(&mut self) -> Result<()> {
+        self.flush().map(drop)
     }
 }

@@ -1,4 +1,4 @@
-//! What page and metrics show: kept by the pipeline, read by whoever asks.
+//! The state that the page and the metrics show: written by the pipeline, read by the web server.
 
 use std::collections::VecDeque;
 use std::sync::{Arc, Mutex, MutexGuard, PoisonError};
@@ -7,23 +7,24 @@ use std::time::{Duration, Instant};
 use onboard::live::{HeadStatus, LiveEnergy, Status, StreamCounts};
 use serde_json::{Value, json};
 
+use crate::events;
 use crate::inbox::{Inbox, Level};
-use crate::sink::Queue;
-use crate::statistics::{Punctuality, SourceHealth};
+use crate::sink::{Distributor, EnergyMessage, HeadMessage, PoseFields};
+use crate::statistics::{ODOMETRY_TO_POSE_TARGETS, Punctuality, SSB_TO_POSE_TARGETS, SourceHealth};
 
-/// Events that the page shows.
+/// Maximum number of events that the page shows, one for each cause.
 const EVENTS: usize = 30;
-/// Places of the track; with more, every second one is kept.
+/// Maximum number of points of the track; with more, every second one is kept.
 const TRACK: usize = 2000;
-/// Distance between places of the track, at first (m).
+/// Distance between points of the track, at first (m).
 const TRACK_M: f64 = 0.25;
 
-/// What others count.
+/// Counters of the other parts of the node.
 pub struct Counters {
     /// Input.
     pub inbox: Arc<Inbox>,
     /// Output.
-    pub records: Arc<Queue>,
+    pub records: Arc<Distributor>,
     /// Punctuality.
     pub punctuality: Arc<Punctuality>,
     /// The sources.
@@ -34,42 +35,55 @@ pub struct Counters {
     pub heads: Vec<(u16, u8, String)>,
 }
 
-/// As things stood when they were shown last.
+/// The newest state.
 #[derive(Debug, Clone)]
 pub struct Shown {
     /// Time of the drive (s).
     pub now_s: f64,
-    /// Pose, state and why.
+    /// Pose, state and reason.
     pub status: Status,
     /// The radio heads.
     pub heads: Vec<HeadStatus>,
-    /// What was done.
+    /// Number of operations and their energy.
     pub energy: LiveEnergy,
-    /// What came of the samples that the pipeline was given.
+    /// Result of the samples that the pipeline was given.
     pub counts: StreamCounts,
 }
 
 #[derive(Default)]
 struct State {
     shown: Option<Shown>,
+    /// Time of the newest state.
+    shown_at: Option<Instant>,
     number: u64,
     due: Option<Instant>,
-    events: VecDeque<Value>,
+    events: VecDeque<Row>,
     track: Vec<[f64; 2]>,
     track_m: f64,
 }
 
-/// The board.
+/// Events of one cause.
+struct Row {
+    key: String,
+    level: Level,
+    source: &'static str,
+    text: String,
+    count: u64,
+    time_s: Option<f64>,
+    since_start_s: f64,
+}
+
+/// The state that the page and the metrics show.
 pub struct Board {
     state: Mutex<State>,
     period: Duration,
-    /// What others count.
+    /// Counters of the other parts of the node.
     pub counters: Counters,
     began: Instant,
 }
 
 impl Board {
-    /// An empty one, to be written so often.
+    /// An empty board with this update period.
     pub fn new(period: Duration, counters: Counters) -> Self {
         let state = State {
             track_m: TRACK_M,
@@ -87,7 +101,7 @@ impl Board {
         self.state.lock().unwrap_or_else(PoisonError::into_inner)
     }
 
-    /// Whether it is time to write again.
+    /// Whether the next update is due.
     pub fn is_due(&self) -> bool {
         let mut state = self.lock();
         let now = Instant::now();
@@ -98,7 +112,7 @@ impl Board {
         true
     }
 
-    /// Writes how things stand.
+    /// Updates the state.
     pub fn show(
         &self,
         now_s: f64,
@@ -114,6 +128,7 @@ impl Board {
             state.add_to_track([pose.x_m, pose.y_m]);
         }
         state.number += 1;
+        state.shown_at = Some(Instant::now());
         state.shown = Some(Shown {
             now_s,
             status: *status,
@@ -123,39 +138,48 @@ impl Board {
         });
     }
 
-    /// Writes an event.
-    pub fn event(&self, time_s: Option<f64>, level: Level, source: &str, text: &str) {
+    /// Adds an event. Events of one cause are one row with their number; the newest row is the last.
+    pub fn event(&self, time_s: Option<f64>, level: Level, source: &'static str, text: String) {
         let mut state = self.lock();
+        let key = events::key(&text);
+        let is_same = |it: &Row| it.source == source && it.level == level && it.key == key;
+        let same = state.events.iter().position(is_same);
+        let same = same.and_then(|index| state.events.remove(index));
         if state.events.len() == EVENTS {
             state.events.pop_front();
         }
-        let since_start_s = self.began.elapsed().as_secs_f64();
-        state.events.push_back(json!({
-            "time_s": time_s, "since_start_s": since_start_s, "level": level, "source": source,
-            "text": text,
-        }));
+        state.events.push_back(Row {
+            key,
+            level,
+            source,
+            text,
+            count: same.map_or(1, |it| it.count + 1),
+            time_s,
+            since_start_s: self.began.elapsed().as_secs_f64(),
+        });
         state.number += 1;
     }
 
-    /// Number of what was written last.
+    /// Returns the number of the newest update.
     pub fn number(&self) -> u64 {
         self.lock().number
     }
 
-    /// As things stood last.
+    /// Returns the newest state.
     pub fn shown(&self) -> Option<Shown> {
         self.lock().shown.clone()
     }
 
-    /// Where the vehicle was.
+    /// Returns the track of the vehicle.
     pub fn track(&self) -> Vec<[f64; 2]> {
         self.lock().track.clone()
     }
 
-    /// Everything that the page shows and that changes, as JSON.
+    /// Returns everything that the page shows and that changes, as JSON.
     pub fn to_json(&self) -> Value {
         let state = self.lock();
-        let (shown, events) = (state.shown.clone(), state.events.clone());
+        let (shown, shown_at) = (state.shown.clone(), state.shown_at);
+        let events: Vec<Value> = state.events.iter().map(row_json).collect();
         drop(state);
         let counters = &self.counters;
         let punctuality = &counters.punctuality;
@@ -163,8 +187,10 @@ impl Board {
         let sources: Vec<Value> = counters.sources.iter().map(|it| source_json(it)).collect();
         let mut value = json!({
             "uptime_s": self.began.elapsed().as_secs_f64(),
+            "age_s": shown_at.map(|it| it.elapsed().as_secs_f64()),
             "events": events,
             "sources": sources,
+            "outputs": counters.records.status(),
             "dropped": {
                 "blocks": dropped_blocks, "messages": dropped_messages,
                 "records": counters.records.dropped(),
@@ -174,23 +200,27 @@ impl Board {
                 "odometry_to_pose": punctuality.odometry_to_pose.quantiles(),
                 "jitter": punctuality.jitter.quantiles(),
             },
+            "latency_targets": {
+                "ssb_to_pose": SSB_TO_POSE_TARGETS,
+                "odometry_to_pose": ODOMETRY_TO_POSE_TARGETS,
+            },
         });
         if let Some(shown) = shown {
-            value["pose"] = crate::sink::status_json(&shown.status);
+            value["pose"] = json!(PoseFields::from(&shown.status));
             value["what_to_do"] = json!(shown.status.reason.what_to_do());
             value["now_s"] = json!(shown.now_s);
             let heads = shown.heads.iter();
             value["heads"] = heads
-                .map(|it| crate::sink::head_json(it, shown.now_s))
+                .map(|it| json!(HeadMessage::new(it, shown.now_s)))
                 .collect();
-            value["energy"] = crate::sink::energy_json(&shown.energy);
+            value["energy"] = json!(EnergyMessage::from(&shown.energy));
             value["duty"] = json!(self.duty(&shown));
             value["found_by_search"] = json!(shown.counts.found);
         }
         value
     }
 
-    /// Share of the samples that were looked at.
+    /// Returns the share of the samples that were processed; `None` without samples.
     pub fn duty(&self, shown: &Shown) -> Option<f64> {
         let samples = self
             .counters
@@ -203,10 +233,10 @@ impl Board {
 }
 
 impl State {
-    fn add_to_track(&mut self, place: [f64; 2]) {
-        let far = |last: &[f64; 2]| (place[0] - last[0]).hypot(place[1] - last[1]) >= self.track_m;
+    fn add_to_track(&mut self, point: [f64; 2]) {
+        let far = |last: &[f64; 2]| (point[0] - last[0]).hypot(point[1] - last[1]) >= self.track_m;
         if self.track.last().is_none_or(far) {
-            self.track.push(place);
+            self.track.push(point);
         }
         if self.track.len() > TRACK {
             let mut number = 0;
@@ -217,6 +247,13 @@ impl State {
             self.track_m *= 2.0;
         }
     }
+}
+
+fn row_json(row: &Row) -> Value {
+    json!({
+        "time_s": row.time_s, "since_start_s": row.since_start_s, "level": row.level,
+        "source": row.source, "text": row.text, "count": row.count,
+    })
 }
 
 fn source_json(source: &SourceHealth) -> Value {

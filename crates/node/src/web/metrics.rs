@@ -3,20 +3,11 @@
 use std::fmt::Write;
 
 use super::board::Board;
+use crate::health::OutputStatus;
 use crate::statistics::{Histogram, SourceHealth};
 use onboard::live::{HeadStatus, State};
 
-const STATES: [State; 7] = [
-    State::Waiting,
-    State::Searching,
-    State::Lost,
-    State::Unavailable,
-    State::Degraded,
-    State::Ok,
-    State::Unmonitored,
-];
-
-/// Name, kind and help of a family, and its value of a source or radio head.
+/// Name, kind and help of a family, and its value for a source, output or radio head.
 type Family<T, V> = (&'static str, &'static str, &'static str, fn(&T) -> V);
 
 struct Text(String);
@@ -85,7 +76,7 @@ pub fn text(board: &Board) -> String {
     text.family(
         "dropped_total",
         "counter",
-        "What could not be taken in time.",
+        "Items that were dropped because they could not be processed in time.",
     );
     for (what, count) in [
         ("blocks", blocks),
@@ -110,7 +101,7 @@ pub fn text(board: &Board) -> String {
         (
             "source_silent_seconds",
             "gauge",
-            "Time since a source brought something.",
+            "Time since the last item of a source.",
             |it| it.silent_for().as_secs_f64(),
         ),
     ];
@@ -120,20 +111,63 @@ pub fn text(board: &Board) -> String {
             text.sample(name, &[("source", source.name)], value(source));
         }
     }
+    let of_outputs: [Family<OutputStatus, f64>; 5] = [
+        (
+            "output_up",
+            "gauge",
+            "1 while an output works, 0 while it has failed.",
+            |it| f64::from(u8::from(it.ok)),
+        ),
+        (
+            "output_failures_total",
+            "counter",
+            "Failures of an output.",
+            |it| it.failures as f64,
+        ),
+        (
+            "output_retries_total",
+            "counter",
+            "Attempts to open a failed output again.",
+            |it| it.retries as f64,
+        ),
+        (
+            "output_written_total",
+            "counter",
+            "Records written by an output.",
+            |it| it.written as f64,
+        ),
+        (
+            "output_dropped_total",
+            "counter",
+            "Records lost by an output that had failed or was too slow.",
+            |it| it.dropped as f64,
+        ),
+    ];
+    let outputs = counters.records.status();
+    for (name, kind, help, value) in of_outputs {
+        text.family(name, kind, help);
+        for output in &outputs {
+            text.sample(name, &[("output", output.name)], value(output));
+        }
+    }
     let Some(shown) = board.shown() else {
         return text.0;
     };
     let status = &shown.status;
-    text.family("state", "gauge", "1 for the state that the pose is in.");
-    for state in STATES {
+    text.family(
+        "state",
+        "gauge",
+        "1 for the present state of the pose, 0 for the others.",
+    );
+    for state in State::ALL {
         let value = f64::from(u8::from(state == status.state));
         text.sample("state", &[("state", state.name())], value);
     }
     if let Some(pose) = status.pose {
-        text.family("position_meters", "gauge", "Place in the map's frame.");
+        text.family("position_meters", "gauge", "Position in the map frame.");
         text.sample("position_meters", &[("axis", "x")], pose.x_m);
         text.sample("position_meters", &[("axis", "y")], pose.y_m);
-        let help = "Heading, counter-clockwise from the map's x axis.";
+        let help = "Heading from -pi to pi, counter-clockwise from the map's x axis.";
         text.one("heading_radians", "gauge", help, pose.heading_rad);
     }
     if let Some(level_m) = status.protection_level_m {
@@ -162,13 +196,13 @@ pub fn text(board: &Board) -> String {
         (
             "head_refused_total",
             "counter",
-            "Angles of a radio head that were not.",
+            "Angles of a radio head that were rejected.",
             |it| Some(it.refused as f64),
         ),
         (
             "head_faulty",
             "gauge",
-            "1 for a radio head that is found faulty.",
+            "1 for a radio head that was identified as faulty.",
             |it| Some(f64::from(u8::from(it.is_faulty))),
         ),
     ];
@@ -186,22 +220,22 @@ pub fn text(board: &Board) -> String {
         }
     }
     let energy = &shown.energy;
-    let help = "SSB bursts listened to.";
+    let help = "SSB bursts received.";
     text.one("bursts_total", "counter", help, energy.listened as f64);
     let help = "Angles estimated.";
     text.one("angles_total", "counter", help, energy.executions as f64);
     if let Some(joules) = energy.energy {
-        let help = "Energy since the start, by the platform's model.";
+        let help = "Energy since the start, by the energy model of the platform.";
         text.one("energy_joules_total", "counter", help, joules.total_j());
     }
     text.one(
         "ssbs_found_total",
         "counter",
-        "SSBs that a search has found; all others came where they were expected.",
+        "SSBs that were found by a search; all others came at the expected time.",
         shown.counts.found as f64,
     );
     if let Some(duty) = board.duty(&shown) {
-        let help = "Share of the samples that were looked at.";
+        let help = "Share of the samples that were processed.";
         text.one("duty_ratio", "gauge", help, duty);
     }
     text.0

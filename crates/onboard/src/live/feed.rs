@@ -13,7 +13,7 @@ use super::stream_clock::Continuity;
 use crate::BoxError;
 use crate::burst::{Burst, OfSsb};
 use crate::energy::{Energy, EnergyModel};
-use crate::geometry::Pose;
+use crate::geometry::{Pose, wrap_angle};
 use crate::localize::{
     self, AngleMeasurement, HISTORY_S, IntegrityState, OdometryVerdict, PoseEstimate, UpdateReason,
 };
@@ -435,7 +435,11 @@ impl Live {
             .onboard
             .pose(status.time_s)
             .map_err(LiveError::Custom)?;
-        status.pose = Some(estimate.pose);
+        // The filter's heading is continuous over several turns.
+        status.pose = Some(Pose {
+            heading_rad: wrap_angle(estimate.pose.heading_rad),
+            ..estimate.pose
+        });
         status.covariance = estimate.covariance;
         let integrity = estimate.integrity;
         status.protection_level_m = integrity.map(|it| it.protection_level_m);

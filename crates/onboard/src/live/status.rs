@@ -24,6 +24,17 @@ pub enum State {
 }
 
 impl State {
+    /// All states.
+    pub const ALL: [Self; 7] = [
+        Self::Waiting,
+        Self::Searching,
+        Self::Lost,
+        Self::Unavailable,
+        Self::Degraded,
+        Self::Ok,
+        Self::Unmonitored,
+    ];
+
     /// Name for files and messages.
     pub const fn name(self) -> &'static str {
         match self {
@@ -164,7 +175,8 @@ impl fmt::Display for Reason {
 pub struct Status {
     /// Time of the pose in seconds: the time asked for, or the last one that odometry vouches for.
     pub time_s: f64,
-    /// Place and heading; while it is searched for, the mean of where it may be. `None` before any odometry.
+    /// Position and heading in (−π, π]; while the first pose is searched for, the mean of the possible poses.
+    /// `None` before any odometry.
     pub pose: Option<Pose>,
     /// Covariance of (x, y, heading), row-major, in m², m·rad and rad².
     pub covariance: Option<[[f64; 3]; 3]>,

@@ -4,7 +4,7 @@ use std::path::Path;
 
 use super::bag::files_of;
 use super::cdr::Decoder;
-use super::messages::{Kind, each_message};
+use super::messages::{FileEnd, Kind, TRUNCATED, each_message};
 use super::reader::stamp_s;
 use crate::angle_log::{AngleLog, angle};
 use crate::error::RecordingError;
@@ -14,13 +14,13 @@ use crate::error::RecordingError;
 /// are passed over; files from before verdicts told `resolved` hold none in doubt.
 ///
 /// # Errors
-/// [`RecordingError`] when a file is no MCAP, is cut off or damaged, or there is no such message. Single
-/// messages are only remarked upon.
+/// [`RecordingError`] when a file is no MCAP or is damaged, or there is no such message. Single messages, and a file
+/// that was not closed, are only remarked upon.
 pub fn read_angles_mcap(bag: &Path, topic: Option<&str>) -> Result<AngleLog, RecordingError> {
     let mut log = AngleLog::default();
     let mut item = 0;
     for file in files_of(bag)? {
-        each_message(&file, |kind, message_topic, data| {
+        let end = each_message(&file, |kind, message_topic, data| {
             if kind != Kind::Verdict || topic.is_some_and(|topic| topic != message_topic) {
                 return;
             }
@@ -34,6 +34,9 @@ pub fn read_angles_mcap(bag: &Path, topic: Option<&str>) -> Result<AngleLog, Rec
                 }
             }
         })?;
+        if end == FileEnd::Truncated {
+            log.add(item, Err(format!("{}: {TRUNCATED}", file.display())));
+        }
     }
     if item == 0 {
         return Err(RecordingError::Missing {

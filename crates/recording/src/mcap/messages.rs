@@ -5,6 +5,7 @@ use std::io::{BufReader, ErrorKind, Read};
 use std::ops::ControlFlow;
 use std::path::Path;
 
+use mcap::McapError;
 use mcap::records::op;
 use mcap::sans_io::{LinearReadEvent, LinearReader, LinearReaderOptions};
 
@@ -30,14 +31,27 @@ pub enum Kind {
     Verdict,
 }
 
-/// Hands every CDR message of a [`Kind`] to `take`, with its topic, in the order of the file.
+/// End of an MCAP file.
+#[derive(Debug, Clone, Copy, PartialEq, Eq)]
+pub enum FileEnd {
+    /// The file was closed.
+    Complete,
+    /// The file ends without a footer: its writer was killed, or lost power or disk space.
+    Truncated,
+}
+
+/// Description of a truncated file, for remarks.
+pub const TRUNCATED: &str = "the file was not closed; it is read up to its last complete chunk";
+
+/// Gives every CDR message of a [`Kind`] to `take`, with its topic, in the order of the file. A file that was not
+/// closed is read up to its last complete chunk.
 ///
 /// # Errors
-/// [`RecordingError`] when the file is no MCAP, or is cut off or damaged.
+/// [`RecordingError`] if the file is not MCAP, or is damaged before its end.
 pub fn each_message(
     file: &Path,
     mut take: impl FnMut(Kind, &str, &[u8]),
-) -> Result<(), RecordingError> {
+) -> Result<FileEnd, RecordingError> {
     let mut channels = Channels::default();
     each_record(file, |opcode, data| {
         channels.record(opcode, data, &mut take)?;
@@ -62,11 +76,11 @@ pub fn first_time_ns(file: &Path) -> Result<Option<u64>, RecordingError> {
     Ok(time_ns)
 }
 
-/// Hands records to `take` until it has enough; it returns `None` for one that is damaged.
+/// Gives records to `take` until it breaks; it returns `None` for a damaged record.
 fn each_record(
     file: &Path,
     mut take: impl FnMut(u8, &[u8]) -> Option<ControlFlow<()>>,
-) -> Result<(), RecordingError> {
+) -> Result<FileEnd, RecordingError> {
     let syntax = |message: String| RecordingError::Syntax {
         file: file.display().to_string(),
         format: "MCAP",
@@ -77,16 +91,24 @@ fn each_record(
     // A damaged length must not be taken for the memory to set aside.
     let options = LinearReaderOptions::default().with_record_length_limit(LONGEST_RECORD);
     let mut reader = LinearReader::new_with_options(options);
+    let mut has_records = false;
     while let Some(event) = reader.next_event() {
-        match event
-            .map_err(|error| syntax(format!("{error}; `mcap recover` keeps what is whole")))?
-        {
+        let event = match event {
+            Ok(event) => event,
+            Err(McapError::UnexpectedEof) if has_records => return Ok(FileEnd::Truncated),
+            Err(error) => {
+                let message = format!("{error}; `mcap recover` keeps the undamaged part");
+                return Err(syntax(message));
+            }
+        };
+        match event {
             LinearReadEvent::ReadRequest(need) => match source.read(reader.insert(need)) {
                 Ok(read) => reader.notify_read(read),
                 Err(error) if error.kind() == ErrorKind::Interrupted => {}
                 Err(error) => return Err(RecordingError::io(file, error)),
             },
             LinearReadEvent::Record { opcode, data } => {
+                has_records = true;
                 let taken = take(opcode, data)
                     .ok_or_else(|| syntax(format!("a record of type {opcode} is damaged")))?;
                 if taken.is_break() {
@@ -95,10 +117,10 @@ fn each_record(
             }
         }
     }
-    Ok(())
+    Ok(FileEnd::Complete)
 }
 
-/// What the file has said of its channels so far.
+/// Schemas and channels of the file so far.
 #[derive(Default)]
 struct Channels {
     /// Schemas of what is read.

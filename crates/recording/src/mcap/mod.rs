@@ -14,6 +14,7 @@ mod schema;
 mod turn_rate;
 mod writer;
 
+pub use ::mcap::write::NoSeek;
 pub use angles::read_angles_mcap;
 pub(crate) use bag::is_bag;
 pub use drive::write_drive_mcap;

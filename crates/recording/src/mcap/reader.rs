@@ -7,7 +7,7 @@ use onboard::observation::OdometrySample;
 
 use super::bag::files_of;
 use super::cdr::Decoder;
-use super::messages::{Kind, each_message};
+use super::messages::{FileEnd, Kind, TRUNCATED, each_message};
 use super::schema::UNOBSERVED;
 use super::turn_rate::{Gyroscope, rates_of_headings, yaw_rad};
 use crate::error::RecordingError;
@@ -43,9 +43,9 @@ struct Turn {
 /// remarked upon.
 ///
 /// # Errors
-/// [`RecordingError`] when a file is no MCAP, is cut off or damaged, when the bag does not have exactly
+/// [`RecordingError`] when a file is no MCAP or is damaged, when the bag does not have exactly
 /// that topic, or several that tell the yaw rate and none is named, or when the named one does not.
-/// Single messages are only remarked upon.
+/// Single messages, and a file that was not closed, are only remarked upon.
 pub fn read_odometry_mcap(
     bag: &Path,
     topic: Option<&str>,
@@ -102,8 +102,14 @@ pub fn read_odometry_mcap(
             turns.push(reading.turn);
         }
     };
+    let mut truncated = Vec::new();
     for file in files_of(bag)? {
-        each_message(&file, &mut take)?;
+        if each_message(&file, &mut take)? == FileEnd::Truncated {
+            truncated.push(format!("{}: {TRUNCATED}", file.display()));
+        }
+    }
+    for text in truncated {
+        collector.remark(OdometryIssue::Truncated(text));
     }
     let topic = one_topic(bag, topic, &topics)?;
     let mut log = collector.finish();

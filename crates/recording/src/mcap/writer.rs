@@ -4,12 +4,13 @@ use std::collections::BTreeMap;
 use std::io::{Seek, Write};
 
 use mcap::records::MessageHeader;
+use mcap::write::NoSeek;
 use mcap::{Compression, McapError, WriteOptions, Writer};
 
 use super::cdr::Encoder;
 use super::schema::{DIAGNOSTICS, ODOMETRY, Schema, TRANSFORMS, UNOBSERVED, VERDICT};
 use onboard::Execution;
-use onboard::geometry::Pose;
+use onboard::geometry::{Pose, wrap_angle};
 use onboard::localize::PoseEstimate;
 
 /// Indices of x, y and yaw among x, y, z, roll, pitch, yaw.
@@ -88,6 +89,23 @@ pub struct McapWriter<W: Write + Seek> {
     message: Encoder,
 }
 
+impl<W: Write> McapWriter<NoSeek<W>> {
+    /// Begins a file whose chunks are compressed in memory and written as a whole, for a destination that only
+    /// appends. An interrupted write therefore never leaves a chunk with an invalid length in the middle of the
+    /// file.
+    ///
+    /// # Errors
+    /// [`McapError`] when the destination cannot be written.
+    pub fn appending(file: W) -> Result<Self, McapError> {
+        // Zstandard's own threads cost more than they save for chunks of a few kilobytes.
+        let options = WriteOptions::new()
+            .compression(Some(Compression::Zstd))
+            .compression_threads(0)
+            .disable_seeking(true);
+        Self::with_options(NoSeek::new(file), options)
+    }
+}
+
 impl<W: Write + Seek> McapWriter<W> {
     /// Begins a file.
     ///
@@ -107,15 +125,27 @@ impl<W: Write + Seek> McapWriter<W> {
     }
 
     fn with_compression(file: W, compression: Option<Compression>) -> Result<Self, McapError> {
-        let options = WriteOptions::new()
+        Self::with_options(file, WriteOptions::new().compression(compression))
+    }
+
+    fn with_options(file: W, options: WriteOptions) -> Result<Self, McapError> {
+        let options = options
             .profile("ros2")
-            .library(concat!("access-av ", env!("CARGO_PKG_VERSION")))
-            .compression(compression);
+            .library(concat!("access-av ", env!("CARGO_PKG_VERSION")));
         Ok(Self {
             file: options.create(file)?,
             topics: BTreeMap::new(),
             message: Encoder::default(),
         })
+    }
+
+    /// Completes the current chunk and flushes the destination. All messages written before this call can be
+    /// read from the file even if no further byte is written.
+    ///
+    /// # Errors
+    /// [`McapError`] when the destination cannot be written.
+    pub fn flush(&mut self) -> Result<(), McapError> {
+        self.file.flush()
     }
 
     /// Writes a pose as `nav_msgs/msg/Odometry`. Axes that are not observed, and all of them where
@@ -131,7 +161,7 @@ impl<W: Write + Seek> McapWriter<W> {
         twist: &Twist,
     ) -> Result<(), McapError> {
         let pose = estimate.pose;
-        let (qz, qw) = (0.5 * pose.heading_rad).sin_cos();
+        let (qz, qw) = (0.5 * wrap_angle(pose.heading_rad)).sin_cos();
         header(&mut self.message, estimate.time_s, frames.parent).string(frames.child);
         for value in [pose.x_m, pose.y_m, 0.0, 0.0, 0.0, qz, qw] {
             self.message.f64(value);
@@ -169,7 +199,7 @@ impl<W: Write + Seek> McapWriter<W> {
     ) -> Result<(), McapError> {
         self.message.start().u32(transforms.len() as u32);
         for (frames, pose) in transforms {
-            let (qz, qw) = (0.5 * pose.heading_rad).sin_cos();
+            let (qz, qw) = (0.5 * wrap_angle(pose.heading_rad)).sin_cos();
             stamp(&mut self.message, time_s, frames.parent).string(frames.child);
             for value in [pose.x_m, pose.y_m, 0.0, 0.0, 0.0, qz, qw] {
                 self.message.f64(value);
