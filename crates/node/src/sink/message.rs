@@ -1,5 +1,7 @@
 //! Messages of the JSON output, their JSON Schema and their reference page.
 
+use std::fmt::Write;
+
 use onboard::live::{HeadStatus, LiveEnergy, Outcome, State, Status};
 use schemars::{JsonSchema, SchemaGenerator};
 use serde::Serialize;
@@ -372,18 +374,15 @@ pub fn reference() -> String {
     for (name, title) in PAGE {
         let definition = &schema["$defs"][name];
         let description = definition["description"].as_str().unwrap_or_default();
-        page += &format!(
-            "\n## {title}\n\n{}\n\n| field | type | description |\n|---|---|---|\n",
-            one_line(description)
-        );
+        let text = one_line(description);
+        // Writing into a string does not fail.
+        let _ = writeln!(page, "\n## {title}\n\n{text}\n");
+        page += "| field | type | description |\n|---|---|---|\n";
         let properties = definition["properties"].as_object();
         for (field, property) in properties.into_iter().flatten() {
             let text = property["description"].as_str().unwrap_or_default();
-            page += &format!(
-                "| `{field}` | {} | {} |\n",
-                type_text(property, &schema),
-                one_line(text)
-            );
+            let (kind, text) = (type_text(property, &schema), one_line(text));
+            let _ = writeln!(page, "| `{field}` | {kind} | {text} |");
         }
     }
     page += "\n## VDA 5050 2.1: `agvPosition`\n\nAs `mobileRobotPosition`, with `positionInitialized` in place of \

@@ -123,7 +123,8 @@ impl Sink for Mqtt {
         let elapsed_s = status.time_s - self.last_s;
         let is_early = (0.0..0.99 / self.settings.rate_hz).contains(&elapsed_s);
         // The end of localization is published at once.
-        if is_early && !(self.said_localized && !localized) {
+        let ends = self.said_localized && !localized;
+        if is_early && !ends {
             return Ok(());
         }
         let level_m = status.protection_level_m;

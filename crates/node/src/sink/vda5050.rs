@@ -1,7 +1,5 @@
 //! The position object of VDA 5050.
 
-use std::time::Duration;
-
 use onboard::geometry::{Pose, wrap_angle};
 use onboard::live::{State, Status};
 use schemars::JsonSchema;
@@ -123,7 +121,7 @@ pub fn position(
     settings: &MqttOutput,
 ) -> VdaPosition {
     let position = PositionFields {
-        timestamp: utc(Duration::from_secs_f64(unix_s())),
+        timestamp: utc(unix_s()),
         x: pose.x_m,
         y: pose.y_m,
         theta: wrap_angle(pose.heading_rad),
@@ -142,9 +140,10 @@ pub fn position(
     }
 }
 
-/// Returns a time since 1970 in UTC as ISO 8601 with milliseconds.
-fn utc(since_1970: Duration) -> String {
-    let (seconds, millis) = (since_1970.as_secs(), since_1970.subsec_millis());
+/// Returns a time in seconds since 1970 in UTC as ISO 8601 with milliseconds.
+fn utc(since_1970_s: f64) -> String {
+    let millis = (1e3 * since_1970_s).round() as u64;
+    let (seconds, millis) = (millis / 1000, millis % 1000);
     let (days, second) = (seconds / 86_400, seconds % 86_400);
     // Days since 1970 to a date of the Gregorian calendar (H. Hinnant, `civil_from_days`): years of 365.2425 days
     // that begin on 1 March, in eras of 400 years.
@@ -256,7 +255,7 @@ mod tests {
             (4_107_542_400.25, "2100-03-01T00:00:00.250Z"),
             (1_795_702_362.123, "2026-11-26T14:12:42.123Z"),
         ] {
-            assert_eq!(utc(Duration::from_secs_f64(seconds)), expected);
+            assert_eq!(utc(seconds), expected);
         }
     }
 }
