@@ -19,7 +19,9 @@ Target = Annotated[Path, typer.Argument(help="The file to write, for example min
 Force = Annotated[bool, typer.Option("--force", help="Write over a file that is there.")]
 Road = Annotated[
     Path | None,
-    typer.Option(help="CSV (x_m, y_m), GeoJSON (a LineString) or DXF (a polyline of one layer)."),
+    typer.Option(
+        help="CSV (x_m, y_m), GeoJSON (a LineString) or DXF (curves of one layer that join)."
+    ),
 ]
 Heads = Annotated[
     Path | None,
@@ -27,9 +29,7 @@ Heads = Annotated[
 ]
 Walls = Annotated[
     Path | None,
-    typer.Option(
-        help="GeoJSON (LineStrings, Polygons) or DXF (lines, polylines, arcs of a layer)."
-    ),
+    typer.Option(help="GeoJSON (LineStrings, Polygons) or DXF (curves and faces of a layer)."),
 ]
 Picture = Annotated[
     Path | None, typer.Option("--underlay", help="PNG or JPEG to lie under the site's maps.")
@@ -152,7 +152,7 @@ def _write(
 ) -> None:
     from access_av import _core
     from access_av.cli.options import announce
-    from access_av.site_files.templates import new
+    from access_av.site_files.templates import missing, new
     from access_av.tables.results_directory import write_whole
 
     if file.is_dir():
@@ -167,11 +167,54 @@ def _write(
     }
     name = "".join(it if it.isalnum() or it in "-_" else "-" for it in file.stem) or kind
     text = new(kind, name, str(file), drawn, placed)
+    to_fill = missing(kind, drawn)
     # A node's file is for access-av-node, which checks it itself.
-    warnings = kinds[kind].from_toml(text, str(file)).warnings() if kind in kinds else []
+    warnings: list[_core.SettingsWarning] = []
+    if kind in kinds:
+        whole = new(kind, name, str(file), drawn, placed, filled=True) if to_fill else text
+        found = kinds[kind].from_toml(whole, str(file)).warnings()
+        warnings = [] if drawn is not None and not drawn.heads else found
     write_whole(file, text)
-    console.print(f"Written: {file}. Next: {_next(kind, file)}", soft_wrap=True, markup=False)
+    if drawn is not None:
+        _report(drawn)
+    if to_fill:
+        after = f"fill in {', '.join(to_fill)} (examples are in its comments), then "
+    console.print(
+        f"Written: {file}. Next: {after if to_fill else ''}{_next(kind, file)}",
+        soft_wrap=True,
+        markup=False,
+    )
     announce(str(file), warnings)
+
+
+def _report(drawn: Drawn) -> None:
+    """Prints what was imported, what was not, and what needs attention."""
+    from access_av.cli.terminal import plain, show_warning
+    from access_av.site_files.curves import length_m
+
+    road = "no road"
+    if drawn.length_m:
+        x0, y0 = drawn.road_m[0] if drawn.road_m else drawn.start[:2]
+        road = (
+            f"road of {drawn.length_m:.2f} m with {_count(drawn.bends, 'bend')}, from "
+            f"({x0:.2f}, {y0:.2f}) m"
+        )
+    walls_m = sum(length_m(it) for it in drawn.walls_m)
+    walls = _count(len(drawn.walls_m), "wall")
+    if drawn.walls_m:
+        walls += f" of {walls_m:.2f} m in total"
+    heads = _count(len(drawn.heads), "radio head")
+    console.print(f"Imported: {road}; {heads}; {walls}.", soft_wrap=True)
+    for what, count in drawn.skipped.items():
+        console.print(f"Not imported: {plain(what)}: {count}", soft_wrap=True)
+    if not drawn.skipped:
+        console.print("Not imported: nothing was left out.", soft_wrap=True)
+    for note in drawn.notes:
+        show_warning(note)
+
+
+def _count(count: int, what: str) -> str:
+    return f"{count or 'no'} {what}{'' if count == 1 else 's'}"
 
 
 def _next(kind: str, file: Path) -> str:

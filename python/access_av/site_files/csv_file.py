@@ -37,11 +37,14 @@ def read_heads(path: Path) -> Drawn:
     Raises
     ------
     InputError
-        When a column or number is missing.
+        When a column or number is missing, or a PCI is no whole number.
     """
     rows = validation.read(path, "table of radio heads", {"name": pl.String})
-    numbers = ("x_m", "y_m", "z_m", *(("pci",) if "pci" in rows.columns else ()))
-    validation.check(rows, str(path), numbers=numbers, other=())
+    validation.check(rows, str(path), numbers=("x_m", "y_m", "z_m"), other=())
+    known = rows.filter(pl.col("pci").is_not_null()) if "pci" in rows.columns else rows.clear()
+    for value in known.get_column("pci", default=pl.Series(dtype=pl.Int64)):
+        if not isinstance(value, (int, float)) or not float(value).is_integer():
+            raise InputError(f"{path}: pci is {value!r}; a whole number, or nothing, is needed")
     return Drawn(
         heads=[
             Head(

@@ -1,22 +1,29 @@
-"""What a file of a plant holds: a road, radio heads, walls; and what of it cannot be."""
+"""Road, radio heads and walls of a plant, and the checks that reject implausible ones."""
 
 from __future__ import annotations
 
 import itertools
 import math
-from dataclasses import dataclass
+from collections import Counter
+from dataclasses import dataclass, field, replace
 from typing import TYPE_CHECKING
 
 from access_av.errors import InputError
 
 if TYPE_CHECKING:
-    from collections.abc import Sequence
+    from collections.abc import Iterator, Mapping, Sequence
 
 # Farther from the road no radio head is of any use; its file is of another place or unit.
 FARTHEST_HEAD_M = 3000.0
 # No plant is larger; roads of more are in another unit.
 LONGEST_ROAD_M = 50_000.0
 SHORTEST_ROAD_M = 2.0
+# Smallest turn that counts as a bend, in radians: 5 degrees.
+BEND_RAD = math.radians(5.0)
+# Turns between two edges below this are rounding, in radians.
+STRAIGHT_RAD = 1e-5
+# Edges of a polyline above this length separate two bends, in metres.
+STRAIGHT_M = 10.0
 
 
 @dataclass(frozen=True)
@@ -50,7 +57,7 @@ class Segment:
 
 @dataclass(frozen=True)
 class Drawn:
-    """What was found in files of a plant, in metres.
+    """Road, radio heads and walls from files of a plant, in metres.
 
     Attributes
     ----------
@@ -64,6 +71,10 @@ class Drawn:
         Radio heads.
     walls_m
         Corners of each wall.
+    skipped
+        Entities of the selected layers or of the map that were not imported, by file and type.
+    notes
+        Facts about the import that need the user's attention.
     """
 
     road_m: Sequence[tuple[float, float]] = ()
@@ -71,10 +82,63 @@ class Drawn:
     segments: Sequence[Segment] = ()
     heads: Sequence[Head] = ()
     walls_m: Sequence[Sequence[tuple[float, float]]] = ()
+    skipped: Mapping[str, int] = field(default_factory=dict)
+    notes: Sequence[str] = ()
+
+    @property
+    def length_m(self) -> float:
+        """Length of the road in metres."""
+        if self.segments:
+            return math.fsum(it.length_m for it in self.segments)
+        points = list(self.road_m)
+        return math.fsum(math.dist(a, b) for a, b in itertools.pairwise(points))
+
+    @property
+    def bends(self) -> int:
+        """Number of stretches that turn by at least :data:`BEND_RAD` in one direction."""
+        turns = [it.turn_rad for it in self.segments] or _turns(self.road_m)
+        directions = itertools.groupby(
+            turns, key=lambda turn: 0.0 if abs(turn) < STRAIGHT_RAD else math.copysign(1.0, turn)
+        )
+        stretches = (math.fsum(turns) for _, turns in directions)
+        return sum(abs(turn) >= BEND_RAD for turn in stretches)
+
+
+def _turns(points: Sequence[tuple[float, float]]) -> Iterator[float]:
+    """Turns between the edges of a polyline in radians; 0 for each long edge."""
+    edges = [(b[0] - a[0], b[1] - a[1]) for a, b in itertools.pairwise(points) if a != b]
+    for (ax, ay), (bx, by) in itertools.pairwise(edges):
+        yield math.atan2(ax * by - ay * bx, ax * bx + ay * by)
+        if math.hypot(bx, by) > STRAIGHT_M:
+            yield 0.0
+
+
+def numbered(heads: Sequence[Head]) -> list[Head]:
+    """Appends a number to names that several radio heads have, as those of one block do.
+
+    Examples
+    --------
+    >>> [it.name for it in numbered([Head("mast", 0, 0, 6), Head("mast", 9, 0, 6)])]
+    ['mast 1', 'mast 2']
+    """
+    count = Counter(it.name for it in heads)
+    taken, made = Counter(count), []
+    seen: Counter[str] = Counter()
+    for head in heads:
+        name = head.name
+        if name and count[head.name] > 1:
+            while True:
+                seen[head.name] += 1
+                name = f"{head.name} {seen[head.name]}"
+                if name not in taken:
+                    break
+            taken[name] += 1
+        made.append(replace(head, name=name))
+    return made
 
 
 def checked(drawn: Drawn, road_file: str, heads_file: str, walls_file: str) -> Drawn:
-    """Refuse what is no plant, and name the file.
+    """Rejects an implausible plant and names the file.
 
     Raises
     ------
@@ -82,9 +146,7 @@ def checked(drawn: Drawn, road_file: str, heads_file: str, walls_file: str) -> D
         For a road too short or too long, and radio heads or walls kilometres from it.
     """
     points = list(drawn.road_m)
-    length_m = math.fsum(it.length_m for it in drawn.segments) or math.fsum(
-        math.dist(a, b) for a, b in itertools.pairwise(points)
-    )
+    length_m = drawn.length_m
     if not SHORTEST_ROAD_M <= length_m <= LONGEST_ROAD_M and (points or drawn.segments):
         raise InputError(
             f"{road_file}: its road is {length_m:,.3g} m long; from {SHORTEST_ROAD_M:g} to "

@@ -2,30 +2,80 @@
 
 from __future__ import annotations
 
-import itertools
 import math
+from collections import Counter
 from typing import TYPE_CHECKING, Any
 
 from access_av.errors import InputError
-from access_av.site_files.drawn import Drawn, Head, Segment
+from access_av.site_files import curves, dxf_curves
+from access_av.site_files.curves import CurveError
+from access_av.site_files.drawn import Drawn, Head
+from access_av.site_files.dxf_curves import UnsupportedError
+from access_av.site_files.dxf_layer import Layer, TooManyError, layer_of
 from access_av.tables.results_directory import regular
 
 if TYPE_CHECKING:
+    from collections.abc import Iterator, Sequence
     from pathlib import Path
 
+    from access_av.site_files.curves import Point, Vertex
+
 MOST_BYTES = 256 << 20
+US_SURVEY_FOOT_M = 1200.0 / 3937.0
 # $INSUNITS of a drawing, by its number (ezdxf's documentation): name and metres.
 UNITS = {
     1: ("inches", 0.0254),
     2: ("feet", 0.3048),
+    3: ("miles", 1609.344),
     4: ("millimetres", 0.001),
     5: ("centimetres", 0.01),
     6: ("metres", 1.0),
+    7: ("kilometres", 1000.0),
+    8: ("microinches", 2.54e-8),
+    9: ("mils", 2.54e-5),
+    10: ("yards", 0.9144),
+    11: ("angstroms", 1e-10),
+    12: ("nanometres", 1e-9),
+    13: ("micrometres", 1e-6),
+    14: ("decimetres", 0.1),
+    15: ("decametres", 10.0),
+    16: ("hectometres", 100.0),
+    17: ("gigametres", 1e9),
+    18: ("astronomical units", 149_597_870_700.0),
+    19: ("light years", 9.460_730_472_580_8e15),
+    20: ("parsecs", 3.085_677_581_491_367e16),
+    21: ("US survey feet", US_SURVEY_FOOT_M),
+    22: ("US survey inches", US_SURVEY_FOOT_M / 12.0),
+    23: ("US survey yards", 3.0 * US_SURVEY_FOOT_M),
+    24: ("US survey miles", 5280.0 * US_SURVEY_FOOT_M),
 }
-# Directions of two segments that meet, nearer than this, make no corner (rad).
-SMOOTH_RAD = 1e-3
-# Round walls become straight ones that leave them by no more.
-SAGITTA_M = 0.05
+# Largest distance between a spline or an ellipse of the road and its chords, in metres.
+ROAD_SAGITTA_M = 0.002
+# Largest distance between a round wall and its chords, in metres.
+WALL_SAGITTA_M = 0.005
+# Points of walls count as equal below this distance, in metres.
+SAME_M = 0.001
+# First bytes of a DWG file.
+DWG = b"AC10"
+# Codes of ezdxf's auditor (ezdxf.audit.AuditError) for entities that it removed.
+REMOVED = {
+    "REMOVED_INVALID_GRAPHIC_ENTITY",
+    "REMOVED_ENTITY_WITH_INVALID_OWNER_HANDLE",
+    "UNDEFINED_BLOCK",
+    "UNDEFINED_BLOCK_NAME",
+    "INVALID_BLOCK_REFERENCE_CYCLE",
+    "ORPHANED_LAYOUT_ENTITY",
+    "INVALID_MAJOR_AXIS",
+    "INVALID_ELLIPSE_RATIO",
+    "INVALID_VERTEX_COUNT",
+    "INVALID_MLINE_VERTEX",
+    "INVALID_SPLINE_DEFINITION",
+    "INVALID_SPLINE_CONTROL_POINT_COUNT",
+    "INVALID_SPLINE_FIT_POINT_COUNT",
+    "INVALID_SPLINE_KNOT_VALUE_COUNT",
+    "INVALID_SPLINE_WEIGHT_COUNT",
+    "INVALID_MESH_DATA",
+}
 
 
 def metres_per_unit(points: tuple[float, float, float, float], length_m: float) -> float:
@@ -50,10 +100,12 @@ def read(
     walls_layer: str | None = None,
     scale_m: float | None = None,
 ) -> Drawn:
-    """Read a polyline as the road, points or block references as radio heads, lines as walls.
+    """Reads curves as the road, points or block references as radio heads, lines as walls.
 
-    Arcs of a polyline that join its lines without a kink stay what they are; elsewhere its corners
-    become points. A radio head's name is the block's attribute ``NAME``, or the block's own name.
+    The curves of the road join at their ends. Arcs of a road without kinks remain arcs; otherwise
+    the road becomes points. A radio head's name is the attribute ``NAME`` of the block reference,
+    or the name of the block. Block references are resolved, also arrays and nested ones. Layers are
+    compared without regard to case.
 
     Parameters
     ----------
@@ -62,133 +114,176 @@ def read(
     road_layer, heads_layer, walls_layer
         Layers; ``None`` for none.
     scale_m
-        Metres of a unit of the drawing. What the drawing itself says is often wrong and has to be
+        Metres per unit of the drawing. The unit in the drawing itself is often wrong and has to be
         confirmed.
+
+    Returns
+    -------
+    Drawn
+        ``skipped`` counts every entity of the layers that was not imported, by type.
 
     Raises
     ------
     InputError
-        Without ezdxf, for a file that is no DXF, a layer that there is not or that holds nothing
-        of the kind, and a scale that nobody confirmed.
+        Without ezdxf, for a file that is not DXF, a missing layer or one without an entity of the
+        required types, and a scale that was not confirmed.
     """
-    try:
-        from ezdxf.filemanagement import readfile
-        from ezdxf.lldxf.const import DXFError
-        from ezdxf.path import make_path
-    except ImportError as error:
-        raise InputError(f"{path}: DXF needs the extra: pip install 'access-av[cad]'") from error
-    try:
-        drawing = readfile(regular(path, MOST_BYTES))
-    except (DXFError, UnicodeDecodeError, ValueError) as error:
-        raise InputError(f"{path}: not a DXF drawing: {error}") from error
+    drawing, removed = _load(path)
     if scale_m is None:
         raise InputError(f"{path}: {_unconfirmed(drawing)}")
-    model = drawing.modelspace()
-    layers = sorted({entity.dxf.layer for entity in model})
-    start = (0.0, 0.0, 0.0)
-    segments: list[Segment] = []
-    points: list[tuple[float, float]] = []
-    if road_layer is not None:
-        found = [
-            entity
-            for entity in model.query("LWPOLYLINE POLYLINE LINE")
-            if entity.dxf.layer == road_layer
-        ]
-        if len(found) != 1:
-            raise InputError(
-                f"{path}: layer {road_layer!r} holds {len(found)} polylines and lines; the road is "
-                f"exactly one. Layers: {', '.join(map(repr, layers))}"
-            )
-        vertices = _vertices(found[0], scale_m)
-        start, segments, points = _shape(path, vertices)
-    heads = [] if heads_layer is None else _heads(path, model, heads_layer, scale_m, layers)
-    walls = [
-        [
-            (scale_m * it.x, scale_m * it.y)
-            for it in make_path(entity).flattening(SAGITTA_M / scale_m)
-        ]
-        for entity in model.query("LINE LWPOLYLINE POLYLINE ARC CIRCLE")
-        if entity.dxf.layer == walls_layer
-    ]
-    if walls_layer is not None and not walls:
-        raise InputError(
-            f"{path}: layer {walls_layer!r} holds no lines, polylines or arcs; walls are such. "
-            f"Layers: {', '.join(map(repr, layers))}"
+    reader = _Reader(path, drawing, scale_m)
+    try:
+        start, segments, points = (
+            ((0.0, 0.0, 0.0), [], []) if road_layer is None else reader.road(road_layer)
         )
-    return Drawn(points, start, segments, heads, walls)
+        heads = [] if heads_layer is None else reader.heads(heads_layer)
+        walls = [] if walls_layer is None else reader.walls(walls_layer)
+    except TooManyError as error:
+        raise InputError(f"{path}: {error}") from error
+    skipped = {**reader.skipped, **removed}
+    return Drawn(points, start, segments, heads, walls, skipped, reader.notes)
+
+
+def _load(path: Path) -> tuple[Any, dict[str, int]]:
+    """The drawing, and the damaged entities that ezdxf removed from any layer."""
+    try:
+        from ezdxf import recover
+        from ezdxf.audit import AuditError
+        from ezdxf.lldxf.const import DXFError
+    except ImportError as error:
+        raise InputError(f"{path}: DXF needs the extra: pip install 'access-av[cad]'") from error
+    with regular(path, MOST_BYTES).open("rb") as file:
+        begin = file.read(4)
+    if begin == DWG:
+        raise InputError(f"{path}: a DWG file; save it as DXF")
+    try:
+        drawing, auditor = recover.readfile(path)
+    # A damaged file also raises errors of the code that reads its values.
+    except (DXFError, ValueError, LookupError, AttributeError, TypeError) as error:
+        raise InputError(f"{path}: not a DXF drawing: {error}") from error
+    codes = {getattr(AuditError, name, None) for name in REMOVED}
+    found = [it for it in (*auditor.errors, *auditor.fixes) if it.code in codes]
+    return drawing, {f"{path}: {it.message.rstrip('.')}": 1 for it in found}
 
 
 def _unconfirmed(drawing: Any) -> str:
-    number = int(drawing.header.get("$INSUNITS", 0))
-    name, metres = UNITS.get(number, (f"no unit that is known here ({number})", None))
-    says = f"it says that it is in {name} ($INSUNITS)"
+    number = drawing.header.get("$INSUNITS", 0)
+    name, metres = UNITS.get(number, (None, None))
+    says = (
+        f"its unit is not specified ($INSUNITS is {number})"
+        if name is None
+        else f"it says that it is in {name} ($INSUNITS), which is often wrong"
+    )
     write = "--two-points X1,Y1,X2,Y2 --length-m L with a length that was measured"
     if metres is not None:
-        write += f", or --metres-per-unit {metres:g} if that is right"
-    return f"{says}, which is often wrong; confirm its scale: {write}"
+        write += f", or --metres-per-unit {metres:.12g} if that is right"
+    return f"{says}; confirm its scale: {write}"
 
 
-def _vertices(entity: Any, scale_m: float) -> list[tuple[float, float, float]]:
-    """Points in metres, each with its bulge: the tangent of a quarter of the arc that follows."""
-    if entity.dxftype() == "LINE":
-        ends = (entity.dxf.start, entity.dxf.end)
-        return [(scale_m * end.x, scale_m * end.y, 0.0) for end in ends]
-    if entity.dxftype() == "LWPOLYLINE":
-        rows = [(x, y, bulge) for x, y, bulge in entity.get_points("xyb")]
-    else:
-        rows = [
-            (it.dxf.location.x, it.dxf.location.y, it.dxf.get("bulge", 0.0))
-            for it in entity.vertices
-        ]
-    if getattr(entity, "is_closed", False) and rows:
-        rows.append((*rows[0][:2], 0.0))
-    return [(scale_m * x, scale_m * y, bulge) for x, y, bulge in rows]
+class _Reader:
+    """A drawing, and the entities of it that were not imported."""
 
+    def __init__(self, path: Path, drawing: Any, scale_m: float) -> None:
+        self.path, self.drawing, self.scale_m = path, drawing, scale_m
+        self.model = drawing.modelspace()
+        self.skipped: Counter[str] = Counter()
+        self.notes: list[str] = []
 
-def _shape(
-    path: Path, vertices: list[tuple[float, float, float]]
-) -> tuple[tuple[float, float, float], list[Segment], list[tuple[float, float]]]:
-    """Lines and arcs where they join without a kink, else points."""
-    segments, ends = [], []
-    for (x0, y0, bulge), (x1, y1, _) in itertools.pairwise(vertices):
-        chord_m = math.hypot(x1 - x0, y1 - y0)
-        if chord_m == 0.0:
-            continue
-        turn_rad = 4.0 * math.atan(bulge)
-        chord_rad = math.atan2(y1 - y0, x1 - x0)
-        length_m = chord_m if bulge == 0.0 else chord_m * 0.5 * turn_rad / math.sin(0.5 * turn_rad)
-        segments.append(Segment(length_m, turn_rad))
-        ends.append((chord_rad - 0.5 * turn_rad, chord_rad + 0.5 * turn_rad))
-    if not segments:
-        raise InputError(f"{path}: the road’s polyline has no length")
-    start = (vertices[0][0], vertices[0][1], ends[0][0])
-    kinks = (
-        abs(math.remainder(begin - end, 2.0 * math.pi))
-        for (_, end), (begin, _) in itertools.pairwise(ends)
-    )
-    if all(kink < SMOOTH_RAD for kink in kinks):
-        return start, segments, []
-    if any(segment.turn_rad for segment in segments):
-        raise InputError(
-            f"{path}: the road’s polyline has arcs, and corners beside them; let its arcs join its "
-            "lines without a kink, or draw it of straight lines alone"
-        )
-    return (0.0, 0.0, 0.0), [], [(x, y) for x, y, _ in vertices]
+    def road(self, name: str) -> tuple[tuple[float, float, float], Sequence[Any], Sequence[Point]]:
+        """Joins all curves of a layer."""
+        layer = Layer(name)
+        found = list(self._curves(layer, ROAD_SAGITTA_M))
+        if not found:
+            raise InputError(
+                f"{self.path}: layer {name!r} holds 0 polylines, lines, arcs and splines; the road "
+                f"is one, or several that join. {self._held(layer, name)}"
+            )
+        self._report(layer, name)
+        try:
+            joined = curves.without_repeats(curves.join([curve for _, curve in found]))
+        except CurveError as error:
+            raise InputError(
+                f"{self.path}: layer {name!r} holds {len(found)} curves; the road is one, or "
+                f"several that join: {error}"
+            ) from error
+        if len(found) > 1:
+            self.notes.append(
+                f"{self.path}: the road is joined from {len(found)} curves; it begins where the "
+                "first one of the drawing does"
+            )
+        smooth = curves.segments(joined)
+        if smooth is not None:
+            return (*smooth, [])
+        return (0.0, 0.0, 0.0), [], curves.flatten(joined, ROAD_SAGITTA_M)
 
+    def heads(self, name: str) -> list[Head]:
+        """Points and block references of a layer."""
+        layer = Layer(name, whole=("POINT", "INSERT"))
+        found = []
+        for entity in layer.entities(self.model):
+            if entity.dxftype() == "POINT":
+                at, named = entity.dxf.location, ""
+            elif entity.dxftype() == "INSERT":
+                at = entity.ocs().to_wcs(entity.dxf.insert)
+                named = entity.get_attrib_text("NAME", "") or entity.dxf.name
+            else:
+                layer.skip(entity)
+                continue
+            found.append(Head(named, *(self.scale_m * it for it in (at.x, at.y, at.z))))
+        if not found:
+            raise InputError(
+                f"{self.path}: layer {name!r} holds no points and no blocks; radio heads are one "
+                f"or the other. {self._held(layer, name)}"
+            )
+        self._report(layer, name)
+        return found
 
-def _heads(path: Path, model: Any, layer: str, scale_m: float, layers: list[str]) -> list[Head]:
-    found = []
-    for entity in model.query("POINT INSERT"):
-        if entity.dxf.layer != layer:
-            continue
-        is_block = entity.dxftype() == "INSERT"
-        at = entity.dxf.insert if is_block else entity.dxf.location
-        named = entity.get_attrib_text("NAME", "") if is_block else ""
-        name = named or (entity.dxf.name if is_block else "")
-        found.append(Head(name, scale_m * at.x, scale_m * at.y, scale_m * at.z))
-    if not found:
-        raise InputError(
-            f"{path}: layer {layer!r} holds no points and no blocks; radio heads are one or the "
-            f"other. Layers: {', '.join(map(repr, layers))}"
-        )
-    return found
+    def walls(self, name: str) -> list[list[Point]]:
+        """Curves of a layer, each once."""
+        layer = Layer(name)
+        walls: dict[tuple[tuple[int, int], ...], list[Point]] = {}
+        for kind, curve in self._curves(layer, WALL_SAGITTA_M):
+            wall = curves.flatten(curve, WALL_SAGITTA_M)
+            key = tuple((round(x / SAME_M), round(y / SAME_M)) for x, y in wall)
+            if min(key, key[::-1]) in walls:
+                layer.skip(kind, "drawn twice")
+            walls.setdefault(min(key, key[::-1]), wall)
+        if not walls:
+            raise InputError(
+                f"{self.path}: layer {name!r} holds no lines, polylines, arcs or splines; walls "
+                f"are such. {self._held(layer, name)}"
+            )
+        self._report(layer, name)
+        return list(walls.values())
+
+    def _curves(self, layer: Layer, sagitta_m: float) -> Iterator[tuple[str, list[Vertex]]]:
+        """Curves with their types."""
+        from ezdxf.lldxf.const import DXFError
+
+        for entity in layer.entities(self.model):
+            try:
+                found = dxf_curves.vertices(entity, self.scale_m, sagitta_m)
+            except UnsupportedError as error:
+                layer.skip(entity, str(error))
+            except (DXFError, ValueError, ArithmeticError, LookupError, TypeError) as error:
+                layer.skip(entity, f"damaged: {error}")
+            else:
+                yield from ((entity.dxftype(), curve) for curve in found)
+
+    def _report(self, layer: Layer, name: str) -> None:
+        """Counts what a layer has that was not imported, also outside of the model."""
+        for layout in self.drawing.layouts:
+            if not layout.is_modelspace:
+                for entity in layout:
+                    if layer_of(entity) == layer.name and entity.dxftype() != "VIEWPORT":
+                        layer.skip(entity, "in paper space")
+        for what, count in layer.skipped.items():
+            self.skipped[f"{self.path}, layer {name!r}: {what}"] += count
+
+    def _held(self, layer: Layer, name: str) -> str:
+        """The layer's entities if there are any, else the names of all layers."""
+        if layer.skipped:
+            listed = ", ".join(f"{count} {what}" for what, count in layer.skipped.items())
+            return f"Not importable on layer {name!r}: {listed}"
+        layers = sorted({str(entity.dxf.get("layer", "0")) for entity in self.model})
+        return f"Layers: {', '.join(map(repr, layers))}"

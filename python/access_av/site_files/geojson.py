@@ -1,13 +1,16 @@
-"""Roads, radio heads, walls in GeoJSON: degrees, or metres where the file says so."""
+"""Roads, radio heads, walls in GeoJSON: longitude and latitude, or the system of its `crs`."""
 
 from __future__ import annotations
 
-import itertools
 import json
 import math
+from collections import Counter
+from dataclasses import dataclass, field
 from typing import TYPE_CHECKING, Any
 
 from access_av.errors import InputError
+from access_av.site_files import curves, georeference
+from access_av.site_files.curves import CurveError
 from access_av.site_files.drawn import Drawn, Head
 from access_av.tables.results_directory import regular
 
@@ -15,135 +18,255 @@ if TYPE_CHECKING:
     from collections.abc import Iterator, Sequence
     from pathlib import Path
 
-EARTH_RADIUS_M = 6_371_008.8  # mean (IUGG); a plant is small enough for a sphere
-METRES_PER_DEGREE = math.radians(EARTH_RADIUS_M)
+    from access_av.site_files.georeference import Origin
+
 MOST_BYTES = 64 << 20
-# Systems in degrees; any other that a file names is in metres.
-IN_DEGREES = ("CRS84", "4326", "4258", "4979")
-METRES_NAME = "urn:ogc:def:crs:OGC::Engineering"
+# Largest depth of nested collections.
+NESTED = 32
+LINES = ("LineString", "MultiLineString")
+AREAS = ("Polygon", "MultiPolygon")
+POINTS = ("Point", "MultiPoint")
 
-Origin = tuple[float, float]
 
+@dataclass
+class Shape:
+    """A geometry of a file: numbers are checked, collections resolved.
 
-def read_walls(path: Path, origin: Origin | None, *, beside_road: bool) -> Drawn:
-    """Read every ``LineString``, and the rings of every ``Polygon``, as walls.
-
-    Parameters
+    Attributes
     ----------
-    path
-        The file.
-    origin
-        As of :func:`read`.
-    beside_road
-        Whether the first ``LineString`` is the road.
-
-    Raises
-    ------
-    InputError
-        When it is no GeoJSON, holds none, or its coordinates cannot be those of a plant.
+    kind
+        Type of the geometry as the file has it.
+    lines
+        Positions of each part: a point, a line, a ring.
+    properties
+        Properties of its feature.
+    where
+        Member of the file that holds its coordinates.
+    used
+        Whether it was imported.
     """
-    held = _held(path)
-    shapes = [(geometry, where) for geometry, _, where in _shapes(held)]
-    lines = [(_list(it), where) for it, where in shapes if it["type"] == "LineString"]
-    rings = [(ring, where) for it, where in shapes if it["type"] == "Polygon" for ring in _list(it)]
-    walls = [
-        [_numbers(path, at, where) for at in line]
-        for line, where in (*lines[beside_road:], *rings)
-        if isinstance(line, list)
-    ]
-    walls = [wall for wall in walls if len(wall) > 1]
-    if not walls:
-        raise InputError(f"{path}: neither a LineString nor a Polygon (a wall) is in it")
-    if not _in_metres(held):
-        for at in itertools.chain(*walls):
-            _check_degrees(path, at)
-        zero = origin or (walls[0][0][1], walls[0][0][0])
-        walls = [[_to_metres(at, zero) for at in wall] for wall in walls]
-    return Drawn(walls_m=[[(at[0], at[1]) for at in wall] for wall in walls])
+
+    kind: str
+    lines: list[list[list[float]]]
+    properties: dict[str, Any]
+    where: str
+    used: bool = False
 
 
-def is_in_degrees(path: Path) -> bool:
-    """Whether a file's coordinates are longitude and latitude."""
-    return not _in_metres(_held(path))
+@dataclass
+class Map:
+    """A GeoJSON file in memory.
 
-
-def _held(path: Path) -> Any:
-    try:
-        return json.loads(regular(path, MOST_BYTES).read_text(encoding="utf-8-sig"))
-    except (ValueError, RecursionError) as error:
-        raise InputError(f"{path}: not GeoJSON: {error}") from error
-
-
-def read(path: Path, origin: Origin | None = None) -> tuple[Drawn, Origin | None]:
-    """Read the first ``LineString`` as the road, and every ``Point`` as a radio head.
-
-    A point's properties ``name``, ``pci`` and ``height_m`` are taken over; the height may also be
-    its third coordinate.
-
-    Parameters
+    Attributes
     ----------
-    path
-        The file.
-    origin
-        Latitude and longitude in degrees of the map's zero. Without, the road's first point is it,
-        or the first radio head where there is no road.
-
-    Returns
-    -------
-    tuple
-        What was drawn, and the origin; ``None`` where the file is in metres.
-
-    Raises
-    ------
-    InputError
-        When it is no GeoJSON, holds neither, or its coordinates cannot be those of a plant.
+    system
+        Name of its reference system; ``None`` for longitude and latitude.
+    other
+        Number of its features and geometries that hold no positions, by type.
     """
-    held = _held(path)
-    shapes = list(_shapes(held))
-    lines = [(geometry, where) for geometry, _, where in shapes if geometry["type"] == "LineString"]
-    points = [it for it in shapes if it[0]["type"] == "Point"]
-    if not lines and not points:
-        raise InputError(
-            f"{path}: neither a LineString (the road) nor a Point (a radio head) is in it"
-        )
-    road = [_numbers(path, at, where) for geometry, where in lines[:1] for at in _list(geometry)]
-    places = [_numbers(path, geometry.get("coordinates"), where) for geometry, _, where in points]
-    if _in_metres(held):
-        origin = None
-        road_m, places_m = road, places
-    else:
-        for at in (*road, *places):
-            _check_degrees(path, at)
+
+    path: Path
+    shapes: list[Shape]
+    system: str | None
+    other: Counter[str] = field(default_factory=Counter)
+
+    @classmethod
+    def load(cls, path: Path) -> Map:
+        """Reads a file.
+
+        Raises
+        ------
+        InputError
+            When it is not GeoJSON, or a position is not two or three finite numbers.
+        """
+        try:
+            held = json.loads(regular(path, MOST_BYTES).read_text(encoding="utf-8-sig"))
+        except (ValueError, RecursionError) as error:
+            raise InputError(f"{path}: not GeoJSON: {error}") from error
+        made = cls(path, [], georeference.name_of(held, str(path)))
+        made.shapes = list(made._found(held, {}, "", 0))
+        return made
+
+    @property
+    def is_in_metres(self) -> bool:
+        """Whether its coordinates are metres of the plant's own frame."""
+        return georeference.is_metres(self.system)
+
+    def first(self) -> list[float]:
+        """The first position of the road, otherwise of the file."""
+        of_lines = [it for it in self.shapes if it.kind in LINES]
+        return next(line[0] for it in (*of_lines, *self.shapes) for line in it.lines if line)
+
+    def place(self, origin: Origin | None, *, given: bool) -> Origin | None:
+        """Transforms all positions to metres of the plant's frame.
+
+        Parameters
+        ----------
+        origin
+            Latitude and longitude of the zero; the first position where ``None``.
+        given
+            Whether the origin was given by the user.
+
+        Returns
+        -------
+        tuple or None
+            The origin; ``None`` where the file is in metres of the plant's frame.
+
+        Raises
+        ------
+        InputError
+            When a position cannot be one of a plant, or the origin is far from it.
+        """
+        if self.is_in_metres or not self.shapes:
+            return None
+        transform = georeference.to_wgs84(self.system, str(self.path))
+        for shape in self.shapes:
+            for line in shape.lines:
+                for at in line:
+                    if transform is not None:
+                        at[:2] = transform(at)
+                    _check_degrees(self.path, shape.where, at, named=self.system)
+        first = self.first()
         if origin is None:
-            first = (road or places)[0]
             origin = first[1], first[0]
-        road_m, places_m = ([_to_metres(at, origin) for at in it] for it in (road, places))
-    heads = [
-        _head(path, at, properties, where)
-        for at, (_, properties, where) in zip(places_m, points, strict=True)
-    ]
-    return Drawn(road_m=[(at[0], at[1]) for at in road_m], heads=heads), origin
+        elif given:
+            georeference.check_origin(origin, (first[0], first[1]), str(self.path))
+        for shape in self.shapes:
+            for line in shape.lines:
+                for at in line:
+                    at[:2] = georeference.to_plane(at[0], at[1], origin)
+        return origin
+
+    def road(self) -> list[tuple[float, float]]:
+        """The first line; the parts of a ``MultiLineString`` join at their ends.
+
+        Raises
+        ------
+        InputError
+            When there is none, or parts do not join.
+        """
+        for shape in self.shapes:
+            if shape.kind not in LINES:
+                continue
+            shape.used = True
+            parts = [[(x, y, 0.0) for x, y, *_ in line] for line in shape.lines if len(line) > 1]
+            if not parts:
+                raise InputError(f"{self.path}: {shape.where}: a road has two or more points")
+            try:
+                return [(x, y) for x, y, _ in curves.without_repeats(curves.join(parts))]
+            except CurveError as error:
+                raise InputError(
+                    f"{self.path}: {shape.where}: the road is one line: {error}"
+                ) from error
+        raise InputError(f"{self.path}: no LineString (the road) is in it{self._held()}")
+
+    def heads(self) -> list[Head]:
+        """Every point as a radio head.
+
+        Raises
+        ------
+        InputError
+            When there is none, or one has no height or a wrong PCI.
+        """
+        found = []
+        for shape in self.shapes:
+            if shape.kind in POINTS:
+                shape.used = True
+                for [at] in shape.lines:
+                    found.append(_head(self.path, at, shape.properties, shape.where))
+        if not found:
+            raise InputError(f"{self.path}: no Point (a radio head) is in it{self._held()}")
+        return found
+
+    def walls(self) -> list[list[tuple[float, float]]]:
+        """Lines that are not the road, and the rings of polygons.
+
+        Raises
+        ------
+        InputError
+            When there is none.
+        """
+        walls = []
+        for shape in self.shapes:
+            if shape.kind in (*LINES, *AREAS) and not shape.used:
+                shape.used = True
+                walls += [[(at[0], at[1]) for at in it] for it in shape.lines if len(it) > 1]
+        if not walls:
+            raise InputError(
+                f"{self.path}: neither a LineString nor a Polygon (a wall) is in it{self._held()}"
+            )
+        return walls
+
+    def skipped(self) -> dict[str, int]:
+        """Number of geometries that were not imported, by file and type."""
+        unused = Counter(it.kind for it in self.shapes if not it.used) + self.other
+        return {f"{self.path}: {what}": count for what, count in unused.items()}
+
+    def _held(self) -> str:
+        held = Counter(it.kind for it in self.shapes) + self.other
+        return "; it has " + (", ".join(f"{n} {it}" for it, n in held.items()) or "no geometry")
+
+    def _found(self, held: Any, properties: Any, where: str, depth: int) -> Iterator[Shape]:
+        kind = held.get("type") if isinstance(held, dict) else None
+        if not isinstance(kind, str) or depth > NESTED:
+            self.other["member without a type" if depth <= NESTED else "nested collection"] += 1
+            return
+        if (
+            depth
+            and "crs" in held
+            and georeference.name_of(held, f"{self.path}: {where}") != (self.system)
+        ):
+            raise InputError(
+                f"{self.path}: {where}crs differs from that of the file; one system is allowed"
+            )
+        if kind == "FeatureCollection":
+            for index, each in enumerate(_list(held, "features")):
+                yield from self._found(each, {}, f"{where}features[{index}].", depth + 1)
+        elif kind == "GeometryCollection":
+            for index, each in enumerate(_list(held, "geometries")):
+                yield from self._found(each, properties, f"{where}geometries[{index}].", depth + 1)
+        elif kind == "Feature":
+            geometry, its = held.get("geometry"), held.get("properties")
+            if geometry is None:
+                self.other["Feature without a geometry"] += 1
+                return
+            known = its if isinstance(its, dict) else {}
+            yield from self._found(geometry, known, f"{where}geometry.", depth + 1)
+        elif kind in (*LINES, *AREAS, *POINTS):
+            coordinates, of = held.get("coordinates"), f"{where}coordinates"
+            if coordinates == []:
+                self.other[f"{kind} without coordinates"] += 1
+                return
+            lines = _lines(self.path, kind, coordinates, of)
+            yield Shape(kind, lines, properties, of)
+        else:
+            self.other[kind[:80]] += 1
 
 
-def _shapes(held: Any, where: str = "") -> Iterator[tuple[dict[str, Any], dict[str, Any], str]]:
-    if not isinstance(held, dict):
-        return
-    if held.get("type") == "FeatureCollection":
-        for index, each in enumerate(_list(held, "features")):
-            yield from _shapes(each, f"features[{index}].")
-    elif held.get("type") == "Feature":
-        geometry = held.get("geometry")
-        if isinstance(geometry, dict):
-            properties = held.get("properties")
-            known = properties if isinstance(properties, dict) else {}
-            yield {"type": None, **geometry}, known, f"{where}geometry.coordinates"
-    elif "type" in held:
-        yield held, {}, f"{where}coordinates"
-
-
-def _list(table: dict[str, Any], key: str = "coordinates") -> list[Any]:
+def _list(table: dict[str, Any], key: str) -> list[Any]:
     found = table.get(key)
     return found if isinstance(found, list) else []
+
+
+def _lines(path: Path, kind: str, coordinates: Any, where: str) -> list[list[list[float]]]:
+    """Positions of each part of a geometry: a point, a line, a ring (RFC 7946, 3.1)."""
+
+    def parts(held: Any) -> list[Any]:
+        if not isinstance(held, list):
+            raise InputError(f"{path}: {where}: {str(held)[:80]}; a list of positions is needed")
+        return held
+
+    if kind == "Point":
+        lines = [[coordinates]]
+    elif kind == "MultiPoint":
+        lines = [[at] for at in parts(coordinates)]
+    elif kind == "LineString":
+        lines = [parts(coordinates)]
+    elif kind == "MultiPolygon":
+        lines = [parts(ring) for area in parts(coordinates) for ring in parts(area)]
+    else:
+        lines = [parts(line) for line in parts(coordinates)]
+    return [[_numbers(path, at, where) for at in line] for line in lines]
 
 
 def _numbers(path: Path, at: Any, where: str) -> list[float]:
@@ -152,18 +275,11 @@ def _numbers(path: Path, at: Any, where: str) -> list[float]:
         isinstance(it, (int, float)) and not isinstance(it, bool) and math.isfinite(it)
         for it in numbers
     ):
-        raise InputError(f"{path}: {where}: {at!r}; two or three finite numbers are needed")
+        raise InputError(f"{path}: {where}: {str(at)[:80]}; two or three finite numbers are needed")
     return [float(it) for it in numbers]
 
 
-def _in_metres(held: Any) -> bool:
-    crs = held.get("crs") if isinstance(held, dict) else None
-    properties = crs.get("properties") if isinstance(crs, dict) else None
-    name = properties.get("name") if isinstance(properties, dict) else None
-    return isinstance(name, str) and not name.endswith(IN_DEGREES)
-
-
-def _check_degrees(path: Path, at: Sequence[float]) -> None:
+def _check_degrees(path: Path, where: str, at: Sequence[float], *, named: str | None) -> None:
     longitude, latitude = at[0], at[1]
     if abs(longitude) <= 180.0 and -60.0 <= latitude <= 72.0:
         is_off_somalia = 41.0 <= longitude <= 60.0 and -6.0 <= latitude <= 16.0
@@ -174,35 +290,30 @@ def _check_degrees(path: Path, at: Sequence[float]) -> None:
         why = "is no [longitude, latitude] of a plant"
     else:
         raise InputError(
-            f"{path}: [{longitude:g}, {latitude:g}] is no [longitude, latitude] in degrees; a file "
-            'in metres names its system: "crs": {"type": "name", "properties": {"name": '
-            '"urn:ogc:def:crs:EPSG::25832"}}'
+            f"{path}: {where}: [{longitude:g}, {latitude:g}] is no [longitude, latitude] in degrees"
+            f"{'' if named is None else f' of {named}'}; a file in another system names it: "
+            '"crs": {"type": "name", "properties": {"name": "urn:ogc:def:crs:EPSG::25832"}}'
         )
     raise InputError(
-        f"{path}: [{longitude:g}, {latitude:g}] {why}; if latitude and longitude are exchanged, "
-        "write [longitude, latitude]"
+        f"{path}: {where}: [{longitude:g}, {latitude:g}] {why}; if latitude and longitude are "
+        "exchanged, write [longitude, latitude]"
     )
-
-
-def _to_metres(at: Sequence[float], origin: Origin) -> list[float]:
-    """East and north of the origin on its tangent plane; a third coordinate stays."""
-    latitude, longitude = origin
-    shrink = math.cos(math.radians(latitude))
-    return [
-        (at[0] - longitude) * METRES_PER_DEGREE * shrink,
-        (at[1] - latitude) * METRES_PER_DEGREE,
-        *at[2:],
-    ]
 
 
 def _head(path: Path, at: Sequence[float], properties: dict[str, Any], where: str) -> Head:
     height = properties.get("height_m", at[2] if len(at) > 2 else None)
     pci = properties.get("pci")
-    if not isinstance(height, (int, float)) or isinstance(height, bool):
+    if (
+        not isinstance(height, (int, float))
+        or isinstance(height, bool)
+        or not math.isfinite(height)
+    ):
         raise InputError(
             f"{path}: {where}: {height!r} is no height; a radio head needs one, as property "
             "`height_m` or third coordinate, in metres"
         )
+    if isinstance(pci, float) and pci.is_integer():
+        pci = int(pci)
     if pci is not None and (not isinstance(pci, int) or isinstance(pci, bool)):
         raise InputError(f"{path}: {where}: pci {pci!r} is no whole number")
     return Head(str(properties.get("name") or ""), at[0], at[1], float(height), pci)
@@ -217,17 +328,19 @@ def text(drawn: Drawn, origin: Origin | None) -> str:
         What is written; its road as points.
     origin
         Latitude and longitude of the map's zero; metres, so named, where ``None``.
+
+    Raises
+    ------
+    InputError
+        When the origin cannot be one of a plant, or the plant is far from its zero.
     """
+    if origin is not None:
+        _check_zero(drawn, origin)
 
     def place(x_m: float, y_m: float) -> list[float]:
         if origin is None:
             return [round(x_m, 4), round(y_m, 4)]
-        latitude, longitude = origin
-        shrink = math.cos(math.radians(latitude))
-        return [
-            round(longitude + x_m / (METRES_PER_DEGREE * shrink), 10),
-            round(latitude + y_m / METRES_PER_DEGREE, 10),
-        ]
+        return [round(it, 10) for it in georeference.to_degrees(x_m, y_m, origin)]
 
     features: list[dict[str, Any]] = []
     if drawn.road_m:
@@ -242,8 +355,23 @@ def text(drawn: Drawn, origin: Origin | None) -> str:
         features.append(_feature("Point", place(head.x_m, head.y_m), properties))
     collection: dict[str, Any] = {"type": "FeatureCollection"}
     if origin is None:
-        collection["crs"] = {"type": "name", "properties": {"name": METRES_NAME}}
+        name = georeference.METRES_NAME
+        collection["crs"] = {"type": "name", "properties": {"name": name}}
     return json.dumps({**collection, "features": features}, ensure_ascii=False, indent=1) + "\n"
+
+
+def _check_zero(drawn: Drawn, origin: Origin) -> None:
+    from pathlib import Path
+
+    _check_degrees(Path("--origin"), "longitude, latitude", (origin[1], origin[0]), named=None)
+    places = [*drawn.road_m, *((it.x_m, it.y_m) for it in drawn.heads)]
+    away_m = max((math.hypot(*it) for it in places), default=0.0)
+    if away_m > georeference.FARTHEST_ORIGIN_M:
+        raise InputError(
+            f"--origin: the plant reaches {away_m / 1000.0:,.0f} km from the zero of its map; at "
+            f"most {georeference.FARTHEST_ORIGIN_M / 1000.0:g} km are allowed with degrees: "
+            "subtract an offset from its coordinates, or write metres (without --origin)"
+        )
 
 
 def _feature(kind: str, coordinates: list[Any], properties: dict[str, Any]) -> dict[str, Any]:

@@ -1,7 +1,8 @@
-"""A plant's road, radio heads and walls out of the files that it has, each by its ending."""
+"""Road, radio heads and walls of a plant from its files, by the ending of each name."""
 
 from __future__ import annotations
 
+import itertools
 import json
 from dataclasses import dataclass, replace
 from typing import TYPE_CHECKING
@@ -12,12 +13,12 @@ from access_av import _core
 from access_av.errors import InputError
 from access_av.run.error_bound import along_route
 from access_av.site_files import csv_file, dxf, geojson
-from access_av.site_files.drawn import Drawn, Head, checked
+from access_av.site_files.drawn import Drawn, Head, checked, numbered
 
 if TYPE_CHECKING:
     from pathlib import Path
 
-    from access_av.site_files.geojson import Origin
+    from access_av.site_files.georeference import Origin
 
 # Points of a written road, so near each other that a bend of 5 m radius is a bend to a millimetre.
 WRITTEN_STEP_M = 0.2
@@ -25,7 +26,7 @@ WRITTEN_STEP_M = 0.2
 
 @dataclass(frozen=True)
 class Options:
-    """What files alone do not say.
+    """Settings of an import that the files do not contain.
 
     Attributes
     ----------
@@ -49,59 +50,97 @@ def read(
 ) -> Drawn:
     """Road, radio heads and walls, in one frame.
 
+    Returns
+    -------
+    Drawn
+        ``skipped`` counts all that was not imported.
+
     Raises
     ------
     InputError
-        Where a file cannot be read, is of another kind, or the two are of different places.
+        Where a file cannot be read, is of another kind, or the files are of different places.
     """
-    drawn, origin = Drawn(), options.origin
-    in_degrees = False
-    if road is not None:
-        drawn, found = _read(road, "road", options, origin)
-        in_degrees = found is not None
-        origin = found or origin
-        if not drawn.road_m and not drawn.segments:
-            raise InputError(f"{road}: no road is in it")
-    for file in filter(None, (heads, walls)):
-        in_metres = road is not None and not in_degrees and options.origin is None
-        if in_metres and _ending(file) == "geojson" and geojson.is_in_degrees(file):
-            raise InputError(
-                f"{file}: in degrees, and {road} in metres: say where the metres’ zero is, "
-                "--origin LATITUDE,LONGITUDE"
-            )
-    if heads is not None:
-        held, found = _read(heads, "heads", options, origin)
-        origin = found or origin
-        if not held.heads:
-            raise InputError(f"{heads}: no radio head is in it")
-        drawn = replace(drawn, heads=held.heads)
-    if walls is not None:
-        if _ending(walls) == "geojson":
-            held = geojson.read_walls(walls, origin, beside_road=walls == road)
-        else:
-            held, _ = _read(walls, "walls", options, origin)
-        drawn = replace(drawn, walls_m=held.walls_m)
+    files = _Files(options)
+    files.check_frames([it for it in (road, heads, walls) if it is not None])
+    drawn = Drawn()
+    for path, what in ((road, "road"), (heads, "heads"), (walls, "walls")):
+        if path is not None:
+            drawn = files.add(drawn, path, what)
+    for each in files.maps.values():
+        drawn = replace(drawn, skipped={**drawn.skipped, **each.skipped()})
+    road_m = [at for at, _ in itertools.groupby(drawn.road_m)]
+    if repeated := len(drawn.road_m) - len(road_m):
+        skipped = {**drawn.skipped, f"{road}: point equal to the one before": repeated}
+        drawn = replace(drawn, road_m=road_m, skipped=skipped)
+    drawn = replace(drawn, heads=numbered(drawn.heads))
+    if drawn.heads and all(it.z_m == 0.0 for it in drawn.heads):
+        note = (
+            f"{heads}: all radio heads are at height 0 m, as in a plan without heights; write the "
+            "heights of their antennas above the ground into position_m"
+        )
+        drawn = replace(drawn, notes=[*drawn.notes, note])
     return checked(drawn, str(road), str(heads or road), str(walls))
+
+
+class _Files:
+    """The files of a plant; maps are read once and have one origin."""
+
+    def __init__(self, options: Options) -> None:
+        self.options = options
+        self.origin = options.origin
+        self.maps: dict[Path, geojson.Map] = {}
+
+    def check_frames(self, paths: list[Path]) -> None:
+        """Rejects files in metres next to files in geographic coordinates without an origin."""
+        for path in dict.fromkeys(paths):
+            if _ending(path) == "geojson":
+                self.maps[path] = geojson.Map.load(path)
+        geographic = [it for it in paths if it in self.maps and not self.maps[it].is_in_metres]
+        in_metres = [it for it in paths if it not in geographic]
+        if geographic and in_metres and self.options.origin is None:
+            raise InputError(
+                f"{geographic[0]}: in geographic coordinates, and {in_metres[0]} in metres: say "
+                "where the metres’ zero is, --origin LATITUDE,LONGITUDE"
+            )
+        for each in self.maps.values():
+            self.origin = each.place(self.origin, given=self.options.origin is not None) or (
+                self.origin
+            )
+
+    def add(self, drawn: Drawn, path: Path, what: str) -> Drawn:
+        """A plant with the road, the radio heads or the walls of a file."""
+        ending = _ending(path)
+        if ending == "geojson":
+            held = self.maps[path]
+            if what == "road":
+                return replace(drawn, road_m=held.road())
+            if what == "heads":
+                return replace(drawn, heads=held.heads())
+            return replace(drawn, walls_m=held.walls())
+        if ending == "csv" and what == "road":
+            return replace(drawn, road_m=csv_file.read_road(path).road_m)
+        if ending == "csv" and what == "heads":
+            return replace(drawn, heads=csv_file.read_heads(path).heads)
+        if ending != "dxf":
+            csv = "" if what == "walls" else ".csv, "
+            raise InputError(f"{path}: its name must end in {csv}.geojson, .json or .dxf")
+        layer = {f"{what}_layer": getattr(self.options, f"{what}_layer")}
+        found = dxf.read(path, **layer, scale_m=self.options.scale_m)
+        drawn = replace(
+            drawn,
+            skipped={**drawn.skipped, **found.skipped},
+            notes=[*drawn.notes, *(it for it in found.notes if it not in drawn.notes)],
+        )
+        if what == "road":
+            return replace(drawn, road_m=found.road_m, start=found.start, segments=found.segments)
+        if what == "heads":
+            return replace(drawn, heads=found.heads)
+        return replace(drawn, walls_m=found.walls_m)
 
 
 def _ending(path: Path) -> str:
     ending = path.suffix.lower().lstrip(".")
     return "geojson" if ending == "json" else ending
-
-
-def _read(
-    path: Path, what: str, options: Options, origin: Origin | None
-) -> tuple[Drawn, Origin | None]:
-    ending = _ending(path)
-    if ending == "geojson":
-        return geojson.read(path, origin)
-    if ending == "dxf":
-        layer = {f"{what}_layer": getattr(options, f"{what}_layer")}
-        return dxf.read(path, **layer, scale_m=options.scale_m), None
-    if ending == "csv" and what != "walls":
-        return (csv_file.read_road if what == "road" else csv_file.read_heads)(path), None
-    csv = "" if what == "walls" else ".csv, "
-    raise InputError(f"{path}: its name must end in {csv}.geojson, .json or .dxf")
 
 
 def of_site(site: _core.Site) -> Drawn:

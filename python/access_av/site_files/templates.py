@@ -2,15 +2,14 @@
 
 from __future__ import annotations
 
-import itertools
 import json
-import math
 from importlib import resources
 from string import Template
 from typing import TYPE_CHECKING
 
+from access_av.site_files.drawn import Drawn, Head, Segment
+
 if TYPE_CHECKING:
-    from access_av.site_files.drawn import Drawn
     from access_av.site_files.picture import Placed
 
 KINDS = ("plant", "site", "vehicle", "scenario", "node")
@@ -19,13 +18,25 @@ HEAD = "position_std_m = 0.1\n{cell}eirp_dbm = 10.0 # to be looked up\neirp_std_
 SSB_INDICES = 8  # of a burst at most carriers below 6 GHz (TS 38.213, 4.1)
 FIRST_PCI = 21
 EXAMPLE_STOP_M = 320.0
+TRIPS = "trips_per_day = 40 # of one vehicle"
+# Stands for what is missing while the rest of a file is checked.
+STRAIGHT = Drawn(segments=[Segment(100.0)], heads=[Head("", 50.0, 10.0, 8.0)])
 WALL_POINTS = 100  # of a table (settings/walls.rs)
 
 
 def new(
-    kind: str, name: str, file: str, drawn: Drawn | None = None, placed: Placed | None = None
+    kind: str,
+    name: str,
+    file: str,
+    drawn: Drawn | None = None,
+    placed: Placed | None = None,
+    *,
+    filled: bool = False,
 ) -> str:
-    """The text of a new file.
+    """Returns the text of a new file.
+
+    A site or plant with imported parts contains no road, radio head, stop or trip of the example:
+    these stand in comments, and :func:`missing` names them.
 
     Parameters
     ----------
@@ -36,33 +47,53 @@ def new(
     file
         What the file is called, for the commands that its comments name.
     drawn
-        Road, radio heads and walls in place of the example's, of a plant or a site.
+        Imported road, radio heads and walls, of a plant or a site.
     placed
         A picture under its maps.
+    filled
+        Whether missing keys are filled with placeholders, so that the others can be checked.
     """
     prefix = "site." if kind == "plant" else ""
     example = Template(_read("example_site.toml")).substitute(prefix=prefix)
     road, heads = example.split("\n# Each sends", 1)
-    heads = f"# Each sends{heads}"
-    stop_m = EXAMPLE_STOP_M
-    if drawn is not None and (drawn.road_m or drawn.segments):
-        road = _road(drawn, prefix)
-        stop_m = round(0.5 * _length_m(drawn), 1)
-    if drawn is not None and drawn.heads:
-        heads = _heads(drawn, prefix)
-    walls = "" if drawn is None else _walls(drawn, prefix)
+    heads, example_walls = f"# Each sends{heads}".split("\n# Walls that", 1)
+    walls = f"\n# Walls that{example_walls}"
+    stops = f"stops = [{{ at_m = {EXAMPLE_STOP_M:.1f}, dwell_s = 15.0 }}]"
+    trips = TRIPS
+    if drawn is not None:
+        made_road = _road(drawn, prefix) if drawn.length_m else None
+        made_heads = _heads(drawn, prefix) if drawn.heads else None
+        if filled:
+            road, heads = _road(STRAIGHT, prefix), _heads(STRAIGHT, prefix)
+        road = made_road or (road if filled else _commented(road))
+        heads = made_heads or (heads if filled else _commented(heads))
+        walls = _walls(drawn, prefix)
+        stops = "stops = [] # for example [{ at_m = 120.0, dwell_s = 15.0 }]"
+        trips = "trips_per_day = 1" if filled else f"# {TRIPS}"
     picture = "" if placed is None else _picture(placed, prefix)
     site = f"{road.rstrip()}\n\n{heads.rstrip()}\n{walls}{picture}"
     return Template(_read(f"{kind}.toml")).substitute(
-        name=name, file=file, site=site, stop_m=f"{stop_m:.1f}"
+        name=name, file=file, site=site, stops=stops, trips=trips
     )
 
 
-def _length_m(drawn: Drawn) -> float:
-    points = list(drawn.road_m)
-    if drawn.segments:
-        return math.fsum(it.length_m for it in drawn.segments)
-    return math.fsum(math.dist(a, b) for a, b in itertools.pairwise(points))
+def missing(kind: str, drawn: Drawn | None) -> list[str]:
+    """Names the keys that a new file needs and an import did not give."""
+    if drawn is None or kind not in ("plant", "site"):
+        return []
+    prefix = "site." if kind == "plant" else ""
+    return [
+        *([f"[{prefix}road]"] if kind == "plant" and not drawn.length_m else []),
+        *([] if drawn.heads else [f"[[{prefix}radio_heads]]"]),
+        *(["fleet.trips_per_day"] if kind == "plant" else []),
+    ]
+
+
+def _commented(text: str) -> str:
+    lines = (
+        f"# {line}" if line and not line.startswith("#") else line for line in text.splitlines()
+    )
+    return "\n".join(lines)
 
 
 def _road(drawn: Drawn, prefix: str) -> str:

@@ -4,25 +4,22 @@ from __future__ import annotations
 
 import subprocess
 import sys
+from pathlib import Path
 from typing import TYPE_CHECKING, Any
 
 import polars as pl
 
 from access_av.errors import InputError
+from access_av.tables import csv_text
 from access_av.tables.columns.glossary import GLOSSARY
 from access_av.tables.columns.tables import TABLES
 from access_av.tables.results_directory import regular
 
 if TYPE_CHECKING:
     from collections.abc import Iterable
-    from pathlib import Path
 
 # Reads a table and forgets it.
 TRY = "import sys, polars; polars.read_parquet(sys.argv[1], glob=False)"
-
-# What may stand between the columns of CSV; of equally many the first is meant.
-SEPARATORS = (",", ";", "\t")
-DECIMAL_COMMA = r"^[+-]?\d+(,\d+)?([eE][+-]?\d+)?$"
 
 # Bytes of a file; a year of paths through a plant has less.
 MOST_BYTES = 4 << 30
@@ -38,37 +35,13 @@ def read(path: Path, what: str, schema: dict[str, Any] | None = None) -> pl.Data
     """
     regular(path, MOST_BYTES)
     try:
-        if path.suffix == ".csv":
-            return _read_csv(path, schema)
+        if path.suffix.lower() == ".csv":
+            return csv_text.read(path, schema)
         _try(path, what)
         return pl.read_parquet(path, glob=False)
     # Of some damage Polars makes a panic of its own.
     except (pl.exceptions.PolarsError, pl.exceptions.PanicException) as error:
         raise InputError(f"{path}: not a {what}: {error}") from None
-
-
-def _read_csv(path: Path, schema: dict[str, Any] | None) -> pl.DataFrame:
-    """Read CSV; where semicolons or tabs separate the columns, a comma may be the decimal one."""
-    with path.open(encoding="utf-8-sig", errors="replace") as file:
-        header = file.readline()
-    separator = max(SEPARATORS, key=header.count)
-    rows = pl.read_csv(path, schema_overrides=schema, separator=separator, glob=False)
-    text = [name for name in rows.select(pl.col(pl.String)).columns if name not in (schema or {})]
-    commas = [
-        name
-        for name in text
-        if separator != ","
-        and rows[name].str.contains(",", literal=True).any()
-        and rows[name].str.contains(DECIMAL_COMMA).all()
-    ]
-    points = rows.select(pl.col(pl.Float64)).columns
-    if commas and points:
-        raise InputError(
-            f"{path}: {commas[0]} has commas and {points[0]} decimal points, which is ambiguous; "
-            "write all numbers with a point, or all with a comma"
-        )
-    decimal = pl.col(commas).str.replace(",", ".", literal=True).cast(pl.Float64)
-    return rows.with_columns(decimal) if commas else rows
 
 
 def _try(path: Path, what: str) -> None:
@@ -93,20 +66,38 @@ def check(
     >>> check(pl.DataFrame({"x_m": [1.0, None]}), "masts.csv", numbers=["x_m"])
     Traceback (most recent call last):
         ...
-    access_av.errors.InputError: masts.csv: x_m is not a number in row 1
+    access_av.errors.InputError: masts.csv: x_m is empty in row 2; a number is needed
     """
     numbers, other = list(numbers), list(other)
     for name in (*other, *numbers):
         if name not in rows.columns:
-            raise InputError(f"{where}: column {name} is missing; there are {rows.columns}")
+            alike = [it for it in rows.columns if it.lower() == name.lower()]
+            hint = f"; write {name} instead of {alike[0]}" if alike else ""
+            named = ", ".join(rows.columns)
+            raise InputError(f"{where}: column {name} is missing; there are {named}{hint}")
     for name in other:
         if len(empty := rows[name].is_null().arg_true()):
-            raise InputError(f"{where}: {name} is empty in row {empty[0]}")
+            raise InputError(f"{where}: {name} is empty in {_row(where, empty[0])}")
     for name in numbers:
         finite = rows[name].cast(pl.Float64, strict=False).is_finite()
         bad = (~finite).fill_null(value=True).arg_true()
         if len(bad):
-            raise InputError(f"{where}: {name} is not a number in row {bad[0]}")
+            value = rows[name][bad[0]]
+            is_empty = value is None or value == ""
+            says = "is empty" if is_empty else f"is {str(value)[:40]!r}"
+            grouped = isinstance(value, str) and csv_text.has_thousands_separators(value)
+            hint = " without thousands separators" if grouped else ""
+            raise InputError(
+                f"{where}: {name} {says} in {_row(where, bad[0])}; a number{hint} is needed"
+            )
+
+
+def _row(where: str, index: int) -> str:
+    """The line of a CSV file, or the row of another table, counted from 1."""
+    path = Path(where)
+    if path.suffix.lower() == ".csv" and path.is_file():
+        return f"line {csv_text.line_of(path, index)}"
+    return f"row {index + 1}"
 
 
 def check_types(rows: pl.DataFrame, where: str, what: str) -> None:

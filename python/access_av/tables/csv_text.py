@@ -1,0 +1,203 @@
+"""Reader of CSV tables: separators, quotes, comments, decimal commas, encodings."""
+
+from __future__ import annotations
+
+import codecs
+import csv
+import io
+import re
+from dataclasses import dataclass
+from typing import TYPE_CHECKING, Any
+
+import polars as pl
+
+from access_av.errors import InputError
+
+if TYPE_CHECKING:
+    from pathlib import Path
+
+# Separators of columns; the first is taken where the header has equally many.
+SEPARATORS = (",", ";", "\t")
+DECIMAL_COMMA = r"^[+-]?\d+(,\d+)?([eE][+-]?\d+)?$"
+THOUSANDS = re.compile(r"[+-]?\d{1,3}([,.'\u2019 \u00a0\u202f]\d{3})+([.,]\d+)?")
+# First line of CSV files that Excel writes or reads: it gives the separator.
+SEPARATOR_LINE = re.compile(rb'"?sep=(.)"?', re.IGNORECASE)
+WIDE = (codecs.BOM_UTF32_LE, codecs.BOM_UTF32_BE, codecs.BOM_UTF16_LE, codecs.BOM_UTF16_BE)
+
+
+@dataclass(frozen=True)
+class Lines:
+    """Lines of a file that hold a header and rows.
+
+    Attributes
+    ----------
+    separator
+        Separator of its columns.
+    names
+        Names of the columns, without blanks around them.
+    rows
+        Lines of the rows.
+    numbers
+        Line number of each row, from 1.
+    """
+
+    separator: str
+    names: list[str]
+    rows: list[bytes]
+    numbers: list[int]
+
+
+def read(path: Path, schema: dict[str, Any] | None = None) -> pl.DataFrame:
+    """Reads a CSV file in UTF-8, as `locate` reads its logs.
+
+    Columns are separated by commas, semicolons or tabs; after the latter two, numbers may have a
+    decimal comma. Blanks around cells, blank lines and lines that begin with ``#`` are ignored.
+
+    Parameters
+    ----------
+    path
+        The file.
+    schema
+        Types of columns that are not inferred.
+
+    Raises
+    ------
+    InputError
+        For another encoding, a column that is there twice, and a row with more or fewer cells than
+        the header.
+    """
+    lines = _lines(path)
+    text_schema = {str(index): pl.String for index in range(len(lines.names))}
+    text = pl.DataFrame(schema=text_schema)
+    if lines.rows:
+        body = io.BytesIO(b"\n".join(lines.rows))
+        text = pl.read_csv(body, has_header=False, schema=text_schema, separator=lines.separator)
+    cells = pl.all().str.strip_chars()
+    text = text.select(pl.when(cells != "").then(cells).name.keep())
+    # A separator at the end of each line makes a column without a name.
+    kept = [
+        index
+        for index, name in enumerate(lines.names)
+        if name or text[str(index)].null_count() < text.height
+    ]
+    for index in kept:
+        if not lines.names[index]:
+            raise InputError(f"{path}: column {index + 1} has no name in the header")
+    columns = [text[str(index)].alias(lines.names[index]) for index in kept]
+    known = schema or {}
+    rows = pl.DataFrame(
+        [it.cast(known[it.name]) if it.name in known else _inferred(it) for it in columns]
+    )
+    return _with_decimal_commas(path, rows, lines.separator, known)
+
+
+def line_of(path: Path, row: int) -> int:
+    """Returns the line number of a row; both count as editors and tables do, from 1 and from 0."""
+    return _lines(path).numbers[row]
+
+
+def has_thousands_separators(text: str) -> bool:
+    """Whether a cell is a number in groups of three digits.
+
+    Examples
+    --------
+    >>> [has_thousands_separators(it) for it in ("1,234.5", "1.234,5", "1 234", "12345", "a")]
+    [True, True, True, False, False]
+    """
+    return THOUSANDS.fullmatch(text.strip()) is not None
+
+
+def _lines(path: Path) -> Lines:
+    data: bytes = path.read_bytes()
+    if data.startswith(WIDE) or b"\0" in data[:1000]:
+        raise InputError(f"{path}: UTF-16 or UTF-32 text; save it as CSV UTF-8")
+    data = data.removeprefix(codecs.BOM_UTF8)
+    try:
+        data.decode("utf-8")
+    except UnicodeDecodeError as error:
+        of = data.count(b"\n", 0, error.start) + 1
+        raise InputError(
+            f"{path}: byte 0x{data[error.start]:02X} in line {of} is not UTF-8, as in Latin-1 or "
+            "Windows-1252 text; save it as CSV UTF-8"
+        ) from error
+    separator: str | None = None
+    names: list[str] | None = None
+    rows: list[bytes] = []
+    numbers: list[int] = []
+    for number, line in enumerate(data.splitlines(), 1):
+        if not line.strip() or line.startswith(b"#"):
+            continue
+        if names is None:
+            given = SEPARATOR_LINE.fullmatch(line.strip(b" \r"))
+            if given is not None and separator is None:
+                separator = given[1].decode("ascii", "replace")
+                continue
+            separator = separator or max(SEPARATORS, key=line.decode("utf-8").count)
+            names = _header(path, line, separator)
+            continue
+        cells = _count(path, line, separator or ",", number)
+        if cells != len(names):
+            hint = ""
+            if cells > len(names) and separator == ",":
+                hint = "; with decimal commas, separate the columns by semicolons"
+            raise InputError(
+                f"{path}: line {number} has {cells} cells instead of {len(names)}{hint}"
+            )
+        rows.append(line)
+        numbers.append(number)
+    if names is None or separator is None:
+        raise InputError(f"{path}: the file is empty; the first line names the columns")
+    return Lines(separator, names, rows, numbers)
+
+
+def _header(path: Path, line: bytes, separator: str) -> list[str]:
+    cells = next(csv.reader([line.decode("utf-8")], delimiter=separator, skipinitialspace=True))
+    names = [it.strip() for it in cells]
+    for name in names:
+        if name and names.count(name) > 1:
+            raise InputError(f"{path}: column {name} is there twice; each may be there once")
+    return names
+
+
+def _count(path: Path, line: bytes, separator: str, number: int) -> int:
+    """Number of cells of a line."""
+    if b'"' not in line:
+        return line.count(separator.encode()) + 1
+    if line.count(b'"') % 2:
+        raise InputError(f"{path}: line {number} has a quote that is not closed on the line")
+    return len(next(csv.reader([line.decode("utf-8")], delimiter=separator)))
+
+
+def _inferred(column: pl.Series) -> pl.Series:
+    """A column of text as numbers or truth values if all its cells are such."""
+    if column.null_count() == len(column):
+        return column
+    for kind in (pl.Int64, pl.Float64):
+        numbers = column.cast(kind, strict=False)
+        if numbers.null_count() == column.null_count():
+            return numbers
+    words = column.str.to_lowercase()
+    if words.drop_nulls().is_in(["true", "false"]).all():
+        return words == "true"
+    return column
+
+
+def _with_decimal_commas(
+    path: Path, rows: pl.DataFrame, separator: str, known: dict[str, Any]
+) -> pl.DataFrame:
+    text = [it for it in rows.select(pl.col(pl.String)).columns if it not in known]
+    commas = [
+        name
+        for name in text
+        if separator != ","
+        and rows[name].str.contains(",", literal=True).any()
+        and rows[name].str.contains(DECIMAL_COMMA).all()
+    ]
+    points = rows.select(pl.col(pl.Float64)).columns
+    if commas and points:
+        raise InputError(
+            f"{path}: {commas[0]} has commas and {points[0]} decimal points, which is ambiguous; "
+            "write all numbers with a point, or all with a comma"
+        )
+    decimal = pl.col(commas).str.replace(",", ".", literal=True).cast(pl.Float64)
+    return rows.with_columns(decimal) if commas else rows
