@@ -27,6 +27,7 @@ PLAIN = [
     "docs/designs.md",
     "docs/energy.md",
     "docs/estimator.md",
+    "docs/node-messages.md",
     "docs/outlook.md",
     "docs/paper.md",
     "docs/profile.md",

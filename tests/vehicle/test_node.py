@@ -13,7 +13,6 @@ import threading
 import time
 import urllib.request
 from contextlib import ExitStack, contextmanager
-from pathlib import Path
 from typing import TYPE_CHECKING, Any
 
 import jsonschema
@@ -33,6 +32,7 @@ from node import NODE, SCHEMAS, Broker, command, free_port, wake_up_every
 
 if TYPE_CHECKING:
     from collections.abc import Iterator
+    from pathlib import Path
 
 sys.path.insert(0, str(ROOT / "examples/live"))
 from transmitter import Drive, Transmitter, Wheels, node_toml, odometry_of, settings_of
@@ -447,9 +447,14 @@ def test_two_tabs_come_back_after_a_restart(drive: Path, tmp_path: Path) -> None
                 tab.wait_for(live)
         for tab in both:
             tab.wait_for(lost)
+            # Data that are not current are grey, and their age is shown.
+            tab.wait_for("document.body.className === 'stale'")
+            assert "s old" in tab.text()
+            assert "No current data" in tab.text()
         with driven_by_udp(drive, tmp_path, page, broker):
             for tab in both:
                 tab.wait_for(live, seconds=15.0)
+                assert tab.evaluate("document.body.className") == ""
                 assert not tab.errors
                 if "ACCESS_AV_AXE" in os.environ:
                     assert layout.hindrances(tab) == []

@@ -96,22 +96,25 @@ impl Json {
 }
 
 impl Sink for Json {
-    fn open(&mut self) -> Result<()> {
+    fn open(&mut self) -> Result<bool> {
         if let Some(Destination::File(file)) = &mut self.destination
             && file.repair()
         {
-            return Ok(());
+            return Ok(false);
         }
         // A FIFO is closed first, so that lines that its last reader did not read are discarded.
         self.destination = None;
         let destination = self.connect().with_context(|| self.named())?;
-        self.destination = Some(destination);
-        Ok(())
+        let destination = self.destination.insert(destination);
+        Ok(matches!(
+            destination,
+            Destination::Clients(..) | Destination::Datagrams(..)
+        ))
     }
 
-    fn take(&mut self, record: &Record) -> Result<()> {
+    fn take(&mut self, record: &Record) -> Result<bool> {
         if self.is_left_out(record) {
-            return Ok(());
+            return Ok(false);
         }
         self.line.clear();
         serde_json::to_writer(&mut self.line, &Message::from(record))?;
@@ -138,7 +141,8 @@ impl Sink for Json {
                 Ok(())
             }
         };
-        done.with_context(|| self.named())
+        done.with_context(|| self.named())?;
+        Ok(true)
     }
 
     fn flush(&mut self) -> Result<bool> {

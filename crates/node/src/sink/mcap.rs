@@ -106,7 +106,7 @@ impl Mcap {
         );
     }
 
-    fn pose(&mut self, record: &PoseRecord) -> Result<()> {
+    fn pose(&mut self, record: &PoseRecord) -> Result<bool> {
         let status = &record.status;
         let elapsed_s = self.odom_s.map_or(0.0, |last_s| status.time_s - last_s);
         self.odom_s = Some(status.time_s);
@@ -120,11 +120,11 @@ impl Mcap {
             status.pose,
             is_due(self.last_pose_s, status.time_s, self.settings.pose_hz),
         ) else {
-            return Ok(());
+            return Ok(false);
         };
         // No pose is published before the first one is found.
         if matches!(status.state, State::Waiting | State::Searching) {
-            return Ok(());
+            return Ok(false);
         }
         self.last_pose_s = status.time_s;
         let odom = self.odom;
@@ -142,7 +142,8 @@ impl Mcap {
         let writer = self.writer(status.time_s)?;
         writer.odometry(POSE_TOPIC, Frames::MAP, &estimate, &twist)?;
         let transforms = [(MAP_TO_ODOM, between(pose, odom)), (Frames::ODOM, odom)];
-        Ok(writer.transforms(status.time_s, &transforms)?)
+        writer.transforms(status.time_s, &transforms)?;
+        Ok(true)
     }
 
     /// Returns the file that is written; begins one if there is none.
@@ -231,27 +232,29 @@ impl Mcap {
 }
 
 impl Sink for Mcap {
-    fn open(&mut self) -> Result<()> {
+    fn open(&mut self) -> Result<bool> {
         let folder = &self.settings.folder;
         fs::create_dir_all(folder)
             .with_context(|| format!("output.mcap.folder: {}", folder.display()))?;
-        self.ensure_space()
+        self.ensure_space()?;
+        Ok(false)
     }
 
-    fn take(&mut self, record: &Record) -> Result<()> {
+    fn take(&mut self, record: &Record) -> Result<bool> {
         match record {
             Record::Pose(pose) if pose.by == By::Odometry => self.pose(pose),
-            Record::Pose(_) => Ok(()),
+            Record::Pose(_) => Ok(false),
             Record::Verdict(outcome) => {
                 let ssb = outcome.execution.ssb;
                 let head = (ssb.pci, ssb.ssb_index);
                 let last_s = self.last_verdict_s.entry(head).or_insert(f64::NEG_INFINITY);
                 if !is_due(*last_s, ssb.time_s, self.settings.verdict_hz) {
-                    return Ok(());
+                    return Ok(false);
                 }
                 *last_s = ssb.time_s;
                 let writer = self.writer(ssb.time_s)?;
-                Ok(writer.verdict(VERDICT_TOPIC, &outcome.execution)?)
+                writer.verdict(VERDICT_TOPIC, &outcome.execution)?;
+                Ok(true)
             }
             Record::Status {
                 status,
@@ -270,7 +273,8 @@ impl Sink for Mcap {
                     diagnosis_of_outputs(outputs),
                 ];
                 self.writer(*time_s)?.diagnostics(*time_s, &statuses)?;
-                self.rotate(*time_s)
+                self.rotate(*time_s)?;
+                Ok(true)
             }
             Record::Event {
                 level,
@@ -288,7 +292,7 @@ impl Sink for Mcap {
                     self.events
                         .push((*level, format!("{source}: {text}{times}")));
                 }
-                Ok(())
+                Ok(false)
             }
         }
     }

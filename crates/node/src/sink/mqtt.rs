@@ -79,7 +79,7 @@ impl Mqtt {
 }
 
 impl Sink for Mqtt {
-    fn open(&mut self) -> Result<()> {
+    fn open(&mut self) -> Result<bool> {
         self.abandon();
         let (host, port) = (self.settings.host.clone(), self.settings.port);
         let mut options = MqttOptions::new(self.client_id.clone(), host, port);
@@ -105,19 +105,19 @@ impl Sink for Mqtt {
         }
         self.link = Some(link);
         self.last_s = f64::NEG_INFINITY;
-        Ok(())
+        Ok(true)
     }
 
-    fn take(&mut self, record: &Record) -> Result<()> {
+    fn take(&mut self, record: &Record) -> Result<bool> {
         self.last_record = Instant::now();
         let status = match record {
             Record::Pose(pose) => &pose.status,
             Record::Status { status, .. } => status,
-            _ => return Ok(()),
+            _ => return Ok(false),
         };
         let localized = self.localized.judge(status);
         let Some(pose) = status.pose else {
-            return Ok(());
+            return Ok(false);
         };
         self.pose = pose;
         let elapsed_s = status.time_s - self.last_s;
@@ -125,20 +125,21 @@ impl Sink for Mqtt {
         // The end of localization is published at once.
         let ends = self.said_localized && !localized;
         if is_early && !ends {
-            return Ok(());
+            return Ok(false);
         }
         let level_m = status.protection_level_m;
         let payload = serde_json::to_string(&position(pose, level_m, localized, &self.settings))?;
-        if let Some(link) = &self.link {
-            let topic = &self.settings.topic;
-            let sent = link
-                .client
-                .try_publish(topic, QoS::AtMostOnce, false, payload);
-            if sent.is_ok() {
-                (self.last_s, self.said_localized) = (status.time_s, localized);
-            }
+        let Some(link) = &self.link else {
+            return Ok(false);
+        };
+        let topic = &self.settings.topic;
+        let sent = link
+            .client
+            .try_publish(topic, QoS::AtMostOnce, false, payload);
+        if sent.is_ok() {
+            (self.last_s, self.said_localized) = (status.time_s, localized);
         }
-        Ok(())
+        Ok(sent.is_ok())
     }
 
     fn flush(&mut self) -> Result<bool> {

@@ -6,17 +6,18 @@ use super::record::Record;
 
 /// An output.
 pub trait Sink: Send {
-    /// Opens the output. Called at the start and after each failure.
+    /// Opens the output. Called at the start and after each failure. Returns whether the output is then known to
+    /// work; otherwise it works once a record is written, because a full disk or a closed pipe can be opened.
     ///
     /// # Errors
     /// Why the output cannot be opened.
-    fn open(&mut self) -> Result<()>;
+    fn open(&mut self) -> Result<bool>;
 
-    /// Writes a record, possibly to a buffer.
+    /// Writes a record, possibly to a buffer. Returns `false` for a record that this output does not contain.
     ///
     /// # Errors
     /// Why the record cannot be written. The output is then opened again.
-    fn take(&mut self, record: &Record) -> Result<()>;
+    fn take(&mut self, record: &Record) -> Result<bool>;
 
     /// Writes buffered records if it is time to, and checks the output. Called at least every 200 ms. Returns
     /// whether no record remains in a buffer.

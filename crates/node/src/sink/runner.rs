@@ -195,13 +195,20 @@ impl Runner {
     }
 
     fn open(&mut self) {
-        self.is_open = self.attempt(|sink| sink.open()).is_some();
+        let opened = self.attempt(|sink| sink.open());
+        self.is_open = opened.is_some();
+        if opened == Some(true) {
+            self.succeed();
+        }
     }
 
     fn take(&mut self, record: &Record) {
         if self.is_open {
+            // Counted as lost if it fails.
             self.unwritten += 1;
-            self.attempt(|sink| sink.take(record));
+            if self.attempt(|sink| sink.take(record)) == Some(false) {
+                self.unwritten -= 1;
+            }
         } else {
             self.lane.health.count_dropped(1);
         }
@@ -219,7 +226,7 @@ impl Runner {
         }
     }
 
-    /// The output works once records are written: a full disk or a closed pipe can be opened.
+    /// The output works.
     fn succeed(&mut self) {
         self.lane
             .health

@@ -28,16 +28,16 @@ impl Tum {
 }
 
 impl Sink for Tum {
-    fn open(&mut self) -> Result<()> {
+    fn open(&mut self) -> Result<bool> {
         // After a failure the file continues behind its last complete line.
         if !self.file.as_mut().is_some_and(GrowingFile::repair) {
             self.file = None;
             self.file = Some(GrowingFile::create(&self.path)?);
         }
-        Ok(())
+        Ok(false)
     }
 
-    fn take(&mut self, record: &Record) -> Result<()> {
+    fn take(&mut self, record: &Record) -> Result<bool> {
         // No pose is written while the first pose is searched for.
         if let Record::Pose(PoseRecord {
             status,
@@ -51,8 +51,9 @@ impl Sink for Tum {
             let line = tum_text(&[TimedPose { time_s, pose }]);
             file.write_all(line.as_bytes())
                 .with_context(|| self.path.display().to_string())?;
+            return Ok(true);
         }
-        Ok(())
+        Ok(false)
     }
 
     fn flush(&mut self) -> Result<bool> {
