@@ -146,6 +146,7 @@
 //! | find SSBs anywhere in a band | [`raster`] |
 //! | bring a recording to the search's rate | [`front_end`] |
 //! | see what is wrong with its channels | [`diagnose`] |
+//! | see its DC offset and interfering tones, which searches and receivers remove | [`tones`](fn@tones) |
 //! | know what SS-RSRP, SS-RSRQ, SS-SINR mean here | [`measure`] |
 //! | name a cell | [`Pci`] |
 //! | lay SSBs out in time | [`Case`], [`Lmax`], [`Numerology`] |
@@ -178,6 +179,7 @@ pub mod track;
 mod transmit;
 
 pub use dsp::channel_covariance::ChannelCovariance;
+pub use dsp::tones::{Tone, tones};
 pub use error::Error;
 pub use input::{diagnose, front_end};
 pub use num_complex::Complex32;

@@ -13,4 +13,5 @@ pub(crate) mod pss_segments;
 pub(crate) mod pss_symbol;
 pub(crate) mod received_grid;
 pub(crate) mod timing;
+pub(crate) mod tones;
 pub(crate) mod whitening;

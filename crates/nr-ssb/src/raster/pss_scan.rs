@@ -6,6 +6,7 @@ use super::error::ScanError;
 use super::parallel::in_parallel;
 use crate::dsp::base_rate::SYMBOL_SAMPLES;
 use crate::dsp::pss_segments::{HOP, SegmentFilter, TRIALS, tiles};
+use crate::dsp::tones::ToneCanceller;
 use crate::input::front_end::FrontEnd;
 use crate::numeric::false_alarm::exponential_sum_threshold;
 use crate::standard::grid::SUBCARRIERS;
@@ -58,29 +59,39 @@ pub(super) fn likely_offsets(
         let front_end = FrontEnd::new(rate_hz, 0.0, scs_hz, antennas.len())?;
         let filter = SegmentFilter::new(antennas.len());
         let bases = vec![vec![Vec::new(); antennas.len()]; tiles.len()];
-        Ok((front_end, filter, bases))
+        let canceller = ToneCanceller::new(antennas.len());
+        Ok((front_end, filter, canceller, bases))
     };
-    let seen = in_parallel(&starts, worker, |(front_end, filter, bases), &start| {
-        let from = start.saturating_sub(in_input(BEFORE));
-        let to = length.min(start + in_input(CHUNK + AFTER));
-        let part: Vec<&[Complex32]> = antennas.iter().map(|it| &it[from..to]).collect();
-        front_end.process_at(&part, &tuned_hz, bases)?;
-        let samples = bases.iter().flatten().map(Vec::len).min().unwrap_or(0);
-        let first = ((start - from) as f64 / ratio) as usize;
-        let end = (first + CHUNK).min(samples);
-        let mut maxima = Vec::new();
-        filter.run(&tiles, bases, (first, end), threshold, &mut maxima);
-        let seen = maxima.iter().map(|maximum| {
-            let received_hz = maximum.subcarriers * scs_hz;
-            Seen {
-                statistic: maximum.statistic,
-                sample: from as f64 + maximum.sample * ratio,
-                received_hz: received_hz.clamp(-reach_hz, reach_hz),
-                offset_hz: nearest_offset(received_hz, reach_hz),
+    let seen = in_parallel(
+        &starts,
+        worker,
+        |(front_end, filter, canceller, bases), &start| {
+            let from = start.saturating_sub(in_input(BEFORE));
+            let to = length.min(start + in_input(CHUNK + AFTER));
+            let part: Vec<&[Complex32]> = antennas.iter().map(|it| &it[from..to]).collect();
+            front_end.process_at(&part, &tuned_hz, bases)?;
+            for base in &mut *bases {
+                canceller.forget();
+                canceller.detect(base, 0);
+                canceller.subtract(base, 0);
             }
-        });
-        Ok::<_, ScanError>(seen.collect::<Vec<_>>())
-    })?;
+            let samples = bases.iter().flatten().map(Vec::len).min().unwrap_or(0);
+            let first = ((start - from) as f64 / ratio) as usize;
+            let end = (first + CHUNK).min(samples);
+            let mut maxima = Vec::new();
+            filter.run(&tiles, bases, (first, end), threshold, &mut maxima);
+            let seen = maxima.iter().map(|maximum| {
+                let received_hz = maximum.subcarriers * scs_hz;
+                Seen {
+                    statistic: maximum.statistic,
+                    sample: from as f64 + maximum.sample * ratio,
+                    received_hz: received_hz.clamp(-reach_hz, reach_hz),
+                    offset_hz: nearest_offset(received_hz, reach_hz),
+                }
+            });
+            Ok::<_, ScanError>(seen.collect::<Vec<_>>())
+        },
+    )?;
     let near = SYMBOL_SAMPLES as f64 * ratio;
     Ok(strongest(
         seen.into_iter().flatten().collect(),

@@ -6,6 +6,7 @@ use super::config::ReceiverConfig;
 use super::error::ReceiverError;
 use super::heard::HeardSsb;
 use super::stream::StreamReceiver;
+use crate::dsp::tones::Tone;
 use crate::search::SearchError;
 
 /// A [`StreamReceiver`] whose number of antennas is not part of its type; places of SSBs are at the
@@ -20,6 +21,8 @@ pub struct Receiver {
 trait Stream: Send {
     fn tracked(&self) -> usize;
 
+    fn tones(&self) -> Vec<Tone>;
+
     fn push(
         &mut self,
         antennas: &[&[Complex32]],
@@ -32,6 +35,10 @@ trait Stream: Send {
 impl<const A: usize> Stream for StreamReceiver<A> {
     fn tracked(&self) -> usize {
         self.receiver().tracked()
+    }
+
+    fn tones(&self) -> Vec<Tone> {
+        self.receiver().tones().collect()
     }
 
     fn push(
@@ -99,6 +106,12 @@ impl Receiver {
     /// Beams that are tracked now.
     pub fn tracked(&self) -> usize {
         self.stream.tracked()
+    }
+
+    /// DC offset and tones that are subtracted from what is received, the strongest first; frequencies from
+    /// the SSB's centre.
+    pub fn tones(&self) -> Vec<Tone> {
+        self.stream.tones()
     }
 
     /// Takes the next samples of every antenna and shows `take` the SSBs that they complete, in order

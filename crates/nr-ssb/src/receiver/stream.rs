@@ -161,12 +161,14 @@ impl<const A: usize> StreamReceiver<A> {
                 && stretch_end as f64 <= last
                 && stretch_end as f64 <= next_start
             {
+                let start = self.searched - GUARD as i64;
+                let to = stretch_end + BEYOND as i64;
+                let antennas = window(start - self.start, to - self.start);
+                let antennas = antennas.as_slice();
+                let window = Window { start, antennas };
+                self.receiver.measure_tones(&window);
                 if self.receiver.searches_at(self.searched as f64) {
-                    let start = self.searched - GUARD as i64;
-                    let to = stretch_end + BEYOND as i64;
-                    let antennas = window(start - self.start, to - self.start);
-                    let antennas = antennas.as_slice();
-                    self.receiver.search(&Window { start, antennas })?;
+                    self.receiver.search(&window)?;
                 }
                 self.searched = stretch_end;
             } else if next_start <= last {

@@ -12,6 +12,7 @@ use super::beam::Beam;
 use super::config::ReceiverConfig;
 use super::error::ReceiverError;
 use crate::dsp::base_rate::SSB_SAMPLES;
+use crate::dsp::tones::Tone;
 use crate::search::{SearchError, Searcher};
 use crate::track::{Tracked, Tracker};
 
@@ -23,6 +24,12 @@ const LOST_INTERVAL_S: f64 = 0.1;
 /// Offsets that a burst is searched at where no beam is known: one for so much of a period (s), at most so many.
 const PERIOD_OF_OFFSET_S: f64 = 0.04;
 const MOST_OFFSETS: f64 = 4.0;
+/// Time after which DC offset and tones are looked for again, in seconds; after [`LOST_INTERVAL_S`] where an SSB
+/// is missing.
+const TONE_INTERVAL_S: f64 = 1.0;
+/// Samples before and after the place where an SSB is expected that tones are subtracted from.
+const BEFORE: usize = 1500;
+const AFTER: usize = 2596;
 /// Samples by which a beam that is found again may come off its period: beyond any drift of its clock.
 const OFF_PERIOD: f64 = 100.0;
 
@@ -71,6 +78,9 @@ pub struct WindowReceiver<const A: usize> {
     in_vain: u32,
     /// Samples that were missing untold so far.
     untold: f64,
+    /// Where tones were last looked for (samples), and the samples without them.
+    tones_measured: f64,
+    cleaned: Vec<Vec<Complex32>>,
 }
 
 impl<const A: usize> WindowReceiver<A> {
@@ -93,6 +103,8 @@ impl<const A: usize> WindowReceiver<A> {
             offset_hz: 0.0,
             in_vain: 0,
             untold: 0.0,
+            tones_measured: f64::NEG_INFINITY,
+            cleaned: vec![Vec::with_capacity(BEFORE + AFTER); A],
             config,
         })
     }
@@ -117,6 +129,28 @@ impl<const A: usize> WindowReceiver<A> {
         self.beams.clear();
         (self.search_begun, self.search_until) = (f64::NEG_INFINITY, f64::NEG_INFINITY);
         (self.in_vain, self.untold) = (0, 0.0);
+        self.tones_measured = f64::NEG_INFINITY;
+    }
+
+    /// DC offset and tones that are subtracted from what is received, the strongest first; frequencies from the
+    /// SSB's centre.
+    pub fn tones(&self) -> impl Iterator<Item = Tone> + '_ {
+        self.searcher.tones()
+    }
+
+    /// Looks for tones in the window where it is time to.
+    pub(super) fn measure_tones(&mut self, window: &Window<'_>) {
+        let is_missing = self.beams.iter().any(|beam| beam.tracker.misses() > 0);
+        let interval_s = if is_missing {
+            LOST_INTERVAL_S
+        } else {
+            TONE_INTERVAL_S
+        };
+        let interval = interval_s * self.config.search.spacing.base_rate_hz();
+        if window.start as f64 - self.tones_measured >= interval {
+            self.tones_measured = window.start as f64;
+            self.searcher.canceller.detect(window.antennas, 0);
+        }
     }
 
     /// Searches the window where it is time to, and shows `take` the SSBs that lie in it, in order of time.
@@ -128,6 +162,7 @@ impl<const A: usize> WindowReceiver<A> {
         window: &Window<'_>,
         take: &mut dyn FnMut(Seen<'_, A>),
     ) -> Result<(), ReceiverError> {
+        self.measure_tones(window);
         if self.searches_at(window.start as f64) {
             self.search(window)?;
             self.search_until = f64::NEG_INFINITY; // all of a burst is in a window
@@ -210,6 +245,7 @@ impl<const A: usize> WindowReceiver<A> {
             return Ok(());
         }
         self.searches += 1;
+        self.tones_measured = window.start as f64;
         for number in 0..self.at_once() {
             self.search_around(self.centre_hz(number), window)?;
             if !self.beams.is_empty() {
@@ -277,7 +313,26 @@ impl<const A: usize> WindowReceiver<A> {
         let Some((index, beam)) = next.filter(|(_, beam)| beam.next_start <= last) else {
             return Ok(false);
         };
-        let (start, decode) = (window.start as f64, self.config.decode_pbch);
+        let (mut start, decode) = (window.start as f64, self.config.decode_pbch);
+        let canceller = &mut self.searcher.canceller;
+        let cleaned: [&[Complex32]; A];
+        let mut antennas = antennas;
+        if canceller.is_needed() {
+            // Subtract the tones from a copy of the samples around the SSB.
+            let place = (beam.next_start - start) as usize;
+            let from = place.saturating_sub(BEFORE);
+            for (copy, samples) in self.cleaned.iter_mut().zip(antennas) {
+                copy.clear();
+                let to = samples.len().min(place + AFTER);
+                copy.extend_from_slice(samples.get(from..to).unwrap_or_default());
+            }
+            canceller.subtract(&mut self.cleaned, 0);
+            let copies = &self.cleaned;
+            cleaned =
+                std::array::from_fn(|antenna| copies.get(antenna).map_or(&[][..], Vec::as_slice));
+            antennas = &cleaned;
+            start += from as f64;
+        }
         let seen = beam
             .tracker
             .track(antennas, start, beam.next_start, decode)?;

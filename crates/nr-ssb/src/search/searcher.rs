@@ -9,6 +9,7 @@ use super::settings::{SearchConfig, check_frequency};
 use crate::dsp::base_rate::{CYCLIC_PREFIX, SSB_SAMPLES};
 use crate::dsp::hypotheses::cfo_hypotheses;
 use crate::dsp::matched_filter::{MatchedFilter, PssCandidate};
+use crate::dsp::tones::{Tone, ToneCanceller};
 use crate::numeric::false_alarm::exponential_sum_threshold;
 
 /// Candidates examined per 20 ms at most; what noise and sidelobes offer beyond is not worth it.
@@ -28,6 +29,7 @@ pub struct Searcher {
     filter: MatchedFilter,
     examiner: Examiner,
     pss_threshold: f32,
+    pub(crate) canceller: ToneCanceller,
     /// Samples of the end of the last block and of this one, per antenna.
     buffer: Vec<Vec<Complex32>>,
     /// Number of samples before the buffer's first.
@@ -58,6 +60,7 @@ impl Searcher {
             filter,
             examiner: Examiner::new(&config, PSS_FLOOR * pss_threshold, cell_threshold),
             pss_threshold,
+            canceller: ToneCanceller::new(antennas),
             buffer: vec![Vec::new(); antennas],
             buffer_start: 0,
             candidates: Vec::new(),
@@ -115,6 +118,8 @@ impl Searcher {
                     .map(|x| if usable(x) { *x } else { Complex32::ZERO }),
             );
         }
+        self.canceller.detect(&self.buffer, tail);
+        self.canceller.subtract(&mut self.buffer, tail);
         self.examiner.begin_block(self.buffer_start as f64);
         self.examine_all(tail + length, look);
         Ok(self.examiner.found_in_order())
@@ -152,6 +157,7 @@ impl Searcher {
     pub fn reset(&mut self) {
         self.buffer.iter_mut().for_each(Vec::clear);
         self.buffer_start = 0;
+        self.canceller.forget();
         self.examiner.forget();
     }
 
@@ -163,6 +169,11 @@ impl Searcher {
     /// What became of the candidates in the block searched last.
     pub fn counts(&self) -> SearchCounts {
         self.examiner.counts()
+    }
+
+    /// DC offset and tones that were subtracted from the block searched last, the strongest first.
+    pub fn tones(&self) -> impl Iterator<Item = Tone> + '_ {
+        self.canceller.tones(self.base_rate_hz)
     }
 
     fn common_length(&self, antennas: &[&[Complex32]]) -> Result<usize, SearchError> {

@@ -26,5 +26,6 @@ mod properties;
 mod receiver;
 mod recordings;
 mod stream;
+mod tones;
 mod track;
 mod vectors;

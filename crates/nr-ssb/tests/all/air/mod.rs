@@ -189,7 +189,7 @@ pub fn rng(seed: u64) -> ChaCha8Rng {
     ChaCha8Rng::seed_from_u64(seed)
 }
 
-fn phasor(angle: f64) -> Complex32 {
+pub fn phasor(angle: f64) -> Complex32 {
     let phasor = Complex64::cis(angle);
     Complex32::new(phasor.re as f32, phasor.im as f32)
 }
