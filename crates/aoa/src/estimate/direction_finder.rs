@@ -147,13 +147,20 @@ impl<M: Manifold<N>, const N: usize> DirectionFinder<M, N> {
         let snapshots = covariance.snapshots();
         let noise_power = noise.unwrap_or_else(|| residual_power::<N>(trace, best.beam));
         let snr = snr::<N>(best.beam, noise_power);
+        let model = Model::new::<N>(
+            [1, if self.is_level() { 1 } else { 2 }],
+            snapshots,
+            noise.is_some(),
+        );
+        let tests = model.tests();
         let noise_covariance = bound::covariance_around(
             &best.around,
             best.direction,
             snr,
             snapshots,
             !self.is_level(),
-        );
+        )
+        .map(|row| row.map(|it| it * tests.unknown_noise));
         let alike = other
             .filter(|other| best.is_far_from(&other.direction))
             .is_some_and(|other| {
@@ -164,16 +171,14 @@ impl<M: Manifold<N>, const N: usize> DirectionFinder<M, N> {
                 per_snapshot * (snapshots as f64) < LIKELIER.ln()
             });
         let at_edge = self.is_at_edge(best.direction, &noise_covariance);
-        let model = Model::new::<N>(
-            [1, if self.is_level() { 1 } else { 2 }],
-            snapshots,
-            noise.is_some(),
-        );
         let left = best.residual(matrix, usize::from(model.parameters));
-        let tests = model.tests();
         let tested = tests.of(&left, noise_power, trace);
         let misfit = tests.misfit(tested.ratios());
-        let weak = threshold_doubt(snr, bound::resolvable_snr::<N>(snapshots));
+        let weak = threshold_doubt(
+            snr,
+            tests.unknown_noise * bound::resolvable_snr::<N>(snapshots),
+        )
+        .or(tests.noise_doubt());
         let geometric = if alike {
             Some(Reason::Ambiguous)
         } else {

@@ -54,11 +54,15 @@ pub fn maximum_likelihood_pilots<const N: usize>(
     Ok(describe(
         &Found {
             phase_rad: place.phase_rad[0],
-            noise_sigma_rad: bound::stochastic::<N>(snr, blocks.len()),
+            noise_sigma_rad: bound::stochastic::<N>(snr, blocks.len()) * tests.unknown_noise.sqrt(),
             snr,
             tests,
             tested: tests.of(&left, noise, power),
-            doubt: threshold_doubt(snr, bound::resolvable_snr::<N>(blocks.len())),
+            doubt: threshold_doubt(
+                snr,
+                tests.unknown_noise * bound::resolvable_snr::<N>(blocks.len()),
+            )
+            .or(tests.noise_doubt()),
         },
         array,
     ))

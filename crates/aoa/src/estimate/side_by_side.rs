@@ -139,10 +139,11 @@ impl<const N: usize> SideBySide<'_, N> {
             Method::EspritLs | Method::EspritTls => esprit::excess::<N>(),
             _ => 1.0,
         };
-        let per_snapshot = excess * excess / (2.0 * self.snapshots as f64 * aperture::<N>());
-        let threshold = bound::resolvable_snr::<N>(self.snapshots);
         let values = spectra.values::<FUSED>(places);
         let tests = Model::one::<N>(self.snapshots, false).tests();
+        let threshold = tests.unknown_noise * bound::resolvable_snr::<N>(self.snapshots);
+        let per_snapshot =
+            tests.unknown_noise * excess * excess / (2.0 * self.snapshots as f64 * aperture::<N>());
         let (mut snrs, mut snr_db) = ([0.0; W], [0.0; W]);
         let (mut noise_sigma, mut phase_sigma) = ([0.0; W], [0.0; W]);
         let (mut coherent, mut noise, mut inflation) = ([0.0; W], [0.0; W], [0.0; W]);
@@ -172,7 +173,7 @@ impl<const N: usize> SideBySide<'_, N> {
                 noise: noise[w],
                 inflation: inflation[w],
             };
-            let doubt = threshold_doubt(snrs[w], threshold);
+            let doubt = threshold_doubt(snrs[w], threshold).or(tests.noise_doubt());
             let geometric = geometric_doubt(phases[w], noise_sigma[w], end_fire);
             *estimate = AngleEstimate {
                 phase_rad: phases[w],

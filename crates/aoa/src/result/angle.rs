@@ -41,6 +41,24 @@ impl AngleEstimate {
         self.verdict.reason().or_else(|| self.fit.misfit())
     }
 
+    /// The estimate of samples of which only the phases were received, all of one modulus.
+    ///
+    /// Half of the noise, the part along the samples, is missing in the residual: the variance of an angle is twice
+    /// of what the residual shows, the SNR is half of it, and the residual is no white noise, so that the fit is not
+    /// tested.
+    #[must_use]
+    pub fn of_phases(self) -> Self {
+        Self {
+            phase_sigma_rad: self.phase_noise_sigma_rad * std::f64::consts::SQRT_2,
+            phase_noise_sigma_rad: self.phase_noise_sigma_rad * std::f64::consts::SQRT_2,
+            sigma_rad: self.sigma_rad * self.phase_noise_sigma_rad / self.phase_sigma_rad
+                * std::f64::consts::SQRT_2,
+            snr_db: self.snr_db - 10.0 * std::f64::consts::LOG10_2,
+            fit: GoodnessOfFit::default(),
+            ..self
+        }
+    }
+
     /// Whether the estimate may be relied on: it is resolved, and the model fits.
     pub fn is_reliable(&self) -> bool {
         self.doubt().is_none()

@@ -6,6 +6,7 @@ mod bad_input;
 mod bounds;
 mod calibration;
 mod common;
+mod few_snapshots;
 mod goodness_of_fit;
 mod pilots;
 mod several_sources;

@@ -1,0 +1,142 @@
+//! Reliable estimates are consistent with their standard deviation for few snapshots too, where the noise
+//! variance is estimated with few degrees of freedom.
+
+use crate::common::Random;
+use aoa::{
+    AngleEstimate, ArbitraryArray, Array, Complex64, Covariance, Direction, DirectionFinder,
+    Manifold, Method, Reason, estimate, maximum_likelihood_pilots,
+};
+
+/// Errors over their standard deviations.
+#[derive(Default)]
+struct Errors {
+    count: f64,
+    squares: f64,
+    beyond: f64,
+}
+
+impl Errors {
+    fn add(&mut self, z: f64) {
+        self.count += 1.0;
+        self.squares += z * z;
+        self.beyond += f64::from(u8::from(z.abs() > 3.0));
+    }
+
+    /// RMS from 0.9 to 1.15 and at most 0.6 % beyond three standard deviations, both within three standard
+    /// errors; those of a square are `sqrt(kurtosis - 1)`, which is below 2.5 for eight degrees of freedom.
+    fn check(&self, of: &str) {
+        let mean = self.squares / self.count;
+        let margin = 3.0 * 2.5 / self.count.sqrt();
+        assert!(
+            mean > 0.81 - margin && mean < 1.3225 + margin,
+            "{of}: z-RMS {}",
+            mean.sqrt()
+        );
+        let share = self.beyond / self.count;
+        let most = 6e-3 + 3.0 * (6e-3 / self.count).sqrt();
+        assert!(
+            share <= most,
+            "{of}: {share} of {} beyond 3 sigma",
+            self.count
+        );
+    }
+}
+
+/// Snapshots of a source of constant power.
+fn snapshots<const N: usize>(
+    random: &mut Random,
+    response: &[Complex64; N],
+    snr_db: f64,
+    count: usize,
+) -> Vec<[Complex64; N]> {
+    let amplitude = 10.0_f64.powf(snr_db / 20.0);
+    let one = |_| {
+        let turn = Complex64::cis(random.uniform(0.0, std::f64::consts::TAU)) * amplitude;
+        response.map(|it| it * turn + random.gaussian())
+    };
+    (0..count).map(one).collect()
+}
+
+fn check_row<const N: usize>(trials: usize) -> usize {
+    let array = Array::<N>::half_wavelength();
+    let mut random = Random::new(N as u64);
+    let mut reliable = 0;
+    let mut all = Errors::default();
+    for count in [1, 2, 5, 10, 20] {
+        for snr_db in [0.0, 10.0, 20.0, 30.0] {
+            let mut errors = [Errors::default(), Errors::default()];
+            for _ in 0..trials {
+                let phase = array.phase_from_angle(random.uniform(0.6, 2.5));
+                let received = snapshots(&mut random, &array.response(phase), snr_db, count);
+                let covariance = Covariance::from_snapshots(&received).unwrap();
+                let all: [AngleEstimate; 2] = [
+                    estimate(Method::MaximumLikelihood, &covariance, &array).unwrap(),
+                    maximum_likelihood_pilots(&received, None, &array).unwrap(),
+                ];
+                for (errors, found) in errors.iter_mut().zip(all) {
+                    if found.is_reliable() {
+                        errors.add((found.phase_rad - phase) / found.phase_sigma_rad);
+                    }
+                }
+            }
+            for errors in errors {
+                // Near the threshold, where few are reliable, these are selected by their noise. They count together with all
+                // others.
+                if errors.count > 0.85 * trials as f64 {
+                    reliable += 1;
+                    errors.check(&format!("{N} antennas, {count} snapshots, {snr_db} dB"));
+                }
+                all.count += errors.count;
+                all.squares += errors.squares;
+                all.beyond += errors.beyond;
+            }
+        }
+    }
+    all.check(&format!("{N} antennas"));
+    reliable
+}
+
+#[test]
+fn errors_of_reliable_angles_follow_their_standard_deviation() {
+    // Of five numbers of snapshots, four SNRs and two estimators: three numbers of snapshots at 10 dB or more.
+    assert!(check_row::<2>(4000) >= 14);
+    assert!(check_row::<3>(3000) >= 16);
+    assert!(check_row::<4>(3000) >= 18);
+    assert!(check_row::<8>(1500) >= 18);
+}
+
+#[test]
+fn a_circle_of_antennas_is_as_consistent_as_a_row() {
+    let array = ArbitraryArray::<5>::circular(0.4).unwrap();
+    let finder = DirectionFinder::new(array.clone(), [0.0, 0.0]).unwrap();
+    let mut random = Random::new(3);
+    for count in [1, 2, 5] {
+        let mut errors = Errors::default();
+        for _ in 0..600 {
+            let azimuth = random.uniform(-3.0, 3.0);
+            let response = array.response(Direction::new(azimuth, 0.0));
+            let received = snapshots(&mut random, &response, 20.0, count);
+            let covariance = Covariance::from_snapshots(&received).unwrap();
+            let found = finder.estimate(&covariance).unwrap();
+            if found.is_reliable() {
+                errors.add((found.direction.azimuth_rad - azimuth) / found.azimuth_sigma_rad());
+            }
+        }
+        // One snapshot of five antennas leaves seven degrees of freedom, one too few.
+        assert_eq!(errors.count > 0.0, count > 1, "{count} snapshots");
+        if count > 1 {
+            errors.check(&format!("{count} snapshots"));
+        }
+    }
+}
+
+#[test]
+fn one_snapshot_of_four_antennas_is_reliable_only_if_the_noise_is_known() {
+    let array = Array::<4>::half_wavelength();
+    let mut random = Random::new(9);
+    let received = snapshots(&mut random, &array.response(0.5), 30.0, 1);
+    let unknown = maximum_likelihood_pilots(&received, None, &array).unwrap();
+    assert_eq!(unknown.doubt(), Some(Reason::TooFewSnapshots));
+    let known = maximum_likelihood_pilots(&received, Some(1.0), &array).unwrap();
+    assert_eq!(known.verdict.reason(), None);
+}
