@@ -5,6 +5,7 @@ use std::fmt;
 
 use nr_ssb::Complex32;
 use nr_ssb::diagnose::{Fault, diagnose};
+use nr_ssb::{Tone, tones};
 use num_complex::Complex64;
 
 use onboard::receive::array_view::{FoundAngle, View};
@@ -15,6 +16,11 @@ const SWAP_SNR_DB: f64 = 10.0;
 const SWAP_GAIN: f64 = 0.1;
 /// Share of the power in one direction that right channels have at least.
 const RIGHT_SHARE: f64 = 0.9;
+
+/// Maximum frequency of a tone that is called a DC offset, in Hz.
+const DC_HZ: f64 = 100.0;
+/// Two tones closer than this are one, in Hz: a bin of the spectra that they are found in.
+pub(super) const ONE_TONE_HZ: f64 = 15e3;
 
 /// What is wrong with the channels.
 #[derive(Debug, Clone, PartialEq)]
@@ -33,6 +39,8 @@ pub enum ChannelFault {
         /// The other.
         second: usize,
     },
+    /// DC offset, or a tone in the recorded band. It is subtracted before SSBs are searched for.
+    Tone(Tone),
 }
 
 impl ChannelFault {
@@ -40,7 +48,7 @@ impl ChannelFault {
     pub const fn channel(&self) -> Option<usize> {
         match self {
             Self::Samples { channel, .. } => Some(*channel),
-            Self::Exchanged { .. } => None,
+            Self::Exchanged { .. } | Self::Tone(_) => None,
         }
     }
 }
@@ -50,6 +58,17 @@ impl fmt::Display for ChannelFault {
         let (channel, fault) = match self {
             Self::Exchanged { first, second } => {
                 return write!(f, "channels {first} and {second} look exchanged");
+            }
+            Self::Tone(tone) if tone.frequency_hz.abs() < DC_HZ => {
+                return write!(f, "DC offset of {:.1} dBFS: removed", tone.power_dbfs);
+            }
+            Self::Tone(tone) => {
+                return write!(
+                    f,
+                    "tone {:+.2} kHz from the centre frequency, {:.1} dBFS: removed",
+                    1e-3 * tone.frequency_hz,
+                    tone.power_dbfs
+                );
             }
             Self::Samples { channel, fault } => (channel, fault),
         };
@@ -80,15 +99,35 @@ impl fmt::Display for ChannelFault {
 }
 
 /// Faults that the samples alone show.
-pub(super) fn faults_of_samples(antennas: &[&[Complex32]]) -> Vec<ChannelFault> {
+pub(super) fn faults_of_samples(
+    antennas: &[&[Complex32]],
+    sample_rate_hz: f64,
+) -> Vec<ChannelFault> {
     let diagnoses = diagnose(antennas).into_iter().enumerate();
-    diagnoses
+    let mut faults: Vec<ChannelFault> = diagnoses
         .flat_map(|(channel, it)| {
             it.faults
                 .into_iter()
                 .map(move |fault| ChannelFault::Samples { channel, fault })
         })
-        .collect()
+        .collect();
+    faults.extend(
+        tones(antennas, sample_rate_hz)
+            .into_iter()
+            .map(ChannelFault::Tone),
+    );
+    faults
+}
+
+/// Adds a tone, unless it is known.
+pub(super) fn add_tone(faults: &mut Vec<ChannelFault>, tone: Tone) {
+    let same = |fault: &ChannelFault| match fault {
+        ChannelFault::Tone(known) => (known.frequency_hz - tone.frequency_hz).abs() < ONE_TONE_HZ,
+        _ => false,
+    };
+    if !faults.iter().any(same) {
+        faults.push(ChannelFault::Tone(tone));
+    }
 }
 
 /// Votes of the SSBs on whether two channels are exchanged.

@@ -4,7 +4,7 @@ use nr_ssb::front_end::FrontEnd;
 use nr_ssb::raster;
 use nr_ssb::{Complex32, SubcarrierSpacing};
 
-use super::diagnosis::{ChannelFault, ExchangeVotes, faults_of_samples};
+use super::diagnosis::{ChannelFault, ExchangeVotes, add_tone, faults_of_samples};
 use super::error::ScanError;
 use super::iq_source::IqSource;
 use super::search_scope::{Places, SearchScope};
@@ -70,7 +70,7 @@ pub fn scan(source: &mut dyn IqSource, settings: &ScanSettings) -> Result<Scan, 
     source.read(0, first_block, &mut antennas)?;
     let slices: Vec<&[Complex32]> = antennas.iter().map(Vec::as_slice).collect();
     let mut found = Scan {
-        faults: faults_of_samples(&slices),
+        faults: faults_of_samples(&slices, rate_hz),
         ..Scan::default()
     };
     let mut votes = ExchangeVotes::default();
@@ -130,6 +130,9 @@ pub fn scan(source: &mut dyn IqSource, settings: &ScanSettings) -> Result<Scan, 
         }
         found.ssbs.extend_from_slice(search.found());
         votes.add(search.votes());
+        for tone in search.tones() {
+            add_tone(&mut found.faults, *tone);
+        }
     }
     found
         .ssbs

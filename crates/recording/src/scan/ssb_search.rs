@@ -4,9 +4,9 @@
 use nr_ssb::front_end::FrontEnd;
 use nr_ssb::grid::SUBCARRIERS;
 use nr_ssb::search::{DetectedSsb, SearchConfig, SearchError, Searcher};
-use nr_ssb::{ChannelCovariance, Complex32, Pci, SubcarrierSpacing};
+use nr_ssb::{ChannelCovariance, Complex32, Pci, SubcarrierSpacing, Tone};
 
-use super::diagnosis::ExchangeVotes;
+use super::diagnosis::{ExchangeVotes, ONE_TONE_HZ};
 use super::error::ScanError;
 use super::iq_source::first_not_finite;
 use crate::error::RecordingError;
@@ -118,6 +118,7 @@ pub struct SsbSearch {
     /// How the SSBs of one block were seen.
     seen: Vec<Seen>,
     votes: ExchangeVotes,
+    tones: Vec<Tone>,
     found: Vec<FoundSsb>,
 }
 
@@ -146,6 +147,7 @@ impl SsbSearch {
             base: vec![Vec::new(); config.antennas],
             seen: Vec::new(),
             votes: ExchangeVotes::default(),
+            tones: Vec::new(),
             found: Vec::new(),
             config,
         })
@@ -202,6 +204,7 @@ impl SsbSearch {
     pub(super) fn begin(&mut self, length: u64) -> Result<(), ScanError> {
         self.searcher.reset();
         self.found.clear();
+        self.tones.clear();
         self.votes = ExchangeVotes::default();
         let (samples, needed) = ((length as f64 / self.ratio) as usize, SSB_SAMPLES);
         if samples < needed {
@@ -222,6 +225,7 @@ impl SsbSearch {
             base,
             seen,
             votes,
+            tones,
             ..
         } = self;
         let at_base_rate: Vec<&[Complex32]>;
@@ -254,7 +258,18 @@ impl SsbSearch {
                     noise_variance: received.noise_variance.to_vec(),
                 });
             })
-            .map_err(|source| config.search_failed(source))?;
+            .map_err(|source| config.search_failed(source))?
+            .to_vec();
+        let offset_hz = config.ssb_freq_hz - config.centre_frequency_hz;
+        for mut tone in searcher.tones() {
+            tone.frequency_hz += offset_hz;
+            let same = |it: &&mut Tone| (it.frequency_hz - tone.frequency_hz).abs() < ONE_TONE_HZ;
+            match tones.iter_mut().find(same) {
+                Some(known) if known.power_dbfs >= tone.power_dbfs => {}
+                Some(known) => *known = tone,
+                None => tones.push(tone),
+            }
+        }
         let ratio = self.ratio;
         self.found.extend(found.iter().map(|ssb| {
             let same = |it: &Seen| it.pci == ssb.pci && it.sample_start == ssb.sample_start;
@@ -286,6 +301,11 @@ impl SsbSearch {
     /// The SSBs of this recording so far, in order of time.
     pub(super) fn found(&self) -> &[FoundSsb] {
         &self.found
+    }
+
+    /// DC offset and tones that were subtracted, each at its strongest; frequencies from the recording's centre.
+    pub fn tones(&self) -> &[Tone] {
+        &self.tones
     }
 
     /// What they say of exchanged channels.
