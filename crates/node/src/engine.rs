@@ -6,7 +6,8 @@ use std::sync::atomic::{AtomicBool, Ordering};
 use std::time::{Duration, Instant};
 
 use num_complex::Complex32;
-use onboard::live::{LiveError, Outcome, StreamConfig};
+use onboard::live::{LiveError, Outcome, Status, StreamConfig};
+use onboard::monitor::ActiveFaults;
 use onboard::observation::{MAX_ELEMENTS, OdometrySample};
 use onboard::settings::{Platform, Site, Vehicle};
 use onboard::{Custom, Live, OdometryDefect};
@@ -16,6 +17,7 @@ use crate::events::{Collapse, Report};
 use crate::gate::{Gate, Windows};
 use crate::health::failures_text;
 use crate::inbox::{Block, Command, Inbox, Input, Level};
+use crate::interruption::Interruptions;
 use crate::sink::{By, Distributor, PoseRecord, Record};
 use crate::statistics::{Punctuality, SourceHealth};
 use crate::supervisor::{self, Watchdog};
@@ -69,6 +71,9 @@ pub struct Engine {
     gate: Arc<Gate>,
     windows: Windows,
     sleeps: bool,
+    interruptions: Interruptions,
+    /// Gaps that the SSBs have shown.
+    unreported_gaps: u64,
     period_s: f64,
     /// Samples that the pipeline has not got yet.
     pending: Block,
@@ -76,6 +81,8 @@ pub struct Engine {
     arrivals: VecDeque<(f64, Instant)>,
     last_pose: Option<(f64, Instant)>,
     last_status_s: f64,
+    /// Active faults that were reported.
+    faults: ActiveFaults,
     /// Silent sources that were named.
     silent: Vec<&'static str>,
     watchdog: Watchdog,
@@ -109,9 +116,12 @@ impl Engine {
             clock: DriveClock::default(),
             gate,
             sleeps,
+            interruptions: Interruptions::default(),
+            unreported_gaps: 0,
             arrivals: VecDeque::with_capacity(ARRIVALS),
             last_pose: None,
             last_status_s: f64::NEG_INFINITY,
+            faults: ActiveFaults::default(),
             silent: Vec::new(),
             watchdog: Watchdog::from_environment(),
             began: Instant::now(),
@@ -153,7 +163,8 @@ impl Engine {
         match input {
             Input::Samples(block) => self.samples(block, came, inbox)?,
             Input::Slept(until_s) => {
-                self.clock.see(until_s);
+                self.clock.see(until_s + self.live.time_offset_s());
+                self.watch_samples(came, until_s);
                 let is_over = |[_, end_s]: [f64; 2]| until_s >= end_s;
                 if self.gate.wanted().is_some_and(is_over) {
                     self.receive(true)?;
@@ -182,11 +193,16 @@ impl Engine {
 
     fn samples(&mut self, block: Block, came: Instant, inbox: &Inbox) -> Result<(), LiveError> {
         let end_s = block.time_s + block.length() as f64 / self.rate_hz();
-        self.clock.see(end_s);
+        if block.offset_s.is_some() {
+            self.live.set_time_offset_s(block.offset_s);
+        }
+        let offset_s = self.live.time_offset_s();
+        self.clock.see(end_s + offset_s);
+        self.watch_samples(came, end_s);
         if self.arrivals.len() == ARRIVALS {
             self.arrivals.pop_front();
         }
-        self.arrivals.push_back((end_s, came));
+        self.arrivals.push_back((end_s + offset_s, came));
         let is_over = |[from_s, until_s]: [f64; 2]| end_s <= from_s || block.time_s >= until_s;
         if self.gate.wanted().is_some_and(is_over) {
             inbox.give_back(block.antennas); // on its way when the gate closed
@@ -210,6 +226,34 @@ impl Engine {
             }
         }
         Ok(())
+    }
+
+    /// Opens the gate after an interruption, because the next SSB may come at any time, and reports samples
+    /// that are missing.
+    fn watch_samples(&mut self, came: Instant, end_s: f64) {
+        let odometry_s = self.live.onboard().newest_odometry().map(|it| it.time_s);
+        let arrival = self.interruptions.samples(came, end_s, odometry_s);
+        if arrival.resumed {
+            self.live.samples_resumed();
+            self.gate.open();
+        }
+        if let Some(missing_s) = arrival.missing_s {
+            let periods = (missing_s / self.period_s).floor();
+            let before_s = self.live.time_offset_s();
+            self.live.add_interruption(periods * self.period_s);
+            // Where arrival times are measured, the source has reported it.
+            if self.live.time_offset_s() > before_s {
+                let text = format!("samples of {missing_s:.2} s are missing");
+                self.event(Level::Warn, "samples", text);
+            }
+        }
+        let gaps = self.live.stream_counts().untold_gaps;
+        if std::mem::replace(&mut self.unreported_gaps, gaps) < gaps
+            && !self.interruptions.is_undecided()
+        {
+            let text = "samples are missing: the SSBs came off their period".to_owned();
+            self.event(Level::Warn, "samples", text);
+        }
     }
 
     fn rate_hz(&self) -> f64 {
@@ -250,6 +294,7 @@ impl Engine {
             self.gate.open();
             return Ok(());
         };
+        let offset_s = self.live.time_offset_s();
         let mut window = self.windows.around(burst_s, ssb_index);
         if window[0] < now_s {
             // Part of it is gone already.
@@ -258,7 +303,7 @@ impl Engine {
         }
         if window[0] < now_s {
             self.gate.open();
-        } else if self.live.listens(burst_s)? {
+        } else if self.live.listens(burst_s + offset_s)? {
             self.gate.set(window);
         } else {
             // None is wanted as far as one can see: it is time to ask again then, and not to listen.
@@ -299,6 +344,7 @@ impl Engine {
         }
         self.clock.see(sample.time_s);
         let status = self.live.status(sample.time_s)?;
+        self.report_faults(&status);
         if let Some(came) = came {
             let now = Instant::now();
             let seconds = |since: Instant| now.saturating_duration_since(since).as_secs_f64();
@@ -317,6 +363,8 @@ impl Engine {
     fn restart(&mut self) -> Result<(), LiveError> {
         self.live = self.setup.live()?;
         self.clock.reset();
+        self.interruptions.reset();
+        self.unreported_gaps = 0;
         self.arrivals.clear();
         self.pending = Block::default();
         (self.last_pose, self.last_status_s) = (None, f64::NEG_INFINITY);
@@ -367,10 +415,24 @@ impl Engine {
         }
         if let Some(last) = last {
             let status = self.live.status(last.after.time_s)?;
+            self.report_faults(&status);
             let by = By::Angles;
             self.records.put(Record::Pose(PoseRecord { status, by }));
         }
         Ok(())
+    }
+
+    /// Reports each fault once when it begins and once when it ends.
+    fn report_faults(&mut self, status: &Status) {
+        let before = std::mem::replace(&mut self.faults, status.faults);
+        for active in status.faults.iter().filter(|it| !before.contains(it.fault)) {
+            let text = format!("fault {}: {}", active.fault.name(), active.fault);
+            self.event(Level::Warn, "monitor", text);
+        }
+        for ended in before.iter().filter(|it| !status.faults.contains(it.fault)) {
+            let text = format!("fault {} has ended", ended.fault.name());
+            self.event(Level::Info, "monitor", text);
+        }
     }
 
     /// When the sample of this time arrived, or would have if samples came one by one.

@@ -22,8 +22,10 @@ const MOST_SPARE: usize = 8;
 /// Samples of every antenna of the array, in its order.
 #[derive(Debug, Default)]
 pub struct Block {
-    /// Time of the first in seconds.
+    /// Sample time of the first, in seconds.
     pub time_s: f64,
+    /// Time minus sample time in seconds, where the arrival of counted samples is measured.
+    pub offset_s: Option<f64>,
     /// As many of each antenna.
     pub antennas: Vec<Vec<Complex32>>,
 }
@@ -39,6 +41,7 @@ impl Block {
         if self.length() == 0 {
             self.time_s = next.time_s;
         }
+        self.offset_s = next.offset_s;
         self.antennas.resize_with(next.antennas.len(), Vec::new);
         for (samples, more) in self.antennas.iter_mut().zip(&next.antennas) {
             samples.extend_from_slice(more);
@@ -263,6 +266,7 @@ mod tests {
     fn block(time_s: f64) -> Input {
         Input::Samples(Block {
             time_s,
+            offset_s: None,
             antennas: vec![vec![Complex32::ZERO; 65_536]; 4],
         })
     }

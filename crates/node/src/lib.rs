@@ -17,6 +17,7 @@ pub mod events;
 pub mod gate;
 pub mod health;
 pub mod inbox;
+mod interruption;
 pub mod playback;
 pub mod settings;
 pub mod sink;

@@ -6,10 +6,11 @@ use crate::geometry::Pose;
 use crate::link_budget::LinkBudget;
 use crate::localize::ekf::EstimatedConstants;
 use crate::localize::{
-    self, AngleMeasurement, AngleUpdate, Ekf, History, Localizer, OdometryVerdict, PoseEstimate,
-    Recovered, UpdateReason, UpdateVerdict,
+    self, AngleMeasurement, AngleUpdate, Ekf, History, Integrity, IntegrityState, Localizer,
+    OdometryVerdict, PoseEstimate, Recovered, UpdateReason, UpdateVerdict,
 };
 use crate::manifold::Measurand;
+use crate::monitor::{ActiveFaults, Change, Fallback, Monitors};
 use crate::observation::{OdometrySample, SensedSsb, SsbObservation};
 use crate::radio_head::RadioHead;
 use crate::settings::{Check, Platform, SettingsError, Site, Vehicle, check_together};
@@ -33,6 +34,10 @@ pub struct Onboard {
     executions: Vec<Execution>,
     /// Those of them that are for the localizer.
     burst: Vec<AngleUpdate>,
+    /// Monitors of the sensors, where the vehicle has an integrity monitor and a built-in localizer.
+    monitors: Option<Box<Monitors>>,
+    faults: ActiveFaults,
+    keeps_journal: bool,
 }
 
 /// What does not change during a drive.
@@ -184,6 +189,7 @@ impl Onboard {
                 check.error(key, vehicle.array.spacing_wavelengths, &error.to_string())
             })?,
         };
+        let is_monitored = custom.localizer.is_none() && vehicle.integrity_monitor().is_some();
         let localizer = match custom.localizer {
             Some(localizer) => localizer,
             None => localize::built_in(site, vehicle, start)?,
@@ -207,6 +213,9 @@ impl Onboard {
             chosen: Vec::with_capacity(heads.len()),
             executions: Vec::with_capacity(heads.len()),
             burst: Vec::with_capacity(heads.len()),
+            monitors: is_monitored.then(|| Box::new(Monitors::new(site, vehicle, heads.len()))),
+            faults: ActiveFaults::default(),
+            keeps_journal: false,
             surroundings: Surroundings {
                 excluded: Vec::with_capacity(heads.len()),
                 walls: Walls::new(site),
@@ -236,7 +245,45 @@ impl Onboard {
             return Ok(Err(OdometryDefect::TimeReversed));
         }
         self.odometry = Some(*sample);
-        self.localizer.odometry(sample).map(Ok)
+        let Some(monitors) = &mut self.monitors else {
+            return self.localizer.odometry(sample).map(Ok);
+        };
+        let sample = monitors.odometry(sample);
+        let verdict = self.localizer.odometry(&sample)?;
+        self.follow_monitors()?;
+        Ok(Ok(verdict))
+    }
+
+    /// Changes the localizer where the odometry's faults begin and end.
+    fn follow_monitors(&mut self) -> Result<(), BoxError> {
+        let Some(monitors) = &mut self.monitors else {
+            return Ok(());
+        };
+        self.faults = *monitors.faults();
+        let localizer = self.localizer.localizer();
+        // A search for the first pose takes every angle anyway; smoothing needs one filter for the whole drive.
+        if localizer.hypotheses().is_some() || self.keeps_journal {
+            return Ok(());
+        }
+        let (Some(change), Some(newest)) = (monitors.change(), self.odometry) else {
+            return Ok(());
+        };
+        let estimate = localizer.pose(newest.time_s)?;
+        let (localizer, first) = match change {
+            Change::Begin => {
+                let localizer = monitors.fallback.begin(estimate.pose)?;
+                (localizer, monitors.fallback.odometry(&newest))
+            }
+            Change::End => (monitors.fallback.end(&estimate)?, newest),
+        };
+        self.localizer = History::new(localizer);
+        self.localizer.odometry(&first)?;
+        Ok(())
+    }
+
+    /// The active faults of odometry, receive channels and radio heads.
+    pub const fn faults(&self) -> &ActiveFaults {
+        &self.faults
     }
 
     /// Takes in the SSB burst at `time_s`: listens if the policy says so, considers what is sensed,
@@ -250,15 +297,22 @@ impl Onboard {
         self.executions.clear();
         self.burst.clear();
         let listened = self.listens(time_s)?;
+        let is_wanted = self.is_wanted(time_s);
         let now = self.surroundings.at(time_s, self.odometry, &self.localizer);
         let searching = is_searching(now.localizer);
         if listened {
+            if let Some(monitors) = &mut self.monitors {
+                monitors.received(time_s);
+            }
             source.sense(&mut self.sensed)?;
             self.chosen.clear();
             self.chosen.resize(self.sensed.len(), searching);
             if !searching && self.sensed.iter().any(|ssb| now.head(ssb).is_some()) {
                 let chosen = &mut self.chosen;
                 self.wake_up_time_s = self.policy.decide(&now, &self.sensed, chosen)?;
+            }
+            if is_wanted {
+                self.chosen.fill(true);
             }
             if !searching && !self.surroundings.walls.is_empty() {
                 // What comes from behind a wall says nothing of where it is sent.
@@ -282,6 +336,7 @@ impl Onboard {
                     execution.verdict = update.verdict;
                 }
             }
+            self.monitor_angles(time_s)?;
         }
         let now = self.surroundings.at(time_s, self.odometry, &self.localizer);
         Ok(Heard {
@@ -289,6 +344,27 @@ impl Onboard {
             executions: &self.executions,
             keeps_bound: self.policy.keeps_bound(&now),
         })
+    }
+
+    /// Whether a monitor wants the burst at a time (s).
+    fn is_wanted(&self, time_s: f64) -> bool {
+        (self.monitors.as_ref()).is_some_and(|monitors| monitors.wants(time_s))
+    }
+
+    /// Hands the angles of the burst at a time (s) to the monitors.
+    fn monitor_angles(&mut self, time_s: f64) -> Result<(), BoxError> {
+        let Some(monitors) = &mut self.monitors else {
+            return Ok(());
+        };
+        let localizer = self.localizer.localizer();
+        let newest_s = self.odometry.map_or(time_s, |sample| sample.time_s);
+        let estimate = localizer.pose(newest_s.max(time_s))?;
+        let is_known = localizer.hypotheses().is_none();
+        monitors.angles(time_s, &self.burst, is_known.then_some(estimate.pose));
+        if monitors.is_without_odometry() {
+            monitors.fallback.received(&estimate);
+        }
+        self.follow_monitors()
     }
 
     /// The angles that were estimated of the last burst that was heard.
@@ -305,7 +381,9 @@ impl Onboard {
         self.surroundings
             .look(newest_s.max(time_s), &self.localizer)?;
         let now = self.surroundings.at(time_s, self.odometry, &self.localizer);
-        Ok(is_searching(now.localizer) || self.policy.listens(&now)?)
+        let is_wanted = is_searching(now.localizer)
+            || (self.monitors.as_ref()).is_some_and(|monitors| monitors.wants(time_s));
+        Ok(is_wanted || self.policy.listens(&now)?)
     }
 
     /// Leaves the angles of a cell out from now on, or takes them in again; `false` where the site has
@@ -332,12 +410,20 @@ impl Onboard {
         if let Some(newest) = &self.odometry {
             self.localizer.odometry(newest)?;
         }
+        if let Some(monitors) = &mut self.monitors {
+            monitors.restart();
+            self.faults = *monitors.faults();
+        }
         Ok(())
     }
 
     /// Forgets the odometry so far: its clock, or its distance, begins anew.
     pub fn forget_odometry(&mut self) {
         self.odometry = None;
+        if let Some(monitors) = &mut self.monitors {
+            monitors.forget_odometry();
+            self.faults = *monitors.faults();
+        }
     }
 
     /// The newest odometry.
@@ -348,6 +434,9 @@ impl Onboard {
     /// Estimates the angle of an SSB for the localizer.
     fn estimate(&mut self, observation: &SsbObservation) -> Result<(), BoxError> {
         let ssb = observation.ssb;
+        if let Some(monitors) = &mut self.monitors {
+            monitors.ssb(observation);
+        }
         let estimated = self.estimator.estimate(observation)?;
         let bound_rad = || self.thermal.sigma_rad(ssb.snr_db);
         let measured = estimated.and_then(|estimated| {
@@ -411,7 +500,18 @@ impl Onboard {
     /// # Errors
     /// Whatever a user's localizer fails with.
     pub fn pose(&self, time_s: f64) -> Result<PoseEstimate, BoxError> {
-        self.localizer.localizer().pose(time_s)
+        let mut estimate = self.localizer.localizer().pose(time_s)?;
+        if self.faults.affects_angles()
+            && let Some(integrity) = &mut estimate.integrity
+        {
+            integrity.state = IntegrityState::Unavailable;
+        }
+        if self.faults.of_odometry().is_some() {
+            // The level of a monitored localizer assumes that the odometry is right.
+            let level_m = Fallback::level_m(&estimate);
+            estimate.integrity = Some(Integrity::unavailable(level_m));
+        }
+        Ok(estimate)
     }
 
     /// Constants of odometer, yaw rate, array and clock as estimated by now, where the localizer does.
@@ -425,6 +525,7 @@ impl Onboard {
     /// Keeps from now on what smoothing takes, where the localizer is one filter and no bank,
     /// whose filters take each other's place. Angles must come in time from now on.
     pub fn keep_journal(&mut self) {
+        self.keeps_journal = true;
         self.localizer.keep_journal();
     }
 

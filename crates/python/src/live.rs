@@ -60,6 +60,8 @@ pub struct LiveStatus {
     samples_age_s: Option<f64>,
     /// SSBs that the receiver keeps to.
     tracked: usize,
+    /// Active faults: name, description, and time of detection in seconds.
+    faults: Vec<(&'static str, String, f64)>,
 }
 
 impl From<CoreStatus> for LiveStatus {
@@ -80,6 +82,9 @@ impl From<CoreStatus> for LiveStatus {
             odometry_age_s: status.odometry_age_s,
             samples_age_s: status.samples_age_s,
             tracked: status.tracked,
+            faults: (status.faults.iter())
+                .map(|it| (it.fault.name(), it.fault.to_string(), it.since_s))
+                .collect(),
         }
     }
 }

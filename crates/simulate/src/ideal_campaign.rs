@@ -1,6 +1,7 @@
 //! Campaigns of a filter that is exactly as good as it says.
 
 use onboard::geometry::Pose;
+use onboard::monitor::ActiveFaults;
 
 use crate::campaign::Campaign;
 use crate::ideal_filter::{IdealError, IdealFilter};
@@ -29,6 +30,7 @@ impl IdealFilter {
                 integrity: None,
                 searching: false,
                 snr_db: 0.0,
+                faults: ActiveFaults::default(),
             }
         };
         RunRecord {

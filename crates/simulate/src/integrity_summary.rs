@@ -120,6 +120,7 @@ impl IntegritySummary {
 mod tests {
     use onboard::geometry::Pose;
     use onboard::localize::Integrity;
+    use onboard::monitor::ActiveFaults;
 
     use super::*;
     use crate::record::Step;
@@ -139,6 +140,7 @@ mod tests {
             }),
             searching: false,
             snr_db: 0.0,
+            faults: ActiveFaults::default(),
         };
         RunRecord {
             run: 0,

@@ -3,6 +3,7 @@
 use onboard::geometry::Pose;
 use onboard::localize::ekf::EstimatedConstants;
 use onboard::localize::{Integrity, IntegrityState};
+use onboard::monitor::ActiveFaults;
 use onboard::{Execution, Heard, Onboard};
 
 use crate::error::SimulationError;
@@ -24,6 +25,8 @@ pub struct Step {
     pub searching: bool,
     /// SNR of the strongest radio head by link budget and shadowing, in dB.
     pub snr_db: f64,
+    /// Active faults of odometry, receive channels and radio heads.
+    pub faults: ActiveFaults,
 }
 
 impl Step {
@@ -131,6 +134,7 @@ impl RunRecord {
             integrity: believed.integrity,
             searching: onboard.searching().is_some(),
             snr_db,
+            faults: *onboard.faults(),
         });
         Ok(())
     }

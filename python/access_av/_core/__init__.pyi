@@ -99,6 +99,7 @@ class LiveStatus:
     odometry_age_s: Final[float | None]
     samples_age_s: Final[float | None]
     tracked: Final[int]
+    faults: Final[list[tuple[str, str, float]]]
 
 @final
 class LiveOutcome:

@@ -404,6 +404,12 @@ fn diagnosis(status: &Status, heads: &[HeadStatus]) -> DiagnosticStatus {
     if let Some(level_m) = status.protection_level_m {
         values.push(("protection_level_m".to_owned(), format!("{level_m:.3}")));
     }
+    for active in status.faults.iter() {
+        values.push((
+            format!("fault {}", active.fault.name()),
+            active.fault.to_string(),
+        ));
+    }
     for head in heads {
         let name = format!("PCI {}, SSB {}", head.head.pci, head.head.ssb_index);
         let snr = head

@@ -3,6 +3,7 @@
 use std::fmt::Write;
 
 use onboard::live::{HeadStatus, LiveEnergy, Outcome, State, Status};
+use onboard::monitor::ActiveFault;
 use schemars::{JsonSchema, SchemaGenerator};
 use serde::Serialize;
 use serde_json::Value;
@@ -47,6 +48,33 @@ pub struct PoseFields {
     pub last_angle_s: Option<f64>,
     /// Number of SSBs that the receiver tracks.
     pub tracked: usize,
+    /// Active faults of odometry, receive channels and radio heads.
+    pub faults: Vec<FaultMessage>,
+}
+
+/// An active fault.
+#[derive(Debug, Clone, PartialEq, Serialize, JsonSchema)]
+#[schemars(extend("additionalProperties" = false))]
+pub struct FaultMessage {
+    /// Name of the fault.
+    pub fault: &'static str,
+    /// Numbers of the receive channels from 0, or the PCI; empty for the odometry.
+    pub subject: String,
+    /// Description.
+    pub description: String,
+    /// Time of the detection in seconds.
+    pub since_s: f64,
+}
+
+impl From<&ActiveFault> for FaultMessage {
+    fn from(active: &ActiveFault) -> Self {
+        Self {
+            fault: active.fault.name(),
+            subject: active.fault.subject(),
+            description: active.fault.to_string(),
+            since_s: active.since_s,
+        }
+    }
 }
 
 impl From<&Status> for PoseFields {
@@ -65,6 +93,7 @@ impl From<&Status> for PoseFields {
             protection_level_m: status.protection_level_m.filter(|it| it.is_finite()),
             last_angle_s: status.last_angle_s,
             tracked: status.tracked,
+            faults: status.faults.iter().map(FaultMessage::from).collect(),
         }
     }
 }
@@ -350,11 +379,12 @@ pub fn schema() -> Value {
 }
 
 /// Types on the reference page, in this order.
-const PAGE: [(&str, &str); 8] = [
+const PAGE: [(&str, &str); 9] = [
     ("PoseMessage", "`pose`"),
     ("VerdictMessage", "`verdict`"),
     ("StatusMessage", "`status`"),
     ("EventMessage", "`event`"),
+    ("FaultMessage", "Items of `faults`"),
     ("HeadMessage", "Items of `heads`"),
     ("EnergyMessage", "`energy`"),
     ("OutputStatus", "Items of `outputs`"),

@@ -218,7 +218,11 @@ impl Framing {
                     into.extend_from_slice(samples.get(first..first + count).unwrap_or_default());
                 }
             }
-            it.inbox.put(Input::Samples(Block { time_s, antennas }));
+            it.inbox.put(Input::Samples(Block {
+                time_s,
+                offset_s: None,
+                antennas,
+            }));
         });
     }
 
@@ -279,7 +283,7 @@ impl Framing {
                 if let Some(finding) = finding {
                     let text = match finding {
                         Finding::Missing(lost_s) => {
-                            format!("samples of {:.1} ms are missing", 1e3 * lost_s)
+                            format!("samples of {lost_s:.2} s are missing")
                         }
                         Finding::WrongRate(excess) => format!(
                             "{:.2} million samples a second come, not the {:.2} of \
@@ -322,7 +326,15 @@ impl Framing {
                 self.inbox.put(Input::warning(source, text));
             }
         }
-        self.inbox.put(Input::Samples(Block { time_s, antennas }));
+        let offset_s = match &self.clock {
+            Times::Counted(_) => None,
+            Times::Arrival(clock) => Some(clock.offset_s()),
+        };
+        self.inbox.put(Input::Samples(Block {
+            time_s,
+            offset_s,
+            antennas,
+        }));
     }
 }
 

@@ -146,7 +146,11 @@ pub fn run(
             Ok(Some(time_s)) => {
                 let count = antennas.first().map_or(0, Vec::len);
                 health.came(count as u64);
-                inbox.put(Input::Samples(Block { time_s, antennas }));
+                inbox.put(Input::Samples(Block {
+                    time_s,
+                    offset_s: None,
+                    antennas,
+                }));
             }
             Err(error) => {
                 let (source, text) = ("samples", error.to_string());

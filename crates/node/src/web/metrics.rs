@@ -163,6 +163,16 @@ pub fn text(board: &Board) -> String {
         let value = f64::from(u8::from(state == status.state));
         text.sample("state", &[("state", state.name())], value);
     }
+    text.family(
+        "fault",
+        "gauge",
+        "1 for each active fault of odometry, receive channels and radio heads.",
+    );
+    for active in status.faults.iter() {
+        let subject = active.fault.subject();
+        let labels = [("fault", active.fault.name()), ("subject", &*subject)];
+        text.sample("fault", &labels, 1.0);
+    }
     if let Some(pose) = status.pose {
         text.family("position_meters", "gauge", "Position in the map frame.");
         text.sample("position_meters", &[("axis", "x")], pose.x_m);

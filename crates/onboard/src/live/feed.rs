@@ -5,7 +5,7 @@ use std::collections::VecDeque;
 use num_complex::Complex32;
 
 use super::error::LiveError;
-use super::outcome::{HeadStatus, Outcome, Sight};
+use super::outcome::{HeadStatus, Outcome};
 use super::start::starting_at;
 use super::status::{Reason, State, Status};
 use super::stream::{SampleStream, StreamConfig, StreamCounts};
@@ -22,6 +22,7 @@ use crate::pipeline::{Custom, Onboard};
 use crate::radio_head::RadioHead;
 use crate::receive::ReceiverConfig;
 use crate::settings::{Boundary, Extent, Platform, Site, Vehicle};
+use crate::sight::Sight;
 
 /// Outcomes kept until they are asked for.
 const OUTCOMES: usize = 256;
@@ -37,6 +38,10 @@ const NO_ANGLE_S: f64 = 5.0;
 
 /// How far ahead the next wake-up is looked for (s).
 const LOOK_AHEAD_S: f64 = 1.0;
+
+/// Maximum time since the last SSB, in seconds, for which windows are placed by the time of that SSB. A
+/// stretch of samples without an SSB, later than this, means that the windows may be misplaced.
+const SSB_SILENT_S: f64 = 1.0;
 
 /// SNR (dB) of an angle of which none is stated: good enough for any policy.
 const UNSTATED_SNR_DB: f64 = 20.0;
@@ -91,8 +96,14 @@ pub struct Live {
     outcomes: VecDeque<Outcome>,
     heads: Vec<HeadStatus>,
     last_angle_s: Option<f64>,
-    /// The first SSB of the last burst: its time and its index.
+    /// The first SSB of the last burst: its sample time and its index.
     last_burst: Option<(f64, u8)>,
+    /// Whether samples have come since the last SSB or the end of the last stretch.
+    has_samples: bool,
+    /// Stretches of samples without an SSB since the last SSB.
+    empty_stretches: u32,
+    /// Whether samples were interrupted for an unknown time, and no SSB has come since.
+    is_resuming: bool,
     energy: Option<EnergyModel>,
     executions: usize,
     listened: usize,
@@ -130,6 +141,9 @@ impl Live {
                 .collect(),
             last_angle_s: None,
             last_burst: None,
+            has_samples: false,
+            empty_stretches: 0,
+            is_resuming: false,
             energy: EnergyModel::new(&vehicle, platform, Extent::Value)?,
             executions: 0,
             listened: 0,
@@ -171,6 +185,7 @@ impl Live {
         finite("the time of samples", time_s)?;
         let stream = self.stream.as_mut().ok_or(LiveError::NoStream)?;
         let continuity = stream.push(time_s, antennas)?;
+        self.has_samples = true;
         if let Some(end_s) = stream.next_s() {
             self.see(end_s);
         }
@@ -203,6 +218,7 @@ impl Live {
     /// # Errors
     /// [`LiveError::Receive`].
     pub fn end_stretch(&mut self) -> Result<(), LiveError> {
+        self.empty_stretches += u32::from(std::mem::take(&mut self.has_samples));
         match &mut self.stream {
             Some(stream) => stream.break_off(),
             None => Ok(()),
@@ -344,6 +360,7 @@ impl Live {
         self.onboard.forget_odometry();
         self.begin(&unknown, anywhere)?;
         (self.last_angle_s, self.last_burst) = (None, None);
+        (self.has_samples, self.empty_stretches) = (false, 0);
         self.interval_s = None;
         (self.executions, self.listened) = (0, 0);
         Ok(())
@@ -423,6 +440,7 @@ impl Live {
             odometry_age_s: age_s,
             samples_age_s: end_s.map(|end_s| now_s - end_s),
             tracked: self.stream.as_ref().map_or(0, SampleStream::tracked),
+            faults: *self.onboard.faults(),
         };
         let (Some(newest), Some(age_s)) = (newest, age_s) else {
             return Ok(status);
@@ -460,6 +478,10 @@ impl Live {
                 Some(_) => Reason::SeveralPlaces { places },
             };
             return (State::Searching, reason);
+        }
+        let faults = self.onboard.faults();
+        if let Some(fault) = faults.of_odometry().or_else(|| faults.of_angles()) {
+            return (State::Unavailable, Reason::SensorFault(fault));
         }
         if self.onboard.is_lost() {
             return (State::Lost, Reason::AnglesElsewhere);
@@ -500,7 +522,9 @@ impl Live {
 
     /// When the receiver has to be on next, after `now_s`: at the beginning of the next burst that is
     /// wanted if the vehicle drives on as it does. Where none is within a second, when to ask again. `now_s`
-    /// itself while no SSB is known, or the place is searched for.
+    /// itself while no SSB is known, while the place is searched for, after
+    /// [`samples_resumed`](Self::samples_resumed), and where stretches of samples had no SSB for a second.
+    /// Both are times of the samples, without [`time_offset_s`](Self::time_offset_s).
     ///
     /// # Errors
     /// As [`listens`](Self::listens).
@@ -508,18 +532,53 @@ impl Live {
         finite("the time of a wake-up", now_s)?;
         let untracked = self.stream.as_ref().is_some_and(|it| it.tracked() == 0);
         let is_searching = self.onboard.searching().is_some() || self.onboard.is_lost();
-        let Some((last_s, _)) = self.last_burst.filter(|_| !untracked && !is_searching) else {
+        let is_silent = |last_s: f64| self.empty_stretches > 0 && now_s - last_s >= SSB_SILENT_S;
+        let is_open = untracked || is_searching || self.is_resuming;
+        let last_burst = self
+            .last_burst
+            .filter(|(last_s, _)| !is_open && !is_silent(*last_s));
+        let Some((last_s, _)) = last_burst else {
             return Ok(now_s);
         };
+        let offset_s = self.time_offset_s();
         let period_s = self.site.ssb.period_s();
         let first = ((now_s - last_s) / period_s).floor() + 1.0;
         let mut burst_s = last_s + first * period_s;
         let mut ahead = 1.0;
-        while burst_s < now_s + LOOK_AHEAD_S && !self.listens(burst_s)? {
+        while burst_s < now_s + LOOK_AHEAD_S && !self.listens(burst_s + offset_s)? {
             burst_s = last_s + (first + ahead) * period_s;
             ahead += 1.0;
         }
         Ok(burst_s)
+    }
+
+    /// Time minus sample time, in seconds: as set by [`set_time_offset_s`](Self::set_time_offset_s), else the
+    /// gaps that the sample times did not report.
+    pub fn time_offset_s(&self) -> f64 {
+        (self.stream.as_ref()).map_or(0.0, SampleStream::correction_s)
+    }
+
+    /// Sets time minus sample time, in seconds, where samples are counted and their arrival is measured:
+    /// counting keeps the times of SSBs exact while the offset may drift or step. `None` derives it from
+    /// the SSBs.
+    pub const fn set_time_offset_s(&mut self, offset_s: Option<f64>) {
+        if let Some(stream) = &mut self.stream {
+            stream.set_offset_s(offset_s);
+        }
+    }
+
+    /// Adds an interruption of the samples, in seconds, that their times do not report: whole periods of the
+    /// SSB, because the SSBs tell the rest.
+    pub fn add_interruption(&mut self, lost_s: f64) {
+        if let Some(stream) = &mut self.stream {
+            stream.add_interruption(lost_s);
+        }
+    }
+
+    /// Notes that samples resumed after an interruption of unknown length:
+    /// [`next_wake_up_s`](Self::next_wake_up_s) wants every sample until an SSB is received.
+    pub const fn samples_resumed(&mut self) {
+        self.is_resuming = true;
     }
 
     /// Index of the first SSB of the last burst, whose times [`next_wake_up_s`](Self::next_wake_up_s) goes
@@ -583,7 +642,9 @@ impl Live {
             listened,
         } = heard.map_err(LiveError::Custom)?;
         self.see(time_s);
-        self.last_burst = Some((time_s, ssb_index));
+        self.last_burst = Some((time_s - self.time_offset_s(), ssb_index));
+        (self.has_samples, self.empty_stretches) = (false, 0);
+        self.is_resuming = false;
         self.listened += usize::from(listened);
         let newest_s = self.onboard.newest_odometry().map(|it| it.time_s);
         let after_s = newest_s.unwrap_or(time_s).max(time_s);

@@ -1,11 +1,8 @@
 //! What became of the angles, and of each radio head.
 
-use crate::geometry::{Pose, wrap_angle};
 use crate::localize::PoseEstimate;
-use crate::manifold::Measurand;
 use crate::pipeline::Execution;
 use crate::radio_head::RadioHead;
-use crate::settings::Vehicle;
 
 /// One angle and what became of it.
 #[derive(Debug, Clone, Copy, PartialEq)]
@@ -56,38 +53,5 @@ impl HeadStatus {
             accepted: 0,
             refused: 0,
         }
-    }
-}
-
-/// Where radio heads are seen from a pose.
-pub struct Sight {
-    measurand: Measurand,
-    position_m: [f64; 3],
-    mounting_rad: f64,
-}
-
-impl Sight {
-    /// By the array of a vehicle.
-    pub fn new(vehicle: &Vehicle) -> Self {
-        Self {
-            measurand: vehicle.array.measurand(),
-            position_m: vehicle.array.position_m,
-            mounting_rad: vehicle.array.mounting_rad,
-        }
-    }
-
-    /// What is measured with the array.
-    pub const fn measurand(&self) -> &Measurand {
-        &self.measurand
-    }
-
-    /// A measured value minus the one at which a radio head is seen from `pose` (rad).
-    pub fn residual_rad(&self, pose: Pose, head: &RadioHead, value_rad: f64) -> f64 {
-        let [forward_m, left_m, up_m] = self.position_m;
-        let array = pose.beside(forward_m, left_m);
-        let ground_m = array.distance_m(head.position);
-        let level = ground_m / ground_m.hypot(head.height_m - up_m).max(f64::MIN_POSITIVE);
-        let azimuth_rad = array.bearing_rad(head.position) - pose.heading_rad - self.mounting_rad;
-        wrap_angle(value_rad - self.measurand.value_rad(azimuth_rad, level))
     }
 }

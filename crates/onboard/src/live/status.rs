@@ -3,6 +3,7 @@
 use std::fmt;
 
 use crate::geometry::Pose;
+use crate::monitor::{ActiveFaults, Fault};
 
 /// What the pose can be relied on for.
 #[derive(Debug, Clone, Copy, PartialEq, Eq, Hash)]
@@ -95,6 +96,8 @@ pub enum Reason {
     },
     /// A fault of odometer, array or site is likelier than none, or was a moment ago.
     FaultSuspected,
+    /// A fault of the odometry or of a receive channel is active.
+    SensorFault(Fault),
     /// Nothing is wrong.
     Nominal,
     /// Nothing is wrong as far as anybody looks: there is no integrity monitor.
@@ -132,6 +135,7 @@ impl Reason {
             Self::FaultSuspected => {
                 "drive on with care; if it stays, check odometer, array and site against their files"
             }
+            Self::SensorFault(fault) => fault.what_to_do(),
             Self::Nominal => "nothing",
             Self::NotMonitored => {
                 "set integrity.enabled = true to know whether the pose can be relied on"
@@ -164,6 +168,7 @@ impl fmt::Display for Reason {
                 "the protection level, {level_m:.2} m, is above the alert limit, {limit_m:.2} m"
             ),
             Self::FaultSuspected => write!(f, "a fault is suspected or was a moment ago"),
+            Self::SensorFault(fault) => fault.fmt(f),
             Self::Nominal => write!(f, "nothing is wrong"),
             Self::NotMonitored => write!(f, "nothing monitors the pose"),
         }
@@ -200,4 +205,6 @@ pub struct Status {
     pub samples_age_s: Option<f64>,
     /// SSBs that the receiver keeps to.
     pub tracked: usize,
+    /// Active faults of odometry, receive channels and radio heads.
+    pub faults: ActiveFaults,
 }

@@ -24,7 +24,7 @@ pub struct StreamConfig {
 pub struct StreamCounts {
     /// Samples taken in, in seconds.
     pub taken_s: f64,
-    /// Gaps by the times of the blocks ...
+    /// Gaps by the times of the blocks, except those after a stretch that the caller ended ...
     pub gaps: u64,
     /// ... and their length together, in seconds.
     pub lost_s: f64,
@@ -48,6 +48,8 @@ pub struct SampleStream {
     elements: usize,
     bursts: Bursts,
     counts: StreamCounts,
+    /// Whether the caller ended the last stretch: the gap that follows it is deliberate.
+    is_stretch_ended: bool,
 }
 
 /// Observations in order of time; the first of them are `held`, the others are memory.
@@ -58,6 +60,10 @@ struct Bursts {
     /// Samples (s) that were missing untold before the newest.
     untold_s: f64,
     untold_gaps: u64,
+    /// Time minus sample time in seconds, if the caller measures it; `untold_s` is not applied then.
+    offset_s: Option<f64>,
+    /// Interruptions that the caller reported, in seconds.
+    interrupted_s: f64,
     /// Until when all SSBs have come; infinite where a stretch of samples has ended.
     heard_until_s: f64,
 }
@@ -67,11 +73,20 @@ impl Bursts {
         if untold_s != self.untold_s {
             (self.untold_s, self.untold_gaps) = (untold_s, self.untold_gaps + 1);
         }
+        let correction_s = self.correction_s() - untold_s;
         match self.observations.get_mut(self.held) {
             Some(room) => room.copy_from(observation),
             None => self.observations.push(observation.clone()),
         }
+        if let Some(taken) = self.observations.get_mut(self.held) {
+            taken.ssb.time_s += correction_s;
+        }
         self.held += 1;
+    }
+
+    /// Time minus sample time, in seconds.
+    fn correction_s(&self) -> f64 {
+        self.offset_s.unwrap_or(self.untold_s + self.interrupted_s)
     }
 }
 
@@ -88,6 +103,7 @@ impl SampleStream {
             receiver: StreamReceiver::new(receiver, rate_hz, centre_hz)?,
             bursts: Bursts::default(),
             counts: StreamCounts::default(),
+            is_stretch_ended: false,
         })
     }
 
@@ -108,7 +124,24 @@ impl SampleStream {
 
     /// Time of the first sample that has not come.
     pub fn next_s(&self) -> Option<f64> {
-        (self.counts.taken_s > 0.0).then(|| self.clock.time_s(self.clock.next() as f64))
+        let next_s = || self.clock.time_s(self.clock.next() as f64) + self.correction_s();
+        (self.counts.taken_s > 0.0).then(next_s)
+    }
+
+    /// Time minus sample time, in seconds: the offset that the caller measured, else the unreported gaps.
+    pub fn correction_s(&self) -> f64 {
+        self.bursts.correction_s()
+    }
+
+    /// Sets time minus sample time, in seconds, for a caller that counts samples and measures when they
+    /// arrive. It replaces the unreported gaps, which are known but for whole periods of the SSB.
+    pub const fn set_offset_s(&mut self, offset_s: Option<f64>) {
+        self.bursts.offset_s = offset_s;
+    }
+
+    /// Adds an interruption, in seconds, that the times of the samples do not report.
+    pub fn add_interruption(&mut self, lost_s: f64) {
+        self.bursts.interrupted_s += lost_s;
     }
 
     /// Takes in the next samples of every antenna, the first of them received at `time_s`.
@@ -136,8 +169,10 @@ impl SampleStream {
             Continuity::First | Continuity::Contiguous => {}
             Continuity::Overlap { .. } => self.counts.overlaps += 1,
             Continuity::Gap { lost_s } => {
-                self.counts.gaps += 1;
-                self.counts.lost_s += lost_s;
+                if !self.is_stretch_ended {
+                    self.counts.gaps += 1;
+                    self.counts.lost_s += lost_s;
+                }
                 self.gap_to(self.clock.next() - length as u64, &before)?;
             }
             Continuity::Restart => {
@@ -146,6 +181,7 @@ impl SampleStream {
                 self.receiver.reset();
             }
         }
+        self.is_stretch_ended = false;
         let mut new: [&[Complex32]; MAX_ELEMENTS] = [&[]; MAX_ELEMENTS];
         for (new, samples) in new.iter_mut().zip(antennas) {
             *new = samples.get(left_out..).unwrap_or_default();
@@ -160,7 +196,7 @@ impl SampleStream {
         } = self;
         let time_s = |sample| clock.time_s(sample);
         receiver.push(new, &time_s, &mut |it, untold_s| bursts.take(it, untold_s))?;
-        bursts.heard_until_s = clock.time_s(receiver.heard_until()) + bursts.untold_s;
+        bursts.heard_until_s = clock.time_s(receiver.heard_until()) + bursts.correction_s();
         Ok(continuity)
     }
 
@@ -171,6 +207,7 @@ impl SampleStream {
     pub fn break_off(&mut self) -> Result<(), LiveError> {
         self.gap_to(self.clock.next(), &self.clock.clone())?;
         self.bursts.heard_until_s = f64::INFINITY;
+        self.is_stretch_ended = true;
         Ok(())
     }
 

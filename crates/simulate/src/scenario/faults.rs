@@ -44,10 +44,39 @@ pub enum FaultKind {
         #[schemars(range(min = 0.0, max = 10.0))]
         ratio: f64,
     },
+    /// The odometry repeats the values of its last sample before the fault.
+    OdometerFrozen,
+    /// The odometry reports no motion: constant distance, zero speed and zero yaw rate.
+    OdometerStopped,
+    /// The odometry reports motion of the wrong sign.
+    OdometerReversed,
     /// An antenna's signal no longer follows the field.
     StuckAntenna {
         /// Number of the antenna, from 0.
         antenna: usize,
+    },
+    /// An antenna has no signal.
+    DeadAntenna {
+        /// Number of the antenna, from 0.
+        antenna: usize,
+    },
+    /// An antenna's signal has the wrong sign.
+    InvertedAntenna {
+        /// Number of the antenna, from 0.
+        antenna: usize,
+    },
+    /// The signals of two antennas are exchanged.
+    ExchangedAntennas {
+        /// Numbers of the antennas, from 0.
+        antennas: [usize; 2],
+    },
+    /// Another transmitter sends the PCI of a radio head at the same time, with the same power at the vehicle.
+    DuplicateHead {
+        /// Number of the radio head in the site, from 0.
+        radio_head: usize,
+        /// Position of the other transmitter minus that of the radio head, `[x, y]` in metres.
+        #[schemars(inner(range(min = -1e5, max = 1e5)))]
+        by_m: [f64; 2],
     },
 }
 
@@ -71,21 +100,42 @@ impl FaultSettings {
             self.until_s,
             "it must be after from_s",
         )?;
+        let has_antenna = |name: &str, antenna: usize| {
+            check.that(
+                antenna < usize::from(elements),
+                &key(name),
+                antenna,
+                &format!("the array has {elements} antennas, counted from 0"),
+            )
+        };
         match self.what {
             FaultKind::NonLineOfSight { radio_head, .. }
-            | FaultKind::MovedHead { radio_head, .. } => check.that(
+            | FaultKind::MovedHead { radio_head, .. }
+            | FaultKind::DuplicateHead { radio_head, .. } => check.that(
                 radio_head < heads,
                 &key("what.radio_head"),
                 radio_head,
                 &format!("the site has {heads} radio heads, counted from 0"),
             ),
-            FaultKind::StuckAntenna { antenna } => check.that(
-                antenna < usize::from(elements),
-                &key("what.antenna"),
-                antenna,
-                &format!("the array has {elements} antennas, counted from 0"),
-            ),
-            FaultKind::OdometerSlip { .. } => Ok(()),
+            FaultKind::StuckAntenna { antenna }
+            | FaultKind::DeadAntenna { antenna }
+            | FaultKind::InvertedAntenna { antenna } => has_antenna("what.antenna", antenna),
+            FaultKind::ExchangedAntennas {
+                antennas: [first, second],
+            } => {
+                check.that(
+                    first != second,
+                    &key("what.antennas"),
+                    format!("[{first}, {second}]"),
+                    "the antennas must differ",
+                )?;
+                has_antenna("what.antennas[0]", first)?;
+                has_antenna("what.antennas[1]", second)
+            }
+            FaultKind::OdometerSlip { .. }
+            | FaultKind::OdometerFrozen
+            | FaultKind::OdometerStopped
+            | FaultKind::OdometerReversed => Ok(()),
         }
     }
 }

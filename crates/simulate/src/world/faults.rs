@@ -15,6 +15,8 @@ pub struct Faults {
     /// The odometer's own last distance, and what slip has added to it, in metres.
     distance_m: f64,
     slipped_m: f64,
+    /// The last sample that was delivered.
+    delivered: Option<OdometrySample>,
 }
 
 impl Faults {
@@ -24,6 +26,7 @@ impl Faults {
             all: all.to_vec(),
             distance_m: 0.0,
             slipped_m: 0.0,
+            delivered: None,
         }
     }
 
@@ -69,18 +72,65 @@ impl Faults {
                         *gain = Complex64::new(gain.norm(), 0.0);
                     }
                 }
+                FaultKind::DeadAntenna { antenna } => {
+                    if let Some(gain) = gains.get_mut(antenna) {
+                        *gain = Complex64::ZERO;
+                    }
+                }
+                FaultKind::InvertedAntenna { antenna } => {
+                    if let Some(gain) = gains.get_mut(antenna) {
+                        *gain = -*gain;
+                    }
+                }
+                FaultKind::ExchangedAntennas {
+                    antennas: [first, second],
+                } if first.max(second) < gains.len() => gains.swap(first, second),
+                FaultKind::DuplicateHead { radio_head, by_m } if radio_head == index => {
+                    let mut other = *head;
+                    other.position.x_m += by_m[0];
+                    other.position.y_m += by_m[1];
+                    let towards = |head| array.line_of_sight(vehicle, head).towards;
+                    let mut received = gains.to_vec();
+                    (array.antennas()).redirect(towards(head), towards(&other), &mut received);
+                    // Its carrier phase is independent of the radio head's.
+                    let turn = Complex64::cis(6000.0 * vehicle.time_s);
+                    for (gain, other) in gains.iter_mut().zip(received) {
+                        *gain += turn * other;
+                    }
+                }
                 _ => {}
             }
         }
     }
 
     /// What becomes of an odometry sample.
-    pub fn slip(&mut self, mut sample: OdometrySample) -> OdometrySample {
+    pub fn slip(&mut self, sample: OdometrySample) -> OdometrySample {
+        let mut sample = self.slipped(sample);
+        let last = self.delivered.unwrap_or(sample);
+        let time_s = sample.time_s;
+        let is = |kind| self.at(time_s).any(|it| it == kind);
+        if is(FaultKind::OdometerFrozen) {
+            sample = OdometrySample {
+                time_s: sample.time_s,
+                ..last
+            };
+        }
+        if is(FaultKind::OdometerStopped) {
+            sample.distance_m = last.distance_m;
+            sample.speed_mps = 0.0;
+            sample.yaw_rate_radps = sample.yaw_rate_radps.map(|_| 0.0);
+        }
+        self.delivered = Some(sample);
+        sample
+    }
+
+    fn slipped(&mut self, mut sample: OdometrySample) -> OdometrySample {
         let moved_m = sample.distance_m - self.distance_m;
         self.distance_m = sample.distance_m;
         let ratio: f64 = (self.at(sample.time_s))
             .map(|fault| match fault {
                 FaultKind::OdometerSlip { ratio } => ratio,
+                FaultKind::OdometerReversed => -1.0,
                 _ => 1.0,
             })
             .product();

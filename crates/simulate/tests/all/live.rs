@@ -7,7 +7,7 @@ use onboard::live::{
     AngleObservation, Continuity, LiveError, Outcome, Reason, State, StreamConfig,
 };
 use onboard::observation::OdometrySample;
-use onboard::settings::{Platform, Site, Vehicle, WakeUpSettings};
+use onboard::settings::{FixedSettings, Platform, Site, Vehicle, WakeUpSettings};
 use onboard::{Custom, Execution, Live};
 use recording::replay::{StartChoice, locate_angles, locate_recording};
 use recording::{Datatype, OdometryLog, Recording, load, read_odometry_csv};
@@ -319,4 +319,89 @@ fn a_pose_can_be_given_and_forgotten_and_cells_left_out() {
         (State::Searching, Reason::NoAngle)
     );
     assert_eq!(live.next_wake_up_s(0.0).unwrap(), 0.0);
+}
+
+/// Feeds samples as a radio that sleeps between the wanted bursts would, a millisecond at a time; `lost` samples are
+/// missing from number `from` on and not counted. Returns the times of the bursts that were received.
+fn drive_asleep(
+    live: &mut Live,
+    odometry: &OdometryLog,
+    samples: &[Vec<Complex32>],
+    [from, lost]: [usize; 2],
+    resumes: bool,
+) -> Vec<f64> {
+    const STEP: usize = 3840;
+    const GUARD_S: f64 = 4e-4;
+    const LENGTH_S: f64 = 2e-3;
+    let (mut odometry, mut received) = (odometry.samples.iter().peekable(), Vec::new());
+    let (mut number, mut counted) = (0, 0);
+    let mut window: Option<[f64; 2]> = None;
+    while number + STEP <= samples[0].len() {
+        if (from..from + STEP).contains(&number) {
+            number += lost;
+            if resumes {
+                live.samples_resumed();
+                window = None;
+            }
+        }
+        let (block_s, end_s) = (counted as f64 / RATE_HZ, (counted + STEP) as f64 / RATE_HZ);
+        while let Some(sample) =
+            odometry.next_if(|it| it.time_s <= (number + STEP) as f64 / RATE_HZ)
+        {
+            live.odometry(sample).unwrap();
+        }
+        let wanted = window.is_none_or(|[from_s, until_s]| end_s > from_s && block_s < until_s);
+        if wanted {
+            live.samples(block_s, &slices(samples, number, number + STEP))
+                .unwrap();
+        }
+        if window.is_none_or(|[_, until_s]| end_s >= until_s) {
+            if window.is_some() {
+                live.end_stretch().unwrap();
+                live.hear_before(f64::INFINITY).unwrap();
+            }
+            let next_s = live.next_wake_up_s(end_s).unwrap();
+            window = (next_s > end_s).then_some([next_s - GUARD_S, next_s + LENGTH_S]);
+        }
+        received
+            .extend(std::iter::from_fn(|| live.next_outcome()).map(|it| it.execution.ssb.time_s));
+        number += STEP;
+        counted += STEP;
+    }
+    received
+}
+
+#[test]
+fn windows_without_an_ssb_open_the_receiver_and_windows_follow_missing_samples() {
+    let mut recorded = record(&common::scratch("live-asleep"), 3.0);
+    recorded.vehicle.wake_up = Some(WakeUpSettings::Fixed(FixedSettings {
+        interval_ms: Some(80.0),
+        ..FixedSettings::default()
+    }));
+    let samples = recorded.samples();
+    // 0.3 s in, samples of 7.3 ms are missing: windows placed by the last SSB miss all that follow.
+    let (from, lost) = ((0.3 * RATE_HZ) as usize, (7.3e-3 * RATE_HZ) as usize);
+    for (resumes, most_s) in [(false, 1.25), (true, 0.2)] {
+        let mut live = recorded.live();
+        let received = drive_asleep(
+            &mut live,
+            &recorded.odometry,
+            &samples,
+            [from, lost],
+            resumes,
+        );
+        let after = received.iter().copied().find(|it| *it > 0.31).unwrap();
+        assert!(after < 0.3 + most_s, "{after}");
+        // From then on it sleeps again, and every window holds its SSBs: two each 80 ms.
+        let later = received.iter().filter(|it| **it > after + 0.1).count();
+        let expected = 2.0 * (3.0 - after - 0.1) / 0.08;
+        assert!(
+            (later as f64 - expected).abs() < 4.0,
+            "{later}, not {expected}"
+        );
+        let counts = live.stream_counts();
+        assert_eq!((counts.untold_gaps, counts.gaps), (1, 0));
+        assert!((counts.untold_s - 7.3e-3).abs() < 1e-5, "{counts:?}");
+        assert!(counts.taken_s < 2.0, "{counts:?}");
+    }
 }

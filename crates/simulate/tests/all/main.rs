@@ -21,6 +21,7 @@ mod late;
 mod live;
 mod locate;
 mod measurement_trace;
+mod monitors;
 mod simulated_drives;
 mod smoother;
 mod space;

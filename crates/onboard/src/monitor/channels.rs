@@ -1,0 +1,287 @@
+//! Receive channels, by the power of each and by the fit of the array's response to what they receive.
+//!
+//! The best steering vector explains a share of the received power. Exchanged or inverted channels leave a larger
+//! residual than the channels put right. Cumulative sums (Page 1954) over SSBs compare the residual with that of each
+//! hypothesis: one pair exchanged, or one channel inverted. A dead channel has a small share of the power.
+//!
+//! Only SSBs with independent fading count: of another radio head, or after a motion of [`FADING_M`].
+
+use std::f64::consts::TAU;
+
+use num_complex::Complex64;
+
+use super::fault::Fault;
+use crate::observation::{MAX_ELEMENTS, SsbObservation};
+use crate::settings::Vehicle;
+
+/// Motion in metres, and time in seconds, after which the fading of a radio head is independent: above one
+/// wavelength.
+const FADING_M: f64 = 0.1;
+const FADING_S: f64 = 1.0;
+/// Minimum SNR of an SSB with all its snapshots, in dB.
+const LEAST_SNR_DB: f64 = 10.0;
+/// Steering vectors that the fit is searched among. Between two of them 0.3 % of the power are lost with 4 antennas.
+const DIRECTIONS: usize = 64;
+/// Maximum number of antennas for which hypotheses are compared: 36 of them.
+const MOST_ANTENNAS: usize = 8;
+/// Hypotheses at most.
+const MOST_HYPOTHESES: usize = MOST_ANTENNAS * (MOST_ANTENNAS - 1) / 2 + MOST_ANTENNAS;
+/// Standard deviation of the residual share of power under scatter, for a Rician factor of 6 dB.
+const SCATTER: f64 = 0.15;
+/// Maximum evidence of one SSB, for or against a hypothesis.
+const MOST_OF_ONE: f64 = 4.0;
+/// Drift of the sums: hypotheses that fit as well as the nominal channels gain no evidence.
+const DRIFT: f64 = 0.3;
+/// Threshold of the sums: false-alarm rate 1e-6 for each excursion from zero (Wald).
+const EVIDENCE: f64 = 13.8;
+/// Drift of the sum of a dead channel. Its SSBs add `ln(1/share)`, which has an exponential distribution in Rayleigh
+/// fading; the false-alarm rate is exp(−0.8 · threshold) for each excursion.
+const DEAD_DRIFT: f64 = 2.0;
+const DEAD_EVIDENCE: f64 = 18.0;
+/// Maximum evidence of one SSB that a channel is dead: five SSBs are needed.
+const DEAD_MOST: f64 = 4.0;
+
+/// A fault of the channels, as a change of what they receive.
+#[derive(Debug, Clone, Copy, PartialEq, Eq)]
+enum Hypothesis {
+    Exchanged(u8, u8),
+    Inverted(u8),
+}
+
+impl Hypothesis {
+    const fn fault(self) -> Fault {
+        match self {
+            Self::Exchanged(first, second) => Fault::ExchangedChannels {
+                channels: [first, second],
+            },
+            Self::Inverted(channel) => Fault::InvertedChannel { channel },
+        }
+    }
+
+    /// Puts a snapshot right.
+    fn correct(self, snapshot: &mut [Complex64]) {
+        match self {
+            Self::Exchanged(first, second) => snapshot.swap(first.into(), second.into()),
+            Self::Inverted(channel) => {
+                if let Some(value) = snapshot.get_mut(usize::from(channel)) {
+                    *value = -*value;
+                }
+            }
+        }
+    }
+}
+
+/// When a radio head counted last.
+#[derive(Debug, Clone, Copy)]
+struct Counted {
+    pci: u16,
+    ssb_index: u8,
+    time_s: f64,
+    distance_m: f64,
+}
+
+/// Monitors the channels of an array.
+#[derive(Debug)]
+pub struct ChannelMonitor {
+    elements: usize,
+    gains: [Complex64; MAX_ELEMENTS],
+    /// Phase factors from one antenna to the next of each direction; empty of an array that is no row.
+    steps: Vec<Complex64>,
+    hypotheses: Vec<(Hypothesis, f64)>,
+    /// Evidence that each channel is dead.
+    dead: [f64; MAX_ELEMENTS],
+    is_dead: [bool; MAX_ELEMENTS],
+    /// The hypothesis that was accepted, and the evidence that it has ended.
+    accepted: Option<(Hypothesis, f64)>,
+    counted: Vec<Counted>,
+}
+
+impl ChannelMonitor {
+    /// For the array of a vehicle, with this number of radio heads.
+    pub fn new(vehicle: &Vehicle, heads: usize) -> Self {
+        let elements = usize::from(vehicle.array.elements);
+        let mut gains = [Complex64::ONE; MAX_ELEMENTS];
+        for (gain, known) in gains.iter_mut().zip(vehicle.array.calibration()) {
+            *gain = known;
+        }
+        let is_compared = vehicle.array.shape.is_row() && (3..=MOST_ANTENNAS).contains(&elements);
+        let mut hypotheses = Vec::with_capacity(MOST_HYPOTHESES);
+        let mut steps = Vec::new();
+        if is_compared {
+            let channels = 0..vehicle.array.elements;
+            for first in channels.clone() {
+                hypotheses.push((Hypothesis::Inverted(first), 0.0));
+                for second in channels.clone().skip(usize::from(first) + 1) {
+                    hypotheses.push((Hypothesis::Exchanged(first, second), 0.0));
+                }
+            }
+            let turn = |number: usize| TAU * number as f64 / DIRECTIONS as f64;
+            steps.extend((0..DIRECTIONS).map(|number| Complex64::cis(-turn(number))));
+        }
+        Self {
+            elements,
+            gains,
+            steps,
+            hypotheses,
+            dead: [0.0; MAX_ELEMENTS],
+            is_dead: [false; MAX_ELEMENTS],
+            accepted: None,
+            counted: Vec::with_capacity(heads),
+        }
+    }
+
+    /// Takes in an SSB, received after this distance driven (m). Calls `change` for each fault that begins or ends.
+    pub fn ssb(
+        &mut self,
+        observation: &SsbObservation,
+        distance_m: f64,
+        change: &mut dyn FnMut(Fault, bool),
+    ) {
+        let values = observation.values();
+        let (elements, count) = (self.elements, observation.count());
+        if observation.elements() != elements || count == 0 {
+            return;
+        }
+        let total: f64 = values.iter().map(Complex64::norm_sqr).sum();
+        let noise = (observation.noise_variance).map(|it| it * (elements * count) as f64);
+        let snr_db = noise.map_or(observation.ssb.snr_db, |noise| {
+            10.0 * (total / noise).log10()
+        });
+        if !(total.is_finite()
+            && snr_db >= LEAST_SNR_DB
+            && self.is_independent(observation, distance_m))
+        {
+            return;
+        }
+        self.power(values, total, change);
+        if !self.steps.is_empty() && !self.is_dead.contains(&true) {
+            self.fit(values, total, change);
+        }
+    }
+
+    /// Whether the fading of an SSB is independent of those before.
+    fn is_independent(&mut self, observation: &SsbObservation, distance_m: f64) -> bool {
+        let ssb = observation.ssb;
+        let now = Counted {
+            pci: ssb.pci,
+            ssb_index: ssb.ssb_index,
+            time_s: ssb.time_s,
+            distance_m,
+        };
+        let is_same = |it: &&mut Counted| (it.pci, it.ssb_index) == (ssb.pci, ssb.ssb_index);
+        if let Some(last) = self.counted.iter_mut().find(is_same) {
+            let moved_m = (distance_m - last.distance_m).abs();
+            let passed_s = (ssb.time_s - last.time_s).abs();
+            let is_independent = moved_m >= FADING_M || passed_s >= FADING_S;
+            if is_independent {
+                *last = now;
+            }
+            return is_independent;
+        }
+        let has_room = self.counted.len() < self.counted.capacity();
+        if has_room {
+            self.counted.push(now);
+        }
+        has_room
+    }
+
+    /// Compares the power of each channel with the mean of the others.
+    fn power(&mut self, values: &[Complex64], total: f64, change: &mut dyn FnMut(Fault, bool)) {
+        let others = (self.elements - 1).max(1) as f64;
+        for channel in 0..self.elements {
+            let of_channel = values.iter().skip(channel).step_by(self.elements);
+            let power: f64 = of_channel.map(Complex64::norm_sqr).sum();
+            let share = power * others / (total - power).max(f64::MIN_POSITIVE);
+            let (Some(evidence), Some(is_dead)) =
+                (self.dead.get_mut(channel), self.is_dead.get_mut(channel))
+            else {
+                continue;
+            };
+            let one = (-share.max(1e-12).ln() - DEAD_DRIFT).clamp(-DEAD_MOST, DEAD_MOST);
+            *evidence = (*evidence + one).clamp(0.0, DEAD_EVIDENCE + DEAD_MOST);
+            let now_dead = if *is_dead {
+                *evidence > 0.0
+            } else {
+                *evidence >= DEAD_EVIDENCE
+            };
+            if now_dead != *is_dead {
+                *is_dead = now_dead;
+                let channel = channel as u8;
+                change(Fault::DeadChannel { channel }, now_dead);
+            }
+        }
+    }
+
+    /// Compares the fit of the array's response with that after each hypothesis.
+    fn fit(&mut self, values: &[Complex64], total: f64, change: &mut dyn FnMut(Fault, bool)) {
+        let nominal = self.residual(values, total, None);
+        if let Some((hypothesis, evidence)) = self.accepted {
+            let corrected = self.residual(values, total, Some(hypothesis));
+            let evidence = cumulated(evidence, corrected - nominal);
+            self.accepted = Some((hypothesis, evidence));
+            if evidence >= EVIDENCE {
+                self.accepted = None;
+                change(hypothesis.fault(), false);
+            }
+            return;
+        }
+        let mut best: Option<(Hypothesis, f64)> = None;
+        for place in 0..self.hypotheses.len() {
+            let Some(&(hypothesis, evidence)) = self.hypotheses.get(place) else {
+                continue;
+            };
+            let corrected = self.residual(values, total, Some(hypothesis));
+            let evidence = cumulated(evidence, nominal - corrected);
+            if let Some((_, slot)) = self.hypotheses.get_mut(place) {
+                *slot = evidence;
+            }
+            if best.is_none_or(|(_, most)| evidence > most) {
+                best = Some((hypothesis, evidence));
+            }
+        }
+        if let Some((hypothesis, _)) = best.filter(|(_, evidence)| *evidence >= EVIDENCE) {
+            self.accepted = Some((hypothesis, 0.0));
+            self.hypotheses
+                .iter_mut()
+                .for_each(|(_, evidence)| *evidence = 0.0);
+            change(hypothesis.fault(), true);
+        }
+    }
+
+    /// Share of the power that the best direction does not explain, after a hypothesis has been put right.
+    fn residual(&self, values: &[Complex64], total: f64, hypothesis: Option<Hypothesis>) -> f64 {
+        let mut powers = [0.0; DIRECTIONS];
+        for snapshot in values.chunks_exact(self.elements) {
+            let mut corrected = [Complex64::ZERO; MAX_ELEMENTS];
+            let Some(corrected) = corrected.get_mut(..self.elements) else {
+                return 1.0;
+            };
+            // The gains belong to the channels, so that they are taken off and put on again.
+            for ((value, received), gain) in corrected.iter_mut().zip(snapshot).zip(self.gains) {
+                *value = received * gain;
+            }
+            if let Some(hypothesis) = hypothesis {
+                hypothesis.correct(corrected);
+            }
+            for (value, gain) in corrected.iter_mut().zip(self.gains) {
+                *value /= gain;
+            }
+            for (power, step) in powers.iter_mut().zip(&self.steps) {
+                // Horner's rule for Σ x_k s^k.
+                let mut sum = Complex64::ZERO;
+                for value in corrected.iter().rev() {
+                    sum = sum * step + value;
+                }
+                *power += sum.norm_sqr();
+            }
+        }
+        let most = powers.iter().copied().fold(0.0, f64::max);
+        (1.0 - most / (self.elements as f64 * total)).max(0.0)
+    }
+}
+
+/// A cumulative sum after another difference of residual shares.
+fn cumulated(evidence: f64, difference: f64) -> f64 {
+    let one = (difference / SCATTER).clamp(-MOST_OF_ONE, MOST_OF_ONE);
+    (evidence + one - DRIFT).max(0.0)
+}

@@ -1,0 +1,123 @@
+//! Distance and speed of the odometry, compared with each other.
+//!
+//! Both come from the same wheels. The difference of the distance's step and the integrated speed is summed
+//! with exponential forgetting; it exceeds half of the distance driven only if one of them is wrong.
+
+use crate::observation::OdometrySample;
+
+/// Time constant of the sums, in seconds.
+const MEMORY_S: f64 = 1.0;
+/// Minimum summed difference of a fault, in metres: encoder steps and rounded speeds stay below it.
+const LEAST_M: f64 = 0.15;
+/// Minimum summed difference of a fault, as a share of the summed distance. A wrong scale or noise stays below
+/// it; a frozen value has 1, a reversed one 2.
+const SHARE: f64 = 0.5;
+/// Maximum difference that one sample adds where the speed is zero, in metres: a counter that is reset once
+/// is no fault, because the localizer uses the speed instead.
+const MOST_OF_ONE_M: f64 = 0.1;
+/// Duration of an interval in seconds beyond which the speed in between is not known.
+const MOST_S: f64 = 0.5;
+
+/// The sums.
+#[derive(Debug, Clone, Copy, Default)]
+pub struct Contradiction {
+    last: Option<OdometrySample>,
+    difference_m: f64,
+    driven_m: f64,
+    is_faulty: bool,
+}
+
+impl Contradiction {
+    /// Takes in a sample. Returns whether distance and speed contradict each other.
+    pub fn odometry(&mut self, sample: &OdometrySample) -> bool {
+        let Some(last) = self.last.replace(*sample) else {
+            return false;
+        };
+        let duration_s = sample.time_s - last.time_s;
+        if duration_s > MOST_S {
+            return self.is_faulty;
+        }
+        // Forget, then add the newest interval.
+        let kept = (-duration_s / MEMORY_S).exp();
+        let by_speed_m = 0.5 * (last.speed_mps + sample.speed_mps) * duration_s;
+        let by_distance_m = sample.distance_m - last.distance_m;
+        let most_m = MOST_OF_ONE_M + 2.0 * by_speed_m.abs();
+        let difference_m = (by_distance_m - by_speed_m).clamp(-most_m, most_m);
+        self.difference_m = kept * self.difference_m + difference_m;
+        self.driven_m =
+            kept * self.driven_m + by_speed_m.abs().max(by_distance_m.abs().min(most_m));
+        let threshold_m = LEAST_M + SHARE * self.driven_m;
+        // A fault ends at half of the threshold, so that it is reported once.
+        let factor = if self.is_faulty { 0.5 } else { 1.0 };
+        self.is_faulty = self.difference_m.abs() > factor * threshold_m;
+        self.is_faulty
+    }
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    /// Runs 10 s at 50 Hz. Returns the times at which the contradiction begins and ends.
+    fn changes(reading: impl Fn(f64, &mut OdometrySample)) -> Vec<f64> {
+        let (mut monitor, mut changes, mut faulty) = (Contradiction::default(), Vec::new(), false);
+        for number in 0..500 {
+            let time_s = 0.02 * f64::from(number);
+            let mut sample = OdometrySample {
+                time_s,
+                distance_m: 2.0 * time_s,
+                speed_mps: 2.0,
+                yaw_rate_radps: None,
+            };
+            reading(time_s, &mut sample);
+            if monitor.odometry(&sample) != faulty {
+                faulty = !faulty;
+                changes.push(time_s);
+            }
+        }
+        changes
+    }
+
+    #[test]
+    fn frozen_and_reversed_values_are_detected_within_two_seconds() {
+        let during = |time_s: f64| (3.0..6.0).contains(&time_s);
+        let frozen_distance = changes(|time_s, it| {
+            if during(time_s) {
+                it.distance_m = 6.0;
+            }
+        });
+        let frozen_speed = changes(|time_s, it| {
+            if during(time_s) {
+                it.speed_mps = 0.0;
+            }
+        });
+        let reversed = changes(|time_s, it| {
+            if during(time_s) {
+                it.speed_mps = -2.0;
+            }
+        });
+        for found in [frozen_distance, frozen_speed, reversed] {
+            let [begins_s, ends_s] = found[..] else {
+                panic!("{found:?}");
+            };
+            assert!((3.0..5.0).contains(&begins_s), "{begins_s}");
+            assert!((6.0..8.0).contains(&ends_s), "{ends_s}");
+        }
+    }
+
+    #[test]
+    fn a_reset_counter_a_wrong_scale_and_noise_are_no_contradiction() {
+        let reset = |time_s: f64, it: &mut OdometrySample| {
+            if time_s > 5.0 {
+                it.distance_m -= 1e4;
+            }
+        };
+        assert!(changes(reset).is_empty());
+        assert!(changes(|_, it| it.distance_m *= 1.3).is_empty());
+        let noise = |time_s: f64, it: &mut OdometrySample| {
+            it.speed_mps += 0.5 * (37.0 * time_s).sin();
+            it.distance_m = (it.distance_m / 0.05).floor() * 0.05;
+        };
+        assert!(changes(noise).is_empty());
+    }
+}

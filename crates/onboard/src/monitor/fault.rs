@@ -1,0 +1,236 @@
+//! Faults that the monitors identify.
+
+use std::fmt;
+
+use serde::Serialize;
+
+/// Maximum number of simultaneous faults.
+const MAX_FAULTS: usize = 8;
+
+/// A fault of a sensor of the vehicle, or of a radio head's identity.
+#[derive(Debug, Clone, Copy, PartialEq, Eq, Hash, Serialize)]
+#[serde(rename_all = "snake_case", tag = "fault")]
+pub enum Fault {
+    /// The odometry reports no motion, or constant motion, while the angles show another motion.
+    OdometryFrozen,
+    /// The odometry reports motion of the wrong sign.
+    OdometryReversed,
+    /// Distance and speed of the odometry contradict each other.
+    OdometryContradictory,
+    /// A receive channel has no signal.
+    DeadChannel {
+        /// Number of the channel, from 0.
+        channel: u8,
+    },
+    /// The signal of a receive channel has the wrong sign: its phase is off by π.
+    InvertedChannel {
+        /// Number of the channel, from 0.
+        channel: u8,
+    },
+    /// The inputs of two receive channels are exchanged.
+    ExchangedChannels {
+        /// Numbers of the channels, from 0, in increasing order.
+        channels: [u8; 2],
+    },
+    /// Two radio heads send the same PCI.
+    DuplicatePci {
+        /// The PCI.
+        pci: u16,
+    },
+}
+
+/// The part that a fault belongs to.
+#[derive(Debug, Clone, Copy, PartialEq, Eq, Hash, Serialize)]
+#[serde(rename_all = "snake_case")]
+pub enum FaultSource {
+    /// The odometry.
+    Odometry,
+    /// A receive channel, by its number from 0.
+    Channel(u8),
+    /// A radio head, by its PCI.
+    Pci(u16),
+}
+
+impl Fault {
+    /// Name for files and metrics.
+    pub const fn name(self) -> &'static str {
+        match self {
+            Self::OdometryFrozen => "odometry_frozen",
+            Self::OdometryReversed => "odometry_reversed",
+            Self::OdometryContradictory => "odometry_contradictory",
+            Self::DeadChannel { .. } => "dead_channel",
+            Self::InvertedChannel { .. } => "inverted_channel",
+            Self::ExchangedChannels { .. } => "exchanged_channels",
+            Self::DuplicatePci { .. } => "duplicate_pci",
+        }
+    }
+
+    /// The part that it belongs to; of exchanged channels, the first.
+    pub const fn source(self) -> FaultSource {
+        match self {
+            Self::OdometryFrozen | Self::OdometryReversed | Self::OdometryContradictory => {
+                FaultSource::Odometry
+            }
+            Self::DeadChannel { channel } | Self::InvertedChannel { channel } => {
+                FaultSource::Channel(channel)
+            }
+            Self::ExchangedChannels {
+                channels: [channel, _],
+            } => FaultSource::Channel(channel),
+            Self::DuplicatePci { pci } => FaultSource::Pci(pci),
+        }
+    }
+
+    /// Number of the channels, or the PCI, for metrics; empty for the odometry.
+    pub fn subject(self) -> String {
+        match self {
+            Self::ExchangedChannels {
+                channels: [first, second],
+            } => format!("{first}-{second}"),
+            other => match other.source() {
+                FaultSource::Odometry => String::new(),
+                FaultSource::Channel(channel) => channel.to_string(),
+                FaultSource::Pci(pci) => pci.to_string(),
+            },
+        }
+    }
+
+    /// What to do about it.
+    pub const fn what_to_do(self) -> &'static str {
+        match self.source() {
+            FaultSource::Odometry => "stop; check the odometer and the source of the odometry",
+            FaultSource::Channel(_) => {
+                "stop; check the cables from the antennas to the receiver, and samples.stream.antennas"
+            }
+            FaultSource::Pci(_) => {
+                "check the PCIs of the radio heads in the network and in the site"
+            }
+        }
+    }
+}
+
+impl fmt::Display for Fault {
+    fn fmt(&self, f: &mut fmt::Formatter<'_>) -> fmt::Result {
+        match self {
+            Self::OdometryFrozen => {
+                write!(f, "the odometry is frozen: the angles show another motion")
+            }
+            Self::OdometryReversed => write!(f, "the odometry has the wrong sign"),
+            Self::OdometryContradictory => {
+                write!(
+                    f,
+                    "distance and speed of the odometry contradict each other"
+                )
+            }
+            Self::DeadChannel { channel } => write!(f, "receive channel {channel} has no signal"),
+            Self::InvertedChannel { channel } => {
+                write!(f, "receive channel {channel} is inverted")
+            }
+            Self::ExchangedChannels {
+                channels: [first, second],
+            } => write!(f, "receive channels {first} and {second} are exchanged"),
+            Self::DuplicatePci { pci } => write!(f, "two radio heads send PCI {pci}"),
+        }
+    }
+}
+
+/// A fault, and since when it is active.
+#[derive(Debug, Clone, Copy, PartialEq, Serialize)]
+pub struct ActiveFault {
+    /// The fault.
+    #[serde(flatten)]
+    pub fault: Fault,
+    /// Time of its detection in seconds.
+    pub since_s: f64,
+}
+
+/// The active faults, in order of detection.
+#[derive(Debug, Clone, Copy, PartialEq, Default)]
+pub struct ActiveFaults([Option<ActiveFault>; MAX_FAULTS]);
+
+impl ActiveFaults {
+    /// The active faults.
+    pub fn iter(&self) -> impl Iterator<Item = &ActiveFault> {
+        self.0.iter().flatten()
+    }
+
+    /// Whether no fault is active.
+    pub fn is_empty(&self) -> bool {
+        self.iter().next().is_none()
+    }
+
+    /// Whether a fault is active.
+    pub fn contains(&self, fault: Fault) -> bool {
+        self.iter().any(|it| it.fault == fault)
+    }
+
+    /// The first active fault of the odometry.
+    pub fn of_odometry(&self) -> Option<Fault> {
+        let mut faults = self.iter().map(|it| it.fault);
+        faults.find(|it| it.source() == FaultSource::Odometry)
+    }
+
+    /// Whether a fault makes every angle wrong: channels that are inverted or exchanged.
+    pub fn affects_angles(&self) -> bool {
+        self.of_angles().is_some()
+    }
+
+    /// The first active fault that makes every angle wrong.
+    pub fn of_angles(&self) -> Option<Fault> {
+        let mut faults = self.iter().map(|it| it.fault);
+        faults.find(|it| {
+            matches!(
+                it,
+                Fault::InvertedChannel { .. } | Fault::ExchangedChannels { .. }
+            )
+        })
+    }
+
+    /// Adds a fault that was detected at a time (s). A fault beyond the eighth is not kept.
+    pub fn begin(&mut self, fault: Fault, since_s: f64) {
+        if self.contains(fault) {
+            return;
+        }
+        if let Some(free) = self.0.iter_mut().find(|it| it.is_none()) {
+            *free = Some(ActiveFault { fault, since_s });
+        }
+    }
+
+    /// Removes a fault that has ended.
+    pub fn end(&mut self, fault: Fault) {
+        let mut kept = 0;
+        for place in 0..MAX_FAULTS {
+            let active = self.0.get_mut(place).and_then(Option::take);
+            if let Some(active) = active.filter(|it| it.fault != fault)
+                && let Some(slot) = self.0.get_mut(kept)
+            {
+                *slot = Some(active);
+                kept += 1;
+            }
+        }
+    }
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    #[test]
+    fn faults_begin_and_end_once_and_keep_their_order() {
+        let (mut faults, dead) = (ActiveFaults::default(), Fault::DeadChannel { channel: 2 });
+        faults.begin(Fault::OdometryFrozen, 1.0);
+        faults.begin(dead, 2.0);
+        faults.begin(Fault::OdometryFrozen, 3.0);
+        let since: Vec<f64> = faults.iter().map(|it| it.since_s).collect();
+        assert_eq!(since, [1.0, 2.0]);
+        assert_eq!(faults.of_odometry(), Some(Fault::OdometryFrozen));
+        faults.end(Fault::OdometryFrozen);
+        assert_eq!(faults.iter().map(|it| it.fault).collect::<Vec<_>>(), [dead]);
+        faults.end(dead);
+        assert!(faults.is_empty() && faults == ActiveFaults::default());
+        for pci in 0..20 {
+            faults.begin(Fault::DuplicatePci { pci }, 0.0);
+        }
+        assert_eq!(faults.iter().count(), MAX_FAULTS);
+    }
+}

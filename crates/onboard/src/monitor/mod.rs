@@ -1,0 +1,161 @@
+//! Monitors of odometry, receive channels and radio heads: they identify faults that no filter can tolerate.
+//!
+//! [`Onboard`](crate::Onboard) runs them where the vehicle has an integrity monitor. A fault of the odometry makes the
+//! pose unavailable until the odometry agrees with the angles again.
+
+mod channels;
+mod contradiction;
+mod fallback;
+mod fault;
+mod motion;
+
+pub use channels::ChannelMonitor;
+pub use contradiction::Contradiction;
+pub use fallback::Fallback;
+pub use fault::{ActiveFault, ActiveFaults, Fault, FaultSource};
+pub use motion::MotionMonitor;
+
+use crate::geometry::Pose;
+use crate::localize::AngleUpdate;
+use crate::observation::{OdometrySample, SsbObservation};
+use crate::settings::{Site, Vehicle};
+use crate::sight::Sight;
+
+/// A change of the localizer that a fault of the odometry requires.
+#[derive(Debug, Clone, Copy, PartialEq, Eq)]
+pub enum Change {
+    /// The odometry is at fault: follow the angles alone.
+    Begin,
+    /// The odometry is right again.
+    End,
+}
+
+/// All monitors of a vehicle, and the faults that they have identified.
+#[derive(Debug)]
+pub struct Monitors {
+    contradiction: Contradiction,
+    motion: MotionMonitor,
+    channels: ChannelMonitor,
+    distance_m: f64,
+    /// Localization without odometry.
+    pub fallback: Fallback,
+    faults: ActiveFaults,
+    /// Whether the localizer is one without odometry.
+    is_without_odometry: bool,
+}
+
+impl Monitors {
+    /// The monitors of a vehicle at a site with this number of radio heads.
+    pub fn new(site: &Site, vehicle: &Vehicle, heads: usize) -> Self {
+        Self {
+            contradiction: Contradiction::default(),
+            motion: MotionMonitor::new(Sight::new(vehicle), heads),
+            channels: ChannelMonitor::new(vehicle, heads),
+            distance_m: 0.0,
+            fallback: Fallback::new(site, vehicle),
+            faults: ActiveFaults::default(),
+            is_without_odometry: false,
+        }
+    }
+
+    /// The active faults.
+    pub const fn faults(&self) -> &ActiveFaults {
+        &self.faults
+    }
+
+    /// Whether the localizer is one without odometry.
+    pub const fn is_without_odometry(&self) -> bool {
+        self.is_without_odometry
+    }
+
+    /// Starts again with another pose, for all that the odometry did before.
+    pub fn restart(&mut self) {
+        if let Some(fault) = self.faults.of_odometry() {
+            self.faults.end(fault);
+        }
+        self.is_without_odometry = false;
+        self.motion.restart();
+    }
+
+    /// Starts again with another odometry.
+    pub fn forget_odometry(&mut self) {
+        self.contradiction = Contradiction::default();
+        self.motion.forget();
+        self.restart();
+    }
+
+    /// Takes in an odometry sample. Returns the sample for the localizer.
+    pub fn odometry(&mut self, sample: &OdometrySample) -> OdometrySample {
+        if let Some(fault) = self.motion.odometry(sample)
+            && self.faults.of_odometry().is_none()
+        {
+            self.faults.begin(fault, sample.time_s);
+        }
+        self.distance_m = sample.distance_m;
+        if self.contradiction.odometry(sample) {
+            self.faults
+                .begin(Fault::OdometryContradictory, sample.time_s);
+        } else {
+            self.faults.end(Fault::OdometryContradictory);
+        }
+        if self.is_without_odometry {
+            self.fallback.odometry(sample)
+        } else {
+            *sample
+        }
+    }
+
+    /// Whether the burst at a time (s) is to be received, whatever the wake-up policy says.
+    pub fn wants(&self, time_s: f64) -> bool {
+        self.faults.of_odometry().is_some() || self.motion.wants(time_s)
+    }
+
+    /// Notes that the burst at a time (s) is received.
+    pub const fn received(&mut self, time_s: f64) {
+        self.motion.received(time_s);
+    }
+
+    /// Takes in an SSB as the array received it.
+    pub fn ssb(&mut self, observation: &SsbObservation) {
+        let (faults, time_s) = (&mut self.faults, observation.ssb.time_s);
+        (self.channels).ssb(observation, self.distance_m, &mut |fault, begins| {
+            if begins {
+                faults.begin(fault, time_s);
+            } else {
+                faults.end(fault);
+            }
+        });
+    }
+
+    /// Takes in the angles of a burst at a time (s), given the pose at the newer of odometry and burst, `None` while it is
+    /// searched for.
+    pub fn angles(&mut self, time_s: f64, updates: &[AngleUpdate], pose: Option<Pose>) {
+        let found = self.motion.angles(updates, pose);
+        let by_angles = [Fault::OdometryFrozen, Fault::OdometryReversed];
+        match (self.faults.of_odometry(), found) {
+            (None, Some(fault)) => {
+                self.faults.begin(fault, time_s);
+                self.motion.restart();
+            }
+            (Some(fault), _) if by_angles.contains(&fault) && self.motion.is_confirmed(time_s) => {
+                self.faults.end(fault);
+            }
+            _ => {}
+        }
+    }
+
+    /// Returns the change of the localizer that is due.
+    pub fn change(&mut self) -> Option<Change> {
+        let is_faulty = self.faults.of_odometry().is_some();
+        if is_faulty == self.is_without_odometry {
+            return None;
+        }
+        self.is_without_odometry = is_faulty;
+        self.motion.restart();
+        Some(if is_faulty {
+            Change::Begin
+        } else {
+            Change::End
+        })
+    }
+}

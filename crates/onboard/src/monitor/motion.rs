@@ -1,0 +1,380 @@
+//! Motion by the odometry, compared with the angles.
+//!
+//! Each radio head has a reference: the residual of one of its angles, and the pose at that time. A later angle is
+//! predicted from there by the odometry. The residual changes by noise alone if the odometry is right, because
+//! errors of pose, survey and array are the same in both.
+//!
+//! * A stop or reversal beyond the friction of tyres is a fault at once.
+//! * Standstill: the squared change has a χ² distribution. The sum over the radio heads without the largest is
+//!   tested, so that one obstructed radio head raises no alarm.
+//! * Motion: the likelihood of the odometry is compared with that of a standing vehicle and of reversed motion, by a
+//!   cumulative sum for each radio head (Page 1954). The sum over the radio heads without the largest is tested.
+
+use crate::geometry::{Pose, wrap_angle};
+use crate::localize::AngleUpdate;
+use crate::observation::OdometrySample;
+use crate::radio_head::RadioHead;
+use crate::sight::Sight;
+
+use super::fault::Fault;
+
+/// Interval of the bursts that are received at standstill, in seconds: two of them within the time to detect.
+const STANDSTILL_INTERVAL_S: f64 = 0.5;
+/// Maximum speed of a standing vehicle, in m/s.
+const STANDING_MPS: f64 = 0.01;
+/// Maximum motion between two angles at standstill, in metres and radians.
+const STANDING_M: f64 = 0.02;
+const STANDING_RAD: f64 = 0.1;
+/// Standard deviation of an angle in addition to its noise, in radians: scatter that moves while the vehicle stands.
+const STANDING_SIGMA_RAD: f64 = 0.02;
+/// The same on the move, where the multipath changes.
+const MOVING_SIGMA_RAD: f64 = 0.06;
+/// Maximum acceleration by the friction of tyres, in m/s², and minimum change of the speed that is compared with it, in
+/// m/s: a smaller one may be noise, or a small robot whose wheels are commanded in steps.
+const FRICTION_MPS2: f64 = 10.0;
+const SUDDEN_MPS: f64 = 1.0;
+/// Normal quantile of the false-alarm rate of one test at standstill, 1e-6.
+const QUANTILE: f64 = 4.753;
+/// Number of consecutive tests at standstill that must exceed the threshold.
+const CONFIRMATIONS: u32 = 2;
+/// Threshold of the cumulative log-likelihood ratio: false-alarm rate 1e-6 for each excursion from zero (Wald).
+const EVIDENCE: f64 = 13.8;
+/// Maximum of one radio head's sum: with two radio heads, one of them can reach the threshold.
+const MOST_EVIDENCE: f64 = 14.5;
+/// Drift of the sum at each angle: alternatives that fit as well as the odometry gain no evidence.
+const DRIFT: f64 = 0.25;
+/// Squared normalized residual from which on an angle counts as an outlier under a hypothesis.
+const OUTLIER: f64 = 9.0;
+/// Squared normalized difference between the hypotheses, from which on an angle is compared.
+const DISTINCT: f64 = 8.0;
+/// Maximum age of a reference on the move and at standstill, in seconds.
+const MOVING_AGE_S: f64 = 2.0;
+const STANDING_AGE_S: f64 = 30.0;
+/// Time after which a single radio head whose angle jumped gets a new reference, in seconds.
+const JUMPED_S: f64 = 1.0;
+/// Jumps of the only radio head within [`STANDING_AGE_S`] that count as motion.
+const SINGLE_JUMPS: u32 = 3;
+/// Time without an angle that contradicts the odometry, in seconds, and number of angles that confirm it, at the end
+/// of a fault.
+const CONFIRMED_S: f64 = 1.5;
+const CONFIRMED_ANGLES: u32 = 4;
+
+/// One radio head's reference.
+#[derive(Debug, Clone, Copy)]
+struct Reference {
+    head: RadioHead,
+    time_s: f64,
+    pose: Pose,
+    distance_m: f64,
+    yaw_rad: f64,
+    residual_rad: f64,
+    variance: f64,
+    /// Evidence of a standing vehicle and of reversed motion.
+    evidence: [f64; 2],
+    /// When its angle at standstill jumped, in seconds, and how often it did.
+    jumped_s: Option<f64>,
+    jumps: u32,
+    /// Whether the next angle replaces it.
+    is_stale: bool,
+}
+
+/// An angle of a burst, reduced to what is compared.
+#[derive(Debug, Clone, Copy)]
+struct Seen {
+    head: RadioHead,
+    time_s: f64,
+    value_rad: f64,
+    variance: f64,
+    /// Pose at its time by the localizer.
+    pose: Pose,
+    distance_m: f64,
+    yaw_rad: f64,
+}
+
+/// Sums over the radio heads of a burst.
+#[derive(Debug, Default)]
+struct Burst {
+    standing: u32,
+    sum: f64,
+    largest: f64,
+    good: u32,
+    bad: u32,
+    /// Jumps of the radio head that was compared last.
+    jumps: u32,
+}
+
+/// Compares the motion by the odometry with the angles.
+#[derive(Debug)]
+pub struct MotionMonitor {
+    sight: Sight,
+    references: Vec<Reference>,
+    last: Option<OdometrySample>,
+    yaw_rad: f64,
+    standing_since_s: Option<f64>,
+    received_s: f64,
+    suspicions: u32,
+    /// Since when no angle has contradicted the odometry, in seconds, and the angles that confirmed it since.
+    confirmed: (f64, u32),
+}
+
+impl MotionMonitor {
+    /// A monitor for this number of radio heads.
+    pub fn new(sight: Sight, heads: usize) -> Self {
+        Self {
+            sight,
+            references: Vec::with_capacity(heads),
+            last: None,
+            yaw_rad: 0.0,
+            standing_since_s: None,
+            received_s: f64::NEG_INFINITY,
+            suspicions: 0,
+            confirmed: (f64::NEG_INFINITY, 0),
+        }
+    }
+
+    /// Forgets all references, because the pose has changed by something other than motion.
+    pub fn restart(&mut self) {
+        self.references.clear();
+        self.suspicions = 0;
+        self.confirmed = (self.last.map_or(f64::NEG_INFINITY, |it| it.time_s), 0);
+    }
+
+    /// Forgets the odometry, too, because its time or distance starts again.
+    pub fn forget(&mut self) {
+        self.last = None;
+        self.standing_since_s = None;
+        self.received_s = f64::NEG_INFINITY;
+        self.restart();
+    }
+
+    /// Takes in an odometry sample. Returns the fault of a stop or a reversal that no tyre can do.
+    pub fn odometry(&mut self, sample: &OdometrySample) -> Option<Fault> {
+        let last = self.last.replace(*sample).unwrap_or(*sample);
+        let duration_s = sample.time_s - last.time_s;
+        self.yaw_rad += sample.yaw_rate_radps.unwrap_or(0.0) * duration_s;
+        let change_mps = (sample.speed_mps - last.speed_mps).abs();
+        let is_sudden = change_mps >= SUDDEN_MPS && change_mps > FRICTION_MPS2 * duration_s;
+        let fault = if !is_sudden || last.speed_mps.abs() < SUDDEN_MPS {
+            None
+        } else if sample.speed_mps.abs() <= STANDING_MPS {
+            Some(Fault::OdometryFrozen)
+        } else if sample.speed_mps * last.speed_mps < 0.0 {
+            Some(Fault::OdometryReversed)
+        } else {
+            None
+        };
+        let stands = sample.speed_mps.abs() <= STANDING_MPS
+            && (sample.distance_m - last.distance_m).abs() <= STANDING_MPS * duration_s.max(0.02);
+        self.standing_since_s = match self.standing_since_s {
+            _ if !stands => None,
+            None => Some(sample.time_s),
+            since => since,
+        };
+        fault
+    }
+
+    /// Whether the burst at a time (s) is to be received: at standstill now and then, and while a fault is suspected.
+    pub fn wants(&self, time_s: f64) -> bool {
+        let due = |since_s: f64| {
+            self.received_s < since_s || time_s - self.received_s >= STANDSTILL_INTERVAL_S - 1e-5
+        };
+        self.suspicions > 0 || self.standing_since_s.is_some_and(due)
+    }
+
+    /// Notes that the burst at a time (s) is received.
+    pub const fn received(&mut self, time_s: f64) {
+        self.received_s = time_s;
+    }
+
+    /// Compares the angles of a burst with the odometry, given the pose at the newest of odometry and burst; `None`
+    /// while it is not known. Returns the fault that they show.
+    pub fn angles(&mut self, updates: &[AngleUpdate], pose: Option<Pose>) -> Option<Fault> {
+        let last = self.last?;
+        let mut burst = Burst::default();
+        for update in updates.iter().filter(|it| it.measured.resolved) {
+            let measured = &update.measured;
+            if !(measured.phase_rad.is_finite() && measured.phase_sigma_rad.is_finite()) {
+                continue;
+            }
+            // The pose at the time of the angle.
+            let ahead_m = (last.time_s - measured.time_s).max(0.0) * last.speed_mps;
+            let seen = Seen {
+                head: update.head,
+                time_s: measured.time_s,
+                value_rad: measured.phase_rad,
+                variance: measured.phase_sigma_rad.powi(2),
+                pose: pose.unwrap_or_default().along_chord(-ahead_m, 0.0),
+                distance_m: last.distance_m - ahead_m,
+                yaw_rad: self.yaw_rad,
+            };
+            self.compare(&seen, pose.is_some(), &mut burst);
+        }
+        self.judge_odometry(&burst, last.time_s);
+        if burst.bad == 1 {
+            self.forget_jump(last.time_s);
+        }
+        if burst.standing > 0 && Self::is_moving(&burst) {
+            self.suspicions += 1;
+        } else if burst.standing > 0 {
+            self.suspicions = 0;
+        }
+        if self.suspicions >= CONFIRMATIONS {
+            return Some(Fault::OdometryFrozen);
+        }
+        let faults = [Fault::OdometryFrozen, Fault::OdometryReversed];
+        let exceeds = |which: usize| {
+            let evidence = self
+                .references
+                .iter()
+                .filter_map(|it| it.evidence.get(which));
+            let (sum, largest) = evidence.fold((0.0, 0.0_f64), |(sum, largest), it| {
+                (sum + it, largest.max(*it))
+            });
+            sum - largest > EVIDENCE
+        };
+        (0..)
+            .zip(faults)
+            .find_map(|(which, fault)| exceeds(which).then_some(fault))
+    }
+
+    /// Whether the odometry has agreed with the angles long enough that its fault has ended.
+    pub fn is_confirmed(&self, time_s: f64) -> bool {
+        let (since_s, angles) = self.confirmed;
+        time_s - since_s >= CONFIRMED_S && angles >= CONFIRMED_ANGLES
+    }
+
+    /// Compares an angle with its radio head's reference, which is replaced once it has served.
+    fn compare(&mut self, seen: &Seen, has_pose: bool, burst: &mut Burst) {
+        let sends = |it: &Reference| it.head.sends(seen.head.pci, seen.head.ssb_index);
+        let Some(place) = self.references.iter().position(sends) else {
+            if self.references.len() < self.references.capacity() {
+                let reference = self.reference(seen);
+                self.references.push(reference);
+            }
+            return;
+        };
+        let Some(reference) = self.references.get(place).copied() else {
+            return;
+        };
+        let moved_m = seen.distance_m - reference.distance_m;
+        let turned_rad = match self.last.and_then(|it| it.yaw_rate_radps) {
+            Some(_) => seen.yaw_rad - reference.yaw_rad,
+            None => wrap_angle(seen.pose.heading_rad - reference.pose.heading_rad),
+        };
+        let age_s = seen.time_s - reference.time_s;
+        let stands = moved_m.abs() <= STANDING_M && turned_rad.abs() <= STANDING_RAD;
+        let change_rad = |share: f64, turn_rad: f64| {
+            let pose = reference.pose.along_chord(share * moved_m, turn_rad);
+            let residual_rad = self.sight.residual_rad(pose, &seen.head, seen.value_rad);
+            wrap_angle(residual_rad - reference.residual_rad)
+        };
+        let mut next = reference;
+        let mut has_served = false;
+        if reference.is_stale {
+            has_served = true;
+        } else if stands && self.standing_since_s.is_some() {
+            let variance = seen.variance + reference.variance + 2.0 * STANDING_SIGMA_RAD.powi(2);
+            let squared = change_rad(1.0, turned_rad).powi(2) / variance;
+            burst.standing += 1;
+            burst.sum += squared;
+            burst.largest = burst.largest.max(squared);
+            if squared < OUTLIER {
+                burst.good += 1;
+                next.jumped_s = None;
+            } else {
+                burst.bad += 1;
+                next.jumped_s.get_or_insert(seen.time_s);
+            }
+            burst.jumps = next.jumps;
+            next.evidence = [0.0; 2];
+            if age_s > STANDING_AGE_S {
+                (has_served, next.jumps) = (true, 0);
+            }
+        } else if has_pose {
+            let variance = seen.variance + reference.variance + 2.0 * MOVING_SIGMA_RAD.powi(2);
+            let expected_rad = change_rad(1.0, turned_rad);
+            let others_rad = [change_rad(0.0, 0.0), change_rad(-1.0, turned_rad)];
+            let apart = others_rad.map(|it| wrap_angle(it - expected_rad).powi(2) / variance);
+            let is_distinct = apart.iter().any(|it| *it >= DISTINCT);
+            has_served = is_distinct || age_s > MOVING_AGE_S;
+            if has_served {
+                let squared = expected_rad.powi(2) / variance;
+                for (evidence, other_rad) in next.evidence.iter_mut().zip(others_rad) {
+                    let other = other_rad.powi(2) / variance;
+                    let ratio = 0.5 * (squared.min(OUTLIER) - other.min(OUTLIER));
+                    *evidence = (*evidence + ratio - DRIFT).clamp(0.0, MOST_EVIDENCE);
+                }
+                if squared >= OUTLIER {
+                    burst.bad += 1;
+                } else if is_distinct {
+                    burst.good += 1;
+                }
+            }
+        } else {
+            has_served = true;
+        }
+        if has_served {
+            next = Reference {
+                evidence: next.evidence,
+                jumps: if stands { next.jumps } else { 0 },
+                ..self.reference(seen)
+            };
+        }
+        if let Some(slot) = self.references.get_mut(place) {
+            *slot = next;
+        }
+    }
+
+    fn reference(&self, seen: &Seen) -> Reference {
+        Reference {
+            head: seen.head,
+            time_s: seen.time_s,
+            pose: seen.pose,
+            distance_m: seen.distance_m,
+            yaw_rad: seen.yaw_rad,
+            residual_rad: self
+                .sight
+                .residual_rad(seen.pose, &seen.head, seen.value_rad),
+            variance: seen.variance,
+            evidence: [0.0; 2],
+            jumped_s: None,
+            jumps: 0,
+            is_stale: false,
+        }
+    }
+
+    /// Removes the reference of the only radio head whose angle at standstill has jumped for long: it is obstructed.
+    fn forget_jump(&mut self, now_s: f64) {
+        let has_jumped =
+            |it: &&mut Reference| it.jumped_s.is_some_and(|at_s| now_s - at_s > JUMPED_S);
+        if let Some(reference) = self.references.iter_mut().find(has_jumped) {
+            reference.jumps += 1;
+            reference.is_stale = true;
+        }
+    }
+
+    /// Whether the angles of a burst show motion while the odometry stands.
+    fn is_moving(burst: &Burst) -> bool {
+        if burst.standing > 1 {
+            return burst.sum - burst.largest > chi_squared(f64::from(burst.standing - 1));
+        }
+        // The only radio head may be obstructed: under motion its angle jumps again and again.
+        burst.sum > chi_squared(1.0) && burst.jumps >= SINGLE_JUMPS
+    }
+
+    /// Notes whether the angles of a burst contradict or confirm the odometry.
+    fn judge_odometry(&mut self, burst: &Burst, now_s: f64) {
+        let is_wrong = burst.bad > 1 || (burst.bad == 1 && burst.good == 0);
+        if is_wrong {
+            self.confirmed = (now_s, 0);
+        } else {
+            self.confirmed.1 += burst.good;
+        }
+    }
+}
+
+/// Quantile of the χ² distribution at the false-alarm rate of one test (Wilson and Hilferty 1931).
+fn chi_squared(freedom: f64) -> f64 {
+    let share = 2.0 / (9.0 * freedom);
+    freedom * (1.0 - share + QUANTILE * share.sqrt()).powi(3)
+}

@@ -1,0 +1,181 @@
+//! Faults that the monitors identify, on simulated runs.
+
+use onboard::localize::IntegrityState;
+use onboard::monitor::Fault;
+use simulate::scenario::{FaultKind, FaultSettings, Scenario};
+use simulate::{RunRecord, Step};
+
+use crate::common::{drives, shipped};
+
+const FROM_S: f64 = 20.0;
+const UNTIL_S: f64 = 30.0;
+
+/// The yard with a fault.
+fn with(what: FaultKind) -> Scenario {
+    let fault = FaultSettings {
+        from_s: FROM_S,
+        until_s: UNTIL_S,
+        what,
+    };
+    Scenario {
+        faults: vec![fault],
+        ..shipped("yard")
+    }
+}
+
+fn is_ok(step: &Step) -> bool {
+    (step.integrity).is_some_and(|it| it.state == IntegrityState::Ok)
+}
+
+fn is_beyond(step: &Step) -> bool {
+    let level_m = step.integrity.map(|it| it.protection_level_m);
+    is_ok(step) && level_m.is_some_and(|level_m| step.error_m() > level_m)
+}
+
+/// Steps with a fault, before and during the simulated one.
+fn faulty(run: &RunRecord) -> [Vec<&Step>; 2] {
+    let is_faulty = |it: &&Step| !it.faults.is_empty() && it.time_s < UNTIL_S;
+    let (before, during) = run
+        .steps
+        .iter()
+        .filter(is_faulty)
+        .partition(|it| it.time_s < FROM_S);
+    [before, during]
+}
+
+#[test]
+fn faults_of_the_odometry_are_detected_within_two_seconds_and_end() {
+    for (what, expected) in [
+        (FaultKind::OdometerStopped, Fault::OdometryFrozen),
+        (FaultKind::OdometerFrozen, Fault::OdometryContradictory),
+        (FaultKind::OdometerReversed, Fault::OdometryReversed),
+    ] {
+        for run in drives(&with(what), 5, 1) {
+            let [before, during] = faulty(&run);
+            assert!(before.is_empty(), "{what:?}");
+            let first = during.first().unwrap();
+            assert!(first.time_s <= FROM_S + 2.0, "{what:?}: {}", first.time_s);
+            assert!(
+                first.faults.contains(expected),
+                "{what:?}: {:?}",
+                first.faults
+            );
+            let near = run
+                .steps
+                .iter()
+                .filter(|it| (FROM_S..UNTIL_S + 10.0).contains(&it.time_s));
+            let beyond = near.clone().filter(|it| is_beyond(it)).count();
+            assert!(
+                beyond <= 50,
+                "{what:?}: ok beyond the level at {beyond} SSBs of 20 ms"
+            );
+            assert!(near.filter(|it| !it.faults.is_empty()).all(|it| !is_ok(it)));
+            // The pose is found again, and its level covers the error.
+            let after = |it: &&Step| it.time_s > UNTIL_S + 5.0 && it.time_s < UNTIL_S + 15.0;
+            for step in run.steps.iter().filter(after) {
+                assert!(step.faults.is_empty(), "{what:?}: {:?}", step.faults);
+                let level_m = step.integrity.unwrap().protection_level_m;
+                assert!(step.error_m() < level_m, "{what:?} at {}", step.time_s);
+            }
+        }
+    }
+}
+
+/// A vehicle that departs while its odometry says that it stands: no sample shows it.
+#[test]
+fn a_departure_that_the_odometry_misses_is_detected_by_the_angles() {
+    // At 42.3 s the yard's vehicle has stopped for 8 s.
+    let nominal = drives(&shipped("yard"), 5, 1).remove(0);
+    let moves = |pair: &[Step]| pair[0].truth.point().distance_m(pair[1].truth.point()) > 0.0;
+    let stop = nominal
+        .steps
+        .windows(2)
+        .skip(500)
+        .position(|pair| !moves(pair))
+        .unwrap()
+        + 500;
+    let leaves = nominal.steps.windows(2).skip(stop).position(moves).unwrap() + stop;
+    let leaves_s = nominal.steps[leaves].time_s;
+    let fault = FaultSettings {
+        from_s: leaves_s - 4.0,
+        until_s: leaves_s + 15.0,
+        what: FaultKind::OdometerStopped,
+    };
+    let scenario = Scenario {
+        faults: vec![fault],
+        ..shipped("yard")
+    };
+    for run in drives(&scenario, 5, 1) {
+        let first = run.steps.iter().find(|it| !it.faults.is_empty()).unwrap();
+        assert!(
+            first.faults.contains(Fault::OdometryFrozen),
+            "{:?}",
+            first.faults
+        );
+        // It accelerates with 0.5 m/s², at 50 m and more from the radio heads.
+        let moved_m = nominal.steps[leaves]
+            .truth
+            .point()
+            .distance_m(first.truth.point());
+        assert!(
+            first.time_s > leaves_s && moved_m < 15.0,
+            "{} {moved_m}",
+            first.time_s
+        );
+        let beyond = run
+            .steps
+            .iter()
+            .filter(|it| it.time_s > first.time_s && is_beyond(it));
+        assert_eq!(beyond.count(), 0);
+    }
+}
+
+#[test]
+fn faults_of_the_channels_are_detected_within_twenty_ssbs() {
+    for (what, expected) in [
+        (
+            FaultKind::DeadAntenna { antenna: 2 },
+            Fault::DeadChannel { channel: 2 },
+        ),
+        (
+            FaultKind::InvertedAntenna { antenna: 1 },
+            Fault::InvertedChannel { channel: 1 },
+        ),
+        (
+            FaultKind::ExchangedAntennas { antennas: [1, 2] },
+            Fault::ExchangedChannels { channels: [1, 2] },
+        ),
+    ] {
+        for run in drives(&with(what), 6, 1) {
+            let [before, during] = faulty(&run);
+            assert!(before.is_empty(), "{what:?}");
+            let first = during.first().unwrap();
+            assert!(
+                first.faults.contains(expected),
+                "{what:?}: {:?}",
+                first.faults
+            );
+            let times = run.executions.iter().map(|it| it.ssb.time_s);
+            let ssbs = times
+                .filter(|it| (FROM_S..first.time_s).contains(it))
+                .count();
+            assert!(ssbs <= 20, "{what:?}: {ssbs}");
+            let ended = run
+                .steps
+                .iter()
+                .find(|it| it.time_s > UNTIL_S && it.faults.is_empty());
+            assert!(ended.unwrap().time_s < UNTIL_S + 10.0, "{what:?}");
+        }
+    }
+}
+
+#[test]
+fn nominal_runs_have_no_fault() {
+    for run in drives(&shipped("yard"), 77, 3) {
+        assert!(
+            run.steps.iter().all(|it| it.faults.is_empty()),
+            "{}",
+            run.run
+        );
+    }
+}
