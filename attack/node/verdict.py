@@ -160,18 +160,22 @@ def _report(run: Recorded, since_s: float) -> tuple[float | None, str]:
 def _localized_above_limit_s(run: Recorded) -> float:
     """Time for which MQTT said `localized: true` above the alert limit (s).
 
-    A message above the limit counts by its protection level, and by its position's true error
-    where the message stands for more than `WRONG_OK_S`.
+    A message counts by its protection level; by the true error of its position it counts only
+    beyond `WRONG_OK_S` in total, which is the time that a fault may stay unknown.
     """
     messages = [it for it in run.arrivals if it.output == "mqtt"]
-    total_s = 0.0
+    total_s, wrong_s = 0.0, 0.0
     for index, (at_s, _, content) in enumerate(messages):
         if not content.get("localized"):
             continue
         next_s = messages[index + 1].at_s if index + 1 < len(messages) else run.ended_s
+        stands_s = min(next_s - at_s, STANDS_S)
+        truth = run.motion.pose(at_s - run.epoch_s)
         if content.get("deviationRange", 0.0) > ALERT_LIMIT_M:
-            total_s += min(next_s - at_s, STANDS_S)
-    return total_s
+            total_s += stands_s
+        elif math.hypot(content["x"] - truth.x_m, content["y"] - truth.y_m) > ALERT_LIMIT_M:
+            wrong_s += stands_s
+    return total_s + max(0.0, wrong_s - WRONG_OK_S)
 
 
 def judge(run: Recorded) -> Verdict:
