@@ -153,7 +153,8 @@ rate_hz = {1.0 / MQTT_PERIOD_S}
             epoch_s=epoch_s,
             window=self.window,
             ended_s=ended_s,
-            arrivals=self.recorder.arrivals,
+            # The end of the process is not part of the run.
+            arrivals=[it for it in self.recorder.arrivals if it.at_s <= ended_s],
             exits=self.node.unexpected_exits,
             is_hung=self.node.is_hung,
             resources=resources,

@@ -142,7 +142,7 @@ rate_hz = {1.0 / MQTT_PERIOD_S}
         epoch_s=epoch_s,
         window=window,
         ended_s=ended_s,
-        arrivals=recorder.arrivals,
+        arrivals=[it for it in recorder.arrivals if it.at_s <= ended_s],
         exits=node.unexpected_exits,
         is_hung=node.is_hung,
         resources=resources,

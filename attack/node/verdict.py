@@ -115,6 +115,21 @@ def _gap_s(times_s: list[float], begin_s: float, end_s: float) -> float:
     return max(b - a for a, b in pairwise(within))
 
 
+def _localized_gap_s(run: Recorded, begin_s: float, end_s: float) -> float:
+    """Longest time for which the last MQTT message said `localized: true` (s).
+
+    A vehicle that is not localized stands still, so that further messages are not needed.
+    """
+    messages = [(it.at_s, it.content) for it in run.arrivals if it.output == "mqtt"]
+    ends_s = [at_s for at_s, _ in messages[1:]] + [end_s]
+    gaps_s = [
+        min(until_s, end_s) - max(at_s, begin_s)
+        for (at_s, content), until_s in zip(messages, ends_s, strict=True)
+        if content.get("localized")
+    ]
+    return max([*gaps_s, 0.0]) if messages else end_s - begin_s
+
+
 def _texts(item: Arrival) -> list[tuple[str, bool]]:
     """Texts by which an item may report a fault, and whether each is an event."""
     content = item.content
@@ -279,12 +294,11 @@ def _judge_outputs(run: Recorded, verdict: Verdict, begin_s: float) -> None:
         # A playback has no MQTT output.
         if fault.sink == name or (name == "mqtt" and fault.samples is not None):
             continue
-        times_s = [it.at_s for it in run.arrivals if it.output == name]
-        gap_s = _gap_s(times_s, from_s, until_s)
         if name == "json":
-            verdict.json_gap_s = gap_s
+            times_s = [it.at_s for it in run.arrivals if it.output == name]
+            verdict.json_gap_s = gap_s = _gap_s(times_s, from_s, until_s)
         else:
-            verdict.mqtt_gap_s = gap_s
+            verdict.mqtt_gap_s = gap_s = _localized_gap_s(run, from_s, until_s)
         has_odometry = not re.search("absent|stuck|back|ahead|milli|closed 10|NaN", fault.name)
         limit_s = GAP_S if has_odometry else 2.0
         if gap_s > limit_s + TOLERANCE_S:
