@@ -7,11 +7,13 @@ use std::time::{Duration, Instant};
 
 use num_complex::Complex32;
 use onboard::live::{LiveError, Outcome, Status, StreamConfig};
+use onboard::localize::UpdateReason;
 use onboard::monitor::ActiveFaults;
 use onboard::observation::{MAX_ELEMENTS, OdometrySample};
 use onboard::settings::{Platform, Site, Vehicle};
 use onboard::{Custom, Live, OdometryDefect};
 
+use crate::angle_watch::AngleWatch;
 use crate::clock::DriveClock;
 use crate::events::{Collapse, Report};
 use crate::gate::{Gate, Windows};
@@ -85,6 +87,7 @@ pub struct Engine {
     faults: ActiveFaults,
     /// Silent sources that were named.
     silent: Vec<&'static str>,
+    angle_watch: AngleWatch,
     watchdog: Watchdog,
     began: Instant,
     /// Repeated events.
@@ -123,6 +126,7 @@ impl Engine {
             last_status_s: f64::NEG_INFINITY,
             faults: ActiveFaults::default(),
             silent: Vec::new(),
+            angle_watch: AngleWatch::default(),
             watchdog: Watchdog::from_environment(),
             began: Instant::now(),
             repeated: Collapse::default(),
@@ -174,6 +178,7 @@ impl Engine {
             }
             Input::Odometry(sample) => self.odometry(&sample, Some(came))?,
             Input::Angle(angle) => {
+                self.angle_watch.came(came);
                 self.clock.see(angle.time_s);
                 if let Err(error) = self.live.angle(&angle) {
                     self.refused("angles", &error);
@@ -411,6 +416,12 @@ impl Engine {
                 }
             }
             self.records.put(Record::Verdict(outcome));
+            let ssb = &outcome.execution.ssb;
+            if outcome.execution.verdict.reason == UpdateReason::UnknownRadioHead
+                && let Some(text) = self.angle_watch.unknown(ssb.pci, ssb.ssb_index)
+            {
+                self.event(Level::Warn, "angles", text);
+            }
             last = Some(outcome);
         }
         if let Some(last) = last {
@@ -454,6 +465,9 @@ impl Engine {
                 self.silent.retain(|it| *it != source.name);
                 self.event(Level::Info, source.name, "is there again".to_owned());
             }
+        }
+        if let Some((level, text)) = self.angle_watch.change(Instant::now()) {
+            self.event(level, "angles", text);
         }
     }
 

@@ -11,6 +11,7 @@
 //! with hostile input.
 
 pub mod address;
+mod angle_watch;
 pub mod clock;
 pub mod engine;
 pub mod events;
