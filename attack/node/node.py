@@ -3,7 +3,6 @@
 from __future__ import annotations
 
 import contextlib
-import functools
 import os
 import shutil
 import signal
@@ -155,13 +154,6 @@ class Client:
         if self.peer is not None:
             self.peer.close()
             self.peer = None
-
-
-@functools.cache
-def keeps_state() -> bool:
-    """Whether the program has the setting `state_file`."""
-    command = [*main_program(), "schema"]
-    return b'"state_file"' in subprocess.run(command, capture_output=True, check=True).stdout
 
 
 def main_program() -> list[str]:

@@ -15,7 +15,7 @@ import numpy as np
 from attack.node import environment, odometry, transmitter
 from attack.node.fault import Context, Fault, Window
 from attack.node.message import Message, merged
-from attack.node.node import Client, Node, Resources, free_port, keeps_state, main_program
+from attack.node.node import Client, Node, Resources, free_port, main_program
 from attack.node.recorder import Arrival, Recorder
 
 if TYPE_CHECKING:
@@ -105,8 +105,8 @@ class Run:
             os.mkfifo(json_address)
         settings = f"""\
 name = "campaign"
-{f'state_file = "{self.folder}/state.json"' if keeps_state() else ""}
 messages = ["tcp-listen://127.0.0.1:{self.ports["messages"]}"]
+state_file = "{self.folder}/state.json"
 page.listen = "127.0.0.1:{self.ports["page"]}"
 [output]
 {f'tum = "{disk}/poses.tum"' if "tum" in outputs else ""}
