@@ -68,10 +68,9 @@ def break_site(run: Run) -> None:
     run.node.signal(signal.SIGHUP)
 
 
-def repair_site(run: Run) -> None:
-    """Restores the site file, and asks the node to read it."""
+def restore_site(run: Run) -> None:
+    """Restores the site file."""
     (run.folder / "site.good").rename(run.folder / "site.toml")
-    run.node.signal(signal.SIGHUP)
 
 
 def reconnect(run: Run) -> None:

@@ -2,6 +2,8 @@
 
 from __future__ import annotations
 
+import signal
+
 from attack.node import actions, changes, resume, samples
 from attack.node.fault import Fault
 
@@ -160,9 +162,15 @@ FAULTS = (
         "site|period",
         lasts_s=3.0,
         begin=actions.break_site,
-        end=actions.repair_site,
+        end=actions.restore_site,
         by_event=True,
         harmless=True,
+    ),
+    Fault(
+        "SIGHUP with valid files",
+        "again|reload",
+        begin=lambda run: run.node.signal(signal.SIGHUP),
+        reported=False,
     ),
     # Outputs.
     Fault(

@@ -179,6 +179,11 @@ impl Engine {
             Input::Odometry(sample) => self.odometry(&sample, Some(came))?,
             Input::Angle(angle) => {
                 self.angle_watch.came(came);
+                let (pci, ssb_index) = (angle.pci, angle.ssb_index);
+                let mut heads = self.setup.site.radio_heads.iter();
+                if !heads.any(|it| (it.pci, it.ssb_index) == (pci, ssb_index)) {
+                    self.report_unknown(pci, ssb_index);
+                }
                 self.clock.see(angle.time_s);
                 if let Err(error) = self.live.angle(&angle) {
                     self.refused("angles", &error);
@@ -417,10 +422,8 @@ impl Engine {
             }
             self.records.put(Record::Verdict(outcome));
             let ssb = &outcome.execution.ssb;
-            if outcome.execution.verdict.reason == UpdateReason::UnknownRadioHead
-                && let Some(text) = self.angle_watch.unknown(ssb.pci, ssb.ssb_index)
-            {
-                self.event(Level::Warn, "angles", text);
+            if outcome.execution.verdict.reason == UpdateReason::UnknownRadioHead {
+                self.report_unknown(ssb.pci, ssb.ssb_index);
             }
             last = Some(outcome);
         }
@@ -443,6 +446,13 @@ impl Engine {
         for ended in before.iter().filter(|it| !status.faults.contains(it.fault)) {
             let text = format!("fault {} has ended", ended.fault.name());
             self.event(Level::Info, "monitor", text);
+        }
+    }
+
+    /// Reports a radio head that the site does not have, once.
+    fn report_unknown(&mut self, pci: u16, ssb_index: u8) {
+        if let Some(text) = self.angle_watch.unknown(pci, ssb_index) {
+            self.event(Level::Warn, "angles", text);
         }
     }
 
