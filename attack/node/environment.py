@@ -112,7 +112,7 @@ class Motion:
             times_s += [end_s, end_s + speed_mps / ACCELERATION_MPS2]
             speeds_mps += [speed_mps, 0.0, 0.0, speed_mps]
         return cls(
-            start_m=random.uniform(5.0, 30.0),
+            start_m=random.uniform(25.0, 40.0),
             times_s=tuple(times_s),
             speeds_mps=tuple(speeds_mps),
             offset_m=random.uniform(0.02, 0.1),

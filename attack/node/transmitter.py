@@ -13,7 +13,7 @@ if TYPE_CHECKING:
     from attack.node.environment import Motion
 
 # Standard deviation of the electrical angle, as stated in each message (rad).
-SIGMA_RAD = 0.03
+SIGMA_RAD = 0.02
 SNR_DB = 20.0
 # Time between SSBs of neighbouring index (s).
 SSB_SPACING_S = 3e-4
