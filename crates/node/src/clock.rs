@@ -165,27 +165,52 @@ impl ArrivalClock {
     }
 }
 
-/// The drive's time: that of the newest that came in, and what has passed since.
+/// Maximum time by which samples or angles may be ahead of the odometry's clock to move the drive's time, in seconds.
+const MAX_AHEAD_S: f64 = 1.0;
+
+/// Time of the drive: that of the newest input, plus the time since its arrival. The odometry's clock leads.
 #[derive(Debug, Clone, Copy, Default)]
-pub struct DriveClock(Option<(f64, Instant)>);
+pub struct DriveClock {
+    newest: Option<(f64, Instant)>,
+    is_of_odometry: bool,
+}
 
 impl DriveClock {
-    /// Something of this time came in.
+    /// Samples or angles of this time came in.
     pub fn see(&mut self, time_s: f64) {
-        if self.0.is_none_or(|(newest_s, _)| time_s > newest_s) {
-            self.0 = Some((time_s, Instant::now()));
+        let is_ahead = |now_s: f64| time_s > now_s + MAX_AHEAD_S;
+        if !(self.is_of_odometry && self.now_s().is_some_and(is_ahead)) {
+            self.move_to(time_s);
         }
     }
 
-    /// What time it is; `None` before anything came in.
+    /// Odometry of this time came in.
+    pub fn see_odometry(&mut self, time_s: f64) {
+        if !self.is_of_odometry {
+            *self = Self {
+                newest: None,
+                is_of_odometry: true,
+            };
+        }
+        self.move_to(time_s);
+    }
+
+    /// Moves on to a time, whatever it is of.
+    pub fn move_to(&mut self, time_s: f64) {
+        if self.newest.is_none_or(|(newest_s, _)| time_s > newest_s) {
+            self.newest = Some((time_s, Instant::now()));
+        }
+    }
+
+    /// Time now in seconds; `None` before any input.
     pub fn now_s(&self) -> Option<f64> {
-        self.0
+        self.newest
             .map(|(time_s, at)| time_s + at.elapsed().as_secs_f64())
     }
 
-    /// Begins anew.
-    pub const fn reset(&mut self) {
-        self.0 = None;
+    /// Forgets the time, as after a step of the odometry's clock.
+    pub fn reset(&mut self) {
+        *self = Self::default();
     }
 }
 
@@ -292,5 +317,21 @@ mod tests {
             Finding::Missing(_) => None,
         });
         assert!((named.unwrap() - 1.0).abs() < 0.05, "{found:?}");
+    }
+
+    #[test]
+    fn the_odometry_leads_the_time_of_the_drive() {
+        let mut clock = DriveClock::default();
+        let near = |clock: &DriveClock, time_s: f64| (clock.now_s().unwrap() - time_s).abs() < 0.5;
+        clock.see(100.0);
+        clock.see_odometry(40.0);
+        assert!(near(&clock, 40.0));
+        clock.see(100.0);
+        assert!(near(&clock, 40.0));
+        clock.see(40.8);
+        assert!(near(&clock, 40.8));
+        clock.reset();
+        clock.see_odometry(3.0);
+        assert!(near(&clock, 3.0));
     }
 }

@@ -6,12 +6,12 @@ use std::sync::atomic::{AtomicBool, Ordering};
 use std::time::{Duration, Instant};
 
 use num_complex::Complex32;
-use onboard::live::{LiveError, Outcome, Status, StreamConfig};
+use onboard::live::{LiveError, Outcome, SavedState, Status, StreamConfig, TimeCheck};
 use onboard::localize::UpdateReason;
 use onboard::monitor::ActiveFaults;
 use onboard::observation::{MAX_ELEMENTS, OdometrySample};
 use onboard::settings::{Platform, Site, Vehicle};
-use onboard::{Custom, Live, OdometryDefect};
+use onboard::{Custom, Live};
 
 use crate::angle_watch::AngleWatch;
 use crate::clock::DriveClock;
@@ -21,14 +21,15 @@ use crate::health::failures_text;
 use crate::inbox::{Block, Command, Inbox, Input, Level};
 use crate::interruption::Interruptions;
 use crate::sink::{By, Distributor, PoseRecord, Record};
+use crate::state::{self, StateStore};
 use crate::statistics::{Punctuality, SourceHealth};
 use crate::supervisor::{self, Watchdog};
 use crate::web::Board;
 
 /// The engine looks at the time this often, whatever comes.
 pub(crate) const TICK: Duration = Duration::from_millis(50);
-/// Odometry so much earlier than the last is of a drive that began anew.
-const RESTART_S: f64 = 1.0;
+/// Time between two saved states.
+const SAVE_EVERY: Duration = Duration::from_secs(1);
 /// Status and diagnoses come once a second (REP-107).
 const STATUS_S: f64 = 1.0;
 /// Arrivals of blocks remembered, to tell when an SSB's last sample came.
@@ -47,6 +48,13 @@ pub struct Setup {
 }
 
 impl Setup {
+    /// Whether site, vehicle and platform are equal.
+    fn is_of_same_files(&self, other: &Self) -> bool {
+        self.site == other.site
+            && self.vehicle == other.vehicle
+            && self.platform == other.platform
+    }
+
     /// The pipeline at the start of a drive.
     ///
     /// # Errors
@@ -60,6 +68,25 @@ impl Setup {
         } = self;
         Live::new(site, vehicle, platform, None, *stream, Custom::default())
     }
+}
+
+/// Loads site, vehicle and platform again.
+pub type Load = Box<dyn Fn() -> anyhow::Result<Setup> + Send>;
+
+/// A request to load site and vehicle again, as by SIGHUP.
+pub struct Reload {
+    /// Set when it is requested.
+    pub requested: Arc<AtomicBool>,
+    /// Loads them.
+    pub load: Load,
+}
+
+/// State that was saved before the start.
+struct Earlier {
+    state: SavedState,
+    /// Its age when it was read, in seconds.
+    age_s: f64,
+    read: Instant,
 }
 
 /// The pipeline and everything around it that does not care where its input comes from.
@@ -92,6 +119,16 @@ pub struct Engine {
     began: Instant,
     /// Repeated events.
     repeated: Collapse,
+    /// Origin of the arrival times, where inputs arrive as they were measured.
+    arrivals_from: Option<Instant>,
+    sources: Vec<Arc<SourceHealth>>,
+    /// Whether it was reported that the clocks of angles and odometry differ.
+    clocks_differ: bool,
+    newest_odometry: Option<OdometrySample>,
+    earlier: Option<Earlier>,
+    store: Option<Arc<StateStore>>,
+    saved: Instant,
+    reload: Option<Reload>,
 }
 
 impl Engine {
@@ -130,7 +167,67 @@ impl Engine {
             watchdog: Watchdog::from_environment(),
             began: Instant::now(),
             repeated: Collapse::default(),
+            arrivals_from: None,
+            sources: Vec::new(),
+            clocks_differ: false,
+            newest_odometry: None,
+            earlier: None,
+            store: None,
+            saved: Instant::now(),
+            reload: None,
         })
+    }
+
+    /// Validates time stamps against the arrival of inputs from now on, which arrive as they were measured.
+    pub fn validate_arrivals(&mut self) {
+        self.arrivals_from = Some(Instant::now());
+    }
+
+    /// Loads site and vehicle again on request.
+    pub fn reload_by(&mut self, reload: Reload) {
+        self.reload = Some(reload);
+    }
+
+    /// Saves the state once a second, and resumes the one that was `read` from the file at the first odometry: a state
+    /// with its age in seconds, nothing at the first start, or why the file cannot be used.
+    ///
+    /// # Errors
+    /// [`LiveError::Custom`].
+    pub fn keep_state(
+        &mut self,
+        store: Arc<StateStore>,
+        read: Result<Option<(SavedState, f64)>, String>,
+    ) -> Result<(), LiveError> {
+        self.store = Some(store);
+        match read {
+            Ok(None) => {
+                let text = "no state file yet: this is the first start".to_owned();
+                self.event(Level::Info, "state", text);
+            }
+            Ok(Some((state, age_s))) => {
+                let read = Instant::now();
+                self.earlier = Some(Earlier { state, age_s, read });
+            }
+            Err(why) => {
+                let text = format!("ignored: {why}");
+                self.event(Level::Warn, "state", text);
+                self.search()?;
+            }
+        }
+        Ok(())
+    }
+
+    /// Searches for the pose, if the vehicle can be found: the configured start pose is that of the first start only.
+    fn search(&mut self) -> Result<(), LiveError> {
+        let text = match self.live.reset() {
+            Ok(()) => "the pose is searched for".to_owned(),
+            Err(LiveError::Settings(_)) => {
+                "the vehicle cannot be found by a search: it starts at the configured pose".to_owned()
+            }
+            Err(error) => return Err(error),
+        };
+        self.event(Level::Info, "state", text);
+        Ok(())
     }
 
     /// The pipeline itself.
@@ -149,6 +246,7 @@ impl Engine {
         silent_after: Duration,
         stop: &AtomicBool,
     ) -> Result<(), LiveError> {
+        self.sources = sources.to_vec();
         while !stop.load(Ordering::Acquire) {
             match inbox.take(TICK) {
                 Some((_, Input::End)) => break,
@@ -156,14 +254,23 @@ impl Engine {
                 None => {}
             }
             self.watch(sources, silent_after);
+            self.reload_if_requested()?;
             self.tick()?;
         }
         self.receive(true)?;
         self.live.settle()?;
-        self.publish_heard(None)
+        self.publish_heard(None)?;
+        self.save()
+    }
+
+    /// Time of arrival for the validation of time stamps, in seconds.
+    fn arrival_s(&self, came: Option<Instant>) -> Option<f64> {
+        let from = self.arrivals_from?;
+        Some(came?.saturating_duration_since(from).as_secs_f64())
     }
 
     fn take(&mut self, came: Instant, input: Input, inbox: &Inbox) -> Result<(), LiveError> {
+        self.live.set_arrival(self.arrival_s(Some(came)));
         match input {
             Input::Samples(block) => self.samples(block, came, inbox)?,
             Input::Slept(until_s) => {
@@ -184,10 +291,11 @@ impl Engine {
                 if !heads.any(|it| (it.pci, it.ssb_index) == (pci, ssb_index)) {
                     self.report_unknown(pci, ssb_index);
                 }
-                self.clock.see(angle.time_s);
-                if let Err(error) = self.live.angle(&angle) {
-                    self.refused("angles", &error);
+                match self.live.angle(&angle) {
+                    Ok(()) => self.clock.see(angle.time_s),
+                    Err(error) => self.refused("angles", &error),
                 }
+                self.report_clocks();
                 self.publish_heard(Some(came))?;
             }
             Input::Command(command) => self.command(command),
@@ -291,7 +399,43 @@ impl Engine {
         if let Err(error) = taken {
             self.refused("samples", &error);
         }
-        self.live.hear_before(f64::INFINITY)
+        self.live.hear_before(f64::INFINITY)?;
+        if let Some(error) = self.live.take_refused_burst() {
+            self.refused("samples", &error);
+            // Whether their clock has stepped is seen soonest with all samples.
+            self.gate.open();
+        }
+        self.report_clocks();
+        Ok(())
+    }
+
+    /// Reports steps of the clock of angles or samples, and clocks that differ or no longer do.
+    fn report_clocks(&mut self) {
+        if let Some(step) = self.live.take_angle_step() {
+            let text = format!(
+                "the clock of the angles or samples has stepped by {:+.3} s; the step is compensated",
+                step.step_s
+            );
+            self.gate.open();
+            self.event(Level::Warn, "angles", text);
+        }
+        let offset_s = self.live.clock_disagreement_s();
+        if offset_s.is_some() != self.clocks_differ {
+            self.clocks_differ = offset_s.is_some();
+            let (level, text) = match offset_s {
+                Some(offset_s) => (
+                    Level::Warn,
+                    format!(
+                        "angles are {:.1} s {} the odometry: synchronize the clocks of the odometry and of the samples \
+                         or angles",
+                        offset_s.abs(),
+                        if offset_s < 0.0 { "behind" } else { "ahead of" }
+                    ),
+                ),
+                None => (Level::Info, "the clocks of angles and odometry agree".to_owned()),
+            };
+            self.event(level, "clocks", text);
+        }
     }
 
     /// Closes the gate up to the next burst that is wanted.
@@ -331,28 +475,25 @@ impl Engine {
         sample: &OdometrySample,
         came: Option<Instant>,
     ) -> Result<(), LiveError> {
-        match self.live.odometry(sample) {
-            Ok(_) => {}
-            Err(LiveError::Odometry(OdometryDefect::TimeReversed))
-                if self
-                    .clock
-                    .now_s()
-                    .is_some_and(|now_s| sample.time_s < now_s - RESTART_S) =>
-            {
-                let text = format!(
-                    "odometry goes back to {:.3} s: everything begins anew",
-                    sample.time_s
-                );
-                self.event(Level::Warn, "odometry", text);
-                self.restart()?;
-                self.live.odometry(sample)?;
-            }
-            Err(error) => {
-                self.refused("odometry", &error);
-                return Ok(());
-            }
+        self.live.set_arrival(self.arrival_s(came));
+        self.resume_earlier(sample)?;
+        if let Err(error) = self.live.odometry(sample) {
+            self.refused("odometry", &error);
+            return Ok(());
         }
-        self.clock.see(sample.time_s);
+        if let Some(step) = self.live.take_odometry_step() {
+            let text = format!(
+                "the clock has stepped by {:+.3} s to {:.3} s; the pose is resumed after {:.2} s and is to be confirmed \
+                 by angles",
+                step.step_s, sample.time_s, step.elapsed_s
+            );
+            self.clock.reset();
+            (self.last_pose, self.last_status_s) = (None, f64::NEG_INFINITY);
+            self.gate.open();
+            self.event(Level::Warn, "odometry", text);
+        }
+        self.newest_odometry = Some(*sample);
+        self.clock.see_odometry(sample.time_s);
         let status = self.live.status(sample.time_s)?;
         self.report_faults(&status);
         if let Some(came) = came {
@@ -370,14 +511,112 @@ impl Engine {
         Ok(())
     }
 
-    fn restart(&mut self) -> Result<(), LiveError> {
-        self.live = self.setup.live()?;
-        self.clock.reset();
+    /// Resumes the state that was saved before the start, at the first odometry.
+    fn resume_earlier(&mut self, sample: &OdometrySample) -> Result<(), LiveError> {
+        if self.earlier.is_none() || TimeCheck::range(sample.time_s).is_err() {
+            return Ok(());
+        }
+        let Some(Earlier { state, age_s, read }) = self.earlier.take() else {
+            return Ok(());
+        };
+        let elapsed_s = age_s + read.elapsed().as_secs_f64();
+        match self.live.resume(&state, elapsed_s, sample)? {
+            Some(by) => {
+                let driven = by.driven_m.map_or_else(
+                    || "an unknown distance".to_owned(),
+                    |driven_m| format!("{driven_m:.2} m by the odometer"),
+                );
+                let text = format!(
+                    "the pose of {elapsed_s:.1} s ago is resumed after {driven}, with a standard deviation of {:.2} m; \
+                     it is to be confirmed by angles",
+                    by.position_std_m
+                );
+                self.event(Level::Info, "state", text);
+            }
+            None => {
+                let text = format!(
+                    "ignored: the pose of {elapsed_s:.1} s ago; the vehicle may have moved by more than {} m",
+                    2.0 * onboard::live::MAX_GROWTH_M
+                );
+                self.event(Level::Warn, "state", text);
+                self.search()?;
+            }
+        }
+        Ok(())
+    }
+
+    /// Has the state written, if there is one.
+    fn save(&mut self) -> Result<(), LiveError> {
+        self.saved = Instant::now();
+        // An earlier state that waits for odometry is not replaced.
+        if let (Some(store), None) = (&self.store, &self.earlier)
+            && let Some(state) = self.live.saved_state()?
+        {
+            store.put(state);
+        }
+        Ok(())
+    }
+
+    /// Loads site and vehicle again if that was requested, and resumes the pose with them; where they cannot be used
+    /// the earlier ones stay.
+    fn reload_if_requested(&mut self) -> Result<(), LiveError> {
+        let Some(reload) = &self.reload else {
+            return Ok(());
+        };
+        if !reload.requested.swap(false, Ordering::AcqRel) {
+            return Ok(());
+        }
+        let loaded = (reload.load)().and_then(|setup| {
+            let live = setup.live()?;
+            Ok((setup, live))
+        });
+        match loaded {
+            Ok((setup, _)) if self.setup.is_of_same_files(&setup) => {
+                let text = "site and vehicle have not changed".to_owned();
+                self.event(Level::Info, "node", text);
+            }
+            Ok((setup, live)) => {
+                self.swap(setup, live)?;
+                let text = "site and vehicle are loaded again; the pose is resumed and is to be confirmed by angles";
+                self.event(Level::Info, "node", text.to_owned());
+            }
+            Err(error) => {
+                let text = format!("site and vehicle are not loaded again, the earlier ones stay: {error:#}");
+                self.event(Level::Warn, "node", text);
+            }
+        }
+        Ok(())
+    }
+
+    /// Goes on with another site and vehicle at the pose there is.
+    fn swap(&mut self, setup: Setup, mut live: Live) -> Result<(), LiveError> {
+        let state = self.live.saved_state()?;
+        let excluded = self.live.heads().iter().filter(|it| it.is_excluded);
+        for pci in excluded.map(|it| it.head.pci) {
+            // The new site may have no such radio head.
+            let _ = live.exclude(pci);
+        }
+        if let Some(sample) = &self.newest_odometry {
+            let resumed = match &state {
+                Some(state) => live.resume(state, 0.0, sample)?.is_some(),
+                None => false,
+            };
+            if !resumed {
+                // A configured start pose is that of the first start only; not every vehicle can be searched for.
+                let _ = live.reset();
+            }
+            live.odometry(sample)?;
+        }
+        if let Some(store) = &self.store {
+            store.set_fingerprint(state::fingerprint(&setup.site, &setup.vehicle));
+        }
+        self.windows = Windows::new(&setup.site);
+        self.period_s = setup.site.ssb.period_s();
+        (self.setup, self.live) = (setup, live);
+        self.pending.antennas.iter_mut().for_each(Vec::clear);
+        self.clocks_differ = false;
         self.interruptions.reset();
         self.unreported_gaps = 0;
-        self.arrivals.clear();
-        self.pending = Block::default();
-        (self.last_pose, self.last_status_s) = (None, f64::NEG_INFINITY);
         self.gate.open();
         Ok(())
     }
@@ -389,17 +628,23 @@ impl Engine {
                 pose,
                 covariance,
             } => {
-                let newest_s = self.live.onboard().newest_odometry().map(|it| it.time_s);
-                let time_s = time_s.or(newest_s).unwrap_or(0.0);
+                let time_s = time_s.or(self.live.newest_odometry_s()).unwrap_or(0.0);
+                self.earlier = None;
                 self.live.set_pose(time_s, pose, covariance)
             }
-            Command::Reset => self.live.reset(),
+            Command::Reset => {
+                self.earlier = None;
+                self.live.reset()
+            }
             Command::Exclude(pci) => self.live.exclude(pci),
             Command::Readmit(pci) => self.live.readmit(pci),
         };
         match done {
             Ok(()) => {
                 self.gate.open();
+                if command == Command::Reset {
+                    self.clock.reset();
+                }
                 self.event(Level::Info, "messages", format!("done: {command:?}"));
             }
             Err(error) => self.refused("messages", &error),
@@ -489,6 +734,9 @@ impl Engine {
         self.watchdog.alive();
         self.report_outputs();
         self.report_repeated(false);
+        if self.store.is_some() && self.saved.elapsed() >= SAVE_EVERY {
+            self.save()?;
+        }
         let Some(now_s) = self.clock.now_s() else {
             return Ok(());
         };
@@ -529,9 +777,13 @@ impl Engine {
         self.watchdog.alive();
     }
 
-    /// Input that was refused is an event.
+    /// Counts and reports rejected input.
     fn refused(&mut self, source: &'static str, error: &LiveError) {
-        self.event(Level::Warn, source, format!("left out: {error}"));
+        let named = |name: &str| self.sources.iter().find(|it| it.name == name);
+        if let Some(health) = named(source).or_else(|| named("messages")) {
+            health.defect();
+        }
+        self.event(Level::Warn, source, format!("rejected: {error}"));
     }
 
     /// Reports an event; repetitions of one cause are counted and reported together.
@@ -594,6 +846,6 @@ impl Engine {
 
     /// Notes a time of the drive.
     pub fn see(&mut self, time_s: f64) {
-        self.clock.see(time_s);
+        self.clock.move_to(time_s);
     }
 }

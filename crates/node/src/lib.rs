@@ -23,6 +23,7 @@ pub mod playback;
 pub mod settings;
 pub mod sink;
 pub mod source;
+pub mod state;
 pub mod statistics;
 pub mod supervisor;
 pub mod web;

@@ -7,24 +7,27 @@ use std::sync::Arc;
 use std::sync::atomic::{AtomicBool, Ordering};
 use std::time::Duration;
 
-use access_av_node::engine::{Engine, Setup};
+use access_av_node::clock::unix_s;
+use access_av_node::engine::{Engine, Reload, Setup};
 use access_av_node::inbox::Level;
 use access_av_node::playback;
 use access_av_node::settings::{NodeSettings, PageSettings};
 use access_av_node::sink::{self, Distributor};
 use access_av_node::source::{self, Sources};
+use access_av_node::state::{self, StateStore};
 use access_av_node::statistics::Punctuality;
 use access_av_node::supervisor;
 use access_av_node::web::{self, Board, Counters};
 use anyhow::{Context, Result};
 use clap::Parser;
+use onboard::live::StreamConfig;
 use onboard::settings::{Platform, Site, TomlFile, Vehicle};
 use recording::load;
 use recording::replay::{as_stated, with_phase};
 use tokio::signal::unix::{SignalKind, signal};
 
 /// Says where the vehicle is: samples and odometry in, poses out, a page to look at.
-#[derive(Parser)]
+#[derive(Clone, Parser)]
 #[command(version, about)]
 struct Arguments {
     /// Site: a shipped name, or a path.
@@ -91,33 +94,68 @@ fn node_settings(path: &std::path::Path) -> Result<NodeSettings> {
 
 fn run(arguments: &Arguments) -> Result<String> {
     let settings = node_settings(&arguments.node)?;
-    let site: Site = load(&arguments.site)?;
-    let vehicle: Vehicle = load(&arguments.vehicle)?;
-    let platform: Platform = load(&vehicle.platform.name)?;
+    let (site, vehicle, platform) = load_vehicle(arguments)?;
     let antennas = usize::from(vehicle.array.elements);
     let mut sources = Sources::open(&settings, antennas, vehicle.odometer.track_width_m)?;
     let measurand = vehicle.array.measurand();
     for angle in &mut sources.files.angles {
         *angle = with_phase(angle, &measurand);
     }
-    // What others state of their angles' errors is taken for all of it.
-    let (site, vehicle) = match settings.samples {
-        None => as_stated(&site, &vehicle),
-        Some(_) => (site, vehicle),
-    };
-    let setup = Setup {
-        site,
-        vehicle,
-        platform,
-        stream: sources.stream,
-    };
+    let setup = setup_of(&settings, (site, vehicle, platform), sources.stream);
     let live = setup.live()?;
     drop(live);
     if arguments.dry_run {
         return Ok(report(&settings, &setup));
     }
-    drive(&settings, setup, sources)?;
+    drive(arguments, &settings, setup, sources)?;
     Ok(String::new())
+}
+
+/// Loads site, vehicle and platform.
+fn load_vehicle(arguments: &Arguments) -> Result<(Site, Vehicle, Platform)> {
+    let site: Site = load(&arguments.site)?;
+    let vehicle: Vehicle = load(&arguments.vehicle)?;
+    let platform: Platform = load(&vehicle.platform.name)?;
+    Ok((site, vehicle, platform))
+}
+
+fn setup_of(
+    settings: &NodeSettings,
+    (site, vehicle, platform): (Site, Vehicle, Platform),
+    stream: Option<StreamConfig>,
+) -> Setup {
+    // The stated standard deviations of angles from elsewhere contain all of their errors.
+    let (site, vehicle) = match settings.samples {
+        None => as_stated(&site, &vehicle),
+        Some(_) => (site, vehicle),
+    };
+    Setup {
+        site,
+        vehicle,
+        platform,
+        stream,
+    }
+}
+
+/// Loads site and vehicle again when SIGHUP has come.
+fn reload(arguments: &Arguments, settings: &NodeSettings, setup: &Setup) -> Reload {
+    let (arguments, settings) = (arguments.clone(), settings.clone());
+    let (stream, antennas) = (setup.stream, setup.vehicle.array.elements);
+    Reload {
+        requested: Arc::default(),
+        load: Box::new(move || {
+            let loaded = load_vehicle(&arguments)?;
+            let elements = loaded.1.array.elements;
+            if stream.is_some() && elements != antennas {
+                anyhow::bail!(
+                    "{}: array.elements is {elements}; it must be {antennas}, the number of channels, until the node is \
+                     started again",
+                    arguments.vehicle
+                );
+            }
+            Ok(setup_of(&settings, loaded, stream))
+        }),
+    }
 }
 
 /// What a dry run says.
@@ -153,13 +191,21 @@ fn report(settings: &NodeSettings, setup: &Setup) -> String {
     lines.join("\n")
 }
 
-fn drive(settings: &NodeSettings, setup: Setup, mut sources: Sources) -> Result<()> {
+fn drive(
+    arguments: &Arguments,
+    settings: &NodeSettings,
+    setup: Setup,
+    mut sources: Sources,
+) -> Result<()> {
     let is_playback = settings.is_playback();
     let monitor = setup.vehicle.integrity_monitor();
     let alert_limit_m = monitor.unwrap_or_default().alert_limit_m;
     let sinks = sink::sinks(&settings.output, &settings.name, alert_limit_m);
     let names: Vec<&str> = sinks.iter().map(|(name, _)| *name).collect();
     let records = Arc::new(Distributor::new(&names, settings.waits()));
+    let reload = reload(arguments, settings, &setup);
+    let reload_requested = Arc::clone(&reload.requested);
+    let fingerprint = state::fingerprint(&setup.site, &setup.vehicle);
     let punctuality = Arc::new(Punctuality::default());
     let page_s = settings.page.as_ref().map_or(1.0, |it| 1.0 / it.rate_hz);
     let heads = setup.site.radio_heads.iter();
@@ -187,9 +233,26 @@ fn drive(settings: &NodeSettings, setup: Setup, mut sources: Sources) -> Result<
         gate,
         settings.sleep && !is_playback,
     )?;
-    serve(settings.page.as_ref(), &board, site, &stop)?;
+    if !settings.waits() {
+        engine.validate_arrivals();
+    }
+    if !is_playback {
+        engine.reload_by(reload);
+    }
+    serve(settings.page.as_ref(), &board, site, &stop, reload_requested)?;
     let writing = sink::start(sinks, &records)?;
     engine.event(Level::Info, "node", format!("{} begins", settings.name));
+    let saving = match &settings.state_file {
+        Some(file) => {
+            let path = PathBuf::from(file);
+            let store = Arc::new(StateStore::new(fingerprint.clone()));
+            let read = state::read(&path, &fingerprint, unix_s());
+            engine.keep_state(Arc::clone(&store), read)?;
+            let inbox = Arc::clone(&sources.inbox);
+            Some((Arc::clone(&store), state::start(store, path, inbox)?))
+        }
+        None => None,
+    };
     let driven = if is_playback {
         supervisor::ready();
         playback::play(
@@ -209,6 +272,11 @@ fn drive(settings: &NodeSettings, setup: Setup, mut sources: Sources) -> Result<
     supervisor::stopping();
     engine.report_repeated(true);
     engine.event(Level::Info, "node", format!("{} ends", settings.name));
+    if let Some((store, saving)) = saving {
+        store.close();
+        // A thread that panicked has ended, too.
+        let _ = saving.join();
+    }
     sources.inbox.close();
     records.close();
     let failed = writing.finish();
@@ -225,6 +293,7 @@ fn serve(
     board: &Arc<Board>,
     site: serde_json::Value,
     stop: &Arc<AtomicBool>,
+    reload_requested: Arc<AtomicBool>,
 ) -> Result<()> {
     let runtime = tokio::runtime::Builder::new_current_thread()
         .enable_all()
@@ -243,6 +312,13 @@ fn serve(
         runtime.block_on(async {
             let mut terminated = signal(SignalKind::terminate())?;
             let mut interrupted = signal(SignalKind::interrupt())?;
+            let mut hung_up = signal(SignalKind::hangup())?;
+            let reloading = async {
+                while hung_up.recv().await.is_some() {
+                    reload_requested.store(true, Ordering::Release);
+                }
+                std::future::pending::<()>().await;
+            };
             let serving = async {
                 match listener {
                     Some((listener, page)) => web::serve(listener, &page, board, &site).await,
@@ -252,6 +328,7 @@ fn serve(
             tokio::select! {
                 _ = terminated.recv() => {}
                 _ = interrupted.recv() => {}
+                () = reloading => {}
                 served = serving => served?,
             }
             stop.store(true, Ordering::Release);

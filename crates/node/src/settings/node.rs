@@ -39,6 +39,10 @@ pub struct NodeSettings {
     #[serde(default = "half")]
     #[schemars(range(min = 0.05, max = 60.0))]
     pub silent_after_s: f64,
+    /// File in which pose, calibration and excluded radio heads are saved every second and from which they are resumed
+    /// at the next start; none by default. A relative path counts from this file.
+    #[serde(default, skip_serializing_if = "Option::is_none")]
+    pub state_file: Option<String>,
     /// Where poses go.
     #[serde(default)]
     pub output: Outputs,
@@ -118,6 +122,9 @@ impl NodeSettings {
         if let Some(SampleSource::Sigmf { recording, .. }) = &mut self.samples {
             place(recording);
         }
+        if let Some(file) = &mut self.state_file {
+            place(file);
+        }
         if let Some(odometry) = &mut self.odometry {
             place(&mut odometry.file);
         }
@@ -162,6 +169,12 @@ impl TomlFile for NodeSettings {
             "fast",
             "only files can be played faster than they were recorded: no messages and samples of a \
              recording or none, or nothing but the messages of one file or of `-`",
+        )?;
+        check.that(
+            self.state_file.is_none() || !self.is_playback(),
+            "state_file",
+            self.state_file.as_deref().unwrap_or_default(),
+            "it must be absent where all input comes from files: a playback has no next start",
         )?;
         if let Some(SampleSource::Zeromq { endpoints, .. }) = &self.samples {
             for (index, endpoint) in endpoints.iter().enumerate() {

@@ -4,109 +4,135 @@ use onboard::geometry::Pose;
 use onboard::live::AngleObservation;
 use onboard::observation::OdometrySample;
 use serde::Deserialize;
+use serde::de::DeserializeOwned;
+use serde_json::{Map, Value};
 
 use crate::clock::unix_s;
 use crate::inbox::{Command, Input};
 
+/// Values of the key `type`.
+const TYPES: &str = "odometry, angle, set-pose, reset, exclude or readmit";
+
 #[derive(Deserialize)]
-#[serde(tag = "type", rename_all = "kebab-case", deny_unknown_fields)]
-enum Message {
-    Odometry {
-        time_s: Option<f64>,
-        speed_mps: f64,
-        distance_m: Option<f64>,
-        yaw_rate_radps: Option<f64>,
-    },
-    Angle {
-        time_s: f64,
-        pci: u16,
-        #[serde(default)]
-        ssb_index: u8,
-        phase_rad: f64,
-        phase_sigma_rad: f64,
-        snr_db: Option<f64>,
-        #[serde(default = "yes")]
-        resolved: bool,
-    },
-    SetPose {
-        time_s: Option<f64>,
-        x_m: f64,
-        y_m: f64,
-        heading_rad: f64,
-        covariance: Option<[[f64; 3]; 3]>,
-    },
-    Reset {},
-    Exclude {
-        pci: u16,
-    },
-    Readmit {
-        pci: u16,
-    },
+#[serde(deny_unknown_fields)]
+struct Odometry {
+    time_s: Option<f64>,
+    speed_mps: f64,
+    distance_m: Option<f64>,
+    yaw_rate_radps: Option<f64>,
+}
+
+#[derive(Deserialize)]
+#[serde(deny_unknown_fields)]
+struct Angle {
+    time_s: f64,
+    pci: u16,
+    #[serde(default)]
+    ssb_index: u8,
+    phase_rad: f64,
+    phase_sigma_rad: f64,
+    snr_db: Option<f64>,
+    #[serde(default = "yes")]
+    resolved: bool,
+}
+
+#[derive(Deserialize)]
+#[serde(deny_unknown_fields)]
+struct SetPose {
+    time_s: Option<f64>,
+    x_m: f64,
+    y_m: f64,
+    heading_rad: f64,
+    covariance: Option<[[f64; 3]; 3]>,
+}
+
+#[derive(Deserialize)]
+#[serde(deny_unknown_fields)]
+struct Reset {}
+
+#[derive(Deserialize)]
+#[serde(deny_unknown_fields)]
+struct Cell {
+    pci: u16,
 }
 
 const fn yes() -> bool {
     true
 }
 
-/// What a line says; nothing where it is blank.
+/// Parses a line; `None` if it is blank.
 ///
 /// # Errors
-/// What is wrong with it.
+/// What is wrong with the line, with the key.
 pub fn parse(line: &[u8]) -> Result<Option<Input>, String> {
     if line.trim_ascii().is_empty() {
         return Ok(None);
     }
-    let message = serde_json::from_slice(line).map_err(|error| error.to_string())?;
-    Ok(Some(match message {
-        Message::Odometry {
-            time_s,
-            speed_mps,
-            distance_m,
-            yaw_rate_radps,
-        } => {
-            let time_s = time_s.unwrap_or_else(unix_s);
-            let sample = OdometrySample::of_speed(time_s, speed_mps, yaw_rate_radps);
-            Input::Odometry(OdometrySample {
-                distance_m: distance_m.unwrap_or(sample.distance_m),
-                ..sample
-            })
+    let value: Value = serde_json::from_slice(line).map_err(|error| error.to_string())?;
+    let Value::Object(mut message) = value else {
+        return Err(format!("not an object; it must be one with the key `type`: {TYPES}"));
+    };
+    let Some(kind) = message.remove("type") else {
+        return Err(format!("the key `type` is missing; it must be {TYPES}"));
+    };
+    Ok(Some(match kind.as_str() {
+        Some("odometry") => odometry(read(message)?),
+        Some("angle") => angle(&read(message)?),
+        Some("set-pose") => set_pose(&read(message)?),
+        Some("reset") => {
+            let Reset {} = read(message)?;
+            Input::Command(Command::Reset)
         }
-        Message::Angle {
-            time_s,
-            pci,
-            ssb_index,
-            phase_rad,
-            phase_sigma_rad,
-            snr_db,
-            resolved,
-        } => Input::Angle(AngleObservation {
-            pci,
-            ssb_index,
-            time_s,
-            phase_rad,
-            sigma_rad: phase_sigma_rad,
-            snr_db,
-            resolved,
-        }),
-        Message::SetPose {
-            time_s,
-            x_m,
-            y_m,
-            heading_rad,
-            covariance,
-        } => Input::Command(Command::SetPose {
-            time_s,
-            pose: Pose {
-                x_m,
-                y_m,
-                heading_rad,
-            },
-            covariance,
-        }),
-        Message::Reset {} => Input::Command(Command::Reset),
-        Message::Exclude { pci } => Input::Command(Command::Exclude(pci)),
-        Message::Readmit { pci } => Input::Command(Command::Readmit(pci)),
+        Some("exclude") => Input::Command(Command::Exclude(read::<Cell>(message)?.pci)),
+        Some("readmit") => Input::Command(Command::Readmit(read::<Cell>(message)?.pci)),
+        _ => return Err(format!("type is {kind}; it must be {TYPES}")),
     }))
+}
+
+/// The rest of a message; errors name the key.
+fn read<T: DeserializeOwned>(message: Map<String, Value>) -> Result<T, String> {
+    serde_path_to_error::deserialize(Value::Object(message)).map_err(|error| {
+        let key = error.path().to_string();
+        let why = error.into_inner();
+        if key == "." {
+            why.to_string()
+        } else {
+            format!("{key}: {why}")
+        }
+    })
+}
+
+fn odometry(message: Odometry) -> Input {
+    let time_s = message.time_s.unwrap_or_else(unix_s);
+    let sample = OdometrySample::of_speed(time_s, message.speed_mps, message.yaw_rate_radps);
+    Input::Odometry(OdometrySample {
+        distance_m: message.distance_m.unwrap_or(sample.distance_m),
+        ..sample
+    })
+}
+
+const fn angle(message: &Angle) -> Input {
+    Input::Angle(AngleObservation {
+        pci: message.pci,
+        ssb_index: message.ssb_index,
+        time_s: message.time_s,
+        phase_rad: message.phase_rad,
+        sigma_rad: message.phase_sigma_rad,
+        snr_db: message.snr_db,
+        resolved: message.resolved,
+    })
+}
+
+const fn set_pose(message: &SetPose) -> Input {
+    Input::Command(Command::SetPose {
+        time_s: message.time_s,
+        pose: Pose {
+            x_m: message.x_m,
+            y_m: message.y_m,
+            heading_rad: message.heading_rad,
+        },
+        covariance: message.covariance,
+    })
 }
 
 #[cfg(test)]
@@ -154,6 +180,14 @@ mod tests {
                 "unknown field `speed`",
             ),
             (r#"{"type":"odometry","speed_mps":1e999}"#, "out of range"),
+            (
+                r#"{"type":"odometry","time_s":"abc","speed_mps":1}"#,
+                "time_s: invalid type: string \"abc\"",
+            ),
+            (
+                r#"{"type":"set-pose","x_m":1,"y_m":2,"heading_rad":0,"covariance":[[1,0,0],[0,"1",0],[0,0,1]]}"#,
+                "covariance[1][1]: invalid type: string",
+            ),
             (
                 r#"{"type":"angle","time_s":1,"pci":-1,"phase_rad":0,"phase_sigma_rad":1}"#,
                 "-1",

@@ -1,5 +1,7 @@
 //! What a live pipeline refuses. Its state is kept.
 
+use super::clocks::MAX_ANGLE_LEAD_S;
+use super::time_check::TimeDefect;
 use crate::BoxError;
 use crate::pipeline::OdometryDefect;
 use crate::receive::ReceiveError;
@@ -29,8 +31,28 @@ pub enum LiveError {
         /// What is allowed.
         allowed: &'static str,
     },
+    /// A time stamp that is not plausible.
+    #[error("{what}: {defect}")]
+    Time {
+        /// Kind of the input.
+        what: &'static str,
+        /// Cause.
+        defect: TimeDefect,
+    },
+    /// An angle whose time is ahead of the odometry.
+    #[error("angle: time_s is {by_s:.3} s ahead of the odometry; at most {MAX_ANGLE_LEAD_S} s are allowed; the clocks of angles or samples and of odometry must agree")]
+    AngleAhead {
+        /// Time by which it is ahead, in seconds.
+        by_s: f64,
+    },
+    /// An angle that was received before.
+    #[error("angle: a copy of the last one of PCI {pci}; each angle counts once")]
+    AngleRepeated {
+        /// Physical cell identity.
+        pci: u16,
+    },
     /// Odometry that cannot be used.
-    #[error("odometry left out: {0}")]
+    #[error("odometry: {0}")]
     Odometry(#[from] OdometryDefect),
     /// A cell that the vehicle does not listen to.
     #[error("no radio head with PCI {pci} at this site that the vehicle listens to")]
@@ -44,4 +66,22 @@ pub enum LiveError {
     /// Whatever a user's own estimator, policy or localizer failed with.
     #[error("{0}")]
     Custom(BoxError),
+}
+
+impl LiveError {
+    /// Short name of the cause, for counters and to group events.
+    pub const fn cause(&self) -> &'static str {
+        match self {
+            Self::Time { defect, .. } => defect.name(),
+            Self::AngleAhead { .. } => "angle ahead of the odometry",
+            Self::AngleRepeated { .. } => "angle repeated",
+            Self::Odometry(_) => "odometry value",
+            Self::Value { .. } => "value",
+            Self::Receive(_) | Self::NoStream => "samples",
+            Self::Settings(_) => "settings",
+            Self::UnknownCell { .. } => "unknown cell",
+            Self::OwnLocalizer => "own localizer",
+            Self::Custom(_) => "own code",
+        }
+    }
 }

@@ -4,12 +4,16 @@ use std::collections::VecDeque;
 
 use num_complex::Complex32;
 
+use super::clocks::Clocks;
+use super::confirmation::Confirmation;
 use super::error::LiveError;
 use super::outcome::{HeadStatus, Outcome};
 use super::start::starting_at;
 use super::status::{Reason, State, Status};
 use super::stream::{SampleStream, StreamConfig, StreamCounts};
 use super::stream_clock::Continuity;
+use super::time_base::ClockStep;
+use super::time_check::TimeCheck;
 use crate::BoxError;
 use crate::burst::{Burst, OfSsb};
 use crate::energy::{Energy, EnergyModel};
@@ -18,7 +22,7 @@ use crate::localize::{
     self, AngleMeasurement, HISTORY_S, IntegrityState, OdometryVerdict, PoseEstimate, UpdateReason,
 };
 use crate::observation::{BURST_S, OdometrySample, SensedSsb};
-use crate::pipeline::{Custom, Onboard};
+use crate::pipeline::{Custom, Onboard, OdometryDefect};
 use crate::radio_head::RadioHead;
 use crate::receive::ReceiverConfig;
 use crate::settings::{Boundary, Extent, Platform, Site, Vehicle};
@@ -95,6 +99,13 @@ pub struct Live {
     angles: Vec<(SensedSsb, AngleMeasurement)>,
     outcomes: VecDeque<Outcome>,
     heads: Vec<HeadStatus>,
+    /// Clocks of the sources; all other times here are of the pipeline, but those of `heads` of the odometry's clock.
+    clocks: Clocks,
+    odometry_step: Option<ClockStep>,
+    refused_burst: Option<LiveError>,
+    confirmation: Confirmation,
+    /// When the localizer found its pose again last.
+    recovered_s: Option<f64>,
     last_angle_s: Option<f64>,
     /// The first SSB of the last burst: its sample time and its index.
     last_burst: Option<(f64, u8)>,
@@ -131,14 +142,18 @@ impl Live {
         let onboard = Onboard::new(site, &vehicle, platform, start, custom)?;
         let receiver = || ReceiverConfig::new(site, &vehicle);
         let stream = stream.map(|config| SampleStream::new(config, receiver()));
+        let heads = RadioHead::heard(site, &vehicle);
         Ok(Self {
             sight: Sight::new(&vehicle),
             stream: stream.transpose()?,
             angles: Vec::with_capacity(ANGLES),
             outcomes: VecDeque::with_capacity(OUTCOMES),
-            heads: (RadioHead::heard(site, &vehicle).into_iter())
-                .map(HeadStatus::new)
-                .collect(),
+            confirmation: Confirmation::new(!vehicle.start.known, heads.len()),
+            heads: heads.into_iter().map(HeadStatus::new).collect(),
+            clocks: Clocks::default(),
+            odometry_step: None,
+            refused_burst: None,
+            recovered_s: None,
             last_angle_s: None,
             last_burst: None,
             has_samples: false,
@@ -155,13 +170,19 @@ impl Live {
         })
     }
 
+    /// Sets when the inputs that follow have arrived, in seconds by a monotonic clock, so that their time stamps are
+    /// validated against it; without, only against their predecessors.
+    pub const fn set_arrival(&mut self, arrival_s: Option<f64>) {
+        self.clocks.arrival_s = arrival_s;
+    }
+
     /// Takes in the next samples of every antenna, of any length, the first of which was received at
     /// `time_s` by the sample clock; what became of the SSBs in them is then among the
     /// [`outcomes`](Self::next_outcome). Samples that are missing, there twice, or of a stream that began
     /// anew, are told by that time.
     ///
     /// # Errors
-    /// [`LiveError`] for another number of antennas, unequal lengths or a time that is not finite.
+    /// [`LiveError`] for another number of antennas, unequal lengths or a time that is not plausible.
     pub fn samples(
         &mut self,
         time_s: f64,
@@ -182,12 +203,12 @@ impl Live {
         time_s: f64,
         antennas: &[&[Complex32]],
     ) -> Result<Continuity, LiveError> {
-        finite("the time of samples", time_s)?;
+        plausible("samples", time_s)?;
         let stream = self.stream.as_mut().ok_or(LiveError::NoStream)?;
         let continuity = stream.push(time_s, antennas)?;
         self.has_samples = true;
         if let Some(end_s) = stream.next_s() {
-            self.see(end_s);
+            self.see(self.clocks.angles.inside(end_s));
         }
         Ok(continuity)
     }
@@ -200,13 +221,26 @@ impl Live {
         while let Some(stream) = &mut self.stream {
             let burst = stream.burst();
             let number = burst.len();
-            if burst
-                .first()
-                .is_none_or(|first| first.ssb().time_s >= time_s)
-            {
+            let Some(first_s) = burst.first().map(|first| first.ssb().time_s) else {
+                break;
+            };
+            if first_s >= time_s {
                 break;
             }
-            let heard = hear(&mut self.onboard, burst);
+            let newest = self.onboard.newest_odometry();
+            let refused = match self.clocks.accept_burst("SSBs", first_s, newest) {
+                Ok(inside_s) => {
+                    stream.shift(number, inside_s - first_s);
+                    None
+                }
+                Err(error) => Some(error),
+            };
+            if let Some(error) = refused {
+                stream.forget(number);
+                self.refused_burst = Some(error);
+                continue;
+            }
+            let heard = hear(&mut self.onboard, stream.first(number));
             stream.forget(number);
             self.book(heard)?;
         }
@@ -225,18 +259,33 @@ impl Live {
         }
     }
 
-    /// Takes in odometry, and says what the localizer made of it. Its speed alone is enough: see
-    /// [`OdometrySample::of_speed`].
+    /// Takes in odometry, and returns the localizer's verdict on it. Its speed alone is enough: see
+    /// [`OdometrySample::of_speed`]. A message that establishes a new time base resumes the pose, whose covariance grows
+    /// by the odometry's error over the elapsed time and distance: see [`take_odometry_step`](Self::take_odometry_step).
     ///
     /// # Errors
-    /// [`LiveError::Odometry`] for a time that is not after the last one's, or a value that is not finite.
+    /// [`LiveError::Time`] for a time that is not plausible, [`LiveError::Odometry`] for a value that is not finite.
     pub fn odometry(&mut self, sample: &OdometrySample) -> Result<OdometryVerdict, LiveError> {
+        let is_infinite = |value: f64| value.is_infinite();
+        if !sample.speed_mps.is_finite()
+            || is_infinite(sample.distance_m)
+            || sample.yaw_rate_radps.is_some_and(|it| !it.is_finite())
+        {
+            return Err(OdometryDefect::NotFinite.into());
+        }
+        let what = "odometry";
+        let (sample, step) =
+            (self.clocks.odometry(sample)).map_err(|defect| LiveError::Time { what, defect })?;
+        if let Some(step) = step {
+            self.odometry_step = Some(step);
+            self.resumed(&step);
+        }
         if let Some((first, _)) = self.angles.first()
             && first.time_s + BURST_S <= sample.time_s
         {
             self.hear_angles()?;
         }
-        let sample = self.with_distance(sample);
+        let sample = self.with_distance(&sample);
         let verdict = self
             .onboard
             .odometry(&sample)
@@ -245,13 +294,50 @@ impl Live {
         Ok(verdict)
     }
 
+    /// The odometry's clock has stepped: its times that were given out are those of the new clock from now on.
+    fn resumed(&mut self, step: &ClockStep) {
+        for head in &mut self.heads {
+            for time_s in [&mut head.last_heard_s, &mut head.last_accepted_s] {
+                *time_s = time_s.map(|it| it + step.step_s);
+            }
+        }
+        self.confirmation.restart();
+    }
+
+    /// Time of the newest odometry by its clock, in seconds.
+    pub fn newest_odometry_s(&self) -> Option<f64> {
+        let newest = self.onboard.newest_odometry()?;
+        Some(self.clocks.odometry.outside(newest.time_s))
+    }
+
+    /// Step of the odometry's clock that was recognized since this was called last; the pose was resumed then.
+    pub const fn take_odometry_step(&mut self) -> Option<ClockStep> {
+        self.odometry_step.take()
+    }
+
+    /// Step of the clock of samples or angles that was recognized since this was called last.
+    pub const fn take_angle_step(&mut self) -> Option<ClockStep> {
+        self.clocks.take_angle_step()
+    }
+
+    /// Cause of the last burst of SSBs whose time was rejected since this was called last.
+    pub const fn take_refused_burst(&mut self) -> Option<LiveError> {
+        self.refused_burst.take()
+    }
+
+    /// Time of angles minus that of odometry, in seconds, where their clocks differ.
+    pub fn clock_disagreement_s(&self) -> Option<f64> {
+        let newest = self.onboard.newest_odometry()?;
+        self.clocks.disagreement_s(newest)
+    }
+
     /// Takes in an angle that was estimated elsewhere. Those of a burst, of SSBs within half a frame, are
     /// heard together: once odometry, a later angle or [`settle`](Self::settle) says that it is complete.
     ///
     /// # Errors
-    /// [`LiveError::Value`] for a value that is not possible.
+    /// [`LiveError::Value`] for a value that is not possible, [`LiveError::Time`], [`LiveError::AngleAhead`] and
+    /// [`LiveError::AngleRepeated`] for a time that is not plausible.
     pub fn angle(&mut self, angle: &AngleObservation) -> Result<(), LiveError> {
-        finite("the time of an angle", angle.time_s)?;
         finite("an angle", angle.phase_rad)?;
         finite("the SNR of an angle", angle.snr_db.unwrap_or_default())?;
         let sigma_rad = angle.sigma_rad;
@@ -262,8 +348,13 @@ impl Live {
                 allowed: "it must be positive",
             });
         }
+        let newest = self.onboard.newest_odometry();
+        let time_s = self.clocks.accept_burst("angle", angle.time_s, newest)?;
+        if self.is_repeated(angle, time_s) {
+            return Err(LiveError::AngleRepeated { pci: angle.pci });
+        }
         if let Some((first, _)) = self.angles.first()
-            && ((angle.time_s - first.time_s).abs() >= BURST_S || self.angles.len() == ANGLES)
+            && ((time_s - first.time_s).abs() >= BURST_S || self.angles.len() == ANGLES)
         {
             self.hear_angles()?;
         }
@@ -271,11 +362,11 @@ impl Live {
         let ssb = SensedSsb {
             pci: angle.pci,
             ssb_index: angle.ssb_index,
-            time_s: angle.time_s,
+            time_s,
             snr_db,
         };
         let measured = AngleMeasurement {
-            time_s: angle.time_s,
+            time_s,
             phase_rad: angle.phase_rad,
             phase_sigma_rad: sigma_rad,
             angle_rad: self.sight.measurand().angle_rad(angle.phase_rad),
@@ -284,6 +375,19 @@ impl Live {
         };
         self.angles.push((ssb, measured));
         Ok(())
+    }
+
+    /// Whether an angle is a copy of the last one of its radio head; `time_s` is its time of the pipeline.
+    fn is_repeated(&self, angle: &AngleObservation, time_s: f64) -> bool {
+        let is_same = |(ssb, measured): &(SensedSsb, AngleMeasurement)| {
+            (ssb.pci, ssb.ssb_index, ssb.time_s) == (angle.pci, angle.ssb_index, time_s)
+                && measured.phase_rad == angle.phase_rad
+        };
+        let heard_s = Some(self.clocks.odometry.outside(time_s));
+        self.angles.iter().any(is_same)
+            || (self.heads.iter()).any(|it| {
+                it.head.sends(angle.pci, angle.ssb_index) && it.last_heard_s == heard_s
+            })
     }
 
     /// Hears what has come of a burst without waiting for more of it, as at the end of a drive.
@@ -314,7 +418,8 @@ impl Live {
         pose: Pose,
         covariance: Option<[[f64; 3]; 3]>,
     ) -> Result<(), LiveError> {
-        finite("the time of a pose", time_s)?;
+        plausible("set-pose", time_s)?;
+        let time_s = self.clocks.odometry.inside(time_s);
         for value in [pose.x_m, pose.y_m, pose.heading_rad] {
             finite("a pose", value)?;
         }
@@ -341,7 +446,7 @@ impl Live {
             let turn_rad = newest.yaw_rate_radps.unwrap_or(0.0) * elapsed_s;
             now = pose.along_chord(newest.speed_mps * elapsed_s, turn_rad);
         }
-        self.begin(&vehicle, now)
+        self.begin_at(&vehicle, now)
     }
 
     /// Forgets pose, odometry and all that was learnt, and searches for the pose as from the start of a
@@ -358,7 +463,8 @@ impl Live {
         unknown.start.pose = None;
         let (unknown, anywhere) = starting_at(&self.site, &unknown, None)?;
         self.onboard.forget_odometry();
-        self.begin(&unknown, anywhere)?;
+        self.clocks.reset();
+        self.begin_at(&unknown, anywhere)?;
         (self.last_angle_s, self.last_burst) = (None, None);
         (self.has_samples, self.empty_stretches) = (false, 0);
         self.interval_s = None;
@@ -366,8 +472,20 @@ impl Live {
         Ok(())
     }
 
-    fn begin(&mut self, vehicle: &Vehicle, start: Pose) -> Result<(), LiveError> {
+    /// The vehicle by its settings.
+    pub(super) const fn vehicle(&self) -> &Vehicle {
+        &self.vehicle
+    }
+
+    /// Whether the odometry counts the distance.
+    pub(super) fn has_distance(&self) -> bool {
+        self.clocks.has_distance()
+    }
+
+    /// Replaces the localizer by that of a vehicle at a start.
+    pub(super) fn begin_at(&mut self, vehicle: &Vehicle, start: Pose) -> Result<(), LiveError> {
         let localizer = localize::built_in(&self.site, vehicle, start)?;
+        self.confirmation = Confirmation::new(!vehicle.start.known, self.heads.len());
         self.angles.clear();
         self.onboard
             .replace_localizer(localizer)
@@ -423,6 +541,16 @@ impl Live {
     /// [`LiveError::Value`] for a time that is not finite, [`LiveError::Custom`].
     pub fn status(&self, now_s: f64) -> Result<Status, LiveError> {
         finite("the time of a status", now_s)?;
+        let now_s = self.clocks.odometry.inside(now_s);
+        let mut status = self.status_inside(now_s)?;
+        let outside = |time_s: f64| self.clocks.odometry.outside(time_s);
+        status.time_s = outside(status.time_s);
+        status.last_angle_s = status.last_angle_s.map(outside);
+        Ok(status)
+    }
+
+    /// The status at a time of the pipeline, with times of the pipeline.
+    fn status_inside(&self, now_s: f64) -> Result<Status, LiveError> {
         let newest = self.onboard.newest_odometry();
         let age_s = newest.map(|it| now_s - it.time_s);
         let end_s = self.stream.as_ref().and_then(SampleStream::next_s);
@@ -438,7 +566,7 @@ impl Live {
             faulty: 0,
             last_angle_s: self.last_angle_s,
             odometry_age_s: age_s,
-            samples_age_s: end_s.map(|end_s| now_s - end_s),
+            samples_age_s: end_s.map(|end_s| now_s - self.clocks.angles.inside(end_s)),
             tracked: self.stream.as_ref().map_or(0, SampleStream::tracked),
             faults: *self.onboard.faults(),
         };
@@ -464,6 +592,8 @@ impl Live {
         status.faulty = integrity.map_or(0, |it| it.faulty);
         (status.state, status.reason) = if age_s > SILENT_S {
             (State::Unavailable, Reason::OdometrySilent { age_s })
+        } else if let Some(offset_s) = self.clocks.disagreement_s(newest) {
+            (State::Unavailable, Reason::ClocksDisagree { offset_s })
         } else {
             self.judge(&estimate, now_s)
         };
@@ -491,6 +621,9 @@ impl Live {
         };
         let faulty = integrity.faulty;
         match integrity.state {
+            IntegrityState::Ok | IntegrityState::Degraded if !self.confirmation.is_confirmed() => {
+                (State::Unavailable, Reason::Unconfirmed)
+            }
             IntegrityState::Ok if faulty > 0 => (State::Ok, Reason::FaultyHeads { heads: faulty }),
             IntegrityState::Ok => (State::Ok, Reason::Nominal),
             IntegrityState::Unavailable => (State::Unavailable, Reason::SourcesDisagree),
@@ -517,6 +650,7 @@ impl Live {
     /// [`LiveError::Custom`] where the user's own policy fails.
     pub fn listens(&mut self, time_s: f64) -> Result<bool, LiveError> {
         finite("the time of a burst", time_s)?;
+        let time_s = self.clocks.angles.inside(time_s);
         self.onboard.listens(time_s).map_err(LiveError::Custom)
     }
 
@@ -642,13 +776,23 @@ impl Live {
             listened,
         } = heard.map_err(LiveError::Custom)?;
         self.see(time_s);
-        self.last_burst = Some((time_s - self.time_offset_s(), ssb_index));
+        let burst_s = self.clocks.angles.outside(time_s) - self.time_offset_s();
+        self.last_burst = Some((burst_s, ssb_index));
         (self.has_samples, self.empty_stretches) = (false, 0);
         self.is_resuming = false;
         self.listened += usize::from(listened);
         let newest_s = self.onboard.newest_odometry().map(|it| it.time_s);
         let after_s = newest_s.unwrap_or(time_s).max(time_s);
         let after = self.onboard.pose(after_s).map_err(LiveError::Custom)?;
+        let (odometry, angles) = (&self.clocks.odometry, &self.clocks.angles);
+        let mut found = after;
+        found.time_s = odometry.outside(after.time_s);
+        if let Some(recovered) = self.onboard.recovered()
+            && self.recovered_s.is_none_or(|it| it < recovered.time_s)
+        {
+            self.recovered_s = Some(recovered.time_s);
+            self.confirmation.confirm();
+        }
         for &execution in self.onboard.executions() {
             self.executions += 1;
             let (ssb, verdict) = (execution.ssb, execution.verdict);
@@ -663,24 +807,33 @@ impl Live {
             if verdict.accepted {
                 self.last_angle_s = Some(ssb.time_s);
             }
+            if verdict.accepted || verdict.reason == UpdateReason::Outlier {
+                self.confirmation.angle(ssb.pci, verdict.accepted);
+            }
+            let heard_s = odometry.outside(ssb.time_s);
             if let Some(status) = &mut status {
                 status.is_faulty = !status.is_excluded && verdict.reason == UpdateReason::Excluded;
                 status.snr_db = Some(ssb.snr_db);
-                status.last_heard_s = Some(ssb.time_s);
+                status.last_heard_s = Some(heard_s);
                 status.residual_rad = residual_rad;
                 status.accepted += u64::from(verdict.accepted);
                 status.refused += u64::from(!verdict.accepted);
                 if verdict.accepted {
-                    status.last_accepted_s = Some(ssb.time_s);
+                    status.last_accepted_s = Some(heard_s);
                 }
             }
             if self.outcomes.len() == OUTCOMES {
                 self.outcomes.pop_front();
             }
+            let mut execution = execution;
+            execution.ssb.time_s = angles.outside(ssb.time_s);
+            if let Some(measured) = &mut execution.measured {
+                measured.time_s = angles.outside(measured.time_s);
+            }
             self.outcomes.push_back(Outcome {
                 execution,
                 residual_rad,
-                after,
+                after: found,
             });
         }
         Ok(())
@@ -715,6 +868,11 @@ fn finite(what: &'static str, value: f64) -> Result<(), LiveError> {
         value,
         allowed,
     })
+}
+
+/// Checks a time stamp that has no predecessors.
+fn plausible(what: &'static str, time_s: f64) -> Result<(), LiveError> {
+    TimeCheck::range(time_s).map_err(|defect| LiveError::Time { what, defect })
 }
 
 /// Standard deviations of place, the larger of its axes (m), and heading (rad).

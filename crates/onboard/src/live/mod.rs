@@ -32,20 +32,28 @@
 //! # Ok::<(), Box<dyn std::error::Error>>(())
 //! ```
 
+mod clocks;
+mod confirmation;
 mod error;
 mod feed;
 mod outcome;
 mod samples;
+mod saved;
 mod start;
 mod status;
 mod stream;
 mod stream_clock;
+mod time_base;
+mod time_check;
 
 pub use error::LiveError;
 pub use feed::{AngleObservation, Live, LiveEnergy};
 pub use outcome::{HeadStatus, Outcome};
 pub use samples::{cf32, ci8, ci16};
+pub use saved::{MAX_GROWTH_M, Resumption, SavedState};
 pub use start::starting_at;
 pub use status::{Reason, State, Status};
 pub use stream::{SampleStream, StreamConfig, StreamCounts};
 pub use stream_clock::Continuity;
+pub use time_base::ClockStep;
+pub use time_check::{TimeCheck, TimeDefect, TimeUnit, TimeVerdict};

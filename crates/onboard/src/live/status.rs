@@ -14,7 +14,8 @@ pub enum State {
     Searching,
     /// Angles come from elsewhere than predicted: it is searched for again.
     Lost,
-    /// Several sources disagree, or there is no odometry any more: not to be relied on.
+    /// Several sources disagree, there is no odometry any more, or no angles have confirmed a given pose: not to be
+    /// relied on.
     Unavailable,
     /// The protection level is above the alert limit, or a fault is suspected.
     Degraded,
@@ -98,6 +99,13 @@ pub enum Reason {
     FaultSuspected,
     /// A fault of the odometry or of a receive channel is active.
     SensorFault(Fault),
+    /// The pose was given or resumed, and angles have not confirmed it yet.
+    Unconfirmed,
+    /// The clocks of angles or samples and of odometry differ.
+    ClocksDisagree {
+        /// Time of the angles minus that of the odometry, in seconds.
+        offset_s: f64,
+    },
     /// Nothing is wrong.
     Nominal,
     /// Nothing is wrong as far as anybody looks: there is no integrity monitor.
@@ -136,6 +144,13 @@ impl Reason {
                 "drive on with care; if it stays, check odometer, array and site against their files"
             }
             Self::SensorFault(fault) => fault.what_to_do(),
+            Self::Unconfirmed => {
+                "drive on with care to where two radio heads or more are in sight; the pose is confirmed \
+                 by five angles"
+            }
+            Self::ClocksDisagree { .. } => {
+                "stop; synchronize the clocks of the odometry and of the samples or angles"
+            }
             Self::Nominal => "nothing",
             Self::NotMonitored => {
                 "set integrity.enabled = true to know whether the pose can be relied on"
@@ -169,6 +184,15 @@ impl fmt::Display for Reason {
             ),
             Self::FaultSuspected => write!(f, "a fault is suspected or was a moment ago"),
             Self::SensorFault(fault) => fault.fmt(f),
+            Self::Unconfirmed => {
+                write!(f, "angles have not confirmed the given or resumed pose yet")
+            }
+            Self::ClocksDisagree { offset_s } => write!(
+                f,
+                "angles are {:.1} s {} the odometry: their clocks differ",
+                offset_s.abs(),
+                if *offset_s < 0.0 { "behind" } else { "ahead of" },
+            ),
             Self::Nominal => write!(f, "nothing is wrong"),
             Self::NotMonitored => write!(f, "nothing monitors the pose"),
         }

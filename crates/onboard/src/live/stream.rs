@@ -235,6 +235,20 @@ impl SampleStream {
         }
     }
 
+    /// The first SSBs.
+    pub fn first(&self, number: usize) -> &[SsbObservation] {
+        let number = number.min(self.bursts.held);
+        self.bursts.observations.get(..number).unwrap_or_default()
+    }
+
+    /// Adds `by_s` seconds to the times of the first SSBs.
+    pub fn shift(&mut self, number: usize, by_s: f64) {
+        let number = number.min(self.bursts.held);
+        for observation in self.bursts.observations.iter_mut().take(number) {
+            observation.ssb.time_s += by_s;
+        }
+    }
+
     /// Forgets the first SSBs.
     pub fn forget(&mut self, number: usize) {
         let number = number.min(self.bursts.held);

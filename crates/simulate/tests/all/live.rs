@@ -242,7 +242,7 @@ fn what_is_refused_changes_nothing() {
     let four = slices(&samples, 0, 100);
     assert!(matches!(
         live.samples(f64::NAN, &four),
-        Err(LiveError::Value { .. })
+        Err(LiveError::Time { .. })
     ));
     assert!(matches!(
         live.samples(0.3, &four[..3]),
@@ -262,7 +262,7 @@ fn what_is_refused_changes_nothing() {
         let sample = OdometrySample::of_speed(time_s, speed_mps, None);
         assert!(matches!(
             live.odometry(&sample),
-            Err(LiveError::Odometry(_))
+            Err(LiveError::Odometry(_) | LiveError::Time { .. })
         ));
     }
     let angle = AngleObservation {

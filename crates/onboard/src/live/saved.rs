@@ -1,0 +1,327 @@
+//! The state that outlives the program: pose, calibration and excluded radio heads.
+
+use serde::{Deserialize, Serialize};
+
+use super::error::LiveError;
+use super::feed::Live;
+use super::status::State;
+use crate::geometry::Pose;
+use crate::localize::PoseEstimate;
+use crate::localize::ekf::{EstimatedConstant, EstimatedConstants};
+use crate::observation::OdometrySample;
+use crate::settings::Vehicle;
+
+/// Protection level in standard deviations: at 10⁻⁷ a horizontal error exceeds 5.3 of them.
+const SIGMAS_OF_LEVEL: f64 = 5.0;
+
+/// Largest growth of the position's standard deviation with which a saved pose is still resumed, in metres: beyond, a
+/// search over the site is more reliable than a search around the pose.
+pub const MAX_GROWTH_M: f64 = 10.0;
+
+/// Relative standard deviation of a distance by the odometer's counter, with slip and unknown calibration.
+const COUNTER_STD: f64 = 0.05;
+
+/// Standard deviation of the position of a vehicle whose counter stands still, in metres, and of its heading, in
+/// radians: it may have been pushed or turned on the spot.
+const STANDING_STD_M: f64 = 0.05;
+const STANDING_STD_RAD: f64 = 0.02;
+
+/// Yaw change per distance, a standard deviation, in rad/m: half of the curvature of a bend of 3 m radius.
+const TURN_STD_RAD_PER_M: f64 = 0.17;
+
+/// Learned standard deviations are increased by this factor, because a calibration ages and is correlated with the pose.
+const CALIBRATION_FACTOR: f64 = 2.0;
+
+/// Estimated constant: value and standard deviation.
+pub type Calibration = [f64; 2];
+
+/// Pose, calibration and excluded radio heads at one time.
+#[derive(Debug, Clone, PartialEq, Serialize, Deserialize)]
+#[serde(deny_unknown_fields)]
+pub struct SavedState {
+    /// Time of the pose by the odometry's clock, in seconds.
+    pub time_s: f64,
+    /// Pose in metres and radians.
+    pub pose: Pose,
+    /// Standard deviation of the position along its worst axis, in metres.
+    pub position_std_m: f64,
+    /// Standard deviation of the heading, in radians.
+    pub heading_std_rad: f64,
+    /// Distance counter of the odometer, in metres; unknown where the odometry gives speeds only.
+    pub distance_m: Option<f64>,
+    /// Speed in m/s.
+    pub speed_mps: f64,
+    /// Yaw rate in rad/s, where known.
+    pub yaw_rate_radps: Option<f64>,
+    /// Metres that the odometer reads per metre driven, and its standard deviation.
+    pub odometer_scale: Option<Calibration>,
+    /// Bias of the yaw rate in rad/s, and its standard deviation.
+    pub yaw_rate_bias_radps: Option<Calibration>,
+    /// Mounting angle of the array in radians, and its standard deviation.
+    pub mounting_rad: Option<Calibration>,
+    /// Phase of the array in radians per element, and its standard deviation.
+    pub phase_rad: Option<Calibration>,
+    /// PCIs of the radio heads that the user has excluded.
+    pub excluded: Vec<u16>,
+    /// PCIs of the radio heads that the integrity monitor has found faulty.
+    pub faulty: Vec<u16>,
+}
+
+/// Motion of the vehicle between a saved state and the first odometry after it.
+#[derive(Debug, Clone, Copy, PartialEq)]
+pub struct Resumption {
+    /// Elapsed time in seconds.
+    pub elapsed_s: f64,
+    /// Distance driven by the odometer's counter, in metres; `None` where it does not tell.
+    pub driven_m: Option<f64>,
+    /// Standard deviation of the position after it, in metres.
+    pub position_std_m: f64,
+    /// Standard deviation of the heading after it, in radians.
+    pub heading_std_rad: f64,
+}
+
+impl SavedState {
+    /// The motion since, if the state is `elapsed_s` seconds old and `sample` is the first odometry, for a vehicle of
+    /// this top speed. `None` if the position's standard deviation would grow by more than [`MAX_GROWTH_M`].
+    pub fn resumption(
+        &self,
+        elapsed_s: f64,
+        sample: &OdometrySample,
+        top_speed_mps: f64,
+    ) -> Option<Resumption> {
+        let reach_m = top_speed_mps * elapsed_s;
+        let counted_m = self.distance_m.map(|before_m| sample.distance_m - before_m);
+        // A counter that was set to zero meanwhile does not tell.
+        let driven_m = counted_m.filter(|it| it.abs() <= reach_m + STANDING_STD_M);
+        let (growth_m, way_m) = match driven_m {
+            Some(driven_m) => {
+                let way_m = driven_m.abs();
+                let turn_std_rad = (TURN_STD_RAD_PER_M * way_m).min(1.0);
+                let across_m = 0.5 * way_m * turn_std_rad;
+                let along_m = COUNTER_STD * way_m;
+                (STANDING_STD_M.hypot(along_m).hypot(across_m), way_m)
+            }
+            // Anywhere within reach: half of it is the standard deviation along each axis of a disc.
+            None => (STANDING_STD_M.hypot(0.5 * reach_m), reach_m),
+        };
+        let turn_rad = STANDING_STD_RAD.hypot(TURN_STD_RAD_PER_M * way_m);
+        let heading_std_rad = self.heading_std_rad.hypot(turn_rad);
+        (growth_m <= MAX_GROWTH_M).then(|| Resumption {
+            elapsed_s,
+            driven_m,
+            position_std_m: self.position_std_m.hypot(growth_m),
+            heading_std_rad: heading_std_rad.min(std::f64::consts::PI),
+        })
+    }
+
+    /// Pose after the motion: the counted distance, or half of the way at the last speed where only that is known,
+    /// along an arc of the last yaw rate.
+    fn moved(&self, by: &Resumption) -> Pose {
+        let way_m = by.driven_m.unwrap_or(0.5 * self.speed_mps * by.elapsed_s);
+        let turn_rad = self.yaw_rate_radps.unwrap_or(0.0) * by.elapsed_s;
+        let is_plausible = turn_rad.abs() <= 2.0 * by.heading_std_rad && way_m != 0.0;
+        self.pose
+            .along_chord(way_m, if is_plausible { turn_rad } else { 0.0 })
+    }
+}
+
+impl Live {
+    /// The state to save; `None` as long as there is no pose, or the pose is searched for.
+    ///
+    /// # Errors
+    /// [`LiveError::Custom`].
+    pub fn saved_state(&self) -> Result<Option<SavedState>, LiveError> {
+        let Some(newest) = self.onboard().newest_odometry() else {
+            return Ok(None);
+        };
+        let time_s = self.newest_odometry_s().unwrap_or(newest.time_s);
+        let status = self.status(time_s)?;
+        let is_found = !matches!(
+            status.state,
+            State::Waiting | State::Searching | State::Lost
+        );
+        let (Some(pose), Some(covariance), true) = (status.pose, status.covariance, is_found)
+        else {
+            return Ok(None);
+        };
+        let estimate = PoseEstimate {
+            time_s,
+            pose,
+            covariance: Some(covariance),
+            integrity: None,
+        };
+        let [largest, _] = estimate.principal_variances();
+        let [.., [.., heading]] = covariance;
+        // The protection level covers faults that the filter's own covariance does not.
+        let level_m = status.protection_level_m.unwrap_or(0.0);
+        let constants = self.onboard().constants();
+        let learned = |of: fn(&EstimatedConstants) -> EstimatedConstant| {
+            let it = of(constants.as_ref()?);
+            (it.stated_std > 0.0 && it.std < it.stated_std).then_some([it.found, it.std])
+        };
+        let pcis = |is: fn(&super::HeadStatus) -> bool| {
+            let mut pcis: Vec<u16> = (self.heads().iter())
+                .filter(|it| is(it))
+                .map(|it| it.head.pci)
+                .collect();
+            pcis.dedup();
+            pcis
+        };
+        Ok(Some(SavedState {
+            time_s,
+            pose,
+            position_std_m: largest.max(0.0).sqrt().max(level_m / SIGMAS_OF_LEVEL),
+            heading_std_rad: heading.max(0.0).sqrt(),
+            distance_m: self.has_distance().then_some(newest.distance_m),
+            speed_mps: status.speed_mps,
+            yaw_rate_radps: status.yaw_rate_radps,
+            odometer_scale: learned(|it| it.odometer_scale),
+            yaw_rate_bias_radps: learned(|it| it.yaw_rate_bias_radps),
+            mounting_rad: learned(|it| it.mounting_rad),
+            phase_rad: learned(|it| it.phase_rad),
+            excluded: pcis(|it| it.is_excluded),
+            faulty: pcis(|it| it.is_faulty),
+        }))
+    }
+
+    /// Resumes a saved state that is `elapsed_s` seconds old, before its first odometry, `sample`, is taken in. Returns
+    /// the assumed motion, or `None` if the vehicle may have moved too far; nothing is changed then. Radio heads that
+    /// were excluded are excluded again; those found faulty must be found again.
+    ///
+    /// # Errors
+    /// [`LiveError`] as of [`set_pose`](Self::set_pose).
+    pub fn resume(
+        &mut self,
+        saved: &SavedState,
+        elapsed_s: f64,
+        sample: &OdometrySample,
+    ) -> Result<Option<Resumption>, LiveError> {
+        let top_speed_mps = self.vehicle().top_speed_mps();
+        let Some(by) = saved.resumption(elapsed_s.max(0.0), sample, top_speed_mps) else {
+            return Ok(None);
+        };
+        let mut vehicle = calibrated(self.vehicle(), saved);
+        vehicle.start.known = true;
+        vehicle.start.position_std_m = by.position_std_m;
+        vehicle.start.heading_std_rad = by.heading_std_rad;
+        self.begin_at(&vehicle, saved.moved(&by))?;
+        for &pci in &saved.excluded {
+            // The site may have lost the radio head.
+            if let Err(error) = self.exclude(pci)
+                && !matches!(error, LiveError::UnknownCell { .. })
+            {
+                return Err(error);
+            }
+        }
+        Ok(Some(by))
+    }
+}
+
+/// The vehicle with the calibration that a saved state has learned, where the vehicle's file gives a standard deviation
+/// for it.
+fn calibrated(vehicle: &Vehicle, saved: &SavedState) -> Vehicle {
+    let mut vehicle = vehicle.clone();
+    let take = |value: &mut f64, std: &mut f64, found: Option<Calibration>| {
+        if let Some([found, found_std]) = found
+            && *std > 0.0
+            && found.is_finite()
+            && found_std >= 0.0
+        {
+            *value = found;
+            *std = std.min(CALIBRATION_FACTOR * found_std).max(f64::MIN_POSITIVE);
+        }
+    };
+    let odometer = &mut vehicle.odometer;
+    take(
+        &mut odometer.scale,
+        &mut odometer.scale_std,
+        saved.odometer_scale,
+    );
+    if let Some(gyroscope) = &mut vehicle.gyroscope {
+        take(
+            &mut gyroscope.bias_radps,
+            &mut gyroscope.bias_std_radps,
+            saved.yaw_rate_bias_radps,
+        );
+    }
+    let array = &mut vehicle.array;
+    if let Some(std_rad) = &mut array.mounting_std_rad {
+        take(&mut array.mounting_rad, std_rad, saved.mounting_rad);
+    }
+    if let Some(std_rad) = &mut array.phase_std_rad {
+        take(&mut array.phase_rad, std_rad, saved.phase_rad);
+    }
+    vehicle
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    fn saved(distance_m: Option<f64>) -> SavedState {
+        SavedState {
+            time_s: 100.0,
+            pose: Pose {
+                x_m: 1.0,
+                y_m: 2.0,
+                heading_rad: 0.0,
+            },
+            position_std_m: 0.2,
+            heading_std_rad: 0.01,
+            distance_m,
+            speed_mps: 1.5,
+            yaw_rate_radps: Some(0.1),
+            odometer_scale: Some([1.01, 0.001]),
+            yaw_rate_bias_radps: None,
+            mounting_rad: None,
+            phase_rad: None,
+            excluded: Vec::new(),
+            faulty: Vec::new(),
+        }
+    }
+
+    fn odometry(distance_m: f64) -> OdometrySample {
+        OdometrySample {
+            time_s: 0.0,
+            distance_m,
+            speed_mps: 1.5,
+            yaw_rate_radps: None,
+        }
+    }
+
+    #[test]
+    fn the_covariance_grows_by_the_counted_distance_or_by_the_reach() {
+        let by = |state: SavedState, elapsed_s, distance_m| {
+            state.resumption(elapsed_s, &odometry(distance_m), 2.0)
+        };
+        let stood = by(saved(Some(50.0)), 300.0, 50.0).unwrap();
+        assert_eq!(stood.driven_m, Some(0.0));
+        assert!(stood.position_std_m < 0.21, "{stood:?}");
+        let drove = by(saved(Some(50.0)), 3.0, 54.5).unwrap();
+        // A bend of 6 m radius leads 4.5²/(2·6) = 1.7 m aside.
+        assert!((1.5..2.0).contains(&drove.position_std_m), "{drove:?}");
+        // The counter was set to zero.
+        let unknown = by(saved(Some(50.0)), 3.0, 0.0).unwrap();
+        assert_eq!(unknown.driven_m, None);
+        assert_eq!(unknown, by(saved(None), 3.0, f64::NAN).unwrap());
+        assert!((3.0..3.1).contains(&unknown.position_std_m), "{unknown:?}");
+        assert_eq!(by(saved(None), 30.0, 0.0), None);
+    }
+
+    #[test]
+    fn the_pose_moves_on_by_the_counted_distance() {
+        let state = saved(Some(50.0));
+        let by = state.resumption(2.0, &odometry(53.0), 2.0).unwrap();
+        let moved = state.moved(&by);
+        let chord_m = moved.point().distance_m(state.pose.point());
+        assert!((chord_m - 3.0).abs() < 0.02, "{chord_m}");
+        assert!((moved.heading_rad - 0.2).abs() < 1e-12);
+    }
+
+    #[test]
+    fn a_saved_state_is_the_same_after_a_file() {
+        let state = saved(None);
+        let text = serde_json::to_string(&state).unwrap();
+        assert_eq!(serde_json::from_str::<SavedState>(&text).unwrap(), state);
+    }
+}

@@ -1,0 +1,527 @@
+//! Validation of the time stamps of a source, against its earlier stamps and the arrival of its messages.
+//!
+//! One implausible stamp is rejected and changes nothing. A new time base, as after a clock was set, is accepted
+//! once [`RUN`] consecutive rejected messages are consistent with each other.
+
+use std::fmt;
+
+/// Largest time stamp, and magnitude of the smallest, in seconds: the year 2286 by the Unix epoch.
+pub const MAX_TIME_S: f64 = 1e10;
+
+/// Maximum lead of a stamp over its expected time, in seconds. A transport that delays and then delivers a backlog
+/// stays below it, because each message of a backlog is compared with the message before.
+pub const MAX_LEAD_S: f64 = 1.0;
+
+/// Number of consecutive messages, consistent with each other, that establish a new time base.
+pub const RUN: u32 = 5;
+
+/// Minimum time between the arrivals of the first and the last message of such a run, in seconds: the messages of a
+/// backlog that is sent again arrive within less.
+const RUN_S: f64 = 0.2;
+
+/// Maximum difference between the durations of such a run by its stamps and by its arrivals, in seconds: jitter of
+/// the transport.
+const JITTER_S: f64 = 0.1;
+
+/// Maximum time between two messages of such a run without arrival times, in seconds.
+const MAX_SPACING_S: f64 = 1.0;
+
+/// Minimum time between the last accepted message and a new time base, in seconds.
+const MIN_ELAPSED_S: f64 = 1e-3;
+
+/// Maximum relative drift between the source's clock and the arrival clock, while clocks are slewed.
+const DRIFT: f64 = 1e-3;
+
+/// Minimum time since the last accepted message for a comparison of units, in seconds.
+const UNIT_WAIT_S: f64 = 0.05;
+
+/// Maximum relative deviation of a stamp's advance from a multiple of the elapsed time that names its unit.
+const UNIT_TOLERANCE: f64 = 0.1;
+
+/// Unit of a time stamp that should be in seconds.
+#[derive(Debug, Clone, Copy, PartialEq, Eq)]
+pub enum TimeUnit {
+    /// Milliseconds.
+    Milliseconds,
+    /// Microseconds.
+    Microseconds,
+    /// Nanoseconds.
+    Nanoseconds,
+}
+
+impl TimeUnit {
+    const ALL: [Self; 3] = [Self::Milliseconds, Self::Microseconds, Self::Nanoseconds];
+
+    /// Number of this unit in a second.
+    pub const fn per_second(self) -> f64 {
+        match self {
+            Self::Milliseconds => 1e3,
+            Self::Microseconds => 1e6,
+            Self::Nanoseconds => 1e9,
+        }
+    }
+
+    /// The unit in which a stamp is a Unix time of the years 2001 to 2286.
+    fn of_unix_time(time: f64) -> Option<Self> {
+        let is_unix = |it: &Self| (1e9..1e10).contains(&(time / it.per_second()));
+        Self::ALL.into_iter().find(is_unix)
+    }
+
+    /// The unit in which stamps advance by this ratio to the elapsed time.
+    fn of_ratio(ratio: f64) -> Option<Self> {
+        let is_near = |it: &Self| (ratio / it.per_second() - 1.0).abs() <= UNIT_TOLERANCE;
+        Self::ALL.into_iter().find(is_near)
+    }
+}
+
+impl fmt::Display for TimeUnit {
+    fn fmt(&self, f: &mut fmt::Formatter<'_>) -> fmt::Result {
+        f.write_str(match self {
+            Self::Milliseconds => "milliseconds",
+            Self::Microseconds => "microseconds",
+            Self::Nanoseconds => "nanoseconds",
+        })
+    }
+}
+
+/// Cause of a rejected time stamp.
+#[derive(Debug, Clone, Copy, PartialEq, thiserror::Error)]
+pub enum TimeDefect {
+    /// Not a number, or infinite.
+    #[error("time_s is {time_s}; it must be a finite number")]
+    NotFinite {
+        /// The stamp.
+        time_s: f64,
+    },
+    /// Larger than [`MAX_TIME_S`].
+    #[error("time_s is {time_s:e}; it must be in seconds and at most {MAX_TIME_S:e}{}", hint(*unit))]
+    OutOfRange {
+        /// The stamp.
+        time_s: f64,
+        /// Unit in which it is a Unix time.
+        unit: Option<TimeUnit>,
+    },
+    /// Advances in proportion to the elapsed time, but in another unit.
+    #[error("time_s advances by {ratio:.3e} per second; it must be in seconds{}", hint(Some(*unit)))]
+    WrongUnit {
+        /// The unit.
+        unit: TimeUnit,
+        /// Advance of the stamps per second of elapsed time.
+        ratio: f64,
+    },
+    /// Equal to the stamp of the previous message.
+    #[error("time_s is {time_s:.3} as in the previous message{}; each message needs a later time", if *is_copy { ", of which it is a copy" } else { "" })]
+    Repeated {
+        /// The stamp.
+        time_s: f64,
+        /// Whether all values are equal, too.
+        is_copy: bool,
+    },
+    /// Earlier than the stamp of the last accepted message.
+    #[error("time_s is {time_s:.3}, {by_s:.3} s before the last accepted message; check the order of the messages and the clock of their source")]
+    Backward {
+        /// The stamp.
+        time_s: f64,
+        /// Time by which it is earlier, in seconds.
+        by_s: f64,
+    },
+    /// Later than its arrival allows.
+    #[error("time_s is {time_s:.3}, {by_s:.3} s after its expected time; at most {MAX_LEAD_S} s are allowed; check the clock of its source")]
+    Future {
+        /// The stamp.
+        time_s: f64,
+        /// Time after the expected time, in seconds.
+        by_s: f64,
+    },
+}
+
+fn hint(unit: Option<TimeUnit>) -> String {
+    unit.map_or_else(String::new, |unit| {
+        let per_second = unit.per_second();
+        format!("; it appears to be in {unit}: divide it by {per_second:e}")
+    })
+}
+
+impl TimeDefect {
+    /// Short name for counters and to group events.
+    pub const fn name(&self) -> &'static str {
+        match self {
+            Self::NotFinite { .. } => "time not finite",
+            Self::OutOfRange { .. } => "time out of range",
+            Self::WrongUnit { .. } => "time in a wrong unit",
+            Self::Repeated { .. } => "time repeated",
+            Self::Backward { .. } => "time backward",
+            Self::Future { .. } => "time in the future",
+        }
+    }
+}
+
+/// Accepted time stamp.
+#[derive(Debug, Clone, Copy, PartialEq)]
+pub enum TimeVerdict {
+    /// It continues the time base.
+    Continues,
+    /// It establishes a new time base.
+    NewBase {
+        /// Time that has elapsed since the last accepted message, in seconds.
+        elapsed_s: f64,
+        /// New time minus the time that the earlier base would give, in seconds.
+        step_s: f64,
+    },
+}
+
+#[derive(Debug, Clone, Copy, PartialEq)]
+struct Stamp {
+    time_s: f64,
+    arrival_s: Option<f64>,
+}
+
+impl Stamp {
+    /// Time stamp minus arrival time, in seconds.
+    fn lead_s(&self) -> Option<f64> {
+        Some(self.time_s - self.arrival_s?)
+    }
+
+    /// Time since another message by the arrivals, in seconds.
+    fn waited_s(&self, since: &Self) -> Option<f64> {
+        Some((self.arrival_s? - since.arrival_s?).max(0.0))
+    }
+}
+
+/// Consecutive rejected messages that are consistent with each other.
+#[derive(Debug, Clone, Copy, PartialEq)]
+struct Run {
+    first: Stamp,
+    last: Stamp,
+    count: u32,
+    /// Largest time stamp minus arrival time, in seconds.
+    lead_s: Option<f64>,
+}
+
+impl Run {
+    fn from(first: Stamp) -> Self {
+        Self {
+            first,
+            last: first,
+            count: 1,
+            lead_s: first.lead_s(),
+        }
+    }
+
+    fn and(self, next: Stamp) -> Self {
+        let step_s = next.time_s - self.last.time_s;
+        let is_consistent = match next.waited_s(&self.last) {
+            Some(waited_s) => (step_s - waited_s).abs() <= MAX_LEAD_S,
+            None => step_s <= MAX_SPACING_S,
+        };
+        if step_s <= 0.0 || !is_consistent {
+            return Self::from(next);
+        }
+        Self {
+            last: next,
+            count: self.count + 1,
+            lead_s: self.lead_s.zip(next.lead_s()).map(|(a_s, b_s)| a_s.max(b_s)),
+            ..self
+        }
+    }
+
+    fn is_time_base(&self) -> bool {
+        let lasted_s = self.last.time_s - self.first.time_s;
+        self.count >= RUN
+            && self.last.waited_s(&self.first).is_none_or(|waited_s| {
+                waited_s >= RUN_S && (lasted_s - waited_s).abs() <= JITTER_S
+            })
+    }
+
+    /// Mean time between two messages, in seconds.
+    fn spacing_s(&self) -> f64 {
+        let steps = self.count.saturating_sub(1).max(1);
+        (self.last.time_s - self.first.time_s) / f64::from(steps)
+    }
+}
+
+/// Validates the time stamps of one source.
+#[derive(Debug, Clone, Default, PartialEq)]
+pub struct TimeCheck {
+    last: Option<Stamp>,
+    /// Largest time stamp minus arrival time of late, in seconds: that of the least delayed messages.
+    lead_s: Option<f64>,
+    run: Option<Run>,
+    /// Messages rejected since the last accepted one.
+    rejected: u32,
+}
+
+impl TimeCheck {
+    /// Time of the last accepted message, in seconds.
+    pub fn last_s(&self) -> Option<f64> {
+        self.last.map(|it| it.time_s)
+    }
+
+    /// Time since the last accepted message by the arrivals, in seconds; `None` without arrival times.
+    pub fn waited_s(&self, arrival_s: Option<f64>) -> Option<f64> {
+        let now = Stamp {
+            time_s: 0.0,
+            arrival_s,
+        };
+        now.waited_s(&self.last?)
+    }
+
+    /// Checks a stamp by itself: finite and within [`MAX_TIME_S`].
+    ///
+    /// # Errors
+    /// [`TimeDefect::NotFinite`] or [`TimeDefect::OutOfRange`].
+    pub fn range(time_s: f64) -> Result<(), TimeDefect> {
+        if !time_s.is_finite() {
+            return Err(TimeDefect::NotFinite { time_s });
+        }
+        if time_s.abs() > MAX_TIME_S {
+            let unit = TimeUnit::of_unix_time(time_s);
+            return Err(TimeDefect::OutOfRange { time_s, unit });
+        }
+        Ok(())
+    }
+
+    /// Validates the stamp of the next message; `arrival_s` is the time of its arrival by a monotonic clock, in
+    /// seconds, and `is_copy` whether it equals the previous message in all values. Without arrival times a step
+    /// ahead counts as a gap.
+    ///
+    /// # Errors
+    /// The cause of a rejection. The reference then remains the last accepted message.
+    pub fn next(
+        &mut self,
+        time_s: f64,
+        arrival_s: Option<f64>,
+        is_copy: bool,
+    ) -> Result<TimeVerdict, TimeDefect> {
+        Self::range(time_s)?;
+        let stamp = Stamp { time_s, arrival_s };
+        let Some(last) = self.last else {
+            self.accept(stamp);
+            return Ok(TimeVerdict::Continues);
+        };
+        let ahead_s = time_s - last.time_s;
+        let waited_s = stamp.waited_s(&last);
+        let defect = if ahead_s == 0.0 {
+            return Err(TimeDefect::Repeated { time_s, is_copy });
+        } else if ahead_s < 0.0 {
+            let by_s = -ahead_s;
+            TimeDefect::Backward { time_s, by_s }
+        } else {
+            match self.lead_over_expected_s(&stamp, &last) {
+                Some(by_s) if by_s > MAX_LEAD_S => TimeDefect::Future { time_s, by_s },
+                _ => {
+                    self.accept(stamp);
+                    return Ok(TimeVerdict::Continues);
+                }
+            }
+        };
+        self.rejected += 1;
+        let run = self.run.map_or(Run::from(stamp), |run| run.and(stamp));
+        self.run = Some(run);
+        if run.is_time_base() {
+            let step_s = self.step_s(&run, &last);
+            // Jitter cannot make the time go back.
+            let elapsed_s = (ahead_s - step_s).max(MIN_ELAPSED_S);
+            let step_s = ahead_s - elapsed_s;
+            self.lead_s = None;
+            self.accept(stamp);
+            return Ok(TimeVerdict::NewBase { elapsed_s, step_s });
+        }
+        // One stamp can be of any ratio; three in a row, none of which continues the one before, have it by their unit.
+        let unit = waited_s
+            .filter(|waited_s| self.rejected >= 3 && run.count == 1 && *waited_s >= UNIT_WAIT_S)
+            .map(|waited_s| ahead_s / waited_s)
+            .and_then(|ratio| Some((TimeUnit::of_ratio(ratio)?, ratio)));
+        Err(unit.map_or(defect, |(unit, ratio)| TimeDefect::WrongUnit { unit, ratio }))
+    }
+
+    /// Lead of a stamp, in seconds, over the later of two expectations: the last message plus the time waited, and the
+    /// least delayed messages of late.
+    fn lead_over_expected_s(&self, stamp: &Stamp, last: &Stamp) -> Option<f64> {
+        let by_last_s = stamp.time_s - last.time_s - stamp.waited_s(last)?;
+        let by_lead_s = stamp.lead_s()? - self.lead_s?;
+        Some(by_last_s.min(by_lead_s))
+    }
+
+    /// Step of the clock, in seconds: between the least delayed messages before and in the run, or without arrival
+    /// times as if no message had been lost between them.
+    fn step_s(&self, run: &Run, last: &Stamp) -> f64 {
+        match (run.lead_s, self.lead_s) {
+            (Some(after_s), Some(before_s)) => after_s - before_s,
+            _ => run.first.time_s - last.time_s - run.spacing_s(),
+        }
+    }
+
+    fn accept(&mut self, stamp: Stamp) {
+        if let Some(lead_s) = stamp.lead_s() {
+            let waited_s = self.last.and_then(|last| stamp.waited_s(&last));
+            let aged = |lead_s: f64| lead_s - DRIFT * waited_s.unwrap_or(0.0);
+            self.lead_s = Some(self.lead_s.map_or(lead_s, |it| aged(it).max(lead_s)));
+        }
+        self.last = Some(stamp);
+        self.run = None;
+        self.rejected = 0;
+    }
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    const PERIOD_S: f64 = 0.02;
+
+    /// A source at 50 Hz whose last accepted message is number 49, at 0.98 s plus `epoch_s`.
+    fn warm(epoch_s: f64) -> TimeCheck {
+        let mut check = TimeCheck::default();
+        for number in 0..50 {
+            let arrival_s = f64::from(number) * PERIOD_S;
+            let verdict = check.next(epoch_s + arrival_s, Some(arrival_s), false);
+            assert_eq!(verdict, Ok(TimeVerdict::Continues));
+        }
+        check
+    }
+
+    #[test]
+    fn one_implausible_stamp_is_rejected_and_the_next_good_one_accepted() {
+        for (time_s, name) in [
+            (3.0, "time in the future"),
+            (1e300, "time out of range"),
+            (f64::NAN, "time not finite"),
+            (0.98, "time repeated"),
+            (0.97, "time backward"),
+            (0.0, "time backward"),
+            (-1e300, "time out of range"),
+        ] {
+            let mut check = warm(0.0);
+            let error = check.next(time_s, Some(1.0), false).unwrap_err();
+            assert_eq!(error.name(), name, "{time_s}: {error}");
+            let good = check.next(1.02, Some(1.02), false);
+            assert_eq!(good, Ok(TimeVerdict::Continues));
+        }
+    }
+
+    #[test]
+    fn a_message_repeated_for_ever_never_becomes_a_time_base() {
+        let mut check = warm(0.0);
+        for number in 50..5000 {
+            let error = check.next(0.98, Some(f64::from(number) * PERIOD_S), true);
+            assert!(matches!(error, Err(TimeDefect::Repeated { is_copy: true, .. })));
+        }
+    }
+
+    #[test]
+    fn a_step_of_the_clock_is_recognized_within_half_a_second() {
+        for (step_s, period_s) in [(-5.0, 0.02), (60.0, 0.02), (1.7e9, 0.1), (-0.5, 0.02)] {
+            let mut check = warm(0.0);
+            let mut rejected = 0;
+            loop {
+                rejected += 1;
+                let arrival_s = 0.98 + f64::from(rejected) * period_s;
+                match check.next(arrival_s + step_s, Some(arrival_s), false) {
+                    Err(error) => assert!(
+                        matches!(error, TimeDefect::Backward { .. } | TimeDefect::Future { .. })
+                    ),
+                    Ok(TimeVerdict::NewBase { elapsed_s, step_s: found_s }) => {
+                        assert!((elapsed_s - f64::from(rejected) * period_s).abs() < 1e-9);
+                        assert!((found_s - step_s).abs() < 1e-6);
+                        break;
+                    }
+                    Ok(TimeVerdict::Continues) => panic!("{step_s} continues"),
+                }
+                assert!(f64::from(rejected) * period_s < 0.5, "{step_s}: {rejected}");
+            }
+            assert!(rejected >= RUN);
+        }
+    }
+
+    #[test]
+    fn delayed_and_then_delivered_messages_are_all_accepted() {
+        let mut check = warm(0.0);
+        // 3 s of messages arrive at once, every tenth is lost; then they are in time again.
+        for number in 50..400 {
+            let time_s = f64::from(number) * PERIOD_S;
+            if number % 10 != 0 {
+                let verdict = check.next(time_s, Some(time_s.max(4.0)), false);
+                assert_eq!(verdict, Ok(TimeVerdict::Continues), "{number}");
+            }
+        }
+        // Of a backlog of which most was lost one step is more than a second.
+        let mut check = warm(0.0);
+        assert!(check.next(1.0, Some(6.0), false).is_ok());
+        assert!(check.next(5.0, Some(6.0), false).is_ok());
+    }
+
+    #[test]
+    fn a_backlog_that_is_sent_again_is_rejected_until_it_is_over() {
+        let mut check = warm(0.0);
+        for number in 20..50 {
+            let verdict = check.next(f64::from(number) * PERIOD_S, Some(1.0), false);
+            assert!(verdict.is_err(), "{number}");
+        }
+        assert_eq!(check.next(1.0, Some(1.0), false), Ok(TimeVerdict::Continues));
+    }
+
+    #[test]
+    fn a_gap_of_messages_is_no_step() {
+        let mut check = warm(0.0);
+        let verdict = check.next(8.98, Some(9.01), false);
+        assert_eq!(verdict, Ok(TimeVerdict::Continues));
+        // Without arrival times every step ahead is one.
+        let mut check = TimeCheck::default();
+        for time_s in [0.0, 0.02, 500.0] {
+            assert!(check.next(time_s, None, false).is_ok());
+        }
+    }
+
+    #[test]
+    fn without_arrivals_a_step_back_takes_a_run_too() {
+        let mut check = TimeCheck::default();
+        for number in 0..100 {
+            assert!(check.next(f64::from(number) * PERIOD_S, None, false).is_ok());
+        }
+        for number in 0..RUN - 1 {
+            let verdict = check.next(f64::from(number) * PERIOD_S, None, false);
+            assert!(verdict.is_err(), "{number}");
+        }
+        let time_s = f64::from(RUN - 1) * PERIOD_S;
+        let verdict = check.next(time_s, None, false);
+        let Ok(TimeVerdict::NewBase { elapsed_s, .. }) = verdict else {
+            panic!("{verdict:?}");
+        };
+        assert!((elapsed_s - f64::from(RUN) * PERIOD_S).abs() < 1e-9);
+    }
+
+    #[test]
+    fn wrong_units_are_named_and_never_become_a_time_base() {
+        for unit in TimeUnit::ALL {
+            // Since the computer was switched on, and since 1970.
+            for epoch_s in [3.0, 1.7e9] {
+                let mut check = TimeCheck::default();
+                let mut named = false;
+                for number in 0..500 {
+                    let arrival_s = f64::from(number) * PERIOD_S;
+                    let time_s = (epoch_s + arrival_s) * unit.per_second();
+                    match check.next(time_s, Some(arrival_s), false) {
+                        Ok(verdict) => assert_eq!((number, verdict), (0, TimeVerdict::Continues)),
+                        Err(error) => named |= error.to_string().contains(&unit.to_string()),
+                    }
+                }
+                assert!(named, "{unit} {epoch_s}");
+            }
+        }
+    }
+
+    #[test]
+    fn leading_zeros_are_rejected_until_the_clock_is_set() {
+        let mut check = TimeCheck::default();
+        for number in 0..20 {
+            let verdict = check.next(0.0, Some(f64::from(number) * PERIOD_S), true);
+            assert_eq!(verdict.is_ok(), number == 0);
+        }
+        let accepted = (20..40).find(|number| {
+            let arrival_s = f64::from(*number) * PERIOD_S;
+            check.next(1.7e9 + arrival_s, Some(arrival_s), false).is_ok()
+        });
+        assert!(accepted.is_some());
+    }
+}
