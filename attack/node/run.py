@@ -106,6 +106,7 @@ class Run:
         settings = f"""\
 name = "campaign"
 messages = ["tcp-listen://127.0.0.1:{self.ports["messages"]}"]
+state_file = "{self.folder}/state.json"
 page.listen = "127.0.0.1:{self.ports["page"]}"
 [output]
 {f'tum = "{disk}/poses.tum"' if "tum" in outputs else ""}

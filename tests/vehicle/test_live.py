@@ -12,6 +12,7 @@ from typing import TYPE_CHECKING, Any
 import numpy as np
 import polars as pl
 import pytest
+import tomllib
 
 import access_av
 from conftest import ROOT
@@ -135,6 +136,46 @@ def test_what_cannot_be_is_refused_and_changes_nothing(drive: Path) -> None:
     assert live.status(1.0).pose == before
 
 
+def test_time_stamps_are_validated_against_arrivals_and_predecessors(drive: Path) -> None:
+    site, vehicle = believed(drive)
+    live = access_av.Live(site, vehicle)
+
+    def drives(time_s: float, arrival_s: float) -> None:
+        live.odometry(time_s, 1.5, distance_m=1.5 * arrival_s, arrival_s=arrival_s)
+
+    for step in range(50):
+        drives(0.02 * step, 0.02 * step)
+    before = live.status(0.98).pose
+    for time_s, said in (
+        (3.02, "after its expected time"),
+        (1e300, "at most 1e10"),
+        (1.7e12, "milliseconds"),
+        (math.nan, "finite"),
+        (0.98, "of which it is a copy"),
+        (0.5, "before the last accepted message"),
+    ):
+        with pytest.raises(ValueError, match=said):
+            drives(time_s, 0.98)
+        assert live.status(0.98).pose == before
+    with pytest.raises(ValueError, match="arrival_s"):
+        live.odometry(1.0, 1.5, arrival_s=math.nan)
+    assert live.clock_step() is None
+    # The clock is 5 s behind from now on.
+    rejected = 0
+    for step in range(50, 100):
+        try:
+            drives(0.02 * step - 5.0, 0.02 * step)
+        except ValueError:
+            rejected += 1
+    step_s = live.clock_step()
+    assert step_s == pytest.approx(-5.0, abs=1e-6)
+    assert 4 <= rejected <= 15
+    status = live.status(1.98 - 5.0)
+    assert status.pose is not None
+    assert before is not None
+    assert math.dist(status.pose[:2], before[:2]) == pytest.approx(1.5, abs=0.1)
+
+
 class Anything(SimpleNamespace):
     """A message whose fields come to be as they are asked for."""
 
@@ -183,6 +224,19 @@ def ros(monkeypatch: pytest.MonkeyPatch, now_s: list[float]) -> SimpleNamespace:
     return seen
 
 
+def phases(site_name: str, vehicle_name: str, x_m: float) -> list[tuple[int, float]]:
+    """PCI and electrical angle of two radio heads from a place on the x axis, heading along it."""
+    site = tomllib.loads(access_av.Site.load(site_name).to_toml())
+    vehicle = tomllib.loads(access_av.Vehicle.load(vehicle_name).to_toml())
+    forward_m, left_m, up_m = vehicle["array"].get("position_m", [0.0, 0.0, 0.0])
+    found = []
+    for head in site["radio_heads"]:
+        dx, dy = head["position_m"][0] - x_m - forward_m, head["position_m"][1] - left_m
+        range_m = math.hypot(dx, dy, head["position_m"][2] - up_m)
+        found.append((range_m, head["pci"], math.pi * dx / range_m))
+    return [(pci, phase_rad) for _, pci, phase_rad in sorted(found)[:2]]
+
+
 def test_the_ros_node_follows_its_topics(monkeypatch: pytest.MonkeyPatch) -> None:
     now_s = [1.0]
     seen = ros(monkeypatch, now_s)
@@ -212,10 +266,23 @@ def test_the_ros_node_follows_its_topics(monkeypatch: pytest.MonkeyPatch) -> Non
     angle = {"pci": 999, "time_s": now_s[0], "phase_rad": 0.1, "sigma_rad": 0.02}
     seen.callbacks["angles"](SimpleNamespace(data=json.dumps(angle)))
     assert not seen.warned
+    # A given pose is published once angles have confirmed it.
+    seen.timer()
+    assert not seen.published["access_av/pose"]
+    assert "have not confirmed" in seen.published["access_av/status"][-1].message
+    for pci, phase_rad in phases("yard", "tugger", -48.5):
+        for _ in range(3):
+            now_s[0] += 0.01
+            drives()
+            angle = {"pci": pci, "time_s": now_s[0], "phase_rad": phase_rad, "sigma_rad": 0.2}
+            seen.callbacks["angles"](SimpleNamespace(data=json.dumps(angle)))
+    drives_on = now_s[0] - 2.0
+    now_s[0] += 0.02
+    drives()
     seen.timer()
     pose = seen.published["access_av/pose"][-1]
     assert pose.header.frame_id == "map"
-    assert pose.pose.pose.position.x == pytest.approx(-48.5, abs=0.3)
+    assert pose.pose.pose.position.x == pytest.approx(-48.5 + 1.5 * drives_on, abs=0.4)
     assert 0.005 < pose.pose.covariance[0] < 0.1
     # What is refused is said, and the node goes on.
     seen.callbacks["angles"](SimpleNamespace(data="{"))

@@ -222,7 +222,8 @@ impl Engine {
         let text = match self.live.reset() {
             Ok(()) => "the pose is searched for".to_owned(),
             Err(LiveError::Settings(_)) => {
-                "the vehicle cannot be found by a search: it starts at the configured pose".to_owned()
+                "the vehicle cannot be found by a search: it starts at the configured pose"
+                    .to_owned()
             }
             Err(error) => return Err(error),
         };
@@ -432,7 +433,10 @@ impl Engine {
                         if offset_s < 0.0 { "behind" } else { "ahead of" }
                     ),
                 ),
-                None => (Level::Info, "the clocks of angles and odometry agree".to_owned()),
+                None => (
+                    Level::Info,
+                    "the clocks of angles and odometry agree".to_owned(),
+                ),
             };
             self.event(level, "clocks", text);
         }
@@ -581,7 +585,9 @@ impl Engine {
                 self.event(Level::Info, "node", text.to_owned());
             }
             Err(error) => {
-                let text = format!("site and vehicle are not loaded again, the earlier ones stay: {error:#}");
+                let text = format!(
+                    "site and vehicle are not loaded again, the earlier ones stay: {error:#}"
+                );
                 self.event(Level::Warn, "node", text);
             }
         }

@@ -239,7 +239,13 @@ fn drive(
     if !is_playback {
         engine.reload_by(reload);
     }
-    serve(settings.page.as_ref(), &board, site, &stop, reload_requested)?;
+    serve(
+        settings.page.as_ref(),
+        &board,
+        site,
+        &stop,
+        reload_requested,
+    )?;
     let writing = sink::start(sinks, &records)?;
     engine.event(Level::Info, "node", format!("{} begins", settings.name));
     let saving = match &settings.state_file {

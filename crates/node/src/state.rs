@@ -63,7 +63,9 @@ pub fn read(
         Err(error) => return Err(named(error.to_string())),
     };
     if size > MAX_BYTES {
-        return Err(named(format!("has {size} bytes; a state file has at most {MAX_BYTES}")));
+        return Err(named(format!(
+            "has {size} bytes; a state file has at most {MAX_BYTES}"
+        )));
     }
     let bytes = fs::read(path).map_err(|error| named(error.to_string()))?;
     let file: StateFile = serde_json::from_slice(&bytes)
@@ -172,7 +174,11 @@ impl StateStore {
 ///
 /// # Errors
 /// Where the thread cannot be started.
-pub fn start(store: Arc<StateStore>, path: PathBuf, inbox: Arc<Inbox>) -> io::Result<JoinHandle<()>> {
+pub fn start(
+    store: Arc<StateStore>,
+    path: PathBuf,
+    inbox: Arc<Inbox>,
+) -> io::Result<JoinHandle<()>> {
     let named = std::thread::Builder::new().name("state".to_owned());
     named.spawn(move || {
         let mut failed: Option<String> = None;
@@ -191,7 +197,10 @@ pub fn start(store: Arc<StateStore>, path: PathBuf, inbox: Arc<Inbox>) -> io::Re
             }
             let (level, text) = match &error {
                 Some(text) => (Level::Warn, text.clone()),
-                None => (Level::Info, format!("state_file {}: written again", path.display())),
+                None => (
+                    Level::Info,
+                    format!("state_file {}: written again", path.display()),
+                ),
             };
             inbox.put(Input::Remark {
                 level,
@@ -249,7 +258,12 @@ mod tests {
             (&text, "a", now_s - 60.0, "s old; it must be"),
             (&text[..text.len() / 2], "a", now_s, "is no state file"),
             ("", "a", now_s, "is no state file"),
-            (&text.replace("\"version\":1", "\"version\":9"), "a", now_s, "version is 9"),
+            (
+                &text.replace("\"version\":1", "\"version\":9"),
+                "a",
+                now_s,
+                "version is 9",
+            ),
             (&text.replace("0.3", "-0.3"), "a", now_s, "negative"),
             (&text.replace("0.3", "null"), "a", now_s, "is no state file"),
             (&"x".repeat(1 << 17), "a", now_s, "bytes"),

@@ -51,10 +51,21 @@ fn sources_vanish_and_return_and_each_silence_is_named_within_a_second() {
     stream.write_all(odometry(2.0).as_bytes()).unwrap();
     node.until_event("messages", "left out");
     assert_eq!(node.until(|it| it["type"] == "pose")["time_s"], 2.0);
-    // A drive that begins anew.
+    // A stamp that goes back is rejected.
     stream.write_all(odometry(0.5).as_bytes()).unwrap();
-    node.until_event("odometry", "begins anew");
-    assert_eq!(node.until(|it| it["type"] == "pose")["time_s"], 0.5);
+    node.until_event(
+        "odometry",
+        "rejected: odometry: time_s is 0.5, 1.500 s before",
+    );
+    // A clock that stays back is accepted, and the pose resumed.
+    for number in 0..20 {
+        let time_s = 0.5 + 0.05 * f64::from(number);
+        stream.write_all(odometry(time_s).as_bytes()).unwrap();
+        std::thread::sleep(Duration::from_millis(50));
+    }
+    node.until_event("odometry", "the clock has stepped by -");
+    let pose = node.until(|it| it["type"] == "pose");
+    assert!(pose["time_s"].as_f64() < Some(1.5), "{pose}");
     let last = node.terminate().pop().unwrap();
     assert_eq!(last["text"], "test ends");
 }
@@ -85,6 +96,84 @@ fn poses_can_be_set_heads_left_out_and_what_is_refused_is_said() {
     drop(input);
     // All there was has come to its end.
     assert!(node.process.wait().unwrap().success());
+}
+
+#[test]
+fn implausible_time_stamps_are_events_of_their_cause_and_leave_the_pose() {
+    let folder = scratch("stamps");
+    let mut node = Node::start(&folder, "-", "");
+    let mut input = node.process.stdin.take().unwrap();
+    for number in 0..10 {
+        let time_s = 100.0 + 0.02 * f64::from(number);
+        input.write_all(odometry(time_s).as_bytes()).unwrap();
+        std::thread::sleep(Duration::from_millis(20));
+    }
+    for (line, said) in [
+        (odometry(102.2), "after its expected time"),
+        (odometry(1e300), "it must be in seconds and at most"),
+        (odometry(1.7e12), "milliseconds"),
+        (odometry(100.18), "of which it is a copy"),
+        (odometry(100.0), "before the last accepted message"),
+    ] {
+        input.write_all(line.as_bytes()).unwrap();
+        node.until_event("odometry", said);
+    }
+    let wrong = r#"{"type":"odometry","time_s":"abc","speed_mps":1}"#;
+    input.write_all(format!("{wrong}\n").as_bytes()).unwrap();
+    node.until_event("messages", "time_s: invalid type: string");
+    for _ in 0..500 {
+        input.write_all(odometry(100.18).as_bytes()).unwrap();
+    }
+    input.write_all(odometry(100.21).as_bytes()).unwrap();
+    assert_eq!(node.until(|it| it["type"] == "pose")["time_s"], 100.21);
+    node.until_event("odometry", "time repeated, 500 more");
+    node.terminate();
+}
+
+#[test]
+fn the_state_is_saved_and_resumed_after_a_kill() {
+    let folder = scratch("state");
+    let file = folder.join("state.json");
+    let more = format!("state_file = {:?}", file.display().to_string());
+    let set = json!({"type": "set-pose", "x_m": 30.0, "y_m": 0.0, "heading_rad": 0.0});
+    let mut node = Node::start(&folder, "-", &more);
+    node.until_event("state", "first start");
+    let mut input = node.process.stdin.take().unwrap();
+    let stands = |time_s: f64| {
+        let message =
+            json!({"type": "odometry", "time_s": time_s, "speed_mps": 0.0, "distance_m": 5.0});
+        format!("{message}\n")
+    };
+    input.write_all(stands(0.0).as_bytes()).unwrap();
+    input.write_all(format!("{set}\n").as_bytes()).unwrap();
+    for number in 1..80 {
+        let time_s = 0.02 * f64::from(number);
+        input.write_all(stands(time_s).as_bytes()).unwrap();
+        std::thread::sleep(Duration::from_millis(20));
+    }
+    node.process.kill().unwrap();
+    node.process.wait().unwrap();
+    let saved: Value = serde_json::from_slice(&fs::read(&file).unwrap()).unwrap();
+    let x_m = saved["state"]["pose"]["x_m"].as_f64().unwrap();
+    let mut node = Node::start(&folder, "-", &more);
+    let mut input = node.process.stdin.take().unwrap();
+    input.write_all(stands(0.0).as_bytes()).unwrap();
+    node.until_event("state", "is resumed after 0.00 m by the odometer");
+    let pose = node.until(|it| it["type"] == "pose");
+    assert!(
+        (pose["x_m"].as_f64().unwrap() - x_m).abs() < 0.2,
+        "{pose} {x_m}"
+    );
+    assert_eq!(pose["state"], "unavailable");
+    node.terminate();
+    // What cannot be used is named, and the vehicle is searched for.
+    fs::write(&file, "{").unwrap();
+    let mut node = Node::start(&folder, "-", &more);
+    node.until_event("state", "state.json: is no state file");
+    let mut input = node.process.stdin.take().unwrap();
+    input.write_all(stands(0.0).as_bytes()).unwrap();
+    assert_eq!(node.until(|it| it["type"] == "pose")["state"], "searching");
+    node.terminate();
 }
 
 #[test]

@@ -192,8 +192,13 @@ pub struct LiveEnergy {
 
 /// The pipeline on a vehicle: samples, angles and odometry in as they come, a status at any time.
 ///
-/// Times are of one clock, in seconds. What is refused raises and changes nothing. Other threads run
+/// Times are of one clock, in seconds. Input that is rejected raises and changes nothing. Other threads run
 /// while samples are worked on.
+///
+/// Time stamps are validated against those before them and, where `arrival_s` is given, against the arrival of the
+/// message by a monotonic clock (`time.monotonic()`). One implausible stamp is rejected. A clock that has stepped for
+/// good is recognized by five consecutive consistent messages: the pose is resumed, and `clock_step` returns the step.
+/// A given or resumed pose is `unavailable` until five angles to two radio heads have confirmed it.
 ///
 /// Parameters
 /// ----------
@@ -222,7 +227,7 @@ pub struct LiveEnergy {
 /// ...     _ = live.odometry(0.02 * step, 1.5, yaw_rate_radps=0.0)
 /// >>> status = live.status(1.0)
 /// >>> status.state, status.reason
-/// ('ok', 'nothing is wrong')
+/// ('unavailable', 'angles have not confirmed the given or resumed pose yet')
 /// >>> round(status.pose[0], 1)
 /// -57.5
 #[pyclass(frozen, module = "access_av._core")]
@@ -275,20 +280,29 @@ impl Live {
     ///     is missing, there twice, or of a stream that began anew, is told by it.
     /// samples : ndarray
     ///     Complex samples, `(antennas, samples)`.
+    /// arrival_s : float, optional
+    ///     Time of their arrival by a monotonic clock.
     ///
     /// Returns
     /// -------
     /// str
     ///     How they go on: `first`, `contiguous`, `gap`, `overlap` or `restart`.
+    #[pyo3(signature = (time_s, samples, *, arrival_s = None))]
     fn samples(
         &self,
         py: Python<'_>,
         time_s: f64,
         samples: &Bound<'_, PyAny>,
+        arrival_s: Option<f64>,
     ) -> PyResult<&'static str> {
         let samples = complex_samples(samples)?;
         let antennas = rows(&samples)?;
-        let taken = py.detach(|| self.core().samples(time_s, &antennas));
+        let arrival_s = finite_arrival(arrival_s)?;
+        let taken = py.detach(|| {
+            let mut core = self.core();
+            core.set_arrival(arrival_s);
+            core.samples(time_s, &antennas)
+        });
         Ok(match taken.map_err(live_error)? {
             Continuity::First => "first",
             Continuity::Contiguous => "contiguous",
@@ -300,6 +314,19 @@ impl Live {
 
     /// Take odometry; its speed alone is enough.
     ///
+    /// Parameters
+    /// ----------
+    /// time_s : float
+    ///     Time of the measurement in seconds.
+    /// speed_mps : float
+    ///     Speed in m/s, negative backwards.
+    /// distance_m : float, optional
+    ///     Distance counter in metres.
+    /// yaw_rate_radps : float, optional
+    ///     Yaw rate in rad/s, counter-clockwise.
+    /// arrival_s : float, optional
+    ///     Time of its arrival by a monotonic clock, in seconds.
+    ///
     /// Returns
     /// -------
     /// bool
@@ -308,8 +335,8 @@ impl Live {
     /// Raises
     /// ------
     /// ValueError
-    ///     A time that is not after the last one's, or a value that is not finite.
-    #[pyo3(signature = (time_s, speed_mps, *, distance_m = None, yaw_rate_radps = None))]
+    ///     A time that is not plausible, or a value that is not finite.
+    #[pyo3(signature = (time_s, speed_mps, *, distance_m = None, yaw_rate_radps = None, arrival_s = None))]
     fn odometry(
         &self,
         py: Python<'_>,
@@ -317,7 +344,9 @@ impl Live {
         speed_mps: f64,
         distance_m: Option<f64>,
         yaw_rate_radps: Option<f64>,
+        arrival_s: Option<f64>,
     ) -> PyResult<bool> {
+        let arrival_s = finite_arrival(arrival_s)?;
         if distance_m.is_some_and(|it| !it.is_finite()) {
             return Err(PyValueError::new_err("distance_m is not a finite number"));
         }
@@ -325,7 +354,11 @@ impl Live {
             distance_m: distance_m.unwrap_or(f64::NAN),
             ..OdometrySample::of_speed(time_s, speed_mps, yaw_rate_radps)
         };
-        let verdict = py.detach(|| self.core().odometry(&sample));
+        let verdict = py.detach(|| {
+            let mut core = self.core();
+            core.set_arrival(arrival_s);
+            core.odometry(&sample)
+        });
         Ok(!matches!(
             verdict.map_err(live_error)?,
             OdometryVerdict::DistanceJump { .. } | OdometryVerdict::YawRateRefused { .. }
@@ -350,7 +383,9 @@ impl Live {
     ///     SNR per antenna.
     /// resolved : bool
     ///     Whether the estimator vouches for it.
-    #[pyo3(signature = (pci, time_s, phase_rad, sigma_rad, *, ssb_index = 0, snr_db = None, resolved = true))]
+    /// arrival_s : float, optional
+    ///     Time of its arrival by a monotonic clock, in seconds.
+    #[pyo3(signature = (pci, time_s, phase_rad, sigma_rad, *, ssb_index = 0, snr_db = None, resolved = true, arrival_s = None))]
     #[allow(clippy::too_many_arguments)] // Python's keywords
     fn angle(
         &self,
@@ -362,7 +397,9 @@ impl Live {
         ssb_index: u8,
         snr_db: Option<f64>,
         resolved: bool,
+        arrival_s: Option<f64>,
     ) -> PyResult<()> {
+        let arrival_s = finite_arrival(arrival_s)?;
         let angle = AngleObservation {
             pci,
             ssb_index,
@@ -372,7 +409,22 @@ impl Live {
             snr_db,
             resolved,
         };
-        py.detach(|| self.core().angle(&angle)).map_err(live_error)
+        py.detach(|| {
+            let mut core = self.core();
+            core.set_arrival(arrival_s);
+            core.angle(&angle)
+        })
+        .map_err(live_error)
+    }
+
+    /// Step of the odometry's clock, in seconds, that was recognized since the last call; the pose was resumed then.
+    fn clock_step(&self) -> Option<f64> {
+        self.core().take_odometry_step().map(|it| it.step_s)
+    }
+
+    /// Time of angles minus that of odometry, in seconds, if their clocks differ; the state is `unavailable` then.
+    fn clock_disagreement_s(&self) -> Option<f64> {
+        self.core().clock_disagreement_s()
     }
 
     /// Hear what has come of a burst without waiting for more of it.
@@ -460,5 +512,14 @@ const fn pose((x_m, y_m, heading_rad): (f64, f64, f64)) -> Pose {
         x_m,
         y_m,
         heading_rad,
+    }
+}
+
+fn finite_arrival(arrival_s: Option<f64>) -> PyResult<Option<f64>> {
+    match arrival_s {
+        Some(value) if !value.is_finite() => Err(PyValueError::new_err(format!(
+            "arrival_s is {value}; it must be a finite number"
+        ))),
+        other => Ok(other),
     }
 }

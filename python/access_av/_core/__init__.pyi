@@ -146,7 +146,13 @@ class Live:
         rate_hz: float | None = None,
         centre_hz: float | None = None,
     ) -> Live: ...
-    def samples(self, time_s: float, samples: NDArray[np.complexfloating[Any, Any]]) -> str: ...
+    def samples(
+        self,
+        time_s: float,
+        samples: NDArray[np.complexfloating[Any, Any]],
+        *,
+        arrival_s: float | None = None,
+    ) -> str: ...
     def odometry(
         self,
         time_s: float,
@@ -154,6 +160,7 @@ class Live:
         *,
         distance_m: float | None = None,
         yaw_rate_radps: float | None = None,
+        arrival_s: float | None = None,
     ) -> bool: ...
     def angle(
         self,
@@ -165,7 +172,10 @@ class Live:
         ssb_index: int = 0,
         snr_db: float | None = None,
         resolved: bool = True,
+        arrival_s: float | None = None,
     ) -> None: ...
+    def clock_step(self) -> float | None: ...
+    def clock_disagreement_s(self) -> float | None: ...
     def settle(self) -> None: ...
     def outcomes(self) -> list[LiveOutcome]: ...
     def set_pose(

@@ -70,7 +70,9 @@ pub fn parse(line: &[u8]) -> Result<Option<Input>, String> {
     }
     let value: Value = serde_json::from_slice(line).map_err(|error| error.to_string())?;
     let Value::Object(mut message) = value else {
-        return Err(format!("not an object; it must be one with the key `type`: {TYPES}"));
+        return Err(format!(
+            "not an object; it must be one with the key `type`: {TYPES}"
+        ));
     };
     let Some(kind) = message.remove("type") else {
         return Err(format!("the key `type` is missing; it must be {TYPES}"));

@@ -2,12 +2,9 @@
 
 use super::error::LiveError;
 use super::time_base::{ClockStep, TimeBase};
-use super::time_check::{TimeCheck, TimeDefect};
+use super::time_check::{MAX_ANGLE_LEAD_S, TimeCheck, TimeDefect};
 use crate::localize::HISTORY_S;
 use crate::observation::{BURST_S, OdometrySample};
-
-/// Maximum time by which an angle may be ahead of the odometry, beyond the time since that arrived, in seconds.
-pub const MAX_ANGLE_LEAD_S: f64 = 1.0;
 
 /// The same lead where arrival times are not known, in seconds: a gap of the odometry is shorter.
 const MAX_LEAD_WITHOUT_ARRIVALS_S: f64 = 10.0;
@@ -120,9 +117,9 @@ impl Clocks {
         let is_same = |it: &Disagreement| {
             it.odometry_s == odometry_s && (it.offset_s - offset_s).abs() < BURST_S
         };
-        let bursts = self.disagreement.map_or(1, |it| {
-            it.bursts.saturating_add(u32::from(!is_same(&it)))
-        });
+        let bursts = self
+            .disagreement
+            .map_or(1, |it| it.bursts.saturating_add(u32::from(!is_same(&it))));
         self.disagreement = Some(Disagreement {
             bursts,
             offset_s,

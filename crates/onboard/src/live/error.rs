@@ -1,7 +1,6 @@
 //! What a live pipeline refuses. Its state is kept.
 
-use super::clocks::MAX_ANGLE_LEAD_S;
-use super::time_check::TimeDefect;
+use super::time_check::{MAX_ANGLE_LEAD_S, TimeDefect};
 use crate::BoxError;
 use crate::pipeline::OdometryDefect;
 use crate::receive::ReceiveError;
@@ -40,7 +39,9 @@ pub enum LiveError {
         defect: TimeDefect,
     },
     /// An angle whose time is ahead of the odometry.
-    #[error("angle: time_s is {by_s:.3} s ahead of the odometry; at most {MAX_ANGLE_LEAD_S} s are allowed; the clocks of angles or samples and of odometry must agree")]
+    #[error(
+        "angle: time_s is {by_s:.3} s ahead of the odometry; at most {MAX_ANGLE_LEAD_S} s are allowed; the clocks of angles or samples and of odometry must agree"
+    )]
     AngleAhead {
         /// Time by which it is ahead, in seconds.
         by_s: f64,

@@ -22,7 +22,7 @@ use crate::localize::{
     self, AngleMeasurement, HISTORY_S, IntegrityState, OdometryVerdict, PoseEstimate, UpdateReason,
 };
 use crate::observation::{BURST_S, OdometrySample, SensedSsb};
-use crate::pipeline::{Custom, Onboard, OdometryDefect};
+use crate::pipeline::{Custom, OdometryDefect, Onboard};
 use crate::radio_head::RadioHead;
 use crate::receive::ReceiverConfig;
 use crate::settings::{Boundary, Extent, Platform, Site, Vehicle};
@@ -385,9 +385,8 @@ impl Live {
         };
         let heard_s = Some(self.clocks.odometry.outside(time_s));
         self.angles.iter().any(is_same)
-            || (self.heads.iter()).any(|it| {
-                it.head.sends(angle.pci, angle.ssb_index) && it.last_heard_s == heard_s
-            })
+            || (self.heads.iter())
+                .any(|it| it.head.sends(angle.pci, angle.ssb_index) && it.last_heard_s == heard_s)
     }
 
     /// Hears what has come of a burst without waiting for more of it, as at the end of a drive.

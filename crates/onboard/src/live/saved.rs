@@ -4,6 +4,7 @@ use serde::{Deserialize, Serialize};
 
 use super::error::LiveError;
 use super::feed::Live;
+use super::outcome::HeadStatus;
 use super::status::State;
 use crate::geometry::Pose;
 use crate::localize::PoseEstimate;
@@ -159,7 +160,7 @@ impl Live {
             let it = of(constants.as_ref()?);
             (it.stated_std > 0.0 && it.std < it.stated_std).then_some([it.found, it.std])
         };
-        let pcis = |is: fn(&super::HeadStatus) -> bool| {
+        let pcis = |is: fn(&HeadStatus) -> bool| {
             let mut pcis: Vec<u16> = (self.heads().iter())
                 .filter(|it| is(it))
                 .map(|it| it.head.pci)
@@ -228,7 +229,9 @@ fn calibrated(vehicle: &Vehicle, saved: &SavedState) -> Vehicle {
             && found_std >= 0.0
         {
             *value = found;
-            *std = std.min(CALIBRATION_FACTOR * found_std).max(f64::MIN_POSITIVE);
+            *std = std
+                .min(CALIBRATION_FACTOR * found_std)
+                .max(f64::MIN_POSITIVE);
         }
     };
     let odometer = &mut vehicle.odometer;

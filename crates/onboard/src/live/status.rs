@@ -191,7 +191,11 @@ impl fmt::Display for Reason {
                 f,
                 "angles are {:.1} s {} the odometry: their clocks differ",
                 offset_s.abs(),
-                if *offset_s < 0.0 { "behind" } else { "ahead of" },
+                if *offset_s < 0.0 {
+                    "behind"
+                } else {
+                    "ahead of"
+                },
             ),
             Self::Nominal => write!(f, "nothing is wrong"),
             Self::NotMonitored => write!(f, "nothing monitors the pose"),

@@ -12,6 +12,9 @@ pub const MAX_TIME_S: f64 = 1e10;
 /// stays below it, because each message of a backlog is compared with the message before.
 pub const MAX_LEAD_S: f64 = 1.0;
 
+/// Maximum time by which an angle may be ahead of the odometry, beyond the time since that arrived, in seconds.
+pub const MAX_ANGLE_LEAD_S: f64 = 1.0;
+
 /// Number of consecutive messages, consistent with each other, that establish a new time base.
 pub const RUN: u32 = 5;
 
@@ -118,7 +121,9 @@ pub enum TimeDefect {
         is_copy: bool,
     },
     /// Earlier than the stamp of the last accepted message.
-    #[error("time_s is {time_s:.3}, {by_s:.3} s before the last accepted message; check the order of the messages and the clock of their source")]
+    #[error(
+        "time_s is {time_s:.3}, {by_s:.3} s before the last accepted message; check the order of the messages and the clock of their source"
+    )]
     Backward {
         /// The stamp.
         time_s: f64,
@@ -126,7 +131,9 @@ pub enum TimeDefect {
         by_s: f64,
     },
     /// Later than its arrival allows.
-    #[error("time_s is {time_s:.3}, {by_s:.3} s after its expected time; at most {MAX_LEAD_S} s are allowed; check the clock of its source")]
+    #[error(
+        "time_s is {time_s:.3}, {by_s:.3} s after its expected time; at most {MAX_LEAD_S} s are allowed; check the clock of its source"
+    )]
     Future {
         /// The stamp.
         time_s: f64,
@@ -220,7 +227,10 @@ impl Run {
         Self {
             last: next,
             count: self.count + 1,
-            lead_s: self.lead_s.zip(next.lead_s()).map(|(a_s, b_s)| a_s.max(b_s)),
+            lead_s: self
+                .lead_s
+                .zip(next.lead_s())
+                .map(|(a_s, b_s)| a_s.max(b_s)),
             ..self
         }
     }
@@ -228,9 +238,10 @@ impl Run {
     fn is_time_base(&self) -> bool {
         let lasted_s = self.last.time_s - self.first.time_s;
         self.count >= RUN
-            && self.last.waited_s(&self.first).is_none_or(|waited_s| {
-                waited_s >= RUN_S && (lasted_s - waited_s).abs() <= JITTER_S
-            })
+            && self
+                .last
+                .waited_s(&self.first)
+                .is_none_or(|waited_s| waited_s >= RUN_S && (lasted_s - waited_s).abs() <= JITTER_S)
     }
 
     /// Mean time between two messages, in seconds.
@@ -332,7 +343,10 @@ impl TimeCheck {
             .filter(|waited_s| self.rejected >= 3 && run.count == 1 && *waited_s >= UNIT_WAIT_S)
             .map(|waited_s| ahead_s / waited_s)
             .and_then(|ratio| Some((TimeUnit::of_ratio(ratio)?, ratio)));
-        Err(unit.map_or(defect, |(unit, ratio)| TimeDefect::WrongUnit { unit, ratio }))
+        Err(unit.map_or(defect, |(unit, ratio)| TimeDefect::WrongUnit {
+            unit,
+            ratio,
+        }))
     }
 
     /// Lead of a stamp, in seconds, over the later of two expectations: the last message plus the time waited, and the
@@ -405,7 +419,10 @@ mod tests {
         let mut check = warm(0.0);
         for number in 50..5000 {
             let error = check.next(0.98, Some(f64::from(number) * PERIOD_S), true);
-            assert!(matches!(error, Err(TimeDefect::Repeated { is_copy: true, .. })));
+            assert!(matches!(
+                error,
+                Err(TimeDefect::Repeated { is_copy: true, .. })
+            ));
         }
     }
 
@@ -418,10 +435,14 @@ mod tests {
                 rejected += 1;
                 let arrival_s = 0.98 + f64::from(rejected) * period_s;
                 match check.next(arrival_s + step_s, Some(arrival_s), false) {
-                    Err(error) => assert!(
-                        matches!(error, TimeDefect::Backward { .. } | TimeDefect::Future { .. })
-                    ),
-                    Ok(TimeVerdict::NewBase { elapsed_s, step_s: found_s }) => {
+                    Err(error) => assert!(matches!(
+                        error,
+                        TimeDefect::Backward { .. } | TimeDefect::Future { .. }
+                    )),
+                    Ok(TimeVerdict::NewBase {
+                        elapsed_s,
+                        step_s: found_s,
+                    }) => {
                         assert!((elapsed_s - f64::from(rejected) * period_s).abs() < 1e-9);
                         assert!((found_s - step_s).abs() < 1e-6);
                         break;
@@ -458,7 +479,10 @@ mod tests {
             let verdict = check.next(f64::from(number) * PERIOD_S, Some(1.0), false);
             assert!(verdict.is_err(), "{number}");
         }
-        assert_eq!(check.next(1.0, Some(1.0), false), Ok(TimeVerdict::Continues));
+        assert_eq!(
+            check.next(1.0, Some(1.0), false),
+            Ok(TimeVerdict::Continues)
+        );
     }
 
     #[test]
@@ -477,7 +501,11 @@ mod tests {
     fn without_arrivals_a_step_back_takes_a_run_too() {
         let mut check = TimeCheck::default();
         for number in 0..100 {
-            assert!(check.next(f64::from(number) * PERIOD_S, None, false).is_ok());
+            assert!(
+                check
+                    .next(f64::from(number) * PERIOD_S, None, false)
+                    .is_ok()
+            );
         }
         for number in 0..RUN - 1 {
             let verdict = check.next(f64::from(number) * PERIOD_S, None, false);
@@ -520,7 +548,9 @@ mod tests {
         }
         let accepted = (20..40).find(|number| {
             let arrival_s = f64::from(*number) * PERIOD_S;
-            check.next(1.7e9 + arrival_s, Some(arrival_s), false).is_ok()
+            check
+                .next(1.7e9 + arrival_s, Some(arrival_s), false)
+                .is_ok()
         });
         assert!(accepted.is_some());
     }

@@ -5,6 +5,7 @@
 mod air;
 mod differential;
 mod gap;
+mod live_times;
 mod random_drives;
 mod receiver;
 mod recovery;
