@@ -55,7 +55,7 @@ fn sources_vanish_and_return_and_each_silence_is_named_within_a_second() {
     stream.write_all(odometry(0.5).as_bytes()).unwrap();
     node.until_event(
         "odometry",
-        "rejected: odometry: time_s is 0.5, 1.500 s before",
+        "rejected: odometry: time_s is 0.500, 1.500 s before",
     );
     // A clock that stays back is accepted, and the pose resumed.
     for number in 0..20 {
@@ -126,7 +126,8 @@ fn implausible_time_stamps_are_events_of_their_cause_and_leave_the_pose() {
     }
     input.write_all(odometry(100.21).as_bytes()).unwrap();
     assert_eq!(node.until(|it| it["type"] == "pose")["time_s"], 100.21);
-    node.until_event("odometry", "time repeated, 500 more");
+    let repeated = |it: &Value| it["text"].as_str().is_some_and(|it| it.contains("is a copy"));
+    node.until(|it| repeated(it) && it["count"].as_u64() > Some(400));
     node.terminate();
 }
 
