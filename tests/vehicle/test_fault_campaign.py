@@ -46,10 +46,6 @@ SHORTFALLS = {
     "SIGKILL at a random time, restart after 1 s",
     "process stopped for 3 s",
     "SIGHUP with an invalid site file",
-    "disk full under MCAP",
-    "disk full under TUM",
-    "log folder removed",
-    "reader of the JSON output closed",
 }
 
 pytestmark = pytest.mark.skipif(

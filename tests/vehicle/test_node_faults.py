@@ -14,6 +14,9 @@ from typing import TYPE_CHECKING, Any
 
 import jsonschema
 import pytest
+from mcap.reader import make_reader
+from rosbags.highlevel import AnyReader
+from rosbags.typesys import Stores, get_typestore
 
 import access_av
 from node import NODE, SCHEMAS, Broker, free_port
@@ -43,6 +46,9 @@ class Driven:
             messages = ["udp://127.0.0.1:{self.port}"]
             [output.json]
             address = "{self.json}"
+            [output.mcap]
+            folder = "{folder}/mcap"
+            pose_hz = 50.0
             [output.mqtt]
             host = "127.0.0.1"
             port = {broker.port}
@@ -158,6 +164,59 @@ def test_the_broker_says_not_localized_after_the_node_has_ended(
     assert retained["localized"] is False
     assert retained["mapId"] == "yard"
     valid([*messages, retained])
+
+
+def test_every_mcap_reader_reads_the_file_of_a_killed_node(
+    start: Callable[[Broker], Driven], tmp_path: Path
+) -> None:
+    broker = Broker()
+    driven = start(broker)
+    driven.wait_for(lambda it: sum(r["type"] == "pose" for r in it) > 200, limit_s=30.0)
+    driven.end(signal.SIGKILL)
+    broker.kill()
+    last_s = max(it["time_s"] for it in driven.records() if it["type"] == "pose")
+    (file,) = (tmp_path / "mcap").iterdir()
+    with file.open("rb") as stream:
+        messages = [it for _, _, it in make_reader(stream, validate_crcs=True).iter_messages()]
+    assert messages[-1].log_time * 1e-9 > last_s - 2.0
+    with AnyReader([file], default_typestore=get_typestore(Stores.ROS2_HUMBLE)) as reader:
+        assert reader.message_count == len(messages) > 200
+
+
+def test_a_pipeline_that_gives_no_record_is_not_localized(tmp_path: Path) -> None:
+    """The time without a record is a gap in a recording that is played in real time."""
+    broker = Broker()
+    known = {"integrity.enabled": False, "start.pose": {"x_m": 0.0, "y_m": 0.0, "heading_rad": 0.0}}
+    vehicle = access_av.Vehicle.load("tugger").with_overrides(known)
+    (tmp_path / "vehicle.toml").write_text(vehicle.to_toml(), encoding="utf-8")
+    times_s = [0.02 * it for it in (*range(150), *range(400, 402))]
+    rows = [f"{it:.2f},{it:.2f},1.0,0.0" for it in times_s]
+    columns = "time_s,distance_m,speed_mps,yaw_rate_radps"
+    (tmp_path / "odometry.csv").write_text("\n".join([columns, *rows]), encoding="utf-8")
+    angles = "time_s,pci,phase_rad,phase_sigma_rad\n100.0,11,0.1,0.1\n"
+    (tmp_path / "angles.csv").write_text(angles, encoding="utf-8")
+    settings = tmp_path / "node.toml"
+    settings.write_text(
+        f"""
+        name = "gap"
+        odometry.file = "{tmp_path}/odometry.csv"
+        angles.file = "{tmp_path}/angles.csv"
+        output.mqtt = {{ host = "127.0.0.1", port = {broker.port}, topic = "fleet/position",
+          map_id = "yard", rate_hz = 10.0, localized_after_s = 0.2 }}
+        """,
+        encoding="utf-8",
+    )
+    arguments = ["--site", "yard", "--vehicle", str(tmp_path / "vehicle.toml"), str(settings)]
+    node = subprocess.Popen([str(NODE), *arguments], stderr=subprocess.DEVNULL)
+    time.sleep(6.5)
+    node.terminate()
+    node.wait(timeout=10.0)
+    messages = broker.heard()
+    times = [datetime.fromisoformat(it["timestamp"]).timestamp() for it in messages]
+    last = max(k for k, it in enumerate(messages) if it["localized"])
+    assert last > 10
+    # Published during the gap, long before the message of the clean end.
+    assert 1.4 < times[last + 1] - times[last] < 2.5
 
 
 def test_a_killed_broker_is_reported_and_connected_again(

@@ -26,7 +26,7 @@ use recording::load;
 use recording::replay::{as_stated, with_phase};
 use tokio::signal::unix::{SignalKind, signal};
 
-/// Says where the vehicle is: samples and odometry in, poses out, a page to look at.
+/// Locates the vehicle: samples and odometry in, poses out by file, socket and MQTT, a page to look at.
 #[derive(Clone, Parser)]
 #[command(version, about)]
 struct Arguments {
@@ -36,9 +36,9 @@ struct Arguments {
     /// Vehicle: a shipped name, or a path.
     #[arg(long)]
     vehicle: String,
-    /// What comes from where and goes whereto.
+    /// Node file: inputs, outputs and page.
     node: PathBuf,
-    /// Says what is missing or unlikely, and ends.
+    /// Checks the files, prints missing and implausible settings, and ends.
     #[arg(long)]
     dry_run: bool,
 }
@@ -85,7 +85,7 @@ fn say(text: &str) -> ExitCode {
     ExitCode::SUCCESS
 }
 
-/// Reads a node file; paths in it count from its folder.
+/// Reads a node file. Paths in it are relative to its folder.
 fn node_settings(path: &std::path::Path) -> Result<NodeSettings> {
     let origin = path.display().to_string();
     let settings: NodeSettings = load(&origin)?;
@@ -158,7 +158,7 @@ fn reload(arguments: &Arguments, settings: &NodeSettings, setup: &Setup) -> Relo
     }
 }
 
-/// What a dry run says.
+/// Returns the text of a dry run.
 fn report(settings: &NodeSettings, setup: &Setup) -> String {
     let mut lines = Vec::new();
     let (site, vehicle) = (&setup.site, &setup.vehicle);
@@ -182,10 +182,10 @@ fn report(settings: &NodeSettings, setup: &Setup) -> String {
         && outputs.mqtt.is_none()
         && settings.page.is_none();
     if nothing {
-        lines.push("warning: no [output] and no [page]: nobody is told the pose".to_owned());
+        lines.push("warning: no [output] and no [page]: the pose is not published".to_owned());
     }
     if vehicle.start.pose.is_none() {
-        lines.push("the start is not known: the vehicle searches for it".to_owned());
+        lines.push("no start.pose: the vehicle searches for its first pose".to_owned());
     }
     lines.push("ready".to_owned());
     lines.join("\n")
@@ -293,7 +293,7 @@ fn drive(
     Ok(())
 }
 
-/// Serves the page if there is to be one, and heeds signals, on a thread of its own.
+/// Serves the page, if it is configured, and handles signals, on a thread of its own.
 fn serve(
     page: Option<&PageSettings>,
     board: &Arc<Board>,
@@ -313,12 +313,15 @@ fn serve(
         }
         None => None,
     };
+    // Registered before anything is started: without them, a signal would end the process at once.
+    let context = runtime.enter();
+    let mut terminated = signal(SignalKind::terminate())?;
+    let mut interrupted = signal(SignalKind::interrupt())?;
+    let mut hung_up = signal(SignalKind::hangup())?;
+    drop(context);
     let (board, stop) = (Arc::clone(board), Arc::clone(stop));
     let work = move || -> Result<()> {
         runtime.block_on(async {
-            let mut terminated = signal(SignalKind::terminate())?;
-            let mut interrupted = signal(SignalKind::interrupt())?;
-            let mut hung_up = signal(SignalKind::hangup())?;
             let reloading = async {
                 while hung_up.recv().await.is_some() {
                     reload_requested.store(true, Ordering::Release);

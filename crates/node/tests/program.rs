@@ -306,7 +306,12 @@ fn printed_schema(options: &[&str]) -> String {
 fn the_schema_of_the_outputs_has_a_description_of_every_field() {
     let schema: Value = serde_json::from_str(&printed_schema(&["--outputs"])).unwrap();
     let definitions = schema["$defs"].as_object().unwrap();
-    for name in ["PoseMessage", "StatusMessage", "MobileRobotPosition", "AgvPosition"] {
+    for name in [
+        "PoseMessage",
+        "StatusMessage",
+        "MobileRobotPosition",
+        "AgvPosition",
+    ] {
         assert!(definitions.contains_key(name), "{name}");
     }
     for (name, definition) in definitions {

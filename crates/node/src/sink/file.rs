@@ -22,16 +22,22 @@ struct Shared {
     flushed: AtomicU64,
     /// Whether all later writes must fail.
     is_stopped: AtomicBool,
+    /// Whether the owner writes the end itself.
+    is_final: AtomicBool,
 }
 
 /// A file, FIFO or device that is appended to.
 ///
 /// Bytes are kept in a buffer until [`flush`](Write::flush). After a failed write, [`repair`](Self::repair)
 /// removes what was written since the last successful flush, so that the file ends with a complete record.
+///
+/// A file may have an end, such as a footer. Each flush writes it, and the next write replaces it: the file is valid
+/// at any time, also after `kill -9`.
 pub struct GrowingFile {
     path: PathBuf,
     file: File,
     is_regular: bool,
+    end: &'static [u8],
     buffer: Vec<u8>,
     /// Shared with [`Tail`], because a writer of a format owns this file.
     shared: Arc<Shared>,
@@ -47,12 +53,21 @@ impl GrowingFile {
     /// # Errors
     /// Those of the file system, with the name of the file.
     pub fn create(path: &Path) -> Result<Self> {
+        Self::create_with_end(path, &[])
+    }
+
+    /// As [`create`](Self::create), with this end.
+    ///
+    /// # Errors
+    /// Those of the file system, with the name of the file.
+    pub fn create_with_end(path: &Path, end: &'static [u8]) -> Result<Self> {
         let file = open(path).with_context(|| path.display().to_string())?;
         let is_regular = file.metadata().is_ok_and(|it| it.is_file());
         Ok(Self {
             path: path.to_owned(),
             file,
             is_regular,
+            end,
             buffer: Vec::with_capacity(BUFFER_BYTES),
             shared: Arc::default(),
             written: 0,
@@ -69,6 +84,7 @@ impl GrowingFile {
         Ok(Tail {
             path: self.path.clone(),
             file: self.file.try_clone()?,
+            end: self.end,
             shared: Arc::clone(&self.shared),
             checked: Instant::now(),
         })
@@ -96,16 +112,22 @@ impl GrowingFile {
         cut && is_at(&self.path, &self.file)
     }
 
-    fn write_buffer(&mut self) -> io::Result<()> {
+    fn write_buffer(&mut self, end: &[u8]) -> io::Result<()> {
         if self.has_failed || self.shared.is_stopped.load(Ordering::Relaxed) {
             return Err(io::Error::new(
                 ErrorKind::BrokenPipe,
                 "an earlier write has failed",
             ));
         }
-        let done = self.file.write_all(&self.buffer);
+        let written = self.written + self.buffer.len() as u64;
+        // One call, so that the kernel does not see the content without its end.
+        self.buffer.extend_from_slice(end);
+        let mut done = self.file.write_all(&self.buffer);
+        if done.is_ok() && !end.is_empty() {
+            done = self.file.seek(SeekFrom::Start(written)).map(drop);
+        }
         if done.is_ok() {
-            self.written += self.buffer.len() as u64;
+            self.written = written;
         }
         self.has_failed = done.is_err();
         self.buffer.clear();
@@ -117,14 +139,16 @@ impl Write for GrowingFile {
     fn write(&mut self, bytes: &[u8]) -> io::Result<usize> {
         self.buffer.extend_from_slice(bytes);
         if self.buffer.len() >= BUFFER_BYTES || self.has_failed {
-            self.write_buffer()?;
+            self.write_buffer(&[])?;
         }
         Ok(bytes.len())
     }
 
     fn flush(&mut self) -> io::Result<()> {
         if !self.buffer.is_empty() || self.has_failed {
-            self.write_buffer()?;
+            let is_final = self.shared.is_final.load(Ordering::Relaxed);
+            let end = if is_final { &[] } else { self.end };
+            self.write_buffer(end)?;
         }
         self.shared.flushed.store(self.written, Ordering::Relaxed);
         Ok(())
@@ -135,6 +159,7 @@ impl Write for GrowingFile {
 pub struct Tail {
     path: PathBuf,
     file: File,
+    end: &'static [u8],
     shared: Arc<Shared>,
     checked: Instant,
 }
@@ -150,6 +175,11 @@ impl Tail {
         self.shared.is_stopped.store(true, Ordering::Relaxed);
     }
 
+    /// Leaves the end of the file to its owner.
+    pub fn finalize(&self) {
+        self.shared.is_final.store(true, Ordering::Relaxed);
+    }
+
     /// As [`GrowingFile::check_exists`].
     ///
     /// # Errors
@@ -158,15 +188,15 @@ impl Tail {
         check_exists(&self.path, &self.file, &mut self.checked)
     }
 
-    /// Removes what was written since the last flush, and appends `end` if there is space for it. The
+    /// Removes what was written since the last flush, and writes the end if there is space for it. The
     /// [`GrowingFile`] must have been stopped.
     ///
     /// # Errors
     /// Those of the file system. The file then ends with the last flush.
-    pub fn complete(mut self, end: &[u8]) -> io::Result<()> {
+    pub fn complete(mut self) -> io::Result<()> {
         let flushed = self.flushed();
         cut(&mut self.file, flushed)?;
-        let done = self.file.write_all(end);
+        let done = self.file.write_all(self.end);
         if done.is_err() {
             cut(&mut self.file, flushed)?;
         }
@@ -293,16 +323,26 @@ mod tests {
     fn a_stopped_file_is_cut_and_completed() {
         let folder = scratch("complete");
         let path = folder.join("log");
-        let mut file = GrowingFile::create(&path).unwrap();
+        let mut file = GrowingFile::create_with_end(&path, b" end").unwrap();
         let tail = file.tail().unwrap();
-        file.write_all(b"chunk").unwrap();
-        file.flush().unwrap();
+        for (chunk, expected) in [("one", "one end"), (", two", "one, two end")] {
+            file.write_all(chunk.as_bytes()).unwrap();
+            file.flush().unwrap();
+            assert_eq!(fs::read_to_string(&path).unwrap(), expected);
+        }
         tail.stop();
         file.write_all(b"more").unwrap();
         assert!(file.flush().is_err());
         drop(file);
-        tail.complete(b" end").unwrap();
-        assert_eq!(fs::read(&path).unwrap(), b"chunk end");
+        tail.complete().unwrap();
+        assert_eq!(fs::read(&path).unwrap(), b"one, two end");
+        let mut file = GrowingFile::create_with_end(&path, b" end").unwrap();
+        file.write_all(b"chunk").unwrap();
+        file.flush().unwrap();
+        file.tail().unwrap().finalize();
+        file.write_all(b" and its own end").unwrap();
+        file.flush().unwrap();
+        assert_eq!(fs::read(&path).unwrap(), b"chunk and its own end");
         fs::remove_dir_all(&folder).unwrap();
     }
 

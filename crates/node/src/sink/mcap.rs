@@ -35,7 +35,7 @@ const YAW_RATE_VARIANCE: f64 = 1e-4;
 const CHUNK: Duration = Duration::from_secs(1);
 /// Maximum number of events in one diagnostic message.
 const MAX_EVENTS: usize = 100;
-/// End of an MCAP file without a summary: DataEnd, Footer, magic.
+/// End of an MCAP file without a summary: DataEnd, Footer, magic. It follows the last chunk at any time.
 const END: &[u8] = b"\x0f\x04\0\0\0\0\0\0\0\0\0\0\0\
     \x02\x14\0\0\0\0\0\0\0\0\0\0\0\0\0\0\0\0\0\0\0\0\0\0\0\0\0\0\0\
     \x89MCAP0\r\n";
@@ -153,7 +153,7 @@ impl Mcap {
             let name = format!("{PREFIX}{:011}-{:05}{ENDING}", since as u64, self.number);
             let path = self.settings.folder.join(name);
             self.number += 1;
-            let file = GrowingFile::create(&path)?;
+            let file = GrowingFile::create_with_end(&path, END)?;
             let tail = file.tail()?;
             self.file = Some(Open {
                 path,
@@ -200,6 +200,7 @@ impl Mcap {
         let Open {
             writer, tail, path, ..
         } = open;
+        tail.finalize();
         let finished = writer.finish();
         if finished.is_err() {
             complete(&path, tail);
@@ -327,14 +328,14 @@ impl Sink for Mcap {
     }
 }
 
-/// Ends a file after a failure: with its last complete chunk, or removes a file without any.
+/// Ends a file after a failure behind its last complete chunk, or removes a file without any.
 fn complete(path: &Path, tail: Tail) {
     tail.stop();
     // Either may fail on a full or missing disk. Readers accept a file without an end.
     if tail.flushed() == 0 {
         let _ = fs::remove_file(path);
     } else {
-        let _ = tail.complete(END);
+        let _ = tail.complete();
     }
 }
 

@@ -398,6 +398,53 @@ fn angles_are_read_from_the_verdicts_of_mcap_and_those_without_an_angle_passed_o
 }
 
 #[test]
+fn an_mcap_file_that_was_not_closed_is_read_up_to_its_last_chunk() {
+    let file = common::scratch("not-closed").join("odo.mcap");
+    let mut writer = McapWriter::appending(File::create(&file).unwrap()).unwrap();
+    let twist = Twist {
+        speed_mps: 4.0,
+        speed_variance: 0.01,
+        yaw_rate: Some((0.02, 1e-4)),
+    };
+    // The length of the file after each chunk of ten messages.
+    let mut lengths = Vec::new();
+    for k in 0..40 {
+        let estimate = estimate(f64::from(k) * 0.25);
+        writer
+            .odometry("/odom", Frames::ODOM, &estimate, &twist)
+            .unwrap();
+        if k % 10 == 9 {
+            writer.flush().unwrap();
+            lengths.push(fs::metadata(&file).unwrap().len() as usize);
+        }
+    }
+    let bytes = fs::read(&file).unwrap();
+    drop(writer);
+    assert_eq!(bytes.len(), lengths[3]);
+    for cut in lengths[0]..bytes.len() {
+        fs::write(&file, &bytes[..cut]).unwrap();
+        let complete = 10 * lengths.iter().filter(|it| **it <= cut).count();
+        let log = read_odometry_mcap(&file, None, None).unwrap();
+        assert!(
+            log.samples.len() >= complete,
+            "{} at {cut}",
+            log.samples.len()
+        );
+        let remarks: Vec<String> = log.remarks.iter().map(ToString::to_string).collect();
+        let named = remarks
+            .iter()
+            .filter(|it| it.contains("odo.mcap: the file was not closed"));
+        assert_eq!(named.count(), 1, "{remarks:?}");
+    }
+    // A file without any record, or with a damaged one, is an error.
+    for damaged in [&bytes[..4], &[&bytes[..8], &[0xff; 100]].concat()] {
+        fs::write(&file, damaged).unwrap();
+        let error = read_odometry_mcap(&file, None, None).unwrap_err();
+        assert!(error.to_string().contains("MCAP"), "{error}");
+    }
+}
+
+#[test]
 fn tum_has_eight_fields_and_comes_back() {
     let file = common::scratch("tum").join("drive.tum");
     let poses: Vec<_> = (0..40)
