@@ -63,7 +63,7 @@ else:
 
 def plug_in(random: Random, case: Case) -> list[str]:
     """An estimator, a policy or a localizer, one of whose answers is strange."""
-    place = random.choice(("estimator=answer", "policy=PlugIn()", "localizer=PlugIn"))
+    place = random.choice(("estimator=answer", "policy=PlugIn", "localizer=PlugIn"))
     good = {
         "stated": "0.5",
         "call": "True",
@@ -73,7 +73,7 @@ def plug_in(random: Random, case: Case) -> list[str]:
         "pose": "self.start",
     }
     strange = {
-        "policy=PlugIn()": ("stated", "call", "listens"),
+        "policy=PlugIn": ("stated", "call", "listens"),
         "localizer=PlugIn": ("odometry", "angle", "pose", "pose"),
     }.get(place)
     answer = random.choice(ANSWERS)

@@ -2,8 +2,10 @@
 
 from __future__ import annotations
 
+import functools
 import re
 import runpy
+import sys
 import warnings
 from types import SimpleNamespace
 from typing import TYPE_CHECKING, Any
@@ -101,7 +103,7 @@ def test_an_estimator_is_billed_what_it_states_and_never_what_another_takes() ->
     board = access_av.Platform.load("jetson-agx-xavier-engine")
 
     def joules(column: str, **stated: Any) -> list[float | None]:
-        runs = access_av.simulate(SHORT, estimator=Stating(**stated), platform=board).runs
+        runs = access_av.simulate(SHORT, estimator=lambda: Stating(**stated), platform=board).runs
         return [runs[column].item(), runs["executions"].item()]
 
     assert joules("energy_j")[0] is None
@@ -126,7 +128,7 @@ def test_an_estimator_is_billed_what_it_states_and_never_what_another_takes() ->
 )
 def test_costs_that_cannot_be_are_refused(stated: dict[str, Any], named: str) -> None:
     with pytest.raises(ValueError, match=named):
-        access_av.simulate(SHORT, estimator=Stating(**stated))
+        access_av.simulate(SHORT, estimator=lambda: Stating(**stated))
 
 
 def test_a_method_that_the_platform_does_not_know_says_which_key_to_set() -> None:
@@ -176,7 +178,7 @@ def test_a_policy_sees_the_situation_and_decides() -> None:
             seen.append(situation)
             return [ssb.pci == 2 for ssb in situation.sensed]
 
-    result = access_av.simulate(SHORT, keep_trajectories=True, policy=Policy())
+    result = access_av.simulate(SHORT, keep_trajectories=True, policy=Policy)
     assert result.executions is not None
     assert set(result.executions["pci"]) == {2}
     assert set(result.executions["wake_up_time_s"]) == {0.5}
@@ -186,6 +188,154 @@ def test_a_policy_sees_the_situation_and_decides() -> None:
     assert first.heads[0].x_m == 205.0
     assert abs(first.sensed[0].snr_db - first.sensed[0].expected_snr_db) < 15.0
     assert len(first.covariance) == 3
+
+
+class EveryMetre:
+    """A policy with state: one burst for each metre driven."""
+
+    def __init__(self, gap_m: float = 1.0) -> None:
+        self.gap_m = gap_m
+        self.last: tuple[float, float] | None = None
+
+    def __call__(self, situation: Any) -> bool:
+        here = (situation.x_m, situation.y_m)
+        if self.last is not None and np.hypot(*np.subtract(here, self.last)) < self.gap_m:
+            return False
+        self.last = here
+        return True
+
+
+class Smoothed:
+    """An estimator with state: the mean of the last two angles."""
+
+    def __init__(self, site: dict[str, Any], vehicle: dict[str, Any], start: Any) -> None:
+        assert len(site["radio_heads"]) == 2
+        assert len(start) == 3
+        self.last_rad: float | None = None
+
+    def __call__(self, snapshots: np.ndarray) -> tuple[float, float]:
+        now_rad = bartlett(snapshots)
+        mean_rad = now_rad if self.last_rad is None else 0.5 * (now_rad + self.last_rad)
+        self.last_rad = now_rad
+        return mean_rad, 0.2
+
+
+def driven(threads: int, **plug_ins: Any) -> dict[str, bytes]:
+    """Bytes of all tables of six runs."""
+    result = access_av.simulate(SHORT, runs=6, threads=threads, keep_trajectories=True, **plug_ins)
+    tables = {name: getattr(result, name) for name in ("runs", "trajectories", "executions")}
+    return {name: table.write_ipc(None).getvalue() for name, table in tables.items()}
+
+
+@pytest.mark.parametrize(
+    "plug_ins",
+    [
+        {"policy": EveryMetre},
+        {"policy": functools.partial(EveryMetre, 2.0)},
+        {"policy": lambda: EveryMetre(gap_m=0.5)},
+        {"policy": lambda site, vehicle, start: EveryMetre()},
+        {"estimator": Smoothed},
+    ],
+    ids=["class", "partial", "function", "settings", "estimator"],
+)
+def test_stateful_plug_ins_give_the_same_bytes_with_any_number_of_threads(
+    plug_ins: dict[str, Any],
+) -> None:
+    one = driven(1, **plug_ins)
+    assert driven(2, **plug_ins) == one
+    assert driven(4, **plug_ins) == one
+
+
+def test_stateful_plug_ins_give_the_same_bytes_on_dask() -> None:
+    distributed = pytest.importorskip("distributed", reason="the extra `dask` is not installed")
+    import cloudpickle
+
+    # Workers cannot import the tests: send them by value.
+    cloudpickle.register_pickle_by_value(sys.modules[__name__])
+    with (
+        warnings.catch_warnings(),
+        distributed.LocalCluster(
+            n_workers=2, threads_per_worker=1, dashboard_address=None
+        ) as cluster,
+        distributed.Client(cluster) as client,
+    ):
+        warnings.simplefilter("ignore")
+        found = client.gather(
+            [client.submit(driven, count, policy=EveryMetre, pure=False) for count in (1, 2)]
+        )
+    assert found[0] == found[1] == driven(1, policy=EveryMetre)
+
+
+def test_an_object_that_all_runs_would_share_is_rejected() -> None:
+    shared = EveryMetre()
+    for role, plug_in, name in (
+        ("policy", shared, "EveryMetre"),
+        ("policy", shared.__call__, "EveryMetre"),
+        ("estimator", Stating(), "Stating"),
+        ("localizer", KeyError("no class"), "KeyError"),
+    ):
+        with pytest.raises(
+            TypeError, match=f"class {name}, which all runs and threads would"
+        ) as it:
+            access_av.simulate(SHORT, **{role: plug_in})
+        assert f"{role}={name} or {role}=lambda: {name}(...)" in str(it.value)
+    with pytest.raises(ValueError, match="returned the same EveryMetre for two runs"):
+        access_av.simulate(SHORT, runs=2, threads=1, policy=lambda: shared)
+    with pytest.raises(TypeError, match="takes 2 arguments"):
+        access_av.simulate(SHORT, policy=lambda site, vehicle: EveryMetre())
+
+
+COUNT = 0
+CALLS: list[float] = []
+TABLE = {"least_db": 0.0}
+
+
+def counting(situation: Any) -> bool:
+    global COUNT
+    COUNT += 1
+    return COUNT % 2 == 0
+
+
+def listing(situation: Any) -> bool:
+    CALLS.append(situation.time_s)
+    return len(CALLS) % 2 == 0
+
+
+def with_default(situation: Any, last: dict[str, float] = {}) -> bool:  # noqa: B006
+    last["time_s"] = situation.time_s
+    return True
+
+
+def reading(situation: Any) -> bool:
+    """Keeps no state: it reads a table, and changes a list of its own."""
+    found: list[bool] = []
+    found.append(all(ssb.snr_db > TABLE["least_db"] for ssb in situation.sensed))
+    return found[0]
+
+
+def test_a_function_that_keeps_state_is_rejected() -> None:
+    last = [0.0]
+    count = 0
+
+    def in_a_cell(situation: Any) -> bool:
+        nonlocal count
+        count += 1
+        return True
+
+    def in_a_list(situation: Any) -> bool:
+        last[0] = situation.time_s
+        return True
+
+    for function, said in (
+        (counting, "writes the global variable 'COUNT'"),
+        (listing, "changes the list 'CALLS'"),
+        (with_default, "changes the dict 'last'"),
+        (in_a_cell, "writes the variable 'count'"),
+        (in_a_list, "changes the list 'last'"),
+    ):
+        with pytest.raises(TypeError, match=said):
+            access_av.simulate(SHORT, policy=function)
+    assert driven(2, policy=reading) == driven(1, policy=reading)
 
 
 class Standing:

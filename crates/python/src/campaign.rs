@@ -21,7 +21,9 @@ use toml::Value;
 
 use crate::message::brief;
 use crate::own_error::{covariance, level};
-use crate::plug_ins::{PythonEstimator, PythonLocalizer, PythonPolicy, estimate_cost};
+use crate::plug_ins::{
+    PythonEstimator, PythonLocalizer, PythonPolicy, estimate_cost, made_for_run,
+};
 use crate::settings::{Platform, Scenario, settings_error};
 use crate::threads::at_most_one_per_core;
 
@@ -56,7 +58,9 @@ pub struct SimulationResult {
 /// Drive a scenario many times.
 ///
 /// The same seed gives the same bytes whatever the number of threads. `estimator`, `policy` and
-/// `localizer` stand in for the vehicle's own; `access_av.simulate` says how they are called.
+/// `localizer` are factories, called as `factory(site, vehicle, start)` at the start of each run; their
+/// objects stand in for the vehicle's own. `access_av.simulate` says how they are called. An
+/// estimator's factory has the attribute that states the energy or the time of one estimate.
 /// `progress` is called with the runs done and their total. Exceptions raised in any of them end
 /// the campaign and reach the caller.
 #[pyfunction]
@@ -273,7 +277,7 @@ fn python_error(error: SimulationError) -> PyErr {
     }
 }
 
-/// The user's own Python code in place of parts of the pipeline.
+/// Factories of the user's own Python code in place of parts of the pipeline, called once per run.
 struct PlugIns {
     estimator: Option<Py<PyAny>>,
     policy: Option<Py<PyAny>>,
@@ -294,19 +298,22 @@ impl PlugIns {
     fn custom(&self, scenario: &CoreScenario, start: Pose) -> Result<Custom, BoxError> {
         Python::attach(|py| {
             let measurand = scenario.vehicle.array.measurand();
-            let estimator = self.estimator.as_ref().map(|call| {
-                let told = self.told_of_sigma.clone();
-                Box::new(PythonEstimator::new(call.clone_ref(py), measurand, told)) as _
-            });
-            let policy = self.policy.as_ref();
-            let policy = policy.map(|call| Box::new(PythonPolicy::new(call.clone_ref(py))) as _);
-            let localizer = self.localizer.as_ref().map(|class| {
-                PythonLocalizer::new(class.bind(py), scenario, start).map(|it| Box::new(it) as _)
-            });
+            let made = |factory: &Option<Py<PyAny>>| {
+                factory
+                    .as_ref()
+                    .map(|factory| made_for_run(factory.bind(py), scenario, start))
+                    .transpose()
+            };
+            let told = self.told_of_sigma.clone();
+            let estimator = made(&self.estimator)?
+                .map(|call| Box::new(PythonEstimator::new(call, measurand, told)) as _);
+            let policy = made(&self.policy)?.map(|call| Box::new(PythonPolicy::new(call)) as _);
+            let localizer =
+                made(&self.localizer)?.map(|object| Box::new(PythonLocalizer::new(object)) as _);
             Ok(Custom {
                 estimator,
                 policy,
-                localizer: localizer.transpose()?,
+                localizer,
             })
         })
     }

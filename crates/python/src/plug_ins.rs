@@ -132,7 +132,7 @@ const ENERGY: &str = "energy_per_execution_j";
 /// ... or seconds of one busy core.
 const TIME: &str = "time_per_execution_s";
 
-/// A Python callable in place of the angle estimator.
+/// A Python callable in place of the angle estimator, of one run.
 pub struct PythonEstimator {
     call: Py<PyAny>,
     measurand: Measurand,
@@ -308,7 +308,7 @@ impl AngleEstimator for PythonEstimator {
     }
 }
 
-/// A Python callable in place of the wake-up policy.
+/// A Python callable in place of the wake-up policy, of one run.
 pub struct PythonPolicy(Py<PyAny>);
 
 impl PythonPolicy {
@@ -387,23 +387,32 @@ impl WakeUpPolicy for PythonPolicy {
     }
 }
 
-/// A Python object in place of the localizer.
+/// A Python object in place of the localizer, of one run.
 pub struct PythonLocalizer(Py<PyAny>);
 
 impl PythonLocalizer {
-    /// `class(site, vehicle, start)`, with site and vehicle as dictionaries, and the start as the
-    /// vehicle is told it: x and y in metres, heading in radians.
-    ///
-    /// # Errors
-    /// What the class raises.
-    pub fn new(class: &Bound<'_, PyAny>, scenario: &Scenario, start: Pose) -> PyResult<Self> {
-        use onboard::settings::TomlFile;
-        let loads = class.py().import("json")?.getattr("loads")?;
-        let site = loads.call1((scenario.site.to_json(),))?;
-        let vehicle = loads.call1((scenario.vehicle.to_json(),))?;
-        let start = (start.x_m, start.y_m, start.heading_rad);
-        Ok(Self(class.call1((site, vehicle, start))?.unbind()))
+    /// An object that a factory made for one run.
+    pub const fn new(object: Py<PyAny>) -> Self {
+        Self(object)
     }
+}
+
+/// Calls a plug-in's factory for one run: `factory(site, vehicle, start)`, with site and vehicle as
+/// dictionaries, and the start as the vehicle knows it: x and y in metres, heading in radians.
+///
+/// # Errors
+/// The exception that the factory raises.
+pub fn made_for_run(
+    factory: &Bound<'_, PyAny>,
+    scenario: &Scenario,
+    start: Pose,
+) -> PyResult<Py<PyAny>> {
+    use onboard::settings::TomlFile;
+    let loads = factory.py().import("json")?.getattr("loads")?;
+    let site = loads.call1((scenario.site.to_json(),))?;
+    let vehicle = loads.call1((scenario.vehicle.to_json(),))?;
+    let start = (start.x_m, start.y_m, start.heading_rad);
+    Ok(factory.call1((site, vehicle, start))?.unbind())
 }
 
 impl Localizer for PythonLocalizer {

@@ -15,18 +15,16 @@ from access_av import _core
 from access_av.device.platform import Platform
 from access_av.run import service_levels
 from access_av.run.operation import Operation
+from access_av.run.plug_ins import factory
 from access_av.statistics.consistency import Consistency, horizontal_error_m
 from access_av.statistics.integrity import Integrity
 from access_av.statistics.percentiles import Percentile, column, percentiles
 from access_av.tables.numbers import number
 
 if TYPE_CHECKING:
-    from collections.abc import Callable, Mapping, Sequence
-    from typing import TypeAlias
+    from collections.abc import Callable, Mapping
 
     from numpy.typing import NDArray
-
-    Estimate: TypeAlias = float | tuple[float, float] | NDArray[np.float64] | None
 
 Scenario = _core.Scenario
 
@@ -199,10 +197,9 @@ def simulate(
     threads: int | None = None,
     keep_trajectories: bool = False,
     errors_every: int | None = None,
-    estimator: Callable[[NDArray[np.complex128]], Estimate] | None = None,
-    policy: Callable[[_core.Situation], bool | Sequence[bool]] | None = None,
-    localizer: Callable[[dict[str, Any], dict[str, Any], tuple[float, float, float]], Any]
-    | None = None,
+    estimator: Callable[..., Any] | None = None,
+    policy: Callable[..., Any] | None = None,
+    localizer: Callable[..., Any] | None = None,
     progress: Callable[[int, int], None] | None = None,
 ) -> Simulation:
     """Drive a scenario many times.
@@ -225,27 +222,32 @@ def simulate(
         Keep every drive's errors in x and y, and its protection levels, at each so many SSBs, for
         statistics over whole runs.
     estimator
-        In place of the vehicle's angle estimator: takes complex snapshots of shape (antennas,
-        snapshots) and returns the angle from the array's axis in radians, 0 to π; or that angle
-        and its standard deviation; or the logarithm of its likelihood over the electrical angle,
-        at equally spaced values from −π on; or ``None`` where there is no angle. An angle without
-        standard deviation gets the Cramér–Rao bound at its SSB's SNR, which is said once. Its
-        attribute ``energy_per_execution_j`` or ``time_per_execution_s`` states what an estimate
-        takes; without one the runs have no energy.
+        Replaces the vehicle's angle estimator: a class, or a function that makes an estimator. It
+        is called once per run, without arguments or as ``estimator(site, vehicle, start)``; a
+        function of the snapshots that keeps no state may be given itself. The object is called
+        with complex snapshots of shape (antennas, snapshots) and returns the angle from the
+        array's axis in radians, 0 to π; or the angle and its standard deviation; or the logarithm
+        of the likelihood over the electrical angle, at equally spaced values from −π on; or
+        ``None`` where there is no angle. An angle without standard deviation gets the Cramér–Rao
+        bound at its SSB's SNR, and one warning. The attribute ``energy_per_execution_j`` or
+        ``time_per_execution_s`` states what an estimate takes; without one the runs have no
+        energy.
     policy
-        In place of the vehicle's wake-up policy: called with the :class:`Situation
-        <access_av._core.Situation>` at each burst that is listened to, it returns whether to
-        estimate the angles of its SSBs, or a list with an answer for each. If it has a method
-        ``listens``, that is asked first, with nothing sensed; else every burst is listened to.
-        An attribute ``wake_up_time_s`` is recorded with each execution.
+        Replaces the vehicle's wake-up policy: a class, or a function that makes a policy, as of
+        ``estimator``; a function of the situation that keeps no state may be given itself. The
+        object is called with the :class:`Situation <access_av._core.Situation>` at each burst that
+        is received, and returns whether to estimate the angles of its SSBs, or a list with an
+        answer for each. Its method ``listens``, if any, decides before the burst whether the
+        receiver is on; without it every burst is received. The attribute ``wake_up_time_s`` is
+        recorded with each execution.
     localizer
-        In place of the vehicle's localizer: called as ``localizer(site, vehicle, start)`` at the
-        start of each run, with both settings as dictionaries and the initial pose (x and y in
-        metres, heading in radians) as the vehicle is told it. The object it returns needs the
-        methods ``odometry(time_s, distance_m, speed_mps, yaw_rate_radps)``, ``angle(time_s, head,
-        phase_rad, phase_sigma_rad)``, which may return whether the angle was used, and
-        ``pose(time_s)``, which returns x, y, heading and, if it is known, the 3 by 3 covariance of
-        the three. Late angles go to copies of it (:func:`copy.deepcopy`).
+        Replaces the vehicle's localizer: a class, or a function that makes a localizer, called
+        once per run as ``localizer(site, vehicle, start)``, with both settings as dictionaries and
+        the initial pose (x and y in metres, heading in radians) as the vehicle knows it. The object
+        needs the methods ``odometry(time_s, distance_m, speed_mps, yaw_rate_radps)``,
+        ``angle(time_s, head, phase_rad, phase_sigma_rad)``, which may return whether the angle was
+        used, and ``pose(time_s)``, which returns x, y, heading and, if known, the 3 by 3 covariance
+        of the three. Late angles go to copies of it (:func:`copy.deepcopy`).
     progress
         Called as ``progress(done, total)`` with numbers of drives.
 
@@ -258,6 +260,9 @@ def simulate(
     ------
     SettingsError
         When the scenario cannot be used; names the key and what is allowed.
+    TypeError
+        When an estimator, policy or localizer is an object that all runs would share, or a
+        function that keeps state.
     ValueError
         When an estimator, policy or localizer returns what it must not; names the call.
     OSError
@@ -279,9 +284,9 @@ def simulate(
         threads=threads,
         keep_trajectories=keep_trajectories,
         errors_every=errors_every,
-        estimator=estimator,
-        policy=policy,
-        localizer=localizer,
+        estimator=factory(estimator, "estimator"),
+        policy=factory(policy, "policy"),
+        localizer=factory(localizer, "localizer"),
         progress=progress,
     )
     return Simulation.of(found, scenario, seed)
