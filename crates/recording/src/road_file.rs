@@ -12,8 +12,34 @@ use crate::text::read_text;
 /// A road of a million points.
 const MOST_BYTES: u64 = 64 << 20;
 
-/// Mean radius of the Earth in metres (IUGG); a road is short enough for a sphere.
-const EARTH_RADIUS_M: f64 = 6_371_008.8;
+/// Semi-major axis of the ellipsoid of WGS 84 in metres (EPSG:7030).
+const SEMI_MAJOR_M: f64 = 6_378_137.0;
+
+/// Square of the eccentricity of the ellipsoid of WGS 84.
+const ECCENTRICITY_SQUARED: f64 = 6.694_379_990_141_317e-3;
+
+/// EPSG codes of longitude and latitude, whose ellipsoids differ from that of WGS 84 by less than
+/// a millimetre: WGS 84, ETRS89, NAD83, SIRGAS 2000, GDA94, GDA2020, NZGD2000.
+const IN_DEGREES: [u32; 9] = [4326, 4979, 4258, 4269, 4674, 4283, 7844, 9057, 4167];
+
+/// EPSG codes of grids whose metres are those of the ground within a thousandth: UTM of WGS 84,
+/// ETRS89 and NAD83, MGA, Gauss-Krüger, and national grids of Switzerland, Britain, the Netherlands,
+/// France and New Zealand.
+const GRIDS: [std::ops::RangeInclusive<u32>; 13] = [
+    32601..=32660,
+    32701..=32760,
+    25828..=25838,
+    26901..=26923,
+    28348..=28358,
+    7846..=7859,
+    31466..=31469,
+    2056..=2056,
+    21781..=21781,
+    27700..=27700,
+    28992..=28992,
+    2154..=2154,
+    2193..=2193,
+];
 
 /// No road of a plant reaches as far (m).
 const PLANT_M: f64 = 100e3;
@@ -65,8 +91,9 @@ fn from_csv(text: &str) -> Result<Vec<[f64; 2]>, Defect> {
     .collect()
 }
 
-/// The first `LineString`: longitude and latitude, to metres east and north of its first point; metres
-/// as they are where the file names a projected system (`crs`, as GIS write it).
+/// The first `LineString`: longitude and latitude, to metres east and north of its first point on the
+/// tangent plane of the ellipsoid; metres unchanged if the file names a grid of [`GRIDS`], or the
+/// frame of the plant.
 fn from_geojson(text: &str) -> Result<Vec<[f64; 2]>, Defect> {
     let defect = |key: &str, message: &str| (key.to_owned(), message.to_owned());
     let json: Value = serde_json::from_str(text).map_err(|e| defect("JSON", &e.to_string()))?;
@@ -81,7 +108,7 @@ fn from_geojson(text: &str) -> Result<Vec<[f64; 2]>, Defect> {
         };
         places.push([first, second]);
     }
-    if is_projected(&json) {
+    if system(&json)? == System::Metres {
         return Ok(places);
     }
     let Some(&[longitude_0, latitude_0]) = places.first() else {
@@ -93,14 +120,8 @@ fn from_geojson(text: &str) -> Result<Vec<[f64; 2]>, Defect> {
             return Err((format!("coordinates[{index}]"), message));
         }
     }
-    let metres_per_degree = EARTH_RADIUS_M.to_radians();
-    let shrink = latitude_0.to_radians().cos();
-    let points: Vec<[f64; 2]> = (places.iter())
-        .map(|[longitude, latitude]| {
-            let east_m = (longitude - longitude_0) * metres_per_degree * shrink;
-            [east_m, (latitude - latitude_0) * metres_per_degree]
-        })
-        .collect();
+    let plane = TangentPlane::new(longitude_0, latitude_0);
+    let points: Vec<[f64; 2]> = places.iter().map(|place| plane.metres(*place)).collect();
     let farthest_m = (points.iter()).fold(0.0, |most: f64, [x_m, y_m]| most.max(x_m.hypot(*y_m)));
     if farthest_m > PLANT_M {
         let message = format!(
@@ -136,13 +157,82 @@ fn not_degrees([longitude, latitude]: [f64; 2]) -> Option<String> {
     })
 }
 
-/// Whether the file says that its coordinates are metres: it names another system than WGS 84.
-fn is_projected(json: &Value) -> bool {
-    let name = json.pointer("/crs/properties/name").and_then(Value::as_str);
-    name.is_some_and(|name| {
-        let degrees = ["CRS84", "4326", "4258", "4979"];
-        !degrees.iter().any(|it| name.ends_with(it))
-    })
+/// Unit of a file's coordinates.
+#[derive(Debug, PartialEq, Eq)]
+enum System {
+    Degrees,
+    Metres,
+}
+
+/// The reference system that the member `crs` names (GeoJSON 2008); degrees without one.
+fn system(json: &Value) -> Result<System, Defect> {
+    let Some(crs) = json.get("crs") else {
+        return Ok(System::Degrees);
+    };
+    let unknown = |what: &str| {
+        let message = format!(
+            "{what} is not read here; allowed are longitude and latitude (no `crs`), grids such as \
+             UTM, and urn:ogc:def:crs:OGC::Engineering for metres of the plant's own frame; \
+             `access-av new site NAME.toml --road FILE` converts any other system"
+        );
+        ("crs".to_owned(), message)
+    };
+    let name = crs.pointer("/properties/name").and_then(Value::as_str);
+    let name = name.ok_or_else(|| unknown("a `crs` without `properties.name`"))?;
+    let last = name.rsplit([':', '/']).next().unwrap_or_default();
+    if ["crs84", "crs84h"].contains(&last.to_ascii_lowercase().as_str()) {
+        return Ok(System::Degrees);
+    }
+    if last.eq_ignore_ascii_case("engineering") {
+        return Ok(System::Metres);
+    }
+    match last.parse::<u32>() {
+        Ok(code) if IN_DEGREES.contains(&code) => Ok(System::Degrees),
+        Ok(code) if GRIDS.iter().any(|codes| codes.contains(&code)) => Ok(System::Metres),
+        _ => Err(unknown(&format!("the reference system {name:?}"))),
+    }
+}
+
+/// The plane that touches the ellipsoid of WGS 84 at a point.
+struct TangentPlane {
+    origin: [f64; 3],
+    longitude_rad: f64,
+    latitude_rad: f64,
+}
+
+impl TangentPlane {
+    fn new(longitude_deg: f64, latitude_deg: f64) -> Self {
+        Self {
+            origin: geocentric_m(longitude_deg, latitude_deg),
+            longitude_rad: longitude_deg.to_radians(),
+            latitude_rad: latitude_deg.to_radians(),
+        }
+    }
+
+    /// Metres east and north of the point.
+    fn metres(&self, [longitude_deg, latitude_deg]: [f64; 2]) -> [f64; 2] {
+        let [x, y, z] = geocentric_m(longitude_deg, latitude_deg);
+        let [dx, dy, dz] = [x - self.origin[0], y - self.origin[1], z - self.origin[2]];
+        let (sin_lon, cos_lon) = self.longitude_rad.sin_cos();
+        let (sin_lat, cos_lat) = self.latitude_rad.sin_cos();
+        let outward = cos_lon * dx + sin_lon * dy;
+        [
+            cos_lon * dy - sin_lon * dx,
+            cos_lat * dz - sin_lat * outward,
+        ]
+    }
+}
+
+/// Geocentric coordinates in metres of a point of the ellipsoid.
+fn geocentric_m(longitude_deg: f64, latitude_deg: f64) -> [f64; 3] {
+    let (sin_lon, cos_lon) = longitude_deg.to_radians().sin_cos();
+    let (sin_lat, cos_lat) = latitude_deg.to_radians().sin_cos();
+    let normal_m = SEMI_MAJOR_M / (1.0 - ECCENTRICITY_SQUARED * sin_lat * sin_lat).sqrt();
+    [
+        normal_m * cos_lat * cos_lon,
+        normal_m * cos_lat * sin_lon,
+        normal_m * (1.0 - ECCENTRICITY_SQUARED) * sin_lat,
+    ]
 }
 
 fn line_string(json: &Value) -> Option<&Vec<Value>> {
@@ -223,14 +313,34 @@ mod tests {
         let text = r#"{"type":"Feature","properties":{},"geometry":
             {"type":"LineString","coordinates":[[8.0,60.0],[8.001,60.0],[8.001,60.001]]}}"#;
         let points = from_geojson(text).unwrap();
-        assert!((points[1][0] - 55.597).abs() < 0.01 && points[1][1].abs() < 1e-9);
-        assert!((points[2][1] - 111.195).abs() < 0.01);
+        // Of the ellipsoid: a degree of longitude at 60° is 55,800 m, of latitude 111,412 m
+        // (NIMA TR8350.2); along 0.001° the tangent plane is 0.4 mm north of the parallel.
+        assert!((points[1][0] - 55.800).abs() < 0.002 && points[1][1].abs() < 1e-3);
+        assert!((points[2][1] - 111.412).abs() < 0.003);
         let metres = text.replacen(
             "\"type\"",
             r#""crs":{"type":"name","properties":{"name":"EPSG:25832"}},"type""#,
             1,
         );
         assert_eq!(from_geojson(&metres).unwrap()[2], [8.001, 60.001]);
+        for (name, said) in [
+            ("urn:ogc:def:crs:EPSG::3857", "access-av new site"),
+            ("EPSG:900913", "access-av new site"),
+            ("EPSG:4978", "access-av new site"),
+            ("unknown", "access-av new site"),
+        ] {
+            let other = metres.replace("EPSG:25832", name);
+            let (key, message) = from_geojson(&other).unwrap_err();
+            assert!(key == "crs" && message.contains(said), "{name}: {message}");
+        }
+        for name in [
+            "urn:ogc:def:crs:OGC:1.3:CRS84",
+            "EPSG:4269",
+            "urn:ogc:def:crs:EPSG::7844",
+        ] {
+            let other = metres.replace("EPSG:25832", name);
+            assert_eq!(from_geojson(&other).unwrap(), points);
+        }
         let point = r#"{"type":"Point","coordinates":[8,60]}"#;
         assert_eq!(from_geojson(point).unwrap_err().0, "geometry");
     }

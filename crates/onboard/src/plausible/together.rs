@@ -6,7 +6,7 @@ use super::usual::rounded;
 use super::vehicle::of_vehicle;
 use super::warning::Warning;
 use crate::road::Road;
-use crate::settings::{Shipped, Site, TomlFile, Vehicle};
+use crate::settings::{LocalizerSettings, Shipped, Site, TomlFile, Vehicle};
 
 /// What is doubtful of a site, heard by a vehicle of which nothing is stated.
 pub fn of_site(site: &Site) -> Vec<Warning> {
@@ -59,7 +59,40 @@ fn on_site(site: &Site, vehicle: &Vehicle) -> Vec<Warning> {
     found.extend(spacing_in_metres(site, vehicle));
     found.extend(start_off_road(site, vehicle).or_else(|| unheard_at_start(site, vehicle)));
     found.extend(strays(site, vehicle));
+    found.extend(one_head_only(site, vehicle));
+    found.extend(below_array(site, vehicle));
     found
+}
+
+/// Radio heads that all have the height 0, below an array that has a height. A site and a vehicle in
+/// one plane have none.
+fn below_array(site: &Site, vehicle: &Vehicle) -> Option<Warning> {
+    let height_m = vehicle.array.position_m[2];
+    let is_flat = site.radio_heads.iter().all(|it| it.position_m[2] == 0.0);
+    (is_flat && height_m > 0.0).then(|| Warning {
+        key: "array.position_m[2]".to_owned(),
+        value: height_m.to_string(),
+        why: "all radio heads are at height 0, as in a drawing without heights".to_owned(),
+        write:
+            "write the height of each radio head above the ground, in metres, as third number of \
+                its position_m"
+                .to_owned(),
+    })
+}
+
+/// Several radio heads for a localizer that takes its heading from one.
+fn one_head_only(site: &Site, vehicle: &Vehicle) -> Option<Warning> {
+    let heads = site.radio_heads.len();
+    let takes_one = matches!(vehicle.localizer, LocalizerSettings::DeadReckoning(_));
+    (takes_one && heads > 1).then(|| Warning {
+        key: "localizer.kind".to_owned(),
+        value: "dead-reckoning".to_owned(),
+        why: format!(
+            "dead reckoning supports one radio head, as in the paper; the site has {heads}, and the \
+             error of the heading jumps from one to the next"
+        ),
+        write: "write kind = \"tracker\", or a site with one radio head".to_owned(),
+    })
 }
 
 /// Half a wavelength, in metres: at carriers below 3 GHz the number is one that wavelengths may be.
