@@ -54,9 +54,7 @@ def apart_m(a: Points, b: Points) -> float:
 def _from(points: Points, line: Points) -> float:
     line = np.asarray(line, dtype=float)
     # Points between the corners too, so that a chord cannot leave a curve unseen.
-    dense = np.concatenate(
-        [np.linspace(p, q, 20) for p, q in itertools.pairwise(points)]
-    )
+    dense = np.concatenate([np.linspace(p, q, 20) for p, q in itertools.pairwise(points)])
     start, along = line[:-1], np.diff(line, axis=0)
     square = np.maximum((along**2).sum(axis=1), 1e-18)
     farthest = 0.0

@@ -125,6 +125,13 @@ NONSENSE: dict[str, tuple[dict[str, object], str, str]] = {
         "road", "write metres"),
     "heights above the sea": (
         {"site.radio_heads[0].position_m": [30.0, 25.0, 412.0]}, "position_m[2]", "above the sea"),
+    "radio heads of a flat drawing": (
+        heads([30.0, 25.0, 0.0], [170.0, -10.0, 0.0], [300.0, 40.0, 0.0]),
+        "array.position_m[2]", "height of each radio head above the ground"),
+    "dead reckoning with several heads": (
+        {"vehicle.localizer": {"kind": "dead-reckoning"},
+         "vehicle.wake_up": {"policy": "fixed", "interval_ms": 100.0}},
+        "localizer.kind", 'kind = "tracker"'),
     "heights in millimetres": (
         {"site.radio_heads[0].position_m": [30.0, 25.0, 8000.0]}, "position_m[2]", "are 8"),
     "array under the ground": (

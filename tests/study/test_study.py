@@ -19,7 +19,11 @@ import layout
 from access_av import Plant, SettingsError, drives, study_plant
 from access_av.errors import InputError
 from access_av.run.error_bound import along_route
+from access_av.run.pairs import Errors
 from access_av.statistics.paired import paired_difference
+from access_av.study.compare import beside_first
+from access_av.study.compare import table as compared_table
+from access_av.study.verdicts import Effect, Judgement
 from access_av.tables.columns.tables import TABLES
 from access_av.tables.toml import tomllib
 from browser import Browser
@@ -184,13 +188,13 @@ def test_remedies_are_driven_in_the_same_worlds(
         found = errors(results, remedy["name"])
         assert remedy["target_error_m"] == pytest.approx(percentile(found, 90.0))
         expected = paired_difference(found, before[: len(found)], 90.0)
-        less = [remedy[key] for key in ("less_m", "less_low_m", "less_high_m")]
+        less = [remedy[key] for key in ("delta_m", "delta_low_m", "delta_high_m")]
         assert less == pytest.approx(expected)
         units, price = prices.get(remedy["name"], (0, 0.0))
         assert not units or remedy["cost"]["central"] == pytest.approx(units * price)
         assert f"{remedy['target_error_m']:.3f} m" in page
-    assert [it["less_m"] for it in said["remedies"]] == sorted(
-        it["less_m"] for it in said["remedies"]
+    assert [it["delta_m"] for it in said["remedies"]] == sorted(
+        it["delta_m"] for it in said["remedies"]
     )
 
 
@@ -481,6 +485,69 @@ def test_whoever_closes_the_pipe_still_gets_the_files(
     assert "BrokenPipe" not in done.stderr
     written = {it.name for it in (tmp_path / "out").iterdir()}
     assert {"report.html", "study.json", "manifest.json", "plant.toml"} <= written
+
+
+def errors_of(name: str, errors_m: np.ndarray) -> Errors:
+    """Ten drives of 100 s."""
+    return Errors(name=name, errors_m=errors_m, duration_s=100.0)
+
+
+def test_a_lost_drive_is_stated_first_in_its_row() -> None:
+    random = np.random.default_rng(5)
+    baseline = np.abs(random.normal(0.0, 0.1, (10, 1000)))
+    one_lost, late, short = baseline.copy(), baseline.copy(), baseline.copy()
+    one_lost[3, 600:] = 40.0
+    late[:, :300] = np.inf  # the search for the first position
+    short[:, 500:540] = 40.0  # 4 s
+    never = baseline.copy()
+    never[0] = np.inf
+    unknown = baseline.copy()
+    unknown[5:7, 100:] = np.inf
+    held = {
+        "baseline": baseline, "lost": one_lost, "late": late, "short": short, "never": never,
+        "unknown": unknown, "same": baseline.copy(),
+    }  # fmt: skip
+    found = beside_first([errors_of(*it) for it in held.items()], [50.0])
+    rows = {it.driven.name: it.in_words() for it in found}
+    assert [it.driven.lost_runs for it in found] == [0, 1, 0, 0, 1, 2, 0]
+    assert rows["baseline"] == "baseline"
+    assert rows["same"] == "identical to the baseline"
+    assert rows["lost"].startswith("LOST in 1 of 10 drives; ")
+    assert rows["unknown"].startswith("LOST in 2 of 10 drives; ")
+    table = compared_table(found)
+    assert table["lost_runs"].to_list() == [0, 1, 0, 0, 1, 2, 0]
+    assert tuple(table.columns) == TABLES["compared"].columns
+
+
+@pytest.mark.parametrize(
+    ("factor", "words"), [(0.5, "better: -0.0"), (2.0, "worse: +0.0"), (1.001, "no difference")]
+)
+def test_a_difference_is_that_of_variant_and_baseline(factor: float, words: str) -> None:
+    random = np.random.default_rng(6)
+    baseline = np.abs(random.normal(0.0, 0.1, (10, 1000)))
+    other = factor * baseline if factor != 1.001 else np.abs(random.normal(0.0, 0.1, (10, 1000)))
+    _, found = beside_first([errors_of("a", baseline), errors_of("b", other)], [50.0])
+    assert found.delta_m is not None
+    expected = np.median(other) - np.median(baseline)
+    assert found.delta_m[0][0] == pytest.approx(expected, abs=1e-3)
+    assert found.in_words().startswith(words)
+
+
+@pytest.mark.parametrize(
+    ("delta_m", "effect"),
+    [
+        ((-0.2, -0.3, -0.1), Effect.HELPS),
+        ((-0.2, -0.3, 0.1), Effect.UNCERTAIN),
+        ((0.2, 0.1, 0.3), Effect.HARMS),
+    ],
+)
+def test_verdicts_are_enums_with_words_of_their_own(
+    delta_m: tuple[float, float, float], effect: Effect
+) -> None:
+    assert Effect.of(delta_m) is effect
+    for each in (*Effect, *Judgement):
+        assert each.words != each.name
+        assert each.badge in ("yes", "fit", "no")
 
 
 def test_paired_intervals_hold_the_difference_as_often_as_they_say() -> None:

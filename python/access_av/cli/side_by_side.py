@@ -84,13 +84,15 @@ def show_compared(found: Sequence[Compared]) -> None:
     if not found:
         return
     percents, driven = found[0].percents, found[0].driven
-    head = ["variant", *(f"{it:g} % within / m" for it in percents), "energy / J", "difference"]
+    head = ["variant", *(f"{it:g} % within / m" for it in percents), "reliability"]
+    head += ["energy / J", "difference"]
     made = table(head, text=1, title=f"Side by side, {driven.runs} {driven.rows} each")
     for it in found:
         energy_j = it.driven.energy_j
         made.add_row(
             it.driven.name,
             *(f"{it.driven.percentile(percent).value:.3f}" for percent in percents),
+            it.reliability(),
             "–" if energy_j is None else f"{energy_j:.2f}",
             it.in_words(),
         )

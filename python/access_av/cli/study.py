@@ -102,13 +102,13 @@ def study(
             ["remedy", f"{found.percent:g} % within / m", "difference / m", "interval", ""], text=1
         )
         for it in found.mended:
-            less, low, high = it.less_m
+            delta, low, high = it.delta_m
             made.add_row(
                 it.remedy.name,
                 f"{it.error.value:.3f}",
-                f"{less:+.3f}",
+                f"{delta:+.3f}",
                 f"{low:+.3f} to {high:+.3f}",
-                it.outcome,
+                it.effect.words,
             )
         console.print(made)
     show_compared(beside)

@@ -24,13 +24,14 @@ def compared_section(found: Sequence[Compared]) -> str:
             escape(it.driven.name),
             *(f"{it.driven.percentile(percent).value:.3f} m" for percent in percents),
             escape(it.in_words()),
+            escape(it.reliability()),
             "–" if it.driven.energy_j is None else f"{number(it.driven.energy_j, 2)} J",
         )
         for it in found
     ]
     head = (
         "Variant", *(f"{percent:g} % within" for percent in percents),
-        f"{percents[-1]:g} %, against the first", "Energy of a trip",
+        f"{percents[-1]:g} %, against the first", "Reliability", "Energy of a trip",
     )  # fmt: skip
     return section(
         "Side by side",

@@ -23,15 +23,8 @@ if TYPE_CHECKING:
     from access_av.study.answer import Study
     from access_av.study.points import Point
 
-_KINDS = {
-    "good enough": "yes",
-    "probably good enough": "fit",
-    "probably not good enough": "fit",
-    "not good enough": "no",
-}
 # Rows of the table along the road.
 MOST_PLACES = 30
-_OUTCOMES = {"helps": "yes", "not sure": "fit", "makes it worse": "no"}
 
 
 def render_study(study: Study, beside: str = "") -> str:
@@ -83,7 +76,7 @@ def render_study(study: Study, beside: str = "") -> str:
 
 
 def _headline(study: Study) -> str:
-    judged = study.judged(study.believed)
+    judged = study.judged(study.believed).words
     return escape(
         f"{judged[0].upper()}{judged[1:]} for {study.error_m:g} m, {study.percent:g} % of the time"
     )
@@ -126,7 +119,7 @@ def _verdict(study: Study) -> str:
                 f"{low:.2%} to {high:.2%}",
                 "–" if driven.ok_share is None else f"{driven.ok_share:.1%}",
                 str(driven.runs),
-                badge(judged, _KINDS[judged]),
+                badge(judged.words, judged.badge),
             )
         )
     channel = json.loads(study.plant.to_json())["poor_channel"]["model"]
@@ -221,16 +214,16 @@ def _remedies(study: Study) -> str:
     base = study.believed.percentile(study.percent)
     rows = [("as it is", f"{base.value:.3f} m", f"{escape(base.interval)} m", "–", "–", "–", "")]
     for it in study.mended:
-        less, low, high = it.less_m
+        delta, low, high = it.delta_m
         rows.append(
             (
                 f"{escape(it.remedy.name)}<small>{escape(it.remedy.what)}</small>",
                 f"{it.error.value:.3f} m",
                 f"{escape(it.error.interval)} m",
-                f"{less:+.3f} m",
+                f"{delta:+.3f} m",
                 f"{low:+.3f} to {high:+.3f} m",
                 _range(it.cost),
-                badge(it.outcome, _OUTCOMES[it.outcome]),
+                badge(it.effect.words, it.effect.badge),
             )
         )
     head = (

@@ -5,12 +5,15 @@ from __future__ import annotations
 from dataclasses import dataclass
 from typing import TYPE_CHECKING
 
+import numpy as np
+
 from access_av.run.service_levels import INDEPENDENT_S
 from access_av.statistics.paired import paired_difference
 from access_av.statistics.percentiles import percentiles
 
 if TYPE_CHECKING:
-    import numpy as np
+    from collections.abc import Mapping
+
     from numpy.typing import NDArray
 
     from access_av.statistics.percentiles import Percentile
@@ -18,6 +21,11 @@ if TYPE_CHECKING:
 # What variants are compared with.
 AS_IT_IS = "as it is"
 DRIVES = "drives"
+# A vehicle with a larger error is off its lane and that of the opposite direction, in metres.
+LOST_M = 5.0
+# Longest time with a larger error that does not count as lost: a vehicle can stop and be localized
+# again, in seconds.
+LOST_S = 5.0
 STRETCHES = f"stretches of {INDEPENDENT_S:g} s of one drive"
 
 
@@ -62,13 +70,45 @@ class Errors:
         [found] = percentiles(self.errors_m, [percent], independent=self.independent)
         return found
 
-    def less_than(self, other: Errors, percent: float) -> tuple[float, float, float]:
-        """By how many metres a percentile is larger than another's, row by row.
+    @property
+    def lost_runs(self) -> int:
+        """Number of rows with a lost vehicle.
+
+        A vehicle is lost if the error exceeds :data:`LOST_M`, or the position becomes unknown, for
+        more than :data:`LOST_S` in total. The search for the first position does not count.
+
+        Examples
+        --------
+        >>> errors_m = np.full((3, 100), 0.1)
+        >>> errors_m[0, :40] = np.inf
+        >>> errors_m[1, 40:] = 30.0
+        >>> Errors(name="a", errors_m=errors_m, duration_s=100.0).lost_runs
+        1
+        """
+        known = np.logical_or.accumulate(np.isfinite(self.errors_m), axis=1)
+        beyond = known & ~(self.errors_m <= LOST_M)
+        never = ~known[:, -1] if known.shape[1] else np.zeros(self.runs, dtype=bool)
+        lost_s = beyond.mean(axis=1) * self.duration_s
+        return int(((lost_s > LOST_S) | never).sum())
+
+    @property
+    def state_shares(self) -> Mapping[str, float] | None:
+        """Share of the time by state of integrity; ``None`` without an integrity monitor."""
+        return None
+
+    @property
+    def exceedances(self) -> int | None:
+        """Number of positions in state ``ok`` whose error exceeds the protection level."""
+        return None
+
+    def delta_m(self, baseline: Errors, percent: float) -> tuple[float, float, float]:
+        """Difference of a percentile to the baseline's in metres, in pairs of rows.
 
         Returns
         -------
         tuple of float
-            The difference, negative where this one is better, and the ends of its 95 % interval.
+            This variant minus the baseline, and the ends of the 95 % interval; negative where this
+            variant is more accurate.
         """
-        runs = min(self.runs, other.runs)
-        return paired_difference(self.errors_m[:runs], other.errors_m[:runs], percent)
+        runs = min(self.runs, baseline.runs)
+        return paired_difference(self.errors_m[:runs], baseline.errors_m[:runs], percent)

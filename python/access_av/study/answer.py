@@ -19,6 +19,7 @@ from access_av.study.points import Point, front, points, recommended, tried
 from access_av.study.remedies import Remedy, remedies
 from access_av.study.trips import Driven, drive
 from access_av.study.unstated import Unstated, unstated
+from access_av.study.verdicts import Effect, Judgement
 
 if TYPE_CHECKING:
     from collections.abc import Callable
@@ -49,9 +50,9 @@ class Mended:
         Its drives.
     error
         The target's percentile with it.
-    less_m
-        By how much that is larger than without, in pairs of drives, and the ends of the 95 %
-        interval; negative where it helps.
+    delta_m
+        Difference of ``error`` to the plant without the remedy, in pairs of drives, and the ends
+        of the 95 % interval; negative where the remedy helps.
     cost
         What it costs, low to high.
     """
@@ -59,15 +60,13 @@ class Mended:
     remedy: Remedy
     driven: Driven
     error: Percentile
-    less_m: tuple[float, float, float]
+    delta_m: tuple[float, float, float]
     cost: Range
 
     @property
-    def outcome(self) -> str:
-        """Whether it helps, in words."""
-        if self.less_m[2] < 0.0:
-            return "helps"
-        return "makes it worse" if self.less_m[0] > 0.0 and self.less_m[1] > 0.0 else "not sure"
+    def effect(self) -> Effect:
+        """Whether the remedy helps."""
+        return Effect.of(self.delta_m)
 
 
 @dataclass(frozen=True, eq=False)
@@ -122,16 +121,15 @@ class Study:
         """The way to operate that is recommended; ``None`` without any figure of energy."""
         return None if self.recommended is None else self.points[self.recommended]
 
-    def judged(self, driven: Driven) -> str:
-        """Whether drives keep the target, for sure or probably."""
+    def judged(self, driven: Driven) -> Judgement:
+        """Whether drives meet the target with 95 % confidence, or probably."""
         share, low, high = driven.within(self.error_m)
-        asked = 0.01 * self.percent
-        if low >= asked:
-            return "good enough"
-        if high < asked:
-            return "not good enough"
-        likely = "good enough" if share >= asked else "not good enough"
-        return f"probably {likely}"
+        required = 0.01 * self.percent
+        if low >= required:
+            return Judgement.MET
+        if high < required:
+            return Judgement.MISSED
+        return Judgement.PROBABLY_MET if share >= required else Judgement.PROBABLY_MISSED
 
     def in_words(self, driven: Driven) -> str:
         """The target's percentile of drives with its interval, in words."""
@@ -141,11 +139,12 @@ class Study:
     @property
     def verdict(self) -> str:
         """One sentence: as believed, and in poor line of sight."""
-        believed = self.judged(self.believed)
+        believed = self.judged(self.believed).words
         return (
             f"{believed[0].upper()}{believed[1:]}: for {self.percent:g} % of the time the vehicle "
             f"knows its position {self.in_words(self.believed)}; {self.error_m:g} m is asked. "
-            f"Where lines of sight are poor: {self.judged(self.poor)}, {self.in_words(self.poor)}."
+            f"Where lines of sight are poor: {self.judged(self.poor).words}, "
+            f"{self.in_words(self.poor)}."
         )
 
     @property
@@ -172,10 +171,10 @@ class Study:
                     "what": it.remedy.what,
                     "settings": dict(it.remedy.settings),
                     **_percentile(it.error),
-                    "less_m": it.less_m[0],
-                    "less_low_m": it.less_m[1],
-                    "less_high_m": it.less_m[2],
-                    "outcome": it.outcome,
+                    "delta_m": it.delta_m[0],
+                    "delta_low_m": it.delta_m[1],
+                    "delta_high_m": it.delta_m[2],
+                    "effect": it.effect.value,
                     "cost": vars(it.cost),
                 }
                 for it in self.mended
@@ -210,9 +209,11 @@ class Study:
             "within_share": share,
             "within_low_share": low,
             "within_high_share": high,
-            "judged": self.judged(driven),
+            "judged": self.judged(driven).value,
+            "lost_runs": driven.lost_runs,
             "ok_share": driven.ok_share,
-            "beyond_level_while_ok": driven.beyond,
+            "state_shares": driven.state_shares and dict(driven.state_shares),
+            "beyond_level_while_ok": driven.exceedances,
         }
 
     def tables(self) -> dict[str, pl.DataFrame]:
@@ -331,7 +332,7 @@ def study_plant(
         changed = scenario.with_overrides(dict(remedy.settings))
         made = driven(remedy.name, changed, pairs)
         mended.append(_mended(remedy, made, believed, percent, prices))
-    mended.sort(key=lambda it: it.less_m[0])
+    mended.sort(key=lambda it: it.delta_m[0])
     poor = driven("poor line of sight", plant.poor_scenario(), fewest)
     at_ways: list[tuple[str, str, Driven]] = []
     for name, (method, wake_up, settings) in operated.items():
@@ -391,7 +392,7 @@ def _mended(
         remedy=remedy,
         driven=driven,
         error=driven.percentile(percent),
-        less_m=driven.less_than(believed, percent),
+        delta_m=driven.delta_m(believed, percent),
         cost=prices.ranges[remedy.price].scaled(remedy.units),
     )
 

@@ -7,6 +7,7 @@ import math
 from dataclasses import dataclass
 from typing import TYPE_CHECKING, Any
 
+import numpy as np
 import polars as pl
 
 from access_av.errors import InputError
@@ -32,27 +33,49 @@ class Compared:
         Its drives.
     percents
         Which percentiles of the error are compared.
-    less_m
-        By how much each is larger than the first variant's, in pairs of drives, and the ends of
-        the 95 % interval; ``None`` of the first one itself.
+    delta_m
+        Difference of each percentile to the first variant's, in pairs of drives, and the ends of
+        the 95 % interval: variant minus baseline; ``None`` of the baseline itself.
+    identical
+        Whether all errors equal those of the baseline.
     """
 
     driven: Errors
     percents: Sequence[float]
-    less_m: Sequence[tuple[float, float, float]] | None
+    delta_m: Sequence[tuple[float, float, float]] | None
+    identical: bool = False
 
     def in_words(self, place: int = -1) -> str:
-        """How one of the percentiles differs from the first variant's."""
-        if self.less_m is None:
-            return "what the others are compared with"
-        less, low, high = self.less_m[place]
+        """Lost drives first, then the difference of one of the percentiles to the baseline's."""
+        driven = self.driven
+        lost = f"LOST in {driven.lost_runs} of {driven.runs} {driven.rows}"
+        difference = self._difference(place)
+        return f"{lost}; {difference}" if driven.lost_runs else difference
+
+    def reliability(self) -> str:
+        """Share of the time by state, and errors beyond the protection level in state ``ok``."""
+        shares = self.driven.state_shares
+        if shares is None:
+            return "no monitor"
+        others = (f"{share:.1%} {state}" for state, share in shares.items() if state != "ok")
+        text = f"{shares['ok']:.1%} ok, {', '.join(others)}"
+        beyond = self.driven.exceedances
+        return f"{text}; {beyond} errors beyond the level while ok" if beyond else text
+
+    def _difference(self, place: int) -> str:
+        if self.delta_m is None:
+            return "baseline"
+        if self.identical:
+            return "identical to the baseline"
+        delta, low, high = self.delta_m[place]
         if math.isinf(low):
-            return f"{less:+.3f} m; of one of the {self.driven.rows} there is no interval"
+            return f"{delta:+.3f} m; of one of the {self.driven.rows} there is no interval"
+        if math.isnan(delta):
+            return "no difference can be given: the baseline has no finite percentile"
+        interval = f"{delta:+.3f} m (95 %: {low:+.3f} to {high:+.3f} m)"
         if low <= 0.0 <= high:
-            return f"not surely different ({low:+.3f} to {high:+.3f} m)"
-        kind = "better" if less < 0.0 else "worse"
-        near, far = sorted((abs(low), abs(high)))
-        return f"{abs(less):.3f} m {kind} ({near:.3f} to {far:.3f} m)"
+            return f"no difference with 95 % confidence: {interval}"
+        return f"{'better' if delta < 0.0 else 'worse'}: {interval}"
 
 
 def values(text: str) -> tuple[str, list[Any]]:
@@ -112,7 +135,7 @@ def compare(
     threads: int | None = None,
     progress: Callable[[int, int], None] | None = None,
 ) -> list[Compared]:
-    """Drive variants in the same worlds, the first being what the others are compared with.
+    """Drives variants in the same environments; the first one is the baseline.
 
     Parameters
     ----------
@@ -135,7 +158,12 @@ def compare(
 def beside_first(found: Sequence[Errors], percents: Sequence[float]) -> list[Compared]:
     """What was driven in the same worlds, each beside the first."""
     return [
-        Compared(it, percents, [it.less_than(found[0], percent) for percent in percents])
+        Compared(
+            it,
+            percents,
+            [it.delta_m(found[0], percent) for percent in percents],
+            np.array_equal(it.errors_m, found[0].errors_m),
+        )
         if it is not found[0]
         else Compared(it, percents, None)
         for it in found
@@ -148,7 +176,8 @@ def table(found: Sequence[Compared]) -> pl.DataFrame:
     for it in found:
         for place, percent in enumerate(it.percents):
             known = it.driven.percentile(percent)
-            more = (None, None, None) if it.less_m is None else it.less_m[place]
+            delta = (None, None, None) if it.delta_m is None else it.delta_m[place]
+            shares = it.driven.state_shares or {}
             rows.append(
                 {
                     "variant": it.driven.name,
@@ -157,7 +186,12 @@ def table(found: Sequence[Compared]) -> pl.DataFrame:
                     "percentile_m": known.value,
                     "percentile_low_m": known.low,
                     "percentile_high_m": known.high,
-                    **dict(zip(("more_m", "more_low_m", "more_high_m"), more, strict=True)),
+                    **dict(zip(("delta_m", "delta_low_m", "delta_high_m"), delta, strict=True)),
+                    "lost_runs": it.driven.lost_runs,
+                    "availability": shares.get("ok"),
+                    "degraded_share": shares.get("degraded"),
+                    "unavailable_share": shares.get("unavailable"),
+                    "exceedances": it.driven.exceedances,
                     "energy_j": it.driven.energy_j,
                 }
             )

@@ -15,11 +15,12 @@ from access_av.run.simulation import simulate
 from access_av.statistics.proportions import clopper_pearson
 
 if TYPE_CHECKING:
-    from collections.abc import Callable
+    from collections.abc import Callable, Mapping
 
     from numpy.typing import NDArray
 
     from access_av import _core
+    from access_av.statistics.integrity import Integrity
 
 # Errors are kept this often: a vehicle moves less than its own width meanwhile.
 KEPT_EVERY_S = 0.1
@@ -62,10 +63,8 @@ class Driven(Errors):
         Times of the epochs.
     executions, listened
         Angle estimates, and SSB bursts listened to, of each run.
-    ok_share
-        Share of the time in which the position may be relied on (state ``ok``).
-    beyond
-        Errors beyond the protection level meanwhile.
+    integrity
+        Counts of states and of errors beyond the protection level; ``None`` without a monitor.
     """
 
     scenario: _core.Scenario
@@ -73,8 +72,22 @@ class Driven(Errors):
     time_s: NDArray[np.float64]
     executions: NDArray[np.int64]
     listened: NDArray[np.int64]
-    ok_share: float | None
-    beyond: int | None
+    integrity: Integrity | None
+
+    @property
+    def state_shares(self) -> Mapping[str, float] | None:
+        """Share of the time by state of integrity; ``None`` without an integrity monitor."""
+        return None if self.integrity is None else self.integrity.state_shares
+
+    @property
+    def ok_share(self) -> float | None:
+        """Share of the time in state ``ok``; ``None`` without an integrity monitor."""
+        return None if self.state_shares is None else float(self.state_shares["ok"])
+
+    @property
+    def exceedances(self) -> int | None:
+        """Number of positions in state ``ok`` whose error exceeds the protection level."""
+        return None if self.integrity is None else self.integrity.exceedances
 
     @property
     def energy_j(self) -> float | None:
@@ -166,7 +179,6 @@ def drive(
     errors_m = np.hypot(found.errors_m[:, :, 0], found.errors_m[:, :, 1]).astype(np.float64)
     errors_m[np.isnan(errors_m)] = np.inf
     time_s = found.steps["time_s"].to_numpy()
-    integrity = found.integrity
     return Driven(
         name=name,
         scenario=scenario,
@@ -176,8 +188,7 @@ def drive(
         executions=found.runs["executions"].to_numpy().astype(np.int64),
         listened=found.runs["listened"].to_numpy().astype(np.int64),
         duration_s=float(time_s[-1]),
-        ok_share=None if integrity is None else float(integrity.state_shares["ok"]),
-        beyond=None if integrity is None else integrity.exceedances,
+        integrity=found.integrity,
     )
 
 

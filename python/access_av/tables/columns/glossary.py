@@ -83,9 +83,14 @@ _GLOSSARY = {
     "percentile_m": ("m", "That percentile"),
     "percentile_low_m": ("m", "Low end of its 95 % interval"),
     "percentile_high_m": ("m", "High end of its 95 % interval"),
-    "more_m": ("m", "By how much it is larger than the first variant's, in pairs of drives"),
-    "more_low_m": ("m", "Low end of the 95 % interval of that"),
-    "more_high_m": ("m", "High end of the 95 % interval of that"),
+    "delta_m": (
+        "m",
+        "Percentile of the variant minus that of the first variant, in pairs of drives",
+    ),
+    "delta_low_m": ("m", "Low end of the 95 % interval of delta_m"),
+    "delta_high_m": ("m", "High end of the 95 % interval of delta_m"),
+    "lost_runs": ("1", "Drives with an error above 5 m for more than 5 s, or never a position"),
+    "degraded_share": ("1", "Share of the time in state degraded"),
     # Errors of the position.
     "error_x_m": ("m", "Estimate minus truth, x"),
     "error_y_m": ("m", "Estimate minus truth, y"),

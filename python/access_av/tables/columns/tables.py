@@ -341,11 +341,16 @@ TABLES: Mapping[str, Table] = {
             "or --compare",
             (
                 "variant", "runs", "percent", "percentile_m", "percentile_low_m",
-                "percentile_high_m", "more_m", "more_low_m", "more_high_m", "energy_j",
+                "percentile_high_m", "delta_m", "delta_low_m", "delta_high_m", "lost_runs",
+                "availability", "degraded_share", "unavailable_share", "exceedances", "energy_j",
             ),
             {
                 "energy_j": _NO_FIGURE,
-                **dict.fromkeys(("more_m", "more_low_m", "more_high_m"), "the first variant"),
+                **dict.fromkeys(("delta_m", "delta_low_m", "delta_high_m"), "the first variant"),
+                **dict.fromkeys(
+                    ("availability", "degraded_share", "unavailable_share", "exceedances"),
+                    "no integrity monitor",
+                ),
                 **dict.fromkeys(
                     ("percentile_low_m", "percentile_high_m"), "one run has no interval"
                 ),
