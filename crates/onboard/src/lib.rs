@@ -31,6 +31,7 @@ pub mod road;
 pub mod settings;
 pub mod sight;
 pub mod thermal;
+pub mod time_unit;
 pub mod wake_up;
 pub mod walls;
 
