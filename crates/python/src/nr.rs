@@ -340,7 +340,7 @@ pub fn scan(
         array: array_setup(spacing_wavelengths, places_wavelengths, calibration),
     };
     let found = recording
-        .with(py, |core| recording::scan::scan(core, &settings))
+        .with(py, |core| recording::scan::scan_recording(core, &settings))
         .map_err(scan_error)?;
     Scan::of(py, &found)
 }

@@ -58,7 +58,8 @@ impl Recording {
 
 #[pymethods]
 impl Recording {
-    /// Open a SigMF recording by its name, its `.sigmf-meta` or its `.sigmf-data`.
+    /// Open a SigMF recording by its name, its `.sigmf-meta` or its `.sigmf-data`, or an archive (`.sigmf`) or
+    /// collection (`.sigmf-collection`) of one recording.
     ///
     /// Parameters
     /// ----------
@@ -70,7 +71,7 @@ impl Recording {
     /// Raises
     /// ------
     /// RecordingError
-    ///     A half missing, unusable metadata, data that ends within a sample.
+    ///     A half missing, unusable metadata, data that ends within a sample or is of another type.
     #[staticmethod]
     #[pyo3(signature = (path, *, verify = true))]
     fn open(py: Python<'_>, path: PathBuf, verify: bool) -> PyResult<Self> {

@@ -63,6 +63,7 @@ pub fn receive_recording(
         let error = ReceiveError::Antennas { found, elements };
         return Err(failed(error.into()));
     }
+    recording.check_one_frequency()?;
     let rate_hz = recording.sample_rate_hz();
     // Where the recording does not say, the SSB was tuned to.
     let centre_hz = recording.centre_frequency_hz();

@@ -41,6 +41,8 @@ pub enum ChannelFault {
     },
     /// DC offset, or a tone in the recorded band. It is subtracted before SSBs are searched for.
     Tone(Tone),
+    /// There are SSBs with I and Q exchanged, and none otherwise.
+    IqExchanged,
 }
 
 impl ChannelFault {
@@ -48,7 +50,7 @@ impl ChannelFault {
     pub const fn channel(&self) -> Option<usize> {
         match self {
             Self::Samples { channel, .. } => Some(*channel),
-            Self::Exchanged { .. } | Self::Tone(_) => None,
+            Self::Exchanged { .. } | Self::Tone(_) | Self::IqExchanged => None,
         }
     }
 }
@@ -68,6 +70,12 @@ impl fmt::Display for ChannelFault {
                     "tone {:+.2} kHz from the centre frequency, {:.1} dBFS: removed",
                     1e-3 * tone.frequency_hz,
                     tone.power_dbfs
+                );
+            }
+            Self::IqExchanged => {
+                return f.write_str(
+                    "I and Q are exchanged (the spectrum is mirrored): SSBs were found with them \
+                     exchanged back, and none otherwise",
                 );
             }
             Self::Samples { channel, fault } => (channel, fault),

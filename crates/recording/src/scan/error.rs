@@ -22,7 +22,7 @@ pub enum ScanError {
         source: FrontEndError,
     },
     /// The search refused its input.
-    #[error("{file}: {source}")]
+    #[error("{file}: {source}{}", rate_of_count(source))]
     Search {
         /// The recording.
         file: String,
@@ -38,4 +38,13 @@ pub enum ScanError {
     /// An impossible array.
     #[error("array: {0}")]
     Array(#[from] aoa::Error),
+}
+
+/// The rate at which samples are counted, which need not be that of the file.
+fn rate_of_count(error: &SearchError) -> &'static str {
+    if matches!(error, SearchError::TooShort { .. }) {
+        ", counted at the base rate of the search and not at that of the recording"
+    } else {
+        ""
+    }
 }

@@ -1,17 +1,20 @@
 //! SHA-512 of a data file.
 
 use std::fmt::Write;
-use std::io::{self, Read};
-use std::path::Path;
+use std::io::{self, Read, Seek, SeekFrom};
 
 use sha2::{Digest, Sha512};
 
 /// Bytes hashed at once.
 const BLOCK: usize = 1 << 16;
 
-/// SHA-512 of a file, hexadecimal, as `core:sha512` holds it.
-pub(super) fn of_file(path: &Path) -> io::Result<String> {
-    let mut file = crate::file::open(path)?;
+use super::archive::Extent;
+
+/// SHA-512 of data, hexadecimal, as `core:sha512` holds it.
+pub(super) fn of_extent(extent: &Extent) -> io::Result<String> {
+    let mut file = crate::file::open(&extent.file)?;
+    file.seek(SeekFrom::Start(extent.offset))?;
+    let mut file = file.take(extent.bytes);
     let mut hash = Sha512::new();
     let mut block = vec![0; BLOCK];
     loop {

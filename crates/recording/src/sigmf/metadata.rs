@@ -5,6 +5,7 @@ use std::path::Path;
 use serde::{Deserialize, Serialize};
 use serde_json::{Map, Value};
 
+use super::frequency;
 use crate::error::RecordingError;
 use crate::file as files;
 
@@ -134,9 +135,7 @@ impl Metadata {
     /// # Errors
     /// [`RecordingError`] naming the key where one is missing, of the wrong type or out of range.
     pub fn read(file: &Path) -> Result<Self, RecordingError> {
-        let text =
-            files::read(file, MOST_BYTES).map_err(|source| RecordingError::io(file, source))?;
-        Self::parse(&text, file)
+        Self::parse(&read_text(file)?, file)
     }
 
     pub(super) fn parse(text: &[u8], file: &Path) -> Result<Self, RecordingError> {
@@ -208,6 +207,11 @@ impl Metadata {
                     allowed,
                 ));
             }
+            if let Some(hz) = capture.frequency_hz {
+                frequency::check_centre_hz(hz).map_err(|allowed| {
+                    RecordingError::value(file, key("core:frequency"), hz, allowed)
+                })?;
+            }
             let before = index
                 .checked_sub(1)
                 .and_then(|before| self.captures.get(before));
@@ -223,6 +227,14 @@ impl Metadata {
         }
         Ok(())
     }
+}
+
+/// Text of a `.sigmf-meta` file.
+///
+/// # Errors
+/// [`RecordingError::Io`].
+pub(super) fn read_text(file: &Path) -> Result<Vec<u8>, RecordingError> {
+    files::read(file, MOST_BYTES).map_err(|source| RecordingError::io(file, source))
 }
 
 fn is_nothing(value: &Value) -> bool {

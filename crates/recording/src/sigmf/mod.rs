@@ -13,13 +13,19 @@
 //! # Ok::<(), recording::RecordingError>(())
 //! ```
 
+mod archive;
 mod checksum;
+mod frequency;
 mod metadata;
 mod reader;
+mod sample_format;
 mod samples;
+mod segment;
 mod writer;
 
+pub use frequency::check_centre_hz;
 pub use metadata::{Annotation, Capture, Global, Metadata};
 pub use reader::{Recording, RecordingWarning};
 pub use samples::Datatype;
+pub use segment::Segment;
 pub use writer::{RecordingWriter, WriterSettings};

@@ -7,9 +7,13 @@ use std::path::{Path, PathBuf};
 
 use num_complex::Complex32;
 
+use super::archive::{self, Extent};
 use super::checksum;
-use super::metadata::{Annotation, Capture, Global, Metadata};
+use super::frequency::check_centre_hz;
+use super::metadata::{self, Annotation, Capture, Global, Metadata};
+use super::sample_format;
 use super::samples::Datatype;
+use super::segment::{self, Segment};
 use crate::error::RecordingError;
 use crate::file as files;
 
@@ -55,25 +59,33 @@ impl fmt::Display for RecordingWarning {
     }
 }
 
+/// Open data of a recording.
+#[derive(Debug)]
+struct DataFile {
+    extent: Extent,
+    file: File,
+}
+
 /// An open recording of one or more channels.
 #[derive(Debug)]
 pub struct Recording {
     metadata: Metadata,
     datatype: Datatype,
     /// One file with all channels interleaved, or one per channel.
-    files: Vec<(PathBuf, File)>,
+    files: Vec<DataFile>,
     length: u64,
     warnings: Vec<RecordingWarning>,
     block: Vec<u8>,
 }
 
 impl Recording {
-    /// Opens a SigMF recording by its name, its `.sigmf-meta` or its `.sigmf-data`, and compares
-    /// the data's SHA-512 with the metadata's, which reads all of it once.
+    /// Opens a SigMF recording by its name, its `.sigmf-meta` or its `.sigmf-data`, or that of an archive (`.sigmf`) or a
+    /// collection (`.sigmf-collection`) of one recording, and compares the data's SHA-512 with the metadata's, which
+    /// reads all of it once.
     ///
     /// # Errors
-    /// [`RecordingError`] when a half is missing, the metadata is not usable, or the data is empty
-    /// or ends within a sample.
+    /// [`RecordingError`] when a half is missing, the metadata is not usable, the data is empty, ends within a sample or
+    /// is not of the stated type.
     pub fn open(path: impl AsRef<Path>) -> Result<Self, RecordingError> {
         let mut recording = Self::open_unverified(path)?;
         recording.verify()?;
@@ -85,10 +97,15 @@ impl Recording {
     /// # Errors
     /// Those of [`open`](Self::open).
     pub fn open_unverified(path: impl AsRef<Path>) -> Result<Self, RecordingError> {
-        let (meta_file, data_file) = both_halves(path.as_ref())?;
-        let metadata = Metadata::read(&meta_file)?;
+        let path = path.as_ref();
+        let Halves {
+            meta_file,
+            text,
+            data,
+        } = halves(path)?;
+        let metadata = Metadata::parse(&text, &meta_file)?;
         let datatype = Datatype::from_name(&metadata.global.datatype, &meta_file)?;
-        let (file, length) = open_data(&data_file, metadata.global.channels, datatype)?;
+        let (data, length) = open_data(data, metadata.global.channels, datatype)?;
         for (index, capture) in metadata.captures.iter().enumerate() {
             if capture.sample_start >= length {
                 return Err(RecordingError::value(
@@ -99,12 +116,18 @@ impl Recording {
                 ));
             }
         }
-        Ok(Self::new(
-            metadata,
-            datatype,
-            vec![(data_file, file)],
-            length,
-        ))
+        let mut recording = Self::new(metadata, datatype, vec![data], length);
+        if let Some(likely) = recording.other_datatype()? {
+            let allowed = format!("the samples are probably `{}`", likely.name());
+            let stated = format!("`{}`", datatype.name());
+            return Err(RecordingError::value(
+                &meta_file,
+                "global.core:datatype",
+                stated,
+                allowed,
+            ));
+        }
+        Ok(recording)
     }
 
     /// Opens raw `cf32_le` files, one per channel.
@@ -136,12 +159,16 @@ impl Recording {
             }],
             annotations: Vec::new(),
         };
+        if let Some(hz) = frequency_hz {
+            check_centre_hz(hz)
+                .map_err(|allowed| RecordingError::value(first, "centre frequency", hz, allowed))?;
+        }
         metadata.check(first)?;
         let mut files = Vec::with_capacity(paths.len());
         let mut length = None;
         for path in paths {
             let path = path.as_ref();
-            let (file, samples) = open_data(path, 1, Datatype::Cf32Le)?;
+            let (data, samples) = open_data(whole(path)?, 1, Datatype::Cf32Le)?;
             let expected = *length.get_or_insert(samples);
             if samples != expected {
                 return Err(RecordingError::UnequalChannels {
@@ -151,22 +178,21 @@ impl Recording {
                     expected,
                 });
             }
-            files.push((path.to_owned(), file));
+            files.push(data);
         }
-        Ok(Self::new(
-            metadata,
-            Datatype::Cf32Le,
-            files,
-            length.unwrap_or(0),
-        ))
+        let mut recording = Self::new(metadata, Datatype::Cf32Le, files, length.unwrap_or(0));
+        if let Some(likely) = recording.other_datatype()? {
+            let allowed = format!(
+                "raw files must be `cf32_le`; for {0}, write a .sigmf-meta file with core:datatype {0}",
+                likely.name()
+            );
+            let found = format!("probably `{}`", likely.name());
+            return Err(RecordingError::value(first, "samples", found, allowed));
+        }
+        Ok(recording)
     }
 
-    fn new(
-        metadata: Metadata,
-        datatype: Datatype,
-        files: Vec<(PathBuf, File)>,
-        length: u64,
-    ) -> Self {
+    fn new(metadata: Metadata, datatype: Datatype, files: Vec<DataFile>, length: u64) -> Self {
         let mut warnings = Vec::new();
         for (annotation, it) in metadata.annotations.iter().enumerate() {
             if it.sample_start.saturating_add(it.sample_count.unwrap_or(1)) > length {
@@ -191,17 +217,63 @@ impl Recording {
     }
 
     fn verify(&mut self) -> Result<(), RecordingError> {
-        let (Some(expected), Some((path, _))) = (&self.metadata.global.sha512, self.files.first())
+        let (Some(expected), Some(DataFile { extent, .. })) =
+            (&self.metadata.global.sha512, self.files.first())
         else {
             return Ok(());
         };
-        let found = checksum::of_file(path).map_err(|source| RecordingError::io(path, source))?;
+        let path = &extent.file;
+        let found =
+            checksum::of_extent(extent).map_err(|source| RecordingError::io(path, source))?;
         if !found.eq_ignore_ascii_case(expected) {
             let file = path.display().to_string();
             self.warnings
                 .push(RecordingWarning::ChecksumMismatch { file });
         }
         Ok(())
+    }
+
+    /// The type that the samples probably are, if that is not the stated one.
+    fn other_datatype(&mut self) -> Result<Option<Datatype>, RecordingError> {
+        for DataFile { extent, file } in &mut self.files {
+            let failed = |source| RecordingError::io(&extent.file, source);
+            let count = extent.bytes.min(sample_format::JUDGED_BYTES as u64);
+            self.block.resize(count as usize, 0);
+            file.seek(SeekFrom::Start(extent.offset)).map_err(failed)?;
+            file.read_exact(&mut self.block).map_err(failed)?;
+            if let Some(likely) = sample_format::contradiction(self.datatype, &self.block) {
+                return Ok(Some(likely));
+            }
+        }
+        Ok(None)
+    }
+
+    /// Parts of the recording with one centre frequency, in their order.
+    pub fn segments(&self) -> Vec<Segment> {
+        segment::segments(&self.metadata.captures, self.length)
+    }
+
+    /// Checks that the recording has one centre frequency, as a drive is received at.
+    ///
+    /// # Errors
+    /// [`RecordingError::Value`] naming the first capture with another one.
+    pub fn check_one_frequency(&self) -> Result<(), RecordingError> {
+        let segments = self.segments();
+        let [first, second, ..] = segments.as_slice() else {
+            return Ok(());
+        };
+        let hz = |it: &Segment| it.centre_frequency_hz.unwrap_or(f64::NAN);
+        let key = format!("captures[{}].core:frequency", second.capture);
+        let allowed = format!(
+            "a drive is received at one centre frequency, and begins at {} Hz; write one recording for each frequency",
+            hz(first)
+        );
+        Err(RecordingError::value(
+            self.data_file(),
+            key,
+            hz(second),
+            allowed,
+        ))
     }
 
     /// The metadata.
@@ -211,7 +283,9 @@ impl Recording {
 
     /// The first data file.
     pub fn data_file(&self) -> &Path {
-        self.files.first().map_or(Path::new(""), |(path, _)| path)
+        self.files
+            .first()
+            .map_or(Path::new(""), |it| &it.extent.file)
     }
 
     /// Samples per second and channel.
@@ -284,9 +358,11 @@ impl Recording {
         } else {
             1
         };
-        for ((path, file), channels) in self.files.iter_mut().zip(channels.chunks_mut(per_file)) {
+        for (DataFile { extent, file }, channels) in
+            self.files.iter_mut().zip(channels.chunks_mut(per_file))
+        {
             let place = Place {
-                path,
+                extent,
                 start,
                 count,
                 datatype: self.datatype,
@@ -299,7 +375,7 @@ impl Recording {
 
 /// A stretch of one data file.
 struct Place<'a> {
-    path: &'a Path,
+    extent: &'a Extent,
     start: u64,
     count: usize,
     datatype: Datatype,
@@ -312,12 +388,14 @@ impl Place<'_> {
         block: &mut Vec<u8>,
         channels: &mut [Vec<Complex32>],
     ) -> Result<(), RecordingError> {
-        let failed = |source| RecordingError::io(self.path, source);
+        let failed = |source| RecordingError::io(&self.extent.file, source);
         let sample_bytes = self.datatype.bytes();
         let frame_bytes = sample_bytes * channels.len();
         let frames_at_once = (BLOCK_BYTES / frame_bytes).max(1);
-        file.seek(SeekFrom::Start(self.start * frame_bytes as u64))
-            .map_err(failed)?;
+        file.seek(SeekFrom::Start(
+            self.extent.offset + self.start * frame_bytes as u64,
+        ))
+        .map_err(failed)?;
         let mut done = 0;
         while done < self.count {
             let frames = frames_at_once.min(self.count - done);
@@ -329,7 +407,7 @@ impl Place<'_> {
                     let sample = self.datatype.decode(bytes);
                     if !sample.is_finite() {
                         return Err(RecordingError::NotFinite {
-                            file: self.path.display().to_string(),
+                            file: self.extent.file.display().to_string(),
                             sample: self.start + (done + index) as u64,
                             channel,
                         });
@@ -341,6 +419,51 @@ impl Place<'_> {
         }
         Ok(())
     }
+}
+
+/// Metadata and data of a recording.
+struct Halves {
+    /// Name of the metadata in errors.
+    meta_file: PathBuf,
+    text: Vec<u8>,
+    data: Extent,
+}
+
+/// Metadata and data of the recording that `path` names.
+fn halves(path: &Path) -> Result<Halves, RecordingError> {
+    let is = |extension: &str| path.extension().is_some_and(|it| it == extension) && path.is_file();
+    if is("sigmf") {
+        let (text, data) = archive::recording_in(path)?;
+        let meta_file = path.to_owned();
+        return Ok(Halves {
+            meta_file,
+            text,
+            data,
+        });
+    }
+    if is("sigmf-collection") {
+        return halves(&archive::recording_of(path)?);
+    }
+    let (meta_file, data_file) = both_halves(path)?;
+    Ok(Halves {
+        text: metadata::read_text(&meta_file)?,
+        data: whole(&data_file)?,
+        meta_file,
+    })
+}
+
+/// All of a file.
+fn whole(path: &Path) -> Result<Extent, RecordingError> {
+    let failed = |source| RecordingError::io(path, source);
+    let bytes = files::open(path)
+        .and_then(|file| file.metadata())
+        .map_err(failed)?
+        .len();
+    Ok(Extent {
+        file: path.to_owned(),
+        offset: 0,
+        bytes,
+    })
 }
 
 /// Metadata file and data file of the recording that `path` names.
@@ -367,23 +490,24 @@ fn both_halves(path: &Path) -> Result<(PathBuf, PathBuf), RecordingError> {
     }
 }
 
+/// Opens data; returns the number of samples per channel, too.
 fn open_data(
-    path: &Path,
+    extent: Extent,
     channels: usize,
     datatype: Datatype,
-) -> Result<(File, u64), RecordingError> {
-    let failed = |source| RecordingError::io(path, source);
-    let file = files::open(path).map_err(failed)?;
-    let bytes = file.metadata().map_err(failed)?.len();
+) -> Result<(DataFile, u64), RecordingError> {
+    let file =
+        files::open(&extent.file).map_err(|source| RecordingError::io(&extent.file, source))?;
+    let bytes = extent.bytes;
     let frame_bytes = (channels * datatype.bytes()) as u64;
     if bytes == 0 || !bytes.is_multiple_of(frame_bytes) {
         return Err(RecordingError::PartialFrame {
-            file: path.display().to_string(),
+            file: extent.file.display().to_string(),
             bytes,
             frame_bytes,
             channels,
             datatype: datatype.name(),
         });
     }
-    Ok((file, bytes / frame_bytes))
+    Ok((DataFile { extent, file }, bytes / frame_bytes))
 }
