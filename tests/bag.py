@@ -49,6 +49,7 @@ def odometry(
     speed_mps: float,
     *,
     heading_rad: float | None = None,
+    side_mps: float = 0.0,
     yaw_rate_radps: float = 0.0,
     quaternion: tuple[float, float, float, float] | None = None,
     topic: str = "/odom",
@@ -62,7 +63,7 @@ def odometry(
     nothing = np.zeros(36)
     point = made("geometry_msgs/msg/Point", x_m, y_m, 0.0)
     turned = made("geometry_msgs/msg/Quaternion", *quaternion)
-    twist = made("geometry_msgs/msg/Twist", vector(speed_mps), vector(z=yaw_rate_radps))
+    twist = made("geometry_msgs/msg/Twist", vector(speed_mps, side_mps), vector(z=yaw_rate_radps))
     whole = made(
         ODOMETRY,
         header(time_s),

@@ -18,6 +18,7 @@ use onboard::burst::OfSsb;
 use onboard::live::AngleObservation;
 use onboard::localize::AngleMeasurement;
 use onboard::observation::SensedSsb;
+use onboard::time_unit::TimeUnit;
 
 const COLUMNS: [&str; 8] = [
     "time_s",
@@ -52,9 +53,6 @@ const DEVIATIONS: &str = "# phase_sigma_rad: all of the error that is believed, 
 
 /// Standard deviation of an angle of which nothing is known, π/√3 (rad).
 const MOST_SIGMA_RAD: f64 = 1.813_799_364_234_217_8;
-
-/// No clock of seconds tells more, be it from 1970 on; milliseconds do since 1973.
-const MOST_TIME_S: f64 = 1e11;
 
 /// SNR (dB) of an angle of which none is stated: good enough for any policy.
 const UNSTATED_SNR_DB: f64 = 20.0;
@@ -102,10 +100,12 @@ pub struct AngleLog {
     pub remarks: Vec<AngleRemark>,
 }
 
-/// A line of an angle log that was left out.
+/// An item of an angle log that was left out.
 #[derive(Debug, Clone, PartialEq)]
 pub struct AngleRemark {
-    /// Line in the file, from 1.
+    /// "line" of a CSV file, "row" of a table or "message" of a bag.
+    pub kind: &'static str,
+    /// Number of the item in the file, from 1.
     pub line: usize,
     /// Time of the last usable angle before it, in seconds.
     pub time_s: f64,
@@ -117,8 +117,8 @@ impl fmt::Display for AngleRemark {
     fn fmt(&self, f: &mut fmt::Formatter<'_>) -> fmt::Result {
         write!(
             f,
-            "angle log line {}: left out, {}",
-            self.line, self.message
+            "angle log {} {}: left out, {}",
+            self.kind, self.line, self.message
         )
     }
 }
@@ -135,7 +135,11 @@ pub fn read_angle_log(file: &Path) -> Result<AngleLog, RecordingError> {
     }
     let mut log = AngleLog::default();
     for row in table.rows {
-        log.add(row.line, row.values.and_then(|values| angle(&values)));
+        log.add(
+            "line",
+            row.line,
+            row.values.and_then(|values| angle(&values)),
+        );
     }
     Ok(log)
 }
@@ -167,7 +171,7 @@ pub fn angle_log_of_columns(
     for row in 0..rows.unwrap_or(0) {
         let value = |column: Option<&Vec<f64>>| column?.get(row).copied();
         let known = wanted.iter().map(|it| value(*it).filter(|it| !it.is_nan()));
-        log.add(row + 1, angle(&known.collect::<Vec<_>>()));
+        log.add("row", row + 1, angle(&known.collect::<Vec<_>>()));
     }
     Ok(log)
 }
@@ -188,12 +192,18 @@ fn untold(has: impl Fn(&str) -> bool) -> Option<&'static str> {
 
 impl AngleLog {
     /// Takes in a line, or remarks on why it is left out.
-    pub(crate) fn add(&mut self, line: usize, read: Result<LoggedAngle, String>) {
+    pub(crate) fn add(
+        &mut self,
+        kind: &'static str,
+        line: usize,
+        read: Result<LoggedAngle, String>,
+    ) {
         match read {
             Ok(angle) => self.angles.push(angle),
             Err(message) => {
                 let last = self.angles.last();
                 self.remarks.push(AngleRemark {
+                    kind,
                     line,
                     time_s: last.map_or(f64::NEG_INFINITY, |last| last.measured.time_s),
                     message,
@@ -227,9 +237,9 @@ pub(crate) fn angle(values: &[Option<f64>]) -> Result<LoggedAngle, String> {
         finite(value, name)?.ok_or_else(|| format!("{name} is missing"))
     };
     let (time_s, pci) = (needed(time_s, "time_s")?, needed(pci, "pci")?);
-    if time_s.abs() > MOST_TIME_S {
+    if let Some(unit) = TimeUnit::of_epoch(time_s) {
         return Err(format!(
-            "time_s {time_s} is no time of a drive; it must be seconds"
+            "time_s {time_s} is no time of a drive, and likely in {unit}; it must be seconds"
         ));
     }
     let ssb_index = finite(ssb_index, "ssb_index")?.unwrap_or(0.0);

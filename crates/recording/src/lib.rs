@@ -15,8 +15,11 @@
 
 mod angle_file;
 mod angle_log;
+mod clock_faults;
+mod counter_jumps;
 mod error;
 mod file;
+mod foreign;
 mod library;
 pub mod mcap;
 mod number;
@@ -39,7 +42,7 @@ pub use error::RecordingError;
 pub use file::write as write_file;
 pub use library::{Files, load};
 pub use mcap::{McapWriter, read_angles_mcap, read_odometry_mcap, write_drive_mcap};
-pub use odometry::{OdometryIssue, OdometryLog, OdometryRemark};
+pub use odometry::{OdometryFields, OdometryIssue, OdometryLog, OdometryRemark};
 pub use odometry_csv::{read_odometry_csv, read_wheel_odometry_csv, write_odometry_csv};
 pub use odometry_file::{OdometryChoice, read_odometry};
 pub use sigmf::{

@@ -4,16 +4,59 @@ use std::fmt;
 
 use onboard::observation::OdometrySample;
 
+use crate::clock_faults::TimeFault;
+use crate::counter_jumps::Jump;
+
 /// A step in time this many times the usual one is a gap.
 const GAP_STEPS: f64 = 5.0;
 
-/// Odometry in order of time, and what was wrong with single items of the file.
+/// Odometry in order of time, and defects of single items of the file.
 #[derive(Debug, Clone, PartialEq, Default)]
 pub struct OdometryLog {
     /// The usable samples, of strictly increasing time.
     pub samples: Vec<OdometrySample>,
-    /// What to know of single items.
+    /// Defects and properties of single items.
     pub remarks: Vec<OdometryRemark>,
+    /// Names of the quantities in the file.
+    pub fields: OdometryFields,
+    /// Whether distance and speed were both read, and not one derived from the other.
+    pub has_both: bool,
+}
+
+/// Names of the quantities of odometry, as its file names them.
+#[derive(Debug, Clone, Copy, PartialEq, Eq)]
+pub struct OdometryFields {
+    /// Time (s).
+    pub time: &'static str,
+    /// Distance or position (m).
+    pub distance: &'static str,
+    /// Speed (m/s).
+    pub speed: &'static str,
+    /// Yaw rate (rad/s).
+    pub yaw_rate: &'static str,
+}
+
+impl OdometryFields {
+    /// Columns of a CSV file.
+    pub const CSV: Self = Self {
+        time: "time_s",
+        distance: "distance_m",
+        speed: "speed_mps",
+        yaw_rate: "yaw_rate_radps",
+    };
+    /// Fields of `nav_msgs/msg/Odometry`.
+    pub const ROS: Self = Self {
+        time: "header.stamp",
+        distance: "pose.pose.position",
+        speed: "twist.twist.linear.x",
+        yaw_rate: "twist.twist.angular.z",
+    };
+}
+
+impl Default for OdometryFields {
+    fn default() -> Self {
+        Self::CSV
+    }
 }
 
 impl OdometryLog {
@@ -54,6 +97,49 @@ pub enum OdometryIssue {
         /// Its column.
         column: &'static str,
     },
+    /// The value of a field is out of range.
+    OutOfRange {
+        /// Its field.
+        field: &'static str,
+        /// Its value.
+        value: f64,
+        /// What is allowed.
+        allowed: &'static str,
+    },
+    /// Its time comes before the clock was set.
+    TimeNotSet {
+        /// The field of the time.
+        field: &'static str,
+        /// Its value (s).
+        time_s: f64,
+    },
+    /// Its time comes before the clock was set; the time at which it was recorded was used instead.
+    TimeRestored {
+        /// The field of the time.
+        field: &'static str,
+        /// Its value (s).
+        time_s: f64,
+    },
+    /// Its time is far ahead of the times before and after it.
+    TimeAhead {
+        /// The field of the time.
+        field: &'static str,
+        /// Its value (s).
+        time_s: f64,
+    },
+    /// Used, but the distance makes a step that no vehicle drives, which was replaced by the speed of its neighbours.
+    DistanceJump {
+        /// The field of the distance.
+        field: &'static str,
+        /// The step (m).
+        step_m: f64,
+        /// Speed of the neighbouring steps (m/s).
+        speed_mps: f64,
+    },
+    /// Used; a property of the file, as a sentence.
+    Noted(String),
+    /// Used; a property of the file that may displace the vehicle, as a sentence.
+    Doubtful(String),
     /// The time of the sample before.
     Duplicate {
         /// That time in seconds.
@@ -106,7 +192,14 @@ impl OdometryIssue {
     pub const fn used(&self) -> bool {
         matches!(
             self,
-            Self::Gap { .. } | Self::Derived { .. } | Self::Unused { .. } | Self::Truncated(_)
+            Self::Gap { .. }
+                | Self::Derived { .. }
+                | Self::Unused { .. }
+                | Self::DistanceJump { .. }
+                | Self::TimeRestored { .. }
+                | Self::Noted(_)
+                | Self::Doubtful(_)
+                | Self::Truncated(_)
         )
     }
 }
@@ -116,6 +209,8 @@ impl fmt::Display for OdometryRemark {
         match self.issue {
             OdometryIssue::Derived { .. }
             | OdometryIssue::Unused { .. }
+            | OdometryIssue::Noted(_)
+            | OdometryIssue::Doubtful(_)
             | OdometryIssue::Truncated(_) => {
                 f.write_str("odometry: ")?;
             }
@@ -127,6 +222,34 @@ impl fmt::Display for OdometryRemark {
             OdometryIssue::NotFinite { column } => {
                 write!(f, "left out, {column} is missing or not finite")
             }
+            OdometryIssue::OutOfRange {
+                field,
+                value,
+                allowed,
+            } => write!(f, "left out, {field} is {value:e}; {allowed}"),
+            OdometryIssue::TimeNotSet { field, time_s } => write!(
+                f,
+                "left out, {field} is {time_s} s, before the clock was set"
+            ),
+            OdometryIssue::TimeRestored { field, time_s } => write!(
+                f,
+                "{field} is {time_s} s, before the clock was set; the time at which it was recorded is used \
+                 instead"
+            ),
+            OdometryIssue::TimeAhead { field, time_s } => write!(
+                f,
+                "left out, {field} is {time_s} s, far ahead of the times before and after it"
+            ),
+            OdometryIssue::DistanceJump {
+                field,
+                step_m,
+                speed_mps,
+            } => write!(
+                f,
+                "{field} jumps by {step_m:.3} m; the speed of the steps next to it, {speed_mps:.3} m/s, \
+                 is used instead"
+            ),
+            OdometryIssue::Noted(text) | OdometryIssue::Doubtful(text) => f.write_str(text),
             OdometryIssue::Duplicate { time_s } => {
                 write!(f, "left out, a second sample at {time_s} s")
             }
@@ -144,108 +267,127 @@ impl fmt::Display for OdometryRemark {
     }
 }
 
-/// Takes items one by one and keeps the usable ones.
+/// Decides item by item which are usable, by their times and values.
 #[derive(Debug)]
 pub struct OdometryCollector {
-    log: OdometryLog,
     kind: &'static str,
-    /// Item of each sample.
-    items: Vec<usize>,
+    fields: OdometryFields,
+    remarks: Vec<OdometryRemark>,
+    /// Number and time (s) of each usable item.
+    usable: Vec<(usize, f64)>,
 }
 
 impl OdometryCollector {
-    /// Of items of a kind: "line" or "message".
-    pub fn of(kind: &'static str) -> Self {
+    /// For items of a kind, "line" or "message", whose quantities have these names.
+    pub const fn new(kind: &'static str, fields: OdometryFields) -> Self {
         Self {
-            log: OdometryLog::default(),
             kind,
-            items: Vec::new(),
+            fields,
+            remarks: Vec::new(),
+            usable: Vec::new(),
         }
     }
 
-    pub fn add(&mut self, item: usize, sample: Result<OdometrySample, String>) {
-        let issue = match sample {
-            Err(message) => OdometryIssue::Malformed(message),
-            Ok(sample) => match (not_finite(&sample), self.log.samples.last()) {
-                (Some(column), _) => OdometryIssue::NotFinite { column },
-                (None, Some(last)) if sample.time_s == last.time_s => OdometryIssue::Duplicate {
-                    time_s: sample.time_s,
-                },
-                (None, Some(last)) if sample.time_s < last.time_s => OdometryIssue::TimeReversed {
-                    time_s: sample.time_s,
-                    before_s: last.time_s,
-                },
-                _ => {
-                    self.log.samples.push(sample);
-                    self.items.push(item);
-                    return;
-                }
-            },
+    /// Whether an item is usable: its values are finite and its time is later than that of the last usable one.
+    /// Reports it otherwise.
+    pub fn accept(
+        &mut self,
+        item: usize,
+        time_s: f64,
+        fault: Option<TimeFault>,
+        values: &[(&'static str, f64)],
+    ) -> bool {
+        let field = self.fields.time;
+        let named = std::iter::once((field, time_s));
+        let mut named = named.chain(values.iter().copied());
+        let not_finite = named.find(|(_, value)| !value.is_finite());
+        let last_s = self.usable.last().map(|last| last.1);
+        let issue = match (not_finite, fault, last_s) {
+            (Some((column, _)), ..) => OdometryIssue::NotFinite { column },
+            (_, Some(TimeFault::NotSet), _) => OdometryIssue::TimeNotSet { field, time_s },
+            (_, Some(TimeFault::Ahead), _) => OdometryIssue::TimeAhead { field, time_s },
+            (.., Some(before_s)) if time_s == before_s => OdometryIssue::Duplicate { time_s },
+            (.., Some(before_s)) if time_s < before_s => {
+                OdometryIssue::TimeReversed { time_s, before_s }
+            }
+            _ => {
+                self.usable.push((item, time_s));
+                return true;
+            }
         };
-        let time_s = self.last().map_or(f64::NEG_INFINITY, |last| last.time_s);
-        let remark = OdometryRemark {
+        self.report(item, issue);
+        false
+    }
+
+    /// Reports something about an item.
+    pub fn report(&mut self, item: usize, issue: OdometryIssue) {
+        let last_s = self.usable.last().map(|last| last.1);
+        self.remarks.push(OdometryRemark {
+            item,
+            kind: self.kind,
+            time_s: last_s.unwrap_or(f64::NEG_INFINITY),
+            issue,
+        });
+    }
+
+    /// Reports a step of a distance that was replaced, at the usable item of this index.
+    pub fn report_jump(&mut self, jump: &Jump, field: &'static str) {
+        let Some(&(item, time_s)) = self.usable.get(jump.index) else {
+            return;
+        };
+        self.remarks.push(OdometryRemark {
             item,
             kind: self.kind,
             time_s,
-            issue,
-        };
-        self.log.remarks.push(remark);
+            issue: OdometryIssue::DistanceJump {
+                field,
+                step_m: jump.step_m,
+                speed_mps: jump.speed_mps,
+            },
+        });
     }
 
-    /// Remarks on the file itself.
+    /// Reports something about the file itself.
     pub fn remark(&mut self, issue: OdometryIssue) {
-        let remark = OdometryRemark::of_file(self.kind, issue);
-        self.log.remarks.push(remark);
+        self.remarks.push(OdometryRemark::of_file(self.kind, issue));
     }
 
-    /// Last distance, for sources that tell places instead.
-    pub fn last(&self) -> Option<&OdometrySample> {
-        self.log.samples.last()
+    /// Times of the usable items (s).
+    pub fn times_s(&self) -> Vec<f64> {
+        self.usable.iter().map(|it| it.1).collect()
     }
 
-    pub fn finish(mut self) -> OdometryLog {
-        let steps = |log: &OdometryLog| -> Vec<f64> {
-            let pairs = log.samples.windows(2);
-            pairs
-                .filter_map(|pair| match pair {
-                    [a, b] => Some(b.time_s - a.time_s),
-                    _ => None,
-                })
-                .collect()
-        };
-        let steps_s = steps(&self.log);
+    /// The log of these samples, one for each usable item, with the gaps between them reported.
+    pub fn finish(mut self, samples: Vec<OdometrySample>, has_both: bool) -> OdometryLog {
+        let steps_s = self.usable.windows(2).map(|pair| match pair {
+            [(_, a_s), (_, b_s)] => b_s - a_s,
+            _ => 0.0,
+        });
+        let steps_s: Vec<f64> = steps_s.collect();
         let mut sorted = steps_s.clone();
         sorted.sort_by(f64::total_cmp);
         let usual_s = sorted
             .get(sorted.len() / 2)
             .copied()
             .unwrap_or(f64::INFINITY);
-        let ends = self.log.samples.iter().zip(&self.items).skip(1);
-        let gaps: Vec<_> = steps_s
+        let ends = self.usable.iter().skip(1);
+        let gaps = steps_s
             .iter()
             .zip(ends)
             .filter(|(gap_s, _)| **gap_s > GAP_STEPS * usual_s)
-            .map(|(&gap_s, (sample, &item))| OdometryRemark {
+            .map(|(&gap_s, &(item, time_s))| OdometryRemark {
                 item,
                 kind: self.kind,
-                time_s: sample.time_s,
+                time_s,
                 issue: OdometryIssue::Gap { gap_s },
-            })
-            .collect();
-        self.log.remarks.extend(gaps);
-        self.log.remarks.sort_by_key(|remark| remark.item);
-        self.log
+            });
+        self.remarks.extend(gaps);
+        self.remarks.sort_by_key(|remark| remark.item);
+        OdometryLog {
+            samples,
+            remarks: self.remarks,
+            fields: self.fields,
+            has_both,
+        }
     }
-}
-
-/// A column whose value is none.
-fn not_finite(sample: &OdometrySample) -> Option<&'static str> {
-    let values = [
-        ("time_s", sample.time_s),
-        ("distance_m", sample.distance_m),
-        ("speed_mps", sample.speed_mps),
-        ("yaw_rate_radps", sample.yaw_rate_radps.unwrap_or(0.0)),
-    ];
-    let mut wrong = values.iter().filter(|(_, value)| !value.is_finite());
-    wrong.next().map(|(column, _)| *column)
 }

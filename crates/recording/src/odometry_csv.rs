@@ -12,9 +12,11 @@ use std::path::Path;
 
 use onboard::observation::OdometrySample;
 
+use crate::clock_faults::time_faults;
+use crate::counter_jumps::{Jump, replace_jumps};
 use crate::error::RecordingError;
 use crate::file as files;
-use crate::odometry::{OdometryCollector, OdometryIssue, OdometryLog};
+use crate::odometry::{OdometryCollector, OdometryFields, OdometryIssue, OdometryLog};
 use crate::table::Table;
 
 const COLUMNS: [&str; 7] = [
@@ -49,25 +51,14 @@ pub fn read_wheel_odometry_csv(
     let has = |name| table.has(name);
     let wheels_m = has("left_m") && has("right_m");
     let wheels_mps = has("left_mps") && has("right_mps");
-    let mut collector = OdometryCollector::of("line");
-    let mut derived = |column, from| {
-        let from = String::from(from);
-        collector.remark(OdometryIssue::Derived { column, from });
-    };
-    match (
-        has("distance_m") || wheels_m,
-        has("speed_mps") || wheels_mps,
-    ) {
-        (true, true) => {}
-        (true, false) => derived("speed_mps", "the distances"),
-        (false, true) => derived("distance_m", "the speeds"),
-        (false, false) => {
-            return Err(table.missing(
-                "distance_m",
-                "the first line must name time_s and one of distance_m, speed_mps, left_m and \
-                 right_m, left_mps and right_mps",
-            ));
-        }
+    let has_distance = has("distance_m") || wheels_m;
+    let has_speed = has("speed_mps") || wheels_mps;
+    if !has_distance && !has_speed {
+        return Err(table.missing(
+            "distance_m",
+            "the first line must name time_s and one of distance_m, speed_mps, left_m and \
+             right_m, left_mps and right_mps",
+        ));
     }
     let wheels_turn = (wheels_m || wheels_mps) && !has("yaw_rate_radps");
     if wheels_turn && track_width_m.is_none() {
@@ -76,24 +67,95 @@ pub fn read_wheel_odometry_csv(
             "it is taken from left and right wheel where the vehicle states odometer.track_width_m",
         ));
     }
-    let mut before: Option<(Row, OdometrySample)> = None;
-    for line in &table.rows {
-        let read = line.values.as_ref().map(|values| {
-            let row = Row::new(values);
-            (row, row.sample(before.as_ref(), track_width_m))
-        });
-        let sample = read.map(|(_, sample)| sample);
-        collector.add(line.line, sample.map_err(Clone::clone));
-        // What was left out is no row to go on from.
-        before = read
-            .ok()
-            .filter(|(_, it)| collector.last() == Some(it))
-            .or(before);
+    let mut collector = OdometryCollector::new("line", OdometryFields::CSV);
+    let mut rows = usable_rows(&table, &mut collector);
+    let times_s = collector.times_s();
+    if !has_speed {
+        collector.remark(derived("speed_mps", "the distances"));
+    } else if !has_distance {
+        collector.remark(derived("distance_m", "the speeds"));
     }
-    Ok(collector.finish())
+    // Nothing but the distance says then how fast the vehicle drove, or how it turned.
+    if !has_speed {
+        replace(&times_s, &mut rows, &mut collector, "distance_m", |row| {
+            row.distance_m.as_mut()
+        });
+    }
+    if !has_speed || (wheels_turn && !wheels_mps) {
+        replace(&times_s, &mut rows, &mut collector, "left_m", |row| {
+            row.wheels_m.as_mut().map(|[left, _]| left)
+        });
+        replace(&times_s, &mut rows, &mut collector, "right_m", |row| {
+            row.wheels_m.as_mut().map(|[_, right]| right)
+        });
+    }
+    let mut samples: Vec<OdometrySample> = Vec::with_capacity(rows.len());
+    let mut before: Option<Row> = None;
+    for row in rows {
+        let last = before.as_ref().zip(samples.last());
+        samples.push(row.sample(last, track_width_m));
+        before = Some(row);
+    }
+    Ok(collector.finish(samples, has_distance && has_speed))
 }
 
-/// What a row tells.
+fn derived(column: &'static str, from: &str) -> OdometryIssue {
+    let from = String::from(from);
+    OdometryIssue::Derived { column, from }
+}
+
+/// Rows whose values are finite, in order of time; the others are reported.
+fn usable_rows(table: &Table, collector: &mut OdometryCollector) -> Vec<Row> {
+    let read = |line: &crate::table::Row| line.values.as_deref().ok().map(Row::new);
+    let read: Vec<Option<Row>> = table.rows.iter().map(read).collect();
+    let times_s: Vec<f64> = read
+        .iter()
+        .map(|row| row.map_or(f64::NAN, |row| row.time_s))
+        .collect();
+    let faults = time_faults(&times_s);
+    let mut rows = Vec::with_capacity(read.len());
+    for ((line, row), fault) in table.rows.iter().zip(read).zip(faults) {
+        match (row, &line.values) {
+            (Some(row), _) => {
+                if collector.accept(line.line, row.time_s, fault, &row.values()) {
+                    rows.push(row);
+                }
+            }
+            (None, Err(message)) => {
+                collector.report(line.line, OdometryIssue::Malformed(message.clone()));
+            }
+            (None, Ok(_)) => {}
+        }
+    }
+    rows
+}
+
+/// Replaces the jumps of a column, in the rows that have it, and reports them.
+fn replace(
+    times_s: &[f64],
+    rows: &mut [Row],
+    collector: &mut OdometryCollector,
+    column: &'static str,
+    value: fn(&mut Row) -> Option<&mut f64>,
+) {
+    let mut given: Vec<(usize, f64, &mut f64)> = times_s
+        .iter()
+        .zip(rows.iter_mut())
+        .enumerate()
+        .filter_map(|(index, (time_s, row))| Some((index, *time_s, value(row)?)))
+        .collect();
+    let times_s: Vec<f64> = given.iter().map(|it| it.1).collect();
+    let mut distances_m: Vec<f64> = given.iter().map(|it| *it.2).collect();
+    for jump in replace_jumps(&times_s, &mut distances_m) {
+        let index = given.get(jump.index).map_or(jump.index, |it| it.0);
+        collector.report_jump(&Jump { index, ..jump }, column);
+    }
+    for ((_, _, value), distance_m) in given.iter_mut().zip(distances_m) {
+        **value = distance_m;
+    }
+}
+
+/// Values of a row.
 #[derive(Clone, Copy)]
 struct Row {
     time_s: f64,
@@ -118,10 +180,34 @@ impl Row {
         }
     }
 
+    /// The values that have to be finite, with their columns.
+    fn values(&self) -> Vec<(&'static str, f64)> {
+        let mut values = Vec::with_capacity(4);
+        values.extend(self.distance_m.map(|it| ("distance_m", it)));
+        values.extend(self.speed_mps.map(|it| ("speed_mps", it)));
+        values.extend(self.yaw_rate_radps.map(|it| ("yaw_rate_radps", it)));
+        for (wheels, names) in [
+            (self.wheels_m, ["left_m", "right_m"]),
+            (self.wheels_mps, ["left_mps", "right_mps"]),
+        ] {
+            values.extend(
+                wheels
+                    .into_iter()
+                    .flat_map(|wheels| names.into_iter().zip(wheels)),
+            );
+        }
+        let moves = [self.distance_m, self.speed_mps];
+        let has_wheels = self.wheels_m.is_some() || self.wheels_mps.is_some();
+        if moves == [None, None] && !has_wheels {
+            values.push(("distance_m", f64::NAN));
+        }
+        values
+    }
+
     /// The row as a sample, after the one before.
     fn sample(
         &self,
-        before: Option<&(Self, OdometrySample)>,
+        before: Option<(&Self, &OdometrySample)>,
         track_width_m: Option<f64>,
     ) -> OdometrySample {
         let mean = |[left, right]: [f64; 2]| 0.5 * (left + right);
@@ -130,14 +216,14 @@ impl Row {
         let step_s = step_s.filter(|step_s| *step_s > 0.0);
         let rate = |now: f64, last: f64| step_s.map_or(0.0, |step_s| (now - last) / step_s);
 
-        let told_m = self.distance_m.or(self.wheels_m.map(mean));
-        let told_mps = self.speed_mps.or(self.wheels_mps.map(mean));
+        let read_m = self.distance_m.or(self.wheels_m.map(mean));
+        let read_mps = self.speed_mps.or(self.wheels_mps.map(mean));
         let last = before.map(|(_, last)| *last);
-        let speed_mps = told_mps.unwrap_or_else(|| {
-            let now_m = told_m.unwrap_or(f64::NAN);
+        let speed_mps = read_mps.unwrap_or_else(|| {
+            let now_m = read_m.unwrap_or(f64::NAN);
             rate(now_m, last.map_or(now_m, |last| last.distance_m))
         });
-        let distance_m = told_m.unwrap_or_else(|| {
+        let distance_m = read_m.unwrap_or_else(|| {
             let step = |last: OdometrySample| {
                 last.distance_m + 0.5 * (last.speed_mps + speed_mps) * (self.time_s - last.time_s)
             };

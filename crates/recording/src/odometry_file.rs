@@ -29,6 +29,19 @@ pub fn read_odometry(
     if is_bag(path) {
         return read_odometry_mcap(path, choice.topic, choice.imu_topic);
     }
+    if path.file_name().is_some_and(|it| it == "metadata.yaml") {
+        let folder = path.parent().map_or(Path::new("."), |it| it);
+        let allowed = format!(
+            "give the rosbag2 folder that it is in: {}",
+            folder.display()
+        );
+        return Err(RecordingError::value(
+            path,
+            "odometry",
+            "the metadata of a bag",
+            allowed,
+        ));
+    }
     for (key, topic) in [("topic", choice.topic), ("imu_topic", choice.imu_topic)] {
         if let Some(topic) = topic {
             let allowed = "only an MCAP file or a rosbag2 folder has topics";

@@ -7,6 +7,7 @@ use csv::{ReaderBuilder, StringRecord, Trim};
 
 use crate::error::RecordingError;
 use crate::file as files;
+use crate::foreign::text_of;
 use crate::number::Numbers;
 
 /// A day of samples at 50 Hz.
@@ -41,7 +42,12 @@ impl Table {
     pub fn read(file: &Path, required: &[&str], optional: &[&str]) -> Result<Self, RecordingError> {
         let bytes =
             files::read(file, MOST_BYTES).map_err(|source| RecordingError::io(file, source))?;
-        Self::parse(&String::from_utf8_lossy(&bytes), file, required, optional)
+        let text = text_of(&bytes).map_err(|message| RecordingError::Syntax {
+            file: file.display().to_string(),
+            format: "CSV",
+            message,
+        })?;
+        Self::parse(&text, file, required, optional)
     }
 
     /// The same of a text; `file` is what errors name.
@@ -111,8 +117,14 @@ impl Table {
     /// That a column is not there, what should be, and what is.
     pub fn missing(&self, column: &str, allowed: &str) -> RecordingError {
         let named: Vec<&str> = self.header.iter().collect();
+        let is_header = |name: &&str| name.parse::<f64>().is_err();
         let named = if named.is_empty() {
             "the file is empty".to_owned()
+        } else if !named.iter().any(is_header) {
+            format!(
+                "the file has no header: its first line holds the numbers {}",
+                named.join(", ")
+            )
         } else {
             format!("it names {}", named.join(", "))
         };

@@ -6,6 +6,7 @@ use std::path::Path;
 use crate::error::RecordingError;
 use crate::file as files;
 use onboard::geometry::{Pose, wrap_angle};
+use onboard::time_unit::TimeUnit;
 
 /// A day of poses at 50 Hz.
 const MOST_BYTES: u64 = 512 << 20;
@@ -43,11 +44,12 @@ pub fn write_tum(file: &Path, poses: &[TimedPose]) -> Result<(), RecordingError>
     files::write(file, tum_text(poses).as_bytes())
 }
 
-/// Reads a TUM trajectory; lines that begin with `#` are comments. Roll and pitch are dropped.
+/// Reads a TUM trajectory; lines that begin with `#` are comments. Roll and pitch are dropped; the heading is NaN if the
+/// quaternion is no rotation.
 ///
 /// # Errors
-/// [`RecordingError::Io`], or [`RecordingError::Value`] naming the line that is not eight numbers
-/// with a unit quaternion.
+/// [`RecordingError::Io`], or [`RecordingError::Value`] naming the line that is not eight numbers, or whose time is not
+/// in seconds.
 pub fn read_tum(file: &Path) -> Result<Vec<TimedPose>, RecordingError> {
     let bytes = files::read(file, MOST_BYTES).map_err(|source| RecordingError::io(file, source))?;
     let text = String::from_utf8_lossy(&bytes);
@@ -61,8 +63,7 @@ pub fn read_tum(file: &Path) -> Result<Vec<TimedPose>, RecordingError> {
         });
     lines
         .map(|(index, line)| {
-            pose(line).ok_or_else(|| {
-                let allowed = "it must be the eight numbers t x y z qx qy qz qw";
+            pose(line).map_err(|allowed| {
                 let line = format!("`{line}`");
                 RecordingError::value(file, format!("line {}", index + 1), line, allowed)
             })
@@ -70,27 +71,36 @@ pub fn read_tum(file: &Path) -> Result<Vec<TimedPose>, RecordingError> {
         .collect()
 }
 
-fn pose(line: &str) -> Option<TimedPose> {
-    let numbers: Vec<f64> = line
-        .split_whitespace()
-        .map(str::parse)
-        .collect::<Result<_, _>>()
-        .ok()?;
+/// Largest deviation of a quaternion's norm from 1: numbers with two digits have up to 0.01.
+const NORM_TOLERANCE: f64 = 0.02;
+
+fn pose(line: &str) -> Result<TimedPose, String> {
+    const ALLOWED: &str = "it must be the eight numbers t x y z qx qy qz qw";
+    let numbers = line.split_whitespace().map(str::parse);
+    let numbers: Vec<f64> = numbers.collect::<Result<_, _>>().map_err(|_| ALLOWED)?;
     let &[time_s, x_m, y_m, z_m, qx, qy, qz, qw] = numbers.as_slice() else {
-        return None;
+        return Err(format!("{ALLOWED}, and it is {}", numbers.len()));
     };
-    let norm = qx * qx + qy * qy + qz * qz + qw * qw;
-    let finite = [time_s, x_m, y_m, z_m]
+    if ![time_s, x_m, y_m, z_m]
         .iter()
-        .all(|value| value.is_finite());
+        .all(|value| value.is_finite())
+    {
+        return Err("t, x, y and z must be finite".to_owned());
+    }
+    if let Some(unit) = TimeUnit::of_epoch(time_s) {
+        return Err(format!("t must be in seconds, and is likely in {unit}"));
+    }
+    let norm = (qx * qx + qy * qy + qz * qz + qw * qw).sqrt();
     // Yaw of a unit quaternion.
+    let [qx, qy, qz, qw] = [qx, qy, qz, qw].map(|it| it / norm);
     let heading_rad = (2.0 * (qw * qz + qx * qy)).atan2(1.0 - 2.0 * (qy * qy + qz * qz));
-    (finite && (norm - 1.0).abs() < 1e-3).then_some(TimedPose {
+    let is_rotation = (norm - 1.0).abs() < NORM_TOLERANCE;
+    Ok(TimedPose {
         time_s,
         pose: Pose {
             x_m,
             y_m,
-            heading_rad,
+            heading_rad: if is_rotation { heading_rad } else { f64::NAN },
         },
     })
 }

@@ -80,6 +80,7 @@ impl Sources {
             } = samples
             {
                 let recording = Recording::open_unverified(recording)?;
+                recording.check_one_frequency()?;
                 let centre_hz = recording.centre_frequency_hz().with_context(|| {
                     let file = recording.data_file().display();
                     format!("{file}: no capture states core:frequency; without it the SSB is not to be found")
@@ -115,6 +116,7 @@ impl Sources {
             files.angles = recording::read_angles(angles.file.as_ref(), topic)?.angles;
             health.push("angles");
         }
+        recording::replay::check_times(&files.odometry, &files.angles)?;
         Ok(Self {
             inbox: Arc::new(Inbox::new(settings.waits())),
             gate: Arc::default(),

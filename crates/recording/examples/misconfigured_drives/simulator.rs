@@ -296,7 +296,7 @@ pub fn drive(kind: Kind, seed: u64, guarded: bool) -> Drive {
         vehicle: Vehicle::from_toml(&vehicle, "vehicle.toml", &Shipped).unwrap(),
         odometry: OdometryLog {
             samples,
-            remarks: Vec::new(),
+            ..OdometryLog::default()
         },
         angles: AngleLog {
             angles,

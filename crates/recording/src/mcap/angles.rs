@@ -20,17 +20,17 @@ pub fn read_angles_mcap(bag: &Path, topic: Option<&str>) -> Result<AngleLog, Rec
     let mut log = AngleLog::default();
     let mut item = 0;
     for file in files_of(bag)? {
-        let end = each_message(&file, |kind, message_topic, data| {
+        let end = each_message(&file, |kind, message_topic, _, data| {
             if kind != Kind::Verdict || topic.is_some_and(|topic| topic != message_topic) {
                 return;
             }
             item += 1;
             match decode(data) {
                 Some((phase_rad, _)) if phase_rad.is_nan() => {}
-                Some((_, columns)) => log.add(item, angle(&columns)),
+                Some((_, columns)) => log.add("message", item, angle(&columns)),
                 None => {
                     let why = "no complete access_av_msgs/msg/AngleVerdict".to_owned();
-                    log.add(item, Err(why));
+                    log.add("message", item, Err(why));
                 }
             }
         })?;

@@ -43,14 +43,14 @@ pub enum FileEnd {
 /// Description of a truncated file, for remarks.
 pub const TRUNCATED: &str = "the file was not closed; it is read up to its last complete chunk";
 
-/// Gives every CDR message of a [`Kind`] to `take`, with its topic, in the order of the file. A file that was not
-/// closed is read up to its last complete chunk.
+/// Gives every CDR message of a [`Kind`] to `take`, with its topic and the recorder's time (ns), in the order of the
+/// file. A file that was not closed is read up to its last complete chunk.
 ///
 /// # Errors
 /// [`RecordingError`] if the file is not MCAP, or is damaged before its end.
 pub fn each_message(
     file: &Path,
-    mut take: impl FnMut(Kind, &str, &[u8]),
+    mut take: impl FnMut(Kind, &str, u64, &[u8]),
 ) -> Result<FileEnd, RecordingError> {
     let mut channels = Channels::default();
     each_record(file, |opcode, data| {
@@ -136,7 +136,7 @@ impl Channels {
         &mut self,
         opcode: u8,
         mut body: &[u8],
-        take: &mut impl FnMut(Kind, &str, &[u8]),
+        take: &mut impl FnMut(Kind, &str, u64, &[u8]),
     ) -> Option<()> {
         match opcode {
             op::SCHEMA => {
@@ -159,9 +159,11 @@ impl Channels {
             }
             op::MESSAGE => {
                 let channel = u16(&mut body)?;
-                let (_, data) = body.split_at_checked(SEQUENCE_BYTES + TIMES_BYTES)?;
+                let (_, times) = body.split_at_checked(SEQUENCE_BYTES)?;
+                let (_, data) = times.split_at_checked(TIMES_BYTES)?;
+                let recorded_ns = u64::from_le_bytes(*times.first_chunk()?);
                 if let Some((kind, topic)) = self.topics.get(&channel)? {
-                    take(*kind, topic, data);
+                    take(*kind, topic, recorded_ns, data);
                 }
             }
             _ => {}

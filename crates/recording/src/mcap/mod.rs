@@ -9,6 +9,9 @@ mod bag;
 mod cdr;
 mod drive;
 mod messages;
+mod motion;
+#[cfg(test)]
+mod motion_tests;
 mod reader;
 mod schema;
 mod turn_rate;

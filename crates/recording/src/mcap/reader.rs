@@ -1,6 +1,7 @@
 //! Odometry out of MCAP files.
 
 use std::collections::BTreeMap;
+use std::ops::Range;
 use std::path::Path;
 
 use onboard::observation::OdometrySample;
@@ -8,33 +9,23 @@ use onboard::observation::OdometrySample;
 use super::bag::files_of;
 use super::cdr::Decoder;
 use super::messages::{FileEnd, Kind, TRUNCATED, each_message};
+use super::motion::{Filled, MAX_COORDINATE_M, Motion, Reading, motion};
 use super::schema::UNOBSERVED;
 use super::turn_rate::{Gyroscope, rates_of_headings, yaw_rad};
+use crate::clock_faults::{TimeFault, time_faults};
 use crate::error::RecordingError;
-use crate::odometry::{OdometryCollector, OdometryIssue, OdometryLog, OdometryRemark};
+use crate::odometry::{
+    OdometryCollector, OdometryFields, OdometryIssue, OdometryLog, OdometryRemark,
+};
 
 /// What items are called.
 const KIND: &str = "message";
-
-/// What is used of one `nav_msgs/msg/Odometry`.
-struct Reading {
-    time_s: f64,
-    x_m: f64,
-    y_m: f64,
-    speed_mps: f64,
-    turn: Turn,
-}
-
-/// What a message tells of the vehicle's turning.
-#[derive(Clone, Copy)]
-struct Turn {
-    yaw_rate_radps: Option<f64>,
-    heading_rad: Option<f64>,
-}
+/// Largest step between the recorder's times by which stamps that were not set are restored (ns).
+const MAX_RECORDED_STEP_NS: u64 = 1_000_000_000;
 
 /// Reads the `nav_msgs/msg/Odometry` messages of one topic of an MCAP file or a rosbag2 folder; of the
-/// only such topic where none is named. The distance is the length of the path of their poses,
-/// backwards where the speed is negative.
+/// only such topic where none is named. The distance is the sum of the steps of their positions along their headings;
+/// [`motion`](super::motion) describes the exceptions.
 ///
 /// The yaw rate is that of the twist. Where it is unknown there, or zero throughout, or `imu_topic` is
 /// named, it is `angular_velocity.z` of a `sensor_msgs/msg/Imu`, whose z axis is taken for up
@@ -52,12 +43,9 @@ pub fn read_odometry_mcap(
     imu_topic: Option<&str>,
 ) -> Result<OdometryLog, RecordingError> {
     let mut topics: Vec<String> = Vec::new();
-    let mut collector = OdometryCollector::of(KIND);
-    let mut turns: Vec<Turn> = Vec::new();
+    let mut messages: Vec<Message> = Vec::new();
     let mut imus: BTreeMap<String, Gyroscope> = BTreeMap::new();
-    let mut last_place: Option<(f64, f64)> = None;
-    let mut item = 0;
-    let mut take = |kind, message_topic: &str, data: &[u8]| {
+    let mut take = |kind, message_topic: &str, recorded_ns: u64, data: &[u8]| {
         if kind == Kind::Imu {
             if imu_topic.is_none_or(|topic| topic == message_topic) {
                 if !imus.contains_key(message_topic) {
@@ -69,37 +57,17 @@ pub fn read_odometry_mcap(
             }
             return;
         }
-        if kind != Kind::Odometry || topic.is_some_and(|topic| topic != message_topic) {
+        if kind != Kind::Odometry {
             return;
         }
         if !topics.iter().any(|topic| topic == message_topic) {
             topics.push(message_topic.to_owned());
         }
-        item += 1;
-        let Some(reading) = decode_odometry(data) else {
-            collector.add(item, Err("no complete nav_msgs/msg/Odometry".to_owned()));
-            return;
-        };
-        let place = (reading.x_m, reading.y_m);
-        let step_m = last_place.map_or(0.0, |(x_m, y_m)| {
-            let length_m = (place.0 - x_m).hypot(place.1 - y_m);
-            length_m.copysign(if reading.speed_mps < 0.0 { -1.0 } else { 1.0 })
-        });
-        let before = collector.last().copied();
-        let driven_m = before.map_or(0.0, |sample| sample.distance_m);
-        collector.add(
-            item,
-            Ok(OdometrySample {
-                time_s: reading.time_s,
-                distance_m: driven_m + step_m,
-                speed_mps: reading.speed_mps,
-                yaw_rate_radps: None,
-            }),
-        );
-        // A sample that was left out must not move the place from which the next step counts.
-        if collector.last().copied() != before {
-            last_place = Some(place);
-            turns.push(reading.turn);
+        if topic.is_none_or(|topic| topic == message_topic) {
+            messages.push(Message {
+                recorded_ns,
+                reading: decode_odometry(data),
+            });
         }
     };
     let mut truncated = Vec::new();
@@ -108,36 +76,142 @@ pub fn read_odometry_mcap(
             truncated.push(format!("{}: {TRUNCATED}", file.display()));
         }
     }
+    let topic = one_topic(bag, topic, &topics)?;
+    let (readings, motion, mut collector) = used(messages);
     for text in truncated {
         collector.remark(OdometryIssue::Truncated(text));
     }
-    let topic = one_topic(bag, topic, &topics)?;
-    let mut log = collector.finish();
+    let times = readings
+        .iter()
+        .zip(&motion.distances_m)
+        .zip(&motion.speeds_mps);
+    let samples = times.map(|((reading, &distance_m), &speed_mps)| OdometrySample {
+        time_s: reading.time_s,
+        distance_m,
+        speed_mps,
+        yaw_rate_radps: None,
+    });
+    let mut log = collector.finish(samples.collect(), motion.has_both);
     Turning {
         bag,
         topic,
-        turns: &turns,
+        readings: &readings,
         imus: &imus,
+        is_straight: motion.is_straight,
     }
     .tell(&mut log, imu_topic)?;
     Ok(log)
 }
 
+/// A message of the odometry's topic.
+struct Message {
+    /// Time of the recorder's clock (ns).
+    recorded_ns: u64,
+    /// `None` if it is not complete.
+    reading: Option<Reading>,
+}
+
+/// The usable messages, their motion, and a collector that has reported the others.
+fn used(mut messages: Vec<Message>) -> (Vec<Reading>, Motion, OdometryCollector) {
+    let stamp_s = |it: &Message| it.reading.map_or(f64::NAN, |it| it.time_s);
+    let times_s: Vec<f64> = messages.iter().map(stamp_s).collect();
+    let mut faults = time_faults(&times_s);
+    let mut collector = OdometryCollector::new(KIND, OdometryFields::ROS);
+    for index in restore_times(&mut messages, &mut faults) {
+        let time_s = times_s.get(index).copied().unwrap_or(f64::NAN);
+        let field = OdometryFields::ROS.time;
+        collector.report(index + 1, OdometryIssue::TimeRestored { field, time_s });
+    }
+    let readings = messages.iter().filter_map(|it| it.reading.as_ref());
+    let filled = Filled::new(readings);
+    let mut readings = Vec::with_capacity(messages.len());
+    for (item, (message, fault)) in (1..).zip(messages.iter().zip(faults)) {
+        let Some(reading) = &message.reading else {
+            let why = "no complete nav_msgs/msg/Odometry".to_owned();
+            collector.report(item, OdometryIssue::Malformed(why));
+            continue;
+        };
+        let values = filled.required(reading);
+        let is_too_far = |it: &&(&str, f64)| it.1.is_finite() && it.1.abs() > MAX_COORDINATE_M;
+        if let Some(&(field, value)) = values.iter().find(is_too_far) {
+            let allowed = "it must be within 1e8 m of 0";
+            collector.report(
+                item,
+                OdometryIssue::OutOfRange {
+                    field,
+                    value,
+                    allowed,
+                },
+            );
+        } else if collector.accept(item, reading.time_s, fault, &values) {
+            readings.push(*reading);
+        }
+    }
+    let motion = motion(&readings, filled);
+    for note in &motion.notes {
+        collector.remark(OdometryIssue::Noted(note.clone()));
+    }
+    for doubt in &motion.doubts {
+        collector.remark(OdometryIssue::Doubtful(doubt.clone()));
+    }
+    for jump in &motion.jumps {
+        collector.report_jump(jump, OdometryFields::ROS.distance);
+    }
+    (readings, motion, collector)
+}
+
+/// Gives leading messages whose stamp was not set the times at which they were recorded, relative to the first message
+/// with a stamp. Returns their indices; none if the recorder's times have a gap.
+fn restore_times(messages: &mut [Message], faults: &mut [Option<TimeFault>]) -> Range<usize> {
+    let unset = faults
+        .iter()
+        .take_while(|it| **it == Some(TimeFault::NotSet))
+        .count();
+    let first = messages
+        .get(unset)
+        .and_then(|it| Some((it.reading?.time_s, it.recorded_ns)));
+    let Some((first_s, first_ns)) = first else {
+        return 0..0;
+    };
+    let recorded = messages.iter().take(unset + 1).map(|it| it.recorded_ns);
+    let recorded: Vec<u64> = recorded.collect();
+    let is_continuous = recorded.windows(2).all(|pair| match pair {
+        [a, b] => a < b && b - a <= MAX_RECORDED_STEP_NS,
+        _ => false,
+    });
+    if !is_continuous {
+        return 0..0;
+    }
+    for (message, fault) in messages.iter_mut().zip(faults).take(unset) {
+        if let Some(reading) = &mut message.reading {
+            reading.time_s = first_s - 1e-9 * (first_ns - message.recorded_ns) as f64;
+        }
+        *fault = None;
+    }
+    0..unset
+}
+
 fn one_topic<'a>(
     bag: &Path,
-    wanted: Option<&str>,
+    wanted: Option<&'a str>,
     found: &'a [String],
 ) -> Result<&'a str, RecordingError> {
     match (found, wanted) {
-        ([topic], _) => Ok(topic),
+        (_, Some(wanted)) if found.iter().any(|topic| topic == wanted) => Ok(wanted),
+        ([topic], None) => Ok(topic),
         ([], _) => Err(RecordingError::Missing {
             file: bag.display().to_string(),
             key: wanted
                 .unwrap_or("a topic of nav_msgs/msg/Odometry")
                 .to_owned(),
-            allowed: "there must be nav_msgs/msg/Odometry in CDR on it".to_owned(),
+            allowed: "no topic of the file has nav_msgs/msg/Odometry in CDR".to_owned(),
         }),
-        (several, _) => Err(RecordingError::value(
+        (several, Some(wanted)) => Err(RecordingError::Missing {
+            file: bag.display().to_string(),
+            key: wanted.to_owned(),
+            allowed: format!("nav_msgs/msg/Odometry in CDR is on {}", several.join(", ")),
+        }),
+        (several, None) => Err(RecordingError::value(
             bag,
             "topic",
             "not given",
@@ -154,16 +228,18 @@ struct Turning<'a> {
     bag: &'a Path,
     /// Topic of the odometry.
     topic: &'a str,
-    /// Of each sample of it.
-    turns: &'a [Turn],
+    /// Its messages, one for each sample.
+    readings: &'a [Reading],
     imus: &'a BTreeMap<String, Gyroscope>,
+    /// Whether the position moves along headings that are all known.
+    is_straight: bool,
 }
 
 impl Turning<'_> {
     /// Gives the samples their yaw rate, and remarks on where it is from.
     fn tell(&self, log: &mut OdometryLog, asked: Option<&str>) -> Result<(), RecordingError> {
         let times_s: Vec<f64> = log.samples.iter().map(|sample| sample.time_s).collect();
-        let by_twist: Vec<Option<f64>> = self.turns.iter().map(|it| it.yaw_rate_radps).collect();
+        let by_twist: Vec<Option<f64>> = self.readings.iter().map(|it| it.yaw_rate_radps).collect();
         let twist_tells = by_twist.iter().flatten().any(|rate| *rate != 0.0);
         let mut remarks = Vec::new();
         let mut told = None;
@@ -204,8 +280,13 @@ impl Turning<'_> {
             told = Some((by_twist, said));
         }
         if told.is_none() {
-            let headings: Vec<Option<f64>> = self.turns.iter().map(|it| it.heading_rad).collect();
-            let rates = rates_of_headings(&times_s, &headings);
+            let headings: Vec<Option<f64>> =
+                self.readings.iter().map(|it| it.heading_rad).collect();
+            let mut rates = rates_of_headings(&times_s, &headings);
+            if self.is_straight && rates.iter().all(Option::is_none) {
+                // The orientation is filled, and never changes.
+                rates.fill(Some(0.0));
+            }
             if rates.iter().any(Option::is_some) {
                 told = Some((rates, format!("pose.orientation of {}", self.topic)));
             }
@@ -306,7 +387,7 @@ fn decode_odometry(message: &[u8]) -> Option<Reading> {
     let [x_m, y_m, _z_m] = decoder.f64s()?;
     let orientation: [f64; 4] = decoder.f64s()?;
     let _covariance: [f64; 36] = decoder.f64s()?;
-    let [speed_mps, _, _] = decoder.f64s()?;
+    let [x_mps, y_mps, _] = decoder.f64s()?;
     let [_, _, yaw_rate_radps] = decoder.f64s()?;
     let covariance: [f64; 36] = decoder.f64s()?;
     let variance = covariance[35];
@@ -314,13 +395,10 @@ fn decode_odometry(message: &[u8]) -> Option<Reading> {
     let is_told = yaw_rate_radps.is_finite() && is_observed;
     Some(Reading {
         time_s,
-        x_m,
-        y_m,
-        speed_mps,
-        turn: Turn {
-            yaw_rate_radps: is_told.then_some(yaw_rate_radps),
-            heading_rad: yaw_rad(orientation),
-        },
+        position_m: [x_m, y_m],
+        heading_rad: yaw_rad(orientation),
+        linear_mps: [x_mps, y_mps],
+        yaw_rate_radps: is_told.then_some(yaw_rate_radps),
     })
 }
 

@@ -147,7 +147,8 @@ fn of_odometry(odometry: &OdometryLog) -> Option<(f64, String)> {
     (by_speed_m > 1.0 && !(0.7..1.5).contains(&ratio)).then(|| {
         let text = format!(
             "odometry: distances add up to {by_distance_m:.1} m, speeds to {by_speed_m:.1} m; check \
-             the units of distance_m, speed_mps and time_s"
+             the units of {}, {} and {}",
+            odometry.fields.distance, odometry.fields.speed, odometry.fields.time
         );
         (start_s, text)
     })

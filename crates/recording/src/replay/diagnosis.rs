@@ -13,6 +13,7 @@ use onboard::geometry::{Point, Pose};
 use onboard::radio_head::RadioHead;
 use onboard::settings::{DriveKind, LocalizerSettings};
 
+use super::direction::reversed_parts;
 use super::error::ReplayError;
 use super::evidence::{Count, Evidence, HeadId, head_of};
 use super::hypotheses::{
@@ -23,6 +24,7 @@ use super::located::{Diagnosis, LocatedDrive};
 use super::moved_head::triangulate;
 use super::yaw_rate;
 use crate::angle_log::LoggedAngle;
+use crate::odometry::{OdometryFields, OdometryIssue};
 
 /// Angles by which it is judged, spread over the drive; of a radio head at most one in this time (s).
 const MOST_ANGLES: usize = 3000;
@@ -99,6 +101,9 @@ pub fn diagnose(given: &Drive<'_>, located: &LocatedDrive) -> Result<Vec<Diagnos
     }
     if found.is_empty() {
         found.extend(too_fast(&given));
+    }
+    if found.is_empty() && !is_sound {
+        found.extend(doubtful_odometry(&given));
     }
     found.extend(missing_yaw_rate(&given, is_sound));
     Ok(found)
@@ -227,6 +232,7 @@ fn hypotheses(given: &Drive<'_>) -> Result<Vec<Hypothesis>, ReplayError> {
     let mut hypotheses = of_drive();
     hypotheses.extend(of_radio_heads(site));
     hypotheses.extend(yaw_rate_hypotheses(given).into_iter().map(|(_, it)| it));
+    hypotheses.extend(reversed_parts(given)?);
     if given.vehicle.drive == DriveKind::Road {
         hypotheses.push(robot());
     }
@@ -326,9 +332,34 @@ fn missing_yaw_rate(given: &Drive<'_>, is_sound: bool) -> Option<Diagnosis> {
     Some(Diagnosis {
         is_of_start: false,
         is_harmless: is_sound,
-        text: format!(
-            "{turns}: the odometry has no yaw_rate_radps; add it, or left and right wheel"
-        ),
+        text: format!("{turns}: {}", add_yaw_rate(&given.odometry.fields)),
+    })
+}
+
+/// The fields of an odometry that would tell the yaw rate.
+fn add_yaw_rate(fields: &OdometryFields) -> &'static str {
+    if *fields == OdometryFields::ROS {
+        "the odometry has no yaw rate; fill twist.twist.angular.z or pose.pose.orientation, or record a \
+         sensor_msgs/msg/Imu"
+    } else {
+        "the odometry has no yaw_rate_radps; add it, or left and right wheel"
+    }
+}
+
+/// Defects of the odometry that were reported, where they did harm.
+fn doubtful_odometry(given: &Drive<'_>) -> impl Iterator<Item = Diagnosis> {
+    let doubts = given
+        .odometry
+        .remarks
+        .iter()
+        .filter_map(|remark| match &remark.issue {
+            OdometryIssue::Doubtful(text) => Some(text),
+            _ => None,
+        });
+    doubts.map(|text| Diagnosis {
+        text: format!("the angles are not what is expected, and {text}"),
+        is_of_start: false,
+        is_harmless: false,
     })
 }
 
@@ -355,8 +386,8 @@ fn too_fast(given: &Drive<'_>) -> Option<Diagnosis> {
         is_harmless: false,
         text: format!(
             "the odometry says {median_mps:.1} m/s in the median while it moves, where \
-             top_speed_kmh is {}; check the units of distances, speeds and time_s",
-            vehicle.top_speed_kmh
+             top_speed_kmh is {}; check the units of distances, speeds and {}",
+            vehicle.top_speed_kmh, given.odometry.fields.time
         ),
     })
 }

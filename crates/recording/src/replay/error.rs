@@ -3,6 +3,7 @@
 use onboard::BoxError;
 use onboard::receive::ReceiveError;
 use onboard::settings::SettingsError;
+use onboard::time_unit::TimeUnit;
 use thiserror::Error;
 
 use crate::error::RecordingError;
@@ -38,6 +39,23 @@ pub enum ReplayError {
     StartTime {
         /// What was given.
         start_time_s: f64,
+    },
+    /// Times that are not in seconds.
+    #[error(
+        "{of}: `{field}` is in {unit}, by steps of {step} between {samples}; it must be in seconds: divide it by \
+         {:e}", unit.per_second()
+    )]
+    TimeUnit {
+        /// "odometry" or "angles".
+        of: &'static str,
+        /// The field of the time.
+        field: &'static str,
+        /// The likely unit.
+        unit: TimeUnit,
+        /// "samples" or "angles".
+        samples: &'static str,
+        /// Median step between them, in that unit.
+        step: f64,
     },
     /// Angles and odometry of different times.
     #[error(

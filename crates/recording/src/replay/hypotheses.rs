@@ -52,6 +52,8 @@ pub struct Hypothesis {
 enum Correction {
     Angle(fn(&mut LoggedAngle, &Vehicle)),
     Odometry(fn(&mut OdometrySample)),
+    /// All of the odometry.
+    Log(Box<OdometryLog>),
     Heads(fn([f64; 3]) -> [f64; 3]),
     /// The place of one radio head, by its number.
     Head(usize, [f64; 2]),
@@ -78,10 +80,24 @@ impl Hypothesis {
         }
     }
 
+    /// The hypothesis of another odometry, with the log-odds that it has to be ahead by.
+    pub fn of_odometry(
+        meant: String,
+        check: &'static str,
+        penalty: f64,
+        odometry: OdometryLog,
+    ) -> Self {
+        Self {
+            penalty,
+            ..Self::new(meant, check, Correction::Log(Box::new(odometry)))
+        }
+    }
+
     /// The drive as it was meant.
     pub fn correct<'a>(&self, given: &Drive<'a>) -> Drive<'a> {
         let mut drive = given.clone();
         match self.correction {
+            Correction::Log(ref log) => drive.odometry = Cow::Owned(log.as_ref().clone()),
             Correction::Angle(meant) => {
                 let angles = drive.angles.to_mut().iter_mut();
                 angles.for_each(|angle| meant(angle, &given.vehicle));

@@ -20,6 +20,7 @@ use super::located::{LocatedDrive, LocatedPose};
 use super::receive::receive_recording;
 use super::start::{StartChoice, starting};
 use super::stated::with_phase;
+use super::time_units::check_times;
 use crate::angle_log::{AngleLog, LoggedAngle};
 use crate::odometry::OdometryLog;
 use crate::sigmf::Recording;
@@ -37,6 +38,7 @@ pub fn locate_angles(
     smooth: bool,
 ) -> Result<LocatedDrive, ReplayError> {
     let (mut vehicle, start) = starting(site, vehicle, start)?;
+    check_times(odometry, &angles.angles)?;
     if angles.angles.is_empty() {
         let why = angles.remarks.first().map(ToString::to_string);
         return Err(ReplayError::NoAngle { why });
@@ -82,6 +84,7 @@ pub fn locate_recording(
         return Err(ReplayError::StartTime { start_time_s });
     }
     let (mut vehicle, start) = starting(site, vehicle, start)?;
+    check_times(odometry, &[])?;
     let mut replay = Replay::new(site, &vehicle, start, Custom::default(), odometry)?;
     let file = recording.data_file().display().to_string();
     let config = ReceiverConfig::new(site, &vehicle);

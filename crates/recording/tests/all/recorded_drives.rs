@@ -197,13 +197,15 @@ fn odometry_is_read_from_mcap() {
         assert!((sample.distance_m - k as f64).abs() < 1e-9);
         assert_eq!((sample.speed_mps, sample.yaw_rate_radps), (4.0, Some(0.02)));
     }
-    // A yaw rate of zero throughout is the lack of a gyroscope.
+    // A yaw rate of zero throughout is the lack of a gyroscope; but the position moves straight along the orientation.
     write_mcap(&file, &["/odom"], 0.0);
     let log = read_odometry_mcap(&file, Some("/odom"), None).unwrap();
-    assert!(
-        log.samples
-            .iter()
-            .all(|sample| sample.yaw_rate_radps.is_none())
+    let mut rates = log.samples.iter().map(|sample| sample.yaw_rate_radps);
+    assert!(rates.all(|rate| rate == Some(0.0)));
+    let said: Vec<String> = log.remarks.iter().map(ToString::to_string).collect();
+    assert_eq!(
+        said,
+        ["odometry: yaw_rate_radps is taken from pose.orientation of /odom"]
     );
 }
 
@@ -473,12 +475,18 @@ fn tum_has_eight_fields_and_comes_back() {
         "1 2 3",
         "1 2 3 4 5 6 7 8 9",
         "1 x 0 0 0 0 0 1",
-        "1 2 3 0 0 0 0 0",
+        "1 2 nan 0 0 0 0 1",
+        "1.7e18 2 3 0 0 0 0 1",
     ] {
         fs::write(&file, format!("# comment\n{line}\n")).unwrap();
         let error = read_tum(&file).unwrap_err();
         assert!(matches!(error, RecordingError::Value { ref key, .. } if key == "line 2"));
     }
+    // A truth is compared by its positions: its orientation need not be known, nor have many digits.
+    fs::write(&file, "1 2 3 0 0 0 0 0\n2 2 3 0 0 0 0.04 1.00\n").unwrap();
+    let read = read_tum(&file).unwrap();
+    assert!(read[0].pose.heading_rad.is_nan());
+    assert!((read[1].pose.heading_rad - 0.08).abs() < 1e-3);
 }
 
 proptest! {

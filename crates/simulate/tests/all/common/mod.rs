@@ -86,7 +86,7 @@ pub fn logs(scenario: &Scenario, seed: u64) -> (OdometryLog, AngleLog, RunRecord
         samples: times
             .filter_map(|time_s| truth.odometer.sample(truth.path.at(time_s)))
             .collect(),
-        remarks: Vec::new(),
+        ..OdometryLog::default()
     };
     let logged = record.executions.iter().map(|execution| LoggedAngle {
         ssb: execution.ssb,

@@ -1,0 +1,109 @@
+//! Files of other formats where a table of text is expected.
+
+/// Beginning of a file, its format, and how to use it.
+const FORMATS: [(&[u8], &str, &str); 9] = [
+    (b"\x89MCAP0", "MCAP", "name the file .mcap"),
+    (
+        b"#ROSBAG",
+        "a bag of ROS 1",
+        "convert it with `rosbags-convert --src FILE --dst FOLDER --dst-storage mcap`",
+    ),
+    (
+        b"SQLite format 3",
+        "sqlite3, as of rosbag2",
+        "convert it to MCAP with `ros2 bag convert`",
+    ),
+    (
+        b"PAR1",
+        "Parquet",
+        "odometry is read of CSV, MCAP or a rosbag2 folder; write it as CSV",
+    ),
+    (
+        b"\x28\xb5\x2f\xfd",
+        "compressed (zstd)",
+        "unpack it with `zstd -d FILE`",
+    ),
+    (
+        b"\x04\x22\x4d\x18",
+        "compressed (lz4)",
+        "unpack it with `lz4 -d FILE`",
+    ),
+    (
+        b"\x1f\x8b",
+        "compressed (gzip)",
+        "unpack it with `gunzip FILE`",
+    ),
+    (
+        b"PK\x03\x04",
+        "a zip file or a spreadsheet",
+        "write the table as CSV",
+    ),
+    (b"\x89HDF", "HDF5", "write the table as CSV"),
+];
+
+/// Byte order marks of UTF-16.
+const UTF16_LE: &[u8] = b"\xff\xfe";
+const UTF16_BE: &[u8] = b"\xfe\xff";
+
+/// Text of a file in UTF-8, or in UTF-16 with a byte order mark.
+///
+/// # Errors
+/// Format of the file and how to use it, if it is no text.
+pub fn text_of(bytes: &[u8]) -> Result<String, String> {
+    let formats = FORMATS.into_iter();
+    let known = formats
+        .clone()
+        .find(|(beginning, ..)| bytes.starts_with(beginning));
+    if let Some((_, format, remedy)) = known {
+        return Err(format!("the file is {format}, and no CSV; {remedy}"));
+    }
+    let utf16 = |from: fn([u8; 2]) -> u16| {
+        let pairs = bytes.chunks_exact(2).skip(1);
+        let units = pairs.filter_map(|pair| pair.first_chunk::<2>().map(|pair| from(*pair)));
+        String::from_utf16_lossy(&units.collect::<Vec<u16>>())
+    };
+    if bytes.starts_with(UTF16_LE) {
+        return Ok(utf16(u16::from_le_bytes));
+    }
+    if bytes.starts_with(UTF16_BE) {
+        return Ok(utf16(u16::from_be_bytes));
+    }
+    if bytes.contains(&0) {
+        return Err(
+            "the file holds zero bytes: it is binary, or UTF-16 without a byte order mark; \
+                    write it as CSV in UTF-8"
+                .to_owned(),
+        );
+    }
+    Ok(String::from_utf8_lossy(bytes).into_owned())
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    #[test]
+    fn text_of_either_encoding_is_read() {
+        let text = "time_s,Größe\n0,1\n";
+        assert_eq!(text_of(text.as_bytes()).unwrap(), text);
+        let units: Vec<u16> = "\u{feff}"
+            .encode_utf16()
+            .chain(text.encode_utf16())
+            .collect();
+        let little: Vec<u8> = units.iter().flat_map(|it| it.to_le_bytes()).collect();
+        let big: Vec<u8> = units.iter().flat_map(|it| it.to_be_bytes()).collect();
+        assert_eq!(text_of(&little).unwrap(), text);
+        assert_eq!(text_of(&big).unwrap(), text);
+        let error = text_of(little.get(2..).unwrap()).unwrap_err();
+        assert!(error.contains("UTF-16"), "{error}");
+    }
+
+    #[test]
+    fn other_formats_are_named() {
+        for (beginning, format, _) in FORMATS {
+            let bytes = [beginning, b"\0\0\0"].concat();
+            let error = text_of(&bytes).unwrap_err();
+            assert!(error.contains(format), "{error}");
+        }
+    }
+}

@@ -1,0 +1,97 @@
+//! Time units of a recorded drive, checked before anything is computed from the times.
+
+use onboard::time_unit::{OdometryTimes, TimeUnit};
+
+use super::error::ReplayError;
+use crate::angle_log::LoggedAngle;
+use crate::odometry::OdometryLog;
+
+/// Share of the angles within the time of the odometry below which their unit is in doubt.
+const MIN_INSIDE: f64 = 0.5;
+/// Share of the angles within the time of the odometry from which on a unit explains them.
+const EXPLAINED: f64 = 0.9;
+
+/// Checks that the times of odometry and angles are in seconds.
+///
+/// # Errors
+/// [`ReplayError::TimeUnit`] naming the likely unit.
+pub fn check_times(odometry: &OdometryLog, angles: &[LoggedAngle]) -> Result<(), ReplayError> {
+    let field = odometry.fields.time;
+    if let Some((unit, step)) = unit_of(odometry) {
+        let (of, samples) = ("odometry", "samples");
+        return Err(ReplayError::TimeUnit {
+            of,
+            field,
+            unit,
+            samples,
+            step,
+        });
+    }
+    if let Some((unit, step)) = unit_of_angles(odometry, angles) {
+        let (of, samples, field) = ("angles", "angles", "time_s");
+        return Err(ReplayError::TimeUnit {
+            of,
+            field,
+            unit,
+            samples,
+            step,
+        });
+    }
+    Ok(())
+}
+
+/// Unit of the odometry's times and the usual step between them; `None` if it may be seconds.
+fn unit_of(odometry: &OdometryLog) -> Option<(TimeUnit, f64)> {
+    let samples = &odometry.samples;
+    let mut times = OdometryTimes {
+        time_s: samples.last()?.time_s,
+        step_s: median_step_s(samples.iter().map(|it| it.time_s)),
+        by_speed_m: odometry.has_both.then_some(0.0),
+        ..OdometryTimes::default()
+    };
+    for pair in samples.windows(2) {
+        let [from, to] = pair else { continue };
+        let step_s = to.time_s - from.time_s;
+        let moved_m = (to.distance_m - from.distance_m).abs();
+        times.by_distance_m += moved_m;
+        times.moving_s += if moved_m > 0.0 { step_s } else { 0.0 };
+        if let Some(by_speed_m) = &mut times.by_speed_m {
+            *by_speed_m += 0.5 * (from.speed_mps + to.speed_mps).abs() * step_s;
+        }
+    }
+    Some((times.unit()?, times.step_s))
+}
+
+/// Unit in which the angles fall into the time of the odometry, if they do not in seconds.
+fn unit_of_angles(odometry: &OdometryLog, angles: &[LoggedAngle]) -> Option<(TimeUnit, f64)> {
+    let times = || angles.iter().map(|it| it.measured.time_s);
+    let inside = |per_second: f64| {
+        let count = times()
+            .filter(|time| odometry.covers(time / per_second))
+            .count();
+        count as f64 / angles.len().max(1) as f64
+    };
+    if angles.is_empty() || inside(1.0) >= MIN_INSIDE {
+        return None;
+    }
+    let [first_s, last_s] = odometry.interval_s()?;
+    // All times are near 0 in a unit that is too long; so the angles have to cover the drive, too.
+    let spans = |unit: &TimeUnit| {
+        let first = times().fold(f64::INFINITY, f64::min) / unit.per_second();
+        let last = times().fold(f64::NEG_INFINITY, f64::max) / unit.per_second();
+        last - first > 0.01 * (last_s - first_s)
+    };
+    let explains = |unit: &TimeUnit| inside(unit.per_second()) >= EXPLAINED && spans(unit);
+    let unit = TimeUnit::ALL.into_iter().find(explains)?;
+    Some((unit, median_step_s(times())))
+}
+
+/// Median of the positive differences of successive times.
+fn median_step_s(times_s: impl Iterator<Item = f64>) -> f64 {
+    let mut before_s = None;
+    let steps =
+        times_s.filter_map(|time_s| before_s.replace(time_s).map(|before_s| time_s - before_s));
+    let mut steps_s: Vec<f64> = steps.filter(|it| *it > 0.0).collect();
+    steps_s.sort_by(f64::total_cmp);
+    steps_s.get(steps_s.len() / 2).copied().unwrap_or(0.0)
+}
