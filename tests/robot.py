@@ -13,7 +13,10 @@ import access_av
 from access_av import drives
 
 if TYPE_CHECKING:
+    from collections.abc import Callable
     from pathlib import Path
+
+    from numpy.typing import NDArray
 
 RATE_HZ = 20.0
 TRACK_M = 0.4
@@ -88,12 +91,21 @@ class Robot:
         return float((error**2).mean() ** 0.5)  # type: ignore[operator]
 
 
-def robot(duration_s: float = 90.0, seed: int = 1) -> Robot:
-    """Winds through the hall, forwards and backwards, and turns on the spot now and then."""
+def robot(
+    duration_s: float = 90.0,
+    seed: int = 1,
+    speed_mps: Callable[[NDArray[np.float64]], NDArray[np.float64]] | None = None,
+) -> Robot:
+    """Winds through the hall, forwards and backwards, and turns on the spot now and then.
+
+    ``speed_mps`` gives the speed at each time (s) in place of that.
+    """
     rng = np.random.default_rng(seed)
     step_s = 1 / RATE_HZ
     time_s = np.arange(0.0, duration_s, step_s)
     speed = np.where(time_s % 30.0 > 27.0, 0.0, np.where(time_s % 45.0 > 40.0, -0.3, 0.5))
+    if speed_mps is not None:
+        speed = speed_mps(time_s)
     yaw = np.where(speed == 0.0, 0.8, 0.25 * np.sin(0.35 * time_s) + 0.1)
     speed[0] = yaw[0] = 0.0
     distance = np.cumsum(speed) * step_s

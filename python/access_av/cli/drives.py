@@ -155,8 +155,8 @@ def locate(
     Angles, CSV or Parquet: time_s; pci; phase_rad (electrical) and phase_sigma_rad, or angle_rad
     (from the array's axis) and angle_sigma_rad; ssb_index and snr_db where known.
 
-    Truth, TUM: t x y z qx qy qz qw a line, at times of its own; a line that begins with # is a
-    comment.
+    Truth, TUM: t x y z qx qy qz qw a line, at times of its own, at most 1 s apart; a line that
+    begins with # is a comment. It has to cover half of the drive. Its orientation is not used.
 
     Site, TOML: radio_heads, of each its pci and position_m; road only where there is one, by its
     polyline_m, segments, or file (GeoJSON or CSV). docs/locate.md has examples of sites and
@@ -165,8 +165,9 @@ def locate(
     --vary changes a key that begins with site. or vehicle., --compare names another vehicle; both
     locate the drive once more, compare the errors with --truth, and write compared.parquet.
 
-    Exit code 0: located. 2: the input cannot be used. 3: never found, lost for more than a fifth of
-    the time or at the end, or something wrong in the input did harm; what to check is said.
+    Exit code 0: located. 2: the input cannot be used. 3: never found, unavailable for more than a
+    fifth of the time or at the end, or displaced by more than 0.5 m by a reported fault of the
+    input; the message names what to check.
     """
     from access_av.drives import recorded as drives
     from access_av.drives.recorded import Drive
@@ -221,6 +222,7 @@ def locate(
     told: dict[str, Any] = {
         **numbers,
         "lost_share": drive.lost_share,
+        "unavailable_share": drive.unavailable_share,
         "remarks": drive.remarks,
         "diagnoses": drive.diagnoses,
         "suspicions": drive.suspicions,
@@ -285,15 +287,20 @@ def _show(drive: Drive, numbers: dict[str, float]) -> None:
     if "rms_error_m" in numbers:
         console.print(
             f"Horizontal error: RMS {numbers['rms_error_m']:.3f} m, "
-            f"90th percentile {numbers['p90_error_m']:.3f} m."
+            f"90th percentile {numbers['p90_error_m']:.3f} m, over "
+            f"{numbers['compared_share']:.0%} of the drive."
         )
     if "smoothed_rms_error_m" in numbers:
         console.print(f"Smoothed: RMS {numbers['smoothed_rms_error_m']:.3f} m.")
 
 
 def _unreliable(drive: Drive) -> str:
+    from access_av.drives.recorded import MAX_UNAVAILABLE
+
     if _lost(drive):
         happened = "the vehicle was never found. Give --start, or a longer drive. "
+    elif drive.unavailable_share > max(drive.lost_share, MAX_UNAVAILABLE):
+        happened = f"for {drive.unavailable_share:.0%} of the time the position was unavailable. "
     elif drive.lost_share:
         at_end = ", the end included," if drive.poses["lost"][-1] else ""
         happened = (

@@ -21,8 +21,25 @@ if TYPE_CHECKING:
     from access_av._core import Scenario, Site, Vehicle
 
 
-# Longest time between two poses of the truth between which it is taken for a straight line (s).
+# Maximum interval between two poses of the truth that is interpolated linearly (s).
 MOST_TRUTH_GAP_S = 1.0
+
+# Minimum share of the drive for which the truth has to be known.
+MIN_COMPARED = 0.5
+
+# Median distance (m) between truth and drive above which they are in different frames.
+OTHER_FRAME_M = 1e4
+
+# Extent of the truth relative to the drive's below which its positions are no metres, and the
+# extent of the drive (m) from which on this is decided. A degree is 1e5 m.
+MIN_EXTENT = 1e-3
+MIN_EXTENT_OF_DRIVE_M = 1.0
+
+# Maximum share of a drive that may be unavailable without making it unreliable.
+MAX_UNAVAILABLE = 0.2
+
+# Units per second that times are in by mistake.
+TIME_UNITS = {"milliseconds": 1e3, "microseconds": 1e6, "nanoseconds": 1e9}
 
 FINDINGS = {"constant": pl.String, "constant_unit": pl.String}
 
@@ -196,9 +213,26 @@ class Drive:
         return self._core.lost_share
 
     @property
+    def unavailable_share(self) -> float:
+        """Share of the time, from the first known pose on, in which the position was unavailable.
+
+        1 if the vehicle was never found.
+        """
+        known = self.poses.filter(~pl.col("searching"))
+        if known.is_empty():
+            return 1.0
+        unavailable = pl.col("lost") | (pl.col("integrity") == "unavailable").fill_null(value=False)
+        return float(known.select(unavailable.mean()).item())
+
+    @property
     def is_reliable(self) -> bool:
-        """Whether it was found, not lost for long or at its end, and nothing wrong did harm."""
-        return not (self._core.is_lost_for_long or self.suspicions)
+        """Whether the drive can be relied on.
+
+        The vehicle was found, its position was available for four fifths of the time and at the
+        end, and no reported fault of the input displaced it by more than 0.5 m.
+        """
+        is_lost = self._core.is_lost_for_long or self.unavailable_share > MAX_UNAVAILABLE
+        return not (is_lost or self.suspicions)
 
     def write_mcap(self, path: str | Path) -> None:
         """Write poses, verdicts and diagnostics as MCAP (ROS 2); no poses while searching."""
@@ -330,46 +364,96 @@ def read_tum(file: str | Path) -> pl.DataFrame:
 
 
 def error_m(poses: pl.DataFrame, truth: str | Path | pl.DataFrame) -> pl.DataFrame:
-    """Horizontal error at the poses' times, the truth between its own times on a straight line.
+    """Horizontal error at the poses' times; the truth is interpolated linearly.
 
     Parameters
     ----------
     poses
-        Poses of a located drive; those before the first known one are passed over, and those that
-        are before, after or in a gap of more than a second of the truth.
+        Poses of a located drive. Poses before the first known one are left out, and poses before,
+        after or in a gap of more than a second of the truth.
     truth
-        TUM trajectory, at times of its own, or what :func:`read_tum` made of it.
+        TUM trajectory, at times of its own, or the table of :func:`read_tum`. Its headings are not
+        used.
 
     Raises
     ------
     RecordingError
         When the file is no TUM trajectory.
     InputError
-        When it shares no time with the drive.
+        When the truth is known for less than half of the drive, or is in another frame.
     """
     known = poses.filter(~pl.col("searching")).sort("time_s")
     true = truth if isinstance(truth, pl.DataFrame) else read_tum(truth)
-    true = true.select("time_s", "x_m", "y_m")
-    before = true.rename({"x_m": "x0", "y_m": "y0"}).with_columns(t0="time_s")
-    after = true.rename({"x_m": "x1", "y_m": "y1"}).with_columns(t1="time_s")
-    both = (
-        known.join_asof(before, on="time_s", strategy="backward")
-        .join_asof(after, on="time_s", strategy="forward")
-        .filter(pl.col("t1") - pl.col("t0") <= MOST_TRUTH_GAP_S)
-    )
-    if both.is_empty():
-        which = "the truth" if isinstance(truth, pl.DataFrame) else truth
-        if true.is_empty():
-            raise InputError(f"{which}: holds no pose")
+    true = true.select("time_s", "x_m", "y_m").sort("time_s")
+    which = "the truth" if isinstance(truth, pl.DataFrame) else str(truth)
+    if true.is_empty():
+        raise InputError(f"{which}: holds no pose")
+    both = _between(known, true)
+    if both.height < MIN_COMPARED * known.height:
+        share = both.height / max(known.height, 1)
         raise InputError(
-            f"{which}: no time in common with the drive: it is from {_interval_s(true)}, the drive "
-            f"from {_interval_s(known)}; both must be told by one clock, in seconds"
+            f"{which}: covers {share:.0%} of the drive, at least {MIN_COMPARED:.0%} is needed; "
+            f"{_why_apart(known, true)}"
         )
     span = pl.col("t1") - pl.col("t0")
     share = pl.when(span > 0).then((pl.col("time_s") - pl.col("t0")) / span).otherwise(0.0)
     dx = pl.col("x_m") - pl.col("x0") - share * (pl.col("x1") - pl.col("x0"))
     dy = pl.col("y_m") - pl.col("y0") - share * (pl.col("y1") - pl.col("y0"))
-    return both.select("time_s", error_m=(dx**2 + dy**2).sqrt(), error_x_m=dx, error_y_m=dy)
+    errors = both.select("time_s", error_m=(dx**2 + dy**2).sqrt(), error_x_m=dx, error_y_m=dy)
+    _check_frame(which, known, true, errors)
+    return errors
+
+
+def _between(known: pl.DataFrame, true: pl.DataFrame) -> pl.DataFrame:
+    """The poses at which the truth is known, with its poses before and after each."""
+    before = true.rename({"x_m": "x0", "y_m": "y0"}).with_columns(t0="time_s")
+    after = true.rename({"x_m": "x1", "y_m": "y1"}).with_columns(t1="time_s")
+    return (
+        known.join_asof(before, on="time_s", strategy="backward")
+        .join_asof(after, on="time_s", strategy="forward")
+        .filter(pl.col("t1") - pl.col("t0") <= MOST_TRUTH_GAP_S)
+    )
+
+
+def _why_apart(known: pl.DataFrame, true: pl.DataFrame) -> str:
+    """Why a truth covers little of a drive, and how to fix it."""
+    for unit, per_second in TIME_UNITS.items():
+        scaled = true.with_columns(pl.col("time_s") / per_second)
+        if _between(known, scaled).height >= MIN_COMPARED * known.height:
+            return f"its times are in {unit}, and must be in seconds"
+    step_s = true["time_s"].diff().median()
+    overlaps = true["time_s"][0] <= known["time_s"][-1] and known["time_s"][0] <= true["time_s"][-1]
+    if overlaps and isinstance(step_s, float) and step_s > MOST_TRUTH_GAP_S:
+        return f"its poses are {step_s:g} s apart, and must be at most {MOST_TRUTH_GAP_S:g} s apart"
+    return (
+        f"it is from {_interval_s(true)}, the drive from {_interval_s(known)}; both must be by one "
+        f"clock, in seconds, and gaps of more than {MOST_TRUTH_GAP_S:g} s are not interpolated"
+    )
+
+
+def _check_frame(which: str, known: pl.DataFrame, true: pl.DataFrame, errors: pl.DataFrame) -> None:
+    """Reject positions of another frame or unit than the map's."""
+    apart_m = errors["error_m"].median()
+    if isinstance(apart_m, float) and apart_m > OTHER_FRAME_M:
+        x_m, y_m = true["x_m"][0], true["y_m"][0]
+        raise InputError(
+            f"{which}: its first position ({x_m:.0f}, {y_m:.0f}) is in another frame, "
+            f"{apart_m / 1e3:.0f} km from the drive (UTM coordinates?); it must be in metres in "
+            "the frame of the site: subtract the site's origin"
+        )
+
+    def extent_m(of: pl.DataFrame) -> float:
+        spans = [float(of[it].max() - of[it].min()) for it in ("x_m", "y_m")]  # type: ignore[operator]
+        return math.hypot(*spans)
+
+    within = true.filter(pl.col("time_s").is_between(known["time_s"][0], known["time_s"][-1]))
+    drive_m, true_m = extent_m(known), extent_m(within)
+    if drive_m > MIN_EXTENT_OF_DRIVE_M and 0.0 < true_m < MIN_EXTENT * drive_m:
+        raise InputError(
+            f"{which}: its positions extend over {true_m:.2g}, those of the drive over "
+            f"{drive_m:.1f} m (longitude and latitude in degrees?); they must be in metres in the "
+            "frame of the site"
+        )
 
 
 def _interval_s(of: pl.DataFrame) -> str:
@@ -427,6 +511,7 @@ def summary(drive: Drive, truth: str | Path | None = None) -> dict[str, float]:
         against = error_m(drive.poses, truth)
         errors = against["error_m"]
         numbers |= _honesty(drive.poses, against)
+        numbers["compared_share"] = against.height / known.height
         numbers["rms_error_m"] = float((errors**2).mean() ** 0.5)  # type: ignore[operator]
         numbers["p90_error_m"] = float(errors.quantile(0.9, "linear") or 0.0)
         if drive.smoothed is not None and not drive.smoothed.is_empty():

@@ -35,7 +35,8 @@ pub fn read_angles_mcap(bag: &Path, topic: Option<&str>) -> Result<AngleLog, Rec
             }
         })?;
         if end == FileEnd::Truncated {
-            log.add(item, Err(format!("{}: {TRUNCATED}", file.display())));
+            let why = format!("{}: {TRUNCATED}", file.display());
+            log.add("message", item, Err(why));
         }
     }
     if item == 0 {
