@@ -217,7 +217,6 @@ impl fmt::Display for OdometryRemark {
             _ => write!(f, "odometry {} {}: ", self.kind, self.item)?,
         }
         match &self.issue {
-            OdometryIssue::Truncated(text) => f.write_str(text),
             OdometryIssue::Malformed(message) => write!(f, "left out, {message}"),
             OdometryIssue::NotFinite { column } => {
                 write!(f, "left out, {column} is missing or not finite")
@@ -249,7 +248,9 @@ impl fmt::Display for OdometryRemark {
                 "{field} jumps by {step_m:.3} m; the speed of the steps next to it, {speed_mps:.3} m/s, \
                  is used instead"
             ),
-            OdometryIssue::Noted(text) | OdometryIssue::Doubtful(text) => f.write_str(text),
+            OdometryIssue::Noted(text)
+            | OdometryIssue::Doubtful(text)
+            | OdometryIssue::Truncated(text) => f.write_str(text),
             OdometryIssue::Duplicate { time_s } => {
                 write!(f, "left out, a second sample at {time_s} s")
             }

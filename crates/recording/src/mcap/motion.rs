@@ -248,7 +248,7 @@ struct Path<'a> {
     steps: Vec<Step>,
     /// Whether the position moves along the heading.
     follows_heading: bool,
-    path_m: f64,
+    length_m: f64,
     notes: Vec<String>,
     doubts: Vec<String>,
 }
@@ -263,7 +263,7 @@ impl<'a> Path<'a> {
             readings,
             steps,
             follows_heading: false,
-            path_m: 0.0,
+            length_m: 0.0,
             doubts: Vec::new(),
             notes: Vec::new(),
         }
@@ -289,7 +289,7 @@ impl<'a> Path<'a> {
         let speeds_mps = self.speeds_mps(meaning, &distances_m);
         let known = || self.readings.iter().map(|it| it.heading_rad);
         let is_straight =
-            self.follows_heading && self.path_m > LEAST_PATH_M && known().all(|it| it.is_some());
+            self.follows_heading && self.length_m > LEAST_PATH_M && known().all(|it| it.is_some());
         Motion {
             distances_m,
             speeds_mps,
@@ -341,7 +341,7 @@ impl<'a> Path<'a> {
         let across_m: f64 = known().map(|[_, across]| across.abs()).sum();
         let path_m: f64 = self.smooth().map(|step| step.length_m).sum();
         self.follows_heading = across2 < max_across * known2 || is_explained;
-        self.path_m = path_m;
+        self.length_m = path_m;
         if !self.follows_heading {
             self.doubts.push(format!(
                 "{POSITION} does not move along the heading of pose.pose.orientation ({across_m:.1} m of {path_m:.1} m \

@@ -157,7 +157,7 @@ mod tests {
             })
             .collect();
         assert_eq!(parts(&samples), [0..6, 6..11]);
-        assert_eq!(parts(&samples[..5]), [0..5]);
+        assert_eq!(parts(&samples[..5]), std::slice::from_ref(&(0..5)));
         let log = OdometryLog {
             samples,
             ..OdometryLog::default()

@@ -35,8 +35,8 @@ pub fn recording_in(archive: &Path) -> Result<(Vec<u8>, Extent), RecordingError>
         message: source.to_string(),
     };
     let mut tar = tar::Archive::new(files::open(archive).map_err(io)?);
-    let (mut metas, mut data): (Vec<(String, Vec<u8>)>, Vec<(String, Extent)>) =
-        (Vec::new(), Vec::new());
+    let mut metas: Vec<(String, Vec<u8>)> = Vec::new();
+    let mut data: Vec<(String, Extent)> = Vec::new();
     for entry in tar.entries_with_seek().map_err(syntax)? {
         let mut entry = entry.map_err(syntax)?;
         let name = String::from_utf8_lossy(&entry.path_bytes()).into_owned();
