@@ -450,6 +450,8 @@ def test_tables_of_points_are_read_as_a_log_is(tmp_path: Path, text: str, points
         ("x_m,y_m\n0,0\n".encode("utf-16"), "UTF-16"),
         (b'x_m,y_m\n"0,0\n100",0\n', "line 2 has a quote that is not closed"),
         (b"", "the file is empty"),
+        (b"x_m,y_m\n" + b'"' + 200_000 * b"9" + b'",0\n', "line 2: field larger"),
+        ("sep=\u00e4\nx_m\u00e4y_m\n0\u00e40\n".encode(), "column x_m is missing"),
     ],
 )
 def test_tables_that_cannot_be_read_are_named_with_the_line(
@@ -472,6 +474,22 @@ def test_a_pci_is_a_whole_number_or_left_out(tmp_path: Path, pci: str, found: An
             csv_file.read_heads(file)
     else:
         assert csv_file.read_heads(file).heads[0].pci == found
+
+
+@pytest.mark.parametrize("data", [b"", b"  0\nSECTION\n", b"0\n", bytes(range(256)) * 8, b"AC1032"])
+def test_files_that_are_no_drawings_are_named(tmp_path: Path, data: bytes) -> None:
+    pytest.importorskip("ezdxf", reason="the extra `cad` is not installed")
+    file = tmp_path / "plant.dxf"
+    file.write_bytes(data)
+    with pytest.raises(InputError, match=r"plant\.dxf: "):
+        dxf.read(file, road_layer="ROAD", scale_m=1.0)
+
+
+def test_whole_numbers_beyond_all_floats_are_rejected(tmp_path: Path) -> None:
+    file = tmp_path / "road.geojson"
+    file.write_text(f'{{"type": "LineString", "coordinates": [[{10**400}, 1], [2, 3]]}}', "utf-8")
+    with pytest.raises(InputError, match="finite numbers are needed"):
+        read(file, None, Options())
 
 
 def test_lines_are_counted_as_an_editor_does(tmp_path: Path) -> None:

@@ -89,7 +89,10 @@ class Layer:
                 skipped_entity_callback=lambda entity, _: lost.append(entity)
             )
             content = [self._counted(it) for it in parts]
-        except (DXFError, ZeroDivisionError, AttributeError) as error:
+        except TooManyError:
+            raise
+        # ValueError, ArithmeticError and others: a block with values that cannot be transformed.
+        except (DXFError, ValueError, ArithmeticError, TypeError, AttributeError) as error:
             self.skip(insert, f"block {insert.dxf.name!r}: {error}")
             return
         for entity in lost:

@@ -271,12 +271,19 @@ def _lines(path: Path, kind: str, coordinates: Any, where: str) -> list[list[lis
 
 def _numbers(path: Path, at: Any, where: str) -> list[float]:
     numbers = at if isinstance(at, list) else []
-    if len(numbers) < 2 or not all(
-        isinstance(it, (int, float)) and not isinstance(it, bool) and math.isfinite(it)
-        for it in numbers
-    ):
+    if len(numbers) < 2 or not all(map(_is_finite, numbers)):
         raise InputError(f"{path}: {where}: {str(at)[:80]}; two or three finite numbers are needed")
     return [float(it) for it in numbers]
+
+
+def _is_finite(value: Any) -> bool:
+    """Whether a value is a finite number; JSON also has whole numbers beyond all floats."""
+    if not isinstance(value, (int, float)) or isinstance(value, bool):
+        return False
+    try:
+        return math.isfinite(value)
+    except OverflowError:
+        return False
 
 
 def _check_degrees(path: Path, where: str, at: Sequence[float], *, named: str | None) -> None:
@@ -301,16 +308,12 @@ def _check_degrees(path: Path, where: str, at: Sequence[float], *, named: str | 
 
 
 def _head(path: Path, at: Sequence[float], properties: dict[str, Any], where: str) -> Head:
-    height = properties.get("height_m", at[2] if len(at) > 2 else None)
+    height: Any = properties.get("height_m", at[2] if len(at) > 2 else None)
     pci = properties.get("pci")
-    if (
-        not isinstance(height, (int, float))
-        or isinstance(height, bool)
-        or not math.isfinite(height)
-    ):
+    if not _is_finite(height):
         raise InputError(
-            f"{path}: {where}: {height!r} is no height; a radio head needs one, as property "
-            "`height_m` or third coordinate, in metres"
+            f"{path}: {where}: {str(height)[:80]!r} is no height; a radio head needs one, as "
+            "property `height_m` or third coordinate, in metres"
         )
     if isinstance(pci, float) and pci.is_integer():
         pci = int(pci)

@@ -21,7 +21,7 @@ SEPARATORS = (",", ";", "\t")
 DECIMAL_COMMA = r"^[+-]?\d+(,\d+)?([eE][+-]?\d+)?$"
 THOUSANDS = re.compile(r"[+-]?\d{1,3}([,.'\u2019 \u00a0\u202f]\d{3})+([.,]\d+)?")
 # First line of CSV files that Excel writes or reads: it gives the separator.
-SEPARATOR_LINE = re.compile(rb'"?sep=(.)"?', re.IGNORECASE)
+SEPARATOR_LINE = re.compile(rb'"?sep=([,;|\t])"?', re.IGNORECASE)
 WIDE = (codecs.BOM_UTF32_LE, codecs.BOM_UTF32_BE, codecs.BOM_UTF16_LE, codecs.BOM_UTF16_BE)
 
 
@@ -130,7 +130,7 @@ def _lines(path: Path) -> Lines:
         if names is None:
             given = SEPARATOR_LINE.fullmatch(line.strip(b" \r"))
             if given is not None and separator is None:
-                separator = given[1].decode("ascii", "replace")
+                separator = given[1].decode("ascii")
                 continue
             separator = separator or max(SEPARATORS, key=line.decode("utf-8").count)
             names = _header(path, line, separator)
@@ -151,8 +151,7 @@ def _lines(path: Path) -> Lines:
 
 
 def _header(path: Path, line: bytes, separator: str) -> list[str]:
-    cells = next(csv.reader([line.decode("utf-8")], delimiter=separator, skipinitialspace=True))
-    names = [it.strip() for it in cells]
+    names = [it.strip() for it in _cells(path, line, separator, 1)]
     for name in names:
         if name and names.count(name) > 1:
             raise InputError(f"{path}: column {name} is there twice; each may be there once")
@@ -165,7 +164,15 @@ def _count(path: Path, line: bytes, separator: str, number: int) -> int:
         return line.count(separator.encode()) + 1
     if line.count(b'"') % 2:
         raise InputError(f"{path}: line {number} has a quote that is not closed on the line")
-    return len(next(csv.reader([line.decode("utf-8")], delimiter=separator)))
+    return len(_cells(path, line, separator, number))
+
+
+def _cells(path: Path, line: bytes, separator: str, number: int) -> list[str]:
+    text = line.decode("utf-8")
+    try:
+        return next(csv.reader([text], delimiter=separator, skipinitialspace=True))
+    except csv.Error as error:
+        raise InputError(f"{path}: line {number}: {error}") from error
 
 
 def _inferred(column: pl.Series) -> pl.Series:
