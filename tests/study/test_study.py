@@ -300,7 +300,7 @@ def test_variants_stand_side_by_side(results: Path, page: str) -> None:
     assert compared["variant"].to_list() == ["as it is", "site.rician_k_db = 3"]
     first, second = compared["percentile_m"]
     assert first == pytest.approx(percentile(errors(results, "as it is"), 90))
-    assert compared["more_m"].to_list() == [None, pytest.approx(second - first)]
+    assert compared["delta_m"].to_list() == [None, pytest.approx(second - first)]
     assert "site.rician_k_db = 3" in page
 
 
