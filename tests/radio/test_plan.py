@@ -123,8 +123,8 @@ def test_the_command_plans_and_refuses(tmp_path: Path, access_av: Callable[..., 
     assert len(json.loads(planned.site.to_json())["radio_heads"]) == 5
     for text, message in (
         ("name,x_m,y_m\na,1,2\n", "column z_m is missing"),
-        ("name,x_m,y_m,z_m\na,1,nan,0\n", "y_m is not a number in row 0"),
-        ("name,x_m,y_m,z_m\n,1,2,3\n", "name is empty in row 0"),
+        ("name,x_m,y_m,z_m\na,1,nan,0\n", "y_m is 'nan' in line 2"),
+        ("name,x_m,y_m,z_m\n,1,2,3\n", "name is empty in line 2"),
         ("name,x_m,y_m,z_m\n", "0 masts"),
         ("name,x_m,y_m,z_m\na,-100,0,0\n", "on the road"),
     ):
@@ -218,8 +218,8 @@ def test_cases_of_an_integrity_campaign_stand_side_by_side(
         for variant in ("as it is", varied)
     ]
     as_it_is, other = (compared["percentile_m"].gather_every(2, at) for at in (0, 1))
-    assert compared["more_m"].to_list()[::2] == [None, None]
-    assert compared["more_m"].to_list()[1::2] == pytest.approx((other - as_it_is).to_list())
+    assert compared["delta_m"].to_list()[::2] == [None, None]
+    assert compared["delta_m"].to_list()[1::2] == pytest.approx((other - as_it_is).to_list())
     page = (tmp_path / "out" / "report.html").read_text()
     assert f"array 1 degree off; {varied}; as set; 4 radio heads" in page
     assert "Side by side" in page
