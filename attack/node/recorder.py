@@ -48,6 +48,8 @@ class Recorder:
         self._socket: socket.socket | None = None
         self._begun = b""
         self._retry_s = 0.0
+        # Longest time between two reads of the sockets (s).
+        self.pause_s = 0.0
         self._stopped = threading.Event()
         self._lock = threading.Lock()
         self._calls: list[str] = []
@@ -75,7 +77,10 @@ class Recorder:
         self.arrivals.append(Arrival(time.time(), output, content))
 
     def _read(self) -> None:
+        last_s = time.monotonic()
         while not self._stopped.wait(PAUSE_S):
+            self.pause_s = max(self.pause_s, time.monotonic() - last_s)
+            last_s = time.monotonic()
             with self._lock:
                 calls, self._calls = self._calls, []
             for call in calls:

@@ -50,7 +50,7 @@ class Recorded:
     is_hung: bool
     resources: list[Resources | None]
     errors: str
-    # Maximum delay of a message against its time of sending (s).
+    # Maximum delay of a message against its time of sending, and of a received item (s).
     lateness_s: float
     # Times at which the sink under test was found working again.
     # Folder of the run.
@@ -159,7 +159,7 @@ rate_hz = {1.0 / MQTT_PERIOD_S}
             is_hung=self.node.is_hung,
             resources=resources,
             errors=self.node.errors(),
-            lateness_s=self.lateness_s,
+            lateness_s=max(self.lateness_s, self.recorder.pause_s),
             folder=self.folder,
             sink_works_s=self.sink_works_s,
         )

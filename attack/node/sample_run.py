@@ -147,7 +147,7 @@ rate_hz = {1.0 / MQTT_PERIOD_S}
         is_hung=node.is_hung,
         resources=resources,
         errors=node.errors(),
-        lateness_s=lateness_s,
+        lateness_s=max(lateness_s, recorder.pause_s),
     )
 
 

@@ -31,7 +31,7 @@ TRUSTED_S = 0.5
 BASELINE_S = 2.0
 # Tolerance of scheduling and of the sampling of outputs (s).
 TOLERANCE_S = 0.15
-# A run counts if every message is sent within this time (s); a source is silent after 0.5 s.
+# A run counts if every message is sent and received within this time (s); a source is silent after 0.5 s.
 LATENESS_S = 0.25
 
 
@@ -200,7 +200,7 @@ def judge(run: Recorded) -> Verdict:
     verdict = Verdict(fault.name, lateness_s=run.lateness_s)
     violate = verdict.violations.append
     if verdict.was_busy:
-        violate(f"computer too busy: a message was sent {run.lateness_s:.1f} s late")
+        violate(f"computer too busy: messages were sent or received {run.lateness_s:.1f} s late")
     points = _points(run)
 
     before = [it for it in points if begin_s - BASELINE_S <= it.at_s < begin_s]
