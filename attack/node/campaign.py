@@ -111,6 +111,33 @@ def table(verdicts: list[Verdict]) -> Table:
     return made
 
 
+def markdown(verdicts: list[Verdict]) -> str:
+    """The same table for the documentation: maxima in seconds."""
+
+    def largest(values: list[float | None]) -> str:
+        known = [it for it in values if it is not None]
+        return f"{max(known):.1f}" if known else "–"
+
+    lines = [
+        "| fault | runs | reported after | `ok` beyond level | recovery | runs with a violation |",
+        "|---|---|---|---|---|---|",
+    ]
+    for name in dict.fromkeys(it.fault for it in verdicts):
+        own = [it for it in verdicts if it.fault == name]
+        failed = [it for it in own if it.violations]
+        kinds = list(dict.fromkeys(text for it in failed for text in it.violations))
+        cells = (
+            name,
+            str(len(own)),
+            largest([it.report_s for it in own]),
+            largest([it.wrong_ok_s for it in own]),
+            largest([it.recovery_s for it in own]),
+            f"{len(failed)}: {kinds[0]}" if failed else "0",
+        )
+        lines.append("| " + " | ".join(cells) + " |")
+    return "\n".join(lines) + "\n"
+
+
 def main(arguments: list[str]) -> int:
     """Exit code 1 if a bound is exceeded."""
     options = argparse.ArgumentParser(prog="python -m attack node", description=__doc__)
@@ -120,6 +147,7 @@ def main(arguments: list[str]) -> int:
     options.add_argument("--first", action="store_true", help="run before others (needs root)")
     options.add_argument("--only", metavar="TEXT", help="faults whose name contains this")
     options.add_argument("--out", type=Path, help="JSON file of all verdicts")
+    options.add_argument("--markdown", type=Path, help="file of the table for the documentation")
     options.add_argument("--keep", type=Path, help="folder that keeps the files of each run")
     chosen = options.parse_args(arguments)
     faults = [it for it in FAULTS if chosen.only is None or chosen.only in it.name]
@@ -139,4 +167,6 @@ def main(arguments: list[str]) -> int:
     if chosen.out:
         made = {"seed": chosen.seed, "runs": [it.to_json() for it in verdicts]}
         chosen.out.write_text(json.dumps(made, indent=1), encoding="utf-8")
+    if chosen.markdown:
+        chosen.markdown.write_text(markdown(verdicts), encoding="utf-8")
     return 1 if any(it.violations for it in verdicts) else 0

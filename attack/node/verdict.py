@@ -31,7 +31,7 @@ TRUSTED_S = 0.5
 BASELINE_S = 2.0
 # Tolerance of scheduling and of the sampling of outputs (s).
 TOLERANCE_S = 0.15
-# A run counts if every message is sent and received within this time (s); a source is silent after 0.5 s.
+# A run counts if every message is sent and received within this time (s).
 LATENESS_S = 0.25
 
 
