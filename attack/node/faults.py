@@ -29,7 +29,13 @@ FAULTS = (
     ),
     Fault("odometry reversed", ODOMETRY, lasts_s=5.0, change=changes.odometry_steps(-1.0, -1.0)),
     Fault(
-        "distance contradicts speed",
+        "distance frozen, speed right",
+        ODOMETRY,
+        lasts_s=5.0,
+        change=changes.odometry_steps(1.0, 0.0),
+    ),
+    Fault(
+        "distance half of the integrated speed",
         ODOMETRY,
         lasts_s=5.0,
         change=changes.odometry_steps(1.0, 0.5),
@@ -103,7 +109,15 @@ FAULTS = (
         lasts_s=5.0,
         change=changes.extra_head(changes.DUPLICATE, 1),
     ),
-    Fault("angles of one head off by 0.5 rad", "head", lasts_s=5.0, change=changes.biased_head),
+    # The gate rejects these angles; only the count of rejected angles of the head shows it.
+    Fault(
+        "angles of one head off by 0.5 rad",
+        "",
+        lasts_s=5.0,
+        change=changes.biased_head,
+        reported=False,
+        harmless=True,
+    ),
     # Bytes and connections.
     Fault(
         "random bytes on the message socket",

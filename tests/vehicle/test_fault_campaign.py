@@ -20,32 +20,8 @@ AT_ONCE = 10
 BEFORE_S = 4.0
 # Faults that exceed a bound: docs/node.md lists them with their figures.
 SHORTFALLS = {
-    "odometry frozen at zero, vehicle drives",
     "odometry frozen at its speed, vehicle stops",
-    "odometry reversed",
-    "distance contradicts speed",
-    "one speed of 1e6 m/s",
-    "one odometry message repeated 5 times a second",
-    "odometry stuck at one message",
-    "one odometry message 2 s in the future",
-    "one odometry message at 1e300 s",
-    "one angle at 1e300 s",
-    "one angle 2 s in the future",
-    "odometry time in milliseconds",
-    "odometry clock back by 5 s",
-    "odometry clock ahead by 60 s",
-    "odometry absent for 8 s",
-    "angles absent for 6 s",
-    "all messages absent for 8 s",
-    "radio head off the site",
-    "one PCI used by two radio heads",
-    "angles of one head off by 0.5 rad",
-    "random bytes on the message socket",
-    "random bytes on page and JSON sockets",
-    "every fifth message cut off",
-    "SIGKILL at a random time, restart after 1 s",
-    "process stopped for 3 s",
-    "SIGHUP with an invalid site file",
+    "distance half of the integrated speed",
 }
 
 pytestmark = pytest.mark.skipif(

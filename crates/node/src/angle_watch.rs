@@ -1,6 +1,11 @@
-//! Watch over angles: radio heads that the site does not have, and angle messages that no longer come.
+//! Watch over angles: radio heads that the site does not have, radio heads that send the same SSB, and angle messages
+//! that no longer come.
 
 use std::time::{Duration, Instant};
+
+use onboard::geometry::wrap_angle;
+use onboard::live::AngleObservation;
+use onboard::observation::BURST_S;
 
 use crate::inbox::Level;
 
@@ -9,10 +14,27 @@ const ABSENT_S: f64 = 1.0;
 /// Maximum number of radio heads that are reported; it bounds the memory.
 const MAX_UNKNOWN: usize = 64;
 
+/// Difference of two angles of one SSB that counts as a contradiction, in standard deviations: 6e-7 of Gaussian errors.
+const CONTRADICTION_SIGMAS: f64 = 5.0;
+/// Contradictions, less SSBs without one, that are reported: within 20 SSBs even if every second one is received.
+const CONTRADICTIONS: u32 = 5;
+
+/// The last angle of an SSB, and how often two of one burst have differed.
+#[derive(Debug, Clone, Copy)]
+struct Sent {
+    head: (u16, u8),
+    time_s: f64,
+    phase_rad: f64,
+    sigma_rad: f64,
+    contradictions: u32,
+    is_reported: bool,
+}
+
 /// Radio heads reported so far, and the last angle message.
 #[derive(Debug, Default)]
 pub struct AngleWatch {
     unknown: Vec<(u16, u8)>,
+    sent: Vec<Sent>,
     last: Option<Instant>,
     is_absent: bool,
 }
@@ -32,6 +54,45 @@ impl AngleWatch {
         self.unknown.push(head);
         Some(format!(
             "the site has no radio head with PCI {pci} and SSB index {ssb_index}: its angles are ignored"
+        ))
+    }
+
+    /// Text if two radio heads send the same SSB: angles of one burst with the same PCI and SSB index have differed
+    /// repeatedly by more than their errors. It is given again only after as many SSBs without a contradiction.
+    pub fn duplicate(&mut self, angle: &AngleObservation) -> Option<String> {
+        let head = (angle.pci, angle.ssb_index);
+        let Some(sent) = self.sent.iter_mut().find(|it| it.head == head) else {
+            if self.sent.len() < MAX_UNKNOWN {
+                self.sent.push(Sent {
+                    head,
+                    time_s: angle.time_s,
+                    phase_rad: angle.phase_rad,
+                    sigma_rad: angle.sigma_rad,
+                    contradictions: 0,
+                    is_reported: false,
+                });
+            }
+            return None;
+        };
+        let is_of_one_burst = (angle.time_s - sent.time_s).abs() < BURST_S;
+        let difference_rad = wrap_angle(angle.phase_rad - sent.phase_rad).abs();
+        let sigma_rad = angle.sigma_rad.hypot(sent.sigma_rad);
+        if is_of_one_burst && difference_rad > CONTRADICTION_SIGMAS * sigma_rad {
+            // Two more, because the next burst takes one away.
+            sent.contradictions = (sent.contradictions + 2).min(2 * CONTRADICTIONS);
+        } else {
+            sent.contradictions = sent.contradictions.saturating_sub(1);
+            sent.is_reported &= sent.contradictions > 0;
+        }
+        (sent.time_s, sent.phase_rad) = (angle.time_s, angle.phase_rad);
+        sent.sigma_rad = angle.sigma_rad;
+        if sent.is_reported || sent.contradictions < CONTRADICTIONS {
+            return None;
+        }
+        sent.is_reported = true;
+        Some(format!(
+            "two radio heads send PCI {} and SSB index {}: angles of one burst differ by {difference_rad:.2} rad",
+            angle.pci, angle.ssb_index
         ))
     }
 
@@ -69,6 +130,37 @@ mod tests {
         assert!(watch.unknown(99, 5).is_some());
         let more = (0..1000).filter(|&pci| watch.unknown(pci, 0).is_some());
         assert_eq!(more.count(), MAX_UNKNOWN - 2);
+    }
+
+    #[test]
+    fn two_heads_of_one_pci_are_reported_within_20_ssbs_and_noise_is_not() {
+        let angle = |burst: u32, offset_s: f64, phase_rad: f64| AngleObservation {
+            pci: 22,
+            ssb_index: 1,
+            time_s: 0.02 * f64::from(burst) + offset_s,
+            phase_rad,
+            sigma_rad: 0.03,
+            snr_db: None,
+            resolved: true,
+        };
+        let mut watch = AngleWatch::default();
+        for burst in 0..1000 {
+            // Each angle twice, with opposite errors of three standard deviations of their difference.
+            for (offset_s, sign) in [(0.0, 1.0), (1e-4, -1.0)] {
+                let sent = angle(burst, offset_s, 3.1 + sign * 0.06);
+                assert_eq!(watch.duplicate(&sent), None);
+            }
+        }
+        let mut reports = Vec::new();
+        for burst in 1000..1100 {
+            for phase_rad in [0.3, 0.9] {
+                if watch.duplicate(&angle(burst, 0.0, phase_rad)).is_some() {
+                    reports.push(burst);
+                }
+            }
+        }
+        assert_eq!(reports.len(), 1);
+        assert!(reports[0] < 1010, "{reports:?}");
     }
 
     #[test]

@@ -50,9 +50,7 @@ pub struct Setup {
 impl Setup {
     /// Whether site, vehicle and platform are equal.
     fn is_of_same_files(&self, other: &Self) -> bool {
-        self.site == other.site
-            && self.vehicle == other.vehicle
-            && self.platform == other.platform
+        self.site == other.site && self.vehicle == other.vehicle && self.platform == other.platform
     }
 
     /// The pipeline at the start of a drive.
@@ -291,6 +289,9 @@ impl Engine {
                 let mut heads = self.setup.site.radio_heads.iter();
                 if !heads.any(|it| (it.pci, it.ssb_index) == (pci, ssb_index)) {
                     self.report_unknown(pci, ssb_index);
+                }
+                if let Some(text) = self.angle_watch.duplicate(&angle) {
+                    self.event(Level::Warn, "angles", text);
                 }
                 match self.live.angle(&angle) {
                     Ok(()) => self.clock.see(angle.time_s),
