@@ -17,8 +17,11 @@ const STEP_S: f64 = 2e-3;
 /// Minimum silence, in seconds, that counts as an interruption. Transport and a loaded computer delay blocks
 /// by less.
 pub const INTERRUPTION_S: f64 = 0.25;
-/// Time after an interruption, in seconds, in which samples that were only late are caught up.
+/// Time in seconds without samples that come faster than in real time, after which those of an interruption are
+/// missing and not late.
 pub const CATCH_UP_S: f64 = 0.2;
+/// Minimum decrease of the delay, in seconds, by samples that come faster than in real time.
+pub const CAUGHT_UP_S: f64 = 0.01;
 /// A stated rate that differs by more from what arrives, relative, is a wrong one.
 const WRONG_RATE: f64 = 0.01;
 /// Windows in a row of which each must say so.
@@ -56,6 +59,8 @@ pub struct ArrivalClock {
 struct Interruption {
     decided_s: f64,
     lost_s: f64,
+    /// The same when the decision was put off last.
+    before_s: f64,
 }
 
 #[derive(Debug, Clone, Copy)]
@@ -104,6 +109,7 @@ impl ArrivalClock {
             self.interruption = Some(Interruption {
                 decided_s: now_s + CATCH_UP_S,
                 lost_s: before_s + delay_s,
+                before_s: before_s + delay_s,
             });
             None
         } else if self.interruption.is_some() {
@@ -120,7 +126,13 @@ impl ArrivalClock {
         let early_s = delay_s.min(0.0);
         self.offset_s += early_s;
         interruption.lost_s += early_s;
-        let Interruption { decided_s, lost_s } = *interruption;
+        if interruption.before_s - interruption.lost_s >= CAUGHT_UP_S {
+            interruption.before_s = interruption.lost_s;
+            interruption.decided_s = now_s + CATCH_UP_S;
+        }
+        let Interruption {
+            decided_s, lost_s, ..
+        } = *interruption;
         if now_s < decided_s {
             return None;
         }
@@ -289,16 +301,16 @@ mod tests {
         let mut clock = ArrivalClock::new(RATE_HZ);
         let mut found = Vec::new();
         for number in 0..8_000 {
-            // From 3 s on nothing arrives for half a second, then ten times as fast.
+            // From 3 s on nothing arrives for half a second, then a third faster than in real time.
             let due_s = f64::from(number) * 1e-3;
             let arrival_s = due_s.max(if due_s < 3.0 {
                 0.0
             } else {
-                3.5 + 0.1 * (due_s - 3.0)
+                3.5 + 0.75 * (due_s - 3.0)
             });
             let (time_s, finding) = clock.block(BLOCK, 100.0 + arrival_s);
             found.extend(finding);
-            if due_s > 3.6 {
+            if due_s > 5.1 {
                 let error_s = time_s + clock.offset_s() - (100.0 + due_s - 1e-3);
                 assert!(error_s.abs() < 1e-3, "{due_s}: {error_s}");
             }

@@ -369,7 +369,7 @@ impl Engine {
         }
         let gaps = self.live.stream_counts().untold_gaps;
         if std::mem::replace(&mut self.unreported_gaps, gaps) < gaps
-            && !self.interruptions.is_undecided()
+            && !self.interruptions.is_recent(came)
         {
             let text = "samples are missing: the SSBs came off their period".to_owned();
             self.event(Level::Warn, "samples", text);

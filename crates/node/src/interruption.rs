@@ -2,7 +2,10 @@
 
 use std::time::{Duration, Instant};
 
-use crate::clock::{CATCH_UP_S, INTERRUPTION_S};
+use crate::clock::{CATCH_UP_S, CAUGHT_UP_S, INTERRUPTION_S};
+
+/// Time within which all SSBs are found again after an interruption.
+const RECENT: Duration = Duration::from_secs(2);
 
 /// Newest samples and odometry at an instant.
 #[derive(Debug, Clone, Copy)]
@@ -10,6 +13,16 @@ struct Mark {
     came: Instant,
     samples_s: f64,
     odometry_s: Option<f64>,
+}
+
+/// An interruption that is not decided.
+#[derive(Debug, Clone, Copy)]
+struct Undecided {
+    /// The last samples before it.
+    before: Mark,
+    /// When the decision was put off last, and the missing time then, in seconds.
+    since: Instant,
+    missing_s: f64,
 }
 
 /// What an arrival of samples shows.
@@ -26,8 +39,10 @@ pub struct Arrival {
 #[derive(Debug, Default)]
 pub struct Interruptions {
     last: Option<Mark>,
-    /// The last samples before an interruption, and when samples resumed.
-    undecided: Option<(Mark, Instant)>,
+    /// An interruption of which the samples may be late or missing.
+    undecided: Option<Undecided>,
+    /// When samples resumed last.
+    resumed: Option<Instant>,
 }
 
 impl Interruptions {
@@ -43,35 +58,45 @@ impl Interruptions {
         };
         let since = |instant| came.saturating_duration_since(instant);
         if since(last.came) >= Duration::from_secs_f64(INTERRUPTION_S) {
-            let before = self.undecided.map_or(last, |(before, _)| before);
-            self.undecided = Some((before, came));
+            let before = self.undecided.map_or(last, |it| it.before);
+            self.undecided = Some(Undecided {
+                before,
+                since: came,
+                missing_s: f64::INFINITY,
+            });
+            self.resumed = Some(came);
             return Arrival {
                 resumed: true,
                 missing_s: None,
             };
         }
-        let is_decided = |(_, resumed): &mut (Mark, Instant)| {
-            since(*resumed) >= Duration::from_secs_f64(CATCH_UP_S)
-        };
-        let missing_s = (self.undecided.take_if(is_decided)).and_then(|(before, _)| {
-            let odometry_s = odometry_s? - before.odometry_s?;
-            let missing_s = odometry_s - (samples_s - before.samples_s);
-            (missing_s >= INTERRUPTION_S).then_some(missing_s)
-        });
+        let mut missing_s = None;
+        if let Some(undecided) = &mut self.undecided {
+            let driven_s = |it: &Mark| Some(odometry_s? - it.odometry_s?);
+            let received_s = samples_s - undecided.before.samples_s;
+            let now_missing_s = driven_s(&undecided.before).map_or(0.0, |it| it - received_s);
+            if undecided.missing_s - now_missing_s >= CAUGHT_UP_S {
+                (undecided.since, undecided.missing_s) = (came, now_missing_s);
+            } else if since(undecided.since) >= Duration::from_secs_f64(CATCH_UP_S) {
+                missing_s = Some(now_missing_s).filter(|it| *it >= INTERRUPTION_S);
+                self.undecided = None;
+            }
+        }
         Arrival {
             resumed: false,
             missing_s,
         }
     }
 
-    /// Whether an interruption is too recent to decide whether samples are missing.
-    pub const fn is_undecided(&self) -> bool {
-        self.undecided.is_some()
+    /// Whether samples resumed so recently before `now` that SSBs off their period belong to that interruption.
+    pub fn is_recent(&self, now: Instant) -> bool {
+        let is_recent = |at| now.saturating_duration_since(at) < RECENT;
+        self.resumed.is_some_and(is_recent)
     }
 
     /// Forgets all arrivals, for a new start.
     pub const fn reset(&mut self) {
-        (self.last, self.undecided) = (None, None);
+        (self.last, self.undecided, self.resumed) = (None, None, None);
     }
 }
 

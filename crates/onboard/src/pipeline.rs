@@ -281,7 +281,7 @@ impl Onboard {
         Ok(())
     }
 
-    /// The active faults of odometry, receive channels and radio heads.
+    /// The active faults of odometry and receive channels.
     pub const fn faults(&self) -> &ActiveFaults {
         &self.faults
     }

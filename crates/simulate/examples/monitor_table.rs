@@ -52,7 +52,8 @@ fn main() {
                 let faults: Vec<_> = step.faults.iter().map(|it| it.fault.name()).collect();
                 let now = format!("{} {faults:?}", integrity.state.name());
                 let is_near = (FROM_S - 1.0..UNTIL_S + 20.0).contains(&step.time_s);
-                if now != before && (is_near || !faults.is_empty()) {
+                let is_time = (step.time_s % 2.0).abs() < 0.5 * period_s && step.time_s > UNTIL_S;
+                if (now != before || is_time) && (is_near || !faults.is_empty()) {
                     println!(
                         "  {:.2} s: {now}, error {:.2} m, level {:.2} m",
                         step.time_s,

@@ -25,7 +25,7 @@ pub struct Step {
     pub searching: bool,
     /// SNR of the strongest radio head by link budget and shadowing, in dB.
     pub snr_db: f64,
-    /// Active faults of odometry, receive channels and radio heads.
+    /// Active faults of odometry and receive channels.
     pub faults: ActiveFaults,
 }
 

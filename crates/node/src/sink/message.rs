@@ -48,7 +48,7 @@ pub struct PoseFields {
     pub last_angle_s: Option<f64>,
     /// Number of SSBs that the receiver tracks.
     pub tracked: usize,
-    /// Active faults of odometry, receive channels and radio heads.
+    /// Active faults of odometry and receive channels.
     pub faults: Vec<FaultMessage>,
 }
 
@@ -58,7 +58,7 @@ pub struct PoseFields {
 pub struct FaultMessage {
     /// Name of the fault.
     pub fault: &'static str,
-    /// Numbers of the receive channels from 0, or the PCI; empty for the odometry.
+    /// Numbers of the receive channels from 0; empty for the odometry.
     pub subject: String,
     /// Description.
     pub description: String,

@@ -166,7 +166,7 @@ pub fn text(board: &Board) -> String {
     text.family(
         "fault",
         "gauge",
-        "1 for each active fault of odometry, receive channels and radio heads.",
+        "1 for each active fault of odometry and receive channels.",
     );
     for active in status.faults.iter() {
         let subject = active.fault.subject();

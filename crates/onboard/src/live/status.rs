@@ -233,6 +233,6 @@ pub struct Status {
     pub samples_age_s: Option<f64>,
     /// SSBs that the receiver keeps to.
     pub tracked: usize,
-    /// Active faults of odometry, receive channels and radio heads.
+    /// Active faults of odometry and receive channels.
     pub faults: ActiveFaults,
 }

@@ -12,7 +12,7 @@ use num_complex::Complex64;
 
 use super::fault::Fault;
 use crate::observation::{MAX_ELEMENTS, SsbObservation};
-use crate::settings::Vehicle;
+use crate::settings::{Site, Vehicle};
 
 /// Motion in metres, and time in seconds, after which the fading of a radio head is independent: above one
 /// wavelength.
@@ -26,8 +26,8 @@ const DIRECTIONS: usize = 64;
 const MOST_ANTENNAS: usize = 8;
 /// Hypotheses at most.
 const MOST_HYPOTHESES: usize = MOST_ANTENNAS * (MOST_ANTENNAS - 1) / 2 + MOST_ANTENNAS;
-/// Standard deviation of the residual share of power under scatter, for a Rician factor of 6 dB.
-const SCATTER: f64 = 0.15;
+/// Residual share of power by errors of the calibration, in addition to that of the site's scatter.
+const CALIBRATION: f64 = 0.02;
 /// Maximum evidence of one SSB, for or against a hypothesis.
 const MOST_OF_ONE: f64 = 4.0;
 /// Drift of the sums: hypotheses that fit as well as the nominal channels gain no evidence.
@@ -85,6 +85,8 @@ struct Counted {
 pub struct ChannelMonitor {
     elements: usize,
     gains: [Complex64; MAX_ELEMENTS],
+    /// Residual share of power that is expected of one direction.
+    scatter: f64,
     /// Phase factors from one antenna to the next of each direction; empty of an array that is no row.
     steps: Vec<Complex64>,
     hypotheses: Vec<(Hypothesis, f64)>,
@@ -97,8 +99,8 @@ pub struct ChannelMonitor {
 }
 
 impl ChannelMonitor {
-    /// For the array of a vehicle, with this number of radio heads.
-    pub fn new(vehicle: &Vehicle, heads: usize) -> Self {
+    /// For the array of a vehicle at a site, with this number of radio heads.
+    pub fn new(site: &Site, vehicle: &Vehicle, heads: usize) -> Self {
         let elements = usize::from(vehicle.array.elements);
         let mut gains = [Complex64::ONE; MAX_ELEMENTS];
         for (gain, known) in gains.iter_mut().zip(vehicle.array.calibration()) {
@@ -121,6 +123,7 @@ impl ChannelMonitor {
         Self {
             elements,
             gains,
+            scatter: CALIBRATION + 1.0 / (1.0 + 10f64.powf(0.1 * site.rician_k_db)),
             steps,
             hypotheses,
             dead: [0.0; MAX_ELEMENTS],
@@ -217,7 +220,7 @@ impl ChannelMonitor {
         let nominal = self.residual(values, total, None);
         if let Some((hypothesis, evidence)) = self.accepted {
             let corrected = self.residual(values, total, Some(hypothesis));
-            let evidence = cumulated(evidence, corrected - nominal);
+            let evidence = cumulated(evidence, (corrected - nominal) / self.scatter);
             self.accepted = Some((hypothesis, evidence));
             if evidence >= EVIDENCE {
                 self.accepted = None;
@@ -231,7 +234,7 @@ impl ChannelMonitor {
                 continue;
             };
             let corrected = self.residual(values, total, Some(hypothesis));
-            let evidence = cumulated(evidence, nominal - corrected);
+            let evidence = cumulated(evidence, (nominal - corrected) / self.scatter);
             if let Some((_, slot)) = self.hypotheses.get_mut(place) {
                 *slot = evidence;
             }
@@ -280,8 +283,8 @@ impl ChannelMonitor {
     }
 }
 
-/// A cumulative sum after another difference of residual shares.
+/// A cumulative sum after another difference of residuals, as a multiple of the expected one.
 fn cumulated(evidence: f64, difference: f64) -> f64 {
-    let one = (difference / SCATTER).clamp(-MOST_OF_ONE, MOST_OF_ONE);
+    let one = difference.clamp(-MOST_OF_ONE, MOST_OF_ONE);
     (evidence + one - DRIFT).max(0.0)
 }

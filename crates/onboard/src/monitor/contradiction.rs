@@ -1,7 +1,7 @@
 //! Distance and speed of the odometry, compared with each other.
 //!
 //! Both come from the same wheels. The difference of the distance's step and the integrated speed is summed
-//! with exponential forgetting; it exceeds half of the distance driven only if one of them is wrong.
+//! with exponential forgetting; it exceeds a quarter of the distance driven only if one of them is wrong.
 
 use crate::observation::OdometrySample;
 
@@ -10,8 +10,8 @@ const MEMORY_S: f64 = 1.0;
 /// Minimum summed difference of a fault, in metres: encoder steps and rounded speeds stay below it.
 const LEAST_M: f64 = 0.15;
 /// Minimum summed difference of a fault, as a share of the summed distance. A wrong scale or noise stays below
-/// it; a frozen value has 1, a reversed one 2.
-const SHARE: f64 = 0.5;
+/// it; a frozen value has 1, half of the speed 0.5.
+const SHARE: f64 = 0.25;
 /// Maximum difference that one sample adds where the speed is zero, in metres: a counter that is reset once
 /// is no fault, because the localizer uses the speed instead.
 const MOST_OF_ONE_M: f64 = 0.1;

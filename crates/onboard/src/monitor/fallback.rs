@@ -25,8 +25,8 @@ const NOISE_RAD_PER_SQRT_S: f64 = 0.3;
 const SPEED_S: f64 = 0.5;
 /// Standard deviations of the protection level during a fault.
 const LEVEL_SIGMAS: f64 = 5.0;
-/// Margin of the standard deviations with which the localizer starts after the fault.
-const MARGIN: f64 = 2.0;
+/// Ratio of the localizer's standard deviations after the fault to those of the filter without odometry.
+const MARGIN: f64 = 1.0;
 /// Minimum standard deviations of that start, in metres and radians.
 const LEAST_STD_M: f64 = 0.3;
 const LEAST_STD_RAD: f64 = 0.05;

@@ -7,7 +7,7 @@ use serde::Serialize;
 /// Maximum number of simultaneous faults.
 const MAX_FAULTS: usize = 8;
 
-/// A fault of a sensor of the vehicle, or of a radio head's identity.
+/// A fault of a sensor of the vehicle.
 #[derive(Debug, Clone, Copy, PartialEq, Eq, Hash, Serialize)]
 #[serde(rename_all = "snake_case", tag = "fault")]
 pub enum Fault {
@@ -32,11 +32,6 @@ pub enum Fault {
         /// Numbers of the channels, from 0, in increasing order.
         channels: [u8; 2],
     },
-    /// Two radio heads send the same PCI.
-    DuplicatePci {
-        /// The PCI.
-        pci: u16,
-    },
 }
 
 /// The part that a fault belongs to.
@@ -47,8 +42,6 @@ pub enum FaultSource {
     Odometry,
     /// A receive channel, by its number from 0.
     Channel(u8),
-    /// A radio head, by its PCI.
-    Pci(u16),
 }
 
 impl Fault {
@@ -61,7 +54,6 @@ impl Fault {
             Self::DeadChannel { .. } => "dead_channel",
             Self::InvertedChannel { .. } => "inverted_channel",
             Self::ExchangedChannels { .. } => "exchanged_channels",
-            Self::DuplicatePci { .. } => "duplicate_pci",
         }
     }
 
@@ -77,11 +69,10 @@ impl Fault {
             Self::ExchangedChannels {
                 channels: [channel, _],
             } => FaultSource::Channel(channel),
-            Self::DuplicatePci { pci } => FaultSource::Pci(pci),
         }
     }
 
-    /// Number of the channels, or the PCI, for metrics; empty for the odometry.
+    /// Numbers of the channels for metrics; empty for the odometry.
     pub fn subject(self) -> String {
         match self {
             Self::ExchangedChannels {
@@ -90,7 +81,6 @@ impl Fault {
             other => match other.source() {
                 FaultSource::Odometry => String::new(),
                 FaultSource::Channel(channel) => channel.to_string(),
-                FaultSource::Pci(pci) => pci.to_string(),
             },
         }
     }
@@ -101,9 +91,6 @@ impl Fault {
             FaultSource::Odometry => "stop; check the odometer and the source of the odometry",
             FaultSource::Channel(_) => {
                 "stop; check the cables from the antennas to the receiver, and samples.stream.antennas"
-            }
-            FaultSource::Pci(_) => {
-                "check the PCIs of the radio heads in the network and in the site"
             }
         }
     }
@@ -129,7 +116,6 @@ impl fmt::Display for Fault {
             Self::ExchangedChannels {
                 channels: [first, second],
             } => write!(f, "receive channels {first} and {second} are exchanged"),
-            Self::DuplicatePci { pci } => write!(f, "two radio heads send PCI {pci}"),
         }
     }
 }
@@ -228,8 +214,8 @@ mod tests {
         assert_eq!(faults.iter().map(|it| it.fault).collect::<Vec<_>>(), [dead]);
         faults.end(dead);
         assert!(faults.is_empty() && faults == ActiveFaults::default());
-        for pci in 0..20 {
-            faults.begin(Fault::DuplicatePci { pci }, 0.0);
+        for channel in 0..20 {
+            faults.begin(Fault::DeadChannel { channel }, 0.0);
         }
         assert_eq!(faults.iter().count(), MAX_FAULTS);
     }

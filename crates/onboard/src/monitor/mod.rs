@@ -1,4 +1,4 @@
-//! Monitors of odometry, receive channels and radio heads: they identify faults that no filter can tolerate.
+//! Monitors of odometry and receive channels: they identify faults that no filter can tolerate.
 //!
 //! [`Onboard`](crate::Onboard) runs them where the vehicle has an integrity monitor. A fault of the odometry makes the
 //! pose unavailable until the odometry agrees with the angles again.
@@ -50,7 +50,7 @@ impl Monitors {
         Self {
             contradiction: Contradiction::default(),
             motion: MotionMonitor::new(Sight::new(vehicle), heads),
-            channels: ChannelMonitor::new(vehicle, heads),
+            channels: ChannelMonitor::new(site, vehicle, heads),
             distance_m: 0.0,
             fallback: Fallback::new(site, vehicle),
             faults: ActiveFaults::default(),
