@@ -108,7 +108,7 @@ fn errors_of_reliable_angles_follow_their_standard_deviation() {
 #[test]
 fn a_circle_of_antennas_is_as_consistent_as_a_row() {
     let array = ArbitraryArray::<5>::circular(0.4).unwrap();
-    let finder = DirectionFinder::new(array.clone(), [0.0, 0.0]).unwrap();
+    let finder = DirectionFinder::new(array, [0.0, 0.0]).unwrap();
     let mut random = Random::new(3);
     for count in [1, 2, 5] {
         let mut errors = Errors::default();
