@@ -288,6 +288,11 @@ fn estimate(snapshots: &Bound<'_, PyAny>, request: &Request<'_, '_>) -> PyResult
         SampleArray::Double(array) => request.run::<f64, N>(py, &samples, slice(array)?),
         SampleArray::Single(array) => request.run::<f32, N>(py, &samples, slice(array)?),
     })?;
+    let estimates = if samples.are_phases()? {
+        estimates.map(aoa::AngleEstimate::of_phases)
+    } else {
+        estimates
+    };
     Ok(AngleEstimate { estimates })
 }
 

@@ -39,6 +39,8 @@ use crate::recording::{Recording, RecordingError};
 ///     Physical cell identity, 0 to 1007.
 /// ssb_index : int
 ///     Index of the SSB in its burst, that is its beam.
+/// ssb_index_is_guess : bool
+///     Whether `ssb_index` comes from the DM-RS and the more probable `lmax` because the PBCH was not decoded.
 /// lmax : int or None
 ///     SSB indices that the cell has, 4, 8 or 64, where frequency or PBCH tell.
 /// half_frame : int or None
@@ -92,6 +94,7 @@ use crate::recording::{Recording, RecordingError};
 pub struct Cell {
     pci: u16,
     ssb_index: u8,
+    ssb_index_is_guess: bool,
     lmax: Option<u8>,
     half_frame: Option<u8>,
     sfn: Option<u16>,
@@ -128,6 +131,7 @@ macro_rules! cell {
         Cell {
             pci: ssb.pci.get(),
             ssb_index: ssb.ssb_index,
+            ssb_index_is_guess: ssb.payload.is_none(),
             lmax: ssb.lmax.map(Lmax::count),
             half_frame: ssb.half_frame.map(u8::from),
             sfn: ssb.payload.map(|payload| payload.sfn()),
@@ -237,9 +241,14 @@ fn array_setup(
 impl Cell {
     fn __repr__(&self) -> String {
         format!(
-            "Cell(pci={}, ssb_index={}, sfn={}, snr_db={:.1}, sample_start={:.2})",
+            "Cell(pci={}, ssb_index={}{}, sfn={}, snr_db={:.1}, sample_start={:.2})",
             self.pci,
             self.ssb_index,
+            if self.ssb_index_is_guess {
+                " (guess)"
+            } else {
+                ""
+            },
             self.sfn
                 .map_or_else(|| "None".to_owned(), |sfn| sfn.to_string()),
             self.snr_db,
@@ -255,7 +264,7 @@ impl Cell {
 /// cells : list of Cell
 ///     The SSBs in order of time.
 /// faults : list of str
-///     What is wrong with single channels: clipped, silent, exchanged.
+///     What is wrong with the channels: clipped, silent, exchanged; DC offset and tones, which were removed.
 /// looked : list of str
 ///     Where was looked: spacings, frequencies, how much of the recording.
 #[pyclass(frozen, get_all, module = "access_av._core.nr")]
@@ -360,8 +369,8 @@ pub fn scan(
 ///
 /// Returns
 /// -------
-/// list of Cell
-///     The SSBs in order of time.
+/// Scan
+///     `access_av.nr.search` makes a list of its cells.
 ///
 /// Examples
 /// --------
@@ -384,7 +393,7 @@ pub fn search(
     spacing_wavelengths: f64,
     places_wavelengths: Option<Vec<[f64; 2]>>,
     calibration: Option<Vec<Complex64>>,
-) -> PyResult<Vec<Py<Cell>>> {
+) -> PyResult<Scan> {
     let samples = complex_samples(samples)?;
     let settings = ScanSettings {
         ssb_freq_hz,
@@ -402,7 +411,7 @@ pub fn search(
     let found = py
         .detach(|| recording::scan::scan(source, &settings))
         .map_err(scan_error)?;
-    Scan::of(py, &found).map(|scan| scan.cells)
+    Scan::of(py, &found)
 }
 
 fn subcarrier_spacing(khz: u32) -> PyResult<SubcarrierSpacing> {

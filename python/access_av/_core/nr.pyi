@@ -19,6 +19,9 @@ class Cell:
     def ssb_index(self) -> int:
         """Index of the SSB in its burst, that is its beam."""
     @property
+    def ssb_index_is_guess(self) -> bool:
+        """Whether the PBCH was not decoded."""
+    @property
     def lmax(self) -> int | None:
         """SSB indices that the cell has, 4, 8 or 64, where frequency or PBCH tell."""
     @property
@@ -112,7 +115,7 @@ class Scan:
         """The SSBs in order of time."""
     @property
     def faults(self) -> list[str]:
-        """What is wrong with single channels."""
+        """What is wrong with the channels, and removed tones."""
     @property
     def looked(self) -> list[str]:
         """Where was looked."""
@@ -142,6 +145,10 @@ class Receiver:
     def finish(self) -> list[Cell]:
         """SSBs held back; the stream ends."""
 
+    @property
+    def tones(self) -> list[tuple[float, float]]:
+        """Tones that are removed now: frequency in Hz, power in dBFS."""
+
 @final
 class Searcher:
     """Search for the SSBs of one frequency, plans and buffers kept from call to call."""
@@ -160,6 +167,10 @@ class Searcher:
     ) -> Searcher: ...
     def search(self, samples: ArrayLike) -> list[Cell]:
         """Every SSB in samples, `(samples,)` or `(antennas, samples)`, in order of time."""
+
+    @property
+    def tones(self) -> list[tuple[float, float]]:
+        """Tones removed in the last search: frequency in Hz, power in dBFS."""
 
 def scan(
     recording: Recording,
@@ -185,7 +196,7 @@ def search(
     spacing_wavelengths: float = 0.5,
     places_wavelengths: Sequence[tuple[float, float]] | None = None,
     calibration: Sequence[complex] | None = None,
-) -> list[Cell]:
+) -> Scan:
     """Find every SSB in samples, `(samples,)` or `(antennas, samples)`, in order of time."""
 
 def build_burst(

@@ -23,14 +23,18 @@ import json
 from typing import TYPE_CHECKING, Any
 
 from access_av._core import Recording
-from access_av._core.nr import Cell, Receiver, Scan, Searcher, build_burst, scan, search
+from access_av._core.nr import Cell, Receiver, Scan, Searcher, build_burst, scan
+from access_av._core.nr import search as _search
 from access_av.signal.recorded_angles import stated_places, stated_spacing, stated_truths
 
 if TYPE_CHECKING:
-    from collections.abc import Sequence
+    from collections.abc import Iterable, Sequence
+
+    from numpy.typing import ArrayLike
 
 __all__ = [
     "Cell",
+    "Cells",
     "Receiver",
     "Recording",
     "Scan",
@@ -41,6 +45,65 @@ __all__ = [
     "scan_as_recorded",
     "search",
 ]
+
+
+class Cells(list[Cell]):
+    """SSBs in order of time.
+
+    Attributes
+    ----------
+    faults
+        Faults of the channels, and the DC offset and tones that were removed before the search.
+    """
+
+    faults: list[str]
+
+    def __init__(self, cells: Iterable[Cell], faults: Iterable[str] = ()) -> None:
+        super().__init__(cells)
+        self.faults = list(faults)
+
+
+def search(
+    samples: ArrayLike,
+    sample_rate_hz: float,
+    *,
+    centre_frequency_hz: float,
+    **settings: Any,
+) -> Cells:
+    """Find every SSB in samples. A `Searcher` keeps its plans between calls.
+
+    Parameters
+    ----------
+    samples
+        Complex samples, ``(samples,)`` or ``(antennas, samples)``.
+    sample_rate_hz
+        Any usual rate that holds an SSB: 3.84 Msps at least.
+    centre_frequency_hz
+        Frequency that stands at 0 Hz in the samples.
+    **settings
+        ``ssb_freq_hz``, ``scs_khz``, ``cfo_ppm``, ``spacing_wavelengths``, ``places_wavelengths``
+        and ``calibration`` of :func:`scan`.
+
+    Raises
+    ------
+    RecordingError
+        A rate, band or length that cannot be searched; samples that are not finite.
+
+    Examples
+    --------
+    >>> import numpy as np
+    >>> from access_av import nr
+    >>> carrier = {"centre_frequency_hz": 3.7008e9, "ssb_freq_hz": 3.7008e9}
+    >>> burst = nr.build_burst(42, ssb_indices=[1], sfn=7, ssb_freq_hz=3.7008e9)
+    >>> noise = np.random.default_rng(1).normal(scale=1e-3, size=(burst.size, 2)) @ [1, 1j]
+    >>> cells = nr.search(burst + noise + 0.1, 7.68e6, **carrier)
+    >>> [(cell.pci, cell.ssb_index, cell.sfn) for cell in cells]
+    [(42, 1, 7)]
+    >>> cells.faults
+    ['DC offset of -20.0 dBFS: removed']
+    """
+    found = _search(samples, sample_rate_hz, centre_frequency_hz=centre_frequency_hz, **settings)
+    return Cells(found.cells, found.faults)
 
 
 def scan_as_recorded(
@@ -116,6 +179,7 @@ def record(cell: Cell) -> dict[str, Any]:
     values: dict[str, Any] = {
         "pci": cell.pci,
         "ssb_index": cell.ssb_index,
+        "ssb_index_is_guess": cell.ssb_index_is_guess,
         "half_frame": cell.half_frame,
         "sfn": cell.sfn,
         "cfo_hz": round(cell.cfo_hz, 2),

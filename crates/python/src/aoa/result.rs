@@ -25,6 +25,17 @@ impl<T> Estimates<T> {
         }
     }
 
+    /// Each of them changed.
+    pub(super) fn map(self, change: impl Fn(T) -> T) -> Self {
+        match self {
+            Self::One(value) => Self::One(change(value)),
+            Self::Many { values, shape } => Self::Many {
+                values: values.into_iter().map(change).collect(),
+                shape,
+            },
+        }
+    }
+
     pub(super) fn as_slice(&self) -> &[T] {
         match self {
             Self::One(value) => std::slice::from_ref(value),

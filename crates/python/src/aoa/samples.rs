@@ -85,6 +85,14 @@ impl<'py> Samples<'py> {
         })
     }
 
+    /// Whether all samples have one modulus, up to rounding: those of a receiver that gives phases only.
+    pub(super) fn are_phases(&self) -> PyResult<bool> {
+        Ok(match &self.array {
+            SampleArray::Double(array) => have_one_modulus(slice(array)?, 1e-12),
+            SampleArray::Single(array) => have_one_modulus(slice(array)?, 1e-6),
+        })
+    }
+
     /// The batch axis, if any, and these axes.
     pub(super) fn shape(&self, axes: impl IntoIterator<Item = usize>) -> Vec<usize> {
         self.batch.into_iter().chain(axes).collect()
@@ -152,6 +160,17 @@ impl<const N: usize> Item<'_, N> {
         };
         (0..count).map(snapshot).collect()
     }
+}
+
+/// Whether the powers of all samples agree, relative.
+fn have_one_modulus<T: Real>(samples: &[Complex<T>], tolerance: f64) -> bool {
+    let power = |sample: &Complex<T>| {
+        let (re, im): (f64, f64) = (sample.re.into(), sample.im.into());
+        re * re + im * im
+    };
+    let first = samples.first().map_or(0.0, power);
+    let agrees = |sample| (power(sample) - first).abs() <= tolerance * first;
+    samples.len() > 1 && samples.iter().all(agrees)
 }
 
 /// Row-major samples as a slice.

@@ -141,6 +141,19 @@ impl Receiver {
         })
     }
 
+    /// DC offset and tones that are removed now, the strongest first: pairs of frequency in Hz and power in dBFS.
+    #[getter]
+    fn tones(&self, py: Python<'_>) -> Vec<(f64, f64)> {
+        py.detach(|| {
+            let receiver = self.core.lock().unwrap_or_else(PoisonError::into_inner);
+            let ssb_freq_hz = receiver.config().search.ssb_freq_hz.unwrap_or_default();
+            let tones = receiver.tones().into_iter();
+            tones
+                .map(|tone| (ssb_freq_hz + tone.frequency_hz, tone.power_dbfs))
+                .collect()
+        })
+    }
+
     fn __repr__(&self, py: Python<'_>) -> String {
         py.detach(|| {
             let receiver = self.core.lock().unwrap_or_else(PoisonError::into_inner);

@@ -111,6 +111,19 @@ impl Searcher {
         found.into_iter().map(|cell| Py::new(py, cell)).collect()
     }
 
+    /// DC offset and tones that were removed in the last search: pairs of frequency in Hz and power in dBFS.
+    #[getter]
+    fn tones(&self, py: Python<'_>) -> Vec<(f64, f64)> {
+        py.detach(|| {
+            let search = self.0.lock().unwrap_or_else(PoisonError::into_inner);
+            let centre_hz = search.config().centre_frequency_hz;
+            let tones = search.tones().iter();
+            tones
+                .map(|tone| (centre_hz + tone.frequency_hz, tone.power_dbfs))
+                .collect()
+        })
+    }
+
     fn __repr__(&self, py: Python<'_>) -> String {
         py.detach(|| {
             let search = self.0.lock().unwrap_or_else(PoisonError::into_inner);
