@@ -29,7 +29,7 @@ SLOW = {
     *("test_codesign", "test_outlook", "test_readings", "test_second_implementation"),
     *("test_headline", "test_unknowns", "test_cli", "test_columns"),
     *("test_node", "test_radio", "test_aarch64", "test_live", "test_off_the_road"),
-    "test_fault_campaign",
+    *("test_fault_campaign", "test_manifold"),
     *("test_study", "test_plant_guide"),
 }
 

@@ -9,7 +9,10 @@ smoothed channel estimate says the same several times over, and goes through `wh
 Every estimate says what it is worth. ``p_value`` tests whether plane waves in white noise explain
 what was received; where they do not, ``verdict`` says whether reflections (or antennas unlike those
 described) or another source are the cause, and the standard deviations hold what that displaces,
-as far as the residual shows it. A model that holds is doubted once in a hundred times.
+as far as the residual shows it. A model that holds is doubted once in a hundred times. With few
+snapshots the noise itself is uncertain: standard deviations allow for that, and with fewer than
+eight degrees of freedom (one snapshot of up to five antennas, two of two or three) no angle is
+reliable. Samples of one modulus are taken for phases, in which half of the noise is missing.
 
 Examples
 --------
@@ -46,6 +49,8 @@ from access_av._core.aoa import (
     root_music,
     spectrum,
 )
+from access_av.signal.manifold import ManifoldFit, fit_manifold
+from access_av.signal.switched import SwitchedEstimate, switched_direction
 
 if TYPE_CHECKING:
     from numpy.typing import NDArray
@@ -53,7 +58,9 @@ if TYPE_CHECKING:
 __all__ = [
     "AngleEstimate",
     "DirectionEstimate",
+    "ManifoldFit",
     "MeasuredManifold",
+    "SwitchedEstimate",
     "calibrate",
     "covariance",
     "crb_rad",
@@ -62,12 +69,14 @@ __all__ = [
     "direction_spectrum",
     "esprit",
     "estimate_sources",
+    "fit_manifold",
     "forward_backward",
     "maximum_likelihood",
     "maximum_likelihood_pilots",
     "music",
     "root_music",
     "spectrum",
+    "switched_direction",
     "whiten",
 ]
 
