@@ -390,9 +390,9 @@ def error_m(poses: pl.DataFrame, truth: str | Path | pl.DataFrame) -> pl.DataFra
         raise InputError(f"{which}: holds no pose")
     both = _between(known, true)
     if both.height < MIN_COMPARED * known.height:
-        share = both.height / max(known.height, 1)
+        covered = both.height / max(known.height, 1)
         raise InputError(
-            f"{which}: covers {share:.0%} of the drive, at least {MIN_COMPARED:.0%} is needed; "
+            f"{which}: covers {covered:.0%} of the drive, at least {MIN_COMPARED:.0%} is needed; "
             f"{_why_apart(known, true)}"
         )
     span = pl.col("t1") - pl.col("t0")
@@ -443,10 +443,13 @@ def _check_frame(which: str, known: pl.DataFrame, true: pl.DataFrame, errors: pl
         )
 
     def extent_m(of: pl.DataFrame) -> float:
-        spans = [float(of[it].max() - of[it].min()) for it in ("x_m", "y_m")]  # type: ignore[operator]
+        places = of.select("x_m", "y_m").to_numpy()
+        spans = places.max(axis=0) - places.min(axis=0)
         return math.hypot(*spans)
 
     within = true.filter(pl.col("time_s").is_between(known["time_s"][0], known["time_s"][-1]))
+    if within.is_empty():
+        return
     drive_m, true_m = extent_m(known), extent_m(within)
     if drive_m > MIN_EXTENT_OF_DRIVE_M and 0.0 < true_m < MIN_EXTENT * drive_m:
         raise InputError(
