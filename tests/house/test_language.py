@@ -32,6 +32,7 @@ PLAIN = [
     "docs/paper.md",
     "docs/profile.md",
     "docs/python.md",
+    "docs/ray-tracing.md",
     "docs/site/*.py",
     "tests/house/test_language.py",
 ]
