@@ -56,6 +56,7 @@ pub struct ArrivalClock {
 
 /// An interruption that may still turn out to be a delay.
 #[derive(Debug, Clone, Copy)]
+#[allow(clippy::struct_field_names, reason = "all fields are in seconds")]
 struct Interruption {
     decided_s: f64,
     lost_s: f64,

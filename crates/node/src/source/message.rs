@@ -78,7 +78,7 @@ pub fn parse(line: &[u8]) -> Result<Option<Input>, String> {
         return Err(format!("the key `type` is missing; it must be {TYPES}"));
     };
     Ok(Some(match kind.as_str() {
-        Some("odometry") => odometry(read(message)?),
+        Some("odometry") => odometry(&read(message)?),
         Some("angle") => angle(&read(message)?),
         Some("set-pose") => set_pose(&read(message)?),
         Some("reset") => {
@@ -104,7 +104,7 @@ fn read<T: DeserializeOwned>(message: Map<String, Value>) -> Result<T, String> {
     })
 }
 
-fn odometry(message: Odometry) -> Input {
+fn odometry(message: &Odometry) -> Input {
     let time_s = message.time_s.unwrap_or_else(unix_s);
     let sample = OdometrySample::of_speed(time_s, message.speed_mps, message.yaw_rate_radps);
     Input::Odometry(OdometrySample {
