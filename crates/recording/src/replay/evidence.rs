@@ -22,8 +22,8 @@ const INDEPENDENT_S: f64 = 1.0;
 /// Squared Mahalanobis distance of an angle that fits: within three standard deviations.
 const FITS: f64 = 9.0;
 
-/// Squared Mahalanobis distance beyond which an angle is as good as any.
-const FARTHEST: f64 = 16.0;
+/// Relative log-likelihood of an angle that the filter cannot use, as of an outlier.
+const UNUSABLE: f64 = -8.0;
 
 /// A radio head by its PCI and SSB index.
 pub type HeadId = (u16, u8);
@@ -89,7 +89,8 @@ impl Evidence {
         for (Step { met, .. }, logged) in steps.iter().zip(angles.iter()) {
             let sigma_rad = with_phase(logged, &measurand).measured.phase_sigma_rad;
             evidence.log_likelihood += log_likelihood(met.as_ref(), sigma_rad);
-            evidence.relative_log_likelihood += relative_log_likelihood(met.as_ref());
+            let relative = met.as_ref().map(|it| it.relative_log_likelihood);
+            evidence.relative_log_likelihood += relative.unwrap_or(UNUSABLE);
             let misfits = |met: &Met| met.innovation.mahalanobis2() > FITS;
             let head = evidence.heads.entry(head_of(logged)).or_default();
             for count in [&mut evidence.all, head] {
@@ -107,14 +108,6 @@ impl Evidence {
 fn log_likelihood(met: Option<&Met>, sigma_rad: f64) -> f64 {
     let density = met.map_or(0.0, |met| met.innovation.density());
     (sigma_rad * with_outliers(density, OUTLIERS)).ln()
-}
-
-/// One that is far off counts as one at the edge.
-fn relative_log_likelihood(met: Option<&Met>) -> f64 {
-    met.map_or(-0.5 * FARTHEST, |Met { innovation, .. }| {
-        let growth = innovation.variance / innovation.measurement_variance;
-        -0.5 * (innovation.mahalanobis2().min(FARTHEST) + growth.ln())
-    })
 }
 
 /// Share of the angles that count as independent.

@@ -19,6 +19,8 @@ use crate::odometry::OdometryLog;
 pub struct Met {
     /// Of the electrical angle (rad).
     pub innovation: Innovation,
+    /// Log-likelihood relative to an angle that is predicted exactly; see [`Ekf::relative_log_likelihood`].
+    pub relative_log_likelihood: f64,
     /// Whether the localizer used it.
     pub used: bool,
 }
@@ -128,14 +130,18 @@ pub fn replay_angles(
         };
         let sends = |head: &&RadioHead| head.sends(logged.ssb.pci, logged.ssb.ssb_index);
         if let Some(head) = heads.iter().find(sends) {
-            let innovation = ekf.and_then(|ekf| ekf.innovation(head, &measured));
+            let innovation = ekf.and_then(|ekf| {
+                let relative = ekf.relative_log_likelihood(head, &measured);
+                Some((ekf.innovation(head, &measured)?, relative))
+            });
             let wanted = used.is_none_or(|used| used.get(index).copied().unwrap_or(false));
             let accepted = wanted
                 && (localizer.update(head, &measured))
                     .map_err(ReplayError::Custom)?
                     .accepted;
-            step.met = innovation.map(|innovation| Met {
+            step.met = innovation.map(|(innovation, relative_log_likelihood)| Met {
                 innovation,
+                relative_log_likelihood,
                 used: accepted,
             });
         }

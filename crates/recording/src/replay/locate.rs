@@ -5,6 +5,7 @@ use std::collections::BTreeMap;
 
 use onboard::geometry::Pose;
 use onboard::localize::UpdateReason;
+use onboard::localize::ekf::EkfConfig;
 use onboard::observation::SensedSsb;
 use onboard::receive::ReceiverConfig;
 use onboard::settings::{IntegritySettings, Site, Vehicle, WakeUpSettings};
@@ -108,7 +109,12 @@ pub fn locate_recording(
     }
     let mut heard: Vec<LoggedAngle> = replay.executions().iter().filter_map(as_logged).collect();
     let mut heard_by = in_time(&vehicle);
-    if let Some(late) = lateness(&as_given(site, &heard_by, odometry, &heard))? {
+    let late = if defines_times(recording) {
+        None
+    } else {
+        lateness(&as_given(site, &heard_by, odometry, &heard))?
+    };
+    if let Some(late) = late {
         heard = earlier(&heard, late.found_s);
         vehicle.receiver.lateness_std_s = Some(late.left_std_s);
         heard_by = in_time(&vehicle);
@@ -131,6 +137,13 @@ pub fn locate_recording(
     }
     explain(&mut replay, site, &heard_by, odometry, &heard)?;
     finish(replay, site, &vehicle, start, odometry, smooth)
+}
+
+/// Whether a recording defines the times of its samples, so that no time offset is searched for.
+fn defines_times(recording: &Recording) -> bool {
+    let captures = &recording.metadata().captures;
+    let keys = ["core:global_index", "core:datetime"];
+    (captures.iter()).any(|it| keys.iter().any(|key| it.other.contains_key(*key)))
 }
 
 /// Takes in the rest of the odometry, and says what is wrong with the drive as it was given.
@@ -212,10 +225,13 @@ fn look_back(
     odometry: &OdometryLog,
     executions: &[Execution],
 ) -> Result<Vec<LocatedPose>, ReplayError> {
-    let unguarded = Vehicle {
+    let mut unguarded = Vehicle {
         integrity: Some(IntegritySettings::off()),
         ..as_chosen(&in_time(vehicle))
     };
+    // The smoothed filter estimates a bias if the monitored one did.
+    let bias_probability = EkfConfig::new(site, vehicle).bias_probability;
+    unguarded.receiver.phase_bias_probability = Some(bias_probability);
     let mut mistrusted_until_s = BTreeMap::new();
     for execution in executions {
         if execution.verdict.reason == UpdateReason::Excluded {

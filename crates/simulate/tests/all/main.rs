@@ -10,6 +10,7 @@ mod allocation;
 mod arrays;
 mod bad_drives;
 mod bad_scenarios;
+mod clock;
 mod common;
 #[path = "../../../nr-ssb/tests/all/counting/mod.rs"]
 mod counting;

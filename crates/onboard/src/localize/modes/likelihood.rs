@@ -5,12 +5,23 @@ use std::f64::consts::TAU;
 use crate::gaussian::with_outliers;
 use crate::localize::ekf::{Ekf, PredictedMeasurement};
 use crate::localize::output::UpdateReason;
+use crate::observation::AngleMeasurement;
+use crate::radio_head::RadioHead;
+
+impl Ekf {
+    /// Returns the log-likelihood of an angle relative to an angle with its own noise alone that is predicted exactly. With
+    /// estimated biases the likelihood contains them, and angles within 2 m of travel count by their independent share.
+    pub fn relative_log_likelihood(&self, head: &RadioHead, measured: &AngleMeasurement) -> f64 {
+        log_likelihood(self, &self.predict_measurement(head, measured))
+    }
+}
 
 /// Share of the angles that are outliers, from any direction, where scatter makes no more of them.
 const OUTLIERS: f64 = 2e-3;
 
-/// Odds to the nominal mode from which on a mode leads: the pose of two about as probable would jump to and fro.
-pub(super) const LEAST_ODDS: f64 = 10.0;
+/// Odds to the nominal mode from which on a mode is selected. The level covers every hypothesis, selected or not; a
+/// selection at lower odds moves the position back and forth and costs availability (K = 5 dB: 91 instead of 94 %).
+pub(super) const LEAST_ODDS: f64 = 100.0;
 
 /// Logarithm of a likelihood ratio at which a sequential test is decided: wrong once in three million (e⁻¹⁵; Wald 1945),
 /// as a fault of a radio head has it. No mode's grows beyond: what more evidence there is must be forgotten some time.
