@@ -10,5 +10,6 @@ mod random_drives;
 mod receiver;
 mod recovery;
 mod settings;
+mod starts;
 mod tracker;
 mod yaw_rate;

@@ -38,8 +38,10 @@ pub(super) struct Evidence {
     pub is_found: bool,
     /// It is of a start that was given,
     pub is_of_start: bool,
-    /// against which the angles speak.
+    /// which is less probable than another start,
     pub doubts_start: bool,
+    /// or of which the search has found the reported position.
+    pub agrees: bool,
     /// No odometry since the search is reported: before anything moves the covariance covers both.
     pub is_just_reported: bool,
     /// Enough way was driven for a find; a long one.
@@ -98,6 +100,8 @@ impl Phase {
                 }
             }
             Self::Relocalizing { .. } if by.is_just_reported => Transition::Stay,
+            // Filter and search may have come to the same position, whatever the angles were by which they did.
+            Self::Relocalizing { .. } if by.agrees => Transition::End { rests: true },
             Self::Relocalizing { .. } if is_ahead && !by.has_moved => Transition::Stay,
             Self::Relocalizing { .. } if is_ahead && by.is_found => Transition::TakeOver,
             // A start that is in doubt has its search go on until either is certain.
@@ -128,6 +132,7 @@ mod tests {
         is_found: false,
         is_of_start: false,
         doubts_start: false,
+        agrees: false,
         is_just_reported: false,
         has_moved: false,
         has_moved_far: false,
@@ -234,6 +239,11 @@ mod tests {
                 End { rests: true },
             ),
             (near, NONE, Stay),
+            (
+                wide,
+                ahead(is(|it| (it.agrees, it.doubts_start) = (true, true))),
+                End { rests: true },
+            ),
             (
                 near,
                 is(|it| (it.is_patient, it.is_just_reported) = (true, true)),

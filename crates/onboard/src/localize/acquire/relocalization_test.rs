@@ -86,6 +86,11 @@ impl RelocalizationTest {
         (self.given.as_ref()).is_some_and(|given| self.search.is_at(given))
     }
 
+    /// Whether the search of a given start has found the position of the filter that is reported.
+    pub fn agrees_with(&self, reported: &Ekf) -> bool {
+        self.is_of_start() && self.search.is_at(reported)
+    }
+
     /// Whether it is of a start that is given.
     pub const fn is_of_start(&self) -> bool {
         self.given.is_some()
@@ -158,23 +163,29 @@ impl RelocalizationTest {
         (WRONG_START / (1.0 - WRONG_START)).ln() + self.against_start()
     }
 
-    /// Logarithm of by how much likelier the angles are elsewhere. What speaks for that counts by independent angles.
+    /// Log-likelihood ratio of all other places to the given start. A ratio for other places is tempered: it counts by
+    /// independent angles, and by the misfit of the best place, so that angles that fit nowhere are no evidence.
     fn against_start(&self) -> f64 {
         let ratio = self.search.evidence() - self.of_filter;
         if ratio > 0.0 {
-            ratio * self.independent_share()
+            ratio * self.independent_share() / self.misfit()
         } else {
             ratio
         }
+    }
+
+    /// Mean squared normalised residual of the angles at the best place of the search, at least 1.
+    fn misfit(&self) -> f64 {
+        (-2.0 * self.search.best() / f64::from(self.angles.max(1))).max(1.0)
     }
 
     fn independent_share(&self) -> f64 {
         f64::from(self.independent) / f64::from(self.angles.max(1))
     }
 
-    /// Whether the angles speak against the start that is given.
+    /// Whether another start is more probable than the given one.
     pub fn doubts_start(&self) -> bool {
-        self.is_of_start() && self.against_start() > 0.0
+        self.is_of_start() && self.log_odds() > 0.0
     }
 
     /// The least way to be driven before a find is believed (m).

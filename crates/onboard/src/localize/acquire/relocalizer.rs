@@ -25,7 +25,6 @@ use crate::geometry::Area;
 use crate::localize::ekf::Ekf;
 use crate::localize::integrity::IntegrityMonitor;
 use crate::localize::localizer::{Localizer, Recovered, copy_into};
-use crate::localize::modes::may_mislead;
 use crate::localize::output::{Integrity, IntegrityState, PoseEstimate};
 use crate::localize::output::{OdometryVerdict, UpdateReason, UpdateVerdict};
 use crate::observation::AngleMeasurement;
@@ -118,8 +117,7 @@ impl Solution {
 
     /// Whether angles may be off as if the vehicle were lost.
     fn may_mislead(&self) -> bool {
-        let bare = || may_mislead(self.ekf().config());
-        (self.monitor()).map_or_else(bare, |it| it.bank().may_mislead())
+        (self.monitor()).is_some_and(|it| it.bank().may_mislead())
     }
 
     /// How much more the angles vary than stated, as far as anybody listens to that.
@@ -335,6 +333,7 @@ impl Relocalizer {
             }),
             is_of_start,
             doubts_start: self.doubts_start(),
+            agrees: is(&|it| it.agrees_with(solution.ekf())),
             is_just_reported: is(&|it| it.reported_s == odometry_s),
             has_moved: is(&|it| it.way_m >= it.least_way_m()),
             has_moved_far: is(&|it| it.way_m > LONG_WAY_M),

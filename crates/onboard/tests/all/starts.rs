@@ -1,0 +1,297 @@
+//! Given, wrong and unknown starts of a road vehicle without a road: a correct start stays available, and a wrong start
+//! costs seconds.
+
+use std::f64::consts::{FRAC_PI_2, PI, TAU};
+
+use onboard::geometry::{Point, Pose};
+use onboard::localize::{AngleMeasurement, IntegrityState, built_in};
+use onboard::observation::OdometrySample;
+use onboard::radio_head::RadioHead;
+use onboard::settings::{Shipped, Site, TomlFile, Vehicle};
+use rand::{RngExt, SeedableRng};
+use rand_chacha::ChaCha8Rng;
+use rand_distr::StandardNormal;
+
+/// Standard deviation of the electrical angles (rad) and share of outliers.
+const SIGMA_RAD: f64 = 0.06;
+const OUTLIERS: f64 = 0.03;
+
+/// Odometry every so often (s); angles with every fourth sample.
+const STEP_S: f64 = 0.05;
+
+/// Duration of a drive (s), and speed (m/s).
+const DRIVE_S: f64 = 90.0;
+const SPEED_MPS: f64 = 1.5;
+
+const VEHICLE: &str = "
+name = 'cart'
+top_speed_kmh = 10.0
+[odometer]
+scale_std = 0.005
+noise_m_per_sqrt_m = 0.01
+[gyroscope]
+noise_rad_per_sqrt_s = 0.002
+bias_std_radps = 0.002
+[start]
+position_std_m = 0.3
+heading_std_rad = 0.05
+[receiver]
+phase_bias_share = 0.25
+";
+
+/// A place with radio heads, and a closed path in it: an oval of two straights and two half circles.
+struct Place {
+    heads_m: &'static [[f64; 2]],
+    straight_m: f64,
+    radius_m: f64,
+}
+
+const HALL: Place = Place {
+    heads_m: &[[-25.0, -15.0], [25.0, -15.0], [25.0, 15.0], [-25.0, 15.0]],
+    straight_m: 20.0,
+    radius_m: 6.0,
+};
+
+const ONE_SIDED: Place = Place {
+    heads_m: &[[-25.0, 15.0], [0.0, 17.0], [25.0, 15.0]],
+    straight_m: 20.0,
+    radius_m: 6.0,
+};
+
+const CORRIDOR: Place = Place {
+    heads_m: &[[-55.0, -2.0], [-20.0, 2.5], [20.0, -2.5], [55.0, 2.0]],
+    straight_m: 100.0,
+    radius_m: 1.2,
+};
+
+impl Place {
+    /// Pose after a distance along the path, counter-clockwise from the middle of the lower straight.
+    fn pose(&self, way_m: f64) -> Pose {
+        let half_m = 0.5 * self.straight_m;
+        let bend_m = PI * self.radius_m;
+        let way_m = (way_m + half_m).rem_euclid(2.0 * (self.straight_m + bend_m));
+        let second = way_m >= self.straight_m + bend_m;
+        let along_m = way_m
+            - if second {
+                self.straight_m + bend_m
+            } else {
+                0.0
+            };
+        let (x_m, y_m, heading_rad) = if along_m < self.straight_m {
+            (along_m - half_m, -self.radius_m, 0.0)
+        } else {
+            let turned_rad = (along_m - self.straight_m) / self.radius_m;
+            let (sin, cos) = turned_rad.sin_cos();
+            (
+                half_m + self.radius_m * sin,
+                -self.radius_m * cos,
+                turned_rad,
+            )
+        };
+        let (sign, turn_rad) = if second { (-1.0, PI) } else { (1.0, 0.0) };
+        Pose {
+            x_m: sign * x_m,
+            y_m: sign * y_m,
+            heading_rad: heading_rad + turn_rad,
+        }
+    }
+
+    fn site(&self) -> Site {
+        let heads = self.heads_m.iter().enumerate();
+        let heads = heads.map(|(pci, [x, y])| {
+            format!("[[radio_heads]]\npci = {pci}\nposition_m = [{x:?}, {y:?}, 0.0]\n")
+        });
+        let text =
+            String::from("name = 'place'\nrician_k_db = 200.0\n") + &heads.collect::<String>();
+        Site::from_toml(&text, "place", &Shipped).unwrap()
+    }
+}
+
+/// Result of a drive.
+#[derive(Debug, Default)]
+struct Driven {
+    /// RMS position error (m).
+    rms_m: f64,
+    /// Share of the epochs in each state.
+    ok: f64,
+    unavailable: f64,
+    /// Time in state `ok` with an error above 1.5 m (s).
+    wrong_s: f64,
+    /// Time from which on the error stays below 1.5 m (s).
+    located_s: f64,
+}
+
+/// Drives with the given start, or an unknown one.
+fn drive(place: &Place, seed: u64, given: Option<fn(Pose) -> Pose>) -> Driven {
+    let mut rng = ChaCha8Rng::seed_from_u64(seed);
+    let site = place.site();
+    let mut vehicle = Vehicle::from_toml(VEHICLE, "cart", &Shipped).unwrap();
+    vehicle.start.known = given.is_some();
+    let heads = RadioHead::heard(&site, &vehicle);
+    let lap_m = 2.0 * (place.straight_m + PI * place.radius_m);
+    let start_m = rng.random::<f64>() * lap_m;
+    let truth = place.pose(start_m);
+    let mut normal = move || -> [f64; 2] { [rng.sample(StandardNormal), rng.random()] };
+    let near = Pose {
+        x_m: truth.x_m + 0.3 * normal()[0],
+        y_m: truth.y_m + 0.3 * normal()[0],
+        heading_rad: truth.heading_rad + 0.05 * normal()[0],
+    };
+    let told = given.map_or(Pose::default(), |given| given(near));
+    let mut localizer = built_in(&site, &vehicle, told).unwrap();
+    let scale = 1.0 + 0.005 * normal()[0];
+    let (mut driven, mut way_m, mut read_m) = (Driven::default(), start_m, 0.0);
+    let (mut square, mut epochs) = (0.0, 0.0);
+    let mut before = truth;
+    for step in 1..=(DRIVE_S / STEP_S) as u32 {
+        let time_s = STEP_S * f64::from(step);
+        way_m += SPEED_MPS * STEP_S;
+        let pose = place.pose(way_m);
+        read_m += scale * SPEED_MPS * STEP_S + 0.01 * (SPEED_MPS * STEP_S).sqrt() * normal()[0];
+        let turned_rad = (pose.heading_rad - before.heading_rad + PI).rem_euclid(TAU) - PI;
+        before = pose;
+        let sample = OdometrySample {
+            time_s,
+            distance_m: read_m,
+            speed_mps: SPEED_MPS,
+            yaw_rate_radps: Some(turned_rad / STEP_S + 0.002 * normal()[0] / STEP_S.sqrt()),
+        };
+        localizer.odometry(&sample).unwrap();
+        if step % 4 == 0 {
+            for head in &heads {
+                let bearing_rad = pose.point().bearing_rad(head.position);
+                let [noise, chance] = normal();
+                let mut phase_rad = PI * (bearing_rad - pose.heading_rad).cos() + SIGMA_RAD * noise;
+                if chance < OUTLIERS {
+                    phase_rad = PI * (2.0 * normal()[1] - 1.0);
+                }
+                let measured = AngleMeasurement {
+                    time_s,
+                    phase_rad,
+                    phase_sigma_rad: SIGMA_RAD,
+                    angle_rad: f64::NAN,
+                    snr_db: 20.0,
+                    resolved: true,
+                };
+                localizer.update(head, &measured).unwrap();
+            }
+        }
+        let estimate = localizer.pose(time_s).unwrap();
+        let error_m = Point::distance_m(estimate.pose.point(), pose.point());
+        let state = estimate.integrity.unwrap().state;
+        epochs += 1.0;
+        square += error_m * error_m;
+        driven.ok += f64::from(u8::from(state == IntegrityState::Ok));
+        driven.unavailable += f64::from(u8::from(state == IntegrityState::Unavailable));
+        if error_m > 1.5 {
+            driven.located_s = time_s;
+            driven.wrong_s += STEP_S * f64::from(u8::from(state == IntegrityState::Ok));
+        }
+    }
+    driven.rms_m = f64::sqrt(square / epochs);
+    driven.ok /= epochs;
+    driven.unavailable /= epochs;
+    driven
+}
+
+type Given = (&'static str, Option<fn(Pose) -> Pose>);
+
+const STARTS: [Given; 7] = [
+    ("correct", Some(|it| it)),
+    (
+        "5 m",
+        Some(|it| Pose {
+            x_m: it.x_m + 3.0,
+            y_m: it.y_m + 4.0,
+            ..it
+        }),
+    ),
+    (
+        "10 m",
+        Some(|it| Pose {
+            x_m: it.x_m - 8.0,
+            y_m: it.y_m + 6.0,
+            ..it
+        }),
+    ),
+    (
+        "+90°",
+        Some(|it| Pose {
+            heading_rad: it.heading_rad + FRAC_PI_2,
+            ..it
+        }),
+    ),
+    (
+        "-90°",
+        Some(|it| Pose {
+            heading_rad: it.heading_rad - FRAC_PI_2,
+            ..it
+        }),
+    ),
+    (
+        "mirrored",
+        Some(|it| Pose {
+            y_m: -it.y_m,
+            heading_rad: -it.heading_rad,
+            ..it
+        }),
+    ),
+    ("unknown", None),
+];
+
+#[test]
+#[ignore = "prints a table of minutes; seeds by STARTS_SEEDS"]
+fn table_of_starts() {
+    let seeds: u64 = std::env::var("STARTS_SEEDS").map_or(2, |it| it.parse().unwrap());
+    let only = std::env::var("STARTS_ONLY").unwrap_or_default();
+    for (name, place) in [
+        ("hall", &HALL),
+        ("one-sided", &ONE_SIDED),
+        ("corridor", &CORRIDOR),
+    ] {
+        for (what, given) in STARTS.iter().filter(|it| it.0.contains(&only)) {
+            for seed in 0..seeds {
+                let Driven {
+                    rms_m,
+                    ok,
+                    unavailable,
+                    wrong_s,
+                    located_s,
+                } = drive(place, seed, *given);
+                println!(
+                    "{name:10} {what:9} {seed} RMS {rms_m:6.2} m, ok {:5.1} %, unavailable {:5.1} %, wrong {wrong_s:5.2} s, located {located_s:5.1} s",
+                    100.0 * ok,
+                    100.0 * unavailable
+                );
+            }
+        }
+    }
+}
+
+#[test]
+fn a_correct_start_stays_available() {
+    for (name, place) in [
+        ("hall", &HALL),
+        ("one-sided", &ONE_SIDED),
+        ("corridor", &CORRIDOR),
+    ] {
+        let driven = drive(place, 0, Some(|it| it));
+        assert!(
+            driven.ok >= 0.9 && driven.unavailable == 0.0,
+            "{name}: {driven:?}"
+        );
+        assert!(driven.rms_m < 0.3, "{name}: {driven:?}");
+    }
+}
+
+#[test]
+fn a_mirrored_start_costs_seconds() {
+    let mirrored = STARTS[5].1;
+    for (name, place) in [("hall", &HALL), ("one-sided", &ONE_SIDED)] {
+        let driven = drive(place, 0, mirrored);
+        assert!(
+            driven.located_s <= 30.0 && driven.wrong_s <= 1.0,
+            "{name}: {driven:?}"
+        );
+    }
+}
