@@ -33,19 +33,17 @@ pub struct IntegritySettings {
 #[derive(Debug, Clone, Copy, PartialEq, Serialize, Deserialize, JsonSchema)]
 #[serde(default, deny_unknown_fields)]
 pub struct FaultProbability {
-    /// Of each radio head: moved, spoofed, without line of sight. A tracker does without it. 0.01 if not
-    /// given, and 1e-3 where errors that stay over metres are found while driving
-    /// (`receiver.phase_bias_probability`): what hides a radio head is found there.
+    /// Fault of a radio head: moved or spoofed. Default: 1e-3 where its bias is estimated
+    /// (`receiver.phase_bias_probability`) and two other radio heads exist to separate it from the position; else 0.01.
     #[serde(skip_serializing_if = "Option::is_none")]
     #[schemars(range(min = 1e-9, max = 0.5))]
     pub radio_head: Option<f64>,
-    /// Of the odometer: it slips, each time that the vehicle sets off; that it is noisier than stated is thirty times as
+    /// Of the odometer: it slips, each time that the vehicle sets off; that it is noisier than stated is ninety times as
     /// probable. Trackers that expect it count as probable as the angles leave it.
     #[schemars(range(min = 1e-9, max = 0.5))]
     pub odometer: f64,
-    /// Of all radio heads at once: their plan is off from the map as a whole. A tracker expects it, and counts as
-    /// probable as the angles leave it. Where there is no map they are the frame, and where errors that stay over
-    /// metres are usual nobody watches it.
+    /// Displacement of all radio heads relative to the map. A filter estimates it, and the angles weigh that filter.
+    /// Without a map the radio heads define the frame, and this fault does not exist.
     #[schemars(range(min = 0.0, max = 0.5))]
     pub all_radio_heads: f64,
     /// Of the array: its mounting or its phases. Nobody watches it: it comes off the risk.
@@ -87,10 +85,10 @@ impl IntegritySettings {
 }
 
 impl FaultProbability {
-    /// That of each radio head, where errors that stay are found while driving or are not.
-    pub fn of_radio_head(&self, finds_errors: bool) -> f64 {
+    /// Returns the prior probability of a fault of each radio head, with or without estimated biases.
+    pub fn of_radio_head(&self, estimates_bias: bool) -> f64 {
         self.radio_head
-            .unwrap_or(if finds_errors { 1e-3 } else { 0.01 })
+            .unwrap_or(if estimates_bias { 1e-3 } else { 0.01 })
     }
 }
 

@@ -45,10 +45,10 @@ pub enum HeadingBetween {
 pub struct TrackerSettings {
     /// Whether it takes the road's course from the site, where the site has one.
     pub map: bool,
-    /// Curvature of the path in 1/m (root mean square), where no road tells.
+    /// RMS curvature of the path in 1/m, used where neither a map nor a yaw rate is available.
     #[schemars(range(min = 0.0, max = 10.0))]
     pub curvature_rms_per_m: f64,
-    /// Distance over which the curvature is forgotten, in metres.
+    /// Correlation length of the curvature, in metres.
     #[schemars(range(min = 1e-3, max = 1e6))]
     pub curvature_correlation_m: f64,
     /// How the odometer's scale walks, per root of a metre driven; 0 is a constant scale on a road and
@@ -65,8 +65,9 @@ impl Default for TrackerSettings {
     fn default() -> Self {
         Self {
             map: true,
-            curvature_rms_per_m: 0.001,
-            curvature_correlation_m: 400.0,
+            // Bends with a radius of 20 m (σ), each about as long as its radius: a vehicle in a yard.
+            curvature_rms_per_m: 0.05,
+            curvature_correlation_m: 15.0,
             odometer_scale_walk_per_sqrt_m: 0.0,
             outlier_probability: 1e-4,
         }

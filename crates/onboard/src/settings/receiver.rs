@@ -45,11 +45,9 @@ pub struct ReceiverSettings {
     #[serde(skip_serializing_if = "Option::is_none")]
     #[schemars(range(min = 0.0, max = 1.0))]
     pub phase_bias_share: Option<f64>,
-    /// How probable it is that a radio head's angles are off by an error that stays over metres, as
-    /// reflections make it, before any is heard; it is then found while driving, beside what is stated.
-    /// Below 0.5 only by a tracker beside the guard's own, whose position is told where the angles speak for
-    /// such errors, and is not `ok`. 0.1 if not given, 0.75 for logged angles of which no such error is
-    /// stated, and 0, none is found, on a differential drive.
+    /// Prior probability that the angles of a radio head have a time-correlated bias, as reflections cause it. Every
+    /// filter of the localizer then estimates the bias of each radio head; 0 estimates none. Default: 0.75 on a road
+    /// vehicle, 0 on a differential drive, without integrity monitoring, and for logged angles with a specified bias.
     #[serde(skip_serializing_if = "Option::is_none")]
     #[schemars(range(min = 0.0, max = 1.0))]
     pub phase_bias_probability: Option<f64>,

@@ -132,8 +132,10 @@ clone_in_place! {
         hypotheses: Vec<Hypothesis>,
         /// How many there were at first.
         places: usize,
-        /// Where they are judged by what is stated alone: what is expected of the angles' bias once it is found.
-        as_stated: Option<EkfConfig>,
+        /// Whether a vague place is penalised for what it does not know.
+        is_as_stated: bool,
+        /// Prior probability of a bias that the filter of the found place estimates.
+        bias_probability: f64,
     }
 }
 
@@ -165,16 +167,19 @@ impl GaussianSum {
         if road.is_none() && Self::serves_as_stated(heads) {
             return Self::as_stated(&config, heads);
         }
-        Self::new(config, road, either_direction, heads)
+        Self {
+            bias_probability: config.bias_probability,
+            ..Self::new(config.as_stated(), road, either_direction, heads)
+        }
     }
 
     /// In the plane, where places are judged by what is stated alone: what a place does not know well counts against it, and
     /// no bias is estimated before it is found.
     pub(super) fn as_stated(config: &EkfConfig, heads: &[RadioHead]) -> Self {
-        let search = Self::new(config.as_stated(), None, true, heads);
         Self {
-            as_stated: Some(*config),
-            ..search
+            is_as_stated: true,
+            bias_probability: config.bias_probability,
+            ..Self::new(config.as_stated(), None, true, heads)
         }
     }
 
@@ -210,7 +215,8 @@ impl GaussianSum {
             heads: heads.to_vec(),
             hypotheses: Vec::new(),
             places: 0,
-            as_stated: None,
+            is_as_stated: false,
+            bias_probability: config.bias_probability,
         };
         made.restart();
         made
@@ -279,7 +285,7 @@ impl GaussianSum {
     /// Judges every hypothesis by an angle. The verdict is that of the likeliest.
     pub fn update(&mut self, head: &RadioHead, measured: &AngleMeasurement) -> UpdateVerdict {
         let mut first = UpdateVerdict::unused(UpdateReason::Unusable);
-        let log_likelihood = if self.as_stated.is_some() {
+        let log_likelihood = if self.is_as_stated {
             log_likelihood_as_stated
         } else {
             log_likelihood
@@ -411,7 +417,7 @@ impl GaussianSum {
             }
         };
         // As stated, any other place is less probable than one in 10¹¹, however far the one that is left is known.
-        let is_only = self.as_stated.is_some() && self.hypotheses.len() == 1;
+        let is_only = self.is_as_stated && self.hypotheses.len() == 1;
         if !((is_placed || is_only) && heading_known) {
             return None;
         }
@@ -425,8 +431,8 @@ impl GaussianSum {
                 other_way += (hypothesis.log_likelihood - best).exp();
             }
         }
-        if let Some(config) = &self.as_stated {
-            one.ekf.expect_bias_as(config);
+        if !one.ekf.is_with_bias() {
+            one.ekf.begin_bias(self.bias_probability);
         }
         (other_way < OTHER_WAY).then_some(one.ekf)
     }
@@ -500,7 +506,7 @@ mod tests {
         let heads = RadioHead::heard(&site, &vehicle);
         let map = site.build_road().unwrap().unwrap();
         let start_m = rng.random::<f64>() * 200.0;
-        let mut search = GaussianSum::new(config, Some(map.clone()), false, &heads);
+        let mut search = GaussianSum::from_scratch(config, Some(map.clone()), false, &heads);
         for step in 0..1000 {
             let time_s = f64::from(step) * 0.02;
             let distance_m = 4.0 * time_s;

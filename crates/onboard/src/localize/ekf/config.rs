@@ -85,10 +85,9 @@ pub struct EkfConfig {
     pub lateness_std_s: f64,
     /// The bias of the angles that is stated.
     pub phase_bias: PhaseBias,
-    /// How probable a time-correlated bias is that this filter estimates; 0 where it estimates none.
+    /// Prior probability that the angles of a radio head have a time-correlated (multipath) bias; 0 if the filter
+    /// estimates no bias.
     pub bias_probability: f64,
-    /// The same of one so rare that only a filter beside estimates it; 0 where there is none.
-    pub rare_bias_probability: f64,
     /// Time between odometry samples above which they are reported as a gap (s).
     pub gap_s: f64,
     /// Speed that no odometry sample can exceed (m/s).
@@ -164,8 +163,7 @@ struct Usual {
     mounting_std_rad: f64,
     /// At walking pace turns show it.
     lateness_std_s: f64,
-    /// Probability that errors of a radio head's angles stay over metres: a differential drive is as often lost, and
-    /// would take the one for the other.
+    /// Prior probability of a time-correlated (multipath) bias of a radio head's angles.
     bias_probability: f64,
 }
 
@@ -177,7 +175,8 @@ const ROAD: Usual = Usual {
     scale_per_sqrt_m: 0.0,
     mounting_std_rad: 0.0,
     lateness_std_s: 0.0,
-    bias_probability: 0.1,
+    // Each of the four sizes of a bias, the smallest of which is what calibration leaves, is equally probable.
+    bias_probability: 0.75,
 };
 
 /// With differential drive.
@@ -188,11 +187,9 @@ const DIFFERENTIAL: Usual = Usual {
     scale_per_sqrt_m: 0.03,
     mounting_std_rad: 0.02,
     lateness_std_s: 0.1,
+    // A wheel slip or a wrong heading shifts the angles of a small robot like a bias does.
     bias_probability: 0.0,
 };
-
-/// From this probability on a bias is usual, so that every filter is to find it.
-const LEAST_USUAL_BIAS_PROBABILITY: f64 = 0.5;
 
 impl EkfConfig {
     /// What a filter on a vehicle assumes at a site.
@@ -250,11 +247,14 @@ impl EkfConfig {
         ]
         .map(|(is_unstated, std_rad)| if is_unstated { std_rad } else { 0.0 });
         let receiver = &vehicle.receiver;
-        let bias_probability = (receiver.phase_bias_probability).unwrap_or(usual.bias_probability);
-        // Without integrity monitoring there is no filter beside this one.
-        let is_alone =
-            vehicle.integrity_monitor().is_none() && receiver.phase_bias_probability.is_some();
-        let is_usual = is_alone || bias_probability >= LEAST_USUAL_BIAS_PROBABILITY;
+        // A vehicle without integrity monitoring trusts its sources, unless a probability is given.
+        let is_monitored = vehicle.integrity_monitor().is_some();
+        let usual_bias_probability = if is_monitored {
+            usual.bias_probability
+        } else {
+            0.0
+        };
+        let bias_probability = (receiver.phase_bias_probability).unwrap_or(usual_bias_probability);
         let mut config = Self {
             drive: vehicle.drive,
             array: ArrayModel {
@@ -316,8 +316,7 @@ impl EkfConfig {
                 correlation_s: receiver.phase_bias_correlation_s,
                 correlation_m: receiver.phase_bias_correlation_m,
             },
-            bias_probability: if is_usual { bias_probability } else { 0.0 },
-            rare_bias_probability: if is_usual { 0.0 } else { bias_probability },
+            bias_probability,
             gap_s: 5.0 / odometer.rate_hz,
             top_speed_mps: 1.5 * vehicle.top_speed_mps(),
         };
@@ -345,7 +344,7 @@ impl EkfConfig {
         self.rician_k.max(1.0)
     }
 
-    /// The same by what is stated of the angles alone: no bias is estimated, however usual.
+    /// Returns the configuration without bias estimation and with the specified noise of the angles.
     #[must_use]
     pub fn as_stated(mut self) -> Self {
         self.set_noise_ratio(None);
@@ -356,11 +355,6 @@ impl EkfConfig {
     /// Whether a time-correlated bias of the angles is estimated.
     pub const fn estimates_bias(&self) -> bool {
         self.bias_probability > 0.0
-    }
-
-    /// Whether a time-correlated bias is so usual that every filter estimates it.
-    pub fn is_bias_usual(&self) -> bool {
-        self.bias_probability >= LEAST_USUAL_BIAS_PROBABILITY
     }
 
     /// How many times the variance that it expects angles have that are heard to have so many times what is stated.

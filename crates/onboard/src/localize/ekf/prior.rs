@@ -97,36 +97,22 @@ impl Ekf {
         self.white = other.white;
     }
 
-    /// The filter by what is stated: angles are as noisy as that, and a bias that is rare is not estimated.
+    /// Returns a copy that expects the specified noise of the angles.
     pub(in crate::localize) fn nominal(&self) -> Self {
         let mut ekf = self.clone();
-        if ekf.config.rare_bias_probability > 0.0 {
-            ekf.begin_bias(0.0);
-        }
         ekf.set_noise_ratio(None);
         ekf
     }
 
-    /// The filter by what is stated of the angles alone: it estimates no bias, however usual.
+    /// Returns a copy without bias estimation that expects the specified noise of the angles.
     pub(in crate::localize) fn as_stated(&self) -> Self {
         let mut ekf = self.nominal();
         ekf.begin_bias(0.0);
         ekf
     }
 
-    /// Goes on with what another configuration of the same vehicle expects of the angles' bias, of which nothing is known.
-    pub(in crate::localize) fn expect_bias_as(&mut self, config: &EkfConfig) {
-        self.begin_bias(config.bias_probability);
-    }
-
-    /// Estimates a bias that is rare, unless it does.
-    pub(in crate::localize) fn estimate_rare_bias(&mut self) {
-        if !self.is_with_bias() {
-            self.begin_bias(self.config.rare_bias_probability);
-        }
-    }
-
-    fn begin_bias(&mut self, probability: f64) {
+    /// Estimates a bias of each radio head from now on, with this prior probability; none if it is 0.
+    pub(in crate::localize) fn begin_bias(&mut self, probability: f64) {
         self.config.bias_probability = probability;
         self.bias = CorrelatedBias::new(self.heads.len(), probability);
     }

@@ -87,8 +87,6 @@ clone_in_place! {
         begun_s: f64,
         /// Whether the odometer's scale was certainly not what is stated, and has not been found to be since.
         has_departed: bool,
-        /// When something was at fault last (s), as far as is known.
-        fault_s: f64,
         now_s: f64,
     }
 }
@@ -122,7 +120,6 @@ impl IntegrityMonitor {
             is_found,
             begun_s: found_s,
             has_departed: false,
-            fault_s: f64::NEG_INFINITY,
             now_s: found_s,
             settings,
         }
@@ -182,7 +179,7 @@ impl IntegrityMonitor {
             restarted.bank.judge(self.now_s);
         }
         self.recover();
-        self.hold_faults();
+        self.hold_departure();
         if self.solution_id() != solution_id {
             let handover = Handover::new(&told, &self.ekf().pose(odometry_s));
             self.handover = handover.or(self.handover);
@@ -195,12 +192,8 @@ impl IntegrityMonitor {
         (self.bank.leading_id(), self.bank.faulty(), self.begun_s)
     }
 
-    /// Holds: which mode leads may change from angle to angle, and a restarted filter does not know the
-    /// odometer yet.
-    fn hold_faults(&mut self) {
-        if self.bank.is_fault() {
-            self.fault_s = self.now_s;
-        }
+    /// Keeps a departed odometer scale in mind until a filter knows the scale: a restarted filter does not yet.
+    fn hold_departure(&mut self) {
         let main = self.bank.nominal();
         self.has_departed =
             main.odometer_departs() || (self.has_departed && !main.knows_odometer());
@@ -228,7 +221,6 @@ impl IntegrityMonitor {
         } else if aged && restarted.bank.is_lost() {
             self.restart();
         } else if restarted.bank.quiet_s(now_s) > patience_s
-            && !restarted.bank.is_fault()
             && self.is_near(&restarted.bank, now_s)
             && let Some(restarted) = self.restarted.take()
         {
@@ -239,11 +231,7 @@ impl IntegrityMonitor {
     }
 
     fn restart(&mut self) {
-        let strayed_m = if self.bank.explains_heads() {
-            0.0
-        } else {
-            self.bank.nominal().driven_m() - self.trusted_m
-        };
+        let strayed_m = self.bank.nominal().driven_m() - self.trusted_m;
         let position_std_m = self.settings.alert_limit_m + strayed_m;
         self.restarted = Some(Restarted {
             bank: self.bank.restarted(position_std_m, self.now_s),
@@ -261,9 +249,6 @@ impl IntegrityMonitor {
         if let Some(handover) = handover.and_then(|it| it.beside(&pose, RECOVERY_S)) {
             pose.cover(&handover);
         }
-        if self.bank.explains_heads() {
-            return pose;
-        }
         let restarted = self.restarted.iter().map(|it| it.bank.nominal());
         for other in self.bank.candidates().chain(restarted) {
             pose.cover(&other.pose(time_s));
@@ -277,10 +262,9 @@ impl IntegrityMonitor {
         hypotheses.clear();
         hypotheses.extend(self.hypotheses_of(&self.bank, time_s).map(|(_, it)| it));
         let levels = self.level.solve(&hypotheses);
-        let state = if self.bank.is_outvoted() && !self.bank.explains_heads() {
+        let state = if self.bank.is_outvoted() {
             IntegrityState::Unavailable
-        } else if self.now_s - self.fault_s <= RECOVERY_S
-            || self.has_departed
+        } else if self.has_departed
             || self.restarted.is_some()
             || self.bank.quiet_s(self.now_s) <= RECOVERY_S
             || levels.horizontal_m > self.settings.alert_limit_m
@@ -329,7 +313,7 @@ mod tests {
     use std::f64::consts::PI;
 
     use super::*;
-    use crate::localize::modes::trip::{angle, trip};
+    use crate::localize::modes::trip::{angle, trip_with_bias};
 
     /// Deviations by which a position may be another one at one angle.
     const MOST_DEVIATIONS: f64 = 5.0;
@@ -340,7 +324,7 @@ mod tests {
         const READS: f64 = 1.5;
         const HIDDEN_S: f64 = 8.0;
         const OFF_RAD: f64 = -0.6;
-        let (heads, road, ekf) = trip();
+        let (heads, road, ekf) = trip_with_bias(0.9);
         let mut guard = IntegrityMonitor::new(&ekf, &heads, IntegritySettings::default(), None);
         let mut farthest_m: f64 = 0.0;
         let mut last = guard.pose(0.0);

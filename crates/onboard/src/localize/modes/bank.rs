@@ -14,7 +14,7 @@
 use super::likelihood::{LEAST_ODDS, LikelihoodRatio, SPEED_JUMP};
 use super::noise_ratio::NoiseRatio;
 use super::subsets::{CLEARED, DETECTED, HeadTest, RECOVERY_S, Subsets, exclude};
-use super::table::{Carry, Mode, ModeId, TABLE, Verdict, Weight};
+use super::table::{Carry, Mode, ModeId, TABLE};
 use crate::clone_in_place::clone_in_place;
 use crate::localize::ekf::{Ekf, PredictedMeasurement};
 use crate::localize::output::{OdometryVerdict, UpdateReason, UpdateVerdict};
@@ -25,6 +25,9 @@ use crate::settings::{FaultProbability, IntegritySettings};
 
 /// However rare a fault is, under it the error is within the level more often than not.
 const MOST_UNDER_FAULT: f64 = 0.49;
+
+/// Minimum number of radio heads that separate the bias of one of them from the position.
+const LEAST_SEPARABLE: usize = 3;
 
 clone_in_place! {
     /// The filter of a mode that is weighed by its posterior.
@@ -42,7 +45,7 @@ clone_in_place! {
 
 impl ModeFilter {
     fn new(mode: &'static Mode, given: &Ekf, faults: &FaultProbability) -> Self {
-        let mut ekf = (mode.seed)(given);
+        let mut ekf = given.nominal();
         (mode.alter)(&mut ekf);
         Self {
             mode,
@@ -56,7 +59,7 @@ impl ModeFilter {
     /// Those of the table that apply to a filter.
     fn all(given: &Ekf, faults: &FaultProbability) -> Vec<Self> {
         let nominal = given.nominal();
-        let apply = |it: &&Mode| it.weight == Weight::Posterior && (it.applies)(&nominal, faults);
+        let apply = |it: &&Mode| (it.applies)(&nominal, faults);
         let modes = TABLE.iter().filter(apply);
         modes.map(|mode| Self::new(mode, given, faults)).collect()
     }
@@ -72,7 +75,6 @@ impl ModeFilter {
         match carry {
             Carry::All => {}
             Carry::AllButHead => exclude(&mut self.ekf, excluded, true),
-            Carry::Filter => self.ratio = LikelihoodRatio::NONE,
             Carry::IfNotAgainst if !self.ratio.is_against() => {}
             Carry::IfNotAgainst | Carry::Nothing => *self = Self::new(self.mode, given, faults),
         }
@@ -110,12 +112,12 @@ impl ModeFilter {
         nominal: (&Ekf, &Result<PredictedMeasurement, UpdateReason>),
         head: &RadioHead,
         measured: &AngleMeasurement,
-    ) -> UpdateVerdict {
+    ) {
         let predicted = self.ekf.predict_measurement(head, measured);
         if measured.resolved {
             self.ratio.update((&self.ekf, &predicted), nominal);
         }
-        self.ekf.update_predicted(predicted, measured)
+        self.ekf.update_predicted(predicted, measured);
     }
 }
 
@@ -157,9 +159,7 @@ impl Bank {
         let faults = &settings.fault_probability;
         let nominal = given.nominal();
         let count = heads.len();
-        let of_heads = TABLE
-            .iter()
-            .find(|it| it.weight == Weight::Prior { heads: 1 });
+        let is_separable = nominal.is_with_bias() && count >= LEAST_SEPARABLE;
         Self {
             settings: *settings,
             subsets: Subsets::new(count),
@@ -168,7 +168,7 @@ impl Bank {
             lost_s: now_s,
             heads: heads.to_vec(),
             modes,
-            head_prior: of_heads.map_or(0.0, |it| (it.prior)(nominal.config(), faults)),
+            head_prior: faults.of_radio_head(is_separable),
             nominal,
             noise: NoiseRatio::new(count),
         }
@@ -183,24 +183,7 @@ impl Bank {
     /// nothing is known of it at `now_s`.
     pub fn restarted(&self, position_std_m: f64, now_s: f64) -> Self {
         let start = (self.leader()).restarted(self.nominal.config(), position_std_m);
-        let mut modes = ModeFilter::all(&start, &self.settings.fault_probability);
-        for it in &mut modes {
-            let before = self
-                .modes
-                .iter()
-                .find(|before| before.mode.id == it.mode.id);
-            if it.mode.on_restart != Carry::Nothing
-                && let Some(before) = before
-            {
-                it.clone_from(before);
-                it.carry(
-                    it.mode.on_restart,
-                    &start,
-                    None,
-                    &self.settings.fault_probability,
-                );
-            }
-        }
+        let modes = ModeFilter::all(&start, &self.settings.fault_probability);
         Self {
             noise: self.noise.resumed(),
             ..Self::with(&start, &self.heads, &self.settings, modes, now_s)
@@ -244,7 +227,7 @@ impl Bank {
     /// The mode that leads: clearly more probable than the nominal one, and more so than any other.
     fn leading(&self) -> Option<&ModeFilter> {
         let most = (self.modes.iter()).max_by(|one, other| one.odds().total_cmp(&other.odds()));
-        most.filter(|it| it.odds() > LEAST_ODDS && it.mode.verdict != Verdict::Unled)
+        most.filter(|it| it.odds() > LEAST_ODDS)
     }
 
     /// The filter that is most probably right: the nominal one, unless another mode leads.
@@ -264,20 +247,9 @@ impl Bank {
         found.map(|it| (it.odds(), &it.ekf))
     }
 
-    /// Whether the mode that leads is a fault.
-    pub fn is_fault(&self) -> bool {
-        (self.leading()).is_some_and(|it| it.mode.verdict == Verdict::Degraded)
-    }
-
     /// Whether angles may be off by the mode that leads as if the vehicle were lost.
     pub fn may_mislead(&self) -> bool {
         self.leading().is_some_and(|it| it.mode.misleads)
-    }
-
-    /// Whether a mode that explains disagreement of several radio heads is clearly more probable than the nominal
-    /// one, whatever leads.
-    pub fn explains_heads(&self) -> bool {
-        (self.modes.iter()).any(|it| it.mode.explains_heads && it.odds() > LEAST_ODDS)
     }
 
     /// The hypotheses of the protection level, each with its probability and the filter that is right under it: the
@@ -285,7 +257,7 @@ impl Bank {
     /// radio heads at fault.
     pub fn hypotheses(&self) -> impl Iterator<Item = (f64, &Ekf)> + Clone {
         let total = 1.0 + self.modes.iter().map(ModeFilter::odds).sum::<f64>();
-        let faults = (self.modes.iter()).filter(|it| it.mode.verdict != Verdict::Ok);
+        let faults = (self.modes.iter()).filter(|it| it.mode.is_fault);
         let fault_free = 1.0 - faults.map(ModeFilter::odds).sum::<f64>() / total;
         let heads = (self.subsets.iter())
             .filter(|subset| !subset.without.iter().any(|&it| self.is_faulty(it)))
@@ -297,22 +269,15 @@ impl Bank {
                 };
                 (fault_free * self.head_prior * both, &subset.ekf)
             });
-        let odds = self.weighed(|_| true);
-        odds.map(move |(odds, ekf)| (odds / total, ekf))
-            .chain(heads)
+        self.mixture().chain(heads)
     }
 
-    /// The modes that may lead, each with its posterior among them and its filter: the estimate is one of those.
+    /// The nominal mode and the modes weighed by their posteriors, each with its posterior and its filter.
     pub fn mixture(&self) -> impl Iterator<Item = (f64, &Ekf)> + Clone {
-        let odds = self.weighed(|it| it.mode.verdict != Verdict::Unled);
-        let total = 1.0 + odds.clone().skip(1).map(|(odds, _)| odds).sum::<f64>();
+        let total = 1.0 + self.modes.iter().map(ModeFilter::odds).sum::<f64>();
+        let modes = self.modes.iter().map(|it| (it.odds(), &it.ekf));
+        let odds = std::iter::once((1.0, &self.nominal)).chain(modes);
         odds.map(move |(odds, ekf)| (odds / total, ekf))
-    }
-
-    /// The nominal mode and others, each with its odds to that and its filter.
-    fn weighed(&self, which: fn(&ModeFilter) -> bool) -> impl Iterator<Item = (f64, &Ekf)> + Clone {
-        let others = self.modes.iter().filter(move |it| which(it));
-        std::iter::once((1.0, &self.nominal)).chain(others.map(|it| (it.odds(), &it.ekf)))
     }
 
     /// The filters without a radio head in doubt, one of which may take over soon.
@@ -381,22 +346,15 @@ impl Bank {
         }
         let noise_ratio = number.map_or(1.0, |number| self.noise.core_ratio_of(number));
         let predicted = self.nominal.predict_measurement(head, measured);
-        let mut by_heads_explained = None;
         for it in &mut self.modes {
             (it.mode.adapt)(&mut it.ekf, noise_ratio);
-            let verdict = it.update((&self.nominal, &predicted), head, measured);
-            if it.mode.explains_heads {
-                by_heads_explained = Some(verdict);
-            }
+            it.update((&self.nominal, &predicted), head, measured);
         }
         let most = (self.modes.iter()).fold(LikelihoodRatio::NONE, |most, it| most.max(it.ratio));
         for it in &mut self.modes {
             it.ratio.limit_by(most);
         }
-        let verdict = self.nominal.update_predicted(predicted, measured);
-        by_heads_explained
-            .filter(|_| self.explains_heads())
-            .unwrap_or(verdict)
+        self.nominal.update_predicted(predicted, measured)
     }
 
     fn update_subsets(&mut self, number: usize, head: &RadioHead, measured: &AngleMeasurement) {
@@ -595,7 +553,9 @@ mod tests {
 
     fn ekf() -> (Ekf, Vec<RadioHead>) {
         let (site, vehicle) = trip();
-        let config = EkfConfig::new(&site, &vehicle);
+        let mut config = EkfConfig::new(&site, &vehicle);
+        // A filter that estimates biases has no test of single radio heads.
+        config.bias_probability = 0.0;
         let heads = RadioHead::heard(&site, &vehicle);
         let start = InitialPose {
             pose: Pose::default(),

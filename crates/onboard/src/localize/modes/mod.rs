@@ -11,6 +11,6 @@ pub(in crate::localize) use bank::Bank;
 pub(in crate::localize) use likelihood::{CERTAIN, log_likelihood, log_likelihood_as_stated};
 pub use subsets::HeadTest;
 pub(in crate::localize) use subsets::RECOVERY_S;
+pub(in crate::localize) use table::ModeId;
 #[cfg(test)]
 pub(in crate::localize) use table::trip;
-pub(in crate::localize) use table::{ModeId, may_mislead};

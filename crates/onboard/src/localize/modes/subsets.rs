@@ -72,7 +72,8 @@ const LATELY: u64 = 32;
 /// So many radio heads keep their filters however long ago they were heard: what they have done may still count.
 const LEAST_WATCHED: usize = 4;
 
-/// Radio heads from which on two are left out: which of two disagrees nobody can tell.
+/// Minimum number of radio heads for filters without two of them: with two radio heads, the faulty one cannot be
+/// identified. Filters that estimate the bias of each radio head bound two faults by that bias.
 const LEAST_FOR_PAIRS: usize = 3;
 
 clone_in_place! {
@@ -184,7 +185,7 @@ impl Subsets {
         }
         let ones = self.iter().filter(|it| it.is_of_one()).count();
         self.begin([head; 2], (head, heads.get(head)), nominal);
-        let pairs = if heads.len() < LEAST_FOR_PAIRS {
+        let pairs = if heads.len() < LEAST_FOR_PAIRS || nominal.is_with_bias() {
             0
         } else {
             ones

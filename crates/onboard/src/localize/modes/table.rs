@@ -18,36 +18,6 @@ pub(in crate::localize) enum ModeId {
     DisplacedSite,
     /// The angles are noisier than stated.
     NoisyAngles,
-    /// The angles have a time-correlated (multipath) bias.
-    CorrelatedBias,
-    /// A radio head is at fault.
-    HeadOut,
-    /// Two radio heads are.
-    TwoHeadsOut,
-}
-
-/// By what a mode counts.
-#[derive(Clone, Copy, Debug, PartialEq, Eq)]
-pub(in crate::localize) enum Weight {
-    /// Its posterior odds to the nominal mode: prior times likelihood ratio.
-    Posterior,
-    /// Its prior alone: one filter for each set of so many radio heads, which has never heard them. Angles decide by
-    /// a test which of them to exclude.
-    Prior {
-        /// Number of radio heads left out.
-        heads: usize,
-    },
-}
-
-/// What becomes of the position where a mode is far more probable than the nominal one.
-#[derive(Clone, Copy, Debug, PartialEq, Eq)]
-pub(in crate::localize) enum Verdict {
-    /// It leads, and nothing is at fault.
-    Ok,
-    /// It leads, and something is at fault: a radio head that is off would explain the same angles.
-    Degraded,
-    /// A fault that never leads, as the nominal filter explains the same; it counts in the protection level alone.
-    Unled,
 }
 
 /// What a hypothesis carries over where the nominal filter becomes another one.
@@ -57,8 +27,6 @@ pub(in crate::localize) enum Carry {
     All,
     /// Both, but for the radio head that is excluded.
     AllButHead,
-    /// The filter, without the likelihood: that was against another nominal filter.
-    Filter,
     /// Filter and likelihood where the angles do not speak against it, else nothing.
     IfNotAgainst,
     /// Nothing: it begins anew from the nominal filter.
@@ -71,48 +39,38 @@ pub(in crate::localize) struct Mode {
     pub id: ModeId,
     /// Whether it is watched beside this nominal filter.
     pub applies: fn(&Ekf, &FaultProbability) -> bool,
-    /// Its probability before any angle is heard; of each of the radio heads, where it is those.
+    /// Prior probability.
     pub prior: fn(&EkfConfig, &FaultProbability) -> f64,
-    /// The filter that it begins from, of the one that is given.
-    pub seed: fn(&Ekf) -> Ekf,
-    /// How its filter differs from that.
+    /// How its filter differs from the nominal one.
     pub alter: fn(&mut Ekf),
     /// How its filter follows the variance that the angles are heard to have, as a multiple of what is stated.
     pub adapt: fn(&mut Ekf, f64),
-    pub weight: Weight,
-    pub verdict: Verdict,
+    /// Whether it is a fault: radio heads are monitored for a second fault only as far as it does not hold.
+    pub is_fault: bool,
     /// How it begins anew whenever the vehicle sets off or its speed jumps by a share, at which a fault may begin.
     pub onset: Option<fn(&mut Ekf, f64)>,
     /// When a radio head is excluded,
     pub on_exclude: Carry,
-    /// when a mode becomes the nominal one,
+    /// and when a mode becomes the nominal one.
     pub on_rebase: Carry,
-    /// and when the bank begins anew from a vague pose.
-    pub on_restart: Carry,
     /// Odds from which on it becomes the nominal mode.
     pub becomes_nominal_at: Option<f64>,
-    /// Whether it explains disagreement of several radio heads.
-    pub explains_heads: bool,
     /// Whether angles may be off by it as if the vehicle were lost.
     pub misleads: bool,
 }
 
-/// What most rows have in common: watched where a bias is not usual, as that would explain the same.
+/// Defaults of a row.
 const ROW: Mode = Mode {
-    id: ModeId::HeadOut,
-    applies: |nominal, _| !nominal.config().estimates_bias(),
+    id: ModeId::Slip,
+    applies: |_, _| true,
     prior: |_, _| 0.0,
-    seed: Ekf::nominal,
     alter: |_| (),
     adapt: |_, _| (),
-    weight: Weight::Posterior,
-    verdict: Verdict::Ok,
+    is_fault: false,
     onset: None,
     on_exclude: Carry::Nothing,
     on_rebase: Carry::All,
-    on_restart: Carry::Nothing,
     becomes_nominal_at: None,
-    explains_heads: false,
     misleads: false,
 };
 
@@ -120,36 +78,23 @@ const SLIP: Mode = Mode {
     id: ModeId::Slip,
     prior: |_, faults| faults.odometer,
     alter: |ekf| ekf.expect_slip(MOST_SLIP),
-    verdict: Verdict::Degraded,
+    is_fault: true,
     onset: Some(|ekf, jump| ekf.expect_slip(if jump > 0.0 { jump } else { MOST_SLIP })),
     on_exclude: Carry::AllButHead,
     on_rebase: Carry::IfNotAgainst,
     ..ROW
 };
 
-const HEAD_OUT: Mode = Mode {
-    id: ModeId::HeadOut,
-    applies: |_, _| true,
-    prior: |config, faults| faults.of_radio_head(config.estimates_bias()),
-    weight: Weight::Prior { heads: 1 },
-    ..ROW
-};
-
 /// The modes, in the order in which their filters are updated.
-pub(in crate::localize) static TABLE: [Mode; 9] = [
+pub(in crate::localize) static TABLE: [Mode; 5] = [
     SLIP,
     // Where every filter estimates a bias, that explains what slip would.
-    Mode {
-        applies: |nominal, _| nominal.config().estimates_bias(),
-        verdict: Verdict::Unled,
-        ..SLIP
-    },
     // The likelihoods soon outweigh this prior, and that of noisier angles.
     Mode {
         id: ModeId::UncalibratedArray,
         applies: |nominal, _| {
             let config = nominal.config();
-            config.unstated_array_std_rad != [0.0; 2] && !config.estimates_bias()
+            config.unstated_array_std_rad != [0.0; 2]
         },
         prior: |_, _| 0.1,
         alter: Ekf::uncalibrate_array,
@@ -161,10 +106,10 @@ pub(in crate::localize) static TABLE: [Mode; 9] = [
         id: ModeId::NoisyOdometer,
         applies: |nominal, _| {
             let config = nominal.config();
-            config.drive == DriveKind::Road && !config.estimates_bias()
+            config.drive == DriveKind::Road
         },
         // So many times as probable as slip, but no likelier than not.
-        prior: |_, faults| (30.0 * faults.odometer).min(0.5),
+        prior: |_, faults| (90.0 * faults.odometer).min(0.5),
         alter: |ekf| ekf.scale_odometer_noise(3.0),
         on_rebase: Carry::Nothing,
         ..ROW
@@ -172,21 +117,19 @@ pub(in crate::localize) static TABLE: [Mode; 9] = [
     // Without a map the radio heads are the frame.
     Mode {
         id: ModeId::DisplacedSite,
-        applies: |nominal, faults| {
-            let watched = faults.all_radio_heads > 0.0 && nominal.has_map();
-            watched && !nominal.config().estimates_bias()
-        },
+        applies: |nominal, faults| faults.all_radio_heads > 0.0 && nominal.has_map(),
         prior: |_, faults| faults.all_radio_heads,
         alter: |ekf| {
             ekf.uncalibrate_array();
             ekf.displace_site(1.5);
         },
-        verdict: Verdict::Degraded,
+        is_fault: true,
         on_exclude: Carry::All,
         ..ROW
     },
     Mode {
         id: ModeId::NoisyAngles,
+        applies: |nominal, _| !nominal.config().estimates_bias(),
         prior: |_, _| 0.02,
         alter: |ekf| ekf.set_noise_ratio(Some(1.0)),
         adapt: |ekf, ratio| {
@@ -197,35 +140,7 @@ pub(in crate::localize) static TABLE: [Mode; 9] = [
         misleads: true,
         ..ROW
     },
-    // Estimated already by a filter that a search has found with it; that may have been of noisier angles, too.
-    Mode {
-        id: ModeId::CorrelatedBias,
-        applies: |nominal, _| nominal.config().rare_bias_probability > 0.0,
-        prior: |config, _| config.rare_bias_probability,
-        seed: Ekf::clone,
-        alter: |ekf| {
-            ekf.set_noise_ratio(None);
-            ekf.estimate_rare_bias();
-        },
-        verdict: Verdict::Degraded,
-        on_exclude: Carry::Filter,
-        on_restart: Carry::Filter,
-        explains_heads: true,
-        misleads: true,
-        ..ROW
-    },
-    HEAD_OUT,
-    Mode {
-        id: ModeId::TwoHeadsOut,
-        weight: Weight::Prior { heads: 2 },
-        ..HEAD_OUT
-    },
 ];
-
-/// Whether the angles of a filter without a bank may be off as if the vehicle were lost.
-pub(in crate::localize) fn may_mislead(config: &EkfConfig) -> bool {
-    config.estimates_bias() && !config.is_bias_usual()
-}
 
 /// A trip past four radio heads at 4 m/s, for tests.
 #[cfg(test)]
@@ -242,8 +157,13 @@ pub(in crate::localize) mod trip {
     /// Standard deviation of the angles (rad).
     pub(in crate::localize) const SIGMA_RAD: f64 = 0.05;
 
-    /// The radio heads, the road, and the filter at its beginning.
+    /// Returns the radio heads, the road, and the filter at the start, without bias estimation.
     pub(in crate::localize) fn trip() -> (Vec<RadioHead>, Road, Ekf) {
+        trip_with_bias(0.0)
+    }
+
+    /// Returns the same with a prior probability of a time-correlated bias.
+    pub(in crate::localize) fn trip_with_bias(probability: f64) -> (Vec<RadioHead>, Road, Ekf) {
         let site = Site::from_library("trip-4", &Shipped).unwrap();
         let vehicle = Vehicle::from_library("paper-carrier", &Shipped).unwrap();
         let heads = RadioHead::heard(&site, &vehicle);
@@ -253,7 +173,8 @@ pub(in crate::localize) mod trip {
             position_std_m: 0.1,
             heading_std_rad: 0.01,
         };
-        let config = EkfConfig::new(&site, &vehicle);
+        let mut config = EkfConfig::new(&site, &vehicle);
+        config.bias_probability = probability;
         let ekf = Ekf::new(config, Some(Arc::new(road.clone())), &heads, &start);
         (heads, road, ekf)
     }
@@ -280,7 +201,7 @@ mod tests {
     use rand_distr::StandardNormal;
 
     use super::super::bank::Bank;
-    use super::trip::{SIGMA_RAD, angle, trip};
+    use super::trip::{SIGMA_RAD, angle, trip, trip_with_bias};
     use super::*;
     use crate::localize::ekf::state::{ALONG, DATUM};
     use crate::observation::OdometrySample;
@@ -299,6 +220,8 @@ mod tests {
         noise: f64,
         /// They are heard until this time (s); always, if 0.
         heard_until_s: f64,
+        /// Prior probability of a bias, by which the filters estimate one.
+        bias_probability: f64,
     }
 
     /// How far off a filter is at the end (m).
@@ -307,7 +230,7 @@ mod tests {
     /// So long past four radio heads in this world, whose angles are off by `off_rad` after so many metres: the bank
     /// then, and how far off its leading filter, and that of a mode, is.
     fn drive(world: &World, until_s: f64, off_rad: impl Fn(usize, f64) -> f64) -> (Bank, Distance) {
-        let (heads, road, ekf) = trip();
+        let (heads, road, ekf) = trip_with_bias(world.bias_probability);
         let mut bank = Bank::new(&ekf, &heads, &IntegritySettings::default(), 0.0);
         let mut noise = ChaCha8Rng::seed_from_u64(1);
         let mut distance_m = 0.0;
@@ -368,7 +291,7 @@ mod tests {
         };
         let (bank, off_m) = drive(&world, 60.0, EXACT);
         assert_eq!(bank.leading_id(), Some(ModeId::UncalibratedArray));
-        assert!(!bank.is_fault() && off_m(bank.leader()) < 0.3);
+        assert!(off_m(bank.leader()) < 0.3);
         // About its filter as the nominal one nothing is wrong any more.
         let bank = bank.about_leading().unwrap();
         assert!(bank.leading_id().is_none() && bank.mode(ModeId::UncalibratedArray).is_none());
@@ -382,7 +305,7 @@ mod tests {
             ..World::default()
         };
         let (mut bank, off_m) = drive(&world, 60.0, EXACT);
-        assert!(bank.leading_id() == Some(ModeId::DisplacedSite) && bank.is_fault());
+        assert_eq!(bank.leading_id(), Some(ModeId::DisplacedSite));
         let [[xx, ..], [_, yy, _], _] = bank.leader().pose(59.9).covariance.unwrap();
         assert!(off_m(bank.leader()) < 3.0 * (xx + yy).sqrt());
         let found = *bank.leader().belief();
@@ -406,7 +329,7 @@ mod tests {
             ..World::default()
         };
         let (bank, off_m) = drive(&world, 60.0, EXACT);
-        assert!(bank.leading_id() == Some(ModeId::NoisyAngles) && !bank.is_fault());
+        assert_eq!(bank.leading_id(), Some(ModeId::NoisyAngles));
         let variance = |ekf: &Ekf| ekf.belief().covariance[ALONG][ALONG];
         assert!(variance(bank.leader()) > 2.0 * variance(bank.nominal()));
         assert!(off_m(bank.leader()) < 4.0 * variance(bank.leader()).sqrt());
@@ -490,16 +413,6 @@ mod tests {
     }
 
     #[test]
-    fn a_bias_is_estimated_beside_the_stated_noise_whatever_a_search_reckoned_with() {
-        let (heads, _, mut found) = trip();
-        found.set_noise_ratio(Some(3.0));
-        let bank = Bank::new(&found, &heads, &IntegritySettings::default(), 0.0);
-        let (_, with_bias) = bank.mode(ModeId::CorrelatedBias).unwrap();
-        assert_eq!(with_bias.config().heard_noise_ratio, None);
-        assert!(with_bias.is_with_bias());
-    }
-
-    #[test]
     fn a_jump_of_the_speed_counts_as_slip_before_any_angle_tells() {
         for scale in [-0.1, 0.1] {
             let world = World {
@@ -521,15 +434,40 @@ mod tests {
         }
     }
 
+    /// Estimated as a nominal condition.
+    const MULTIPATH: f64 = 0.9;
+
     #[test]
-    fn a_correlated_bias_explains_the_radio_heads_and_is_a_fault() {
+    fn a_correlated_bias_is_nominal() {
         // Of each radio head another one every three metres, as reflections make it.
         let bias_rad = |head: usize, way_m: f64| {
             let number = (way_m / 3.0).floor() as u64 * 4 + head as u64;
             0.3 * ChaCha8Rng::seed_from_u64(number).sample::<f64, _>(StandardNormal)
         };
-        let (bank, off_m) = drive(&World::default(), 60.0, bias_rad);
-        assert!(bank.explains_heads() && bank.is_fault());
+        let world = World {
+            bias_probability: MULTIPATH,
+            ..World::default()
+        };
+        let (bank, off_m) = drive(&world, 60.0, bias_rad);
+        assert!(bank.leading_id().is_none() && !bank.is_lost());
+        let [[xx, ..], [_, yy, _], _] = bank.leader().pose(59.9).covariance.unwrap();
+        assert!(off_m(bank.leader()) < 4.0 * (xx + yy).sqrt());
         assert!(off_m(bank.leader()) < 1.0, "{}", off_m(bank.leader()));
+    }
+
+    /// A bias of each radio head could explain a displaced plan as well.
+    #[test]
+    fn a_displaced_site_leads_beside_estimated_biases() {
+        let moved_m = [1.2, -1.6];
+        let world = World {
+            moved_m,
+            bias_probability: MULTIPATH,
+            ..World::default()
+        };
+        let (bank, off_m) = drive(&world, 60.0, EXACT);
+        assert_eq!(bank.leading_id(), Some(ModeId::DisplacedSite));
+        let [[xx, ..], [_, yy, _], _] = bank.leader().pose(59.9).covariance.unwrap();
+        assert!(off_m(bank.leader()) < 4.0 * (xx + yy).sqrt());
+        assert!(off_m(bank.leader()) < off_m(bank.nominal()));
     }
 }
