@@ -2,7 +2,11 @@
 //!
 //! ```sh
 //! cargo run -p simulate --example monitor_table -- yard 3
+//! cargo run -p simulate --example monitor_table -- yard 20 nominal inf-sh
 //! ```
+//!
+//! With `nominal` it counts the faults that are reported in runs without a fault, in the scenario's channel or in one of
+//! 3GPP.
 #![allow(clippy::unwrap_used, clippy::print_stdout, reason = "an example")]
 
 use onboard::Custom;
@@ -18,6 +22,9 @@ fn main() {
     let arguments: Vec<String> = std::env::args().collect();
     let name = arguments.get(1).map_or("yard", String::as_str);
     let runs: u64 = arguments.get(2).map_or(1, |it| it.parse().unwrap());
+    if arguments.get(3).is_some_and(|it| it == "nominal") {
+        return nominal(name, runs, arguments.get(4).map(String::as_str));
+    }
     let kinds = [
         FaultKind::OdometerStopped,
         FaultKind::OdometerFrozen,
@@ -66,5 +73,28 @@ fn main() {
             let beyond_s = period_s * beyond as f64;
             println!("{name} {what:?} run {run}: ok beyond the level {beyond_s:.2} s");
         }
+    }
+}
+
+/// Prints the faults that are reported in each run without a fault.
+fn nominal(name: &str, runs: u64, channel: Option<&str>) {
+    let mut scenario = Scenario::from_library(name, &Shipped).unwrap();
+    if let Some(channel) = channel {
+        let overrides = [("channel.model", channel.into())];
+        scenario = scenario.with_overrides(overrides, &Shipped).unwrap();
+    }
+    let simulation = Simulation::on_its_platform(&scenario).unwrap();
+    for run in 0..runs {
+        let record = simulation.run(9, run, &|_| Ok(Custom::default())).unwrap();
+        let mut reported = Vec::new();
+        for step in &record.steps {
+            for active in step.faults.iter() {
+                let found = (active.fault.name(), active.since_s);
+                if !reported.contains(&found) {
+                    reported.push(found);
+                }
+            }
+        }
+        println!("{name} {channel:?} run {run}: {reported:?}");
     }
 }

@@ -331,8 +331,9 @@ fn drive_asleep(
     resumes: bool,
 ) -> Vec<f64> {
     const STEP: usize = 3840;
-    const GUARD_S: f64 = 4e-4;
-    const LENGTH_S: f64 = 2e-3;
+    // Either of the two radio heads may be the first that was received: their SSBs are 1 ms apart.
+    const GUARD_S: f64 = 2e-3;
+    const LENGTH_S: f64 = 3e-3;
     let (mut odometry, mut received) = (odometry.samples.iter().peekable(), Vec::new());
     let (mut number, mut counted) = (0, 0);
     let mut window: Option<[f64; 2]> = None;
@@ -361,7 +362,11 @@ fn drive_asleep(
                 live.hear_before(f64::INFINITY).unwrap();
             }
             let next_s = live.next_wake_up_s(end_s).unwrap();
+            let was_open = window.is_none();
             window = (next_s > end_s).then_some([next_s - GUARD_S, next_s + LENGTH_S]);
+            if was_open && window.is_some() {
+                live.end_stretch().unwrap();
+            }
         }
         received
             .extend(std::iter::from_fn(|| live.next_outcome()).map(|it| it.execution.ssb.time_s));
