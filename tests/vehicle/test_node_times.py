@@ -66,10 +66,13 @@ class Run:
         self.truth = np.loadtxt(drive / "truth.tum")
         self.records: list[tuple[float, Message]] = []
         self.began_s = 0.0
+        self.peer: socket.socket | None = None
         self.start()
 
     def start(self) -> None:
         """Starts the node and connects to it."""
+        if self.peer is not None:
+            self.peer.close()
         self.node = subprocess.Popen(
             command(self.drive, self.settings), stdout=subprocess.PIPE, text=True
         )
@@ -85,8 +88,9 @@ class Run:
     def read(self, node: subprocess.Popen[str]) -> None:
         """Reads what the node says, with the time of the drive."""
         assert node.stdout is not None
-        for line in node.stdout:
-            self.records.append((time.monotonic() - self.began_s, json.loads(line)))
+        with node.stdout:
+            for line in node.stdout:
+                self.records.append((time.monotonic() - self.began_s, json.loads(line)))
 
     def send(
         self,
@@ -100,6 +104,7 @@ class Run:
             time_s, rest = self.messages.pop(0)
             time.sleep(max(0.0, self.began_s + time_s - time.monotonic()))
             for message in change({**rest, "time_s": time_s}):
+                assert self.peer is not None
                 self.peer.sendall(json.dumps(message).encode() + b"\n")
 
     def pause(self, until_s: float) -> None:
@@ -140,11 +145,11 @@ class Run:
         ]
         assert not wrong, wrong[:3]
 
-    def assert_recovered(self) -> None:
-        """The last pose is `ok` and right."""
+    def assert_recovered(self, *states: str) -> None:
+        """The last pose has one of these states (default: `ok`) and is right."""
         self.assert_truthful()
         error_m, last = self.poses(0.0)[-1]
-        assert last["state"] == "ok", last
+        assert last["state"] in (states or ("ok",)), (last["state"], last["reason"])
         assert error_m < last["protection_level_m"] + 0.3
 
 
@@ -154,6 +159,8 @@ def run(drive: Path, tmp_path: Path) -> Iterator[Run]:
     yield made
     made.node.kill()
     made.node.wait()
+    made.reading.join(10.0)
+    assert made.peer is not None
     made.peer.close()
 
 
@@ -178,7 +185,8 @@ def test_a_killed_node_resumes_its_pose_within_its_covariance(run: Run) -> None:
     covariance = np.array(first["covariance"])[:2, :2]
     error = where - np.array(true)
     assert error @ np.linalg.solve(covariance, error) < LARGEST_NEES, (error, covariance)
-    run.assert_recovered()
+    # Confirmed; a level above the alert limit is `degraded`.
+    run.assert_recovered("ok", "degraded")
 
 
 def test_implausible_stamps_are_rejected_and_reported(run: Run) -> None:
@@ -199,12 +207,14 @@ def test_implausible_stamps_are_rejected_and_reported(run: Run) -> None:
     time.sleep(0.3)
     run.end()
     texts = run.events("odometry", 6.0)
-    for said in ("after its expected time", "at most 1e10", "milliseconds", "is a copy"):
+    for said in ("after its expected time", "at most 1e11", "milliseconds", "is a copy"):
         assert any(said in it for it in texts), (said, texts)
     # Repetitions of a cause are counted.
     assert len(texts) <= 3 * 6, texts
     assert not any("stepped" in it for it in texts)
-    assert all(it["state"] == "ok" for _, it in run.poses(6.0)), "harmless"
+    # Harmless, apart from pauses of a busy computer.
+    reasons = {it["reason"] for _, it in run.poses(6.0) if it["state"] != "ok"}
+    assert all(it.startswith("no odometry for") for it in reasons), reasons
     run.assert_recovered()
 
 

@@ -128,6 +128,11 @@ impl Clocks {
         (offset_s > lead_s && waited_s.is_some()).then_some(offset_s)
     }
 
+    /// Whether the last burst was at a time that agrees with the odometry's.
+    pub const fn agree(&self) -> bool {
+        self.disagreement.is_none()
+    }
+
     /// Time of angles minus that of odometry, in seconds, where the last bursts show that their clocks differ.
     pub fn disagreement_s(&self, newest: &OdometrySample) -> Option<f64> {
         let found = self.disagreement?;

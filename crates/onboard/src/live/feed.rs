@@ -806,7 +806,8 @@ impl Live {
             if verdict.accepted {
                 self.last_angle_s = Some(ssb.time_s);
             }
-            if verdict.accepted || verdict.reason == UpdateReason::Outlier {
+            let is_judged = verdict.accepted || verdict.reason == UpdateReason::Outlier;
+            if is_judged && self.clocks.agree() {
                 self.confirmation.angle(ssb.pci, verdict.accepted);
             }
             let heard_s = odometry.outside(ssb.time_s);

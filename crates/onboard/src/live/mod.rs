@@ -56,4 +56,4 @@ pub use status::{Reason, State, Status};
 pub use stream::{SampleStream, StreamConfig, StreamCounts};
 pub use stream_clock::Continuity;
 pub use time_base::ClockStep;
-pub use time_check::{TimeCheck, TimeDefect, TimeUnit, TimeVerdict};
+pub use time_check::{TimeCheck, TimeDefect, TimeVerdict};

@@ -3,10 +3,7 @@
 //! One implausible stamp is rejected and changes nothing. A new time base, as after a clock was set, is accepted
 //! once [`RUN`] consecutive rejected messages are consistent with each other.
 
-use std::fmt;
-
-/// Largest time stamp, and magnitude of the smallest, in seconds: the year 2286 by the Unix epoch.
-pub const MAX_TIME_S: f64 = 1e10;
+use crate::time_unit::{MAX_TIME_S, TimeUnit};
 
 /// Maximum lead of a stamp over its expected time, in seconds. A transport that delays and then delivers a backlog
 /// stays below it, because each message of a backlog is compared with the message before.
@@ -41,50 +38,10 @@ const UNIT_WAIT_S: f64 = 0.05;
 /// Maximum relative deviation of a stamp's advance from a multiple of the elapsed time that names its unit.
 const UNIT_TOLERANCE: f64 = 0.1;
 
-/// Unit of a time stamp that should be in seconds.
-#[derive(Debug, Clone, Copy, PartialEq, Eq)]
-pub enum TimeUnit {
-    /// Milliseconds.
-    Milliseconds,
-    /// Microseconds.
-    Microseconds,
-    /// Nanoseconds.
-    Nanoseconds,
-}
-
-impl TimeUnit {
-    const ALL: [Self; 3] = [Self::Milliseconds, Self::Microseconds, Self::Nanoseconds];
-
-    /// Number of this unit in a second.
-    pub const fn per_second(self) -> f64 {
-        match self {
-            Self::Milliseconds => 1e3,
-            Self::Microseconds => 1e6,
-            Self::Nanoseconds => 1e9,
-        }
-    }
-
-    /// The unit in which a stamp is a Unix time of the years 2001 to 2286.
-    fn of_unix_time(time: f64) -> Option<Self> {
-        let is_unix = |it: &Self| (1e9..1e10).contains(&(time / it.per_second()));
-        Self::ALL.into_iter().find(is_unix)
-    }
-
-    /// The unit in which stamps advance by this ratio to the elapsed time.
-    fn of_ratio(ratio: f64) -> Option<Self> {
-        let is_near = |it: &Self| (ratio / it.per_second() - 1.0).abs() <= UNIT_TOLERANCE;
-        Self::ALL.into_iter().find(is_near)
-    }
-}
-
-impl fmt::Display for TimeUnit {
-    fn fmt(&self, f: &mut fmt::Formatter<'_>) -> fmt::Result {
-        f.write_str(match self {
-            Self::Milliseconds => "milliseconds",
-            Self::Microseconds => "microseconds",
-            Self::Nanoseconds => "nanoseconds",
-        })
-    }
+/// The unit in which stamps advance by this ratio to the elapsed time.
+fn unit_of_ratio(ratio: f64) -> Option<TimeUnit> {
+    let is_near = |it: &TimeUnit| (ratio / it.per_second() - 1.0).abs() <= UNIT_TOLERANCE;
+    TimeUnit::ALL.into_iter().find(is_near)
 }
 
 /// Cause of a rejected time stamp.
@@ -286,7 +243,8 @@ impl TimeCheck {
             return Err(TimeDefect::NotFinite { time_s });
         }
         if time_s.abs() > MAX_TIME_S {
-            let unit = TimeUnit::of_unix_time(time_s);
+            let is_time = |unit: &TimeUnit| time_s.abs() / unit.per_second() <= MAX_TIME_S;
+            let unit = TimeUnit::of_epoch(time_s).filter(is_time);
             return Err(TimeDefect::OutOfRange { time_s, unit });
         }
         Ok(())
@@ -342,7 +300,7 @@ impl TimeCheck {
         let unit = waited_s
             .filter(|waited_s| self.rejected >= 3 && run.count == 1 && *waited_s >= UNIT_WAIT_S)
             .map(|waited_s| ahead_s / waited_s)
-            .and_then(|ratio| Some((TimeUnit::of_ratio(ratio)?, ratio)));
+            .and_then(|ratio| Some((unit_of_ratio(ratio)?, ratio)));
         Err(unit.map_or(defect, |(unit, ratio)| TimeDefect::WrongUnit {
             unit,
             ratio,
