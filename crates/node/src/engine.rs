@@ -525,25 +525,24 @@ impl Engine {
             return Ok(());
         };
         let elapsed_s = age_s + read.elapsed().as_secs_f64();
-        if let Some(by) = self.live.resume(&state, elapsed_s, sample)? {
-            let driven = by.driven_m.map_or_else(
-                || "an unknown distance".to_owned(),
-                |driven_m| format!("{driven_m:.2} m by the odometer"),
-            );
-            let text = format!(
-                "the pose of {elapsed_s:.1} s ago is resumed after {driven}, with a standard deviation of {:.2} m; \
-                     it is to be confirmed by angles",
-                by.position_std_m
-            );
-            self.event(Level::Info, "state", text);
-        } else {
+        let Some(by) = self.live.resume(&state, elapsed_s, sample)? else {
             let text = format!(
                 "ignored: the pose of {elapsed_s:.1} s ago; the vehicle may have moved by more than {} m",
                 2.0 * onboard::live::MAX_GROWTH_M
             );
             self.event(Level::Warn, "state", text);
-            self.search()?;
-        }
+            return self.search();
+        };
+        let driven = by.driven_m.map_or_else(
+            || "an unknown distance".to_owned(),
+            |driven_m| format!("{driven_m:.2} m by the odometer"),
+        );
+        let text = format!(
+            "the pose of {elapsed_s:.1} s ago is resumed after {driven}, with a standard deviation of {:.2} m; it is \
+             to be confirmed by angles",
+            by.position_std_m
+        );
+        self.event(Level::Info, "state", text);
         Ok(())
     }
 

@@ -542,9 +542,9 @@ impl Live {
         finite("the time of a status", now_s)?;
         let now_s = self.clocks.odometry.inside(now_s);
         let mut status = self.status_inside(now_s)?;
-        let outside = |time_s: f64| self.clocks.odometry.outside(time_s);
-        status.time_s = outside(status.time_s);
-        status.last_angle_s = status.last_angle_s.map(outside);
+        let clock = &self.clocks.odometry;
+        status.time_s = clock.outside(status.time_s);
+        status.last_angle_s = status.last_angle_s.map(|it| clock.outside(it));
         Ok(status)
     }
 

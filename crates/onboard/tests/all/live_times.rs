@@ -35,12 +35,13 @@ struct Drive {
 }
 
 fn new_live(start: Option<Pose>) -> Live {
-    let mut site =
-        "name = \"lane\"\n[road]\nwidth_m = 4.0\npolyline_m = [[-30.0, 0.0], [120.0, 0.0]]\n"
-            .to_owned();
-    for (pci, position) in HEADS {
-        site += &format!("[[radio_heads]]\npci = {pci}\nposition_m = {position:?}\n");
-    }
+    let head = |(pci, position): &(u16, [f64; 3])| {
+        format!("[[radio_heads]]\npci = {pci}\nposition_m = {position:?}\n")
+    };
+    let heads: Vec<String> = HEADS.iter().map(head).collect();
+    let lane =
+        "name = \"lane\"\n[road]\nwidth_m = 4.0\npolyline_m = [[-30.0, 0.0], [120.0, 0.0]]\n";
+    let site = lane.to_owned() + &heads.concat();
     let vehicle = "name = \"cart\"\n[odometer]\nscale_std = 0.003\nnoise_m_per_sqrt_m = 0.01\n\
                    [wake_up]\npolicy = \"fixed\"\ninterval_ms = 1.0\n";
     let site = Site::from_toml(&site, "site", &Shipped).unwrap();
