@@ -157,6 +157,9 @@ fn a_given_start_is_ok_once_angles_have_confirmed_it() {
     assert_eq!(drive.reason(), Reason::Unconfirmed);
     assert_eq!(drive.status().0, State::Unavailable);
     assert!(drive.drive(1.0).is_empty());
+    assert_ne!(drive.reason(), Reason::Unconfirmed);
+    // Confirmed at once; the level of a start that is known to 0.5 m falls below the alert limit with more angles.
+    assert!(drive.drive(4.0).is_empty());
     drive.assert_fine();
     // A wrong start never is.
     let mut drive = Drive::new();
