@@ -126,7 +126,11 @@ fn implausible_time_stamps_are_events_of_their_cause_and_leave_the_pose() {
     }
     input.write_all(odometry(100.21).as_bytes()).unwrap();
     assert_eq!(node.until(|it| it["type"] == "pose")["time_s"], 100.21);
-    let repeated = |it: &Value| it["text"].as_str().is_some_and(|it| it.contains("is a copy"));
+    let repeated = |it: &Value| {
+        it["text"]
+            .as_str()
+            .is_some_and(|it| it.contains("is a copy"))
+    };
     node.until(|it| repeated(it) && it["count"].as_u64() > Some(400));
     node.terminate();
 }

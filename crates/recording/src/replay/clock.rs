@@ -10,9 +10,9 @@ use onboard::gaussian::CERTAIN_SIGMAS;
 use onboard::localize::ekf::EkfConfig;
 use onboard::settings::LocalizerSettings;
 
-use super::diagnosis::{is_understood, screened, spread};
+use super::diagnosis::{is_understood, spread};
 use super::error::ReplayError;
-use super::evidence::Evidence;
+use super::evidence::{Evidence, screened};
 use super::hypotheses::Drive;
 use crate::angle_log::LoggedAngle;
 

@@ -15,7 +15,7 @@ use onboard::settings::{DriveKind, LocalizerSettings};
 
 use super::direction::reversed_parts;
 use super::error::ReplayError;
-use super::evidence::{Count, Evidence, HeadId, head_of};
+use super::evidence::{Count, Evidence, HeadId, head_of, screened};
 use super::hypotheses::{
     Drive, Hypothesis, Subject, moved, of_drive, of_radio_heads, of_yaw_rate, robot,
 };
@@ -148,11 +148,6 @@ pub fn spread<'a>(given: &Drive<'a>) -> Drive<'a> {
 pub fn is_understood(evidence: &Evidence) -> bool {
     let is_off = |it: &Count| it.angles >= LEAST_OF_HEAD && it.misfit_share() > MOST_MISFITS;
     evidence.all.refused_share() < MOST_REFUSED && !evidence.heads.values().any(is_off)
-}
-
-/// What a plain filter makes of a drive: all that it takes to tell what is worth more.
-pub fn screened(drive: &Drive<'_>) -> Result<Option<Evidence>, ReplayError> {
-    Evidence::by(&mut plain_filter(&drive.site, &drive.vehicle)?, drive)
 }
 
 /// What the vehicle's own localizer makes of a drive; `None` where it is lost.

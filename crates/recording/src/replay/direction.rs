@@ -7,8 +7,8 @@ use std::ops::Range;
 
 use onboard::observation::OdometrySample;
 
-use super::diagnosis::screened;
 use super::error::ReplayError;
+use super::evidence::screened;
 use super::hypotheses::{Drive, FREEDOM_LOG_ODDS, Hypothesis};
 use crate::odometry::OdometryLog;
 

@@ -8,7 +8,7 @@ use onboard::localize::Localizer;
 
 use super::error::ReplayError;
 use super::hypotheses::Drive;
-use super::innovations::{Met, Step, replay_angles};
+use super::innovations::{Met, Step, plain_filter, replay_angles};
 use super::stated::with_phase;
 use crate::angle_log::LoggedAngle;
 
@@ -118,4 +118,12 @@ fn independent_share(angles: &[LoggedAngle]) -> f64 {
     };
     let independent: BTreeSet<_> = angles.iter().map(apart).collect();
     independent.len() as f64 / angles.len().max(1) as f64
+}
+
+/// Evaluates a drive with a plain filter, which suffices to rank hypotheses; `None` if the filter is lost.
+///
+/// # Errors
+/// As [`plain_filter`].
+pub fn screened(drive: &Drive<'_>) -> Result<Option<Evidence>, ReplayError> {
+    Evidence::by(&mut plain_filter(&drive.site, &drive.vehicle)?, drive)
 }
