@@ -36,8 +36,11 @@ pub fn run(input: &[u8]) {
             );
             assert!(log.remarks.iter().all(|it| !it.to_string().is_empty()));
         }
-        // The same messages once more add nothing but remarks.
-        if let (Ok(alone), Ok(twice)) = (&alone, &twice) {
+        // Repeated messages add nothing but remarks. Faults of time stamps are judged by the other
+        // stamps, so that a damaged log may be judged differently if it is repeated.
+        if let (Ok(alone), Ok(twice)) = (&alone, &twice)
+            && alone.remarks.is_empty()
+        {
             assert_eq!(alone.samples.len(), twice.samples.len());
         }
         std::fs::remove_dir_all(bag).expect("written above");

@@ -305,7 +305,7 @@ def test_what_would_never_end(access_av: Cli, tmp_path: Path) -> None:
     refused(access_av("vehicle", "check", one), "wake_up")
 
 
-TUM = b"0.0 0 0 0 0 0 0 1\n0.1 0.1 0 0 0 0 0 1\n"
+TUM = b"0.0 0 0 0 0 0 0 1\n0.3 0.1 0 0 0 0 0 1\n"
 
 
 @pytest.mark.parametrize(
@@ -313,8 +313,9 @@ TUM = b"0.0 0 0 0 0 0 0 1\n0.1 0.1 0 0 0 0 0 1\n"
     [
         (b"these are words\n", 2),
         (TUM.decode().encode("utf-16"), 2),
-        (TUM.replace(b"0.1 0.1", b"0.1 nan"), 2),
-        (TUM.replace(b"0 1\n", b"0 0\n"), 2),
+        (TUM.replace(b"0.3 0.1", b"0.3 nan"), 2),
+        # The heading of the reference is not used.
+        (TUM.replace(b"0 1\n", b"0 0\n"), 0),
         (b"", 2),
         (b"\xef\xbb\xbf# a comment\n" + TUM, 0),
     ],

@@ -49,8 +49,9 @@ struct Burst {
 }
 
 impl MeasurementTraces {
-    /// MeasurementTraces of the first `runs` runs of a scenario, with the angles of these methods; `None` where
-    /// it matters to an SSB which others are listened to, or when.
+    /// MeasurementTraces of the first `runs` runs of a scenario, with the angles of these methods. `None` if an SSB
+    /// depends on the reception of others, or if a fault of the receive channels occurs: a trace has no channels, and
+    /// the vehicle's monitor of the channels would not find the fault.
     ///
     /// # Errors
     /// [`SimulationError`] when there are no such threads, or an estimator refuses the array.
@@ -59,7 +60,10 @@ impl MeasurementTraces {
         methods: &[EstimatorMethod],
         options: &CampaignOptions<'_>,
     ) -> Result<Option<Self>, SimulationError> {
-        if !simulation.world().is_independent_of_listening() {
+        let faults = &simulation.scenario().faults;
+        if !simulation.world().is_independent_of_listening()
+            || faults.iter().any(|it| it.what.is_of_channels())
+        {
             return Ok(None);
         }
         let (seed, first) = (options.seed, options.first_run);

@@ -82,6 +82,9 @@ def tracked(scenario: Scenario, base_ms: float, *, knows_road: bool = True) -> S
         {
             "vehicle.localizer.kind": "tracker",
             "vehicle.localizer.map": knows_road,
+            # Prior of the path without a map: the paper's trip is nearly straight.
+            "vehicle.localizer.curvature_rms_per_m": 0.001,
+            "vehicle.localizer.curvature_correlation_m": 400.0,
             "vehicle.integrity.enabled": False,
             "vehicle.wake_up": {
                 "policy": "uncertainty",

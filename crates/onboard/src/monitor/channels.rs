@@ -71,6 +71,17 @@ impl Hypothesis {
     }
 }
 
+/// Whether an inverted channel differs from an inverted channel with a lower number. In a row of four, channels two
+/// apart are equivalent: their responses differ by π in the electrical angle. In a row of three, an inverted middle
+/// channel is equivalent to none for the same reason.
+const fn is_distinct(elements: u8, channel: u8) -> bool {
+    match elements {
+        3 => channel == 0,
+        4 => channel < 2,
+        _ => true,
+    }
+}
+
 /// When a radio head counted last.
 #[derive(Debug, Clone, Copy)]
 struct Counted {
@@ -112,7 +123,9 @@ impl ChannelMonitor {
         if is_compared {
             let channels = 0..vehicle.array.elements;
             for first in channels.clone() {
-                hypotheses.push((Hypothesis::Inverted(first), 0.0));
+                if is_distinct(vehicle.array.elements, first) {
+                    hypotheses.push((Hypothesis::Inverted(first), 0.0));
+                }
                 for second in channels.clone().skip(usize::from(first) + 1) {
                     hypotheses.push((Hypothesis::Exchanged(first, second), 0.0));
                 }

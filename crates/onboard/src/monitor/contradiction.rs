@@ -12,6 +12,8 @@ const LEAST_M: f64 = 0.15;
 /// Minimum summed difference of a fault, as a share of the summed distance. A wrong scale or noise stays below
 /// it; a frozen value has 1, half of the speed 0.5.
 const SHARE: f64 = 0.25;
+/// Bound of the summed difference, in multiples of the minimum of a fault.
+const BOUND: f64 = 2.0;
 /// Maximum difference that one sample adds where the speed is zero, in metres: a counter that is reset once
 /// is no fault, because the localizer uses the speed instead.
 const MOST_OF_ONE_M: f64 = 0.1;
@@ -43,10 +45,12 @@ impl Contradiction {
         let by_distance_m = sample.distance_m - last.distance_m;
         let most_m = MOST_OF_ONE_M + 2.0 * by_speed_m.abs();
         let difference_m = (by_distance_m - by_speed_m).clamp(-most_m, most_m);
-        self.difference_m = kept * self.difference_m + difference_m;
         self.driven_m =
             kept * self.driven_m + by_speed_m.abs().max(by_distance_m.abs().min(most_m));
         let threshold_m = LEAST_M + SHARE * self.driven_m;
+        // The sum is bounded, so that a large fault ends as soon as a small one.
+        let bound_m = BOUND * threshold_m;
+        self.difference_m = (kept * self.difference_m + difference_m).clamp(-bound_m, bound_m);
         // A fault ends at half of the threshold, so that it is reported once.
         let factor = if self.is_faulty { 0.5 } else { 1.0 };
         self.is_faulty = self.difference_m.abs() > factor * threshold_m;

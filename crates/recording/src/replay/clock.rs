@@ -82,7 +82,8 @@ pub fn lateness(given: &Drive<'_>) -> Result<Option<Lateness>, ReplayError> {
         .retain(|it| it.measured.time_s - first_s < SPAN_S);
     // Within three of the deviations that a filter begins with anyway it finds it by itself, too.
     let config = EkfConfig::new(&given.site, vehicle);
-    let of_filter_s = CERTAIN_SIGMAS * config.lateness_std_s;
+    let filter_std_s = config.lateness_std_s;
+    let of_filter_s = CERTAIN_SIGMAS * filter_std_s;
     let scale_std = config.odometer_scale_std;
     // What is searched for is no state of the filter as well.
     given.vehicle.to_mut().receiver.lateness_std_s = Some(0.0);
@@ -111,7 +112,7 @@ pub fn lateness(given: &Drive<'_>) -> Result<Option<Lateness>, ReplayError> {
     }
     let around_s = [best.0 - GRID_S, best.0 + GRID_S];
     let found_s = highest(around_s, &mut likelihood)?;
-    if found_s.abs() < LEAST_LATENESS_S.max(of_filter_s) {
+    if found_s.abs() < LEAST_LATENESS_S {
         return Ok(None);
     }
     let Some(at_best) = of(found_s)?.filter(is_understood) else {
@@ -122,10 +123,10 @@ pub fn lateness(given: &Drive<'_>) -> Result<Option<Lateness>, ReplayError> {
     if log_odds < DOUBT_LOG_ODDS {
         return Ok(None);
     }
-    if log_odds < CORRECTION_LOG_ODDS {
+    if log_odds < CORRECTION_LOG_ODDS || found_s.abs() < of_filter_s {
         return Ok(Some(Lateness {
             found_s: 0.0,
-            left_std_s: DOUBTED_STD_S,
+            left_std_s: DOUBTED_STD_S.max(filter_std_s),
         }));
     }
     let beside = likelihood(found_s - ASIDE_S)? + likelihood(found_s + ASIDE_S)?;

@@ -11,7 +11,7 @@ use onboard::receive::ReceiverConfig;
 use onboard::settings::{IntegritySettings, Site, Vehicle, WakeUpSettings};
 use onboard::{Custom, Execution};
 
-use super::clock::{earlier, lateness};
+use super::clock::{LEAST_LATENESS_S, Lateness, earlier, lateness};
 use super::data_quality::warnings;
 use super::diagnosis::diagnose;
 use super::drive::Replay;
@@ -44,8 +44,13 @@ pub fn locate_angles(
         let why = angles.remarks.first().map(ToString::to_string);
         return Err(ReplayError::NoAngle { why });
     }
+    let measurand = vehicle.array.measurand();
     let mut logged = Cow::Borrowed(angles.angles.as_slice());
-    let late = lateness(&as_given(site, &vehicle, odometry, &logged))?;
+    let mut late = lateness(&as_given(site, &vehicle, odometry, &logged))?;
+    if let Some(found) = &mut late {
+        let angles: Vec<LoggedAngle> = logged.iter().map(|it| with_phase(it, &measurand)).collect();
+        *found = resolved(*found, site, &vehicle, start, odometry, &angles)?;
+    }
     if let Some(late) = late {
         logged = Cow::Owned(earlier(&logged, late.found_s));
         vehicle.receiver.lateness_std_s = Some(late.left_std_s);
@@ -57,7 +62,6 @@ pub fn locate_angles(
     for remark in &angles.remarks {
         replay.remark(remark.time_s, remark.to_string());
     }
-    let measurand = vehicle.array.measurand();
     let angles: Vec<LoggedAngle> = logged.iter().map(|it| with_phase(it, &measurand)).collect();
     for (time_s, text) in warnings(site, &vehicle, odometry, &angles)? {
         replay.remark(time_s, text);
@@ -109,11 +113,15 @@ pub fn locate_recording(
     }
     let mut heard: Vec<LoggedAngle> = replay.executions().iter().filter_map(as_logged).collect();
     let mut heard_by = in_time(&vehicle);
-    let late = if defines_times(recording) {
+    let mut late = if defines_times(recording) {
         None
     } else {
         lateness(&as_given(site, &heard_by, odometry, &heard))?
     };
+    if let Some(found) = &mut late {
+        let chosen = as_chosen(&heard_by);
+        *found = resolved(*found, site, &chosen, start, odometry, &heard)?;
+    }
     if let Some(late) = late {
         heard = earlier(&heard, late.found_s);
         vehicle.receiver.lateness_std_s = Some(late.left_std_s);
@@ -137,6 +145,34 @@ pub fn locate_recording(
     }
     explain(&mut replay, site, &heard_by, odometry, &heard)?;
     finish(replay, site, &vehicle, start, odometry, smooth)
+}
+
+/// Resolves a time offset that the search left in doubt: the localizer's filter estimates the offset over the whole
+/// drive. A significant estimate is corrected from the start of the drive, and its variance remains.
+fn resolved(
+    late: Lateness,
+    site: &Site,
+    vehicle: &Vehicle,
+    start: Pose,
+    odometry: &OdometryLog,
+    angles: &[LoggedAngle],
+) -> Result<Lateness, ReplayError> {
+    if late.found_s != 0.0 {
+        return Ok(late);
+    }
+    let mut vehicle = vehicle.clone();
+    vehicle.receiver.lateness_std_s = Some(late.left_std_s);
+    let mut replay = Replay::new(site, &vehicle, start, Custom::default(), odometry)?;
+    replay.hear(angles)?;
+    let drive = replay.finish()?;
+    let is_suspect = drive.suspicions().next().is_some();
+    let estimate = drive.constants.map(|it| it.lateness_s);
+    Ok(estimate
+        .filter(|it| !is_suspect && it.is_remarkable(LEAST_LATENESS_S))
+        .map_or(late, |it| Lateness {
+            found_s: it.found - it.stated,
+            left_std_s: it.std,
+        }))
 }
 
 /// Whether a recording defines the times of its samples, so that no time offset is searched for.

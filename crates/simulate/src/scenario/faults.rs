@@ -80,6 +80,19 @@ pub enum FaultKind {
     },
 }
 
+impl FaultKind {
+    /// Whether the fault is one of the receive channels.
+    pub const fn is_of_channels(&self) -> bool {
+        matches!(
+            self,
+            Self::StuckAntenna { .. }
+                | Self::DeadAntenna { .. }
+                | Self::InvertedAntenna { .. }
+                | Self::ExchangedAntennas { .. }
+        )
+    }
+}
+
 impl FaultSettings {
     /// Refuses what contradicts itself, or the site and its vehicle.
     ///

@@ -55,10 +55,19 @@ fn every_policy_and_method_drives_as_by_itself() {
 
 #[test]
 fn several_radio_heads_and_faults_too() {
-    let simulation = simulation(
-        "nlos-and-faults",
-        &[("vehicle.receiver.snr_noise_db", Value::from(0.0))],
+    let overrides = [("vehicle.receiver.snr_noise_db", Value::from(0.0))];
+    let whole = simulation("nlos-and-faults", &overrides);
+    let methods = [EstimatorMethod::MaximumLikelihood];
+    // The fault of an antenna is found by the channels, which a trace does not have.
+    assert!(
+        MeasurementTraces::record(&whole, &methods, &options())
+            .unwrap()
+            .is_none()
     );
+    let mut scenario = whole.scenario().clone();
+    scenario.faults.retain(|it| !it.what.is_of_channels());
+    assert!(scenario.faults.len() >= 2);
+    let simulation = Simulation::on_its_platform(&scenario).unwrap();
     let traces = record(&simulation, &[EstimatorMethod::MaximumLikelihood]);
     let own = simulation.campaign(&options()).unwrap();
     assert_eq!(traces.campaign(&simulation, &options()).unwrap(), own);

@@ -91,7 +91,10 @@ fn fewer_executions_where_the_snr_is_sensed_first() {
         [
             (
                 "vehicle.localizer",
-                common::value("{ kind = 'tracker', map = false }"),
+                // The paper's road hardly bends.
+                common::value(
+                    "{ kind = 'tracker', map = false, curvature_rms_per_m = 0.001, curvature_correlation_m = 400.0 }",
+                ),
             ),
             ("vehicle.wake_up.policy", "uncertainty".into()),
             ("vehicle.wake_up.base_ms", 80.0.into()),
