@@ -335,7 +335,10 @@ _GLOSSARY = {
     # Recordings.
     "name": ("text", "Name of the radio head"),
     "recording": ("text", "Path of the recording"),
-    "ssb_index_is_guess": ("bool", "Whether no PBCH was decoded, so that ssb_index is not certain"),
+    "ssb_index_is_guess": (
+        "true or false",
+        "Whether no PBCH was decoded, so that ssb_index is not certain",
+    ),
     "half_frame": ("1", "Half of the radio frame, 0 or 1"),
     "sfn": ("1", "System frame number"),
     "cfo_hz": ("Hz", "Carrier frequency offset"),

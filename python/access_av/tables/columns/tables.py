@@ -473,9 +473,9 @@ TABLES: Mapping[str, Table] = {
             "An SSB found in a recording",
             "`access-av scan --json`; all but `recording`: `access_av.nr.record(cell)`",
             (
-                "recording", "pci", "ssb_index", "ssb_index_is_guess", "half_frame", "sfn", "cfo_hz",
-                "snr_db", "sample_start", "sample_offset", "mib_bits", "ssb_freq_hz", "scs_khz", "lmax",
-                "rsrp_dbfs", "rsrq_db", "sinr_db", "angle_deg", "azimuth_deg", "elevation_deg",
+                "recording", "pci", "ssb_index", "ssb_index_is_guess", "half_frame", "sfn",
+                "cfo_hz", "snr_db", "sample_start", "sample_offset", "mib_bits", "ssb_freq_hz",
+                "scs_khz", "lmax", "rsrp_dbfs", "rsrq_db", "sinr_db", "angle_deg", "azimuth_deg", "elevation_deg",
                 "sigma_deg", "verdict", "doubt", "p_value",
             ),
             {
