@@ -40,6 +40,7 @@ phase_bias_share = 0.25
 ";
 
 /// A place with radio heads, and a closed path in it: an oval of two straights and two half circles.
+#[expect(clippy::struct_field_names, reason = "every name ends with its unit")]
 struct Place {
     heads_m: &'static [[f64; 2]],
     straight_m: f64,

@@ -475,8 +475,8 @@ TABLES: Mapping[str, Table] = {
             (
                 "recording", "pci", "ssb_index", "ssb_index_is_guess", "half_frame", "sfn",
                 "cfo_hz", "snr_db", "sample_start", "sample_offset", "mib_bits", "ssb_freq_hz",
-                "scs_khz", "lmax", "rsrp_dbfs", "rsrq_db", "sinr_db", "angle_deg", "azimuth_deg", "elevation_deg",
-                "sigma_deg", "verdict", "doubt", "p_value",
+                "scs_khz", "lmax", "rsrp_dbfs", "rsrq_db", "sinr_db", "angle_deg", "azimuth_deg",
+                "elevation_deg", "sigma_deg", "verdict", "doubt", "p_value",
             ),
             {
                 **dict.fromkeys(("half_frame", "sfn", "mib_bits"), _UNDECODED),
