@@ -6,7 +6,6 @@
 //! lateness is confounded with them on a straight road. Speed that changes and turns tell it: while a vehicle drives straight on, late angles are
 //! those of a place further back.
 
-use onboard::gaussian::CERTAIN_SIGMAS;
 use onboard::localize::ekf::EkfConfig;
 use onboard::settings::LocalizerSettings;
 
@@ -83,7 +82,6 @@ pub fn lateness(given: &Drive<'_>) -> Result<Option<Lateness>, ReplayError> {
     // Within three of the deviations that a filter begins with anyway it finds it by itself, too.
     let config = EkfConfig::new(&given.site, vehicle);
     let filter_std_s = config.lateness_std_s;
-    let of_filter_s = CERTAIN_SIGMAS * filter_std_s;
     let scale_std = config.odometer_scale_std;
     // What is searched for is no state of the filter as well.
     given.vehicle.to_mut().receiver.lateness_std_s = Some(0.0);
@@ -123,7 +121,7 @@ pub fn lateness(given: &Drive<'_>) -> Result<Option<Lateness>, ReplayError> {
     if log_odds < DOUBT_LOG_ODDS {
         return Ok(None);
     }
-    if log_odds < CORRECTION_LOG_ODDS || found_s.abs() < of_filter_s {
+    if log_odds < CORRECTION_LOG_ODDS {
         return Ok(Some(Lateness {
             found_s: 0.0,
             left_std_s: DOUBTED_STD_S.max(filter_std_s),
