@@ -58,6 +58,8 @@ pub struct Lateness {
     pub found_s: f64,
     /// Standard deviation of what is left of it to the localizer's filter (s).
     pub left_std_s: f64,
+    /// Most probable offset (s), also if it is in doubt.
+    pub candidate_s: f64,
 }
 
 /// The lateness of a drive's angles, where it is more than anybody minds, explains them, and is as much likelier than none
@@ -125,6 +127,7 @@ pub fn lateness(given: &Drive<'_>) -> Result<Option<Lateness>, ReplayError> {
         return Ok(Some(Lateness {
             found_s: 0.0,
             left_std_s: DOUBTED_STD_S.max(filter_std_s),
+            candidate_s: found_s,
         }));
     }
     let beside = likelihood(found_s - ASIDE_S)? + likelihood(found_s + ASIDE_S)?;
@@ -134,6 +137,7 @@ pub fn lateness(given: &Drive<'_>) -> Result<Option<Lateness>, ReplayError> {
     Ok(Some(Lateness {
         found_s,
         left_std_s,
+        candidate_s: found_s,
     }))
 }
 

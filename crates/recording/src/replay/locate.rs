@@ -161,7 +161,8 @@ fn resolved(
         return Ok(late);
     }
     let mut vehicle = vehicle.clone();
-    vehicle.receiver.lateness_std_s = Some(late.left_std_s);
+    // The prior covers the candidate of the search, so that it does not bias the estimate.
+    vehicle.receiver.lateness_std_s = Some(late.left_std_s.max(late.candidate_s.abs()));
     let mut replay = Replay::new(site, &vehicle, start, Custom::default(), odometry)?;
     replay.hear(angles)?;
     let drive = replay.finish()?;
@@ -172,6 +173,7 @@ fn resolved(
         .map_or(late, |it| Lateness {
             found_s: it.found - it.stated,
             left_std_s: it.std,
+            ..late
         }))
 }
 
