@@ -58,6 +58,20 @@ impl Hypothesis {
         }
     }
 
+    /// Whether a row of antennas distinguishes the fault from no fault and from a fault with lower numbers. A change of
+    /// the electrical angle by π inverts every second channel; a change of its sign reverses the row. The product with
+    /// one of both is another single fault only in short rows.
+    const fn is_distinct(self, elements: u8) -> bool {
+        match (self, elements) {
+            (Self::Inverted(channel), 3) => channel == 0,
+            (Self::Inverted(channel), 4) => channel < 2,
+            (Self::Exchanged(first, second), 3..=5) => {
+                first + second != elements - 1 || (first == 0 && elements > 3)
+            }
+            _ => true,
+        }
+    }
+
     /// Puts a snapshot right.
     fn correct(self, snapshot: &mut [Complex64]) {
         match self {
@@ -68,17 +82,6 @@ impl Hypothesis {
                 }
             }
         }
-    }
-}
-
-/// Whether an inverted channel differs from an inverted channel with a lower number. In a row of four, channels two
-/// apart are equivalent: their responses differ by π in the electrical angle. In a row of three, an inverted middle
-/// channel is equivalent to none for the same reason.
-const fn is_distinct(elements: u8, channel: u8) -> bool {
-    match elements {
-        3 => channel == 0,
-        4 => channel < 2,
-        _ => true,
     }
 }
 
@@ -123,11 +126,15 @@ impl ChannelMonitor {
         if is_compared {
             let channels = 0..vehicle.array.elements;
             for first in channels.clone() {
-                if is_distinct(vehicle.array.elements, first) {
-                    hypotheses.push((Hypothesis::Inverted(first), 0.0));
+                let inverted = Hypothesis::Inverted(first);
+                if inverted.is_distinct(vehicle.array.elements) {
+                    hypotheses.push((inverted, 0.0));
                 }
                 for second in channels.clone().skip(usize::from(first) + 1) {
-                    hypotheses.push((Hypothesis::Exchanged(first, second), 0.0));
+                    let exchanged = Hypothesis::Exchanged(first, second);
+                    if exchanged.is_distinct(vehicle.array.elements) {
+                        hypotheses.push((exchanged, 0.0));
+                    }
                 }
             }
             let turn = |number: usize| TAU * number as f64 / DIRECTIONS as f64;

@@ -142,8 +142,13 @@ fn faults_of_the_channels_are_detected_within_twenty_ssbs() {
             Fault::InvertedChannel { channel: 1 },
         ),
         (
+            FaultKind::ExchangedAntennas { antennas: [0, 1] },
+            Fault::ExchangedChannels { channels: [0, 1] },
+        ),
+        // The inner pair is equivalent to the outer pair.
+        (
             FaultKind::ExchangedAntennas { antennas: [1, 2] },
-            Fault::ExchangedChannels { channels: [1, 2] },
+            Fault::ExchangedChannels { channels: [0, 3] },
         ),
     ] {
         for run in drives(&with(what), 6, 1) {
