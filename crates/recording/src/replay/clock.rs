@@ -53,6 +53,7 @@ const DOUBTED_STD_S: f64 = 0.1;
 
 /// How much later angles come than they say, by the odometry's clock.
 #[derive(Debug, Clone, Copy, PartialEq)]
+#[expect(clippy::struct_field_names, reason = "every name ends with its unit")]
 pub struct Lateness {
     /// The lateness (s).
     pub found_s: f64,
