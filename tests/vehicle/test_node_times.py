@@ -212,9 +212,11 @@ def test_implausible_stamps_are_rejected_and_reported(run: Run) -> None:
     # Repetitions of a cause are counted.
     assert len(texts) <= 3 * 6, texts
     assert not any("stepped" in it for it in texts)
-    # Harmless, apart from pauses of a busy computer.
+    # Harmless, apart from pauses of a busy computer. At the start of the road the protection level is
+    # near the alert limit.
     reasons = {it["reason"] for _, it in run.poses(6.0) if it["state"] != "ok"}
-    assert all(it.startswith("no odometry for") for it in reasons), reasons
+    harmless = ("no odometry for", "the protection level")
+    assert all(it.startswith(harmless) for it in reasons), reasons
     run.assert_recovered()
 
 

@@ -346,6 +346,13 @@ impl Onboard {
         })
     }
 
+    /// Receives every burst until angles have confirmed the pose again.
+    pub fn await_confirmation(&mut self) {
+        if let Some(monitors) = &mut self.monitors {
+            monitors.await_confirmation();
+        }
+    }
+
     /// Whether a monitor wants the burst at a time (s).
     fn is_wanted(&self, time_s: f64) -> bool {
         (self.monitors.as_ref()).is_some_and(|monitors| monitors.wants(time_s))

@@ -5,7 +5,6 @@ use std::collections::VecDeque;
 use num_complex::Complex32;
 
 use super::clocks::Clocks;
-use super::confirmation::Confirmation;
 use super::error::LiveError;
 use super::outcome::{HeadStatus, Outcome};
 use super::start::starting_at;
@@ -21,6 +20,7 @@ use crate::geometry::{Pose, wrap_angle};
 use crate::localize::{
     self, AngleMeasurement, HISTORY_S, IntegrityState, OdometryVerdict, PoseEstimate, UpdateReason,
 };
+use crate::monitor::Confirmation;
 use crate::observation::{BURST_S, OdometrySample, SensedSsb};
 use crate::pipeline::{Custom, OdometryDefect, Onboard};
 use crate::radio_head::RadioHead;
@@ -44,8 +44,9 @@ const NO_ANGLE_S: f64 = 5.0;
 const LOOK_AHEAD_S: f64 = 1.0;
 
 /// Maximum time since the last SSB, in seconds, for which windows are placed by the time of that SSB. A
-/// stretch of samples without an SSB, later than this, means that the windows may be misplaced.
-const SSB_SILENT_S: f64 = 1.0;
+/// stretch of samples without an SSB, later than this, means that the windows may be misplaced. With one more burst,
+/// reception resumes within a second.
+const SSB_SILENT_S: f64 = 0.8;
 
 /// SNR (dB) of an angle of which none is stated: good enough for any policy.
 const UNSTATED_SNR_DB: f64 = 20.0;
@@ -835,6 +836,9 @@ impl Live {
                 residual_rad,
                 after: found,
             });
+        }
+        if !self.confirmation.is_confirmed() {
+            self.onboard.await_confirmation();
         }
         Ok(())
     }

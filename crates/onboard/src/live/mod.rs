@@ -33,7 +33,6 @@
 //! ```
 
 mod clocks;
-mod confirmation;
 mod error;
 mod feed;
 mod outcome;

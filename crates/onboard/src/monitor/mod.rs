@@ -4,19 +4,21 @@
 //! pose unavailable until the odometry agrees with the angles again.
 
 mod channels;
+mod confirmation;
 mod contradiction;
 mod fallback;
 mod fault;
 mod motion;
 
 pub use channels::ChannelMonitor;
+pub use confirmation::Confirmation;
 pub use contradiction::Contradiction;
 pub use fallback::Fallback;
 pub use fault::{ActiveFault, ActiveFaults, Fault, FaultSource};
 pub use motion::MotionMonitor;
 
 use crate::geometry::Pose;
-use crate::localize::AngleUpdate;
+use crate::localize::{AngleUpdate, UpdateReason};
 use crate::observation::{OdometrySample, SsbObservation};
 use crate::settings::{Site, Vehicle};
 use crate::sight::Sight;
@@ -36,6 +38,8 @@ pub struct Monitors {
     contradiction: Contradiction,
     motion: MotionMonitor,
     channels: ChannelMonitor,
+    /// Of a given pose: until then every burst is received.
+    confirmation: Confirmation,
     distance_m: f64,
     /// Localization without odometry.
     pub fallback: Fallback,
@@ -51,6 +55,7 @@ impl Monitors {
             contradiction: Contradiction::default(),
             motion: MotionMonitor::new(Sight::new(vehicle), heads),
             channels: ChannelMonitor::new(site, vehicle, heads),
+            confirmation: Confirmation::new(false, heads),
             distance_m: 0.0,
             fallback: Fallback::new(site, vehicle),
             faults: ActiveFaults::default(),
@@ -75,6 +80,14 @@ impl Monitors {
         }
         self.is_without_odometry = false;
         self.motion.restart();
+        self.confirmation.restart();
+    }
+
+    /// Receives every burst until angles have confirmed the pose again.
+    pub fn await_confirmation(&mut self) {
+        if self.confirmation.is_confirmed() {
+            self.confirmation.restart();
+        }
     }
 
     /// Starts again with another odometry.
@@ -107,7 +120,9 @@ impl Monitors {
 
     /// Whether the burst at a time (s) is to be received, whatever the wake-up policy says.
     pub fn wants(&self, time_s: f64) -> bool {
-        self.faults.of_odometry().is_some() || self.motion.wants(time_s)
+        self.faults.of_odometry().is_some()
+            || !self.confirmation.is_confirmed()
+            || self.motion.wants(time_s)
     }
 
     /// Notes that the burst at a time (s) is received.
@@ -130,6 +145,12 @@ impl Monitors {
     /// Takes in the angles of a burst at a time (s), given the pose at the newer of odometry and burst, `None` while it is
     /// searched for.
     pub fn angles(&mut self, time_s: f64, updates: &[AngleUpdate], pose: Option<Pose>) {
+        for update in updates {
+            let verdict = update.verdict;
+            if verdict.accepted || verdict.reason == UpdateReason::Outlier {
+                self.confirmation.angle(update.head.pci, verdict.accepted);
+            }
+        }
         let found = self.motion.angles(updates, pose);
         let by_angles = [Fault::OdometryFrozen, Fault::OdometryReversed];
         match (self.faults.of_odometry(), found) {
