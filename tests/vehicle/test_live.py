@@ -224,8 +224,8 @@ def ros(monkeypatch: pytest.MonkeyPatch, now_s: list[float]) -> SimpleNamespace:
     return seen
 
 
-def phases(site_name: str, vehicle_name: str, x_m: float) -> list[tuple[int, float]]:
-    """PCI and electrical angle of two radio heads from a place on the x axis, heading along it."""
+def phases(site_name: str, vehicle_name: str, x_m: float) -> list[tuple[int, int, float]]:
+    """PCI, SSB index and electrical angle of two radio heads from a place on the x axis, heading along it."""
     site = tomllib.loads(access_av.Site.load(site_name).to_toml())
     vehicle = tomllib.loads(access_av.Vehicle.load(vehicle_name).to_toml())
     forward_m, left_m, up_m = vehicle["array"].get("position_m", [0.0, 0.0, 0.0])
@@ -233,8 +233,8 @@ def phases(site_name: str, vehicle_name: str, x_m: float) -> list[tuple[int, flo
     for head in site["radio_heads"]:
         dx, dy = head["position_m"][0] - x_m - forward_m, head["position_m"][1] - left_m
         range_m = math.hypot(dx, dy, head["position_m"][2] - up_m)
-        found.append((range_m, head["pci"], math.pi * dx / range_m))
-    return [(pci, phase_rad) for _, pci, phase_rad in sorted(found)[:2]]
+        found.append((range_m, head["pci"], head.get("ssb_index", 0), math.pi * dx / range_m))
+    return [(pci, index, phase_rad) for _, pci, index, phase_rad in sorted(found)[:2]]
 
 
 def test_the_ros_node_follows_its_topics(monkeypatch: pytest.MonkeyPatch) -> None:
@@ -270,11 +270,12 @@ def test_the_ros_node_follows_its_topics(monkeypatch: pytest.MonkeyPatch) -> Non
     seen.timer()
     assert not seen.published["access_av/pose"]
     assert "have not confirmed" in seen.published["access_av/status"][-1].message
-    for pci, phase_rad in phases("yard", "tugger", -48.5):
+    for pci, ssb_index, phase_rad in phases("yard", "tugger", -48.5):
         for _ in range(3):
             now_s[0] += 0.01
             drives()
-            angle = {"pci": pci, "time_s": now_s[0], "phase_rad": phase_rad, "sigma_rad": 0.2}
+            angle = {"pci": pci, "ssb_index": ssb_index, "time_s": now_s[0]}
+            angle |= {"phase_rad": phase_rad, "sigma_rad": 0.2}
             seen.callbacks["angles"](SimpleNamespace(data=json.dumps(angle)))
     drives_on = now_s[0] - 2.0
     now_s[0] += 0.02

@@ -44,9 +44,8 @@ const NO_ANGLE_S: f64 = 5.0;
 const LOOK_AHEAD_S: f64 = 1.0;
 
 /// Maximum time since the last SSB, in seconds, for which windows are placed by the time of that SSB. A
-/// stretch of samples without an SSB, later than this, means that the windows may be misplaced. With one more burst,
-/// reception resumes within a second.
-const SSB_SILENT_S: f64 = 0.8;
+/// stretch of samples without an SSB, later than this, means that the windows may be misplaced.
+const SSB_SILENT_S: f64 = 1.0;
 
 /// SNR (dB) of an angle of which none is stated: good enough for any policy.
 const UNSTATED_SNR_DB: f64 = 20.0;
