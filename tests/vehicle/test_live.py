@@ -225,7 +225,7 @@ def ros(monkeypatch: pytest.MonkeyPatch, now_s: list[float]) -> SimpleNamespace:
 
 
 def phases(site_name: str, vehicle_name: str, x_m: float) -> list[tuple[int, int, float]]:
-    """PCI, SSB index and electrical angle of two radio heads from a place on the x axis, heading along it."""
+    """PCI, SSB index and electrical angle of two radio heads, seen from the x axis, along it."""
     site = tomllib.loads(access_av.Site.load(site_name).to_toml())
     vehicle = tomllib.loads(access_av.Vehicle.load(vehicle_name).to_toml())
     forward_m, left_m, up_m = vehicle["array"].get("position_m", [0.0, 0.0, 0.0])

@@ -13,6 +13,7 @@ import threading
 import time
 import urllib.request
 from contextlib import ExitStack, contextmanager
+from pathlib import Path
 from typing import TYPE_CHECKING, Any
 
 import jsonschema
@@ -32,7 +33,6 @@ from node import NODE, SCHEMAS, Broker, command, free_port, wake_up_every
 
 if TYPE_CHECKING:
     from collections.abc import Iterator
-    from pathlib import Path
 
 sys.path.insert(0, str(ROOT / "examples/live"))
 from transmitter import Drive, Transmitter, Wheels, node_toml, odometry_of, settings_of
@@ -272,7 +272,11 @@ localized_after_s = 0.5
 
 @pytest.fixture(scope="module")
 def live(drive: Path, tmp_path_factory: pytest.TempPathFactory) -> Live:
-    return Live(drive, tmp_path_factory.mktemp("live"))
+    folder = tmp_path_factory.mktemp("live")
+    # The default wake-up policy may skip bursts for seconds.
+    copy = Path(shutil.copytree(drive, folder / "drive"))
+    wake_up_every(copy, 0.3)
+    return Live(copy, folder)
 
 
 def test_every_radio_head_is_heard_through_sockets_of_others(live: Live) -> None:

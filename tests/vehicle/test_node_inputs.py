@@ -19,7 +19,6 @@ import access_av
 from conftest import ROOT
 from node import NODE, command, wake_up_every
 
-
 sys.path.insert(0, str(ROOT / "examples/live"))
 from transmitter import Drive, Transmitter, node_toml
 

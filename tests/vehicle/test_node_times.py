@@ -127,12 +127,15 @@ class Run:
         ]
 
     def poses(self, since_s: float, until_s: float = math.inf) -> list[tuple[float, Message]]:
-        """Poses between two times of the drive, with their error in metres at their arrival."""
+        """Poses between two times of the drive, with their error in metres.
+
+        The error is that at the time of the pose, or at its arrival if the clocks differ.
+        """
         found = []
         for at_s, it in self.records:
             if it["type"] == "pose" and it.get("x_m") is not None and since_s <= at_s < until_s:
-                x_m = np.interp(at_s, self.truth[:, 0], self.truth[:, 1])
-                y_m = np.interp(at_s, self.truth[:, 0], self.truth[:, 2])
+                time_s = it["time_s"] if abs(it["time_s"] - at_s) < 0.5 else at_s
+                x_m, y_m = (np.interp(time_s, self.truth[:, 0], self.truth[:, k]) for k in (1, 2))
                 found.append((math.hypot(it["x_m"] - x_m, it["y_m"] - y_m), it))
         return found
 
@@ -212,8 +215,8 @@ def test_implausible_stamps_are_rejected_and_reported(run: Run) -> None:
     # Repetitions of a cause are counted.
     assert len(texts) <= 3 * 6, texts
     assert not any("stepped" in it for it in texts)
-    # Harmless, apart from pauses of a busy computer. At the start of the road the protection level is
-    # near the alert limit.
+    # Harmless, apart from pauses of a busy computer. At the start of the road the protection level
+    # is near the alert limit.
     reasons = {it["reason"] for _, it in run.poses(6.0) if it["state"] != "ok"}
     harmless = ("no odometry for", "the protection level")
     assert all(it.startswith(harmless) for it in reasons), reasons
