@@ -384,13 +384,12 @@ impl Onboard {
     /// # Errors
     /// Whatever a user's policy fails with.
     pub fn listens(&mut self, time_s: f64) -> Result<bool, BoxError> {
+        let is_wanted = self.is_wanted(time_s);
         let newest_s = self.odometry.map_or(time_s, |sample| sample.time_s);
         self.surroundings
             .look(newest_s.max(time_s), &self.localizer)?;
         let now = self.surroundings.at(time_s, self.odometry, &self.localizer);
-        let is_wanted = is_searching(now.localizer)
-            || (self.monitors.as_ref()).is_some_and(|monitors| monitors.wants(time_s));
-        Ok(is_wanted || self.policy.listens(&now)?)
+        Ok(is_wanted || is_searching(now.localizer) || self.policy.listens(&now)?)
     }
 
     /// Leaves the angles of a cell out from now on, or takes them in again; `false` where the site has

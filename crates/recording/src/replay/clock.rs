@@ -82,7 +82,6 @@ pub fn lateness(given: &Drive<'_>) -> Result<Option<Lateness>, ReplayError> {
         .angles
         .to_mut()
         .retain(|it| it.measured.time_s - first_s < SPAN_S);
-    // Within three of the deviations that a filter begins with anyway it finds it by itself, too.
     let config = EkfConfig::new(&given.site, vehicle);
     let filter_std_s = config.lateness_std_s;
     let scale_std = config.odometer_scale_std;
