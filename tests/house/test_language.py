@@ -28,6 +28,7 @@ PLAIN = [
     "docs/energy.md",
     "docs/estimator.md",
     "docs/node-messages.md",
+    "docs/node.md",
     "docs/outlook.md",
     "docs/paper.md",
     "docs/profile.md",
