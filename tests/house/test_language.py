@@ -27,6 +27,7 @@ PLAIN = [
     "docs/designs.md",
     "docs/energy.md",
     "docs/estimator.md",
+    "docs/integrity.md",
     "docs/node-messages.md",
     "docs/node.md",
     "docs/outlook.md",
