@@ -28,6 +28,7 @@ PLAIN = [
     "docs/energy.md",
     "docs/estimator.md",
     "docs/integrity.md",
+    "docs/locate.md",
     "docs/node-messages.md",
     "docs/node.md",
     "docs/outlook.md",
