@@ -33,6 +33,7 @@ PLAIN = [
     "docs/node.md",
     "docs/outlook.md",
     "docs/paper.md",
+    "docs/plant.md",
     "docs/profile.md",
     "docs/python.md",
     "docs/ray-tracing.md",
