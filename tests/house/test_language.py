@@ -22,6 +22,7 @@ if TYPE_CHECKING:
 PLAIN = [
     "CONTRIBUTING.md",
     "README.md",
+    "crates/simulate/**/*.rs",
     "docs/README.md",
     "docs/command-line.md",
     "docs/designs.md",

@@ -216,7 +216,7 @@ def test_a_scenario_refuses_paths_of_another_site(
     alone = table.filter(pl.col("pci") != 3)
     assert "no path from its radio head pci=3" in refused(alone)
     under = site.with_overrides({"radio_heads[1].position_m": [30.0, 21.0, -1.0]})
-    with pytest.raises(ValueError, match="stands under the road"):
+    with pytest.raises(ValueError, match="is below the road"):
         refused(line_of_sight(under, LANE_M), under)
     for override, message in (
         ('channel.paths="nowhere.npz"', "nowhere.npz"),

@@ -1,5 +1,5 @@
-//! What an SSB costs on the vehicle, one thread: from samples to angle, and from angle to pose.
-//! `cargo bench -p simulate`.
+//! Single-threaded processing time of an SSB on the vehicle: from samples to angle, and from angle
+//! to pose. Run with `cargo bench -p simulate`.
 #![allow(clippy::unwrap_used, reason = "this is a benchmark")]
 
 use std::f64::consts::TAU;
@@ -17,7 +17,7 @@ use rand_distr::{Distribution, StandardNormal};
 use simulate::random::{Purpose, Streams};
 
 const ANTENNAS: usize = 4;
-/// 20 ms at 3.84 Msps.
+/// Samples in 20 ms at 3.84 Msps.
 const PERIOD: usize = 76_800;
 
 fn main() {
@@ -32,7 +32,8 @@ fn believed(site: &str) -> (Site, Vehicle) {
     )
 }
 
-/// 20 ms of the site's first cell on four antennas at 20 dB per resource element.
+/// Returns 20 ms of the site's first cell at four antennas, with an SNR of 20 dB per resource
+/// element.
 fn samples(site: &Site) -> Vec<Vec<Complex32>> {
     let burst = Burst {
         pci: Pci::new(site.radio_heads[0].pci).unwrap(),
@@ -45,7 +46,7 @@ fn samples(site: &Site) -> Vec<Vec<Complex32>> {
     let numerology = Numerology::new(burst.case.spacing(), 256).unwrap();
     let sent = burst.iq(&mut Ofdm::new(numerology)).unwrap();
     let mut random = Streams::new(1, 0).generator(Purpose::SampleNoise, 0);
-    // A resource element of power one has 1/256 of it in a sample.
+    // A resource element of unit power has the power 1/256 in a sample.
     let noise = (0.5 * 0.01 / 256.0_f32).sqrt();
     let mut draw = || -> f32 { StandardNormal.sample(&mut random) };
     (0..ANTENNAS)
@@ -98,7 +99,7 @@ fn samples_to_angle(bencher: divan::Bencher, pilots: &str) {
     bencher.bench_local(next);
 }
 
-/// With and without a map, and where errors that stay over metres are found.
+/// Angle to pose, with and without a map, and with an estimate of correlated angle errors.
 #[divan::bench(args = [(true, false), (false, false), (true, true)])]
 fn angle_to_pose(bencher: divan::Bencher, (map, estimates_bias): (bool, bool)) {
     let (site, mut vehicle) = believed("trip-2");
@@ -132,13 +133,15 @@ fn angle_to_pose(bencher: divan::Bencher, (map, estimates_bias): (bool, bool)) {
         snr_db: 20.0,
         resolved: true,
     };
-    // The same tracker each time: a second angle would find nothing new. Its copy is not timed.
+    // Each iteration starts from a copy of the tracker, because a second equal angle carries little
+    // information. The time of the copy is excluded.
     bencher
         .with_inputs(|| tracker.clone())
         .bench_local_refs(|tracker| tracker.update(&heads[0], divan::black_box(&measured)));
 }
 
-/// One SSB of each of four radio heads and an odometry sample, guarded and bare, and the position after it.
+/// One SSB of each of four radio heads, an odometry sample and the position query, with and without
+/// integrity monitoring.
 #[divan::bench(args = [true, false])]
 fn burst_to_pose(bencher: divan::Bencher, guarded: bool) {
     let (site, mut vehicle) = believed("trip-4");
@@ -148,7 +151,7 @@ fn burst_to_pose(bencher: divan::Bencher, guarded: bool) {
     let mut localizer = onboard::localize::built_in(&site, &vehicle, road.pose(0.0)).unwrap();
     let mut number = 0;
     let mut next = || {
-        // To and fro, so that the road does not end.
+        // The vehicle drives back and forth, so that the road does not end.
         let time_s = 0.02 * f64::from(number);
         let way_m = 100.0 - 100.0 * (0.04 * time_s).cos();
         number += 1;

@@ -2,9 +2,9 @@
 //! `cargo run --release -p simulate --example availability_table -- runs seed[,seed] scenario[,…] channel[,…] fault[,…]
 //! [key=value …]`.
 //!
-//! Channels are `nominal`, `K=5` or a model of TR 38.901; faults are those of `access-av integrity`. `beyond` is the
-//! share of the `ok` steps whose error exceeds the protection level, `silent` the longest time with an error beyond
-//! the alert limit in state `ok`.
+//! Channels are `nominal`, `K=5` or a model of TR 38.901; faults are those of `access-av
+//! integrity`. `beyond` is the fraction of the `ok` steps whose error exceeds the protection level.
+//! `silent` is the longest time in state `ok` with an error that exceeds the alert limit.
 #![allow(clippy::print_stdout, reason = "prints a table")]
 
 use std::error::Error;
@@ -16,7 +16,7 @@ use toml::{Table, Value};
 
 type Result<T> = std::result::Result<T, Box<dyn Error>>;
 
-/// Beginning of a fault that lasts until the end of the run (s).
+/// Start of a fault that lasts until the end of the run (s).
 const FROM_S: f64 = 20.0;
 
 /// Array mounting of the fault `array` (rad): 1°.

@@ -1,10 +1,10 @@
-//! Protection levels, alarms and false alarms, nominal and under each fault:
-//! `cargo run --release -p simulate --example integrity_table -- [runs] [seed ...]`.
+//! Protection levels, alarms and false alarms without a fault and under each fault: `cargo run
+//! --release -p simulate --example integrity_table -- [runs] [seed ...]`.
 //!
-//! The epochs of a run hang together: beside each share stand the end of its 95 % interval by the
-//! bootstrap over runs, and in how many runs anything happened at all. Silent is the longest time
-//! without an alarm while the error was beyond the alert limit; early are alarms while it was within,
-//! be it that the protection level passed the limit or that a source was suspected.
+//! The epochs of a run are correlated. Therefore, each fraction is shown with the upper end of its
+//! 95 % bootstrap interval over runs and with the number of affected runs. `silent` is the longest
+//! time without an alarm while the error exceeded the alert limit. `early` counts alarms while the
+//! error was within the alert limit, caused by the protection level or by a suspected source.
 #![allow(clippy::print_stdout, reason = "prints a table")]
 
 mod common;
@@ -93,7 +93,8 @@ fn cases() -> Result<Vec<(&'static str, Scenario)>> {
 fn print(name: &str, runs: &[IntegritySummary]) {
     let total = IntegritySummary::sum(runs);
     let affected = runs.iter().filter(|run| run.beyond > 0).count();
-    // Counts alone: adding up the histograms thousands of times would take longer than driving.
+    // The bootstrap uses counts only, because merging histograms thousands of times would be slower
+    // than the simulation.
     let counts: Vec<[f64; 2]> = (runs.iter())
         .map(|run| [run.beyond as f64, run.ok as f64])
         .collect();

@@ -1,12 +1,13 @@
-//! Response of the monitors to faults: time to detection, time `ok` beyond the protection level, time to recovery.
+//! Response of the monitors to faults: time to detection, time in state `ok` with an error that
+//! exceeds the protection level, and time to recovery.
 //!
 //! ```sh
 //! cargo run -p simulate --example monitor_table -- yard 3
 //! cargo run -p simulate --example monitor_table -- yard 20 nominal inf-sh
 //! ```
 //!
-//! With `nominal` it counts the faults that are reported in runs without a fault, in the scenario's channel or in one of
-//! 3GPP.
+//! With `nominal`, the table counts the faults that are reported in fault-free runs, in the
+//! scenario's channel or in a channel of 3GPP.
 #![allow(clippy::unwrap_used, clippy::print_stdout, reason = "an example")]
 
 use onboard::Custom;
@@ -76,7 +77,7 @@ fn main() {
     }
 }
 
-/// Prints the faults that are reported in each run without a fault.
+/// Prints the faults that are reported in each fault-free run.
 fn nominal(name: &str, runs: u64, channel: Option<&str>) {
     let mut scenario = Scenario::from_library(name, &Shipped).unwrap();
     if let Some(channel) = channel {

@@ -1,5 +1,6 @@
-//! Starts from scratch: from where on the road is the vehicle found, after what distance, and is it
-//! there? `cargo run --release -p simulate --example start_table -- [starts] [seed]`.
+//! Search for an unknown start: fraction of starting points at which the vehicle is found, distance
+//! driven until then, and correctness. Run with `cargo run --release -p simulate --example
+//! start_table -- [starts] [seed]`.
 
 #![allow(clippy::print_stdout, reason = "this is a program")]
 
@@ -15,7 +16,7 @@ use simulate::{Found, Simulation};
 
 use common::{Result, arguments, changed};
 
-/// Road that is left ahead of the last starting point (m).
+/// Minimum distance from a starting point to the end of the road (m).
 const AHEAD_M: f64 = 60.0;
 
 fn main() -> Result<()> {
@@ -60,7 +61,7 @@ fn main() -> Result<()> {
     Ok(())
 }
 
-/// Searches from each of the starting points; those in which the vehicle was found.
+/// Searches from each starting point and returns the successful searches.
 fn search(scenario: &Scenario, starts: u64, seed: u64) -> Result<Vec<Found>> {
     let file = &scenario.name;
     let length_m = scenario.path(Check { file })?.length_m();

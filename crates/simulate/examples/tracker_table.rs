@@ -1,9 +1,9 @@
-//! The tracker against its bound, against its own covariance and against the paper's method:
+//! Comparison of the tracker with its Cramér–Rao bound, its own covariance and the paper's method:
 //! `cargo run --release -p simulate --example tracker_table -- [runs] [seed]`.
 //!
-//! Below each of the first lines stands what campaigns of that size by a perfectly consistent
-//! filter show: an odometer's scale stays with it for a whole run, so that figures scatter however
-//! good the filter.
+//! The line below each of the first lines shows the spread of a perfectly consistent filter in
+//! campaigns of equal size. The spread is large because the odometer's scale error is constant
+//! during a run.
 #![allow(clippy::print_stdout, reason = "prints a table")]
 
 mod common;
@@ -14,11 +14,12 @@ use toml::Value;
 
 use common::{Result, arguments, changed, fixed};
 
-/// SSBs before the errors are held against the covariance: an exact start has no error ellipse. A
-/// perfect filter's errors are drawn as far apart.
+/// Number of initial SSBs that are excluded from the comparison with the covariance, because an
+/// exact start has a singular covariance. The errors of the perfect filter are drawn at the same
+/// spacing.
 const SETTLING: usize = 50;
 
-/// Campaigns of a perfect filter.
+/// Number of campaigns of a perfect filter.
 const CAMPAIGNS: u64 = 200;
 
 fn main() -> Result<()> {
@@ -137,7 +138,7 @@ fn print_line(name: &str, bound_m: f64, errors: &Consistency) {
     );
 }
 
-/// Largest ratio of root mean square error to bound from 20 m of travel on.
+/// Returns the largest ratio of RMS error to bound after 20 m of travel.
 fn largest_ratio<'a>(campaign: &Campaign, bound: impl IntoIterator<Item = &'a BoundPoint>) -> f64 {
     (campaign.steps.iter().zip(bound))
         .filter(|(_, point)| point.along_m >= 20.0)
@@ -145,7 +146,7 @@ fn largest_ratio<'a>(campaign: &Campaign, bound: impl IntoIterator<Item = &'a Bo
         .fold(0.0, f64::max)
 }
 
-/// The paper's adaptive wake-up in every mode, and fixed intervals.
+/// Returns the paper's adaptive wake-up in every power mode and the fixed intervals.
 fn policies() -> Vec<(String, Vec<(&'static str, Value)>)> {
     let mode = |mode: i64| {
         let settings = vec![("vehicle.platform.mode", mode.into())];

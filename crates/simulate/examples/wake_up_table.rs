@@ -1,5 +1,5 @@
-//! What each wake-up policy costs and what error it leaves, on the yard, with the settings shipped:
-//! `cargo run --release -p simulate --example wake_up_table -- [runs] [seed ...]`.
+//! Cost and error of each wake-up policy on the yard with the shipped settings: `cargo run
+//! --release -p simulate --example wake_up_table -- [runs] [seed ...]`.
 //!
 //! Every policy drives the same runs over the same radio channel.
 #![allow(clippy::print_stdout, reason = "prints a table")]
@@ -11,7 +11,7 @@ use simulate::scenario::Scenario;
 
 use common::{Result, arguments, campaign, changed, fixed};
 
-/// One policy, one outcome for each seed.
+/// One policy with one outcome per seed.
 struct Policy {
     name: String,
     scenario: Scenario,
@@ -35,7 +35,7 @@ fn main() -> Result<()> {
     }
 
     println!("yard, {runs} runs of each, seeds {seeds:?}");
-    println!("policy                 p90 m  executions  bursts heard  bound out of reach");
+    println!("policy                 p90 m  executions    receptions  target unreachable");
     for policy in &policies {
         println!(
             "{:20} {:7.3} {:11.0} {:13.0} {:17.1} %",
@@ -46,7 +46,7 @@ fn main() -> Result<()> {
             100.0 * policy.mean(|it| it.out_of_reach),
         );
     }
-    println!("\nagainst each other: mean over the seeds, least and most");
+    println!("\nratios: mean, minimum and maximum over the seeds");
     println!("policy               against             share of executions      p90 over p90");
     let (driven, references): (Vec<_>, Vec<_>) = policies.iter().partition(|policy| {
         matches!(
@@ -104,7 +104,8 @@ impl Policy {
         self.outcomes.iter().map(of).sum::<f64>() / self.outcomes.len() as f64
     }
 
-    /// A figure over that of another policy on the same seeds: mean, least and most.
+    /// Returns the ratio of a metric to that of another policy with equal seeds: mean, minimum and
+    /// maximum.
     fn against(&self, other: &Self, of: impl Fn(&Outcome) -> f64) -> String {
         let ratios: Vec<f64> = (self.outcomes.iter().zip(&other.outcomes))
             .map(|(mine, theirs)| of(mine) / of(theirs))

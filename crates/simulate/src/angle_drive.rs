@@ -1,4 +1,4 @@
-//! A scenario's drive as a log of the angles that the vehicle's receiver finds in it.
+//! Export of a scenario's run as a log of the angles of arrival that the receiver estimates.
 
 use std::fs;
 use std::path::Path;
@@ -14,12 +14,16 @@ use crate::run::Simulation;
 use crate::scenario::Scenario;
 use crate::synth::{SynthError, write_settings};
 
-/// Writes run `run` of a scenario into `directory`, up to `end_s`: `angles.csv` with the angle of
-/// every SSB, `odometry.csv`, the truth in `truth.tum`, `scenario.toml`, and what the vehicle
-/// believes in `site.toml` and `vehicle.toml`. Returns the number of angles.
+/// Writes run `run` of a scenario up to `end_s` into `directory` and returns the number of angles.
 ///
-/// The deviation of an angle is all of its error that is believed: noise, and the site's scatter,
-/// which is another half a wavelength on. The vehicle file says that.
+/// - `angles.csv`: the angle of arrival of every SSB
+/// - `odometry.csv`: the odometry samples
+/// - `truth.tum`: the true poses
+/// - `site.toml`, `vehicle.toml`: the nominal models
+/// - `scenario.toml`: the scenario
+///
+/// The standard deviation of an angle is its total modelled error: thermal noise and the scatter of
+/// the site. The scatter is independent after half a wavelength, as the vehicle file specifies.
 ///
 /// # Errors
 /// [`SynthError`].
@@ -36,7 +40,7 @@ pub fn log_angles(
         simulation.world().is_independent_of_listening(),
         "fidelity",
         "samples, latency or noisy SNR",
-        "a log of angles takes snapshots that are there at once, with the SNR as it is",
+        "a log of angles requires snapshots without latency and with the true SNR",
     )?;
     let method = scenario.vehicle.estimator.method;
     let trace = MeasurementTrace::record(&simulation, &[method], Streams::new(seed, run), run)?;

@@ -1,13 +1,14 @@
-//! How far a statistic over runs is known.
+//! Confidence interval of a statistic over runs.
 
 use rand::{RngExt, SeedableRng};
 use rand_chacha::ChaCha8Rng;
 
-/// Resamples: the ends of a 95 % interval are the 50th of 2000 from either side.
+/// Number of resamples. The ends of the 95 % interval are the 50th smallest and the 50th largest
+/// value.
 const RESAMPLES: usize = 2000;
 
-/// 95 % interval of a statistic over independent runs, by the bootstrap (Efron 1979): runs are
-/// drawn with replacement, whole, so that whatever hangs together within one stays together.
+/// Returns the 95 % bootstrap confidence interval of a statistic over independent runs (Efron
+/// 1979). Whole runs are drawn with replacement, which preserves the correlation within a run.
 pub fn bootstrap_interval<T>(runs: &[T], statistic: impl Fn(&[&T]) -> f64) -> [f64; 2] {
     let mut rng = ChaCha8Rng::seed_from_u64(0);
     let mut sample: Vec<&T> = Vec::with_capacity(runs.len());
@@ -34,7 +35,8 @@ mod tests {
         let values: Vec<f64> = (0..100).map(f64::from).collect();
         let mean = |sample: &[&f64]| sample.iter().copied().sum::<f64>() / sample.len() as f64;
         let [low, high] = bootstrap_interval(&values, mean);
-        // 2000 resamples place the 2.5 % quantile to about 0.06 standard errors.
+        // The 2.5 % quantile of 2000 resamples has a standard deviation of about 0.06 standard
+        // errors.
         assert!(
             (low - (49.5 - 1.96 * 2.887)).abs() < 4.0 * 0.06 * 2.887,
             "{low}"

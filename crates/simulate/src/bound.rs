@@ -1,18 +1,21 @@
-//! How well any localizer can do on a route: the posterior Cramér–Rao bound.
+//! Posterior Cramér–Rao bound of the localization error on a route.
 //!
-//! Tichavský, Muravchik and Nehorai (1998): for states that move and are measured with additive
-//! Gaussian noise the posterior information obeys
+//! For a state with additive Gaussian process and measurement noise, the posterior information
+//! obeys (Tichavský, Muravchik and Nehorai 1998)
 //! `J⁺ = (F J⁻¹ Fᵀ + Q)⁻¹ + Σ Hᵀ R⁻¹ H`,
-//! with the Jacobians taken at the true states. Its inverse bounds the mean squared error of every
-//! estimator from below. The truth taken here drives in the middle of its lane: the centimetres of
-//! its wander do not change the geometry. The whole road is taken as surveyed.
+//! with the Jacobians evaluated at the true states. The inverse of `J` is a lower bound of the mean
+//! squared error of every estimator. The true path is the lane centre, because a lateral wander of
+//! centimetres does not change the geometry. The whole road is assumed to be surveyed.
 //!
-//! One angle has the variance of its thermal noise (the Cramér–Rao bound of the snapshots at the
-//! link budget's SNR) and that of the scatter, which successive looks share as
-//! [`ArrayModel::correlation`](onboard::localize::ekf::ArrayModel::correlation) says: its spectrum at the
-//! line of sight stands for white noise, as it may where the state changes little in a wavelength.
-//! Where the scenario has traced paths, K is theirs at each place, and a radio head without a line of
-//! sight says nothing. Elsewhere walls take of the K that is expected what they take of the direct wave.
+//! The variance of an angle is the sum of two terms. The thermal term is the Cramér–Rao bound of
+//! the snapshots at the SNR of the link budget. The scatter term is correlated over successive SSBs
+//! with the coefficient
+//! [`ArrayModel::correlation`](onboard::localize::ekf::ArrayModel::correlation). White noise
+//! replaces the scatter, with the spectral density of the scatter in the direction of the line of
+//! sight. The replacement is accurate if the state changes little within a wavelength. With traced
+//! paths, the Rician K factor is taken from the paths at each position, and a radio head without a
+//! line of sight gives no information. Without traced paths, walls reduce the nominal K factor by
+//! their attenuation of the direct path.
 
 use onboard::gaussian::{Gaussian, Matrix, identity, product};
 use onboard::geometry::{Point, Pose};
@@ -33,28 +36,28 @@ use crate::ideal_filter::IdealFilter;
 use crate::scenario::Scenario;
 use crate::world::MotionProfile;
 
-/// The bound at one SSB.
+/// Bound at one SSB.
 #[derive(Clone, Copy, Debug, PartialEq)]
 pub struct BoundPoint {
     /// Time (s).
     pub time_s: f64,
     /// Distance along the road (m).
     pub along_m: f64,
-    /// Place on the road.
+    /// True pose on the road.
     pub pose: Pose,
-    /// Least root mean square of the horizontal error (m).
+    /// Lower bound of the RMS horizontal error (m).
     pub position_rms_m: f64,
-    /// Least standard deviation along the road (m).
+    /// Lower bound of the standard deviation along the road (m).
     pub along_std_m: f64,
-    /// Least standard deviation across the road (m).
+    /// Lower bound of the standard deviation across the road (m).
     pub across_std_m: f64,
-    /// Least standard deviation of the heading (rad).
+    /// Lower bound of the standard deviation of the heading (rad).
     pub heading_std_rad: f64,
-    /// Least standard deviation of the odometer's scale.
+    /// Lower bound of the standard deviation of the odometer's scale.
     pub scale_std: f64,
 }
 
-/// What the bound of a scenario is made of.
+/// Calculator of the bound of a scenario.
 #[derive(Clone, Debug)]
 pub struct Bound {
     config: EkfConfig,
@@ -69,7 +72,7 @@ pub struct Bound {
     walls: Walls,
 }
 
-/// Traced paths, and the numbers of the radio heads in their file.
+/// Traced paths, and the index of each radio head in their file.
 #[derive(Clone, Debug)]
 struct Traced {
     paths: Paths,
@@ -77,11 +80,11 @@ struct Traced {
 }
 
 impl Bound {
-    /// The bound of a scenario as its vehicle believes it. A vehicle without tracker is taken with
-    /// the tracker's default settings.
+    /// Creates the bound of a scenario for the nominal site and vehicle. A vehicle without a
+    /// tracker gets the tracker's default settings.
     ///
     /// # Errors
-    /// [`SettingsError`] when the road cannot be built.
+    /// [`SettingsError`] if the road cannot be built.
     pub fn new(scenario: &Scenario) -> Result<Self, SettingsError> {
         let (site, vehicle) = (&scenario.site, &scenario.vehicle);
         let check = Check {
@@ -105,7 +108,8 @@ impl Bound {
             thermal: ThermalNoise::new(site, vehicle),
             start: InitialPose {
                 pose: road.pose(scenario.motion.start_at_m),
-                // A start that is not known is anywhere on the road.
+                // Without a given start, the prior standard deviation of the position is the length
+                // of the road.
                 position_std_m: if start.known {
                     start.position_std_m
                 } else {
@@ -124,7 +128,7 @@ impl Bound {
         })
     }
 
-    /// The bound at each SSB of the drive, every SSB being used.
+    /// Returns the bound at each SSB of the drive. Every SSB is used.
     pub fn along_route(&self) -> Vec<BoundPoint> {
         let scatter = |travelled_m, angle_model: &AngleModel| {
             scatter_bound(self.config.rician_k, angle_model.aperture)
@@ -137,7 +141,8 @@ impl Bound {
         points
     }
 
-    /// A filter that makes the errors the tracker says it makes, at every `stride`-th SSB.
+    /// Returns the ideal filter: its errors have exactly the covariance that the tracker reports,
+    /// at every `stride`-th SSB.
     pub fn ideal_filter(&self, stride: usize) -> IdealFilter {
         let scatter = |travelled_m, angle_model: &AngleModel| {
             self.config.shared_variance(travelled_m, angle_model)
@@ -156,9 +161,9 @@ impl Bound {
         filter
     }
 
-    /// Drives the route with looks whose scatter has the variance `scatter(travelled, angle_model)`,
-    /// and calls `visit(Ψ, belief, time, distance along the road)` at each SSB, Ψ being what
-    /// became of an error since the one before.
+    /// Propagates the belief along the route with the scatter variance `scatter(travelled,
+    /// angle_model)`, and calls `visit(Ψ, belief, time, distance along the road)` at each SSB. Ψ is
+    /// the closed-loop transition of the error since the previous SSB.
     fn walk(
         &self,
         scatter: impl Fn(f64, &AngleModel) -> f64,
@@ -208,8 +213,8 @@ impl Bound {
         step.jacobian
     }
 
-    /// Puts the state at its true place and takes in an angle to each radio head; `transition`
-    /// follows what becomes of an error.
+    /// Sets the state to the true pose and updates the covariance with an angle to each radio head.
+    /// The closed-loop transition of the error accumulates in `transition`.
     fn listen(
         &self,
         belief: &mut Belief,
@@ -242,7 +247,7 @@ impl Bound {
                 let thermal = self.thermal_variance(&head, &angle_model);
                 let variance = fading * scatter(&angle_model) + thermal;
                 let gain = belief.update(0.0, &row, variance);
-                // (I − K H) times the transition so far.
+                // Multiply the accumulated transition by (I − K H).
                 let mut seen = [0.0; STATES];
                 for j in 0..STATES {
                     for k in 0..STATES {
@@ -258,15 +263,16 @@ impl Bound {
         }
     }
 
-    /// Variance (rad²) of an angle by thermal noise, at the sharpness that the array has there.
+    /// Returns the variance (rad²) of an angle due to thermal noise, for the array's effective
+    /// aperture in the direction of the radio head.
     fn thermal_variance(&self, head: &RadioHead, angle_model: &AngleModel) -> f64 {
         let mean = self.config.array.measurand.mean_aperture();
         self.thermal.variance(head, angle_model.range_m) * (mean / angle_model.aperture)
     }
 
-    /// A radio head as it is received at a place, and by how much the scatter's variance there is larger
-    /// than at the K that is expected; none where it has no line of sight, and so says nothing of
-    /// where it is.
+    /// Returns a radio head as received at `place`, and the ratio of the scatter variance there to
+    /// the scatter variance at the nominal K factor. Returns `None` without a line of sight,
+    /// because the radio head then gives no information.
     fn seen(&self, number: usize, head: &RadioHead, place: Point) -> Option<(RadioHead, f64)> {
         let Some(traced) = &self.traced else {
             let passing = self.walls.passing(head.position, place);
@@ -304,10 +310,10 @@ impl Bound {
         }
     }
 
-    /// The bound of the position (m, root mean square) at any `place` of the site from `looks`
-    /// independent looks at every radio head, by a vehicle that knows its heading to
-    /// `heading_std_rad` and nothing of its place. Averaged over eight headings, in information.
-    /// `None` where the radio heads leave a direction open.
+    /// Returns the bound of the RMS position error (m) at `place` for `looks` independent angles of
+    /// every radio head. The heading is known with the standard deviation `heading_std_rad`, and
+    /// the position has a flat prior. The information is averaged over eight headings. Returns
+    /// `None` if the radio heads leave one direction unobservable.
     pub fn at(&self, place: Point, looks: f64, heading_std_rad: f64) -> Option<f64> {
         const HEADINGS: u32 = 8;
         const VAGUE_M: f64 = 1e4;

@@ -1,4 +1,4 @@
-//! Many simulated drives, and what they have in common.
+//! Campaigns of simulated runs and their statistics.
 
 use onboard::Custom;
 use onboard::energy::{Energy, EnergyModel, EstimateCost};
@@ -13,33 +13,35 @@ use crate::integrity_summary::IntegritySummary;
 use crate::record::{Found, RunRecord, Step};
 use crate::run::{MakeCustom, Simulation};
 
-/// How a campaign is carried out; none of it but `seed`, `first_run` and `runs` touches its numbers.
+/// Options of a campaign. Only `seed`, `first_run` and `runs` influence the numerical results.
 #[derive(Clone, Copy)]
 pub struct CampaignOptions<'a> {
     /// Seed of all random streams.
     pub seed: u64,
-    /// Number of the first run, for campaigns in parts.
+    /// Number of the first run, for campaigns that are computed in parts.
     pub first_run: u64,
     /// Number of runs.
     pub runs: usize,
-    /// Number of threads; `None` for one per core.
+    /// Number of threads; `None` uses one per core.
     pub threads: Option<usize>,
-    /// Whether to keep every run's record.
+    /// Whether to keep the record of every run.
     pub keep_records: bool,
-    /// Whether to find the errors' quantiles, which takes a histogram for each step.
+    /// Whether to compute quantiles of the error. Quantiles require one histogram per step.
     pub quantiles: bool,
-    /// Keeps each run's errors and levels at every so many SSBs, which takes far less than its record.
+    /// Interval, in SSBs, at which the error and protection level of each run are kept. This takes
+    /// far less memory than the records.
     pub errors_every: Option<usize>,
-    /// The user's own code, made anew for each run.
+    /// Factory of the user's own estimator, policy and localizer, called once per run.
     pub custom: &'a MakeCustom<'a>,
-    /// What an estimate costs.
+    /// Cost of one angle estimate.
     pub estimate_cost: EstimateCost,
-    /// Told how many runs are done; `false` stops the campaign.
+    /// Progress callback with the number of finished runs; it returns `false` to stop the campaign.
     pub progress: &'a dyn Fn(usize) -> bool,
 }
 
 impl Default for CampaignOptions<'_> {
-    /// One run of seed 0 on every core, with nothing kept and nobody told.
+    /// Returns options for one run with seed 0 on every core, without records and without progress
+    /// reports.
     fn default() -> Self {
         Self {
             seed: 0,
@@ -56,7 +58,7 @@ impl Default for CampaignOptions<'_> {
     }
 }
 
-/// Errors at one SSB, over all runs that know their pose by then; NaN where none does.
+/// Errors at one SSB over all runs whose pose is initialised; NaN if there is no initialised run.
 #[derive(Debug, Clone, PartialEq, Default)]
 pub struct StepStatistics {
     /// Mean of |x error| in metres.
@@ -65,66 +67,71 @@ pub struct StepStatistics {
     pub mean_abs_error_y_m: f64,
     /// Root mean square of the horizontal error in metres.
     pub rms_error_m: f64,
-    /// What the localizer's covariances make of it; `None` where it has none.
+    /// RMS horizontal error in metres according to the localizer's covariances; `None` without
+    /// covariances.
     pub predicted_rms_m: Option<f64>,
-    /// Mean of the squared position error normalised by its covariance (NEES), 2 for a localizer
-    /// that is as wrong as it says; `None` where it has no covariance, or one without area.
+    /// Mean normalised estimation error squared (NEES) of the position; 2 for a consistent
+    /// localizer. `None` without a covariance or with a singular covariance.
     pub mean_nees: Option<f64>,
-    /// Root mean square of the heading error in radians.
+    /// RMS heading error in radians.
     pub rms_heading_error_rad: f64,
-    /// Mean SNR by link budget and shadowing, in dB.
+    /// Mean SNR from link budget and shadowing, in dB.
     pub mean_snr_db: f64,
-    /// Median of the horizontal error in metres; NaN where no quantiles are asked for.
+    /// Median of the horizontal error in metres; NaN if quantiles are not computed.
     pub p50_error_m: f64,
-    /// Its 90th percentile.
+    /// 90th percentile of the horizontal error in metres; NaN if quantiles are not computed.
     pub p90_error_m: f64,
-    /// Its 99th percentile.
+    /// 99th percentile of the horizontal error in metres; NaN if quantiles are not computed.
     pub p99_error_m: f64,
 }
 
-/// One run in a line.
+/// Summary of one run.
 #[derive(Debug, Clone, Copy, PartialEq)]
 pub struct RunSummary {
-    /// Its number.
+    /// Number of the run.
     pub run: u64,
-    /// Estimated angles.
+    /// Number of angle estimates.
     pub executions: usize,
-    /// SSB bursts listened to.
+    /// Number of SSB bursts received.
     pub listened: usize,
-    /// SSBs at which no choice of angles could keep the bound of an uncertainty-driven wake-up.
+    /// Number of SSBs at which no selection of angles could meet the target error of an
+    /// uncertainty-driven wake-up policy.
     pub out_of_reach: usize,
-    /// Longest time from one estimated angle to the next, in seconds; 0 with fewer than two.
+    /// Longest time between consecutive angle estimates in seconds; 0 with fewer than two
+    /// estimates.
     pub longest_gap_s: f64,
-    /// Its energy, where the platform has figures for the method.
+    /// Energy of the run; `None` if the platform has no figures for the method.
     pub energy: Option<Energy>,
-    /// Root mean square of its horizontal error in metres.
+    /// RMS horizontal error in metres.
     pub rms_error_m: f64,
-    /// Its largest horizontal error in metres.
+    /// Maximum horizontal error in metres.
     pub max_error_m: f64,
-    /// Its horizontal error at the end, in metres.
+    /// Horizontal error at the end of the run in metres.
     pub final_error_m: f64,
-    /// How its first pose came about; `None` if it was not found.
+    /// First initialised pose; `None` if the pose was never initialised.
     pub found: Option<Found>,
 }
 
-/// What a campaign found.
+/// Result of a campaign.
 #[derive(Debug, Clone, PartialEq)]
 pub struct Campaign {
     /// Times of the steps in seconds.
     pub time_s: Vec<f64>,
     /// Statistics of each step.
     pub steps: Vec<StepStatistics>,
-    /// The runs, by number.
+    /// Summaries of the runs, ordered by run number.
     pub runs: Vec<RunSummary>,
-    /// Horizontal errors of all steps of all runs that know their pose.
+    /// Histogram of the horizontal errors of all steps of all runs with an initialised pose.
     pub errors: ErrorHistogram,
-    /// How the runs kept to their protection levels, by number; empty where none are stated.
+    /// Integrity summaries, ordered by run number; empty if the localizer reports no protection
+    /// levels.
     pub integrity: Vec<IntegritySummary>,
-    /// The runs' records, where asked for.
+    /// Records of the runs, if `keep_records` is set.
     pub records: Vec<RunRecord>,
-    /// Errors in x and y in metres of each run at every so many SSBs, run by run, where asked for.
+    /// Errors in x and y in metres at every `errors_every`-th SSB, run after run; empty if
+    /// `errors_every` is not set.
     pub errors_m: Vec<[f32; 2]>,
-    /// Protection levels in metres at the same SSBs; none where the pose may not be relied on.
+    /// Protection levels in metres at the same SSBs as `errors_m`; `None` unless the state is `ok`.
     pub levels_m: Vec<Option<f32>>,
 }
 
@@ -143,20 +150,22 @@ struct StepSums {
 }
 
 impl Simulation {
-    /// Drives many times.
+    /// Simulates `options.runs` runs.
     ///
-    /// Runs are computed in parallel and added up in order of their numbers: the result does not
-    /// depend on the number of threads, and memory not on the number of runs.
+    /// Runs are computed in parallel and accumulated in the order of their numbers. The result does
+    /// not depend on the number of threads, and the memory for statistics does not depend on the
+    /// number of runs.
     ///
     /// # Errors
-    /// [`SimulationError`] of the first run that fails, or that the caller stopped it.
+    /// [`SimulationError`] of the first run that fails, or [`SimulationError::Stopped`] if the
+    /// caller stopped the campaign.
     pub fn campaign(&self, options: &CampaignOptions<'_>) -> Result<Campaign, SimulationError> {
         let (seed, first, custom) = (options.seed, options.first_run, options.custom);
         let drive = |number| self.run(seed, first + number as u64, custom);
         self.campaign_of(options, options.runs, drive)
     }
 
-    /// The campaign of `count` runs, the records of which `drive` makes by their place.
+    /// Accumulates a campaign of `count` records, which `drive` computes by index.
     pub(crate) fn campaign_of(
         &self,
         options: &CampaignOptions<'_>,
@@ -219,7 +228,7 @@ impl Simulation {
     }
 }
 
-/// Threads to run on: as many as asked for, or one per core.
+/// Creates a thread pool with the requested number of threads, by default one per core.
 pub(crate) fn thread_pool(threads: Option<usize>) -> Result<ThreadPool, ThreadPoolBuildError> {
     ThreadPoolBuilder::new()
         .num_threads(threads.unwrap_or(0))
@@ -227,7 +236,7 @@ pub(crate) fn thread_pool(threads: Option<usize>) -> Result<ThreadPool, ThreadPo
 }
 
 impl Campaign {
-    /// The campaign of these runs, of equally many steps each.
+    /// Creates a campaign from existing records with equal numbers of steps.
     pub(crate) fn of(records: impl IntoIterator<Item = RunRecord>) -> Self {
         let mut sums = Vec::new();
         let mut campaign = Self {
@@ -285,10 +294,10 @@ fn summary(record: &RunRecord, energy: Option<&EnergyModel>) -> RunSummary {
     }
 }
 
-/// Steps that one thread adds up at a time.
+/// Number of steps that one thread accumulates at a time.
 const CHUNK: usize = 256;
 
-/// Adds the records up in their order, step by step.
+/// Accumulates the records in order, separately for each step.
 fn add_up(records: &[RunRecord], sums: &mut [StepSums]) {
     let chunks = sums.par_chunks_mut(CHUNK).enumerate();
     chunks.for_each(|(number, sums)| {
@@ -300,7 +309,7 @@ fn add_up(records: &[RunRecord], sums: &mut [StepSums]) {
     });
 }
 
-/// The errors of all steps.
+/// Merges the error histograms of all steps.
 fn all_errors(sums: &[StepSums]) -> ErrorHistogram {
     let mut errors = ErrorHistogram::default();
     let steps = sums.iter().filter_map(|step| step.errors.as_ref());
@@ -328,7 +337,7 @@ impl StepSums {
         self.abs_x_m += (step.estimate.x_m - step.truth.x_m).abs();
         self.abs_y_m += (step.estimate.y_m - step.truth.y_m).abs();
         self.square_m2 += error_m * error_m;
-        // A single run without makes the sum NaN, and the mean none.
+        // One run without a covariance makes the sum NaN, which is reported as `None`.
         self.predicted_m2 += step.predicted_m2().unwrap_or(f64::NAN);
         self.nees += step.nees().unwrap_or(f64::NAN);
         self.heading_rad2 += heading_rad * heading_rad;

@@ -1,9 +1,10 @@
-//! Roots of covariances.
+//! Cholesky factor of a covariance.
 
 use onboard::gaussian::Matrix;
 
-/// Lower factor `L Lᵀ` of a positive semidefinite matrix, of which the lower triangle is read;
-/// directions that have less than a rounding error of the variance `scale` get none.
+/// Returns the lower factor `L` with `L Lᵀ` equal to a positive semidefinite matrix. Only the lower
+/// triangle is read. Directions with less variance than the rounding error of `scale` get a zero
+/// column.
 pub(crate) fn cholesky<const N: usize>(matrix: &Matrix<N>, scale: &Matrix<N>) -> Matrix<N> {
     let mut factor = [[0.0; N]; N];
     for j in 0..N {

@@ -1,28 +1,30 @@
-//! Whether a localizer is as wrong as it says.
+//! Consistency of a localizer's errors with its covariances.
 
 use crate::campaign::Campaign;
 
-/// Standard normal quantile of a two-sided 95 % band.
+/// Standard normal quantile of a two-sided 95 % interval.
 const BAND: f64 = 1.959_964;
 
-/// A campaign's errors beside their own prediction.
+/// Errors of a campaign compared with their predicted values.
 #[derive(Debug, Clone, Copy, PartialEq)]
 pub struct Consistency {
     /// Root mean square of the horizontal error in metres.
     pub rms_m: f64,
-    /// What the localizer's covariances say that it is; NaN where it has none.
+    /// RMS horizontal error in metres according to the localizer's covariances; NaN without
+    /// covariances.
     pub predicted_rms_m: f64,
     /// 90th percentile of the horizontal error in metres.
     pub p90_m: f64,
-    /// Mean of the normalised squared position error (NEES), 2 for a consistent localizer.
+    /// Mean normalised estimation error squared (NEES) of the position; 2 for a consistent
+    /// localizer.
     pub mean_nees: f64,
-    /// Share of the steps whose mean NEES over the runs lies within its 95 % band.
+    /// Fraction of the steps whose mean NEES over the runs is within its 95 % interval.
     pub in_band: f64,
 }
 
 impl Campaign {
-    /// Errors against covariances. The NEES of the first `skip` steps is left out: a start that is
-    /// known exactly has an error ellipse without area.
+    /// Compares errors with covariances. The NEES of the first `skip` steps is ignored, because an
+    /// exactly known start has a singular covariance.
     pub fn consistency(&self, skip: usize) -> Consistency {
         let [low, high] = nees_band(self.runs.len());
         let nees = || {
@@ -43,7 +45,8 @@ impl Campaign {
         }
     }
 
-    /// Largest mean of |x error| and of |y error| over the steps, in metres: the paper's figures.
+    /// Returns the maximum over the steps of the mean |x error| and the mean |y error| in metres
+    /// (the paper's metric).
     pub fn worst_mean_abs_error_m(&self) -> [f64; 2] {
         self.steps
             .iter()
@@ -55,7 +58,7 @@ impl Campaign {
             })
     }
 
-    /// Mean number of estimated angles in a run.
+    /// Returns the mean number of angle estimates per run.
     pub fn mean_executions(&self) -> f64 {
         mean(self.runs.iter().map(|run| run.executions as f64))
     }
@@ -66,8 +69,8 @@ fn mean(values: impl Iterator<Item = f64>) -> f64 {
     sum / count
 }
 
-/// 95 % band of the mean NEES over `runs` runs: χ² with two degrees of freedom each, by the cube
-/// root transformation of Wilson and Hilferty.
+/// Returns the 95 % interval of the mean NEES over `runs` runs. χ² with two degrees of freedom per
+/// run is approximated by the cube root transformation of Wilson and Hilferty.
 fn nees_band(runs: usize) -> [f64; 2] {
     let freedom = 2.0 * runs as f64;
     let spread = 2.0 / (9.0 * freedom);
@@ -79,8 +82,8 @@ mod tests {
     use super::*;
 
     #[test]
-    fn band_is_that_of_chi_squared() {
-        // χ²(200): 162.73 and 241.06.
+    fn nees_band_equals_tabulated_chi_squared_quantiles() {
+        // Tabulated quantiles of χ²(200): 162.73 and 241.06.
         let [low, high] = nees_band(100);
         assert!((low - 1.6273).abs() < 1e-3, "{low}");
         assert!((high - 2.4106).abs() < 1e-3, "{high}");

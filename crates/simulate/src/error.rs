@@ -1,38 +1,39 @@
-//! Why a simulation ended early.
+//! Errors of a simulation.
 
 use onboard::BoxError;
 use onboard::receive::ReceiveError;
 use onboard::settings::SettingsError;
 use thiserror::Error;
 
-/// Why a simulation ended early.
+/// Error that ends a simulation.
 #[derive(Debug, Error)]
 pub enum SimulationError {
-    /// The scenario and the platform do not go together.
+    /// The scenario and the platform are incompatible.
     #[error(transparent)]
     Settings(#[from] SettingsError),
     /// The user's own estimator, policy or localizer failed.
     #[error("{0}")]
     Custom(BoxError),
-    /// An SSB of the scenario cannot be sent as samples.
+    /// An SSB of the scenario cannot be synthesised as samples.
     #[error("samples: {0}")]
     Samples(#[from] nr_ssb::Error),
-    /// The receiver refuses its samples.
+    /// The receiver rejects the samples.
     #[error("receiver: {0}")]
     Receive(#[from] ReceiveError),
-    /// The threads asked for cannot be had.
+    /// The thread pool cannot be created.
     #[error("no threads to run on: {0}")]
     Threads(#[from] rayon::ThreadPoolBuildError),
-    /// A run or method that was not recorded.
+    /// The run or method is not part of the traces.
     #[error("no trace of this run")]
     NotTraced,
-    /// The caller asked to stop.
+    /// The caller stopped the simulation.
     #[error("stopped")]
     Stopped,
 }
 
 impl SimulationError {
-    /// What ended a drive: the user's own code, or the simulation's end of it.
+    /// Converts the error of a drive to a simulation error; other errors are from the user's own
+    /// code.
     pub(crate) fn of_drive(error: BoxError) -> Self {
         match error.downcast::<Self>() {
             Ok(own) => *own,

@@ -1,13 +1,13 @@
-//! Quantiles of an error without keeping every value.
+//! Quantiles of an error from a histogram.
 
-/// Bins per factor of ten: neighbours differ by 5.9 %, and quantiles are interpolated in between.
+/// Bins per decade. Adjacent bins differ by 5.9 %, and quantiles are interpolated within a bin.
 const BINS_PER_DECADE: f64 = 40.0;
-/// Everything below counts as this, in metres.
+/// Lower limit of the first bin in metres; smaller values are counted in the first bin.
 const SMALLEST_M: f64 = 1e-4;
-/// Up to 1 km.
+/// Number of bins, up to 1 km.
 const BINS: usize = 7 * BINS_PER_DECADE as usize + 1;
 
-/// A histogram of lengths with logarithmic bins from 0.1 mm to 1 km.
+/// Histogram of lengths with logarithmic bins from 0.1 mm to 1 km.
 #[derive(Debug, Clone, PartialEq, Eq)]
 pub struct ErrorHistogram {
     counts: Box<[u32; BINS]>,
@@ -24,7 +24,7 @@ impl Default for ErrorHistogram {
 }
 
 impl ErrorHistogram {
-    /// Counts one error.
+    /// Adds one error.
     pub fn add(&mut self, error_m: f64) {
         let position = (error_m.abs() / SMALLEST_M).max(1.0).log10() * BINS_PER_DECADE;
         if let Some(count) = self.counts.get_mut((position as usize).min(BINS - 1)) {
@@ -33,7 +33,7 @@ impl ErrorHistogram {
         }
     }
 
-    /// Counts everything another histogram has counted.
+    /// Adds the counts of another histogram.
     pub fn merge(&mut self, other: &Self) {
         for (count, more) in self.counts.iter_mut().zip(other.counts.iter()) {
             *count += more;
@@ -41,7 +41,7 @@ impl ErrorHistogram {
         self.total += other.total;
     }
 
-    /// The error in metres that the share `probability` of all stays below; `None` when empty.
+    /// Returns the quantile in metres for `probability`; `None` for an empty histogram.
     pub fn quantile_m(&self, probability: f64) -> Option<f64> {
         let wanted = probability * f64::from(self.total);
         let mut below = 0.0;

@@ -1,4 +1,4 @@
-//! Campaigns of a filter that is exactly as good as it says.
+//! Campaigns of an ideal filter, whose errors have exactly the reported covariance.
 
 use onboard::geometry::Pose;
 use onboard::monitor::ActiveFaults;
@@ -8,8 +8,8 @@ use crate::ideal_filter::{IdealError, IdealFilter};
 use crate::record::{RunRecord, Step};
 
 impl IdealFilter {
-    /// A campaign of `runs` runs of its errors, along the filter's first two states instead of x
-    /// and y.
+    /// Simulates a campaign of `runs` runs of the filter's errors. The first two states of the
+    /// filter replace x and y.
     pub fn campaign(&self, seed: u64, runs: u64) -> Campaign {
         Campaign::of((0..runs).map(|run| self.record(seed, run)))
     }

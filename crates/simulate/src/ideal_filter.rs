@@ -1,11 +1,10 @@
-//! The errors of a filter that is exactly as good as it says: what a campaign of a given size may
-//! show by chance, and against which its figures are to be judged.
+//! Errors of an ideal filter, whose errors have exactly the reported covariance. They show the
+//! random variation of a campaign's statistics for a given number of runs.
 //!
-//! Such a filter's error is the Gauss–Markov process of its own covariance: over a stretch of the
-//! route `e⁺ = Ψ e + ξ`, with the closed-loop transition `Ψ = Π (I − K H) F` and
-//! `Cov ξ = P⁺ − Ψ P Ψᵀ`. An odometer's scale and the start stay with a vehicle for the whole run,
-//! so that the steps of a run are far from independent and even a perfect filter's figures scatter
-//! from campaign to campaign.
+//! The error of an ideal filter is a Gauss–Markov process: over a section of the route, `e⁺ = Ψ e +
+//! ξ`, with the closed-loop transition `Ψ = Π (I − K H) F` and `Cov ξ = P⁺ − Ψ P Ψᵀ`. The errors of
+//! the odometer's scale and of the start are constant during a run. Therefore, the steps of a run
+//! are strongly correlated, and the statistics of an ideal filter vary between campaigns.
 
 use onboard::gaussian::{Matrix, product};
 use onboard::localize::ekf::state::{ACROSS, ALONG, STATES};
@@ -15,32 +14,33 @@ use rand_distr::StandardNormal;
 use crate::cholesky::cholesky;
 use crate::random::{Purpose, Streams};
 
-/// A perfectly consistent filter along a route.
+/// Perfectly consistent filter along a route.
 #[derive(Clone, Debug, Default)]
 pub struct IdealFilter {
     points: Vec<Point>,
 }
 
-/// One of the places where its error is drawn.
+/// Position at which the error is drawn.
 #[derive(Clone, Copy, Debug)]
 struct Point {
     transition: Matrix<STATES>,
-    /// Cholesky factor of what is new in the error.
+    /// Cholesky factor of the covariance of ξ, the new part of the error.
     fresh: Matrix<STATES>,
     covariance_m2: [[f64; 2]; 2],
 }
 
-/// Its error at one of these places, along the filter's first two states.
+/// Error at one position, along the filter's first two states.
 #[derive(Clone, Copy, Debug, PartialEq)]
 pub struct IdealError {
-    /// The error (m).
+    /// Error (m).
     pub error_m: [f64; 2],
-    /// Its covariance (m²).
+    /// Covariance of the error (m²).
     pub covariance_m2: [[f64; 2]; 2],
 }
 
 impl IdealFilter {
-    /// Adds the next place: the closed-loop transition to it and the covariances before and after.
+    /// Adds the next position: the closed-loop transition to it, and the covariances before and
+    /// after.
     pub(crate) fn push(
         &mut self,
         transition: &Matrix<STATES>,
@@ -66,14 +66,14 @@ impl IdealFilter {
         });
     }
 
-    /// The errors of one run. The first place's transition starts from nothing.
+    /// Draws the errors of one run. The transition to the first position starts from a zero error.
     pub fn run(&self, seed: u64, run: u64) -> impl Iterator<Item = IdealError> {
         let mut rng = Streams::new(seed, run).generator(Purpose::Start, 1);
         let mut error = [0.0; STATES];
         self.points.iter().map(move |point| {
             let mut next = [0.0; STATES];
             for j in 0..STATES {
-                // A state that is switched off draws nothing.
+                // A disabled state has zero variance and consumes no random number.
                 let draw = if point.fresh[j][j] > 0.0 {
                     rng.sample::<f64, _>(StandardNormal)
                 } else {
@@ -99,7 +99,7 @@ mod tests {
     use onboard::settings::{Shipped, TomlFile};
 
     #[test]
-    fn its_errors_have_the_covariance_it_states() {
+    fn errors_have_the_reported_covariance() {
         let scenario = Scenario::from_library("paper-real-odometry-2", &Shipped).unwrap();
         let filter = Bound::new(&scenario).unwrap().ideal_filter(200);
         let runs = 4000;
@@ -112,10 +112,10 @@ mod tests {
                 }
             }
         }
-        // The first place is an exact start.
+        // The first position is an exact start with zero covariance.
         for (point, [aa, ab, bb]) in filter.points.iter().zip(sums).skip(1) {
             let [[paa, pab], [_, pbb]] = point.covariance_m2;
-            // Deviation of a sample covariance of Gaussians; four of them.
+            // Tolerance: four standard deviations of the sample covariance of Gaussian numbers.
             let tolerance = |variance: f64| 4.0 * (variance / runs as f64).sqrt();
             assert!((aa - paa).abs() < tolerance(2.0 * paa * paa));
             assert!((bb - pbb).abs() < tolerance(2.0 * pbb * pbb));

@@ -1,47 +1,48 @@
-//! How a guarded localizer kept its promises in one run.
+//! Integrity statistics of one run.
 
 use onboard::localize::IntegrityState;
 
 use crate::histogram::ErrorHistogram;
 use crate::record::RunRecord;
 
-/// Least error in metres that a protection level is divided by: below it the error is no error.
+/// Minimum error in metres in the ratio of protection level to error; smaller errors are replaced
+/// by this value.
 const LEAST_ERROR_M: f64 = 1e-3;
 
-/// What became of protection levels and alarms in one run. Its epochs hang together: what counts as
-/// independent is the run.
+/// Statistics of protection levels and alarms of one run. Epochs within a run are correlated; runs
+/// are independent.
 #[derive(Debug, Clone, PartialEq, Default)]
 pub struct IntegritySummary {
     /// Steps with a protection level.
     pub epochs: usize,
-    /// Those whose state was `ok`.
+    /// Number of steps in state `ok`.
     pub ok: usize,
-    /// Those whose state was `unavailable`.
+    /// Number of steps in state `unavailable`.
     pub unavailable: usize,
-    /// Those whose state was `ok` although the error was beyond the protection level.
+    /// Number of steps in state `ok` whose error exceeds the protection level.
     pub beyond: usize,
-    /// Alarms: times at which the state left `ok`.
+    /// Number of alarms: transitions from `ok` to another state.
     pub alarms: usize,
-    /// Alarms at which the error was within the alert limit.
+    /// Number of alarms while the error was within the alert limit.
     pub early_alarms: usize,
-    /// Alarms at which error and protection level were both within it: a source was suspected,
-    /// nominally a false alarm.
+    /// Number of alarms while the error and the protection level were within the alert limit. Such
+    /// an alarm is caused by a suspected source, and is a false alarm in a fault-free run.
     pub suspicions: usize,
-    /// Times at which the error passed the alert limit.
+    /// Number of times at which the error began to exceed the alert limit.
     pub excursions: usize,
-    /// Longest time in seconds that the error had been beyond the alert limit while the state was
+    /// Longest time in seconds for which the error exceeded the alert limit while the state was
     /// `ok`.
     pub longest_silence_s: f64,
-    /// Largest horizontal error in metres.
+    /// Maximum horizontal error in metres.
     pub worst_m: f64,
-    /// Time driven in seconds.
+    /// Duration of the run in seconds.
     pub duration_s: f64,
-    /// Protection level over error.
+    /// Histogram of the ratio of protection level to error.
     pub ratios: ErrorHistogram,
 }
 
 impl IntegritySummary {
-    /// The summary of a run; `None` where its localizer stated no protection level.
+    /// Creates the summary of a run; `None` if the localizer reports no protection levels.
     pub fn new(record: &RunRecord, alert_limit_m: f64) -> Option<Self> {
         let mut summary = Self::default();
         let mut was_ok = true;
@@ -80,7 +81,7 @@ impl IntegritySummary {
         Some(summary)
     }
 
-    /// Several runs as one.
+    /// Combines the summaries of several runs.
     pub fn sum<'a>(runs: impl IntoIterator<Item = &'a Self>) -> Self {
         let mut total = Self::default();
         for run in runs {
@@ -100,17 +101,17 @@ impl IntegritySummary {
         total
     }
 
-    /// Share of the epochs in state `ok` whose error was beyond the protection level.
+    /// Returns the fraction of the `ok` epochs whose error exceeds the protection level.
     pub fn risk(&self) -> f64 {
         self.beyond as f64 / self.ok.max(1) as f64
     }
 
-    /// So many of them per hour.
+    /// Converts a count to a rate per hour.
     pub fn per_h(&self, count: usize) -> f64 {
         count as f64 / (self.duration_s / 3600.0)
     }
 
-    /// Median of protection level over error.
+    /// Returns the median ratio of protection level to error.
     pub fn median_ratio(&self) -> f64 {
         self.ratios.quantile_m(0.5).unwrap_or(f64::NAN)
     }
@@ -153,18 +154,18 @@ mod tests {
     }
 
     #[test]
-    fn counts_what_it_says() {
+    fn counts_alarms_excursions_and_exceeded_levels() {
         use IntegrityState::{Degraded, Ok};
         let record = record(&[
             (0.1, 0.8, Ok),
-            (0.1, 0.8, Degraded), // an alarm without need
-            (0.5, 0.4, Ok),       // beyond its level
-            (2.0, 9.0, Ok),       // beyond the alert limit, silent for 0 s ...
+            (0.1, 0.8, Degraded), // a false alarm
+            (0.5, 0.4, Ok),       // error exceeds the protection level
+            (2.0, 9.0, Ok),       // error exceeds the alert limit for 0 s ...
             (2.0, 9.0, Ok),       // ... 1 s ...
             (2.0, 9.0, Degraded),
-            (2.0, 9.0, Ok), // ... and again 3 s after it began
+            (2.0, 9.0, Ok), // ... and again 3 s after the beginning
             (0.5, 9.0, Ok),
-            (2.0, 9.0, Degraded), // an alarm in time
+            (2.0, 9.0, Degraded), // a correct alarm
         ]);
         let summary = IntegritySummary::new(&record, 1.5).unwrap();
         assert_eq!((summary.epochs, summary.ok, summary.beyond), (9, 6, 1));
@@ -173,7 +174,7 @@ mod tests {
         assert_eq!(summary.excursions, 2);
         assert_eq!((summary.longest_silence_s, summary.worst_m), (3.0, 2.0));
         let median = summary.median_ratio();
-        // A bin of the histogram is 6 % wide.
+        // The width of a histogram bin is 6 %.
         assert!((median / 4.5 - 1.0).abs() < 0.06, "{median}");
         let twice = IntegritySummary::sum([&summary, &summary]);
         assert_eq!((twice.beyond, twice.excursions), (2, 4));

@@ -1,4 +1,4 @@
-//! Reception by samples: the air makes them, the same receiver as on the vehicle takes them.
+//! Reception of simulated IQ samples with the receiver of the vehicle.
 
 use onboard::observation::{SensedSsb, SsbObservation};
 use onboard::receive::{Receiver, ReceiverConfig, Window};
@@ -10,34 +10,34 @@ use crate::random::Streams;
 use crate::scenario::Scenario;
 use crate::world::{Path, VehicleState};
 
-/// Air and receiver of one run.
+/// Signal synthesis and receiver of one run.
 pub struct IqReception {
     air: IqAir,
     receiver: Receiver,
     observations: Vec<SsbObservation>,
 }
 
-/// One burst, received when the pipeline listens to it.
+/// One burst, which is synthesised when the pipeline receives it.
 pub struct IqBurstReception<'a> {
-    /// Air and receiver.
+    /// Signal synthesis and receiver.
     pub reception: &'a mut IqReception,
     /// Number of the burst.
     pub number: u64,
-    /// Where the vehicle drives.
+    /// True path of the vehicle.
     pub path: &'a Path,
-    /// How much earlier than its time stamp an SSB is received, in seconds.
+    /// Time stamp minus time of reception of an SSB, in seconds.
     pub lateness_s: f64,
-    /// Channels of the radio heads, and the mean SNR of each (dB).
+    /// Channels of the radio heads.
     pub channels: &'a [HeadChannel],
-    /// See `channels`.
+    /// Mean SNR of each radio head (dB).
     pub snrs_db: &'a [f64],
 }
 
 impl IqReception {
-    /// The air and receiver of the run that `streams` belongs to.
+    /// Creates the synthesis and receiver of the run that `streams` belongs to.
     ///
     /// # Errors
-    /// [`SimulationError`] for what cannot be sent as samples.
+    /// [`SimulationError`] if the scenario cannot be synthesised as samples.
     pub fn new(scenario: &Scenario, streams: Streams) -> Result<Self, SimulationError> {
         let config = ReceiverConfig::new(&scenario.site, &scenario.vehicle);
         Ok(Self {

@@ -1,7 +1,7 @@
-//! What is really so: motion, channel and faults around a vehicle, and campaigns of its drives.
+//! Simulation of vehicles: true motion, channels and faults, and campaigns of runs.
 //!
-//! A [`Scenario`](scenario::Scenario) holds what is believed of site and vehicle, and how the world
-//! departs from it; [`truth`] makes the one from the other, and nothing else does.
+//! A [`Scenario`](scenario::Scenario) contains the nominal models of site and vehicle and the
+//! deviations of the truth. Only [`truth`] derives the truth from the nominal models.
 
 mod angle_drive;
 mod bootstrap;

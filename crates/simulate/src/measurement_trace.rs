@@ -1,9 +1,10 @@
-//! Measurement traces of drives: what comes to the vehicle, to be driven again with another localizer or wake-up
-//! policy.
+//! Measurement traces: recorded measurements of simulated drives, which can be processed again with
+//! another localizer or wake-up policy.
 //!
-//! What an SSB brings does not depend on which others were heard, its noise included
-//! ([`HeadChannel::observe`]). So the angle of every SSB is estimated once, and whoever chooses among
-//! them has the record of a drive of its own, to the last bit, for a small part of its computing.
+//! The signal of an SSB, including its noise, does not depend on which other SSBs are received
+//! ([`HeadChannel::observe`]). Therefore, the angle of every SSB is estimated once. A policy that
+//! selects among these angles gets the same record as in its own drive, bit by bit, in a small
+//! fraction of the computing time.
 
 use onboard::geometry::Pose;
 use onboard::localize::AngleMeasurement;
@@ -20,41 +21,42 @@ use crate::record::RunRecord;
 use crate::run::Simulation;
 use crate::world::Faults;
 
-/// Runs of a world, each as its measurements.
+/// Measurement traces of several runs.
 pub struct MeasurementTraces {
     simulation: Simulation,
     methods: Vec<EstimatorMethod>,
     runs: Vec<MeasurementTrace>,
 }
 
-/// One run: what comes to the vehicle.
+/// Measurements of one run.
 pub(crate) struct MeasurementTrace {
     run: u64,
     pub told_start: Pose,
     pub odometry: Vec<OdometrySample>,
     bursts: Vec<Burst>,
-    /// What is sensed, burst by burst.
+    /// Detected SSBs of all bursts.
     sensed: Vec<SensedSsb>,
-    /// Their angles, by method.
+    /// Angles of the detected SSBs for each method.
     angles: Vec<Vec<Option<AngleMeasurement>>>,
 }
 
-/// A burst of SSBs, and the vehicle when it comes.
+/// Burst of SSBs and the true pose of the vehicle.
 struct Burst {
     time_s: f64,
     truth: Pose,
     snr_db: f64,
-    /// Where its SSBs end among all that are sensed.
+    /// End index of the burst's SSBs in `sensed`.
     end: usize,
 }
 
 impl MeasurementTraces {
-    /// MeasurementTraces of the first `runs` runs of a scenario, with the angles of these methods. `None` if an SSB
-    /// depends on the reception of others, or if a fault of the receive channels occurs: a trace has no channels, and
-    /// the vehicle's monitor of the channels would not find the fault.
+    /// Records the first `runs` runs of a scenario with the angles of the given methods. Returns
+    /// `None` if an SSB depends on the reception of others or if a fault of the receive channels
+    /// occurs. A trace contains no receive channels, so that the vehicle's channel monitor could
+    /// not detect the fault.
     ///
     /// # Errors
-    /// [`SimulationError`] when there are no such threads, or an estimator refuses the array.
+    /// [`SimulationError`] if the thread pool cannot be created or an estimator rejects the array.
     pub fn record(
         simulation: &Simulation,
         methods: &[EstimatorMethod],
@@ -82,8 +84,8 @@ impl MeasurementTraces {
         }))
     }
 
-    /// Whether a simulation is of the same world, and its method in the traces: all may differ that
-    /// only localizer, wake-up policy and computer go by.
+    /// Whether the traces are valid for another simulation. The environment must be equal and its
+    /// method must be recorded. The localizer, wake-up policy and computer may differ.
     pub fn serve(&self, other: &Simulation) -> bool {
         let grid_deg = |it: &Simulation| it.scenario().vehicle.estimator.music_grid_deg;
         self.methods
@@ -92,10 +94,10 @@ impl MeasurementTraces {
             && self.simulation.world().sounds_like(other.world())
     }
 
-    /// The campaign of a simulation that the traces serve, over their runs.
+    /// Runs the campaign of a simulation for which the traces are valid.
     ///
     /// # Errors
-    /// [`SimulationError`], as [`Simulation::campaign`] has them.
+    /// [`SimulationError`] with the same conditions as [`Simulation::campaign`].
     pub fn campaign(
         &self,
         simulation: &Simulation,
@@ -112,19 +114,19 @@ impl MeasurementTraces {
 }
 
 impl MeasurementTrace {
-    /// The angles of a method, in order of time.
+    /// Returns the SSBs and angles of a method in order of time.
     pub fn angles_of(&self, method: usize) -> impl Iterator<Item = (SensedSsb, AngleMeasurement)> {
         let angles = self.angles.get(method).into_iter().flatten();
         let heard = self.sensed.iter().zip(angles);
         heard.filter_map(|(&ssb, angle)| Some((ssb, (*angle)?)))
     }
 
-    /// When bursts come, and where the vehicle is then.
+    /// Returns the times of the bursts and the true poses.
     pub fn truth(&self) -> impl Iterator<Item = (f64, Pose)> {
         self.bursts.iter().map(|burst| (burst.time_s, burst.truth))
     }
 
-    /// Records a run, with the angles of these methods.
+    /// Records a run with the angles of the given methods.
     pub fn record(
         simulation: &Simulation,
         methods: &[EstimatorMethod],
@@ -176,7 +178,7 @@ impl MeasurementTrace {
                 for (estimator, angles) in estimators.iter_mut().zip(&mut trace.angles) {
                     let estimated = estimator.estimate(&observation);
                     let estimated = estimated.map_err(SimulationError::Custom)?;
-                    // The built-in estimators all tell their standard deviation.
+                    // All built-in estimators report their standard deviation.
                     let bound_rad = || f64::NAN;
                     angles.push(estimated.and_then(|it| {
                         estimator::measurement(&reception.ssb, it, &measurand, bound_rad)
@@ -207,7 +209,7 @@ impl MeasurementTrace {
         for burst in &self.bursts {
             let time_s = burst.time_s;
             while let Some(sample) = odometry.next_if(|sample| sample.time_s <= time_s) {
-                // A simulated odometer neither repeats itself nor returns NaN.
+                // A simulated odometer never repeats a sample and never returns NaN.
                 let _ = (onboard.odometry(sample)).map_err(SimulationError::Custom)?;
             }
             let here = end..burst.end;
@@ -226,11 +228,11 @@ impl MeasurementTrace {
     }
 }
 
-/// A burst from trace.
+/// Burst from a trace.
 struct Played<'a> {
     sensed: &'a [SensedSsb],
     angles: &'a [Option<AngleMeasurement>],
-    /// What an SSB without an angle is given as: without snapshots it has none.
+    /// Empty observation for an SSB without an angle.
     silence: &'a mut SsbObservation,
 }
 

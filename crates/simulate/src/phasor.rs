@@ -1,18 +1,20 @@
-//! Cosine and sine at once, of phases that have turned a thousand times.
+//! Cosine and sine of phases up to a million radians.
 
 use std::f64::consts::FRAC_2_PI;
 
 use num_complex::Complex64;
 
-/// Adding and taking it away again rounds to a whole number.
+/// Constant whose addition and subtraction round a number to an integer.
 const ROUNDER: f64 = 6_755_399_441_055_744.0;
-/// π/2 in two parts; the first has so few digits that small multiples of it are exact.
+/// π/2 in two parts. The first part has few significant bits, so that its small multiples are
+/// exact.
 const HALF_PI: [f64; 2] = [1.570_796_326_734_125_6, 6.077_100_506_506_192e-11];
-/// Largest magnitude that is reduced that way.
+/// Maximum magnitude of the argument reduction (rad).
 const MOST_RAD: f64 = 1e6;
 
-/// e^(jφ), to 1e-10 of a turn in a million radians and 1e-15 near zero: most of a simulated drive is
-/// spent on it. Reduction to an eighth of a turn (Cody and Waite), then fdlibm's polynomials.
+/// Returns e^(jφ) with an error of 1e-10 cycles at a million radians and 1e-15 near zero. A fast
+/// implementation matters because a simulated drive spends most of its time here. The argument is
+/// reduced to an eighth of a cycle (Cody and Waite); fdlibm's polynomials follow.
 pub fn phasor(angle_rad: f64) -> Complex64 {
     if angle_rad.abs() > MOST_RAD {
         return Complex64::cis(angle_rad);
@@ -47,7 +49,7 @@ mod tests {
     use super::*;
 
     #[test]
-    fn it_is_the_standard_librarys() {
+    fn phasor_equals_the_standard_library() {
         for number in -200_000..200_000 {
             let angle_rad = f64::from(number) * 0.137_35;
             let error = (phasor(angle_rad) - Complex64::cis(angle_rad)).norm();

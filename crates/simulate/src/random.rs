@@ -1,10 +1,10 @@
-//! Random numbers that depend on the seed, the run and their purpose, and on nothing else.
+//! Random numbers that depend only on the seed, the run and their purpose.
 
 use rand::SeedableRng;
 use rand_chacha::ChaCha8Rng;
 
-/// What random numbers are for. Each purpose has its own stream, so that drawing more for one
-/// leaves the others as they were.
+/// Purpose of random numbers. Each purpose has its own stream, so that additional draws for one
+/// purpose do not change the others.
 #[derive(Debug, Clone, Copy, PartialEq, Eq)]
 #[repr(u32)]
 pub enum Purpose {
@@ -32,21 +32,21 @@ pub enum Purpose {
     ScatterDelay = 11,
     /// Mounting and calibration of the array.
     Array = 12,
-    /// Places and powers of a radio head.
+    /// Positions and powers of the radio heads.
     Survey = 13,
-    /// What stops a radio head's line of sight.
+    /// Blockage of a radio head's line of sight.
     Blockage = 14,
-    /// Large-scale parameters of a radio head's channel along the way.
+    /// Large-scale parameters of a radio head's channel.
     LargeScale = 15,
     /// Clusters of a radio head's channel.
     Clusters = 16,
-    /// Directions of a radio head's scatter around the forward axis.
+    /// Rotation of a radio head's scatter around the forward axis.
     ScatterTurn = 17,
-    /// Lateness of the receiver's clock.
+    /// Time offset of the receiver's clock.
     Clock = 18,
 }
 
-/// The random streams of one run.
+/// Random streams of one run.
 #[derive(Debug, Clone, Copy, PartialEq, Eq)]
 pub struct Streams {
     seed: u64,
@@ -54,12 +54,12 @@ pub struct Streams {
 }
 
 impl Streams {
-    /// The streams of run number `run` under `seed`.
+    /// Creates the streams of run number `run` for the seed `seed`.
     pub const fn new(seed: u64, run: u64) -> Self {
         Self { seed, run }
     }
 
-    /// A generator keyed by (seed, run, purpose, index); `index` tells radio heads apart.
+    /// Returns a generator keyed by (seed, run, purpose, index); `index` distinguishes radio heads.
     pub fn generator(self, purpose: Purpose, index: usize) -> ChaCha8Rng {
         let mut key = [0; 32];
         let words = [self.seed, self.run, u64::from(purpose as u32), index as u64];
@@ -77,7 +77,7 @@ mod tests {
     use super::*;
 
     #[test]
-    fn every_coordinate_of_the_key_counts() {
+    fn every_component_of_the_key_changes_the_stream() {
         let first = |seed, run, purpose, index| {
             Streams::new(seed, run).generator(purpose, index).next_u64()
         };

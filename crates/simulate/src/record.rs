@@ -1,4 +1,4 @@
-//! What happened in one simulated drive.
+//! Record of one simulated run.
 
 use onboard::geometry::Pose;
 use onboard::localize::ekf::EstimatedConstants;
@@ -13,24 +13,24 @@ use crate::error::SimulationError;
 pub struct Step {
     /// Time in seconds.
     pub time_s: f64,
-    /// Where the vehicle is.
+    /// True pose.
     pub truth: Pose,
-    /// Where it believes to be.
+    /// Estimated pose.
     pub estimate: Pose,
-    /// Covariance of (x, y, heading), where the localizer has one.
+    /// Covariance of (x, y, heading); `None` if the localizer has none.
     pub covariance: Option<[[f64; 3]; 3]>,
-    /// Protection level and state, where the localizer is guarded.
+    /// Protection level and state; `None` without integrity monitoring.
     pub integrity: Option<Integrity>,
-    /// Whether it is still in search of its first pose.
+    /// Whether the localizer is still searching for the first pose.
     pub searching: bool,
-    /// SNR of the strongest radio head by link budget and shadowing, in dB.
+    /// SNR of the strongest radio head from link budget and shadowing, in dB.
     pub snr_db: f64,
     /// Active faults of odometry and receive channels.
     pub faults: ActiveFaults,
 }
 
 impl Step {
-    /// Estimate minus truth in x and in y, in metres; NaN as long as the first pose is not known.
+    /// Returns estimate minus truth in x and y in metres; NaN until the first pose is found.
     pub fn error_xy_m(&self) -> [f32; 2] {
         if self.searching {
             return [f32::NAN; 2];
@@ -39,26 +39,27 @@ impl Step {
         [estimate.x_m - truth.x_m, estimate.y_m - truth.y_m].map(|error_m| error_m as f32)
     }
 
-    /// Protection level in metres; `None` where the pose may not be relied on.
+    /// Returns the protection level in metres; `None` unless the state is `ok` and the first pose
+    /// is found.
     pub fn level_while_ok_m(&self) -> Option<f32> {
         let relied_on = |it: &Integrity| it.state == IntegrityState::Ok && !self.searching;
         let level_m = self.integrity.filter(relied_on);
         level_m.map(|it| it.protection_level_m as f32)
     }
 
-    /// Horizontal error in metres.
+    /// Returns the horizontal error in metres.
     pub fn error_m(&self) -> f64 {
         self.truth.point().distance_m(self.estimate.point())
     }
 
-    /// Sum of the variances of the horizontal error in m²; `None` where the localizer has none.
+    /// Returns the sum of the variances of x and y in m²; `None` without a covariance.
     pub fn predicted_m2(&self) -> Option<f64> {
         let [[xx, ..], [_, yy, _], _] = self.covariance?;
         Some(xx + yy)
     }
 
-    /// Squared horizontal error normalised by its covariance (NEES); `None` where the localizer
-    /// has none, or one without area.
+    /// Returns the squared position error normalised by its covariance (NEES); `None` without a
+    /// covariance or with a singular one.
     pub fn nees(&self) -> Option<f64> {
         let [[xx, xy, _], [_, yy, _], _] = self.covariance?;
         let (dx, dy) = (
@@ -71,34 +72,36 @@ impl Step {
     }
 }
 
-/// All that happened in one run.
+/// Record of one run.
 #[derive(Debug, Clone, PartialEq)]
 pub struct RunRecord {
-    /// Its number.
+    /// Number of the run.
     pub run: u64,
     /// One step per SSB.
     pub steps: Vec<Step>,
-    /// The estimated angles.
+    /// Angle estimates.
     pub executions: Vec<Execution>,
-    /// SSB bursts that the receiver listened to.
+    /// Number of SSB bursts received.
     pub listened: usize,
-    /// Constants of the vehicle as estimated by the end of the drive, where the localizer does.
+    /// Estimated constants of the vehicle at the end of the run; `None` if the localizer estimates
+    /// none.
     pub constants: Option<EstimatedConstants>,
-    /// SSBs at which no choice of angles could keep the bound of an uncertainty-driven wake-up.
+    /// Number of SSBs at which no selection of angles could meet the target error of an
+    /// uncertainty-driven wake-up policy.
     pub out_of_reach: usize,
 }
 
-/// How the first pose came about.
+/// First initialised pose.
 #[derive(Debug, Clone, Copy, PartialEq)]
 pub struct Found {
-    /// The first step at which the pose was known.
+    /// First step with a known pose.
     pub step: Step,
-    /// Distance driven by then, in metres.
+    /// Distance driven until this step, in metres.
     pub driven_m: f64,
 }
 
 impl RunRecord {
-    /// A run of which nothing has happened yet.
+    /// Creates an empty record.
     pub(crate) fn new(run: u64, steps: usize) -> Self {
         Self {
             run,
@@ -110,14 +113,14 @@ impl RunRecord {
         }
     }
 
-    /// Adds what became of a burst.
+    /// Adds the results of a burst.
     pub(crate) fn add(&mut self, heard: &Heard<'_>) {
         self.listened += usize::from(heard.listened);
         self.executions.extend_from_slice(heard.executions);
         self.out_of_reach += usize::from(heard.keeps_bound == Some(false));
     }
 
-    /// Adds where the vehicle is at an SSB, and where it believes to be.
+    /// Adds the true and estimated poses at an SSB.
     pub(crate) fn add_step(
         &mut self,
         onboard: &Onboard,
@@ -139,8 +142,8 @@ impl RunRecord {
         Ok(())
     }
 
-    /// How the first pose came about: at once, unless it had to be searched for; `None` if it was
-    /// not found.
+    /// Returns the first initialised pose: the first step, unless the localizer had to search for
+    /// it. Returns `None` if it was not found.
     pub fn found(&self) -> Option<Found> {
         let first = self.steps.iter().position(|step| !step.searching)?;
         let until = self.steps.get(..=first)?;

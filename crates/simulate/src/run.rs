@@ -1,4 +1,4 @@
-//! One simulated drive.
+//! Simulation of one run.
 
 use std::collections::VecDeque;
 use std::sync::Arc;
@@ -17,10 +17,10 @@ use crate::snapshot_reception::{SnapshotBuffers, SnapshotReception};
 use crate::truth::{PropagationMaker, World};
 use crate::world::{Faults, Odometer, Path, VehicleState};
 
-/// The user's own code for a run that starts at the pose the vehicle is told.
+/// Factory of the user's own code for a run that starts at the given pose.
 pub type MakeCustom<'a> = dyn Fn(Pose) -> Result<Custom, BoxError> + Sync + 'a;
 
-/// A scenario on a platform, ready to be run.
+/// Scenario on a platform, ready to be simulated.
 #[derive(Clone)]
 pub struct Simulation {
     world: World,
@@ -32,12 +32,12 @@ impl Simulation {
     /// Prepares a scenario.
     ///
     /// # Errors
-    /// [`SettingsError`] when the platform lacks what the scenario asks of it.
+    /// [`SettingsError`] if the platform lacks a capability that the scenario requires.
     pub fn new(scenario: &Scenario, platform: Platform) -> Result<Self, SettingsError> {
         let world = World::new(scenario)?;
-        // On to the first SSB that finds the vehicle at its destination.
+        // The last step is the first SSB after the arrival at the destination.
         let steps = (world.duration_s() / scenario.site.ssb.period_s()).ceil() as usize + 1;
-        // Whatever the pipeline refuses, it refuses before the first run.
+        // Report all errors of the pipeline before the first run.
         let (site, vehicle) = (&scenario.site, &scenario.vehicle);
         Onboard::new(site, vehicle, &platform, Pose::default(), Custom::default())?;
         Ok(Self {
@@ -47,51 +47,51 @@ impl Simulation {
         })
     }
 
-    /// A scenario on the platform it names.
+    /// Prepares a scenario on the platform that it names.
     ///
     /// # Errors
-    /// [`SettingsError`] when there is no such platform, or it lacks what the scenario asks of it.
+    /// [`SettingsError`] if the platform does not exist or lacks a required capability.
     pub fn on_its_platform(scenario: &Scenario) -> Result<Self, SettingsError> {
         let platform = recording::load(&scenario.vehicle.platform.name)?;
         Self::new(scenario, platform)
     }
 
-    /// The same with another propagation.
+    /// Replaces the propagation.
     #[must_use]
     pub fn with_propagation(mut self, propagation: Arc<PropagationMaker>) -> Self {
         self.world = self.world.with_propagation(propagation);
         self
     }
 
-    /// The world.
+    /// Returns the environment.
     pub(crate) const fn world(&self) -> &World {
         &self.world
     }
 
-    /// The scenario.
+    /// Returns the scenario.
     pub fn scenario(&self) -> &Scenario {
         self.world.scenario()
     }
 
-    /// The platform.
+    /// Returns the platform.
     pub const fn platform(&self) -> &Platform {
         &self.platform
     }
 
-    /// Steps of a run: one per SSB.
+    /// Returns the number of steps of a run: one per SSB.
     pub const fn steps(&self) -> usize {
         self.steps
     }
 
-    /// Time of step `number` in seconds.
+    /// Returns the time of step `number` in seconds.
     pub fn time_s(&self, number: usize) -> f64 {
         number as f64 * self.scenario().site.ssb.period_s()
     }
 
-    /// Drives once. The same seed and run number give the same record to the last bit.
+    /// Simulates one run. Equal seed and run number give a bit-identical record.
     ///
     /// # Errors
-    /// [`SimulationError`] from the user's own code, if any.
+    /// [`SimulationError`] from the user's own code.
     pub fn run(
         &self,
         seed: u64,
@@ -113,7 +113,7 @@ impl Simulation {
     }
 }
 
-/// A drive going on.
+/// State of a run.
 struct Drive {
     onboard: Onboard,
     path: Path,
@@ -122,9 +122,9 @@ struct Drive {
     faults: Faults,
     iq: Option<IqReception>,
     buffers: SnapshotBuffers,
-    /// Bursts that have been sent and not yet heard.
+    /// Bursts that have been sent and not yet processed.
     on_the_way: VecDeque<Burst>,
-    /// Buffers of bursts that have been heard.
+    /// Reusable buffers of processed bursts.
     spare: Vec<Vec<f64>>,
     latency_s: f64,
     lateness_s: f64,
@@ -173,7 +173,7 @@ impl Drive {
         })
     }
 
-    /// Sends burst number `number`, which gets the time stamp `time_s`.
+    /// Sends burst number `number` with the time stamp `time_s`.
     fn send(&mut self, number: usize, time_s: f64) {
         let vehicle = self.path.heard_at(time_s, self.lateness_s);
         let mut snrs_db = self.spare.pop().unwrap_or_default();
@@ -187,7 +187,7 @@ impl Drive {
         });
     }
 
-    /// Odometry up to `time_s`, and what arrives before each sample.
+    /// Processes odometry up to `time_s` and, before each sample, the bursts that have arrived.
     fn odometry_until(
         &mut self,
         time_s: f64,
@@ -198,7 +198,7 @@ impl Drive {
                 self.hear(burst, record)?;
             }
             if let Some(sample) = self.odometer.sample(self.path.at(sample_s)) {
-                // A simulated odometer neither repeats itself nor returns NaN.
+                // A simulated odometer never repeats a sample and never returns NaN.
                 let _ = self
                     .onboard
                     .odometry(&self.faults.slip(sample))
@@ -208,7 +208,7 @@ impl Drive {
         Ok(())
     }
 
-    /// Hears what has arrived by `time_s`.
+    /// Processes the bursts that have arrived by `time_s`.
     fn hear_until(&mut self, time_s: f64, record: &mut RunRecord) -> Result<(), SimulationError> {
         while let Some(burst) = self.arrived(|arrives_s| arrives_s <= time_s) {
             self.hear(burst, record)?;
@@ -216,7 +216,7 @@ impl Drive {
         Ok(())
     }
 
-    /// The next burst, if the time at which it arrives is `by` now.
+    /// Returns the next burst if `by` accepts its arrival time.
     fn arrived(&mut self, by: impl Fn(f64) -> bool) -> Option<Burst> {
         let arrives_s = self.on_the_way.front()?.vehicle.time_s + self.latency_s;
         by(arrives_s).then(|| self.on_the_way.pop_front()).flatten()

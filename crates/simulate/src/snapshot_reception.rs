@@ -1,4 +1,4 @@
-//! Reception by snapshots: drawn for those SSBs only whose angle is wanted.
+//! Reception of snapshots, which are drawn only for the SSBs whose angle is estimated.
 
 use onboard::observation::{SensedSsb, SsbObservation};
 use onboard::{BoxError, Observed, SsbSource};
@@ -6,31 +6,31 @@ use onboard::{BoxError, Observed, SsbSource};
 use crate::channel::{HeadChannel, Reception};
 use crate::world::{Faults, VehicleState};
 
-/// What the array received of one burst.
+/// Reception of one burst.
 pub struct SnapshotReception<'a> {
     /// Number of the burst.
     pub number: u64,
-    /// Where the vehicle was.
+    /// True state of the vehicle.
     pub vehicle: &'a VehicleState,
-    /// Channels of the radio heads, and the mean SNR of each (dB).
+    /// Channels of the radio heads.
     pub channels: &'a mut [HeadChannel],
-    /// See `channels`.
+    /// Mean SNR of each radio head (dB).
     pub snrs_db: &'a [f64],
-    /// What is wrong.
+    /// Faults of the run.
     pub faults: &'a Faults,
-    /// Buffers, kept from burst to burst.
+    /// Reusable buffers.
     pub buffers: &'a mut SnapshotBuffers,
 }
 
-/// What one burst after the other is received in.
+/// Reusable buffers for the reception of bursts.
 pub struct SnapshotBuffers {
-    /// Of each SSB that is heard the number of its channel.
+    /// Channel index and reception of each detected SSB.
     receptions: Vec<(usize, Reception)>,
     observation: SsbObservation,
 }
 
 impl SnapshotBuffers {
-    /// Buffers for an array of so many antennas.
+    /// Creates buffers for an array of `elements` antennas.
     pub fn new(elements: usize) -> Self {
         Self {
             receptions: Vec::new(),

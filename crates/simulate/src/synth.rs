@@ -1,5 +1,4 @@
-//! A scenario as somebody on the vehicle would have recorded it: samples of all antennas, odometry,
-//! the site, and beside them the truth.
+//! Simulated recording of a scenario: IQ samples of all antennas, odometry, site and truth.
 
 use std::f64::consts::FRAC_PI_2;
 use std::fs;
@@ -23,38 +22,38 @@ use crate::scenario::Scenario;
 use crate::truth::World;
 use crate::world::{Faults, Odometer, Path as DrivenPath, VehicleState};
 
-/// How a scenario is recorded.
+/// Settings of a simulated recording.
 #[derive(Debug, Clone, Copy, PartialEq)]
 pub struct SynthSettings {
     /// Seed of all random streams.
     pub seed: u64,
     /// Number of the run.
     pub run: u64,
-    /// Seconds recorded from the start on; the whole drive without.
+    /// Duration of the recording in seconds [default: the whole drive].
     pub duration_s: Option<f64>,
-    /// Whether the time between the bursts is recorded too, which makes the file larger by the
-    /// burst's share of the period.
+    /// Whether the samples between the bursts are recorded too. The file size grows by the ratio of
+    /// the burst period to the burst duration.
     pub continuous: bool,
     /// Format of the samples.
     pub datatype: Datatype,
 }
 
-/// What was written.
+/// Result of a simulated recording.
 #[derive(Debug, Clone, PartialEq)]
 pub struct Synthesized {
-    /// The recording's metadata.
+    /// Path of the metadata file.
     pub recording: PathBuf,
-    /// Number of bursts in it.
+    /// Number of recorded bursts.
     pub bursts: usize,
-    /// Samples per antenna.
+    /// Number of samples per antenna.
     pub samples: u64,
 }
 
-/// Why a scenario cannot be recorded.
+/// Error of a simulated recording.
 #[derive(Debug, Error)]
 #[non_exhaustive]
 pub enum SynthError {
-    /// The scenario cannot be sent as samples.
+    /// The scenario cannot be synthesised as samples.
     #[error(transparent)]
     Settings(#[from] SettingsError),
     /// A file cannot be written.
@@ -63,18 +62,23 @@ pub enum SynthError {
     /// An SSB cannot be built.
     #[error("samples: {0}")]
     Samples(#[from] nr_ssb::Error),
-    /// The drive cannot be driven.
+    /// The drive cannot be simulated.
     #[error(transparent)]
     Simulation(#[from] SimulationError),
-    /// The caller asked to stop; no file of it is there.
+    /// The caller stopped the recording; no file was written.
     #[error("stopped")]
     Stopped,
 }
 
-/// Writes a drive into `directory`: `iq.sigmf-meta` and `iq.sigmf-data`, `odometry.csv`, what the
-/// vehicle believes in `site.toml` and `vehicle.toml`, `scenario.toml`, and the truth in
-/// `truth.tum` and the recording's annotations. `progress` is told which share of the drive is
-/// recorded; `false` stops it.
+/// Simulates a drive and writes the recording to `directory`.
+///
+/// - `iq.sigmf-meta`, `iq.sigmf-data`: samples, with the truth of each SSB as annotations
+/// - `odometry.csv`: odometry samples
+/// - `truth.tum`: true poses
+/// - `site.toml`, `vehicle.toml`: nominal models
+/// - `scenario.toml`: the scenario
+///
+/// `progress` gets the recorded fraction of the drive and returns `false` to stop.
 ///
 /// # Errors
 /// [`SynthError`].
@@ -166,7 +170,8 @@ pub fn synthesize(
     })
 }
 
-/// Writes what the vehicle is told in `site.toml` and `vehicle.toml`, and `scenario.toml`.
+/// Writes the nominal models to `site.toml` and `vehicle.toml`, and the scenario to
+/// `scenario.toml`.
 pub(crate) fn write_settings(
     directory: &Path,
     scenario: &Scenario,
@@ -182,8 +187,8 @@ pub(crate) fn write_settings(
     Ok(())
 }
 
-/// The vehicle as its owner would describe it: with the start of this drive, channels as calibrated,
-/// and a tracker to locate it by.
+/// Returns the vehicle as its owner would describe it: with the given start, the calibrated channel
+/// gains and a tracker as localizer.
 fn told_vehicle(scenario: &Scenario, start: Pose, channel_gains: &[Complex64]) -> Vehicle {
     let mut vehicle = scenario.vehicle.clone();
     let gains = channel_gains.iter().map(|gain| [gain.re, gain.im]);
@@ -211,7 +216,7 @@ fn write_odometry(
     write_odometry_csv(file, &samples)
 }
 
-/// How an SSB is received: SNR, frequency offset by the oscillators, first sample.
+/// Reception of an SSB: SNR, frequency offset due to the oscillators, first sample.
 struct Received {
     snr_db: f64,
     cfo_hz: f64,
@@ -241,13 +246,14 @@ fn annotation(
     });
     let array = &scenario.vehicle.array;
     let angle = if array.shape.is_row() {
-        // It sees the angle from its axis, whichever side the wave comes from, and from above or not.
+        // A linear array measures the angle from its axis only: sides and elevation are not
+        // distinguished.
         json!({
             "azimuth_from_broadside_deg": along.clamp(-1.0, 1.0).asin().to_degrees(),
             "element_spacing_wavelengths": array.spacing_wavelengths,
         })
     } else {
-        // Broadside is a quarter of a turn clockwise of the axis.
+        // Broadside is a quarter turn clockwise from the axis.
         json!({
             "azimuth_from_broadside_deg": wrap_angle(left.atan2(along) + FRAC_PI_2).to_degrees(),
             "elevation_deg": level.min(1.0).acos().to_degrees(),

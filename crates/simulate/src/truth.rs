@@ -1,4 +1,4 @@
-//! The one place where truth is made, from what is believed.
+//! Derivation of the truth from the nominal models. No other module derives truth.
 
 use std::sync::Arc;
 
@@ -18,10 +18,10 @@ use crate::random::{Purpose, Streams};
 use crate::scenario::{Fidelity, Scenario, TruthSettings};
 use crate::world::{MotionProfile, Odometer, Path, TrueArray};
 
-/// Makes the propagation over a link.
+/// Factory of the propagation over a link.
 pub type PropagationMaker = dyn Fn(&Link<'_>) -> Box<dyn Propagation> + Send + Sync;
 
-/// What is so on average, over all runs: what is believed, and how the world departs from it.
+/// Environment of all runs of a scenario: nominal models and systematic deviations of the truth.
 #[derive(Clone)]
 pub struct World {
     scenario: Arc<Scenario>,
@@ -32,32 +32,32 @@ pub struct World {
     propagation: Arc<PropagationMaker>,
 }
 
-/// What is so in one run.
+/// Truth of one run.
 pub struct Truth {
-    /// The site: radio heads where they stand, with the power they send.
+    /// Site with the true positions and transmit powers of the radio heads.
     pub site: Site,
-    /// The vehicle, as it is built and measures.
+    /// Vehicle with its true properties.
     pub vehicle: Vehicle,
-    /// The radio heads of that site, those that the vehicle does not listen to included.
+    /// Radio heads of the true site, including those that the vehicle does not use.
     pub heads: Vec<RadioHead>,
-    /// The array, at the start of the drive.
+    /// Array at the start of the run.
     pub array: TrueArray,
-    /// The odometer, at the start of the drive.
+    /// Odometer at the start of the run.
     pub odometer: Odometer,
-    /// Where the vehicle drives.
+    /// Path of the vehicle.
     pub path: Path,
-    /// The initial pose as the vehicle is told it: a measurement, as wrong as stated.
+    /// Initial pose with a random error of its specified covariance, as given to the vehicle.
     pub told_start: Pose,
-    /// How each radio head's signal comes to the vehicle.
+    /// Propagation from each radio head.
     pub propagation: Vec<Box<dyn Propagation>>,
 }
 
 impl World {
-    /// The world of a scenario.
+    /// Creates the environment of a scenario.
     ///
     /// # Errors
-    /// [`SettingsError`] when the scenario has been changed by hand into an impossible one; never
-    /// after reading.
+    /// [`SettingsError`] if the scenario was changed by code to an invalid one. A scenario that was
+    /// read from a file is valid.
     pub fn new(scenario: &Scenario) -> Result<Self, SettingsError> {
         let check = Check {
             file: &scenario.name,
@@ -74,24 +74,25 @@ impl World {
         })
     }
 
-    /// The world with another propagation.
+    /// Replaces the propagation.
     #[must_use]
     pub fn with_propagation(mut self, propagation: Arc<PropagationMaker>) -> Self {
         self.propagation = propagation;
         self
     }
 
-    /// The scenario.
+    /// Returns the scenario.
     pub fn scenario(&self) -> &Scenario {
         &self.scenario
     }
 
-    /// Duration of the drive in seconds; wandering takes no time.
+    /// Returns the duration of the drive in seconds. Lateral wander does not change it.
     pub const fn duration_s(&self) -> f64 {
         self.motion.duration_s()
     }
 
-    /// Whether what an SSB brings depends neither on when it is heard nor on which others are.
+    /// Whether the signal of an SSB is independent of the time of processing and of the reception
+    /// of other SSBs.
     pub(crate) fn is_independent_of_listening(&self) -> bool {
         let scenario = &self.scenario;
         scenario.fidelity == Fidelity::Snapshots
@@ -99,8 +100,8 @@ impl World {
             && self.vehicle.receiver.snr_noise_db == 0.0
     }
 
-    /// Whether the same comes to the vehicle in another world, run by run. Both are taken to have
-    /// their scenario's own propagation.
+    /// Whether the vehicle receives equal signals in another environment in each run. Both
+    /// environments are assumed to use the propagation of their scenario.
     pub(crate) fn sounds_like(&self, other: &Self) -> bool {
         let besides = |scenario: &Scenario| Scenario {
             name: String::new(),
@@ -119,8 +120,8 @@ impl World {
             && besides(&self.scenario) == besides(&other.scenario)
     }
 
-    /// What is so in the run that `streams` belongs to: every value drawn from its standard
-    /// deviation.
+    /// Draws the truth of the run that `streams` belongs to. Each value gets an error with its
+    /// standard deviation.
     pub fn draw(&self, streams: Streams) -> Truth {
         let factor = self.scenario.truth.factor();
         let (mut site, mut vehicle) = (self.site.clone(), self.vehicle.clone());
@@ -131,7 +132,7 @@ impl World {
             *x_m += head.position_std_m * normal();
             *y_m += head.position_std_m * normal();
             let eirp_dbm = head.eirp_dbm + head.eirp_std_db * normal();
-            // More than a site's file may say is drawn of none.
+            // Limit the drawn power to the range of a site file.
             let (least, most) = (
                 RadioHeadSettings::LEAST_EIRP_DBM,
                 RadioHeadSettings::MOST_EIRP_DBM,
@@ -148,7 +149,7 @@ impl World {
         let [forward_m, left_m, _] = &mut array.position_m;
         *forward_m += array.position_std_m * normal();
         *left_m += array.position_std_m * normal();
-        // The odometer's noise goes on from what its constants were drawn by.
+        // One generator draws first the constants and then the noise of the odometer.
         let mut noise = streams.generator(Purpose::Odometer, 0);
         let mut normal = || factor * noise.sample::<f64, _>(StandardNormal);
         vehicle.odometer.scale += vehicle.odometer.scale_std * normal();
@@ -196,7 +197,8 @@ impl World {
     }
 }
 
-/// A vehicle without what its estimator, localizer, wake-up policy and computer are set to.
+/// Returns the physical properties of a vehicle, with default estimator, localizer, wake-up policy
+/// and computer.
 fn what_it_is(vehicle: &Vehicle) -> Vehicle {
     Vehicle {
         name: String::new(),
@@ -210,7 +212,7 @@ fn what_it_is(vehicle: &Vehicle) -> Vehicle {
     }
 }
 
-/// The scenario's own.
+/// Returns the propagation of the scenario's channel model.
 fn default_propagation(
     scenario: &Scenario,
     check: Check<'_>,

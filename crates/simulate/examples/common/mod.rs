@@ -1,4 +1,4 @@
-//! What the tables share.
+//! Functions that are shared by the tables.
 #![allow(dead_code, reason = "each table takes what it needs")]
 
 use std::error::Error;
@@ -10,7 +10,7 @@ use toml::Value;
 
 pub type Result<T> = std::result::Result<T, Box<dyn Error>>;
 
-/// Number of runs and seeds, from the command line.
+/// Parses the number of runs and the seeds from the command line.
 pub fn arguments(runs: usize, seed: u64) -> Result<(usize, Vec<u64>)> {
     let mut arguments = std::env::args().skip(1);
     let runs = arguments.next().map_or(Ok(runs), |text| text.parse())?;
@@ -22,7 +22,8 @@ pub fn arguments(runs: usize, seed: u64) -> Result<(usize, Vec<u64>)> {
     Ok((runs, seeds))
 }
 
-/// A shipped scenario with some of its keys changed, its vehicle mistrusting nobody unless they say so.
+/// Returns a shipped scenario with changed keys. Integrity monitoring is off unless the keys enable
+/// it.
 pub fn changed<'a>(
     name: &str,
     overrides: impl IntoIterator<Item = (&'a str, Value)>,
@@ -33,7 +34,7 @@ pub fn changed<'a>(
     Ok(scenario.with_overrides(overrides, &Shipped)?)
 }
 
-/// A campaign on the platform that the scenario names.
+/// Runs a campaign on the platform that the scenario names.
 pub fn campaign(scenario: &Scenario, seed: u64, runs: usize) -> Result<Campaign> {
     let options = CampaignOptions {
         seed,
@@ -44,7 +45,7 @@ pub fn campaign(scenario: &Scenario, seed: u64, runs: usize) -> Result<Campaign>
     Ok(simulation.campaign(&options)?)
 }
 
-/// The settings of a wake-up at a fixed interval.
+/// Returns the settings of a wake-up at a fixed interval.
 pub fn fixed(interval_ms: f64) -> [(&'static str, Value); 2] {
     [
         ("vehicle.wake_up.policy", "fixed".into()),

@@ -1,4 +1,4 @@
-//! What stands in the line of sight: walls, and what moves on after a while.
+//! Blockage of the line of sight by walls and by moving objects.
 
 use onboard::geometry::Point;
 use onboard::walls::Walls;
@@ -9,11 +9,11 @@ use crate::random::Purpose;
 use crate::scenario::BlockageSettings;
 use crate::world::LineOfSight;
 
-/// When the line of sight of a link is blocked: a Poisson process in time, each blocker staying
-/// exponentially long.
+/// Blockage of the line of sight of one link. Blockers arrive as a Poisson process in time, and the
+/// duration of each blockage is exponentially distributed.
 #[derive(Debug, Clone)]
 pub struct Blockage {
-    /// From when until when, in seconds; in order of their beginnings.
+    /// Start and end of each blockage in seconds, ordered by start.
     times_s: Vec<[f64; 2]>,
     amplitude: f64,
     walls: Walls,
@@ -21,7 +21,7 @@ pub struct Blockage {
 }
 
 impl Blockage {
-    /// The blockage of a link.
+    /// Draws the blockage of a link.
     pub fn new(settings: Option<BlockageSettings>, link: &Link<'_>) -> Self {
         let (walls, head) = (Walls::new(link.site), link.radio_head());
         let head = head.map_or_else(Point::default, |head| head.position);
@@ -50,12 +50,12 @@ impl Blockage {
         }
     }
 
-    /// What is left of the line of sight's amplitude.
+    /// Returns the amplitude factor of the line of sight due to moving blockers and walls (0 to 1).
     pub fn amplitude(&self, sight: &LineOfSight) -> f64 {
         self.moving(sight.time_s) * self.walls.passing(self.head, sight.place).sqrt()
     }
 
-    /// The same without the walls.
+    /// Returns the amplitude factor of the line of sight due to moving blockers only (0 to 1).
     pub fn moving(&self, time_s: f64) -> f64 {
         let begun = self
             .times_s

@@ -1,5 +1,4 @@
-//! Rician fading across the array, and shadowing: a line of sight and scatter that stands still
-//! during an SSB.
+//! Rician fading across the array and shadowing. The scatter is constant during an SSB.
 
 use std::f64::consts::TAU;
 
@@ -15,13 +14,13 @@ use crate::random::Purpose;
 use crate::scenario::{ChannelSettings, ScatterModel};
 use crate::world::{Antennas, LineOfSight};
 
-/// The propagation from one radio head in one run.
+/// Propagation from one radio head in one run.
 ///
-/// The scatter is a sum of plane waves of fixed directions, uniform over the sphere, and random
-/// phases (Aulin's model), so that it is a function of the distance driven: its autocorrelation is
-/// sin(2πΔ/λ)/(2πΔ/λ), first zero at half a wavelength, and its Doppler spectrum is flat. Like any
-/// wave, the line of sight turns its phase with its own Doppler. Where scatter has a delay spread,
-/// each ray's delay is exponentially distributed, and the channel varies over the band.
+/// The scatter is a sum of plane waves with fixed directions, uniform over the sphere, and random
+/// phases (Aulin's model). It is a function of the distance driven. Its autocorrelation is
+/// sin(2πΔ/λ)/(2πΔ/λ), with the first zero at half a wavelength, and its Doppler spectrum is flat.
+/// The phase of the line of sight rotates with its own Doppler shift. With a delay spread, each ray
+/// has an exponentially distributed delay, which makes the channel frequency-selective.
 #[derive(Debug, Clone)]
 pub struct RicianPropagation {
     shadowing: Shadowing,
@@ -31,25 +30,25 @@ pub struct RicianPropagation {
     wavenumber_per_m: f64,
     rays: Vec<Ray>,
     model: ScatterModel,
-    /// Whether the scatter is delayed against the line of sight.
+    /// Whether the scatter has a delay spread.
     dispersive: bool,
 }
 
-/// A plane wave, for one antenna or for all.
+/// Plane wave at one antenna or at all antennas.
 #[derive(Debug, Clone, Copy)]
 struct Ray {
-    /// Cosine of its direction to the forward axis: its Doppler.
+    /// Cosine of the angle to the forward axis, which determines the Doppler shift.
     cosine: f64,
-    /// Its amplitude at the start.
+    /// Complex amplitude at the start of the road.
     start: Complex64,
-    /// Its cosine to the left.
+    /// Cosine of the angle to the left axis.
     left: f64,
-    /// Delay after the line of sight, in seconds.
+    /// Delay relative to the line of sight in seconds.
     delay_s: f64,
 }
 
 impl RicianPropagation {
-    /// The propagation over a link.
+    /// Draws the propagation of a link.
     pub fn new(settings: &ChannelSettings, link: &Link<'_>) -> Self {
         let &Link {
             site,
@@ -70,14 +69,15 @@ impl RicianPropagation {
         let mut turns = streams.generator(Purpose::ScatterTurn, head);
         let rays = (0..count)
             .map(|_| {
-                // Uniform over the sphere is uniform in the cosine to any axis (Archimedes).
+                // A uniform direction on the sphere has a uniform cosine to any axis (Archimedes).
                 let cosine = 2.0 * rng.random::<f64>() - 1.0;
                 let beside = (1.0 - cosine * cosine).sqrt();
                 Ray {
                     cosine,
                     start: Complex64::cis(rng.random::<f64>() * TAU),
                     left: beside * (TAU * turns.random::<f64>()).cos(),
-                    // Exponential: mean and standard deviation are the spread.
+                    // An exponential distribution has equal mean and standard deviation, both the
+                    // delay spread.
                     delay_s: -spread_s * (1.0 - delays.random::<f64>()).ln(),
                 }
             })
@@ -117,7 +117,7 @@ impl Propagation for RicianPropagation {
         }
         let first_hz = -((into.len() / elements / 2) as f64) * step_hz;
         let per_antenna = self.rays.len() / elements;
-        // Without delays one frequency is like another.
+        // Without delays, the channel is equal at all frequencies.
         let count = if self.dispersive {
             into.len() / elements
         } else {
@@ -223,14 +223,14 @@ mod tests {
         Antennas::new(&Vehicle::from_library("paper", &Shipped).unwrap().array)
     }
 
-    /// Gains at the carrier beside the radio head.
+    /// Gains at the carrier near the radio head.
     fn gains(fading: &RicianPropagation, phase_rad: f64, along_m: f64) -> [Complex64; ELEMENTS] {
         let mut gains = [Complex64::ZERO; ELEMENTS];
         fading.response(&sight(phase_rad, along_m), &row(), 0.0, &mut gains);
         gains
     }
 
-    /// Mean over runs of f(gains) at antenna 0 of an arriving line of sight at broadside.
+    /// Mean scatter power at antenna 0 over the runs, for a line of sight from broadside.
     fn mean_power_of_scatter(k_db: f64, model: ScatterModel) -> f64 {
         let site = site(k_db);
         let runs = 4000;
@@ -245,12 +245,13 @@ mod tests {
     }
 
     #[test]
-    fn k_divides_the_power() {
+    fn rician_k_divides_the_power_between_line_of_sight_and_scatter() {
         for model in [ScatterModel::PerAntenna, ScatterModel::Rays] {
             for k_db in [0.0, 10.0, 20.0] {
                 let k = 10f64.powf(0.1 * k_db);
                 let scatter = mean_power_of_scatter(k_db, model);
-                // Scatter power is exponential: relative error 1/√runs, with 4 antennas alike.
+                // The scatter power is exponentially distributed, so that the relative error is
+                // 1/√runs.
                 assert!(
                     (scatter * (k + 1.0) - 1.0).abs() < 4.0 / 4000f64.sqrt(),
                     "{model:?} {k_db}"
@@ -287,7 +288,7 @@ mod tests {
     }
 
     #[test]
-    fn antennas_fade_apart_or_together() {
+    fn scatter_is_independent_or_common_to_the_antennas_as_configured() {
         let product = |model| {
             let site = site(-30.0);
             let runs = 4000;
@@ -299,12 +300,12 @@ mod tests {
             (0..runs).map(one).sum::<f64>() / runs as f64
         };
         assert!(product(ScatterModel::PerAntenna).abs() < 0.05);
-        // Neighbours at λ/2 in an isotropic field: sin(π)/π.
+        // Antennas at a distance of λ/2 in an isotropic field have the correlation sin(π)/π.
         assert!(product(ScatterModel::Rays).abs() < 0.05);
     }
 
     #[test]
-    fn scatter_decorrelates_over_frequency_as_its_delays_have_it() {
+    fn scatter_decorrelates_over_frequency_according_to_the_delay_spread() {
         for model in [ScatterModel::PerAntenna, ScatterModel::Rays] {
             let site = site(-30.0);
             let (runs, step_hz) = (4000, 250e3);
@@ -323,10 +324,10 @@ mod tests {
                 }
             }
             for (step, sum) in sums.iter().enumerate() {
-                // The characteristic function of an exponential distribution.
+                // Characteristic function of an exponential distribution.
                 let turns = step as f64 * step_hz * 300e-9;
                 let expected = Complex64::new(1.0, TAU * turns).inv();
-                // Fourth moments of a sum of eight rays: below two.
+                // The fourth moment of a sum of eight rays is below two.
                 let bound = 4.0 * (2.0 / runs as f64).sqrt();
                 let deviation = sum / runs as f64 - expected;
                 assert!(deviation.norm() < bound, "{model:?} {step}: {deviation}");

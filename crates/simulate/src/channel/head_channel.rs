@@ -1,4 +1,4 @@
-//! From the vehicle's true place to what its array receives of one radio head.
+//! Channel from one radio head to the array of the vehicle.
 
 use std::f64::consts::FRAC_1_SQRT_2;
 
@@ -16,7 +16,7 @@ use crate::random::{Purpose, Streams};
 use crate::truth::Truth;
 use crate::world::{TrueArray, VehicleState};
 
-/// The channel from one radio head to the vehicle in one run.
+/// Channel from one radio head to the vehicle in one run.
 pub struct HeadChannel {
     head: RadioHead,
     budget: LinkBudget,
@@ -27,35 +27,35 @@ pub struct HeadChannel {
     snapshot_noise: ChaCha8Rng,
 }
 
-/// One SSB at the array, before noise.
+/// One SSB at the array before noise.
 #[derive(Debug, Clone, Copy, PartialEq)]
 pub struct Reception {
-    /// What the receiver senses of it without estimating an angle.
+    /// Quantities that the receiver measures without an angle estimate.
     pub ssb: SensedSsb,
     gains: [Complex64; MAX_ELEMENTS],
     elements: usize,
 }
 
 impl Reception {
-    /// Whether anything of it arrives: where a ray tracer found no path there is nothing to sense.
+    /// Whether the SSB has power. Without a traced path there is no signal to detect.
     pub fn is_heard(&self) -> bool {
         self.ssb.snr_db > f64::NEG_INFINITY
     }
 
-    /// Gains of the antennas, relative to unit noise power.
+    /// Returns the complex antenna gains relative to unit noise power.
     pub fn gains(&self) -> &[Complex64] {
         self.gains.get(..self.elements).unwrap_or_default()
     }
 
-    /// The same, to be changed.
+    /// Returns mutable complex antenna gains relative to unit noise power.
     pub fn gains_mut(&mut self) -> &mut [Complex64] {
         self.gains.get_mut(..self.elements).unwrap_or_default()
     }
 }
 
 impl HeadChannel {
-    /// The channels of a run, one from each radio head, in the order of the site; they take over
-    /// how the truth has the signals come.
+    /// Creates the channels of a run, one per radio head in the order of the site. The propagation
+    /// objects are moved out of `truth`.
     pub fn all(truth: &mut Truth, streams: Streams) -> Vec<Self> {
         let budget = LinkBudget::new(&truth.site, &truth.vehicle);
         let propagation = std::mem::take(&mut truth.propagation).into_iter();
@@ -73,26 +73,26 @@ impl HeadChannel {
             .collect()
     }
 
-    /// The radio head, where it stands.
+    /// Returns the radio head at its true position.
     pub const fn head(&self) -> &RadioHead {
         &self.head
     }
 
-    /// The array, as it is by now.
+    /// Returns the array in its current state.
     pub const fn array(&self) -> &TrueArray {
         &self.array
     }
 
-    /// Mean SNR in dB of the SSB that arrives now: link budget, shadowing and further path loss. To
-    /// be called once for each SSB, in order.
+    /// Returns the mean SNR in dB of the current SSB from link budget, shadowing and additional
+    /// path loss. Call this function once per SSB, in order.
     pub fn next_snr_db(&mut self, vehicle: &VehicleState) -> f64 {
         self.array.advance(vehicle.along_m);
         let sight = self.array.line_of_sight(vehicle, &self.head);
         self.budget.snr_db(&self.head, sight.distance_m) + self.propagation.next_gain_db(&sight)
     }
 
-    /// Gains of the antennas at frequencies `step_hz` apart around the carrier, for a mean SNR of
-    /// `snr_db`; see [`Propagation::response`].
+    /// Computes the antenna gains at frequencies `step_hz` apart around the carrier for the mean
+    /// SNR `snr_db`; see [`Propagation::response`].
     pub fn response(
         &self,
         vehicle: &VehicleState,
@@ -112,7 +112,7 @@ impl HeadChannel {
         }
     }
 
-    /// The SSB of mean SNR `snr_db` at the array, with fading.
+    /// Returns the SSB with the mean SNR `snr_db` at the array, including fading.
     pub fn receive(&mut self, vehicle: &VehicleState, snr_db: f64) -> Reception {
         let mut reception = Reception {
             ssb: SensedSsb {
@@ -136,15 +136,16 @@ impl HeadChannel {
         reception
     }
 
-    /// The array's output for SSB number `number`, noise of unit power included.
+    /// Writes the snapshots of SSB number `number`, with noise of unit power, to `into`.
     ///
-    /// Blind, each snapshot carries one unknown QPSK symbol, as a resource element of the broadcast
-    /// channel does (TS 38.211, 7.3.3.1). With pilots there
-    /// is one despread block per OFDM symbol: N known resource elements add up to an N-fold SNR,
-    /// their common phase unknown from symbol to symbol.
+    /// Without pilots, each snapshot carries one unknown QPSK symbol, like a resource element of
+    /// the PBCH (TS 38.211, 7.3.3.1). With pilots, there is one despread block per OFDM symbol: N
+    /// known resource elements give an N-fold SNR, and their common phase is unknown in each
+    /// symbol.
     pub fn observe(&mut self, number: u64, reception: &Reception, into: &mut SsbObservation) {
         into.restart(reception.ssb);
-        // Each SSB has its own nonce: it sounds the same whether or not earlier ones were heard.
+        // Each SSB has its own stream position, so that its noise does not depend on which SSBs
+        // were received before.
         self.snapshot_noise.set_stream(number);
         self.snapshot_noise.set_word_pos(0);
         match self.receiver.pilots.per_symbol() {
@@ -173,7 +174,7 @@ impl HeadChannel {
         into.push(snapshot.get(..gains.len()).unwrap_or_default());
     }
 
-    /// A random QPSK symbol.
+    /// Draws a random QPSK symbol.
     fn qpsk(&mut self) -> Complex64 {
         let bits = self.snapshot_noise.next_u32();
         let level = |bit: u32| {
@@ -186,7 +187,7 @@ impl HeadChannel {
         Complex64::new(level(0), level(1))
     }
 
-    /// A circular Gaussian of unit power.
+    /// Draws a circular complex Gaussian number of unit power.
     fn complex_normal(&mut self) -> Complex64 {
         let re: f64 = self.snapshot_noise.sample(StandardNormal);
         let im: f64 = self.snapshot_noise.sample(StandardNormal);

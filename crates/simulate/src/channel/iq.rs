@@ -1,6 +1,6 @@
-//! From the vehicle's true place to the samples that its receiver gets of an SSB burst: every radio
-//! head's SSB, multipath, Doppler, faults, frequency offset, clock drift, noise, channel errors,
-//! converter.
+//! Synthesis of the IQ samples that the receiver gets of an SSB burst. The samples include the SSBs
+//! of all radio heads, multipath, Doppler shift, faults, frequency offset, clock drift, noise,
+//! channel errors and the A/D converter.
 
 use std::f64::consts::{FRAC_1_SQRT_2, TAU};
 
@@ -22,14 +22,14 @@ use crate::random::{Purpose, Streams};
 use crate::scenario::{IqSettings, Scenario};
 use crate::world::{Faults, VehicleState};
 
-/// Size of the transforms: samples are made at the base rate.
+/// FFT size at the base sample rate.
 const FFT_SIZE: usize = 256;
-/// Samples before the first SSB of a burst and after the last.
+/// Samples before the first SSB and after the last SSB of a burst.
 const MARGIN: usize = 64;
-/// Subcarrier that stands at the SSB's centre.
+/// Subcarrier at the SSB's centre frequency.
 const CENTRE: f64 = 120.0;
 
-/// What is on the air, and the hardware that receives it, in one run.
+/// Transmitted signals and receiver hardware of one run.
 pub struct IqAir {
     numerology: Numerology,
     case: Case,
@@ -38,45 +38,47 @@ pub struct IqAir {
     ssb_freq_hz: f64,
     settings: IqSettings,
     period_s: f64,
-    /// Error of the receiver's oscillator: positive is too fast.
+    /// Relative frequency error of the receiver's oscillator; positive means too fast.
     oscillator: f64,
     head_oscillators: Vec<f64>,
     channel_gains: Vec<Complex64>,
     noise: ChaCha8Rng,
-    /// Whether samples are made from one burst to the next, without a gap.
+    /// Whether samples are also generated between the bursts.
     continuous: bool,
     faults: Faults,
-    /// Gains of the antennas at each subcarrier, and a symbol's samples.
+    /// Antenna gains at each subcarrier.
     response: Vec<Complex64>,
+    /// Samples of one OFDM symbol.
     symbol: Vec<Complex32>,
-    /// Sum of all SSBs at each antenna, before the converter.
+    /// Sum of all SSBs at each antenna before the A/D converter.
     sum: Vec<Vec<Complex64>>,
     burst: IqBurst,
 }
 
-/// Samples of one burst, at the base rate.
+/// Samples of one burst at the base sample rate.
 #[derive(Debug, Clone, PartialEq, Default)]
 pub struct IqBurst {
-    /// Number of the first sample by the receiver's clock.
+    /// Index of the first sample according to the receiver's clock.
     pub start: u64,
-    /// The vehicle's time at it, in seconds.
+    /// Vehicle time of the first sample in seconds.
     pub time_s: f64,
-    /// The samples of each antenna; full scale of the converter is one.
+    /// Samples of each antenna, relative to the full scale of the A/D converter.
     pub antennas: Vec<Vec<Complex32>>,
-    /// Where each radio head's SSB begins, by the receiver's clock; in the order of the heads.
+    /// Sample index of the start of each radio head's SSB according to the receiver's clock, in the
+    /// order of the radio heads.
     pub ssb_starts: Vec<f64>,
 }
 
 impl IqAir {
-    /// Frequency offset that the oscillators give the SSB of radio head `index`, in Hz; that of its speed
-    /// comes on top, path by path.
+    /// Returns the carrier frequency offset of the SSB of radio head `index` due to the
+    /// oscillators, in Hz. The Doppler shift is added path by path.
     pub fn cfo_hz(&self, index: usize) -> f64 {
         let oscillator = self.head_oscillators.get(index).copied().unwrap_or(0.0);
         (oscillator - self.oscillator) * self.ssb_freq_hz
     }
 
-    /// The air of the run that `streams` belongs to. What it sends is as the site plans it; where
-    /// from and how strong the channels say.
+    /// Creates the transmitted signals of the run that `streams` belongs to. The site determines
+    /// the signals, and the channels determine position and power.
     ///
     /// # Errors
     /// [`Error`] for a numerology of frequency range 2.
@@ -126,25 +128,26 @@ impl IqAir {
         })
     }
 
-    /// Makes samples from one burst to the next too, not around the bursts only.
+    /// Enables samples between the bursts.
     #[must_use]
     pub const fn continuous(mut self) -> Self {
         self.continuous = true;
         self
     }
 
-    /// Samples per second.
+    /// Returns the sample rate in Hz.
     pub fn sample_rate_hz(&self) -> f64 {
         self.numerology.sample_rate_hz()
     }
 
-    /// Gains of the receive channels, as a calibration would find them.
+    /// Returns the complex gains of the receive channels, as a calibration would measure them.
     pub fn channel_gains(&self) -> &[Complex64] {
         &self.channel_gains
     }
 
-    /// What the receiver gets of burst number `number`, received at the vehicle's `time_s`, of radio
-    /// heads with these mean SNRs. `state` gives the truth at any time.
+    /// Returns the samples of burst number `number`, received at the vehicle time `time_s`.
+    /// `snrs_db` are the mean SNRs of the radio heads, and `state` returns the true vehicle state
+    /// at any time.
     ///
     /// # Errors
     /// [`Error`] for an SSB index that a cell cannot have.
@@ -189,13 +192,13 @@ impl IqAir {
         Ok(&self.burst)
     }
 
-    /// Where burst number `number`'s half frame begins: a clock that runs too fast has counted more
-    /// samples by then.
+    /// Returns the sample index at which the half frame of burst number `number` begins. A clock
+    /// that is too fast has counted more samples.
     fn half_frame_start(&self, number: u64) -> f64 {
         number as f64 * self.period_s * self.sample_rate_hz() * (1.0 + self.oscillator)
     }
 
-    /// First symbols of the earliest and the latest SSB.
+    /// Returns the first symbols of the earliest and the latest SSB.
     fn span(&self, heads: &[HeadChannel]) -> Result<(usize, usize), Error> {
         let mut span: Option<(usize, usize)> = None;
         for head in heads {
@@ -206,7 +209,7 @@ impl IqAir {
         Ok(span.unwrap_or_default())
     }
 
-    /// Adds one radio head's SSB; returns where it begins.
+    /// Adds the SSB of one radio head and returns its start as a sample index.
     fn add_ssb(
         &mut self,
         index: usize,
@@ -229,7 +232,7 @@ impl IqAir {
         let delay = sight.distance_m / SPEED_OF_LIGHT_MPS * rate_hz;
         let start = half_frame_start + self.numerology.symbol_start(first_symbol) as f64 + delay;
         let place = (start - self.burst.start as f64).floor();
-        // What is left of the delay becomes a phase ramp over the subcarriers.
+        // Apply the fractional part of the delay as a phase ramp over the subcarriers.
         let fraction = start - self.burst.start as f64 - place;
         let cfo = self.cfo_hz(index) / rate_hz;
         let symbol_len = self.numerology.ssb_symbol_len();
@@ -271,16 +274,17 @@ impl IqAir {
         Ok(start)
     }
 
-    /// What a cell broadcasts in burst number `number`.
+    /// Returns the PBCH payload of a cell in burst number `number`.
     fn payload(&self, number: u64, ssb_index: u8) -> Result<BchPayload, Error> {
         let half_frames = (number as f64 * self.period_s / 5e-3).round() as u64;
         let sfn = (half_frames / 2 % 1024) as u16;
         BchPayload::new(Mib::default(), sfn, half_frames % 2 == 1, ssb_index)
     }
 
-    /// Noise that has unit power on a resource element: a transform of 256 adds up 256 samples.
+    /// Adds noise with unit power per resource element. An FFT of size 256 adds up 256 samples.
     fn add_noise(&mut self, number: u64) {
-        // Each burst has its own nonce: it sounds the same whether or not earlier ones were heard.
+        // Each burst has its own stream position, so that its noise does not depend on which bursts
+        // were received before.
         self.noise.set_stream(number);
         self.noise.set_word_pos(0);
         let sigma = FRAC_1_SQRT_2 / (FFT_SIZE as f64).sqrt();
@@ -293,9 +297,10 @@ impl IqAir {
         }
     }
 
-    /// Gain control, rounding and clipping.
+    /// Applies gain control, quantisation and clipping.
     fn convert(&mut self) {
-        // The strongest symbol sets the gain: a mean over the pauses would drive an SSB into the limit.
+        // The strongest symbol determines the gain. A mean that includes the pauses would overdrive
+        // the converter during an SSB.
         let symbol_len = self.numerology.ssb_symbol_len();
         let power = |symbol: &[Complex64]| {
             symbol.iter().map(Complex64::norm_sqr).sum::<f64>() / symbol.len() as f64
@@ -305,7 +310,7 @@ impl IqAir {
             .iter()
             .flat_map(|samples| samples.chunks_exact(symbol_len).map(power))
             .fold(f64::MIN_POSITIVE, f64::max);
-        // I and Q share the power.
+        // I and Q each have half of the power.
         let rms = (0.5 * strongest).sqrt();
         let scale = 10f64.powf(-0.05 * self.settings.adc_headroom_db) / rms;
         let steps = f64::from(1u32 << (self.settings.adc_bits - 1));

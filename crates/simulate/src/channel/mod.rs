@@ -1,5 +1,5 @@
-//! The channel between radio heads and the vehicle's antennas, as snapshots or as samples.
-//! [`Propagation`] is the door for others.
+//! Channel between radio heads and the vehicle's antennas, for snapshots or for samples. Other
+//! channel models implement [`Propagation`].
 
 mod blockage;
 mod fading;

@@ -1,4 +1,4 @@
-//! The door for channels.
+//! Interface of the channel models.
 
 use num_complex::Complex64;
 use onboard::radio_head::RadioHead;
@@ -8,19 +8,19 @@ use onboard::settings::{Site, Vehicle};
 use crate::random::Streams;
 use crate::world::{Antennas, LineOfSight};
 
-/// How the signal of one radio head comes to the antennas, in one run. To write one, copy
-/// [`RicianPropagation`](super::RicianPropagation).
+/// Propagation from one radio head to the antennas in one run.
+/// [`RicianPropagation`](super::RicianPropagation) is an example implementation.
 ///
-/// What it does must be a function of the place, and not of what was asked for before: the same
-/// drive fades the same whether or not its SSBs are heard.
+/// The channel must be a function of the position and independent of earlier calls. Then a run has
+/// the same fading for every choice of received SSBs.
 pub trait Propagation: Send {
-    /// Mean power in dB above what the link budget has in free space: shadowing, and whatever path
-    /// loss there is on top. Called once for each SSB, in order.
+    /// Returns the mean power relative to the free-space link budget in dB: shadowing and
+    /// additional path loss. Called once per SSB, in order.
     fn next_gain_db(&mut self, sight: &LineOfSight) -> f64;
 
-    /// Gains of the antennas, of unit mean power, at frequencies `step_hz` apart, the carrier in
-    /// their middle (of an even number, just above it): antenna after antenna, frequency after
-    /// frequency, into chunks of as many as there are antennas.
+    /// Computes the complex antenna gains with unit mean power at frequencies `step_hz` apart. The
+    /// carrier is in the middle (just above the middle for an even number of frequencies). `into`
+    /// contains one chunk per frequency, with one gain per antenna.
     fn response(
         &self,
         sight: &LineOfSight,
@@ -30,25 +30,25 @@ pub trait Propagation: Send {
     );
 }
 
-/// What lies between one radio head and the vehicle in one run.
+/// Link between one radio head and the vehicle in one run.
 #[derive(Debug, Clone, Copy)]
 pub struct Link<'a> {
-    /// The site, as it is.
+    /// True site.
     pub site: &'a Site,
-    /// The vehicle, as it is.
+    /// True vehicle.
     pub vehicle: &'a Vehicle,
-    /// What is driven along.
+    /// Road that the vehicle drives along.
     pub road: &'a Road,
-    /// How long the drive takes, in seconds.
+    /// Duration of the drive in seconds.
     pub duration_s: f64,
-    /// Number of the radio head in the site.
+    /// Index of the radio head in the site.
     pub head: usize,
-    /// The streams of the run.
+    /// Random streams of the run.
     pub streams: Streams,
 }
 
 impl Link<'_> {
-    /// The radio head, where it stands.
+    /// Returns the radio head at its true position.
     pub fn radio_head(&self) -> Option<RadioHead> {
         self.site.radio_heads.get(self.head).map(RadioHead::from)
     }

@@ -1,4 +1,4 @@
-//! Log-normal shadowing along the way.
+//! Log-normal shadowing along the road.
 
 use rand::RngExt;
 use rand_chacha::ChaCha8Rng;
@@ -7,8 +7,8 @@ use rand_distr::StandardNormal;
 use crate::random::{Purpose, Streams};
 use crate::scenario::ChannelSettings;
 
-/// Shadowing of one radio head in one run: Gaussian in dB, with an exponential autocorrelation over
-/// distance (Gudmundson 1991).
+/// Shadowing of one radio head in one run. The value in dB is Gaussian with an exponential
+/// autocorrelation over distance (Gudmundson 1991).
 #[derive(Debug, Clone)]
 pub struct Shadowing {
     rng: ChaCha8Rng,
@@ -18,7 +18,7 @@ pub struct Shadowing {
 }
 
 impl Shadowing {
-    /// The shadowing of radio head number `head`.
+    /// Creates the shadowing of the radio head with index `head`.
     pub fn new(settings: &ChannelSettings, streams: Streams, head: usize) -> Self {
         Self {
             rng: streams.generator(Purpose::Shadowing, head),
@@ -28,8 +28,8 @@ impl Shadowing {
         }
     }
 
-    /// The next value in dB, at `along_m` driven. Called for each SSB, heard or not, so that the
-    /// channel is the same whatever the vehicle does.
+    /// Returns the next value in dB at the distance `along_m`. Called for every SSB, received or
+    /// not, so that the channel does not depend on the vehicle's receptions.
     pub fn next_db(&mut self, along_m: f64) -> f64 {
         let fresh: f64 = self.rng.sample(StandardNormal);
         let normalised = match self.last {
@@ -70,7 +70,7 @@ mod tests {
     }
 
     #[test]
-    fn fresh_for_every_ssb() {
+    fn values_are_independent_without_a_correlation_length() {
         let series = series(0.0, 0.08);
         let std_db = (series.iter().map(|x| x * x).sum::<f64>() / 1e5).sqrt();
         assert!((std_db - 3.0).abs() < 0.03, "{std_db}");
@@ -78,7 +78,7 @@ mod tests {
     }
 
     #[test]
-    fn correlated_over_distance() {
+    fn values_are_correlated_over_distance() {
         let series = series(5.0, 1.0);
         for lag in [1, 5, 10] {
             let expected = (-(lag as f64) / 5.0).exp();

@@ -1,4 +1,4 @@
-//! What happens to the signal between radio head and vehicle.
+//! Channel between radio head and vehicle.
 
 use onboard::settings::{Check, SettingsError};
 use schemars::JsonSchema;
@@ -9,36 +9,37 @@ use serde::{Deserialize, Serialize};
 #[derive(Debug, Clone, PartialEq, Serialize, Deserialize, JsonSchema)]
 #[serde(default, deny_unknown_fields)]
 pub struct ChannelSettings {
-    /// Where the channel is from.
+    /// Channel model.
     pub model: ChannelModel,
-    /// File of traced paths of the model `paths` (npz), counted from the scenario's.
+    /// File of ray-traced paths (npz) for the model `paths`, relative to the scenario file.
     #[serde(skip_serializing_if = "Option::is_none")]
     pub paths: Option<String>,
-    /// Standard deviation of the log-normal shadowing in dB. This and what follows but `blockage`
-    /// and `hall` are of the model `rician`.
+    /// Standard deviation of the log-normal shadowing in dB. All following keys except
+    /// `line_of_sight_only`, `blockage` and `hall` apply to the model `rician` only.
     #[schemars(range(min = 0.0, max = 40.0))]
     pub shadowing_std_db: f64,
-    /// Distance over which shadowing decorrelates, in metres; 0 draws it afresh for every SSB.
+    /// Correlation distance of the shadowing in metres; 0 draws independent shadowing for every
+    /// SSB.
     #[schemars(range(min = 0.0, max = 1e4))]
     pub shadowing_correlation_m: f64,
-    /// How the scatter reaches the antennas.
+    /// Correlation of the scatter between the antennas.
     pub scatter: ScatterModel,
-    /// Number of scattered rays, at each antenna or at all together.
+    /// Number of scattered rays, per antenna (`per-antenna`) or in total (`rays`).
     #[schemars(range(min = 1, max = 64))]
     pub rays: u16,
-    /// Root-mean-square delay spread of the scatter in nanoseconds: its power decays exponentially
-    /// with this time constant from the line of sight on; 0 delays none of it. With
-    /// `fidelity = "iq"` only; the standard deviation of each angle then tells of the scatter too.
+    /// RMS delay spread of the scatter in nanoseconds, for an exponentially decaying power delay
+    /// profile; 0 disables the delays. Requires `fidelity = "iq"`. The standard deviation of each
+    /// angle then includes the scatter.
     #[schemars(range(min = 0.0, max = 1e5))]
     pub delay_spread_ns: f64,
-    /// Whether radio heads are heard only where they have a line of sight, with the models of TR
-    /// 38.901: what is left of the error when a vehicle is told which angles to leave out.
+    /// Whether SSBs without a line of sight are removed (models of TR 38.901 only). The result is
+    /// the error of a vehicle that knows which angles have no line of sight.
     #[serde(skip_serializing_if = "std::ops::Not::not")]
     pub line_of_sight_only: bool,
-    /// What stands in the line of sight and moves on; nothing does by default.
+    /// Moving objects that block the line of sight [default: none].
     #[serde(skip_serializing_if = "Option::is_none")]
     pub blockage: Option<BlockageSettings>,
-    /// The hall of a factory model; that of the model's calibration by default.
+    /// Hall of a factory model [default: the hall of the model's calibration].
     #[serde(skip_serializing_if = "Option::is_none")]
     pub hall: Option<HallSettings>,
 }
@@ -60,61 +61,61 @@ impl Default for ChannelSettings {
     }
 }
 
-/// Where the channel is from: the site's Rician K; the statistics of 3GPP TR 38.901, which draw line
-/// of sight, K, path loss, spreads, delays and angles for each radio head along the way; or paths
-/// that a ray tracer has found.
+/// Channel model: Rician fading with the K factor of the site, a statistical model of 3GPP TR
+/// 38.901, or ray-traced paths. The models of TR 38.901 draw line of sight, K factor, path loss,
+/// delays and angles along the road for each radio head.
 #[derive(Debug, Clone, Copy, PartialEq, Eq, Default, Serialize, Deserialize, JsonSchema)]
 #[serde(rename_all = "kebab-case")]
 pub enum ChannelModel {
-    /// A line of sight and scatter from all sides, of the site's K.
+    /// Line of sight and isotropic scatter with the K factor of the site.
     #[default]
     Rician,
-    /// A street canyon (UMi).
+    /// Street canyon (UMi).
     Umi,
-    /// An indoor factory (InF) with sparse clutter, radio heads among it.
+    /// Indoor factory (InF) with sparse clutter and radio heads below the clutter height.
     InfSl,
-    /// With dense clutter, radio heads among it.
+    /// Indoor factory with dense clutter and radio heads below the clutter height.
     InfDl,
-    /// With sparse clutter, radio heads above it.
+    /// Indoor factory with sparse clutter and radio heads above the clutter.
     InfSh,
-    /// With dense clutter, radio heads above it.
+    /// Indoor factory with dense clutter and radio heads above the clutter.
     InfDh,
-    /// Traced paths, of the file `paths`.
+    /// Ray-traced paths from the file `paths`.
     Paths,
 }
 
 impl ChannelModel {
-    /// The model of this name.
+    /// Returns the model with this name.
     pub fn named(name: &str) -> Option<Self> {
         Self::deserialize(StrDeserializer::<Unknown>::new(name)).ok()
     }
 }
 
-/// How scatter reaches the antennas. Either way it stands still during an SSB and decorrelates
-/// over about half a wavelength travelled.
+/// Correlation of the scatter between the antennas. Scatter is constant during an SSB and
+/// decorrelates over about half a wavelength of driven distance.
 #[derive(Debug, Clone, Copy, PartialEq, Eq, Default, Serialize, Deserialize, JsonSchema)]
 #[serde(rename_all = "kebab-case")]
 pub enum ScatterModel {
-    /// Independent at each antenna: scatterers close by and all around.
+    /// Independent at each antenna: many scatterers close to the vehicle.
     #[default]
     PerAntenna,
-    /// The same plane waves at all antennas, from uniformly drawn directions.
+    /// Equal plane waves at all antennas, with uniformly drawn directions.
     Rays,
 }
 
-/// `[channel.blockage]`: other vehicles and people in the line of sight of each radio head, at
+/// `[channel.blockage]`: vehicles and people that block the line of sight of each radio head at
 /// random times.
 #[derive(Debug, Clone, Copy, PartialEq, Serialize, Deserialize, JsonSchema)]
 #[serde(deny_unknown_fields)]
 pub struct BlockageSettings {
-    /// How many stop the line of sight in a minute, on average.
+    /// Mean number of blockages per minute and radio head.
     #[schemars(range(min = 0.0, max = 600.0))]
     pub per_minute: f64,
-    /// How long each does, on average, in seconds.
+    /// Mean duration of a blockage in seconds.
     #[serde(default = "a_vehicle_passing")]
     #[schemars(range(min = 0.01, max = 3600.0))]
     pub duration_s: f64,
-    /// By how many dB.
+    /// Attenuation of the line of sight during a blockage in dB.
     #[serde(default = "a_vehicles_loss")]
     #[schemars(range(min = 0.0, max = 100.0))]
     pub loss_db: f64,
@@ -128,25 +129,25 @@ const fn a_vehicles_loss() -> f64 {
     20.0
 }
 
-/// `[channel.hall]` of the factory models (TR 38.901, tables 7.2-4 and 7.4.2-1).
+/// `[channel.hall]`: hall of a factory model (TR 38.901, tables 7.2-4 and 7.4.2-1).
 #[derive(Debug, Clone, Copy, PartialEq, Serialize, Deserialize, JsonSchema)]
 #[serde(deny_unknown_fields)]
 pub struct HallSettings {
     /// Length, width and height in metres.
     pub size_m: [f64; 3],
-    /// Share of the floor that clutter covers.
+    /// Fraction of the floor that is covered by clutter.
     #[schemars(range(min = 0.0, max = 0.99))]
     pub clutter_density: f64,
-    /// Its typical size in metres.
+    /// Typical size of the clutter in metres.
     #[schemars(range(min = 0.1, max = 100.0))]
     pub clutter_size_m: f64,
-    /// Its height in metres; of heads above it only.
+    /// Height of the clutter in metres; used for radio heads above the clutter only.
     #[schemars(range(min = 0.0, max = 100.0))]
     pub clutter_height_m: f64,
 }
 
 impl ChannelSettings {
-    /// Refuses what the model has no place for.
+    /// Checks the keys against the model.
     ///
     /// # Errors
     /// [`SettingsError::Value`].
@@ -161,11 +162,11 @@ impl ChannelSettings {
             } else {
                 "missing"
             },
-            "it goes with `model = \"paths\"`, and that with it",
+            "`paths` is required with `model = \"paths\"` and allowed with no other model",
         )?;
         if let Some(hall) = self.hall {
             let key = "channel.hall";
-            check.that(factory, key, "given", "only an InF `model` has a hall")?;
+            check.that(factory, key, "given", "allowed with an InF `model` only")?;
             let roomy = (hall.size_m.iter()).all(|side_m| (1.0..=1e4).contains(side_m));
             check.that(
                 roomy,
@@ -178,7 +179,7 @@ impl ChannelSettings {
             factory || self.model == Umi || !self.line_of_sight_only,
             "channel.line_of_sight_only",
             "true",
-            "only a `model` of TR 38.901 draws lines of sight",
+            "allowed with a `model` of TR 38.901 only",
         )?;
         let mine = Self {
             model: self.model,
@@ -192,7 +193,7 @@ impl ChannelSettings {
             self.model == Rician || *self == mine,
             "channel.model",
             "not `rician`",
-            "others have their own shadowing, scatter, rays and delays; leave those keys out",
+            "this model defines shadowing, scatter, rays and delays; remove these keys",
         )
     }
 }

@@ -1,4 +1,4 @@
-//! Things that go wrong, at stated times.
+//! Faults at given times.
 
 use onboard::settings::{Check, SettingsError};
 use schemars::JsonSchema;
@@ -8,21 +8,22 @@ use serde::{Deserialize, Serialize};
 #[derive(Debug, Clone, Copy, PartialEq, Serialize, Deserialize, JsonSchema)]
 #[serde(deny_unknown_fields)]
 pub struct FaultSettings {
-    /// From when on, in seconds.
+    /// Start of the fault in seconds from the start of the run.
     #[schemars(range(min = 0.0, max = 1e9))]
     pub from_s: f64,
-    /// Until when, in seconds.
+    /// End of the fault in seconds from the start of the run.
     #[schemars(range(min = 0.0, max = 1e9))]
     pub until_s: f64,
-    /// What goes wrong.
+    /// Kind of fault.
     pub what: FaultKind,
 }
 
-/// What goes wrong.
+/// Kind of fault.
 #[derive(Debug, Clone, Copy, PartialEq, Serialize, Deserialize, JsonSchema)]
 #[serde(tag = "kind", rename_all = "kebab-case", deny_unknown_fields)]
 pub enum FaultKind {
-    /// A radio head is heard by a detour: its electrical angle is off.
+    /// The signal of a radio head arrives on a reflected path, which gives an error of the
+    /// electrical angle.
     NonLineOfSight {
         /// Number of the radio head in the site, from 0.
         radio_head: usize,
@@ -30,17 +31,18 @@ pub enum FaultKind {
         #[schemars(range(min = -6.3, max = 6.3))]
         bias_rad: f64,
     },
-    /// A radio head, or one that pretends to be it, is not where the survey says.
+    /// A radio head, or a transmitter that imitates it, is at a position different from the
+    /// surveyed one.
     MovedHead {
         /// Number of the radio head in the site, from 0.
         radio_head: usize,
-        /// How far off it is, `[x, y]` in metres.
+        /// True position minus surveyed position, `[x, y]` in metres.
         #[schemars(inner(range(min = -1e5, max = 1e5)))]
         by_m: [f64; 2],
     },
-    /// The wheels slip: the odometer reads so many times the distance.
+    /// The wheels slip, which gives a scale error of the odometer.
     OdometerSlip {
-        /// Reading over distance.
+        /// Measured distance divided by true distance.
         #[schemars(range(min = 0.0, max = 10.0))]
         ratio: f64,
     },
@@ -50,7 +52,7 @@ pub enum FaultKind {
     OdometerStopped,
     /// The odometry reports motion of the wrong sign.
     OdometerReversed,
-    /// An antenna's signal no longer follows the field.
+    /// The signal of an antenna is independent of the field.
     StuckAntenna {
         /// Number of the antenna, from 0.
         antenna: usize,
@@ -81,7 +83,7 @@ pub enum FaultKind {
 }
 
 impl FaultKind {
-    /// Whether the fault is one of the receive channels.
+    /// Whether the fault affects the receive channels.
     pub const fn is_of_channels(&self) -> bool {
         matches!(
             self,
@@ -94,7 +96,7 @@ impl FaultKind {
 }
 
 impl FaultSettings {
-    /// Refuses what contradicts itself, or the site and its vehicle.
+    /// Checks the fault for consistency with the site and the vehicle.
     ///
     /// # Errors
     /// [`SettingsError::Value`].
@@ -111,14 +113,14 @@ impl FaultSettings {
             later,
             &key("until_s"),
             self.until_s,
-            "it must be after from_s",
+            "must be greater than `from_s`",
         )?;
         let has_antenna = |name: &str, antenna: usize| {
             check.that(
                 antenna < usize::from(elements),
                 &key(name),
                 antenna,
-                &format!("the array has {elements} antennas, counted from 0"),
+                &format!("the array has {elements} antennas with numbers from 0"),
             )
         };
         match self.what {
@@ -128,7 +130,7 @@ impl FaultSettings {
                 radio_head < heads,
                 &key("what.radio_head"),
                 radio_head,
-                &format!("the site has {heads} radio heads, counted from 0"),
+                &format!("the site has {heads} radio heads with numbers from 0"),
             ),
             FaultKind::StuckAntenna { antenna }
             | FaultKind::DeadAntenna { antenna }

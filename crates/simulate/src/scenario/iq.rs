@@ -1,33 +1,36 @@
-//! The receiver's hardware, where samples are simulated.
+//! Hardware of the receiver in simulations with IQ samples.
 
 use schemars::JsonSchema;
 use serde::{Deserialize, Serialize};
 
-/// `[iq]`: used with `fidelity = "iq"`, and for recordings made of a scenario.
+/// `[iq]`: used with `fidelity = "iq"` and for simulated recordings.
 #[derive(Debug, Clone, Copy, PartialEq, Serialize, Deserialize, JsonSchema)]
 #[serde(default, deny_unknown_fields)]
 pub struct IqSettings {
-    /// Standard deviation of the error of the receiver's oscillator in parts per million, drawn
-    /// once per run. It shifts the carrier and stretches the sampling clock alike.
+    /// Standard deviation of the frequency error of the receiver's oscillator in parts per million,
+    /// drawn once per run. The error affects the carrier frequency and the sample clock.
     #[schemars(range(min = 0.0, max = 20.0))]
     pub oscillator_ppm: f64,
-    /// Its error itself in place of one that is drawn; positive is too fast.
+    /// Frequency error of the receiver's oscillator in parts per million, instead of a random one;
+    /// positive is too fast.
     #[serde(skip_serializing_if = "Option::is_none")]
     #[schemars(range(min = -60.0, max = 60.0))]
     pub oscillator_error_ppm: Option<f64>,
-    /// Standard deviation of the error of each radio head's (TS 38.104 allows 0.05).
+    /// Standard deviation of the frequency error of each radio head's oscillator in parts per
+    /// million (TS 38.104 allows an error of 0.05).
     #[schemars(range(min = 0.0, max = 0.2))]
     pub head_oscillator_ppm: f64,
-    /// Bits of the converter, for each of I and Q.
+    /// Resolution of the A/D converter in bits, for each of I and Q.
     #[schemars(range(min = 1, max = 24))]
     pub adc_bits: u8,
-    /// Full scale of the converter over the root mean square of the strongest symbol, in dB.
+    /// Full scale of the A/D converter relative to the RMS value of the strongest symbol, in dB.
     #[schemars(range(min = -20.0, max = 60.0))]
     pub adc_headroom_db: f64,
-    /// Standard deviation of the phase error of each channel in radians, drawn once per run.
+    /// Standard deviation of the phase error of each receive channel in radians, drawn once per
+    /// run.
     #[schemars(range(min = 0.0, max = 6.3))]
     pub channel_phase_rad: f64,
-    /// The same of its gain, in dB.
+    /// Standard deviation of the gain error of each receive channel in dB, drawn once per run.
     #[schemars(range(min = 0.0, max = 20.0))]
     pub channel_gain_db: f64,
 }

@@ -1,4 +1,4 @@
-//! A scenario: a site and a vehicle, as they are believed to be, and the world around them.
+//! Scenario: nominal site and vehicle, the environment, and the deviations of the truth.
 
 mod channel;
 mod faults;

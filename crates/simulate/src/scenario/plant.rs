@@ -1,4 +1,4 @@
-//! A plant: what a fleet does on a site, what is asked of it, and what things cost there.
+//! Plant: the task of a fleet on a site, the required accuracy and the prices.
 
 use onboard::settings::{Check, Library, SettingsError, Site, TomlFile, Vehicle};
 use schemars::JsonSchema;
@@ -13,35 +13,35 @@ use super::scenario_file::{Fidelity, Scenario, hold, named_or_held};
 use super::target::Target;
 use super::truth::TruthSettings;
 
-/// A plant file: a site, a vehicle, a fleet of it, and the accuracy that is needed.
+/// Plant file: a site, a vehicle, the fleet and the required accuracy.
 #[derive(Debug, Clone, PartialEq, Serialize, Deserialize, JsonSchema)]
 #[serde(deny_unknown_fields)]
 pub struct Plant {
-    /// Short name; also the name of its results.
+    /// Short name of the plant and of its results.
     pub name: String,
-    /// What the plant is.
+    /// Description of the plant.
     #[serde(default)]
     pub description: String,
-    /// Horizontal error, and how much of the time it has to be within it: `"0.3 m 99 %"`.
+    /// Maximum horizontal error and the fraction of time for which it is required: `"0.3 m 99 %"`.
     pub target: Target,
-    /// The site: a name, or the site itself.
+    /// Site: a name or a table.
     #[schemars(schema_with = "named_or_held::<Site>")]
     pub site: Site,
-    /// The vehicle: a name, or the vehicle itself.
+    /// Vehicle: a name or a table.
     #[schemars(schema_with = "named_or_held::<Vehicle>")]
     pub vehicle: Vehicle,
-    /// A trip: along the site's road, with its stops.
+    /// Trip of a vehicle along the site's road, with its stops.
     #[serde(default)]
     pub motion: MotionSettings,
-    /// What happens to the signal on its way, as it is believed.
+    /// Nominal channel.
     #[serde(default)]
     pub channel: ChannelSettings,
-    /// The same where lines of sight are poor, for comparison.
+    /// Channel with a poor line of sight, for comparison [default: street canyon].
     #[serde(default = "street_canyon")]
     pub poor_channel: ChannelSettings,
-    /// How many vehicles, and how much they drive.
+    /// Size and use of the fleet.
     pub fleet: Fleet,
-    /// What things cost; what is not stated is taken from published prices.
+    /// Prices; missing ones are replaced by published prices.
     #[serde(default)]
     pub prices: Prices,
 }
@@ -53,17 +53,17 @@ pub struct Fleet {
     /// Number of vehicles.
     #[schemars(range(min = 1, max = 100_000))]
     pub vehicles: u32,
-    /// Hours a day that a vehicle is switched on.
+    /// Operating time of a vehicle in hours per day.
     #[schemars(range(min = 0.1, max = 24.0))]
     pub hours_per_day: f64,
-    /// Trips of one vehicle in a day.
+    /// Number of trips of a vehicle per day.
     #[schemars(range(min = 1, max = 100_000))]
     pub trips_per_day: u32,
-    /// Days of work in a year.
+    /// Number of operating days per year.
     #[serde(default = "weekdays")]
     #[schemars(range(min = 1.0, max = 366.0))]
     pub days_per_year: f64,
-    /// Years over which costs are added up.
+    /// Period of the cost calculation in years.
     #[serde(default = "usual_life")]
     #[schemars(range(min = 0.1, max = 50.0))]
     pub years: f64,
@@ -73,46 +73,46 @@ pub struct Fleet {
 #[derive(Debug, Clone, PartialEq, Default, Serialize, Deserialize, JsonSchema)]
 #[serde(default, deny_unknown_fields)]
 pub struct Prices {
-    /// The currency; US dollars without. Published prices are US dollars, and are not converted.
+    /// Currency [default: US dollars]. Published prices are in US dollars and are not converted.
     #[serde(skip_serializing_if = "Option::is_none")]
     pub currency: Option<String>,
-    /// Electricity, a kWh.
+    /// Price of electricity per kWh.
     #[serde(skip_serializing_if = "Option::is_none")]
     pub electricity_per_kwh: Option<Price>,
-    /// Carbon intensity of electricity, gCO2e a kWh; Germany's without.
+    /// Carbon intensity of electricity in gCO2e per kWh [default: Germany's].
     #[serde(skip_serializing_if = "Option::is_none")]
     pub grid_g_per_kwh: Option<Price>,
-    /// Receiver and antennas of a vehicle.
+    /// Price of the receiver and the antennas of a vehicle.
     #[serde(skip_serializing_if = "Option::is_none")]
     pub receiver: Option<Price>,
-    /// LiDAR of a vehicle, which is compared with.
+    /// Price of the LiDAR of a vehicle, for comparison.
     #[serde(skip_serializing_if = "Option::is_none")]
     pub lidar: Option<Price>,
-    /// A roadside unit, which is compared with.
+    /// Price of a roadside unit, for comparison.
     #[serde(skip_serializing_if = "Option::is_none")]
     pub roadside_unit: Option<Price>,
-    /// Its upkeep in a year.
+    /// Maintenance cost of a roadside unit per year.
     #[serde(skip_serializing_if = "Option::is_none")]
     pub roadside_unit_yearly: Option<Price>,
-    /// One further radio head with its mast.
+    /// Price of an additional radio head with its mast.
     #[serde(skip_serializing_if = "Option::is_none")]
     pub radio_head: Option<Price>,
-    /// Moving a radio head.
+    /// Cost of moving a radio head.
     #[serde(skip_serializing_if = "Option::is_none")]
     pub move_radio_head: Option<Price>,
-    /// Surveying the place of a radio head.
+    /// Cost of surveying the position of a radio head.
     #[serde(skip_serializing_if = "Option::is_none")]
     pub survey: Option<Price>,
-    /// Calibrating a vehicle's antenna array.
+    /// Cost of calibrating the antenna array of a vehicle.
     #[serde(skip_serializing_if = "Option::is_none")]
     pub calibration: Option<Price>,
-    /// A better odometer for a vehicle.
+    /// Price of a better odometer for a vehicle.
     #[serde(skip_serializing_if = "Option::is_none")]
     pub odometer: Option<Price>,
-    /// A change of settings in the cells, all of them.
+    /// Cost of changing the settings of all cells.
     #[serde(skip_serializing_if = "Option::is_none")]
     pub cell_settings: Option<Price>,
-    /// A change of a vehicle's software settings, all of them.
+    /// Cost of changing the software settings of a vehicle.
     #[serde(skip_serializing_if = "Option::is_none")]
     pub vehicle_settings: Option<Price>,
 }
@@ -186,7 +186,7 @@ impl TomlFile for Plant {
 }
 
 impl Plant {
-    /// A trip as a scenario, through this channel.
+    /// Returns the scenario of a trip with the given channel.
     pub fn scenario(&self, channel: &ChannelSettings) -> Scenario {
         Scenario {
             name: self.name.clone(),
@@ -222,7 +222,7 @@ mod tests {
     }
 
     #[test]
-    fn shipped_plants_are_sound_and_are_read_again_as_they_were_written() {
+    fn shipped_plants_are_valid_and_round_trip_through_toml() {
         for name in Plant::names() {
             let plant = Plant::from_library(name, &Shipped).unwrap();
             let again = Plant::from_toml(&plant.to_toml(), "again", &Shipped).unwrap();
@@ -231,7 +231,7 @@ mod tests {
     }
 
     #[test]
-    fn bad_values_are_named() {
+    fn invalid_values_are_reported_with_their_key() {
         let message = refused(("trips_per_day = 40", "trips_per_day = 400"));
         assert!(message.contains("fleet.trips_per_day") && message.contains("at most"));
         let message = refused(("0.3 m 99 %", "0.3 99"));

@@ -1,4 +1,4 @@
-//! What can be read of a scenario, and is most likely not what was meant.
+//! Warnings about valid but implausible values of a scenario.
 
 use onboard::geometry::Point;
 use onboard::plausible::{
@@ -14,37 +14,37 @@ const ROWS: &[Usual] = &[
     Usual {
         key: "ssb_latency_ms",
         within: [0.0, 1000.0],
-        why: "a vehicle has driven metres until then",
+        why: "a vehicle drives several metres in this time",
         write: |it| format!("write milliseconds: {it} µs are {}", rounded(it / 1000.0)),
     },
     Usual {
         key: "motion.top_speed_kmh",
         within: [0.1, 100.0],
-        why: "no vehicle of a plant is as fast",
+        why: "no plant vehicle reaches this speed",
         write: |it| format!("write km/h: {it} m/min are {:.1}", it * 0.06),
     },
     Usual {
         key: "motion.acceleration_mps2",
         within: [0.02, 9.81],
-        why: "no tyre grips better than 1 g",
-        write: |it| format!("write m/s²: {it} km/h in a second are {:.2}", it / 3.6),
+        why: "tyre friction limits the acceleration to 1 g",
+        write: |it| format!("write m/s²: {it} km/h per second are {:.2}", it / 3.6),
     },
     Usual {
         key: "motion.stops[].dwell_s",
         within: [0.0, 3600.0],
-        why: "that is longer than an hour",
+        why: "a stop is at most one hour",
         write: |it| format!("write seconds: {it} ms are {}", rounded(it / 1000.0)),
     },
     Usual {
         key: "channel.shadowing_std_db",
         within: [0.0, 15.0],
-        why: "shadowing has 3 to 8 dB (TR 38.901, table 7.4.1-1)",
+        why: "shadowing has a standard deviation of 3 to 8 dB (TR 38.901, table 7.4.1-1)",
         write: |_| "write a standard deviation in dB, 3 to 8".to_owned(),
     },
     Usual {
         key: "truth.std_factor",
         within: [0.0, 50.0],
-        why: "nothing is as far from what is believed of it",
+        why: "no quantity deviates by this many standard deviations",
         write: as_percent,
     },
     Usual {
@@ -54,19 +54,20 @@ const ROWS: &[Usual] = &[
         write: as_milliseconds,
     },
 ];
-/// Rubber on dry ground holds to about 0.8 g across (m/s²).
+/// Maximum lateral acceleration of rubber on dry ground, about 0.8 g (m/s²).
 const MOST_ACROSS_MPS2: f64 = 8.0;
-/// Nobody overlooks an array turned by 20 degrees, or a mast as far from its place (m).
+/// Maximum unnoticed rotation of an array, 20 degrees (rad).
 const MOST_TURNED_RAD: f64 = 0.35;
+/// Maximum unnoticed displacement of a mast (m).
 const MOST_MOVED_M: f64 = 100.0;
-/// How finely bends are looked at (m).
+/// Step at which the curvature of the road is evaluated (m).
 const STEP_M: f64 = 1.0;
 
 impl Scenario {
-    /// What is doubtful of it, its site and its vehicle.
+    /// Returns warnings about implausible values of the scenario, its site and its vehicle.
     ///
     /// # Errors
-    /// [`SettingsError`] only where the scenario has been changed by hand into an impossible one.
+    /// [`SettingsError`] only if the scenario was changed by code to an invalid one.
     pub fn warnings(&self) -> Result<Vec<Warning>, SettingsError> {
         let check = Check { file: &self.name };
         let path = self.path(check)?;
@@ -83,7 +84,7 @@ impl Scenario {
         Ok(found)
     }
 
-    /// A truth in another unit than the belief.
+    /// Warns of true values that are probably in another unit than the nominal values.
     fn far_from_belief(&self, check: Check<'_>) -> Result<Vec<Warning>, SettingsError> {
         let (site, vehicle, _) = self.actual(check)?;
         let believed = of_vehicle(&self.vehicle);
@@ -95,7 +96,7 @@ impl Scenario {
                 key: "array.mounting_rad".to_owned(),
                 value: vehicle.array.mounting_rad.to_string(),
                 why: format!(
-                    "that is {:.0} degrees from what is believed",
+                    "that is {:.0} degrees from the nominal value",
                     turned_rad.to_degrees()
                 ),
                 write: as_degrees(vehicle.array.mounting_rad),
@@ -113,7 +114,7 @@ impl Scenario {
             (moved_m > MOST_MOVED_M).then(|| Warning {
                 key: format!("site.radio_heads[{index}].position_m"),
                 value: format!("{:?}", head.position_m),
-                why: format!("that is {moved_m:.0} m from where it is believed to be"),
+                why: format!("that is {moved_m:.0} m from the nominal position"),
                 write: "write its own place, in metres in the frame of the site, not by how much it is \
                         off"
                     .to_owned(),
@@ -124,16 +125,19 @@ impl Scenario {
 
     fn faster_than_it_is(&self) -> Option<Warning> {
         let (speed_kmh, top_kmh) = (self.motion.top_speed_kmh?, self.vehicle.top_speed_kmh);
-        // Ten per cent are what a controller overshoots.
+        // A controller overshoots the speed by up to 10 %.
         (speed_kmh > 1.1 * top_kmh).then(|| Warning {
             key: "motion.top_speed_kmh".to_owned(),
             value: speed_kmh.to_string(),
-            why: format!("the vehicle goes {top_kmh} km/h at the most"),
-            write: format!("write vehicle.top_speed_kmh = {speed_kmh}, if it does go as fast"),
+            why: format!("the maximum speed of the vehicle is {top_kmh} km/h"),
+            write: format!(
+                "write vehicle.top_speed_kmh = {speed_kmh}, if the vehicle reaches this speed"
+            ),
         })
     }
 
-    /// A bend that cannot be driven at this speed: too narrow a radius, or another unit of speed.
+    /// Warns of a bend that cannot be driven at the speed because of a wrong radius or a wrong
+    /// unit.
     fn thrown_out(&self, path: &Road) -> Option<Warning> {
         let key = match self.motion.top_speed_kmh {
             Some(_) => "motion.top_speed_kmh",
@@ -160,7 +164,7 @@ impl Scenario {
                      across, and tyres hold to {MOST_ACROSS_MPS2}",
                     1.0 / curvature_per_m
                 ),
-                write: format!("write km/h, {most_kmh:.0} or less here, or a wider bend"),
+                write: format!("write at most {most_kmh:.0} km/h, or a larger radius"),
             }
         })
     }
@@ -171,9 +175,9 @@ impl Scenario {
         late.map(|(index, fault)| Warning {
             key: format!("faults[{index}].from_s"),
             value: fault.from_s.to_string(),
-            why: format!("the drive takes {duration_s:.0} s at the most"),
+            why: format!("the duration of the drive is at most {duration_s:.0} s"),
             write: format!(
-                "write seconds from its start on: {} ms are {}",
+                "write seconds from the start of the drive: {} ms are {}",
                 fault.from_s,
                 rounded(fault.from_s / 1000.0)
             ),

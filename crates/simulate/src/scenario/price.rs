@@ -1,4 +1,4 @@
-//! A price: one number, or a range and where it is from.
+//! Price: one number, or a range with its source.
 
 use std::fmt;
 
@@ -6,16 +6,16 @@ use schemars::{JsonSchema, Schema, SchemaGenerator, json_schema};
 use serde::de::{Error, MapAccess, Visitor};
 use serde::{Deserialize, Deserializer, Serialize};
 
-/// A price, or another figure of money and carbon that nobody knows exactly.
+/// Uncertain price or carbon intensity.
 #[derive(Debug, Clone, PartialEq, Serialize)]
 pub struct Price {
-    /// The least it may be.
+    /// Minimum.
     pub low: f64,
-    /// The number, in the unit its key names.
+    /// Value, in the unit of its key.
     pub value: f64,
-    /// The most it may be.
+    /// Maximum.
     pub high: f64,
-    /// Offer, list or judgement it is taken from.
+    /// Source: an offer, a price list or an estimate.
     pub source: String,
 }
 
@@ -85,7 +85,7 @@ impl JsonSchema for Price {
     fn json_schema(_generator: &mut SchemaGenerator) -> Schema {
         let number = json_schema!({ "type": "number", "minimum": LEAST, "maximum": MOST });
         json_schema!({
-            "description": "One number, or its range and where it is from.",
+            "description": "A number, or a range with its source.",
             "oneOf": [
                 number,
                 {

@@ -1,4 +1,4 @@
-//! A scenario file.
+//! Scenario file.
 
 use std::path::Path;
 
@@ -16,57 +16,57 @@ use super::truth::TruthSettings;
 use crate::channel::{Paths, PathsError};
 use onboard::road::Road;
 
-/// Everything a simulated drive depends on, besides the seed.
+/// Scenario: everything that determines a simulated run, except the seed.
 #[derive(Debug, Clone, PartialEq, Serialize, Deserialize, JsonSchema)]
 #[serde(deny_unknown_fields)]
 pub struct Scenario {
-    /// Short name; also the name of its results.
+    /// Short name of the scenario and of its results.
     pub name: String,
-    /// What the scenario is for.
+    /// Purpose of the scenario.
     #[serde(default)]
     pub description: String,
-    /// How much of the radio is simulated.
+    /// Level of detail of the simulated radio.
     #[serde(default)]
     pub fidelity: Fidelity,
-    /// Whether a drive may be longer than fits into usual memory and patience.
+    /// Whether drives are allowed that need more than the usual memory or computing time.
     #[serde(default)]
     pub allow_large: bool,
-    /// How long after its reception an SSB reaches the localizer, in ms.
+    /// Delay from the reception of an SSB to its arrival at the localizer, in ms.
     #[serde(default)]
     #[schemars(range(min = 0.0, max = 10_000.0))]
     pub ssb_latency_ms: f64,
-    /// The site, as it is believed to be: a name, or the site itself.
+    /// Nominal site: a name or a table.
     #[schemars(schema_with = "named_or_held::<Site>")]
     pub site: Site,
-    /// The vehicle, as it is believed to be: a name, or the vehicle itself.
+    /// Nominal vehicle: a name or a table.
     #[schemars(schema_with = "named_or_held::<Vehicle>")]
     pub vehicle: Vehicle,
-    /// How the vehicle drives.
+    /// Motion of the vehicle.
     #[serde(default)]
     pub motion: MotionSettings,
-    /// What happens to the signal on its way.
+    /// Channel between radio heads and vehicle.
     #[serde(default)]
     pub channel: ChannelSettings,
-    /// What the receiver's hardware does to the samples, where they are simulated.
+    /// Receiver hardware in simulations with IQ samples.
     #[serde(default)]
     pub iq: IqSettings,
-    /// How the world departs from what is believed.
+    /// Deviations of the truth from the nominal models.
     #[serde(default)]
     pub truth: TruthSettings,
-    /// What goes wrong on the way.
+    /// Faults during the run.
     #[serde(default, skip_serializing_if = "Vec::is_empty")]
     #[schemars(length(max = 1000))]
     pub faults: Vec<FaultSettings>,
 }
 
-/// How much of the radio is simulated.
+/// Level of detail of the simulated radio.
 #[derive(Debug, Clone, Copy, PartialEq, Eq, Default, Serialize, Deserialize, JsonSchema)]
 #[serde(rename_all = "kebab-case")]
 pub enum Fidelity {
     /// Array snapshots drawn from the channel, as in the paper.
     #[default]
     Snapshots,
-    /// Samples of every SSB at every antenna, received as a recording is (`[iq]`).
+    /// IQ samples of every SSB at every antenna, processed by the receiver (`[iq]`).
     Iq,
 }
 
@@ -74,7 +74,7 @@ pub(super) fn named_or_held<T: JsonSchema>(generator: &mut SchemaGenerator) -> S
     let held = generator.subschema_for::<T>();
     json_schema!({
         "oneOf": [
-            { "type": "string", "description": "A shipped name, or the path of a file." },
+            { "type": "string", "description": "Name of a shipped file, or path of a file." },
             held,
         ],
     })
@@ -140,7 +140,8 @@ impl TomlFile for Scenario {
         hold::<Vehicle>(table, origin, library)?;
         let channel = table.get_mut("channel").and_then(Value::as_table_mut);
         if let Some(Value::String(file)) = channel.and_then(|it| it.get_mut("paths")) {
-            // Written out elsewhere, the scenario still means the same file.
+            // Make the path absolute, so that a copy of the scenario elsewhere refers to the same
+            // file.
             let folder = Path::new(origin).parent().unwrap_or(Path::new(""));
             if let Ok(path) = std::path::absolute(folder.join(&*file)) {
                 *file = path.display().to_string();
@@ -168,7 +169,7 @@ impl TomlFile for Scenario {
     }
 }
 
-/// Puts a site or vehicle in the place of its name.
+/// Replaces the name of a site or vehicle by its table.
 pub(super) fn hold<T: TomlFile>(
     table: &mut Table,
     origin: &str,
@@ -183,7 +184,7 @@ pub(super) fn hold<T: TomlFile>(
         Some(Value::Table(held)) => {
             T::from_table(held, origin, library).map_err(|error| error.beneath(origin, T::WHAT))?
         }
-        _ => return Ok(()), // missing, or of another type, is for the reader to refuse
+        _ => return Ok(()), // the deserializer reports a missing value or a wrong type
     };
     let held = Table::try_from(&held).unwrap_or_default();
     table.insert(T::WHAT.to_owned(), Value::Table(held));
@@ -191,25 +192,25 @@ pub(super) fn hold<T: TomlFile>(
 }
 
 impl Scenario {
-    /// What is driven along, as it is believed to lie: the motion's path, or the site's road.
+    /// Returns the nominal path: the path of the motion, or the site's road.
     ///
     /// # Errors
-    /// [`SettingsError::Value`] where there is neither.
+    /// [`SettingsError::Value`] if the scenario has no path and the site no road.
     pub fn path(&self, check: Check<'_>) -> Result<Road, SettingsError> {
         match (&self.motion.path, &self.site.road) {
             (Some(path), _) => path.build("motion.path", check),
             (None, Some(road)) => road.build("site.road", check),
             (None, None) => {
-                let allowed = "the site has no road to drive along; give a path";
+                let allowed = "the site has no road; add `motion.path`";
                 Err(check.error("motion.path", "missing", allowed))
             }
         }
     }
 
-    /// The traced paths, of a scenario that has them.
+    /// Returns the ray-traced paths; `None` if the scenario has none.
     ///
     /// # Errors
-    /// [`SettingsError::Value`] for a file that cannot be read, or is of another site.
+    /// [`SettingsError::Value`] if the file cannot be read or belongs to another site.
     pub fn traced_paths(&self, check: Check<'_>) -> Result<Option<Paths>, SettingsError> {
         let Some(file) = &self.channel.paths else {
             return Ok(None);
@@ -222,10 +223,10 @@ impl Scenario {
         Ok(Some(paths))
     }
 
-    /// What is so on average, over all runs: the site, the vehicle, and what it drives along.
+    /// Returns the true site, vehicle and path before random errors are drawn.
     ///
     /// # Errors
-    /// [`SettingsError`] for a truth that cannot be.
+    /// [`SettingsError`] for an invalid truth.
     pub fn actual(&self, check: Check<'_>) -> Result<(Site, Vehicle, Road), SettingsError> {
         let (site, vehicle) = self.truth.depart(&self.site, &self.vehicle, check)?;
         let road = match (&self.motion.path, &site.road) {
@@ -235,19 +236,19 @@ impl Scenario {
         Ok((site, vehicle, road))
     }
 
-    /// How large a drive is.
+    /// Returns the size of a drive.
     ///
     /// # Errors
-    /// [`SettingsError`] for a truth that cannot be.
+    /// [`SettingsError`] for an invalid truth.
     pub fn size(&self, check: Check<'_>) -> Result<DriveSize, SettingsError> {
         let (site, vehicle, road) = self.actual(check)?;
         Ok(DriveSize::new(&self.motion, &site, &vehicle, &road))
     }
 
-    /// Refuses to hold more runs in memory than it is likely to have.
+    /// Checks that the given number of runs fits into the usual memory.
     ///
     /// # Errors
-    /// [`SettingsError`], unless `allow_large`.
+    /// [`SettingsError`] if the runs do not fit, unless `allow_large` is set.
     pub fn check_runs(&self, runs: usize) -> Result<(), SettingsError> {
         let check = Check { file: &self.name };
         if self.allow_large {
@@ -256,7 +257,7 @@ impl Scenario {
         self.size(check)?.check_runs(runs, check)
     }
 
-    /// Refuses what cannot be sent as samples.
+    /// Checks that the signals can be synthesised as samples.
     ///
     /// # Errors
     /// [`SettingsError::Value`] for a numerology or an SSB index of frequency range 2.
@@ -265,7 +266,7 @@ impl Scenario {
             [15.0, 30.0].contains(&self.site.ssb.subcarrier_spacing_khz),
             "site.ssb.subcarrier_spacing_khz",
             self.site.ssb.subcarrier_spacing_khz,
-            "samples can be made at 15 and 30",
+            "samples can be synthesised at 15 and 30",
         )?;
         let count = if self.site.carrier_mhz <= 3000.0 {
             4
@@ -277,7 +278,7 @@ impl Scenario {
                 head.ssb_index < count,
                 &format!("site.radio_heads[{index}].ssb_index"),
                 head.ssb_index,
-                &format!("samples can be made of an index below {count} at this carrier"),
+                &format!("samples can be synthesised for an index below {count} at this carrier"),
             )?;
         }
         Ok(())
@@ -289,7 +290,7 @@ impl Scenario {
             (0.0..length_m).contains(&motion.start_at_m),
             "motion.start_at_m",
             motion.start_at_m,
-            &format!("it must be on the road, from 0 to {length_m:.1} m"),
+            &format!("must be on the path, from 0 to {length_m:.1} m"),
         )?;
         let mut before_m = 0.0;
         for (index, stop) in motion.stops.iter().enumerate() {
@@ -305,10 +306,11 @@ impl Scenario {
         Ok(())
     }
 
-    /// Refuses delays that snapshots cannot show, or that symbols would run into each other by.
+    /// Rejects a delay spread that is used with snapshots or causes intersymbol interference.
     fn check_iq(&self, check: Check<'_>) -> Result<(), SettingsError> {
         let (key, spread_ns) = ("channel.delay_spread_ns", self.channel.delay_spread_ns);
-        // A quarter of the prefix, 18 samples of a symbol's 256: e⁻⁴ of the scatter comes later.
+        // Limit: a quarter of the cyclic prefix (18 of 256 samples). A fraction e⁻⁴ of the scatter
+        // exceeds the prefix.
         let prefix_ns = 18.0 / 256.0 * 1e6 / self.site.ssb.subcarrier_spacing_khz;
         let most_ns = 0.25 * prefix_ns;
         let allowed = format!("it must be between 0 and {most_ns}");
@@ -317,7 +319,7 @@ impl Scenario {
             spread_ns == 0.0 || self.fidelity == Fidelity::Iq,
             key,
             spread_ns,
-            "it acts on samples only, with fidelity = \"iq\"; else it must be 0",
+            "requires fidelity = \"iq\"; otherwise it must be 0",
         )?;
         if self.fidelity == Fidelity::Iq {
             self.check_sends_samples(check)?;

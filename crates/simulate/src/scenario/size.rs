@@ -1,36 +1,37 @@
-//! How large a drive is, before it is driven.
+//! Size of a drive before it is simulated.
 
 use onboard::road::Road;
 use onboard::settings::{Check, SettingsError, Site, Vehicle};
 
 use super::motion::MotionSettings;
 
-/// Radio heads times SSB bursts, or odometry samples, of a drive that nobody is asked about: some
-/// hours past four radio heads.
+/// Maximum number of SSBs or odometry samples of a drive without `allow_large`. The limit equals
+/// several hours with four radio heads.
 const MOST_LOOKS: f64 = 5e6;
-/// Memory that nobody is asked about.
+/// Maximum memory without `allow_large`, in bytes.
 const MOST_BYTES: f64 = 1.5e9;
-/// Memory of a burst's statistics over all runs, most of it for the quantiles.
+/// Memory of the statistics of one burst over all runs in bytes, mainly for the quantiles.
 const BYTES_PER_BURST: f64 = 1300.0;
-/// Memory of a run's step and angle, and as columns of its tables.
+/// Memory of a step of a run, including its table row, in bytes.
 const BYTES_PER_STEP: f64 = 500.0;
+/// Memory of an SSB of a run, including its table row, in bytes.
 const BYTES_PER_LOOK: f64 = 400.0;
 
-/// How long a drive takes, and what there is to compute and to keep of it; from above.
+/// Upper bounds of the duration, computation and memory of a drive.
 #[derive(Debug, Clone, Copy, PartialEq)]
 pub struct DriveSize {
-    /// From the start to the destination.
+    /// Time from the start to the destination in seconds.
     pub duration_s: f64,
-    /// SSB bursts.
+    /// Number of SSB bursts.
     pub bursts: f64,
-    /// SSBs: those of all radio heads.
+    /// Number of SSBs of all radio heads.
     pub looks: f64,
-    /// Odometry samples.
+    /// Number of odometry samples.
     pub odometry_samples: f64,
 }
 
 impl DriveSize {
-    /// The size of a drive of `vehicle` along `road`.
+    /// Computes the size of a drive of `vehicle` along `road`.
     pub(super) fn new(
         motion: &MotionSettings,
         site: &Site,
@@ -39,7 +40,7 @@ impl DriveSize {
     ) -> Self {
         let top_speed_mps = motion.top_speed_kmh.unwrap_or(vehicle.top_speed_kmh) / 3.6;
         let acceleration_mps2 = (motion.acceleration_mps2).unwrap_or(vehicle.acceleration_mps2);
-        // Each leg takes one ramp more than at top speed throughout, or less if it is short.
+        // Each leg takes one ramp longer than at constant top speed. Short legs take less.
         let legs = motion.stops.iter().filter(|it| it.at_m > motion.start_at_m);
         let ramps_s = (1.0 + legs.clone().count() as f64) * top_speed_mps / acceleration_mps2;
         let dwell_s: f64 = legs.map(|stop| stop.dwell_s).sum();
@@ -54,13 +55,13 @@ impl DriveSize {
         }
     }
 
-    /// Memory of so many runs that are in it at the same time, in bytes.
+    /// Returns the memory of `runs` simultaneous runs in bytes.
     pub fn bytes(&self, runs: usize) -> f64 {
         let of_run = self.bursts * BYTES_PER_STEP + self.looks * BYTES_PER_LOOK;
         self.bursts * BYTES_PER_BURST + runs as f64 * of_run
     }
 
-    /// Refuses a drive that would take hours and gigabytes.
+    /// Rejects a drive that needs too much time or memory.
     pub(super) fn check(&self, check: Check<'_>) -> Result<(), SettingsError> {
         let (hours, looks, gigabytes) =
             (self.duration_s / 3600.0, self.looks, self.bytes(1) * 1e-9);
@@ -78,7 +79,7 @@ impl DriveSize {
         )
     }
 
-    /// Refuses a campaign that keeps more runs than usual memory holds.
+    /// Rejects a campaign whose runs do not fit into the usual memory.
     pub(super) fn check_runs(&self, runs: usize, check: Check<'_>) -> Result<(), SettingsError> {
         let most_gb = MOST_BYTES * 1e-9;
         check.that(

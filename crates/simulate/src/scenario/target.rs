@@ -1,9 +1,9 @@
-//! What accuracy is asked for, in words: `"0.3 m 99 %"`.
+//! Required accuracy in the form `"0.3 m 99 %"`.
 
 use schemars::JsonSchema;
 use serde::{Deserialize, Serialize};
 
-/// A horizontal error and how much of the time it has to be within it.
+/// Maximum horizontal error and the fraction of time for which it is required.
 #[derive(Debug, Clone, PartialEq, Serialize, Deserialize, JsonSchema)]
 #[serde(try_from = "String", into = "String")]
 #[schemars(with = "String")]
@@ -16,12 +16,12 @@ pub struct Target {
 const UNITS_M: [(&str, f64); 3] = [("mm", 1e-3), ("cm", 1e-2), ("m", 1.0)];
 
 impl Target {
-    /// Horizontal error that is not to be passed, in metres.
+    /// Returns the maximum horizontal error in metres.
     pub const fn error_m(&self) -> f64 {
         self.error_m
     }
 
-    /// For how much of the time, in percent.
+    /// Returns the required fraction of time in percent.
     pub const fn percent(&self) -> f64 {
         self.percent
     }
@@ -72,7 +72,7 @@ mod tests {
     use super::*;
 
     #[test]
-    fn targets_are_read_as_people_write_them() {
+    fn targets_are_parsed_in_common_notations() {
         for text in ["0.3 m 99 %", "0.3m 99%", "30 cm, 99 %", " 300 mm 99.0 % "] {
             let target = Target::try_from(text.to_owned()).unwrap();
             assert!((target.error_m() - 0.3).abs() < 1e-12, "{text}");

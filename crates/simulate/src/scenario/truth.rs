@@ -1,4 +1,4 @@
-//! How the world departs from what is believed of it.
+//! Deviations of the truth from the nominal models.
 
 use onboard::settings::{
     Check, Library, SettingsError, Shipped, Site, TomlFile, Vehicle, lay_over,
@@ -7,37 +7,37 @@ use schemars::JsonSchema;
 use serde::{Deserialize, Serialize};
 use toml::{Table, Value};
 
-/// `[truth]`: by default every value of site and vehicle that has a standard deviation is drawn
-/// from it, once per run. Under `site` and `vehicle` stand values that are otherwise than believed,
-/// by the same keys; radio heads by their names, or as `all`. A value given here is not drawn,
-/// unless its standard deviation is given too, from which it then is.
+/// `[truth]`: deviations of the truth. Every value of site and vehicle with a standard
+/// deviation gets a random error, once per run. The tables `site` and `vehicle` contain true values
+/// with the keys of the nominal models. Radio heads are addressed by name or as `all`. A value in
+/// these tables gets no random error unless its standard deviation is given there too.
 #[derive(Debug, Clone, PartialEq, Serialize, Deserialize, JsonSchema)]
 #[serde(default, deny_unknown_fields)]
 pub struct TruthSettings {
-    /// Whether what is uncertain is drawn.
+    /// Whether errors are drawn from the standard deviations.
     pub draw: Draw,
-    /// By what every standard deviation is multiplied that is drawn from.
+    /// Factor for all standard deviations of the drawn errors.
     #[schemars(range(min = 0.0, max = 1000.0))]
     pub std_factor: f64,
-    /// What of the site is otherwise: `road`, `radio_heads`, `rician_k_db`, `walls`.
+    /// True values of the site: `road`, `radio_heads`, `rician_k_db`, `walls`.
     #[serde(skip_serializing_if = "Table::is_empty")]
     #[schemars(with = "serde_json::Map<String, serde_json::Value>")]
     pub site: Table,
-    /// What of the vehicle is otherwise: `array`, `odometer`, `gyroscope`, `receiver`,
-    /// `lane_keeping`, `top_speed_kmh`, `acceleration_mps2`.
+    /// True values of the vehicle: `array`, `odometer`, `gyroscope`, `receiver`, `lane_keeping`,
+    /// `top_speed_kmh`, `acceleration_mps2`.
     #[serde(skip_serializing_if = "Table::is_empty")]
     #[schemars(with = "serde_json::Map<String, serde_json::Value>")]
     pub vehicle: Table,
 }
 
-/// Whether what is uncertain is drawn.
+/// Source of the random errors.
 #[derive(Debug, Clone, Copy, PartialEq, Eq, Default, Serialize, Deserialize, JsonSchema)]
 #[serde(rename_all = "kebab-case")]
 pub enum Draw {
-    /// From the standard deviations that site and vehicle state.
+    /// Errors are drawn from the standard deviations of site and vehicle.
     #[default]
     AsStated,
-    /// Nothing is: all is as believed, but for what stands here.
+    /// No errors are drawn. All values are nominal except those in `[truth]`.
     None,
 }
 
@@ -52,8 +52,9 @@ impl Default for TruthSettings {
     }
 }
 
-/// What of a site and of a vehicle is a fact of the world; the rest is how the vehicle is set.
+/// Physical keys of a site. Other keys are settings of the software.
 const SITE_FACTS: [&str; 4] = ["road", "radio_heads", "rician_k_db", "walls"];
+/// Physical keys of a vehicle. Other keys are settings of the software.
 const VEHICLE_FACTS: [&str; 7] = [
     "array",
     "odometer",
@@ -64,7 +65,7 @@ const VEHICLE_FACTS: [&str; 7] = [
     "acceleration_mps2",
 ];
 
-/// Values and the standard deviations they are drawn from.
+/// Values and the keys of their standard deviations.
 const DRAWN: [(&str, &str); 7] = [
     ("position_m", "position_std_m"),
     ("eirp_dbm", "eirp_std_db"),
@@ -76,10 +77,10 @@ const DRAWN: [(&str, &str); 7] = [
 ];
 
 impl TruthSettings {
-    /// Site and vehicle as they are on average: believed values, but for those that are otherwise.
+    /// Returns the true site and vehicle: nominal values, replaced by the given true values.
     ///
     /// # Errors
-    /// [`SettingsError`] for a key that there is not, or that nothing believes in.
+    /// [`SettingsError`] for an unknown key, or for a key that the nominal model does not contain.
     pub fn depart(
         &self,
         site: &Site,
@@ -100,7 +101,7 @@ impl TruthSettings {
         ))
     }
 
-    /// By what a standard deviation is multiplied that is drawn from.
+    /// Returns the factor of the standard deviations.
     pub const fn factor(&self) -> f64 {
         match self.draw {
             Draw::AsStated => self.std_factor,
@@ -124,18 +125,18 @@ fn depart<T: TomlFile + Clone>(
     let mut laid = over.clone();
     not_drawn(&mut laid);
     lay_over(&mut table, laid, &path, check)?;
-    // Whatever it reads is already in the table.
+    // All referenced files are already part of the table.
     let library: &dyn Library = &Shipped;
     let departed =
         T::from_table(table, check.file, library).map_err(|error| error.beneath(check.file, &path));
     for key in over.keys() {
-        // What else there is not, the reader knows better.
+        // Errors of unknown keys are reported by the deserializer.
         let exists = base.contains_key(key) || departed.is_ok();
         check.that(
             facts.contains(&key.as_str()) || !exists,
             &format!("{path}.{key}"),
             "given",
-            &format!("only facts can be otherwise: {}", facts.join(", ")),
+            &format!("only physical keys can differ: {}", facts.join(", ")),
         )?;
     }
     let departed = departed?;
@@ -143,7 +144,7 @@ fn depart<T: TomlFile + Clone>(
     Ok(departed)
 }
 
-/// A value that is given is not drawn.
+/// Sets the standard deviation of a given value to zero, so that no error is drawn.
 fn not_drawn(over: &mut Table) {
     for (value, std) in DRAWN {
         if over.contains_key(value) && !over.contains_key(std) {
@@ -155,7 +156,8 @@ fn not_drawn(over: &mut Table) {
         .for_each(not_drawn);
 }
 
-/// Refuses what the belief has no place for, such as a gyroscope that the vehicle lacks.
+/// Rejects keys that the nominal model does not contain, such as a gyroscope that the vehicle
+/// lacks.
 fn believed_in(
     base: &Table,
     over: &Table,
@@ -165,10 +167,10 @@ fn believed_in(
     for (key, value) in over {
         let path = format!("{path}.{key}");
         match (base.get(key), value) {
-            // A wall may stand where nobody has told of one.
+            // Walls may be missing in the nominal model.
             (None, Value::Array(_)) if key == "walls" => {}
             (None, _) => {
-                return Err(check.error(&path, "given", "nothing believes in such a thing"));
+                return Err(check.error(&path, "given", "the nominal model has no such key"));
             }
             (Some(Value::Table(base)), Value::Table(over)) => {
                 believed_in(base, over, &path, check)?;

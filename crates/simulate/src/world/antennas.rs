@@ -1,4 +1,4 @@
-//! What the antennas make of a plane wave.
+//! Response of the antennas to plane waves.
 
 use std::f64::consts::TAU;
 use std::sync::Arc;
@@ -10,7 +10,7 @@ use onboard::settings::ArraySettings;
 
 use crate::phasor::phasor;
 
-/// The array's response to plane waves, whatever the number of its antennas.
+/// Response of an array with any number of antennas.
 #[derive(Debug, Clone)]
 pub struct Antennas {
     elements: usize,
@@ -19,7 +19,7 @@ pub struct Antennas {
 
 #[derive(Debug, Clone)]
 enum Shape {
-    /// Phase in radians from antenna to antenna of a wave that comes along the axis.
+    /// Linear array: phase difference in radians of adjacent antennas for a wave along the axis.
     Row {
         element_rad: f64,
     },
@@ -27,7 +27,7 @@ enum Shape {
 }
 
 impl Antennas {
-    /// The antennas of a vehicle whose settings are checked.
+    /// Creates the antennas of a vehicle with valid settings.
     pub fn new(array: &ArraySettings) -> Self {
         let element_rad = TAU * array.spacing_wavelengths;
         Self {
@@ -36,13 +36,14 @@ impl Antennas {
         }
     }
 
-    /// Number of antennas.
+    /// Returns the number of antennas.
     pub const fn elements(&self) -> usize {
         self.elements
     }
 
-    /// Adds a wave that comes from `towards`: the horizontal part, along the array's axis and to its
-    /// left, of the unit vector to its source, which is not below the horizon.
+    /// Adds the response to a wave from the direction `towards`: the components along the array's
+    /// axis and to its left of the unit vector to the source. The source is at or above the
+    /// horizon.
     pub fn add(&self, mut wave: Complex64, towards: [f64; 2], gains: &mut [Complex64]) {
         match &self.shape {
             Shape::Row { element_rad } => {
@@ -56,7 +57,7 @@ impl Antennas {
         }
     }
 
-    /// Moves the source of what the antennas received.
+    /// Changes the direction of the source of the received signals.
     pub fn redirect(&self, from: [f64; 2], to: [f64; 2], gains: &mut [Complex64]) {
         let response = |towards| {
             let mut response = [Complex64::ZERO; MAX_ELEMENTS];
@@ -68,13 +69,13 @@ impl Antennas {
             .iter_mut()
             .zip(response(from).iter().zip(response(to)))
         {
-            // An antenna that is deaf to the one direction has nothing to be turned to the other.
+            // An antenna without a response in the old direction remains without a signal.
             *gain *= to * from.conj() / from.norm_sqr().max(f64::MIN_POSITIVE);
         }
     }
 
-    /// Lets what the antennas received of a source seem to come from `bias_rad` beside it: in the
-    /// electrical angle of a row, in azimuth else.
+    /// Adds the error `bias_rad` to the apparent direction of a source: to the electrical angle of
+    /// a linear array, otherwise to the azimuth.
     pub fn displace(&self, towards: [f64; 2], bias_rad: f64, gains: &mut [Complex64]) {
         if matches!(self.shape, Shape::Row { .. }) {
             return steer(gains, bias_rad);
@@ -86,7 +87,7 @@ impl Antennas {
     }
 }
 
-/// Turns a wave by `phase_rad` from antenna to antenna.
+/// Rotates the phase of each antenna by `phase_rad` relative to the previous antenna.
 pub fn steer(gains: &mut [Complex64], phase_rad: f64) {
     if phase_rad == 0.0 {
         return;

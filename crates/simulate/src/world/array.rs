@@ -1,4 +1,4 @@
-//! How the array really sits on the vehicle, and what its phase calibration leaves.
+//! True mounting and channel errors of the array.
 
 use num_complex::Complex64;
 use onboard::geometry::Point;
@@ -12,29 +12,29 @@ use rand_distr::StandardNormal;
 use super::antennas::{Antennas, steer};
 use super::path::VehicleState;
 
-/// The array of one run: as drawn at the start, then walking at random over the distance driven.
+/// Array of one run: initial errors, followed by a random walk over the distance driven.
 #[derive(Debug, Clone)]
 pub struct TrueArray {
-    /// As it is at the start; its standard deviations have been drawn from already.
+    /// True values; their random errors have been drawn.
     settings: ArraySettings,
     antennas: Antennas,
     rng: ChaCha8Rng,
-    /// What drift has made of the amplitude of each antenna.
+    /// Amplitude of each antenna due to gain drift.
     amplitudes: [f64; MAX_ELEMENTS],
     amplitude_rng: ChaCha8Rng,
     along_m: f64,
 }
 
-/// The line of sight from a radio head.
+/// Line of sight from a radio head.
 #[derive(Debug, Clone, Copy, PartialEq)]
 pub struct LineOfSight {
-    /// Horizontal part of the unit vector to the radio head, along the array's axis and to its left.
+    /// Components along the array's axis and to its left of the unit vector to the radio head.
     pub towards: [f64; 2],
-    /// Length in metres.
+    /// Distance in metres.
     pub distance_m: f64,
-    /// Where the middle of the array is.
+    /// Position of the array's centre.
     pub place: Point,
-    /// Direction of its axis in the map's frame, in radians.
+    /// Direction of the array's axis in the map frame in radians.
     pub axis_rad: f64,
     /// Distance driven in metres.
     pub along_m: f64,
@@ -43,9 +43,9 @@ pub struct LineOfSight {
 }
 
 impl TrueArray {
-    /// An array that is so at the start; `rng` draws how it walks.
+    /// Creates the array at the start of a run; `rng` draws the random walk.
     pub fn new(settings: ArraySettings, rng: ChaCha8Rng) -> Self {
-        // Numbers of their own, so that gains that drift leave all else as it was.
+        // A separate stream for the gains, so that gain drift does not change other random numbers.
         let mut amplitude_rng = rng.clone();
         amplitude_rng.set_stream(1);
         Self {
@@ -58,17 +58,18 @@ impl TrueArray {
         }
     }
 
-    /// How it is by now; the standard deviations in it have been drawn from already.
+    /// Returns the current true values.
     pub const fn settings(&self) -> &ArraySettings {
         &self.settings
     }
 
-    /// Its antennas.
+    /// Returns the antennas.
     pub const fn antennas(&self) -> &Antennas {
         &self.antennas
     }
 
-    /// Moves on to this distance along the road; to be called once for each SSB, in order.
+    /// Advances the random walk to the distance `along_m`. Call this function once per SSB, in
+    /// order.
     pub fn advance(&mut self, along_m: f64) {
         let root_m = (along_m - self.along_m).abs().sqrt();
         self.along_m = along_m;
@@ -85,7 +86,7 @@ impl TrueArray {
         }
     }
 
-    /// How it sees a radio head.
+    /// Returns the line of sight to a radio head.
     pub fn line_of_sight(&self, vehicle: &VehicleState, head: &RadioHead) -> LineOfSight {
         let eye = self.eye(vehicle);
         let distance_m = head.distance_m(eye, self.height_m());
@@ -103,10 +104,10 @@ impl TrueArray {
         }
     }
 
-    /// Where its middle is.
+    /// Returns the position of the array's centre.
     fn eye(&self, vehicle: &VehicleState) -> Point {
         match self.settings.position_m {
-            // Asked for at every SSB, heard or not.
+            // Fast path: called for every SSB.
             [0.0, 0.0, _] => vehicle.pose.point(),
             [forward_m, left_m, _] => vehicle.pose.beside(forward_m, left_m),
         }
@@ -117,8 +118,7 @@ impl TrueArray {
         up_m
     }
 
-    /// What the array makes of the field at its antennas: each channel runs ahead of the one before,
-    /// and amplifies as it does by now.
+    /// Applies the phase and gain errors of the receive channels to the field at the antennas.
     pub fn distort(&self, gains: &mut [Complex64]) {
         steer(gains, self.settings.phase_rad);
         for (gain, amplitude) in gains.iter_mut().zip(self.amplitudes) {
@@ -133,7 +133,7 @@ mod tests {
     use crate::random::{Purpose, Streams};
 
     #[test]
-    fn drift_has_its_spread() {
+    fn mounting_and_phase_drift_have_the_specified_spread() {
         let settings = ArraySettings {
             mounting_drift_rad_per_sqrt_m: 0.004,
             phase_drift_rad_per_sqrt_m: 0.01,
@@ -150,7 +150,8 @@ mod tests {
             squares[0] += array.settings.mounting_rad.powi(2) / runs as f64;
             squares[1] += array.settings.phase_rad.powi(2) / runs as f64;
         }
-        // 0.004² · 25 m and 0.01² · 25 m; four deviations of a sample variance.
+        // Variances 0.004² · 25 m and 0.01² · 25 m; tolerance of four standard deviations of the
+        // sample variance.
         for (found, expected) in squares.into_iter().zip([4e-4, 2.5e-3]) {
             let ratio: f64 = found / expected;
             assert!(
@@ -161,7 +162,7 @@ mod tests {
     }
 
     #[test]
-    fn gains_drift_apart_by_their_spread_and_leave_the_phase_as_it_was() {
+    fn gain_drift_has_the_specified_spread_and_does_not_change_the_phase() {
         let settings = ArraySettings {
             phase_drift_rad_per_sqrt_m: 0.01,
             gain_drift_db_per_sqrt_m: 0.2,
@@ -195,8 +196,8 @@ mod tests {
                 }
             }
         }
-        // (0.2 dB)² · 25 m, each antenna by itself; four deviations of a sample variance, and of a
-        // sample covariance.
+        // Variance (0.2 dB)² · 25 m, independent for each antenna; tolerance of four standard
+        // deviations of the sample variance and covariance.
         let [[first, both], [_, second]] = sums;
         let deviation = (runs as f64).sqrt().recip();
         assert!(
@@ -211,7 +212,7 @@ mod tests {
     }
 
     #[test]
-    fn an_array_without_phase_errors_passes_the_field_on() {
+    fn an_array_without_phase_errors_does_not_change_the_signals() {
         let rng = Streams::new(1, 0).generator(Purpose::Array, 0);
         let mut array = TrueArray::new(ArraySettings::default(), rng);
         array.advance(50.0);

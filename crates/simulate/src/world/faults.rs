@@ -1,4 +1,4 @@
-//! Faults, brought into what the sensors deliver.
+//! Faults of the sensors.
 
 use num_complex::Complex64;
 use onboard::observation::OdometrySample;
@@ -8,19 +8,20 @@ use super::array::TrueArray;
 use super::path::VehicleState;
 use crate::scenario::{FaultKind, FaultSettings};
 
-/// The faults of a run.
+/// Faults of a run.
 #[derive(Debug, Clone)]
 pub struct Faults {
     all: Vec<FaultSettings>,
-    /// The odometer's own last distance, and what slip has added to it, in metres.
+    /// Last measured distance of the odometer in metres.
     distance_m: f64,
+    /// Distance added by slip in metres.
     slipped_m: f64,
-    /// The last sample that was delivered.
+    /// Last delivered sample.
     delivered: Option<OdometrySample>,
 }
 
 impl Faults {
-    /// These faults.
+    /// Creates the faults of a run.
     pub fn new(all: &[FaultSettings]) -> Self {
         Self {
             all: all.to_vec(),
@@ -37,12 +38,12 @@ impl Faults {
             .map(|fault| fault.what)
     }
 
-    /// Whether anything is wrong at this time.
+    /// Whether any fault is active at this time.
     pub fn any_at(&self, time_s: f64) -> bool {
         self.at(time_s).next().is_some()
     }
 
-    /// What becomes of the antennas' gains for radio head number `index`.
+    /// Applies the faults to the antenna gains of the radio head with index `index`.
     pub fn distort(
         &self,
         index: usize,
@@ -92,7 +93,8 @@ impl Faults {
                     let towards = |head| array.line_of_sight(vehicle, head).towards;
                     let mut received = gains.to_vec();
                     (array.antennas()).redirect(towards(head), towards(&other), &mut received);
-                    // Its carrier phase is independent of the radio head's.
+                    // The carrier phase of the other transmitter is independent of the radio
+                    // head's.
                     let turn = Complex64::cis(6000.0 * vehicle.time_s);
                     for (gain, other) in gains.iter_mut().zip(received) {
                         *gain += turn * other;
@@ -103,7 +105,7 @@ impl Faults {
         }
     }
 
-    /// What becomes of an odometry sample.
+    /// Applies the faults to an odometry sample.
     pub fn slip(&mut self, sample: OdometrySample) -> OdometrySample {
         let mut sample = self.slipped(sample);
         let last = self.delivered.unwrap_or(sample);

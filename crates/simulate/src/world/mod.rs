@@ -1,4 +1,4 @@
-//! What moves and what measures it, as it really is.
+//! True motion and sensors of the vehicle.
 
 mod antennas;
 mod array;

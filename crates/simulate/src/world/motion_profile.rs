@@ -1,10 +1,10 @@
-//! When the vehicle is where along the road: accelerate, cruise, brake, between one stop and the next.
+//! Position along the road as a function of time: acceleration, cruise and braking between stops.
 
 use onboard::settings::Vehicle;
 
 use crate::scenario::MotionSettings;
 
-/// A drive from end to end of the road, with its stops.
+/// Drive from one end of the road to the other, with stops.
 #[derive(Debug, Clone, PartialEq)]
 pub struct MotionProfile {
     legs: Vec<Leg>,
@@ -12,16 +12,16 @@ pub struct MotionProfile {
     length_m: f64,
 }
 
-/// Where along the road, and how fast.
+/// Position along the road and speed.
 #[derive(Debug, Clone, Copy, PartialEq)]
 pub struct Motion {
     /// Distance along the road in metres.
     pub along_m: f64,
-    /// Speed along it in m/s.
+    /// Speed along the road in m/s.
     pub speed_mps: f64,
 }
 
-/// From standstill to standstill.
+/// Motion from standstill to standstill.
 #[derive(Debug, Clone, Copy, PartialEq)]
 struct Leg {
     start_s: f64,
@@ -41,7 +41,8 @@ impl Leg {
         acceleration_mps2: f64,
         top_mps: f64,
     ) -> Self {
-        // Too short a leg to reach the top speed: accelerate for half of it, brake for the rest.
+        // A short leg does not reach the top speed: accelerate for one half, brake for the other
+        // half.
         let peak_mps = top_mps.min((acceleration_mps2 * length_m).sqrt());
         let ramp_s = peak_mps / acceleration_mps2;
         let cruise_s = (length_m - peak_mps * ramp_s).max(0.0) / peak_mps;
@@ -89,8 +90,8 @@ impl Leg {
 }
 
 impl MotionProfile {
-    /// The drive of a vehicle to the end of a road of `length_m`. Stops are in driving order and on
-    /// the road.
+    /// Creates the drive of a vehicle to the end of a road of `length_m`. The stops must be in
+    /// driving order and on the road.
     pub fn new(settings: &MotionSettings, vehicle: &Vehicle, length_m: f64) -> Self {
         let acceleration_mps2 = settings
             .acceleration_mps2
@@ -119,12 +120,12 @@ impl MotionProfile {
         }
     }
 
-    /// Duration of the drive in seconds.
+    /// Returns the duration of the drive in seconds.
     pub const fn duration_s(&self) -> f64 {
         self.duration_s
     }
 
-    /// Place and speed at `time_s`; before the drive and after it the vehicle stands.
+    /// Returns the position and speed at `time_s`. The vehicle stands before and after the drive.
     pub fn at(&self, time_s: f64) -> Motion {
         let index = self
             .legs
@@ -153,7 +154,7 @@ mod tests {
     }
 
     #[test]
-    fn papers_trip_takes_80_33_s() {
+    fn trip_of_the_paper_takes_80_33_s() {
         let profile = profile(&MotionSettings::default(), 300.0);
         // 2·(v/a) + (300 − v²/a)/v with v = 25/6 m/s and a = 1/2 m/s².
         assert!((profile.duration_s() - 241.0 / 3.0).abs() < 1e-9);
@@ -165,7 +166,7 @@ mod tests {
     }
 
     #[test]
-    fn stops_add_their_dwell_and_a_ramp_each() {
+    fn each_stop_adds_its_dwell_time_and_a_ramp() {
         let stops = vec![StopSettings {
             at_m: 100.0,
             dwell_s: 7.0,
@@ -184,7 +185,7 @@ mod tests {
     }
 
     #[test]
-    fn a_drive_that_begins_on_the_way_passes_over_the_stops_before() {
+    fn stops_before_the_start_position_are_ignored() {
         let stop = |at_m| StopSettings { at_m, dwell_s: 5.0 };
         let begin = |start_at_m, stops| {
             let settings = MotionSettings {
@@ -201,14 +202,14 @@ mod tests {
     }
 
     #[test]
-    fn short_legs_never_reach_top_speed() {
+    fn short_legs_do_not_reach_the_top_speed() {
         let profile = profile(&MotionSettings::default(), 2.0);
         assert!((profile.at(0.5 * profile.duration_s()).speed_mps - 1.0).abs() < 1e-12);
         assert!((profile.duration_s() - 4.0).abs() < 1e-12);
     }
 
     #[test]
-    fn speed_is_the_derivative_of_place() {
+    fn speed_is_the_derivative_of_position() {
         let stops = vec![StopSettings {
             at_m: 120.0,
             dwell_s: 2.0,

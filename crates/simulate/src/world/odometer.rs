@@ -1,4 +1,4 @@
-//! What the odometer makes of the truth: a scale error, noise, a drifting gyroscope, lost samples.
+//! Odometer and gyroscope with scale error, noise, bias drift and lost samples.
 
 use onboard::observation::OdometrySample;
 use onboard::settings::{GyroscopeSettings, OdometerSettings};
@@ -8,21 +8,21 @@ use rand_distr::StandardNormal;
 
 use super::path::VehicleState;
 
-/// The odometer of one run.
+/// Odometer of one run.
 #[derive(Debug, Clone)]
 pub struct Odometer {
-    /// As they are: their standard deviations have been drawn from already.
+    /// True values; their random errors have been drawn.
     settings: OdometerSettings,
     gyroscope: Option<GyroscopeSettings>,
     rng: ChaCha8Rng,
     measured_m: f64,
     last: VehicleState,
-    /// Samples that have been due.
+    /// Number of samples that have been due.
     due: u32,
 }
 
 impl Odometer {
-    /// The odometer at the start of a drive; `rng` draws its noise.
+    /// Creates the odometer at the start of a run; `rng` draws its noise.
     pub const fn new(
         settings: OdometerSettings,
         gyroscope: Option<GyroscopeSettings>,
@@ -39,12 +39,12 @@ impl Odometer {
         }
     }
 
-    /// Time between samples in seconds.
+    /// Returns the sample period in seconds.
     pub fn period_s(&self) -> f64 {
         self.settings.rate_hz.recip()
     }
 
-    /// When the next sample is due, if that is by `time_s`; it counts as the last one then.
+    /// Returns the time of the next sample if it is due by `time_s`, and marks it as taken.
     pub fn next_s(&mut self, time_s: f64) -> Option<f64> {
         let next_s = f64::from(self.due) * self.period_s();
         (next_s <= time_s).then(|| {
@@ -53,12 +53,13 @@ impl Odometer {
         })
     }
 
-    /// The sample at `now`, later than the last one's; `None` when it is lost. The first is not: it is
-    /// what makes the start of a drive, of which the initial pose tells.
+    /// Returns the sample at `now`, which must be later than the previous one; `None` if the sample
+    /// is lost. The first sample is never lost, because it defines the start, to which the initial
+    /// pose refers.
     pub fn sample(&mut self, now: VehicleState) -> Option<OdometrySample> {
         let duration_s = now.time_s - self.last.time_s;
-        // In the middle of the road the path is the road. Off it, the mean of both ends' speeds is
-        // as good as the step is short: below a micrometre in 20 ms.
+        // On the centre line, the path length equals the road length. Elsewhere, the trapezoidal
+        // rule of the speed has an error below a micrometre in 20 ms.
         let driven_m = if now.lateral_m == 0.0 && self.last.lateral_m == 0.0 {
             now.along_m - self.last.along_m
         } else {
@@ -126,14 +127,14 @@ mod tests {
     }
 
     #[test]
-    fn without_errors_it_is_exact() {
+    fn odometer_without_errors_is_exact() {
         let (count, last) = drive(OdometerSettings::default(), 0);
         assert_eq!(count, 500);
         assert!((last.unwrap().distance_m - 40.0).abs() < 1e-9);
     }
 
     #[test]
-    fn noise_has_its_spread() {
+    fn noise_has_the_specified_variance() {
         let noisy = OdometerSettings {
             noise_m_per_sqrt_m: 0.01,
             ..Default::default()
@@ -145,7 +146,7 @@ mod tests {
             .sum::<f64>()
             / runs as f64;
         let expected_m2 = 0.01_f64.powi(2) * 40.0;
-        // Four standard deviations of a sample variance, √(2/n).
+        // Tolerance: four standard deviations of a sample variance, √(2/n).
         assert!((variance_m2 / expected_m2 - 1.0).abs() < 4.0 * (2.0 / runs as f64).sqrt());
     }
 

@@ -1,4 +1,4 @@
-//! The vehicle's true pose: on the road, but for its lateral wander.
+//! True pose of the vehicle: on the road with lateral wander.
 
 use onboard::geometry::Pose;
 use onboard::road::{LaneKeeping, Road};
@@ -8,7 +8,7 @@ use rand_distr::StandardNormal;
 use super::motion_profile::MotionProfile;
 use crate::random::{Purpose, Streams};
 
-/// The path of the vehicle on its road, in one run.
+/// Path of the vehicle along its road in one run.
 #[derive(Debug, Clone)]
 pub struct Path {
     road: Road,
@@ -16,23 +16,23 @@ pub struct Path {
     wander: Wander,
 }
 
-/// The truth at one instant.
+/// True state at one time.
 #[derive(Debug, Clone, Copy, PartialEq)]
 pub struct VehicleState {
     /// Time in seconds.
     pub time_s: f64,
     /// Distance along the road in metres.
     pub along_m: f64,
-    /// Distance from its middle in metres; left is positive.
+    /// Distance from the centre line in metres; left is positive.
     pub lateral_m: f64,
-    /// Speed of the vehicle along its own path in m/s.
+    /// Speed along the vehicle's own path in m/s.
     pub speed_mps: f64,
-    /// Its pose.
+    /// Pose of the vehicle.
     pub pose: Pose,
 }
 
 impl Path {
-    /// The path of the run that `streams` belongs to.
+    /// Draws the path of the run that `streams` belongs to.
     pub fn new(road: Road, motion: MotionProfile, keeping: LaneKeeping, streams: Streams) -> Self {
         let wander = Wander::new(keeping, road.length_m(), streams);
         Self {
@@ -42,12 +42,13 @@ impl Path {
         }
     }
 
-    /// Duration of the drive in seconds.
+    /// Returns the duration of the drive in seconds.
     pub const fn duration_s(&self) -> f64 {
         self.motion.duration_s()
     }
 
-    /// The vehicle as it was when a signal was received whose time stamp, `time_s`, is so much later.
+    /// Returns the true state at the reception of a signal with the time stamp `time_s`. The
+    /// reception was `lateness_s` before the time stamp.
     pub fn heard_at(&self, time_s: f64, lateness_s: f64) -> VehicleState {
         VehicleState {
             time_s,
@@ -55,7 +56,7 @@ impl Path {
         }
     }
 
-    /// The truth at `time_s`.
+    /// Returns the true state at `time_s`.
     pub fn at(&self, time_s: f64) -> VehicleState {
         let motion = self.motion.at(time_s);
         let middle = self.road.pose(motion.along_m);
@@ -68,7 +69,8 @@ impl Path {
                 pose: middle,
             };
         };
-        // Beside the middle of a bend, a metre of road is 1 − κd metres long.
+        // At a lateral offset d in a bend of curvature κ, a metre of road corresponds to 1 − κd
+        // metres.
         let stretch = 1.0 - self.road.curvature_per_m(motion.along_m) * lateral_m;
         let mut pose = middle.offset_left(lateral_m);
         pose.heading_rad += slope.atan2(stretch);
@@ -82,14 +84,14 @@ impl Path {
     }
 }
 
-/// Distance between the points at which the wander is drawn, in metres.
+/// Distance between the knots of the wander in metres.
 const KNOT_M: f64 = 0.5;
 
-/// A drawn path beside the middle of the road: points of the Gauss–Markov process of
-/// [`LaneKeeping`], joined by cubics that share their offsets and slopes.
+/// Lateral wander around the centre line: knots of the Gauss–Markov process of [`LaneKeeping`],
+/// interpolated by cubics with equal offset and slope at the knots.
 #[derive(Debug, Clone)]
 struct Wander {
-    /// Offset in metres and slope, every [`KNOT_M`]; empty for a vehicle that does not wander.
+    /// Lateral offset in metres and slope at each knot, every [`KNOT_M`]; empty without wander.
     knots: Vec<[f64; 2]>,
 }
 
@@ -100,7 +102,7 @@ impl Wander {
         }
         let transition = keeping.transition(KNOT_M);
         let noise = keeping.noise(KNOT_M);
-        // Cholesky factor of the noise of one step.
+        // Cholesky factor of the process noise of one step.
         let slope_std = noise[1][1].sqrt();
         let shared = noise[0][1] / slope_std;
         let own = (noise[0][0] - shared * shared).max(0.0).sqrt();
@@ -128,13 +130,13 @@ impl Wander {
         }
     }
 
-    /// Offset in metres and slope; `None` for a vehicle that does not wander.
+    /// Returns the lateral offset in metres and the slope; `None` without wander.
     fn at(&self, along_m: f64) -> Option<(f64, f64)> {
         let place = (along_m / KNOT_M).max(0.0);
         let index = (place as usize).min(self.knots.len().checked_sub(2)?);
         let [[p0, m0], [p1, m1]] = *self.knots.get(index..)?.first_chunk()?;
         let u = place - index as f64;
-        // Cubic Hermite polynomial and its derivative.
+        // Cubic Hermite polynomial and derivative.
         let (h00, h10) = (
             (1.0 + 2.0 * u) * (1.0 - u) * (1.0 - u),
             u * (1.0 - u) * (1.0 - u),
@@ -170,7 +172,7 @@ mod tests {
     }
 
     #[test]
-    fn wander_has_its_rms() {
+    fn wander_has_the_specified_rms() {
         let squares: f64 = (0..400)
             .map(|run| {
                 (0..80)

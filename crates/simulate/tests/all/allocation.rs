@@ -1,4 +1,4 @@
-//! A vehicle that drives for years allocates nothing once under way.
+//! No allocation after initialisation.
 
 use std::f64::consts::PI;
 
@@ -20,10 +20,10 @@ fn the_counter_counts() {
 }
 
 #[test]
-fn a_drive_under_way_allocates_nothing() {
+fn a_drive_allocates_nothing_after_initialisation() {
     let guarded = || ("vehicle.integrity", value("{}"));
     let adapts = ("vehicle.receiver.phase_bias_probability", value("0.1"));
-    // A bound that every angle is demanded for.
+    // A target error so small that every angle is required.
     let mut demanding = unguarded("yard");
     demanding.vehicle.wake_up = Some(WakeUpSettings::Uncertainty(UncertaintySettings {
         bound_m: 1e-3,
@@ -54,7 +54,7 @@ fn a_drive_under_way_allocates_nothing() {
     }
 }
 
-/// Drives for 20 s or so, the last 16 of them without allocation; the number of angles accepted.
+/// Drives for about 20 s, the last 16 s without allocation. Returns the number of accepted angles.
 fn drive(scenario: &Scenario) -> u32 {
     let road = scenario.path(Check { file: "test" }).unwrap();
     let (site, vehicle) = (&scenario.site, &scenario.vehicle);
@@ -82,8 +82,8 @@ fn drive(scenario: &Scenario) -> u32 {
         burst.clear();
         for head in &heads {
             let angle_rad = pose.point().bearing_rad(head.position) - pose.heading_rad;
-            // Outliers and angles of which nothing is sure are part of it; to a guard, outliers
-            // are a fault.
+            // Outliers and ambiguous angles are included. With integrity monitoring, outliers are
+            // omitted because they would be faults.
             let outlier = if number % 50 == 49 && !integrity {
                 1.5
             } else {
@@ -112,8 +112,8 @@ fn drive(scenario: &Scenario) -> u32 {
         std::hint::black_box(onboard.pose(time_s)).unwrap();
         accepted > 0
     };
-    // Once warm: a few seconds of driving, and one since the first angle, from which on the start is
-    // confirmed.
+    // Warm-up: a few seconds of driving, and one second after the first angle, which confirms the
+    // start.
     let (mut number, mut since_angle) = (0, 0);
     while number < 200 || (since_angle < 50 && number < 1000) {
         since_angle += u32::from(step(number));

@@ -1,4 +1,4 @@
-//! Arrays that are not in a row, through the whole chain.
+//! Arrays that are not linear, in the whole chain.
 
 use num_complex::Complex64;
 use onboard::geometry::wrap_angle;
@@ -13,7 +13,7 @@ use toml::Value;
 
 use crate::common::{campaign, changed, run, value};
 
-/// A fifth of a circle is half a wavelength's chord.
+/// Circular array of five elements with adjacent elements half a wavelength apart.
 const CIRCLE: [(&str, &str); 2] = [
     ("vehicle.array.elements", "5"),
     ("vehicle.array.shape", "{ kind = \"circular\" }"),
@@ -24,8 +24,8 @@ fn with_circle<'a>(more: impl IntoIterator<Item = (&'a str, &'a str)>) -> Vec<(&
     all.map(|(key, text)| (key, value(text))).collect()
 }
 
-/// RMSE over bound of the azimuths of a run, the mean of their squares over their variances, and how
-/// many they are.
+/// Returns the ratio of RMSE to bound of the azimuths of a run, the mean of the squared errors
+/// normalised by their variances, and the number of azimuths.
 fn azimuths(scenario: &Scenario, seed: u64) -> [f64; 3] {
     let truth = World::new(scenario).unwrap().draw(Streams::new(seed, 0));
     let thermal = ThermalNoise::new(&scenario.site, &scenario.vehicle);
@@ -49,9 +49,9 @@ fn azimuths(scenario: &Scenario, seed: u64) -> [f64; 3] {
 }
 
 #[test]
-fn a_circle_of_five_is_at_the_bound_in_azimuth() {
-    // Strong signals without scatter, at the horizon and from above, blind and by pilots, as snapshots
-    // and as samples.
+fn azimuth_of_a_circle_of_five_attains_the_bound() {
+    // Strong signals without scatter, from the horizon and from above, blind and with pilots, as
+    // snapshots and as samples.
     for (pilots, fidelity, height_m) in [
         ("blind", "snapshots", 0.0),
         ("blind", "snapshots", 40.0),
@@ -76,7 +76,7 @@ fn a_circle_of_five_is_at_the_bound_in_azimuth() {
         let scenario = changed("paper-real-odometry-2", all);
         let [ratio, nees, count] = azimuths(&scenario, 3);
         println!("{pilots} {fidelity} {height_m} m: RMSE / bound {ratio:.3}, NEES {nees:.3}");
-        // Four standard deviations of a mean of so many squares; its root has half of them.
+        // Four standard deviations of the mean of `count` squares; its root has half of them.
         let chance = 4.0 * (2.0 / count).sqrt();
         assert!((1.0 - 0.5 * chance..1.1).contains(&ratio), "{ratio}");
         assert!((nees - 1.0).abs() < chance, "{nees}");
@@ -84,14 +84,14 @@ fn a_circle_of_five_is_at_the_bound_in_azimuth() {
 }
 
 #[test]
-fn a_drive_with_a_circle_is_as_wrong_as_it_says_and_as_right_as_can_be() {
+fn tracker_with_a_circle_is_consistent_and_efficient() {
     let (runs, campaigns) = (12, 100);
     let scenario = changed("paper-real-odometry-2", with_circle([]));
     let bound = Bound::new(&scenario).unwrap();
     let points = bound.along_route();
     let square_m2: f64 = points.iter().map(|it| it.position_rms_m.powi(2)).sum();
     let bound_m = (square_m2 / points.len() as f64).sqrt();
-    // What a filter with the tracker's covariances shows in campaigns of this size.
+    // Spread of an ideal filter in campaigns of this size.
     let filter = bound.ideal_filter(50);
     let ideal: Vec<_> = (0..campaigns)
         .map(|seed| filter.campaign(seed, runs).consistency(1))
@@ -111,7 +111,7 @@ fn a_drive_with_a_circle_is_as_wrong_as_it_says_and_as_right_as_can_be() {
 }
 
 #[test]
-fn places_and_tables_are_the_circle_that_they_describe() {
+fn positions_and_tables_of_a_circle_give_equal_results() {
     let circle = ArraySettings {
         elements: 5,
         shape: ArrayShape::Circular {},
@@ -145,7 +145,7 @@ fn places_and_tables_are_the_circle_that_they_describe() {
         "{{ kind = \"measured\", elevations_rad = {elevations:?}, responses = [{responses}] }}"
     );
     let angles = |shape: &str| {
-        // Angle by angle, not as a statistic: a short road has enough of them.
+        // Angles are compared one by one, so that a short road suffices.
         let road = "[{ length_m = 60.0, turn_rad = 0.1 }]";
         let all = with_circle([("vehicle.array.shape", shape), ("site.road.segments", road)]);
         let record = run(&changed("paper-real-odometry-2", all), 1, 0);

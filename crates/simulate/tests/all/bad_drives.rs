@@ -1,5 +1,5 @@
-//! Recorded drives with something wrong in them: each item is named in what comes out, and the pose
-//! goes on as if it had not been there.
+//! Recorded drives with errors: each error is reported, and the pose is as if the erroneous item
+//! were missing.
 
 use crate::common;
 use std::fs;
@@ -17,7 +17,7 @@ use simulate::scenario::Scenario;
 
 use crate::common::{changed, unguarded, value};
 
-/// A drive as files, and its truth.
+/// A drive as files, with its truth.
 struct Drive {
     dir: PathBuf,
     scenario: Scenario,
@@ -47,7 +47,7 @@ impl Drive {
         }
     }
 
-    /// Locates the drive from its files, as they are by now.
+    /// Locates the drive from its current files.
     fn locate(&self) -> LocatedDrive {
         let (odometry, angles) = (self.dir.join("odometry.csv"), self.dir.join("angles.csv"));
         fs::write(&odometry, self.odometry.join("\n")).unwrap();
@@ -63,20 +63,20 @@ impl Drive {
         locate_angles(site, vehicle, start, odometry, angles, false).unwrap()
     }
 
-    /// The largest error of any pose in its own standard deviations.
+    /// Returns the largest error of a pose, normalised by its standard deviation.
     fn worst(&self, drive: &LocatedDrive) -> f64 {
         let deviations = drive.poses.iter().filter_map(|pose| {
             let number = (pose.estimate.time_s / 0.02).round() as usize;
             let truth = self.truth.get(number)?.truth.point();
             let [larger, _] = pose.estimate.principal_variances();
             let error_m = pose.estimate.pose.point().distance_m(truth);
-            // The start is known exactly.
+            // The start is known exactly, with a singular covariance.
             (number > 50).then(|| error_m / larger.sqrt())
         });
         deviations.fold(0.0, f64::max)
     }
 
-    /// What the diagnoses in the MCAP file say.
+    /// Returns the texts of the diagnoses in the MCAP file.
     fn diagnoses(&self, drive: &LocatedDrive) -> String {
         let file = self.dir.join("drive.mcap");
         write_drive_mcap(&file, drive).unwrap();
@@ -94,7 +94,7 @@ fn diagnoses(file: &Path) -> String {
 }
 
 #[test]
-fn a_drive_with_nothing_wrong_has_nothing_to_remark() {
+fn a_drive_without_errors_has_no_remarks() {
     let drive = Drive::new("drive-sound");
     let located = drive.locate();
     assert_eq!(located.remarks, []);
@@ -104,7 +104,7 @@ fn a_drive_with_nothing_wrong_has_nothing_to_remark() {
 }
 
 #[test]
-fn bad_odometry_is_named_and_passed_over() {
+fn bad_odometry_is_reported_and_ignored() {
     let sound = Drive::new("drive-odometry").locate();
     let mut drive = Drive::new("drive-odometry");
     let duplicate = drive.odometry[200].clone();
@@ -137,14 +137,14 @@ fn bad_odometry_is_named_and_passed_over() {
         assert!(told.contains(text), "{text}");
     }
     assert!(told.contains("1 remarkable item"));
-    // The state is what it would have been without them.
+    // The state equals the state without the erroneous samples.
     assert_eq!(located.poses, sound.poses);
 }
 
 #[test]
-fn a_gap_and_a_jump_of_the_odometer_are_named_and_bridged() {
+fn a_gap_and_a_reset_of_the_odometer_are_reported_and_bridged() {
     let mut drive = Drive::new("drive-gap");
-    // The counter starts again at zero after eight seconds.
+    // The counter restarts at zero after eight seconds.
     let reset_m: f64 = drive.odometry[400]
         .split(',')
         .nth(1)
@@ -157,7 +157,7 @@ fn a_gap_and_a_jump_of_the_odometer_are_named_and_bridged() {
         fields[1] = (distance_m - reset_m).to_string();
         *line = fields.join(",");
     }
-    // One second is missing.
+    // One second of samples is missing.
     drive.odometry.drain(500..550);
     let located = drive.locate();
     let texts: Vec<&str> = located.remarks.iter().map(|it| it.text.as_str()).collect();
@@ -175,7 +175,7 @@ fn a_gap_and_a_jump_of_the_odometer_are_named_and_bridged() {
 }
 
 #[test]
-fn bad_angles_are_named_and_passed_over() {
+fn bad_angles_are_reported_and_ignored() {
     let sound = Drive::new("drive-angles").locate();
     let mut drive = Drive::new("drive-angles");
     let changed = |line: &str, column: usize, value: &str| {
@@ -207,7 +207,7 @@ fn bad_angles_are_named_and_passed_over() {
         assert!(text.contains(expected), "{text}: {expected}");
         assert!(told.contains(text), "{text}");
     }
-    // What can be read gets a verdict, each by itself.
+    // Each readable angle gets its own verdict.
     let refused = |reason| {
         let executions = located.executions.iter();
         executions.filter(|it| it.verdict.reason == reason).count()
@@ -220,7 +220,7 @@ fn bad_angles_are_named_and_passed_over() {
 }
 
 #[test]
-fn a_measurement_without_a_variance_is_unusable_whoever_made_it() {
+fn an_angle_without_a_variance_is_unusable_for_every_estimator() {
     let mut drive = Drive::new("drive-variance");
     drive.angles.truncate(3); // a comment, the columns, and an angle
     let odometry = {

@@ -1,4 +1,4 @@
-//! Every kind of unusable scenario: which error, which key, and what it says is allowed.
+//! Invalid scenarios: the error names the key and the allowed values.
 
 use onboard::settings::{SettingsError, Shipped, TomlFile};
 use recording::{Files, load};
@@ -7,7 +7,7 @@ use simulate::scenario::Scenario;
 
 use crate::common::shipped;
 
-/// The paper's scenario with one line of it replaced.
+/// Returns the paper's scenario with one line replaced.
 fn with_line(line: &str, replacement: &str) -> Result<Scenario, SettingsError> {
     let text = shipped("paper").to_toml();
     assert!(
@@ -30,7 +30,7 @@ fn assert_says(outcome: Result<Scenario, SettingsError>, key: &str, allowed: &st
 }
 
 #[test]
-fn misspelt_keys_get_the_nearest_known_one() {
+fn misspelt_keys_get_the_nearest_known_key() {
     let nearest = "did you mean `rician_k_db`?";
     assert_says(
         with_line("rician_k_db =", "rician_kdb ="),
@@ -60,7 +60,7 @@ fn wrong_units_are_unknown_keys() {
 }
 
 #[test]
-fn wrong_types_say_what_is_expected() {
+fn wrong_types_are_reported_with_the_expected_type() {
     let outcome = with_line("carrier_mhz = 3500.0", "carrier_mhz = \"3.5 GHz\"");
     assert_says(outcome, "site.carrier_mhz", "expected f64");
     let outcome = with_line("either_direction = false", "either_direction = 0");
@@ -178,7 +178,7 @@ fn numbers_must_be_finite_and_in_range() {
 }
 
 #[test]
-fn a_guess_of_the_road_is_straight() {
+fn a_guess_of_the_road_must_be_straight() {
     assert_says(
         with_line("surveyed = true", "surveyed = false"),
         "site.road.segments[0].turn_rad",
@@ -199,7 +199,7 @@ fn a_guess_of_the_road_is_straight() {
 }
 
 #[test]
-fn contradictions_name_both_sides() {
+fn contradictions_are_reported_with_both_sides() {
     let bound = "position_uncertainty_m = 1.0";
     let outcome = with_line(bound, "base_ms = 250.0\nt_max_ms = 240.0");
     assert_says(outcome, "vehicle.wake_up.due.t_max_ms", "base_ms, 250");
@@ -219,7 +219,7 @@ fn contradictions_name_both_sides() {
 }
 
 #[test]
-fn base_time_of_the_platform_counts_too() {
+fn base_time_of_the_platform_limits_the_interval() {
     let scenario = with_line("position_uncertainty_m = 1.0", "t_max_ms = 60.0").unwrap();
     let simulation = Simulation::on_its_platform(&scenario).map(drop);
     let message = simulation.unwrap_err().to_string();
@@ -238,7 +238,7 @@ fn with_heads(heads: &str) -> Result<Scenario, SettingsError> {
 }
 
 #[test]
-fn radio_heads_have_their_own_place_and_name() {
+fn radio_heads_need_distinct_positions_and_names() {
     let apart = "{ position_m = [50, 20, 0] }, { position_m = [50, -20, 0], pci = 1 }";
     assert!(with_heads(apart).is_ok());
     assert_says(with_heads(""), "site.radio_heads", "1 to 1000");
@@ -269,7 +269,7 @@ fn radio_heads_have_their_own_place_and_name() {
 }
 
 #[test]
-fn missing_parts_are_named() {
+fn missing_parts_are_reported() {
     assert_says(
         read(&format!("{NAMES}{HEAD}site.road.width_m = 4.0")),
         "site.road",
@@ -290,15 +290,15 @@ fn missing_parts_are_named() {
 }
 
 #[test]
-fn without_a_road_there_is_a_path_to_drive_along() {
+fn a_site_without_a_road_requires_a_path() {
     let roaming = format!("{NAMES}{HEAD}");
-    assert_says(read(&roaming), "motion.path", "give a path");
+    assert_says(read(&roaming), "motion.path", "add `motion.path`");
     let path = "motion.path.segments = [{ length_m = 100 }]";
     assert!(read(&format!("{roaming}{path}")).is_ok());
 }
 
 #[test]
-fn a_vehicle_that_hears_nothing_is_refused() {
+fn a_vehicle_without_radio_heads_is_rejected() {
     let heads = "{ position_m = [50, 20, 0], pci = 7 }";
     let hears = |list: &str| {
         let names = NAMES.replace("vehicle = 'carrier'\n", "");
@@ -314,7 +314,7 @@ fn a_vehicle_that_hears_nothing_is_refused() {
 }
 
 #[test]
-fn broken_toml_says_where() {
+fn invalid_toml_is_reported_with_its_position() {
     let message = read("name = \n").unwrap_err().to_string();
     assert!(
         message.contains("plant.toml") && message.contains("line 1"),
@@ -323,7 +323,7 @@ fn broken_toml_says_where() {
 }
 
 #[test]
-fn unknown_names_list_the_shipped_ones() {
+fn unknown_names_are_reported_with_the_shipped_ones() {
     let message = load::<Scenario>("papper").unwrap_err().to_string();
     assert!(message.contains("did you mean `paper`?"), "{message}");
     let message = read("name = 'plant'\nsite = 'yrad'\nvehicle = 'carrier'")
@@ -336,7 +336,7 @@ fn unknown_names_list_the_shipped_ones() {
 }
 
 #[test]
-fn resolved_scenarios_read_back_the_same() {
+fn resolved_scenarios_round_trip_through_toml() {
     for name in Scenario::names() {
         let scenario = shipped(name);
         let again = Scenario::from_toml(&scenario.to_toml(), name, &Shipped);
@@ -345,7 +345,7 @@ fn resolved_scenarios_read_back_the_same() {
 }
 
 #[test]
-fn overriding_a_tag_drops_the_old_variants_keys() {
+fn overriding_a_tag_removes_the_keys_of_the_old_variant() {
     let paper = shipped("paper");
     let changes = [
         ("vehicle.wake_up.interval_ms", 20.into()),

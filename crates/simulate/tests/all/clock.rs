@@ -1,4 +1,5 @@
-//! Time offsets between angles and odometry of a recorded drive: agreeing clocks are not corrected, and a real offset is.
+//! Time offsets between angles and odometry of a recorded drive: a zero offset is not corrected,
+//! and a real offset is.
 
 use onboard::settings::{Shipped, TomlFile};
 use recording::replay::{StartChoice, locate_angles};
@@ -7,14 +8,15 @@ use simulate::scenario::Scenario;
 
 use crate::common::{changed, logs};
 
-/// Largest time offset that needs no correction (s).
+/// Maximum time offset that is not corrected (s).
 const LEAST_S: f64 = 0.03;
 
-/// Three standard deviations of a time offset in doubt (s), which is a state of the filter instead of a correction.
+/// Three standard deviations of an uncertain time offset (s), which is a filter state instead of a
+/// correction.
 const DOUBTED_S: f64 = 0.3;
 
-/// Locates the first seconds of a recorded drive whose angles have late time stamps, and returns the time offset that was
-/// found, and its standard deviation (s).
+/// Locates the first seconds of a recorded drive whose angles have late time stamps. Returns the
+/// estimated time offset and its standard deviation (s).
 fn found_s(
     scenario: &Scenario,
     (odometry, angles): (&OdometryLog, &AngleLog),
@@ -37,7 +39,7 @@ fn found_s(
     found.map_or([0.0; 2], |it| [it.found, it.std])
 }
 
-/// A drive of the yard with the vehicle's own clocks.
+/// Simulates a drive of the yard with equal clocks.
 fn drive(seed: u64) -> (Scenario, OdometryLog, AngleLog, StartChoice) {
     let scenario = changed("yard", []);
     let (odometry, angles, record) = logs(&scenario, seed);

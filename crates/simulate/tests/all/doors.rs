@@ -1,4 +1,4 @@
-//! The user's own code in place of parts of the pipeline and of the world, and arrays of other sizes.
+//! Custom localizers, policies, estimators and channels, and arrays of other sizes.
 
 use crate::common;
 use std::f64::consts::{PI, TAU};
@@ -28,14 +28,14 @@ fn run_with(scenario: &Scenario, custom: &MakeCustom) -> Result<RunRecord, Simul
     simulation(scenario).run(2, 0, custom)
 }
 
-/// Drives straight on by the odometer, and only counts angles.
+/// Localizer that drives straight ahead by the odometer and counts angles.
 #[derive(Clone)]
 struct StraightOn {
     start: Pose,
     driven_m: f64,
     now_s: f64,
     angles: usize,
-    /// How many angles it takes before it gives up.
+    /// Number of angles after which it fails.
     patience: usize,
 }
 
@@ -91,9 +91,9 @@ fn straight_on(patience: usize) -> impl Fn(Pose) -> Result<Custom, BoxError> {
 }
 
 #[test]
-fn a_localizer_of_ones_own_drives_and_may_give_up() {
+fn a_custom_localizer_drives_and_may_fail() {
     for latency_ms in [0.0, 100.0] {
-        // Algorithm 1 asks where the vehicle is.
+        // Algorithm 1 needs the position.
         let late = [
             ("ssb_latency_ms", Value::from(latency_ms)),
             ("vehicle.wake_up.policy", "pid".into()),
@@ -109,7 +109,7 @@ fn a_localizer_of_ones_own_drives_and_may_give_up() {
                 .all(|it| reason(it) == UpdateReason::Excluded)
         );
         let last = record.steps.last().unwrap();
-        // The road's 300 m, by an odometer whose scale is off by some thousandths.
+        // The road's 300 m, measured with a scale error of a few thousandths.
         let straight_m = last
             .estimate
             .point()
@@ -125,7 +125,7 @@ fn a_localizer_of_ones_own_drives_and_may_give_up() {
     }
 }
 
-/// One radio head at a time, the strongest, every so often.
+/// Policy that estimates the angle of the strongest radio head at fixed intervals.
 struct Strongest {
     every_s: f64,
     next_s: f64,
@@ -142,7 +142,7 @@ impl WakeUpPolicy for Strongest {
         sensed: &[SensedSsb],
         chosen: &mut [bool],
     ) -> Result<f64, BoxError> {
-        // What the budget promises is what an SSB has, but for shadowing and scatter.
+        // The expected SNR differs from the measured one by shadowing and scatter.
         for ssb in sensed {
             let promised_db = now.expected_snr_db(now.head(ssb).ok_or("a stranger")?)?;
             if (promised_db - ssb.snr_db).abs() > 60.0 {
@@ -159,7 +159,7 @@ impl WakeUpPolicy for Strongest {
 }
 
 #[test]
-fn a_policy_of_ones_own_chooses() {
+fn a_custom_policy_selects_radio_heads() {
     let strongest = |_| {
         Ok(Custom {
             policy: Some(Box::new(Strongest {
@@ -181,7 +181,7 @@ fn a_policy_of_ones_own_chooses() {
     assert!(record.steps.last().unwrap().error_m() < 1.0);
 }
 
-/// What an estimator of one's own makes of a built-in one's angle.
+/// Custom estimator that modifies the angle of a built-in one.
 struct Retold<F>(Box<dyn AngleEstimator>, F);
 
 impl<F> AngleEstimator for Retold<F>
@@ -218,7 +218,7 @@ where
 }
 
 #[test]
-fn an_estimator_without_deviation_gets_the_bound_at_its_snr() {
+fn an_estimator_without_a_standard_deviation_gets_the_bound_at_its_snr() {
     let scenario = unguarded("paper-real-odometry-2");
     let bare = |phase_rad, _| {
         Ok(Some(EstimatedAngle::Angle {
@@ -232,7 +232,7 @@ fn an_estimator_without_deviation_gets_the_bound_at_its_snr() {
     let bound = ThermalNoise::new(&scenario.site, &scenario.vehicle);
     for execution in &record.executions {
         let measured = execution.measured.unwrap();
-        // Of 254 known elements on four antennas: 1/√(2 · SNR · 254 · 5).
+        // Bound for 254 known resource elements at four antennas: 1/√(2 · SNR · 254 · 5).
         let snr = 10f64.powf(0.1 * execution.ssb.snr_db);
         let by_hand_rad = (2.0 * snr * 254.0 * 5.0).sqrt().recip();
         assert!((measured.phase_sigma_rad / by_hand_rad - 1.0).abs() < 1e-9);
@@ -247,10 +247,10 @@ fn an_estimator_without_deviation_gets_the_bound_at_its_snr() {
 }
 
 #[test]
-fn a_likelihood_leads_where_its_angle_does() {
+fn a_likelihood_gives_the_same_position_as_its_angle() {
     let scenario = unguarded("paper-real-odometry-2");
     let built_in = run_with(&scenario, NONE).unwrap();
-    // On a grid of a thousandth of a turn.
+    // Likelihood on a grid of 1/1000 cycle.
     let likelihood = |phase_rad: f64, sigma_rad: f64| {
         let log = (0..1000).map(|index| {
             let angle_rad = TAU * f64::from(index) / 1000.0 - PI;
@@ -278,7 +278,7 @@ fn a_likelihood_leads_where_its_angle_does() {
 }
 
 #[test]
-fn an_estimator_may_find_nothing_or_fail() {
+fn an_estimator_may_return_nothing_or_fail() {
     let scenario = unguarded("paper-real-odometry-2");
     let record = retold(&scenario, |_, _| Ok(None)).unwrap();
     for execution in &record.executions {
@@ -311,12 +311,12 @@ fn not_finite() -> EstimatedAngle {
 }
 
 #[test]
-fn code_that_cannot_be_made_ends_the_run() {
+fn an_error_of_the_factory_ends_the_run() {
     let error = run_with(&shipped("paper"), &|_| Err("no such module".into())).unwrap_err();
     assert_eq!(error.to_string(), "no such module");
 }
 
-/// A line of sight and nothing else, so much weaker than free space has it.
+/// Line of sight without scatter, with a loss relative to free space.
 struct Clear {
     loss_db: f64,
 }
@@ -335,7 +335,7 @@ impl Propagation for Clear {
 }
 
 #[test]
-fn a_propagation_of_ones_own_carries_snapshots_and_samples() {
+fn a_custom_propagation_works_with_snapshots_and_samples() {
     for fidelity in ["snapshots", "iq"] {
         let short = value("[{ length_m = 40.0, turn_rad = 0.05 }]");
         let scenario = changed(
@@ -366,13 +366,14 @@ fn a_propagation_of_ones_own_carries_snapshots_and_samples() {
             let error_rad = wrap_angle(measured.phase_rad - PI * sight.towards[0]);
             squares.push((error_rad / measured.phase_sigma_rad).powi(2));
         }
-        // Noise alone: four deviations of a sample variance, and what the converter costs.
+        // Noise only: four standard deviations of a sample variance, plus the loss of the
+        // converter.
         let count = squares.len() as f64;
         let mean_db = apart_db.iter().sum::<f64>() / count;
         let worst_db = apart_db
             .iter()
             .fold(0.0, |worst: f64, it| worst.max(it.abs()));
-        // Samples measure it, a single SSB's to a decibel or so.
+        // The SNR estimate of a single SSB from samples has an error of about 1 dB.
         assert!(mean_db.abs() < 0.2, "{fidelity}: {mean_db}");
         assert!(worst_db < 1.5, "{fidelity}: {worst_db}");
         let mean = squares.iter().sum::<f64>() / count;
@@ -386,7 +387,7 @@ fn a_propagation_of_ones_own_carries_snapshots_and_samples() {
 }
 
 #[test]
-fn arrays_of_any_size_drive() {
+fn arrays_of_any_size_are_consistent() {
     let runs = 24;
     let mut by_size = Vec::new();
     for elements in [2, 3, 5, 8] {
@@ -394,7 +395,7 @@ fn arrays_of_any_size_drive() {
         let scenario = changed("paper-real-odometry-2", [array.clone()]);
         let found = common::campaign(&scenario, 8, runs).consistency(50);
         println!("{elements} antennas: {found:?}");
-        // As in the tests of the tracker, a run counts as one look.
+        // As in the tests of the tracker, a run counts as one independent sample.
         let bound = 4.0 / (runs as f64).sqrt();
         assert!(
             (found.mean_nees / 2.0 - 1.0).abs() < bound,
@@ -417,7 +418,7 @@ fn arrays_of_any_size_drive() {
         let worst_m = record.steps.iter().map(Step::error_m).fold(0.0, f64::max);
         assert!(worst_m < 1.0, "{elements}: {worst_m} m with samples");
     }
-    // More antennas see better.
+    // The error decreases with the number of antennas.
     assert!(
         by_size.is_sorted_by(|fewer, more| fewer > more),
         "{by_size:?}"

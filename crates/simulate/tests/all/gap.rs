@@ -1,5 +1,5 @@
-//! A drive through a stretch of road that was not surveyed: what the map gives there is a guess,
-//! and the road leaves it by metres.
+//! Drive through an unsurveyed section of the road: the map contains a guess, and the true road
+//! deviates from it by metres.
 
 use crate::common;
 use onboard::settings::{Shipped, TomlFile};
@@ -10,11 +10,12 @@ use toml::Value;
 
 use crate::common::{changed, value};
 
-/// Road on both sides of the gap (m) ...
+/// Length of the surveyed road on each side of the gap (m).
 const SURVEYED_M: f64 = 90.0;
-/// ... and the gap's bends to and fro: quarters of this radius (m) and turn (rad), which leave the
-/// chord by `2 R (1 − cos a)`, 2.0 m, and come back to it in its direction after `4 R sin a`.
+/// Radius of the four bends in the gap (m). With the angle a of each bend, the road leaves the
+/// chord by `2 R (1 − cos a)` = 2.0 m and returns to its direction after `4 R sin a`.
 const RADIUS_M: f64 = 200.0;
+/// Angle of each bend in the gap (rad).
 const TURN_RAD: f64 = 0.1;
 
 fn with_road(scenario: &Scenario, gap: &str) -> Scenario {
@@ -28,7 +29,8 @@ fn gap_m() -> f64 {
     4.0 * RADIUS_M * TURN_RAD.sin()
 }
 
-/// The paper's trip, by one clock; the road bends by about as much as it does in the gap.
+/// Returns the paper's trip without a time offset. The curvature statistics match the bends in the
+/// gap.
 fn scenario() -> Scenario {
     changed(
         "paper-real-odometry-2",
@@ -46,7 +48,8 @@ fn scenario() -> Scenario {
     )
 }
 
-/// A drive on the true road, located by a map that has the chord instead, and smoothed.
+/// Simulates a drive on the true road, locates it with a map that contains the chord, and smooths
+/// it.
 fn drive(seed: u64, surveyed: bool) -> (LocatedDrive, RunRecord) {
     let scenario = scenario();
     let side = if seed.is_multiple_of(2) { 1.0 } else { -1.0 };
@@ -67,8 +70,8 @@ fn drive(seed: u64, surveyed: bool) -> (LocatedDrive, RunRecord) {
     )
 }
 
-/// Squared error of a pose against its covariance, per dimension, and against the larger
-/// of its principal variances.
+/// Returns the squared error of a pose, normalised by its covariance (per dimension) and by the
+/// larger of its principal variances.
 fn error(pose: &LocatedPose, record: &RunRecord) -> (f64, f64) {
     let number = (pose.estimate.time_s / 0.02).round() as usize;
     let truth = record.steps[number].truth;
@@ -83,7 +86,7 @@ fn error(pose: &LocatedPose, record: &RunRecord) -> (f64, f64) {
 }
 
 #[test]
-fn through_the_gap_and_after_it_as_wrong_as_it_says() {
+fn errors_in_the_gap_and_after_it_are_consistent() {
     let runs = 32;
     // The gap lasts from 24 to 46 s.
     let after_s = [47.0, 50.0, 55.0, 60.0, 65.0];
@@ -95,7 +98,7 @@ fn through_the_gap_and_after_it_as_wrong_as_it_says() {
             matches!(remarks[..], [one] if one.contains("not surveyed from 90.0 to 169.9 m")),
             "{remarks:?}"
         );
-        // The start is known exactly.
+        // The start is known exactly, with a singular covariance.
         for pose in located.poses.iter().skip(50) {
             let (_, square) = error(pose, &record);
             assert!(square < 16.0, "{} s: {square}", pose.estimate.time_s);
@@ -107,7 +110,7 @@ fn through_the_gap_and_after_it_as_wrong_as_it_says() {
             }
         }
     }
-    // Half a χ² of two degrees of freedom has mean and deviation one.
+    // Half of a χ² variable with two degrees of freedom has mean one and standard deviation one.
     for (nees, time_s) in nees.iter().flat_map(|nees| nees.iter().zip(after_s)) {
         let deviation = (nees - 1.0).abs() * (runs as f64).sqrt();
         assert!(deviation < 4.0, "{time_s} s: {nees}");
@@ -115,7 +118,7 @@ fn through_the_gap_and_after_it_as_wrong_as_it_says() {
 }
 
 #[test]
-fn the_guess_taken_for_the_road_leads_astray() {
+fn a_guess_that_is_declared_as_surveyed_gives_inconsistent_errors() {
     for seed in 0..2 {
         let (located, record) = drive(seed, true);
         let squares = located.poses.iter().skip(50).map(|it| error(it, &record).1);

@@ -1,9 +1,9 @@
 //! Protection levels and alarms on simulated drives, nominal and under faults.
 //!
-//! The promises are 1e-3 and 1e-2 of the epochs in state `ok`; the command
-//! `cargo run --release -p simulate --example integrity_table` counts them over millions. Here a
-//! few runs are held to what chance allows for their number: the epochs of a run hang together over
-//! tens of seconds, a run being worth about eight of them.
+//! The specified integrity risks are 1e-3 and 1e-2 of the epochs in state `ok`. The command `cargo
+//! run --release -p simulate --example integrity_table` counts millions of epochs. Here, a few runs
+//! are compared with the statistical limits for their number. The epochs of a run are correlated
+//! over tens of seconds, so that a run has about eight independent epochs.
 
 use crate::common;
 use onboard::localize::IntegrityState;
@@ -35,7 +35,7 @@ fn summaries(scenario: &Scenario, runs: usize) -> Vec<IntegritySummary> {
     common::campaign(scenario, SEED, runs).integrity
 }
 
-/// The yard of a guarded vehicle that listens every 100 ms, and this otherwise.
+/// Returns the yard with integrity monitoring, a reception every 100 ms, and one changed key.
 fn yard_every_100_ms(key: &str, otherwise: Value) -> Scenario {
     let often = value("{ policy = 'fixed', interval_ms = 100.0 }");
     changed(
@@ -48,15 +48,16 @@ fn yard_every_100_ms(key: &str, otherwise: Value) -> Scenario {
     )
 }
 
-/// Most runs of `runs` that may leave the protection level at all where the risk is `risk`: of 8
-/// independent looks in each the expected number, and four deviations of its Poisson spread.
+/// Returns the maximum number of runs with an exceeded protection level for the integrity risk
+/// `risk`: the expected number with 8 independent epochs per run, plus four Poisson standard
+/// deviations.
 fn most_affected(runs: usize, risk: f64) -> usize {
     let expected = 8.0 * runs as f64 * risk;
     (expected + 4.0 * expected.sqrt()).ceil() as usize
 }
 
 #[test]
-fn nominal_drives_are_ok_and_within_their_level() {
+fn nominal_runs_are_ok_and_within_the_protection_level() {
     let runs = 16;
     let summaries = summaries(&scenario(Vec::new()), runs);
     let affected = (summaries.iter())
@@ -64,20 +65,20 @@ fn nominal_drives_are_ok_and_within_their_level() {
         .count();
     assert!(affected <= most_affected(runs, 1e-3), "{affected}");
     let total = IntegritySummary::sum(&summaries);
-    // At departure, until the angles exclude slip: with estimated biases that takes some metres, in which the level may
-    // pass the alert limit more than once.
+    // Some alarms occur at departure, until the angles exclude slip. With estimated biases, this
+    // takes some metres, and the protection level may exceed the alert limit more than once.
     assert!(total.alarms <= 3 * runs, "{}", total.alarms);
     let ok = total.ok as f64 / total.epochs as f64;
     assert!(ok > 0.98, "{ok}");
-    // The median over a run wanders by a third of itself; over n runs by that over √n.
+    // The median ratio of a run varies by a third, and of n runs by a third divided by √n.
     let ratio = total.median_ratio();
     let chance = 4.0 * 0.33 / (runs as f64).sqrt();
     assert!(ratio < 6.0 * (1.0 + chance) && ratio > 3.0, "{ratio}");
 }
 
-/// Noisier angles are no fault of a radio head: the level grows with them.
+/// Noisier angles do not indicate a faulty radio head; the protection level grows.
 #[test]
-fn less_k_than_believed_is_no_fault() {
+fn a_lower_rician_k_than_nominal_is_not_a_fault() {
     let scenario = yard_every_100_ms("truth.site.rician_k_db", value("5.0"));
     let (mut unavailable, mut beyond, mut all) = (0, 0, 0);
     for step in drives(&scenario, SEED, 2).iter().flat_map(|it| &it.steps) {
@@ -91,10 +92,11 @@ fn less_k_than_believed_is_no_fault() {
     assert!(1000 * beyond <= all, "{beyond} of {all}");
 }
 
-/// Reflections make the angles of some radio heads vary thirty times as much as stated: the others are as sound as
-/// before, and the place at hand is not left for one that explains a few angles better.
+/// Reflections multiply the error variance of some radio heads by thirty. The other radio heads
+/// remain valid. The position must not jump to another hypothesis that explains a few angles
+/// better.
 #[test]
-fn reflections_do_not_take_the_vehicle_elsewhere() {
+fn reflections_do_not_move_the_position_to_another_hypothesis() {
     let scenario = yard_every_100_ms("channel", value("{ model = 'inf-sh' }"));
     let errors_m = drives(&scenario, 1, 1);
     let errors_m = (errors_m.iter().flat_map(|it| &it.steps)).map(Step::error_m);
@@ -103,7 +105,7 @@ fn reflections_do_not_take_the_vehicle_elsewhere() {
 }
 
 #[test]
-fn a_moved_radio_head_is_bounded_or_told_in_time() {
+fn a_moved_radio_head_is_bounded_or_reported_in_time() {
     let runs = 8;
     for by_m in [[25.0, 0.0], [3.0, 0.0]] {
         let what = FaultKind::MovedHead {
@@ -127,10 +129,10 @@ fn a_moved_radio_head_is_bounded_or_told_in_time() {
     }
 }
 
-/// The biases of all radio heads explain the angles of an array with a stuck antenna: the level covers the error, or the
-/// state reports it.
+/// The biases of all radio heads explain the angles of an array with a stuck antenna. The
+/// protection level bounds the error, or the state reports it.
 #[test]
-fn an_antenna_that_sticks_is_covered_or_reported() {
+fn a_stuck_antenna_is_bounded_or_reported() {
     let stuck = fault(25.0, 60.0, FaultKind::StuckAntenna { antenna: 1 });
     for record in drives(&scenario(vec![stuck]), SEED, 3) {
         let during = record
@@ -148,9 +150,10 @@ fn an_antenna_that_sticks_is_covered_or_reported() {
     }
 }
 
-/// Two of four at once: nobody can tell which, and the position is carried away.
+/// Two of four radio heads fail simultaneously. The faulty ones cannot be identified, and the
+/// position becomes wrong.
 #[test]
-fn led_astray_it_says_so_and_finds_back() {
+fn a_double_fault_is_reported_and_the_pose_recovers() {
     let wall = |radio_head, bias_rad| {
         let what = FaultKind::NonLineOfSight {
             radio_head,
@@ -165,13 +168,14 @@ fn led_astray_it_says_so_and_finds_back() {
             .filter(|step| step.error_m() > ALERT_LIMIT_M)
             .filter(|step| step.integrity.unwrap().state == IntegrityState::Ok)
             .count();
-        // One second of 50 SSBs is allowed for an alarm.
+        // An alarm may take one second (50 SSBs).
         assert!(
             unsaid <= 50,
             "run {}: {unsaid} SSBs, {worst_m} m",
             record.run
         );
-        // 20 s after the last fault: recovery takes 5 s of peace, twice where a restart is needed.
+        // 20 s after the last fault: recovery takes 5 s without a new detection, and twice as long
+        // with a re-initialisation.
         for step in record.steps.iter().filter(|step| step.time_s > 50.0) {
             let error_m = step.error_m();
             assert!(
@@ -186,11 +190,11 @@ fn led_astray_it_says_so_and_finds_back() {
     }
 }
 
-/// Without a second radio head odometry and road are the only witnesses: what they can vouch for
-/// grows with the distance, once the angles have told that the wheels did not slip as it set off, until
-/// it is told that it is too much.
+/// With a single radio head, only odometry and road can reveal a fault. Once the angles exclude
+/// slip at departure, the protection level grows with the distance until it exceeds the alert
+/// limit.
 #[test]
-fn one_radio_head_is_trusted_as_far_as_odometry_goes() {
+fn one_radio_head_is_trusted_within_the_accuracy_of_odometry() {
     let alone = |faults| Scenario {
         faults,
         ..changed("paper-real-odometry", [("vehicle.integrity", value("{}"))])

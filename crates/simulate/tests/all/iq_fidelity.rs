@@ -1,4 +1,4 @@
-//! `fidelity = "iq"` agrees with `fidelity = "snapshots"`, and its receiver keeps the cells.
+//! `fidelity = "iq"` agrees with `fidelity = "snapshots"`, and its receiver tracks the cells.
 
 use crate::common;
 use std::f64::consts::TAU;
@@ -12,7 +12,7 @@ use toml::Value;
 
 use crate::common::{changed, shipped, value};
 
-/// The paper's drive, 80 m of it, with known pilots, an angle at every SSB.
+/// Returns the first 80 m of the paper's drive with known pilots and an angle at every SSB.
 fn scenario(fidelity: &str, k_db: f64, more: &[(&'static str, Value)]) -> Scenario {
     let mut overrides = vec![
         ("fidelity", Value::from(fidelity)),
@@ -38,7 +38,7 @@ fn drive(scenario: &Scenario, run: u64) -> RunRecord {
     common::run(scenario, 3, run)
 }
 
-/// Error of the electrical angle of one SSB, and the deviation that the receiver states.
+/// Error of the electrical angle of one SSB, and the standard deviation reported by the receiver.
 #[derive(Debug, Clone, Copy)]
 struct Seen {
     driven_m: f64,
@@ -52,7 +52,7 @@ impl Seen {
     }
 }
 
-/// One error per SSB.
+/// Returns one error per SSB.
 fn errors(scenario: &Scenario, record: &RunRecord) -> Vec<Seen> {
     let [x_m, y_m, _] = scenario.site.radio_heads[0].position_m;
     let head = Point::new(x_m, y_m);
@@ -82,8 +82,8 @@ fn mean_square(values: impl ExactSizeIterator<Item = f64>) -> f64 {
 }
 
 #[test]
-fn noise_makes_the_same_angle_errors_in_samples_and_in_snapshots() {
-    // Noise only: every SSB is independent.
+fn noise_gives_equal_angle_errors_with_samples_and_snapshots() {
+    // With noise only, the errors of different SSBs are independent.
     for pilots in ["ssb", "pss+sss", "pss"] {
         let by = |fidelity| {
             let more = [("vehicle.receiver.pilots", Value::from(pilots))];
@@ -97,7 +97,8 @@ fn noise_makes_the_same_angle_errors_in_samples_and_in_snapshots() {
         let sigma = |errors: &[Seen]| mean_square(errors.iter().map(|it| it.sigma_rad));
         let square = |errors: &[Seen]| mean_square(errors.iter().map(|it| it.error_rad));
         let ratio = square(&iq) / square(&snapshots);
-        // The variance of n Gaussian errors has a relative deviation of √(2/n); four of the ratio's.
+        // The variance of n Gaussian errors has a relative standard deviation of √(2/n). The limit
+        // is four standard deviations of the ratio.
         let bound = 4.0 * (4.0 / iq.len() as f64).sqrt();
         let sigmas = (sigma(&iq) / sigma(&snapshots)).sqrt();
         println!(
@@ -105,8 +106,8 @@ fn noise_makes_the_same_angle_errors_in_samples_and_in_snapshots() {
             iq.len()
         );
         assert!((ratio - 1.0).abs() < bound, "{pilots}: {ratio}");
-        // Each knows its own deviation, and the two state the same: what the converter and the
-        // timing cost is far below 2 %.
+        // Each variance matches the reported one, and both reported ones are equal, because the
+        // converter and the timing change them by less than 2 %.
         for squares in [relative(&snapshots), relative(&iq)] {
             assert!((squares - 1.0).abs() < 0.05 + bound, "{pilots}: {squares}");
         }
@@ -115,8 +116,9 @@ fn noise_makes_the_same_angle_errors_in_samples_and_in_snapshots() {
 }
 
 #[test]
-fn scatter_makes_the_same_angle_errors_in_samples_and_in_snapshots() {
-    // Scatter of 10 dB, the same in both by its random streams: SSB by SSB the errors are alike.
+fn scatter_gives_equal_angle_errors_with_samples_and_snapshots() {
+    // Rician K of 10 dB. Both fidelities use the same random streams, so that the errors of each
+    // SSB are similar.
     let strong = [("site.radio_heads[0].eirp_dbm", Value::from(20.0))];
     let of = |fidelity| {
         let scenario = scenario(fidelity, 10.0, &strong);
@@ -133,12 +135,12 @@ fn scatter_makes_the_same_angle_errors_in_samples_and_in_snapshots() {
         difference.sqrt()
     );
     assert!((ratio - 1.0).abs() < 0.1, "{ratio}");
-    // An SSB is not an instant: the vehicle moves on by a hundredth of a wavelength during it.
+    // The vehicle moves by a hundredth of a wavelength during an SSB.
     assert!(difference < 0.02 * expected);
 }
 
 #[test]
-fn scatter_with_a_delay_spread_is_averaged_over_the_band_and_owned_up_to() {
+fn scatter_with_a_delay_spread_is_averaged_over_the_band_and_included_in_sigma() {
     let (k_db, spread_s, bandwidth_hz) = (5.0, 300e-9, 240.0 * 30e3);
     let of = |spread_ns: f64| {
         let more = [
@@ -149,7 +151,7 @@ fn scatter_with_a_delay_spread_is_averaged_over_the_band_and_owned_up_to() {
         ];
         let scenario = scenario("iq", k_db, &more);
         let mut all = errors(&scenario, &drive(&scenario, 1));
-        // A wavelength apart, scatter is independent.
+        // Scatter is independent at a distance of one wavelength.
         let mut last_m = f64::NEG_INFINITY;
         all.retain(|error| {
             let far = error.driven_m >= last_m + scenario.site.wavelength_m();
@@ -160,8 +162,9 @@ fn scatter_with_a_delay_spread_is_averaged_over_the_band_and_owned_up_to() {
     };
     let (flat, spread) = (of(0.0), of(1e9 * spread_s));
     let square = |errors: &[Seen]| mean_square(errors.iter().map(|it| it.error_rad));
-    // What scatter leaves of a flat channel, 1/(2 K A) with A = N(N² − 1)/12, and of its plain sum
-    // over the band: the mean of 1/(1 + j2πfτ) over the differences f of all frequencies.
+    // Error variance due to scatter in a flat channel: 1/(2 K A) with A = N(N² − 1)/12. For a plain
+    // sum over the band, it is multiplied by the mean of 1/(1 + j2πfτ) over all frequency
+    // differences f.
     let once = 1.0 / (2.0 * 10f64.powf(0.1 * k_db) * 5.0);
     let x = TAU * bandwidth_hz * spread_s;
     let plain = once * (2.0 * x.atan() / x - (1.0 + x * x).ln() / (x * x));
@@ -173,7 +176,8 @@ fn scatter_with_a_delay_spread_is_averaged_over_the_band_and_owned_up_to() {
         square(&spread).sqrt(),
         plain.sqrt(),
     );
-    // The mean square of n Gaussian errors has a relative deviation of √(2/n); four of them.
+    // The mean square of n Gaussian errors has a relative standard deviation of √(2/n). The limit
+    // is four of them.
     let bound = 4.0 * (2.0 / spread.len() as f64).sqrt();
     assert!(square(&flat) > once * (1.0 - bound));
     assert!(square(&spread) < plain);
@@ -181,7 +185,7 @@ fn scatter_with_a_delay_spread_is_averaged_over_the_band_and_owned_up_to() {
 }
 
 #[test]
-fn faults_act_on_samples_as_on_snapshots() {
+fn faults_have_equal_effects_on_samples_and_snapshots() {
     let fault = |what: &str| {
         value(&format!(
             "[{{ from_s = 0.0, until_s = 1e3, what = {what} }}]"
@@ -209,14 +213,14 @@ fn faults_act_on_samples_as_on_snapshots() {
         );
         let rms = |errors: &[f64]| mean_square(errors.iter().copied()).sqrt();
         println!("{what}: RMS {:.3} and {:.3} rad", rms(&snapshots), rms(&iq));
-        // Without a fault noise alone is left, some thousandths.
+        // Without the fault, the noise alone gives some thousandths.
         assert!(rms(&iq) > 0.05, "{what}");
         assert!((rms(&iq) / rms(&snapshots) - 1.0).abs() < 0.05, "{what}");
     }
 }
 
 #[test]
-fn several_cells_blind_snapshots_and_bad_hardware_are_survived() {
+fn several_cells_with_blind_snapshots_and_poor_hardware_are_located() {
     let two = value(
         "[{ position_m = [205.0, 100.0, 0.0], pci = 1, eirp_dbm = 10.0 }, \
          { position_m = [40.0, -60.0, 0.0], pci = 400, ssb_index = 3, eirp_dbm = 10.0 }]",
@@ -247,7 +251,7 @@ fn several_cells_blind_snapshots_and_bad_hardware_are_survived() {
 }
 
 #[test]
-fn samples_repeat_to_the_last_bit_and_differ_by_run() {
+fn samples_are_reproducible_and_differ_between_runs() {
     let scenario = scenario("iq", 20.0, &[]);
     let (a, b, c) = (
         drive(&scenario, 1),
@@ -259,14 +263,14 @@ fn samples_repeat_to_the_last_bit_and_differ_by_run() {
 }
 
 #[test]
-fn what_cannot_be_sent_as_samples_is_refused() {
+fn unsupported_samples_are_rejected() {
     let scenario = shipped("paper");
     for (key, value) in [
         ("site.ssb.subcarrier_spacing_khz", Value::from(120.0)),
         ("site.radio_heads[0].ssb_index", Value::from(8)),
         ("iq.adc_bits", Value::from(0)),
         ("iq.oscillator_ppm", Value::from(1000.0)),
-        // More than a quarter of the cyclic prefix.
+        // The delay spread exceeds a quarter of the cyclic prefix.
         ("channel.delay_spread_ns", Value::from(1200.0)),
     ] {
         let overrides = [("fidelity", Value::from("iq")), (key, value)];

@@ -1,4 +1,4 @@
-//! SSBs that arrive after newer odometry: on a vehicle always.
+//! SSBs that arrive after newer odometry, which is the normal case on a vehicle.
 
 use crate::common;
 use onboard::geometry::Pose;
@@ -15,10 +15,10 @@ use toml::Value;
 use crate::common::{Burst, changed, shipped, simulation, unguarded, value};
 use crate::counting::allocations;
 
-/// When the last SSB is sent before the end of a drive, in seconds.
+/// Time from the last SSB to the end of a drive in seconds.
 const SILENCE_S: f64 = 1.0;
 
-/// The beginning of a drive, with an angle to every radio head in every burst.
+/// Beginning of a drive with an angle to every radio head in every burst.
 struct Drive {
     scenario: Scenario,
     until_s: f64,
@@ -53,7 +53,7 @@ impl Drive {
         Onboard::new(site, vehicle, platform, self.start, Custom::default()).unwrap()
     }
 
-    /// What comes in, in order: at equal times odometry before bursts.
+    /// Returns the inputs in order of arrival. At equal times, odometry precedes bursts.
     fn arrivals(&self, lateness_s: impl Fn(usize) -> f64) -> Vec<Arrival<'_>> {
         let odometry = self.odometry.iter();
         let odometry = odometry.map(|it| (it.time_s, Arrival::Odometry(it)));
@@ -66,7 +66,7 @@ impl Drive {
         all.into_iter().map(|(_, arrival)| arrival).collect()
     }
 
-    /// The poses at all odometry from the arrival of the last SSB on.
+    /// Returns the poses at all odometry samples after the arrival of the last SSB.
     fn poses(&self, lateness_s: impl Fn(usize) -> f64) -> Vec<PoseEstimate> {
         let mut onboard = self.onboard();
         let mut poses = Vec::new();
@@ -88,7 +88,7 @@ enum Arrival<'a> {
     Burst(&'a [LoggedAngle]),
 }
 
-/// Number of angles accepted.
+/// Processes an input and returns the number of accepted angles.
 fn take(onboard: &mut Onboard, arrival: &Arrival<'_>) -> usize {
     match arrival {
         Arrival::Odometry(sample) => {
@@ -132,7 +132,7 @@ fn assert_same(found: &[PoseEstimate], expected: &[PoseEstimate], what: &str) {
 
 fn drives() -> Vec<Drive> {
     let mut guarded = changed("yard", [("vehicle.integrity", value("{}"))]);
-    // A radio head that is found faulty, and trusted again.
+    // A radio head that is found faulty and later valid again.
     guarded.faults = shipped("nlos-and-faults").faults;
     guarded.faults.truncate(1);
     guarded.faults[0].from_s = 3.0;
@@ -149,11 +149,11 @@ fn drives() -> Vec<Drive> {
 }
 
 #[test]
-fn late_ssbs_leave_the_pose_that_they_would_have_left_in_time() {
+fn late_ssbs_give_the_same_final_pose_as_punctual_ones() {
     for mut drive in drives() {
         let name = drive.scenario.name.clone();
         for odometry_every in [1, 5] {
-            // At 50 Hz, as often as SSBs come, and at 10 Hz.
+            // Odometry at 50 Hz, the rate of the SSBs, and at 10 Hz.
             let mut number = 0;
             drive.odometry.retain(|_| {
                 number += 1;
@@ -173,7 +173,7 @@ fn late_ssbs_leave_the_pose_that_they_would_have_left_in_time() {
 }
 
 #[test]
-fn what_is_older_than_the_history_is_too_late_and_changes_nothing() {
+fn ssbs_older_than_the_buffer_are_too_late_and_change_nothing() {
     for drive in drives() {
         let mut onboard = drive.onboard();
         let mut late = Vec::new();
@@ -198,7 +198,7 @@ fn what_is_older_than_the_history_is_too_late_and_changes_nothing() {
 }
 
 #[test]
-fn late_ssbs_cost_no_allocation_once_warm() {
+fn late_ssbs_allocate_nothing_after_initialisation() {
     for drive in drives() {
         let mut onboard = drive.onboard();
         let arrivals = drive.arrivals(|number| [0.03, 0.1, 0.4][number % 3]);
@@ -217,7 +217,7 @@ fn late_ssbs_cost_no_allocation_once_warm() {
     }
 }
 
-/// Takes every angle of the bursts sent up to a time.
+/// Policy that estimates every angle of the bursts sent up to a given time.
 struct Until(f64);
 
 impl WakeUpPolicy for Until {
@@ -237,7 +237,7 @@ impl WakeUpPolicy for Until {
 }
 
 #[test]
-fn a_drive_whose_ssbs_are_all_late_ends_where_it_would() {
+fn a_drive_with_only_late_ssbs_ends_at_the_same_pose() {
     for name in ["paper-real-odometry-2", "paper"] {
         let drive = |latency_ms: f64| -> RunRecord {
             let scenario = changed(name, [("ssb_latency_ms", Value::from(latency_ms))]);
@@ -266,7 +266,7 @@ fn a_drive_whose_ssbs_are_all_late_ends_where_it_would() {
             };
             let what = format!("{name}, {latency_ms} ms");
             assert_same(&estimates(&late), &estimates(&in_time), &what);
-            // Meanwhile it knows less.
+            // Before the SSBs arrive, the estimate differs.
             assert_ne!(late.steps[1000].estimate, in_time.steps[1000].estimate);
         }
     }

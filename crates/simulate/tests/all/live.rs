@@ -1,4 +1,4 @@
-//! A drive that is fed to the vehicle as it comes.
+//! Drives whose data are processed as they arrive.
 
 use std::path::Path;
 
@@ -19,7 +19,7 @@ use crate::counting::allocations;
 
 const RATE_HZ: f64 = 3.84e6;
 
-/// A drive whose samples are all there.
+/// Recorded drive with all samples.
 struct Recorded {
     site: Site,
     vehicle: Vehicle,
@@ -29,7 +29,7 @@ struct Recorded {
     centre_hz: f64,
 }
 
-/// By one clock: of a log two are searched for.
+/// Returns a scenario without a time offset, because the replay of a log searches for one.
 fn scenario() -> Scenario {
     changed(
         "paper-real-odometry-2",
@@ -93,7 +93,7 @@ fn slices(samples: &[Vec<Complex32>], from: usize, to: usize) -> Vec<&[Complex32
         .collect()
 }
 
-/// Drives with blocks of this length; the odometry up to a block's end comes before it.
+/// Processes blocks of the given length. Odometry up to the end of a block precedes the block.
 fn drive(
     live: &mut Live,
     odometry: &OdometryLog,
@@ -124,7 +124,7 @@ fn drive(
 }
 
 #[test]
-fn samples_as_they_come_make_the_poses_of_the_recording() {
+fn live_samples_give_the_poses_of_the_recording() {
     let mut recorded = record(&common::scratch("live"), 2.0);
     let (site, vehicle) = (&recorded.site, &recorded.vehicle);
     let (start, odometry) = (StartChoice::AsSet, &recorded.odometry);
@@ -158,12 +158,12 @@ fn samples_as_they_come_make_the_poses_of_the_recording() {
 }
 
 #[test]
-fn angles_as_they_come_make_the_poses_of_the_log() {
+fn live_angles_give_the_poses_of_the_log() {
     let scenario = shipped("paper-real-odometry-4");
     let (odometry, angles, _) = logs(&scenario, 3);
     let (site, mut vehicle) = (scenario.site.clone(), scenario.vehicle.clone());
     vehicle.wake_up = Some(WakeUpSettings::EVERY_SSB);
-    // Of a log two clocks are searched for.
+    // The replay of a log searches for a time offset; disable this.
     vehicle.receiver.lateness_std_s = Some(0.0);
     vehicle.start.pose = Some(
         scenario
@@ -197,7 +197,7 @@ fn angles_as_they_come_make_the_poses_of_the_log() {
 }
 
 #[test]
-fn under_way_nothing_is_allocated() {
+fn live_processing_allocates_nothing_after_initialisation() {
     let mut recorded = record(&common::scratch("live-allocation"), 1.2);
     let samples = recorded.samples();
     let mut live = recorded.live();
@@ -232,7 +232,7 @@ fn under_way_nothing_is_allocated() {
 }
 
 #[test]
-fn what_is_refused_changes_nothing() {
+fn rejected_inputs_change_nothing() {
     let mut recorded = record(&common::scratch("live-refusals"), 0.2);
     let samples = recorded.samples();
     let mut live = recorded.live();
@@ -287,7 +287,7 @@ fn what_is_refused_changes_nothing() {
 }
 
 #[test]
-fn a_pose_can_be_given_and_forgotten_and_cells_left_out() {
+fn a_pose_can_be_set_and_cleared_and_cells_can_be_excluded() {
     let mut recorded = record(&common::scratch("live-given"), 0.6);
     let samples = recorded.samples();
     let mut live = recorded.live();
@@ -321,8 +321,9 @@ fn a_pose_can_be_given_and_forgotten_and_cells_left_out() {
     assert_eq!(live.next_wake_up_s(0.0).unwrap(), 0.0);
 }
 
-/// Feeds samples as a radio that sleeps between the wanted bursts would, a millisecond at a time; `lost` samples are
-/// missing from number `from` on and not counted. Returns the times of the bursts that were received.
+/// Feeds samples like a radio that is off between the required bursts, one millisecond at a time.
+/// From sample number `from` on, `lost` samples are missing and not counted. Returns the times of
+/// the received bursts.
 fn drive_asleep(
     live: &mut Live,
     odometry: &OdometryLog,
@@ -384,7 +385,8 @@ fn windows_without_an_ssb_open_the_receiver_and_windows_follow_missing_samples()
         ..FixedSettings::default()
     }));
     let samples = recorded.samples();
-    // 0.3 s in, samples of 7.3 ms are missing: windows placed by the last SSB miss all that follow.
+    // At 0.3 s, samples of 7.3 ms are missing. Windows placed relative to the last SSB miss all
+    // following SSBs.
     let (from, lost) = ((0.3 * RATE_HZ) as usize, (7.3e-3 * RATE_HZ) as usize);
     for (resumes, most_s) in [(false, 1.25), (true, 0.2)] {
         let mut live = recorded.live();
@@ -397,7 +399,8 @@ fn windows_without_an_ssb_open_the_receiver_and_windows_follow_missing_samples()
         );
         let after = received.iter().copied().find(|it| *it > 0.31).unwrap();
         assert!(after < 0.3 + most_s, "{after}");
-        // From then on it sleeps again, and every window holds its SSBs: two each 80 ms.
+        // After re-acquisition, the receiver sleeps again and every window contains its SSBs: two
+        // per 80 ms.
         let later = received.iter().filter(|it| **it > after + 0.1).count();
         let expected = 2.0 * (3.0 - after - 0.1) / 0.08;
         assert!(

@@ -1,4 +1,4 @@
-//! From a scenario to a recorded drive and back to where the vehicle was.
+//! Recording of a simulated drive and localization from the recording.
 
 use crate::common;
 use std::path::Path;
@@ -42,14 +42,14 @@ fn scenario() -> Scenario {
     )
 }
 
-/// Site and vehicle as they were written beside a drive.
+/// Reads the site and vehicle files of a recorded drive.
 fn believed(dir: &Path) -> (Site, Vehicle) {
     let path = |name: &str| dir.join(name).display().to_string();
     let site = load(&path("site.toml")).unwrap();
     (site, load(&path("vehicle.toml")).unwrap())
 }
 
-/// Locates recorded samples from where the vehicle's file says that the drive begins.
+/// Locates recorded samples from the start in the vehicle file.
 fn locate(
     (site, vehicle): &(Site, Vehicle),
     odometry: &OdometryLog,
@@ -59,7 +59,7 @@ fn locate(
     locate_recording(site, vehicle, start, odometry, recording, 0.0, false)
 }
 
-/// Root mean square of the horizontal error in metres.
+/// Returns the RMS horizontal error in metres.
 fn rms_error_m(drive: &LocatedDrive, truth: &Path) -> f64 {
     let truth = read_tum(truth).unwrap();
     let squares: Vec<f64> = truth
@@ -92,7 +92,7 @@ fn a_recorded_drive_is_located() {
 
     let drive = locate(&believed, &odometry, &mut recording).unwrap();
     assert_eq!(drive.poses.len(), odometry.samples.len());
-    // Two heads; what the acquisition of the second costs is a burst or two.
+    // Two radio heads; the acquisition of the second takes one or two bursts.
     assert!(
         drive.executions.len() + 5 > 2 * made.bursts,
         "{}",
@@ -106,7 +106,7 @@ fn a_recorded_drive_is_located() {
     assert!(accepted * 100 > drive.executions.len() * 98);
     let from_samples_m = rms_error_m(&drive, &dir.join("truth.tum"));
 
-    // The same by way of an angle log, with an angle from a cell that the site does not know.
+    // Repeat with an angle log that contains an angle of an unknown cell.
     let mut angles: Vec<LoggedAngle> = drive
         .executions
         .iter()
@@ -118,12 +118,12 @@ fn a_recorded_drive_is_located() {
     let mut stranger = angles[20];
     stranger.ssb.pci = 999;
     angles.insert(20, stranger);
-    // And one that comes a second late.
+    // Add an angle that arrives one second late.
     angles.insert(100, angles[4]);
     let file = dir.join("angles.csv");
     write_angle_log(&file, &angles).unwrap();
     let angles = read_angle_log(&file).unwrap();
-    // The recording defines its own times, a log does not.
+    // A recording has one clock, but the replay of a log searches for a time offset; disable this.
     let (site, mut vehicle) = believed.clone();
     vehicle.receiver.lateness_std_s = Some(0.0);
     let (site, vehicle) = (&site, &vehicle);
@@ -141,7 +141,7 @@ fn a_recorded_drive_is_located() {
 }
 
 #[test]
-fn a_recording_without_gaps_is_scanned_and_located_alike() {
+fn a_continuous_recording_is_scanned_and_located_equally() {
     let settings = SynthSettings {
         duration_s: Some(0.5),
         continuous: true,
@@ -175,7 +175,7 @@ fn a_recording_without_gaps_is_scanned_and_located_alike() {
 }
 
 #[test]
-fn what_does_not_fit_together_is_refused() {
+fn incompatible_inputs_are_rejected() {
     let dir = common::scratch("misfit-drive");
     let settings = SynthSettings {
         duration_s: Some(0.1),
@@ -207,7 +207,7 @@ fn what_does_not_fit_together_is_refused() {
     far.site.ssb.subcarrier_spacing_khz = 120.0;
     assert!(synthesize(&far, &settings, &dir, &mut |_| true).is_err());
 
-    // One radio head leaves several places open.
+    // With one radio head, several positions are possible.
     let (mut site, mut vehicle) = believed;
     vehicle.start.pose = None;
     site.radio_heads.truncate(1);

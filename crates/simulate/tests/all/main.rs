@@ -1,4 +1,4 @@
-//! Simulated drives, from outside.
+//! Tests of simulated drives through the public interface.
 #![allow(
     clippy::expect_used,
     clippy::print_stdout,

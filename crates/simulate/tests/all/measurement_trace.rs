@@ -1,4 +1,4 @@
-//! Drives from trace are the drives themselves, to the last bit.
+//! Measurement traces reproduce drives bit by bit.
 
 use onboard::settings::{EstimatorMethod, TomlFile};
 use recording::Files;
@@ -31,7 +31,7 @@ fn record(simulation: &Simulation, methods: &[EstimatorMethod]) -> MeasurementTr
 }
 
 #[test]
-fn every_policy_and_method_drives_as_by_itself() {
+fn every_policy_and_method_gives_the_record_of_its_own_drive() {
     let methods = [EstimatorMethod::Music, EstimatorMethod::Esprit];
     let traces = record(&simulation("paper", &[]), &methods);
     let tracker = ("vehicle.localizer.kind", Value::from("tracker"));
@@ -54,11 +54,11 @@ fn every_policy_and_method_drives_as_by_itself() {
 }
 
 #[test]
-fn several_radio_heads_and_faults_too() {
+fn traces_support_several_radio_heads_and_faults() {
     let overrides = [("vehicle.receiver.snr_noise_db", Value::from(0.0))];
     let whole = simulation("nlos-and-faults", &overrides);
     let methods = [EstimatorMethod::MaximumLikelihood];
-    // The fault of an antenna is found by the channels, which a trace does not have.
+    // An antenna fault is detected from the receive channels, which a trace does not contain.
     assert!(
         MeasurementTraces::record(&whole, &methods, &options())
             .unwrap()
@@ -74,7 +74,7 @@ fn several_radio_heads_and_faults_too() {
 }
 
 #[test]
-fn another_world_is_not_on_the_tape() {
+fn traces_are_invalid_for_another_environment() {
     let traces = record(&simulation("paper", &[]), &[EstimatorMethod::Music]);
     for (key, value) in [
         ("site.rician_k_db", Value::from(7.0)),
@@ -89,7 +89,7 @@ fn another_world_is_not_on_the_tape() {
         let other = simulation("paper", &[(key, value)]);
         assert!(!traces.serve(&other), "{key}");
     }
-    // What is believed of the radiated power is not the power.
+    // The nominal transmit power may differ if the true power is equal.
     let believed = [
         ("site.radio_heads[0].eirp_dbm", Value::from(-10.0)),
         (
@@ -101,7 +101,7 @@ fn another_world_is_not_on_the_tape() {
 }
 
 #[test]
-fn where_it_matters_when_the_vehicle_listens_there_is_no_tape() {
+fn receptions_that_depend_on_each_other_have_no_traces() {
     for (key, value) in [
         ("ssb_latency_ms", Value::from(30.0)),
         ("vehicle.receiver.snr_noise_db", Value::from(1.0)),

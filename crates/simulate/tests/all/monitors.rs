@@ -1,4 +1,4 @@
-//! Faults that the monitors identify, on simulated runs.
+//! Detection of faults by the monitors in simulated runs.
 
 use onboard::localize::IntegrityState;
 use onboard::monitor::Fault;
@@ -10,7 +10,7 @@ use crate::common::{drives, shipped};
 const FROM_S: f64 = 20.0;
 const UNTIL_S: f64 = 30.0;
 
-/// The yard with a fault.
+/// Returns the yard with a fault.
 fn with(what: FaultKind) -> Scenario {
     let fault = FaultSettings {
         from_s: FROM_S,
@@ -32,7 +32,7 @@ fn is_beyond(step: &Step) -> bool {
     is_ok(step) && level_m.is_some_and(|level_m| step.error_m() > level_m)
 }
 
-/// Steps with a fault, before and during the simulated one.
+/// Returns the steps with a reported fault, before and during the simulated one.
 fn faulty(run: &RunRecord) -> [Vec<&Step>; 2] {
     let is_faulty = |it: &&Step| !it.faults.is_empty() && it.time_s < UNTIL_S;
     let (before, during) = run
@@ -70,7 +70,7 @@ fn faults_of_the_odometry_are_detected_within_two_seconds_and_end() {
                 "{what:?}: ok beyond the level at {beyond} SSBs of 20 ms"
             );
             assert!(near.filter(|it| !it.faults.is_empty()).all(|it| !is_ok(it)));
-            // The pose is found again, and its level covers the error.
+            // The pose recovers, and its protection level bounds the error.
             let after = |it: &&Step| it.time_s > UNTIL_S + 5.0 && it.time_s < UNTIL_S + 15.0;
             for step in run.steps.iter().filter(after) {
                 assert!(step.faults.is_empty(), "{what:?}: {:?}", step.faults);
@@ -81,10 +81,11 @@ fn faults_of_the_odometry_are_detected_within_two_seconds_and_end() {
     }
 }
 
-/// A vehicle that departs while its odometry says that it stands: no sample shows it.
+/// The vehicle departs while the odometry reports standstill, so that odometry alone does not
+/// reveal the fault.
 #[test]
 fn a_departure_that_the_odometry_misses_is_detected_by_the_angles() {
-    // At 42.3 s the yard's vehicle has stopped for 8 s.
+    // At 42.3 s the yard's vehicle has been stopped for 8 s.
     let nominal = drives(&shipped("yard"), 5, 1).remove(0);
     let moves = |pair: &[Step]| pair[0].truth.point().distance_m(pair[1].truth.point()) > 0.0;
     let stop = nominal
@@ -112,7 +113,7 @@ fn a_departure_that_the_odometry_misses_is_detected_by_the_angles() {
             "{:?}",
             first.faults
         );
-        // It accelerates with 0.5 m/s², at 50 m and more from the radio heads.
+        // The vehicle accelerates with 0.5 m/s² at 50 m or more from the radio heads.
         let moved_m = nominal.steps[leaves]
             .truth
             .point()

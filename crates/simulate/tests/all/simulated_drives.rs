@@ -1,5 +1,4 @@
-//! Whole simulated drives: what they cost, that they repeat to the bit, and that the user's own code
-//! takes part in them.
+//! Complete simulated drives: cost, reproducibility and custom code.
 
 use crate::common;
 use std::f64::consts::PI;
@@ -49,7 +48,7 @@ fn fixed(method: &str, interval_ms: f64) -> Vec<(&'static str, Value)> {
 }
 
 #[test]
-fn same_bytes_whatever_the_threads() {
+fn results_do_not_depend_on_the_number_of_threads() {
     let simulation = simulation(&[
         ("vehicle.lane_keeping.rms_m", 0.1.into()),
         ("vehicle.odometer.scale_std", 0.003.into()),
@@ -58,21 +57,21 @@ fn same_bytes_whatever_the_threads() {
     ]);
     let one = campaign(&simulation, 18, 1);
     let two = campaign(&simulation, 18, 2);
-    // NaN-free by construction, so equality is equality of bits but for the sign of zero.
+    // The results contain no NaN, so that equality means equal bits apart from the sign of zero.
     assert_eq!(one, two);
     let other = simulation.run(8, 0, NONE).unwrap();
     assert_ne!(one.records[0], other);
 }
 
 #[test]
-fn adding_runs_keeps_the_ones_before() {
+fn additional_runs_do_not_change_earlier_ones() {
     let simulation = simulation(&[]);
     let (few, more) = (campaign(&simulation, 2, 1), campaign(&simulation, 5, 2));
     assert_eq!(few.records[..], more.records[..2]);
 }
 
 #[test]
-fn policies_meet_the_same_radio_channel() {
+fn all_policies_see_the_same_radio_channel() {
     let every = simulation(&fixed("music", 20.0)).run(3, 0, NONE).unwrap();
     let fourth = simulation(&fixed("music", 80.0)).run(3, 0, NONE).unwrap();
     let mut compared = 0;
@@ -86,9 +85,9 @@ fn policies_meet_the_same_radio_channel() {
 }
 
 #[test]
-fn the_papers_trip() {
-    // Means of |error| over n runs scatter by about 0.75/√n of themselves: 0.12 here, three times
-    // that is allowed below.
+fn trip_of_the_paper_has_the_errors_of_the_paper() {
+    // The mean of |error| over n runs has a relative standard deviation of about 0.75/√n: 0.12
+    // here. The limits are three times as large.
     let runs = 40;
     let theoretical = campaign(&simulation(&fixed("music", 20.0)), runs, 2);
     let esprit = campaign(&simulation(&fixed("esprit", 20.0)), runs, 2);
@@ -107,9 +106,9 @@ fn the_papers_trip() {
 }
 
 #[test]
-fn a_standing_vehicle_stays_where_it_is() {
+fn a_standing_vehicle_keeps_its_position() {
     let record = common::run(&shipped("paper-stop-and-go"), 1, 0);
-    // It stops at 90 m, 90/(25/6) s and one ramp of 25/3 s after the start, for 8 s.
+    // The vehicle stops at 90 m, 90/(25/6) s plus one ramp of 25/3 s after the start, for 8 s.
     let stop_s = 90.0 / (25.0 / 6.0) + 25.0 / 3.0;
     let standing: Vec<_> = record
         .steps
@@ -143,7 +142,7 @@ impl AngleEstimator for Sideways {
     }
 }
 
-/// In order at the start of the drive, and never again.
+/// Policy that works at the start of the drive only.
 struct Failing;
 
 impl WakeUpPolicy for Failing {
@@ -166,7 +165,7 @@ impl WakeUpPolicy for Failing {
 }
 
 #[test]
-fn own_estimators_and_policies_take_part() {
+fn custom_estimators_and_policies_are_used() {
     let simulation = simulation(&[]);
     let sideways = |_| {
         Ok(Custom {
@@ -193,7 +192,7 @@ fn own_estimators_and_policies_take_part() {
 }
 
 #[test]
-fn the_caller_can_stop() {
+fn the_caller_can_stop_a_campaign() {
     let options = CampaignOptions {
         seed: 1,
         runs: 1000,

@@ -1,4 +1,4 @@
-//! The smoother on simulated drives: better than the filter, and as good as it says.
+//! The smoother on simulated drives is more accurate than the filter and consistent.
 
 use onboard::localize::PoseEstimate;
 use recording::replay::{LocatedDrive, StartChoice, locate_angles};
@@ -9,7 +9,7 @@ use toml::Value;
 
 use crate::common::{changed, logs, unguarded, value};
 
-/// Locates a run of a scenario, from its true start where that is known.
+/// Locates a run of a scenario, from its true start if the start is known.
 fn locate(
     scenario: &Scenario,
     (odometry, angles, record): &(OdometryLog, AngleLog, RunRecord),
@@ -24,7 +24,7 @@ fn locate(
     locate_angles(site, vehicle, start, odometry, angles, smooth).unwrap()
 }
 
-/// Located and smoothed drives of a scenario, beside their truths.
+/// Returns located and smoothed drives of a scenario with their truths.
 fn drives(scenario: &Scenario, runs: u64) -> Vec<(LocatedDrive, Vec<Step>)> {
     (0..runs)
         .map(|seed| {
@@ -48,7 +48,7 @@ fn variance_m2(estimate: &PoseEstimate) -> f64 {
     estimate.principal_variances().iter().sum()
 }
 
-/// Normalised squared error of the position.
+/// Returns the normalised squared error of the position (NEES).
 fn nees(estimate: &PoseEstimate, truth: &Step) -> f64 {
     let (dx, dy) = (
         estimate.pose.x_m - truth.truth.x_m,
@@ -59,11 +59,12 @@ fn nees(estimate: &PoseEstimate, truth: &Step) -> f64 {
 }
 
 #[test]
-fn smoothed_drives_are_better_and_as_good_as_they_say() {
+fn smoothed_drives_are_more_accurate_and_consistent() {
     let runs = 30;
     for name in ["paper-real-odometry", "paper-real-odometry-2"] {
         let drives = drives(&unguarded(name), runs);
-        // Mean over a drive of what smoothing takes off the squared error, and ought to.
+        // Mean over a drive of the reduction of the squared error by smoothing, actual and
+        // predicted.
         let (mut gained, mut promised, mut filtered, mut smoothed) = (vec![], 0.0, 0.0, 0.0);
         for (drive, truths) in &drives {
             let mut gain = 0.0;
@@ -88,12 +89,13 @@ fn smoothed_drives_are_better_and_as_good_as_they_say() {
             (smoothed / epochs).sqrt(),
             promised / epochs,
         );
-        // The mean over drives, each paired with itself, is above zero, and what was promised.
+        // The mean over drives of the paired difference is above zero and equals the predicted
+        // reduction.
         assert!(mean > 0.0 && mean > 2.0 * error);
         assert!((mean - promised / epochs).abs() < 4.0 * error);
 
-        // NEES at times a tenth of the drive apart: χ² with two degrees of freedom for each run,
-        // within its band of 99.9 % (Wilson and Hilferty), with nine such times 99 % in all.
+        // NEES at times a tenth of the drive apart: χ² with two degrees of freedom per run, within
+        // its 99.9 % interval (Wilson and Hilferty). With nine times, the joint level is 99 %.
         let freedom = 2.0 * runs as f64;
         let spread = 2.0 / (9.0 * freedom);
         let [low, high] = [-3.29, 3.29].map(|z: f64| (1.0 - spread + z * spread.sqrt()).powi(3));
@@ -108,10 +110,10 @@ fn smoothed_drives_are_better_and_as_good_as_they_say() {
 }
 
 #[test]
-fn the_last_pose_is_the_filters() {
+fn the_last_smoothed_pose_equals_the_filtered_pose() {
     let yaw = value("{ noise_rad_per_sqrt_s = 1e-3 }");
-    // What a guard tells covers what may be otherwise, too: as good as nothing, what is hardly probable at this drive's
-    // end, and an odometer that may be noisier.
+    // The covariance with integrity monitoring also includes alternative hypotheses. Here they are
+    // excluded, or improbable at the end of this drive: biases, outliers and a noisier odometer.
     let sure = [
         ("vehicle.array.mounting_std_rad", 0.0.into()),
         ("vehicle.array.phase_std_rad", 0.0.into()),
@@ -150,7 +152,7 @@ fn the_last_pose_is_the_filters() {
 }
 
 #[test]
-fn a_drive_that_was_found_is_smoothed_from_there() {
+fn a_drive_with_an_unknown_start_is_smoothed_after_initialisation() {
     let unknown = [("vehicle.start.known", false.into())];
     let scenario = changed("paper-real-odometry-2", unknown);
     let drive = locate(&scenario, &logs(&scenario, 1), true);

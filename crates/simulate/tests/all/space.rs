@@ -1,4 +1,4 @@
-//! Radio heads high up and an array off the odometer's point: the tracker sees them where they are.
+//! Elevated radio heads and an array with a lever arm: the tracker models their geometry.
 
 use onboard::settings::{Shipped, TomlFile};
 use simulate::Consistency;
@@ -7,7 +7,8 @@ use toml::Value;
 
 use crate::common::{campaign, changed, unguarded, value};
 
-/// Heads 8 m high, and an array 1.2 m up and 0.8 m before the odometer's point.
+/// Radio heads at a height of 8 m, and an array 1.2 m above and 0.8 m in front of the odometer's
+/// reference point.
 fn high() -> Scenario {
     let mut changes: Vec<(String, Value)> = Vec::new();
     for (index, head) in unguarded("paper-real-odometry-4")
@@ -37,12 +38,12 @@ fn drive(scenario: &Scenario) -> Consistency {
 }
 
 #[test]
-fn heights_and_lever_arm_are_believed_as_they_are() {
+fn heights_and_lever_arm_are_modelled() {
     let high = high();
     let found = drive(&high);
     assert!((0.8..1.2).contains(&(found.mean_nees / 2.0)), "{found:?}");
 
-    // The same world, believed flat.
+    // Equal environment, but a nominal model without heights.
     let (site, vehicle) = (high.site, high.vehicle);
     let heads = site.radio_heads.iter();
     let places = heads.map(|head| format!("{}.position_m = {:?}", head.name, head.position_m));

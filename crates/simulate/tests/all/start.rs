@@ -1,4 +1,4 @@
-//! Starts from scratch: the vehicle is somewhere on its road and finds out where.
+//! Unknown starts: the vehicle is at an unknown position on its road.
 
 use crate::common;
 use onboard::gaussian::principal_variances;
@@ -18,7 +18,7 @@ fn unknown(name: &str) -> Scenario {
     changed(name, [("vehicle.start.known", false.into())])
 }
 
-/// A run that begins anywhere on the road but its last 60 m.
+/// Simulates a run that begins at a random position on the road except its last 60 m.
 fn run_from_anywhere(scenario: &Scenario, seed: u64, number: u64) -> RunRecord {
     let mut random = Streams::new(seed, number).generator(Purpose::Start, 1);
     let share = f64::from(random.next_u32()) / f64::from(u32::MAX);
@@ -29,7 +29,7 @@ fn run_from_anywhere(scenario: &Scenario, seed: u64, number: u64) -> RunRecord {
     run(&there, seed, number)
 }
 
-/// Within 2 m of the truth, and within four standard deviations.
+/// Whether the found position is within 2 m and within four standard deviations of the truth.
 fn is_right(record: &RunRecord) -> bool {
     record.found().is_some_and(|found| {
         let (truth, estimate) = (found.step.truth.point(), found.step.estimate.point());
@@ -41,7 +41,7 @@ fn is_right(record: &RunRecord) -> bool {
 }
 
 #[test]
-fn a_vehicle_anywhere_on_its_road_is_found() {
+fn a_vehicle_at_any_position_on_its_road_is_found() {
     let starts = 20;
     let mut right = 0;
     for name in ["paper-real-odometry-2", "yard"] {
@@ -49,12 +49,13 @@ fn a_vehicle_anywhere_on_its_road_is_found() {
         let records = (0..starts).map(|number| run_from_anywhere(&scenario, 11, number));
         right += records.filter(is_right).count();
     }
-    // If 99 of 100 are right, 37 or fewer of 40 are with a probability of 0.7 %.
+    // If the success probability is 99 %, the probability of 37 or fewer successes out of 40 is 0.7
+    // %.
     assert!(right > 37, "{right} of {}", 2 * starts);
 }
 
 #[test]
-fn while_it_searches_it_listens_always_and_vouches_for_nothing() {
+fn during_the_search_all_ssbs_are_received_and_no_pose_is_valid() {
     let road = value("[{ length_m = 60.0, turn_rad = 0.05 }]");
     let scenario = changed(
         "paper-real-odometry-2",
@@ -73,7 +74,7 @@ fn while_it_searches_it_listens_always_and_vouches_for_nothing() {
         .position(|step| !step.searching)
         .unwrap();
     assert!(found.step.time_s > 0.0 && until > 10, "{found:?}");
-    // Both radio heads at each SSB, whatever the policy.
+    // During the search, both radio heads are received at each SSB, for every policy.
     let looked = |step: &&onboard::Execution| step.ssb.time_s < found.step.time_s;
     assert_eq!(record.executions.iter().filter(looked).count(), 2 * until);
     for step in &record.steps[..until] {
@@ -83,12 +84,12 @@ fn while_it_searches_it_listens_always_and_vouches_for_nothing() {
         assert!(error_m < integrity.protection_level_m, "{step:?}");
     }
     assert!(record.steps[until..].iter().all(|step| !step.searching));
-    // Afterwards the policy decides, which does not always listen.
+    // After the search, the policy decides, and does not receive every burst.
     assert!(record.listened < record.steps.len());
 }
 
 #[test]
-fn what_cannot_be_found_is_refused() {
+fn settings_that_prevent_a_search_are_rejected() {
     let refused = |name: &str, changes: &[(&str, Value)], why: &str| {
         let changes = changes.iter().cloned();
         let unknown = changes.chain([("vehicle.start.known", false.into())]);
@@ -107,7 +108,7 @@ fn what_cannot_be_found_is_refused() {
     refused("paper-real-odometry-2", &no_map, "three elsewhere");
 }
 
-/// Errors of the published poses in metres and in their own standard deviations.
+/// Returns the errors of the published poses in metres and in standard deviations.
 fn errors(drive: &LocatedDrive, record: &RunRecord) -> Vec<(f64, f64)> {
     let both = drive.poses.iter().zip(&record.steps);
     both.filter(|(pose, _)| pose.searching.is_none())
@@ -120,8 +121,9 @@ fn errors(drive: &LocatedDrive, record: &RunRecord) -> Vec<(f64, f64)> {
 }
 
 #[test]
-fn a_recorded_drive_either_way_needs_no_initial_pose() {
-    // The paper's road driven from its end to its beginning, which the site does not know.
+fn a_recorded_drive_in_either_direction_needs_no_initial_pose() {
+    // The paper's road is driven from its end to its beginning. The site does not specify the
+    // direction.
     let mut scenario = unknown("paper-real-odometry-2");
     let road = scenario.path(Check { file: "test" }).unwrap();
     let end = Value::try_from(road.reversed().pose(0.0)).unwrap();
@@ -137,7 +139,7 @@ fn a_recorded_drive_either_way_needs_no_initial_pose() {
     assert_eq!(scenario.vehicle.start.pose, None);
     let drive = locate(&scenario);
     let errors = errors(&drive, &record);
-    // Found within a few metres of 300, and from then on as good as the tracker says.
+    // The vehicle is found within a few metres of 300 m, and the errors are then consistent.
     assert!(
         errors.len() * 10 > drive.poses.len() * 8,
         "{}",
@@ -154,8 +156,8 @@ fn a_recorded_drive_either_way_needs_no_initial_pose() {
         drive.poses.len() - errors.len()
     );
 
-    // Who takes the road for one-way cannot find the vehicle there, and says so; who is right is
-    // sure of it to the end.
+    // With the wrong assumption of a one-way road, the vehicle is not found, and the state reports
+    // this. With the correct assumption, the pose stays valid to the end.
     assert!(!drive.poses.last().unwrap().is_lost);
     scenario.vehicle.start.either_direction = false;
     let misled = locate(&scenario);
@@ -163,7 +165,7 @@ fn a_recorded_drive_either_way_needs_no_initial_pose() {
     println!("{lost} poses of {} known to be lost", misled.poses.len());
     assert!(lost * 20 > misled.poses.len());
 
-    // No pose is published before there is one.
+    // No pose is published before initialisation.
     let dir = common::scratch("start-mcap");
     write_drive_mcap(&dir.join("drive.mcap"), &drive).unwrap();
     let published = read_odometry_mcap(&dir.join("drive.mcap"), None, None).unwrap();

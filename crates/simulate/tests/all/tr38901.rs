@@ -1,4 +1,5 @@
-//! The channels of TR 38.901: against another implementation's, along a drive, and as samples.
+//! The channels of TR 38.901: comparison with another implementation, along a drive, and as
+//! samples.
 
 use crate::common;
 use std::collections::BTreeMap;
@@ -23,7 +24,7 @@ fn environment(model: &str) -> Environment {
     Environment::of(ChannelModel::named(model).unwrap(), 3.5, None).unwrap()
 }
 
-/// Horizontal distances as `benches/tr38901_oracle.py` has them.
+/// Returns the horizontal distances of `benches/tr38901_oracle.py`.
 fn places(model: &str) -> Vec<Place> {
     let (head_m, array_m, least_m, most_m) = match model {
         "umi" => (10.0, 1.5, 20.0, 120.0),
@@ -41,10 +42,10 @@ fn places(model: &str) -> Vec<Place> {
     (0..DROPS).map(place).collect()
 }
 
-/// A quantity's name, and its value in a drop.
+/// Name and value of a quantity of a drop.
 type Quantity = (&'static str, fn(&Drop) -> f64);
 
-/// Every quantity of the oracle's table.
+/// All quantities of the oracle's table.
 const QUANTITIES: [Quantity; 8] = [
     ("path_loss_db", |drop| drop.path_loss_db),
     ("shadowing_db", |drop| drop.shadowing_db),
@@ -60,11 +61,11 @@ const QUANTITIES: [Quantity; 8] = [
     }),
 ];
 
-/// Quantiles of Sionna's drops (`benches/tr38901_oracle.py`), within 3 %: of the value where it is a
-/// power, a length or an angle, of the range from 5 to 95 % where it is in decibels; or within what
-/// quantiles of so many drops stray by, where a state is rare.
+/// Compares the quantiles with Sionna's drops (`benches/tr38901_oracle.py`). The tolerance is 3 %:
+/// of the value for powers, lengths and angles, and of the range from 5 to 95 % for decibels. For
+/// rare states, it is the statistical uncertainty of the quantile.
 #[test]
-fn drops_are_another_implementations() {
+fn drops_agree_with_another_implementation() {
     let table = include_str!("data/tr38901_sionna.txt");
     let mut lines = table.lines();
     let header: Vec<&str> = lines.next().unwrap().split(' ').collect();
@@ -107,7 +108,7 @@ fn drops_are_another_implementations() {
             worst = worst.max(apart.abs());
             let rank = values.partition_point(|value| value < expected) as f64;
             let count = values.len() as f64;
-            // Four deviations; the oracle has 2.5 times as many drops.
+            // Four standard deviations; the oracle has 2.5 times as many drops.
             let stray = 4.0 * (1.4 * p * (1.0 - p) / count).sqrt();
             if apart.abs() >= 0.03 && (rank / count - p).abs() >= stray {
                 failed.push(format!("{model} {state} {name} at {p}: {found} {expected}"));
@@ -122,7 +123,7 @@ fn drops_are_another_implementations() {
 const LENGTH_M: f64 = 2000.0;
 const ELEMENTS: usize = 4;
 
-/// The propagation along a straight road past a radio head.
+/// Returns the propagation along a straight road past a radio head.
 fn along_a_road(model: &str, settings: &ChannelSettings, run: u64) -> Tr38901Propagation {
     let trip = changed("paper-real-odometry-4", []); // radio heads and antennas at one height
     let (mut site, vehicle): (Site, Vehicle) = (trip.site, trip.vehicle);
@@ -146,7 +147,7 @@ fn along_a_road(model: &str, settings: &ChannelSettings, run: u64) -> Tr38901Pro
 
 const HEAD: Point = Point::new(1000.0, 20.0);
 
-/// How an array that looks ahead sees it, at 1 m/s.
+/// Returns the line of sight of an array in the forward direction at a speed of 1 m/s.
 fn sight(along_m: f64) -> LineOfSight {
     let place = Point::new(along_m, 0.0);
     let distance_m = place.distance_m(HEAD);
@@ -168,14 +169,14 @@ fn gains(channel: &Tr38901Propagation, along_m: f64) -> [Complex64; ELEMENTS] {
 }
 
 #[test]
-fn power_is_one_on_average_and_half_a_wavelength_on_it_is_another() {
+fn mean_power_is_one_and_the_field_decorrelates_over_half_a_wavelength() {
     for model in MODELS {
         let (mut power, mut same, mut half) = (0.0, Complex64::ZERO, Complex64::ZERO);
         let mut count = 0.0;
         for run in 0..40 {
             let channel = along_a_road(model, &ChannelSettings::default(), run);
             for step in 0..60 {
-                // Clusters at one place stay together for metres: every 33 m is another.
+                // Clusters are constant over metres; positions 33 m apart have different clusters.
                 let along_m = 15.0 + 33.0 * f64::from(step);
                 let here = gains(&channel, along_m)[0];
                 power += here.norm_sqr();
@@ -186,22 +187,24 @@ fn power_is_one_on_average_and_half_a_wavelength_on_it_is_another() {
         }
         let (power, same, half) = (power / count, same.norm() / count, half.norm() / count);
         println!("{model}: power {power:.3}, at 0.1 mm {same:.3}, at 0.5 m {half:.3}");
-        // Power of a Rician channel has a relative spread of at most one.
+        // The power of a Rician channel has a relative standard deviation of at most one.
         assert!(
             (power - 1.0).abs() < 4.0 / f64::sqrt(count),
             "{model}: {power}"
         );
         assert!((same / power - 1.0).abs() < 1e-3, "{model}: {same}");
-        // A line of sight that is passed turns by hundreds of radians.
+        // The phase of the line of sight rotates by hundreds of radians on the way past the radio
+        // head.
         assert!(half < 0.2, "{model}: {half}");
     }
 }
 
 #[test]
-fn clusters_stay_for_metres_and_not_for_more() {
-    // Without a line of sight, from far, the power of a beam is that of the clusters in it.
+fn clusters_are_correlated_over_metres_only() {
+    // Far from the radio head and without a line of sight, the power of a beam depends on the
+    // clusters in the beam.
     let beam = |channel: &Tr38901Propagation, along_m: f64| {
-        // Averaged over two wavelengths, so that it is not of single rays.
+        // An average over two wavelengths removes the fading of single rays.
         let looks = (0..24).map(|look| {
             let gains = gains(channel, along_m + 0.0071 * f64::from(look));
             let total: f64 = gains.iter().map(Complex64::norm_sqr).sum();
@@ -235,7 +238,7 @@ fn clusters_stay_for_metres_and_not_for_more() {
 }
 
 #[test]
-fn a_blocked_line_of_sight_comes_back() {
+fn a_blocked_line_of_sight_returns() {
     let settings = ChannelSettings {
         blockage: Some(BlockageSettings {
             per_minute: 2.0,
@@ -254,7 +257,8 @@ fn a_blocked_line_of_sight_comes_back() {
             count += 1;
         }
     }
-    // At any time e^(−2/min · 5 s) are gone; a tenth of ten thousand independent times.
+    // The fraction of unblocked time is e^(−2/min · 5 s). The tolerance is 0.02 for ten thousand
+    // independent times.
     let share = f64::from(blocked as u32) / f64::from(count as u32);
     assert!(
         (share - (1.0 - (-1.0f64 / 6.0).exp())).abs() < 0.02,
@@ -263,7 +267,7 @@ fn a_blocked_line_of_sight_comes_back() {
 }
 
 #[test]
-fn told_of_its_lines_of_sight_a_vehicle_hears_the_same_there_and_nothing_elsewhere() {
+fn with_line_of_sight_only_other_positions_have_no_signal() {
     let told = ChannelSettings {
         line_of_sight_only: true,
         ..ChannelSettings::default()
@@ -272,7 +276,7 @@ fn told_of_its_lines_of_sight_a_vehicle_hears_the_same_there_and_nothing_elsewhe
     for run in 0..40 {
         let [mut told, mut all] =
             [&told, &ChannelSettings::default()].map(|it| along_a_road("umi", it, run));
-        // Where there is a line of sight now and then.
+        // The line of sight exists at some of these positions.
         for along_m in (800..1200).map(f64::from) {
             let sight = sight(along_m);
             let [here, of_all] = [&mut told, &mut all].map(|it| it.next_gain_db(&sight));
@@ -289,14 +293,15 @@ fn told_of_its_lines_of_sight_a_vehicle_hears_the_same_there_and_nothing_elsewhe
             }
         }
     }
-    // Eight correlation distances in each of 40 drives: at most 0.5 / √320, and three of that.
+    // Eight correlation distances in each of 40 drives: a standard deviation of at most 0.5/√320.
+    // The limit is three of them.
     let (heard, expected): (f64, f64) = (heard / places, expected / places);
     println!("{heard:.3} of the way, {expected:.3} expected");
     assert!((heard - expected).abs() < 0.084 && expected > 0.2);
 }
 
 #[test]
-fn a_drive_is_the_same_again_and_by_samples_too() {
+fn a_drive_is_reproducible_and_works_with_samples() {
     for model in ["umi", "inf-sh"] {
         let short = [
             (
@@ -318,7 +323,7 @@ fn a_drive_is_the_same_again_and_by_samples_too() {
         let heard = [&record, &samples].map(|it| it.executions.len());
         println!("{model}: {heard:?} angles");
         assert!(heard.iter().all(|count| *count > 20), "{model}: {heard:?}");
-        // Mean SNRs are of the way alone, whatever the fidelity.
+        // The mean SNR depends on the position only, not on the fidelity.
         for (a, b) in record.steps.iter().zip(&samples.steps) {
             assert_eq!(a.snr_db, b.snr_db);
         }
@@ -326,7 +331,7 @@ fn a_drive_is_the_same_again_and_by_samples_too() {
 }
 
 #[test]
-fn what_a_model_has_no_place_for_is_refused() {
+fn keys_without_a_meaning_for_the_model_are_rejected() {
     use onboard::settings::Shipped;
     use onboard::settings::TomlFile;
     let hall = "{ size_m = [50.0, 0.0, 8.0], clutter_density = 0.3, clutter_size_m = 3.0, \
@@ -336,9 +341,9 @@ fn what_a_model_has_no_place_for_is_refused() {
         (
             "channel.hall",
             hall.replace(" 0.0,", " 30.0,"),
-            "only an InF",
+            "allowed with an InF",
         ),
-        ("channel.rays", "9".to_owned(), "leave those keys out"),
+        ("channel.rays", "9".to_owned(), "remove these keys"),
         ("channel.model", "\"inf-xl\"".to_owned(), "inf-sl"),
         (
             "channel.blockage",

@@ -11,7 +11,7 @@ use crate::common::{NONE, campaign, changed, drives, simulation, unguarded, valu
 
 const SEED: u64 = 11;
 
-/// Mean normalised squared error of the position, and root mean square error.
+/// Returns the mean normalised squared error of the position (NEES) and the RMS error.
 fn consistency(records: &[RunRecord]) -> (f64, f64) {
     let (mut nees, mut square_m2, mut count) = (0.0, 0.0, 0.0);
     for step in records
@@ -30,7 +30,7 @@ fn consistency(records: &[RunRecord]) -> (f64, f64) {
     (nees / count, (square_m2 / count).sqrt())
 }
 
-/// Mean and standard deviation of a figure over campaigns.
+/// Returns the mean and standard deviation of a statistic over campaigns.
 fn spread(campaigns: &[Consistency], figure: fn(&Consistency) -> f64) -> (f64, f64) {
     let count = campaigns.len() as f64;
     let mean = campaigns.iter().map(figure).sum::<f64>() / count;
@@ -39,7 +39,7 @@ fn spread(campaigns: &[Consistency], figure: fn(&Consistency) -> f64) -> (f64, f
 }
 
 #[test]
-fn as_wrong_as_it_says_and_as_right_as_can_be() {
+fn tracker_is_consistent_and_efficient() {
     let (runs, campaigns) = (32, 200);
     for (name, target_p90_m) in [
         ("paper-real-odometry", 0.40),
@@ -52,7 +52,7 @@ fn as_wrong_as_it_says_and_as_right_as_can_be() {
         let square_m2: f64 = points.iter().map(|p| p.position_rms_m.powi(2)).sum();
         let bound_m = (square_m2 / points.len() as f64).sqrt();
 
-        // What a filter with the tracker's covariances shows in campaigns of this size ...
+        // Spread of an ideal filter with the tracker's covariances in campaigns of this size.
         let filter = bound.ideal_filter(50);
         let ideal: Vec<Consistency> = (0..campaigns)
             .map(|seed| filter.campaign(seed, runs).consistency(1))
@@ -60,7 +60,8 @@ fn as_wrong_as_it_says_and_as_right_as_can_be() {
         let (p90_m, p90_spread_m) = spread(&ideal, |it| it.p90_m);
         let (rms_m, rms_spread_m) = spread(&ideal, |it| it.rms_m);
         let (nees, nees_spread) = spread(&ideal, |it| it.mean_nees);
-        // ... meets what is asked of it, its mean being known to a √campaigns of the spread ...
+        // The ideal filter meets the requirement. Its mean has a standard error of
+        // spread/√campaigns.
         let certain = 4.0 / (campaigns as f64).sqrt();
         assert!(
             p90_m + certain * p90_spread_m < target_p90_m,
@@ -71,7 +72,7 @@ fn as_wrong_as_it_says_and_as_right_as_can_be() {
             "{name}: {rms_m} {bound_m}"
         );
 
-        // ... and the tracker cannot be told from it.
+        // The tracker's statistics are within the spread of the ideal filter.
         let found = campaign(&scenario, SEED, runs as usize).consistency(50);
         for (what, found, expected, spread) in [
             ("p90", found.p90_m, p90_m, p90_spread_m),
@@ -87,7 +88,7 @@ fn as_wrong_as_it_says_and_as_right_as_can_be() {
 }
 
 #[test]
-fn a_start_unknown_by_five_metres_is_found_as_well_as_can_be() {
+fn a_start_error_of_five_metres_is_corrected_efficiently() {
     let (runs, campaigns, stride) = (48, 100, 50);
     for (map, heading_std_rad) in [(true, 0.0), (false, 0.02)] {
         let scenario = changed(
@@ -100,7 +101,7 @@ fn a_start_unknown_by_five_metres_is_found_as_well_as_can_be() {
         );
         let bound = Bound::new(&scenario).unwrap();
         let points = bound.along_route();
-        // Every 50th step from 20 m of travel on.
+        // Every 50th step after 20 m of travel.
         let ratios = |campaign: &Campaign, stride: usize| -> Vec<f64> {
             (campaign.steps.iter().step_by(stride))
                 .zip(points.iter().step_by(50))
@@ -111,7 +112,7 @@ fn a_start_unknown_by_five_metres_is_found_as_well_as_can_be() {
         let mean = |ratios: &[f64]| ratios.iter().sum::<f64>() / ratios.len() as f64;
         let largest = |ratios: &[f64]| ratios.iter().copied().fold(0.0, f64::max);
 
-        // A filter with the tracker's covariances is within 1.2 of the bound at every step ...
+        // The RMS error of the ideal filter is within 1.2 times the bound at every step.
         let filter = bound.ideal_filter(stride);
         let ideal: Vec<Vec<f64>> = (0..campaigns)
             .map(|seed| ratios(&filter.campaign(seed, runs), 1))
@@ -122,8 +123,8 @@ fn a_start_unknown_by_five_metres_is_found_as_well_as_can_be() {
             assert!(ratio < 1.2, "step {step}: {ratio}");
         }
 
-        // ... and the tracker, on average and at its worst step, no further than such a filter by
-        // four standard deviations of a campaign of this size.
+        // The mean and the largest ratio of the tracker are within four standard deviations of
+        // those of the ideal filter.
         let found = ratios(&campaign(&scenario, SEED, runs as usize), stride);
         for (what, of) in [
             ("mean", &mean as &dyn Fn(&[f64]) -> f64),
@@ -160,11 +161,11 @@ fn more_radio_heads_lower_the_bound() {
 }
 
 #[test]
-fn the_site_bound_is_blind_along_the_line_through_two_heads() {
+fn the_site_bound_is_large_on_the_line_through_two_heads() {
     let scenario = unguarded("paper-real-odometry-2");
     let bound = Bound::new(&scenario).unwrap();
     let between = bound.at([150.0, 10.0].into(), 50.0, 0.01).unwrap();
-    // Far out on the line through both heads their angles say the same.
+    // Far away on the line through both radio heads, their angles carry equal information.
     let beyond = bound.at([785.0, 820.0].into(), 50.0, 0.01);
     assert!(
         beyond.is_none_or(|rms_m| rms_m > 20.0 * between),
@@ -173,7 +174,7 @@ fn the_site_bound_is_blind_along_the_line_through_two_heads() {
 }
 
 #[test]
-fn without_a_map_it_stays_within_its_covariance() {
+fn errors_without_a_map_are_consistent() {
     let no_map = [("vehicle.localizer.map", false.into())];
     let scenario = changed("paper-real-odometry-4", no_map);
     let runs = 12;
@@ -185,7 +186,7 @@ fn without_a_map_it_stays_within_its_covariance() {
 }
 
 #[test]
-fn a_campus_is_driven_from_cell_to_cell() {
+fn a_campus_is_driven_across_several_cells() {
     let records = drives(&unguarded("campus-handover"), SEED, 1);
     let mut cells: Vec<u16> = records[0]
         .executions
@@ -200,7 +201,7 @@ fn a_campus_is_driven_from_cell_to_cell() {
     assert!(last.truth.point().distance_m(last.estimate.point()) < 2.0);
 }
 
-/// The array of a run at its end, by the same draws.
+/// Returns the true array at the end of a run, with the same random numbers.
 fn array_at_the_end(simulation: &Simulation, run: u64) -> ArraySettings {
     let world = World::new(simulation.scenario()).unwrap();
     let mut truth = world.draw(Streams::new(SEED, run));
@@ -212,7 +213,7 @@ fn array_at_the_end(simulation: &Simulation, run: u64) -> ArraySettings {
 }
 
 #[test]
-fn mounting_and_calibration_are_found_while_driving() {
+fn mounting_and_calibration_are_estimated_while_driving() {
     let runs = 16;
     for drifting in [0.0, 1.0] {
         let scenario = changed(
@@ -241,7 +242,7 @@ fn mounting_and_calibration_are_found_while_driving() {
                 (found.phase_rad, truth.phase_rad),
             ]) {
                 let error = (found.departure() - truth) / found.std;
-                // 64 draws are beyond four standard deviations with a probability of 0.4 %.
+                // The probability that any of 64 values exceeds four standard deviations is 0.4 %.
                 assert!(error.abs() < 4.0, "{found:?} {truth}");
                 assert!(found.std < 0.5 * found.stated_std, "{found:?}");
                 *sum += error * error / runs as f64;
@@ -249,7 +250,7 @@ fn mounting_and_calibration_are_found_while_driving() {
             let holds = !found.array_departs();
             assert!(holds || drifting > 0.0, "{found:?}");
         }
-        // The mean of squared standard normals deviates by √(2/n).
+        // The mean of n squared standard normal numbers has a standard deviation of √(2/n).
         for mean in normalised {
             assert!(
                 (mean - 1.0).abs() < 4.0 * (2.0 / runs as f64).sqrt(),
@@ -260,8 +261,8 @@ fn mounting_and_calibration_are_found_while_driving() {
 }
 
 #[test]
-fn an_array_that_has_left_its_survey_is_noticed() {
-    // Nobody is told: the survey is said to be good to 0.01 rad, and the array is far off it.
+fn an_array_that_deviates_from_its_survey_is_reported() {
+    // The specified standard deviation of the survey is 0.01 rad; the true deviation is far larger.
     let scenario = changed(
         "paper-real-odometry-2",
         [
@@ -277,7 +278,7 @@ fn an_array_that_has_left_its_survey_is_noticed() {
         let found = simulation.run(SEED, run, NONE).unwrap();
         let off_rad = array_at_the_end(&simulation, run).phase_rad;
         let found = found.constants.unwrap();
-        // The alarm is for departures beyond 3 · (0.01 + σ); σ may err by four of itself.
+        // The warning is for deviations above 3 · (0.01 + σ). The estimate may err by 4 σ.
         let limit_rad = 3.0 * (0.01 + found.phase_rad.std);
         if off_rad.abs() > limit_rad + 4.0 * found.phase_rad.std {
             assert!(found.array_departs(), "{off_rad} {found:?}");
@@ -287,7 +288,7 @@ fn an_array_that_has_left_its_survey_is_noticed() {
     assert!(noticed >= 4, "{noticed}");
 }
 
-/// Mean squared error of each run, beside what its covariances predict (m²).
+/// Returns the mean squared error of each run and its predicted value (m²).
 fn squares(records: &[RunRecord]) -> Vec<[f64; 2]> {
     let of_run = |record: &RunRecord| {
         let count = record.steps.len() as f64;
@@ -299,7 +300,7 @@ fn squares(records: &[RunRecord]) -> Vec<[f64; 2]> {
 }
 
 #[test]
-fn a_gyroscope_helps_as_much_as_it_says() {
+fn a_gyroscope_reduces_the_error_as_predicted() {
     for map in [true, false] {
         let map_or_none = [("vehicle.localizer.map", map.into())];
         let without = changed("paper-real-odometry", map_or_none);
@@ -312,7 +313,7 @@ fn a_gyroscope_helps_as_much_as_it_says() {
             bias_std_radps: 1e-3,
             bias_walk_radps_per_sqrt_s: 0.0,
         });
-        // The same drives, but for the gyroscope: what it takes from the squared error of a run.
+        // Equal runs with and without the gyroscope: reduction of the squared error per run.
         let [without, with] = [without, with].map(|scenario| squares(&drives(&scenario, SEED, 32)));
         let gains = || {
             without
@@ -334,9 +335,9 @@ fn a_gyroscope_helps_as_much_as_it_says() {
 }
 
 #[test]
-fn an_odometer_that_reads_noise_by_noise_does_not_win_against_the_yaw_rate() {
-    // Each reading is off by half of the step: what is read too little must not count for less noise,
-    // nor noise for a reason to believe in an offset.
+fn multiplicative_odometer_noise_does_not_override_the_yaw_rate() {
+    // The error of each sample is half of the increment. An increment that is too small must not
+    // get a smaller variance, and noise must not be mistaken for an offset.
     let scenario = changed(
         "yard",
         [
@@ -369,8 +370,9 @@ fn an_odometer_that_reads_noise_by_noise_does_not_win_against_the_yaw_rate() {
         let [[xx, ..], [_, yy, _], _] = step.covariance.unwrap();
         error_m * error_m / (xx + yy)
     });
-    // The place is known by the bend's direction, so along the road alone: χ² of one degree of freedom
-    // each, their sum below its quantile of 1e-4.
+    // Only the position along the road is uncertain, because the bend determines the lateral
+    // position. The sum of χ² variables with one degree of freedom each is below its quantile of 1
+    // − 1e-4.
     let sum: f64 = squares.sum();
     assert!(sum < 39.1, "{sum} of {runs} runs");
 }

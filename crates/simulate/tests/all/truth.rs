@@ -1,4 +1,4 @@
-//! How the world departs from what is believed of it.
+//! Deviations of the truth from the nominal models.
 
 use crate::common;
 use std::f64::consts::PI;
@@ -14,7 +14,7 @@ use crate::common::{changed, shipped, unguarded, value};
 
 const RUNS: u64 = 2000;
 
-/// A standard deviation beside everything that can be wrong.
+/// Returns a scenario in which every uncertain value has a standard deviation.
 fn uncertain(more: &[(&'static str, Value)]) -> Scenario {
     let mut changes: Vec<(&str, Value)> = [
         ("site.radio_heads[0].position_std_m", 0.3),
@@ -39,7 +39,7 @@ fn draw(scenario: &Scenario, run: u64) -> Truth {
     World::new(scenario).unwrap().draw(Streams::new(9, run))
 }
 
-/// How a run departs from the scenario, beside what each departure's standard deviation is.
+/// Returns name, deviation and standard deviation of each quantity of a run.
 fn departures(scenario: &Scenario, truth: &Truth) -> Vec<(&'static str, f64, f64)> {
     let (site, vehicle) = (&scenario.site, &scenario.vehicle);
     let by_head = |index: usize, axis: usize| {
@@ -88,7 +88,7 @@ fn departures(scenario: &Scenario, truth: &Truth) -> Vec<(&'static str, f64, f64
 }
 
 #[test]
-fn everything_uncertain_is_drawn_with_its_spread_and_by_itself() {
+fn all_uncertain_values_are_drawn_independently_with_their_standard_deviation() {
     let scenario = uncertain(&[]);
     let world = World::new(&scenario).unwrap();
     let runs: Vec<_> = (0..RUNS)
@@ -99,14 +99,14 @@ fn everything_uncertain_is_drawn_with_its_spread_and_by_itself() {
     for first in 0..quantities {
         let (name, _, std) = runs[0][first];
         let mean = runs.iter().map(|run| run[first].1 / std).sum::<f64>() / count;
-        // Four deviations of a sample mean.
+        // Four standard deviations of a sample mean.
         assert!(mean.abs() < 4.0 / count.sqrt(), "{name}: {mean}");
         for second in first..quantities {
             let product = |run: &Vec<(&str, f64, f64)>| {
                 run[first].1 / run[first].2 * run[second].1 / run[second].2
             };
             let found = runs.iter().map(product).sum::<f64>() / count;
-            // Four deviations of a sample variance, and of a sample covariance.
+            // Four standard deviations of a sample variance and a sample covariance.
             let (expected, deviation) = if first == second {
                 (1.0, (2.0 / count).sqrt())
             } else {
@@ -122,7 +122,7 @@ fn everything_uncertain_is_drawn_with_its_spread_and_by_itself() {
 }
 
 #[test]
-fn heights_and_what_has_no_deviation_are_as_believed() {
+fn heights_and_values_without_a_standard_deviation_are_nominal() {
     let scenario = uncertain(&[]);
     let truth = draw(&scenario, 3);
     for (drawn, believed) in (truth.site.radio_heads.iter()).zip(&scenario.site.radio_heads) {
@@ -140,7 +140,7 @@ fn heights_and_what_has_no_deviation_are_as_believed() {
 }
 
 #[test]
-fn seeds_and_runs_draw_their_own_and_always_the_same() {
+fn seeds_and_runs_determine_the_draws() {
     let scenario = uncertain(&[]);
     let world = World::new(&scenario).unwrap();
     let by = |seed, run| departures(&scenario, &world.draw(Streams::new(seed, run)));
@@ -152,7 +152,7 @@ fn seeds_and_runs_draw_their_own_and_always_the_same() {
 }
 
 #[test]
-fn a_factor_scales_every_departure_and_none_leaves_all_as_believed() {
+fn std_factor_scales_all_deviations_and_draw_none_removes_them() {
     let once = uncertain(&[]);
     let thrice = uncertain(&[("truth.std_factor", 3.0.into())]);
     let by = |scenario: &Scenario| departures(scenario, &draw(scenario, 1));
@@ -169,7 +169,7 @@ fn a_factor_scales_every_departure_and_none_leaves_all_as_believed() {
 }
 
 #[test]
-fn a_value_that_is_given_is_so_in_every_run() {
+fn a_given_true_value_holds_in_every_run() {
     let heads = "{ roadside.position_m = [200.0, 90.0, 5.0], all.eirp_dbm = 3.0 }";
     let scenario = uncertain(&[
         ("truth.site.radio_heads", value(heads)),
@@ -189,18 +189,18 @@ fn a_value_that_is_given_is_so_in_every_run() {
             (0.1, 1.05)
         );
         assert_eq!(vehicle.receiver.lateness_s, 0.03);
-        // What is not given is drawn as ever.
+        // Values that are not given are drawn.
         assert_ne!(second.position_m, scenario.site.radio_heads[1].position_m);
         assert_ne!(vehicle.array.phase_rad, 0.0);
     }
-    // Belief stays what it is.
+    // The nominal models do not change.
     let believed = uncertain(&[]);
     assert_eq!(scenario.vehicle, believed.vehicle);
     assert_eq!(scenario.site, believed.site);
 }
 
 #[test]
-fn a_value_given_with_its_deviation_is_drawn_around() {
+fn a_true_value_with_a_standard_deviation_is_drawn_around_the_value() {
     let scenario = uncertain(&[
         ("truth.vehicle.array.mounting_rad", 0.1.into()),
         ("truth.vehicle.array.mounting_std_rad", 0.01.into()),
@@ -218,7 +218,7 @@ fn a_value_given_with_its_deviation_is_drawn_around() {
 }
 
 #[test]
-fn departures_act_in_the_world() {
+fn deviations_change_the_simulated_signals() {
     let exact = [
         ("truth.draw", Value::from("none")),
         ("truth.vehicle.odometer.scale", 1.1.into()),
@@ -251,7 +251,7 @@ fn departures_act_in_the_world() {
 }
 
 #[test]
-fn angles_of_a_late_clock_are_of_where_the_vehicle_was() {
+fn angles_with_late_time_stamps_refer_to_earlier_positions() {
     const LATE_S: f64 = 0.2;
     for fidelity in ["snapshots", "iq"] {
         for told_s in [0.0, LATE_S] {
@@ -261,7 +261,7 @@ fn angles_of_a_late_clock_are_of_where_the_vehicle_was() {
                     ("fidelity", fidelity.into()),
                     ("site.road.segments", value("[{ length_m = 60.0 }]")),
                     ("site.rician_k_db", 90.0.into()),
-                    // At a time of its own.
+                    // A different SSB index gives a different reception time.
                     ("site.radio_heads[1].ssb_index", 2.into()),
                     ("vehicle.receiver.lateness_s", told_s.into()),
                     ("truth.vehicle.receiver.lateness_s", LATE_S.into()),
@@ -271,7 +271,7 @@ fn angles_of_a_late_clock_are_of_where_the_vehicle_was() {
             let [mut sum, mut information] = [0.0; 2];
             for execution in &common::run(&scenario, 9, 0).executions {
                 let measured = execution.measured.unwrap();
-                // What the vehicle is told of, it takes off.
+                // The vehicle subtracts the specified time offset.
                 assert_eq!(measured.time_s, execution.ssb.time_s - told_s);
                 let head = truth.heads.iter().find(|it| it.pci == execution.ssb.pci);
                 let phase_at = |time_s| {
@@ -286,7 +286,7 @@ fn angles_of_a_late_clock_are_of_where_the_vehicle_was() {
                 sum -= weight * rate_radps * error_rad;
                 information += weight * rate_radps * rate_radps;
             }
-            // Least squares, and their standard deviation.
+            // Least-squares estimate and its standard deviation.
             let (found_s, std_s) = (sum / information, information.sqrt().recip());
             assert!(std_s < 0.05 * LATE_S, "{fidelity}: {std_s}");
             assert!(
@@ -298,7 +298,7 @@ fn angles_of_a_late_clock_are_of_where_the_vehicle_was() {
 }
 
 #[test]
-fn what_cannot_depart_is_refused() {
+fn invalid_deviations_are_rejected() {
     for (name, key, value, told, allowed) in [
         (
             "yard",
@@ -361,7 +361,7 @@ fn what_cannot_depart_is_refused() {
             "truth.vehicle.gyroscope.bias_radps",
             0.01.into(),
             "truth.vehicle.gyroscope",
-            "nothing believes in such a thing",
+            "the nominal model has no such key",
         ),
         (
             "yard",
@@ -375,21 +375,21 @@ fn what_cannot_depart_is_refused() {
             "truth.vehicle.localizer.kind",
             "dead-reckoning".into(),
             "truth.vehicle.localizer",
-            "only facts can be otherwise: array, odometer",
+            "only physical keys can differ: array, odometer",
         ),
         (
             "yard",
             "truth.vehicle.name",
             "other".into(),
             "truth.vehicle.name",
-            "only facts can be otherwise: array, odometer",
+            "only physical keys can differ: array, odometer",
         ),
         (
             "yard",
             "truth.site.carrier_mhz",
             3600.0.into(),
             "truth.site.carrier_mhz",
-            "only facts can be otherwise: road, radio_heads, rician_k_db",
+            "only physical keys can differ: road, radio_heads, rician_k_db",
         ),
         (
             "yard",

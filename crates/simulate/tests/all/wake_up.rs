@@ -1,4 +1,5 @@
-//! The uncertainty-driven wake-up on simulated drives: what it saves, and that it keeps its bound.
+//! The uncertainty-driven wake-up on simulated drives: savings and compliance with the target
+//! error.
 
 use crate::common;
 use onboard::gaussian::RadialQuantile;
@@ -15,7 +16,7 @@ fn runs(scenario: &Scenario, runs: usize) -> Vec<RunSummary> {
     common::campaign(scenario, SEED, runs).runs
 }
 
-/// The yard of which everything but the odometer is exact, on a platform.
+/// Returns the yard on the given platform with exact settings except for the odometer.
 fn bare_yard(platform: &str) -> Scenario {
     let exact = (0..4).map(|head| format!("site.radio_heads[{head}].position_std_m"));
     let exact: Vec<String> = exact.collect();
@@ -29,7 +30,7 @@ fn bare_yard(platform: &str) -> Scenario {
     common::changed("yard", changes)
 }
 
-/// Mean over runs, and the standard error of it.
+/// Returns the mean over runs and its standard error.
 fn mean(values: impl Iterator<Item = f64> + Clone) -> (f64, f64) {
     let count = values.clone().count() as f64;
     let mean = values.clone().sum::<f64>() / count;
@@ -37,10 +38,10 @@ fn mean(values: impl Iterator<Item = f64> + Clone) -> (f64, f64) {
     (mean, (variance / count).sqrt())
 }
 
-/// The same runs under either policy: their differences are held against their own spread.
+/// Both policies process equal runs; the paired differences are compared with their standard error.
 #[test]
-fn half_the_executions_of_the_pid_for_no_more_error() {
-    // Of which the receiver is not counted: an angle costs what an execution does.
+fn half_the_executions_of_the_pid_give_no_larger_error() {
+    // The energy of the receiver is excluded; only angle estimates have a cost.
     let yard = bare_yard("jetson-agx-xavier");
     let driven = runs(&yard, 6);
     for base_ms in [80.0, 150.0] {
@@ -63,10 +64,10 @@ fn half_the_executions_of_the_pid_for_no_more_error() {
     }
 }
 
-/// With the receiver counted a wake-up costs as much as a thousand angles: what is heard at once is
-/// taken at once, and the next wake-up is farther off.
+/// With the receiver's energy included, a wake-up costs as much as a thousand angles. All SSBs of a
+/// received burst are processed, and the next wake-up is later.
 #[test]
-fn fewer_wake_ups_than_at_a_fixed_interval_for_no_more_error() {
+fn fewer_wake_ups_than_at_a_fixed_interval_give_no_larger_error() {
     let yard = bare_yard("jetson-agx-xavier-engine");
     let changes = [
         ("vehicle.wake_up.policy", "fixed".into()),
@@ -83,15 +84,16 @@ fn fewer_wake_ups_than_at_a_fixed_interval_for_no_more_error() {
     assert!(driven.iter().all(|it| it.executions > 3 * it.listened));
 }
 
-/// Where the SNR of neighbouring SSBs differs, whoever senses before it chooses needs fewer angles.
+/// If the SNR of consecutive SSBs differs, a policy that measures the SNR before its selection
+/// needs fewer angles.
 #[test]
-fn fewer_executions_where_the_snr_is_sensed_first() {
+fn measuring_the_snr_first_saves_executions() {
     let paper = common::changed(
         "paper",
         [
             (
                 "vehicle.localizer",
-                // The paper's road hardly bends.
+                // The paper's road is almost straight.
                 common::value(
                     "{ kind = 'tracker', map = false, curvature_rms_per_m = 0.001, curvature_correlation_m = 400.0 }",
                 ),
@@ -114,10 +116,12 @@ fn fewer_executions_where_the_snr_is_sensed_first() {
     assert!(listened(&sensing) > listened(&by_budget), "what it costs");
 }
 
-/// More variance than any angle takes away: none is taken before the bound demands it.
+/// Minimum variance reduction above that of any angle: angles are estimated only if the target
+/// error requires them (m²).
 const NEVER_WORTH_IT_M2: f64 = 1e6;
 
-/// The drive with four radio heads, on the bound's demand alone, SSBs coming so late.
+/// Simulates the drive with four radio heads, with estimates only if the target error requires
+/// them, and with a latency of the SSBs.
 fn on_demand(bound_m: f64, latency_ms: f64, runs: u64) -> Vec<RunRecord> {
     let settings = UncertaintySettings {
         bound_m,
@@ -135,13 +139,13 @@ fn driven_by(settings: UncertaintySettings, latency_ms: f64, runs: u64) -> Vec<R
     drives(&scenario, SEED, runs)
 }
 
-/// Variances of the horizontal error along its principal axes, larger first.
+/// Returns the principal variances of the horizontal error, larger first.
 fn variances(step: &Step) -> [f64; 2] {
     let [[xx, xy, _], [_, yy, _], _] = step.covariance.unwrap();
     principal_variances(xx, xy, yy)
 }
 
-/// The largest error that the tracker predicts with a probability of 90 %.
+/// Returns the maximum over the run of the predicted 90th percentile of the error.
 fn most_predicted_m(record: &RunRecord) -> f64 {
     let quantile = RadialQuantile::new(0.1);
     let predicted_m = |step: &Step| quantile.radius(variances(step));
@@ -149,14 +153,14 @@ fn most_predicted_m(record: &RunRecord) -> f64 {
 }
 
 #[test]
-fn the_bound_is_kept_with_its_confidence_and_as_late_as_can_be() {
+fn the_target_error_is_met_with_the_fewest_angles() {
     let bound_m = 0.3;
     let records = on_demand(bound_m, 0.0, 12);
     for record in &records {
-        // An angle may turn out an outlier, one in 10⁴ by the gate, and leave its SSB without.
+        // One angle in 10⁴ is rejected as an outlier by the innovation gate.
         assert!(record.out_of_reach <= 3, "{}", record.out_of_reach);
-        // Until the next SSB the error grows by less than 3 %: as late as can be is nearly at the
-        // bound, and one angle missed barely beyond.
+        // The error grows by less than 3 % until the next SSB. An estimate at the last possible SSB
+        // gives an error close to the target, and one missed angle exceeds it slightly.
         let most_m = most_predicted_m(record);
         assert!((0.97..1.03).contains(&(most_m / bound_m)), "{most_m}");
         assert!(record.listened < record.steps.len());
@@ -170,7 +174,7 @@ fn the_bound_is_kept_with_its_confidence_and_as_late_as_can_be() {
 }
 
 #[test]
-fn the_bound_is_kept_by_ssbs_that_come_late() {
+fn the_target_error_is_met_with_late_ssbs() {
     for record in on_demand(0.3, 100.0, 3) {
         let most_m = most_predicted_m(&record);
         assert!((0.97..1.03).contains(&(most_m / 0.3)), "{most_m}");
@@ -178,7 +182,7 @@ fn the_bound_is_kept_by_ssbs_that_come_late() {
 }
 
 #[test]
-fn a_bound_out_of_reach_is_told_and_everything_tried() {
+fn an_infeasible_target_error_is_reported_and_all_angles_are_used() {
     let settings = UncertaintySettings {
         bound_m: 0.02,
         least_gain_m2: 0.0,
@@ -196,7 +200,7 @@ fn a_bound_out_of_reach_is_told_and_everything_tried() {
 }
 
 #[test]
-fn a_looser_bound_costs_less() {
+fn a_larger_target_error_costs_less() {
     let executions = [0.3, 0.6, 1.2].map(|bound_m| on_demand(bound_m, 0.0, 1)[0].executions.len());
     assert!(
         executions[0] > 2 * executions[1] && executions[1] > 2 * executions[2],

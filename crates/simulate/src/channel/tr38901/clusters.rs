@@ -1,4 +1,4 @@
-//! Clusters of plane waves: steps 5 to 8 of 7.5.
+//! Clusters of plane waves (TR 38.901, 7.5, steps 5 to 8).
 
 use std::f64::consts::TAU;
 
@@ -10,28 +10,29 @@ use super::large_scale::{LargeScale, Parameters};
 use crate::phasor::phasor;
 use crate::world::{Antennas, LineOfSight};
 
-/// Rays of a cluster, 20 of them, about its middle in units of its spread (table 7.5-3).
+/// Offsets of the 20 rays of a cluster from its centre, in units of the cluster's spread (table
+/// 7.5-3); each offset applies with both signs.
 const OFFSETS: [f64; 10] = [
     0.0447, 0.1413, 0.2492, 0.3715, 0.5129, 0.6797, 0.8844, 1.1481, 1.5195, 2.1551,
 ];
 const RAYS: usize = 2 * OFFSETS.len();
-/// Clusters that are weaker than the strongest by so much are left out.
+/// Minimum power of a cluster relative to the strongest one (−25 dB); weaker clusters are removed.
 const FLOOR: f64 = 3.162_277_660_168_379e-3;
-/// The two strongest clusters come in three parts: their delays in units of the cluster's, and their
-/// rays (table 7.5-5).
+/// Sub-clusters of the two strongest clusters: delay in units of the cluster's delay spread, and
+/// ray indices (table 7.5-5).
 const PARTS: [(f64, &[usize]); 3] = [
     (0.0, &[0, 1, 2, 3, 4, 5, 6, 7, 18, 19]),
     (1.28, &[8, 9, 10, 11, 16, 17]),
     (2.56, &[12, 13, 14, 15]),
 ];
 
-/// Scatter of unit power, as plane waves of fixed directions.
+/// Scatter of unit power as plane waves of fixed directions.
 #[derive(Debug, Clone)]
 pub struct Clusters {
     groups: Vec<Group>,
 }
 
-/// Rays of one delay and one power.
+/// Rays with equal delay and power.
 #[derive(Debug, Clone)]
 struct Group {
     delay_s: f64,
@@ -40,8 +41,8 @@ struct Group {
     rays: Vec<Ray>,
 }
 
-/// A plane wave: where it comes from, projected on the ground, and its phase at the map's origin.
-/// In single precision, as there are many.
+/// Plane wave: horizontal part of the unit vector to the source, and phase at the map's origin.
+/// Single precision saves memory because there are many rays.
 #[derive(Debug, Clone, Copy)]
 struct Ray {
     east: f32,
@@ -50,7 +51,8 @@ struct Ray {
 }
 
 impl Clusters {
-    /// Clusters at a place that sees the radio head at these angles of azimuth and zenith.
+    /// Draws clusters at a position from which the radio head has the given azimuth and zenith
+    /// angle.
     pub fn draw(
         parameters: &Parameters,
         large_scale: &LargeScale,
@@ -66,7 +68,7 @@ impl Clusters {
         delays_s.sort_by(f64::total_cmp);
         let first_s = delays_s.first().copied().unwrap_or(0.0);
 
-        // Step 6.
+        // Step 6: cluster powers.
         let decay_s = scale / (parameters.delay_scaling - 1.0);
         let mut powers: Vec<f64> = delays_s
             .iter()
@@ -86,7 +88,7 @@ impl Clusters {
             *power /= total;
         }
 
-        // With the line of sight's, angles are made of the powers (7.5-8).
+        // With a line of sight, the angles depend on powers that include it (7.5-8).
         let k = 10f64.powf(0.1 * k_db);
         let with_direct = |(number, power): (usize, &f64)| match number {
             0 if parameters.line_of_sight => (power + k) / (k + 1.0),
@@ -130,7 +132,7 @@ impl Clusters {
                 &[(0.0, &ALL)]
             };
             for (part, rays) in parts {
-                // Step 8: azimuths and zeniths are coupled at random.
+                // Step 8: random coupling of azimuths and zeniths.
                 let mut coupled = rays.to_vec();
                 shuffle(&mut coupled, rng);
                 let rays = rays.iter().zip(&coupled).map(|(azimuth, zenith)| {
@@ -138,7 +140,7 @@ impl Clusters {
                     let azimuth_rad = azimuth_rad + (azimuths_deg[number] + away_deg).to_radians();
                     let away_deg = parameters.cluster_zenith_deg * offset(*zenith);
                     let zenith_rad = zenith_rad + (zeniths_deg[number] + away_deg).to_radians();
-                    // Past the zenith it would come down on the other side; its azimuth is kept.
+                    // A zenith angle below zero is mirrored, but the azimuth is retained.
                     let level = zenith_rad.sin().abs();
                     Ray {
                         east: (level * azimuth_rad.cos()) as f32,
@@ -156,7 +158,7 @@ impl Clusters {
         Self { groups }
     }
 
-    /// Adds `weight` times what the antennas receive at each frequency.
+    /// Adds the antennas' response to the clusters at each frequency, multiplied by `weight`.
     pub fn add(
         &self,
         weight: Complex64,
@@ -194,8 +196,8 @@ impl Clusters {
         }
     }
 
-    /// Root-mean-square spread of the delays in seconds, a line of sight of this Rician K among
-    /// them.
+    /// Returns the RMS delay spread in seconds, including a line of sight with the Rician factor
+    /// `k`.
     pub fn delay_spread_s(&self, k: f64) -> f64 {
         let scatter = 1.0 / (k + 1.0);
         let powers = (self.groups.iter())
@@ -209,8 +211,8 @@ impl Clusters {
         (second - first * first).max(0.0).sqrt()
     }
 
-    /// Circular spread of the azimuths in radians (annex A.1), with a line of sight from
-    /// `azimuth_rad` of this Rician K among them.
+    /// Returns the circular azimuth spread in radians (annex A.1), including a line of sight from
+    /// `azimuth_rad` with the Rician factor `k`.
     pub fn azimuth_spread_rad(&self, k: f64, azimuth_rad: f64) -> f64 {
         let mut sum = Complex64::cis(azimuth_rad) * k;
         for group in &self.groups {
@@ -228,7 +230,7 @@ const ALL: [usize; RAYS] = [
     0, 1, 2, 3, 4, 5, 6, 7, 8, 9, 10, 11, 12, 13, 14, 15, 16, 17, 18, 19,
 ];
 
-/// Angle of a ray to the middle of its cluster, in units of the cluster's spread.
+/// Returns the offset of a ray from the centre of its cluster, in units of the cluster's spread.
 fn offset(ray: usize) -> f64 {
     let magnitude = OFFSETS[ray / 2];
     if ray.is_multiple_of(2) {
@@ -238,8 +240,8 @@ fn offset(ray: usize) -> f64 {
     }
 }
 
-/// Angles of the clusters to the line of sight, by their powers. Where there is a line of sight the
-/// first cluster is about it.
+/// Returns the angles of the clusters relative to the line of sight as a function of their powers.
+/// With a line of sight, the angles are shifted so that the first cluster has the angle zero.
 fn around<R: Rng>(
     powers: &[f64],
     line_of_sight: bool,
@@ -263,7 +265,7 @@ fn sign(rng: &mut impl Rng) -> f64 {
     if rng.random::<f64>() < 0.5 { -1.0 } else { 1.0 }
 }
 
-/// Fisher and Yates.
+/// Shuffles the values (Fisher and Yates).
 fn shuffle(values: &mut [usize], rng: &mut impl Rng) {
     for last in (1..values.len()).rev() {
         let with = (rng.random::<f64>() * (last + 1) as f64) as usize;

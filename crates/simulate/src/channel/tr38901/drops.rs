@@ -1,4 +1,4 @@
-//! Independent drops, to hold against other implementations.
+//! Independent drops, for comparisons with other implementations.
 
 use rand::RngExt;
 use rand_distr::StandardNormal;
@@ -8,10 +8,10 @@ use super::environment::{Environment, Place};
 use super::large_scale::{COUNT, Parameters};
 use crate::random::{Purpose, Streams};
 
-/// One link, dropped at random.
+/// One randomly drawn link.
 #[derive(Debug, Clone, Copy, PartialEq)]
 pub struct Drop {
-    /// Whether there is a line of sight.
+    /// Whether the link has a line of sight.
     pub line_of_sight: bool,
     /// Path loss in dB, without shadowing.
     pub path_loss_db: f64,
@@ -19,19 +19,19 @@ pub struct Drop {
     pub shadowing_db: f64,
     /// Rician K in dB; NaN without a line of sight.
     pub k_db: f64,
-    /// Delay spread as drawn in step 4, in seconds.
+    /// Delay spread drawn in step 4, in seconds.
     pub delay_spread_s: f64,
-    /// Azimuth spread of arrival as drawn, in degrees.
+    /// Azimuth spread of arrival drawn in step 4, in degrees.
     pub azimuth_spread_deg: f64,
-    /// Zenith spread of arrival as drawn, in degrees.
+    /// Zenith spread of arrival drawn in step 4, in degrees.
     pub zenith_spread_deg: f64,
-    /// Delay spread of the paths that came of it, in seconds.
+    /// Delay spread of the resulting paths in seconds.
     pub paths_delay_spread_s: f64,
-    /// Circular azimuth spread of these paths, in degrees.
+    /// Circular azimuth spread of the resulting paths in degrees.
     pub paths_azimuth_spread_deg: f64,
 }
 
-/// One drop at each place.
+/// Draws one link at each position.
 pub fn draw_drops(environment: &Environment, places: &[Place], seed: u64) -> Vec<Drop> {
     let parameters = [false, true].map(|clear| Parameters::of(environment, clear));
     let mut rng = Streams::new(seed, 0).generator(Purpose::Clusters, 0);

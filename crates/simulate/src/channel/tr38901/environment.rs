@@ -1,15 +1,15 @@
-//! The environments: line-of-sight probability and path loss.
+//! Environments of TR 38.901: line-of-sight probability and path loss.
 
 use onboard::settings::SPEED_OF_LIGHT_MPS;
 
 use crate::scenario::{ChannelModel, HallSettings};
 
-/// An environment at a carrier.
+/// Environment at a carrier frequency.
 #[derive(Debug, Clone, Copy, PartialEq)]
 pub struct Environment {
-    /// Carrier in GHz.
+    /// Carrier frequency in GHz.
     pub carrier_ghz: f64,
-    /// Street or factory.
+    /// Street canyon or factory.
     pub(super) kind: Kind,
 }
 
@@ -19,17 +19,17 @@ pub(super) enum Kind {
     Factory(Factory),
 }
 
-/// An indoor factory (table 7.2-4).
+/// Indoor factory (table 7.2-4).
 #[derive(Debug, Clone, Copy, PartialEq)]
 pub(super) struct Factory {
-    /// Whether clutter is dense.
+    /// Whether the clutter is dense.
     dense: bool,
-    /// Whether the radio heads are above it.
+    /// Whether the radio heads are above the clutter.
     high: bool,
     pub hall: HallSettings,
 }
 
-/// A vehicle's place seen from a radio head.
+/// Position of the vehicle relative to a radio head.
 #[derive(Debug, Clone, Copy, PartialEq)]
 pub struct Place {
     /// Horizontal distance in metres.
@@ -41,16 +41,17 @@ pub struct Place {
 }
 
 impl Place {
-    /// Distance in metres.
+    /// Returns the distance in metres, at least 1 m because the models are valid in the far field
+    /// only.
     pub fn distance_m(&self) -> f64 {
-        // The models are of the far field; nobody drives through a radio head.
         self.level_m.hypot(self.head_m - self.array_m).max(1.0)
     }
 }
 
 impl Environment {
-    /// The environment of a model at a carrier, in the hall it is given or that of the model's
-    /// calibration (table 7.8-7); none of the models that are not of TR 38.901.
+    /// Creates the environment of a model at a carrier frequency. The default hall is the one of
+    /// the model's calibration (table 7.8-7). Returns `None` for a model that is not from TR
+    /// 38.901.
     pub fn of(model: ChannelModel, carrier_ghz: f64, hall: Option<HallSettings>) -> Option<Self> {
         let (dense, high) = match model {
             ChannelModel::Rician | ChannelModel::Paths => return None,
@@ -68,7 +69,7 @@ impl Environment {
         } else {
             (0.2, 10.0, 2.0)
         };
-        // SL and DH in the small hall, DL and SH in the large one.
+        // Calibration halls: small for SL and DH, large for DL and SH.
         let size_m = if dense == high {
             [120.0, 60.0, 10.0]
         } else {
@@ -86,8 +87,8 @@ impl Environment {
         })
     }
 
-    /// Heights of radio head and array in metres: as they are, or, where a site is drawn flat, those
-    /// of the model (tables 7.2-1 and 7.8-7).
+    /// Returns the heights of radio head and array in metres. If both are equal (a site without
+    /// heights), the heights of the model are used (tables 7.2-1 and 7.8-7).
     pub fn heights_m(&self, head_m: f64, array_m: f64) -> [f64; 2] {
         if head_m != array_m {
             return [head_m, array_m];
@@ -100,7 +101,7 @@ impl Environment {
         [head_m, 1.5]
     }
 
-    /// Probability of a line of sight (table 7.4.2-1).
+    /// Returns the probability of a line of sight (table 7.4.2-1).
     pub fn line_of_sight_probability(&self, place: &Place) -> f64 {
         let level_m = place.level_m;
         match self.kind {
@@ -113,7 +114,7 @@ impl Environment {
                 let mut reach_m = -hall.clutter_size_m / (1.0 - hall.clutter_density).ln();
                 if high {
                     let above_m = hall.clutter_height_m - place.array_m;
-                    // An array above the clutter sees over it.
+                    // An array above the clutter always has a line of sight.
                     if above_m <= 0.0 {
                         return 1.0;
                     }
@@ -124,8 +125,7 @@ impl Environment {
         }
     }
 
-    /// Distance in metres over which the state of the line of sight decorrelates (table
-    /// 7.6.3.1-2).
+    /// Returns the correlation distance of the line-of-sight state in metres (table 7.6.3.1-2).
     pub fn state_correlation_m(&self) -> f64 {
         match self.kind {
             Kind::Umi => 50.0,
@@ -133,13 +133,13 @@ impl Environment {
         }
     }
 
-    /// Path loss in dB, with a line of sight or without (table 7.4.1-1).
+    /// Returns the path loss in dB with or without a line of sight (table 7.4.1-1).
     pub fn path_loss_db(&self, place: &Place, line_of_sight: bool) -> f64 {
         let decades = place.distance_m().log10();
         let carrier = self.carrier_ghz.log10();
         match self.kind {
             Kind::Umi => {
-                // Beneath 1.5 m the model ends.
+                // The model is valid from 1.5 m upwards.
                 let array_m = place.array_m.max(1.5);
                 let breakpoint_m =
                     4.0 * (place.head_m - 1.0).max(0.0) * (array_m - 1.0) * self.carrier_ghz * 1e9
@@ -177,7 +177,7 @@ impl Environment {
         }
     }
 
-    /// Standard deviation of the shadowing in dB (table 7.4.1-1).
+    /// Returns the standard deviation of the shadowing in dB (table 7.4.1-1).
     pub fn shadowing_std_db(&self, line_of_sight: bool) -> f64 {
         match self.kind {
             Kind::Umi if line_of_sight => 4.0,

@@ -1,12 +1,13 @@
-//! Large-scale parameters: table 7.5-6, and how they hang together.
+//! Large-scale parameters (table 7.5-6) and their correlations.
 
 use onboard::gaussian::{Matrix, identity};
 
 use super::environment::{Environment, Kind};
 use crate::cholesky::cholesky;
 
-/// Shadowing, K, and the spreads of delay, azimuth and zenith of arrival: the order of step 4.
-/// Departure angles have no part in what one antenna of a radio head sends.
+/// Number of large-scale parameters, in the order of step 4: shadowing, K, delay spread, azimuth
+/// spread and zenith spread of arrival. Departure angles do not matter because a radio head has one
+/// antenna.
 pub const COUNT: usize = 5;
 const SHADOWING: usize = 0;
 const K: usize = 1;
@@ -14,7 +15,7 @@ const DELAY: usize = 2;
 const AZIMUTH: usize = 3;
 const ZENITH: usize = 4;
 
-/// Mean and standard deviation.
+/// Normal distribution.
 #[derive(Debug, Clone, Copy, PartialEq)]
 struct Normal {
     mean: f64,
@@ -25,62 +26,63 @@ const fn normal(mean: f64, std: f64) -> Normal {
     Normal { mean, std }
 }
 
-/// The parameters of an environment, with a line of sight or without.
+/// Parameters of an environment with or without a line of sight.
 #[derive(Debug, Clone, PartialEq)]
 pub struct Parameters {
-    /// In dB; in dB; decimal logarithms of seconds and of degrees.
+    /// Distributions of shadowing (dB), K (dB), delay spread (log10 of seconds) and azimuth and
+    /// zenith spread (log10 of degrees).
     normals: [Normal; COUNT],
-    /// Lower triangular root of their correlations.
+    /// Lower Cholesky factor of the correlation matrix.
     root: Matrix<COUNT>,
-    /// Distances in metres over which they decorrelate.
+    /// Correlation distances in metres.
     pub correlation_m: [f64; COUNT],
-    /// Distance over which clusters decorrelate (table 7.6.3.1-2).
+    /// Correlation distance of the clusters in metres (table 7.6.3.1-2).
     pub cluster_correlation_m: f64,
     /// Whether there is a line of sight.
     pub line_of_sight: bool,
     /// Number of clusters.
     pub clusters: usize,
-    /// Proportionality of delays, r_τ.
+    /// Delay scaling parameter r_τ.
     pub delay_scaling: f64,
-    /// Standard deviation of the shadowing of each cluster, ζ (dB).
+    /// Standard deviation ζ of the shadowing of each cluster (dB).
     pub cluster_shadowing_db: f64,
-    /// Spreads within a cluster: delay (s), azimuth and zenith of arrival (degrees).
+    /// Delay spread within a cluster (s).
     pub cluster_delay_s: f64,
-    /// See `cluster_delay_s`.
+    /// Azimuth spread of arrival within a cluster (degrees).
     pub cluster_azimuth_deg: f64,
-    /// See `cluster_delay_s`.
+    /// Zenith spread of arrival within a cluster (degrees).
     pub cluster_zenith_deg: f64,
-    /// C_φ^NLOS (table 7.5-2).
+    /// Scaling factor C_φ^NLOS (table 7.5-2).
     pub azimuth_scaling: f64,
-    /// C_θ^NLOS (table 7.5-4).
+    /// Scaling factor C_θ^NLOS (table 7.5-4).
     pub zenith_scaling: f64,
-    /// Of lg of the delay (s) of everything beyond the straight way, where there is no line of sight
-    /// (table 7.6.9-1).
+    /// Distribution of log10 of the absolute excess delay (s) without a line of sight (table
+    /// 7.6.9-1).
     excess_delay: Option<Normal>,
 }
 
-/// Large-scale parameters of one link at one place.
+/// Large-scale parameters of one link at one position.
 #[derive(Debug, Clone, Copy, PartialEq)]
 pub struct LargeScale {
     /// Shadowing in dB; positive is more power.
     pub shadowing_db: f64,
-    /// Rician K in dB; means nothing without a line of sight.
+    /// Rician K factor in dB; meaningless without a line of sight.
     pub k_db: f64,
-    /// Spread of the delays (s).
+    /// Delay spread (s).
     pub delay_spread_s: f64,
-    /// Spread of the azimuths of arrival (degrees).
+    /// Azimuth spread of arrival (degrees).
     pub azimuth_spread_deg: f64,
-    /// Spread of the zeniths of arrival (degrees).
+    /// Zenith spread of arrival (degrees).
     pub zenith_spread_deg: f64,
 }
 
 impl Parameters {
-    /// The parameters of an environment.
+    /// Returns the parameters of an environment.
     pub fn of(environment: &Environment, line_of_sight: bool) -> Self {
         let shadowing = normal(0.0, environment.shadowing_std_db(line_of_sight));
         match environment.kind {
             Kind::Umi => {
-                // Below 2 GHz the values of 2 GHz hold.
+                // Frequencies below 2 GHz use the values of 2 GHz.
                 let f = (1.0 + environment.carrier_ghz.max(2.0)).log10();
                 umi(f, shadowing, line_of_sight)
             }
@@ -95,7 +97,7 @@ impl Parameters {
         }
     }
 
-    /// What independent standard normal numbers make of the large-scale parameters (step 4).
+    /// Converts independent standard normal numbers to the large-scale parameters (step 4).
     pub fn large_scale(&self, normals: &[f64; COUNT]) -> LargeScale {
         let value = |index: usize| {
             let root = self.root[index].iter().zip(normals);
@@ -111,7 +113,7 @@ impl Parameters {
         }
     }
 
-    /// What a standard normal number makes of the delay beyond the straight way (s).
+    /// Converts a standard normal number to the excess delay (s).
     pub fn excess_delay_s(&self, deviate: f64) -> f64 {
         self.excess_delay
             .map_or(0.0, |lg| 10f64.powf(lg.mean + lg.std * deviate))
@@ -241,7 +243,7 @@ mod tests {
     use crate::scenario::ChannelModel;
 
     #[test]
-    fn correlations_have_roots() {
+    fn correlation_matrices_have_cholesky_factors() {
         for model in [ChannelModel::Umi, ChannelModel::InfSl] {
             let environment = Environment::of(model, 3.5, None).unwrap();
             for line_of_sight in [true, false] {

@@ -1,9 +1,9 @@
-//! The geometry-based stochastic channel of 3GPP TR 38.901 (V19.2), for one antenna of a radio head
-//! and the vehicle's array, vertically polarised: UMi and the indoor factories.
+//! Geometry-based stochastic channel of 3GPP TR 38.901 (V19.2) between one vertically polarised
+//! antenna of a radio head and the vehicle's array: UMi and the indoor factories.
 //!
-//! Along the way run Gaussian processes: the state of the line of sight, K and shadowing of every
-//! place ([`track`]). Clusters ([`clusters`]) are drawn a correlation distance apart, as plane waves
-//! of fixed directions, and fade over into each other in between.
+//! The line-of-sight state, the K factor and the shadowing are Gaussian processes of the distance
+//! driven ([`track`]). Clusters ([`clusters`]) are drawn one correlation distance apart as plane
+//! waves of fixed directions, and are cross-faded in between.
 
 mod clusters;
 mod drops;

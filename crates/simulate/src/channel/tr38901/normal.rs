@@ -1,6 +1,7 @@
-//! The quantile of the normal distribution.
+//! Quantile of the normal distribution.
 
-/// Φ⁻¹(p), to 1e-7 (Wichura 1988, algorithm AS 241, PPND7); infinite at 0 and 1.
+/// Returns Φ⁻¹(p) with an error below 1e-7 (Wichura 1988, algorithm AS 241, PPND7); infinite at 0
+/// and 1.
 pub fn quantile(p: f64) -> f64 {
     let q = p - 0.5;
     if q.abs() <= 0.425 {
@@ -31,7 +32,7 @@ mod tests {
     use super::*;
 
     #[test]
-    fn tabulated() {
+    fn quantiles_equal_tabulated_values() {
         for (p, z) in [
             (0.5, 0.0),
             (0.975, 1.959_963_984_5),

@@ -1,4 +1,4 @@
-//! The channel along a drive.
+//! Channel of TR 38.901 along a drive.
 
 use std::f64::consts::{FRAC_PI_2, PI, TAU};
 
@@ -19,16 +19,17 @@ use crate::random::Purpose;
 use crate::scenario::ChannelSettings;
 use crate::world::{Antennas, LineOfSight};
 
-/// Scatter that is weaker than the rest by so much is not computed.
+/// Relative amplitude below which a scatter component is not computed.
 const NEGLIGIBLE: f64 = 1e-4;
 
-/// Soft state from which on there is a line of sight rather than none.
+/// Soft state above which the link has a line of sight.
 const LINE_OF_SIGHT: f64 = 0.5;
 
-/// The propagation from one radio head in one run.
+/// Propagation from one radio head in one run.
 ///
-/// Line of sight and what there is without one are two channels, mixed by a soft state of the line
-/// of sight (7.6.3.3): a normal process of place whose threshold is the probability there.
+/// Two channels, with and without a line of sight, are mixed by a soft line-of-sight state
+/// (7.6.3.3). The state is a normal process of position, and its threshold follows from the
+/// line-of-sight probability at the position.
 #[derive(Debug, Clone)]
 pub struct Tr38901Propagation {
     environment: Environment,
@@ -43,16 +44,16 @@ pub struct Tr38901Propagation {
     hidden: Channel,
 }
 
-/// With a line of sight, or without.
+/// Channel with or without a line of sight.
 #[derive(Debug, Clone)]
 struct Channel {
     parameters: Parameters,
     tracks: [Track; COUNT],
-    /// Clusters every `cluster_correlation_m` of the way.
+    /// Clusters at intervals of `cluster_correlation_m` along the road.
     clusters: Vec<Clusters>,
 }
 
-/// What arrives at one place: amplitudes, the total of their squares being one.
+/// Amplitudes of the components at one position. The sum of their squares is one.
 struct Mix {
     gain_db: f64,
     direct: f64,
@@ -61,7 +62,7 @@ struct Mix {
 }
 
 impl Tr38901Propagation {
-    /// The propagation over a link.
+    /// Draws the propagation of a link.
     pub fn new(
         environment: Environment,
         settings: &ChannelSettings,
@@ -107,7 +108,7 @@ impl Tr38901Propagation {
         };
         let along_m = sight.along_m;
         let threshold = normal::quantile(self.environment.line_of_sight_probability(&place));
-        // (7.6-17): λ in metres.
+        // Equation (7.6-17), with λ in metres.
         let sharpness = (20.0 * self.wavenumber_per_m / TAU).sqrt();
         let soft = 0.5 + (sharpness * (self.state.at(along_m) + threshold)).atan() / PI;
         let [clear, hidden] =
@@ -204,7 +205,8 @@ impl Channel {
         self.parameters.large_scale(&normals)
     }
 
-    /// The clusters before and behind, and their amplitudes, whose squares sum up to one.
+    /// Returns the previous and next clusters and their amplitudes. The sum of the squared
+    /// amplitudes is one.
     fn clusters_at(&self, along_m: f64) -> impl Iterator<Item = (&Clusters, f64)> {
         let place = (along_m / self.parameters.cluster_correlation_m).max(0.0);
         let index = (place as usize).min(self.clusters.len().saturating_sub(2));

@@ -1,4 +1,4 @@
-//! Channels that a ray tracer has found: a file of paths, and the propagation along them.
+//! Ray-traced channels: file of paths, and propagation along the paths.
 
 mod paths;
 mod propagation;

@@ -1,4 +1,4 @@
-//! The paths between radio heads and the places of a site.
+//! Ray-traced paths between radio heads and the positions of a site.
 
 use std::collections::HashMap;
 use std::f64::consts::FRAC_PI_2;
@@ -12,20 +12,22 @@ use thiserror::Error;
 
 use super::read::Arrays;
 
-/// A place stands for what lies nearer to it than to any other, as far as this.
+/// Maximum distance between a position and the nearest traced position, in metres.
 const REACH_M: f64 = 1.0;
-/// How far a road may lead on beyond the places.
+/// Maximum length of the road before the first and after the last traced position, in metres.
 const ENDS_M: f64 = 10.0;
-/// What a path may be shorter than the straight way by: single precision, rounded places.
+/// Tolerance of a path that is shorter than the straight line, in metres. Single precision and
+/// rounded positions cause such paths.
 const SLACK_M: f64 = 0.3;
-/// A path is shorter than this; one that is longer is in another unit.
+/// Maximum length of a path in metres; a longer path indicates a wrong unit.
 const LONGEST_M: f64 = 1e5;
-/// A path that is no longer than the straight way by more than this is the line of sight.
+/// Maximum excess length of the line of sight, in metres.
 const DIRECT_M: f64 = 0.01;
-/// Least cosine between the line of sight and where it is said to come from.
+/// Minimum cosine between the geometric direction of the line of sight and its direction of arrival
+/// in the file.
 const LEAST_COSINE: f64 = 0.9;
 
-/// Why a file of paths cannot be used.
+/// Error of a file of paths.
 #[derive(Debug, Error)]
 #[error("{0}")]
 pub struct PathsError(String);
@@ -36,28 +38,29 @@ impl PathsError {
     }
 }
 
-/// One path at one place.
+/// One path at one position.
 #[derive(Debug, Clone, Copy)]
 pub struct TracedPath {
-    /// Amplitude: its square is the gain between isotropic antennas. Phase at the place.
+    /// Complex amplitude: its squared magnitude is the gain between isotropic antennas, and its
+    /// phase is valid at the traced position.
     pub gain: Complex32,
-    /// How much later than straight it comes (s).
+    /// Delay relative to the straight line (s).
     pub excess_s: f32,
-    /// Where it comes from, projected on the ground.
+    /// Horizontal part of the unit vector to the source.
     pub towards: [f32; 2],
     /// Whether it is the line of sight.
     pub direct: bool,
 }
 
-/// The paths of a site, as a ray tracer found them.
+/// Ray-traced paths of a site.
 #[derive(Debug, Clone)]
 pub struct Paths {
     carrier_mhz: f64,
     heads: Vec<Head>,
     places: Vec<[f64; 3]>,
-    /// Numbers of the places in each square of the ground.
+    /// Indices of the traced positions in each square of the ground.
     squares: HashMap<[i64; 2], Vec<usize>>,
-    /// Where the paths of each head at each place begin.
+    /// Index of the first path of each radio head and traced position.
     begins: Vec<usize>,
     all: Vec<TracedPath>,
 }
@@ -70,13 +73,16 @@ struct Head {
 }
 
 impl Paths {
-    /// Reads an npz file with the arrays `carrier_mhz`; `head_pci`, `head_ssb_index`, `head_m` (n × 3,
-    /// the map's frame); `place_m` (n × 3); and of each path `path_head`, `path_place` (their numbers,
-    /// from 0), `gain` (complex), `delay_s`, `azimuth_rad`, `elevation_rad` (of arrival, the map's
-    /// frame).
+    /// Reads an npz file with the following arrays.
+    ///
+    /// - `carrier_mhz`
+    /// - `head_pci`, `head_ssb_index`, `head_m` (n × 3, map frame)
+    /// - `place_m` (n × 3, map frame)
+    /// - per path: `path_head` and `path_place` (indices from 0), `gain` (complex), `delay_s`,
+    ///   `azimuth_rad` and `elevation_rad` (angles of arrival, map frame)
     ///
     /// # Errors
-    /// [`PathsError`] naming the array and what is wrong with it.
+    /// [`PathsError`] with the array and the error.
     pub fn read(file: &Path) -> Result<Self, PathsError> {
         let mut arrays = Arrays::open(file).map_err(PathsError)?;
         let mut numbers = |name: &str, width| arrays.numbers(name, width).map_err(PathsError);
@@ -97,12 +103,14 @@ impl Paths {
         finite("head_m", head_m.iter().flatten())?;
         finite("place_m", places.iter().flatten())?;
         if pcis.len() != head_m.len() || indices.len() != head_m.len() {
-            return PathsError::that("`head_pci`, `head_ssb_index` and `head_m` must be as long");
+            return PathsError::that(
+                "`head_pci`, `head_ssb_index` and `head_m` must have equal lengths",
+            );
         }
         for (pci, [_, _, z_m]) in pcis.iter().zip(&head_m) {
             if *z_m < 0.0 {
                 return PathsError::that(format!(
-                    "`head_m`: radio head pci={pci} at z = {z_m} m stands under the road"
+                    "`head_m`: radio head pci={pci} at z = {z_m} m is below the road"
                 ));
             }
         }
@@ -226,13 +234,14 @@ impl Paths {
         })
     }
 
-    /// Refuses paths of another site, carrier or road.
+    /// Checks that the paths belong to the site, carrier and road.
     ///
     /// # Errors
     /// [`PathsError`].
     pub fn check(&self, site: &Site, road: &Road) -> Result<(), PathsError> {
         let carrier_mhz = site.carrier_mhz;
-        // Phases hold at one frequency; an SSB's place in the carrier is within a per cent.
+        // Phases are valid at one frequency. The SSB's centre frequency differs from the carrier's
+        // by less than 1 %.
         let same = (self.carrier_mhz / carrier_mhz - 1.0).abs() <= 0.01;
         if !same {
             return PathsError::that(format!(
@@ -264,7 +273,7 @@ impl Paths {
         }
         let metres = road.length_m().floor() as usize;
         let mut metres = (0..=metres).map(|it| it as f64);
-        // Nothing is heard on what leads to the first place, and on from the last.
+        // Positions before the first and after the last traced position have no signal.
         let inside = ENDS_M..=road.length_m() - ENDS_M;
         let untraced = |along_m: &f64| self.place_near(road.pose(*along_m).point()).is_none();
         if let Some(along_m) = metres.find(|it| inside.contains(it) && untraced(it)) {
@@ -275,14 +284,15 @@ impl Paths {
         Ok(())
     }
 
-    /// Number of a radio head of the site in the file.
+    /// Returns the index of a radio head of the site in the file.
     pub fn head(&self, head: &RadioHeadSettings) -> Option<usize> {
         let (pci, ssb_index) = (f64::from(head.pci), f64::from(head.ssb_index));
         (self.heads.iter()).position(|it| it.pci == pci && it.ssb_index == ssb_index)
     }
 
-    /// The paths from a radio head of the file at the place nearest to this, and how far off in x and
-    /// y this is; none beyond reach.
+    /// Returns the paths from radio head `head` of the file at the nearest traced position, and the
+    /// offset of `place` from that position in x and y (m). Returns `None` if the distance exceeds
+    /// [`REACH_M`].
     pub fn near(&self, head: usize, place: Point) -> Option<(&[TracedPath], [f64; 2])> {
         let number = self.place_near(place)?;
         let [x_m, y_m, _] = self.places[number];
@@ -291,8 +301,9 @@ impl Paths {
         Some((paths, [place.x_m - x_m, place.y_m - y_m]))
     }
 
-    /// Rician K of a radio head of the file there: power of its line of sight by that of the other
-    /// paths. None beyond reach; 0 without a line of sight.
+    /// Returns the Rician K factor of a radio head of the file at `place`: the power of the line of
+    /// sight divided by the power of the other paths. Returns `None` if no traced position is near,
+    /// and 0 without a line of sight.
     pub fn rician_k(&self, head: usize, place: Point) -> Option<f64> {
         let (paths, _) = self.near(head, place)?;
         let power = |direct| {
@@ -300,7 +311,7 @@ impl Paths {
             such.map(|path| f64::from(path.gain.norm_sqr()))
                 .sum::<f64>()
         };
-        // A single path leaves rounding at most.
+        // With a single path, the power of the others is zero apart from rounding.
         Some(power(true) / power(false).max(f64::MIN_POSITIVE))
     }
 
@@ -321,7 +332,7 @@ impl Paths {
     }
 }
 
-/// The square of [`REACH_M`] that a place is in.
+/// Returns the square of side [`REACH_M`] that contains `place`.
 fn square(place: Point) -> [i64; 2] {
     [place.x_m, place.y_m].map(|part_m| (part_m / REACH_M).floor() as i64)
 }

@@ -1,4 +1,4 @@
-//! The channel along traced paths.
+//! Propagation along ray-traced paths.
 
 use std::f64::consts::TAU;
 use std::sync::Arc;
@@ -14,10 +14,11 @@ use crate::phasor::phasor;
 use crate::scenario::ChannelSettings;
 use crate::world::{Antennas, LineOfSight};
 
-/// What is received where there is no path at all, in dB under free space.
+/// Received power without any path, in dB relative to free space.
 const NOTHING_DB: f64 = -200.0;
 
-/// The propagation from one radio head: the paths of the nearest place, gone on with as plane waves.
+/// Propagation from one radio head. The paths of the nearest traced position are extrapolated as
+/// plane waves.
 #[derive(Debug, Clone)]
 pub struct TracedPropagation {
     paths: Arc<Paths>,
@@ -28,7 +29,7 @@ pub struct TracedPropagation {
 }
 
 impl TracedPropagation {
-    /// The propagation over a link; none where the file has not its radio head.
+    /// Creates the propagation of a link; `None` if the file does not contain the radio head.
     pub fn new(paths: Arc<Paths>, settings: &ChannelSettings, link: &Link<'_>) -> Option<Self> {
         let head = paths.head(link.site.radio_heads.get(link.head)?)?;
         Some(Self {
@@ -41,7 +42,7 @@ impl TracedPropagation {
     }
 }
 
-/// Total power of paths.
+/// Returns the total power of the paths.
 fn power(paths: &[TracedPath]) -> f64 {
     let powers = paths.iter().map(|path| f64::from(path.gain.norm_sqr()));
     powers.sum()
@@ -68,7 +69,7 @@ impl Propagation for TracedPropagation {
             return;
         };
         let scale = power(paths).sqrt().recip();
-        // Its walls are in the paths already.
+        // The paths already include the attenuation of walls.
         let passing = self.blockage.moving(sight.time_s);
         let (sin, cos) = sight.axis_rad.sin_cos();
         let [x, y] = [east_m, north_m].map(|part_m| self.wavenumber_per_m * part_m);

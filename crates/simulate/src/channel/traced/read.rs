@@ -1,4 +1,4 @@
-//! Arrays of an npz file.
+//! Reader of the arrays of an npz file.
 
 use std::fs::File;
 use std::io::Read;
@@ -8,10 +8,10 @@ use npyz::{DType, NpyFile, Order};
 use num_complex::Complex32;
 use zip::ZipArchive;
 
-/// The arrays of a file.
+/// Arrays of an npz file.
 pub struct Arrays(ZipArchive<File>);
 
-/// Why there is no such array: what an error says of it.
+/// Error message without the file name.
 type Why = String;
 
 impl Arrays {
@@ -33,7 +33,7 @@ impl Arrays {
         Ok(bytes)
     }
 
-    /// Real or whole numbers, `width` to a row.
+    /// Reads real or integer numbers with `width` values per row.
     pub fn numbers(&mut self, name: &str, width: u64) -> Result<Vec<f64>, Why> {
         let bytes = self.bytes(name)?;
         let npy =
@@ -46,7 +46,7 @@ impl Arrays {
         };
         if !fits {
             return Err(format!(
-                "array `{name}` has the shape {shape:?}; {width} to a row are needed"
+                "array `{name}` has the shape {shape:?}; each row must have {width} values"
             ));
         }
         let by_column = npy.order() == Order::Fortran;
@@ -65,7 +65,7 @@ impl Arrays {
             "u1" => npy.into_vec::<u8>().map(widened),
             _ => {
                 return Err(format!(
-                    "array `{name}` is of type {kind}; it must be f4, f8, i4 or i8"
+                    "array `{name}` has the type {kind}; it must be f4, f8, i4 or i8"
                 ));
             }
         };
@@ -82,7 +82,7 @@ impl Arrays {
         })
     }
 
-    /// Complex numbers.
+    /// Reads complex numbers.
     pub fn complex(&mut self, name: &str) -> Result<Vec<Complex32>, Why> {
         let bytes = self.bytes(name)?;
         let npy =

@@ -1,4 +1,4 @@
-//! What several tests share.
+//! Functions that are shared by the tests.
 #![allow(
     dead_code,
     unused_imports,
@@ -21,21 +21,22 @@ use toml::Value;
 
 pub use files::scratch;
 
-/// None of the user's own code.
+/// Factory without custom code.
 pub const NONE: &MakeCustom = &|_| Ok(Custom::default());
 
-/// A shipped scenario.
+/// Returns a shipped scenario.
 pub fn shipped(name: &str) -> Scenario {
     Scenario::from_library(name, &Shipped).unwrap()
 }
 
-/// A shipped scenario whose vehicle mistrusts nobody: driven in a tenth of the time.
+/// Returns a shipped scenario without integrity monitoring, which takes a tenth of the computing
+/// time.
 pub fn unguarded(name: &str) -> Scenario {
     changed(name, [])
 }
 
-/// A shipped scenario with some of its keys changed, its vehicle mistrusting nobody unless they say so
-/// (`vehicle.integrity`).
+/// Returns a shipped scenario with changed keys. Integrity monitoring is off unless the keys enable
+/// it (`vehicle.integrity`).
 pub fn changed<'a>(name: &str, overrides: impl IntoIterator<Item = (&'a str, Value)>) -> Scenario {
     let unguarded = [("vehicle.integrity.enabled", false.into())];
     let overrides = unguarded.into_iter().chain(overrides);
@@ -43,23 +44,23 @@ pub fn changed<'a>(name: &str, overrides: impl IntoIterator<Item = (&'a str, Val
     scenario.unwrap_or_else(|error| panic!("{error}"))
 }
 
-/// The value of a TOML expression.
+/// Returns the value of a TOML expression.
 pub fn value(text: &str) -> Value {
     let table = format!("it = {text}").parse::<toml::Table>();
     table.unwrap()["it"].clone()
 }
 
-/// A scenario on its platform.
+/// Prepares a scenario on its platform.
 pub fn simulation(scenario: &Scenario) -> Simulation {
     Simulation::on_its_platform(scenario).unwrap()
 }
 
-/// One run of a scenario.
+/// Simulates one run of a scenario.
 pub fn run(scenario: &Scenario, seed: u64, number: u64) -> RunRecord {
     simulation(scenario).run(seed, number, NONE).unwrap()
 }
 
-/// The first runs of a scenario.
+/// Simulates the first runs of a scenario.
 pub fn drives(scenario: &Scenario, seed: u64, runs: u64) -> Vec<RunRecord> {
     let simulation = simulation(scenario);
     (0..runs)
@@ -67,7 +68,7 @@ pub fn drives(scenario: &Scenario, seed: u64, runs: u64) -> Vec<RunRecord> {
         .collect()
 }
 
-/// The first runs of a scenario as a campaign.
+/// Simulates the first runs of a scenario as a campaign.
 pub fn campaign(scenario: &Scenario, seed: u64, runs: usize) -> Campaign {
     let options = CampaignOptions {
         seed,
@@ -77,7 +78,7 @@ pub fn campaign(scenario: &Scenario, seed: u64, runs: usize) -> Campaign {
     simulation(scenario).campaign(&options).unwrap()
 }
 
-/// Odometry and angles of a run, as a vehicle would have logged them.
+/// Returns the odometry and angle logs of a run.
 pub fn logs(scenario: &Scenario, seed: u64) -> (OdometryLog, AngleLog, RunRecord) {
     let record = run(scenario, seed, 0);
     let mut truth = World::new(scenario).unwrap().draw(Streams::new(seed, 0));
@@ -99,7 +100,7 @@ pub fn logs(scenario: &Scenario, seed: u64) -> (OdometryLog, AngleLog, RunRecord
     (odometry, angles, record)
 }
 
-/// A burst whose angles are known.
+/// Burst with given angles.
 pub struct Burst<'a>(pub &'a [LoggedAngle]);
 
 impl SsbSource for Burst<'_> {
