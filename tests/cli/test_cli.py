@@ -117,7 +117,8 @@ def test_set_changes_one_key(access_av: Cli, tmp_path: Path) -> None:
 def test_evaluation_leaves_its_files(quick_study: Path) -> None:
     names = {path.name for path in (quick_study / "latest").iterdir()}
     assert names == {
-        "ablation.svg", "ablations.parquet", "claims.json", "errors.parquet", "fair.parquet",
+        "ablation.svg", "ablations.parquet", "claims.json", "errors.parquet",
+        "evaluation_runs.parquet", "fair.parquet", "resamples.parquet",
         "fixed_front.parquet", "freedoms.parquet", "front.svg", "manifest.json",
         "operating_points.parquet", "ours.parquet", "platform.toml",
         "report.html", "scenario.toml", "snr.parquet",

@@ -8,12 +8,13 @@ import pytest
 
 import synthetic
 from access_av.errors import InputError
+from access_av.paper import summary
 from access_av.paper.claims import (
     EVIDENCE,
+    NO_EVIDENCE,
     NOT_JUDGED,
-    NOT_REPRODUCED,
     NOT_TESTABLE,
-    REPRODUCED,
+    VERDICTS,
     as_records,
     check_claims,
     evidence,
@@ -108,7 +109,7 @@ def test_every_figure_of_the_papers_sections_is_a_row() -> None:
     rows = {claim.id.split("_")[0]: claim for claim in claims}
     assert rows.keys() >= FIGURES.keys()
     for name in FIGURES:
-        assert rows[name].verdict in (REPRODUCED, NOT_REPRODUCED, NOT_TESTABLE, NOT_JUDGED)
+        assert rows[name].verdict in VERDICTS
         assert rows[name].verdict != NOT_TESTABLE or rows[name].note
 
 
@@ -116,8 +117,30 @@ def test_two_refrigerators_would_take_eleven_kilowatt_hours() -> None:
     claims = {claim.id: claim for claim in check_claims(synthetic.evaluation().outcome)}
     claim = claims["e10_two_refrigerators"]
     assert claim.obtained == pytest.approx(39.884 / 3.6 / 1.4, abs=1e-3)
-    assert not claim.reproduced
+    assert not claim.met
+    assert claim.verdict == "differs"
     assert "5.5 kWh" in claim.note
+
+
+def test_claims_by_arithmetic_or_construction_do_not_count_as_reproduced() -> None:
+    claims = check_claims(synthetic.evaluation().outcome)
+    given = [claim for claim in claims if claim.evidence in NO_EVIDENCE and claim.is_judged]
+    assert {claim.verdict for claim in given} == {"agrees", "differs"}
+    assert not any(claim.reproduced for claim in given)
+    met = sum(claim.reproduced for claim in claims)
+    assert f"reproduced: {met} of " in summary.counts_text(claims)
+    assert "not counted as reproduced" in summary.counts_text(claims)
+
+
+def test_the_deviation_is_the_tolerance_at_which_the_verdict_changes() -> None:
+    outcome = synthetic.evaluation().outcome
+    judged = [claim for claim in check_claims(outcome) if claim.deviation]
+    assert judged
+    for claim in judged:
+        for factor, met in ((0.99, False), (1.01, True)):
+            entry = {**stated_claims()[claim.id], "tolerance": factor * claim.deviation}
+            [again] = check_claims(outcome, stated={claim.id: entry})
+            assert again.met == met, claim.id
 
 
 def test_the_spread_of_single_trips_stands_beside_the_mean() -> None:
@@ -184,7 +207,7 @@ def test_a_platform_without_a_mode_is_named() -> None:
 def test_records_have_the_promised_fields() -> None:
     records = json.loads(json.dumps(as_records(check_claims(synthetic.evaluation().outcome))))
     for record in records:
-        assert record["verdict"] in (REPRODUCED, NOT_REPRODUCED, NOT_JUDGED, NOT_TESTABLE)
+        assert record["verdict"] in VERDICTS
         assert record["evidence"] in EVIDENCE or record["verdict"] == NOT_TESTABLE
         assert isinstance(record["turns_with_seed"], bool)
 

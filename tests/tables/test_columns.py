@@ -138,6 +138,7 @@ def test_bound() -> None:
 
 def test_evaluation(quick_study: Path) -> None:
     names = ("operating_points", "errors", "snr", "ablations", "fixed_front", "ours", "fair",
+             "evaluation_runs", "resamples",
              "freedoms")  # fmt: skip
     for name in names:
         check(name, pl.read_parquet(quick_study / "latest" / f"{name}.parquet"))

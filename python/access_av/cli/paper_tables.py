@@ -8,6 +8,7 @@ from access_av.cli.terminal import console, is_narrow, table
 from access_av.paper import summary
 from access_av.paper.claims import NOT_JUDGED
 from access_av.paper.statements import METHODS
+from access_av.paper.summary import SIGNS
 from access_av.signal.methods import label
 from access_av.tables.numbers import value_text
 
@@ -23,8 +24,11 @@ if TYPE_CHECKING:
 
 
 def mark(claim: Claim) -> str:
-    """A verdict in two signs: met or not, and whether it turns with the seed."""
-    sign = "–" if not claim.is_judged else "✓" if claim.reproduced else "✗"
+    """Returns the sign of a verdict, and the sign of one that changes with the seed.
+
+    ✓ reproduced, ✗ not reproduced, = agrees and ≠ differs by arithmetic or construction.
+    """
+    sign = SIGNS.get(claim.verdict, "–")
     return sign + ((claim.seeds_met or "?") if claim.turns_with_seed else "")
 
 
@@ -36,7 +40,7 @@ def show_study(study: Study) -> None:
     console.print(f"{summary.headline(study)}.", style="bold")
     console.print(summary.lead(study))
     shown = study.of(study.shown.reading.name)
-    console.print(f"Claims met under “{study.shown.reading.title}”: {summary.counts_text(shown)}.")
+    console.print(f"Claims under “{study.shown.reading.title}”: {summary.counts_text(shown)}.")
     console.print(summary.fair_text(study))
     console.print(summary.ours_text(study))
     if seeds := summary.seeds_text(study):
@@ -83,7 +87,8 @@ def _show_claims(study: Study) -> None:
     columns = [each.reading.name for each in study.evaluations]
     matrix = table(
         ["claim", *(map(str, range(1, len(columns) + 1)))],
-        title="Claims by readings (✓ met, ✗ not, ? or 3/5 turns with the seed)",
+        title="Claims by readings (✓ reproduced, ✗ not; = agrees, ≠ differs by arithmetic or "
+        "construction; ? or 3/5: changes with the seed)",
     )
     by_reading = [study.of(name) for name in columns]
     for claims in zip(*by_reading, strict=True):
@@ -98,7 +103,13 @@ def _show_freedoms(study: Study) -> None:
     if not study.bought:
         return
     made = table(
-        ["free in the energy fit", "numbers / solved", "claims met", "saving %", "both halves"],
+        [
+            "free in the energy fit",
+            "numbers / solved",
+            "reproduced / by construction / by arithmetic",
+            "saving %",
+            "both halves",
+        ],
         title=f"What each freedom buys, claims under {study.shown.reading.name}",
         text=1,
     )
@@ -107,7 +118,7 @@ def _show_freedoms(study: Study) -> None:
         made.add_row(
             ("and " if index else "") + each.says + (" *" if each.is_shipped else ""),
             f"{each.free} / {each.solved}",
-            f"{each.met} ({each.by_construction} by construction)",
+            f"{each.reproduced} / {each.by_construction} / {each.by_arithmetic}",
             "–" if saving is None else f"{saving:.1f}",
             ", ".join(each.both) or "none",
         )

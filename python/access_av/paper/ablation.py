@@ -6,8 +6,8 @@ left of a difference, run by run, is the controller's.
 
 from __future__ import annotations
 
-from dataclasses import dataclass
-from typing import TYPE_CHECKING
+from dataclasses import dataclass, field
+from typing import TYPE_CHECKING, Any
 
 import numpy as np
 
@@ -46,6 +46,8 @@ class Ablation:
     matters
         1 where the controller helps, -1 where it harms, 0 where it makes no difference. It makes
         one where the whole interval is beyond :data:`LEAST_SHARE` of the error.
+    constant
+        Drives with the constant.
     """
 
     reading: str
@@ -59,6 +61,11 @@ class Ablation:
     gain_low_m: float
     gain_high_m: float
     matters: int
+    constant: Drives | None = field(default=None, repr=False, compare=False)
+
+    def as_row(self) -> dict[str, Any]:
+        """Returns a row of the table ``ablations``."""
+        return {key: value for key, value in vars(self).items() if key != "constant"}
 
 
 def ablate(driver: Driver, evaluation: Evaluation) -> list[Ablation]:
@@ -98,6 +105,7 @@ def compare(
         gain_low_m=float(low_m),
         gain_high_m=float(high_m),
         matters=1 if low_m > least_m else -1 if high_m < -least_m else 0,
+        constant=constant,
     )
 
 

@@ -22,6 +22,10 @@ REPRODUCED = "reproduced"
 NOT_REPRODUCED = "not reproduced"
 NOT_JUDGED = "not judged"
 NOT_TESTABLE = "not testable"
+# Verdicts of claims that are no evidence: they follow by arithmetic or by construction.
+AGREES = "agrees"
+DIFFERS = "differs"
+VERDICTS = (REPRODUCED, NOT_REPRODUCED, AGREES, DIFFERS, NOT_JUDGED, NOT_TESTABLE)
 
 INDEPENDENT = "independent"
 CALIBRATED = "calibrated"
@@ -29,6 +33,8 @@ BY_CONSTRUCTION = "by construction"
 ARITHMETIC = "arithmetic"
 # From the one that says most to the one that says least.
 EVIDENCE = (INDEPENDENT, CALIBRATED, BY_CONSTRUCTION, ARITHMETIC)
+# Kinds whose claims are not counted as reproduced: no simulation can contradict them.
+NO_EVIDENCE = (BY_CONSTRUCTION, ARITHMETIC)
 
 # A verdict turns with the seed unless its margin is this many standard deviations of the difference
 # between two seeds away from zero: 99 % of other seeds agree.
@@ -46,8 +52,14 @@ class Claim:
     turns_with_seed
         Whether other runs may give another verdict: by its margin's spread over the runs, or
         because another seed that was tried did.
+    verdict
+        One of :data:`VERDICTS`.
     evidence
-        One of :data:`EVIDENCE`: what the verdict is worth; empty where there is none.
+        One of :data:`EVIDENCE`: the kind of evidence; empty for a claim that is not testable.
+    deviation
+        Maximum relative deviation of ``obtained`` from ``stated``, for claims with a tolerance.
+    tolerance
+        Maximum allowed deviation; ``None`` without one.
     spread
         How far single trips depart from a mean over the runs, where the claim is of one.
     met_by_seed
@@ -68,16 +80,23 @@ class Claim:
     note: str
     spread: Mapping[str, float] = field(default_factory=dict)
     met_by_seed: Mapping[int, bool] = field(default_factory=dict)
+    deviation: float | None = None
+    tolerance: float | None = None
 
     @property
     def reproduced(self) -> bool:
-        """Whether the claim is met."""
+        """Whether the claim is met, and evidence supports it: not by arithmetic or construction."""
         return self.verdict == REPRODUCED
 
     @property
+    def met(self) -> bool:
+        """Whether the claim is met, whatever the kind of evidence."""
+        return self.verdict in (REPRODUCED, AGREES)
+
+    @property
     def is_judged(self) -> bool:
-        """Whether there is a verdict."""
-        return self.verdict in (REPRODUCED, NOT_REPRODUCED)
+        """Whether the claim is met or not met."""
+        return self.verdict in (REPRODUCED, NOT_REPRODUCED, AGREES, DIFFERS)
 
     @property
     def seeds_met(self) -> str:
@@ -157,7 +176,7 @@ def with_seeds(claims: Mapping[int, list[Claim]]) -> list[Claim]:
     first, *_ = claims.values()
     made = []
     for index, claim in enumerate(first):
-        met = {seed: each[index].reproduced for seed, each in claims.items()}
+        met = {seed: each[index].met for seed, each in claims.items()}
         turns = claim.turns_with_seed or len({*met.values()}) > 1
         made.append(replace(claim, met_by_seed=met, turns_with_seed=turns))
     return made
@@ -182,7 +201,10 @@ def _judge(
             finding = FINDINGS[claim_id](outcome)
             by = np.atleast_1d(margin(entry, finding.value))
             met = bool(by[0] >= 0.0)
-            verdict = REPRODUCED if met else NOT_REPRODUCED
+            held, missed = (
+                (AGREES, DIFFERS) if kind in NO_EVIDENCE else (REPRODUCED, NOT_REPRODUCED)
+            )
+            verdict = held if met else missed
             turns = _turns(by)
             note = " ".join(filter(None, (finding.note, "" if met else finding.conflict)))
         except (MissingFigureError, InputError) as error:
@@ -201,7 +223,22 @@ def _judge(
         evidence=kind,
         note=note,
         spread={} if finding is None else dict(finding.spread),
+        deviation=None if finding is None else _deviation(entry, finding.value),
+        tolerance=_tolerance(entry) if finding else None,
     )
+
+
+def _tolerance(entry: Mapping[str, Any]) -> float | None:
+    """Maximum allowed deviation under the rule ``about``."""
+    return float(entry.get("tolerance", 0.0)) if entry["rule"] == "about" else None
+
+
+def _deviation(entry: Mapping[str, Any], value: Any) -> float | None:
+    """Maximum relative deviation under the rule ``about``."""
+    if entry["rule"] != "about":
+        return None
+    exact = margin({**entry, "tolerance": 0.0}, value)
+    return round(abs(_first(exact)), 4)
 
 
 def _turns(margins: Numbers) -> bool:

@@ -73,25 +73,21 @@ def _a1(outcome: Outcome) -> Finding:
         }
         note += (
             f" That is of the mean over the runs: in the worst mode {within:.0%} of the single "
-            f"trips stay within {bound_m} m throughout, and the 99th percentile of a trip's worst "
-            f"error is {p99_m:.2f} m."
+            f"trips stay within {bound_m} m at every SSB, and the 99th percentile of a trip's "
+            f"maximum error is {p99_m:.2f} m."
         )
     return Finding(np.maximum(worst_x_m, worst_y_m), note=note, spread=spread)
 
 
 def _a2(outcome: Outcome) -> Finding:
     shares = {
-        (mode, method): _share_below(ours, outcome.fixed[mode, method])
+        (mode, method): ours.share_below(outcome.fixed[mode, method])
         for mode, ours in outcome.adaptive.items()
         for method in METHODS
     }
     mode, method = min(shares, key=lambda key: shares[key][0])
     least = np.min(np.broadcast_arrays(*shares.values()), axis=0)
     return Finding(least, note=f"Closest rival: {label(method)} in mode {mode}.")
-
-
-def _share_below(ours: Drives, rival: Drives) -> Numbers:
-    return np.asarray((ours.horizontal_m < rival.horizontal_m).mean(axis=1))
 
 
 def _a3(outcome: Outcome) -> Finding:
@@ -122,11 +118,7 @@ def _fixed_worst(outcome: Outcome, method: str) -> Numbers:
 
 def _errors_accumulate(outcome: Outcome) -> Finding:
     """How much larger errors are in the last quarter of the trip than in the first."""
-    ratios = {}
-    for (mode, method), drives in outcome.fixed.items():
-        quarter = drives.horizontal_m.shape[1] // 4
-        early, late = drives.horizontal_m[:, :quarter], drives.horizontal_m[:, -quarter:]
-        ratios[mode, method] = late.mean(axis=1) / np.maximum(early.mean(axis=1), 1e-9)
+    ratios = {case: drives.late_to_early for case, drives in outcome.fixed.items()}
     mode, method = min(ratios, key=lambda key: ratios[key][0])
     return Finding(
         np.min(np.broadcast_arrays(*ratios.values()), axis=0),

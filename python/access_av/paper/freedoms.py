@@ -9,7 +9,7 @@ from __future__ import annotations
 from dataclasses import dataclass
 from typing import TYPE_CHECKING, Any
 
-from access_av.paper.claims import BY_CONSTRUCTION, check_claims
+from access_av.paper.claims import ARITHMETIC, BY_CONSTRUCTION, check_claims
 from access_av.paper.energy_fit import FREEDOMS, NONE, SHIPPED, numbers
 from access_av.paper.statements import half, stated_claims
 
@@ -35,8 +35,9 @@ class Bought:
         The one that comes with this step.
     free, solved
         How many numbers are free, and how many of them are solved for.
-    met, by_construction
-        Claims met under the shown reading, and how many of them by construction.
+    reproduced, by_construction, by_arithmetic
+        Number of claims under the shown reading that are reproduced, and of those that agree by
+        construction or by arithmetic, which are not counted as reproduced.
     average_saving_percent
         What e4 is about, under the shown reading.
     energy, both
@@ -47,8 +48,9 @@ class Bought:
     says: str
     free: int
     solved: int
-    met: int
+    reproduced: int
     by_construction: int
+    by_arithmetic: int
     average_saving_percent: float | None
     energy: tuple[str, ...]
     both: tuple[str, ...]
@@ -59,8 +61,9 @@ class Bought:
             "freedom": self.says,
             "free_numbers": self.free,
             "solved_numbers": self.solved,
-            "claims_met": self.met,
-            "met_by_construction": self.by_construction,
+            "claims_reproduced": self.reproduced,
+            "agree_by_construction": self.by_construction,
+            "agree_by_arithmetic": self.by_arithmetic,
             "average_saving_percent": self.average_saving_percent,
             "keep_energy": ", ".join(self.energy),
             "keep_both": ", ".join(self.both),
@@ -74,7 +77,7 @@ class Bought:
 
 def met_halves(claims: Sequence[Claim]) -> tuple[bool, bool]:
     """Whether the claims of one reading keep the accuracy half, and the energy half."""
-    met = {claim.id for claim in claims if claim.reproduced}
+    met = {claim.id for claim in claims if claim.met}
     return met.issuperset(half("accuracy")), met.issuperset(half("energy"))
 
 
@@ -130,8 +133,9 @@ def _bought(
         says=(FREEDOMS[freedoms[-1]] if freedoms else NONE).says,
         free=free,
         solved=solved,
-        met=sum(it.reproduced for it in counted),
-        by_construction=sum(it.reproduced and it.evidence == BY_CONSTRUCTION for it in counted),
+        reproduced=sum(it.reproduced for it in counted),
+        by_construction=sum(it.met and it.evidence == BY_CONSTRUCTION for it in counted),
+        by_arithmetic=sum(it.met and it.evidence == ARITHMETIC for it in counted),
         average_saving_percent=saving[0] if saving else None,
         energy=tuple(energy),
         both=tuple(both),

@@ -10,13 +10,15 @@ from dataclasses import dataclass, field
 from typing import TYPE_CHECKING, TypeAlias
 
 import numpy as np
+import polars as pl
 from numpy.typing import NDArray
 
 if TYPE_CHECKING:
     from collections.abc import Mapping
 
 Numbers: TypeAlias = NDArray[np.float64]
-# How many SSBs lie between two errors that are kept of each run.
+# Every fifth SSB is kept of the errors of resamples against time. Maxima, and all figures of the
+# sample itself, are over every SSB.
 EVERY = 5
 
 
@@ -29,13 +31,19 @@ class Drives:
     executions, worst_x_m, worst_y_m, rms_error_m
         Arrays over variants. Worst is along the track, of the mean over runs of the absolute error.
     horizontal_m
-        Mean absolute errors in x and y, put together, against time: variants by SSBs.
+        Mean absolute errors in x and y, put together, against time: variants by every fifth SSB.
     longest_gap_s
         Longest time between two estimates of any run.
     besides_j
         Energy besides that of the executions, where the platform counts it.
     worst_of_runs_m
-        The worst error of each single run in x or y, where single runs are known.
+        Maximum error of each run in x or y over every SSB; ``None`` if runs are unknown.
+    track_m
+        ``horizontal_m`` of the sample at every SSB, of shape (SSBs,); ``None`` if unknown.
+    runs
+        One row per run: ``run``, ``executions``, ``rms_error_m``, ``max_error_x_m``,
+        ``max_error_y_m``, ``longest_gap_s``, and ``other_energy_j``, the energy in addition to that
+        of the executions; ``None`` if unknown.
     """
 
     executions: Numbers
@@ -46,11 +54,31 @@ class Drives:
     longest_gap_s: float | Numbers = 0.0
     besides_j: float = 0.0
     worst_of_runs_m: Numbers | None = None
+    track_m: Numbers | None = None
+    runs: pl.DataFrame | None = None
 
     @property
     def worst_m(self) -> Numbers:
         """The larger of X and Y."""
         return np.maximum(self.worst_x_m, self.worst_y_m)
+
+    def share_below(self, other: Drives) -> Numbers:
+        """Share of the track on which the mean error is below that of other drives.
+
+        The first variant is over every SSB if both are known there, resamples over every fifth.
+        """
+        found = np.asarray((self.horizontal_m < other.horizontal_m).mean(axis=1), dtype=np.float64)
+        if self.track_m is not None and other.track_m is not None:
+            found[0] = np.mean(self.track_m < other.track_m)
+        return found
+
+    @property
+    def late_to_early(self) -> Numbers:
+        """Mean error of the last quarter of the trip divided by that of the first quarter."""
+        found = _late_to_early(self.horizontal_m)
+        if self.track_m is not None:
+            found[0] = _late_to_early(self.track_m[None, :])[0]
+        return found
 
     @classmethod
     def of_runs(
@@ -63,21 +91,30 @@ class Drives:
         executions
             Of each run.
         errors_m
-            Estimate minus truth in x and y, of shape (runs, SSBs, 2).
+            Estimate minus truth in x and y at every SSB, of shape (runs, SSBs, 2).
         weights
             One row per variant, of shape (variants, runs), each of sum 1.
         """
-        size = np.abs(errors_m)
+        size_x, size_y = (np.abs(np.ascontiguousarray(errors_m[:, :, it])) for it in (0, 1))
         light = weights.astype(np.float32)
-        mean_x, mean_y = (light @ size[:, :, axis] for axis in (0, 1))
+        mean_x, mean_y = light @ size_x, light @ size_y
         square_m2 = np.square(errors_m, dtype=np.float64).sum(axis=2).mean(axis=1)
         return cls(
             executions=weights @ executions,
             worst_x_m=mean_x.max(axis=1).astype(np.float64),
             worst_y_m=mean_y.max(axis=1).astype(np.float64),
             rms_error_m=np.sqrt(weights @ square_m2),
-            horizontal_m=np.hypot(mean_x, mean_y),
-            worst_of_runs_m=size.max(axis=(1, 2)).astype(np.float64),
+            horizontal_m=np.hypot(mean_x[:, ::EVERY], mean_y[:, ::EVERY]),
+            worst_of_runs_m=np.maximum(size_x.max(axis=1), size_y.max(axis=1)).astype(np.float64),
+            runs=pl.DataFrame(
+                {
+                    "run": np.arange(len(executions)),
+                    "executions": executions,
+                    "rms_error_m": np.sqrt(square_m2),
+                    "max_error_x_m": size_x.max(axis=1).astype(np.float64),
+                    "max_error_y_m": size_y.max(axis=1).astype(np.float64),
+                }
+            ),
         )
 
 
@@ -130,3 +167,10 @@ def resamples(runs: int, count: int, seed: int = 0) -> Numbers:
     rng = np.random.default_rng(seed)
     drawn = rng.multinomial(runs, np.full(runs, 1.0 / runs), size=count) / runs
     return np.vstack([np.full(runs, 1.0 / runs), drawn])
+
+
+def _late_to_early(errors_m: Numbers) -> Numbers:
+    quarter = errors_m.shape[1] // 4
+    early, late = errors_m[:, :quarter], errors_m[:, -quarter:]
+    # The start is exact: its error is 0, and a nanometre stands for it.
+    return np.asarray(late.mean(axis=1) / np.maximum(early.mean(axis=1), 1e-9), dtype=np.float64)

@@ -12,7 +12,7 @@ with a real one, and beside them what one angle would do and what no localizer c
 
 from __future__ import annotations
 
-from dataclasses import dataclass, replace
+from dataclasses import dataclass, field, replace
 from typing import TYPE_CHECKING, Any
 
 import numpy as np
@@ -51,6 +51,8 @@ class Comparison:
         By how much our RMS error is less, with its paired 95 % interval.
     executions_less, executions_less_low, executions_less_high
         The same of the executions, and so of the energy.
+    ours
+        Drives of our tracker.
     """
 
     mode: int
@@ -69,6 +71,11 @@ class Comparison:
     executions_less: float
     executions_less_low: float
     executions_less_high: float
+    ours: Drives | None = field(default=None, repr=False, compare=False)
+
+    def as_row(self) -> dict[str, Any]:
+        """Returns a row of the table ``ours``."""
+        return {key: value for key, value in vars(self).items() if key != "ours"}
 
     @property
     def is_better(self) -> bool:
@@ -150,6 +157,7 @@ def beside(evaluation: Evaluation, mode: int, ours: Drives, *, knows_road: bool)
         executions_less=float(less[0]),
         executions_less_low=least,
         executions_less_high=most,
+        ours=ours,
     )
 
 
@@ -179,6 +187,8 @@ class Fair:
         an angle at every SSB.
     rms_low_m, rms_high_m
         95 % interval of ``rms_m`` over the runs.
+    drives
+        The drives; ``None`` of the bound.
     """
 
     real_odometer: bool
@@ -189,6 +199,13 @@ class Fair:
     rms_low_m: float
     rms_high_m: float
     worst_m: float | None
+    drives: Drives | None = field(default=None, repr=False, compare=False)
+
+    @property
+    def variant(self) -> str:
+        """Odometer, road map and method, as the table of runs names them."""
+        odometer = "real odometer" if self.real_odometer else "exact odometer"
+        return f"{odometer}, {'' if self.knows_road else 'no '}road map, {self.who}"
 
     def as_row(self) -> dict[str, Any]:
         """A row of the table ``fair``."""
@@ -247,6 +264,7 @@ def _fair(real: bool, knows_road: bool, who: str, drives: Drives) -> Fair:
         rms_low_m=low_m,
         rms_high_m=high_m,
         worst_m=float(drives.worst_m[0]),
+        drives=drives,
     )
 
 

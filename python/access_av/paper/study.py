@@ -11,7 +11,7 @@ import polars as pl
 from access_av._core import SettingsError
 from access_av.device.platform import Figure, Platform
 from access_av.errors import InputError
-from access_av.paper import ablation, freedoms, own_design
+from access_av.paper import ablation, freedoms, own_design, run_tables
 from access_av.paper import chosen as chosen_otherwise
 from access_av.paper.claims import Claim, check_claims, with_seeds
 from access_av.paper.driver import Driver
@@ -22,7 +22,7 @@ from access_av.paper.sampled_readings import sample
 from access_av.paper.unknowns import Unknowns, sobol
 
 if TYPE_CHECKING:
-    from collections.abc import Callable, Mapping, Sequence
+    from collections.abc import Callable, Iterator, Mapping, Sequence
 
     from access_av.paper.outcome import Drives
     from access_av.paper.own_design import Fair
@@ -109,10 +109,14 @@ class Study:
             "operating_points": named["points"],
             "errors": named["errors"],
             "snr": self.shown.snr,
-            "ablations": pl.DataFrame([asdict(each) for each in self.ablations]),
+            "ablations": pl.DataFrame([each.as_row() for each in self.ablations]),
             "fixed_front": pl.DataFrame(front),
-            "ours": pl.DataFrame([asdict(each) for each in self.ours]),
+            "ours": pl.DataFrame([each.as_row() for each in self.ours]),
             "fair": pl.DataFrame([each.as_row() for each in self.fair]),
+            "evaluation_runs": run_tables.joined(self._runs()),
+            "resamples": run_tables.joined(
+                table for each in self.evaluations for table in run_tables.resamples_of(each)
+            ),
         }
         if self.bought:
             tables["freedoms"] = pl.DataFrame([each.as_row() for each in self.bought])
@@ -121,6 +125,32 @@ class Study:
         if self.unknowns is not None:
             tables["unknowns"] = pl.DataFrame([asdict(each) for each in self.unknowns.indices])
         return tables
+
+    def _runs(self) -> Iterator[pl.DataFrame]:
+        """Yields the runs of every setting: operating points, and what they are compared with."""
+        for each in self.evaluations:
+            yield from run_tables.runs_of(each)
+        music: dict[str, Any] = {"method": "music", "mode": None, "base_wake_up_ms": None}
+        shown: dict[str, Any] = {**music, "reading": self.shown.reading.name}
+        for one in self.ablations:
+            key = {**music, "reading": one.reading, "base_wake_up_ms": one.constant_ms}
+            key |= {"campaign": run_tables.CONSTANT, "mode": one.mode, "adaptive": False}
+            if one.constant is not None:
+                yield run_tables.of_drives(one.constant, None, **key)
+        for interval_ms, drives in self.front:
+            key = {**shown, "campaign": run_tables.FRONT, "base_wake_up_ms": interval_ms}
+            yield run_tables.of_drives(drives, None, adaptive=False, **key)
+        for mine in self.ours:
+            per_execution_j = self.shown.outcome.energy_per_execution_j[mine.mode].get("music")
+            each_j = None if per_execution_j is None else float(per_execution_j.flat[0])
+            key = {**shown, "campaign": run_tables.TRACKER, "mode": mine.mode}
+            key["variant"] = "road map" if mine.map else "no road map"
+            if mine.ours is not None:
+                yield run_tables.of_drives(mine.ours, each_j, adaptive=True, **key)
+        for equal in self.fair:
+            key = {**shown, "campaign": run_tables.EQUAL, "variant": equal.variant}
+            if equal.drives is not None:
+                yield run_tables.of_drives(equal.drives, None, adaptive=True, **key)
 
 
 def study(

@@ -6,7 +6,14 @@ from collections import Counter
 from dataclasses import dataclass
 from typing import TYPE_CHECKING, Any
 
-from access_av.paper.claims import EVIDENCE
+from access_av.paper.claims import (
+    AGREES,
+    DIFFERS,
+    EVIDENCE,
+    NO_EVIDENCE,
+    NOT_REPRODUCED,
+    REPRODUCED,
+)
 from access_av.paper.energy_fit import FREEDOMS
 from access_av.paper.freedoms import met_halves
 from access_av.paper.statements import of_claim
@@ -91,6 +98,8 @@ def controller_text(counts: tuple[int, int, int]) -> str:
 
 
 SAVING = "e4_average_saving_percent"
+# Signs of verdicts in tables.
+SIGNS = {REPRODUCED: "✓", NOT_REPRODUCED: "✗", AGREES: "=", DIFFERS: "≠"}
 PROMISE = (
     "The paper promises that adaptive MUSIC stays within 0.3 m and beats every fixed interval over "
     "most of the track (its accuracy: claims a1 and a2), and that it saves more than 52 % of the "
@@ -210,19 +219,29 @@ def shown_value(value: Any) -> str:
 
 
 def counts(claims: Sequence[Claim]) -> dict[str, tuple[int, int]]:
-    """Claims met, and claims judged, by what a verdict is worth."""
+    """Returns the numbers of claims met and of claims judged, by kind of evidence."""
     found = {}
     for kind in EVIDENCE:
         judged = [it for it in claims if it.evidence == kind and it.is_judged]
-        found[kind] = (sum(it.reproduced for it in judged), len(judged))
+        found[kind] = (sum(it.met for it in judged), len(judged))
     return found
 
 
 def counts_text(claims: Sequence[Claim]) -> str:
-    """The same in words."""
-    return ", ".join(
-        f"{met} of {judged} {kind}" for kind, (met, judged) in counts(claims).items() if judged
-    )
+    """Returns the numbers of reproduced claims, and apart from them of those without evidence.
+
+    Claims that agree by construction or by arithmetic are not counted as reproduced.
+    """
+
+    def listed(kinds: Sequence[str]) -> str:
+        return ", ".join(f"{found[kind][0]} of {found[kind][1]} {kind}" for kind in kinds)
+
+    found = {kind: each for kind, each in counts(claims).items() if each[1]}
+    evident = [kind for kind in found if kind not in NO_EVIDENCE]
+    given = [kind for kind in found if kind in NO_EVIDENCE]
+    parts = [f"reproduced: {listed(evident)}"] if evident else []
+    parts += [f"agree, not counted as reproduced: {listed(given)}"] if given else []
+    return "; ".join(parts)
 
 
 def ours_text(study: Study) -> str:

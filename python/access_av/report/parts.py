@@ -16,7 +16,7 @@ OUTCOMES = {"reached": "yes", "too few drives": "fit", "not reached": "no"}
 
 
 def badge(text: str, kind: str) -> str:
-    """A small label: ``kind`` is ``yes``, ``no`` or ``fit``."""
+    """A small label: ``kind`` is ``yes``, ``no``, ``fit``, ``arithmetic`` or ``construction``."""
     return f'<span class="badge {kind}">{escape(text)}</span>'
 
 

@@ -8,6 +8,7 @@ from importlib.metadata import version
 from typing import TYPE_CHECKING
 
 from access_av.paper import summary
+from access_av.paper.claims import ARITHMETIC, BY_CONSTRUCTION, NO_EVIDENCE
 from access_av.paper.statements import METHODS
 from access_av.report.page import fill
 from access_av.report.paper import (
@@ -28,6 +29,12 @@ if TYPE_CHECKING:
     from access_av.paper.study import Study
     from access_av.report.chart import Spec
 
+# Kinds of evidence that are none, in the words of a tile.
+TILES = {BY_CONSTRUCTION: "by construction", ARITHMETIC: "by arithmetic"}
+NO_FIGURES = (
+    "The source of the paper contains no figures: each \\includegraphics has an empty file name. "
+    "Claims are compared with the paper's text and tables only."
+)
 TEMPLATE = resources.files(__package__).joinpath("evaluation.html")
 
 
@@ -66,6 +73,8 @@ def render(study: Study, specs: dict[str, Spec] | None = None) -> str:
         matrix=readings.matrix(study),
         seeds=escape(summary.seeds_text(study)),
         claims=readings.claims(study),
+        tolerances=escape(readings.tolerances()),
+        power_modes=readings.power_modes(evaluation),
         contribution=controller.contribution(study, specs),
         unknowns=unknowns.unknowns(study, specs),
         ours=controller.ours(study),
@@ -89,7 +98,12 @@ def _tiles(study: Study) -> str:
     name = study.shown.reading.title
     met = summary.counts(study.of(study.shown.reading.name))
     made = [
-        tile(f"{held} of {judged}", f"claims {kind}, met under “{name}”")
+        tile(
+            f"{held} of {judged}",
+            f"claims agree {TILES[kind]}, not counted as reproduced"
+            if kind in NO_EVIDENCE
+            else f"{kind} claims reproduced under “{name}”",
+        )
         for kind, (held, judged) in met.items()
         if judged
     ]
@@ -132,6 +146,7 @@ def _provenance(evaluation: Evaluation) -> str:
             )
     head = ("Mode", "Method", "J per execution", "Provenance", "Source")
     return (
+        f"<p>{escape(NO_FIGURES)}</p>"
         "<p>Errors, executions and SNR are simulated by this version from the scenario below "
         "and the seed above. Prices and carbon factors carry their sources where they stand.</p>"
         "<details><summary>Energy per execution, with its sources</summary>"

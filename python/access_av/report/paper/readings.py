@@ -11,14 +11,18 @@ import polars as pl
 
 from access_av.paper import summary
 from access_av.paper.chosen import entries
+from access_av.paper.claims import NO_EVIDENCE, NOT_REPRODUCED, REPRODUCED
+from access_av.paper.margins import ROUNDED
+from access_av.paper.statements import METHODS, of_claim, paper_numbers
 from access_av.paper.statements import half as half_of
-from access_av.paper.statements import of_claim
 from access_av.report.chart import BLUE, GREEN, GREY, ORANGE, finish, with_labels
 from access_av.report.parts import badge, figure, table
+from access_av.signal.methods import label
 from access_av.tables.numbers import value_text
 
 if TYPE_CHECKING:
     from access_av.paper.claims import Claim
+    from access_av.paper.evaluation import Evaluation
     from access_av.paper.study import Study
     from access_av.report.chart import Spec
 
@@ -52,7 +56,7 @@ def readings(study: Study) -> str:
         "Energy half",
         "t_max",
         "Algorithm 1",
-        "Claims met",
+        "Claims",
     )
     unusable = "".join(
         f'<p class="note">Not evaluated: {escape(name)}: {escape(why)}</p>'
@@ -166,7 +170,7 @@ def matrix(study: Study) -> str:
     rows = [
         (
             f"<b>{escape(_short(claims[0]))}</b> <span>{escape(claims[0].says)}</span>",
-            f"<span>{escape(summary.shown_value(claims[0].stated))}</span>",
+            f"<span>{_value(claims[0], claims[0].stated)}</span>",
             *(_cell(claim) for claim in claims),
         )
         for claims in zip(*columns, strict=True)
@@ -178,32 +182,91 @@ def claims(study: Study) -> str:
     """The claims under the shown reading, with intervals and what each verdict is worth."""
     rows = []
     for claim in study.of(study.shown.reading.name):
-        kind = "fit" if not claim.is_judged else "yes" if claim.reproduced else "no"
         turns = " " + badge("turns with the seed", "fit") if claim.turns_with_seed else ""
         if claim.seeds_met:
             turns += f"<small>met with {claim.seeds_met} seeds</small>"
-        obtained = escape(summary.shown_value(claim.obtained))
+        obtained = _value(claim, claim.obtained)
         if isinstance(claim.interval, list):
             low, high = (value_text(end) for end in claim.interval)
             obtained += f"<small>{low} … {high}</small>"
+        if claim.deviation is not None and claim.tolerance is not None:
+            obtained += f"<small>{_deviation_text(claim.deviation, claim.tolerance)}</small>"
         rows.append(
             (
                 f"<b>{escape(claim.says)}</b><small>{escape(claim.where)} · "
                 f"<code>{escape(claim.id)}</code></small><small>{escape(claim.note)}</small>",
-                escape(summary.shown_value(claim.stated)),
+                _value(claim, claim.stated),
                 obtained,
                 escape(claim.unit),
                 escape(claim.evidence),
-                badge(claim.verdict, kind) + turns,
+                _verdict(claim) + turns,
             )
         )
     return table(("Claim", "Paper", "Obtained", "Unit", "Evidence", "Verdict"), rows)
+
+
+def tolerances() -> str:
+    """Returns the reason for each tolerance."""
+    return " ".join(f"{it['reason']}" for it in paper_numbers()["tolerances"].values())
+
+
+def power_modes(evaluation: Evaluation) -> str:
+    """Returns the power modes as a table: the paper's values, and those of the platform."""
+    stated = {int(row[0]): row[1:] for row in of_claim("x2_power_modes")}
+    rows = []
+    for mode in evaluation.platform.modes:
+        paper_mhz, *paper_ms = stated.get(mode.number, [None] * (1 + len(METHODS)))
+        times = [mode.base_wake_up_ms[method] for method in METHODS]
+        rows.append(
+            (
+                f"{mode.number} {escape(mode.name)}",
+                _pair(paper_mhz, mode.cpu_hz / 1e6),
+                *(_pair(*each) for each in zip(paper_ms, times, strict=True)),
+            )
+        )
+    head = ("Mode", "Clock / MHz", *(f"{label(method)} / ms" for method in METHODS))
+    return table(head, rows, numbers=range(1, 2 + len(METHODS)))
+
+
+def _pair(stated: float | None, used: float) -> str:
+    """Returns one value if paper and platform agree, otherwise both."""
+    if stated is not None and math.isclose(stated, used, rel_tol=ROUNDED):
+        return f"{stated:g}"
+    return f"{'–' if stated is None else f'{stated:g}'} (platform {used:g})"
+
+
+def _value(claim: Claim, value: object) -> str:
+    """Returns a stated or obtained value; a table of settings is shown once, above the claims."""
+    if claim.id.startswith("x2_") and isinstance(value, list):
+        return "table of power modes"
+    return escape(summary.shown_value(value))
 
 
 def _short(claim: Claim) -> str:
     number, *words = claim.id.split("_")
     # Two claims are e3: one of the saving, one of the executions.
     return f"{number} {words[-1]}" if number == "e3" and words[-1] == "executions" else number
+
+
+def _kind(claim: Claim) -> str:
+    """Kind of a claim's badge: arithmetic and construction have their own."""
+    if claim.evidence in NO_EVIDENCE and claim.is_judged:
+        return claim.evidence.split()[-1]
+    return {REPRODUCED: "yes", NOT_REPRODUCED: "no"}.get(claim.verdict, "fit")
+
+
+def _verdict(claim: Claim) -> str:
+    given = claim.evidence in NO_EVIDENCE and claim.is_judged
+    text = f"{claim.evidence}: {claim.verdict}" if given else claim.verdict
+    return badge(text, _kind(claim))
+
+
+def _deviation_text(deviation: float, tolerance: float) -> str:
+    return (
+        f"deviation {deviation:.1%}, tolerance {tolerance:.3g}"
+        if tolerance < 0.01
+        else (f"deviation {deviation:.0%}, tolerance {tolerance:.0%}")
+    )
 
 
 def _met(held: bool) -> str:
@@ -214,9 +277,9 @@ def _cell(claim: Claim) -> str:
     """A claim's value and verdict in a small cell."""
     if not claim.is_judged:
         return badge("–", "fit")
-    sign = "✓" if claim.reproduced else "✗"
+    sign = summary.SIGNS[claim.verdict]
     if claim.turns_with_seed:
         sign += f" {claim.seeds_met or '?'}"
     plain = isinstance(claim.obtained, (int, float))
     value = f"<small>{escape(summary.shown_value(claim.obtained))}</small>" if plain else ""
-    return badge(sign, "yes" if claim.reproduced else "no") + value
+    return badge(sign, _kind(claim)) + value

@@ -104,6 +104,18 @@ _GLOSSARY = {
         "Root mean square of the horizontal error, over all runs and times of the row",
     ),
     "max_error_m": ("m", "Largest horizontal error"),
+    "max_error_x_m": ("m", "Maximum error in x over every SSB of the run"),
+    "max_error_y_m": ("m", "Maximum error in y over every SSB of the run"),
+    "resample": ("1", "Number of the bootstrap resample of the runs; 0 is the sample itself"),
+    "late_to_early": ("1", "Mean error of the last quarter of the trip over that of the first"),
+    **{
+        f"share_below_{method}": (
+            "1",
+            f"Share of the track with a smaller mean error than {method} at its fixed interval in "
+            "the same mode",
+        )
+        for method in ("music", "esprit", "root_music")
+    },
     "final_error_m": ("m", "Horizontal error at the end"),
     "p50_error_m": ("m", "Median of the horizontal error, over all runs and times of the row"),
     **{
@@ -250,7 +262,9 @@ _GLOSSARY = {
     "reading": ("text", "Name of the reading of the paper"),
     "campaign": (
         "text",
-        "P: every SSB; Q: fixed at what the computer manages; R: adaptive",
+        "P: every SSB; Q: fixed at what the computer manages; R: adaptive; constant: in place of "
+        "Algorithm 1; front: MUSIC at fixed intervals; tracker: that of this project; equal: both "
+        "with equal information",
     ),
     "mode": ("1", "Power mode of the platform"),
     "mode_name": ("text", "Its name"),
@@ -264,8 +278,9 @@ _GLOSSARY = {
     "unit": ("text", "Unit of stated and obtained"),
     "verdict": (
         "text",
-        "Of a claim: reproduced, not reproduced, not judged; of an angle: resolved, or why noise "
-        "and geometry leave it in doubt",
+        "Of a claim: reproduced or not reproduced; agrees or differs, by arithmetic or by "
+        "construction; not judged; not testable. Of an angle: resolved, or why noise and geometry "
+        "leave it in doubt",
     ),
     "doubt": (
         "text",
@@ -274,6 +289,8 @@ _GLOSSARY = {
     ),
     "p_value": ("1", "Probability that a plane wave in white noise fits as badly or worse"),
     "interval": ("any", "95 % interval of obtained over the runs, in its shape"),
+    "deviation": ("1", "Maximum relative deviation of obtained from stated"),
+    "tolerance": ("1", "Maximum deviation with which the claim is met"),
     "met_by_seed": ("any", "With each seed whether it is met; empty where it was judged with one"),
     "turns_with_seed": ("true or false", "Other runs may give another verdict"),
     "evidence": (
@@ -289,8 +306,15 @@ _GLOSSARY = {
     "freedom": ("text", "What the energy fit is free in, beside what the rows above are"),
     "free_numbers": ("1", "Numbers that are free, all rows above included"),
     "solved_numbers": ("1", "How many of them are solved for from stated figures"),
-    "claims_met": ("1", "Claims met under the shown reading"),
-    "met_by_construction": ("1", "How many of them by construction"),
+    "claims_reproduced": ("1", "Number of claims reproduced under the shown reading"),
+    "agree_by_construction": (
+        "1",
+        "Number of claims that agree by construction; not in claims_reproduced",
+    ),
+    "agree_by_arithmetic": (
+        "1",
+        "Number of claims that agree by arithmetic; not in claims_reproduced",
+    ),
     "average_saving_percent": ("1", "Per cent, what e4 is about, under the shown reading"),
     "keep_energy": ("text", "Readings that keep the energy half"),
     "keep_both": ("text", "Readings that keep both halves"),

@@ -39,6 +39,14 @@ _NO_FIGURE = "the platform has no figure for the method"
 _NO_ARRAY = "one channel only; the key is absent then"
 _UNDECODED = "the message was not decoded"
 
+_SETTING = (
+    "reading", "campaign", "mode", "method", "adaptive", "base_wake_up_ms", "variant",
+)  # fmt: skip
+_SETTING_NULL = {
+    "mode": f"{_NO_MODE}; the front; or equal information, which is in mode 0",
+    "base_wake_up_ms": "the tracker, or equal information",
+}
+
 _ERRORS = (
     "mean_abs_error_x_m", "mean_abs_error_y_m", "rms_error_m", "rms_heading_error_rad",
     "mean_true_snr_db", "p50_error_m", "p90_error_m", "p99_error_m",
@@ -393,11 +401,46 @@ TABLES: Mapping[str, Table] = {
             (
                 "reading", "id", "says", "where", "stated", "obtained", "interval", "unit",
                 "verdict", "turns_with_seed", "evidence", "note", "spread", "met_by_seed",
+                "deviation", "tolerance",
             ),
             {
                 "obtained": "it could not be judged, is not testable, or nothing is within the "
                 "budget",
                 "interval": "nothing in it is drawn, or it is of modes",
+                **dict.fromkeys(
+                    ("deviation", "tolerance"), "its rule has no tolerance, or it is not judged"
+                ),
+            },
+        ),
+        Table(
+            "evaluation_runs",
+            "A run of a setting of the evaluation",
+            "`evaluation_runs.parquet` of `access-av evaluate`",
+            (
+                *_SETTING, "run", "executions", "rms_error_m", "max_error_x_m", "max_error_y_m",
+                "longest_gap_s", "energy_j",
+            ),
+            {
+                **_SETTING_NULL,
+                "energy_j": f"{_NO_MODE}; a constant, the front or equal information; "
+                f"or {_NO_FIGURE}",
+            },
+        ),
+        Table(
+            "resamples",
+            "A bootstrap resample of the runs of an operating point",
+            "`resamples.parquet` of `access-av evaluate`",
+            (
+                *_SETTING, "resample", "executions", "worst_error_x_m", "worst_error_y_m",
+                "rms_error_m", "late_to_early", "share_below_music", "share_below_esprit",
+                "share_below_root_music",
+            ),
+            {
+                **_SETTING_NULL,
+                **dict.fromkeys(
+                    (f"share_below_{method}" for method in ("music", "esprit", "root_music")),
+                    "the wake-up time is fixed",
+                ),
             },
         ),
         Table(
@@ -445,8 +488,9 @@ TABLES: Mapping[str, Table] = {
             "A freedom of the energy fit, beside those above it",
             "`freedoms.parquet` of `access-av evaluate`",
             (
-                "freedom", "free_numbers", "solved_numbers", "claims_met", "met_by_construction",
-                "average_saving_percent", "keep_energy", "keep_both",
+                "freedom", "free_numbers", "solved_numbers", "claims_reproduced",
+                "agree_by_construction", "agree_by_arithmetic", "average_saving_percent",
+                "keep_energy", "keep_both",
             ),
             {"average_saving_percent": "it could not be judged"},
         ),

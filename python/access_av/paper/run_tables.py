@@ -1,0 +1,134 @@
+"""Tables of runs and of resamples, from which intervals and shares can be computed again."""
+
+from __future__ import annotations
+
+from typing import TYPE_CHECKING, Any
+
+import numpy as np
+import polars as pl
+
+from access_av.paper.statements import METHODS
+
+if TYPE_CHECKING:
+    from collections.abc import Iterable, Iterator, Mapping
+
+    from access_av.paper.evaluation import Evaluation
+    from access_av.paper.outcome import Drives
+
+# Campaigns of the table of runs that are not operating points: constants in place of Algorithm 1,
+# MUSIC at fixed intervals, the tracker of this project, and both with equal information.
+CONSTANT, FRONT, TRACKER, EQUAL = "constant", "front", "tracker", "equal"
+
+
+def of_drives(drives: Drives, energy_per_execution_j: float | None, **key: Any) -> pl.DataFrame:
+    """Returns the runs of a setting; columns ``evaluation_runs`` of :mod:`access_av.columns`.
+
+    Parameters
+    ----------
+    drives
+        The setting's drives. Without single runs the table is empty.
+    energy_per_execution_j
+        Energy per angle estimate; ``None`` if unknown.
+    key
+        Columns that identify the setting.
+    """
+    if drives.runs is None:
+        return pl.DataFrame()
+    energy_j = (
+        pl.lit(None, dtype=pl.Float64)
+        if energy_per_execution_j is None
+        else pl.col("executions") * energy_per_execution_j + pl.col("other_energy_j")
+    )
+    return drives.runs.select(
+        *_key(**key),
+        "run",
+        "executions",
+        "rms_error_m",
+        "max_error_x_m",
+        "max_error_y_m",
+        "longest_gap_s",
+        energy_j.alias("energy_j"),
+    )
+
+
+def _key(
+    *,
+    reading: str,
+    campaign: str,
+    mode: int | None,
+    method: str,
+    adaptive: bool,
+    base_wake_up_ms: float | None,
+    variant: str = "",
+) -> list[pl.Expr]:
+    return [
+        pl.lit(reading).alias("reading"),
+        pl.lit(campaign).alias("campaign"),
+        pl.lit(mode, dtype=pl.Int64).alias("mode"),
+        pl.lit(method).alias("method"),
+        pl.lit(adaptive).alias("adaptive"),
+        pl.lit(base_wake_up_ms, dtype=pl.Float64).alias("base_wake_up_ms"),
+        pl.lit(variant).alias("variant"),
+    ]
+
+
+def _points(evaluation: Evaluation) -> Iterator[tuple[dict[str, Any], Drives, float | None]]:
+    """Yields key, drives and energy per estimate of every operating point."""
+    outcome = evaluation.outcome
+    for point in evaluation.points.iter_rows(named=True):
+        mode, method = point["mode"], point["method"]
+        if mode is None:
+            drives = outcome.every_ssb[method]
+        elif point["adaptive"]:
+            drives = outcome.adaptive[mode]
+        else:
+            drives = outcome.fixed[mode, method]
+        names = ("campaign", "mode", "method", "adaptive", "base_wake_up_ms")
+        key = {"reading": evaluation.reading.name, **{name: point[name] for name in names}}
+        yield key, drives, point["energy_per_execution_j"]
+
+
+def runs_of(evaluation: Evaluation) -> list[pl.DataFrame]:
+    """Returns the runs of every operating point of an evaluation, one table each."""
+    tables = (of_drives(drives, each_j, **key) for key, drives, each_j in _points(evaluation))
+    return [table for table in tables if not table.is_empty()]
+
+
+def resamples_of(evaluation: Evaluation) -> list[pl.DataFrame]:
+    """Returns the bootstrap resamples of every operating point of an evaluation.
+
+    Columns ``resamples`` of :mod:`access_av.columns`. Row 0 of a setting is the sample.
+    """
+    tables = []
+    for key, drives, _ in _points(evaluation):
+        count = len(drives.rms_error_m)
+        shares: Mapping[str, Any] = {f"share_below_{method}": None for method in METHODS}
+        if key["adaptive"]:
+            fixed = evaluation.outcome.fixed
+            shares = {
+                f"share_below_{method}": drives.share_below(fixed[key["mode"], method])
+                for method in METHODS
+            }
+        values = {
+            "resample": np.arange(count),
+            "executions": drives.executions,
+            "worst_error_x_m": drives.worst_x_m,
+            "worst_error_y_m": drives.worst_y_m,
+            "rms_error_m": drives.rms_error_m,
+            "late_to_early": drives.late_to_early,
+            **shares,
+        }
+        schema = {name: pl.Float64 for name in values if name != "resample"}
+        columns = {
+            name: [None] * count if value is None else np.asarray(value)
+            for name, value in values.items()
+        }
+        table = pl.DataFrame(columns, schema_overrides=schema)
+        tables.append(table.select(*_key(**key), pl.all()))
+    return tables
+
+
+def joined(tables: Iterable[pl.DataFrame]) -> pl.DataFrame:
+    """Returns one table of many; an empty one without any."""
+    found = [table for table in tables if not table.is_empty()]
+    return pl.concat(found) if found else pl.DataFrame()
