@@ -1,29 +1,30 @@
 //! The thread that owns the pipeline: takes what comes in, hands on what comes of it.
 
+mod reports;
+mod samples;
+
 use std::collections::VecDeque;
 use std::sync::Arc;
 use std::sync::atomic::{AtomicBool, Ordering};
 use std::time::{Duration, Instant};
 
-use num_complex::Complex32;
-use onboard::live::{LiveError, Outcome, SavedState, Status, StreamConfig, TimeCheck};
+use onboard::live::{LiveError, Outcome, SavedState, StreamConfig, TimeCheck};
 use onboard::localize::UpdateReason;
 use onboard::monitor::ActiveFaults;
-use onboard::observation::{MAX_ELEMENTS, OdometrySample};
+use onboard::observation::OdometrySample;
 use onboard::settings::{Platform, Site, Vehicle};
 use onboard::{Custom, Live};
 
 use crate::angle_watch::AngleWatch;
 use crate::clock::DriveClock;
-use crate::events::{Collapse, Report};
+use crate::events::Collapse;
 use crate::gate::{Gate, Windows};
-use crate::health::failures_text;
 use crate::inbox::{Block, Command, Inbox, Input, Level};
 use crate::interruption::Interruptions;
 use crate::sink::{By, Distributor, PoseRecord, Record};
 use crate::state::{self, StateStore};
 use crate::statistics::{Punctuality, SourceHealth};
-use crate::supervisor::{self, Watchdog};
+use crate::supervisor::Watchdog;
 use crate::web::Board;
 
 /// The engine looks at the time this often, whatever comes.
@@ -311,166 +312,6 @@ impl Engine {
         Ok(())
     }
 
-    fn samples(&mut self, block: Block, came: Instant, inbox: &Inbox) -> Result<(), LiveError> {
-        let end_s = block.time_s + block.length() as f64 / self.rate_hz();
-        if block.offset_s.is_some() {
-            self.live.set_time_offset_s(block.offset_s);
-        }
-        let offset_s = self.live.time_offset_s();
-        self.clock.see(end_s + offset_s);
-        self.watch_samples(came, end_s);
-        if self.arrivals.len() == ARRIVALS {
-            self.arrivals.pop_front();
-        }
-        self.arrivals.push_back((end_s + offset_s, came));
-        let is_over = |[from_s, until_s]: [f64; 2]| end_s <= from_s || block.time_s >= until_s;
-        if self.gate.wanted().is_some_and(is_over) {
-            inbox.give_back(block.antennas); // on its way when the gate closed
-            return Ok(());
-        }
-        let pending_s = self.pending.length() as f64 / self.rate_hz();
-        let is_next = (self.pending.time_s + pending_s - block.time_s).abs() < 0.5 / self.rate_hz();
-        if pending_s > 0.0 && !is_next {
-            self.receive(true)?;
-        }
-        self.pending.append(&block);
-        inbox.give_back(block.antennas);
-        if self.gate.wanted().is_none() && end_s - self.pending.time_s >= self.period_s {
-            self.receive(false)?;
-            self.publish_heard(Some(came))?;
-            self.sleep_until_next(end_s)?;
-            if self.gate.wanted().is_some() {
-                // What the receiver holds back would be heard with the next window only.
-                self.receive(true)?;
-                self.publish_heard(Some(came))?;
-            }
-        }
-        Ok(())
-    }
-
-    /// Opens the gate after an interruption, because the next SSB may come at any time, and reports samples
-    /// that are missing.
-    fn watch_samples(&mut self, came: Instant, end_s: f64) {
-        let odometry_s = self.live.onboard().newest_odometry().map(|it| it.time_s);
-        let arrival = self.interruptions.samples(came, end_s, odometry_s);
-        if arrival.resumed {
-            self.live.samples_resumed();
-            self.gate.open();
-        }
-        if let Some(missing_s) = arrival.missing_s {
-            let periods = (missing_s / self.period_s).floor();
-            let before_s = self.live.time_offset_s();
-            self.live.add_interruption(periods * self.period_s);
-            // Where arrival times are measured, the source has reported it.
-            if self.live.time_offset_s() > before_s {
-                let text = format!("samples of {missing_s:.2} s are missing");
-                self.event(Level::Warn, "samples", text);
-            }
-        }
-        let gaps = self.live.stream_counts().untold_gaps;
-        if std::mem::replace(&mut self.unreported_gaps, gaps) < gaps
-            && !self.interruptions.is_recent(came)
-        {
-            let text = "samples are missing: the SSBs came off their period".to_owned();
-            self.event(Level::Warn, "samples", text);
-        }
-    }
-
-    fn rate_hz(&self) -> f64 {
-        self.setup.stream.map_or(1.0, |it| it.rate_hz)
-    }
-
-    /// Hands the samples of a window, or of a period, to the pipeline, all at once: whoever searches for cells
-    /// must see a whole burst.
-    fn receive(&mut self, ends: bool) -> Result<(), LiveError> {
-        let mut antennas: [&[Complex32]; MAX_ELEMENTS] = [&[]; MAX_ELEMENTS];
-        for (antenna, samples) in antennas.iter_mut().zip(&self.pending.antennas) {
-            *antenna = samples;
-        }
-        let antennas = antennas
-            .get(..self.pending.antennas.len())
-            .unwrap_or_default();
-        let mut taken = Ok(());
-        if self.pending.length() > 0 {
-            taken = self.live.receive(self.pending.time_s, antennas).map(drop);
-        }
-        if ends && taken.is_ok() {
-            taken = self.live.end_stretch();
-        }
-        self.pending.antennas.iter_mut().for_each(Vec::clear);
-        if let Err(error) = taken {
-            self.refused("samples", &error);
-        }
-        self.live.hear_before(f64::INFINITY)?;
-        if let Some(error) = self.live.take_refused_burst() {
-            self.refused("samples", &error);
-            // Whether their clock has stepped is seen soonest with all samples.
-            self.gate.open();
-        }
-        self.report_clocks();
-        Ok(())
-    }
-
-    /// Reports steps of the clock of angles or samples, and clocks that differ or no longer do.
-    fn report_clocks(&mut self) {
-        if let Some(step) = self.live.take_angle_step() {
-            let text = format!(
-                "the clock of the angles or samples has stepped by {:+.3} s; the step is compensated",
-                step.step_s
-            );
-            self.gate.open();
-            self.event(Level::Warn, "angles", text);
-        }
-        let offset_s = self.live.clock_disagreement_s();
-        if offset_s.is_some() != self.clocks_differ {
-            self.clocks_differ = offset_s.is_some();
-            let (level, text) = match offset_s {
-                Some(offset_s) => (
-                    Level::Warn,
-                    format!(
-                        "angles are {:.1} s {} the odometry: synchronize the clocks of the odometry and of the samples \
-                         or angles",
-                        offset_s.abs(),
-                        if offset_s < 0.0 { "behind" } else { "ahead of" }
-                    ),
-                ),
-                None => (
-                    Level::Info,
-                    "the clocks of angles and odometry agree".to_owned(),
-                ),
-            };
-            self.event(level, "clocks", text);
-        }
-    }
-
-    /// Closes the gate up to the next burst that is wanted.
-    fn sleep_until_next(&mut self, now_s: f64) -> Result<(), LiveError> {
-        if !self.sleeps {
-            return Ok(());
-        }
-        let mut burst_s = self.live.next_wake_up_s(now_s)?;
-        let Some(ssb_index) = self.live.last_ssb_index().filter(|_| burst_s > now_s) else {
-            self.gate.open();
-            return Ok(());
-        };
-        let offset_s = self.live.time_offset_s();
-        let mut window = self.windows.around(burst_s, ssb_index);
-        if window[0] < now_s {
-            // Part of it is gone already.
-            burst_s = self.live.next_wake_up_s(burst_s)?;
-            window = self.windows.around(burst_s, ssb_index);
-        }
-        if window[0] < now_s {
-            self.gate.open();
-        } else if self.live.listens(burst_s + offset_s)? {
-            self.gate.set(window);
-        } else {
-            // None is wanted as far as one can see: it is time to ask again then, and not to listen.
-            self.gate.set([window[0]; 2]);
-        }
-        Ok(())
-    }
-
     /// Takes in odometry, and hands on the pose by it.
     ///
     /// # Errors
@@ -684,51 +525,6 @@ impl Engine {
         Ok(())
     }
 
-    /// Reports each fault once when it begins and once when it ends.
-    fn report_faults(&mut self, status: &Status) {
-        let before = std::mem::replace(&mut self.faults, status.faults);
-        for active in status.faults.iter().filter(|it| !before.contains(it.fault)) {
-            let text = format!("fault {}: {}", active.fault.name(), active.fault);
-            self.event(Level::Warn, "monitor", text);
-        }
-        for ended in before.iter().filter(|it| !status.faults.contains(it.fault)) {
-            let text = format!("fault {} has ended", ended.fault.name());
-            self.event(Level::Info, "monitor", text);
-        }
-    }
-
-    /// Reports a radio head that the site does not have, once.
-    fn report_unknown(&mut self, pci: u16, ssb_index: u8) {
-        if let Some(text) = self.angle_watch.unknown(pci, ssb_index) {
-            self.event(Level::Warn, "angles", text);
-        }
-    }
-
-    /// When the sample of this time arrived, or would have if samples came one by one.
-    fn arrival_of(&self, time_s: f64) -> Option<Instant> {
-        let (end_s, came) = self.arrivals.iter().find(|(end_s, _)| *end_s >= time_s)?;
-        came.checked_sub(Duration::try_from_secs_f64(end_s - time_s).ok()?)
-    }
-
-    /// Names sources that are silent, and those that are no longer.
-    fn watch(&mut self, sources: &[Arc<SourceHealth>], silent_after: Duration) {
-        for source in sources {
-            let silent = source.silent_for();
-            let told = self.silent.contains(&source.name);
-            if silent >= silent_after && !told {
-                self.silent.push(source.name);
-                let text = format!("nothing has come for {:.1} s", silent.as_secs_f64());
-                self.event(Level::Warn, source.name, text);
-            } else if silent < silent_after && told {
-                self.silent.retain(|it| *it != source.name);
-                self.event(Level::Info, source.name, "is there again".to_owned());
-            }
-        }
-        if let Some((level, text)) = self.angle_watch.change(Instant::now()) {
-            self.event(level, "angles", text);
-        }
-    }
-
     /// What is due by the clock: a status a second, and what the page shows.
     ///
     /// # Errors
@@ -778,73 +574,6 @@ impl Engine {
     /// Says that the pipeline is alive, where it waits.
     pub fn alive(&mut self) {
         self.watchdog.alive();
-    }
-
-    /// Counts and reports rejected input.
-    fn refused(&mut self, source: &'static str, error: &LiveError) {
-        let named = |name: &str| self.sources.iter().find(|it| it.name == name);
-        if let Some(health) = named(source).or_else(|| named("messages")) {
-            health.defect();
-        }
-        self.event(Level::Warn, source, format!("rejected: {error}"));
-    }
-
-    /// Reports an event; repetitions of one cause are counted and reported together.
-    pub fn event(&mut self, level: Level, source: &'static str, text: String) {
-        self.board
-            .event(self.clock.now_s(), level, source, text.clone());
-        let report = self
-            .repeated
-            .add(self.now_of_events_s(), level, source, text);
-        if let Some(report) = report {
-            self.put_event(report);
-        }
-    }
-
-    /// Reports repeated events that are due; all of them if `all`.
-    pub fn report_repeated(&mut self, all: bool) {
-        for report in self.repeated.due(self.now_of_events_s(), all) {
-            self.put_event(report);
-        }
-    }
-
-    fn put_event(&mut self, report: Report) {
-        let Report {
-            level,
-            source,
-            text,
-            count,
-        } = report;
-        self.records.put(Record::Event {
-            time_s: self.clock.now_s(),
-            level,
-            source,
-            text,
-            count,
-        });
-    }
-
-    /// Time by which repeated events are reported: real time, or that of the drive in playback.
-    fn now_of_events_s(&self) -> f64 {
-        if self.records.waits() {
-            self.clock.now_s().unwrap_or(0.0)
-        } else {
-            self.began.elapsed().as_secs_f64()
-        }
-    }
-
-    /// Reports outputs that have failed or work again.
-    fn report_outputs(&mut self) {
-        let changes = self.records.changes();
-        if changes.is_empty() {
-            return;
-        }
-        self.watchdog
-            .set_outputs(failures_text(&self.records.status()));
-        for change in changes {
-            supervisor::log(&format!("output {}: {}", change.name, change.text));
-            self.event(change.level, change.name, change.text);
-        }
     }
 
     /// Notes a time of the drive.

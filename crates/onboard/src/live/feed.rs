@@ -1,5 +1,9 @@
 //! The live pipeline.
 
+mod commands;
+mod condition;
+mod reception;
+
 use std::collections::VecDeque;
 
 use num_complex::Complex32;
@@ -8,7 +12,6 @@ use super::clocks::Clocks;
 use super::error::LiveError;
 use super::outcome::{HeadStatus, Outcome};
 use super::start::starting_at;
-use super::status::{Reason, State, Status};
 use super::stream::{SampleStream, StreamConfig, StreamCounts};
 use super::stream_clock::Continuity;
 use super::time_base::ClockStep;
@@ -16,10 +19,8 @@ use super::time_check::TimeCheck;
 use crate::BoxError;
 use crate::burst::{Burst, OfSsb};
 use crate::energy::{Energy, EnergyModel};
-use crate::geometry::{Pose, wrap_angle};
-use crate::localize::{
-    self, AngleMeasurement, HISTORY_S, IntegrityState, OdometryVerdict, PoseEstimate, UpdateReason,
-};
+use crate::geometry::Pose;
+use crate::localize::{AngleMeasurement, OdometryVerdict, UpdateReason};
 use crate::monitor::Confirmation;
 use crate::observation::{BURST_S, OdometrySample, SensedSsb};
 use crate::pipeline::{Custom, OdometryDefect, Onboard};
@@ -33,19 +34,6 @@ const OUTCOMES: usize = 256;
 
 /// Angles of a burst at most.
 const ANGLES: usize = 64;
-
-/// Odometry that is older does not vouch for a pose (s).
-const SILENT_S: f64 = 0.5;
-
-/// Time without an accepted angle that is a reason of its own (s).
-const NO_ANGLE_S: f64 = 5.0;
-
-/// How far ahead the next wake-up is looked for (s).
-const LOOK_AHEAD_S: f64 = 1.0;
-
-/// Maximum time since the last SSB, in seconds, for which windows are placed by the time of that SSB. A
-/// stretch of samples without an SSB, later than this, means that the windows may be misplaced.
-const SSB_SILENT_S: f64 = 1.0;
 
 /// SNR (dB) of an angle of which none is stated: good enough for any policy.
 const UNSTATED_SNR_DB: f64 = 20.0;
@@ -405,72 +393,6 @@ impl Live {
         self.outcomes.pop_front()
     }
 
-    /// The pose is this at `time_s`, with the covariance of (x, y, heading), or as uncertain as the
-    /// vehicle's settings say of a start. What was learnt while driving is forgotten.
-    ///
-    /// # Errors
-    /// [`LiveError`] for values that are not possible, for a time more than half a second from the
-    /// newest odometry, and where the localizer is the user's own.
-    pub fn set_pose(
-        &mut self,
-        time_s: f64,
-        pose: Pose,
-        covariance: Option<[[f64; 3]; 3]>,
-    ) -> Result<(), LiveError> {
-        plausible("set-pose", time_s)?;
-        let time_s = self.clocks.odometry.inside(time_s);
-        for value in [pose.x_m, pose.y_m, pose.heading_rad] {
-            finite("a pose", value)?;
-        }
-        if self.has_own_localizer {
-            return Err(LiveError::OwnLocalizer);
-        }
-        let mut vehicle = self.vehicle.clone();
-        vehicle.start.known = true;
-        if let Some(covariance) = covariance {
-            let (position_std_m, heading_std_rad) = deviations(&covariance)?;
-            vehicle.start.position_std_m = position_std_m;
-            vehicle.start.heading_std_rad = heading_std_rad;
-        }
-        let mut now = pose;
-        if let Some(newest) = self.onboard.newest_odometry() {
-            let elapsed_s = newest.time_s - time_s;
-            if elapsed_s.abs() > HISTORY_S {
-                return Err(LiveError::Value {
-                    what: "the time of a pose from the newest odometry's",
-                    value: -elapsed_s,
-                    allowed: "it must be within 0.5 s",
-                });
-            }
-            let turn_rad = newest.yaw_rate_radps.unwrap_or(0.0) * elapsed_s;
-            now = pose.along_chord(newest.speed_mps * elapsed_s, turn_rad);
-        }
-        self.begin_at(&vehicle, now)
-    }
-
-    /// Forgets pose, odometry and all that was learnt, and searches for the pose as from the start of a
-    /// drive; times may be earlier than before from now on.
-    ///
-    /// # Errors
-    /// [`LiveError::Settings`] where the vehicle cannot be found by searching
-    /// ([`set_pose`](Self::set_pose) then), [`LiveError::OwnLocalizer`].
-    pub fn reset(&mut self) -> Result<(), LiveError> {
-        if self.has_own_localizer {
-            return Err(LiveError::OwnLocalizer);
-        }
-        let mut unknown = self.vehicle.clone();
-        unknown.start.pose = None;
-        let (unknown, anywhere) = starting_at(&self.site, &unknown, None)?;
-        self.onboard.forget_odometry();
-        self.clocks.reset();
-        self.begin_at(&unknown, anywhere)?;
-        (self.last_angle_s, self.last_burst) = (None, None);
-        (self.has_samples, self.empty_stretches) = (false, 0);
-        self.interval_s = None;
-        (self.executions, self.listened) = (0, 0);
-        Ok(())
-    }
-
     /// The vehicle by its settings.
     pub(super) const fn vehicle(&self) -> &Vehicle {
         &self.vehicle
@@ -479,42 +401,6 @@ impl Live {
     /// Whether the odometry counts the distance.
     pub(super) fn has_distance(&self) -> bool {
         self.clocks.has_distance()
-    }
-
-    /// Replaces the localizer by that of a vehicle at a start.
-    pub(super) fn begin_at(&mut self, vehicle: &Vehicle, start: Pose) -> Result<(), LiveError> {
-        let localizer = localize::built_in(&self.site, vehicle, start)?;
-        self.confirmation = Confirmation::new(!vehicle.start.known, self.heads.len());
-        self.angles.clear();
-        self.onboard
-            .replace_localizer(localizer)
-            .map_err(LiveError::Custom)
-    }
-
-    /// Leaves a cell out from now on.
-    ///
-    /// # Errors
-    /// [`LiveError::UnknownCell`].
-    pub fn exclude(&mut self, pci: u16) -> Result<(), LiveError> {
-        self.set_excluded(pci, true)
-    }
-
-    /// Takes a cell in again that was left out.
-    ///
-    /// # Errors
-    /// [`LiveError::UnknownCell`].
-    pub fn readmit(&mut self, pci: u16) -> Result<(), LiveError> {
-        self.set_excluded(pci, false)
-    }
-
-    fn set_excluded(&mut self, pci: u16, excluded: bool) -> Result<(), LiveError> {
-        if !self.onboard.exclude(pci, excluded) {
-            return Err(LiveError::UnknownCell { pci });
-        }
-        for status in self.heads.iter_mut().filter(|it| it.head.pci == pci) {
-            status.is_excluded = excluded;
-        }
-        Ok(())
     }
 
     /// What is known of each radio head that the vehicle listens to.
@@ -531,193 +417,6 @@ impl Live {
     /// The pipeline, to ask it for calibration and findings.
     pub const fn onboard(&self) -> &Onboard {
         &self.onboard
-    }
-
-    /// How the vehicle stands at `now_s`. A pose is told for half a second beyond the newest odometry at
-    /// most.
-    ///
-    /// # Errors
-    /// [`LiveError::Value`] for a time that is not finite, [`LiveError::Custom`].
-    pub fn status(&self, now_s: f64) -> Result<Status, LiveError> {
-        finite("the time of a status", now_s)?;
-        let now_s = self.clocks.odometry.inside(now_s);
-        let mut status = self.status_inside(now_s)?;
-        let clock = &self.clocks.odometry;
-        status.time_s = clock.outside(status.time_s);
-        status.last_angle_s = status.last_angle_s.map(|it| clock.outside(it));
-        Ok(status)
-    }
-
-    /// The status at a time of the pipeline, with times of the pipeline.
-    fn status_inside(&self, now_s: f64) -> Result<Status, LiveError> {
-        let newest = self.onboard.newest_odometry();
-        let age_s = newest.map(|it| now_s - it.time_s);
-        let end_s = self.stream.as_ref().and_then(SampleStream::next_s);
-        let mut status = Status {
-            time_s: now_s,
-            pose: None,
-            covariance: None,
-            speed_mps: newest.map_or(0.0, |it| it.speed_mps),
-            yaw_rate_radps: newest.and_then(|it| it.yaw_rate_radps),
-            state: State::Waiting,
-            reason: Reason::NoOdometry,
-            protection_level_m: None,
-            faulty: 0,
-            last_angle_s: self.last_angle_s,
-            odometry_age_s: age_s,
-            samples_age_s: end_s.map(|end_s| now_s - self.clocks.angles.inside(end_s)),
-            tracked: self.stream.as_ref().map_or(0, SampleStream::tracked),
-            faults: *self.onboard.faults(),
-        };
-        let (Some(newest), Some(age_s)) = (newest, age_s) else {
-            return Ok(status);
-        };
-        status.time_s = newest.time_s + age_s.clamp(0.0, SILENT_S);
-        if (0.0..=SILENT_S).contains(&age_s) {
-            status.time_s = now_s;
-        }
-        let estimate = self
-            .onboard
-            .pose(status.time_s)
-            .map_err(LiveError::Custom)?;
-        // The filter's heading is continuous over several turns.
-        status.pose = Some(Pose {
-            heading_rad: wrap_angle(estimate.pose.heading_rad),
-            ..estimate.pose
-        });
-        status.covariance = estimate.covariance;
-        let integrity = estimate.integrity;
-        status.protection_level_m = integrity.map(|it| it.protection_level_m);
-        status.faulty = integrity.map_or(0, |it| it.faulty);
-        (status.state, status.reason) = if age_s > SILENT_S {
-            (State::Unavailable, Reason::OdometrySilent { age_s })
-        } else if let Some(offset_s) = self.clocks.disagreement_s(newest) {
-            (State::Unavailable, Reason::ClocksDisagree { offset_s })
-        } else {
-            self.judge(&estimate, now_s)
-        };
-        Ok(status)
-    }
-
-    /// State and reason of a pose with odometry behind it.
-    fn judge(&self, estimate: &PoseEstimate, now_s: f64) -> (State, Reason) {
-        if let Some(places) = self.onboard.searching() {
-            let reason = match self.last_angle_s {
-                None => Reason::NoAngle,
-                Some(_) => Reason::SeveralPlaces { places },
-            };
-            return (State::Searching, reason);
-        }
-        let faults = self.onboard.faults();
-        if let Some(fault) = faults.of_odometry().or_else(|| faults.of_angles()) {
-            return (State::Unavailable, Reason::SensorFault(fault));
-        }
-        if self.onboard.is_lost() {
-            return (State::Lost, Reason::AnglesElsewhere);
-        }
-        let Some(integrity) = estimate.integrity else {
-            return (State::Unmonitored, Reason::NotMonitored);
-        };
-        let faulty = integrity.faulty;
-        match integrity.state {
-            IntegrityState::Ok | IntegrityState::Degraded if !self.confirmation.is_confirmed() => {
-                (State::Unavailable, Reason::Unconfirmed)
-            }
-            IntegrityState::Ok if faulty > 0 => (State::Ok, Reason::FaultyHeads { heads: faulty }),
-            IntegrityState::Ok => (State::Ok, Reason::Nominal),
-            IntegrityState::Unavailable => (State::Unavailable, Reason::SourcesDisagree),
-            IntegrityState::Degraded => {
-                let level_m = integrity.protection_level_m;
-                let monitor = self.vehicle.integrity_monitor().unwrap_or_default();
-                let limit_m = monitor.alert_limit_m;
-                let silent_s = self.last_angle_s.map(|last_s| now_s - last_s);
-                let reason = match silent_s {
-                    _ if level_m <= limit_m && faulty > 0 => Reason::FaultyHeads { heads: faulty },
-                    _ if level_m <= limit_m => Reason::FaultSuspected,
-                    None => Reason::NoAngle,
-                    Some(age_s) if age_s > NO_ANGLE_S => Reason::AnglesSilent { age_s },
-                    Some(_) => Reason::LevelAboveLimit { level_m, limit_m },
-                };
-                (State::Degraded, reason)
-            }
-        }
-    }
-
-    /// Whether the burst at `time_s` is wanted, as things stand now.
-    ///
-    /// # Errors
-    /// [`LiveError::Custom`] where the user's own policy fails.
-    pub fn listens(&mut self, time_s: f64) -> Result<bool, LiveError> {
-        finite("the time of a burst", time_s)?;
-        let time_s = self.clocks.angles.inside(time_s);
-        self.onboard.listens(time_s).map_err(LiveError::Custom)
-    }
-
-    /// When the receiver has to be on next, after `now_s`: at the beginning of the next burst that is
-    /// wanted if the vehicle drives on as it does. Where none is within a second, when to ask again. `now_s`
-    /// itself while no SSB is known, while the place is searched for, after
-    /// [`samples_resumed`](Self::samples_resumed), and where stretches of samples had no SSB for a second.
-    /// Both are times of the samples, without [`time_offset_s`](Self::time_offset_s).
-    ///
-    /// # Errors
-    /// As [`listens`](Self::listens).
-    pub fn next_wake_up_s(&mut self, now_s: f64) -> Result<f64, LiveError> {
-        finite("the time of a wake-up", now_s)?;
-        let untracked = self.stream.as_ref().is_some_and(|it| it.tracked() == 0);
-        let is_searching = self.onboard.searching().is_some() || self.onboard.is_lost();
-        let is_silent = |last_s: f64| self.empty_stretches > 0 && now_s - last_s >= SSB_SILENT_S;
-        let is_open = untracked || is_searching || self.is_resuming;
-        let last_burst = self
-            .last_burst
-            .filter(|(last_s, _)| !is_open && !is_silent(*last_s));
-        let Some((last_s, _)) = last_burst else {
-            return Ok(now_s);
-        };
-        let offset_s = self.time_offset_s();
-        let period_s = self.site.ssb.period_s();
-        let first = ((now_s - last_s) / period_s).floor() + 1.0;
-        let mut burst_s = last_s + first * period_s;
-        let mut ahead = 1.0;
-        while burst_s < now_s + LOOK_AHEAD_S && !self.listens(burst_s + offset_s)? {
-            burst_s = last_s + (first + ahead) * period_s;
-            ahead += 1.0;
-        }
-        Ok(burst_s)
-    }
-
-    /// Time minus sample time, in seconds: as set by [`set_time_offset_s`](Self::set_time_offset_s), else the
-    /// gaps that the sample times did not report.
-    pub fn time_offset_s(&self) -> f64 {
-        (self.stream.as_ref()).map_or(0.0, SampleStream::correction_s)
-    }
-
-    /// Sets time minus sample time, in seconds, where samples are counted and their arrival is measured:
-    /// counting keeps the times of SSBs exact while the offset may drift or step. `None` derives it from
-    /// the SSBs.
-    pub const fn set_time_offset_s(&mut self, offset_s: Option<f64>) {
-        if let Some(stream) = &mut self.stream {
-            stream.set_offset_s(offset_s);
-        }
-    }
-
-    /// Adds an interruption of the samples, in seconds, that their times do not report: whole periods of the
-    /// SSB, because the SSBs tell the rest.
-    pub fn add_interruption(&mut self, lost_s: f64) {
-        if let Some(stream) = &mut self.stream {
-            stream.add_interruption(lost_s);
-        }
-    }
-
-    /// Notes that samples resumed after an interruption of unknown length:
-    /// [`next_wake_up_s`](Self::next_wake_up_s) wants every sample until an SSB is received.
-    pub const fn samples_resumed(&mut self) {
-        self.is_resuming = true;
-    }
-
-    /// Index of the first SSB of the last burst, whose times [`next_wake_up_s`](Self::next_wake_up_s) goes
-    /// on from.
-    pub fn last_ssb_index(&self) -> Option<u8> {
-        self.last_burst.map(|(_, ssb_index)| ssb_index)
     }
 
     /// What was done since the start or the last reset, and the energy of it by the platform's model.
@@ -876,32 +575,4 @@ fn finite(what: &'static str, value: f64) -> Result<(), LiveError> {
 /// Checks a time stamp that has no predecessors.
 fn plausible(what: &'static str, time_s: f64) -> Result<(), LiveError> {
     TimeCheck::range(time_s).map_err(|defect| LiveError::Time { what, defect })
-}
-
-/// Standard deviations of place, the larger of its axes (m), and heading (rad).
-fn deviations(covariance: &[[f64; 3]; 3]) -> Result<(f64, f64), LiveError> {
-    let variances = PoseEstimate {
-        time_s: 0.0,
-        pose: Pose::default(),
-        covariance: Some(*covariance),
-        integrity: None,
-    }
-    .principal_variances();
-    let [.., [.., heading]] = *covariance;
-    let [largest, least] = variances;
-    for (what, value) in [
-        ("the variance of a place in m²", largest),
-        ("the variance of a place in m²", least),
-        ("the variance of a heading in rad²", heading),
-    ] {
-        if !(0.0..=1e8).contains(&value) {
-            let allowed = "it must be from 0 to 1e8";
-            return Err(LiveError::Value {
-                what,
-                value,
-                allowed,
-            });
-        }
-    }
-    Ok((largest.sqrt(), heading.sqrt().min(std::f64::consts::PI)))
 }

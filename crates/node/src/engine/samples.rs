@@ -1,0 +1,151 @@
+//! Samples: handed to the pipeline in whole windows, and dropped between them.
+
+use std::time::{Duration, Instant};
+
+use num_complex::Complex32;
+use onboard::live::LiveError;
+use onboard::observation::MAX_ELEMENTS;
+
+use super::{ARRIVALS, Engine};
+use crate::inbox::{Block, Inbox, Level};
+
+impl Engine {
+    pub(super) fn samples(
+        &mut self,
+        block: Block,
+        came: Instant,
+        inbox: &Inbox,
+    ) -> Result<(), LiveError> {
+        let end_s = block.time_s + block.length() as f64 / self.rate_hz();
+        if block.offset_s.is_some() {
+            self.live.set_time_offset_s(block.offset_s);
+        }
+        let offset_s = self.live.time_offset_s();
+        self.clock.see(end_s + offset_s);
+        self.watch_samples(came, end_s);
+        if self.arrivals.len() == ARRIVALS {
+            self.arrivals.pop_front();
+        }
+        self.arrivals.push_back((end_s + offset_s, came));
+        let is_over = |[from_s, until_s]: [f64; 2]| end_s <= from_s || block.time_s >= until_s;
+        if self.gate.wanted().is_some_and(is_over) {
+            inbox.give_back(block.antennas); // on its way when the gate closed
+            return Ok(());
+        }
+        let pending_s = self.pending.length() as f64 / self.rate_hz();
+        let is_next = (self.pending.time_s + pending_s - block.time_s).abs() < 0.5 / self.rate_hz();
+        if pending_s > 0.0 && !is_next {
+            self.receive(true)?;
+        }
+        self.pending.append(&block);
+        inbox.give_back(block.antennas);
+        if self.gate.wanted().is_none() && end_s - self.pending.time_s >= self.period_s {
+            self.receive(false)?;
+            self.publish_heard(Some(came))?;
+            self.sleep_until_next(end_s)?;
+            if self.gate.wanted().is_some() {
+                // What the receiver holds back would be heard with the next window only.
+                self.receive(true)?;
+                self.publish_heard(Some(came))?;
+            }
+        }
+        Ok(())
+    }
+
+    /// Opens the gate after an interruption, because the next SSB may come at any time, and reports samples
+    /// that are missing.
+    pub(super) fn watch_samples(&mut self, came: Instant, end_s: f64) {
+        let odometry_s = self.live.onboard().newest_odometry().map(|it| it.time_s);
+        let arrival = self.interruptions.samples(came, end_s, odometry_s);
+        if arrival.resumed {
+            self.live.samples_resumed();
+            self.gate.open();
+        }
+        if let Some(missing_s) = arrival.missing_s {
+            let periods = (missing_s / self.period_s).floor();
+            let before_s = self.live.time_offset_s();
+            self.live.add_interruption(periods * self.period_s);
+            // Where arrival times are measured, the source has reported it.
+            if self.live.time_offset_s() > before_s {
+                let text = format!("samples of {missing_s:.2} s are missing");
+                self.event(Level::Warn, "samples", text);
+            }
+        }
+        let gaps = self.live.stream_counts().untold_gaps;
+        if std::mem::replace(&mut self.unreported_gaps, gaps) < gaps
+            && !self.interruptions.is_recent(came)
+        {
+            let text = "samples are missing: the SSBs came off their period".to_owned();
+            self.event(Level::Warn, "samples", text);
+        }
+    }
+
+    pub(super) fn rate_hz(&self) -> f64 {
+        self.setup.stream.map_or(1.0, |it| it.rate_hz)
+    }
+
+    /// Hands the samples of a window, or of a period, to the pipeline, all at once: whoever searches for cells
+    /// must see a whole burst.
+    pub(super) fn receive(&mut self, ends: bool) -> Result<(), LiveError> {
+        let mut antennas: [&[Complex32]; MAX_ELEMENTS] = [&[]; MAX_ELEMENTS];
+        for (antenna, samples) in antennas.iter_mut().zip(&self.pending.antennas) {
+            *antenna = samples;
+        }
+        let antennas = antennas
+            .get(..self.pending.antennas.len())
+            .unwrap_or_default();
+        let mut taken = Ok(());
+        if self.pending.length() > 0 {
+            taken = self.live.receive(self.pending.time_s, antennas).map(drop);
+        }
+        if ends && taken.is_ok() {
+            taken = self.live.end_stretch();
+        }
+        self.pending.antennas.iter_mut().for_each(Vec::clear);
+        if let Err(error) = taken {
+            self.refused("samples", &error);
+        }
+        self.live.hear_before(f64::INFINITY)?;
+        if let Some(error) = self.live.take_refused_burst() {
+            self.refused("samples", &error);
+            // Whether their clock has stepped is seen soonest with all samples.
+            self.gate.open();
+        }
+        self.report_clocks();
+        Ok(())
+    }
+
+    /// Closes the gate up to the next burst that is wanted.
+    pub(super) fn sleep_until_next(&mut self, now_s: f64) -> Result<(), LiveError> {
+        if !self.sleeps {
+            return Ok(());
+        }
+        let mut burst_s = self.live.next_wake_up_s(now_s)?;
+        let Some(ssb_index) = self.live.last_ssb_index().filter(|_| burst_s > now_s) else {
+            self.gate.open();
+            return Ok(());
+        };
+        let offset_s = self.live.time_offset_s();
+        let mut window = self.windows.around(burst_s, ssb_index);
+        if window[0] < now_s {
+            // Part of it is gone already.
+            burst_s = self.live.next_wake_up_s(burst_s)?;
+            window = self.windows.around(burst_s, ssb_index);
+        }
+        if window[0] < now_s {
+            self.gate.open();
+        } else if self.live.listens(burst_s + offset_s)? {
+            self.gate.set(window);
+        } else {
+            // None is wanted as far as one can see: it is time to ask again then, and not to listen.
+            self.gate.set([window[0]; 2]);
+        }
+        Ok(())
+    }
+
+    /// When the sample of this time arrived, or would have if samples came one by one.
+    pub(super) fn arrival_of(&self, time_s: f64) -> Option<Instant> {
+        let (end_s, came) = self.arrivals.iter().find(|(end_s, _)| *end_s >= time_s)?;
+        came.checked_sub(Duration::try_from_secs_f64(end_s - time_s).ok()?)
+    }
+}
