@@ -24,6 +24,7 @@ PLAIN = [
     "README.md",
     "crates/simulate/**/*.rs",
     "docs/README.md",
+    "docs/architecture.md",
     "docs/checks.md",
     "docs/command-line.md",
     "docs/designs.md",
